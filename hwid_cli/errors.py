@@ -1,0 +1,21 @@
+"""Errors that a user can act on; the command line shows them as one line.
+
+A message names the place, the value found, what was expected, and the next step.
+Wrong shapes inside ``maths`` stay ``ValueError``: they are our bugs, not the user's.
+"""
+
+
+class HwidError(Exception):
+    """Base of every error that a user can mend."""
+
+
+class ConfigError(HwidError):
+    """The configuration says something that cannot be done."""
+
+
+class MeasurementError(HwidError):
+    """A measurement file cannot be used as it is."""
+
+
+class CacheError(HwidError):
+    """The cache or a results file cannot be read or written."""

@@ -1,0 +1,1 @@
+"""The Hammerstein-Wiener model: evaluate it, fit it, say how certain it is."""

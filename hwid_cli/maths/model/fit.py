@@ -1,0 +1,192 @@
+"""Fit a Hammerstein-Wiener model to recordings by their free-run simulation error.
+
+The data are scaled to about one, searched (`search`), and the winner is brought back to
+their units (`normalise`). Whatever goes wrong ends in `Fit.status`, never in an
+exception: a campaign counts failures, it does not stop at them.
+
+References
+----------
+docs/method.md, sections "The fit" and "The search".
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from hwid_cli.maths import scores
+from hwid_cli.maths.model import sensitivities, static_map
+from hwid_cli.maths.model.candidates import Candidate, Experiment
+from hwid_cli.maths.model.levenberg_marquardt import Search
+from hwid_cli.maths.model.linear_block import is_stable, poles
+from hwid_cli.maths.model.normalise import normalise, rescaled
+from hwid_cli.maths.model.search import linear_search, nonlinear_search, with_maps
+from hwid_cli.maths.model.uncertainty import standard_errors
+from hwid_cli.records.model import Fit, FitOptions, Orders
+from hwid_cli.records.recordings import Recording
+
+
+@dataclass(frozen=True, eq=False)
+class _Problem:
+    """Scaled experiments and what they were divided by."""
+
+    experiments: tuple[Experiment, ...]
+    input_scale: float
+    output_scale: float
+
+
+def fit(recordings: Sequence[Recording], orders: Orders, options: FitOptions) -> Fit:
+    """Fit one model to one or several recordings.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+        Of one sample time. Joined as ``options.join`` says.
+    orders : Orders
+    options : FitOptions
+
+    Returns
+    -------
+    Fit
+        With ``status`` ``failed`` and a reason where no usable model was found.
+
+    Raises
+    ------
+    ValueError
+        If there is no recording or the sample times differ.
+
+    References
+    ----------
+    docs/method.md, sections "The fit" and "The search".
+    """
+    if not recordings:
+        raise ValueError("fit needs at least one recording")
+    if len({one.sample_time_s for one in recordings}) > 1:
+        raise ValueError("recordings of one fit must share their sample time")
+    names = tuple(one.name for one in recordings)
+    blank = Fit(names, orders, options, None, "failed", "")
+    reason = _reason_not_to_fit(recordings, orders, options)
+    if reason:
+        return replace(blank, message=reason)
+    problem = _scaled(recordings, options)
+    try:
+        linear = linear_search(problem.experiments, orders, options)
+        linear_rmsd = _rmsd(linear, problem)
+        if options.input_map == "none" and options.output_map == "none":
+            search = linear
+        else:
+            search = nonlinear_search(problem.experiments, orders, options)
+    except np.linalg.LinAlgError as error:
+        return replace(blank, message=f"linear algebra failed: {error}")
+    if not np.isfinite(search.cost) or not is_stable(
+        search.candidate.model.denominator
+    ):
+        return replace(
+            blank, message="no start gave a stable model", linear_rmsd=linear_rmsd
+        )
+    return _described(
+        replace(blank, linear_rmsd=linear_rmsd), search, recordings, problem
+    )
+
+
+def _reason_not_to_fit(
+    recordings: Sequence[Recording], orders: Orders, options: FitOptions
+) -> str:
+    """Why these data cannot determine a model; empty if they can."""
+    total = sum(one.n_samples for one in recordings)
+    needed = _least_parameters(orders, options) + orders.n_state
+    if total <= needed:
+        return f"{total} samples cannot determine a model that needs more than {needed}"
+    inputs = np.concatenate([one.input for one in recordings])
+    if np.ptp(inputs) == 0.0:
+        return f"the input is constant at {inputs[0]:g}"
+    outputs = np.concatenate([one.output for one in recordings])
+    if np.ptp(outputs) == 0.0:
+        return f"the output is constant at {outputs[0]:g}"
+    return ""
+
+
+def _least_parameters(orders: Orders, options: FitOptions) -> int:
+    """Parameters of a model, each shared gain counted once."""
+    sizes = {
+        "piecewise_linear": 2 * options.units,
+        "polynomial": options.degree + 1,
+        "saturation": 2,
+        "dead_zone": 2,
+        "none": 0,
+    }
+    return orders.nb + orders.nf + sizes[options.input_map] + sizes[options.output_map]
+
+
+def _joined(
+    recordings: Sequence[Recording], options: FitOptions
+) -> tuple[Experiment, ...]:
+    """Recordings joined as the options say."""
+    if options.join == "experiments":
+        return tuple(Experiment(one.input, one.output) for one in recordings)
+    return (
+        Experiment(
+            np.concatenate([one.input for one in recordings]),
+            np.concatenate([one.output for one in recordings]),
+        ),
+    )
+
+
+def _scaled(recordings: Sequence[Recording], options: FitOptions) -> _Problem:
+    """Experiments divided by their size, so that one damping suits all."""
+    experiments = _joined(recordings, options)
+    input_scale = max(float(np.max(np.abs(one.input))) for one in experiments)
+    output_scale = float(np.std(np.concatenate([one.output for one in experiments])))
+    scaled = tuple(
+        Experiment(one.input / input_scale, one.output / output_scale)
+        for one in experiments
+    )
+    return _Problem(scaled, input_scale, output_scale)
+
+
+def _described(
+    blank: Fit, search: Search, recordings: Sequence[Recording], problem: _Problem
+) -> Fit:
+    """The winner in the units of the data, with all that is said about it."""
+    candidate = with_maps(search.candidate, problem.experiments, static_map.with_domain)
+    candidate = _in_units(candidate, problem, recordings[0])
+    experiments = _joined(recordings, blank.options)
+    simulated = np.concatenate(sensitivities.simulated_outputs(candidate, experiments))
+    measured = np.concatenate([one.output for one in experiments])
+    first = candidate.free_responses[0]
+    return replace(
+        blank,
+        model=replace(candidate.model, free_response=first),
+        status=search.status,
+        message=search.message,
+        iterations=search.iterations,
+        rmsd=scores.rmsd(measured, simulated),
+        fit_percent=scores.fit_percent(measured, simulated),
+        poles=poles(candidate.model.denominator),
+        is_stable=True,
+        uncertainty=standard_errors(
+            candidate,
+            experiments,
+            free_break_points=blank.options.free_break_points,
+        ),
+    )
+
+
+def _in_units(candidate: Candidate, problem: _Problem, like: Recording) -> Candidate:
+    """Normalised candidate for the data as they are."""
+    states = candidate.free_responses
+    # The initial states of all experiments change their unit together with the model.
+    scaled = replace(
+        candidate.model,
+        free_response=states.ravel(),
+        sample_time_s=like.sample_time_s,
+        input_unit=like.input_unit,
+        output_unit=like.output_unit,
+    )
+    model = normalise(rescaled(scaled, problem.input_scale, problem.output_scale))
+    return Candidate(model, model.free_response.reshape(states.shape))
+
+
+def _rmsd(search: Search, problem: _Problem) -> float:
+    samples = sum(one.output.size for one in problem.experiments)
+    return float(np.sqrt(search.cost / samples)) * problem.output_scale

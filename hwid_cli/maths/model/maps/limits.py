@@ -1,0 +1,136 @@
+"""Saturation and dead zone: two limits, slope one between or beyond them; and no map.
+
+References
+----------
+docs/method.md, eq. (4).
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from hwid_cli.maths.model.maps.rule import MapRule, Shape
+from hwid_cli.records.model import FitOptions, StaticMap
+
+# Shares of the signal's range at which the limits start. A limit that no sample reaches
+# has no derivative, so a fit from there could never move it: several starts are tried.
+_SATURATION_STARTS = (0.6, 0.9, 0.3)
+_DEAD_ZONE_STARTS = (0.2, 0.05, 0.5)
+
+
+def _clip(static_map: StaticMap, argument: np.ndarray) -> np.ndarray:
+    lower, upper = static_map.parameters
+    return np.clip(argument, lower, upper)
+
+
+def _differentiate_saturation(
+    static_map: StaticMap,
+    argument: np.ndarray,
+    with_positions: bool,  # noqa: ARG001 - a rule's signature
+    out: np.ndarray,
+    first: int,
+) -> tuple[np.ndarray, np.ndarray]:
+    lower, upper = static_map.parameters
+    out[:, first] = argument < lower
+    out[:, first + 1] = argument > upper
+    slope = 1.0 - out[:, first] - out[:, first + 1]
+    return _clip(static_map, argument), slope
+
+
+def _evaluate_dead_zone(static_map: StaticMap, argument: np.ndarray) -> np.ndarray:
+    return argument - _clip(static_map, argument)
+
+
+def _differentiate_dead_zone(
+    static_map: StaticMap,
+    argument: np.ndarray,
+    with_positions: bool,
+    out: np.ndarray,
+    first: int,
+) -> tuple[np.ndarray, np.ndarray]:
+    clipped, slope = _differentiate_saturation(
+        static_map, argument, with_positions, out, first
+    )
+    out[:, first : first + 2] *= -1.0
+    return argument - clipped, 1.0 - slope
+
+
+def _starts_at(
+    kind: str, shares: tuple[float, ...]
+) -> Callable[[FitOptions, float, float, Shape], tuple[StaticMap, ...]]:
+    """Start with both limits at shares of the range around zero or its middle."""
+
+    def starts(
+        options: FitOptions,  # noqa: ARG001 - a rule's signature
+        lowest: float,
+        highest: float,
+        shape: Shape,  # noqa: ARG001
+    ) -> tuple[StaticMap, ...]:
+        centre = 0.0 if lowest < 0.0 < highest else 0.5 * (lowest + highest)
+        domain = (lowest, highest)
+        return tuple(
+            StaticMap(kind, centre + share * (np.array(domain) - centre), domain)
+            for share in shares
+        )
+
+    return starts
+
+
+def _stretch(static_map: StaticMap, factor: float) -> StaticMap:
+    low, high = static_map.domain
+    return replace(
+        static_map,
+        parameters=static_map.parameters * factor,
+        domain=(low * factor, high * factor),
+    )
+
+
+def _with_domain(static_map: StaticMap, domain: tuple[float, float]) -> StaticMap:
+    return replace(static_map, domain=domain)
+
+
+def _settle(old: StaticMap, proposed: StaticMap) -> StaticMap:  # noqa: ARG001
+    return replace(proposed, parameters=np.sort(proposed.parameters))
+
+
+def _differentiate_none(
+    static_map: StaticMap,  # noqa: ARG001 - a rule's signature
+    argument: np.ndarray,
+    with_positions: bool,  # noqa: ARG001
+    out: np.ndarray,  # noqa: ARG001
+    first: int,  # noqa: ARG001
+) -> tuple[np.ndarray, np.ndarray]:
+    return argument, np.ones_like(argument)
+
+
+SATURATION = MapRule(
+    evaluate=_clip,
+    differentiate=_differentiate_saturation,
+    starts=_starts_at("saturation", _SATURATION_STARTS),
+    stretch=_stretch,
+    with_domain=_with_domain,
+    names=lambda static_map: ("lower", "upper"),
+    settle=_settle,
+)
+
+DEAD_ZONE = MapRule(
+    evaluate=_evaluate_dead_zone,
+    differentiate=_differentiate_dead_zone,
+    starts=_starts_at("dead_zone", _DEAD_ZONE_STARTS),
+    stretch=_stretch,
+    with_domain=_with_domain,
+    names=lambda static_map: ("lower", "upper"),
+    settle=_settle,
+)
+
+NONE = MapRule(
+    evaluate=lambda static_map, argument: np.asarray(argument, dtype=float),
+    differentiate=_differentiate_none,
+    starts=lambda options, low, high, shape: (
+        StaticMap("none", np.zeros(0), (low, high)),
+    ),
+    stretch=_stretch,
+    with_domain=_with_domain,
+    names=lambda static_map: (),
+)

@@ -1,0 +1,136 @@
+"""Piecewise linear map: break-points and the values there, linear beyond the ends.
+
+References
+----------
+docs/method.md, eq. (2).
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from hwid_cli.maths.model.kernels import piecewise_linear, piecewise_linear_jacobian
+from hwid_cli.maths.model.maps.rule import MapRule, Shape
+from hwid_cli.records.model import FitOptions, StaticMap
+
+# A step of the fit may shrink a segment to this share of its width at most, so that
+# break-points stay in order and can still come close to each other over several steps.
+_LEAST_SHRINK = 0.2
+# Segments narrower than this share of the whole would be jumps, not slopes.
+_LEAST_WIDTH = 1e-4
+
+
+def break_points_and_values(static_map: StaticMap) -> tuple[np.ndarray, np.ndarray]:
+    """Split a piecewise linear map's parameters.
+
+    Parameters
+    ----------
+    static_map : StaticMap
+
+    Returns
+    -------
+    break_points, values : ndarray, shape (units,)
+    """
+    units = static_map.parameters.size // 2
+    return static_map.parameters[:units], static_map.parameters[units:]
+
+
+def _evaluate(static_map: StaticMap, argument: np.ndarray) -> np.ndarray:
+    argument = np.ascontiguousarray(argument, dtype=float)
+    return piecewise_linear(argument, *break_points_and_values(static_map))[0]
+
+
+def _differentiate(
+    static_map: StaticMap,
+    argument: np.ndarray,
+    with_positions: bool,
+    out: np.ndarray,
+    first: int,
+) -> tuple[np.ndarray, np.ndarray]:
+    points, values = break_points_and_values(static_map)
+    value, slope, segment = piecewise_linear(argument, points, values)
+    piecewise_linear_jacobian(
+        argument, points, (slope, segment), with_positions, out, first
+    )
+    return value, slope
+
+
+def _starts(
+    options: FitOptions, lowest: float, highest: float, shape: Shape
+) -> tuple[StaticMap, ...]:
+    points = np.linspace(lowest, highest, options.units)
+    parameters = np.concatenate([points, shape(points)])
+    return (StaticMap("piecewise_linear", parameters, (lowest, highest)),)
+
+
+def _stretch(static_map: StaticMap, factor: float) -> StaticMap:
+    low, high = static_map.domain
+    return replace(
+        static_map,
+        parameters=static_map.parameters * factor,
+        domain=(low * factor, high * factor),
+    )
+
+
+def _names(static_map: StaticMap) -> tuple[str, ...]:
+    units = static_map.parameters.size // 2
+    points = tuple(f"break_point[{i}]" for i in range(units))
+    return points + tuple(f"value[{i}]" for i in range(units))
+
+
+def _amplify(static_map: StaticMap, factor: float) -> StaticMap:
+    points, values = break_points_and_values(static_map)
+    return replace(static_map, parameters=np.concatenate([points, values * factor]))
+
+
+def _compress(static_map: StaticMap, factor: float) -> StaticMap:
+    points, values = break_points_and_values(static_map)
+    low, high = (edge / factor for edge in static_map.domain)
+    points = points / factor
+    if factor < 0:
+        points, values, low, high = points[::-1], values[::-1], high, low
+    return replace(
+        static_map, parameters=np.concatenate([points, values]), domain=(low, high)
+    )
+
+
+def _size(static_map: StaticMap) -> tuple[float, np.ndarray]:
+    points, values = break_points_and_values(static_map)
+    low, high = static_map.domain
+    gradient = np.zeros(static_map.parameters.size)
+    gradient[points.size + np.argmax(values)] = 1.0 / (high - low)
+    gradient[points.size + np.argmin(values)] = -1.0 / (high - low)
+    return float(np.ptp(values) / (high - low)), gradient
+
+
+def _settle(old: StaticMap, proposed: StaticMap) -> StaticMap:
+    """Keep the break-points in order."""
+    points, values = break_points_and_values(proposed)
+    old_points, _ = break_points_and_values(old)
+    old_widths = old_points[1:] - old_points[:-1]
+    least = np.maximum(
+        _LEAST_SHRINK * old_widths, _LEAST_WIDTH * (old_points[-1] - old_points[0])
+    )
+    least = np.minimum(least, old_widths)
+    widths = points[1:] - points[:-1]
+    if (widths >= least).all():
+        return proposed
+    laid_out = np.concatenate([[0.0], np.cumsum(np.maximum(widths, least))])
+    # Keep the mean of the break-points, so that widening pushes to both sides alike.
+    laid_out += points.mean() - laid_out.mean()
+    return replace(proposed, parameters=np.concatenate([laid_out, values]))
+
+
+RULE = MapRule(
+    evaluate=_evaluate,
+    differentiate=_differentiate,
+    starts=_starts,
+    stretch=_stretch,
+    with_domain=lambda one, domain: replace(one, domain=domain),
+    names=_names,
+    amplify=_amplify,
+    compress=_compress,
+    size=_size,
+    n_positions=lambda static_map: static_map.parameters.size // 2,
+    settle=_settle,
+)

@@ -1,0 +1,83 @@
+"""What one kind of static map must offer."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from hwid_cli.records.model import FitOptions, StaticMap
+
+Shape = Callable[[np.ndarray], np.ndarray]
+
+
+def no_positions(static_map: StaticMap) -> int:  # noqa: ARG001 - a rule's signature
+    """Tell that all parameters move from the first phase on.
+
+    Parameters
+    ----------
+    static_map : StaticMap
+
+    Returns
+    -------
+    int
+    """
+    return 0
+
+
+def keep_proposed(old: StaticMap, proposed: StaticMap) -> StaticMap:  # noqa: ARG001
+    """Accept every proposed map.
+
+    Parameters
+    ----------
+    old, proposed : StaticMap
+
+    Returns
+    -------
+    StaticMap
+    """
+    return proposed
+
+
+@dataclass(frozen=True)
+class MapRule:
+    """What one kind of static map can do.
+
+    Parameters
+    ----------
+    evaluate : callable (StaticMap, v) -> ndarray
+    differentiate : callable (StaticMap, v, with_positions, out, first) -> (value, slope)
+        Writes a column for each active parameter into `out`, from column `first` on.
+    starts : callable (FitOptions, lowest, highest, shape) -> tuple of StaticMap
+        Maps over the given range that follow the function `shape` where the kind can.
+    stretch : callable (StaticMap, factor) -> StaticMap
+        The map v -> factor * map(v / factor), for a positive factor.
+    with_domain : callable (StaticMap, (lowest, highest)) -> StaticMap
+        The same map with another domain.
+    names : callable (StaticMap) -> tuple of str
+        Names of the parameters.
+    amplify : callable (StaticMap, factor) -> StaticMap, or None
+        The map v -> factor * map(v); None where the kind has no free gain.
+    compress : callable (StaticMap, factor) -> StaticMap, or None
+        The map v -> map(factor * v); None where the kind has no free gain.
+    size : callable (StaticMap) -> (float, ndarray), or None
+        A mean slope that grows in proportion to the values, and its gradient by the
+        parameters; None where the kind has no free gain.
+    n_positions : callable (StaticMap) -> int
+        Leading parameters that stay fixed in the first phase of a fit.
+    settle : callable (old, proposed) -> StaticMap
+        The proposed map with its parameters put into a legal order.
+    """
+
+    evaluate: Callable[[StaticMap, np.ndarray], np.ndarray]
+    differentiate: Callable[
+        [StaticMap, np.ndarray, bool, np.ndarray, int], tuple[np.ndarray, np.ndarray]
+    ]
+    starts: Callable[[FitOptions, float, float, Shape], tuple[StaticMap, ...]]
+    stretch: Callable[[StaticMap, float], StaticMap]
+    with_domain: Callable[[StaticMap, tuple[float, float]], StaticMap]
+    names: Callable[[StaticMap], tuple[str, ...]]
+    amplify: Callable[[StaticMap, float], StaticMap] | None = None
+    compress: Callable[[StaticMap, float], StaticMap] | None = None
+    size: Callable[[StaticMap], tuple[float, np.ndarray]] | None = None
+    n_positions: Callable[[StaticMap], int] = no_positions
+    settle: Callable[[StaticMap, StaticMap], StaticMap] = keep_proposed

@@ -1,0 +1,348 @@
+"""The phases of a fit, from linear starts to free break-points.
+
+1. *Screen*: every start runs a few iterations with fixed break-points.
+2. *Place*: the best of each family goes on, its maps get many equally spaced
+   break-points, and those that matter most stay. Break-points moved from an equally
+   spaced coarse grid stop in poor minima far more often.
+3. *Free*: break-points move.
+4. *Relax*: with the maps of the best model taken as known, new linear blocks are found by
+   least squares and continue from there; this leaves minima of the linear block.
+
+The best candidate seen wins. docs/method.md, section "The search".
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from hwid_cli.maths.model import static_map
+from hwid_cli.maths.model.candidates import Candidate, Experiment, linear_output
+from hwid_cli.maths.model.kernels import thinned_break_points
+from hwid_cli.maths.model.levenberg_marquardt import Search, minimise
+from hwid_cli.maths.model.linear_block import filtered
+from hwid_cli.maths.model.maps.piecewise_linear import break_points_and_values
+from hwid_cli.maths.model.starts import Start, linear_starts
+from hwid_cli.records.model import FitOptions, HammersteinWiener, Orders, StaticMap
+
+_SCREENING_ITERATIONS = 6
+_PLACING_ITERATIONS = 6
+_RELAXING_ITERATIONS = 8
+_FINALISTS = 2
+_RELAXED_BLOCKS = 2
+_LINEAR_STARTS = 3
+# Cost that a relaxed block must reach, as a share of the best so far, to be finished;
+# nearer to it the search has only come back to where it was.
+_WORTH_GOING_ON = 0.995
+# Break-points of the fine maps from which the final ones are chosen, for each final one.
+_FINE_FACTOR = 3
+# Share of the samples that every fine break-point counts for beyond those near it, so
+# that the ends of a map, which few samples reach, keep theirs.
+_WEIGHT_OF_SHAPE = 1e-3
+# Slopes of the output map below this share of their mean square say too little about x.
+_FLAT = 0.1
+
+
+def linear_search(
+    experiments: Sequence[Experiment], orders: Orders, options: FitOptions
+) -> Search:
+    """Linear output-error model: both maps are left out.
+
+    Parameters
+    ----------
+    experiments : sequence of Experiment
+        Scaled to about one.
+    orders : Orders
+    options : FitOptions
+        Its maps are ignored.
+
+    Returns
+    -------
+    Search
+    """
+    linear = replace(options, input_map="none", output_map="none")
+    starts = linear_starts(
+        experiments,
+        orders,
+        options=linear,
+        sees_input_map=False,
+        count=_LINEAR_STARTS,
+    )
+    return _finished(
+        _screened(experiments, starts, orders, linear)[0], experiments, linear
+    )
+
+
+def nonlinear_search(
+    experiments: Sequence[Experiment], orders: Orders, options: FitOptions
+) -> Search:
+    """Hammerstein-Wiener model of given orders and kinds of maps.
+
+    Parameters
+    ----------
+    experiments : sequence of Experiment
+        Scaled to about one.
+    orders : Orders
+    options : FitOptions
+
+    Returns
+    -------
+    Search
+        Its iterations are those of the winning chain.
+    """
+    starts = linear_starts(
+        experiments,
+        orders,
+        options=options,
+        sees_input_map=options.input_map in ("piecewise_linear", "polynomial"),
+        count=options.starts,
+    )
+    finalists = _finalists(experiments, starts, orders, options)
+    placed = [_placed(one, experiments, options) for one in finalists]
+    best = _finished(_best(placed), experiments, options)
+    relaxed = _relaxed(best, experiments, orders, options)
+    if relaxed.cost < _WORTH_GOING_ON * best.cost:
+        return _best([best, _finished(relaxed, experiments, options)])
+    return best
+
+
+def _finalists(
+    experiments: Sequence[Experiment],
+    starts: Sequence[Start],
+    orders: Orders,
+    options: FitOptions,
+) -> list[Search]:
+    """Best screened candidate of each family, then the best of the rest."""
+    by_family: dict[int, list[Search]] = {}
+    for start in starts:
+        family = by_family.setdefault(start.input_points.size, [])
+        family.extend(_screened(experiments, (start,), orders, options))
+    leaders, rest = [], []
+    for family in by_family.values():
+        family.sort(key=lambda one: one.cost)
+        leaders.append(family[0])
+        rest.extend(family[1:])
+    rest.sort(key=lambda one: one.cost)
+    return (leaders + rest)[:_FINALISTS]
+
+
+def _screened(
+    experiments: Sequence[Experiment],
+    starts: Sequence[Start],
+    orders: Orders,
+    options: FitOptions,
+) -> list[Search]:
+    """A few iterations from every start and every starting map, best first."""
+    found = [
+        minimise(
+            candidate,
+            experiments,
+            with_positions=False,
+            max_iterations=min(_SCREENING_ITERATIONS, options.max_iterations),
+        )
+        for start in starts
+        for candidate in _candidates(experiments, start, orders, options)
+    ]
+    return sorted(found, key=lambda one: one.cost)
+
+
+def _candidates(
+    experiments: Sequence[Experiment],
+    start: Start,
+    orders: Orders,
+    options: FitOptions,
+) -> list[Candidate]:
+    """Models that begin with one linear block, one for each pair of starting maps."""
+    inputs = np.concatenate([one.input for one in experiments])
+    n_state = orders.n_state if options.initial_state == "estimated" else 0
+    candidates = []
+    for input_map in static_map.starting_maps(
+        options.input_map,
+        options,
+        inputs.min(),
+        inputs.max(),
+        shape=lambda u: np.interp(u, start.input_points, start.input_values),
+    ):
+        x = np.concatenate(
+            [
+                filtered(
+                    static_map.evaluate(input_map, one.input),
+                    start.numerator,
+                    start.denominator,
+                    orders.nk,
+                    steady=options.initial_state == "steady",
+                )
+                for one in experiments
+            ]
+        )
+        for output_map in static_map.starting_maps(
+            options.output_map,
+            options,
+            x.min(),
+            x.max(),
+            shape=lambda x: x + start.offset,
+        ):
+            model = HammersteinWiener(
+                input_map,
+                start.numerator,
+                start.denominator,
+                orders.nk,
+                output_map,
+                sample_time_s=1.0,
+                initial_state=options.initial_state,
+            )
+            candidates.append(Candidate(model, np.zeros((len(experiments), n_state))))
+    return candidates
+
+
+def _placed(
+    screened: Search, experiments: Sequence[Experiment], options: FitOptions
+) -> Search:
+    """Go on with fixed break-points, then put them where the maps bend."""
+    settled = minimise(
+        screened.candidate,
+        experiments,
+        with_positions=False,
+        max_iterations=min(_PLACING_ITERATIONS, options.max_iterations),
+    )
+    iterations = screened.iterations + settled.iterations
+    if not (options.free_break_points and _has_break_points(settled.candidate)):
+        return replace(settled, iterations=iterations)
+    fine = minimise(
+        with_maps(settled.candidate, experiments, _finer),
+        experiments,
+        with_positions=False,
+        max_iterations=min(_PLACING_ITERATIONS, options.max_iterations),
+    )
+    thinned = with_maps(
+        fine.candidate,
+        experiments,
+        lambda one, argument: _thinner(one, argument, options.units),
+    )
+    # The fine maps' cost tells which finalist is worth freeing: how well its final
+    # break-points happen to lie before they move does not.
+    return replace(fine, candidate=thinned, iterations=iterations + fine.iterations)
+
+
+def _finished(
+    placed: Search, experiments: Sequence[Experiment], options: FitOptions
+) -> Search:
+    """Run until the search stands still, with break-points free if they may be."""
+    final = minimise(
+        placed.candidate,
+        experiments,
+        with_positions=options.free_break_points,
+        max_iterations=options.max_iterations,
+    )
+    return replace(final, iterations=placed.iterations + final.iterations)
+
+
+def _relaxed(
+    best: Search,
+    experiments: Sequence[Experiment],
+    orders: Orders,
+    options: FitOptions,
+) -> Search:
+    """Find the linear block anew between the maps of the best model."""
+    between = _between_maps(best.candidate, experiments)
+    starts = linear_starts(
+        between, orders, options=options, sees_input_map=False, count=_RELAXED_BLOCKS
+    )
+    model = best.candidate.model
+    found = [
+        minimise(
+            Candidate(
+                replace(model, numerator=one.numerator, denominator=one.denominator),
+                np.zeros_like(best.candidate.free_responses),
+            ),
+            experiments,
+            with_positions=False,
+            max_iterations=min(_RELAXING_ITERATIONS, options.max_iterations),
+        )
+        for one in starts
+    ]
+    leader = _best(found)
+    return replace(leader, iterations=best.iterations + leader.iterations)
+
+
+def _between_maps(
+    candidate: Candidate, experiments: Sequence[Experiment]
+) -> list[Experiment]:
+    """Signals before and after the linear block; the latter corrected by the output.
+
+    The correction is a Gauss-Newton step of x towards the measured output, held back
+    where the output map is flat.
+    """
+    result = []
+    output_map = candidate.model.output_map
+    for index, one in enumerate(experiments):
+        w, x = linear_output(candidate, index, one)
+        scratch = np.empty((x.size, output_map.parameters.size))
+        y, slope = static_map.differentiate(
+            output_map, x, scratch, 0, with_positions=True
+        )
+        held_back = slope**2 + _FLAT * float(np.mean(slope**2)) + 1e-300
+        result.append(Experiment(w, x + (one.output - y) * slope / held_back))
+    return result
+
+
+def with_maps(
+    candidate: Candidate,
+    experiments: Sequence[Experiment],
+    change: Callable[[StaticMap, np.ndarray], StaticMap],
+) -> Candidate:
+    """Candidate with both maps changed, given the arguments that reach them.
+
+    Parameters
+    ----------
+    candidate : Candidate
+    experiments : sequence of Experiment
+    change : callable (StaticMap, ndarray) -> StaticMap
+
+    Returns
+    -------
+    Candidate
+    """
+    model = candidate.model
+    u = np.concatenate([one.input for one in experiments])
+    x = np.concatenate(
+        [linear_output(candidate, i, one)[1] for i, one in enumerate(experiments)]
+    )
+    return Candidate(
+        replace(
+            model,
+            input_map=change(model.input_map, u),
+            output_map=change(model.output_map, x),
+        ),
+        candidate.free_responses,
+    )
+
+
+def _finer(one: StaticMap, argument: np.ndarray) -> StaticMap:
+    """Same map with more break-points, equally spaced over what reaches it."""
+    low, high = float(argument.min()), float(argument.max())
+    if one.kind != "piecewise_linear" or not low < high:
+        return one
+    points = np.linspace(low, high, _FINE_FACTOR * (one.parameters.size // 2))
+    values = static_map.evaluate(one, points)
+    return StaticMap(one.kind, np.concatenate([points, values]), (low, high))
+
+
+def _thinner(one: StaticMap, argument: np.ndarray, units: int) -> StaticMap:
+    """Map with fewer break-points, those that it needs most."""
+    if one.kind != "piecewise_linear" or one.parameters.size <= 2 * units:
+        return one
+    points, values = break_points_and_values(one)
+    middles = np.concatenate([[-np.inf], 0.5 * (points[1:] + points[:-1]), [np.inf]])
+    weights = np.histogram(argument, middles)[0] + _WEIGHT_OF_SHAPE * argument.size
+    kept = thinned_break_points(points, values, weights, units)
+    return replace(one, parameters=np.concatenate([points[kept], values[kept]]))
+
+
+def _has_break_points(candidate: Candidate) -> bool:
+    maps = (candidate.model.input_map, candidate.model.output_map)
+    return any(one.kind == "piecewise_linear" for one in maps)
+
+
+def _best(searches: Sequence[Search]) -> Search:
+    return min(searches, key=lambda one: one.cost)

@@ -1,0 +1,173 @@
+"""Free-run simulation of a Hammerstein-Wiener model.
+
+References
+----------
+docs/method.md, eqs. (1)-(7).
+"""
+
+import numpy as np
+
+from hwid_cli.maths.model import static_map
+from hwid_cli.maths.model.kernels import difference_columns
+from hwid_cli.maths.model.linear_block import (
+    difference_basis,
+    filtered,
+    free_response,
+    padded_signal,
+)
+from hwid_cli.records.model import HammersteinWiener
+from hwid_cli.records.recordings import Recording
+
+_ESTIMATE_ITERATIONS = 6
+# Damping of the initial state's equations against directions that the output does not
+# show, and the share of the cost that an iteration must gain.
+_DAMPING = 1e-9
+_LEAST_GAIN = 1e-8
+
+
+def simulate(
+    model: HammersteinWiener,
+    input: np.ndarray,  # noqa: A002 - the field's word
+    *,
+    initial_state: np.ndarray | None = None,
+) -> np.ndarray:
+    """Output of a model for an input, without any measured output.
+
+    Parameters
+    ----------
+    model : HammersteinWiener
+    input : ndarray, shape (n_samples,), [input unit]
+    initial_state : ndarray, shape (n_state,), optional, [x]
+        Coefficients of the free response to start with. Unless given, a model fitted with
+        an estimated initial state starts like the first recording of its fit.
+
+    Returns
+    -------
+    ndarray, shape (n_samples,), [output unit]
+
+    Raises
+    ------
+    ValueError
+        If the input is not a 1-D array of at least one sample.
+
+    References
+    ----------
+    docs/method.md, eqs. (1)-(7).
+
+    Examples
+    --------
+    >>> from hwid_cli.records.model import StaticMap
+    >>> none = StaticMap("none", np.zeros(0))
+    >>> model = HammersteinWiener(none, [0.5], [1.0, -0.5], 1, none, 1e-3)
+    >>> simulate(model, np.ones(3))
+    array([0.  , 0.5 , 0.75])
+    """
+    signal = np.ascontiguousarray(input, dtype=float)
+    if signal.ndim != 1 or signal.size == 0:
+        raise ValueError(f"input must be a 1-D array with samples, got {signal.shape}")
+    coefficients = model.free_response if initial_state is None else initial_state
+    with np.errstate(over="ignore", invalid="ignore"):
+        return static_map.evaluate(
+            model.output_map,
+            _forced(model, signal) + _free(model, coefficients, signal),
+        )
+
+
+def validation_output(model: HammersteinWiener, recording: Recording) -> np.ndarray:
+    """Output of a model for a recording, started by the model's own rule.
+
+    Parameters
+    ----------
+    model : HammersteinWiener
+        With ``estimated``, the initial state, and nothing else, is fitted to this
+        recording first.
+    recording : Recording
+
+    Returns
+    -------
+    ndarray, shape (n_samples,), [output unit]
+        Not finite where the model diverges.
+    """
+    if model.initial_state != "estimated":
+        return simulate(model, recording.input, initial_state=np.zeros(0))
+    return simulate(
+        model, recording.input, initial_state=estimated_state(model, recording)
+    )
+
+
+def estimated_state(model: HammersteinWiener, recording: Recording) -> np.ndarray:
+    """Initial state with which a model comes closest to a recording.
+
+    Gauss-Newton steps on the coefficients of the free response, from zero; each counts
+    only if it lowers the deviation.
+
+    Parameters
+    ----------
+    model : HammersteinWiener
+    recording : Recording
+
+    Returns
+    -------
+    ndarray, shape (n_state,), [x]
+
+    References
+    ----------
+    docs/method.md, eq. (7).
+    """
+    n_state = model.orders.n_state
+    forced = _forced(model, np.ascontiguousarray(recording.input))
+    coefficients = np.zeros(n_state)
+    if n_state == 0 or not np.isfinite(forced).all():
+        return coefficients
+    impulse = padded_signal(
+        free_response(np.ones(1), model.denominator, forced.size), n_state + 1, 0.0
+    )
+    basis = difference_basis(n_state)
+    best, x, cost = coefficients, forced, float("inf")
+    for _ in range(_ESTIMATE_ITERATIONS):
+        residual, jacobian = _state_equations(model, x, recording.output, impulse)
+        now = float(residual @ residual)
+        if not now < cost * (1.0 - _LEAST_GAIN):
+            break
+        best, cost = coefficients, now
+        coefficients = coefficients + basis @ _damped_solution(jacobian, residual)
+        x = forced + _free(model, coefficients, forced)
+    return best
+
+
+def _state_equations(
+    model: HammersteinWiener, x: np.ndarray, output: np.ndarray, impulse: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Residual and its derivatives by the free response's coefficients."""
+    n_state = model.orders.n_state
+    scratch = np.empty((x.size, model.output_map.parameters.size))
+    y, slope = static_map.differentiate(
+        model.output_map, x, scratch, 0, with_positions=True
+    )
+    jacobian = np.empty((x.size, n_state))
+    difference_columns(impulse, n_state + 1, 0, slope, 0, n_state, jacobian)
+    return output - y, jacobian
+
+
+def _damped_solution(jacobian: np.ndarray, residual: np.ndarray) -> np.ndarray:
+    matrix = jacobian.T @ jacobian
+    scale = np.sqrt(np.diag(matrix))
+    scale[scale == 0.0] = 1.0
+    matrix = matrix / scale / scale[:, None] + _DAMPING * np.eye(scale.size)
+    return np.linalg.solve(matrix, (jacobian.T @ residual) / scale) / scale
+
+
+def _forced(model: HammersteinWiener, signal: np.ndarray) -> np.ndarray:
+    return filtered(
+        static_map.evaluate(model.input_map, signal),
+        model.numerator,
+        model.denominator,
+        model.delay,
+        steady=model.initial_state == "steady",
+    )
+
+
+def _free(
+    model: HammersteinWiener, coefficients: np.ndarray, like: np.ndarray
+) -> np.ndarray:
+    return free_response(np.asarray(coefficients), model.denominator, like.size)

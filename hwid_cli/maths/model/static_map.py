@@ -1,0 +1,192 @@
+"""Static nonlinearities: one table from name to functions, and what fits do with them.
+
+Another nonlinearity is one more entry in `RULES` (and its name in `records.model`).
+
+References
+----------
+docs/method.md, eqs. (2)-(4).
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from hwid_cli.maths.model.maps import limits, piecewise_linear, polynomial
+from hwid_cli.maths.model.maps.rule import MapRule, Shape
+from hwid_cli.records.model import FitOptions, StaticMap
+
+RULES: dict[str, MapRule] = {
+    "piecewise_linear": piecewise_linear.RULE,
+    "saturation": limits.SATURATION,
+    "dead_zone": limits.DEAD_ZONE,
+    "polynomial": polynomial.RULE,
+    "none": limits.NONE,
+}
+
+
+def evaluate(static_map: StaticMap, argument: np.ndarray) -> np.ndarray:
+    """Value of a static map.
+
+    Parameters
+    ----------
+    static_map : StaticMap
+    argument : ndarray, shape (n,)
+
+    Returns
+    -------
+    ndarray, shape (n,)
+
+    References
+    ----------
+    docs/method.md, eqs. (2)-(4).
+
+    Examples
+    --------
+    >>> evaluate(StaticMap("dead_zone", np.array([-1.0, 2.0])), np.array([-3.0, 0, 5]))
+    array([-2.,  0.,  3.])
+    """
+    return RULES[static_map.kind].evaluate(static_map, argument)
+
+
+def differentiate(
+    static_map: StaticMap,
+    argument: np.ndarray,
+    out: np.ndarray,
+    first: int,
+    *,
+    with_positions: bool,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Value and slope of a static map; its derivatives by its parameters into `out`.
+
+    Parameters
+    ----------
+    static_map : StaticMap
+    argument : ndarray, shape (n,)
+    out : ndarray, shape (n, at least first + n_active)
+        Receives one column for each active parameter. Written in place, because fresh
+        memory for every call would cost more than the arithmetic.
+    first : int
+        First column to write.
+    with_positions : bool
+        Whether the break-points of a piecewise linear map count as parameters.
+
+    Returns
+    -------
+    value, slope : ndarray, shape (n,)
+    """
+    rule = RULES[static_map.kind]
+    return rule.differentiate(static_map, argument, with_positions, out, first)
+
+
+def starting_maps(
+    kind: str,
+    options: FitOptions,
+    lowest: float,
+    highest: float,
+    *,
+    shape: Shape = lambda argument: argument,
+) -> tuple[StaticMap, ...]:
+    """Maps from which a fit can start.
+
+    Parameters
+    ----------
+    kind : str
+    options : FitOptions
+    lowest, highest : float
+        Range of the argument; widened where it is empty.
+    shape : callable (ndarray) -> ndarray
+        What kinds with a free shape should look like; the identity unless given.
+
+    Returns
+    -------
+    tuple of StaticMap
+    """
+    if not lowest < highest:
+        half = 0.5 * max(abs(lowest), 1.0)
+        lowest, highest = lowest - half, lowest + half
+    return RULES[kind].starts(options, float(lowest), float(highest), shape)
+
+
+def active_parameters(static_map: StaticMap, *, with_positions: bool) -> slice:
+    """Which parameters a fit may move.
+
+    Parameters
+    ----------
+    static_map : StaticMap
+    with_positions : bool
+
+    Returns
+    -------
+    slice
+    """
+    first = 0 if with_positions else RULES[static_map.kind].n_positions(static_map)
+    return slice(first, static_map.parameters.size)
+
+
+def move(static_map: StaticMap, step: np.ndarray, *, with_positions: bool) -> StaticMap:
+    """Map after a step of its active parameters, put into a legal order.
+
+    Parameters
+    ----------
+    static_map : StaticMap
+    step : ndarray, shape (n_active,)
+    with_positions : bool
+
+    Returns
+    -------
+    StaticMap
+    """
+    parameters = static_map.parameters.copy()
+    parameters[active_parameters(static_map, with_positions=with_positions)] += step
+    proposed = replace(static_map, parameters=parameters)
+    return RULES[static_map.kind].settle(static_map, proposed)
+
+
+def with_domain(static_map: StaticMap, argument: np.ndarray) -> StaticMap:
+    """Same map, with the range of an argument as its domain.
+
+    Parameters
+    ----------
+    static_map : StaticMap
+    argument : ndarray, shape (n,)
+        A constant one leaves the map as it is.
+
+    Returns
+    -------
+    StaticMap
+        Gives the same values.
+    """
+    lowest, highest = float(np.min(argument)), float(np.max(argument))
+    if not lowest < highest:
+        return static_map
+    return RULES[static_map.kind].with_domain(static_map, (lowest, highest))
+
+
+def stretch(static_map: StaticMap, factor: float) -> StaticMap:
+    """The map ``v -> factor * map(v / factor)``: another unit for argument and value.
+
+    Parameters
+    ----------
+    static_map : StaticMap
+    factor : float
+        Positive.
+
+    Returns
+    -------
+    StaticMap
+    """
+    return RULES[static_map.kind].stretch(static_map, factor)
+
+
+def parameter_names(static_map: StaticMap) -> tuple[str, ...]:
+    """Names of a map's parameters, in their order.
+
+    Parameters
+    ----------
+    static_map : StaticMap
+
+    Returns
+    -------
+    tuple of str
+    """
+    return RULES[static_map.kind].names(static_map)

@@ -1,0 +1,79 @@
+"""Parameters of a current-driven mechanism: mass, spring, damper, friction, contact."""
+
+from dataclasses import dataclass, field
+
+from hwid_cli.records.ranges import require_not_negative, require_positive
+
+
+@dataclass(frozen=True)
+class Friction:
+    """Dry friction with two levels.
+
+    Parameters
+    ----------
+    coulomb_N : float, [N]
+        Force against the motion while sliding.
+    break_away_N : float, [N]
+        Force that must be exceeded to start from rest; at least ``coulomb_N``.
+    """
+
+    coulomb_N: float = 2.4
+    break_away_N: float = 3.6
+
+    def __post_init__(self) -> None:
+        require_not_negative(self, "coulomb_N")
+        if not self.break_away_N >= self.coulomb_N:
+            raise ValueError(
+                f"break_away_N must be at least coulomb_N = {self.coulomb_N!r}, "
+                f"got {self.break_away_N!r}"
+            )
+
+
+@dataclass(frozen=True)
+class Contact:
+    """A spring that acts only beyond a position.
+
+    Parameters
+    ----------
+    position_m : float, [m]
+        Where it begins, counted from the position without current.
+    stiffness_N_per_m : float, [N/m]
+        Stiffness on top of the main spring; 0 for no contact.
+    both_sides : bool
+        Whether there is one at ``-position_m`` too.
+    """
+
+    position_m: float = 0.33
+    stiffness_N_per_m: float = 250.0
+    both_sides: bool = False
+
+    def __post_init__(self) -> None:
+        require_positive(self, "position_m")
+        require_not_negative(self, "stiffness_N_per_m")
+
+
+@dataclass(frozen=True)
+class Mechanics:
+    """A current-driven mass with spring, damper, dry friction and a contact.
+
+    Parameters
+    ----------
+    mass_kg : float, [kg]
+    damping_N_s_per_m : float, [N s/m]
+    stiffness_N_per_m : float, [N/m]
+        0 for a free axis.
+    force_constant_N_per_A : float, [N/A]
+    friction : Friction
+    contact : Contact
+    """
+
+    mass_kg: float = 2.0
+    damping_N_s_per_m: float = 15.0
+    stiffness_N_per_m: float = 968.0
+    force_constant_N_per_A: float = 48.4
+    friction: Friction = field(default_factory=Friction)
+    contact: Contact = field(default_factory=Contact)
+
+    def __post_init__(self) -> None:
+        require_positive(self, "mass_kg")
+        require_not_negative(self, "damping_N_s_per_m", "stiffness_N_per_m")

@@ -1,0 +1,270 @@
+"""The Hammerstein-Wiener model, its orders, the options of a fit and its result."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from hwid_cli.records.recordings import frozen_vector
+
+INITIAL_STATES = ("zero", "steady", "estimated")
+JOINS = ("concatenate", "experiments")
+MAP_KINDS = ("piecewise_linear", "saturation", "dead_zone", "polynomial", "none")
+FIT_STATUSES = ("converged", "iteration_limit", "stalled", "failed")
+
+
+@dataclass(frozen=True, order=True)
+class Orders:
+    """Orders of the linear block B(q)/F(q), as in MATLAB's ``[nb nf nk]``.
+
+    Parameters
+    ----------
+    nb : int, [-]
+        Number of numerator coefficients, at least 1.
+    nf : int, [-]
+        Number of poles, at least 0.
+    nk : int, [samples]
+        Delay from input to output, at least 0.
+
+    Raises
+    ------
+    ValueError
+        If an order is out of its range.
+    """
+
+    nb: int
+    nf: int
+    nk: int
+
+    def __post_init__(self) -> None:
+        for name, least in (("nb", 1), ("nf", 0), ("nk", 0)):
+            value = getattr(self, name)
+            if value != int(value) or value < least:
+                raise ValueError(f"{name} must be an integer >= {least}, got {value!r}")
+            object.__setattr__(self, name, int(value))
+
+    @property
+    def n_state(self) -> int:
+        """Number of past values that the linear block remembers."""
+        return max(self.nf, self.nb + self.nk - 1)
+
+
+@dataclass(frozen=True)
+class FitOptions:
+    """How a model is fitted; part of every cached result's key.
+
+    Parameters
+    ----------
+    input_map, output_map : str
+        One of ``MAP_KINDS``.
+    units : int, [-]
+        Break-points of a piecewise linear map; degree of a polynomial is
+        ``degree``.
+    degree : int, [-]
+        Degree of a polynomial map.
+    initial_state : str
+        ``zero``: the linear block starts empty. ``steady``: it starts in equilibrium
+        with the first input. ``estimated``: its free response is fitted too.
+    join : str
+        How several recordings make one fit: ``concatenate`` puts them one after the
+        other, ``experiments`` gives each its own initial state.
+    free_break_points : bool
+        Whether break-points move in the last phase of the fit.
+    max_iterations : int, [-]
+        Limit for each phase of the search from one start.
+    starts : int, [-]
+        Number of linear starts that are screened.
+    """
+
+    input_map: str = "piecewise_linear"
+    output_map: str = "piecewise_linear"
+    units: int = 10
+    degree: int = 5
+    initial_state: str = "estimated"
+    join: str = "concatenate"
+    free_break_points: bool = True
+    max_iterations: int = 60
+    starts: int = 6
+
+    def __post_init__(self) -> None:
+        for name, allowed in (
+            ("input_map", MAP_KINDS),
+            ("output_map", MAP_KINDS),
+            ("initial_state", INITIAL_STATES),
+            ("join", JOINS),
+        ):
+            if getattr(self, name) not in allowed:
+                raise ValueError(
+                    f"{name} must be one of {', '.join(allowed)}, "
+                    f"got {getattr(self, name)!r}"
+                )
+        for name, least in (
+            ("units", 2),
+            ("degree", 1),
+            ("max_iterations", 1),
+            ("starts", 1),
+        ):
+            value = getattr(self, name)
+            if value != int(value) or value < least:
+                raise ValueError(f"{name} must be an integer >= {least}, got {value!r}")
+
+
+@dataclass(frozen=True, eq=False)
+class StaticMap:
+    """A static nonlinearity: its kind and the numbers that fix it.
+
+    Parameters
+    ----------
+    kind : str
+        One of ``MAP_KINDS``.
+    parameters : ndarray, shape (n_parameters,)
+        ``piecewise_linear``: break-points, then the values there. ``saturation``: lower
+        and upper limit. ``dead_zone``: lower and upper edge. ``polynomial``: Chebyshev
+        coefficients over ``domain``, constant first. ``none``: empty.
+    domain : tuple of float
+        Range of the argument in the fit; outside it the map extrapolates.
+    """
+
+    kind: str
+    parameters: np.ndarray
+    domain: tuple[float, float] = (-1.0, 1.0)
+
+    def __post_init__(self) -> None:
+        if self.kind not in MAP_KINDS:
+            raise ValueError(
+                f"map kind {self.kind!r} is none of {', '.join(MAP_KINDS)}"
+            )
+        object.__setattr__(
+            self, "parameters", frozen_vector(self.parameters, "parameters")
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class HammersteinWiener:
+    """``w = f(u)``, ``x = B(q)/F(q) w``, ``y = g(x)``.
+
+    Parameters
+    ----------
+    input_map : StaticMap
+        f, from the input unit to w.
+    numerator : ndarray, shape (nb,), [-]
+        Coefficients of ``q^-nk ... q^-(nk + nb - 1)``.
+    denominator : ndarray, shape (nf + 1,), [-]
+        Coefficients of ``q^0 ... q^-nf``; the first is 1.
+    delay : int, [samples]
+        nk.
+    output_map : StaticMap
+        g, from x to the output unit.
+    sample_time_s : float, [s]
+    initial_state : str
+        Rule by which a simulation starts; one of ``INITIAL_STATES``.
+    free_response : ndarray, shape (n_state,) or (0,), [x]
+        With ``estimated``: x gains ``C(q)/F(q)`` times a unit pulse at the first
+        sample; these are C's coefficients for the first recording of the fit.
+    input_unit, output_unit : str
+    """
+
+    input_map: StaticMap
+    numerator: np.ndarray
+    denominator: np.ndarray
+    delay: int
+    output_map: StaticMap
+    sample_time_s: float
+    initial_state: str = "zero"
+    free_response: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    input_unit: str = "A"
+    output_unit: str = "m"
+
+    def __post_init__(self) -> None:
+        for name in ("numerator", "denominator", "free_response"):
+            object.__setattr__(self, name, frozen_vector(getattr(self, name), name))
+        if self.denominator.size == 0 or self.denominator[0] != 1.0:
+            raise ValueError("denominator must start with 1")
+
+    @property
+    def orders(self) -> Orders:
+        """Orders ``[nb nf nk]`` of the linear block."""
+        return Orders(self.numerator.size, self.denominator.size - 1, self.delay)
+
+
+@dataclass(frozen=True, eq=False)
+class Uncertainty:
+    """Standard errors of a model's parameters, or the reason why there are none.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Parameter names, such as ``b[0]``, ``f[1]``, ``input_map.value[3]``.
+    standard_errors : ndarray, shape (n_parameters,)
+        In the units of the parameters; NaN where the data do not determine one.
+    reason : str
+        Why some or all are missing; empty if all exist.
+    """
+
+    names: tuple[str, ...] = ()
+    standard_errors: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    reason: str = ""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(
+            self,
+            "standard_errors",
+            frozen_vector(self.standard_errors, "standard_errors"),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """The result of one fit, successful or not.
+
+    Parameters
+    ----------
+    identified_on : tuple of str
+        Names of the recordings, in the order in which they were joined.
+    orders : Orders
+    options : FitOptions
+    model : HammersteinWiener or None
+        None where no usable model was found.
+    status : str
+        One of ``FIT_STATUSES``; only ``failed`` has no model.
+    message : str
+        Why the search stopped, for people.
+    iterations : int, [-]
+        Iterations of the winning start, all phases together.
+    rmsd : float, [output unit]
+        Over all recordings of the fit; NaN if failed.
+    fit_percent : float, [%]
+        ``100 (1 - norm(y - y_hat) / norm(y - mean(y)))``; NaN if failed.
+    linear_rmsd : float, [output unit]
+        RMSD of the best linear output-error model of the same orders found on the way.
+    poles : ndarray of complex, shape (nf,), [-]
+    is_stable : bool
+        Whether every pole lies inside the unit circle.
+    uncertainty : Uncertainty
+    """
+
+    identified_on: tuple[str, ...]
+    orders: Orders
+    options: FitOptions
+    model: HammersteinWiener | None
+    status: str
+    message: str
+    iterations: int = 0
+    rmsd: float = float("nan")
+    fit_percent: float = float("nan")
+    linear_rmsd: float = float("nan")
+    poles: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=complex))
+    is_stable: bool = False
+    uncertainty: Uncertainty = field(default_factory=Uncertainty)
+
+    def __post_init__(self) -> None:
+        if self.status not in FIT_STATUSES:
+            raise ValueError(
+                f"status {self.status!r} is none of {', '.join(FIT_STATUSES)}"
+            )
+        if (self.model is None) != (self.status == "failed"):
+            raise ValueError("a fit has no model exactly when it failed")
+
+    @property
+    def name(self) -> str:
+        """Name of the recordings that were joined, ``step_06+step_09``."""
+        return "+".join(self.identified_on)

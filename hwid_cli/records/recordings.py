@@ -1,0 +1,154 @@
+"""Measurements as records: what was read, what was calibrated, and what was changed."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+KINDS = ("step", "sine", "random", "other")
+
+
+def frozen_vector(values: np.ndarray, name: str) -> np.ndarray:
+    """Return a read-only 1-D float64 copy; raise ValueError on another shape."""
+    vector = np.array(values, dtype=np.float64)
+    if vector.ndim != 1:
+        raise ValueError(f"{name} must be 1-D, got shape {vector.shape}")
+    vector.flags.writeable = False
+    return vector
+
+
+@dataclass(frozen=True, eq=False)
+class RawRecording:
+    """A measurement as the file holds it, before calibration.
+
+    Parameters
+    ----------
+    name : str
+        Unique within an experiment; the file name without its ending.
+    input : ndarray, shape (n_input,), [input_unit]
+    output : ndarray, shape (n_output,), [output_unit]
+        May differ in length from the input until calibration cuts both.
+    sample_time_s : float, [s]
+    kind : str
+        One of ``KINDS``.
+    source : str
+        The file it came from, for messages.
+    sha256 : str
+        Hash of the file's bytes, hexadecimal.
+    input_unit, output_unit : str
+    """
+
+    name: str
+    input: np.ndarray
+    output: np.ndarray
+    sample_time_s: float
+    kind: str = "other"
+    source: str = ""
+    sha256: str = ""
+    input_unit: str = "A"
+    output_unit: str = "m"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "input", frozen_vector(self.input, "input"))
+        object.__setattr__(self, "output", frozen_vector(self.output, "output"))
+        _check_common(self.kind, self.sample_time_s)
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """A calibrated measurement: input and output of equal length, all finite.
+
+    Parameters
+    ----------
+    name : str
+        Unique within an experiment.
+    input : ndarray, shape (n_samples,), [input_unit]
+    output : ndarray, shape (n_samples,), [output_unit]
+    sample_time_s : float, [s]
+    kind : str
+        One of ``KINDS``.
+    sha256 : str
+        Hash of the bytes of the file that it was read from; empty if from memory.
+    input_unit, output_unit : str
+
+    Raises
+    ------
+    ValueError
+        If the lengths differ, a value is not finite, or the sample time is not positive.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> Recording("r1", np.ones(3), np.zeros(3), sample_time_s=1e-3).n_samples
+    3
+    """
+
+    name: str
+    input: np.ndarray
+    output: np.ndarray
+    sample_time_s: float
+    kind: str = "other"
+    sha256: str = ""
+    input_unit: str = "A"
+    output_unit: str = "m"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "input", frozen_vector(self.input, "input"))
+        object.__setattr__(self, "output", frozen_vector(self.output, "output"))
+        _check_common(self.kind, self.sample_time_s)
+        if self.input.size != self.output.size:
+            raise ValueError(
+                f"recording {self.name!r}: input has {self.input.size} samples, "
+                f"output {self.output.size}"
+            )
+        if not (np.isfinite(self.input).all() and np.isfinite(self.output).all()):
+            raise ValueError(
+                f"recording {self.name!r} holds values that are not finite"
+            )
+
+    @property
+    def n_samples(self) -> int:
+        """Number of samples."""
+        return int(self.input.size)
+
+
+@dataclass(frozen=True)
+class CalibrationLog:
+    """What calibration did to one recording.
+
+    Parameters
+    ----------
+    name : str
+    steps : tuple of str
+        The recipe's steps in the order in which they ran.
+    first_sample : int, [samples]
+        Index in the raw record of the first sample kept.
+    n_samples : int, [samples]
+        Samples kept.
+    n_raw_input, n_raw_output : int, [samples]
+        Lengths of the raw columns.
+    input_offset, output_offset : float, [input unit], [output unit]
+        What was subtracted; 0 where the recipe subtracts nothing.
+    period_samples : float, [samples]
+        Period found in a sine's input; 0 where the recipe needs none.
+    repaired_input, repaired_output : tuple of int
+        Indices in the raw record of single damaged samples that were replaced.
+    """
+
+    name: str
+    steps: tuple[str, ...]
+    first_sample: int
+    n_samples: int
+    n_raw_input: int
+    n_raw_output: int
+    input_offset: float = 0.0
+    output_offset: float = 0.0
+    period_samples: float = 0.0
+    repaired_input: tuple[int, ...] = field(default=())
+    repaired_output: tuple[int, ...] = field(default=())
+
+
+def _check_common(kind: str, sample_time_s: float) -> None:
+    if kind not in KINDS:
+        raise ValueError(f"kind {kind!r} is none of {', '.join(KINDS)}")
+    if not (np.isfinite(sample_time_s) and sample_time_s > 0):
+        raise ValueError(f"sample_time_s must be positive, got {sample_time_s!r}")

@@ -1,0 +1,73 @@
+"""Results of whole stages: the cross-validation tensor and the tables read off it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True, eq=False)
+class CrossValidation:
+    """RMSD of every model on every recording.
+
+    Parameters
+    ----------
+    identified_on : tuple of str, length n
+    nb, nk : tuple of int
+        The two axes of the order grid, as the configuration names them.
+    nk_role : str
+        ``poles``: orders are ``[nb, nk, 1]``; ``delay``: ``[nb, nf, nk]``.
+    validated_on : tuple of str, length m
+    rmsd : ndarray, shape (n, nb, nk, m), [unit]
+        NaN where there is no usable model or its output is not finite.
+    status : ndarray of str, shape (n, nb, nk, m)
+        ``ok`` or why the RMSD is missing.
+    unit : str
+        Unit of the output.
+    threshold : float, [unit]
+        A model covers a recording when its RMSD lies below.
+    """
+
+    identified_on: tuple[str, ...]
+    nb: tuple[int, ...]
+    nk: tuple[int, ...]
+    nk_role: str
+    validated_on: tuple[str, ...]
+    rmsd: np.ndarray
+    status: np.ndarray
+    unit: str
+    threshold: float
+
+    def __post_init__(self) -> None:
+        shape = (
+            len(self.identified_on),
+            len(self.nb),
+            len(self.nk),
+            len(self.validated_on),
+        )
+        if self.rmsd.shape != shape or self.status.shape != shape:
+            raise ValueError(
+                f"rmsd {self.rmsd.shape} and status {self.status.shape} must have "
+                f"shape {shape}"
+            )
+
+
+@dataclass(frozen=True)
+class ModelScore:
+    """One model and how it did.
+
+    Parameters
+    ----------
+    identified_on : str
+    nb, nk : int
+        Its place in the order grid.
+    rmsd : float, [output unit]
+        On its own recording.
+    coverage : int, [-]
+        Recordings on which its RMSD lies below the threshold.
+    """
+
+    identified_on: str
+    nb: int
+    nk: int
+    rmsd: float
+    coverage: int
