@@ -1,0 +1,286 @@
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy import signal
+
+from hwid_cli.maths import scores
+from hwid_cli.maths.model.fit import fit
+from hwid_cli.maths.model.simulate import simulate, validation_output
+from hwid_cli.records.model import FitOptions, Orders
+from hwid_cli.records.recordings import Recording
+from tests.maths.model.plants import ORDERS, POLES, measured, plant
+
+PAIRS = [
+    ("none", "none"),
+    ("saturation", "none"),
+    ("none", "saturation"),
+    ("dead_zone", "none"),
+    ("dead_zone", "saturation"),
+    ("polynomial", "none"),
+    ("polynomial", "polynomial"),
+    ("piecewise_linear", "none"),
+    ("piecewise_linear", "piecewise_linear"),
+]
+
+
+def options(input_map, output_map, initial_state="zero", **others):
+    return FitOptions(
+        input_map=input_map,
+        output_map=output_map,
+        units=4,
+        degree=3,
+        initial_state=initial_state,
+        **others,
+    )
+
+
+@pytest.mark.parametrize("initial_state", ["zero", "steady", "estimated"])
+@pytest.mark.parametrize(("input_map", "output_map"), PAIRS)
+def test_known_model_is_recovered_from_noise_free_data(
+    input_map, output_map, initial_state
+):
+    recording = measured(plant(input_map, output_map, initial_state))
+    result = fit([recording], ORDERS, options(input_map, output_map, initial_state))
+    assert result.status == "converged"
+    assert result.rmsd < 1e-6 * np.std(recording.output)
+    np.testing.assert_allclose(
+        np.sort_complex(result.poles), np.sort_complex(POLES), atol=1e-6
+    )
+
+
+@pytest.mark.parametrize(
+    ("input_map", "output_map"),
+    [("none", "none"), ("saturation", "none"), ("dead_zone", "saturation")],
+)
+def test_noisy_estimates_lie_within_three_standard_errors(input_map, output_map):
+    true = plant(input_map, output_map)
+    deviations = []
+    for seed in range(12):
+        recording = measured(true, seed=seed, noise=0.05)
+        result = fit([recording], ORDERS, options(input_map, output_map))
+        uncertainty = result.uncertainty
+        assert uncertainty.reason == ""
+        got = np.concatenate(
+            [
+                result.model.input_map.parameters,
+                result.model.output_map.parameters,
+                result.model.numerator,
+                result.model.denominator[1:],
+            ]
+        )
+        expected = np.concatenate(
+            [
+                true.input_map.parameters,
+                true.output_map.parameters,
+                true.numerator,
+                true.denominator[1:],
+            ]
+        )
+        deviations.append((got - expected) / uncertainty.standard_errors)
+    deviations = np.array(deviations)
+    # Of a normal variable 0.27 % lies beyond three; four hold for every one of the
+    # hundred drawn here.
+    assert np.abs(deviations).max() < 4.0
+    assert np.mean(np.abs(deviations) < 3.0) > 0.97
+    # Standard errors that are far too large would pass the bounds above.
+    assert 0.7 < np.sqrt(np.mean(deviations**2)) < 1.3
+
+
+def test_noisy_fit_comes_down_to_the_noise():
+    recording = measured(plant("piecewise_linear", "polynomial"), noise=0.02)
+    result = fit([recording], ORDERS, FitOptions(initial_state="zero"))
+    noise = 0.02 * np.std(recording.output)
+    # 44 parameters of 1500 samples take 1.5 % off the residual, a map between straight
+    # lines adds a little.
+    assert result.rmsd == pytest.approx(noise, rel=0.1)
+
+
+def test_linear_special_case_is_scipys_filter():
+    rng = np.random.default_rng(5)
+    b, f = [0.0, 0.2, 0.1], [1.0, -1.2, 0.5]
+    u = rng.standard_normal(800)
+    recording = Recording("r", u, signal.lfilter(b, f, u), 1e-3)
+    result = fit([recording], Orders(2, 2, 1), options("none", "none"))
+    np.testing.assert_allclose(result.model.numerator, b[1:], atol=1e-9)
+    np.testing.assert_allclose(result.model.denominator, f, atol=1e-9)
+    # Both are rounding error, computed in scaled and in true units.
+    assert max(result.linear_rmsd, result.rmsd) < 1e-12
+
+
+def test_rmsd_and_fit_percent_are_those_of_the_returned_model():
+    recording = measured(plant("dead_zone", "polynomial"), noise=0.02)
+    result = fit([recording], ORDERS, FitOptions(units=5))
+    simulated = simulate(result.model, recording.input)
+    # The same model in other units: rounding.
+    assert result.rmsd == pytest.approx(scores.rmsd(recording.output, simulated), 1e-9)
+    assert result.fit_percent == pytest.approx(
+        scores.fit_percent(recording.output, simulated), rel=1e-9
+    )
+
+
+@pytest.mark.parametrize("scale", [1e-9, 1e6])
+def test_units_of_the_data_do_not_change_the_fit(scale):
+    recording = measured(plant("dead_zone", "polynomial"), noise=0.02)
+    scaled = Recording("r", recording.input, recording.output * scale, 1e-3)
+    first = fit([recording], ORDERS, FitOptions(units=5))
+    second = fit([scaled], ORDERS, FitOptions(units=5))
+    # Scaling rounds the data, and the search ends within 1e-5 of the optimum's cost.
+    assert second.rmsd == pytest.approx(first.rmsd * scale, rel=1e-4)
+
+
+def test_same_data_give_the_same_numbers():
+    recording = measured(plant("dead_zone", "polynomial"), noise=0.02)
+    first, second = (fit([recording], ORDERS, FitOptions(units=5)) for _ in range(2))
+    assert first.rmsd == second.rmsd
+    np.testing.assert_array_equal(first.model.denominator, second.model.denominator)
+
+
+def test_wrong_initial_state_costs_accuracy_and_estimating_it_does_not():
+    recording = measured(plant("none", "polynomial", "estimated"), n_samples=400)
+    empty = fit([recording], ORDERS, options("none", "polynomial", "zero"))
+    estimated = fit([recording], ORDERS, options("none", "polynomial", "estimated"))
+    assert empty.rmsd > 1e-3 * np.std(recording.output)
+    assert estimated.rmsd < 1e-9 * np.std(recording.output)
+
+
+def two_recordings_that_start_in_motion():
+    """Parts of one long run: each part's initial state is the end of what went before."""
+    whole = measured(plant("saturation", "none"), n_samples=2000)
+    return [
+        Recording("a", whole.input[1200:], whole.output[1200:], 1e-3),
+        Recording("b", whole.input[300:1000], whole.output[300:1000], 1e-3),
+    ]
+
+
+def test_experiments_have_initial_states_of_their_own():
+    parts = two_recordings_that_start_in_motion()
+    separate = fit(
+        parts, ORDERS, options("saturation", "none", "estimated", join="experiments")
+    )
+    joined = fit(
+        parts, ORDERS, options("saturation", "none", "estimated", join="concatenate")
+    )
+    size = np.std(parts[0].output)
+    assert separate.rmsd < 1e-9 * size
+    # At the joint the state jumps, which no one model can follow.
+    assert joined.rmsd > 1e-3 * size
+    assert separate.name == "a+b"
+
+
+def test_order_of_experiments_does_not_matter():
+    parts = two_recordings_that_start_in_motion()
+    kind = options("saturation", "none", "estimated", join="experiments")
+    forward, backward = fit(parts, ORDERS, kind), fit(parts[::-1], ORDERS, kind)
+    np.testing.assert_allclose(
+        forward.model.denominator, backward.model.denominator, atol=1e-9
+    )
+
+
+def test_concatenation_is_the_fit_of_the_joined_record():
+    parts = two_recordings_that_start_in_motion()
+    joined = Recording(
+        "ab",
+        np.concatenate([one.input for one in parts]),
+        np.concatenate([one.output for one in parts]),
+        1e-3,
+    )
+    kind = options("saturation", "none", join="concatenate")
+    first, second = fit(parts, ORDERS, kind), fit([joined], ORDERS, kind)
+    assert first.rmsd == second.rmsd
+
+
+def test_validation_estimates_the_initial_state_of_the_recording():
+    parts = two_recordings_that_start_in_motion()
+    result = fit(parts[:1], ORDERS, options("saturation", "none", "estimated"))
+    other = parts[1]
+    told = scores.rmsd(other.output, simulate(result.model, other.input))
+    estimated = scores.rmsd(other.output, validation_output(result.model, other))
+    assert told > 1e-3
+    assert estimated < 1e-8
+
+
+def test_validation_of_a_steady_model_starts_in_equilibrium_with_the_recording():
+    true = plant("none", "polynomial", "steady")
+    result = fit([measured(true)], ORDERS, options("none", "polynomial", "steady"))
+    other = measured(true, seed=7)
+    output = validation_output(result.model, other)
+    assert scores.rmsd(other.output, output) < 1e-8
+
+
+def constant(value):
+    return np.full(200, value)
+
+
+@pytest.mark.parametrize(
+    ("u", "y", "reason"),
+    [
+        (np.arange(30.0), np.arange(30.0), "30 samples cannot determine"),
+        (constant(2.0), np.arange(200.0), "the input is constant at 2"),
+        (np.arange(200.0), constant(3.0), "the output is constant at 3"),
+    ],
+)
+def test_data_that_cannot_determine_a_model_give_a_failed_fit(u, y, reason):
+    result = fit([Recording("r", u, y, 1.0)], ORDERS, FitOptions())
+    assert result.status == "failed"
+    assert result.model is None
+    assert np.isnan(result.rmsd)
+    assert reason in result.message
+
+
+def test_fit_of_pure_noise_is_a_value_and_stable():
+    rng = np.random.default_rng(0)
+    recording = Recording("r", *rng.standard_normal((2, 300)), 1.0)
+    result = fit([recording], Orders(4, 6, 1), FitOptions(units=5))
+    assert result.status in ("converged", "iteration_limit", "stalled")
+    assert (np.abs(result.poles) < 1.0).all()
+    assert result.is_stable
+
+
+def test_undetermined_parameters_have_no_standard_error_and_the_reason_names_them():
+    # The input never leaves one segment of the true map and one of a fitted map of two.
+    rng = np.random.default_rng(0)
+    u = np.where(rng.random(600) < 0.5, 1.0, 2.0)
+    y = signal.lfilter([0.0, 0.5], [1.0, -0.5], u) + 1e-3 * rng.standard_normal(600)
+    result = fit(
+        [Recording("r", u, y, 1.0)],
+        Orders(1, 1, 1),
+        options("piecewise_linear", "none", free_break_points=False),
+    )
+    inner = [result.uncertainty.names.index(f"input_map.value[{i}]") for i in (1, 2)]
+    assert np.isnan(result.uncertainty.standard_errors[inner]).all()
+    assert "input_map.value[1]" in result.uncertainty.reason
+
+
+def test_recordings_of_one_fit_must_share_their_sample_time():
+    u = np.arange(200.0)
+    with pytest.raises(ValueError, match="share their sample time"):
+        fit(
+            [Recording("a", u, u, 1.0), Recording("b", u, u, 2.0)], ORDERS, FitOptions()
+        )
+
+
+def public_suite() -> Path:
+    """Benchmark plants beside the project, if they are there."""
+    data = Path(os.environ.get("HWID_REALDATA", "../shared/realdata"))
+    return data.parent / "peers" / "hw_suite.npz"
+
+
+@pytest.mark.skipif(
+    not public_suite().exists(),
+    reason="hw_suite.npz not found: put it into the folder peers beside HWID_REALDATA",
+)
+@pytest.mark.slow
+def test_random_plants_reach_their_noise_floor():
+    suite = np.load(public_suite())
+    percent = []
+    for k in range(20):
+        nb, nf, nk, *_ = suite[f"meta_{k}"].astype(int)
+        recording = Recording("r", suite[f"u_train_{k}"], suite[f"y_train_{k}"], 1.0)
+        result = fit([recording], Orders(nb, nf, nk), FitOptions())
+        simulated = simulate(result.model, suite[f"u_test_{k}"])
+        percent.append(scores.fit_percent(suite[f"y_test_{k}"], simulated))
+    # The noise floor is 99.00 % on each.
+    assert np.median(percent) > 98.9
+    assert np.min(percent) > 98.0
