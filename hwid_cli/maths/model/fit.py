@@ -20,7 +20,8 @@ from hwid_cli.maths.model.candidates import Candidate, Experiment
 from hwid_cli.maths.model.levenberg_marquardt import Search
 from hwid_cli.maths.model.linear_block import is_stable, poles
 from hwid_cli.maths.model.normalise import normalise, rescaled
-from hwid_cli.maths.model.search import linear_search, nonlinear_search, with_maps
+from hwid_cli.maths.model.placing import with_maps
+from hwid_cli.maths.model.search import linear_search, nonlinear_search
 from hwid_cli.maths.model.uncertainty import standard_errors
 from hwid_cli.records.model import Fit, FitOptions, Orders
 from hwid_cli.records.recordings import Recording

@@ -11,19 +11,18 @@
 The best candidate seen wins. docs/method.md, section "The search".
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from hwid_cli.maths.model import static_map
 from hwid_cli.maths.model.candidates import Candidate, Experiment, linear_output
-from hwid_cli.maths.model.kernels import thinned_break_points
 from hwid_cli.maths.model.levenberg_marquardt import Search, minimise
 from hwid_cli.maths.model.linear_block import filtered
-from hwid_cli.maths.model.maps.piecewise_linear import break_points_and_values
+from hwid_cli.maths.model.placing import finer, thinner, with_maps
 from hwid_cli.maths.model.starts import Start, linear_starts
-from hwid_cli.records.model import FitOptions, HammersteinWiener, Orders, StaticMap
+from hwid_cli.records.model import FitOptions, HammersteinWiener, Orders
 
 _SCREENING_ITERATIONS = 6
 _PLACING_ITERATIONS = 6
@@ -34,11 +33,6 @@ _LINEAR_STARTS = 3
 # Cost that a relaxed block must reach, as a share of the best so far, to be finished;
 # nearer to it the search has only come back to where it was.
 _WORTH_GOING_ON = 0.995
-# Break-points of the fine maps from which the final ones are chosen, for each final one.
-_FINE_FACTOR = 3
-# Share of the samples that every fine break-point counts for beyond those near it, so
-# that the ends of a map, which few samples reach, keep theirs.
-_WEIGHT_OF_SHAPE = 1e-3
 # Slopes of the output map below this share of their mean square say too little about x.
 _FLAT = 0.1
 
@@ -209,7 +203,7 @@ def _placed(
     if not (options.free_break_points and _has_break_points(settled.candidate)):
         return replace(settled, iterations=iterations)
     fine = minimise(
-        with_maps(settled.candidate, experiments, _finer),
+        with_maps(settled.candidate, experiments, finer),
         experiments,
         with_positions=False,
         max_iterations=min(_PLACING_ITERATIONS, options.max_iterations),
@@ -217,7 +211,7 @@ def _placed(
     thinned = with_maps(
         fine.candidate,
         experiments,
-        lambda one, argument: _thinner(one, argument, options.units),
+        lambda one, argument: thinner(one, argument, options.units),
     )
     # The fine maps' cost tells which finalist is worth freeing: how well its final
     # break-points happen to lie before they move does not.
@@ -284,59 +278,6 @@ def _between_maps(
         held_back = slope**2 + _FLAT * float(np.mean(slope**2)) + 1e-300
         result.append(Experiment(w, x + (one.output - y) * slope / held_back))
     return result
-
-
-def with_maps(
-    candidate: Candidate,
-    experiments: Sequence[Experiment],
-    change: Callable[[StaticMap, np.ndarray], StaticMap],
-) -> Candidate:
-    """Candidate with both maps changed, given the arguments that reach them.
-
-    Parameters
-    ----------
-    candidate : Candidate
-    experiments : sequence of Experiment
-    change : callable (StaticMap, ndarray) -> StaticMap
-
-    Returns
-    -------
-    Candidate
-    """
-    model = candidate.model
-    u = np.concatenate([one.input for one in experiments])
-    x = np.concatenate(
-        [linear_output(candidate, i, one)[1] for i, one in enumerate(experiments)]
-    )
-    return Candidate(
-        replace(
-            model,
-            input_map=change(model.input_map, u),
-            output_map=change(model.output_map, x),
-        ),
-        candidate.free_responses,
-    )
-
-
-def _finer(one: StaticMap, argument: np.ndarray) -> StaticMap:
-    """Same map with more break-points, equally spaced over what reaches it."""
-    low, high = float(argument.min()), float(argument.max())
-    if one.kind != "piecewise_linear" or not low < high:
-        return one
-    points = np.linspace(low, high, _FINE_FACTOR * (one.parameters.size // 2))
-    values = static_map.evaluate(one, points)
-    return StaticMap(one.kind, np.concatenate([points, values]), (low, high))
-
-
-def _thinner(one: StaticMap, argument: np.ndarray, units: int) -> StaticMap:
-    """Map with fewer break-points, those that it needs most."""
-    if one.kind != "piecewise_linear" or one.parameters.size <= 2 * units:
-        return one
-    points, values = break_points_and_values(one)
-    middles = np.concatenate([[-np.inf], 0.5 * (points[1:] + points[:-1]), [np.inf]])
-    weights = np.histogram(argument, middles)[0] + _WEIGHT_OF_SHAPE * argument.size
-    kept = thinned_break_points(points, values, weights, units)
-    return replace(one, parameters=np.concatenate([points[kept], values[kept]]))
 
 
 def _has_break_points(candidate: Candidate) -> bool:

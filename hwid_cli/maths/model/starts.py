@@ -250,7 +250,9 @@ def _delayed(
     out = np.empty((n, count * k))
     for j in range(count):
         out[:, j * k : (j + 1) * k] = current
-        current = np.diff(current, axis=0, prepend=0.0)
+        difference = current.copy()
+        difference[1:] -= current[:-1]
+        current = difference
     return out
 
 
