@@ -164,7 +164,8 @@ def _stable_cost(proposed: Candidate, experiments: Sequence[Experiment]) -> floa
 
 def _solve(matrix: np.ndarray, vector: np.ndarray, damping: float) -> np.ndarray | None:
     """Damped step, or None where rounding made the matrix indefinite."""
-    damped = matrix + damping * np.eye(vector.size)
+    damped = matrix.copy()
+    damped.flat[:: vector.size + 1] += damping
     _, step, info = dposv(damped, vector, lower=1)
     return step if info == 0 and np.isfinite(step).all() else None
 

@@ -269,7 +269,7 @@ def public_suite() -> Path:
 
 @pytest.mark.skipif(
     not public_suite().exists(),
-    reason="hw_suite.npz not found: put it into the folder peers beside HWID_REALDATA",
+    reason="hw_suite.npz not found: put it into a folder peers beside HWID_REALDATA",
 )
 @pytest.mark.slow
 def test_random_plants_reach_their_noise_floor():
