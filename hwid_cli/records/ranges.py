@@ -4,7 +4,19 @@ import math
 
 
 def require_positive(record: object, *names: str) -> None:
-    """Raise ValueError unless the named fields are finite and above 0."""
+    """Refuse fields that are not finite and above 0.
+
+    Parameters
+    ----------
+    record : object
+    *names : str
+        Fields to check.
+
+    Raises
+    ------
+    ValueError
+        Naming the first field that is out of range, and its value.
+    """
     for name in names:
         value = getattr(record, name)
         if not (math.isfinite(value) and value > 0):
@@ -12,7 +24,19 @@ def require_positive(record: object, *names: str) -> None:
 
 
 def require_not_negative(record: object, *names: str) -> None:
-    """Raise ValueError unless the named fields are finite and at least 0."""
+    """Refuse fields that are not finite and at least 0.
+
+    Parameters
+    ----------
+    record : object
+    *names : str
+        Fields to check.
+
+    Raises
+    ------
+    ValueError
+        Naming the first field that is out of range, and its value.
+    """
     for name in names:
         value = getattr(record, name)
         if not (math.isfinite(value) and value >= 0):
@@ -20,7 +44,19 @@ def require_not_negative(record: object, *names: str) -> None:
 
 
 def require_share(record: object, *names: str) -> None:
-    """Raise ValueError unless the named fields lie between 0 and 1."""
+    """Refuse fields that do not lie between 0 and 1.
+
+    Parameters
+    ----------
+    record : object
+    *names : str
+        Fields to check.
+
+    Raises
+    ------
+    ValueError
+        Naming the first field that is out of range, and its value.
+    """
     for name in names:
         value = getattr(record, name)
         if not 0 <= value <= 1:
