@@ -1,0 +1,1 @@
+"""The experiment as a whole: one module for each stage, and the pool they run on."""

@@ -1,0 +1,102 @@
+"""One column of a measurement file, with what is needed to name the row of a fault."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+
+@dataclass(frozen=True, eq=False)
+class Column:
+    """Numbers of one column and the rows of the file that they stand in.
+
+    Parameters
+    ----------
+    title : str
+        How messages call it, such as ``input 'current_A'``.
+    values : ndarray, shape (n,)
+        NaN where the file holds no number.
+    rows : ndarray of int, shape (n,)
+        Row of each value as a reader of the file counts it.
+    rows_from_zero : bool
+        Whether that count starts at 0 (arrays) and not at 1 (lines of text).
+    texts : mapping of int to str
+        What stands in a row in place of a number.
+    """
+
+    title: str
+    values: np.ndarray
+    rows: np.ndarray
+    rows_from_zero: bool = True
+    texts: Mapping[int, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class FileColumns:
+    """The columns of one recording, as its file holds them.
+
+    Parameters
+    ----------
+    input, output : Column
+        May differ in length.
+    time : Column or None
+    """
+
+    input: Column
+    output: Column
+    time: Column | None = None
+
+
+def array_column(title: str, values: np.ndarray) -> Column:
+    """Make the column of an array; its rows are sample numbers from 0.
+
+    Parameters
+    ----------
+    title : str
+    values : ndarray, shape (n,)
+
+    Returns
+    -------
+    Column
+    """
+    return Column(title, np.asarray(values, np.float64), np.arange(values.size))
+
+
+def keep_rows(column: Column, selection: slice) -> Column:
+    """Keep a stretch of a column, together with the numbers of its rows.
+
+    Parameters
+    ----------
+    column : Column
+    selection : slice
+
+    Returns
+    -------
+    Column
+    """
+    return replace(column, values=column.values[selection], rows=column.rows[selection])
+
+
+def place_of(path: Path, column: Column, index: int) -> str:
+    """Name the place of a value, for a message.
+
+    Parameters
+    ----------
+    path : Path
+    column : Column
+    index : int
+        Position in ``values``.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> column = array_column("input 'u'", np.zeros(3))
+    >>> place_of(Path("run07.mat"), column, 2)
+    'run07.mat, row 2 (counted from 0)'
+    """
+    counted = " (counted from 0)" if column.rows_from_zero else ""
+    return f"{path}, row {int(column.rows[index])}{counted}"

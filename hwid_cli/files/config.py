@@ -1,0 +1,130 @@
+"""A configuration file as an ``Experiment``, every key checked.
+
+Keys, types and defaults are the fields of the dataclasses in ``records``; only the
+few keys that are written in a shorter way than they are held are read here.
+"""
+
+from dataclasses import fields, is_dataclass
+from pathlib import Path
+from typing import Any
+
+from hwid_cli.errors import ConfigError
+from hwid_cli.files.config_checks import check_experiment
+from hwid_cli.files.config_fields import Place, Reader, build, convert
+from hwid_cli.records.experiment import (
+    CrossvalOptions,
+    DiagnoseOptions,
+    Experiment,
+    GroupOptions,
+    IdentifyOptions,
+    OrdersOptions,
+)
+
+_ALL = "all"
+
+
+def load_experiment(path: Path) -> Experiment:
+    """Experiment that a YAML file describes.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    Experiment
+        ``source`` is the path as given; keys that the file leaves out hold their
+        defaults.
+
+    Raises
+    ------
+    ConfigError
+        One line with file, key, value found, what was expected and the next step.
+    """
+    # PyYAML is loaded only by commands that read a configuration.
+    from hwid_cli.files.yaml_text import read_yaml  # noqa: PLC0415, RUF100
+
+    experiment = build(
+        Experiment,
+        read_yaml(Path(path)),
+        Place(str(path)),
+        readers=_READERS,
+        given={"source": str(path)},
+    )
+    check_experiment(experiment)
+    return experiment
+
+
+def describe_experiment(experiment: Experiment) -> dict[str, Any]:
+    """Give the resolved configuration as plain data, for storing and hashing.
+
+    Parameters
+    ----------
+    experiment : Experiment
+
+    Returns
+    -------
+    dict
+        Every key with its value, defaults included; tuples are lists. ``source`` is
+        left out: moving the file changes nothing.
+    """
+    described = _plain_data(experiment)
+    del described["source"]
+    return described
+
+
+def _plain_data(value: Any) -> Any:
+    if is_dataclass(value):
+        return {
+            field.name: _plain_data(getattr(value, field.name))
+            for field in fields(value)
+        }
+    if isinstance(value, tuple | list):
+        return [_plain_data(item) for item in value]
+    if isinstance(value, dict):
+        return {key: _plain_data(item) for key, item in value.items()}
+    return value
+
+
+def _read_orders_axis(value: Any, place: Place) -> tuple[int, ...]:
+    """``[first, last]``, one order, or a list of three or more."""
+    orders = convert(value, tuple[int, ...], place, readers={})
+    if len(orders) == 2:
+        first, last = orders
+        if first > last:
+            raise ConfigError(
+                f"{place}: found [{first}, {last}]; expected [first, last] with "
+                f"first <= last; write [{last}, {first}]"
+            )
+        return tuple(range(first, last + 1))
+    return orders
+
+
+def _read_names(value: Any, place: Place) -> tuple[str, ...] | None:
+    """List of names; ``all`` or nothing is None."""
+    if value is None or value == _ALL:
+        return None
+    return convert(value, tuple[str, ...], place, readers={})
+
+
+def _read_hold_out(value: Any, place: Place) -> str | tuple[str, ...]:
+    """``auto`` or a list of names."""
+    return (
+        "auto"
+        if value == "auto"
+        else convert(value, tuple[str, ...], place, readers={})
+    )
+
+
+_READERS: dict[tuple[type, str], Reader] = {
+    (OrdersOptions, "nb"): _read_orders_axis,
+    (OrdersOptions, "nk"): _read_orders_axis,
+    (IdentifyOptions, "recordings"): _read_names,
+    (CrossvalOptions, "recordings"): _read_names,
+    (GroupOptions, "start"): _read_names,
+    (GroupOptions, "candidates"): _read_names,
+    (GroupOptions, "validate"): _read_names,
+    (DiagnoseOptions, "recordings"): _read_names,
+    (DiagnoseOptions, "effects"): _read_names,
+    (DiagnoseOptions, "hold_out"): _read_hold_out,
+}

@@ -1,0 +1,259 @@
+"""What the keys of one configuration must agree on, beyond the type of each."""
+
+import math
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from hwid_cli.errors import ConfigError
+from hwid_cli.files.suggestions import did_you_mean
+from hwid_cli.records.experiment import (
+    NK_ROLES,
+    RECIPE_STEPS,
+    CalibrateOptions,
+    Experiment,
+    GroupOptions,
+    OrdersOptions,
+    RecordingsOptions,
+)
+from hwid_cli.records.recordings import KINDS
+
+_KEEP = ("top", "best", "coverage_at_least")
+# Lists of recordings that may not hold a test recording, and what they do with it.
+_SEEN_BEFORE_TEST = (
+    ("identify", "recordings", "identifies"),
+    ("crossval", "recordings", "validates"),
+    ("group", "start", "starts groups"),
+    ("group", "candidates", "is a candidate"),
+    ("group", "validate", "validates"),
+)
+
+
+def check_experiment(experiment: Experiment) -> None:
+    """Refuse a configuration whose values cannot be used together.
+
+    Parameters
+    ----------
+    experiment : Experiment
+        ``source`` names the file in messages.
+
+    Raises
+    ------
+    ConfigError
+        For the first value that cannot be used.
+    """
+    file = experiment.source
+    _check_name(experiment.name, file)
+    if experiment.recordings is not None:
+        _check_recordings(experiment.recordings, file)
+    if experiment.calibrate is not None:
+        _check_calibrate(experiment.calibrate, file)
+    _check_orders(experiment.orders, file)
+    if experiment.crossval is not None:
+        _require(
+            experiment.crossval.threshold > 0,
+            f"{file}: crossval.threshold",
+            experiment.crossval.threshold,
+            "a number > 0",
+        )
+    if experiment.group is not None:
+        _check_group(experiment.group, file)
+    if experiment.diagnose is not None:
+        _require(
+            experiment.diagnose.max_effects >= 0,
+            f"{file}: diagnose.max_effects",
+            experiment.diagnose.max_effects,
+            "an integer >= 0",
+        )
+    _check_name_lists(experiment, file)
+    _check_test(experiment, file)
+
+
+def _require(holds: bool, place: str, found: object, expected: str) -> None:
+    if not holds:
+        raise ConfigError(f"{place}: found {found!r}; expected {expected}")
+
+
+def _check_name(name: str, file: str) -> None:
+    is_folder_name = bool(name) and name == name.strip() and name[0] != "."
+    _require(
+        is_folder_name and not set(name) & set('/\\:*?"<>|'),
+        f"{file}: name",
+        name,
+        "a name that can be a folder (letters, digits, - and _)",
+    )
+
+
+def _check_recordings(options: RecordingsOptions, file: str) -> None:
+    at = f"{file}: recordings"
+    for name in ("files", "exclude"):
+        for pattern in getattr(options, name):
+            _require(pattern != "", f"{at}.{name}", pattern, "a file name or pattern")
+    _require(len(options.files) > 0, f"{at}.files", [], "at least one name or pattern")
+    _check_columns(options, at)
+    _require_known(options.kind, KINDS, f"{at}.kind")
+    for name in ("input_scale", "output_scale"):
+        scale = getattr(options, name)
+        _require(scale != 0, f"{at}.{name}", scale, "a number other than 0")
+    _require(
+        options.sampling_tolerance > 0,
+        f"{at}.sampling_tolerance",
+        options.sampling_tolerance,
+        "a share of the sample time > 0, such as 0.01",
+    )
+    first, last = options.first_sample, options.last_sample
+    _require(first >= 0, f"{at}.first_sample", first, "an integer >= 0")
+    _require(
+        last is None or last > first,
+        f"{at}.last_sample",
+        last,
+        f"an integer > first_sample = {first}",
+    )
+    _require(options.every >= 1, f"{at}.every", options.every, "an integer >= 1")
+
+
+def _check_columns(options: RecordingsOptions, at: str) -> None:
+    columns = options.columns
+    taken: dict[object, str] = {}
+    for name in ("time", "input", "output"):
+        column = getattr(columns, name)
+        if column is None:
+            continue
+        if isinstance(column, int):
+            _require(column >= 0, f"{at}.columns.{name}", column, "a number >= 0")
+        if column in taken:
+            raise ConfigError(
+                f"{at}.columns.{name}: found {column!r}, which is the {taken[column]} "
+                "too; expected another column"
+            )
+        taken[column] = name
+    step = options.sample_time_s
+    if step is None and columns.time is None:
+        raise ConfigError(
+            f"{at}.sample_time_s: missing, and columns.time too; expected one of them; "
+            "name the time column or give the sample time"
+        )
+    _require(
+        step is None or (math.isfinite(step) and step > 0),
+        f"{at}.sample_time_s",
+        step,
+        "a number of seconds > 0",
+    )
+    if options.resample and columns.time is None:
+        raise ConfigError(
+            f"{at}.resample: found true; expected a time column to resample by; "
+            "name it in columns.time"
+        )
+
+
+def _check_calibrate(options: CalibrateOptions, file: str) -> None:
+    at = f"{file}: calibrate"
+    for kind in KINDS:
+        recipe = getattr(options, kind)
+        _require_known(recipe, RECIPE_STEPS, f"{at}.{kind}")
+        _require_distinct(recipe, f"{at}.{kind}")
+    _require(
+        options.samples is None or options.samples >= 1,
+        f"{at}.samples",
+        options.samples,
+        "an integer >= 1",
+    )
+    _require(
+        options.rest_samples >= 1,
+        f"{at}.rest_samples",
+        options.rest_samples,
+        "an integer >= 1",
+    )
+
+
+def _check_orders(options: OrdersOptions, file: str) -> None:
+    at = f"{file}: orders"
+    if options.nk_role not in NK_ROLES:
+        raise ConfigError(
+            f"{at}.nk_role: found {options.nk_role!r}; "
+            f"{did_you_mean(options.nk_role, NK_ROLES)}"
+        )
+    for name, least in (("nb", 1), ("nk", 0)):
+        axis = getattr(options, name)
+        _require(len(axis) > 0, f"{at}.{name}", [], "at least one order")
+        _require(min(axis) >= least, f"{at}.{name}", min(axis), f"orders >= {least}")
+        _require_distinct(axis, f"{at}.{name}")
+    if options.nk_role == "delay":
+        if options.nf is None:
+            raise ConfigError(
+                f"{at}.nf: missing; expected the number of poles, because nk_role is "
+                "delay; add the key"
+            )
+        _require(options.nf >= 0, f"{at}.nf", options.nf, "an integer >= 0")
+    elif options.nf is not None:
+        raise ConfigError(
+            f"{at}.nf: found {options.nf}; expected no such key, because with nk_role "
+            "poles the number of poles is nk; remove it or set nk_role: delay"
+        )
+
+
+def _check_group(options: GroupOptions, file: str) -> None:
+    at = f"{file}: group.keep"
+    _require_known(options.keep, _KEEP, at)
+    _require(
+        len(options.keep) == 1, at, options.keep, f"exactly one of {', '.join(_KEEP)}"
+    )
+    ((rule, value),) = options.keep.items()
+    if rule == "best":
+        _require(value is True, f"{at}.best", value, "true")
+    else:
+        counts = value if isinstance(value, tuple) else (value,)
+        is_count = [not isinstance(n, bool) and n >= 1 for n in counts]
+        _require(
+            bool(counts) and all(is_count),
+            f"{at}.{rule}",
+            value,
+            "an integer >= 1, or one for each level",
+        )
+    _require(
+        options.max_level >= 1,
+        f"{file}: group.max_level",
+        options.max_level,
+        "an integer >= 1",
+    )
+
+
+def _check_name_lists(experiment: Experiment, file: str) -> None:
+    for section, name, _ in (*_SEEN_BEFORE_TEST, ("test", "recordings", "tests")):
+        names = _listed(experiment, section, name)
+        if names is not None:
+            at = f"{file}: {section}.{name}"
+            _require(len(names) > 0, at, [], "at least one recording")
+            _require_distinct(names, at)
+
+
+def _check_test(experiment: Experiment, file: str) -> None:
+    held_out = _listed(experiment, "test", "recordings") or ()
+    for section, name, what_it_does in _SEEN_BEFORE_TEST:
+        both = sorted(set(held_out) & set(_listed(experiment, section, name) or ()))
+        if both:
+            raise ConfigError(
+                f"{file}: test.recordings: {both[0]!r} {what_it_does} too "
+                f"({section}.{name}); expected recordings that are used nowhere else; "
+                "take it out of one of the two lists"
+            )
+
+
+def _listed(experiment: Experiment, section: str, name: str) -> tuple[str, ...] | None:
+    return getattr(getattr(experiment, section), name, None)
+
+
+def _require_known(
+    found: Iterable[str] | Mapping[str, Any], known: Iterable[str], place: str
+) -> None:
+    for name in found:
+        if name not in known:
+            raise ConfigError(f"{place}: found {name!r}; {did_you_mean(name, known)}")
+
+
+def _require_distinct(values: tuple[Any, ...], place: str) -> None:
+    for value in values:
+        if values.count(value) > 1:
+            raise ConfigError(
+                f"{place}: {value!r} is listed twice; expected every value once; "
+                "remove one"
+            )

@@ -1,0 +1,111 @@
+"""The cache on disk: one small HDF5 file for each task, safe to kill at any moment.
+
+``<folder>/<first two digits of the key>/<key>.h5``. Entries may be thrown away: what
+cannot be read is set aside with the ending ``.bad`` and computed again.
+"""
+
+import logging
+from pathlib import Path
+from typing import TypeVar
+
+import h5py
+
+from hwid_cli.files.hdf5_records import read_record, write_record
+from hwid_cli.files.replaced_files import check_format, replaced_hdf5
+
+Record = TypeVar("Record")
+
+_log = logging.getLogger(__name__)
+
+FORMAT = "hwid-cache"
+SCHEMA_VERSION = 1
+
+
+class Hdf5Store:
+    """Results of tasks by key, in a folder; only one process may write a key at a time.
+
+    Holds no open file, so it may be sent to a worker.
+
+    Parameters
+    ----------
+    folder : Path
+        Made when the first entry is put.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = Path(folder)
+
+    def get(self, key: str, record_type: type[Record]) -> Record | None:
+        """Look a result up.
+
+        Parameters
+        ----------
+        key : str
+        record_type : type
+            The dataclass that was put.
+
+        Returns
+        -------
+        Record or None
+            None if there is none, or none that can be read.
+        """
+        path = self._path(key)
+        try:
+            content = path.read_bytes()
+        except FileNotFoundError:
+            return None
+        except OSError as error:
+            _log.warning("%s: cannot be read (%s); computed again", path, error)
+            return None
+        try:
+            with h5py.File(h5py.h5f.open_file_image(content), "r") as file:
+                check_format(file, format_name=FORMAT, version=SCHEMA_VERSION)
+                found = file.attrs.get("record")
+                if found != record_type.__name__:
+                    raise ValueError(f"holds a {found}, no {record_type.__name__}")
+                return read_record(file["record"], record_type)
+        # What h5py raises on damaged files, and records on impossible values.
+        except (
+            ArithmeticError,
+            LookupError,
+            OSError,
+            RuntimeError,
+            TypeError,
+        ) as error:
+            _set_aside(path, error)
+        except ValueError as error:
+            _set_aside(path, error)
+        return None
+
+    def put(self, key: str, record: object) -> None:
+        """Keep a result.
+
+        Parameters
+        ----------
+        key : str
+        record : dataclass instance
+
+        Raises
+        ------
+        CacheError
+            If it cannot be written.
+        """
+        with replaced_hdf5(
+            self._path(key), format_name=FORMAT, version=SCHEMA_VERSION
+        ) as file:
+            file.attrs["key"] = key
+            file.attrs["record"] = type(record).__name__
+            write_record(file.create_group("record"), record)
+
+    def _path(self, key: str) -> Path:
+        return self._folder / key[:2] / f"{key}.h5"
+
+
+def _set_aside(path: Path, error: Exception) -> None:
+    """Rename an entry that cannot be read, so that it is not tried again."""
+    said = " ".join(str(error).split())
+    _log.warning("%s: unusable (%s); set aside and computed again", path, said)
+    try:
+        path.replace(path.with_suffix(".bad"))
+    except OSError as failure:
+        _log.warning("%s: cannot be set aside (%s)", path, failure)

@@ -1,0 +1,87 @@
+"""Which kind a recording is: by the configuration's patterns, else by ``plan.csv``."""
+
+import csv
+from collections.abc import Mapping
+from fnmatch import fnmatchcase
+from pathlib import Path
+
+from hwid_cli.errors import MeasurementError
+from hwid_cli.files.suggestions import did_you_mean
+from hwid_cli.records.recordings import KINDS
+
+PLAN_NAME = "plan.csv"
+_OTHER = "other"
+
+
+def kind_of(
+    path: Path, patterns: Mapping[str, tuple[str, ...]], plan: Mapping[str, str]
+) -> str:
+    """Find the kind of a recording.
+
+    Parameters
+    ----------
+    path : Path
+    patterns : mapping of str to tuple of str
+        Patterns on the file's name without its ending, for each kind.
+    plan : mapping of str to str
+        Kinds by recording name, as ``read_plan`` gives them.
+
+    Returns
+    -------
+    str
+        One of ``records.recordings.KINDS``; ``other`` where nothing says more.
+
+    Raises
+    ------
+    MeasurementError
+        If patterns of two kinds match.
+    """
+    matching = [
+        kind
+        for kind, of_kind in patterns.items()
+        if any(fnmatchcase(path.stem, pattern) for pattern in of_kind)
+    ]
+    if len(matching) > 1:
+        raise MeasurementError(
+            f"{path}: matches the patterns of {' and '.join(matching)} in "
+            "recordings.kind; expected one kind for each file; make the patterns "
+            "narrower"
+        )
+    return matching[0] if matching else plan.get(path.stem, _OTHER)
+
+
+def read_plan(folder: Path) -> dict[str, str]:
+    """Read the kinds that a folder's ``plan.csv`` states.
+
+    Parameters
+    ----------
+    folder : Path
+
+    Returns
+    -------
+    dict of str to str
+        Kind by recording name; empty where there is no plan, or one without the
+        columns ``name`` and ``kind``.
+
+    Raises
+    ------
+    MeasurementError
+        If a row states an unknown kind.
+    """
+    path = folder / PLAN_NAME
+    if not path.is_file():
+        return {}
+    kinds = {}
+    with path.open(encoding="utf-8-sig", errors="replace", newline="") as file:
+        reader = csv.DictReader(file)
+        if not {"name", "kind"} <= set(reader.fieldnames or ()):
+            return {}
+        for row in reader:
+            kind = (row["kind"] or "").strip()
+            if kind not in KINDS:
+                raise MeasurementError(
+                    f"{path}, row {reader.line_num}: the kind is {kind!r}; "
+                    f"{did_you_mean(kind, KINDS)}"
+                )
+            kinds[(row["name"] or "").strip()] = kind
+    return kinds

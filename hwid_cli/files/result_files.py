@@ -1,0 +1,172 @@
+"""The files that hold results: their provenance, and how a stage is replaced in one."""
+
+import json
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, TypeVar
+
+import h5py
+import numpy as np
+
+from hwid_cli import __version__
+from hwid_cli.errors import CacheError
+from hwid_cli.files.hdf5_values import write_array
+from hwid_cli.files.replaced_files import check_format, replaced_hdf5
+
+Result = TypeVar("Result")
+
+CALIBRATED_FORMAT = "hwid-calibrated"
+RESULTS_FORMAT = "hwid-results"
+SCHEMA_VERSION = 1
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """What a stage's results came from; stored with them.
+
+    Parameters
+    ----------
+    key : str
+        Hash of everything that the stage depends on, see ``campaign.cache.task_key``.
+    config : mapping
+        Resolved configuration, see ``files.config.describe_experiment``.
+    inputs : mapping of str to str
+        SHA-256 of each recording's file by the recording's name.
+    """
+
+    key: str
+    config: Mapping[str, Any] = field(default_factory=dict)
+    inputs: Mapping[str, str] = field(default_factory=dict)
+
+
+def read_stage_key(path: Path, stage: str) -> str | None:
+    """Read the key of a stage's stored results.
+
+    Parameters
+    ----------
+    path : Path
+        ``calibrated.h5`` for ``calibrate``, else ``results.h5``.
+    stage : str
+
+    Returns
+    -------
+    str or None
+        None if there are no results of that stage, or none that can be read.
+    """
+    try:
+        with h5py.File(path, "r") as file:
+            group = file if stage == "calibrate" else file[stage]
+            expected = CALIBRATED_FORMAT if stage == "calibrate" else RESULTS_FORMAT
+            check_format(file, format_name=expected, version=SCHEMA_VERSION)
+            return str(group.attrs["key"])
+    except (KeyError, OSError, RuntimeError, ValueError):
+        return None
+
+
+def write_provenance(group: h5py.Group, provenance: Provenance) -> None:
+    """Write where results came from into their group.
+
+    Parameters
+    ----------
+    group : h5py.Group
+    provenance : Provenance
+    """
+    group.attrs["key"] = provenance.key
+    inner = group.create_group("provenance")
+    inner.attrs["package_version"] = __version__
+    config = json.dumps(provenance.config, indent=1, sort_keys=True)
+    write_array(inner, "config", np.array(config, dtype=object))
+    names = sorted(provenance.inputs)
+    hashes = [provenance.inputs[name] for name in names]
+    write_array(inner, "input_names", np.array(names, dtype=object))
+    write_array(inner, "input_sha256", np.array(hashes, dtype=object))
+
+
+@contextmanager
+def replaced_stage(
+    path: Path, stage: str, provenance: Provenance
+) -> Iterator[h5py.Group]:
+    """Give the empty group of a stage in a new ``results.h5`` with all other stages.
+
+    Parameters
+    ----------
+    path : Path
+    stage : str
+    provenance : Provenance
+
+    Yields
+    ------
+    h5py.Group
+        The file on disk is replaced when the block ends.
+
+    Raises
+    ------
+    CacheError
+        If the old file cannot be read or the new one not written; the old one is
+        untouched then.
+    """
+    start = b""
+    if path.exists():
+        with _opened(path, stage):
+            start = path.read_bytes()
+    with replaced_hdf5(
+        path, format_name=RESULTS_FORMAT, version=SCHEMA_VERSION, start=start
+    ) as file:
+        if stage in file:
+            # HDF5 gives the room to what is written before the file is closed.
+            del file[stage]
+        group = file.create_group(stage)
+        write_provenance(group, provenance)
+        yield group
+
+
+def read_results(path: Path, stage: str, read: Callable[[h5py.File], Result]) -> Result:
+    """Read a stage's results; every fault is one line that says what to do.
+
+    Parameters
+    ----------
+    path : Path
+        ``calibrated.h5`` for ``calibrate``, else ``results.h5``.
+    stage : str
+    read : callable
+        From the open file to the results.
+
+    Returns
+    -------
+    Result
+
+    Raises
+    ------
+    CacheError
+        If the file or the stage is missing, or cannot be read.
+    """
+    if not path.is_file():
+        raise CacheError(
+            f"{path}: no such file; expected the results of {stage}; run 'hwid {stage}'"
+        )
+    with _opened(path, stage) as file:
+        if stage != "calibrate" and stage not in file:
+            raise CacheError(
+                f"{path}: holds {', '.join(file) or 'nothing'}; expected the results "
+                f"of {stage}; run 'hwid {stage}'"
+            )
+        return read(file)
+
+
+@contextmanager
+def _opened(path: Path, stage: str) -> Iterator[h5py.File]:
+    """Give an open results file; faults in it become errors that a user can act on."""
+    is_calibrated = stage == "calibrate"
+    format_name = CALIBRATED_FORMAT if is_calibrated else RESULTS_FORMAT
+    try:
+        with h5py.File(path, "r") as file:
+            check_format(file, format_name=format_name, version=SCHEMA_VERSION)
+            yield file
+    except (KeyError, OSError, RuntimeError, TypeError, ValueError) as error:
+        said = " ".join(str(error).split())
+        raise CacheError(
+            f"{path}: cannot be read ({said}); expected the results of {stage}; "
+            f"move the file away and run 'hwid {stage}' again"
+        ) from error

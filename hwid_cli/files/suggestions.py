@@ -1,0 +1,43 @@
+"""What a user may have meant by a name that is not known."""
+
+from collections.abc import Iterable
+from difflib import get_close_matches
+
+# Below this likeness a suggestion misleads more often than it helps.
+_LIKENESS = 0.6
+_LISTED = 12
+
+
+def did_you_mean(found: object, known: Iterable[object]) -> str:
+    """Next step for an unknown name: the closest known one, or all of them.
+
+    Parameters
+    ----------
+    found : object
+        The name as the user wrote it.
+    known : iterable of object
+        The names that would have been understood.
+
+    Returns
+    -------
+    str
+        The end of an error message, without a full stop.
+
+    Examples
+    --------
+    >>> did_you_mean("nkk", ["nb", "nk"])
+    "did you mean 'nk'?"
+    >>> did_you_mean("voltage", ["nb", "nk"])
+    'expected one of nb, nk'
+    >>> did_you_mean("voltage", [])
+    'expected none'
+    """
+    names = [str(name) for name in known]
+    folded = {name.casefold(): name for name in reversed(names)}
+    close = get_close_matches(str(found).casefold(), folded, n=1, cutoff=_LIKENESS)
+    if close:
+        return f"did you mean {folded[close[0]]!r}?"
+    if not names:
+        return "expected none"
+    more = f" and {len(names) - _LISTED} more" if len(names) > _LISTED else ""
+    return f"expected one of {', '.join(names[:_LISTED])}{more}"

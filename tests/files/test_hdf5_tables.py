@@ -1,0 +1,58 @@
+from uuid import uuid4
+
+import h5py
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hwid_cli.files.hdf5_tables import read_table, write_table
+from hwid_cli.records.model import Fit
+from tests.files.record_examples import (
+    EVERYTHING,
+    Everything,
+    WithMore,
+    assert_same,
+    example_fit,
+    failed_fit,
+)
+
+
+def in_memory():
+    return h5py.File(uuid4().hex, "w", driver="core", backing_store=False)
+
+
+@given(st.lists(st.none() | EVERYTHING, max_size=5))
+def test_every_list_of_records_comes_back_bit_by_bit(records):
+    with in_memory() as file:
+        write_table(file, records, Everything)
+        found = read_table(file, Everything)
+    assert len(found) == len(records)
+    for one, other in zip(found, records, strict=True):
+        assert_same(one, other)
+
+
+def test_fits_with_and_without_a_model_come_back():
+    fits = [example_fit(nb=1), failed_fit(), example_fit(nb=7, nf=0, seed=2)]
+    with in_memory() as file:
+        write_table(file, fits, Fit)
+        for found, fit in zip(read_table(file, Fit), fits, strict=True):
+            assert_same(found, fit)
+
+
+def test_one_row_of_every_data_set_is_one_record():
+    fits = [example_fit(nb=1), failed_fit(), example_fit(nb=3, seed=2)]
+    with in_memory() as file:
+        write_table(file, fits, Fit)
+        np.testing.assert_array_equal(file["rmsd"], [fit.rmsd for fit in fits])
+        assert file["status"].asstr()[1] == "failed"
+        assert file["model/is_present"][:].tolist() == [True, False, True]
+        numerator = file["model/numerator"][:]
+        assert file["model/numerator_length"][:].tolist() == [1, 0, 3]
+        np.testing.assert_array_equal(numerator[2], fits[2].model.numerator)
+        assert np.isnan(numerator[0, 1:]).all()
+
+
+def test_form_without_a_place_in_columns_is_an_error():
+    with in_memory() as file, pytest.raises(TypeError, match="inners: a tuple of reco"):
+        write_table(file, [], WithMore)
