@@ -1,0 +1,190 @@
+"""Stage ``crossval``: the RMSD of every model on every recording.
+
+One task simulates all models of one recording on one recording, one after the other, and
+keeps the RMSDs only: simulated signals are never held for more than one model.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from hwid_cli.campaign.cache import task_key
+from hwid_cli.campaign.identify import recording_key
+from hwid_cli.campaign.runner import RunSettings, Task, run_tasks
+from hwid_cli.maths.model.simulate import validation_output
+from hwid_cli.maths.scores import rmsd
+from hwid_cli.records.experiment import CrossvalOptions, OrdersOptions
+from hwid_cli.records.model import Fit, HammersteinWiener, StaticMap
+from hwid_cli.records.recordings import Recording
+from hwid_cli.records.results import CrossValidation
+
+STAGE = "crossval"
+STAGE_VERSION = 1
+
+# Why an RMSD is there or missing.
+OK, NO_MODEL, NOT_FINITE = "ok", "no model", "not finite"
+
+
+@dataclass(frozen=True, eq=False)
+class Deviations:
+    """RMSD of several models on one recording.
+
+    Parameters
+    ----------
+    rmsd : ndarray, shape (n_models,), [output unit]
+        NaN where there is none.
+    status : ndarray of str, shape (n_models,)
+        ``OK``, ``NO_MODEL`` or ``NOT_FINITE``.
+    """
+
+    rmsd: np.ndarray
+    status: np.ndarray
+
+
+def cross_validate(
+    fits: Sequence[Fit],
+    recordings: Sequence[Recording],
+    orders: OrdersOptions,
+    options: CrossvalOptions,
+    settings: RunSettings,
+) -> CrossValidation:
+    """Validate every model on every recording.
+
+    Parameters
+    ----------
+    fits : sequence of Fit
+        As ``identify_all`` gives them: recording by recording, orders within.
+    recordings : sequence of Recording
+        Those that judge.
+    orders : OrdersOptions
+    options : CrossvalOptions
+    settings : RunSettings
+
+    Returns
+    -------
+    CrossValidation
+    """
+    tasks = crossval_tasks(fits, recordings, orders)
+    done = run_tasks(tasks, settings)
+    n_grid = len(orders.nb) * len(orders.nk)
+    names = tuple(fit.name for fit in fits[::n_grid])
+    # Tasks run over (identified_on, validated_on), each with all of the grid.
+    shape = (len(names), len(recordings), len(orders.nb), len(orders.nk))
+    deviations = np.array([item.result.rmsd for item in done]).reshape(shape)
+    status = np.array([item.result.status for item in done]).reshape(shape)
+    return CrossValidation(
+        identified_on=names,
+        nb=orders.nb,
+        nk=orders.nk,
+        nk_role=orders.nk_role,
+        validated_on=tuple(recording.name for recording in recordings),
+        rmsd=np.moveaxis(deviations, 1, -1).copy(),
+        status=np.moveaxis(status, 1, -1).copy(),
+        unit=recordings[0].output_unit,
+        threshold=options.threshold,
+    )
+
+
+def crossval_tasks(
+    fits: Sequence[Fit], recordings: Sequence[Recording], orders: OrdersOptions
+) -> tuple[Task, ...]:
+    """List the tasks: for each recording's models, one for each judging recording.
+
+    Parameters
+    ----------
+    fits : sequence of Fit
+        Recording by recording, orders within.
+    recordings : sequence of Recording
+    orders : OrdersOptions
+
+    Returns
+    -------
+    tuple of Task
+    """
+    n_grid = len(orders.nb) * len(orders.nk)
+    contents = [recording_key(recording) for recording in recordings]
+    tasks = []
+    for first in range(0, len(fits), n_grid):
+        models = tuple(fit.model for fit in fits[first : first + n_grid])
+        model_keys = [None if model is None else _model_key(model) for model in models]
+        for recording, content in zip(recordings, contents, strict=True):
+            matters = {"models": model_keys, "recording": content}
+            tasks.append(
+                Task(
+                    key=task_key(STAGE, STAGE_VERSION, matters, []),
+                    name=f"{fits[first].name} on {recording.name}",
+                    function=_deviations,
+                    arguments=(models, recording),
+                    result_type=Deviations,
+                )
+            )
+    return tuple(tasks)
+
+
+def crossval_key(
+    fits: Sequence[Fit],
+    recordings: Sequence[Recording],
+    orders: OrdersOptions,
+    options: CrossvalOptions,
+) -> str:
+    """Content key of the whole stage: its RMSDs and the names on their axes.
+
+    Parameters
+    ----------
+    fits : sequence of Fit
+    recordings : sequence of Recording
+    orders : OrdersOptions
+    options : CrossvalOptions
+
+    Returns
+    -------
+    str
+    """
+    settings = {
+        "rmsds": [task.key for task in crossval_tasks(fits, recordings, orders)],
+        "identified_on": [fit.name for fit in fits],
+        "validated_on": [recording.name for recording in recordings],
+        "orders": orders,
+        "threshold": options.threshold,
+    }
+    return task_key(STAGE, STAGE_VERSION, settings, [])
+
+
+def _model_key(model: HammersteinWiener) -> str:
+    """Content key of a model: every number and word that it consists of."""
+    settings, arrays = _content(model, "")
+    return task_key("model", 1, settings, arrays)
+
+
+def _content(
+    part: HammersteinWiener | StaticMap, prefix: str
+) -> tuple[dict[str, object], list[np.ndarray]]:
+    settings: dict[str, object] = {}
+    arrays: list[np.ndarray] = []
+    for item in fields(part):
+        value, name = getattr(part, item.name), prefix + item.name
+        if isinstance(value, StaticMap):
+            inner_settings, inner_arrays = _content(value, f"{name}.")
+            settings |= inner_settings
+            arrays += inner_arrays
+        elif isinstance(value, np.ndarray):
+            arrays.append(value)
+        else:
+            settings[name] = value
+    return settings, arrays
+
+
+def _deviations(
+    models: Sequence[HammersteinWiener | None], recording: Recording
+) -> Deviations:
+    """RMSD of each model; a simulated signal lives only until it is scored."""
+    values = np.full(len(models), np.nan)
+    for number, model in enumerate(models):
+        if model is not None:
+            values[number] = rmsd(recording.output, validation_output(model, recording))
+    status = [
+        NO_MODEL if model is None else OK if np.isfinite(value) else NOT_FINITE
+        for model, value in zip(models, values, strict=True)
+    ]
+    return Deviations(values, np.array(status))

@@ -1,0 +1,48 @@
+"""Which candidate orders to try."""
+
+from hwid_cli.errors import ConfigError
+from hwid_cli.records.experiment import OrdersOptions
+from hwid_cli.records.model import Orders
+
+# Delay of the published grid, whose second axis counts poles, [samples].
+DELAY_OF_POLE_GRID = 1
+
+
+def candidate_orders(options: OrdersOptions) -> tuple[tuple[int, int, Orders], ...]:
+    """List the candidate orders, each with its place in the grid.
+
+    Parameters
+    ----------
+    options : OrdersOptions
+
+    Returns
+    -------
+    tuple of (nb, nk, Orders)
+        Row by row; ``nb`` and ``nk`` are the grid's axes as the configuration names
+        them. With ``nk_role: poles`` the orders are ``[nb, nk, 1]``, with ``delay``
+        ``[nb, nf, nk]``.
+
+    Raises
+    ------
+    ConfigError
+        If the grid lacks the number of poles.
+
+    Examples
+    --------
+    >>> candidate_orders(OrdersOptions(nb=(2,), nk=(3,)))
+    ((2, 3, Orders(nb=2, nf=3, nk=1)),)
+    """
+    if options.nk_role == "delay" and options.nf is None:
+        raise ConfigError(
+            "orders.nf: missing; expected the number of poles where nk_role is delay; "
+            "add nf, or set nk_role: poles"
+        )
+    return tuple(
+        (nb, nk, _orders(options, nb, nk)) for nb in options.nb for nk in options.nk
+    )
+
+
+def _orders(options: OrdersOptions, nb: int, nk: int) -> Orders:
+    if options.nk_role == "delay" and options.nf is not None:
+        return Orders(nb, options.nf, nk)
+    return Orders(nb, nk, DELAY_OF_POLE_GRID)
