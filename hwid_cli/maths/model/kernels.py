@@ -71,7 +71,21 @@ def filter_signal(
     delay: int,
     out: np.ndarray,
 ) -> None:
-    """Run ``q^-delay B(q)/F(q)`` along one signal; shapes as in `filter_columns`."""
+    """Run ``q^-delay B(q)/F(q)`` along one signal.
+
+    Parameters
+    ----------
+    signal : ndarray, shape (pad + n,)
+        With its past in front.
+    pad : int, [samples]
+        At least ``max(nf, nb - 1 + delay)``.
+    numerator : ndarray, shape (nb,)
+    denominator : ndarray, shape (nf + 1,)
+        Monic.
+    delay : int, [samples]
+    out : ndarray, shape (pad + n,)
+        The first ``pad`` values are read, the others written.
+    """
     nf = denominator.size - 1
     for t in range(pad, signal.size):
         value = 0.0
@@ -134,6 +148,11 @@ def piecewise_linear(
     argument: np.ndarray, break_points: np.ndarray, values: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Evaluate a piecewise linear map.
+
+    Parameters
+    ----------
+    argument : ndarray, shape (n,)
+    break_points, values : ndarray, shape (units,)
 
     Returns
     -------
@@ -205,6 +224,14 @@ def is_schur_stable(denominator: np.ndarray) -> bool:
     """Tell whether every root of a monic polynomial lies inside the unit circle.
 
     Schur-Cohn recursion on the reflection coefficients; no roots are computed.
+
+    Parameters
+    ----------
+    denominator : ndarray, shape (n + 1,)
+
+    Returns
+    -------
+    bool
     """
     a = denominator.copy()
     for order in range(a.size - 1, 0, -1):
@@ -223,6 +250,12 @@ def bends(
     break_points: np.ndarray, values: np.ndarray, with_positions: bool
 ) -> tuple[np.ndarray, np.ndarray]:
     """Changes of slope of a piecewise linear map, in units of its mean slope.
+
+    Parameters
+    ----------
+    break_points, values : ndarray, shape (units,)
+    with_positions : bool
+        Whether the break-points have columns in the jacobian.
 
     Returns
     -------

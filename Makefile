@@ -1,0 +1,81 @@
+# Everything below needs only make and Python >= 3.11; .venv is made on demand.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+HWID := $(BIN)/hwid
+# Each stamp is as old as the installation that it stands for.
+RUN := $(VENV)/installed-run
+DEV := $(VENV)/installed-dev
+
+.DEFAULT_GOAL := help
+.PHONY: help install run test test-all check format smoke bench clean \
+        simulate calibrate identify crossval thesis chapter2 hsm150
+
+help:  ## show these targets
+	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / {printf "  make %-10s %s\n", $$1, $$2}' Makefile
+
+$(RUN): pyproject.toml
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { \
+	  echo "$(PYTHON) is older than Python 3.11 or missing; name a newer one:" \
+	       "make PYTHON=python3.12" >&2; exit 1; }
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable .
+	@touch $@
+
+# pip knows dependency groups since 25.1.
+$(DEV): $(RUN)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check 'pip>=25.1'
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --group dev
+	@touch $@
+
+install: $(DEV)  ## make .venv with everything that tests and checks need
+
+run: $(RUN)  ## the main job on the virtual gun: raw measurements in, tables out
+	$(HWID) run configs/demo.yaml
+
+test: $(DEV)  ## fast tests
+	$(BIN)/python -m pytest --quiet
+
+test-all: $(DEV)  ## all tests, also the slow ones
+	$(BIN)/python -m pytest --quiet -m ''
+
+check: $(DEV)  ## lint, format, types, import contracts
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+format: $(DEV)  ## put the code into form
+	$(BIN)/ruff check --fix
+	$(BIN)/ruff format
+
+smoke: $(DEV)  ## every stage on tiny recordings, twice
+	$(BIN)/python tests/smoke.py
+
+bench: $(DEV)  ## speed and accuracy against what a user would write
+	@for file in tests/benchmarks/bench_*.py; do $(BIN)/python "$$file" || exit 1; done
+
+simulate: $(RUN)  ## stage: virtual measurements of the gun
+	$(HWID) simulate configs/thesis.yaml
+
+calibrate: $(RUN)  ## stage: calibrate them
+	$(HWID) calibrate configs/thesis.yaml
+
+identify: $(RUN)  ## stage: models for every recording and every order
+	$(HWID) identify configs/thesis.yaml
+
+crossval: $(RUN)  ## stage: every model on every recording
+	$(HWID) crossval configs/thesis.yaml
+
+thesis: $(RUN)  ## all stages at full size: 43 recordings x 100 orders
+	$(HWID) run configs/thesis.yaml
+
+chapter2: $(RUN)  ## all stages on the simulated servo
+	$(HWID) run configs/chapter2.yaml
+
+hsm150: $(RUN)  ## all stages on measurements of a real servo motor
+	$(HWID) run configs/hsm150.yaml
+
+clean:  ## remove .venv and caches; results stay
+	rm -rf $(VENV) .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
+	find hwid_cli tests -name __pycache__ -type d -prune -exec rm -rf {} +

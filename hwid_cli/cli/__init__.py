@@ -1,0 +1,1 @@
+"""Thin commands: parse, read, compute, write, show."""

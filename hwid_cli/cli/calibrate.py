@@ -1,0 +1,137 @@
+"""``hwid calibrate``: raw measurements in, recordings of equal length out."""
+
+from typing import TYPE_CHECKING
+
+import click
+
+from hwid_cli.cli.options import Choices, stage_options
+
+if TYPE_CHECKING:
+    from hwid_cli.cli.session import Session
+    from hwid_cli.files.results import Calibrated
+    from hwid_cli.records.recordings import RawRecording
+
+
+@click.command("calibrate")
+@stage_options
+def command(choices: Choices) -> None:
+    """Cut recordings to their useful part and take offsets off.
+
+    Reads the raw recordings, applies the recipe of each kind, replaces single damaged
+    samples, and writes calibrated.h5 and a figure before/after of each recording.
+    """
+    from hwid_cli.cli.session import open_session, say
+    from hwid_cli.report.tables import calibration_table
+
+    session = open_session(choices, "calibrate")
+    calibrated = calibrate_stage(session)
+    say(session, calibration_table(calibrated.logs))
+    say(session, f"results: {session.calibrated_path}, {session.out / 'figures'}")
+
+
+def calibrate_stage(session: "Session") -> "Calibrated":
+    """Bring ``calibrated.h5`` up to date.
+
+    Parameters
+    ----------
+    session : Session
+
+    Returns
+    -------
+    Calibrated
+    """
+    from hwid_cli.campaign.calibrate import calibrate_all, calibration_key
+    from hwid_cli.cli.session import is_unchanged, provenance, say, start_timer
+    from hwid_cli.files.recordings import read_recordings
+    from hwid_cli.files.results import Calibrated, read_calibrated, write_calibrated
+
+    find_measurements(session)
+    timer = start_timer()
+    raws = read_recordings(session.experiment, session.out)
+    options = session.experiment.calibrate
+    key = calibration_key(raws, options)
+    is_old = is_unchanged(session, "calibrate", key)
+    if is_old:
+        calibrated = read_calibrated(session.calibrated_path)
+    else:
+        recordings, logs = calibrate_all(raws, options)
+        origin = provenance(session, key, recordings)
+        write_calibrated(session.calibrated_path, recordings, logs, origin)
+        calibrated = Calibrated(recordings, logs, key)
+    if options is not None:
+        draw_figures(session, raws, calibrated, only_missing=is_old)
+    state = "from the cache" if is_old else "done"
+    say(
+        session,
+        f"calibrate: {len(raws)} recordings {state}, "
+        f"{_what_changed(session, calibrated)}, {timer()}",
+    )
+    return calibrated
+
+
+def _what_changed(session: "Session", calibrated: "Calibrated") -> str:
+    if session.experiment.calibrate is None:
+        return "left as they are (no calibrate: section)"
+    n_repaired = sum(
+        len(log.repaired_input) + len(log.repaired_output) for log in calibrated.logs
+    )
+    return f"{n_repaired} damaged samples replaced"
+
+
+def find_measurements(session: "Session") -> None:
+    """Make virtual measurements up to date, or end the program if optional ones lack.
+
+    Parameters
+    ----------
+    session : Session
+
+    Raises
+    ------
+    click.exceptions.Exit
+        With code 0 and one line that says where to put the data.
+    """
+    from hwid_cli.cli.simulate import simulate_stage
+    from hwid_cli.files.recordings import (
+        find_files,
+        missing_files_message,
+        recordings_base,
+    )
+
+    if session.experiment.simulate is not None:
+        simulate_stage(session)
+    base = recordings_base(session.experiment, session.out)
+    if not find_files(session.experiment, base):
+        click.echo(f"skipped: {missing_files_message(session.experiment, base)}")
+        raise click.exceptions.Exit(0)
+
+
+def draw_figures(
+    session: "Session",
+    raws: "list[RawRecording]",
+    calibrated: "Calibrated",
+    *,
+    only_missing: bool,
+) -> None:
+    """Draw each recording before and after calibration.
+
+    Parameters
+    ----------
+    session : Session
+    raws : list of RawRecording
+    calibrated : Calibrated
+        In the same order.
+    only_missing : bool
+        Whether figures that are there may stay.
+    """
+    folder = session.out / "figures" / "calibrate"
+    paths = [folder / f"{raw.name}.png" for raw in raws]
+    if only_missing and all(path.is_file() for path in paths):
+        return
+    from hwid_cli.files.replaced_files import replace_file
+    from hwid_cli.report.plots import as_png, calibration_figure
+
+    for path, raw, recording, log in zip(
+        paths, raws, calibrated.recordings, calibrated.logs, strict=True
+    ):
+        if not (only_missing and path.is_file()):
+            replace_file(path, as_png(calibration_figure(raw, recording, log)))

@@ -1,0 +1,125 @@
+"""``hwid crossval``: the RMSD of every model on every recording."""
+
+from typing import TYPE_CHECKING
+
+import click
+
+from hwid_cli.cli.identify import Identified, identify_stage, show_fits
+from hwid_cli.cli.options import Choices, stage_options
+
+if TYPE_CHECKING:
+    from hwid_cli.cli.session import Session
+    from hwid_cli.records.results import CrossValidation
+
+
+@click.command("crossval")
+@stage_options
+def command(choices: Choices) -> None:
+    """Validate every model on every recording.
+
+    Writes the tensor of RMSDs to results.h5:/crossval, crossval.csv and coverage.csv,
+    and shows the models that cover the most recordings.
+    """
+    from hwid_cli.cli.session import open_session, say
+
+    session = open_session(choices, "crossval")
+    identified, crossval = crossval_stage(session)
+    show_fits(session, identified)
+    show_coverage(session, identified, crossval)
+    say(session, f"\nresults: {session.results_path}, crossval.csv, coverage.csv")
+
+
+def crossval_stage(session: "Session") -> "tuple[Identified, CrossValidation]":
+    """Bring ``results.h5:/crossval`` and its CSV files up to date.
+
+    Parameters
+    ----------
+    session : Session
+
+    Returns
+    -------
+    Identified, CrossValidation
+    """
+    from hwid_cli.campaign.crossval import cross_validate, crossval_key
+    from hwid_cli.campaign.selection import select_recordings
+    from hwid_cli.cli.session import (
+        is_unchanged,
+        provenance,
+        say,
+        stage_tasks,
+        start_timer,
+    )
+    from hwid_cli.files.results import read_crossval, write_crossval
+    from hwid_cli.records.experiment import CrossvalOptions
+
+    experiment, path = session.experiment, session.results_path
+    identified = identify_stage(session)
+    options = experiment.crossval or CrossvalOptions()
+    judges = select_recordings(
+        identified.recordings,
+        options.recordings,
+        key=f"{experiment.source}: crossval.recordings",
+        held_out=() if experiment.test is None else experiment.test.recordings,
+    )
+    timer = start_timer()
+    key = crossval_key(identified.fits, judges, experiment.orders, options)
+    if is_unchanged(session, "crossval", key):
+        crossval = read_crossval(path)
+        done = len(crossval.identified_on) * len(crossval.validated_on)
+        say(
+            session,
+            f"crossval: {done} pairs from the cache, 0 computed, {timer()}",
+        )
+    else:
+        n_grid = len(experiment.orders.nb) * len(experiment.orders.nk)
+        total = len(identified.fits) // n_grid * len(judges)
+        with stage_tasks(session, "crossval", total, "pairs") as settings:
+            crossval = cross_validate(
+                identified.fits, judges, experiment.orders, options, settings
+            )
+        write_crossval(path, crossval, provenance(session, key, judges))
+    write_tables(session, identified, crossval)
+    return identified, crossval
+
+
+def write_tables(
+    session: "Session", identified: Identified, crossval: "CrossValidation"
+) -> None:
+    """Write ``crossval.csv`` and ``coverage.csv``.
+
+    Parameters
+    ----------
+    session : Session
+    identified : Identified
+    crossval : CrossValidation
+    """
+    from hwid_cli.campaign.ranking import score_models
+    from hwid_cli.files.result_tables import write_coverage_csv, write_crossval_csv
+
+    scores = score_models(identified.fits, crossval)
+    write_crossval_csv(session.out / "crossval.csv", crossval)
+    write_coverage_csv(session.out / "coverage.csv", scores, len(crossval.validated_on))
+
+
+def show_coverage(
+    session: "Session", identified: Identified, crossval: "CrossValidation"
+) -> None:
+    """Show the models that cover the most recordings.
+
+    Parameters
+    ----------
+    session : Session
+    identified : Identified
+    crossval : CrossValidation
+    """
+    from hwid_cli.campaign.ranking import best_of_each, score_models
+    from hwid_cli.cli.session import say, screen_width
+    from hwid_cli.report.tables import coverage_table, cross_table
+
+    scores = score_models(identified.fits, crossval)
+    best = best_of_each(scores, crossval.identified_on)
+    say(
+        session,
+        f"\n{coverage_table(scores, crossval, nf=session.experiment.orders.nf)}",
+    )
+    say(session, f"\n{cross_table(best, crossval, width=screen_width())}")

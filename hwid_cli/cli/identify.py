@@ -1,0 +1,112 @@
+"""``hwid identify``: one model for every recording and every pair of orders."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import click
+
+from hwid_cli.cli.calibrate import calibrate_stage
+from hwid_cli.cli.options import Choices, stage_options
+
+if TYPE_CHECKING:
+    from hwid_cli.cli.session import Session
+    from hwid_cli.records.model import Fit
+    from hwid_cli.records.recordings import Recording
+
+
+@dataclass(frozen=True, eq=False)
+class Identified:
+    """What identification used and gave.
+
+    Parameters
+    ----------
+    recordings : tuple of Recording
+        All calibrated ones.
+    fits : tuple of Fit
+        Recording by recording, orders within.
+    """
+
+    recordings: "tuple[Recording, ...]"
+    fits: "tuple[Fit, ...]"
+
+
+@click.command("identify")
+@stage_options
+def command(choices: Choices) -> None:
+    """Fit a model to every recording for every pair of orders.
+
+    Writes the models to results.h5:/identify and shows the three best of each
+    recording.
+    """
+    from hwid_cli.cli.session import open_session, say
+
+    session = open_session(choices, "identify")
+    show_fits(session, identify_stage(session))
+    say(session, f"results: {session.results_path}")
+
+
+def identify_stage(session: "Session") -> Identified:
+    """Bring ``results.h5:/identify`` up to date.
+
+    Parameters
+    ----------
+    session : Session
+
+    Returns
+    -------
+    Identified
+    """
+    from hwid_cli.campaign.identify import identify_all, identify_key
+    from hwid_cli.campaign.order_grid import candidate_orders
+    from hwid_cli.campaign.selection import select_recordings
+    from hwid_cli.cli.session import (
+        is_unchanged,
+        provenance,
+        say,
+        stage_tasks,
+        start_timer,
+    )
+    from hwid_cli.files.results import read_fits, write_fits
+
+    experiment, path = session.experiment, session.results_path
+    recordings = calibrate_stage(session).recordings
+    chosen = select_recordings(
+        recordings,
+        None if experiment.identify is None else experiment.identify.recordings,
+        key=f"{experiment.source}: identify.recordings",
+        held_out=() if experiment.test is None else experiment.test.recordings,
+    )
+    timer = start_timer()
+    key = identify_key(chosen, experiment.orders, experiment.fit)
+    if is_unchanged(session, "identify", key):
+        fits = read_fits(path)
+        say(
+            session,
+            f"identify: {len(fits)} fits from the cache, 0 computed, {timer()}",
+        )
+        return Identified(recordings, fits)
+    total = len(chosen) * len(candidate_orders(experiment.orders))
+    with stage_tasks(session, "identify", total, "fits") as settings:
+        fits = identify_all(chosen, experiment.orders, experiment.fit, settings)
+    write_fits(path, fits, experiment.orders, provenance(session, key, chosen))
+    return Identified(recordings, fits)
+
+
+def show_fits(session: "Session", identified: Identified) -> None:
+    """Show the best models of each recording and how the fits ended.
+
+    Parameters
+    ----------
+    session : Session
+    identified : Identified
+    """
+    from hwid_cli.campaign.ranking import best_fits, count_statuses
+    from hwid_cli.cli.session import say
+    from hwid_cli.report.tables import best_models_table, status_line
+
+    table = best_models_table(
+        best_fits(identified.fits),
+        identified.recordings[0].output_unit,
+        nk_is_delay=session.experiment.orders.nk_role == "delay",
+    )
+    say(session, f"\n{table}\n\n{status_line(count_statuses(identified.fits))}")

@@ -1,0 +1,109 @@
+"""The ``hwid`` command: its subcommands, log levels, and the one place for errors."""
+
+import errno
+import logging
+
+import click
+
+from hwid_cli import __version__
+from hwid_cli.cli import calibrate, crossval, identify, run, simulate
+from hwid_cli.errors import HwidError
+
+# What a disk or a folder may refuse, which is no fault of the program.
+_MENDABLE = (
+    errno.ENOSPC,
+    errno.EDQUOT,
+    errno.EACCES,
+    errno.EPERM,
+    errno.EROFS,
+)
+EXIT_ERROR, EXIT_INTERRUPTED = 1, 130
+
+
+class _Commands(click.Group):
+    """Turns what a user can mend into one line and an exit code."""
+
+    def invoke(self, ctx: click.Context) -> object:
+        """Run the chosen command.
+
+        Parameters
+        ----------
+        ctx : click.Context
+
+        Returns
+        -------
+        object
+            What the command returns.
+        """
+        try:
+            return super().invoke(ctx)
+        except HwidError as error:
+            _complain(str(error))
+            ctx.exit(EXIT_ERROR)
+        except OSError as error:
+            if error.errno not in _MENDABLE:
+                raise
+            _complain(f"{error.filename}: {error.strerror}; mend it, or choose --out")
+            ctx.exit(EXIT_ERROR)
+        except KeyboardInterrupt:
+            _complain("interrupted; what was finished is kept, run again to go on")
+            ctx.exit(EXIT_INTERRUPTED)
+
+    def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002
+        """Name the commands in the order in which they work.
+
+        Parameters
+        ----------
+        ctx : click.Context
+
+        Returns
+        -------
+        list of str
+        """
+        return list(self.commands)
+
+
+def _complain(message: str) -> None:
+    click.echo(f"hwid: {' '.join(message.split())}", err=True)
+
+
+def set_log_levels(*, verbose: bool, quiet: bool) -> None:
+    """Send log lines to stderr, more or fewer of them.
+
+    Parameters
+    ----------
+    verbose : bool
+        Also what the program is doing.
+    quiet : bool
+        Errors only.
+    """
+    level = logging.ERROR if quiet else logging.DEBUG if verbose else logging.WARNING
+    logger = logging.getLogger("hwid_cli")
+    logger.setLevel(level)
+    # Not the root logger: other libraries say more than a user wants to read.
+    if not any(isinstance(handler, _ToStderr) for handler in logger.handlers):
+        logger.addHandler(_ToStderr())
+
+
+class _ToStderr(logging.Handler):
+    """Writes log lines as the errors are written."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        _complain(self.format(record))
+
+
+@click.group(cls=_Commands, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(__version__, prog_name="hwid")
+@click.pass_context
+def main(ctx: click.Context) -> None:
+    """Identify models of servo drives from few measurements.
+
+    Every command takes one configuration file; configs/README.md explains its keys. A
+    stage runs the stages before it where they are missing, and answers from the cache
+    what it has computed before.
+    """
+    ctx.obj = set_log_levels
+
+
+for _module in (run, simulate, calibrate, identify, crossval):
+    main.add_command(_module.command)

@@ -1,0 +1,210 @@
+"""One run of the program: its experiment, its folder, and who computes.
+
+Imported by commands when they run, so that ``hwid --help`` stays fast.
+"""
+
+import shutil
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import click
+
+from hwid_cli.campaign.runner import RunSettings, TaskDone, Workers
+from hwid_cli.cli.options import Choices
+from hwid_cli.errors import ConfigError
+from hwid_cli.files.config import describe_experiment, load_experiment
+from hwid_cli.files.hdf5_store import Hdf5Store
+from hwid_cli.files.result_files import Provenance, read_stage_key
+from hwid_cli.records.experiment import Experiment
+from hwid_cli.records.recordings import Recording
+from hwid_cli.report.progress import StageProgress
+
+STAGES = ("simulate", "calibrate", "identify", "crossval")
+
+
+@dataclass(frozen=True, eq=False)
+class Session:
+    """What all stages of one run share.
+
+    Parameters
+    ----------
+    experiment : Experiment
+    out : Path
+        Folder of the results; exists.
+    workers : Workers
+    forced : tuple of str
+        Stages that ignore their cached results.
+    is_quiet : bool
+    """
+
+    experiment: Experiment
+    out: Path
+    workers: Workers
+    forced: tuple[str, ...]
+    is_quiet: bool
+
+    @property
+    def calibrated_path(self) -> Path:
+        """File of calibrated recordings."""
+        return self.out / "calibrated.h5"
+
+    @property
+    def results_path(self) -> Path:
+        """File of models and scores."""
+        return self.out / "results.h5"
+
+
+def open_session(choices: Choices, *stages: str) -> Session:
+    """Read the configuration and make the folder of the results.
+
+    Parameters
+    ----------
+    choices : Choices
+    *stages : str
+        What ``--force`` computes again.
+
+    Returns
+    -------
+    Session
+
+    Raises
+    ------
+    ConfigError
+        If the configuration or the folder cannot be used.
+    """
+    experiment = load_experiment(choices.config)
+    out = choices.out or Path("results") / experiment.name
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ConfigError(
+            f"--out {out}: {error.strerror}; expected a folder that can be made and "
+            "written; choose another one"
+        ) from error
+    return Session(
+        experiment=experiment,
+        out=out,
+        workers=Workers(choices.jobs, choices.backend, choices.scheduler),
+        forced=stages if choices.force else (),
+        is_quiet=choices.quiet,
+    )
+
+
+def say(session: Session, text: str) -> None:
+    """Show text to people, unless they asked for quiet.
+
+    Parameters
+    ----------
+    session : Session
+    text : str
+    """
+    if not session.is_quiet:
+        click.echo(text)
+
+
+def screen_width() -> int:
+    """Characters in a line of the terminal; 80 where there is none.
+
+    Returns
+    -------
+    int, [characters]
+    """
+    return shutil.get_terminal_size((80, 24)).columns
+
+
+def is_unchanged(session: Session, stage: str, key: str) -> bool:
+    """Whether the stored results of a stage are those that it would give now.
+
+    Parameters
+    ----------
+    session : Session
+    stage : str
+    key : str
+        Of everything that the stage depends on.
+
+    Returns
+    -------
+    bool
+    """
+    if stage in session.forced:
+        return False
+    is_calibrate = stage == "calibrate"
+    path = session.calibrated_path if is_calibrate else session.results_path
+    return read_stage_key(path, stage) == key
+
+
+def provenance(
+    session: Session, key: str, recordings: tuple[Recording, ...]
+) -> Provenance:
+    """Say where results come from.
+
+    Parameters
+    ----------
+    session : Session
+    key : str
+        Of everything that the stage depends on.
+    recordings : tuple of Recording
+        That it used.
+
+    Returns
+    -------
+    Provenance
+    """
+    return Provenance(
+        key,
+        describe_experiment(session.experiment),
+        {recording.name: recording.sha256 for recording in recordings},
+    )
+
+
+@contextmanager
+def stage_tasks(
+    session: Session, stage: str, total: int, unit: str
+) -> Iterator[RunSettings]:
+    """Run the tasks of a stage under a progress bar, and sum up at the end.
+
+    Parameters
+    ----------
+    session : Session
+    stage : str
+    total : int, [-]
+        Tasks.
+    unit : str
+        What one task is, in the plural.
+
+    Yields
+    ------
+    RunSettings
+    """
+    timer = start_timer()
+    with StageProgress(stage, total, unit, is_silent=session.is_quiet) as progress:
+
+        def on_done(item: TaskDone) -> None:
+            progress.advance(from_cache=item.from_cache)
+
+        yield RunSettings(
+            store=Hdf5Store(session.out / "cache"),
+            workers=session.workers,
+            force=stage in session.forced,
+            on_done=on_done,
+        )
+    say(
+        session,
+        f"{stage}: {progress.from_cache} {unit} from the cache, "
+        f"{progress.computed} computed, {timer()}",
+    )
+
+
+def start_timer() -> Callable[[], str]:
+    """Start a clock.
+
+    Returns
+    -------
+    callable
+        Gives the time since, as text with its unit.
+    """
+    start = time.perf_counter()
+    return lambda: f"{time.perf_counter() - start:.1f} s"

@@ -1,0 +1,97 @@
+"""Progress of a long stage: a bar with rate and time left, nothing without a terminal."""
+
+import sys
+from types import TracebackType
+
+from rich.console import Console
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    ProgressColumn,
+    Task,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
+from rich.text import Text
+
+
+class StageProgress:
+    """Counts what is done and shows it on a terminal.
+
+    Parameters
+    ----------
+    stage : str
+    total : int, [-]
+        Tasks that are to come.
+    unit : str
+        What one task is, in the plural.
+    is_silent : bool
+        True never shows anything.
+
+    Attributes
+    ----------
+    from_cache, computed : int, [-]
+        Tasks that were answered from the cache, and others.
+    """
+
+    def __init__(self, stage: str, total: int, unit: str, *, is_silent: bool) -> None:
+        self.from_cache = 0
+        self.computed = 0
+        console = Console(file=sys.stderr)
+        self._bar = Progress(
+            TextColumn("{task.description}"),
+            BarColumn(),
+            MofNCompleteColumn(),
+            _Rate(unit),
+            TimeElapsedColumn(),
+            TextColumn("left"),
+            TimeRemainingColumn(),
+            console=console,
+            disable=is_silent or not console.is_terminal,
+            transient=True,
+        )
+        self._task = self._bar.add_task(stage, total=total, computed=0)
+
+    def __enter__(self) -> "StageProgress":
+        """Show the bar."""
+        self._bar.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Take the bar away."""
+        self._bar.stop()
+
+    def advance(self, *, from_cache: bool) -> None:
+        """Count one more task.
+
+        Parameters
+        ----------
+        from_cache : bool
+            Whether nothing had to be computed for it.
+        """
+        if from_cache:
+            self.from_cache += 1
+        else:
+            self.computed += 1
+        self._bar.update(self._task, advance=1, computed=self.computed)
+
+
+class _Rate(ProgressColumn):
+    """Computed tasks per second."""
+
+    def __init__(self, unit: str) -> None:
+        super().__init__()
+        self._unit = unit
+
+    def render(self, task: Task) -> Text:
+        """Write the rate; empty until there is one."""
+        if not task.elapsed or not task.fields["computed"]:
+            return Text("")
+        return Text(f"{task.fields['computed'] / task.elapsed:.1f} {self._unit}/s")

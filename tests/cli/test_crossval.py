@@ -1,0 +1,95 @@
+import csv
+
+import h5py
+import numpy as np
+
+
+def rows_of(path):
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_the_tensor_and_the_tables_are_written(hwid, out):
+    result = hwid("crossval")
+
+    assert result.exit_code == 0, result.output
+    assert "crossval: 0 pairs from the cache, 9 computed" in result.stdout
+    with h5py.File(out / "results.h5") as file:
+        tensor = file["crossval/rmsd"]
+        assert tensor.shape == (3, 1, 2, 3)
+        assert tensor.dtype == np.float64
+        assert [dim.label for dim in tensor.dims] == [
+            "identified_on",
+            "nb",
+            "nk",
+            "validated_on",
+        ]
+        assert "identify" in file
+    rows = rows_of(out / "crossval.csv")
+    assert len(rows) == 18
+    assert list(rows[0]) == [
+        "identified_on",
+        "nb",
+        "nk",
+        "validated_on",
+        "rmsd",
+        "status",
+    ]
+    coverage = rows_of(out / "coverage.csv")
+    assert len(coverage) == 6
+    assert {row["of"] for row in coverage} == {"3"}
+
+
+def test_the_three_published_tables_are_shown(after_run, hwid):
+    text = hwid("crossval").stdout
+
+    for table in ("T3.2.2-1", "T3.2.2.2-2", "T3.2.2.2-3"):
+        assert f"(form of {table})" in text
+
+
+def test_a_second_run_answers_from_the_cache_with_the_same_numbers(
+    after_run, hwid, out
+):
+    first = (out / "crossval.csv").read_bytes()
+    result = hwid("crossval")
+
+    assert "identify: 6 fits from the cache, 0 computed" in result.stdout
+    assert "crossval: 9 pairs from the cache, 0 computed" in result.stdout
+    assert (out / "crossval.csv").read_bytes() == first
+
+
+def test_a_lost_results_file_is_made_from_the_cache_with_the_same_numbers(
+    after_run, hwid, out
+):
+    first = (out / "crossval.csv").read_bytes()
+    (out / "results.h5").unlink()
+    result = hwid("crossval")
+
+    assert "identify: 6 fits from the cache, 0 computed" in result.stdout
+    assert "crossval: 9 pairs from the cache, 0 computed" in result.stdout
+    assert (out / "crossval.csv").read_bytes() == first
+
+
+def test_two_jobs_give_the_numbers_of_one(after_run, hwid, out, tmp_path):
+    result = hwid("crossval", "--jobs", "2", folder=tmp_path / "two")
+
+    assert result.exit_code == 0, result.output
+    one, two = (
+        (folder / "crossval.csv").read_bytes() for folder in (out, tmp_path / "two")
+    )
+    assert one == two
+
+
+def test_another_threshold_counts_anew_without_simulating(after_run, hwid, edit, out):
+    edit("threshold: 0.01", "threshold: 1000.0")
+    result = hwid("crossval")
+
+    assert "crossval: 9 pairs from the cache, 0 computed" in result.stdout
+    assert {row["coverage"] for row in rows_of(out / "coverage.csv")} == {"3"}
+
+
+def test_chosen_recordings_judge(after_run, hwid, edit, out):
+    edit("{threshold: 0.01}", "{threshold: 0.01, recordings: [step_12]}")
+    hwid("crossval")
+
+    assert {row["validated_on"] for row in rows_of(out / "crossval.csv")} == {"step_12"}

@@ -1,0 +1,87 @@
+import pytest
+
+
+def test_all_stages_run_in_order_and_the_results_are_named(hwid, out):
+    result = hwid("run")
+
+    assert result.exit_code == 0, result.output
+    stages = [line.split(":")[0] for line in result.stdout.splitlines()[:4]]
+    assert stages == ["simulate", "calibrate", "identify", "crossval"]
+    assert result.stdout.splitlines()[-1] == f"results: {out}"
+
+
+def test_a_second_run_computes_nothing_and_force_computes_all(after_run, hwid):
+    assert hwid("run").stdout.count("from the cache, 0 computed") == 2
+
+    text = hwid("run", "--force").stdout
+    assert "simulate: 3 measurements computed" in text
+    assert "calibrate: 3 recordings done" in text
+    assert "0 fits from the cache, 6 computed" in text
+    assert "0 pairs from the cache, 9 computed" in text
+
+
+def test_only_the_stages_that_are_named_run(hwid, edit, out):
+    edit("identify: {}\ncrossval: {threshold: 0.01}", "")
+    result = hwid("run")
+
+    assert result.exit_code == 0
+    assert (out / "calibrated.h5").is_file()
+    assert not (out / "results.h5").exists()
+
+
+def test_stages_of_later_versions_are_named_and_left_out(after_run, hwid, edit):
+    edit("identify: {}", "diagnose: {}")
+    result = hwid("run")
+
+    assert result.exit_code == 0
+    assert "diagnose: named in" in result.stdout
+
+
+def test_a_configuration_without_any_stage_is_refused(hwid, tmp_path):
+    path = tmp_path / "nothing.yaml"
+    path.write_text("name: nothing\n")
+    result = hwid("run", path=path)
+
+    assert result.exit_code == 1
+    assert "names no stage" in result.stderr
+
+
+def test_a_missing_configuration_is_named(hwid, tmp_path):
+    result = hwid("run", path=tmp_path / "no.yaml")
+
+    assert result.exit_code == 1
+    assert "no.yaml" in result.stderr
+    assert result.stderr.count("\n") == 1
+
+
+def test_a_folder_that_cannot_be_made_is_named(hwid, tmp_path):
+    (tmp_path / "file").write_text("")
+    result = hwid("run", folder=tmp_path / "file" / "out")
+
+    assert result.exit_code == 1
+    assert "--out" in result.stderr
+    assert result.stderr.count("\n") == 1
+
+
+def test_the_default_folder_is_named_after_the_experiment(
+    config, tmp_path, monkeypatch
+):
+    from click.testing import CliRunner
+
+    from hwid_cli.cli.main import main
+
+    monkeypatch.chdir(tmp_path)
+    result = CliRunner().invoke(main, ["simulate", str(config)])
+
+    assert result.exit_code == 0
+    assert (tmp_path / "results" / "tiny" / "raw" / "plan.csv").is_file()
+
+
+@pytest.mark.parametrize("command", ["simulate", "calibrate", "identify", "crossval"])
+def test_an_unknown_key_is_refused_by_every_stage(hwid, edit, command):
+    edit("nk: [1, 2]", "nkk: [1, 2]")
+    result = hwid(command)
+
+    assert result.exit_code == 1
+    assert "orders.nkk" in result.stderr
+    assert "'nk'" in result.stderr

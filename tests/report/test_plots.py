@@ -1,0 +1,37 @@
+import numpy as np
+
+from hwid_cli.records.recordings import CalibrationLog, RawRecording, Recording
+from hwid_cli.report.plots import calibration_figure
+
+TIME = np.arange(500.0)
+RAW = RawRecording("r1", np.sin(TIME), np.cos(TIME), 0.01, output_unit="rad")
+RECORDING = Recording("r1", np.sin(TIME[100:400]), np.cos(TIME[100:400]), 0.01)
+LOG = CalibrationLog(
+    "r1", ("cut",), 100, 300, 500, 500, repaired_input=(120, 130), repaired_output=()
+)
+
+
+def test_the_figure_shows_both_columns_with_quantity_and_unit():
+    figure = calibration_figure(RAW, RECORDING, LOG)
+
+    upper, lower = figure.axes
+    assert upper.get_ylabel() == "input u [A]"
+    assert lower.get_ylabel() == "output y [rad]"
+    assert lower.get_xlabel().endswith("[s]")
+
+
+def test_what_was_cut_is_shaded_and_what_was_repaired_is_marked():
+    upper, lower = calibration_figure(RAW, RECORDING, LOG).axes
+
+    shaded = sorted(patch.get_x() for patch in upper.patches)
+    assert shaded == [0.0, 4.0]
+    marks = {line.get_label(): line for line in upper.lines}["repaired"]
+    np.testing.assert_allclose(marks.get_xdata(), [1.2, 1.3])
+    assert "repaired" not in {line.get_label() for line in lower.lines}
+
+
+def test_the_calibrated_signal_lies_where_it_was_in_the_raw_record():
+    upper, _ = calibration_figure(RAW, RECORDING, LOG).axes
+
+    line = {line.get_label(): line for line in upper.lines}["calibrated"]
+    assert line.get_xdata()[0] == 1.0

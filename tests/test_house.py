@@ -1,0 +1,217 @@
+"""The rules of the house that a program can check."""
+
+import ast
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from hwid_cli.cli.main import main
+
+PROJECT = Path(__file__).parents[1]
+SOURCES = sorted((PROJECT / "hwid_cli").rglob("*.py"))
+TESTS = sorted((PROJECT / "tests").rglob("*.py"))
+TOP_LEVEL = {
+    ".ci",
+    ".github",
+    ".gitignore",
+    "CHANGELOG.md",
+    "LICENSE",
+    "Makefile",
+    "README.md",
+    "configs",
+    "data",
+    "docs",
+    "hwid_cli",
+    "pyproject.toml",
+    "tests",
+}
+MOST_LINES_OF_MODULE = 330
+MOST_LINES_OF_FUNCTION = 45
+FORBIDDEN_NAMES = {"utils", "helpers", "common", "core", "misc"}
+
+
+def short(path):
+    return str(path.relative_to(PROJECT))
+
+
+def functions_of(path):
+    """Functions and methods of a file; what lies inside one belongs to it."""
+
+    def walk(node, outer):
+        for child in ast.iter_child_nodes(node):
+            if isinstance(child, ast.FunctionDef | ast.AsyncFunctionDef):
+                yield (*outer, child.name), child
+            elif isinstance(child, ast.ClassDef):
+                yield from walk(child, (*outer, child.name))
+            else:
+                yield from walk(child, outer)
+
+    return list(walk(ast.parse(path.read_text()), ()))
+
+
+def body_lines(function):
+    """Lines of a function without signature and docstring."""
+    body = function.body
+    if ast.get_docstring(function, clean=False) is not None:
+        body = body[1:]
+    return function.end_lineno - body[0].lineno + 1 if body else 0
+
+
+def is_click_command(function):
+    # The docstring of a command is its help; its one argument is told there.
+    return any("click." in ast.unparse(line) for line in function.decorator_list)
+
+
+def is_public(names):
+    return not any(name.startswith("_") for name in names)
+
+
+def arguments_of(function):
+    found = function.args
+    plain = [*found.posonlyargs, *found.args, *found.kwonlyargs]
+    extra = [item for item in (found.vararg, found.kwarg) if item is not None]
+    return {item.arg for item in (*plain, *extra)} - {"self", "cls"}
+
+
+def documented_parameters(docstring):
+    """Names in the Parameters section of a numpy docstring."""
+    section = re.search(
+        r"^Parameters\n-+\n(.*?)(?=^\w[^\n]*\n-+$|\Z)", docstring, re.DOTALL | re.M
+    )
+    if section is None:
+        return set()
+    heads = re.findall(r"^(\S[^:\n]*?)(?: :.*)?$", section[1], re.M)
+    return {name.strip().lstrip("*") for head in heads for name in head.split(",")}
+
+
+def test_the_docstring_reader_knows_a_missing_argument():
+    docstring = """First line.
+
+Parameters
+----------
+a, b : int, [-]
+    Two.
+*others : str
+
+Returns
+-------
+c : int
+"""
+    assert documented_parameters(docstring) == {"a", "b", "others"}
+
+
+def test_every_public_function_documents_every_argument():
+    faults = []
+    for path in SOURCES:
+        for names, function in functions_of(path):
+            if not is_public(names) or is_click_command(function):
+                continue
+            place = f"{short(path)}:{function.lineno} {'.'.join(names)}"
+            docstring = ast.get_docstring(function)
+            if not docstring:
+                faults.append(f"{place}: no docstring")
+                continue
+            missing = arguments_of(function) - documented_parameters(docstring)
+            if missing:
+                faults.append(f"{place}: {', '.join(sorted(missing))}")
+    assert faults == []
+
+
+def test_no_module_is_too_long():
+    long = {
+        short(path): lines
+        for path in (*SOURCES, *TESTS)
+        if (lines := len(path.read_text().splitlines())) > MOST_LINES_OF_MODULE
+    }
+    assert long == {}
+
+
+def test_no_function_is_too_long():
+    long = [
+        f"{short(path)}: {'.'.join(names)} has {body_lines(function)} lines"
+        for path in SOURCES
+        if path.name != "kernels.py"
+        for names, function in functions_of(path)
+        if body_lines(function) > MOST_LINES_OF_FUNCTION
+    ]
+    assert long == []
+
+
+def test_no_module_is_named_after_nothing():
+    assert not {path.stem for path in SOURCES} & FORBIDDEN_NAMES
+
+
+def test_nothing_outside_the_tests_is_named_like_a_test():
+    named = [
+        f"{short(path)}: {'.'.join(names)}"
+        for path in SOURCES
+        for names, _ in functions_of(path)
+        if names[-1].startswith("test")
+    ]
+    assert named == []
+
+
+def test_tests_mirror_the_package():
+    rooms = PROJECT / "hwid_cli"
+    strays = [
+        short(path)
+        for path in TESTS
+        if path.name.startswith("test_") and path.parent != PROJECT / "tests"
+        if not (rooms / path.parent.relative_to(PROJECT / "tests")).is_dir()
+        if "benchmarks" not in path.parts and "reference" not in path.parts
+    ]
+    assert strays == []
+
+
+def test_the_top_level_holds_what_it_should_and_nothing_else():
+    listed = subprocess.run(
+        ["git", "ls-files", "--cached", "--others", "--exclude-standard"],
+        cwd=PROJECT,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    if listed.returncode != 0:
+        pytest.skip("not a git clone")
+    names = [name for name in listed.stdout.splitlines() if (PROJECT / name).exists()]
+    assert {name.split("/")[0] for name in names} == TOP_LEVEL
+
+
+def test_import_contracts_hold():
+    done = subprocess.run(
+        [str(Path(sys.executable).parent / "lint-imports"), "--no-cache"],
+        cwd=PROJECT,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+@pytest.mark.parametrize("name", list(main.commands))
+def test_every_command_has_help(name):
+    command = main.commands[name]
+
+    assert command.help
+    for parameter in command.params:
+        if parameter.param_type_name == "option":
+            assert parameter.help, parameter.name
+
+
+def test_the_readme_has_a_row_for_every_command_and_no_other():
+    rows = re.findall(r"^\| `hwid (\w+) ", (PROJECT / "README.md").read_text(), re.M)
+    assert rows == list(main.commands)
+
+
+def test_every_make_target_that_ci_calls_exists():
+    makefile = (PROJECT / "Makefile").read_text()
+    targets = set(re.findall(r"^([a-z0-9-]+):", makefile, re.M))
+    for path in (".ci/run", ".github/workflows/ci.yml"):
+        called = re.findall(
+            r"^\W*(?:run: )?make ([a-z0-9-]+)", (PROJECT / path).read_text(), re.M
+        )
+        assert called
+        assert set(called) <= targets
