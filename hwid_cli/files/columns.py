@@ -78,6 +78,27 @@ def keep_rows(column: Column, selection: slice) -> Column:
     return replace(column, values=column.values[selection], rows=column.rows[selection])
 
 
+def block_means(column: Column, n: int) -> Column:
+    """Replace each block of n values by its mean; an incomplete last block goes.
+
+    Parameters
+    ----------
+    column : Column
+    n : int, [samples]
+
+    Returns
+    -------
+    Column
+        With the row in which each block begins.
+    """
+    if n == 1:
+        return column
+    whole = column.values[: column.values.size // n * n].reshape(-1, n)
+    return replace(
+        column, values=whole.mean(axis=1), rows=column.rows[::n][: whole.shape[0]]
+    )
+
+
 def place_of(path: Path, column: Column, index: int) -> str:
     """Name the place of a value, for a message.
 

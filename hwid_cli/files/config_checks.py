@@ -108,7 +108,7 @@ def _check_recordings(options: RecordingsOptions, file: str) -> None:
         last,
         f"an integer > first_sample = {first}",
     )
-    _require(options.every >= 1, f"{at}.every", options.every, "an integer >= 1")
+    _require(options.average >= 1, f"{at}.average", options.average, "an integer >= 1")
 
 
 def _check_columns(options: RecordingsOptions, at: str) -> None:

@@ -4,6 +4,7 @@
 cannot be read is set aside with the ending ``.bad`` and computed again.
 """
 
+import hashlib
 import logging
 from pathlib import Path
 from typing import TypeVar
@@ -19,6 +20,7 @@ _log = logging.getLogger(__name__)
 
 FORMAT = "hwid-cache"
 SCHEMA_VERSION = 1
+_SEAL_BYTES = hashlib.sha256().digest_size
 
 
 class Hdf5Store:
@@ -58,7 +60,8 @@ class Hdf5Store:
             _log.warning("%s: cannot be read (%s); computed again", path, error)
             return None
         try:
-            with h5py.File(h5py.h5f.open_file_image(content), "r") as file:
+            image = h5py.h5f.open_file_image(_unsealed(content))
+            with h5py.File(image, "r") as file:
                 check_format(file, format_name=FORMAT, version=SCHEMA_VERSION)
                 found = file.attrs.get("record")
                 if found != record_type.__name__:
@@ -91,7 +94,7 @@ class Hdf5Store:
             If it cannot be written.
         """
         with replaced_hdf5(
-            self._path(key), format_name=FORMAT, version=SCHEMA_VERSION
+            self._path(key), format_name=FORMAT, version=SCHEMA_VERSION, seal=_sealed
         ) as file:
             file.attrs["key"] = key
             file.attrs["record"] = type(record).__name__
@@ -99,6 +102,19 @@ class Hdf5Store:
 
     def _path(self, key: str) -> Path:
         return self._folder / key[:2] / f"{key}.h5"
+
+
+def _sealed(image: bytes) -> bytes:
+    """Add a checksum behind an HDF5 file; readers of HDF5 do not look there."""
+    return image + hashlib.sha256(image).digest()
+
+
+def _unsealed(content: bytes) -> bytes:
+    """Take the checksum off; HDF5 crashes the interpreter on some damaged files."""
+    image = content[:-_SEAL_BYTES]
+    if hashlib.sha256(image).digest() != content[-_SEAL_BYTES:]:
+        raise ValueError("content and checksum do not match")
+    return image
 
 
 def _set_aside(path: Path, error: Exception) -> None:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from hwid_cli.errors import ConfigError, MeasurementError
 from hwid_cli.files import recording_checks as checks
-from hwid_cli.files.columns import FileColumns, keep_rows
+from hwid_cli.files.columns import FileColumns, block_means, keep_rows
 from hwid_cli.files.recording_formats import read_columns
 from hwid_cli.files.recording_kinds import PLAN_NAME, kind_of, read_plan
 from hwid_cli.files.sampling import sample_uniformly
@@ -165,7 +165,7 @@ def _read_recording(path: Path, kind: str, experiment: Experiment) -> RawRecordi
     columns = _select(columns, slice(options.first_sample, last))
     checks.check_numbers(path, columns)
     columns, step = sample_uniformly(path, columns, options)
-    columns = _select(columns, slice(None, None, options.every))
+    columns = _averaged(columns, options.average)
     checks.check_equal_lengths(
         path, columns, kind, experiment.calibrate or CalibrateOptions()
     )
@@ -178,7 +178,7 @@ def _read_recording(path: Path, kind: str, experiment: Experiment) -> RawRecordi
         name=path.stem,
         input=columns.input.values * options.input_scale,
         output=columns.output.values * options.output_scale,
-        sample_time_s=float(f"{step * options.every:.{_STEP_DIGITS}g}"),
+        sample_time_s=float(f"{step * options.average:.{_STEP_DIGITS}g}"),
         kind=kind,
         source=str(path),
         sha256=digest,
@@ -192,6 +192,14 @@ def _select(columns: FileColumns, selection: slice) -> FileColumns:
         keep_rows(columns.input, selection),
         keep_rows(columns.output, selection),
         None if columns.time is None else keep_rows(columns.time, selection),
+    )
+
+
+def _averaged(columns: FileColumns, n: int) -> FileColumns:
+    return FileColumns(
+        block_means(columns.input, n),
+        block_means(columns.output, n),
+        None if columns.time is None else block_means(columns.time, n),
     )
 
 

@@ -4,7 +4,7 @@ HDF5 files are built in memory first: h5py was seen to crash the interpreter at 
 when the disk is full.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from uuid import uuid4
@@ -50,7 +50,12 @@ def replace_file(path: Path, content: bytes) -> None:
 
 @contextmanager
 def replaced_hdf5(
-    path: Path, *, format_name: str, version: int, start: bytes = b""
+    path: Path,
+    *,
+    format_name: str,
+    version: int,
+    start: bytes = b"",
+    seal: Callable[[bytes], bytes] = bytes,
 ) -> Iterator[h5py.File]:
     """Give an HDF5 file in memory that becomes the file on disk at the end.
 
@@ -63,6 +68,8 @@ def replaced_hdf5(
         Root attribute ``schema_version``.
     start : bytes
         HDF5 file to begin with; none gives an empty one.
+    seal : callable
+        From the finished file's bytes to those that are written.
 
     Yields
     ------
@@ -83,7 +90,7 @@ def replaced_hdf5(
         yield file
         file.flush()
         image = file.id.get_file_image()
-    replace_file(path, image)
+    replace_file(path, seal(image))
 
 
 def _in_memory(start: bytes) -> h5py.File:

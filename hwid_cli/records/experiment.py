@@ -43,7 +43,7 @@ class RecordingsOptions:
     output_scale: float = 1.0
     first_sample: int = 0
     last_sample: int | None = None
-    every: int = 1
+    average: int = 1
     optional: bool = False
 
 

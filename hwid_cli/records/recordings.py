@@ -8,7 +8,23 @@ KINDS = ("step", "sine", "random", "other")
 
 
 def frozen_vector(values: np.ndarray, name: str) -> np.ndarray:
-    """Return a read-only 1-D float64 copy; raise ValueError on another shape."""
+    """Read-only 1-D float64 copy.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+    name : str
+        For the message.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+
+    Raises
+    ------
+    ValueError
+        If the shape is another one.
+    """
     vector = np.array(values, dtype=np.float64)
     if vector.ndim != 1:
         raise ValueError(f"{name} must be 1-D, got shape {vector.shape}")

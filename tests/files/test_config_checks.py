@@ -17,7 +17,7 @@ def load(write_config):
     ("text", "message"),
     [
         ("kind: {stepp: a}", r"recordings.kind: found 'stepp'; did you mean 'step'\?"),
-        ("every: 0", r"recordings.every: found 0; expected an integer >= 1"),
+        ("average: 0", r"recordings.average: found 0; expected an integer >= 1"),
         ("first_sample: -1", r"recordings.first_sample: found -1; expected .* >= 0"),
         (
             "first_sample: 5, last_sample: 5",

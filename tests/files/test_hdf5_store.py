@@ -1,3 +1,4 @@
+import hashlib
 import logging
 import pickle
 import signal
@@ -56,40 +57,56 @@ def damage_bytes(path):
     path.write_bytes(bytes(content))
 
 
+def change(path, alter):
+    """Change an entry as another version of the program would, checksum and all."""
+    content = path.read_bytes()[:-32]
+    with h5py.File(h5py.h5f.open_file_image(content, flags=1)) as file:
+        alter(file)
+        file.flush()
+        image = file.id.get_file_image()
+    path.write_bytes(image + hashlib.sha256(image).digest())
+
+
 def damage_status(path):
-    with h5py.File(path, "r+") as file:
-        file["record"].attrs["status"] = "invented"
+    change(path, lambda file: file["record"].attrs.__setitem__("status", "invented"))
 
 
 def damage_field(path):
-    with h5py.File(path, "r+") as file:
-        del file["record/poles"]
+    change(path, lambda file: file.pop("record/poles"))
 
 
 def damage_version(path):
-    with h5py.File(path, "r+") as file:
-        file.attrs["schema_version"] = hdf5_store.SCHEMA_VERSION + 1
+    other = hdf5_store.SCHEMA_VERSION + 1
+    change(path, lambda file: file.attrs.__setitem__("schema_version", other))
+
+
+def damage_one_bit(path):
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 1
+    path.write_bytes(bytes(content))
 
 
 @pytest.mark.parametrize(
-    "damage",
+    ("damage", "reason"),
     [
-        damage_half,
-        damage_all,
-        damage_noise,
-        damage_bytes,
-        damage_status,
-        damage_field,
-        damage_version,
+        (damage_half, "content and checksum do not match"),
+        (damage_all, "content and checksum do not match"),
+        (damage_noise, "content and checksum do not match"),
+        (damage_bytes, "content and checksum do not match"),
+        (damage_one_bit, "content and checksum do not match"),
+        (damage_status, "status 'invented' is none of"),
+        (damage_field, "poles"),
+        (damage_version, "holds hwid-cache version 2, expected hwid-cache 1"),
     ],
 )
 def test_unusable_entry_is_reported_set_aside_and_made_again(
-    store, entry, caplog, damage
+    store, entry, caplog, damage, reason
 ):
     damage(entry)
     with caplog.at_level(logging.WARNING):
         assert store.get(KEY, Fit) is None
     assert f"{entry}: unusable (" in caplog.text
+    assert reason in caplog.text
     assert "set aside and computed again" in caplog.text
     assert not entry.exists()
     assert entry.with_suffix(".bad").exists()

@@ -54,14 +54,16 @@ def test_scales_multiply_the_columns(tiny, write_csv, signals):
     np.testing.assert_array_equal(recording.output, signals[2] * -2)
 
 
-def test_window_and_thinning_pick_samples_and_stretch_the_clock(tiny, write_csv):
+def test_averaging_takes_means_of_whole_blocks_and_stretches_the_clock(tiny, write_csv):
     n = 400
     time = np.arange(n) / 1000
     write_csv("a.csv", columns=(time, np.sin(time), np.cos(time)))
-    more = "first_sample: 100\nlast_sample: 289\nevery: 3"
+    more = "first_sample: 100\nlast_sample: 290\naverage: 3"
     (recording,) = read(tiny(more=more))
-    np.testing.assert_array_equal(recording.input, np.sin(time[100:290:3]))
-    np.testing.assert_array_equal(recording.output, np.cos(time[100:290:3]))
+    # 191 samples make 63 blocks of three; two are left over.
+    blocks = time[100:289].reshape(63, 3)
+    np.testing.assert_allclose(recording.input, np.sin(blocks).mean(1), rtol=1e-14)
+    np.testing.assert_allclose(recording.output, np.cos(blocks).mean(1), rtol=1e-14)
     assert recording.sample_time_s == 0.003
 
 
@@ -80,7 +82,7 @@ def test_window_hides_damage_outside_it(tiny, write_csv):
 def test_sample_time_without_time_column_is_that_of_the_file(tiny, write_csv, signals):
     write_csv("a.csv", columns=tuple(np.tile(column, 2) for column in signals))
     columns = "{input: u, output: y}"
-    (recording,) = read(tiny(columns=columns, more="sample_time_s: 0.1\nevery: 2"))
+    (recording,) = read(tiny(columns=columns, more="sample_time_s: 0.1\naverage: 2"))
     assert recording.sample_time_s == 0.2
 
 
@@ -196,7 +198,7 @@ def test_real_motor_recordings_are_read(tiny, monkeypatch):
     experiment = tiny(
         "'${HWID_REALDATA}/hsm150_motor/*.mat'",
         "{variable: data, time: 0, input: 6, output: 2}",
-        more="output_unit: rad\nevery: 10",
+        more="output_unit: rad\naverage: 10",
     )
     recordings = read(experiment)
     assert len(recordings) == 12

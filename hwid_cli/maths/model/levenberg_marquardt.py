@@ -20,8 +20,8 @@ from scipy.linalg.lapack import dposv
 
 from hwid_cli.maths.model import sensitivities
 from hwid_cli.maths.model.candidates import Candidate, Experiment, columns, moved
-from hwid_cli.maths.model.kernels import bends
 from hwid_cli.maths.model.linear_block import is_stable
+from hwid_cli.maths.model.maps.kernels import bends
 from hwid_cli.maths.model.maps.piecewise_linear import break_points_and_values
 from hwid_cli.maths.model.sensitivities import Equations
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from hwid_cli.maths.model import static_map
 from hwid_cli.maths.model.candidates import Candidate, Experiment, linear_output
-from hwid_cli.maths.model.kernels import thinned_break_points
+from hwid_cli.maths.model.maps.kernels import thinned_break_points
 from hwid_cli.maths.model.maps.piecewise_linear import break_points_and_values
 from hwid_cli.records.model import StaticMap
 

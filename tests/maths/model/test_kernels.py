@@ -3,6 +3,7 @@ import pytest
 from scipy import signal
 
 from hwid_cli.maths.model import kernels
+from hwid_cli.maths.model.maps import kernels as map_kernels
 
 POINTS = np.array([-3.0, -1.0, 0.5, 2.0, 3.0])
 VALUES = np.array([-1.0, -0.5, 0.4, 2.0, 2.1])
@@ -32,7 +33,7 @@ def test_decaying_response_ends_in_zeros_instead_of_subnormal_numbers():
 
 @pytest.mark.parametrize("with_positions", [True, False])
 def test_bends_are_changes_of_slope_with_the_stated_derivatives(with_positions):
-    bend, jacobian = kernels.bends(POINTS, VALUES, with_positions)
+    bend, jacobian = map_kernels.bends(POINTS, VALUES, with_positions)
     size = np.ptp(VALUES) / np.ptp(POINTS)
     slopes = np.diff(VALUES) / np.diff(POINTS)
     np.testing.assert_allclose(bend, np.diff(slopes) / size, rtol=1e-13)
@@ -43,7 +44,7 @@ def test_bends_are_changes_of_slope_with_the_stated_derivatives(with_positions):
     for k in inner:
         moved = parameters.copy()
         moved[k] += step
-        above, _ = kernels.bends(moved[:5], moved[5:], with_positions)
+        above, _ = map_kernels.bends(moved[:5], moved[5:], with_positions)
         column = k if with_positions else k - 5
         if column >= 0:
             np.testing.assert_allclose(
@@ -54,7 +55,7 @@ def test_bends_are_changes_of_slope_with_the_stated_derivatives(with_positions):
 def test_thinning_keeps_the_break_points_where_a_map_bends():
     points = np.linspace(0.0, 10.0, 31)
     values = np.interp(points, [0.0, 2.0, 7.0, 10.0], [0.0, 0.0, 5.0, 2.0])
-    kept = kernels.thinned_break_points(points, values, np.ones(31), 4)
+    kept = map_kernels.thinned_break_points(points, values, np.ones(31), 4)
     np.testing.assert_allclose(points[kept], [0.0, 2.0, 7.0, 10.0])
 
 
@@ -62,5 +63,5 @@ def test_thinning_heeds_where_the_samples_are():
     points = np.linspace(0.0, 10.0, 21)
     values = np.abs(points - 2.0) + np.abs(points - 8.0)
     weights = np.where(points < 5.0, 1.0, 1e-6)
-    kept = kernels.thinned_break_points(points, values, weights, 3)
+    kept = map_kernels.thinned_break_points(points, values, weights, 3)
     assert points[kept][1] == 2.0

@@ -9,7 +9,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from hwid_cli.maths.model.kernels import piecewise_linear, piecewise_linear_jacobian
+from hwid_cli.maths.model.maps.kernels import (
+    piecewise_linear,
+    piecewise_linear_jacobian,
+)
 from hwid_cli.maths.model.maps.rule import MapRule, Shape
 from hwid_cli.records.model import FitOptions, StaticMap
 
