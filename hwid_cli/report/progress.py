@@ -40,6 +40,7 @@ class StageProgress:
         self.from_cache = 0
         self.computed = 0
         console = Console(file=sys.stderr)
+        self._is_shown = console.is_terminal and not is_silent
         self._bar = Progress(
             TextColumn("{task.description}"),
             BarColumn(),
@@ -49,14 +50,15 @@ class StageProgress:
             TextColumn("left"),
             TimeRemainingColumn(),
             console=console,
-            disable=is_silent or not console.is_terminal,
+            disable=not self._is_shown,
             transient=True,
         )
         self._task = self._bar.add_task(stage, total=total, computed=0)
 
     def __enter__(self) -> "StageProgress":
         """Show the bar."""
-        self._bar.start()
+        if self._is_shown:
+            self._bar.start()
         return self
 
     def __exit__(
@@ -66,7 +68,9 @@ class StageProgress:
         trace: TracebackType | None,
     ) -> None:
         """Take the bar away."""
-        self._bar.stop()
+        # Stopping a bar that was never shown prints an empty line in some versions.
+        if self._is_shown:
+            self._bar.stop()
 
     def advance(self, *, from_cache: bool) -> None:
         """Count one more task.

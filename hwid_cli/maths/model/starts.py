@@ -108,7 +108,8 @@ def linear_starts(
         )
         found: list[Start] = []
         for n_poles, radius in _variants(orders):
-            found += _iterations(regression, np.poly(np.full(n_poles, radius)))
+            prefilter = np.atleast_1d(np.poly(np.full(n_poles, radius)))
+            found += _iterations(regression, prefilter)
         found.sort(key=lambda start: start.cost)
         chosen.extend(_distinct(found, -(-count // len(families))))
     return tuple(chosen)

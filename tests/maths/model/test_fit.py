@@ -109,6 +109,24 @@ def test_linear_special_case_is_scipys_filter():
     assert max(result.linear_rmsd, result.rmsd) < 1e-12
 
 
+@pytest.mark.parametrize(
+    ("orders", "b", "f"),
+    [
+        (Orders(3, 0, 1), [0.0, 0.5, 0.2, 0.1], [1.0]),
+        (Orders(1, 0, 0), [2.0], [1.0]),
+        (Orders(2, 1, 0), [0.5, 0.3], [1.0, -0.7]),
+        (Orders(1, 3, 5), [0.0] * 5 + [0.3], [1.0, -0.5, 0.2, -0.1]),
+    ],
+)
+@pytest.mark.parametrize("initial_state", ["zero", "estimated"])
+def test_orders_at_their_lower_ends_are_fitted(orders, b, f, initial_state):
+    u = np.random.default_rng(0).standard_normal(400)
+    recording = Recording("r", u, signal.lfilter(b, f, u), 1e-3)
+    result = fit([recording], orders, options("none", "none", initial_state))
+    assert result.rmsd < 1e-9
+    assert result.poles.size == orders.nf
+
+
 def test_rmsd_and_fit_percent_are_those_of_the_returned_model():
     recording = measured(plant("dead_zone", "polynomial"), noise=0.02)
     result = fit([recording], ORDERS, FitOptions(units=5))
