@@ -9,7 +9,7 @@ DEV := $(VENV)/installed-dev
 
 .DEFAULT_GOAL := help
 .PHONY: help install run test test-all check format smoke bench clean \
-        simulate calibrate identify crossval thesis chapter2 hsm150
+        simulate calibrate identify crossval steps thesis chapter2 hsm150
 
 help:  ## show these targets
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / {printf "  make %-10s %s\n", $$1, $$2}' Makefile
@@ -67,13 +67,17 @@ identify: $(RUN)  ## stage: models for every recording and every order
 crossval: $(RUN)  ## stage: every model on every recording
 	$(HWID) crossval configs/thesis.yaml
 
+steps: $(RUN)  ## section 3.2 of the thesis: models of the 15 steps on the 15 steps
+	$(HWID) run configs/thesis_steps.yaml
+
 thesis: $(RUN)  ## all stages at full size: 43 recordings x 100 orders
 	$(HWID) run configs/thesis.yaml
 
 chapter2: $(RUN)  ## all stages on the simulated servo
 	$(HWID) run configs/chapter2.yaml
 
-hsm150: $(RUN)  ## all stages on measurements of a real servo motor
+hsm150: $(RUN)  ## all stages on measurements of a real servo motor, and linear models of them
+	$(HWID) run configs/hsm150_linear.yaml
 	$(HWID) run configs/hsm150.yaml
 
 clean:  ## remove .venv and caches; results stay

@@ -20,7 +20,7 @@ from hwid_cli.records.experiment import (
     Experiment,
     RecordingsOptions,
 )
-from hwid_cli.records.recordings import RawRecording
+from hwid_cli.records.recordings import KINDS, RawRecording
 
 _log = logging.getLogger(__name__)
 
@@ -136,7 +136,8 @@ def read_recordings(experiment: Experiment, out: Path) -> list[RawRecording]:
     Returns
     -------
     list of RawRecording
-        In the order of ``find_files``, all with one and the same sample time.
+        Steps first, then sines, random signals and others, each in the order of
+        ``find_files``; all with one and the same sample time.
 
     Raises
     ------
@@ -150,6 +151,7 @@ def read_recordings(experiment: Experiment, out: Path) -> list[RawRecording]:
     for path in paths:
         kind = kind_of(path, options.kind, plans[path.parent])
         recordings.append(_read_recording(path, kind, experiment))
+    recordings.sort(key=lambda recording: KINDS.index(recording.kind))
     checks.check_sample_times(recordings, options.sampling_tolerance)
     # Within the tolerance they are the same clock; what follows may rely on it.
     return [

@@ -8,7 +8,7 @@ def test_calibrated_recordings_and_a_figure_of_each_are_written(hwid, out):
 
     assert result.exit_code == 0, result.output
     calibrated = read_calibrated(out / "calibrated.h5")
-    assert [r.name for r in calibrated.recordings] == ["sine_12", "step_02", "step_12"]
+    assert [r.name for r in calibrated.recordings] == ["step_02", "step_12", "sine_12"]
     figures = sorted(path.name for path in (out / "figures" / "calibrate").iterdir())
     assert figures == ["sine_12.png", "step_02.png", "step_12.png"]
     assert "step_02" in result.stdout

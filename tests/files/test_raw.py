@@ -45,7 +45,7 @@ def test_measurements_are_read_back_as_recordings(write_config, tmp_path):
     assert [path.name for path in paths] == ["step_01.csv", "sine_01.csv"]
     experiment = load_experiment(write_config(CONFIG))
     found = {r.name: r for r in read_recordings(experiment, tmp_path / "out")}
-    assert list(found) == ["sine_01", "step_01"]
+    assert list(found) == ["step_01", "sine_01"]
     for measurement in measurements():
         recording = found[measurement.name]
         np.testing.assert_array_equal(recording.input, measurement.input)

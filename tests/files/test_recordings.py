@@ -38,8 +38,16 @@ def test_plan_beside_the_files_gives_the_kind(tiny, write_csv, tmp_path):
     for name in ("a.csv", "b.csv"):
         write_csv(name)
     (tmp_path / "plan.csv").write_text("name,kind\na,sine\nb,sine\n")
-    kinds = [r.kind for r in read(tiny(more="kind: {step: b}"))]
-    assert kinds == ["sine", "step"]
+    kinds = {r.name: r.kind for r in read(tiny(more="kind: {step: b}"))}
+    assert kinds == {"a": "sine", "b": "step"}
+
+
+def test_steps_come_before_sines_before_random_signals(tiny, write_csv):
+    for name in ("random_1", "sine_10", "sine_2", "step_1", "extra"):
+        write_csv(f"{name}.csv")
+    more = "kind: {random: random_*, sine: sine_*, step: step_*}"
+    names = [one.name for one in read(tiny(more=more))]
+    assert names == ["step_1", "sine_2", "sine_10", "random_1", "extra"]
 
 
 def test_kind_that_no_file_has_is_fine(tiny, write_csv):
