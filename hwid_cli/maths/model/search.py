@@ -239,10 +239,15 @@ def _relaxed(
 ) -> Search:
     """Find the linear block anew between the maps of the best model."""
     between = _between_maps(best.candidate, experiments)
-    starts = linear_starts(
-        between, orders, options=options, sees_input_map=False, count=_RELAXED_BLOCKS
-    )
     model = best.candidate.model
+    starts = linear_starts(
+        between,
+        orders,
+        options=options,
+        sees_input_map=False,
+        count=_RELAXED_BLOCKS,
+        prefilters=(model.denominator,),
+    )
     found = [
         minimise(
             Candidate(

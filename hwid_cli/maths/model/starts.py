@@ -71,6 +71,7 @@ def linear_starts(
     options: FitOptions,
     sees_input_map: bool,
     count: int,
+    prefilters: Sequence[np.ndarray] = (),
 ) -> tuple[Start, ...]:
     """Stable linear blocks, best first.
 
@@ -86,6 +87,8 @@ def linear_starts(
         Whether the input may be expanded into hat functions.
     count : int
         How many to return at most.
+    prefilters : sequence of ndarray
+        Denominators to begin with where some are known; else several are tried.
 
     Returns
     -------
@@ -107,8 +110,7 @@ def linear_starts(
             and len(experiments) <= _MOST_FREE_RESPONSES,
         )
         found: list[Start] = []
-        for n_poles, radius in _variants(orders):
-            prefilter = np.atleast_1d(np.poly(np.full(n_poles, radius)))
+        for prefilter in prefilters or _prefilters(orders):
             found += _iterations(regression, prefilter)
         found.sort(key=lambda start: start.cost)
         chosen.extend(_distinct(found, -(-count // len(families))))
@@ -147,14 +149,17 @@ def _hat_columns(signal: np.ndarray, points: np.ndarray) -> np.ndarray:
     return np.column_stack([np.interp(signal, points, row) for row in unit])
 
 
-def _variants(orders: Orders) -> list[tuple[int, float]]:
-    """Numbers of poles and prefilters with which the iterations begin.
+def _prefilters(orders: Orders) -> list[np.ndarray]:
+    """Denominators with which the iterations begin.
 
     Fewer poles than asked for find what a rich model of a simple plant, or of a poor
     input, misses: the other poles then start at zero.
     """
-    fewer = [(n_poles, 0.0) for n_poles in _FEWER_POLES if n_poles < orders.nf]
-    return [(orders.nf, radius) for radius in _PREFILTER_RADII] + fewer
+    variants = [(orders.nf, radius) for radius in _PREFILTER_RADII]
+    variants += [(n_poles, 0.0) for n_poles in _FEWER_POLES if n_poles < orders.nf]
+    return [
+        np.atleast_1d(np.poly(np.full(n_poles, radius))) for n_poles, radius in variants
+    ]
 
 
 def _iterations(regression: _Regression, denominator: np.ndarray) -> list[Start]:
