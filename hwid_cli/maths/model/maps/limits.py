@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from hwid_cli.maths.model.maps.rule import MapRule, Shape
+from hwid_cli.maths.model.maps.rule import MapRule, Shape, stretched
 from hwid_cli.records.model import FitOptions, StaticMap
 
 # Shares of the signal's range at which the limits start. A limit that no sample reaches
@@ -77,15 +77,6 @@ def _starts_at(
     return starts
 
 
-def _stretch(static_map: StaticMap, factor: float) -> StaticMap:
-    low, high = static_map.domain
-    return replace(
-        static_map,
-        parameters=static_map.parameters * factor,
-        domain=(low * factor, high * factor),
-    )
-
-
 def _with_domain(static_map: StaticMap, domain: tuple[float, float]) -> StaticMap:
     return replace(static_map, domain=domain)
 
@@ -108,7 +99,7 @@ SATURATION = MapRule(
     evaluate=_clip,
     differentiate=_differentiate_saturation,
     starts=_starts_at("saturation", _SATURATION_STARTS),
-    stretch=_stretch,
+    stretch=stretched,
     with_domain=_with_domain,
     names=lambda static_map: ("lower", "upper"),
     settle=_settle,
@@ -118,7 +109,7 @@ DEAD_ZONE = MapRule(
     evaluate=_evaluate_dead_zone,
     differentiate=_differentiate_dead_zone,
     starts=_starts_at("dead_zone", _DEAD_ZONE_STARTS),
-    stretch=_stretch,
+    stretch=stretched,
     with_domain=_with_domain,
     names=lambda static_map: ("lower", "upper"),
     settle=_settle,
@@ -130,7 +121,7 @@ NONE = MapRule(
     starts=lambda options, low, high, shape: (
         StaticMap("none", np.zeros(0), (low, high)),
     ),
-    stretch=_stretch,
+    stretch=stretched,
     with_domain=_with_domain,
     names=lambda static_map: (),
 )

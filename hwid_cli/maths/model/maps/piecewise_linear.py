@@ -13,7 +13,7 @@ from hwid_cli.maths.model.maps.kernels import (
     piecewise_linear,
     piecewise_linear_jacobian,
 )
-from hwid_cli.maths.model.maps.rule import MapRule, Shape
+from hwid_cli.maths.model.maps.rule import MapRule, Shape, stretched
 from hwid_cli.records.model import FitOptions, StaticMap
 
 # A step of the fit may shrink a segment to this share of its width at most, so that
@@ -64,15 +64,6 @@ def _starts(
     points = np.linspace(lowest, highest, options.units)
     parameters = np.concatenate([points, shape(points)])
     return (StaticMap("piecewise_linear", parameters, (lowest, highest)),)
-
-
-def _stretch(static_map: StaticMap, factor: float) -> StaticMap:
-    low, high = static_map.domain
-    return replace(
-        static_map,
-        parameters=static_map.parameters * factor,
-        domain=(low * factor, high * factor),
-    )
 
 
 def _names(static_map: StaticMap) -> tuple[str, ...]:
@@ -128,7 +119,7 @@ RULE = MapRule(
     evaluate=_evaluate,
     differentiate=_differentiate,
     starts=_starts,
-    stretch=_stretch,
+    stretch=stretched,
     with_domain=lambda one, domain: replace(one, domain=domain),
     names=_names,
     amplify=_amplify,

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.polynomial import chebyshev
 
-from hwid_cli.maths.model.maps.rule import MapRule, Shape
+from hwid_cli.maths.model.maps.rule import MapRule, Shape, stretched
 from hwid_cli.records.model import FitOptions, StaticMap
 
 
@@ -58,15 +58,6 @@ def _interpolated(
     return StaticMap("polynomial", coefficients, (lowest, highest))
 
 
-def _stretch(static_map: StaticMap, factor: float) -> StaticMap:
-    low, high = static_map.domain
-    return replace(
-        static_map,
-        parameters=static_map.parameters * factor,
-        domain=(low * factor, high * factor),
-    )
-
-
 def _with_domain(static_map: StaticMap, domain: tuple[float, float]) -> StaticMap:
     degree = static_map.parameters.size - 1
     return _interpolated(degree, *domain, lambda at: _evaluate(static_map, at))
@@ -103,7 +94,7 @@ RULE = MapRule(
     evaluate=_evaluate,
     differentiate=_differentiate,
     starts=_starts,
-    stretch=_stretch,
+    stretch=stretched,
     with_domain=_with_domain,
     names=_names,
     amplify=_amplify,

@@ -1,7 +1,7 @@
 """What one kind of static map must offer."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -36,6 +36,28 @@ def keep_proposed(old: StaticMap, proposed: StaticMap) -> StaticMap:  # noqa: AR
     StaticMap
     """
     return proposed
+
+
+def stretched(static_map: StaticMap, factor: float) -> StaticMap:
+    """Stretch a map all of whose parameters have the unit of argument or value.
+
+    Parameters
+    ----------
+    static_map : StaticMap
+    factor : float
+        Positive.
+
+    Returns
+    -------
+    StaticMap
+        The map v -> factor * map(v / factor).
+    """
+    low, high = static_map.domain
+    return replace(
+        static_map,
+        parameters=static_map.parameters * factor,
+        domain=(low * factor, high * factor),
+    )
 
 
 @dataclass(frozen=True)
