@@ -76,7 +76,7 @@ def fit(recordings: Sequence[Recording], orders: Orders, options: FitOptions) ->
         if options.input_map == "none" and options.output_map == "none":
             search = linear
         else:
-            search = nonlinear_search(problem.experiments, orders, options)
+            search = nonlinear_search(problem.experiments, orders, options, linear)
     except np.linalg.LinAlgError as error:
         return replace(blank, message=f"linear algebra failed: {error}")
     if not np.isfinite(search.cost) or not is_stable(

@@ -65,9 +65,12 @@ class Search:
 
 @dataclass(frozen=True, eq=False)
 class _Step:
-    """A step that lowered the total, and the damping to go on with."""
+    """A step that lowered the total, and the damping to go on with.
 
-    candidate: Candidate
+    Without a candidate no step did; the gain is then what the first one promised.
+    """
+
+    candidate: Candidate | None
     cost: float
     gain: float
     damping: float
@@ -106,9 +109,11 @@ def minimise(
         step = _accepted_step(
             candidate, experiments, cost, damping, with_positions=with_positions
         )
-        if step is None:
-            why = "no damping gave a better step"
-            return Search(candidate, cost, iteration, "stalled", why)
+        if step.candidate is None:
+            status, why = "stalled", "no damping gave a better step"
+            if step.gain < _LEAST_GAIN:
+                status, why = "converged", f"no step gains {_LEAST_GAIN:g} of the cost"
+            return Search(candidate, cost, iteration, status, why)
         candidate, cost, damping = step.candidate, step.cost, step.damping
         small_gains = small_gains + 1 if step.gain < _LEAST_GAIN else 0
         if small_gains == _SMALL_GAINS_IN_A_ROW:
@@ -125,7 +130,7 @@ def _accepted_step(
     damping: float,
     *,
     with_positions: bool,
-) -> _Step | None:
+) -> _Step:
     """Raise the damping until a step lowers the total and stays stable."""
     weight = cost / sum(one.output.size for one in experiments) / _USUAL_BEND**2
     system = sensitivities.equations(
@@ -135,24 +140,27 @@ def _accepted_step(
     total = cost + weight * _squared_bends(candidate)
     diagonal = np.diag(system.matrix)
     if not np.isfinite(diagonal).all():
-        return None
+        return _Step(None, cost, float("inf"), damping)
     scale = 1.0 / np.sqrt(np.maximum(diagonal, _LEAST_DIAGONAL * diagonal.max()))
     matrix = system.matrix * scale[:, None] * scale
     vector = system.vector * scale
-    growth = 2.0
+    growth, promised = 2.0, None
     while damping < _LARGEST_DAMPING:
         step = _solve(matrix, vector, damping)
         if step is not None:
+            predicted = float(step @ (damping * step + vector))
+            promised = predicted if promised is None else promised
             proposed = moved(candidate, scale * step, with_positions=with_positions)
             proposed_cost = _stable_cost(proposed, experiments)
             lowered = total - proposed_cost - weight * _squared_bends(proposed)
             if lowered > 0.0:
-                ratio = lowered / float(step @ (damping * step + vector))
+                ratio = lowered / predicted
                 easing = min(2.0, max(0.1, 1.0 - (2.0 * ratio - 1.0) ** 3))
                 damping = max(_LEAST_DAMPING, damping * easing)
                 return _Step(proposed, proposed_cost, lowered / total, damping)
         damping, growth = damping * growth, growth * 2.0
-    return None
+    gain = float("inf") if promised is None else promised / total
+    return _Step(None, cost, gain, damping)
 
 
 def _stable_cost(proposed: Candidate, experiments: Sequence[Experiment]) -> float:

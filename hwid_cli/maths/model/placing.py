@@ -21,6 +21,28 @@ _FINE_FACTOR = 3
 _WEIGHT_OF_SHAPE = 1e-3
 
 
+def reaching(
+    candidate: Candidate, experiments: Sequence[Experiment]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Signals that reach the input map and the output map.
+
+    Parameters
+    ----------
+    candidate : Candidate
+    experiments : sequence of Experiment
+
+    Returns
+    -------
+    u, x : ndarray, shape (n,)
+        Of all experiments, one after the other.
+    """
+    u = np.concatenate([one.input for one in experiments])
+    x = np.concatenate(
+        [linear_output(candidate, i, one)[1] for i, one in enumerate(experiments)]
+    )
+    return u, x
+
+
 def with_maps(
     candidate: Candidate,
     experiments: Sequence[Experiment],
@@ -39,10 +61,7 @@ def with_maps(
     Candidate
     """
     model = candidate.model
-    u = np.concatenate([one.input for one in experiments])
-    x = np.concatenate(
-        [linear_output(candidate, i, one)[1] for i, one in enumerate(experiments)]
-    )
+    u, x = reaching(candidate, experiments)
     return Candidate(
         replace(
             model,

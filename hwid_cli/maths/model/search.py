@@ -20,7 +20,7 @@ from hwid_cli.maths.model import static_map
 from hwid_cli.maths.model.candidates import Candidate, Experiment, linear_output
 from hwid_cli.maths.model.levenberg_marquardt import Search, minimise
 from hwid_cli.maths.model.linear_block import filtered
-from hwid_cli.maths.model.placing import finer, thinner, with_maps
+from hwid_cli.maths.model.placing import finer, reaching, thinner, with_maps
 from hwid_cli.maths.model.starts import Start, linear_starts
 from hwid_cli.records.model import FitOptions, HammersteinWiener, Orders
 
@@ -68,7 +68,10 @@ def linear_search(
 
 
 def nonlinear_search(
-    experiments: Sequence[Experiment], orders: Orders, options: FitOptions
+    experiments: Sequence[Experiment],
+    orders: Orders,
+    options: FitOptions,
+    linear: Search,
 ) -> Search:
     """Hammerstein-Wiener model of given orders and kinds of maps.
 
@@ -78,6 +81,9 @@ def nonlinear_search(
         Scaled to about one.
     orders : Orders
     options : FitOptions
+    linear : Search
+        What `linear_search` found: with maps that pass everything on it is a model of
+        every kind, and the result is never worse.
 
     Returns
     -------
@@ -96,8 +102,25 @@ def nonlinear_search(
     best = _finished(_best(placed), experiments, options)
     relaxed = _relaxed(best, experiments, orders, options)
     if relaxed.cost < _WORTH_GOING_ON * best.cost:
-        return _best([best, _finished(relaxed, experiments, options)])
+        best = _best([best, _finished(relaxed, experiments, options)])
+    if linear.cost < best.cost:
+        passing = replace(linear, candidate=_passing(linear, experiments, options))
+        best = _best([best, passing, _finished(passing, experiments, options)])
     return best
+
+
+def _passing(
+    linear: Search, experiments: Sequence[Experiment], options: FitOptions
+) -> Candidate:
+    """Linear model with maps of the kinds asked for that pass everything on."""
+    candidate = linear.candidate
+    u, x = reaching(candidate, experiments)
+    model = replace(
+        candidate.model,
+        input_map=static_map.identity(options.input_map, options, u),
+        output_map=static_map.identity(options.output_map, options, x),
+    )
+    return replace(candidate, model=model)
 
 
 def _finalists(
@@ -148,7 +171,8 @@ def _candidates(
 ) -> list[Candidate]:
     """Models that begin with one linear block, one for each pair of starting maps."""
     inputs = np.concatenate([one.input for one in experiments])
-    n_state = orders.n_state if options.initial_state == "estimated" else 0
+    is_estimated = options.initial_state == "estimated"
+    states = start.free_responses if is_estimated else np.zeros((len(experiments), 0))
     candidates = []
     for input_map in static_map.starting_maps(
         options.input_map,
@@ -185,7 +209,7 @@ def _candidates(
                 sample_time_s=1.0,
                 initial_state=options.initial_state,
             )
-            candidates.append(Candidate(model, np.zeros((len(experiments), n_state))))
+            candidates.append(Candidate(model, states))
     return candidates
 
 
@@ -252,7 +276,7 @@ def _relaxed(
         minimise(
             Candidate(
                 replace(model, numerator=one.numerator, denominator=one.denominator),
-                np.zeros_like(best.candidate.free_responses),
+                one.free_responses[:, : best.candidate.free_responses.shape[1]],
             ),
             experiments,
             with_positions=False,

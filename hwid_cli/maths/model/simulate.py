@@ -18,11 +18,12 @@ from hwid_cli.maths.model.linear_block import (
 from hwid_cli.records.model import HammersteinWiener
 from hwid_cli.records.recordings import Recording
 
-_ESTIMATE_ITERATIONS = 6
+_ESTIMATE_ITERATIONS = 8
+_MOST_HALVINGS = 8
 # Damping of the initial state's equations against directions that the output does not
 # show, and the share of the cost that an iteration must gain.
 _DAMPING = 1e-9
-_LEAST_GAIN = 1e-8
+_LEAST_GAIN = 1e-6
 
 
 def simulate(
@@ -98,8 +99,9 @@ def validation_output(model: HammersteinWiener, recording: Recording) -> np.ndar
 def estimated_state(model: HammersteinWiener, recording: Recording) -> np.ndarray:
     """Initial state with which a model comes closest to a recording.
 
-    Gauss-Newton steps on the coefficients of the free response, from zero; each counts
-    only if it lowers the deviation.
+    Gauss-Newton steps on the coefficients of the free response, each halved until it
+    lowers the deviation. They begin at zero or at the state of the fit, whichever is
+    closer, so that a model never does worse on its own recording than in its fit.
 
     Parameters
     ----------
@@ -116,23 +118,49 @@ def estimated_state(model: HammersteinWiener, recording: Recording) -> np.ndarra
     """
     n_state = model.orders.n_state
     forced = _forced(model, np.ascontiguousarray(recording.input))
-    coefficients = np.zeros(n_state)
+    best = np.zeros(n_state)
     if n_state == 0 or not np.isfinite(forced).all():
-        return coefficients
+        return best
+
+    def deviation(coefficients: np.ndarray) -> float:
+        x = forced + _free(model, coefficients, forced)
+        residual = recording.output - static_map.evaluate(model.output_map, x)
+        return float(residual @ residual)
+
+    cost = deviation(best)
+    if model.free_response.size == n_state:
+        of_fit = deviation(model.free_response)
+        if of_fit < cost:
+            best, cost = model.free_response, of_fit
+    for _ in range(_ESTIMATE_ITERATIONS):
+        step = _state_step(model, forced, best, recording.output)
+        halvings = 0.5 ** np.arange(_MOST_HALVINGS)
+        tried = (best + share * step for share in halvings)
+        better = ((one, deviation(one)) for one in tried)
+        found = next((pair for pair in better if pair[1] < cost), None)
+        if found is None:
+            break
+        gain = cost - found[1]
+        best, cost = found
+        if gain < _LEAST_GAIN * cost:
+            break
+    return best
+
+
+def _state_step(
+    model: HammersteinWiener,
+    forced: np.ndarray,
+    coefficients: np.ndarray,
+    output: np.ndarray,
+) -> np.ndarray:
+    """Gauss-Newton step of the free response's coefficients."""
+    n_state = model.orders.n_state
     impulse = padded_signal(
         free_response(np.ones(1), model.denominator, forced.size), n_state + 1, 0.0
     )
-    basis = difference_basis(n_state)
-    best, x, cost = coefficients, forced, float("inf")
-    for _ in range(_ESTIMATE_ITERATIONS):
-        residual, jacobian = _state_equations(model, x, recording.output, impulse)
-        now = float(residual @ residual)
-        if not now < cost * (1.0 - _LEAST_GAIN):
-            break
-        best, cost = coefficients, now
-        coefficients = coefficients + basis @ _damped_solution(jacobian, residual)
-        x = forced + _free(model, coefficients, forced)
-    return best
+    x = forced + _free(model, coefficients, forced)
+    residual, jacobian = _state_equations(model, x, output, impulse)
+    return difference_basis(n_state) @ _damped_solution(jacobian, residual)
 
 
 def _state_equations(

@@ -54,6 +54,8 @@ class Start:
         Input map that belongs to the numerator.
     offset : float
         Constant that belongs to the output.
+    free_responses : ndarray, shape (n_experiments, n_state)
+        Initial states that belong to it; zero where none were sought.
     """
 
     numerator: np.ndarray
@@ -62,6 +64,7 @@ class Start:
     input_points: np.ndarray
     input_values: np.ndarray
     offset: float
+    free_responses: np.ndarray
 
 
 def linear_starts(
@@ -208,7 +211,11 @@ def _scored(regression: _Regression, denominator: np.ndarray) -> Start:
     gain = strength[0] * (1.0 if is_expanded else right[0, 0])
     numerator = difference_basis(regression.orders.nb) @ left[:, 0] * gain
     offset = float(solution[n_inputs]) if regression.has_level else 0.0
-    return Start(numerator, denominator, cost, points, values, offset)
+    states = np.zeros((len(regression.experiments), regression.orders.n_state))
+    if regression.has_free_response:
+        found = solution[matrix.shape[1] - states.size :].reshape(states.shape)
+        states = found @ difference_basis(states.shape[1]).T
+    return Start(numerator, denominator, cost, points, values, offset, states)
 
 
 def _regressors(

@@ -101,10 +101,33 @@ def starting_maps(
     -------
     tuple of StaticMap
     """
-    if not lowest < highest:
-        half = 0.5 * max(abs(lowest), 1.0)
-        lowest, highest = lowest - half, lowest + half
-    return RULES[kind].starts(options, float(lowest), float(highest), shape)
+    lowest, highest = _widened(float(lowest), float(highest))
+    return RULES[kind].starts(options, lowest, highest, shape)
+
+
+def identity(kind: str, options: FitOptions, argument: np.ndarray) -> StaticMap:
+    """Map that passes an argument on unchanged.
+
+    Parameters
+    ----------
+    kind : str
+    options : FitOptions
+    argument : ndarray, shape (n,)
+
+    Returns
+    -------
+    StaticMap
+    """
+    lowest, highest = _widened(float(np.min(argument)), float(np.max(argument)))
+    return RULES[kind].identity(options, lowest, highest)
+
+
+def _widened(lowest: float, highest: float) -> tuple[float, float]:
+    """A range that is not empty."""
+    if lowest < highest:
+        return lowest, highest
+    half = 0.5 * max(abs(lowest), 1.0)
+    return lowest - half, highest + half
 
 
 def active_parameters(static_map: StaticMap, *, with_positions: bool) -> slice:

@@ -179,3 +179,10 @@ def test_starting_map_over_an_empty_range_is_usable():
 @pytest.mark.parametrize("kind", MAP_KINDS)
 def test_every_parameter_has_a_name(kind):
     assert len(static_map.parameter_names(MAPS[kind])) == MAPS[kind].parameters.size
+
+
+@pytest.mark.parametrize("kind", MAP_KINDS)
+def test_identity_passes_on_what_lies_in_its_range(kind):
+    argument = np.linspace(-2.0, 5.0, 30)
+    one = static_map.identity(kind, OPTIONS, argument)
+    np.testing.assert_allclose(static_map.evaluate(one, argument), argument, atol=1e-14)

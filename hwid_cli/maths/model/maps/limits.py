@@ -99,6 +99,9 @@ SATURATION = MapRule(
     evaluate=_clip,
     differentiate=_differentiate_saturation,
     starts=_starts_at("saturation", _SATURATION_STARTS),
+    identity=lambda options, low, high: StaticMap(
+        "saturation", np.array([low, high]), (low, high)
+    ),
     stretch=stretched,
     with_domain=_with_domain,
     names=lambda static_map: ("lower", "upper"),
@@ -109,6 +112,9 @@ DEAD_ZONE = MapRule(
     evaluate=_evaluate_dead_zone,
     differentiate=_differentiate_dead_zone,
     starts=_starts_at("dead_zone", _DEAD_ZONE_STARTS),
+    identity=lambda options, low, high: StaticMap(
+        "dead_zone", np.zeros(2), (low, high)
+    ),
     stretch=stretched,
     with_domain=_with_domain,
     names=lambda static_map: ("lower", "upper"),
@@ -121,6 +127,7 @@ NONE = MapRule(
     starts=lambda options, low, high, shape: (
         StaticMap("none", np.zeros(0), (low, high)),
     ),
+    identity=lambda options, low, high: StaticMap("none", np.zeros(0), (low, high)),
     stretch=stretched,
     with_domain=_with_domain,
     names=lambda static_map: (),

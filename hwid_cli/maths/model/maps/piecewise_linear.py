@@ -119,6 +119,7 @@ RULE = MapRule(
     evaluate=_evaluate,
     differentiate=_differentiate,
     starts=_starts,
+    identity=lambda options, low, high: _starts(options, low, high, np.asarray)[0],
     stretch=stretched,
     with_domain=lambda one, domain: replace(one, domain=domain),
     names=_names,

@@ -71,6 +71,8 @@ class MapRule:
         Writes a column for each active parameter into `out`, from column `first` on.
     starts : callable (FitOptions, lowest, highest, shape) -> tuple of StaticMap
         Maps over the given range that follow the function `shape` where the kind can.
+    identity : callable (FitOptions, lowest, highest) -> StaticMap
+        A map that passes on what lies in the range unchanged.
     stretch : callable (StaticMap, factor) -> StaticMap
         The map v -> factor * map(v / factor), for a positive factor.
     with_domain : callable (StaticMap, (lowest, highest)) -> StaticMap
@@ -95,6 +97,7 @@ class MapRule:
         [StaticMap, np.ndarray, bool, np.ndarray, int], tuple[np.ndarray, np.ndarray]
     ]
     starts: Callable[[FitOptions, float, float, Shape], tuple[StaticMap, ...]]
+    identity: Callable[[FitOptions, float, float], StaticMap]
     stretch: Callable[[StaticMap, float], StaticMap]
     with_domain: Callable[[StaticMap, tuple[float, float]], StaticMap]
     names: Callable[[StaticMap], tuple[str, ...]]
