@@ -41,3 +41,8 @@ def __getattr__(name: str) -> Any:
     if name not in _PUBLIC:
         raise AttributeError(f"module 'hwid_cli' has no attribute {name!r}")
     return getattr(import_module(_PUBLIC[name]), name)
+
+
+def __dir__() -> list[str]:
+    """Show the public names, loaded or not."""
+    return [*globals(), *_PUBLIC]

@@ -23,7 +23,6 @@ def command(choices: Choices) -> None:
     from hwid_cli.cli.session import STAGES, open_session, say
 
     session = open_session(choices, *STAGES)
-    run_stages(session)
     for section in _LATER:
         if getattr(session.experiment, section) is not None:
             say(
@@ -31,6 +30,7 @@ def command(choices: Choices) -> None:
                 f"{section}: named in {session.experiment.source}, but this "
                 "version of hwid does not have it yet; left out",
             )
+    run_stages(session)
     say(session, f"\nresults: {session.out}")
 
 

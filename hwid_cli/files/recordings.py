@@ -151,6 +151,14 @@ def read_recordings(experiment: Experiment, out: Path) -> list[RawRecording]:
     for path in paths:
         kind = kind_of(path, options.kind, plans[path.parent])
         recordings.append(_read_recording(path, kind, experiment))
+    for kind in options.kind:
+        if kind not in {recording.kind for recording in recordings}:
+            _log.warning(
+                "%s: recordings.kind.%s: %s matches no file; its recipe is not used",
+                experiment.source,
+                kind,
+                " or ".join(repr(pattern) for pattern in options.kind[kind]),
+            )
     recordings.sort(key=lambda recording: KINDS.index(recording.kind))
     checks.check_sample_times(recordings, options.sampling_tolerance)
     # Within the tolerance they are the same clock; what follows may rely on it.

@@ -1,6 +1,7 @@
 """The files that hold results: their provenance, and how a stage is replaced in one."""
 
 import json
+import logging
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -20,6 +21,8 @@ Result = TypeVar("Result")
 CALIBRATED_FORMAT = "hwid-calibrated"
 RESULTS_FORMAT = "hwid-results"
 SCHEMA_VERSION = 1
+
+_log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -104,15 +107,13 @@ def replaced_stage(
     Raises
     ------
     CacheError
-        If the old file cannot be read or the new one not written; the old one is
-        untouched then.
+        If the new file cannot be written; the old one is untouched then.
     """
-    start = b""
-    if path.exists():
-        with _opened(path, stage):
-            start = path.read_bytes()
     with replaced_hdf5(
-        path, format_name=RESULTS_FORMAT, version=SCHEMA_VERSION, start=start
+        path,
+        format_name=RESULTS_FORMAT,
+        version=SCHEMA_VERSION,
+        start=_readable_bytes(path, stage),
     ) as file:
         if stage in file:
             # HDF5 gives the room to what is written before the file is closed.
@@ -120,6 +121,26 @@ def replaced_stage(
         group = file.create_group(stage)
         write_provenance(group, provenance)
         yield group
+
+
+def _readable_bytes(path: Path, stage: str) -> bytes:
+    """Content of a results file; one that cannot be read is set aside."""
+    if not path.exists():
+        return b""
+    try:
+        with _opened(path, stage):
+            return path.read_bytes()
+    except CacheError:
+        aside = path.with_name(f"{path.name}.bad")
+        path.replace(aside)
+        _log.warning(
+            "%s: cannot be read; set aside as %s; other stages than %s come back from "
+            "the cache when they are run",
+            path,
+            aside.name,
+            stage,
+        )
+        return b""
 
 
 def read_results(path: Path, stage: str, read: Callable[[h5py.File], Result]) -> Result:

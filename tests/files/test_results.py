@@ -230,13 +230,14 @@ def test_unreadable_results_are_one_clear_line(path, damage, read):
 
 
 @pytest.mark.parametrize("damage", [damage_half, damage_version])
-def test_unreadable_results_are_not_overwritten(path, damage):
+def test_unreadable_results_are_set_aside_not_overwritten(path, damage, caplog):
     write_all(path)
     damage(path)
     content = path.read_bytes()
-    with pytest.raises(CacheError, match="move the file away"):
-        write_crossval(path, crossval(), PROVENANCE)
-    assert path.read_bytes() == content
+    write_crossval(path, crossval(), PROVENANCE)
+    assert path.with_name(f"{path.name}.bad").read_bytes() == content
+    assert f"{path}: cannot be read; set aside as {path.name}.bad" in caplog.text
+    assert read_crossval(path).validated_on == crossval().validated_on
 
 
 def test_full_disk_leaves_the_old_results_untouched(path, monkeypatch):

@@ -26,6 +26,8 @@ from hwid_cli.maths.model.uncertainty import standard_errors
 from hwid_cli.records.model import Fit, FitOptions, Orders
 from hwid_cli.records.recordings import Recording
 
+_DEFAULTS = FitOptions()
+
 
 @dataclass(frozen=True, eq=False)
 class _Problem:
@@ -36,7 +38,9 @@ class _Problem:
     output_scale: float
 
 
-def fit(recordings: Sequence[Recording], orders: Orders, options: FitOptions) -> Fit:
+def fit(
+    recordings: Sequence[Recording], orders: Orders, options: FitOptions = _DEFAULTS
+) -> Fit:
     """Fit one model to one or several recordings.
 
     Parameters
@@ -59,6 +63,16 @@ def fit(recordings: Sequence[Recording], orders: Orders, options: FitOptions) ->
     References
     ----------
     docs/method.md, sections "The fit" and "The search".
+
+    Examples
+    --------
+    >>> from scipy.signal import lfilter
+    >>> u = np.random.default_rng(1).standard_normal(300)
+    >>> recording = Recording("r1", u, lfilter([0.0, 0.2], [1.0, -0.8], u), 1e-3)
+    >>> linear = FitOptions(input_map="none", output_map="none")
+    >>> result = fit([recording], Orders(nb=1, nf=1, nk=1), linear)
+    >>> result.status, np.round(result.model.denominator, 6)
+    ('converged', array([ 1. , -0.8]))
     """
     if not recordings:
         raise ValueError("fit needs at least one recording")

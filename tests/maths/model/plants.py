@@ -3,7 +3,12 @@
 import numpy as np
 
 from hwid_cli.maths.model.simulate import simulate
-from hwid_cli.records.model import HammersteinWiener, Orders, StaticMap
+from hwid_cli.records.model import (
+    FitOptions,
+    HammersteinWiener,
+    Orders,
+    StaticMap,
+)
 from hwid_cli.records.recordings import Recording
 
 POLES = 0.9 * np.exp(np.array([0.3j, -0.3j]))
@@ -60,3 +65,17 @@ def measured(
     rng = np.random.default_rng(seed + 1000)
     y = y + noise * np.std(y) * rng.standard_normal(n_samples)
     return Recording(f"r{seed}", u, y, model.sample_time_s)
+
+
+def options(
+    input_map: str, output_map: str, initial_state: str = "zero", **others: object
+) -> FitOptions:
+    """Options whose maps are as large as those of the plants."""
+    return FitOptions(
+        input_map=input_map,
+        output_map=output_map,
+        units=4,
+        degree=3,
+        initial_state=initial_state,
+        **others,
+    )
