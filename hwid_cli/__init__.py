@@ -25,7 +25,7 @@ _PUBLIC = {
     "simulate": "hwid_cli.maths.model.simulate",
 }
 
-__all__ = [  # noqa: PLE0604, RUF100
+__all__ = [
     "Fit",
     "FitOptions",
     "HammersteinWiener",
