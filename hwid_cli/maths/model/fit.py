@@ -123,14 +123,11 @@ def _reason_not_to_fit(
 
 def _least_parameters(orders: Orders, options: FitOptions) -> int:
     """Parameters of a model, each shared gain counted once."""
-    sizes = {
-        "piecewise_linear": 2 * options.units,
-        "polynomial": options.degree + 1,
-        "saturation": 2,
-        "dead_zone": 2,
-        "none": 0,
-    }
-    return orders.nb + orders.nf + sizes[options.input_map] + sizes[options.output_map]
+    maps = (
+        static_map.identity(kind, options, np.array([0.0, 1.0]))
+        for kind in (options.input_map, options.output_map)
+    )
+    return orders.nb + orders.nf + sum(one.parameters.size for one in maps)
 
 
 def _joined(

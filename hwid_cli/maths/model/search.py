@@ -94,7 +94,7 @@ def nonlinear_search(
         experiments,
         orders,
         options=options,
-        sees_input_map=options.input_map in ("piecewise_linear", "polynomial"),
+        sees_input_map=static_map.has_free_shape(options.input_map),
         count=options.starts,
     )
     finalists = _finalists(experiments, starts, orders, options)

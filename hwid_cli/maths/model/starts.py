@@ -20,6 +20,7 @@ from scipy.linalg import eigh
 from hwid_cli.maths.model.candidates import Experiment
 from hwid_cli.maths.model.kernels import filter_columns
 from hwid_cli.maths.model.linear_block import difference_basis, filtered, reflected
+from hwid_cli.maths.model.static_map import has_free_shape
 from hwid_cli.records.model import FitOptions, Orders
 
 # Hat functions into which the input is expanded; few, because each brings nb unknowns.
@@ -28,8 +29,6 @@ _ITERATIONS = 4
 # Pole radii of the filters with which the iterations begin: none, and slower ones.
 _PREFILTER_RADII = (0.0, 0.9)
 _FEWER_POLES = (2,)
-# Kinds of output map that can carry an offset.
-_MAPS_WITH_OFFSET = ("piecewise_linear", "polynomial")
 # With more experiments the free responses would outnumber everything else.
 _MOST_FREE_RESPONSES = 3
 # Poles further out than this settle too slowly to be found by least squares.
@@ -108,7 +107,7 @@ def linear_starts(
             tuple(_hat_columns(one.input, points) for one in experiments),
             orders,
             points,
-            has_level=n_points > 2 or options.output_map in _MAPS_WITH_OFFSET,
+            has_level=n_points > 2 or has_free_shape(options.output_map),
             has_free_response=options.initial_state == "estimated"
             and len(experiments) <= _MOST_FREE_RESPONSES,
         )

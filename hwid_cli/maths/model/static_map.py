@@ -198,7 +198,27 @@ def stretch(static_map: StaticMap, factor: float) -> StaticMap:
     -------
     StaticMap
     """
-    return RULES[static_map.kind].stretch(static_map, factor)
+    # Every parameter has the unit of argument or value, whatever the kind.
+    low, high = static_map.domain
+    return replace(
+        static_map,
+        parameters=static_map.parameters * factor,
+        domain=(low * factor, high * factor),
+    )
+
+
+def has_free_shape(kind: str) -> bool:
+    """Tell whether maps of a kind have a gain and an offset of their own.
+
+    Parameters
+    ----------
+    kind : str
+
+    Returns
+    -------
+    bool
+    """
+    return RULES[kind].size is not None
 
 
 def parameter_names(static_map: StaticMap) -> tuple[str, ...]:

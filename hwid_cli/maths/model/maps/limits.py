@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from hwid_cli.maths.model.maps.rule import MapRule, Shape, stretched
+from hwid_cli.maths.model.maps.rule import MapRule, Shape
 from hwid_cli.records.model import FitOptions, StaticMap
 
 # Shares of the signal's range at which the limits start. A limit that no sample reaches
@@ -102,7 +102,6 @@ SATURATION = MapRule(
     identity=lambda options, low, high: StaticMap(
         "saturation", np.array([low, high]), (low, high)
     ),
-    stretch=stretched,
     with_domain=_with_domain,
     names=lambda static_map: ("lower", "upper"),
     settle=_settle,
@@ -115,7 +114,6 @@ DEAD_ZONE = MapRule(
     identity=lambda options, low, high: StaticMap(
         "dead_zone", np.zeros(2), (low, high)
     ),
-    stretch=stretched,
     with_domain=_with_domain,
     names=lambda static_map: ("lower", "upper"),
     settle=_settle,
@@ -128,7 +126,6 @@ NONE = MapRule(
         StaticMap("none", np.zeros(0), (low, high)),
     ),
     identity=lambda options, low, high: StaticMap("none", np.zeros(0), (low, high)),
-    stretch=stretched,
     with_domain=_with_domain,
     names=lambda static_map: (),
 )

@@ -13,7 +13,7 @@ from hwid_cli.maths.model.maps.kernels import (
     piecewise_linear,
     piecewise_linear_jacobian,
 )
-from hwid_cli.maths.model.maps.rule import MapRule, Shape, stretched
+from hwid_cli.maths.model.maps.rule import MapRule, Shape
 from hwid_cli.records.model import FitOptions, StaticMap
 
 # A step of the fit may shrink a segment to this share of its width at most, so that
@@ -120,7 +120,6 @@ RULE = MapRule(
     differentiate=_differentiate,
     starts=_starts,
     identity=lambda options, low, high: _starts(options, low, high, np.asarray)[0],
-    stretch=stretched,
     with_domain=lambda one, domain: replace(one, domain=domain),
     names=_names,
     amplify=_amplify,

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.polynomial import chebyshev
 
-from hwid_cli.maths.model.maps.rule import MapRule, Shape, stretched
+from hwid_cli.maths.model.maps.rule import MapRule, Shape
 from hwid_cli.records.model import FitOptions, StaticMap
 
 
@@ -95,7 +95,6 @@ RULE = MapRule(
     differentiate=_differentiate,
     starts=_starts,
     identity=lambda options, low, high: _starts(options, low, high, np.asarray)[0],
-    stretch=stretched,
     with_domain=_with_domain,
     names=_names,
     amplify=_amplify,

@@ -1,7 +1,7 @@
 """What one kind of static map must offer."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -38,28 +38,6 @@ def keep_proposed(old: StaticMap, proposed: StaticMap) -> StaticMap:  # noqa: AR
     return proposed
 
 
-def stretched(static_map: StaticMap, factor: float) -> StaticMap:
-    """Stretch a map all of whose parameters have the unit of argument or value.
-
-    Parameters
-    ----------
-    static_map : StaticMap
-    factor : float
-        Positive.
-
-    Returns
-    -------
-    StaticMap
-        The map v -> factor * map(v / factor).
-    """
-    low, high = static_map.domain
-    return replace(
-        static_map,
-        parameters=static_map.parameters * factor,
-        domain=(low * factor, high * factor),
-    )
-
-
 @dataclass(frozen=True)
 class MapRule:
     """What one kind of static map can do.
@@ -73,8 +51,6 @@ class MapRule:
         Maps over the given range that follow the function `shape` where the kind can.
     identity : callable (FitOptions, lowest, highest) -> StaticMap
         A map that passes on what lies in the range unchanged.
-    stretch : callable (StaticMap, factor) -> StaticMap
-        The map v -> factor * map(v / factor), for a positive factor.
     with_domain : callable (StaticMap, (lowest, highest)) -> StaticMap
         The same map with another domain.
     names : callable (StaticMap) -> tuple of str
@@ -98,7 +74,6 @@ class MapRule:
     ]
     starts: Callable[[FitOptions, float, float, Shape], tuple[StaticMap, ...]]
     identity: Callable[[FitOptions, float, float], StaticMap]
-    stretch: Callable[[StaticMap, float], StaticMap]
     with_domain: Callable[[StaticMap, tuple[float, float]], StaticMap]
     names: Callable[[StaticMap], tuple[str, ...]]
     amplify: Callable[[StaticMap, float], StaticMap] | None = None
