@@ -123,8 +123,8 @@ class ParameterChange:
     """
 
     parameter: str = "stiffness"
-    largest: float = 0.04
-    share: float = 0.5
+    largest: float = 0.1
+    share: float = 0.7
 
     def __post_init__(self) -> None:
         if self.parameter not in CHANGING_PARAMETERS:
@@ -207,7 +207,7 @@ class GunPlan:
     sine_frequencies_rad_per_sample: tuple[float, ...] = (0.5, 0.34, 0.22, 0.11, 0.005)
     sine_amplitudes_A: tuple[float, ...] = (1.0, 2.0, 3.0, 4.0, 5.0)
     sine_left_out: tuple[str, ...] = ("4x4", "4x5")
-    sine_fade_in_samples: int = 0
+    sine_fade_in_samples: int = 500
     random_amplitudes_A: tuple[float, ...] = (1.0, 2.0, 3.0, 4.0, 5.0)
     random_shortest_samples: int = 20
     random_longest_samples: int = 80

@@ -17,8 +17,8 @@ class Friction:
         Force that must be exceeded to start from rest; at least ``coulomb_N``.
     """
 
-    coulomb_N: float = 2.4
-    break_away_N: float = 3.6
+    coulomb_N: float = 4.8
+    break_away_N: float = 7.2
 
     def __post_init__(self) -> None:
         require_not_negative(self, "coulomb_N")
@@ -44,7 +44,7 @@ class Contact:
     """
 
     position_m: float = 0.33
-    stiffness_N_per_m: float = 250.0
+    stiffness_N_per_m: float = 1000.0
     both_sides: bool = False
 
     def __post_init__(self) -> None:

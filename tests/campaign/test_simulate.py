@@ -93,8 +93,8 @@ def test_gun_rests_during_a_lead_in_of_varying_length(ideal_gun):
 
 def test_rest_positions_lie_within_the_stiction_band(ideal_gun):
     rests = np.array([one.plan["rest_position_m"] for one in ideal_gun.values()])
-    softest = 968.0 * (1 - 0.04)
-    assert np.max(np.abs(rests)) <= 0.8 * 3.6 / softest
+    softest = 968.0 * (1 - 0.1)
+    assert np.max(np.abs(rests)) <= 0.8 * 7.2 / softest
     assert np.std(rests) > 1e-3
 
 
@@ -109,20 +109,22 @@ def test_recorded_input_is_the_command_also_where_the_drive_saturates(ideal_gun)
 
 
 def test_static_travel_is_about_five_centimetres_per_ampere(ideal_gun):
-    # Ramps overshoot little: 2 s suffice to settle; a few percent are changed stiffness.
+    # Ramps overshoot little: 2 s suffice to settle. The stiffness may be 10 % off, and
+    # friction holds 5 mm of the smallest travel of 100 mm.
     for name, amplitude in (("step_06", 2.0), ("step_07", 4.0), ("step_08", 6.0)):
         travel = ideal_gun[name].output[-1]
-        assert travel == pytest.approx(0.05 * amplitude, rel=0.08)
-    assert 0.4 < ideal_gun["step_10"].output[-1] < 0.5
+        assert travel == pytest.approx(0.05 * amplitude, rel=0.16)
+    # 9.5 A against spring and contact: 0.40 m, with the same tolerance.
+    assert 0.34 < ideal_gun["step_10"].output[-1] < 0.46
 
 
 def test_only_some_recordings_have_a_changed_parameter(ideal_gun):
     factors = np.array([one.plan["parameter_factor"] for one in ideal_gun.values()])
     changed = factors[factors != 1.0]
-    # 43 draws with probability 0.5: within three standard deviations of 21.5.
-    assert 11 < changed.size < 32
-    assert np.max(np.abs(changed - 1.0)) <= 0.04
-    assert np.std(changed) > 0.01
+    # 43 draws with probability 0.7: within three standard deviations of 30.
+    assert 21 < changed.size < 39
+    assert np.max(np.abs(changed - 1.0)) <= 0.1
+    assert np.std(changed) > 0.025
 
 
 @pytest.mark.parametrize("parameter", ["stiffness", "damping", "force_constant"])
@@ -173,7 +175,9 @@ def test_displacement_is_read_in_steps_of_the_resolution(gun):
 def test_sine_runs_at_its_frequency_and_amplitude(ideal_gun):
     recording = ideal_gun["sine_13"]
     excited = recording.input[recording.plan["lead_in_samples"] :]
-    np.testing.assert_allclose(excited, 3.0 * np.sin(0.22 * np.arange(excited.size)))
+    n = np.arange(excited.size)
+    grown = 3.0 * np.minimum(n / 500, 1.0)
+    np.testing.assert_allclose(excited, grown * np.sin(0.22 * n))
 
 
 def test_small_plan_runs_with_few_samples():

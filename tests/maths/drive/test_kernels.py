@@ -12,7 +12,7 @@ from hwid_cli.maths.drive.friction import friction_force, sticks
 from hwid_cli.maths.drive.mechanics import simulate_motion, spring_force
 from hwid_cli.records.mechanics import Contact, Friction, Mechanics
 
-GUN = Mechanics()
+GUN = Mechanics(friction=Friction(2.4, 3.6), contact=Contact(0.33, 250.0))
 NO_FRICTION = Friction(0.0, 0.0)
 NO_CONTACT = Contact(1.0, 0.0)
 LINEAR = replace(GUN, friction=NO_FRICTION, contact=NO_CONTACT)

@@ -16,7 +16,7 @@ from hwid_cli.maths.drive.mechanics import (
 )
 from hwid_cli.records.mechanics import Contact, Friction, Mechanics
 
-GUN = Mechanics()
+GUN = Mechanics(friction=Friction(2.4, 3.6), contact=Contact(0.33, 250.0))
 TS = 0.005
 
 # Tests on drawn currents have no deadline: the first one waits for the compiler.
