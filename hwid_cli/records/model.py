@@ -235,7 +235,8 @@ class Fit:
     fit_percent : float, [%]
         ``100 (1 - norm(y - y_hat) / norm(y - mean(y)))``; NaN if failed.
     linear_rmsd : float, [output unit]
-        RMSD of the best linear output-error model of the same orders found on the way.
+        RMSD of the best linear output-error model of the same orders found on the way;
+        NaN where the fit began with models and needed none.
     poles : ndarray of complex, shape (nf,), [-]
     is_stable : bool
         Whether every pole lies inside the unit circle.

@@ -23,7 +23,8 @@ from hwid_cli.maths.model.normalise import normalise, rescaled
 from hwid_cli.maths.model.placing import with_maps
 from hwid_cli.maths.model.search import linear_search, nonlinear_search
 from hwid_cli.maths.model.uncertainty import standard_errors
-from hwid_cli.records.model import Fit, FitOptions, Orders
+from hwid_cli.maths.model.warm_start import warm_search
+from hwid_cli.records.model import Fit, FitOptions, HammersteinWiener, Orders
 from hwid_cli.records.recordings import Recording
 
 _DEFAULTS = FitOptions()
@@ -39,7 +40,11 @@ class _Problem:
 
 
 def fit(
-    recordings: Sequence[Recording], orders: Orders, options: FitOptions = _DEFAULTS
+    recordings: Sequence[Recording],
+    orders: Orders,
+    options: FitOptions = _DEFAULTS,
+    *,
+    starts: Sequence[HammersteinWiener] = (),
 ) -> Fit:
     """Fit one model to one or several recordings.
 
@@ -49,6 +54,10 @@ def fit(
         Of one sample time. Joined as ``options.join`` says.
     orders : Orders
     options : FitOptions
+    starts : sequence of HammersteinWiener
+        Models of the same orders and kinds of maps to begin with, such as those of the
+        single recordings of a group; several times faster than a search from nothing,
+        which is what happens without a stable one or where theirs ends without a model.
 
     Returns
     -------
@@ -58,7 +67,8 @@ def fit(
     Raises
     ------
     ValueError
-        If there is no recording or the sample times differ.
+        If there is no recording, the sample times differ, or a start has other orders
+        or kinds of maps.
 
     References
     ----------
@@ -78,19 +88,25 @@ def fit(
         raise ValueError("fit needs at least one recording")
     if len({one.sample_time_s for one in recordings}) > 1:
         raise ValueError("recordings of one fit must share their sample time")
+    kinds = (options.input_map, options.output_map)
+    for start in starts:
+        if (start.input_map.kind, start.output_map.kind) != kinds or (
+            start.orders != orders
+        ):
+            raise ValueError(f"a start must have the orders {orders} and maps {kinds}")
     names = tuple(one.name for one in recordings)
     blank = Fit(names, orders, options, None, "failed", "")
     reason = _reason_not_to_fit(recordings, orders, options)
     if reason:
         return replace(blank, message=reason)
     problem = _scaled(recordings, options)
+    linear_rmsd = float("nan")
     try:
-        linear = linear_search(problem.experiments, orders, options)
-        linear_rmsd = _rmsd(linear, problem)
-        if options.input_map == "none" and options.output_map == "none":
-            search = linear
-        else:
-            search = nonlinear_search(problem.experiments, orders, options, linear)
+        search = _warm_search(problem, options, starts)
+        if search is None:
+            linear = linear_search(problem.experiments, orders, options)
+            linear_rmsd = _rmsd(linear, problem)
+            search = _search(problem, orders, options, linear)
     except np.linalg.LinAlgError as error:
         return replace(blank, message=f"linear algebra failed: {error}")
     if not np.isfinite(search.cost) or not is_stable(
@@ -102,6 +118,30 @@ def fit(
     return _described(
         replace(blank, linear_rmsd=linear_rmsd), search, recordings, problem
     )
+
+
+def _warm_search(
+    problem: _Problem, options: FitOptions, starts: Sequence[HammersteinWiener]
+) -> Search | None:
+    """Search near the starts; None where none is stable or no model came of them."""
+    scaled = [
+        rescaled(one, 1.0 / problem.input_scale, 1.0 / problem.output_scale)
+        for one in starts
+        if is_stable(one.denominator)
+    ]
+    if not scaled:
+        return None
+    search = warm_search(problem.experiments, options, scaled)
+    return search if np.isfinite(search.cost) else None
+
+
+def _search(
+    problem: _Problem, orders: Orders, options: FitOptions, linear: Search
+) -> Search:
+    """Search from nothing but the linear model."""
+    if options.input_map == "none" and options.output_map == "none":
+        return linear
+    return nonlinear_search(problem.experiments, orders, options, linear)
 
 
 def _reason_not_to_fit(

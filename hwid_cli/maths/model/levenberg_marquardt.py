@@ -26,7 +26,7 @@ from hwid_cli.maths.model.maps.piecewise_linear import break_points_and_values
 from hwid_cli.maths.model.sensitivities import Equations
 
 # Share of the cost that a step must gain; smaller gains in a row end the search.
-_LEAST_GAIN = 1e-5
+LEAST_GAIN = 1e-5
 _SMALL_GAINS_IN_A_ROW = 2
 _FIRST_DAMPING = 1e-2
 _LEAST_DAMPING = 1e-14
@@ -82,6 +82,7 @@ def minimise(
     *,
     with_positions: bool,
     max_iterations: int,
+    least_gain: float = LEAST_GAIN,
 ) -> Search:
     """Improve a candidate until it stands still or the iterations are used up.
 
@@ -94,6 +95,8 @@ def minimise(
         Whether break-points are free.
     max_iterations : int
         Limit on accepted steps.
+    least_gain : float, [-]
+        Share of the cost that a step must gain.
 
     Returns
     -------
@@ -111,13 +114,13 @@ def minimise(
         )
         if step.candidate is None:
             status, why = "stalled", "no damping gave a better step"
-            if step.gain < _LEAST_GAIN:
-                status, why = "converged", f"no step gains {_LEAST_GAIN:g} of the cost"
+            if step.gain < least_gain:
+                status, why = "converged", f"no step gains {least_gain:g} of the cost"
             return Search(candidate, cost, iteration, status, why)
         candidate, cost, damping = step.candidate, step.cost, step.damping
-        small_gains = small_gains + 1 if step.gain < _LEAST_GAIN else 0
+        small_gains = small_gains + 1 if step.gain < least_gain else 0
         if small_gains == _SMALL_GAINS_IN_A_ROW:
-            why = f"two steps in a row gained less than {_LEAST_GAIN:g} of the cost"
+            why = f"two steps in a row gained less than {least_gain:g} of the cost"
             return Search(candidate, cost, iteration + 1, "converged", why)
     why = f"reached the limit of {max_iterations} iterations"
     return Search(candidate, cost, max_iterations, "iteration_limit", why)

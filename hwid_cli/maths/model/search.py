@@ -20,12 +20,12 @@ from hwid_cli.maths.model import static_map
 from hwid_cli.maths.model.candidates import Candidate, Experiment, linear_output
 from hwid_cli.maths.model.levenberg_marquardt import Search, minimise
 from hwid_cli.maths.model.linear_block import filtered
-from hwid_cli.maths.model.placing import finer, reaching, thinner, with_maps
+from hwid_cli.maths.model.phases import finish, place
+from hwid_cli.maths.model.placing import reaching
 from hwid_cli.maths.model.starts import Start, linear_starts
 from hwid_cli.records.model import FitOptions, HammersteinWiener, Orders
 
 _SCREENING_ITERATIONS = 6
-_PLACING_ITERATIONS = 6
 _RELAXING_ITERATIONS = 8
 _FINALISTS = 2
 _RELAXED_BLOCKS = 2
@@ -62,7 +62,7 @@ def linear_search(
         sees_input_map=False,
         count=_LINEAR_STARTS,
     )
-    return _finished(
+    return finish(
         _screened(experiments, starts, orders, linear)[0], experiments, linear
     )
 
@@ -98,14 +98,14 @@ def nonlinear_search(
         count=options.starts,
     )
     finalists = _finalists(experiments, starts, orders, options)
-    placed = [_placed(one, experiments, options) for one in finalists]
-    best = _finished(_best(placed), experiments, options)
+    placed = [place(one, experiments, options) for one in finalists]
+    best = finish(_best(placed), experiments, options)
     relaxed = _relaxed(best, experiments, orders, options)
     if relaxed.cost < _WORTH_GOING_ON * best.cost:
-        best = _best([best, _finished(relaxed, experiments, options)])
+        best = _best([best, finish(relaxed, experiments, options)])
     if linear.cost < best.cost:
         passing = replace(linear, candidate=_passing(linear, experiments, options))
-        best = _best([best, passing, _finished(passing, experiments, options)])
+        best = _best([best, passing, finish(passing, experiments, options)])
     return best
 
 
@@ -213,48 +213,6 @@ def _candidates(
     return candidates
 
 
-def _placed(
-    screened: Search, experiments: Sequence[Experiment], options: FitOptions
-) -> Search:
-    """Go on with fixed break-points, then put them where the maps bend."""
-    settled = minimise(
-        screened.candidate,
-        experiments,
-        with_positions=False,
-        max_iterations=min(_PLACING_ITERATIONS, options.max_iterations),
-    )
-    iterations = screened.iterations + settled.iterations
-    if not (options.free_break_points and _has_break_points(settled.candidate)):
-        return replace(settled, iterations=iterations)
-    fine = minimise(
-        with_maps(settled.candidate, experiments, finer),
-        experiments,
-        with_positions=False,
-        max_iterations=min(_PLACING_ITERATIONS, options.max_iterations),
-    )
-    thinned = with_maps(
-        fine.candidate,
-        experiments,
-        lambda one, argument: thinner(one, argument, options.units),
-    )
-    # The fine maps' cost tells which finalist is worth freeing: how well its final
-    # break-points happen to lie before they move does not.
-    return replace(fine, candidate=thinned, iterations=iterations + fine.iterations)
-
-
-def _finished(
-    placed: Search, experiments: Sequence[Experiment], options: FitOptions
-) -> Search:
-    """Run until the search stands still, with break-points free if they may be."""
-    final = minimise(
-        placed.candidate,
-        experiments,
-        with_positions=options.free_break_points,
-        max_iterations=options.max_iterations,
-    )
-    return replace(final, iterations=placed.iterations + final.iterations)
-
-
 def _relaxed(
     best: Search,
     experiments: Sequence[Experiment],
@@ -307,11 +265,6 @@ def _between_maps(
         held_back = slope**2 + _FLAT * float(np.mean(slope**2)) + 1e-300
         result.append(Experiment(w, x + (one.output - y) * slope / held_back))
     return result
-
-
-def _has_break_points(candidate: Candidate) -> bool:
-    maps = (candidate.model.input_map, candidate.model.output_map)
-    return any(one.kind == "piecewise_linear" for one in maps)
 
 
 def _best(searches: Sequence[Search]) -> Search:

@@ -1,0 +1,90 @@
+"""The last phases of every search: break-points are placed, then everything is freed.
+
+docs/method.md, section "The search".
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from hwid_cli.maths.model.candidates import Candidate, Experiment
+from hwid_cli.maths.model.levenberg_marquardt import LEAST_GAIN, Search, minimise
+from hwid_cli.maths.model.placing import finer, thinner, with_maps
+from hwid_cli.records.model import FitOptions
+
+_PLACING_ITERATIONS = 6
+
+
+def place(
+    screened: Search, experiments: Sequence[Experiment], options: FitOptions
+) -> Search:
+    """Go on with fixed break-points, then put them where the maps bend.
+
+    Parameters
+    ----------
+    screened : Search
+    experiments : sequence of Experiment
+    options : FitOptions
+
+    Returns
+    -------
+    Search
+        Its cost is that of the fine maps: how well the final break-points happen to lie
+        before they move does not tell which candidate is worth freeing.
+    """
+    settled = minimise(
+        screened.candidate,
+        experiments,
+        with_positions=False,
+        max_iterations=min(_PLACING_ITERATIONS, options.max_iterations),
+    )
+    iterations = screened.iterations + settled.iterations
+    if not (options.free_break_points and _has_break_points(settled.candidate)):
+        return replace(settled, iterations=iterations)
+    fine = minimise(
+        with_maps(settled.candidate, experiments, finer),
+        experiments,
+        with_positions=False,
+        max_iterations=min(_PLACING_ITERATIONS, options.max_iterations),
+    )
+    thinned = with_maps(
+        fine.candidate,
+        experiments,
+        lambda one, argument: thinner(one, argument, options.units),
+    )
+    return replace(fine, candidate=thinned, iterations=iterations + fine.iterations)
+
+
+def finish(
+    placed: Search,
+    experiments: Sequence[Experiment],
+    options: FitOptions,
+    *,
+    least_gain: float = LEAST_GAIN,
+) -> Search:
+    """Run until the search stands still, with break-points free if they may be.
+
+    Parameters
+    ----------
+    placed : Search
+    experiments : sequence of Experiment
+    options : FitOptions
+    least_gain : float, [-]
+        Share of the cost that a step must gain.
+
+    Returns
+    -------
+    Search
+    """
+    final = minimise(
+        placed.candidate,
+        experiments,
+        with_positions=options.free_break_points,
+        max_iterations=options.max_iterations,
+        least_gain=least_gain,
+    )
+    return replace(final, iterations=placed.iterations + final.iterations)
+
+
+def _has_break_points(candidate: Candidate) -> bool:
+    maps = (candidate.model.input_map, candidate.model.output_map)
+    return any(one.kind == "piecewise_linear" for one in maps)
