@@ -104,22 +104,53 @@ def crossval_tasks(
     """
     n_grid = len(orders.nb) * len(orders.nk)
     contents = [recording_key(recording) for recording in recordings]
-    tasks = []
+    tasks: list[Task] = []
     for first in range(0, len(fits), n_grid):
         models = tuple(fit.model for fit in fits[first : first + n_grid])
-        model_keys = [None if model is None else _model_key(model) for model in models]
-        for recording, content in zip(recordings, contents, strict=True):
-            matters = {"models": model_keys, "recording": content}
-            tasks.append(
-                Task(
-                    key=task_key(STAGE, STAGE_VERSION, matters, []),
-                    name=f"{fits[first].name} on {recording.name}",
-                    function=_deviations,
-                    arguments=(models, recording),
-                    result_type=Deviations,
-                )
-            )
+        tasks += deviation_tasks(models, recordings, contents, fits[first].name)
     return tuple(tasks)
+
+
+def deviation_tasks(
+    models: Sequence[HammersteinWiener | None],
+    recordings: Sequence[Recording],
+    contents: Sequence[str],
+    name: str,
+) -> tuple[Task, ...]:
+    """List the tasks that give the RMSD of several models on each recording.
+
+    Parameters
+    ----------
+    models : sequence of HammersteinWiener or None
+        All judged in one task; None stands for a failed fit.
+    recordings : sequence of Recording
+        One task for each.
+    contents : sequence of str
+        ``recording_key`` of each recording.
+    name : str
+        Of the models, for people.
+
+    Returns
+    -------
+    tuple of Task
+        Each gives ``Deviations``.
+    """
+    model_keys = [None if model is None else model_key(model) for model in models]
+    return tuple(
+        Task(
+            key=task_key(
+                STAGE,
+                STAGE_VERSION,
+                {"models": model_keys, "recording": content},
+                [],
+            ),
+            name=f"{name} on {recording.name}",
+            function=_deviations,
+            arguments=(tuple(models), recording),
+            result_type=Deviations,
+        )
+        for recording, content in zip(recordings, contents, strict=True)
+    )
 
 
 def crossval_key(
@@ -151,8 +182,17 @@ def crossval_key(
     return task_key(STAGE, STAGE_VERSION, settings, [])
 
 
-def _model_key(model: HammersteinWiener) -> str:
-    """Content key of a model: every number and word that it consists of."""
+def model_key(model: HammersteinWiener) -> str:
+    """Content key of a model: every number and word that it consists of.
+
+    Parameters
+    ----------
+    model : HammersteinWiener
+
+    Returns
+    -------
+    str
+    """
     settings, arrays = _content(model, "")
     return task_key("model", 1, settings, arrays)
 

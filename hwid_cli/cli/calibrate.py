@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 import click
 
 from hwid_cli.cli.options import Choices, stage_options
+from hwid_cli.cli.stages import once
 
 if TYPE_CHECKING:
     from hwid_cli.cli.session import Session
@@ -29,6 +30,7 @@ def command(choices: Choices) -> None:
     say(session, f"results: {session.calibrated_path}, {session.out / 'figures'}")
 
 
+@once
 def calibrate_stage(session: "Session") -> "Calibrated":
     """Bring ``calibrated.h5`` up to date.
 
@@ -55,7 +57,7 @@ def calibrate_stage(session: "Session") -> "Calibrated":
         calibrated = read_calibrated(session.calibrated_path)
     else:
         recordings, logs = calibrate_all(raws, options)
-        origin = provenance(session, key, recordings)
+        origin = provenance(session, key, recordings, seconds=timer.seconds)
         write_calibrated(session.calibrated_path, recordings, logs, origin)
         calibrated = Calibrated(recordings, logs, key)
     if options is not None:

@@ -6,6 +6,7 @@ import click
 
 from hwid_cli.cli.identify import Identified, identify_stage, show_fits
 from hwid_cli.cli.options import Choices, stage_options
+from hwid_cli.cli.stages import once
 
 if TYPE_CHECKING:
     from hwid_cli.cli.session import Session
@@ -29,6 +30,7 @@ def command(choices: Choices) -> None:
     say(session, f"\nresults: {session.results_path}, crossval.csv, coverage.csv")
 
 
+@once
 def crossval_stage(session: "Session") -> "tuple[Identified, CrossValidation]":
     """Bring ``results.h5:/crossval`` and its CSV files up to date.
 
@@ -77,7 +79,8 @@ def crossval_stage(session: "Session") -> "tuple[Identified, CrossValidation]":
             crossval = cross_validate(
                 identified.fits, judges, experiment.orders, options, settings
             )
-        write_crossval(path, crossval, provenance(session, key, judges))
+        origin = provenance(session, key, judges, seconds=timer.seconds)
+        write_crossval(path, crossval, origin)
     write_tables(session, identified, crossval)
     return identified, crossval
 

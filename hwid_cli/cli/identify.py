@@ -7,6 +7,7 @@ import click
 
 from hwid_cli.cli.calibrate import calibrate_stage
 from hwid_cli.cli.options import Choices, stage_options
+from hwid_cli.cli.stages import once
 
 if TYPE_CHECKING:
     from hwid_cli.cli.session import Session
@@ -45,6 +46,7 @@ def command(choices: Choices) -> None:
     say(session, f"results: {session.results_path}")
 
 
+@once
 def identify_stage(session: "Session") -> Identified:
     """Bring ``results.h5:/identify`` up to date.
 
@@ -88,7 +90,8 @@ def identify_stage(session: "Session") -> Identified:
     total = len(chosen) * len(candidate_orders(experiment.orders))
     with stage_tasks(session, "identify", total, "fits") as settings:
         fits = identify_all(chosen, experiment.orders, experiment.fit, settings)
-    write_fits(path, fits, experiment.orders, provenance(session, key, chosen))
+    origin = provenance(session, key, chosen, seconds=timer.seconds)
+    write_fits(path, fits, experiment.orders, origin)
     return Identified(recordings, fits)
 
 

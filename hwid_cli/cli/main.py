@@ -6,7 +6,16 @@ import logging
 import click
 
 from hwid_cli import __version__
-from hwid_cli.cli import calibrate, crossval, identify, run, simulate
+from hwid_cli.cli import (
+    calibrate,
+    crossval,
+    group,
+    identify,
+    report,
+    run,
+    simulate,
+    test,
+)
 from hwid_cli.errors import HwidError
 
 # What a disk or a folder may refuse, which is no fault of the program.
@@ -105,5 +114,5 @@ def main(ctx: click.Context) -> None:
     ctx.obj = set_log_levels
 
 
-for _module in (run, simulate, calibrate, identify, crossval):
+for _module in (run, simulate, calibrate, identify, crossval, group, test, report):
     main.add_command(_module.command)

@@ -19,6 +19,8 @@ class Choices:
         Configuration file.
     out : Path or None
         Folder of the results; None means ``results/<name>``.
+    cache : Path or None
+        Folder of what was computed before; None means ``cache`` in that folder.
     jobs : int or None, [-]
         Processes; None means one for each core.
     backend : str
@@ -33,6 +35,7 @@ class Choices:
 
     config: Path
     out: Path | None = None
+    cache: Path | None = None
     jobs: int | None = None
     backend: str = "loky"
     scheduler: str | None = None
@@ -48,6 +51,13 @@ _OPTIONS: tuple[Callable[..., Any], ...] = (
         type=click.Path(path_type=Path),
         metavar="DIR",
         help="Folder of the results.  [default: results/<name>]",
+    ),
+    click.option(
+        "--cache",
+        type=click.Path(path_type=Path),
+        metavar="DIR",
+        help="Folder of what was computed before; experiments may share one.  "
+        "[default: cache in the folder of the results]",
     ),
     click.option(
         "--jobs",

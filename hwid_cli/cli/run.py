@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from hwid_cli.cli.session import Session
 
 # Sections of the configuration whose stages this version does not have.
-_LATER = ("group", "test", "diagnose")
+_LATER = ("diagnose",)
 
 
 @click.command("run")
@@ -31,11 +31,12 @@ def command(choices: Choices) -> None:
                 "version of hwid does not have it yet; left out",
             )
     run_stages(session)
+    _report(session)
     say(session, f"\nresults: {session.out}")
 
 
 def run_stages(session: "Session") -> None:
-    """Run the last stage that the configuration names, and so all before it.
+    """Run all stages that the configuration names, and so those that they need.
 
     Parameters
     ----------
@@ -46,26 +47,70 @@ def run_stages(session: "Session") -> None:
     ConfigError
         If it names none.
     """
-    from hwid_cli.cli.calibrate import calibrate_stage
-    from hwid_cli.cli.crossval import crossval_stage, show_coverage
-    from hwid_cli.cli.identify import identify_stage, show_fits
-    from hwid_cli.cli.simulate import simulate_stage
     from hwid_cli.errors import ConfigError
 
     experiment = session.experiment
-    if experiment.crossval is not None:
-        identified, crossval = crossval_stage(session)
-        show_fits(session, identified)
-        show_coverage(session, identified, crossval)
-    elif experiment.identify is not None:
-        show_fits(session, identify_stage(session))
-    elif experiment.calibrate is not None:
-        calibrate_stage(session)
-    elif experiment.simulate is not None:
-        simulate_stage(session)
-    else:
+    named = [name for name in _STAGES if getattr(experiment, name) is not None]
+    if not named:
         raise ConfigError(
-            f"{experiment.source}: names no stage; expected simulate, calibrate, "
-            "identify or crossval; add the section of what is to be done, such as "
+            f"{experiment.source}: names no stage; expected some of "
+            f"{', '.join(_STAGES)}; add the section of what is to be done, such as "
             "'crossval: {}'"
         )
+    for name in named:
+        _STAGES[name](session)
+
+
+def _simulate(session: "Session") -> None:
+    from hwid_cli.cli.simulate import simulate_stage
+
+    simulate_stage(session)
+
+
+def _calibrate(session: "Session") -> None:
+    from hwid_cli.cli.calibrate import calibrate_stage
+
+    calibrate_stage(session)
+
+
+def _identify(session: "Session") -> None:
+    from hwid_cli.cli.identify import identify_stage, show_fits
+
+    show_fits(session, identify_stage(session))
+
+
+def _crossval(session: "Session") -> None:
+    from hwid_cli.cli.crossval import crossval_stage, show_coverage
+
+    show_coverage(session, *crossval_stage(session))
+
+
+def _group(session: "Session") -> None:
+    from hwid_cli.cli.group import group_stage, show_groups
+
+    show_groups(session, group_stage(session))
+
+
+def _test(session: "Session") -> None:
+    from hwid_cli.cli.test import final_test_stage, show_final_test
+
+    show_final_test(session, final_test_stage(session))
+
+
+def _report(session: "Session") -> None:
+    """Show what has run, unless it is measurements only."""
+    from hwid_cli.cli.report import report_stage
+
+    if session.calibrated_path.is_file():
+        report_stage(session)
+
+
+# In the order in which they work; the names are those of the configuration's sections.
+_STAGES = {
+    "simulate": _simulate,
+    "calibrate": _calibrate,
+    "identify": _identify,
+    "crossval": _crossval,
+    "group": _group,
+    "test": _test,
+}

@@ -5,10 +5,11 @@ Imported by commands when they run, so that ``hwid --help`` stays fast.
 
 import shutil
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -17,12 +18,16 @@ from hwid_cli.cli.options import Choices
 from hwid_cli.errors import ConfigError
 from hwid_cli.files.config import describe_experiment, load_experiment
 from hwid_cli.files.hdf5_store import Hdf5Store
-from hwid_cli.files.result_files import Provenance, read_stage_key
+from hwid_cli.files.result_files import (
+    Provenance,
+    current_versions,
+    read_stage_key,
+)
 from hwid_cli.records.experiment import Experiment
 from hwid_cli.records.recordings import Recording
 from hwid_cli.report.progress import StageProgress
 
-STAGES = ("simulate", "calibrate", "identify", "crossval")
+STAGES = ("simulate", "calibrate", "identify", "crossval", "group", "test")
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,17 +39,23 @@ class Session:
     experiment : Experiment
     out : Path
         Folder of the results; exists.
+    cache : Path
+        Folder of what was computed before.
     workers : Workers
     forced : tuple of str
         Stages that ignore their cached results.
     is_quiet : bool
+    finished : dict
+        Results of the stages that ran in this session, see ``stages.once``.
     """
 
     experiment: Experiment
     out: Path
+    cache: Path
     workers: Workers
     forced: tuple[str, ...]
     is_quiet: bool
+    finished: dict[str, Any] = field(default_factory=dict)
 
     @property
     def calibrated_path(self) -> Path:
@@ -87,6 +98,7 @@ def open_session(choices: Choices, *stages: str) -> Session:
     return Session(
         experiment=experiment,
         out=out,
+        cache=choices.cache or out / "cache",
         workers=Workers(choices.jobs, choices.backend, choices.scheduler),
         forced=stages if choices.force else (),
         is_quiet=choices.quiet,
@@ -137,7 +149,11 @@ def is_unchanged(session: Session, stage: str, key: str) -> bool:
 
 
 def provenance(
-    session: Session, key: str, recordings: tuple[Recording, ...]
+    session: Session,
+    key: str,
+    recordings: tuple[Recording, ...],
+    *,
+    seconds: float = float("nan"),
 ) -> Provenance:
     """Say where results come from.
 
@@ -148,6 +164,8 @@ def provenance(
         Of everything that the stage depends on.
     recordings : tuple of Recording
         That it used.
+    seconds : float, [s]
+        What the run took that gave the results; NaN unknown.
 
     Returns
     -------
@@ -157,12 +175,14 @@ def provenance(
         key,
         describe_experiment(session.experiment),
         {recording.name: recording.sha256 for recording in recordings},
+        seconds,
+        current_versions(),
     )
 
 
 @contextmanager
 def stage_tasks(
-    session: Session, stage: str, total: int, unit: str
+    session: Session, stage: str, total: int, unit: str, *, part: str = ""
 ) -> Iterator[RunSettings]:
     """Run the tasks of a stage under a progress bar, and sum up at the end.
 
@@ -174,37 +194,59 @@ def stage_tasks(
         Tasks.
     unit : str
         What one task is, in the plural.
+    part : str
+        Which part of the stage, where it has several.
 
     Yields
     ------
     RunSettings
     """
-    timer = start_timer()
-    with StageProgress(stage, total, unit, is_silent=session.is_quiet) as progress:
+    timer, label = start_timer(), f"{stage} {part}".rstrip()
+    with StageProgress(label, total, unit, is_silent=session.is_quiet) as progress:
 
         def on_done(item: TaskDone) -> None:
             progress.advance(from_cache=item.from_cache)
 
         yield RunSettings(
-            store=Hdf5Store(session.out / "cache"),
+            store=Hdf5Store(session.cache),
             workers=session.workers,
             force=stage in session.forced,
             on_done=on_done,
         )
     say(
         session,
-        f"{stage}: {progress.from_cache} {unit} from the cache, "
+        f"{label}: {progress.from_cache} {unit} from the cache, "
         f"{progress.computed} computed, {timer()}",
     )
 
 
-def start_timer() -> Callable[[], str]:
+@dataclass(frozen=True)
+class Timer:
+    """A running clock; a call gives the time since its start as text with its unit.
+
+    Parameters
+    ----------
+    start_s : float, [s]
+        Reading of the system's steady clock at the start.
+    """
+
+    start_s: float
+
+    @property
+    def seconds(self) -> float:
+        """Time since the start, in seconds."""
+        return time.perf_counter() - self.start_s
+
+    def __call__(self) -> str:
+        """Time since the start, as text."""
+        return f"{self.seconds:.1f} s"
+
+
+def start_timer() -> Timer:
     """Start a clock.
 
     Returns
     -------
-    callable
-        Gives the time since, as text with its unit.
+    Timer
     """
-    start = time.perf_counter()
-    return lambda: f"{time.perf_counter() - start:.1f} s"
+    return Timer(time.perf_counter())

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 import click
 
 from hwid_cli.cli.options import Choices, stage_options
+from hwid_cli.cli.stages import once
 
 if TYPE_CHECKING:
     from hwid_cli.cli.session import Session
@@ -25,6 +26,7 @@ def command(choices: Choices) -> None:
     say(session, f"results: {session.out / 'raw'}")
 
 
+@once
 def simulate_stage(session: "Session") -> None:
     """Bring the virtual measurements up to date.
 

@@ -96,6 +96,7 @@ class GroupOptions:
         default_factory=lambda: {"top": 3}
     )
     max_level: int = 4
+    warm_start: bool = True
 
 
 @dataclass(frozen=True)

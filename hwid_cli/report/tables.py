@@ -8,9 +8,8 @@ import numpy as np
 from hwid_cli.records.model import Fit
 from hwid_cli.records.recordings import CalibrationLog
 from hwid_cli.records.results import CrossValidation, ModelScore
+from hwid_cli.report.text_table import WIDTH, number, split_table, text_table
 
-WIDTH = 80
-_GAP = "  "
 # Words for the statuses of fits.
 _STATUS_WORDS = {
     "converged": "converged",
@@ -71,14 +70,38 @@ def calibration_table(logs: Sequence[CalibrationLog]) -> str:
     -------
     str
     """
-    rows = [
+    heads, rows = calibration_cells(logs)
+    return text_table(
+        "Calibration: samples, what was subtracted, samples repaired (in/out)",
+        heads,
+        rows,
+        text_columns=(0,),
+    )
+
+
+def calibration_cells(
+    logs: Sequence[CalibrationLog],
+) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    """Write what calibration did, for a table on the screen or on a page.
+
+    Parameters
+    ----------
+    logs : sequence of CalibrationLog
+
+    Returns
+    -------
+    heads : tuple of str
+    rows : list of tuple of str
+        One for each recording, its name first.
+    """
+    rows: list[tuple[str, ...]] = [
         (
             log.name,
             f"{log.n_raw_input}/{log.n_raw_output}",
             str(log.first_sample),
             str(log.n_samples),
-            _number(log.input_offset) if "input_offset" in log.steps else "-",
-            _number(log.output_offset) if "output_offset" in log.steps else "-",
+            number(log.input_offset) if "input_offset" in log.steps else "-",
+            number(log.output_offset) if "output_offset" in log.steps else "-",
             f"{log.period_samples:.2f}" if log.period_samples else "-",
             f"{len(log.repaired_input)}/{len(log.repaired_output)}",
         )
@@ -94,12 +117,7 @@ def calibration_table(logs: Sequence[CalibrationLog]) -> str:
         "period",
         "repaired",
     )
-    return _table(
-        "Calibration: samples, what was subtracted, samples repaired (in/out)",
-        heads,
-        rows,
-        text_columns=(0,),
-    )
+    return heads, rows
 
 
 def best_models_table(
@@ -129,9 +147,9 @@ def best_models_table(
                 (
                     f"{fit.name}/{fit.orders.nb}/{nk}",
                     thesis_name(fit.name, fit.orders.nb, nk, nf),
-                    _number(fit.rmsd),
+                    number(fit.rmsd),
                     _percent(fit.fit_percent),
-                    _number(fit.linear_rmsd),
+                    number(fit.linear_rmsd),
                 )
             )
     heads = ("model", "thesis's name", "RMSD", "fit %", "linear RMSD")
@@ -139,7 +157,7 @@ def best_models_table(
         f"Best models of each recording, RMSD [{unit}] on that recording; beside it the "
         "best\nlinear output-error model of the same orders (form of T3.2.2-1)"
     )
-    return _table(title, heads, rows, text_columns=(0, 1))
+    return text_table(title, heads, rows, text_columns=(0, 1))
 
 
 def coverage_table(
@@ -171,7 +189,7 @@ def coverage_table(
             str(score.nb),
             str(score.nk),
             f"{score.coverage} of {len(crossval.validated_on)}",
-            _number(score.rmsd),
+            number(score.rmsd),
             thesis_name(score.identified_on, score.nb, score.nk, nf),
         )
         for score in scores[:count]
@@ -181,7 +199,7 @@ def coverage_table(
         f"Models that cover the most recordings: RMSD below {crossval.threshold:g} "
         f"{crossval.unit}\n(form of T3.2.2.2-2)"
     )
-    return _table(title, heads, rows, text_columns=(0, 5))
+    return text_table(title, heads, rows, text_columns=(0, 5))
 
 
 def cross_table(
@@ -202,27 +220,20 @@ def cross_table(
     str
         An asterisk marks what is covered.
     """
-    labels = [f"{score.identified_on}/{score.nb}/{score.nk}" for score in best]
-    lines = [_cross_row(score, crossval) for score in best]
-    heads = list(crossval.validated_on)
-    column = max([8, *map(len, heads)]) + len(_GAP)
-    room = width - max([5, *map(len, labels)]) - len("covers") - len(_GAP)
-    per_block = max(1, room // column)
-    blocks = []
-    for first in range(0, len(heads), per_block):
-        part = slice(first, first + per_block)
-        rows = [
-            (label, *row[part], str(score.coverage))
-            for label, row, score in zip(labels, lines, best, strict=True)
-        ]
-        blocks.append(
-            _table("", ("model", *heads[part], "covers"), rows, text_columns=(0,))
+    rows = [
+        (
+            f"{score.identified_on}/{score.nb}/{score.nk}",
+            *_cross_row(score, crossval),
+            str(score.coverage),
         )
+        for score in best
+    ]
     title = (
         f"Widest model of each recording on all recordings: RMSD [{crossval.unit}], "
         f"* below\n{crossval.threshold:g} (form of T3.2.2.2-3)"
     )
-    return "\n\n".join([f"{title}\n{blocks[0]}", *blocks[1:]])
+    heads = ("model", *crossval.validated_on, "covers")
+    return split_table(title, heads, rows, width=width)
 
 
 def _cross_row(score: ModelScore, crossval: CrossValidation) -> list[str]:
@@ -232,8 +243,7 @@ def _cross_row(score: ModelScore, crossval: CrossValidation) -> list[str]:
         crossval.nk.index(score.nk),
     ]
     return [
-        _number(value) + ("*" if value < crossval.threshold else " ")
-        for value in values
+        number(value) + ("*" if value < crossval.threshold else " ") for value in values
     ]
 
 
@@ -256,29 +266,6 @@ def status_line(counts: Mapping[str, int]) -> str:
     """
     parts = [f"{n} {_STATUS_WORDS.get(status, status)}" for status, n in counts.items()]
     return f"Fits: {', '.join(parts) or 'none'}"
-
-
-def _table(
-    title: str,
-    heads: Sequence[str],
-    rows: Sequence[Sequence[str]],
-    *,
-    text_columns: Sequence[int],
-) -> str:
-    """Columns as wide as their content; text left-aligned, numbers right."""
-    widths = [max(map(len, column)) for column in zip(heads, *rows, strict=True)]
-    lines = [title] if title else []
-    for row in (heads, ["-" * width for width in widths], *rows):
-        cells = [
-            cell.ljust(width) if number in text_columns else cell.rjust(width)
-            for number, (cell, width) in enumerate(zip(row, widths, strict=True))
-        ]
-        lines.append(_GAP.join(cells).rstrip())
-    return "\n".join(lines)
-
-
-def _number(value: float) -> str:
-    return f"{value:.2e}" if np.isfinite(value) else "-"
 
 
 def _percent(value: float) -> str:

@@ -1,0 +1,130 @@
+"""The search for groups as plain text, in the forms of the published tables."""
+
+from hwid_cli.records.groups import Group, GroupSearch
+from hwid_cli.report.text_table import WIDTH, number, split_table, text_table
+
+# Tables of the thesis for groups of two, three and four.
+_PUBLISHED = {2: "T3.3.3.1-2", 3: "T3.3.3.2-2", 4: "T3.3.3.3-2"}
+
+
+def levels_table(search: GroupSearch) -> str:
+    """Show what each level tried, filtered and kept.
+
+    Parameters
+    ----------
+    search : GroupSearch
+
+    Returns
+    -------
+    str
+    """
+    rows = []
+    for level in search.levels:
+        groups = [one for one in search.groups if one.level == level]
+        best = max(one.coverage for one in groups)
+        rows.append(
+            (
+                str(level),
+                str(sum(join.level == level for join in search.joins)),
+                str(len(groups)),
+                str(sum(one.n_models for one in groups)),
+                str(sum(one.n_models - one.n_self_passed for one in groups)),
+                str(sum(one.n_self_passed - one.n_cross_passed for one in groups)),
+                f"{best} of {len(search.validated_on)}",
+                str(sum(one.coverage == best for one in groups)),
+                str(sum(one.is_kept for one in groups)),
+            )
+        )
+    heads = (
+        "level",
+        "joins",
+        "groups",
+        "models",
+        "not self",
+        "not cross",
+        "widest",
+        "so wide",
+        "go on",
+    )
+    title = (
+        f"Search for groups: models above {search.threshold:g} {search.unit} on their "
+        "own recordings\n(not self), models below it on no recording (not cross), "
+        "and the widest coverage"
+    )
+    return text_table(title, heads, rows, text_columns=())
+
+
+def join_table(search: GroupSearch, level: int, *, width: int = WIDTH) -> str:
+    """Show the coverage of every join of a level, base by add-on.
+
+    Parameters
+    ----------
+    search : GroupSearch
+    level : int, [-]
+        Recordings in the groups, at least 2.
+    width : int, [characters]
+        Of the screen; more add-ons than fit go into further blocks.
+
+    Returns
+    -------
+    str
+        A dash where the base holds the add-on; an asterisk marks groups that go on.
+    """
+    by_name = {one.name: one for one in search.groups}
+    joins = [join for join in search.joins if join.level == level]
+    cells = {(join.base, join.add_on): by_name[join.group] for join in joins}
+    bases = list(dict.fromkeys(join.base for join in joins))
+    tried = {join.add_on for join in joins}
+    add_ons = [one.add_on for one in search.joins if one.add_on in tried]
+    # In the order of the experiment: single recordings come in it, others as they join.
+    singles = [join.base for join in search.joins if join.level == 1]
+    heads = [name for name in singles if name in tried]
+    heads += [name for name in dict.fromkeys(add_ons) if name not in heads]
+    rows = [
+        (base, *(_cell(cells.get((base, name))) for name in heads), str(widest))
+        for base in bases
+        for widest in [
+            max(one.coverage for (name, _), one in cells.items() if name == base)
+        ]
+    ]
+    form = f" (form of {_PUBLISHED[level]})" if level in _PUBLISHED else ""
+    title = (
+        f"Groups of {level}: recordings covered of {len(search.validated_on)}, base by "
+        f"add-on,\n* goes on{form}"
+    )
+    return split_table(title, ("base", *heads, "widest"), rows, width=width)
+
+
+def chain_table(search: GroupSearch) -> str:
+    """Show the winner and what it grew from.
+
+    Parameters
+    ----------
+    search : GroupSearch
+
+    Returns
+    -------
+    str
+    """
+    if not search.chain:
+        return f"No group covers anything: {search.reason}."
+    rows = [
+        (
+            one.model_name,
+            f"{one.coverage} of {len(search.validated_on)}",
+            number(one.rmsd),
+            number(one.validation_rmsd),
+        )
+        for one in search.chain_groups
+    ]
+    heads = ("model", "covers", "own RMSD", "validation RMSD")
+    table = text_table(
+        f"The chain of groups, RMSD [{search.unit}]", heads, rows, text_columns=(0,)
+    )
+    return f"{table}\nThe search stopped: {search.reason}."
+
+
+def _cell(group: Group | None) -> str:
+    if group is None:
+        return "-"
+    return f"{group.coverage}{'*' if group.is_kept else ' '}"
