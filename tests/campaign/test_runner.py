@@ -124,6 +124,8 @@ INTERRUPTED = """
         time.sleep(0.1)
         return Orders(n, 1, 1)
 
+    # A shell that starts this in the background has it ignore Ctrl-C.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     seen = []
 
     def on_done(item):

@@ -3,6 +3,8 @@ import csv
 import h5py
 import numpy as np
 
+from hwid_cli.files.result_files import read_provenance
+
 
 def rows_of(path):
     with path.open(newline="") as file:
@@ -93,3 +95,14 @@ def test_chosen_recordings_judge(after_run, hwid, edit, out):
     hwid("crossval")
 
     assert {row["validated_on"] for row in rows_of(out / "crossval.csv")} == {"step_12"}
+
+
+def test_results_say_how_long_they_took_and_what_computed_them(after_run, out):
+    for path, stage in (
+        (out / "calibrated.h5", "calibrate"),
+        (out / "results.h5", "identify"),
+        (out / "results.h5", "crossval"),
+    ):
+        origin = read_provenance(path, stage)
+        assert 0 < origin.seconds < 600, stage
+        assert origin.versions["numpy"] == np.__version__

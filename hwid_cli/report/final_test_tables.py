@@ -1,0 +1,273 @@
+"""The final test as text: the chain of groups, and the matrix of what covers what."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from hwid_cli.records.groups import ChainTrend, FinalTest
+from hwid_cli.report.tables import thesis_name
+from hwid_cli.report.text_table import (
+    GAP,
+    WIDTH,
+    joined_names,
+    number,
+    split_table,
+    text_table,
+)
+
+# Published tables of the chain on all recordings of a kind.
+_FORMS = {"step": "T3.4.1-2", "sine": "T3.4.1-3"}
+# Columns of the matrix that stand together, so that the eye can count.
+_TOGETHER = 5
+
+
+def chain_on_tests_table(
+    final: FinalTest, trend: ChainTrend, *, width: int = WIDTH
+) -> str:
+    """Show the chain on the recordings that nothing else has used (as T3.3.3.4-1).
+
+    Parameters
+    ----------
+    final : FinalTest
+    trend : ChainTrend
+    width : int, [characters]
+        Of the screen.
+
+    Returns
+    -------
+    str
+        Beneath the table stands whether the RMSD falls along the chain.
+    """
+    rows = _chain_rows(final, final.tested_on, map(number, trend.tested_rmsd))
+    title = (
+        f"The chain on the test recordings: RMSD [{final.unit}], * below "
+        f"{final.threshold:g}\n(form of T3.3.3.4-1)"
+    )
+    table = split_table(title, ("model", *final.tested_on, "mean"), rows, width=width)
+    return f"{table}\n{trend_line(trend)}"
+
+
+def trend_line(trend: ChainTrend) -> str:
+    """Say whether the RMSD on the test recordings falls along the chain.
+
+    Parameters
+    ----------
+    trend : ChainTrend
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> coverage = np.array([[3], [4], [4]])
+    >>> trend_line(ChainTrend(("a", "b", "c"), (0.3, 0.1, 0.2), ("step",), coverage))
+    'Along the chain the mean RMSD on the test recordings falls, but not at every level.'
+    """
+    values = trend.tested_rmsd
+    start = "Along the chain the mean RMSD on the test recordings"
+    if len(values) < 2:
+        return "The chain has one level, so there is no trend to judge."
+    if not np.isfinite(values).all():
+        return f"{start} is not known at every level."
+    falls = [later < earlier for earlier, later in pairwise(values)]
+    if all(falls):
+        return f"{start} falls at every level."
+    if values[-1] < values[0]:
+        return f"{start} falls, but not at every level."
+    return f"{start} does not fall."
+
+
+def chain_coverage_table(
+    final: FinalTest, trend: ChainTrend, *, nf: int | None = None
+) -> str:
+    """Show how many recordings the chain covers, level by level (as T3.4.1-1).
+
+    Parameters
+    ----------
+    final : FinalTest
+    trend : ChainTrend
+    nf : int or None, [-]
+        As for ``tables.thesis_name``.
+
+    Returns
+    -------
+    str
+    """
+    rows = [
+        (model, *map(str, counts), str(total), _thesis_name(model, nf))
+        for model, counts, total in zip(
+            trend.models, trend.coverage, trend.total, strict=True
+        )
+    ]
+    title = (
+        f"Recordings that the chain covers, its own included, of {len(final.recordings)}"
+        "\n(form of T3.4.1-1 and T3.4.2-1)"
+    )
+    heads = ("model", *trend.kinds, "all", "thesis's name")
+    return text_table(title, heads, rows, text_columns=(0, len(heads) - 1))
+
+
+def _thesis_name(model: str, nf: int | None) -> str:
+    identified_on, nb, nk = model.rsplit("/", 2)
+    return thesis_name(identified_on, int(nb), int(nk), nf)
+
+
+def chain_tables(
+    final: FinalTest,
+    trend: ChainTrend,
+    kinds: Mapping[str, str],
+    *,
+    width: int = WIDTH,
+) -> str:
+    """Show the chain on all recordings, kind by kind (as T3.4.1-2 and T3.4.1-3).
+
+    Parameters
+    ----------
+    final : FinalTest
+    trend : ChainTrend
+    kinds : mapping of str to str
+        Kind of each recording by its name.
+    width : int, [characters]
+        Of the screen.
+
+    Returns
+    -------
+    str
+    """
+    tables = []
+    for place, kind in enumerate(trend.kinds):
+        names = [name for name in final.recordings if kinds[name] == kind]
+        rows = _chain_rows(final, names, map(str, trend.coverage[:, place]))
+        form = f" (form of {_FORMS[kind]})" if kind in _FORMS else ""
+        title = (
+            f"The chain on all recordings of kind {kind}: RMSD [{final.unit}], * below "
+            f"{final.threshold:g}{form}"
+        )
+        tables.append(
+            split_table(title, ("model", *names, "covers"), rows, width=width)
+        )
+    return "\n\n".join(tables)
+
+
+def _chain_rows(
+    final: FinalTest, names: Sequence[str], last: Iterable[str]
+) -> list[tuple[str, ...]]:
+    """RMSD of each of the chain's models on some recordings."""
+    columns = [final.recordings.index(name) for name in names]
+    return [
+        (
+            model,
+            *(_marked(value, final) for value in final.rmsd[row, columns]),
+            end,
+        )
+        for model, row, end in zip(
+            final.chain, map(final.models.index, final.chain), last, strict=True
+        )
+    ]
+
+
+def _marked(value: float, final: FinalTest) -> str:
+    return number(value) + ("*" if value < final.threshold else " ")
+
+
+def coverage_matrix_table(final: FinalTest, *, width: int = WIDTH) -> str:
+    """Show which model covers which recording (as T3.4.3-1).
+
+    Parameters
+    ----------
+    final : FinalTest
+    width : int, [characters]
+        Of the screen; more recordings than fit go into further blocks.
+
+    Returns
+    -------
+    str
+        One character for each pair, recordings' names from top to bottom.
+    """
+    labels = ["model", *_short_names(final), "covered by"]
+    label = max(map(len, labels))
+    room = width - label - len(GAP) - len("  covers")
+    # Each group of columns takes one more character for the gap behind it.
+    per_block = max(1, room * _TOGETHER // (_TOGETHER + 1))
+    title = (
+        f"Coverage of all models on all recordings: 1 RMSD below {final.threshold:g} "
+        f"{final.unit}, . not,\nblank its own; a + adds to the model above it (form of "
+        "T3.4.3-1)"
+    )
+    blocks = [
+        _matrix_block(final, slice(first, first + per_block), labels[1:-1], label)
+        for first in range(0, len(final.recordings), per_block)
+    ]
+    return "\n\n".join([f"{title}\n{blocks[0]}", *blocks[1:]])
+
+
+def _matrix_block(
+    final: FinalTest, part: slice, labels: Sequence[str], label: int
+) -> str:
+    """Some columns of the matrix, with heads, rows and sums."""
+
+    def line(start: str, cells: str, end: str = "") -> str:
+        return f"{start:{label}}{GAP}{_grouped(cells)}{GAP}{end:>6}".rstrip()
+
+    heads = _downwards(final.recordings[part])
+    lines = [line("", cells) for cells in heads[:-1]]
+    lines.append(line("model", heads[-1], "covers"))
+    covered = final.rmsd[:, part] < final.threshold
+    for row, name in enumerate(labels):
+        cells = np.where(covered[row], "1", ".")
+        cells[final.is_own[row, part]] = " "
+        lines.append(line(name, "".join(cells), str(final.covers[row])))
+    counts = _downwards([str(n) for n in final.covered_by[part]])
+    lines.append(line("covered by", counts[0]))
+    lines += [line("", cells) for cells in counts[1:]]
+    return "\n".join(lines)
+
+
+def _short_names(final: FinalTest) -> list[str]:
+    """Names of models; what a chain's model adds to the one above it follows a ``+``."""
+    short = []
+    before = ""
+    for model in final.models:
+        who = model.rsplit("/", 2)[0]
+        is_longer = model in final.chain and before and who.startswith(f"{before}+")
+        short.append(model[len(before) :] if is_longer else model)
+        before = who if model in final.chain else ""
+    return short
+
+
+def _downwards(names: Sequence[str]) -> list[str]:
+    """Lines that hold the names from top to bottom, one name in each column."""
+    height = max(map(len, names))
+    placed = [name.rjust(height) for name in names]
+    return ["".join(letters) for letters in zip(*placed, strict=True)]
+
+
+def _grouped(cells: str) -> str:
+    starts = range(0, len(cells), _TOGETHER)
+    return " ".join(cells[first : first + _TOGETHER] for first in starts)
+
+
+def gaps_text(final: FinalTest, *, width: int = WIDTH) -> str:
+    """Name the recordings that nothing covers, or hardly anything.
+
+    Parameters
+    ----------
+    final : FinalTest
+    width : int, [characters]
+        Of the screen.
+
+    Returns
+    -------
+    str
+    """
+    parts = [
+        ("Covered by no model at all, not even their own", final.uncovered),
+        ("Covered by fewer than a tenth of the other models", final.hard_to_cover),
+    ]
+    lines = []
+    for what, names in parts:
+        lines.append(f"{what}: {len(names)} of {len(final.recordings)} recordings")
+        lines += [f"  {line}" for line in joined_names(names, width=width - 2) if line]
+    return "\n".join(lines)

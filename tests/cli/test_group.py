@@ -1,0 +1,86 @@
+import csv
+
+import pytest
+
+SECTION = "group: {keep: {best: true}, max_level: 2}\n"
+
+
+@pytest.fixture
+def grouped(config, hwid, after_run):
+    config.write_text(config.read_text() + SECTION)
+    result = hwid("group")
+    assert result.exit_code == 0, result.output
+    return result
+
+
+def rows_of(path):
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_the_search_is_written_and_shown(grouped, out):
+    rows = rows_of(out / "groups.csv")
+
+    assert {row["level"] for row in rows} == {"1", "2"}
+    assert list(rows[0])[:7] == [
+        *("level", "base", "add_on", "coverage", "nb", "nk", "kept"),
+    ]
+    assert "T3.3.3.1-2" in grouped.stdout
+    assert "The search stopped: " in grouped.stdout
+    assert "group level 1: 6 fits from the cache, 0 computed" in grouped.stdout
+
+
+def test_a_second_run_answers_from_the_cache_with_the_same_table(grouped, hwid, out):
+    before = (out / "groups.csv").read_bytes()
+    result = hwid("group")
+
+    assert "groups from the cache, 0 computed" in result.stdout
+    assert (out / "groups.csv").read_bytes() == before
+
+
+def test_force_searches_again_but_keeps_the_models_of_single_recordings(grouped, hwid):
+    result = hwid("group", "--force")
+
+    assert "group level 1: 6 fits from the cache, 0 computed" in result.stdout
+    assert "group level 2: 0 fits from the cache" in result.stdout
+
+
+def test_another_threshold_fits_nothing_again(grouped, hwid, edit):
+    edit("crossval: {threshold: 0.01}", "crossval: {threshold: 0.02}")
+    result = hwid("group")
+
+    assert result.exit_code == 0, result.output
+    fits = [line for line in result.stdout.splitlines() if " fits from" in line]
+    assert fits
+    assert all(", 0 computed" in line for line in fits if "level 1" in line)
+
+
+def test_test_recordings_take_no_part(config, hwid, after_run, out):
+    config.write_text(config.read_text() + SECTION + "test: {recordings: [step_12]}\n")
+    result = hwid("group")
+
+    assert result.exit_code == 0, result.output
+    assert "step_12" not in (out / "groups.csv").read_text()
+
+
+@pytest.mark.parametrize(
+    ("section", "message"),
+    [
+        (
+            "group: {start: [step_02]}\ntest: {recordings: [step_02]}\n",
+            "'step_02' starts groups too",
+        ),
+        (
+            "group: {candidates: [step_02]}\ntest: {recordings: [step_02]}\n",
+            "'step_02' is a candidate too",
+        ),
+        ("group: {start: [step_2]}\n", "group.start: no recording 'step_2'; did you"),
+    ],
+)
+def test_a_list_that_cannot_be_is_one_line(config, hwid, after_run, section, message):
+    config.write_text(config.read_text() + section)
+    result = hwid("group")
+
+    assert result.exit_code == 1
+    assert message in result.stderr
+    assert len(result.stderr.strip().splitlines()) == 1

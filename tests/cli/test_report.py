@@ -1,0 +1,100 @@
+import re
+
+import pytest
+
+from hwid_cli.cli.options import Choices
+from hwid_cli.cli.report import read_stored
+from hwid_cli.cli.session import open_session
+
+
+def files_below(folder):
+    return {
+        str(path.relative_to(folder)): path.read_bytes()
+        for path in sorted(folder.rglob("*.png"))
+    }
+
+
+def test_without_results_it_says_in_one_line_what_to_run(hwid, out):
+    result = hwid("report")
+
+    assert result.exit_code == 1
+    assert result.stderr.count("\n") == 1
+    assert "holds no results" in result.stderr
+    assert "run 'hwid run" in result.stderr
+    assert not (out / "report.html").exists()
+
+
+def test_a_report_of_all_stages(after_run, hwid, out):
+    before = (out / "results.h5").read_bytes()
+    result = hwid("report")
+
+    assert result.exit_code == 0, result.output
+    assert "shows calibrate, identify, crossval" in result.stdout
+    # No stage is run.
+    assert (out / "results.h5").read_bytes() == before
+    html = (out / "report.html").read_text()
+    figures = files_below(out / "figures")
+    assert html.count("<img") == len(figures)
+    assert {"calibrate/step_02.png", "recordings/step_02_detail.png"} <= set(figures)
+    assert "hwid group CONFIG" in html
+    # Seconds and versions come from the results.
+    row = re.search(r"<td class=\"text\">identify</td>(.*?)</tr>", html, re.DOTALL)
+    assert re.search(r"<td>\d+\.\d</td>", row[1])
+    assert "unknown" not in row[1]
+    assert "as configured" in row[1]
+
+
+@pytest.mark.slow
+def test_the_same_results_give_the_same_bytes(after_run, hwid, out):
+    hwid("report")
+    html, figures = (out / "report.html").read_bytes(), files_below(out)
+    hwid("report")
+
+    assert (out / "report.html").read_bytes() == html
+    assert files_below(out) == figures
+
+
+@pytest.mark.slow
+def test_models_newer_than_the_tensor_do_not_break_it(after_run, hwid, out, edit):
+    edit("nk: [1, 2]", "nk: [2, 2]")
+    hwid("identify")
+    result = hwid("report")
+
+    assert result.exit_code == 0, result.output
+    assert "belongs to other models" in (out / "report.html").read_text()
+
+
+def test_settings_that_changed_since_the_run_are_named(after_run, config, out, edit):
+    edit("threshold: 0.01", "threshold: 0.02")
+    session = open_session(Choices(config, out), "report")
+
+    changed = {run.stage: run.changed for run in read_stored(session).stages}
+    assert changed == {"calibrate": (), "identify": (), "crossval": ("crossval",)}
+
+
+def test_calibration_alone_can_be_reported(hwid, out):
+    hwid("calibrate")
+    result = hwid("report")
+
+    assert result.exit_code == 0, result.output
+    assert "shows calibrate," in result.stdout
+
+
+def test_a_broken_diagnosis_is_one_line(after_run, hwid, out):
+    (out / "diagnosis.json").write_text("{")
+    result = hwid("report")
+
+    assert result.exit_code == 1
+    assert "diagnosis.json: cannot be read" in result.stderr
+
+
+def test_a_page_is_drawn_again_only_when_its_results_have_changed(
+    after_run, hwid, edit
+):
+    hwid("report")
+
+    assert "shows calibrate, identify, crossval already" in hwid("report").stdout
+    assert "already" not in hwid("report", "--force").stdout
+    edit("crossval: {threshold: 0.01}", "crossval: {threshold: 0.02}")
+    assert hwid("crossval").exit_code == 0
+    assert "already" not in hwid("report").stdout

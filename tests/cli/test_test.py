@@ -1,0 +1,159 @@
+import csv
+import shutil
+
+import h5py
+import pytest
+from click.testing import CliRunner
+
+from hwid_cli.cli.main import main
+from tests.cli.conftest import CONFIG
+
+# One more step and one more sine, which nothing else uses.
+PLAN = "only: [step_02, step_12, sine_12]"
+MORE = "only: [step_02, step_05, step_12, sine_03, sine_12]"
+SECTION = "test: {recordings: [step_05, sine_03]}\n"
+GROUP = "group: {start: [step_02], keep: {best: true}, max_level: 2}\n"
+WITH_TEST = CONFIG.replace(PLAN, MORE) + SECTION
+TABLES = ("test.csv", "assignment.csv", "coverage_matrix.csv")
+
+
+@pytest.fixture(scope="module")
+def first_run(tmp_path_factory):
+    """A first run with groups: its folder and what it said."""
+    folder = tmp_path_factory.mktemp("tested")
+    path = folder / "tiny.yaml"
+    path.write_text(WITH_TEST + GROUP)
+    arguments = ["test", str(path), "--out", str(folder / "out"), "--jobs", "1"]
+    result = CliRunner().invoke(main, arguments)
+    assert result.exit_code == 0, result.output
+    return folder / "out", result.stdout
+
+
+@pytest.fixture
+def config(tmp_path):
+    path = tmp_path / "tiny.yaml"
+    path.write_text(WITH_TEST + GROUP)
+    return path
+
+
+@pytest.fixture
+def again(first_run, out, hwid):
+    """Run once more, with the results of the first run at hand."""
+    shutil.copytree(first_run[0], out)
+    return lambda *options: hwid("test", *options)
+
+
+def rows_of(path):
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def tables_of(folder):
+    return [(folder / name).read_bytes() for name in TABLES]
+
+
+def test_every_model_is_judged_on_every_recording(first_run):
+    out, said = first_run
+
+    assert "test: 0 recordings from the cache, 5 computed" in said
+    with h5py.File(out / "results.h5") as file:
+        models = file["test/models"].asstr()[:].tolist()
+        assert file["test/rmsd"].shape == (len(models), 5)
+        assert {"identify", "crossval", "group", "test"} <= set(file)
+    rows = rows_of(out / "test.csv")
+    assert [row["model"] for row in rows[::5]] == models
+    assert {row["recording"] for row in rows if row["is_test"] == "1"} == {
+        "step_05",
+        "sine_03",
+    }
+    assert len(rows_of(out / "assignment.csv")) == 5
+    assert rows_of(out / "coverage_matrix.csv")[-1]["model"] == "covered_by"
+
+
+def test_the_chain_of_groups_comes_last(first_run):
+    with h5py.File(first_run[0] / "results.h5") as file:
+        chain = file["test/chain"].asstr()[:].tolist()
+        models = file["test/models"].asstr()[:].tolist()
+
+    assert chain[0].startswith("step_02/")
+    assert models[-len(chain) :] == chain
+    levels = {row["model"]: row["level"] for row in rows_of(first_run[0] / "test.csv")}
+    assert [levels[name] for name in chain] == ["1", "2"][: len(chain)]
+
+
+def test_the_published_tables_are_shown(first_run):
+    for form in ("3.3.3.4-1", "3.4.1-1", "3.4.1-2", "3.4.1-3", "3.4.3-1", "3.4.3-2"):
+        assert f"(form of T{form}" in first_run[1].replace("\n", " ")
+    assert "Right for " in first_run[1]
+
+
+def test_without_groups_the_single_models_are_judged(again, edit, out):
+    edit(GROUP, "")
+    result = again()
+
+    assert result.exit_code == 0, result.output
+    assert "The chain" not in result.stdout
+    # Three models of their own; the test recordings have none.
+    rows = rows_of(out / "test.csv")
+    assert len(rows) == 3 * 5
+    assert {row["level"] for row in rows} == {"1"}
+
+
+def test_a_second_run_answers_from_the_results_with_the_same_tables(
+    again, out, first_run
+):
+    for name in TABLES:
+        (out / name).unlink()
+    # Nothing but the stored results can answer now.
+    shutil.rmtree(out / "cache")
+    result = again()
+
+    assert "test: 5 recordings from the cache, 0 computed" in result.stdout
+    assert tables_of(out) == tables_of(first_run[0])
+    shown, before = (
+        said.split("Coverage of all")[1].split("results:")[0]
+        for said in (result.stdout, first_run[1])
+    )
+    assert shown == before
+
+
+def test_a_lost_results_file_is_made_from_the_cache(again, out, first_run):
+    (out / "results.h5").unlink()
+    result = again()
+
+    assert "test: 5 recordings from the cache, 0 computed" in result.stdout
+    assert tables_of(out) == tables_of(first_run[0])
+
+
+def test_force_judges_again(again):
+    said = again("--force").stdout
+
+    assert "test: 0 recordings from the cache, 5 computed" in said
+    assert "crossval: 9 pairs from the cache, 0 computed" in said
+
+
+def test_another_threshold_is_another_result(again, edit, out):
+    edit("threshold: 0.01", "threshold: 1000.0")
+    again()
+
+    assert {row["covered"] for row in rows_of(out / "test.csv")} == {"1"}
+
+
+def test_without_the_section_one_line_says_what_to_add(hwid, config, edit):
+    edit(SECTION, "")
+    result = hwid("test")
+
+    assert result.exit_code == 1
+    (line,) = result.stderr.splitlines()
+    assert f"{config}: test: the section is missing" in line
+    assert "add it, such as 'test: {recordings: [step_05, step_10]}'" in line
+    assert result.stdout == ""
+
+
+def test_an_unknown_test_recording_is_one_line_that_names_it(again, edit):
+    edit("[step_05, sine_03]", "[step_55]")
+    result = again()
+
+    assert result.exit_code == 1
+    assert "test.recordings: no recording 'step_55'" in result.stderr
+    assert len(result.stderr.splitlines()) == 1
