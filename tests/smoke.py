@@ -50,11 +50,13 @@ def main() -> None:
         check(tensor.shape == shape, f"tensor {tensor.shape}, axes {shape}")
         check(bool(np.isfinite(tensor).all()), f"RMSDs that are not finite: {tensor}")
         second = run(out)
-        for stage in ("identify", "crossval"):
+        for stage in ("identify", "crossval", "group", "test"):
             found = re.search(rf"^{stage}: (\d+) .* from the cache, 0 ", second, re.M)
             check(found is not None, f"{stage} was not cached:\n{second}")
         again, _ = read_tensor(out)
         check(bool(np.array_equal(tensor, again)), "the second run gave other numbers")
+        page = (out / "report.html").read_text(encoding="utf-8")
+        check("<h2" in page and "data:image/png" in page, "the report is empty")
     sys.stdout.write(first)
     sys.stdout.write(f"smoke: passed, {tensor.size} RMSDs, cached in the second run\n")
 

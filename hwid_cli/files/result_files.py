@@ -2,9 +2,12 @@
 
 import json
 import logging
+import math
+import platform
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -13,7 +16,7 @@ import numpy as np
 
 from hwid_cli import __version__
 from hwid_cli.errors import CacheError
-from hwid_cli.files.hdf5_values import write_array
+from hwid_cli.files.hdf5_values import read_array, write_array
 from hwid_cli.files.replaced_files import check_format, replaced_hdf5
 
 Result = TypeVar("Result")
@@ -23,6 +26,9 @@ RESULTS_FORMAT = "hwid-results"
 SCHEMA_VERSION = 1
 
 _log = logging.getLogger(__name__)
+
+# Packages whose version can move a number or change a file.
+_PACKAGES = ("numpy", "scipy", "numba", "h5py")
 
 
 @dataclass(frozen=True)
@@ -37,11 +43,32 @@ class Provenance:
         Resolved configuration, see ``files.config.describe_experiment``.
     inputs : mapping of str to str
         SHA-256 of each recording's file by the recording's name.
+    seconds : float, [s]
+        Time that the run of the stage took which gave the results; NaN unknown.
+    versions : mapping of str to str
+        What computed them, see ``current_versions``; empty unknown.
     """
 
     key: str
     config: Mapping[str, Any] = field(default_factory=dict)
     inputs: Mapping[str, str] = field(default_factory=dict)
+    seconds: float = float("nan")
+    versions: Mapping[str, str] = field(default_factory=dict)
+
+
+def current_versions() -> dict[str, str]:
+    """Versions of the program, of Python and of what computes and stores.
+
+    Returns
+    -------
+    dict of str to str
+        Without packages that are not installed.
+    """
+    versions = {"hwid": __version__, "python": platform.python_version()}
+    for package in _PACKAGES:
+        with suppress(PackageNotFoundError):
+            versions[package] = version(package)
+    return versions
 
 
 def read_stage_key(path: Path, stage: str) -> str | None:
@@ -85,6 +112,47 @@ def write_provenance(group: h5py.Group, provenance: Provenance) -> None:
     hashes = [provenance.inputs[name] for name in names]
     write_array(inner, "input_names", np.array(names, dtype=object))
     write_array(inner, "input_sha256", np.array(hashes, dtype=object))
+    inner.attrs["seconds"] = provenance.seconds
+    versions = inner.create_group("versions")
+    for name, number in provenance.versions.items():
+        versions.attrs[name] = number
+
+
+def read_provenance(path: Path, stage: str) -> Provenance:
+    """Read where a stage's stored results came from.
+
+    Parameters
+    ----------
+    path : Path
+        ``calibrated.h5`` for ``calibrate``, else ``results.h5``.
+    stage : str
+
+    Returns
+    -------
+    Provenance
+        Seconds are NaN and versions empty where an older program did not store them.
+
+    Raises
+    ------
+    CacheError
+        If there are no results of that stage, or none that can be read.
+    """
+
+    def read(file: h5py.File) -> Provenance:
+        group = file if stage == "calibrate" else file[stage]
+        inner = group["provenance"]
+        names = read_array(inner, "input_names").tolist()
+        hashes = read_array(inner, "input_sha256").tolist()
+        stored = inner["versions"].attrs if "versions" in inner else {}
+        return Provenance(
+            key=str(group.attrs["key"]),
+            config=json.loads(str(read_array(inner, "config"))),
+            inputs=dict(zip(names, hashes, strict=True)),
+            seconds=float(inner.attrs.get("seconds", math.nan)),
+            versions={str(name): str(number) for name, number in stored.items()},
+        )
+
+    return read_results(path, stage, read)
 
 
 @contextmanager

@@ -1,4 +1,4 @@
-"""Figures: records in, figures out; the only home of matplotlib."""
+"""Figures of the calibration: records in, figures out; those of the report are in ``figures``."""
 
 import io
 
@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from hwid_cli.records.recordings import CalibrationLog, RawRecording, Recording
 
 # Inches and dots: 800 x 500 pixels, fast to draw and sharp enough to judge a cut.
-_SIZE, _DOTS = (8.0, 5.0), 100
+_SIZE, DOTS = (8.0, 5.0), 100
 
 
 def calibration_figure(
@@ -29,7 +29,7 @@ def calibration_figure(
         Input above output over time; what was cut is shaded, repaired samples are
         marked.
     """
-    figure = Figure(figsize=_SIZE, dpi=_DOTS)
+    figure = Figure(figsize=_SIZE, dpi=DOTS)
     # Fixed margins: a layout engine draws everything twice.
     figure.subplots_adjust(left=0.12, right=0.98, top=0.93, bottom=0.1, hspace=0.08)
     upper, lower = figure.subplots(2, 1, sharex=True)

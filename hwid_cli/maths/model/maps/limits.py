@@ -105,6 +105,7 @@ SATURATION = MapRule(
     with_domain=_with_domain,
     names=lambda static_map: ("lower", "upper"),
     settle=_settle,
+    corners=lambda static_map: static_map.parameters,
 )
 
 DEAD_ZONE = MapRule(
@@ -117,6 +118,7 @@ DEAD_ZONE = MapRule(
     with_domain=_with_domain,
     names=lambda static_map: ("lower", "upper"),
     settle=_settle,
+    corners=lambda static_map: static_map.parameters,
 )
 
 NONE = MapRule(

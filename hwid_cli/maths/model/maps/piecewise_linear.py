@@ -127,4 +127,5 @@ RULE = MapRule(
     size=_size,
     n_positions=lambda static_map: static_map.parameters.size // 2,
     settle=_settle,
+    corners=lambda static_map: break_points_and_values(static_map)[0],
 )

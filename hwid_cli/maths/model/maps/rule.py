@@ -38,6 +38,20 @@ def keep_proposed(old: StaticMap, proposed: StaticMap) -> StaticMap:  # noqa: AR
     return proposed
 
 
+def no_corners(static_map: StaticMap) -> np.ndarray:  # noqa: ARG001
+    """Tell that a map is smooth.
+
+    Parameters
+    ----------
+    static_map : StaticMap
+
+    Returns
+    -------
+    ndarray, shape (0,)
+    """
+    return np.zeros(0)
+
+
 @dataclass(frozen=True)
 class MapRule:
     """What one kind of static map can do.
@@ -66,6 +80,8 @@ class MapRule:
         Leading parameters that stay fixed in the first phase of a fit.
     settle : callable (old, proposed) -> StaticMap
         The proposed map with its parameters put into a legal order.
+    corners : callable (StaticMap) -> ndarray
+        Arguments at which the slope changes.
     """
 
     evaluate: Callable[[StaticMap, np.ndarray], np.ndarray]
@@ -81,3 +97,4 @@ class MapRule:
     size: Callable[[StaticMap], tuple[float, np.ndarray]] | None = None
     n_positions: Callable[[StaticMap], int] = no_positions
     settle: Callable[[StaticMap, StaticMap], StaticMap] = keep_proposed
+    corners: Callable[[StaticMap], np.ndarray] = no_corners

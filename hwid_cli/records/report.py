@@ -1,0 +1,318 @@
+"""What a report shows: stored results, and what is worked out from them for its figures."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from hwid_cli.records.groups import FinalTest, GroupSearch
+from hwid_cli.records.model import Fit
+from hwid_cli.records.recordings import CalibrationLog, Recording
+from hwid_cli.records.results import CrossValidation
+
+# Why a recording is shown with a model: it is the best of those fitted to it, the one
+# that the final test assigned, or the best of the cross-validation.
+CHOICES = ("own", "assigned", "crossval")
+
+
+@dataclass(frozen=True)
+class StageRun:
+    """The run of a stage whose results are stored.
+
+    Parameters
+    ----------
+    stage : str
+    key : str
+        Hash of everything that the results depend on.
+    seconds : float, [s]
+        What the run took; NaN unknown.
+    versions : mapping of str to str
+        Program, Python and packages; empty unknown.
+    changed : tuple of str
+        Sections of the configuration that matter to the stage and read differently now.
+    """
+
+    stage: str
+    key: str
+    seconds: float = float("nan")
+    versions: Mapping[str, str] = field(default_factory=dict)
+    changed: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class StoredResults:
+    """Whatever stages have left below ``--out``.
+
+    Parameters
+    ----------
+    name : str
+        Of the experiment.
+    config : str
+        Resolved configuration as JSON.
+    nk_role : str
+        What the second axis of the order grid counts; one of ``experiment.NK_ROLES``.
+    stages : tuple of StageRun
+        Those that have run, in their order.
+    recordings : tuple of Recording
+        Calibrated ones.
+    logs : tuple of CalibrationLog
+        In the order of the recordings.
+    fits : tuple of Fit
+        Of single recordings.
+    crossval : CrossValidation or None
+    search : GroupSearch or None
+    final_test : FinalTest or None
+    diagnosis : mapping or None
+        Content of ``diagnosis.json``.
+    """
+
+    name: str
+    config: str
+    nk_role: str
+    stages: tuple[StageRun, ...] = ()
+    recordings: tuple[Recording, ...] = ()
+    logs: tuple[CalibrationLog, ...] = ()
+    fits: tuple[Fit, ...] = ()
+    crossval: CrossValidation | None = None
+    search: GroupSearch | None = None
+    final_test: FinalTest | None = None
+    diagnosis: Mapping[str, Any] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class SimulatedRecording:
+    """A recording and what a model makes of its input.
+
+    Parameters
+    ----------
+    recording : Recording
+    model : str
+        ``step_06/3/7``.
+    choice : str
+        Why this model; one of ``CHOICES``.
+    output : ndarray, shape (n_samples,), [output unit]
+        Simulated.
+    residual : ndarray, shape (n_samples,), [output unit]
+        Measured minus simulated.
+    rmsd : float, [output unit]
+    fit_percent : float, [%]
+    detail : tuple of int, [samples]
+        First sample of the stretch worth a closer look, and the one after its last.
+    """
+
+    recording: Recording
+    model: str
+    choice: str
+    output: np.ndarray
+    residual: np.ndarray
+    rmsd: float
+    fit_percent: float
+    detail: tuple[int, int]
+
+
+@dataclass(frozen=True, eq=False)
+class OrderGrid:
+    """RMSD of every model on its own recording.
+
+    Parameters
+    ----------
+    recordings : tuple of str, length n
+    nb, nk : tuple of int
+    nk_role : str
+    rmsd : ndarray, shape (n, nb, nk), [unit]
+        NaN where a fit failed.
+    unit : str
+        Unit of the output.
+    """
+
+    recordings: tuple[str, ...]
+    nb: tuple[int, ...]
+    nk: tuple[int, ...]
+    nk_role: str
+    rmsd: np.ndarray
+    unit: str
+
+
+@dataclass(frozen=True, eq=False)
+class RmsdMatrix:
+    """RMSD of some models on some recordings, and what that covers.
+
+    Parameters
+    ----------
+    models : tuple of str, length n
+    recordings : tuple of str, length m
+    rmsd : ndarray, shape (n, m), [unit]
+    is_own : ndarray of bool, shape (n, m)
+        Whether the model was fitted to the recording.
+    covers : ndarray of int, shape (n,), [-]
+        Recordings that each model covers, a model's own counted or not as the stage does.
+    covered_by : ndarray of int, shape (m,), [-]
+        Models that cover each recording.
+    unit : str
+    threshold : float, [unit]
+    """
+
+    models: tuple[str, ...]
+    recordings: tuple[str, ...]
+    rmsd: np.ndarray
+    is_own: np.ndarray
+    covers: np.ndarray
+    covered_by: np.ndarray
+    unit: str
+    threshold: float
+
+
+@dataclass(frozen=True, eq=False)
+class MapCurve:
+    """A static map over the range of its argument.
+
+    Parameters
+    ----------
+    argument, value : ndarray, shape (n,)
+    corners, corner_values : ndarray, shape (n_corners,)
+        Break-points or limits in that range; empty for smooth maps.
+    """
+
+    argument: np.ndarray
+    value: np.ndarray
+    corners: np.ndarray
+    corner_values: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class FrequencyResponse:
+    """Response of a linear block up to half the sampling frequency.
+
+    Parameters
+    ----------
+    frequency_Hz : ndarray, shape (n,), [Hz]
+    magnitude : ndarray, shape (n,), [-]
+        Both sides of the block are in the input's unit.
+    phase_deg : ndarray, shape (n,), [deg]
+        Unwrapped, the delay included.
+    """
+
+    frequency_Hz: np.ndarray
+    magnitude: np.ndarray
+    phase_deg: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class ModelView:
+    """One model, seen from all sides.
+
+    Parameters
+    ----------
+    model : str
+        Its name.
+    input_curve, output_curve : MapCurve
+    response : FrequencyResponse
+    poles, zeros : ndarray of complex, [-]
+    delay : int, [samples]
+    is_stable : bool
+    rmsd : float, [output unit]
+        On the recordings of its fit.
+    coverage : int, [-]
+        Recordings that it covers, of ``covers_of``.
+    covers_of : int, [-]
+    input_unit, output_unit : str
+    """
+
+    model: str
+    input_curve: MapCurve
+    output_curve: MapCurve
+    response: FrequencyResponse
+    poles: np.ndarray
+    zeros: np.ndarray
+    delay: int
+    is_stable: bool
+    rmsd: float
+    coverage: int
+    covers_of: int
+    input_unit: str
+    output_unit: str
+
+
+@dataclass(frozen=True, eq=False)
+class ChainOnTests:
+    """The chain of groups on recordings that nothing else has used.
+
+    Parameters
+    ----------
+    models : tuple of str, length n
+        Level by level.
+    recordings : tuple of str, length m
+    rmsd : ndarray, shape (n, m), [unit]
+    mean : ndarray, shape (n,), [unit]
+        Over the recordings; NaN where one is missing.
+    covers : ndarray of int, shape (n,), [-]
+    unit : str
+    threshold : float, [unit]
+    """
+
+    models: tuple[str, ...]
+    recordings: tuple[str, ...]
+    rmsd: np.ndarray
+    mean: np.ndarray
+    covers: np.ndarray
+    unit: str
+    threshold: float
+
+
+@dataclass(frozen=True)
+class PredictionCounts:
+    """How often the model told from the input alone was right.
+
+    Parameters
+    ----------
+    right : int, [-]
+        Recordings that the chosen model covers.
+    possible : int, [-]
+        Recordings that any model of the set covers.
+    total : int, [-]
+    """
+
+    right: int
+    possible: int
+    total: int
+
+
+@dataclass(frozen=True, eq=False)
+class ReportContents:
+    """Everything that a report shows.
+
+    Parameters
+    ----------
+    stored : StoredResults
+    statuses : mapping of str to int
+        How the fits ended.
+    simulated : tuple of SimulatedRecording
+        In the order of the recordings, without those that no model is there for.
+    without_model : tuple of str
+        Those recordings.
+    grid : OrderGrid or None
+    cross : RmsdMatrix or None
+        The widest model of each recording on all that judge.
+    models : tuple of ModelView
+        The chain of groups, or the widest models.
+    trend : ChainOnTests or None
+    chain_matrix, full_matrix : RmsdMatrix or None
+        The chain, and all models of the final test, on all recordings.
+    predictions : PredictionCounts or None
+    outdated : tuple of str
+        Stages whose stored results do not belong to the models that are stored now.
+    """
+
+    stored: StoredResults
+    statuses: Mapping[str, int] = field(default_factory=dict)
+    simulated: tuple[SimulatedRecording, ...] = ()
+    without_model: tuple[str, ...] = ()
+    grid: OrderGrid | None = None
+    cross: RmsdMatrix | None = None
+    models: tuple[ModelView, ...] = ()
+    trend: ChainOnTests | None = None
+    chain_matrix: RmsdMatrix | None = None
+    full_matrix: RmsdMatrix | None = None
+    predictions: PredictionCounts | None = None
+    outdated: tuple[str, ...] = ()

@@ -1,0 +1,1 @@
+"""Figures of the report: records in, figures out."""

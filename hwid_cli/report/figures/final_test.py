@@ -1,0 +1,56 @@
+"""Figure of the final test: the chain of groups on recordings that nobody used."""
+
+from matplotlib.figure import Figure
+
+from hwid_cli.records.report import ChainOnTests
+from hwid_cli.report.figures.style import (
+    BLACK,
+    LINES,
+    new_figure,
+    number_decades,
+    styled,
+)
+
+# Lines with a legend of their own; more are told apart by nobody.
+_MOST_NAMED = 10
+
+
+@styled
+def trend_figure(trend: ChainOnTests) -> Figure:
+    """Draw the RMSD on the test recordings along the chain of groups.
+
+    Parameters
+    ----------
+    trend : ChainOnTests
+
+    Returns
+    -------
+    Figure
+        One line for each recording, their mean, and the threshold.
+    """
+    figure = new_figure(8.4, 3.9)
+    figure.subplots_adjust(left=0.1, right=0.76, top=0.96, bottom=0.2)
+    axes = figure.subplots()
+    levels = list(range(1, len(trend.models) + 1))
+    for number, name in enumerate(trend.recordings):
+        label = name if len(trend.recordings) <= _MOST_NAMED else ""
+        style = LINES[number % len(LINES)]
+        axes.plot(levels, trend.rmsd[:, number], lw=1.2, ms=5, label=label, **style)
+    axes.plot(levels, trend.mean, color=BLACK, lw=2.8, marker="o", ms=6, label="mean")
+    told = f"threshold {trend.threshold:g} {trend.unit}"
+    axes.axhline(trend.threshold, color=BLACK, lw=1.0, ls=(0, (2, 2)), label=told)
+    axes.set_yscale("log")
+    number_decades(axes.yaxis, *axes.get_ylim())
+    axes.set_xticks(levels, [_tick(model) for model in trend.models])
+    axes.set_xlim(levels[0] - 0.2, levels[-1] + 0.2)
+    axes.set_xlabel("recordings in the group, added one by one")
+    axes.set_ylabel(f"RMSD [{trend.unit}]")
+    axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.02))
+    return figure
+
+
+def _tick(model: str) -> str:
+    """``1: step_06``, ``2: + step_09``: what the level added."""
+    recordings = model.rsplit("/", 2)[0].split("+")
+    sign = "+ " if len(recordings) > 1 else ""
+    return f"{len(recordings)}: {sign}{recordings[-1]}"

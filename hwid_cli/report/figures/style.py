@@ -1,0 +1,151 @@
+"""How all figures of the report look: sizes, colours that everybody can tell apart."""
+
+import math
+from collections.abc import Callable
+from functools import wraps
+from typing import Any, ParamSpec, TypeVar
+
+import matplotlib as mpl
+from matplotlib.axes import Axes
+from matplotlib.axis import Axis
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+from hwid_cli.report import plots
+
+Arguments = ParamSpec("Arguments")
+Drawn = TypeVar("Drawn")
+
+# Sharp on a screen with fine pixels, [dots/inch].
+DOTS = 150
+# Two figures side by side, and one over the whole width of the page, [inch].
+HALF_WIDTH, FULL_WIDTH = 5.6, 11.2
+
+# Colours by Okabe and Ito, told apart by colour-blind readers too; the order also falls
+# in brightness steps that a grey print keeps.
+BLACK, BLUE, VERMILLION, GREEN = "#000000", "#0072B2", "#D55E00", "#009E73"
+ORANGE, SKY, PURPLE, GREY = "#E69F00", "#56B4E9", "#CC79A7", "#7f7f7f"
+# Lines differ in colour, dashes and markers at once.
+LINES: tuple[dict[str, Any], ...] = (
+    {"color": BLUE, "ls": "-", "marker": "o"},
+    {"color": VERMILLION, "ls": "--", "marker": "s"},
+    {"color": GREEN, "ls": "-.", "marker": "^"},
+    {"color": PURPLE, "ls": ":", "marker": "D"},
+    {"color": ORANGE, "ls": "-", "marker": "v"},
+    {"color": SKY, "ls": "--", "marker": "P"},
+    {"color": BLACK, "ls": "-.", "marker": "X"},
+)
+# Even in brightness from end to end, so that it survives a grey print.
+HEAT = "cividis"
+# Where there is no number.
+MISSING_COLOUR, MISSING_HATCH = "#e3e3e3", "////"
+
+# Over more decades than this, each is marked once, [-].
+_MANY_DECADES = 2.3
+
+_SETTINGS: Any = {
+    "font.size": 9.0,
+    "axes.titlesize": 9.5,
+    "axes.titlelocation": "left",
+    # A fixed place: looking for a free one measures every tick again.
+    "axes.titley": 1.0,
+    "axes.labelsize": 9.0,
+    "xtick.labelsize": 8.0,
+    "ytick.labelsize": 8.0,
+    "legend.fontsize": 8.0,
+    "legend.frameon": False,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.edgecolor": "#555555",
+    "axes.linewidth": 0.8,
+    "axes.grid": True,
+    "grid.color": "#dddddd",
+    "grid.linewidth": 0.6,
+    "axes.axisbelow": True,
+    "hatch.linewidth": 0.5,
+    "hatch.color": "#a0a0a0",
+    # Names of recordings may hold dollars, which are no formulas.
+    "text.parse_math": False,
+}
+
+
+def styled(
+    draw: Callable[Arguments, Drawn],
+) -> Callable[Arguments, Drawn]:
+    """Let a function draw in the report's style, whatever the user's settings are.
+
+    Parameters
+    ----------
+    draw : callable
+
+    Returns
+    -------
+    callable
+    """
+
+    @wraps(draw)
+    def with_style(*args: Arguments.args, **kwargs: Arguments.kwargs) -> Drawn:
+        with mpl.rc_context():
+            mpl.rcdefaults()
+            mpl.rcParams.update(_SETTINGS)
+            return draw(*args, **kwargs)
+
+    return with_style
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """Give an empty figure.
+
+    Parameters
+    ----------
+    width, height : float, [inch]
+
+    Returns
+    -------
+    Figure
+    """
+    return Figure(figsize=(width, height), dpi=DOTS)
+
+
+@styled
+def as_png(figure: Figure) -> bytes:
+    """Render a figure, with the same bytes for the same figure.
+
+    Parameters
+    ----------
+    figure : Figure
+
+    Returns
+    -------
+    bytes
+        A PNG file.
+    """
+    return plots.as_png(figure)
+
+
+def number_decades(axis: Axis, low: float, high: float) -> None:
+    """Write plain numbers along a logarithmic axis, often enough to read it.
+
+    Parameters
+    ----------
+    axis : Axis
+    low, high : float
+        Ends of what is shown; positive.
+    """
+    decades = math.log10(high / low)
+    subs = (1.0,) if decades > _MANY_DECADES else (1.0, 2.0, 5.0)
+    axis.set_major_locator(LogLocator(subs=subs, numticks=12))
+    axis.set_major_formatter(FuncFormatter(lambda value, place: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())
+
+
+def mark_missing(axes: Axes) -> None:
+    """Hatch whatever a heat map leaves blank.
+
+    Parameters
+    ----------
+    axes : Axes
+    """
+    axes.patch.set_facecolor(MISSING_COLOUR)
+    axes.patch.set_hatch(MISSING_HATCH)
+    axes.patch.set_edgecolor("#a0a0a0")

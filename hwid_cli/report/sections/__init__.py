@@ -1,0 +1,1 @@
+"""Sections of the report: records in, blocks of the page out."""

@@ -1,0 +1,139 @@
+"""What was run on what, and what came out, in a few sentences."""
+
+from hwid_cli.records.report import ReportContents
+from hwid_cli.report.page import Block, Cell, Code, Folded, Section, Table, Text
+from hwid_cli.report.sections.words import counted, listed, with_unit
+from hwid_cli.report.tables import status_line
+from hwid_cli.report.text_table import MISSING
+
+# Characters of a hash that tell files and runs apart for the eye.
+_SHORT = 10
+# Recordings whose table is shown open.
+_MOST_OPEN = 12
+
+
+def summary_section(contents: ReportContents) -> Section:
+    """Write the first section.
+
+    Parameters
+    ----------
+    contents : ReportContents
+
+    Returns
+    -------
+    Section
+    """
+    stored = contents.stored
+    recordings = _recordings_table(contents)
+    many = len(stored.recordings) > _MOST_OPEN
+    blocks: list[Block] = [Text(line) for line in _headline(contents)]
+    blocks.append(_stages_table(contents))
+    blocks += [Text(line, is_note=True) for line in _remarks(contents)]
+    if many:
+        summary = f"All {counted(len(stored.recordings), 'recording')}"
+        blocks.append(Folded(summary, (recordings,)))
+    elif stored.recordings:
+        blocks.append(recordings)
+    configuration = "The configuration with all defaults filled in"
+    blocks.append(Folded(configuration, (Code(stored.config),), is_printed=False))
+    return Section("summary", "Summary", "Summary", tuple(blocks))
+
+
+def _headline(contents: ReportContents) -> list[str]:
+    stored, lines = contents.stored, []
+    if stored.recordings:
+        about = counted(len(stored.recordings), "recording")
+        if stored.fits:
+            kinds = status_line(contents.statuses).removeprefix("Fits: ")
+            about += f" and {counted(len(stored.fits), 'fitted model')} ({kinds})"
+        lines.append(f"{about}.")
+    if contents.cross is not None:
+        cross = contents.cross
+        row = int(cross.covers.argmax())
+        lines.append(
+            f"The widest model of a single recording, {cross.models[row]}, covers "
+            f"{cross.covers[row]} of {len(cross.recordings)} recordings with an RMSD "
+            f"below {with_unit(cross.threshold, cross.unit)}."
+        )
+    if stored.search is not None and stored.search.chain_groups:
+        winner = stored.search.chain_groups[-1]
+        lines.append(
+            f"Grouping: the group {winner.name} covers {winner.coverage} of "
+            f"{len(stored.search.validated_on)} with its model {winner.model_name}."
+        )
+    if contents.trend is not None and contents.trend.models:
+        trend = contents.trend
+        lines.append(
+            f"On {counted(len(trend.recordings), 'test recording')} that nothing else "
+            f"has used, the mean RMSD goes from {with_unit(trend.mean[0], trend.unit)} "
+            f"with the first model of the chain to "
+            f"{with_unit(trend.mean[-1], trend.unit)} with the last, which covers "
+            f"{trend.covers[-1]} of them."
+        )
+    if stored.diagnosis is not None:
+        verdict = str(stored.diagnosis.get("verdict", MISSING))
+        lines.append(f"Diagnosis of the simulation: {verdict}.")
+    return lines
+
+
+def _stages_table(contents: ReportContents) -> Table:
+    rows = []
+    for run in contents.stored.stages:
+        rows.append(
+            (
+                run.stage,
+                f"{run.seconds:.1f}" if run.seconds == run.seconds else "unknown",
+                Cell(run.key[:_SHORT], title=run.key),
+                run.versions.get("hwid", "unknown"),
+                _state(contents, run.stage, run.changed),
+            )
+        )
+    return Table(
+        "Stages whose results are shown; seconds are those of the run that gave them",
+        ("stage", "seconds [s]", "key", "hwid", "state"),
+        tuple(rows),
+        text_columns=(0, 2, 4),
+    )
+
+
+def _state(contents: ReportContents, stage: str, changed: tuple[str, ...]) -> str:
+    if stage in contents.outdated:
+        return f"older than the models; run 'hwid {stage}' again"
+    if changed:
+        return f"other settings now: {listed(changed)}"
+    return "as configured"
+
+
+def _remarks(contents: ReportContents) -> list[str]:
+    """Versions, said once where all stages agree."""
+    known = [run for run in contents.stored.stages if run.versions]
+    groups: dict[str, list[str]] = {}
+    for run in known:
+        packages = {name: n for name, n in run.versions.items() if name != "hwid"}
+        text = ", ".join(f"{name} {number}" for name, number in packages.items())
+        groups.setdefault(text, []).append(run.stage)
+    if len(groups) == 1:
+        return [f"Computed with {next(iter(groups))}."]
+    return [
+        f"{listed(stages)}: computed with {text}." for text, stages in groups.items()
+    ]
+
+
+def _recordings_table(contents: ReportContents) -> Table:
+    rows = tuple(
+        (
+            recording.name,
+            recording.kind,
+            str(recording.n_samples),
+            f"{recording.sample_time_s:g}",
+            f"{recording.n_samples * recording.sample_time_s:.3g}",
+            Cell(recording.sha256[:_SHORT] or MISSING, title=recording.sha256),
+        )
+        for recording in contents.stored.recordings
+    )
+    return Table(
+        "Recordings after calibration; the hash is that of the measured file",
+        ("recording", "kind", "samples", "sample time [s]", "length [s]", "SHA-256"),
+        rows,
+        text_columns=(0, 1, 5),
+    )

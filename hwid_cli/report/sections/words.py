@@ -1,0 +1,155 @@
+"""Numbers and lists as words, and figures as blocks: what all sections share."""
+
+import re
+import struct
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from hwid_cli.report.figures.style import DOTS, as_png
+from hwid_cli.report.page import Image
+from hwid_cli.report.text_table import MISSING
+
+_MOST_NAMED = 8
+# Keeps a number and its unit on one line.
+_GLUE = "\N{NO-BREAK SPACE}"
+
+
+def with_unit(value: float, unit: str) -> str:
+    """Write a number with three digits and its unit.
+
+    Parameters
+    ----------
+    value : float, [unit]
+    unit : str
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> with_unit(0.0012345, "m").split(), with_unit(float("nan"), "m")
+    (['0.00123', 'm'], '-')
+    """
+    return f"{value:.3g}{_GLUE}{unit}".rstrip() if np.isfinite(value) else MISSING
+
+
+def percent(value: float) -> str:
+    """Write a percentage with two decimals.
+
+    Parameters
+    ----------
+    value : float, [%]
+
+    Returns
+    -------
+    str
+    """
+    return f"{value:.2f}{_GLUE}%" if np.isfinite(value) else MISSING
+
+
+def counted(count: int, one: str, many: str = "") -> str:
+    """Write a number of things.
+
+    Parameters
+    ----------
+    count : int, [-]
+    one : str
+        The thing.
+    many : str
+        Its plural; an s is added unless given.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> counted(1, "fit"), counted(2, "fit"), counted(0, "entry", "entries")
+    ('1 fit', '2 fits', '0 entries')
+    """
+    return f"{count} {one if count == 1 else many or one + 's'}"
+
+
+def listed(names: Sequence[str], most: int = _MOST_NAMED) -> str:
+    """Write names one after the other.
+
+    Parameters
+    ----------
+    names : sequence of str
+    most : int, [-]
+        More are counted only.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> listed(["a", "b", "c"]), listed(["a", "b", "c"], most=2)
+    ('a, b and c', 'a, b and 1 more')
+    """
+    if len(names) > most:
+        return f"{', '.join(names[:most])} and {len(names) - most} more"
+    if len(names) < 2:
+        return "".join(names)
+    return f"{', '.join(names[:-1])} and {names[-1]}"
+
+
+def drawn(file: str, figure: Figure, alt: str) -> Image:
+    """Render a figure for the page.
+
+    Parameters
+    ----------
+    file : str
+        Where it lies below ``figures/``; without ending.
+    figure : Figure
+    alt : str
+
+    Returns
+    -------
+    Image
+    """
+    return image(f"{file}.png", as_png(figure), alt, dots_per_inch=DOTS)
+
+
+def image(file: str, png: bytes, alt: str, *, dots_per_inch: int) -> Image:
+    """Take a finished PNG file into the page.
+
+    Parameters
+    ----------
+    file : str
+        Where it lies below ``figures/``.
+    png : bytes
+    alt : str
+    dots_per_inch : int, [pixels/inch]
+
+    Returns
+    -------
+    Image
+    """
+    # Width and height stand at a fixed place in every PNG file, behind its signature
+    # and the head of its first part.
+    width, height = struct.unpack(">II", png[16:24])
+    return Image(file, png, alt, width, height, dots_per_inch)
+
+
+def file_name(name: str) -> str:
+    """Make a name of a recording or model that every disk takes.
+
+    Parameters
+    ----------
+    name : str
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> file_name("step_06+step_09/3/7")
+    'step_06+step_09_3_7'
+    """
+    return re.sub(r"[^\w.+ -]", "_", name)
