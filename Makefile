@@ -3,16 +3,19 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 HWID := $(BIN)/hwid
+# The experiments of the thesis share what they have computed.
+THESIS := --cache results/cache
 # Each stamp is as old as the installation that it stands for.
 RUN := $(VENV)/installed-run
 DEV := $(VENV)/installed-dev
 
 .DEFAULT_GOAL := help
 .PHONY: help install run test test-all check format smoke bench clean \
-        simulate calibrate identify crossval steps thesis chapter2 hsm150
+        simulate calibrate identify crossval group test-stage steps model1 model2 \
+        reproduction thesis chapter2 hsm150
 
 help:  ## show these targets
-	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / {printf "  make %-10s %s\n", $$1, $$2}' Makefile
+	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' Makefile
 
 $(RUN): pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { \
@@ -56,22 +59,39 @@ bench: $(DEV)  ## speed and accuracy against what a user would write
 	@for file in tests/benchmarks/bench_*.py; do $(BIN)/python "$$file" || exit 1; done
 
 simulate: $(RUN)  ## stage: virtual measurements of the gun
-	$(HWID) simulate configs/thesis.yaml
+	$(HWID) simulate configs/thesis.yaml $(THESIS)
 
 calibrate: $(RUN)  ## stage: calibrate them
-	$(HWID) calibrate configs/thesis.yaml
+	$(HWID) calibrate configs/thesis.yaml $(THESIS)
 
 identify: $(RUN)  ## stage: models for every recording and every order
-	$(HWID) identify configs/thesis.yaml
+	$(HWID) identify configs/thesis.yaml $(THESIS)
 
 crossval: $(RUN)  ## stage: every model on every recording
-	$(HWID) crossval configs/thesis.yaml
+	$(HWID) crossval configs/thesis.yaml $(THESIS)
+
+group: $(RUN)  ## stage: the search for groups of steps
+	$(HWID) group configs/model1.yaml $(THESIS)
+
+test-stage: $(RUN)  ## stage: the groups on recordings that were never used (make test is the tests)
+	$(HWID) test configs/model1.yaml $(THESIS)
 
 steps: $(RUN)  ## section 3.2 of the thesis: models of the 15 steps on the 15 steps
-	$(HWID) run configs/thesis_steps.yaml
+	$(HWID) run configs/thesis_steps.yaml $(THESIS)
 
-thesis: $(RUN)  ## all stages at full size: 43 recordings x 100 orders
-	$(HWID) run configs/thesis.yaml
+model1: $(RUN)  ## sections 3.3 and 3.4.1: groups of steps, on all 38 recordings
+	$(HWID) run configs/model1.yaml $(THESIS)
+
+model2: $(RUN)  ## section 3.4.2: groups of steps and sines, on all 38 recordings
+	$(HWID) run configs/model2.yaml $(THESIS)
+
+reproduction: $(RUN)  ## docs/reproduction.md from what steps, model1 and model2 have left
+	$(BIN)/python docs/reproduction.py results/thesis_steps/results.h5 results/model1/results.h5 \
+	  results/model2/results.h5 > docs/reproduction.tmp && mv docs/reproduction.tmp docs/reproduction.md
+
+thesis: chapter2 steps model1 model2  ## everything of the thesis at full size, and all 43 recordings
+	$(HWID) run configs/thesis.yaml $(THESIS)
+	$(MAKE) reproduction
 
 chapter2: $(RUN)  ## all stages on the simulated servo
 	$(HWID) run configs/chapter2.yaml
