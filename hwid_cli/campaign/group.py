@@ -104,6 +104,7 @@ def search_all(plan: GroupPlan, run: RunLevel) -> GroupSearch:
         plan.candidates,
         plan.options,
         score,
+        n_validate=len(plan.validate),
         is_ordered=plan.fit_options.join == "concatenate",
     )
     return GroupSearch(

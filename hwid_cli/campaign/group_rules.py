@@ -66,6 +66,7 @@ def search_groups(
     options: GroupOptions,
     score: Score,
     *,
+    n_validate: int,
     is_ordered: bool,
 ) -> Found:
     """Search for groups of recordings whose models cover much.
@@ -81,6 +82,8 @@ def search_groups(
         Its ``keep`` and ``max_level``.
     score : callable
         Called once for each level.
+    n_validate : int, [-]
+        Recordings that judge.
     is_ordered : bool
         Whether 6-8 and 8-6 are two groups.
 
@@ -102,7 +105,7 @@ def search_groups(
         best = max(one.coverage for one in level)
         levels.append(Level(best, sum(one.coverage == best for one in level)))
         flags = kept(level, options.keep, turn) if turn >= 0 else [True] * len(level)
-        reason = reason_to_stop(levels, options.max_level)
+        reason = reason_to_stop(levels, options.max_level, n_validate)
         new = [] if reason else _grown(level, flags, candidates, is_ordered=is_ordered)
         if not reason and not new:
             reason = "no group that goes on can grow" if any(flags) else _NONE_KEPT
@@ -149,7 +152,7 @@ def kept(
     return tuple(one.coverage >= max(1, least) for one in level)
 
 
-def reason_to_stop(levels: Sequence[Level], max_level: int) -> str:
+def reason_to_stop(levels: Sequence[Level], max_level: int, n_validate: int) -> str:
     """Tell whether a search has come to its end.
 
     Parameters
@@ -158,6 +161,8 @@ def reason_to_stop(levels: Sequence[Level], max_level: int) -> str:
         All so far.
     max_level : int, [-]
         Largest number of recordings in a group.
+    n_validate : int, [-]
+        Recordings that judge; a group that covers all of them cannot be surpassed.
 
     Returns
     -------
@@ -166,6 +171,8 @@ def reason_to_stop(levels: Sequence[Level], max_level: int) -> str:
         only stays, one more level is tried if more groups than before reach it: the
         level may have prepared what the next one gains.
     """
+    if levels[-1].best == n_validate:
+        return f"all {n_validate} validation recordings are covered"
     if len(levels) >= 2:
         before, last = levels[-2], levels[-1]
         if last.best < before.best:

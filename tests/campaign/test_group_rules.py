@@ -58,6 +58,7 @@ def replay(options):
         TWELVE,
         options,
         lambda names: [group(one, table[one]) for one in names],
+        n_validate=12,
         is_ordered=True,
     )
 
@@ -130,6 +131,7 @@ def test_keeping_8_instead_of_7_is_another_search():
         TWELVE,
         mutated,
         lambda tried: [group(one, table.get(one, 0)) for one in tried],
+        n_validate=12,
         is_ordered=True,
     )
 
@@ -168,6 +170,7 @@ def test_the_second_published_chain_grows_with_its_coverage():
         tuple(last),
         options,
         lambda tried: [group(one, scores.get(one, 0)) for one in tried],
+        n_validate=38,
         is_ordered=True,
     )
 
@@ -183,6 +186,7 @@ def test_the_winner_of_equally_wide_groups_has_the_lowest_validation_rmsd():
         ("a", "b"),
         GroupOptions(start=("a", "b"), keep={"best": True}),
         lambda tried: [group(one, 1, rmsd=rmsd[one]) for one in tried],
+        n_validate=12,
         is_ordered=True,
     )
 
@@ -201,6 +205,7 @@ def test_without_order_permutations_are_one_group_with_two_joins():
         ("a", "b", "c"),
         GroupOptions(start=("b", "a"), keep={"best": True}, max_level=2),
         score,
+        n_validate=12,
         is_ordered=False,
     )
 
@@ -218,6 +223,7 @@ def test_without_order_the_chain_goes_through_the_widest_base():
         ("a", "b"),
         GroupOptions(start=("a", "b"), keep={"best": True}, max_level=2),
         lambda tried: [group(one, coverage[one]) for one in tried],
+        n_validate=12,
         is_ordered=False,
     )
 
@@ -231,6 +237,7 @@ def test_without_start_the_rule_chooses_among_single_recordings_too():
         ("a", "b", "c"),
         GroupOptions(keep={"best": True}, max_level=2),
         lambda tried: [group(one, coverage[one[0]] + len(one)) for one in tried],
+        n_validate=12,
         is_ordered=True,
     )
 
@@ -290,13 +297,20 @@ def test_the_last_number_of_a_list_holds_for_all_further_levels():
 def test_the_search_goes_on_while_the_coverage_grows_or_once_more_groups_reach_it(
     levels, expected
 ):
-    reason = reason_to_stop([Level(*one) for one in levels], max_level=9)
+    reason = reason_to_stop([Level(*one) for one in levels], max_level=9, n_validate=12)
 
     assert reason.startswith(expected)
     assert bool(reason) == bool(expected)
 
 
 def test_the_largest_level_ends_the_search():
-    reason = reason_to_stop([Level(1, 1), Level(2, 1)], max_level=2)
+    reason = reason_to_stop([Level(1, 1), Level(2, 1)], max_level=2, n_validate=12)
 
     assert reason == "groups of 2 are the largest that group.max_level allows"
+
+
+def test_a_search_ends_where_everything_is_covered():
+    # More groups reach the maximum than before, but nothing is left to gain.
+    reason = reason_to_stop([Level(11, 1), Level(12, 3)], max_level=9, n_validate=12)
+
+    assert reason == "all 12 validation recordings are covered"
