@@ -1,5 +1,8 @@
 """Figure of the final test: the chain of groups on recordings that nobody used."""
 
+from collections.abc import Sequence
+from itertools import pairwise
+
 from matplotlib.figure import Figure
 
 from hwid_cli.records.report import ChainOnTests
@@ -41,7 +44,7 @@ def trend_figure(trend: ChainOnTests) -> Figure:
     axes.axhline(trend.threshold, color=BLACK, lw=1.0, ls=(0, (2, 2)), label=told)
     axes.set_yscale("log")
     number_decades(axes.yaxis, *axes.get_ylim())
-    axes.set_xticks(levels, [_tick(model) for model in trend.models])
+    axes.set_xticks(levels, _ticks(trend.models))
     axes.set_xlim(levels[0] - 0.2, levels[-1] + 0.2)
     axes.set_xlabel("recordings in the group, added one by one")
     axes.set_ylabel(f"RMSD [{trend.unit}]")
@@ -49,8 +52,11 @@ def trend_figure(trend: ChainOnTests) -> Figure:
     return figure
 
 
-def _tick(model: str) -> str:
-    """``1: step_06``, ``2: + step_09``: what the level added."""
-    recordings = model.rsplit("/", 2)[0].split("+")
-    sign = "+ " if len(recordings) > 1 else ""
-    return f"{len(recordings)}: {sign}{recordings[-1]}"
+def _ticks(models: Sequence[str]) -> list[str]:
+    """``1: step_06``, ``2: + step_09``: what each level added to the one before."""
+    groups = [model.rsplit("/", 2)[0].split("+") for model in models]
+    ticks = [f"{len(groups[0])}: {'+'.join(groups[0])}"] if groups else []
+    for before, group in pairwise(groups):
+        added = [name for name in group if name not in before]
+        ticks.append(f"{len(group)}: + {', '.join(added)}")
+    return ticks

@@ -148,13 +148,20 @@ def _draw_group(
         alpha=0.75,
         zorder=4,
     )
-    added = f"+ {group.recordings[-1]}" if group.level > 1 else group.recordings[0]
+    added = _added(search, group)
     if len(added) > _MOST_CHARACTERS:
         added = f"{added[: _MOST_CHARACTERS - 3]}..."
     weight = "bold" if on_chain else "normal"
     style: dict[str, Any] = {"va": "center", "size": 8.0, "weight": weight, "zorder": 5}
     axes.text(column + 0.012, row, added, **style)
     axes.text(column + _BOX - 0.012, row, str(group.coverage), ha="right", **style)
+
+
+def _added(search: GroupSearch, group: Group) -> str:
+    """What joined a group's base; of several bases the one on the chain, or the first."""
+    joins = [join for join in search.joins if join.group == group.name]
+    join = next((one for one in joins if one.base in search.chain), joins[0])
+    return f"+ {join.add_on}" if join.add_on else join.base
 
 
 def _head(axes: Axes, search: GroupSearch, column: int, level: int) -> None:

@@ -4,6 +4,7 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 
+from hwid_cli.records.groups import Group, GroupSearch, Join
 from hwid_cli.report.figures.final_test import trend_figure
 from hwid_cli.report.figures.groups import coverage_histogram_figure, tree_figure
 from hwid_cli.report.figures.matrices import order_grid_figure, rmsd_matrix_figure
@@ -145,6 +146,47 @@ def test_the_tree_holds_the_chain_and_the_counts_of_each_level():
         of_level = [group for group in search.groups if group.level == level]
         kept = sum(group.is_kept for group in of_level)
         assert any(f"{len(of_level)} groups, {kept} kept" in text for text in found)
+
+
+def test_the_tree_names_what_joined_where_names_keep_another_order():
+    # Without order a group is named as the experiment orders its recordings: step_06
+    # grew by step_03.
+    groups = (
+        Group(("step_06",), 1, 1, 1, 1e-3, 1e-2, 1, 1, 1, True),
+        Group(("step_03", "step_06"), 2, 1, 1, 1e-3, 1e-2, 1, 1, 1, False),
+    )
+    search = GroupSearch(
+        groups=groups,
+        joins=(
+            Join(1, "step_06", "", "step_06"),
+            Join(2, "step_06", "step_03", "step_03+step_06"),
+        ),
+        fits=(None, None),
+        validated_on=("step_03", "step_06"),
+        rmsd=np.full((2, 2), 1e-3),
+        chain=("step_06", "step_03+step_06"),
+        reason="",
+        join="experiments",
+        unit="m",
+        threshold=0.01,
+    )
+
+    found = texts(tree_figure(search))
+    assert "step_06" in found
+    assert "+ step_03" in found
+
+
+def test_the_trend_names_what_each_level_added(contents):
+    trend = replace(
+        contents.trend,
+        models=("step_06/3/7", "step_03+step_06/1/2"),
+        rmsd=contents.trend.rmsd[:2],
+        mean=contents.trend.mean[:2],
+    )
+    axes = trend_figure(trend).axes[0]
+
+    ticks = [one.get_text() for one in axes.get_xticklabels()]
+    assert ticks == ["1: step_06", "2: + step_03"]
 
 
 def test_a_tree_of_hundreds_of_groups_stays_readable():
