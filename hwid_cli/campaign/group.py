@@ -9,7 +9,7 @@ References
 docs/method.md, section "Groups".
 """
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -88,7 +88,9 @@ def search_all(plan: GroupPlan, run: RunLevel) -> GroupSearch:
     scored: dict[str, _Scored] = {}
 
     def score(tried: Sequence[tuple[str, ...]]) -> list[Group]:
-        names = {name for group in tried for name in group} - set(singles)
+        is_needed = len(tried[0]) == 1 or plan.options.warm_start
+        names = {name for group in tried for name in group} if is_needed else set()
+        names -= set(singles)
         singles.update(_fit_singles(plan, names, run))
         fits = _fit_level(plan, tried, singles, run)
         deviations = _validate_level(plan, tried, fits, run)
@@ -184,7 +186,7 @@ def _fit_level(
     for group in tried:
         recordings = tuple(by_name[name] for name in group)
         for number, (nb, nk, orders) in enumerate(candidate_orders(plan.orders)):
-            starts = _starts(plan, [singles[name][number] for name in group])
+            starts = _starts(plan, singles, group, number)
             matters = {
                 "recordings": [contents[name] for name in group],
                 "orders": orders,
@@ -212,10 +214,14 @@ def _fit_level(
     ]
 
 
-def _starts(plan: GroupPlan, members: Sequence[Fit]) -> tuple[HammersteinWiener, ...]:
+def _starts(
+    plan: GroupPlan, singles: Mapping[str, Sequence[Fit]], group: Sequence[str], at: int
+) -> tuple[HammersteinWiener, ...]:
+    """Models of a group's members at one place in the grid."""
     if not plan.options.warm_start:
         return ()
-    return tuple(one.model for one in members if one.model is not None)
+    models = (singles[name][at].model for name in group)
+    return tuple(model for model in models if model is not None)
 
 
 def _fit_group(

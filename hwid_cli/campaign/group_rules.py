@@ -108,7 +108,7 @@ def search_groups(
         reason = reason_to_stop(levels, options.max_level, n_validate)
         new = [] if reason else _grown(level, flags, candidates, is_ordered=is_ordered)
         if not reason and not new:
-            reason = "no group that goes on can grow" if any(flags) else _NONE_KEPT
+            reason = "no group that goes on can grow" if any(flags) else _none(best)
         groups += [
             replace(one, is_kept=bool(flag) and not reason)
             for one, flag in zip(level, flags, strict=True)
@@ -120,7 +120,9 @@ def search_groups(
         turn += 1
 
 
-_NONE_KEPT = "no group passes group.keep"
+def _none(best: int) -> str:
+    """Why no group of a level goes on."""
+    return "no group passes group.keep" if best else "no model covers any recording"
 
 
 def kept(

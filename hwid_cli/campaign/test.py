@@ -74,8 +74,9 @@ def final_models(
     Returns
     -------
     FinalModels
-        A model that is both the widest of its recording and the first of the chain is
-        listed once, in the chain. Recordings without any usable model are left out.
+        The recording that the chain starts from is there with the chain's first model
+        only: two of its models would count as two that cover. Recordings without any
+        usable model are left out.
     """
     places = [
         (name, nb, nk)
@@ -98,7 +99,8 @@ def final_models(
             if fit is not None
         }
         chain = dict(found[name] for name in search.chain if name in found)
-    alone = {name: fit for name, fit in singles.items() if name not in chain}
+    grouped = {fit.identified_on for fit in chain.values()}
+    alone = {k: fit for k, fit in singles.items() if fit.identified_on not in grouped}
     usable = {k: fit for k, fit in (alone | chain).items() if fit.model is not None}
     return FinalModels(
         tuple(usable), tuple(usable.values()), sum(name in chain for name in usable)

@@ -13,6 +13,15 @@ if TYPE_CHECKING:
     from hwid_cli.records.recordings import RawRecording
 
 
+# Keys of the configuration that name recordings.
+_NAME_LISTS = {
+    "identify": ("recordings",),
+    "crossval": ("recordings",),
+    "group": ("start", "candidates", "validate"),
+    "test": ("recordings",),
+}
+
+
 @click.command("calibrate")
 @stage_options
 def command(choices: Choices) -> None:
@@ -43,7 +52,7 @@ def calibrate_stage(session: "Session") -> "Calibrated":
     Calibrated
     """
     from hwid_cli.campaign.calibrate import calibrate_all, calibration_key
-    from hwid_cli.cli.session import is_unchanged, provenance, say, start_timer
+    from hwid_cli.cli.session import provenance, read_unchanged, say, start_timer
     from hwid_cli.files.recordings import read_recordings
     from hwid_cli.files.results import Calibrated, read_calibrated, write_calibrated
 
@@ -52,10 +61,9 @@ def calibrate_stage(session: "Session") -> "Calibrated":
     raws = read_recordings(session.experiment, session.out)
     options = session.experiment.calibrate
     key = calibration_key(raws, options)
-    is_old = is_unchanged(session, "calibrate", key)
-    if is_old:
-        calibrated = read_calibrated(session.calibrated_path)
-    else:
+    calibrated = read_unchanged(session, "calibrate", key, read_calibrated)
+    is_old = calibrated is not None
+    if calibrated is None:
         recordings, logs = calibrate_all(raws, options)
         origin = provenance(session, key, recordings, seconds=timer.seconds)
         write_calibrated(session.calibrated_path, recordings, logs, origin)
@@ -68,7 +76,20 @@ def calibrate_stage(session: "Session") -> "Calibrated":
         f"calibrate: {len(raws)} recordings {state}, "
         f"{_what_changed(session, calibrated)}, {timer()}",
     )
+    _check_names(session, calibrated)
     return calibrated
+
+
+def _check_names(session: "Session", calibrated: "Calibrated") -> None:
+    """Refuse a misspelt recording in any section before hours of fitting."""
+    from hwid_cli.campaign.selection import select_recordings
+
+    experiment = session.experiment
+    for section, keys in _NAME_LISTS.items():
+        options = getattr(experiment, section)
+        for key in keys if options is not None else ():
+            place = f"{experiment.source}: {section}.{key}"
+            select_recordings(calibrated.recordings, getattr(options, key), key=place)
 
 
 def _what_changed(session: "Session", calibrated: "Calibrated") -> str:

@@ -45,8 +45,8 @@ def crossval_stage(session: "Session") -> "tuple[Identified, CrossValidation]":
     from hwid_cli.campaign.crossval import cross_validate, crossval_key
     from hwid_cli.campaign.selection import select_recordings
     from hwid_cli.cli.session import (
-        is_unchanged,
         provenance,
+        read_unchanged,
         say,
         stage_tasks,
         start_timer,
@@ -65,8 +65,8 @@ def crossval_stage(session: "Session") -> "tuple[Identified, CrossValidation]":
     )
     timer = start_timer()
     key = crossval_key(identified.fits, judges, experiment.orders, options)
-    if is_unchanged(session, "crossval", key):
-        crossval = read_crossval(path)
+    crossval = read_unchanged(session, "crossval", key, read_crossval)
+    if crossval is not None:
         done = len(crossval.identified_on) * len(crossval.validated_on)
         say(
             session,

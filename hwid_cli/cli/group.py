@@ -46,14 +46,14 @@ def group_stage(session: "Session") -> "GroupSearch":
     GroupSearch
     """
     from hwid_cli.campaign.group import group_key, search_all
-    from hwid_cli.cli.session import is_unchanged, provenance, say, start_timer
+    from hwid_cli.cli.session import provenance, read_unchanged, say, start_timer
     from hwid_cli.files.group_results import read_group, write_group, write_groups_csv
 
     plan, path = _plan(session), session.results_path
     timer = start_timer()
     key = group_key(plan)
-    if is_unchanged(session, "group", key):
-        search = read_group(path)
+    search = read_unchanged(session, "group", key, read_group)
+    if search is not None:
         tried = len(search.groups)
         say(session, f"group: {tried} groups from the cache, 0 computed, {timer()}")
     else:

@@ -62,8 +62,8 @@ def identify_stage(session: "Session") -> Identified:
     from hwid_cli.campaign.order_grid import candidate_orders
     from hwid_cli.campaign.selection import select_recordings
     from hwid_cli.cli.session import (
-        is_unchanged,
         provenance,
+        read_unchanged,
         say,
         stage_tasks,
         start_timer,
@@ -80,8 +80,8 @@ def identify_stage(session: "Session") -> Identified:
     )
     timer = start_timer()
     key = identify_key(chosen, experiment.orders, experiment.fit)
-    if is_unchanged(session, "identify", key):
-        fits = read_fits(path)
+    fits = read_unchanged(session, "identify", key, read_fits)
+    if fits is not None:
         say(
             session,
             f"identify: {len(fits)} fits from the cache, 0 computed, {timer()}",

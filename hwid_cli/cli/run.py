@@ -1,5 +1,6 @@
 """``hwid run``: all stages that a configuration names."""
 
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 import click
@@ -21,6 +22,7 @@ def command(choices: Choices) -> None:
     With --force, all of them ignore their cached results.
     """
     from hwid_cli.cli.session import STAGES, open_session, say
+    from hwid_cli.errors import HwidError
 
     session = open_session(choices, *STAGES)
     for section in _LATER:
@@ -30,7 +32,13 @@ def command(choices: Choices) -> None:
                 f"{section}: named in {session.experiment.source}, but this "
                 "version of hwid does not have it yet; left out",
             )
-    run_stages(session)
+    try:
+        run_stages(session)
+    except HwidError:
+        # What did run is worth looking at all the more, if it can be read.
+        with suppress(HwidError):
+            _report(session)
+        raise
     _report(session)
     say(session, f"\nresults: {session.out}")
 

@@ -3,19 +3,20 @@
 Imported by commands when they run, so that ``hwid --help`` stays fast.
 """
 
+import logging
 import shutil
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import click
 
 from hwid_cli.campaign.runner import RunSettings, TaskDone, Workers
 from hwid_cli.cli.options import Choices
-from hwid_cli.errors import ConfigError
+from hwid_cli.errors import CacheError, ConfigError
 from hwid_cli.files.config import describe_experiment, load_experiment
 from hwid_cli.files.hdf5_store import Hdf5Store
 from hwid_cli.files.result_files import (
@@ -26,6 +27,10 @@ from hwid_cli.files.result_files import (
 from hwid_cli.records.experiment import Experiment
 from hwid_cli.records.recordings import Recording
 from hwid_cli.report.progress import StageProgress
+
+Result = TypeVar("Result")
+
+_log = logging.getLogger(__name__)
 
 STAGES = ("simulate", "calibrate", "identify", "crossval", "group", "test")
 
@@ -146,6 +151,36 @@ def is_unchanged(session: Session, stage: str, key: str) -> bool:
     is_calibrate = stage == "calibrate"
     path = session.calibrated_path if is_calibrate else session.results_path
     return read_stage_key(path, stage) == key
+
+
+def read_unchanged(
+    session: Session, stage: str, key: str, read: Callable[[Path], Result]
+) -> Result | None:
+    """Read the stored results of a stage if they are those that it would give now.
+
+    Parameters
+    ----------
+    session : Session
+    stage : str
+    key : str
+        Of everything that the stage depends on.
+    read : callable
+        From the path of the results to the result.
+
+    Returns
+    -------
+    Result or None
+        None where the stage has to run; results that cannot be read are named in the
+        log, and the cache has what they were made of.
+    """
+    if not is_unchanged(session, stage, key):
+        return None
+    path = session.calibrated_path if stage == "calibrate" else session.results_path
+    try:
+        return read(path)
+    except CacheError as error:
+        _log.warning("%s (%s comes back from the cache now)", error, stage)
+        return None
 
 
 def provenance(

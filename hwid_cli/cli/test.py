@@ -65,8 +65,8 @@ def final_test_stage(session: "Session") -> "FinalTest":
     """
     from hwid_cli.campaign.test import final_test_key, judge_models
     from hwid_cli.cli.session import (
-        is_unchanged,
         provenance,
+        read_unchanged,
         say,
         stage_tasks,
         start_timer,
@@ -78,8 +78,8 @@ def final_test_stage(session: "Session") -> "FinalTest":
     key = final_test_key(
         given.models, given.recordings, given.tested_on, given.threshold
     )
-    if is_unchanged(session, "test", key):
-        final = read_final_test(path)
+    final = read_unchanged(session, "test", key, read_final_test)
+    if final is not None:
         done = len(final.recordings)
         say(session, f"test: {done} recordings from the cache, 0 computed, {timer()}")
     else:
@@ -102,6 +102,7 @@ def _to_judge(session: "Session") -> _ToJudge:
     """Run the stages before this one, and choose the models that it judges."""
     from hwid_cli.campaign.selection import select_recordings
     from hwid_cli.campaign.test import final_models
+    from hwid_cli.cli.session import say
     from hwid_cli.errors import ConfigError
 
     experiment = session.experiment
@@ -113,7 +114,13 @@ def _to_judge(session: "Session") -> _ToJudge:
         )
     identified, crossval = crossval_stage(session)
     search = None
-    if experiment.group is not None:
+    if experiment.group is None:
+        say(
+            session,
+            f"test: {experiment.source} has no group: section, so there is no chain of "
+            "groups to test; models of single recordings only",
+        )
+    else:
         from hwid_cli.cli.group import group_stage
 
         search = group_stage(session)

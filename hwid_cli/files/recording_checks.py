@@ -120,7 +120,7 @@ def check_equal_lengths(
 
 
 def check_names(paths: Sequence[Path]) -> None:
-    """Refuse two files that would give one recording name.
+    """Refuse two files that would give one recording name, and names that say group.
 
     Parameters
     ----------
@@ -129,10 +129,15 @@ def check_names(paths: Sequence[Path]) -> None:
     Raises
     ------
     MeasurementError
-        For the first name that comes twice.
+        For the first name that comes twice or holds a plus.
     """
     first: dict[str, Path] = {}
     for path in paths:
+        if "+" in path.stem:
+            raise MeasurementError(
+                f"{path}: gives the recording name {path.stem!r}; expected a name "
+                "without '+', which joins the names of a group; rename the file"
+            )
         if path.stem in first:
             raise MeasurementError(
                 f"{path}: gives the recording name {path.stem!r}, which "

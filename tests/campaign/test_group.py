@@ -203,6 +203,15 @@ def test_cold_fits_are_other_tasks_than_warm_ones():
     assert any("+" in name for name in bench.computed[before:])
 
 
+def test_cold_fits_need_no_models_of_recordings_that_only_join():
+    bench = Bench()
+    options = GroupOptions(keep={"best": True}, max_level=2, warm_start=False)
+    search_all(plan(start=("a",), candidates=("a", "b"), options=options), bench)
+
+    names = [name for name in bench.computed if " on " not in name]
+    assert names == ["a/1/1", "a/2/1", "a+b/1/1", "a+b/2/1"]
+
+
 @pytest.mark.parametrize(
     "change",
     [

@@ -1,5 +1,6 @@
 import csv
 
+import h5py
 import pytest
 
 SECTION = "group: {keep: {best: true}, max_level: 2}\n"
@@ -63,6 +64,31 @@ def test_test_recordings_take_no_part(config, hwid, after_run, out):
 
     assert result.exit_code == 0, result.output
     assert "step_12" not in (out / "groups.csv").read_text()
+
+
+def test_results_that_lack_a_part_come_back_from_the_cache(grouped, hwid, out):
+    before = (out / "groups.csv").read_bytes()
+    with h5py.File(out / "results.h5", "a") as file:
+        del file["group/rmsd"]
+    result = hwid("group")
+
+    assert result.exit_code == 0, result.output
+    assert "group comes back from the cache" in result.stderr
+    fits = [line for line in result.stdout.splitlines() if "level 2" in line]
+    assert fits
+    assert all(", 0 computed" in line for line in fits)
+    assert (out / "groups.csv").read_bytes() == before
+
+
+def test_a_misspelt_recording_is_found_before_anything_is_fitted(config, hwid):
+    config.write_text(config.read_text() + "group: {start: [stp_02]}\n")
+    result = hwid("identify")
+
+    assert result.exit_code == 1
+    assert (
+        "group.start: no recording 'stp_02'; did you mean 'step_02'?" in result.stderr
+    )
+    assert "fits" not in result.stdout
 
 
 @pytest.mark.parametrize(

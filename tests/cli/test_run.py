@@ -86,3 +86,17 @@ def test_an_unknown_key_is_refused_by_every_stage(hwid, edit, command):
     assert result.exit_code == 1
     assert "orders.nkk" in result.stderr
     assert "'nk'" in result.stderr
+
+
+def test_a_stage_that_fails_still_leaves_a_report_of_those_before(
+    after_run, config, hwid, out
+):
+    # The widest models of one recording are there, but the test's file cannot be written.
+    config.write_text(config.read_text() + "test: {recordings: [step_12]}\n")
+    (out / "report.html").unlink()
+    (out / "test.csv").mkdir()
+    result = hwid("run")
+
+    assert result.exit_code != 0
+    assert "shows calibrate, identify, crossval" in result.stdout
+    assert (out / "report.html").is_file()

@@ -92,6 +92,7 @@ def test_without_groups_the_single_models_are_judged(again, edit, out):
     result = again()
 
     assert result.exit_code == 0, result.output
+    assert "no group: section, so there is no chain of groups to test" in result.stdout
     assert "The chain" not in result.stdout
     # Three models of their own; the test recordings have none.
     rows = rows_of(out / "test.csv")

@@ -104,6 +104,11 @@ def test_two_files_of_one_name_are_refused():
         checks.check_names(paths)
 
 
+def test_a_name_that_reads_like_a_group_is_refused():
+    with pytest.raises(MeasurementError, match=r"'a\+b'; expected a name without '\+'"):
+        checks.check_names([Path("a.csv"), Path("a+b.csv")])
+
+
 def test_different_sample_times_are_refused():
     first = RawRecording("a", np.ones(2), np.ones(2), 0.001, source="a.csv")
     second = replace(first, name="b", sample_time_s=0.00101, source="b.csv")

@@ -313,3 +313,18 @@ def test_versions_name_the_program_and_what_computes():
 
     assert versions["hwid"] == __version__
     assert set(versions) == {"hwid", "python", "numpy", "scipy", "numba", "h5py"}
+
+
+def test_results_with_damaged_inner_parts_are_set_aside_too(path, caplog):
+    write_fits(path, [example_fit()], OrdersOptions(nb=(1,), nk=(1,)), PROVENANCE)
+    content = bytearray(path.read_bytes())
+    with h5py.File(path) as file:
+        place = h5py.h5o.get_info(file["identify/fit/model"].id).addr
+    # The header of a group below the root: opening the file does not look at it.
+    content[place : place + 64] = b"\xff" * 64
+    path.write_bytes(content)
+    write_fits(path, [example_fit()], OrdersOptions(nb=(1,), nk=(1,)), PROVENANCE)
+
+    assert len(read_fits(path)) == 1
+    assert path.with_name(f"{path.name}.bad").read_bytes() == content
+    assert "set aside" in caplog.text

@@ -131,8 +131,14 @@ def _warm_search(
     ]
     if not scaled:
         return None
-    search = warm_search(problem.experiments, options, scaled)
-    return search if np.isfinite(search.cost) else None
+    try:
+        search = warm_search(problem.experiments, options, scaled)
+    except np.linalg.LinAlgError:
+        return None
+    is_usable = np.isfinite(search.cost) and is_stable(
+        search.candidate.model.denominator
+    )
+    return search if is_usable else None
 
 
 def _search(
