@@ -20,6 +20,8 @@ from hwid_cli.report.text_table import (
 _FORMS = {"step": "T3.4.1-2", "sine": "T3.4.1-3"}
 # Columns of the matrix that stand together, so that the eye can count.
 _TOGETHER = 5
+# Longer names leave no room for recordings beside them, [characters].
+_LONGEST_NAME = 36
 
 
 def chain_on_tests_table(
@@ -45,7 +47,9 @@ def chain_on_tests_table(
         f"{final.threshold:g}\n(form of T3.3.3.4-1)"
     )
     table = split_table(title, ("model", *final.tested_on, "mean"), rows, width=width)
-    return f"{table}\n{trend_line(trend)}"
+    legend = [f"{label}: {model}" for model, label in _labels(final).items()]
+    meanings = legend if _has_long_names(final) else []
+    return "\n".join([table, *meanings, trend_line(trend)])
 
 
 def trend_line(trend: ChainTrend) -> str:
@@ -156,9 +160,10 @@ def _chain_rows(
 ) -> list[tuple[str, ...]]:
     """RMSD of each of the chain's models on some recordings."""
     columns = [final.recordings.index(name) for name in names]
+    labels = _labels(final)
     return [
         (
-            model,
+            labels[model],
             *(_marked(value, final) for value in final.rmsd[row, columns]),
             end,
         )
@@ -166,6 +171,17 @@ def _chain_rows(
             final.chain, map(final.models.index, final.chain), last, strict=True
         )
     ]
+
+
+def _has_long_names(final: FinalTest) -> bool:
+    return max(map(len, final.chain), default=0) > _LONGEST_NAME
+
+
+def _labels(final: FinalTest) -> dict[str, str]:
+    """What stands for the chain's models: their names, or C1, C2 ... where these are long."""
+    if not _has_long_names(final):
+        return {model: model for model in final.chain}
+    return {model: f"C{place}" for place, model in enumerate(final.chain, 1)}
 
 
 def _marked(value: float, final: FinalTest) -> str:

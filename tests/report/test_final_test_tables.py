@@ -169,3 +169,22 @@ def test_gaps_are_named_and_counted():
     assert "a tenth of the other models: 38 of 38" in text
     assert all(text.count(name) >= 1 for name in FINAL.recordings)
     assert "0 of 38 recordings" in gaps_text(replace(FINAL, uncovered=()))
+
+
+def test_long_names_of_groups_stand_beneath_the_table_once():
+    longer = {
+        name: name.replace("step_", "idf_neg_0.045_step_") for name in FINAL.chain
+    }
+    final = replace(
+        FINAL,
+        models=tuple(longer.get(name, name) for name in FINAL.models),
+        chain=tuple(longer.values()),
+    )
+    trend = chain_trend(final, KINDS)
+    lines = chain_on_tests_table(final, trend).splitlines()
+
+    assert f"C1: {final.chain[0]}" in lines
+    assert sum(final.chain[-1] in line for line in lines) == 1
+    # All test recordings stand in one block.
+    assert sum(line.startswith("model") for line in lines) == 1
+    assert "\nC1 " in chain_tables(final, trend, KINDS)
