@@ -45,7 +45,7 @@ _SECTIONS = {
 }
 STAGES = tuple(_SECTIONS)
 # Raised when the page or a figure changes, so that pages are drawn again.
-REPORT_VERSION = 1
+REPORT_VERSION = 2
 
 
 def report_key(stored: StoredResults, figures: Mapping[str, bytes]) -> str:

@@ -8,12 +8,14 @@ import click
 from hwid_cli.cli.options import Choices, stage_options
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from hwid_cli.cli.session import Session
     from hwid_cli.records.report import StageRun, StoredResults
 
 FILE = "report.html"
 FIGURES = "figures"
-_KEY_MARK = "<!-- drawn from "
+_KEY_MARK, _KEY_END = "<!-- drawn from ", " -->\n"
 
 
 @click.command("report")
@@ -46,6 +48,8 @@ def report_stage(session: "Session") -> Path:
     ------
     ConfigError
         If no stage has run.
+    CacheError
+        If results are there but cannot be read; nothing is written then.
     """
     from hwid_cli.campaign.report import report_contents, report_key
     from hwid_cli.cli.session import say, start_timer
@@ -65,7 +69,7 @@ def report_stage(session: "Session") -> Path:
     key = report_key(stored, figures)
     path = session.out / FILE
     stages = ", ".join(run.stage for run in stored.stages) or "the diagnosis"
-    if "report" not in session.forced and _key_of(path) == key:
+    if "report" not in session.forced and _is_complete(session.out, path, key):
         say(session, f"report: {path} shows {stages} already, {timer()}")
         return path
     page = report_page(report_contents(stored), figures)
@@ -73,17 +77,32 @@ def report_stage(session: "Session") -> Path:
         place = session.out / FIGURES / name
         if not (place.is_file() and place.read_bytes() == png):
             replace_file(place, png)
-    replace_file(path, f"{page.html}{_KEY_MARK}{key} -->\n".encode())
+    replace_file(path, (page.html + _last_line(key, page.figures)).encode())
     say(session, f"report: {path} shows {stages}, {timer()}")
     return path
 
 
-def _key_of(path: Path) -> str:
-    """Key in the last line of a page; empty where there is none."""
+def _last_line(key: str, figures: "Iterable[str]") -> str:
+    """Comment that says what a page was drawn from, and which figures belong to it."""
+    import json
+
+    # The sign that ends a comment may be part of a name.
+    names = json.dumps(sorted(figures)).replace(">", "\\u003e")
+    return f"{_KEY_MARK}{key} {names}{_KEY_END}"
+
+
+def _is_complete(out: Path, path: Path, key: str) -> bool:
+    """Whether a page was drawn from the same, and all of its figures are still there."""
+    import json
+
     if not path.is_file():
-        return ""
-    last = path.read_bytes()[-200:].decode("utf-8", errors="replace")
-    return last.rpartition(_KEY_MARK)[2].removesuffix(" -->\n")
+        return False
+    page = path.read_text(encoding="utf-8", errors="replace")
+    said, _, names = page.rpartition(_KEY_MARK)[2].partition(" ")
+    if said != key or not names.endswith(_KEY_END):
+        return False
+    figures = json.loads(names.removesuffix(_KEY_END))
+    return all((out / FIGURES / name).is_file() for name in figures)
 
 
 def read_stored(session: "Session") -> "StoredResults":
@@ -96,6 +115,11 @@ def read_stored(session: "Session") -> "StoredResults":
     Returns
     -------
     StoredResults
+
+    Raises
+    ------
+    CacheError
+        If results are there but cannot be read.
     """
     import json
 
@@ -135,14 +159,15 @@ def _stage_runs(
 ) -> "tuple[StageRun, ...]":
     """Stages that have left results, and how each was run."""
     from hwid_cli.campaign.report import STAGES, changed_sections
-    from hwid_cli.files.result_files import read_provenance, read_stage_key
+    from hwid_cli.files.result_files import read_provenance
+    from hwid_cli.files.stored_stages import has_left_results
     from hwid_cli.records.report import StageRun
 
     runs = []
     for stage in STAGES:
         is_first = stage == "calibrate"
         path = session.calibrated_path if is_first else session.results_path
-        if read_stage_key(path, stage) is None:
+        if not has_left_results(path, stage):
             continue
         origin = read_provenance(path, stage)
         changed = changed_sections(stage, described, origin.config)

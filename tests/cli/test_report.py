@@ -1,9 +1,10 @@
 import re
 
+import h5py
 import pytest
 
 from hwid_cli.cli.options import Choices
-from hwid_cli.cli.report import read_stored
+from hwid_cli.cli.report import _is_complete, _last_line, read_stored
 from hwid_cli.cli.session import open_session
 
 
@@ -98,3 +99,61 @@ def test_a_page_is_drawn_again_only_when_its_results_have_changed(
     edit("crossval: {threshold: 0.01}", "crossval: {threshold: 0.02}")
     assert hwid("crossval").exit_code == 0
     assert "already" not in hwid("report").stdout
+
+
+def damage_half(path):
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+
+
+def damage_first_bytes(path):
+    path.write_bytes(bytes(16) + path.read_bytes()[16:])
+
+
+def damage_stage(path):
+    with h5py.File(path, "r+") as file:
+        group = file if path.name == "calibrated.h5" else file["crossval"]
+        del group.attrs["key"]
+
+
+@pytest.mark.parametrize("file", ["results.h5", "calibrated.h5"])
+@pytest.mark.parametrize("damage", [damage_half, damage_first_bytes, damage_stage])
+def test_results_that_cannot_be_read_leave_the_old_page(
+    after_run, hwid, out, damage, file
+):
+    (out / "report.html").write_text("the old page")
+    figures = files_below(out)
+    damage(out / file)
+    result = hwid("report")
+
+    assert result.exit_code == 1
+    assert result.stderr.count("\n") == 1
+    assert f"{file}: cannot be read" in result.stderr
+    assert (out / "report.html").read_text() == "the old page"
+    assert files_below(out) == figures
+
+
+def test_a_figure_that_was_deleted_is_written_again(after_run, hwid, out):
+    hwid("report")
+    figures = files_below(out)
+    (out / "figures" / "crossval" / "matrix.png").unlink()
+
+    assert "already" not in hwid("report").stdout
+    assert files_below(out) == figures
+    assert "already" in hwid("report").stdout
+
+
+def test_the_last_line_stays_one_comment_whatever_figures_are_called(tmp_path):
+    figures = ["calibrate/a-->b.png", "recordings/\u00e4\n.png"]
+    line = _last_line("key", figures)
+    for name in figures:
+        path = tmp_path / "figures" / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(b"")
+    page = tmp_path / "report.html"
+    page.write_text(f"<html>\n{line}")
+
+    assert line.count("-->") == line.count("\n") == 1
+    assert _is_complete(tmp_path, page, "key")
+    assert not _is_complete(tmp_path, page, "other")
+    (tmp_path / "figures" / figures[0]).unlink()
+    assert not _is_complete(tmp_path, page, "key")

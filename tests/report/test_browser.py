@@ -36,6 +36,10 @@ addEventListener("load", () => {
     broken: images.filter(one => one.naturalWidth === 0).map(one => one.alt),
     tiny: images.filter(one => one.getBoundingClientRect().width < 200)
       .map(one => one.alt),
+    small: images.filter(one => one.closest(".n1")).map(one => [
+      one.alt,
+      one.getBoundingClientRect().width / one.style.getPropertyValue("--inches"),
+    ]),
     outside: boxes.filter(one => one.getBoundingClientRect().right > innerWidth + 1)
       .map(one => one.className),
   }, "*");
@@ -123,3 +127,12 @@ def test_every_image_is_decoded_and_large_enough_to_be_read(visit, page):
     assert answer["images"] == page.html.count("<img")
     assert answer["broken"] == []
     assert answer["tiny"] == []
+
+
+def test_labels_of_single_figures_keep_their_size_on_a_phone(visit):
+    answer, _ = visit
+
+    # Labels have 7.5 points and more: 9 pixels at 85 pixels in an inch. Rounded sizes
+    # of figures and the room of a desk take some off.
+    assert len(answer["small"]) > 5
+    assert {name: size for name, size in answer["small"] if size < 84} == {}

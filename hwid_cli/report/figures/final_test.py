@@ -16,6 +16,8 @@ from hwid_cli.report.figures.style import (
 
 # Lines with a legend of their own; more are told apart by nobody.
 _MOST_NAMED = 10
+# Width, room left of the axes, and height of a row of the legend, [inch].
+_WIDTH, _LEFT, _ROW = 7.2, 0.75, 0.19
 
 
 @styled
@@ -31,12 +33,19 @@ def trend_figure(trend: ChainOnTests) -> Figure:
     Figure
         One line for each recording, their mean, and the threshold.
     """
-    figure = new_figure(8.4, 3.9)
-    figure.subplots_adjust(left=0.1, right=0.76, top=0.96, bottom=0.2)
+    is_named = len(trend.recordings) <= _MOST_NAMED
+    # Below the axes two entries in a row, which a narrow screen shows at once.
+    rows = -(-((len(trend.recordings) if is_named else 0) + 2) // 2)
+    below = 0.75 + _ROW * rows
+    height = 3.2 + below
+    figure = new_figure(_WIDTH, height)
+    figure.subplots_adjust(
+        left=_LEFT / _WIDTH, right=0.98, top=1 - 0.12 / height, bottom=below / height
+    )
     axes = figure.subplots()
     levels = list(range(1, len(trend.models) + 1))
     for number, name in enumerate(trend.recordings):
-        label = name if len(trend.recordings) <= _MOST_NAMED else ""
+        label = name if is_named else ""
         style = LINES[number % len(LINES)]
         axes.plot(levels, trend.rmsd[:, number], lw=1.2, ms=5, label=label, **style)
     axes.plot(levels, trend.mean, color=BLACK, lw=2.8, marker="o", ms=6, label="mean")
@@ -48,7 +57,9 @@ def trend_figure(trend: ChainOnTests) -> Figure:
     axes.set_xlim(levels[0] - 0.2, levels[-1] + 0.2)
     axes.set_xlabel("recordings in the group, added one by one")
     axes.set_ylabel(f"RMSD [{trend.unit}]")
-    axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.02))
+    figure.legend(
+        loc="lower left", bbox_to_anchor=(0.1 / _WIDTH, 0.0), ncols=2, columnspacing=1.2
+    )
     return figure
 
 

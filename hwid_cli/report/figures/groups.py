@@ -183,6 +183,22 @@ def _foot(
     axes.text(column, -(n_shown + 0.55), text, va="center", size=7.5, color="#444444")
 
 
+_KEPT: dict[str, Any] = {"color": BLUE, "label": "kept"}
+_DROPPED: dict[str, Any] = {
+    "color": "#d9d9d9",
+    "edgecolor": GREY,
+    "hatch": "///",
+    "lw": 0.5,
+    "label": "dropped",
+}
+_LAST: dict[str, Any] = {
+    "color": SKY,
+    "edgecolor": BLUE,
+    "lw": 0.8,
+    "label": "last level",
+}
+
+
 @styled
 def coverage_histogram_figure(search: GroupSearch) -> Figure:
     """Draw how many groups of each level cover how many recordings.
@@ -194,7 +210,8 @@ def coverage_histogram_figure(search: GroupSearch) -> Figure:
     Returns
     -------
     Figure
-        Kept groups are hatched.
+        Groups that go on are filled, dropped ones hatched and stand on them. Those of
+        the last level are neither: the winner may be among them.
     """
     levels = search.levels
     figure = new_figure(FULL_WIDTH, 2.6)
@@ -207,17 +224,14 @@ def coverage_histogram_figure(search: GroupSearch) -> Figure:
         rest = [
             sum(g.coverage == c and not g.is_kept for g in of_level) for c in counts
         ]
-        axes.bar(counts, kept, color=BLUE, label="kept", width=0.8)
+        if level != levels[-1]:
+            axes.bar(counts, kept, width=0.8, **_KEPT)
         axes.bar(
             counts,
             rest,
             bottom=kept,
-            color="#d9d9d9",
-            edgecolor=GREY,
-            hatch="///",
-            lw=0.5,
-            label="dropped",
             width=0.8,
+            **(_LAST if level == levels[-1] else _DROPPED),
         )
         axes.set_title(f"level {level}", color=BLACK)
         axes.set_xlabel("recordings covered [-]")
@@ -225,5 +239,13 @@ def coverage_histogram_figure(search: GroupSearch) -> Figure:
         axes.xaxis.get_major_locator().set_params(integer=True)
         axes.grid(visible=False, axis="x")
     every[0].set_ylabel("groups [-]")
-    every[-1].legend(loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=2)
+    bars = [one for axes in every for one in axes.containers]
+    handles = {str(one.get_label()): one for one in bars}
+    figure.legend(
+        handles.values(),
+        handles.keys(),
+        loc="upper right",
+        bbox_to_anchor=(0.99, 1.0),
+        ncols=3,
+    )
     return figure

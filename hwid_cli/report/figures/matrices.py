@@ -22,9 +22,11 @@ from hwid_cli.report.figures.style import (
 # Colours go from the lowest RMSD, or the threshold, to this many times of it, [-].
 _MOST_COLOURS = 1e3
 # Small maps in a row, the room of one of them and what stands beside them, [inch].
-_MOST_COLUMNS, _ROOM, _MARGINS = 6, 1.58, 1.7
+_MOST_COLUMNS, _ROOM, _MARGINS = 6, 1.55, 1.9
 # Side of a cell of the matrix, at most and at least, [inch].
 _LARGEST_CELL, _SMALLEST_CELL = 0.42, 0.17
+# Right of a matrix, and from where its colour bar with numbers and label is, [inch].
+_RIGHT, _BAR = 1.75, 1.05
 # A character of a label, [inch].
 _CHARACTER = 0.072
 
@@ -72,7 +74,7 @@ def order_grid_figure(grid: OrderGrid) -> Figure:
     figure = new_figure(width, height)
     figure.subplots_adjust(
         left=0.6 / width,
-        right=1 - 1.1 / width,
+        right=1 - 1.3 / width,
         top=1 - 0.3 / height,
         bottom=0.55 / height,
         wspace=0.22,
@@ -94,7 +96,7 @@ def order_grid_figure(grid: OrderGrid) -> Figure:
             axes.set_ylabel("numerator nb")
     bar_height = min(0.8, 3.0 / height)
     place = figure.add_axes(
-        (1 - 0.85 / width, 0.5 - bar_height / 2, 0.15 / width, bar_height)
+        (1 - _BAR / width, 0.5 - bar_height / 2, 0.15 / width, bar_height)
     )
     ends = _ends(grid.rmsd, scale)
     figure.colorbar(mesh, cax=place, label=f"RMSD [{grid.unit}]", extend=ends)
@@ -145,9 +147,9 @@ def rmsd_matrix_figure(matrix: RmsdMatrix, *, with_margins: bool = True) -> Figu
     rows, columns = matrix.rmsd.shape
     label_width = _CHARACTER * max(map(len, matrix.models)) + 0.35
     label_height = _CHARACTER * max(map(len, matrix.recordings)) + 0.2
-    room = FULL_WIDTH - label_width - 1.5
+    room = FULL_WIDTH - label_width - _RIGHT
     cell = float(np.clip(room / columns, _SMALLEST_CELL, _LARGEST_CELL))
-    width = label_width + columns * cell + 1.5
+    width = label_width + columns * cell + _RIGHT
     top, bottom = (0.6 if with_margins else 0.2), label_height + 0.3
     height = max(rows * cell, 1.1) + top + bottom
     figure = new_figure(width, height)
@@ -165,13 +167,14 @@ def rmsd_matrix_figure(matrix: RmsdMatrix, *, with_margins: bool = True) -> Figu
         _write_margins(axes, matrix)
     tall = min(2.6, max(rows * cell, 1.1))
     bar = figure.add_axes(
-        (1 - 0.78 / width, 1 - (top + tall) / height, 0.13 / width, tall / height)
+        (1 - _BAR / width, 1 - (top + tall) / height, 0.13 / width, tall / height)
     )
-    figure.colorbar(mesh, cax=bar, extend=_ends(matrix.rmsd, scale))
+    # Beside the numbers: above the bar are its arrow and the counts.
+    label = f"RMSD [{matrix.unit}]"
+    figure.colorbar(mesh, cax=bar, label=label, extend=_ends(matrix.rmsd, scale))
     number_decades(bar.yaxis, *bar.get_ylim())
     bar.axhline(matrix.threshold, color="w", lw=3.0)
     bar.axhline(matrix.threshold, color=BLACK, lw=1.2)
-    bar.set_title(f"RMSD [{matrix.unit}]", loc="center", fontsize=8, pad=5)
     return figure
 
 

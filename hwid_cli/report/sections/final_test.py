@@ -3,11 +3,11 @@
 import numpy as np
 
 from hwid_cli.records.groups import FinalTest, Prediction
-from hwid_cli.records.report import ReportContents, RmsdMatrix
+from hwid_cli.records.report import ChainOnTests, ReportContents, RmsdMatrix
 from hwid_cli.report.figures.final_test import trend_figure
 from hwid_cli.report.figures.matrices import rmsd_matrix_figure
 from hwid_cli.report.page import Block, Cell, Figures, Folded, Section, Table, Text
-from hwid_cli.report.sections.words import counted, drawn, listed, with_unit
+from hwid_cli.report.sections.words import drawn, listed, with_unit
 from hwid_cli.report.text_table import number
 
 _NOT_RUN = Text("Not run yet: run 'hwid test CONFIG'.", is_note=True)
@@ -35,26 +35,32 @@ def final_test_section(contents: ReportContents) -> Section:
     else:
         if trend.recordings:
             alt = "RMSD on the test recordings along the chain of groups"
-            ways = f"{with_unit(trend.mean[0], trend.unit)} with " + (
-                f"{trend.models[0]} to {with_unit(trend.mean[-1], trend.unit)} with "
-                f"{trend.models[-1]}"
-            )
-            sentence = (
-                f"The mean RMSD on {listed(trend.recordings)} goes from {ways}; the "
-                f"models cover {', '.join(map(str, trend.covers))} of "
-                f"{len(trend.recordings)}."
-            )
             figure = drawn("test/trend", trend_figure(trend), alt)
-            blocks.append(Figures((figure,), sentence))
+            blocks.append(Figures((figure,), _trend_sentence(trend)))
         alt = "Heat map of the RMSD of the chain's models on all recordings"
         figure = drawn("test/chain", rmsd_matrix_figure(matrix), alt)
+        covers = ", ".join(map(str, matrix.covers))
+        is_one = len(matrix.models) == 1
+        ways = ("model covers", "its") if is_one else ("models cover", "their")
         sentence = (
-            f"On all {len(matrix.recordings)} recordings the chain's models cover "
-            f"{', '.join(map(str, matrix.covers))}, their own left out."
+            f"On all {len(matrix.recordings)} recordings the chain's {ways[0]} "
+            f"{covers}, {ways[1]} own left out."
         )
         blocks.append(Figures((figure,), sentence))
     title = "Test: the chain of groups on recordings that nothing else has used"
     return Section("test", title, "Test", tuple(blocks))
+
+
+def _trend_sentence(trend: ChainOnTests) -> str:
+    first, last = (with_unit(trend.mean[place], trend.unit) for place in (0, -1))
+    start = f"The mean RMSD on {listed(trend.recordings)}"
+    covers = f"{', '.join(map(str, trend.covers))} of {len(trend.recordings)}"
+    if len(trend.models) == 1:
+        return f"{start} is {first} with {trend.models[0]}, which covers {covers}."
+    return (
+        f"{start} goes from {first} with {trend.models[0]} to {last} with "
+        f"{trend.models[-1]}; the models cover {covers}."
+    )
 
 
 def coverage_section(contents: ReportContents) -> Section:
@@ -76,21 +82,30 @@ def coverage_section(contents: ReportContents) -> Section:
         alt = "Heat map of the RMSD of all models on all recordings"
         figure = drawn("coverage/matrix", rmsd_matrix_figure(matrix), alt)
         blocks.append(Figures((figure,), _matrix_sentence(matrix)))
-        covered = f"No model covers {listed(final.uncovered)}."
-        everything = "Every recording is covered by some model."
-        blocks.append(Text(covered if final.uncovered else everything))
-        if final.hard_to_cover:
-            hard = listed(final.hard_to_cover)
-            blocks.append(Text(f"Hardly any foreign model covers {hard}."))
+        if len(final.uncovered) == len(final.recordings):
+            covered = "No model covers any recording, not even its own."
+        elif final.uncovered:
+            covered = f"No model covers {listed(final.uncovered)}."
+        else:
+            covered = "Every recording is covered by some model."
+        blocks.append(Text(covered))
+        hard = [name for name in final.hard_to_cover if name not in final.uncovered]
+        if hard:
+            blocks.append(Text(f"Hardly any foreign model covers {listed(hard)}."))
     title = "Coverage: all models on all recordings"
     return Section("coverage", title, "Coverage", tuple(blocks))
 
 
 def _matrix_sentence(matrix: RmsdMatrix) -> str:
     row = int(np.argmax(matrix.covers))
+    most = (
+        f"{matrix.models[row]} covers the most foreign recordings, "
+        f"{matrix.covers[row]} of {len(matrix.recordings)}."
+        if matrix.covers[row]
+        else "No model covers a foreign recording."
+    )
     return (
-        f"{matrix.models[row]} covers the most foreign recordings, {matrix.covers[row]} "
-        f"of {len(matrix.recordings)}. A dot marks an RMSD below "
+        f"{most} A dot marks an RMSD below "
         f"{with_unit(matrix.threshold, matrix.unit)}, a square the recordings of the "
         "fit, which the counts leave out."
     )
@@ -130,11 +145,13 @@ def assignment_section(contents: ReportContents) -> Section:
 
 def _smallest_set(final: FinalTest) -> str:
     within = len(final.recordings) - len(final.uncovered)
-    return (
-        f"{counted(len(final.smallest_set), 'model')} together cover the {within} of "
-        f"{len(final.recordings)} recordings that any model covers: "
-        f"{listed(final.smallest_set)}."
-    )
+    names = listed(final.smallest_set)
+    which = f"the {within} of {len(final.recordings)} recordings that any model covers"
+    if not final.smallest_set:
+        return "No model covers any recording: there is no set of models to choose."
+    if len(final.smallest_set) == 1:
+        return f"One model, {names}, covers {which}."
+    return f"{len(final.smallest_set)} models together cover {which}: {names}."
 
 
 def _maybe_folded(what: str, table: Table) -> Block:

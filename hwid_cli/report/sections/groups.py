@@ -1,11 +1,12 @@
 """Section about the search for groups of recordings."""
 
+from collections.abc import Collection
+
 from hwid_cli.records.groups import Group, GroupSearch
 from hwid_cli.records.report import ReportContents
 from hwid_cli.report.figures.groups import coverage_histogram_figure, tree_figure
 from hwid_cli.report.page import Block, Cell, Figures, Folded, Section, Table, Text
-from hwid_cli.report.sections.words import counted, drawn, with_unit
-from hwid_cli.report.text_table import MISSING
+from hwid_cli.report.sections.words import NOTHING_COVERED, counted, drawn, with_unit
 
 _JOINS = {
     "concatenate": "one after the other, so that their order matters",
@@ -47,14 +48,26 @@ def _stop(search: GroupSearch) -> str:
 
 def _tree(search: GroupSearch) -> Figures:
     alt = "Tree of the kept groups, level by level, with their coverage"
-    chain = " to ".join(str(group.coverage) for group in search.chain_groups)
-    winner = search.chain[-1] if search.chain else MISSING
     sentence = (
-        f"The chain to {winner} (bold, blue) raises the coverage from {chain} of "
-        f"{len(search.validated_on)}; the number in each box and its filled part are "
-        "the coverage."
+        f"{_chain(search)} The number in each box and its filled part are the coverage."
     )
     return Figures((drawn("groups/tree", tree_figure(search), alt),), sentence)
+
+
+def _chain(search: GroupSearch) -> str:
+    covers = [group.coverage for group in search.chain_groups]
+    of = len(search.validated_on)
+    if not covers:
+        return f"There is no chain: {NOTHING_COVERED}"
+    winner = search.chain[-1]
+    if len(covers) == 1:
+        return f"The winner, {winner} (bold, blue), covers {covers[0]} of {of}."
+    if len(set(covers)) == 1:
+        how = f"keeps the coverage at {covers[0]}"
+    else:
+        verb = "raises" if covers[-1] > covers[0] else "moves"
+        how = f"{verb} the coverage from {' to '.join(map(str, covers))}"
+    return f"The chain to {winner} (bold, blue) {how} of {of}."
 
 
 def _histogram(search: GroupSearch) -> Figures:
@@ -67,10 +80,16 @@ def _histogram(search: GroupSearch) -> Figures:
         group.level == search.levels[-1] and group.coverage == best[-1]
         for group in search.groups
     )
-    sentence = (
-        f"The best coverage of the levels is {', '.join(map(str, best))}; on the last "
-        f"one {counted(at_best, 'group')} {'reaches' if at_best == 1 else 'reach'} it."
-    )
+    reach = f"{counted(at_best, 'group')} {'reaches' if at_best == 1 else 'reach'} it"
+    if not any(best):
+        sentence = "No group covers any recording, on any level."
+    elif len(best) == 1:
+        sentence = f"The best coverage is {best[0]}; {reach}."
+    else:
+        ways = ", ".join(map(str, best))
+        sentence = (
+            f"The best coverage of the levels is {ways}; on the last one {reach}."
+        )
     figure = coverage_histogram_figure(search)
     return Figures((drawn("groups/coverage", figure, alt),), sentence)
 
@@ -100,6 +119,9 @@ def _levels_table(search: GroupSearch) -> Table:
         "best coverage",
     )
     caption = "What each level tried and what its filters left"
+    reason = search.reason.strip().rstrip(".")
+    if reason:
+        caption += f"; the search stopped after the last: {reason}"
     return Table(caption, heads, tuple(rows), text_columns=())
 
 
@@ -108,7 +130,7 @@ def _join_table(search: GroupSearch, level: int) -> Table:
     joins = [join for join in search.joins if join.level == level]
     by_name = {group.name: group for group in search.groups}
     bases = list(dict.fromkeys(join.base for join in joins))
-    add_ons = sorted({join.add_on for join in joins})
+    add_ons = _in_order(search, {join.add_on for join in joins})
     group_of = {(join.base, join.add_on): by_name[join.group] for join in joins}
     most = max(1, len(search.validated_on))
     rows: list[tuple[Cell | str, ...]] = []
@@ -121,6 +143,14 @@ def _join_table(search: GroupSearch, level: int) -> Table:
         "model; frames mark what was kept"
     )
     return Table(caption, ("base", *add_ons), tuple(rows))
+
+
+def _in_order(search: GroupSearch, names: Collection[str]) -> list[str]:
+    """Add-ons in the order of the experiment, as the tables on the screen have them."""
+    # Single recordings come in that order, others as they join.
+    singles = [join.base for join in search.joins if join.level == 1]
+    later = [join.add_on for join in search.joins]
+    return [name for name in dict.fromkeys([*singles, *later]) if name in names]
 
 
 def _join_cell(group: Group | None, search: GroupSearch, most: int) -> Cell:

@@ -5,7 +5,12 @@ from collections.abc import Mapping
 import numpy as np
 
 from hwid_cli.records.recordings import CalibrationLog
-from hwid_cli.records.report import OrderGrid, ReportContents, SimulatedRecording
+from hwid_cli.records.report import (
+    OrderGrid,
+    ReportContents,
+    RmsdMatrix,
+    SimulatedRecording,
+)
 from hwid_cli.report import plots
 from hwid_cli.report.figures.matrices import order_grid_figure, rmsd_matrix_figure
 from hwid_cli.report.figures.recordings import simulation_figure
@@ -22,7 +27,7 @@ from hwid_cli.report.page import (
 from hwid_cli.report.sections.words import (
     counted,
     drawn,
-    file_name,
+    file_names,
     image,
     listed,
     percent,
@@ -32,6 +37,9 @@ from hwid_cli.report.tables import calibration_cells
 
 # Figures that are shown open; all others are folded.
 _MOST_OPEN = 4
+# Rows of a table that stands open before the first figure.
+_MOST_ROWS = 12
+_DETAIL = "_detail"
 _WHY = {
     "own": "the best of its own models",
     "assigned": "the model that the final test assigns to it",
@@ -61,7 +69,10 @@ def calibration_section(
     else:
         heads, rows = calibration_cells(logs)
         caption = "Samples, what was subtracted, samples repaired (input/output)"
-        blocks.append(Table(caption, heads, tuple(rows)))
+        table = Table(caption, heads, tuple(rows))
+        folded = f"The table of all {counted(len(rows), 'recording')}"
+        many = len(rows) > _MOST_ROWS
+        blocks.append(Folded(folded, (table,)) if many else table)
         shown = [
             Figures((_calibration_image(log, figures[log.name]),), _cut_sentence(log))
             for log in logs
@@ -111,7 +122,9 @@ def recordings_section(contents: ReportContents) -> Section:
     blocks: list[Block] = []
     if not contents.simulated:
         blocks.append(Text("No models yet: run 'hwid identify CONFIG'.", is_note=True))
-    shown = [_simulation(one) for one in contents.simulated]
+    names = [one.recording.name for one in contents.simulated]
+    files = file_names(names, ("", _DETAIL))
+    shown = [_simulation(one, files[one.recording.name]) for one in contents.simulated]
     blocks += shown[:_MOST_OPEN]
     if shown[_MOST_OPEN:]:
         what = f"{counted(len(shown) - _MOST_OPEN, 'more recording')}"
@@ -124,9 +137,9 @@ def recordings_section(contents: ReportContents) -> Section:
     return Section("recordings", title, "Best models", tuple(blocks))
 
 
-def _simulation(one: SimulatedRecording) -> Figures:
+def _simulation(one: SimulatedRecording, file_name: str) -> Figures:
     name, unit = one.recording.name, one.recording.output_unit
-    file = f"recordings/{file_name(name)}"
+    file = f"recordings/{file_name}"
     worst = int(np.nanargmax(np.abs(one.residual))) if _is_finite(one) else 0
     at = worst * one.recording.sample_time_s
     sentence = (
@@ -142,7 +155,7 @@ def _simulation(one: SimulatedRecording) -> Figures:
     images = (
         drawn(file, simulation_figure(one, is_detail=False), alt),
         drawn(
-            f"{file}_detail",
+            f"{file}{_DETAIL}",
             simulation_figure(one, is_detail=True),
             f"{alt}, in detail",
         ),
@@ -219,15 +232,29 @@ def crossval_section(contents: ReportContents) -> Section:
     else:
         alt = "Heat map of the RMSD of each recording's widest model on all recordings"
         figure = drawn("crossval/matrix", rmsd_matrix_figure(matrix), alt)
-        row, column = int(matrix.covers.argmax()), int(matrix.covered_by.argmin())
         sentence = (
-            f"{matrix.models[row]} covers the most, {matrix.covers[row]} of "
-            f"{len(matrix.recordings)} (its own among them); hardest to cover is "
-            f"{matrix.recordings[column]}, by "
-            f"{counted(int(matrix.covered_by[column]), 'model')}. A dot marks an RMSD "
-            f"below {with_unit(matrix.threshold, matrix.unit)}, a square the recording "
+            f"{_coverage_sentence(matrix)} A dot marks an RMSD below "
+            f"{with_unit(matrix.threshold, matrix.unit)}, a square the recording "
             "of the fit, the line in the colour bar the threshold."
         )
         blocks.append(Figures((figure,), sentence))
     title = "Cross-validation: the widest model of each recording"
     return Section("crossval", title, "Cross-validation", tuple(blocks))
+
+
+def _coverage_sentence(matrix: RmsdMatrix) -> str:
+    row, column = int(matrix.covers.argmax()), int(matrix.covered_by.argmin())
+    if not matrix.covers[row]:
+        return f"No model covers any of the {len(matrix.recordings)}, not even its own."
+    widest = (
+        f"{matrix.models[row]} covers the most, {matrix.covers[row]} of "
+        f"{len(matrix.recordings)} (its own among them)"
+    )
+    if not matrix.covered_by[column]:
+        nobody = np.flatnonzero(matrix.covered_by == 0)
+        names = listed([matrix.recordings[place] for place in nobody])
+        return f"{widest}; none of these models covers {names}."
+    return (
+        f"{widest}; hardest to cover is {matrix.recordings[column]}, by "
+        f"{counted(int(matrix.covered_by[column]), 'model')}."
+    )

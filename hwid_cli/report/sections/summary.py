@@ -1,8 +1,8 @@
 """What was run on what, and what came out, in a few sentences."""
 
-from hwid_cli.records.report import ReportContents
+from hwid_cli.records.report import ChainOnTests, ReportContents
 from hwid_cli.report.page import Block, Cell, Code, Folded, Section, Table, Text
-from hwid_cli.report.sections.words import counted, listed, with_unit
+from hwid_cli.report.sections.words import NOTHING_COVERED, counted, listed, with_unit
 from hwid_cli.report.tables import status_line
 from hwid_cli.report.text_table import MISSING
 
@@ -50,30 +50,45 @@ def _headline(contents: ReportContents) -> list[str]:
     if contents.cross is not None:
         cross = contents.cross
         row = int(cross.covers.argmax())
+        below = f"with an RMSD below {with_unit(cross.threshold, cross.unit)}"
         lines.append(
             f"The widest model of a single recording, {cross.models[row]}, covers "
-            f"{cross.covers[row]} of {len(cross.recordings)} recordings with an RMSD "
-            f"below {with_unit(cross.threshold, cross.unit)}."
+            f"{cross.covers[row]} of {len(cross.recordings)} recordings {below}."
+            if cross.covers[row]
+            else f"No model of a single recording covers any recording {below}."
         )
-    if stored.search is not None and stored.search.chain_groups:
+    if stored.search is not None and not stored.search.chain:
+        lines.append(f"Grouping: {NOTHING_COVERED}")
+    elif stored.search is not None:
         winner = stored.search.chain_groups[-1]
         lines.append(
             f"Grouping: the group {winner.name} covers {winner.coverage} of "
             f"{len(stored.search.validated_on)} with its model {winner.model_name}."
         )
-    if contents.trend is not None and contents.trend.models:
-        trend = contents.trend
-        lines.append(
-            f"On {counted(len(trend.recordings), 'test recording')} that nothing else "
-            f"has used, the mean RMSD goes from {with_unit(trend.mean[0], trend.unit)} "
-            f"with the first model of the chain to "
-            f"{with_unit(trend.mean[-1], trend.unit)} with the last, which covers "
-            f"{trend.covers[-1]} of them."
-        )
+    if (
+        contents.trend is not None
+        and contents.trend.models
+        and contents.trend.recordings
+    ):
+        lines.append(_trend_line(contents.trend))
     if stored.diagnosis is not None:
         verdict = str(stored.diagnosis.get("verdict", MISSING))
         lines.append(f"Diagnosis of the simulation: {verdict}.")
     return lines
+
+
+def _trend_line(trend: ChainOnTests) -> str:
+    first, last = (with_unit(trend.mean[place], trend.unit) for place in (0, -1))
+    ways = (
+        f"is {first} with {trend.models[0]}"
+        if len(trend.models) == 1
+        else f"goes from {first} with the first model of the chain to {last} with the "
+        "last"
+    )
+    return (
+        f"On {counted(len(trend.recordings), 'test recording')} that nothing else "
+        f"has used, the mean RMSD {ways}, which covers {trend.covers[-1]} of them."
+    )
 
 
 def _stages_table(contents: ReportContents) -> Table:

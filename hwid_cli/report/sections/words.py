@@ -2,7 +2,7 @@
 
 import re
 import struct
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -10,6 +10,8 @@ from matplotlib.figure import Figure
 from hwid_cli.report.figures.style import DOTS, as_png
 from hwid_cli.report.page import Image
 from hwid_cli.report.text_table import MISSING
+
+NOTHING_COVERED = "no group covers any recording."
 
 _MOST_NAMED = 8
 # Keeps a number and its unit on one line.
@@ -136,20 +138,34 @@ def image(file: str, png: bytes, alt: str, *, dots_per_inch: int) -> Image:
     return Image(file, png, alt, width, height, dots_per_inch)
 
 
-def file_name(name: str) -> str:
-    """Make a name of a recording or model that every disk takes.
+def file_names(names: Iterable[str], endings: Sequence[str] = ("",)) -> dict[str, str]:
+    """Make file names of recordings or models that every disk takes and tells apart.
 
     Parameters
     ----------
-    name : str
+    names : iterable of str
+    endings : sequence of str
+        What follows a name in the files that belong to it.
 
     Returns
     -------
-    str
+    dict of str to str
+        By the names; equal ones are numbered. Large and small letters count as equal,
+        as they do on some disks.
 
     Examples
     --------
-    >>> file_name("step_06+step_09/3/7")
-    'step_06+step_09_3_7'
+    >>> file_names(["step_06+step_09/3/7", "c#", "c_"])
+    {'step_06+step_09/3/7': 'step_06+step_09_3_7', 'c#': 'c_', 'c_': 'c__2'}
     """
-    return re.sub(r"[^\w.+ -]", "_", name)
+    found: dict[str, str] = {}
+    taken: set[str] = set()
+    for name in dict.fromkeys(names):
+        plain = re.sub(r"[^\w.+ -]", "_", name)
+        file, number = plain, 1
+        while taken & (files := {f"{file}{end}".casefold() for end in endings}):
+            number += 1
+            file = f"{plain}_{number}"
+        taken |= files
+        found[name] = file
+    return found

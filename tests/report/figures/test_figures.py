@@ -3,6 +3,7 @@ from dataclasses import replace
 import matplotlib as mpl
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from hwid_cli.records.groups import Group, GroupSearch, Join
 from hwid_cli.report.figures.final_test import trend_figure
@@ -68,6 +69,18 @@ def test_order_grids_of_any_number_are_drawn(contents, count):
     assert len(visible) == count + 1
 
 
+def test_large_numbers_leave_the_label_of_the_order_grids_inside(contents):
+    values = np.geomspace(2e3, 1e6, contents.grid.rmsd.size)
+    values = values.reshape(contents.grid.rmsd.shape)
+    grid = replace(contents.grid, rmsd=values, unit="micrometre")
+    figure = order_grid_figure(grid)
+    FigureCanvasAgg(figure).draw()
+
+    label = figure.axes[-1].yaxis.label.get_window_extent()
+    # A fiftieth of an inch is left to the edge.
+    assert label.x1 < figure.bbox.x1 - 0.02 * figure.dpi
+
+
 def test_a_failed_fit_stays_blank_over_the_hatching(contents):
     grid = contents.grid
     values = grid.rmsd.copy()
@@ -101,7 +114,42 @@ def test_the_threshold_is_marked_in_the_colour_bar(contents):
     bar = rmsd_matrix_figure(matrix).axes[1]
 
     assert {line.get_ydata()[0] for line in bar.lines} == {matrix.threshold}
-    assert bar.get_title() == "RMSD [m]"
+    assert bar.get_ylabel() == "RMSD [m]"
+    # Above the bar are its arrow and the counts.
+    assert bar.get_title() == ""
+
+
+@pytest.mark.parametrize("factor", [1.0, 1e-5, 1e6])
+def test_nothing_beside_the_matrix_touches_whatever_the_numbers(contents, factor):
+    matrix = contents.full_matrix
+    values = matrix.rmsd * factor
+    values[0, 0] = 1e9 * factor
+    large = replace(
+        matrix,
+        rmsd=values,
+        threshold=matrix.threshold * factor,
+        unit="counts",
+        covers=matrix.covers + 1000,
+    )
+    figure = rmsd_matrix_figure(large)
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    axes, bar = figure.axes
+    left = max(one.get_window_extent().x1 for one in axes.texts)
+    label = bar.yaxis.label.get_window_extent()
+    low, high = bar.get_ylim()
+    numbers = [
+        text.get_window_extent()
+        for place, text in zip(bar.get_yticks(), bar.get_yticklabels(), strict=True)
+        if low <= place <= high
+    ]
+
+    # With its label, wherever that stands.
+    assert left < bar.get_tightbbox().x0
+    assert max(one.x1 for one in numbers) < label.x0
+    assert label.x1 < figure.bbox.x1
+    # Beside the bar, not above it where its arrow is.
+    assert label.y1 < bar.get_window_extent().y1
 
 
 def test_a_matrix_without_any_number_is_drawn(contents):
@@ -212,6 +260,38 @@ def test_histograms_count_every_group_once():
     # Dropped groups stand on the kept ones.
     kept, dropped = np.split(np.array(figure.axes[1].patches), 2)
     assert [bar.get_y() for bar in dropped] == [bar.get_height() for bar in kept]
+
+
+def test_groups_of_the_last_level_are_not_called_dropped():
+    figure = coverage_histogram_figure(group_search(12))
+
+    labels = [[bars.get_label() for bars in axes.containers] for axes in figure.axes]
+    assert labels[:-1] == 3 * [["kept", "dropped"]]
+    assert labels[-1] == ["last level"]
+    told = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert told == ["kept", "dropped", "last level"]
+    colours = {axes.patches[-1].get_facecolor() for axes in figure.axes}
+    assert len(colours) == 2
+
+
+def test_the_legend_of_the_trend_stands_below_where_a_phone_shows_it(contents):
+    trend = contents.trend
+    names = tuple(f"random_{number:02d}" for number in range(10))
+    many = replace(
+        trend,
+        recordings=names,
+        rmsd=np.repeat(trend.rmsd[:, :1], 10, axis=1),
+    )
+    figure = trend_figure(many)
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    legend = figure.legends[0].get_window_extent()
+    axes = figure.axes[0]
+
+    # A phone shows 360 of the 85 pixels that an inch has there.
+    assert legend.x1 < 360 / 85 * figure.dpi
+    assert legend.y0 >= 0
+    assert legend.y1 < axes.xaxis.label.get_window_extent().y0
 
 
 def test_the_trend_has_a_line_for_each_recording_their_mean_and_the_threshold(contents):

@@ -1,0 +1,259 @@
+"""What the report says where there is little to say."""
+
+import re
+from dataclasses import replace
+from html import unescape
+
+import numpy as np
+import pytest
+
+from hwid_cli.campaign.report import report_contents
+from hwid_cli.records.groups import Group, GroupSearch, Join
+from hwid_cli.records.report import ReportContents
+from hwid_cli.report.page import Figures, Folded, Heading, Table, Text, images_of
+from hwid_cli.report.sections.final_test import (
+    assignment_section,
+    coverage_section,
+    final_test_section,
+)
+from hwid_cli.report.sections.groups import groups_section
+from hwid_cli.report.sections.models import models_section
+from hwid_cli.report.sections.recordings import (
+    calibration_section,
+    crossval_section,
+    recordings_section,
+)
+from hwid_cli.report.sections.summary import summary_section
+from tests.report.report_examples import calibrated_only, log, names
+
+
+def said(section):
+    """Sentences of a section, those of its figures too."""
+    found = []
+    for block in section.blocks:
+        if isinstance(block, Text | Heading):
+            found.append(block.text)
+        elif isinstance(block, Figures):
+            found.append(block.sentence)
+    return re.sub(r"\s+", " ", unescape(" ".join(found)))
+
+
+def tables(section):
+    found = []
+    for block in section.blocks:
+        found += block.blocks if isinstance(block, Folded) else [block]
+    return [block for block in found if isinstance(block, Table)]
+
+
+def one_level(coverage):
+    """A search over three recordings that ends on its first level."""
+    who = ("c", "a", "b")
+    return GroupSearch(
+        groups=tuple(
+            Group((n,), coverage, 1, 1, 1e-3, 1e-2, 1, 1, 1, False) for n in who
+        ),
+        joins=tuple(Join(1, name, "", name) for name in who),
+        fits=(None, None, None),
+        validated_on=who,
+        rmsd=np.full((3, 3), 1e-3),
+        chain=("c",) if coverage else (),
+        reason="no model covers any recording",
+        join="experiments",
+        unit="m",
+        threshold=0.01,
+    )
+
+
+@pytest.fixture
+def nothing_covered(contents):
+    """Results of all stages among which no model covers anything."""
+    stored, final = contents.stored, contents.stored.final_test
+    final = replace(
+        final,
+        rmsd=np.full(final.rmsd.shape, 0.5),
+        covers=0 * final.covers,
+        covered_by=0 * final.covered_by,
+        uncovered=final.recordings,
+        hard_to_cover=final.recordings,
+        chain=(),
+        smallest_set=(),
+        assigned_in_set=tuple("" for _ in final.recordings),
+        predictions=(),
+    )
+    crossval = stored.crossval
+    crossval = replace(crossval, rmsd=np.full(crossval.rmsd.shape, 0.5))
+    search = one_level(0)
+    return report_contents(
+        replace(stored, final_test=final, search=search, crossval=crossval)
+    )
+
+
+def test_without_a_chain_the_tree_says_that_nothing_is_covered(nothing_covered):
+    text = said(groups_section(nothing_covered))
+
+    assert "There is no chain: no group covers any recording." in text
+    assert "raises" not in text
+    assert "reach" not in text
+
+
+def test_without_a_chain_no_command_is_asked_for_that_has_run(nothing_covered):
+    text = said(models_section(nothing_covered))
+
+    assert text == "No model is chosen: no group covers any recording."
+
+
+def test_where_nothing_is_covered_no_model_is_the_widest(nothing_covered):
+    assert said(coverage_section(nothing_covered)).count(" of ") == 1
+    assert "No model covers a foreign recording." in said(
+        coverage_section(nothing_covered)
+    )
+    assert "No model covers any of the 5" in said(crossval_section(nothing_covered))
+    summary = said(summary_section(nothing_covered))
+    assert "No model of a single recording covers any recording" in summary
+    assert "Grouping: no group covers any recording." in summary
+
+
+def test_where_nothing_is_covered_there_is_no_set_of_models(nothing_covered):
+    text = said(assignment_section(nothing_covered))
+
+    assert text == (
+        "No model covers any recording: there is no set of models to choose."
+    )
+
+
+def test_a_smallest_set_of_one_is_a_model(contents):
+    final = replace(contents.stored.final_test, smallest_set=("step_01/2/2",))
+    one = replace(contents, stored=replace(contents.stored, final_test=final))
+
+    assert "One model, step_01/2/2, covers the 5 of 6" in said(assignment_section(one))
+
+
+def test_a_chain_of_one_neither_raises_nor_goes_anywhere(contents):
+    trend = contents.trend
+    short = replace(
+        contents,
+        trend=replace(
+            trend,
+            models=trend.models[:1],
+            rmsd=trend.rmsd[:1],
+            mean=trend.mean[:1],
+            covers=trend.covers[:1],
+        ),
+        chain_matrix=replace(
+            contents.chain_matrix,
+            models=trend.models[:1],
+            rmsd=contents.chain_matrix.rmsd[:1],
+            is_own=contents.chain_matrix.is_own[:1],
+            covers=contents.chain_matrix.covers[:1],
+        ),
+        stored=replace(contents.stored, search=one_level(2)),
+    )
+
+    groups = said(groups_section(short))
+    assert "The winner, c (bold, blue), covers 2 of 3." in groups
+    assert "The best coverage is 2; 3 groups reach it." in groups
+    tested = said(final_test_section(short))
+    assert f"with {trend.models[0]}, which covers" in tested
+    assert "the chain's model covers" in tested
+    for text in (groups, tested, said(summary_section(short))):
+        assert not re.search("goes from|raises|with the last", text)
+
+
+@pytest.mark.parametrize(
+    ("covers", "expected"),
+    [
+        ((1, 2), "raises the coverage from 1 to 2 of 5"),
+        ((2, 2), "keeps the coverage at 2 of 5"),
+        ((2, 1), "moves the coverage from 2 to 1 of 5"),
+    ],
+)
+def test_the_chain_says_how_its_coverage_goes(contents, covers, expected):
+    search = contents.stored.search
+    of = dict(zip(search.chain, covers, strict=True))
+    groups = tuple(
+        replace(one, coverage=of.get(one.name, one.coverage)) for one in search.groups
+    )
+    stored = replace(contents.stored, search=replace(search, groups=groups))
+
+    assert expected in said(groups_section(replace(contents, stored=stored)))
+
+
+def test_a_recording_that_nobody_covers_is_not_listed_twice(contents):
+    assert contents.stored.final_test.hard_to_cover == ("step_01", "step_03")
+
+    text = said(coverage_section(contents))
+    assert "No model covers step_03." in text
+    assert "Hardly any foreign model covers step_01." in text
+
+
+def test_a_peak_at_the_lowest_frequency_drawn_has_no_place(contents):
+    view = contents.models[0]
+    magnitude = np.linspace(1.0, 0.1, view.response.magnitude.size)
+    low = replace(view, response=replace(view.response, magnitude=magnitude))
+    text = said(models_section(replace(contents, models=(low,))))
+
+    assert "and passes low frequencies most." in text
+    assert "passes most at" not in text
+
+
+def test_the_level_table_says_why_the_search_stopped(contents):
+    caption = tables(groups_section(contents))[0].caption
+
+    assert contents.stored.search.reason in caption
+
+
+def test_add_ons_stand_in_the_order_of_the_experiment(contents):
+    who = ("step_10", "sine_2", "step_9")
+    pairs = [(a, b) for a in who for b in who if a != b]
+    members = [(name,) for name in who] + pairs
+    search = replace(
+        contents.stored.search,
+        groups=tuple(
+            Group(one, 1, 1, 1, 1e-3, 1e-2, 1, 1, 1, False) for one in members
+        ),
+        joins=(
+            *(Join(1, name, "", name) for name in who),
+            *(Join(2, a, b, f"{a}+{b}") for a, b in pairs),
+        ),
+        fits=tuple(None for _ in members),
+        rmsd=np.full((len(members), len(contents.stored.search.validated_on)), 1e-3),
+        chain=("step_10",),
+    )
+    stored = replace(contents.stored, search=search)
+    joined = tables(groups_section(replace(contents, stored=stored)))[1]
+
+    assert joined.heads == ("base", *who)
+
+
+def test_figures_of_names_that_look_alike_are_files_of_their_own(contents):
+    shown = contents.simulated[0]
+    who = ("c#", "c_", "C#", "d", "d_detail")
+    alike = replace(
+        contents,
+        simulated=tuple(
+            replace(shown, recording=replace(shown.recording, name=name))
+            for name in who
+        ),
+    )
+    files = [one.file.casefold() for one in images_of(recordings_section(alike).blocks)]
+
+    assert len(set(files)) == len(files) == 2 * len(who)
+
+
+def test_figures_of_models_that_look_alike_are_files_of_their_own(contents):
+    view = contents.models[0]
+    alike = replace(
+        contents,
+        models=tuple(replace(view, model=name) for name in ("c#/1/2", "c_/1/2")),
+    )
+    files = [one.file for one in images_of(models_section(alike).blocks)]
+
+    assert len(set(files)) == len(files) == 6
+
+
+@pytest.mark.parametrize(("count", "is_folded"), [(12, False), (13, True)])
+def test_a_long_calibration_table_is_folded(count, is_folded):
+    stored = replace(calibrated_only(), logs=tuple(log(name) for name in names(count)))
+    first = calibration_section(ReportContents(stored), {}).blocks[0]
+
+    assert isinstance(first, Folded) == is_folded
