@@ -43,7 +43,7 @@ def levels_table(search: GroupSearch) -> str:
         "not self",
         "not cross",
         "widest",
-        "so wide",
+        "reach it",
         "go on",
     )
     title = (
