@@ -37,10 +37,10 @@ run: $(RUN)  ## the main job on the virtual gun: raw measurements in, tables out
 	$(HWID) run configs/demo.yaml
 
 test: $(DEV)  ## fast tests
-	$(BIN)/python -m pytest --quiet
+	$(BIN)/python -m pytest --quiet --numprocesses auto
 
 test-all: $(DEV)  ## all tests, also the slow ones
-	$(BIN)/python -m pytest --quiet -m ''
+	$(BIN)/python -m pytest --quiet --numprocesses auto -m ''
 
 check: $(DEV)  ## lint, format, types, import contracts
 	$(BIN)/ruff check

@@ -66,6 +66,7 @@ def finished(tmp_path_factory):
     arguments = ["run", str(path), "--out", str(folder / "out"), "--jobs", "1"]
     result = CliRunner().invoke(main, arguments)
     assert result.exit_code == 0, result.output
+    (folder / "out" / "said.txt").write_text(result.stdout)
     return folder / "out"
 
 

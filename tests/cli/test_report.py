@@ -89,6 +89,7 @@ def test_a_broken_diagnosis_is_one_line(after_run, hwid, out):
     assert "diagnosis.json: cannot be read" in result.stderr
 
 
+@pytest.mark.slow
 def test_a_page_is_drawn_again_only_when_its_results_have_changed(
     after_run, hwid, edit
 ):
@@ -132,6 +133,7 @@ def test_results_that_cannot_be_read_leave_the_old_page(
     assert files_below(out) == figures
 
 
+@pytest.mark.slow
 def test_a_figure_that_was_deleted_is_written_again(after_run, hwid, out):
     hwid("report")
     figures = files_below(out)
