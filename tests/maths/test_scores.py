@@ -1,3 +1,6 @@
+import csv
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -48,3 +51,26 @@ def test_fit_percent_of_a_constant_output_does_not_exist():
 def test_coverage_counts_strictly_below_the_threshold_and_skips_nan():
     deviations = np.array([[0.01, 0.0099, np.nan], [0.0, 0.001, 0.002]])
     np.testing.assert_array_equal(scores.coverage(deviations, 0.01), [1, 3])
+
+
+def published_cross_rmsd():
+    """T3.2.2.2-3: RMSD of each step's best model on all steps, and printed coverage."""
+    path = Path(__file__).parents[1] / "reference" / "cross_rmsd.csv"
+    with path.open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    values = [[float(row[str(n)]) for n in range(1, 16)] for row in rows]
+    return np.array(values), np.array([int(row["printed_coverage"]) for row in rows])
+
+
+def test_the_published_coverage_is_counted_from_the_published_rmsd():
+    values, printed = published_cross_rmsd()
+
+    # Printed to three decimals: a cell of 0.010 may lie on either side of the threshold.
+    least = scores.coverage(values, 0.01)
+    most = scores.coverage(values, np.nextafter(0.01, 1.0))
+    assert (least <= printed).all()
+    assert (printed <= most).all()
+    # In these rows nothing is rounded to the threshold, so the count is exact.
+    exact = least == most
+    assert exact.sum() >= 8
+    np.testing.assert_array_equal(least[exact], printed[exact])
