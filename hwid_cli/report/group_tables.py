@@ -74,12 +74,7 @@ def join_table(search: GroupSearch, level: int, *, width: int = WIDTH) -> str:
     joins = [join for join in search.joins if join.level == level]
     cells = {(join.base, join.add_on): by_name[join.group] for join in joins}
     bases = list(dict.fromkeys(join.base for join in joins))
-    tried = {join.add_on for join in joins}
-    add_ons = [one.add_on for one in search.joins if one.add_on in tried]
-    # In the order of the experiment: single recordings come in it, others as they join.
-    singles = [join.base for join in search.joins if join.level == 1]
-    heads = [name for name in singles if name in tried]
-    heads += [name for name in dict.fromkeys(add_ons) if name not in heads]
+    heads = add_ons_of(search, level)
     rows = [
         (base, *(_cell(cells.get((base, name))) for name in heads), str(widest))
         for base in bases
@@ -93,6 +88,25 @@ def join_table(search: GroupSearch, level: int, *, width: int = WIDTH) -> str:
         f"add-on,\n* goes on{form}"
     )
     return split_table(title, ("base", *heads, "widest"), rows, width=width)
+
+
+def add_ons_of(search: GroupSearch, level: int) -> list[str]:
+    """List what joined on a level, in the order of the experiment.
+
+    Parameters
+    ----------
+    search : GroupSearch
+    level : int, [-]
+
+    Returns
+    -------
+    list of str
+    """
+    tried = {join.add_on for join in search.joins if join.level == level}
+    # Single recordings come in the order of the experiment, others as they join.
+    singles = [join.base for join in search.joins if join.level == 1]
+    later = [join.add_on for join in search.joins]
+    return [name for name in dict.fromkeys([*singles, *later]) if name in tried]
 
 
 def chain_table(search: GroupSearch) -> str:

@@ -1,10 +1,9 @@
 """Section about the search for groups of recordings."""
 
-from collections.abc import Collection
-
 from hwid_cli.records.groups import Group, GroupSearch
 from hwid_cli.records.report import ReportContents
 from hwid_cli.report.figures.groups import coverage_histogram_figure, tree_figure
+from hwid_cli.report.group_tables import add_ons_of
 from hwid_cli.report.page import Block, Cell, Figures, Folded, Section, Table, Text
 from hwid_cli.report.sections.words import NOTHING_COVERED, counted, drawn, with_unit
 
@@ -130,7 +129,7 @@ def _join_table(search: GroupSearch, level: int) -> Table:
     joins = [join for join in search.joins if join.level == level]
     by_name = {group.name: group for group in search.groups}
     bases = list(dict.fromkeys(join.base for join in joins))
-    add_ons = _in_order(search, {join.add_on for join in joins})
+    add_ons = add_ons_of(search, level)
     group_of = {(join.base, join.add_on): by_name[join.group] for join in joins}
     most = max(1, len(search.validated_on))
     rows: list[tuple[Cell | str, ...]] = []
@@ -143,14 +142,6 @@ def _join_table(search: GroupSearch, level: int) -> Table:
         "model; frames mark what was kept"
     )
     return Table(caption, ("base", *add_ons), tuple(rows))
-
-
-def _in_order(search: GroupSearch, names: Collection[str]) -> list[str]:
-    """Add-ons in the order of the experiment, as the tables on the screen have them."""
-    # Single recordings come in that order, others as they join.
-    singles = [join.base for join in search.joins if join.level == 1]
-    later = [join.add_on for join in search.joins]
-    return [name for name in dict.fromkeys([*singles, *later]) if name in names]
 
 
 def _join_cell(group: Group | None, search: GroupSearch, most: int) -> Cell:
