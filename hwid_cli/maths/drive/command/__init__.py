@@ -1,0 +1,1 @@
+"""What becomes of the command before it drives the motion."""

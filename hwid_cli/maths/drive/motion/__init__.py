@@ -1,0 +1,1 @@
+"""Motion of a drive with every effect of the catalogue."""

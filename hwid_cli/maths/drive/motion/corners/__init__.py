@@ -1,0 +1,1 @@
+"""Corners of the forces on a drive."""

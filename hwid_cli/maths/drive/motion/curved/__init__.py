@@ -1,0 +1,1 @@
+"""Motion between two events where a force is curved."""

@@ -1,0 +1,1 @@
+"""Events: reversals, break-aways, corners of forces."""

@@ -1,0 +1,1 @@
+"""Forces on a drive."""

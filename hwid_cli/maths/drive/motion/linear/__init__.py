@@ -1,0 +1,1 @@
+"""Motion between two events where all forces are linear."""

@@ -1,0 +1,1 @@
+"""Pieces of the command with the push of the drive."""

@@ -1,0 +1,1 @@
+"""Push of the drive."""

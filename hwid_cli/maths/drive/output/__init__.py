@@ -1,0 +1,1 @@
+"""What the sensor of the output makes of the displacement."""

@@ -1,0 +1,70 @@
+"""Places of the parameters in the vector that the compiled loops read.
+
+A parameter that is switched off is 0, except where the comment says infinite.
+"""
+
+(
+    MASS,
+    DAMPING,
+    STIFFNESS,
+    FORCE_CONSTANT,
+    FRICTION_FORWARD,
+    FRICTION_BACKWARD,
+    STATIC_EXCESS,
+    STRIBECK_VELOCITY,
+    HYSTERESIS_FORCE,
+    HYSTERESIS_YIELD,
+    DRAG,
+    CUBIC,
+    QUADRATIC,
+    STOP_POSITION,
+    STOP_STIFFNESS,
+    SIDE_POSITION,
+    SIDE_STIFFNESS,
+    SPRING_GAP,
+    GEAR_GAP,
+    GEAR_STIFFNESS,
+    MOTOR_SHARE,
+    OUTPUT_GAP,
+    OUTPUT_ZERO,  # what the sensor reads at the start, taken off
+    MODE_MASS,
+    MODE_STIFFNESS,
+    MODE_DAMPING,
+    COGGING_FORCE,
+    COGGING_PERIOD,
+    COGGING_PHASE,
+    COGGING_ORIGIN,  # set by the simulation: where the drive rests without current
+    COGGING_REST,  # set by the simulation: sine of the phase
+    LOAD,
+    DEAD_ZONE,
+    SATURATION,  # infinite
+    RATE,  # infinite
+    DELAY,
+    LAG,
+    SATURATION_LOSS,
+    SAG_LOSS,
+    THERMAL_LOSS,
+    THERMAL_TIME,
+    REFERENCE_CURRENT,
+    CLIP_LIMIT,  # infinite
+    CLIP_SLOPE,
+    SENSOR_QUADRATIC,
+    SENSOR_CUBIC,
+    SENSOR_DRIFT,
+    REFERENCE_DISPLACEMENT,
+    PERIODIC_FORCE,
+    PERIODIC_FREQUENCY,
+    PERIODIC_PHASE,
+    RESISTANCE,
+    INDUCTANCE,
+    BACK_EMF,
+    POSITION_GAIN,
+    VELOCITY_GAIN,
+    COMMAND_LIMIT,  # infinite
+    ZERO_ORDER_HOLD,
+    START_POSITION,  # used where nothing holds a position, or where it is estimated
+    START_VELOCITY,
+    IS_START_GIVEN,
+    OUTPUT_ZERO,  # position at which the sensor reads 0
+    N_SLOTS,
+) = range(63)

@@ -1,0 +1,123 @@
+"""The physics simulation of a drive: mass, spring, damper, and effects on top."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from hwid_cli.records.ranges import require_not_negative, require_positive
+
+# How recordings start: at rest in equilibrium; at rest wherever friction holds the drive;
+# anyhow, so that position and velocity are found from the recording.
+STARTS = ("rest", "held", "estimated")
+HOLDS = ("linear", "zero", "smooth")
+# Parameters of the base that a re-fit may move; the mass only sets the scale.
+BASE_PARAMETERS = (
+    "damping_N_s_per_m",
+    "stiffness_N_per_m",
+    "force_constant_N_per_A",
+)
+# What may differ between recordings (effect ``parameter_change``).
+CHANGING = ("stiffness", "force_constant", "damping")
+
+
+@dataclass(frozen=True)
+class Controller:
+    """A cascade: proportional position loop around a proportional velocity loop.
+
+    ``input = velocity_gain (position_gain (reference - output) - velocity)``, computed
+    at every sample and held until the next one.
+
+    Parameters
+    ----------
+    position_gain_per_s : float, [1/s]
+    velocity_gain : float, [input unit s/m]
+    limit : float or None, [input unit]
+        The command is cut to plus and minus this; None for no limit.
+    """
+
+    position_gain_per_s: float
+    velocity_gain: float
+    limit: float | None = None
+
+    def __post_init__(self) -> None:
+        require_positive(self, "position_gain_per_s", "velocity_gain")
+        if self.limit is not None:
+            require_positive(self, "limit")
+
+
+@dataclass(frozen=True)
+class Drive:
+    """A drive with the effects that its simulation holds.
+
+    Parameters
+    ----------
+    mass_kg : float, [kg]
+    damping_N_s_per_m : float, [N s/m]
+    stiffness_N_per_m : float, [N/m]
+        0 for a free axis.
+    force_constant_N_per_A : float, [N/A]
+    effects : mapping of str to mapping of str to float
+        Parameters of each effect by its id; ``which`` of ``parameter_change`` is text.
+    reference_current_A, reference_displacement_m : float, [A], [m]
+        Where laws that need a reference count from (Iref and xr).
+    resistance_ohm : float or None, [ohm]
+        None: the input is the current. Else it is the voltage.
+    inductance_H : float, [H]
+    back_emf_V_s_per_m : float or None, [V s/m]
+        None: the same number as the force constant.
+    hold : str
+        One of ``HOLDS``: how the input goes on between samples; ``smooth`` for one that
+        was low-pass filtered before it was sampled.
+    controller : Controller or None
+        None: the input is given. Else it follows a reference.
+    """
+
+    mass_kg: float = 1.0
+    damping_N_s_per_m: float = 0.0
+    stiffness_N_per_m: float = 0.0
+    force_constant_N_per_A: float = 1.0
+    effects: Mapping[str, Mapping[str, float | str]] = field(default_factory=dict)
+    reference_current_A: float = 1.0
+    reference_displacement_m: float = 1.0
+    resistance_ohm: float | None = None
+    inductance_H: float = 0.0
+    back_emf_V_s_per_m: float | None = None
+    hold: str = "linear"
+    controller: Controller | None = None
+
+    def __post_init__(self) -> None:
+        require_positive(
+            self, "mass_kg", "reference_current_A", "reference_displacement_m"
+        )
+        require_not_negative(
+            self, "damping_N_s_per_m", "stiffness_N_per_m", "inductance_H"
+        )
+        if self.resistance_ohm is not None:
+            require_positive(self, "resistance_ohm")
+        if self.hold not in HOLDS:
+            raise ValueError(
+                f"hold must be one of {', '.join(HOLDS)}, got {self.hold!r}"
+            )
+
+
+@dataclass(frozen=True, eq=False)
+class SimulatedRecording:
+    """A recording beside the simulation of its drive.
+
+    Parameters
+    ----------
+    name : str
+    time_s, input, measured, simulated : ndarray, shape (n_samples,)
+        Under a controller input, measured and simulated are the reference, the measured
+        command and the simulated one.
+    rms : float
+        Of measured minus simulated, in the unit of what is compared.
+    """
+
+    name: str
+    time_s: np.ndarray
+    input: np.ndarray
+    measured: np.ndarray
+    simulated: np.ndarray
+    rms: float
