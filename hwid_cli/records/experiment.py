@@ -5,6 +5,7 @@ Every key of a configuration file is a field here. ``configs/README.md`` explain
 
 from dataclasses import dataclass, field
 
+from hwid_cli.records.drive import Controller
 from hwid_cli.records.machines import GunMachine, ServoMachine
 from hwid_cli.records.model import FitOptions
 
@@ -23,6 +24,7 @@ class Columns:
     input: str | int
     output: str | int
     time: str | int | None = None
+    reference: str | int | None = None
     variable: str | None = None
 
 
@@ -43,6 +45,7 @@ class RecordingsOptions:
     output_scale: float = 1.0
     first_sample: int = 0
     last_sample: int | None = None
+    parts: dict[str, tuple[int, ...]] = field(default_factory=dict)
     average: int = 1
     optional: bool = False
 
@@ -115,7 +118,14 @@ class SimulationOptions:
     damping_N_s_per_m: float = 0.0
     stiffness_N_per_m: float = 0.0
     force_constant_N_per_A: float = 1.0
-    effects: dict[str, dict[str, float]] = field(default_factory=dict)
+    effects: dict[str, dict[str, float | str]] = field(default_factory=dict)
+    reference_current_A: float | None = None
+    reference_displacement_m: float | None = None
+    resistance_ohm: float | None = None
+    inductance_H: float = 0.0
+    back_emf_V_s_per_m: float | None = None
+    hold: str = "linear"
+    controller: Controller | None = None
 
 
 @dataclass(frozen=True)
@@ -126,6 +136,8 @@ class DiagnoseOptions:
     hold_out: str | tuple[str, ...] = "auto"
     effects: tuple[str, ...] | None = None
     max_effects: int = 3
+    initial_state: str = "rest"
+    skip_samples: int = 0
 
 
 @dataclass(frozen=True)

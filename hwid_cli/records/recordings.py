@@ -51,6 +51,8 @@ class RawRecording:
     sha256 : str
         Hash of the file's bytes, hexadecimal.
     input_unit, output_unit : str
+    reference : ndarray or None, [output_unit]
+        What a controller was told to follow; as long as the input.
     """
 
     name: str
@@ -62,10 +64,12 @@ class RawRecording:
     sha256: str = ""
     input_unit: str = "A"
     output_unit: str = "m"
+    reference: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "input", frozen_vector(self.input, "input"))
         object.__setattr__(self, "output", frozen_vector(self.output, "output"))
+        _freeze_reference(self)
         _check_common(self.kind, self.sample_time_s)
 
 
@@ -85,6 +89,8 @@ class Recording:
     sha256 : str
         Hash of the bytes of the file that it was read from; empty if from memory.
     input_unit, output_unit : str
+    reference : ndarray or None, shape (n_samples,), [output_unit]
+        What a controller was told to follow; None for a drive without one.
 
     Raises
     ------
@@ -106,10 +112,12 @@ class Recording:
     sha256: str = ""
     input_unit: str = "A"
     output_unit: str = "m"
+    reference: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "input", frozen_vector(self.input, "input"))
         object.__setattr__(self, "output", frozen_vector(self.output, "output"))
+        _freeze_reference(self)
         _check_common(self.kind, self.sample_time_s)
         if self.input.size != self.output.size:
             raise ValueError(
@@ -161,6 +169,18 @@ class CalibrationLog:
     period_samples: float = 0.0
     repaired_input: tuple[int, ...] = field(default=())
     repaired_output: tuple[int, ...] = field(default=())
+
+
+def _freeze_reference(record: "RawRecording | Recording") -> None:
+    if record.reference is None:
+        return
+    reference = frozen_vector(record.reference, "reference")
+    if reference.size != record.input.size or not np.isfinite(reference).all():
+        raise ValueError(
+            f"recording {record.name!r}: reference must be finite and as long as the "
+            f"input, {record.input.size} samples, got {reference.size}"
+        )
+    object.__setattr__(record, "reference", reference)
 
 
 def _check_common(kind: str, sample_time_s: float) -> None:

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from hwid_cli.records.diagnosis import Diagnosis
 from hwid_cli.records.groups import FinalTest, GroupSearch
 from hwid_cli.records.model import Fit
 from hwid_cli.records.recordings import CalibrationLog, Recording
@@ -65,6 +66,8 @@ class StoredResults:
     final_test : FinalTest or None
     diagnosis : mapping or None
         Content of ``diagnosis.json``.
+    diagnosis_record : Diagnosis or None
+        What that file was written from, with its curves.
     """
 
     name: str
@@ -78,6 +81,7 @@ class StoredResults:
     search: GroupSearch | None = None
     final_test: FinalTest | None = None
     diagnosis: Mapping[str, Any] | None = None
+    diagnosis_record: Diagnosis | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,1 @@
+"""Diagnosis: where a simulation and measurements disagree, and what is missing."""

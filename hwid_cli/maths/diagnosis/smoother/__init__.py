@@ -1,0 +1,1 @@
+"""Compiled smoother of the force that a simulation lacks."""

@@ -1,0 +1,83 @@
+"""Sets of effects that a diagnosis considers: how they were fitted, how they rank."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class RankedCandidate:
+    """One set of effects that was considered.
+
+    Parameters
+    ----------
+    effects : tuple of str
+        Ids; empty for the base alone.
+    forecast_share : float, [-]
+        Share of the base's error that it should explain by the ranking beforehand.
+    is_fitted : bool
+        Whether it was fitted by simulation; what follows is NaN if not.
+    train_rms, held_out_rms : float, [output unit]
+    bic_gain : float, [-]
+        How much lower its information criterion is than the base's, on training data.
+    explained_share : float, [-]
+        Of the excess over the noise on held-out recordings.
+    improved_share : float, [-]
+        Of the held-out recordings.
+    whiteness : float, [-]
+        Statistic of what it leaves, over its limit: above 1 something remains.
+    note : str
+    """
+
+    effects: tuple[str, ...]
+    forecast_share: float
+    is_fitted: bool
+    train_rms: float
+    held_out_rms: float
+    bic_gain: float
+    explained_share: float
+    improved_share: float
+    whiteness: float
+    note: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class CandidateFit:
+    """Base and effects as fitted to the training recordings, and how they do.
+
+    Parameters
+    ----------
+    effects : tuple of str
+        Ids in the catalogue of drive effects, without those that the simulation had.
+    names : tuple of str
+        ``<owner>/<parameter>`` of what all recordings share.
+    values : ndarray, shape (n_names,)
+    own_names : tuple of str
+        ``<owner>/<parameter>`` of what each recording has for itself.
+    own : ndarray, shape (n_recordings, n_own)
+        In the order of the recordings.
+    sse : ndarray, shape (n_recordings,)
+        Sum of squared residuals of each recording.
+    whiteness : float, [-]
+        Of all residuals, see ``RankedCandidate``.
+    neighbour : float, [-]
+        Correlation of neighbouring residuals.
+    iterations : int
+    has_converged : bool
+    """
+
+    effects: tuple[str, ...]
+    names: tuple[str, ...]
+    values: np.ndarray
+    own_names: tuple[str, ...]
+    own: np.ndarray
+    sse: np.ndarray
+    whiteness: float
+    neighbour: float
+    iterations: int
+    has_converged: bool
+
+    @property
+    def is_usable(self) -> bool:
+        """Whether every recording could be simulated."""
+        return bool(np.isfinite(self.sse).all())

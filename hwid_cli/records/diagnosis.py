@@ -1,0 +1,284 @@
+"""What a diagnosis found: the verdict, how it was reached, and what shows it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hwid_cli.records.candidates import RankedCandidate
+
+VERDICTS = ("named", "ambiguous", "parameters", "unknown", "none")
+
+
+@dataclass(frozen=True)
+class FittedParameter:
+    """One parameter with its 95 % interval.
+
+    Parameters
+    ----------
+    name : str
+        Ends in its unit.
+    value : float
+    low, high : float
+        Bounds of the interval; NaN where there is none.
+    text : str
+        In place of a number where the parameter is a word; else empty.
+    """
+
+    name: str
+    value: float
+    low: float = float("nan")
+    high: float = float("nan")
+    text: str = ""
+
+
+@dataclass(frozen=True)
+class FittedEffect:
+    """An effect that the simulation lacks.
+
+    Parameters
+    ----------
+    id : str
+    sentence : str
+        In plain words.
+    equation : str
+    parameters : tuple of FittedParameter
+    """
+
+    id: str
+    sentence: str
+    equation: str
+    parameters: tuple[FittedParameter, ...]
+
+
+@dataclass(frozen=True)
+class NoiseFloor:
+    """How much of the output is noise.
+
+    Parameters
+    ----------
+    rms : float, [output unit]
+    method : str
+        ``repeats``, ``rest`` or ``differences``.
+    resolution : float, [output unit]
+        Smallest difference of a coarse sensor; 0 where it is not the limit.
+    is_coloured : bool
+        Whether neighbouring samples of the noise go together.
+    whitening : tuple of float
+        Coefficients of the autoregressive filter that makes it white; (1,) if it is.
+    sentence : str
+    """
+
+    rms: float
+    method: str
+    resolution: float
+    is_coloured: bool
+    whitening: tuple[float, ...]
+    sentence: str
+
+
+@dataclass(frozen=True)
+class Gap:
+    """Distance between simulation and measurement.
+
+    Parameters
+    ----------
+    train_rms, held_out_rms : float, [output unit]
+    ratio_to_noise : float, [-]
+        Of the held-out recordings.
+    """
+
+    train_rms: float
+    held_out_rms: float
+    ratio_to_noise: float
+
+
+@dataclass(frozen=True)
+class BaseParameter:
+    """A parameter of the simulation as given and as fitted.
+
+    Parameters
+    ----------
+    name : str
+    before, refitted, after : float
+        As given; fitted without an effect; fitted together with the effects.
+    """
+
+    name: str
+    before: float
+    refitted: float
+    after: float
+
+
+@dataclass(frozen=True)
+class RecordingGap:
+    """The gap in one recording.
+
+    Parameters
+    ----------
+    name : str
+    kind : str
+    is_held_out : bool
+    rms_given, rms_before, rms_after : float, [output unit]
+        Simulation as given, base re-fitted, with the effects.
+    """
+
+    name: str
+    kind: str
+    is_held_out: bool
+    rms_given: float
+    rms_before: float
+    rms_after: float
+
+
+@dataclass(frozen=True)
+class Place:
+    """A place where the error sits.
+
+    Parameters
+    ----------
+    about : str
+        ``recording``, ``segment``, ``harmonic``, ``amplitude`` or ``variable``.
+    variable : str
+        Name of the recording, segment, harmonic, kind of recording or variable.
+    share : float, [-]
+        Of the excess error (of the variance of the missing force, for a variable).
+    rms : float, [output unit]
+        NaN where it has no meaning.
+    sentence : str
+    """
+
+    about: str
+    variable: str
+    share: float
+    rms: float
+    sentence: str
+
+
+@dataclass(frozen=True, eq=False)
+class Overlay:
+    """Curves of one recording.
+
+    Parameters
+    ----------
+    name : str
+    time_s, input, measured, before, after : ndarray, shape (n_samples,)
+    noise_rms : float
+    """
+
+    name: str
+    time_s: np.ndarray
+    input: np.ndarray
+    measured: np.ndarray
+    before: np.ndarray
+    after: np.ndarray
+    noise_rms: float
+
+
+@dataclass(frozen=True, eq=False)
+class LatentForce:
+    """The force that the simulation lacks, against the variable that explains it most.
+
+    Parameters
+    ----------
+    variable : str
+    unit : str
+    at : ndarray, shape (n_bins,), [unit]
+    mean, spread : ndarray, shape (n_bins,), [N]
+        Of the force estimated from the measurements.
+    law : ndarray, shape (n_bins,), [N]
+        The same estimated from the simulation with the effects; empty without any.
+    """
+
+    variable: str
+    unit: str
+    at: np.ndarray
+    mean: np.ndarray
+    spread: np.ndarray
+    law: np.ndarray
+
+
+@dataclass(frozen=True)
+class NextExperiment:
+    """An input that would separate what these data do not.
+
+    Parameters
+    ----------
+    input : str
+        Empty where none is needed.
+    reason : str
+    """
+
+    input: str
+    reason: str
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosis:
+    """Everything that ``hwid diagnose`` found.
+
+    Parameters
+    ----------
+    verdict : str
+        One of ``VERDICTS``.
+    complete : bool
+        Whether nothing remains beyond the noise.
+    summary : str
+        The verdict in one or two sentences.
+    effects : tuple of FittedEffect
+    ambiguous_with : tuple of str
+        Effects that fit as well; the ids of a set are joined by ``+``.
+    noise : NoiseFloor
+    given, before, after : Gap
+        Simulation as given, base re-fitted, with the effects.
+    explained_share : float, [-]
+    base : tuple of BaseParameter
+    places : tuple of Place
+        Where the error sits, the largest first.
+    not_observable : tuple of str
+    next_experiment : NextExperiment
+    train, held_out : tuple of str
+    candidates : tuple of RankedCandidate
+        The best first.
+    gaps : tuple of RecordingGap
+    overlays : tuple of Overlay
+        The worst held-out recordings first.
+    latent_force : tuple of LatentForce
+        The variable that explains most first.
+    present : tuple of FittedEffect
+        Effects that the simulation had already, as fitted now.
+    reference_current_A, reference_displacement_m : float, [A], [m]
+        Where laws that need a reference count from.
+    output_unit : str
+        Of the signal that is compared.
+    """
+
+    verdict: str
+    complete: bool
+    summary: str
+    effects: tuple[FittedEffect, ...]
+    ambiguous_with: tuple[str, ...]
+    noise: NoiseFloor
+    given: Gap
+    before: Gap
+    after: Gap
+    explained_share: float
+    base: tuple[BaseParameter, ...]
+    places: tuple[Place, ...]
+    not_observable: tuple[str, ...]
+    next_experiment: NextExperiment
+    train: tuple[str, ...]
+    held_out: tuple[str, ...]
+    candidates: tuple[RankedCandidate, ...]
+    gaps: tuple[RecordingGap, ...]
+    overlays: tuple[Overlay, ...]
+    latent_force: tuple[LatentForce, ...]
+    present: tuple[FittedEffect, ...] = ()
+    reference_current_A: float = 1.0
+    reference_displacement_m: float = 1.0
+    output_unit: str = "m"
+
+    def __post_init__(self) -> None:
+        if self.verdict not in VERDICTS:
+            raise ValueError(
+                f"verdict {self.verdict!r} is none of {', '.join(VERDICTS)}"
+            )
