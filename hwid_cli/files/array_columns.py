@@ -14,7 +14,7 @@ import numpy as np
 import scipy.io
 
 from hwid_cli.errors import MeasurementError
-from hwid_cli.files.columns import Column, FileColumns, array_column
+from hwid_cli.files.columns import ROLES, Column, FileColumns, array_column
 from hwid_cli.files.suggestions import did_you_mean
 from hwid_cli.records.experiment import Columns
 
@@ -24,7 +24,7 @@ _Variables = Mapping[str, _Load]
 
 
 def read_mat_columns(path: Path, columns: Columns) -> FileColumns:
-    """Read input, output and time from a MAT file of any version.
+    """Read input, output, time and reference from a MAT file of any version.
 
     Parameters
     ----------
@@ -46,14 +46,12 @@ def read_mat_columns(path: Path, columns: Columns) -> FileColumns:
     variables: dict[str, _Load] = {}
     for name, value in content.items():
         if not name.startswith("__"):
-            variables[name] = _loader(value)
-            for member in getattr(value, "dtype", np.dtype(float)).names or ():
-                variables[f"{name}.{member}"] = _loader(_member(value, member))
+            variables.update(_with_members(name, value))
     return _pick(path, columns, variables)
 
 
 def read_npz_columns(path: Path, columns: Columns) -> FileColumns:
-    """Read input, output and time from an NPZ file.
+    """Read input, output, time and reference from an NPZ file.
 
     Parameters
     ----------
@@ -81,7 +79,7 @@ def read_npz_columns(path: Path, columns: Columns) -> FileColumns:
 
 
 def read_h5_columns(path: Path, columns: Columns) -> FileColumns:
-    """Read input, output and time from an HDF5 file.
+    """Read input, output, time and reference from an HDF5 file.
 
     Parameters
     ----------
@@ -134,6 +132,14 @@ def _dataset(dataset: h5py.Dataset, is_transposed: bool) -> _Load:
     return load
 
 
+def _with_members(name: str, value: Any) -> dict[str, _Load]:
+    """A MATLAB variable, and all that lies inside if it is a struct."""
+    variables: dict[str, _Load] = {name: _loader(value)}
+    for member in getattr(getattr(value, "dtype", None), "names", None) or ():
+        variables.update(_with_members(f"{name}.{member}", _member(value, member)))
+    return variables
+
+
 def _member(value: np.ndarray, member: str) -> Any:
     """Member of a MATLAB struct; a struct array of one holds it in its only cell."""
     inner = value[member]
@@ -145,7 +151,7 @@ def _pick(path: Path, columns: Columns, variables: _Variables) -> FileColumns:
     table = None
     if columns.variable is not None and not _is_group(columns.variable, variables):
         table = _variable(path, columns.variable, variables, "variable")
-    for role in ("input", "output", "time"):
+    for role in ROLES:
         key = getattr(columns, role)
         if key is None:
             continue
@@ -154,7 +160,7 @@ def _pick(path: Path, columns: Columns, variables: _Variables) -> FileColumns:
         else:
             values = _named(path, columns.variable, table, key, (variables, role))
         found[role] = array_column(f"{role} {key!r}", values)
-    return FileColumns(found["input"], found["output"], found.get("time"))
+    return FileColumns(**found)
 
 
 def _is_group(name: str, variables: _Variables) -> bool:

@@ -1,6 +1,6 @@
 """One column of a measurement file, with what is needed to name the row of a fault."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -41,11 +41,36 @@ class FileColumns:
     input, output : Column
         May differ in length.
     time : Column or None
+    reference : Column or None
+        What a controller was told to follow.
     """
 
     input: Column
     output: Column
     time: Column | None = None
+    reference: Column | None = None
+
+
+# Names of the columns in ``FileColumns`` and in ``records.experiment.Columns``.
+ROLES = ("input", "output", "time", "reference")
+
+
+def with_each(columns: FileColumns, change: Callable[[Column], Column]) -> FileColumns:
+    """Change every column that is there in the same way.
+
+    Parameters
+    ----------
+    columns : FileColumns
+    change : callable
+
+    Returns
+    -------
+    FileColumns
+    """
+    there = {role: getattr(columns, role) for role in ROLES}
+    return FileColumns(
+        **{role: change(one) for role, one in there.items() if one is not None}
+    )
 
 
 def array_column(title: str, values: np.ndarray) -> Column:

@@ -1,10 +1,14 @@
 """What the keys of one configuration must agree on, beyond the type of each."""
 
 import math
-from collections.abc import Iterable, Mapping
-from typing import Any
 
 from hwid_cli.errors import ConfigError
+from hwid_cli.files.config_requirements import (
+    require,
+    require_distinct,
+    require_known,
+)
+from hwid_cli.files.simulation_checks import check_simulation
 from hwid_cli.files.suggestions import did_you_mean
 from hwid_cli.records.experiment import (
     NK_ROLES,
@@ -49,7 +53,7 @@ def check_experiment(experiment: Experiment) -> None:
         _check_calibrate(experiment.calibrate, file)
     _check_orders(experiment.orders, file)
     if experiment.crossval is not None:
-        _require(
+        require(
             experiment.crossval.threshold > 0,
             f"{file}: crossval.threshold",
             experiment.crossval.threshold,
@@ -57,25 +61,14 @@ def check_experiment(experiment: Experiment) -> None:
         )
     if experiment.group is not None:
         _check_group(experiment.group, file)
-    if experiment.diagnose is not None:
-        _require(
-            experiment.diagnose.max_effects >= 0,
-            f"{file}: diagnose.max_effects",
-            experiment.diagnose.max_effects,
-            "an integer >= 0",
-        )
+    check_simulation(experiment)
     _check_name_lists(experiment, file)
     _check_test(experiment, file)
 
 
-def _require(holds: bool, place: str, found: object, expected: str) -> None:
-    if not holds:
-        raise ConfigError(f"{place}: found {found!r}; expected {expected}")
-
-
 def _check_name(name: str, file: str) -> None:
     is_folder_name = bool(name) and name == name.strip() and name[0] != "."
-    _require(
+    require(
         is_folder_name and not set(name) & set('/\\:*?"<>|'),
         f"{file}: name",
         name,
@@ -87,39 +80,65 @@ def _check_recordings(options: RecordingsOptions, file: str) -> None:
     at = f"{file}: recordings"
     for name in ("files", "exclude"):
         for pattern in getattr(options, name):
-            _require(pattern != "", f"{at}.{name}", pattern, "a file name or pattern")
-    _require(len(options.files) > 0, f"{at}.files", [], "at least one name or pattern")
+            require(pattern != "", f"{at}.{name}", pattern, "a file name or pattern")
+    require(len(options.files) > 0, f"{at}.files", [], "at least one name or pattern")
     _check_columns(options, at)
-    _require_known(options.kind, KINDS, f"{at}.kind")
+    require_known(options.kind, KINDS, f"{at}.kind")
     for name in ("input_scale", "output_scale"):
         scale = getattr(options, name)
-        _require(scale != 0, f"{at}.{name}", scale, "a number other than 0")
-    _require(
+        require(scale != 0, f"{at}.{name}", scale, "a number other than 0")
+    require(
         options.sampling_tolerance > 0,
         f"{at}.sampling_tolerance",
         options.sampling_tolerance,
         "a share of the sample time > 0, such as 0.01",
     )
     first, last = options.first_sample, options.last_sample
-    _require(first >= 0, f"{at}.first_sample", first, "an integer >= 0")
-    _require(
+    require(first >= 0, f"{at}.first_sample", first, "an integer >= 0")
+    require(
         last is None or last > first,
         f"{at}.last_sample",
         last,
         f"an integer > first_sample = {first}",
     )
-    _require(options.average >= 1, f"{at}.average", options.average, "an integer >= 1")
+    require(options.average >= 1, f"{at}.average", options.average, "an integer >= 1")
+    _check_parts(options, at)
+
+
+def _check_parts(options: RecordingsOptions, at: str) -> None:
+    for name, bounds in options.parts.items():
+        place = f"{at}.parts.{name}"
+        is_name = bool(name) and name == name.strip() and name[0] != "."
+        require(
+            is_name and not set(name) & set('/\\:*?"<>|+'),
+            place,
+            name,
+            "a name of letters, digits, - and _",
+        )
+        require(
+            len(bounds) == 2 and 0 <= bounds[0] < bounds[1],
+            place,
+            list(bounds),
+            "[first, last + 1]: two samples counted from 0, the second one larger",
+        )
+    is_cut = options.first_sample != 0 or options.last_sample is not None
+    if options.parts and is_cut:
+        name = "first_sample" if options.first_sample else "last_sample"
+        raise ConfigError(
+            f"{at}.{name}: found {getattr(options, name)}; expected no such key beside "
+            "recordings.parts, which says what is used; remove one of the two"
+        )
 
 
 def _check_columns(options: RecordingsOptions, at: str) -> None:
     columns = options.columns
     taken: dict[object, str] = {}
-    for name in ("time", "input", "output"):
+    for name in ("time", "input", "output", "reference"):
         column = getattr(columns, name)
         if column is None:
             continue
         if isinstance(column, int):
-            _require(column >= 0, f"{at}.columns.{name}", column, "a number >= 0")
+            require(column >= 0, f"{at}.columns.{name}", column, "a number >= 0")
         if column in taken:
             raise ConfigError(
                 f"{at}.columns.{name}: found {column!r}, which is the {taken[column]} "
@@ -132,7 +151,7 @@ def _check_columns(options: RecordingsOptions, at: str) -> None:
             f"{at}.sample_time_s: missing, and columns.time too; expected one of them; "
             "name the time column or give the sample time"
         )
-    _require(
+    require(
         step is None or (math.isfinite(step) and step > 0),
         f"{at}.sample_time_s",
         step,
@@ -149,15 +168,15 @@ def _check_calibrate(options: CalibrateOptions, file: str) -> None:
     at = f"{file}: calibrate"
     for kind in KINDS:
         recipe = getattr(options, kind)
-        _require_known(recipe, RECIPE_STEPS, f"{at}.{kind}")
-        _require_distinct(recipe, f"{at}.{kind}")
-    _require(
+        require_known(recipe, RECIPE_STEPS, f"{at}.{kind}")
+        require_distinct(recipe, f"{at}.{kind}")
+    require(
         options.samples is None or options.samples >= 1,
         f"{at}.samples",
         options.samples,
         "an integer >= 1",
     )
-    _require(
+    require(
         options.rest_samples >= 1,
         f"{at}.rest_samples",
         options.rest_samples,
@@ -174,16 +193,16 @@ def _check_orders(options: OrdersOptions, file: str) -> None:
         )
     for name, least in (("nb", 1), ("nk", 0)):
         axis = getattr(options, name)
-        _require(len(axis) > 0, f"{at}.{name}", [], "at least one order")
-        _require(min(axis) >= least, f"{at}.{name}", min(axis), f"orders >= {least}")
-        _require_distinct(axis, f"{at}.{name}")
+        require(len(axis) > 0, f"{at}.{name}", [], "at least one order")
+        require(min(axis) >= least, f"{at}.{name}", min(axis), f"orders >= {least}")
+        require_distinct(axis, f"{at}.{name}")
     if options.nk_role == "delay":
         if options.nf is None:
             raise ConfigError(
                 f"{at}.nf: missing; expected the number of poles, because nk_role is "
                 "delay; add the key"
             )
-        _require(options.nf >= 0, f"{at}.nf", options.nf, "an integer >= 0")
+        require(options.nf >= 0, f"{at}.nf", options.nf, "an integer >= 0")
     elif options.nf is not None:
         raise ConfigError(
             f"{at}.nf: found {options.nf}; expected no such key, because with nk_role "
@@ -193,23 +212,23 @@ def _check_orders(options: OrdersOptions, file: str) -> None:
 
 def _check_group(options: GroupOptions, file: str) -> None:
     at = f"{file}: group.keep"
-    _require_known(options.keep, _KEEP, at)
-    _require(
+    require_known(options.keep, _KEEP, at)
+    require(
         len(options.keep) == 1, at, options.keep, f"exactly one of {', '.join(_KEEP)}"
     )
     ((rule, value),) = options.keep.items()
     if rule == "best":
-        _require(value is True, f"{at}.best", value, "true")
+        require(value is True, f"{at}.best", value, "true")
     else:
         counts = value if isinstance(value, tuple) else (value,)
         is_count = [not isinstance(n, bool) and n >= 1 for n in counts]
-        _require(
+        require(
             bool(counts) and all(is_count),
             f"{at}.{rule}",
             value,
             "an integer >= 1, or one for each level",
         )
-    _require(
+    require(
         options.max_level >= 1,
         f"{file}: group.max_level",
         options.max_level,
@@ -222,8 +241,8 @@ def _check_name_lists(experiment: Experiment, file: str) -> None:
         names = _listed(experiment, section, name)
         if names is not None:
             at = f"{file}: {section}.{name}"
-            _require(len(names) > 0, at, [], "at least one recording")
-            _require_distinct(names, at)
+            require(len(names) > 0, at, [], "at least one recording")
+            require_distinct(names, at)
 
 
 def _check_test(experiment: Experiment, file: str) -> None:
@@ -240,20 +259,3 @@ def _check_test(experiment: Experiment, file: str) -> None:
 
 def _listed(experiment: Experiment, section: str, name: str) -> tuple[str, ...] | None:
     return getattr(getattr(experiment, section), name, None)
-
-
-def _require_known(
-    found: Iterable[str] | Mapping[str, Any], known: Iterable[str], place: str
-) -> None:
-    for name in found:
-        if name not in known:
-            raise ConfigError(f"{place}: found {name!r}; {did_you_mean(name, known)}")
-
-
-def _require_distinct(values: tuple[Any, ...], place: str) -> None:
-    for value in values:
-        if values.count(value) > 1:
-            raise ConfigError(
-                f"{place}: {value!r} is listed twice; expected every value once; "
-                "remove one"
-            )

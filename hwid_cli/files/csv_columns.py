@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from hwid_cli.errors import MeasurementError
-from hwid_cli.files.columns import Column, FileColumns
+from hwid_cli.files.columns import ROLES, Column, FileColumns
 from hwid_cli.files.suggestions import did_you_mean
 from hwid_cli.records.experiment import Columns
 
@@ -33,7 +33,7 @@ class _Sheet:
 
 
 def read_csv_columns(path: Path, columns: Columns) -> FileColumns:
-    """Read input, output and time from a CSV file.
+    """Read input, output, time and reference from a CSV file.
 
     Parameters
     ----------
@@ -53,9 +53,7 @@ def read_csv_columns(path: Path, columns: Columns) -> FileColumns:
     """
     sheet = _read_sheet(path)
     wanted = {
-        role: key
-        for role in ("input", "output", "time")
-        if (key := getattr(columns, role)) is not None
+        role: key for role in ROLES if (key := getattr(columns, role)) is not None
     }
     header, body = _split_header(sheet, list(wanted.values()))
     places = {
@@ -71,7 +69,7 @@ def read_csv_columns(path: Path, columns: Columns) -> FileColumns:
         role: _column(path, f"{role} {wanted[role]!r}", sheet, body, place)
         for role, place in places.items()
     }
-    return FileColumns(found["input"], found["output"], found.get("time"))
+    return FileColumns(**found)
 
 
 def _read_sheet(path: Path) -> _Sheet:

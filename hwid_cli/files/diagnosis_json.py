@@ -1,10 +1,17 @@
 """``diagnosis.json``: what a diagnosis found."""
 
+import hashlib
 import json
+import math
+from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from hwid_cli.errors import CacheError
+from hwid_cli.files.replaced_files import replace_file
+from hwid_cli.files.result_files import Provenance
+from hwid_cli.records.diagnosis import Diagnosis, FittedEffect, FittedParameter
 
 
 def read_diagnosis(path: Path) -> dict[str, Any] | None:
@@ -39,3 +46,131 @@ def read_diagnosis(path: Path) -> dict[str, Any] | None:
             "results of diagnose; run 'hwid diagnose' again"
         )
     return found
+
+
+def write_diagnosis_json(
+    path: Path,
+    diagnosis: Diagnosis,
+    seconds: float,
+    origin: Provenance,
+    *,
+    figures: Sequence[str] = (),
+) -> None:
+    """Write ``diagnosis.json``.
+
+    Parameters
+    ----------
+    path : Path
+    diagnosis : Diagnosis
+    seconds : float, [s]
+        What the run took that gave the diagnosis.
+    origin : Provenance
+        Of that run.
+    figures : sequence of str
+        Names of the figures that show it.
+
+    Raises
+    ------
+    CacheError
+        If it cannot be written; an old file is untouched then.
+    """
+    content = {
+        **_content(diagnosis),
+        "seconds": seconds,
+        "figures": list(figures),
+        "provenance": _provenance(origin),
+    }
+    text = json.dumps(
+        _without_nan(content), indent=2, ensure_ascii=False, allow_nan=False
+    )
+    replace_file(path, f"{text}\n".encode())
+
+
+def _content(diagnosis: Diagnosis) -> dict[str, Any]:
+    return {
+        "verdict": diagnosis.verdict,
+        "complete": diagnosis.complete,
+        "summary": diagnosis.summary,
+        "effects": [_effect(effect) for effect in diagnosis.effects],
+        "present": [_effect(effect) for effect in diagnosis.present],
+        "ambiguous_with": [_ids(one) for one in diagnosis.ambiguous_with],
+        "gap": {
+            "noise_rms": diagnosis.noise.rms,
+            "given": asdict(diagnosis.given),
+            "before": asdict(diagnosis.before),
+            "after": asdict(diagnosis.after),
+            "explained_share": diagnosis.explained_share,
+            "unit": diagnosis.output_unit,
+        },
+        "noise": asdict(diagnosis.noise),
+        "reference": {
+            "current_A": diagnosis.reference_current_A,
+            "displacement_m": diagnosis.reference_displacement_m,
+        },
+        "base": {
+            moment: {one.name: getattr(one, moment) for one in diagnosis.base}
+            for moment in ("before", "refitted", "after")
+        },
+        "where": [
+            {
+                "variable": place.variable,
+                "share": place.share,
+                "sentence": place.sentence,
+                "about": place.about,
+                "rms": place.rms,
+            }
+            for place in diagnosis.places
+        ],
+        "not_observable": list(diagnosis.not_observable),
+        "next_experiment": asdict(diagnosis.next_experiment),
+        "recordings": {
+            "train": list(diagnosis.train),
+            "held_out": list(diagnosis.held_out),
+        },
+    }
+
+
+def _effect(effect: FittedEffect) -> dict[str, Any]:
+    return {
+        "id": effect.id,
+        "sentence": effect.sentence,
+        "equation": effect.equation,
+        "parameters": {
+            one.name: {"value": one.text or one.value, "ci95": _interval(one)}
+            for one in effect.parameters
+        },
+    }
+
+
+def _interval(parameter: FittedParameter) -> list[float] | None:
+    bounds = [parameter.low, parameter.high]
+    return bounds if any(math.isfinite(bound) for bound in bounds) else None
+
+
+def _ids(joined: str) -> str | list[str]:
+    """Id of one effect, or the list of ids of a set."""
+    ids = joined.split("+")
+    return ids if len(ids) > 1 else joined
+
+
+def _provenance(origin: Provenance) -> dict[str, Any]:
+    config = json.dumps(origin.config, sort_keys=True)
+    return {
+        "key": origin.key,
+        "config_sha256": hashlib.sha256(config.encode()).hexdigest(),
+        "inputs": dict(sorted(origin.inputs.items())),
+        "versions": dict(sorted(origin.versions.items())),
+    }
+
+
+def _without_nan(value: Any) -> Any:
+    """JSON knows no NaN and no infinity: both are null."""
+    if isinstance(value, dict):
+        return {key: _without_nan(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_without_nan(item) for item in value]
+    # Numbers of numpy are no numbers to the writer.
+    plain = value.item() if hasattr(value, "item") else value
+    if isinstance(plain, float) and not math.isfinite(plain):
+        return None
+    return plain

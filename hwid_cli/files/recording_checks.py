@@ -27,7 +27,7 @@ def check_numbers(path: Path, columns: FileColumns) -> None:
     MeasurementError
         For the first such row.
     """
-    for column in (columns.time, columns.input, columns.output):
+    for column in (columns.time, columns.input, columns.output, columns.reference):
         if column is None:
             continue
         if column.values.size == 0:
@@ -98,6 +98,8 @@ def check_equal_lengths(
 ) -> None:
     """Refuse columns of different length that calibration will not cut.
 
+    A reference goes with the input: both are commands of the same length.
+
     Parameters
     ----------
     path : Path
@@ -108,9 +110,17 @@ def check_equal_lengths(
     Raises
     ------
     MeasurementError
-        If the lengths differ and the recipe of this kind has no ``cut``.
+        If the lengths differ and the recipe of this kind has no ``cut``, or the
+        reference has another length than the input.
     """
     n_input, n_output = columns.input.values.size, columns.output.values.size
+    reference = columns.reference
+    if reference is not None and reference.values.size != n_input:
+        raise MeasurementError(
+            f"{path}: {columns.input.title} has {n_input} values and {reference.title} "
+            f"has {reference.values.size}; expected equal lengths; mend the file or "
+            "leave out recordings.columns.reference"
+        )
     if n_input != n_output and "cut" not in getattr(calibrate, kind):
         raise MeasurementError(
             f"{path}: {columns.input.title} has {n_input} values and "
@@ -119,12 +129,13 @@ def check_equal_lengths(
         )
 
 
-def check_names(paths: Sequence[Path]) -> None:
-    """Refuse two files that would give one recording name, and names that say group.
+def check_names(named: Sequence[tuple[Path, str]]) -> None:
+    """Refuse recordings of one name, and names that say group.
 
     Parameters
     ----------
-    paths : sequence of Path
+    named : sequence of (Path, str)
+        File and name of each recording.
 
     Raises
     ------
@@ -132,19 +143,19 @@ def check_names(paths: Sequence[Path]) -> None:
         For the first name that comes twice or holds a plus.
     """
     first: dict[str, Path] = {}
-    for path in paths:
-        if "+" in path.stem:
+    for path, name in named:
+        if "+" in name:
             raise MeasurementError(
-                f"{path}: gives the recording name {path.stem!r}; expected a name "
+                f"{path}: gives the recording name {name!r}; expected a name "
                 "without '+', which joins the names of a group; rename the file"
             )
-        if path.stem in first:
+        if name in first:
             raise MeasurementError(
-                f"{path}: gives the recording name {path.stem!r}, which "
-                f"{first[path.stem]} gives already; expected every name once; rename "
+                f"{path}: gives the recording name {name!r}, which "
+                f"{first[name]} gives already; expected every name once; rename "
                 "one file or add a pattern to recordings.exclude"
             )
-        first[path.stem] = path
+        first[name] = path
 
 
 def check_sample_times(recordings: Sequence[RawRecording], tolerance: float) -> None:

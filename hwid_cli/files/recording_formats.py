@@ -22,7 +22,7 @@ READERS: dict[str, Callable[[Path, Columns], FileColumns]] = {
 
 
 def read_columns(path: Path, columns: Columns) -> FileColumns:
-    """Read input, output and time from a measurement file by its ending.
+    """Read the columns of a measurement file by its ending.
 
     Parameters
     ----------

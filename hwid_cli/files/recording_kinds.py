@@ -14,7 +14,11 @@ _OTHER = "other"
 
 
 def kind_of(
-    path: Path, patterns: Mapping[str, tuple[str, ...]], plan: Mapping[str, str]
+    path: Path,
+    patterns: Mapping[str, tuple[str, ...]],
+    plan: Mapping[str, str],
+    *,
+    name: str = "",
 ) -> str:
     """Find the kind of a recording.
 
@@ -22,9 +26,12 @@ def kind_of(
     ----------
     path : Path
     patterns : mapping of str to tuple of str
-        Patterns on the file's name without its ending, for each kind.
+        Patterns on the recording's name, or on the file's name without its ending, for
+        each kind.
     plan : mapping of str to str
         Kinds by recording name, as ``read_plan`` gives them.
+    name : str
+        Of the recording; empty means the file's name without its ending.
 
     Returns
     -------
@@ -36,10 +43,11 @@ def kind_of(
     MeasurementError
         If patterns of two kinds match.
     """
+    names = {name or path.stem, path.stem}
     matching = [
         kind
         for kind, of_kind in patterns.items()
-        if any(fnmatchcase(path.stem, pattern) for pattern in of_kind)
+        if any(fnmatchcase(one, pattern) for pattern in of_kind for one in names)
     ]
     if len(matching) > 1:
         raise MeasurementError(
@@ -47,7 +55,9 @@ def kind_of(
             "recordings.kind; expected one kind for each file; make the patterns "
             "narrower"
         )
-    return matching[0] if matching else plan.get(path.stem, _OTHER)
+    if matching:
+        return matching[0]
+    return plan.get(name or path.stem, plan.get(path.stem, _OTHER))
 
 
 def read_plan(folder: Path) -> dict[str, str]:

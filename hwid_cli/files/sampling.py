@@ -5,12 +5,19 @@ larger jitter is refused, or resampled where the configuration says so.
 """
 
 import logging
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from hwid_cli.errors import MeasurementError
-from hwid_cli.files.columns import Column, FileColumns, array_column, place_of
+from hwid_cli.files.columns import (
+    Column,
+    FileColumns,
+    array_column,
+    place_of,
+    with_each,
+)
 from hwid_cli.records.experiment import RecordingsOptions
 
 _log = logging.getLogger(__name__)
@@ -85,7 +92,8 @@ def sample_uniformly(
 
 
 def _check_length(path: Path, columns: FileColumns, time: Column) -> None:
-    longest = max(columns.input.values.size, columns.output.values.size)
+    others = (columns.input, columns.output, columns.reference)
+    longest = max(one.values.size for one in others if one is not None)
     if time.values.size < longest:
         raise MeasurementError(
             f"{path}: {time.title} has {time.values.size} values for {longest} rows; "
@@ -161,4 +169,4 @@ def _resample(columns: FileColumns, stamps: np.ndarray, step: float) -> FileColu
         grid = known[0] + step * np.arange(count)
         return array_column(column.title, np.interp(grid, known, column.values))
 
-    return FileColumns(resampled(columns.input), resampled(columns.output))
+    return replace(with_each(columns, resampled), time=None)

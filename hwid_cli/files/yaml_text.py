@@ -1,4 +1,6 @@
-"""YAML files as plain dicts, lists and scalars; every fault is one line with its place.
+"""YAML files as plain dicts, lists and scalars, and back.
+
+Every fault is one line with its place.
 
 Stricter than ``yaml.safe_load`` where it would be silently wrong: a key that is given
 twice is an error, and ``1e-3`` is a number as in YAML 1.2, not text.
@@ -42,6 +44,38 @@ class _StrictLoader(yaml.SafeLoader):
 _StrictLoader.add_implicit_resolver(
     "tag:yaml.org,2002:float", _EXPONENT_WITHOUT_POINT, list("-+.0123456789")
 )
+
+
+class _StrictDumper(yaml.SafeDumper):
+    """Safe dumper whose text the strict loader reads back to the same values."""
+
+
+# Text that looks like a number to the loader has to be quoted.
+_StrictDumper.add_implicit_resolver(
+    "tag:yaml.org,2002:float", _EXPONENT_WITHOUT_POINT, list("-+.0123456789")
+)
+
+
+def yaml_text(content: dict[str, Any]) -> str:
+    """Text of a mapping, the keys in their order, innermost sections in one line.
+
+    Parameters
+    ----------
+    content : dict
+        Of dicts, lists and scalars; floats keep all their digits.
+
+    Returns
+    -------
+    str
+    """
+    return yaml.dump(
+        content,
+        Dumper=_StrictDumper,
+        sort_keys=False,
+        allow_unicode=True,
+        default_flow_style=None,
+        width=88,
+    )
 
 
 def read_yaml(path: Path) -> dict[Any, Any]:

@@ -86,7 +86,6 @@ def test_columns_must_make_a_recording(load, section, message):
         ("group: {keep: {best: false}}", r"group.keep.best: found False; .*true"),
         ("group: {keep: {top: [3, 0]}}", r"group.keep.top: found \(3, 0\)"),
         ("group: {max_level: 0}", r"group.max_level: found 0; .* >= 1"),
-        ("diagnose: {max_effects: -1}", r"diagnose.max_effects: found -1; .* >= 0"),
         ("identify: {recordings: []}", r"identify.recordings: found \[\]"),
         ("identify: {recordings: [a, a]}", r"identify.recordings: 'a' is listed twice"),
     ],

@@ -101,12 +101,12 @@ def test_two_files_of_one_name_are_refused():
         "rename one file or add a pattern to recordings.exclude"
     )
     with pytest.raises(MeasurementError, match=message):
-        checks.check_names(paths)
+        checks.check_names([(path, path.stem) for path in paths])
 
 
 def test_a_name_that_reads_like_a_group_is_refused():
     with pytest.raises(MeasurementError, match=r"'a\+b'; expected a name without '\+'"):
-        checks.check_names([Path("a.csv"), Path("a+b.csv")])
+        checks.check_names([(Path("a.csv"), "a"), (Path("a+b.csv"), "a+b")])
 
 
 def test_different_sample_times_are_refused():

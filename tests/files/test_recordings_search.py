@@ -6,12 +6,12 @@ import pytest
 
 from hwid_cli.errors import ConfigError, MeasurementError
 from hwid_cli.files.config import load_experiment
-from hwid_cli.files.recordings import (
+from hwid_cli.files.recording_paths import (
     find_files,
     missing_files_message,
-    read_recordings,
     recordings_base,
 )
+from hwid_cli.files.recordings import read_recordings
 
 BY_COLUMNS = "{time: t, input: u, output: y}"
 

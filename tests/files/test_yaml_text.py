@@ -1,7 +1,9 @@
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from hwid_cli.errors import ConfigError
-from hwid_cli.files.yaml_text import read_yaml
+from hwid_cli.files.yaml_text import read_yaml, yaml_text
 
 
 def test_numbers_with_an_exponent_and_no_point_are_numbers(write_config):
@@ -62,3 +64,37 @@ def test_byte_order_mark_is_no_part_of_the_first_key(tmp_path):
     path = tmp_path / "bom.yaml"
     path.write_bytes(b"\xef\xbb\xbfname: a\n")
     assert read_yaml(path) == {"name": "a"}
+
+
+@settings(max_examples=200)
+@given(
+    st.recursive(
+        st.floats(allow_nan=False, allow_infinity=False)
+        | st.integers()
+        | st.booleans()
+        # Control characters have no place in YAML without escapes; names hold none.
+        | st.text(st.characters(exclude_categories=["C"])),
+        lambda inner: (
+            st.lists(inner) | st.dictionaries(st.text("abc1e-.", min_size=1), inner)
+        ),
+        max_leaves=8,
+    )
+)
+def test_what_is_written_is_read_back_to_the_same_values(tmp_path_factory, value):
+    path = tmp_path_factory.mktemp("yaml") / "any.yaml"
+    path.write_text(yaml_text({"value": value}), encoding="utf-8")
+    found = read_yaml(path)["value"]
+
+    assert found == value
+    # 1 equals 1.0 and True, which no configuration may mix up.
+    assert repr(found) == repr(value)
+
+
+def test_text_that_reads_like_a_number_is_quoted(write_config):
+    text = yaml_text({"a": "1e3", "b": "-2E-5", "c": "12", "d": 1e-5})
+    assert read_yaml(write_config(text)) == {
+        "a": "1e3",
+        "b": "-2E-5",
+        "c": "12",
+        "d": 1e-5,
+    }

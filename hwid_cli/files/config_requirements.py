@@ -1,0 +1,70 @@
+"""What a value of a configuration must hold, refused in one line where it does not."""
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from hwid_cli.errors import ConfigError
+from hwid_cli.files.suggestions import did_you_mean
+
+
+def require(holds: bool, place: str, found: object, expected: str) -> None:
+    """Refuse a value for which a condition does not hold.
+
+    Parameters
+    ----------
+    holds : bool
+    place : str
+        File and key.
+    found : object
+    expected : str
+
+    Raises
+    ------
+    ConfigError
+    """
+    if not holds:
+        raise ConfigError(f"{place}: found {found!r}; expected {expected}")
+
+
+def require_known(
+    found: Iterable[str] | Mapping[str, Any], known: Iterable[str], place: str
+) -> None:
+    """Refuse names that are not among the known ones.
+
+    Parameters
+    ----------
+    found : iterable of str
+    known : iterable of str
+    place : str
+        File and key.
+
+    Raises
+    ------
+    ConfigError
+        For the first such name, with the nearest known one.
+    """
+    for name in found:
+        if name not in known:
+            raise ConfigError(f"{place}: found {name!r}; {did_you_mean(name, known)}")
+
+
+def require_distinct(values: tuple[Any, ...], place: str) -> None:
+    """Refuse a list in which a value comes twice.
+
+    Parameters
+    ----------
+    values : tuple
+    place : str
+        File and key.
+
+    Raises
+    ------
+    ConfigError
+        For the first such value.
+    """
+    for value in values:
+        if values.count(value) > 1:
+            raise ConfigError(
+                f"{place}: {value!r} is listed twice; expected every value once; "
+                "remove one"
+            )
