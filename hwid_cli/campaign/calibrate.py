@@ -82,6 +82,12 @@ def calibration_key(
         for raw in raws
     ]
     arrays = [one.pop(side) for one in about for side in ("input", "output")]
+    for one in about:
+        reference = one.pop("reference")
+        # Said only where there is one: keys of recordings without one stay as they were.
+        if reference is not None:
+            one["has_reference"] = True
+            arrays.append(reference)
     settings = {"recordings": about, "options": options}
     return task_key(STAGE, STAGE_VERSION, settings, arrays)
 
@@ -122,6 +128,7 @@ def _calibrate(
         options=options,
         input=raw.input,
         output=raw.output,
+        reference=raw.reference,
         log=CalibrationLog(
             name=raw.name,
             steps=getattr(options, raw.kind),
@@ -168,5 +175,6 @@ def _finish(draft: Draft) -> tuple[Recording, CalibrationLog]:
         sha256=raw.sha256,
         input_unit=raw.input_unit,
         output_unit=raw.output_unit,
+        reference=draft.reference,
     )
     return recording, replace(draft.log, n_samples=recording.n_samples)

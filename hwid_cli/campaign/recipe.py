@@ -7,6 +7,8 @@
   excitation; for a sine the mean over its first whole period.
 - ``recut``: a sine to whole periods.
 
+A reference is cut with the input, and an offset of the output is subtracted from it too.
+
 A step takes a draft and returns the next one; it never alters a record.
 """
 
@@ -44,6 +46,7 @@ class Draft:
     input : ndarray, shape (n_input,), [input unit]
     output : ndarray, shape (n_output,), [output unit]
     log : CalibrationLog
+    reference : ndarray or None, shape (n_input,), [output unit]
     """
 
     raw: RawRecording
@@ -51,6 +54,7 @@ class Draft:
     input: np.ndarray
     output: np.ndarray
     log: CalibrationLog
+    reference: np.ndarray | None = None
 
     @property
     def recipe(self) -> tuple[str, ...]:
@@ -162,6 +166,7 @@ def _keep(draft: Draft, first: int, n_samples: int) -> Draft:
         draft,
         input=draft.input[kept],
         output=draft.output[kept],
+        reference=None if draft.reference is None else draft.reference[kept],
         log=replace(draft.log, first_sample=draft.log.first_sample + first),
     )
 
@@ -178,7 +183,11 @@ def _subtract(side: str) -> Callable[[Draft], Draft]:
             offset = float(np.mean(values[: _rest_length(draft, f"{side}_offset")]))
         total = getattr(draft.log, f"{side}_offset") + offset
         log = replace(draft.log, **{f"{side}_offset": total})
-        return replace(draft, **{side: values - offset}, log=log)
+        reference = draft.reference
+        if side == "output" and reference is not None:
+            # A controller compares the two: their difference stays what it was.
+            reference = reference - offset
+        return replace(draft, **{side: values - offset}, log=log, reference=reference)
 
     return subtract
 

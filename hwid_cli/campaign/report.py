@@ -42,7 +42,10 @@ _SECTIONS = {
     "crossval": ("crossval",),
     "group": ("group",),
     "test": ("test",),
+    "diagnose": ("simulation", "diagnose"),
 }
+# Stages that a stage does not build on although they run before it.
+_BESIDE = {"diagnose": ("identify", "crossval", "group", "test")}
 STAGES = tuple(_SECTIONS)
 # Raised when the page or a figure changes, so that pages are drawn again.
 REPORT_VERSION = 2
@@ -89,7 +92,12 @@ def changed_sections(
         Empty where the results are those of today's configuration.
     """
     before = STAGES[: STAGES.index(stage) + 1]
-    matter = [section for name in before for section in _SECTIONS[name]]
+    matter = [
+        section
+        for name in before
+        if name not in _BESIDE.get(stage, ())
+        for section in _SECTIONS[name]
+    ]
     # Only what is in JSON can be compared with what was stored as JSON.
     today = json.loads(json.dumps(now))
     return tuple(

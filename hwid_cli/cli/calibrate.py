@@ -19,6 +19,7 @@ _NAME_LISTS = {
     "crossval": ("recordings",),
     "group": ("start", "candidates", "validate"),
     "test": ("recordings",),
+    "diagnose": ("recordings", "hold_out"),
 }
 
 
@@ -88,8 +89,11 @@ def _check_names(session: "Session", calibrated: "Calibrated") -> None:
     for section, keys in _NAME_LISTS.items():
         options = getattr(experiment, section)
         for key in keys if options is not None else ():
-            place = f"{experiment.source}: {section}.{key}"
-            select_recordings(calibrated.recordings, getattr(options, key), key=place)
+            names = getattr(options, key)
+            # The one word that stands for a choice of names.
+            if names != "auto":
+                place = f"{experiment.source}: {section}.{key}"
+                select_recordings(calibrated.recordings, names, key=place)
 
 
 def _what_changed(session: "Session", calibrated: "Calibrated") -> str:
@@ -114,7 +118,7 @@ def find_measurements(session: "Session") -> None:
         With code 0 and one line that says where to put the data.
     """
     from hwid_cli.cli.simulate import simulate_stage
-    from hwid_cli.files.recordings import (
+    from hwid_cli.files.recording_paths import (
         find_files,
         missing_files_message,
         recordings_base,

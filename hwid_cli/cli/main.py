@@ -9,6 +9,7 @@ from hwid_cli import __version__
 from hwid_cli.cli import (
     calibrate,
     crossval,
+    diagnose,
     group,
     identify,
     report,
@@ -105,7 +106,7 @@ class _ToStderr(logging.Handler):
 @click.version_option(__version__, prog_name="hwid")
 @click.pass_context
 def main(ctx: click.Context) -> None:
-    """Identify models of servo drives from few measurements.
+    """Identify models of servo drives from few measurements, and diagnose simulations.
 
     Every command takes one configuration file; configs/README.md explains its keys. A
     stage runs the stages before it where they are missing, and answers from the cache
@@ -114,5 +115,16 @@ def main(ctx: click.Context) -> None:
     ctx.obj = set_log_levels
 
 
-for _module in (run, simulate, calibrate, identify, crossval, group, test, report):
+_MODULES = (
+    run,
+    simulate,
+    calibrate,
+    identify,
+    crossval,
+    group,
+    test,
+    diagnose,
+    report,
+)
+for _module in _MODULES:
     main.add_command(_module.command)

@@ -125,6 +125,7 @@ def read_stored(session: "Session") -> "StoredResults":
 
     from hwid_cli.files.config import describe_experiment
     from hwid_cli.files.diagnosis_json import read_diagnosis
+    from hwid_cli.files.diagnosis_results import read_diagnosis_record
     from hwid_cli.files.final_test_results import read_final_test
     from hwid_cli.files.group_results import read_group
     from hwid_cli.files.results import read_calibrated, read_crossval, read_fits
@@ -151,6 +152,7 @@ def read_stored(session: "Session") -> "StoredResults":
         search=read_group(path) if "group" in done else None,
         final_test=read_final_test(path) if "test" in done else None,
         diagnosis=read_diagnosis(session.out / "diagnosis.json"),
+        diagnosis_record=read_diagnosis_record(path) if "diagnose" in done else None,
     )
 
 

@@ -10,9 +10,6 @@ from hwid_cli.cli.options import Choices, stage_options
 if TYPE_CHECKING:
     from hwid_cli.cli.session import Session
 
-# Sections of the configuration whose stages this version does not have.
-_LATER = ("diagnose",)
-
 
 @click.command("run")
 @stage_options
@@ -25,13 +22,6 @@ def command(choices: Choices) -> None:
     from hwid_cli.errors import HwidError
 
     session = open_session(choices, *STAGES)
-    for section in _LATER:
-        if getattr(session.experiment, section) is not None:
-            say(
-                session,
-                f"{section}: named in {session.experiment.source}, but this "
-                "version of hwid does not have it yet; left out",
-            )
     try:
         run_stages(session)
     except HwidError:
@@ -105,6 +95,12 @@ def _test(session: "Session") -> None:
     show_final_test(session, final_test_stage(session))
 
 
+def _diagnose(session: "Session") -> None:
+    from hwid_cli.cli.diagnose import diagnose_stage, show_diagnosis
+
+    show_diagnosis(session, diagnose_stage(session))
+
+
 def _report(session: "Session") -> None:
     """Show what has run, unless it is measurements only."""
     from hwid_cli.cli.report import report_stage
@@ -121,4 +117,5 @@ _STAGES = {
     "crossval": _crossval,
     "group": _group,
     "test": _test,
+    "diagnose": _diagnose,
 }

@@ -32,7 +32,7 @@ Result = TypeVar("Result")
 
 _log = logging.getLogger(__name__)
 
-STAGES = ("simulate", "calibrate", "identify", "crossval", "group", "test")
+STAGES = ("simulate", "calibrate", "identify", "crossval", "group", "test", "diagnose")
 
 
 @dataclass(frozen=True, eq=False)
@@ -236,18 +236,53 @@ def stage_tasks(
     ------
     RunSettings
     """
+    with _progress(session, stage, total, unit, part=part) as (settings, _):
+        yield settings
+
+
+@contextmanager
+def stage_rounds(
+    session: Session, stage: str, unit: str
+) -> Iterator[tuple[RunSettings, Callable[[str, int], None]]]:
+    """Run the tasks of a stage that come in rounds, each with a progress bar.
+
+    Parameters
+    ----------
+    session : Session
+    stage : str
+    unit : str
+        What one task is, in the plural.
+
+    Yields
+    ------
+    RunSettings
+    callable
+        Takes what the next round does and how many tasks it has.
+    """
+    with _progress(session, stage, 0, unit) as (settings, progress):
+        yield (
+            settings,
+            lambda text, total: progress.begin_round(f"{stage}: {text}", total),
+        )
+
+
+@contextmanager
+def _progress(
+    session: Session, stage: str, total: int, unit: str, *, part: str = ""
+) -> Iterator[tuple[RunSettings, StageProgress]]:
     timer, label = start_timer(), f"{stage} {part}".rstrip()
     with StageProgress(label, total, unit, is_silent=session.is_quiet) as progress:
 
         def on_done(item: TaskDone) -> None:
             progress.advance(from_cache=item.from_cache)
 
-        yield RunSettings(
+        settings = RunSettings(
             store=Hdf5Store(session.cache),
             workers=session.workers,
             force=stage in session.forced,
             on_done=on_done,
         )
+        yield settings, progress
     say(
         session,
         f"{label}: {progress.from_cache} {unit} from the cache, "

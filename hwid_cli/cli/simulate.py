@@ -1,4 +1,4 @@
-"""``hwid simulate``: virtual measurements of a simulated machine."""
+"""``hwid simulate``: virtual measurements, and a physics model beside the recordings."""
 
 from typing import TYPE_CHECKING
 
@@ -14,16 +14,25 @@ if TYPE_CHECKING:
 @click.command("simulate")
 @stage_options
 def command(choices: Choices) -> None:
-    """Make virtual measurements of a simulated machine.
+    """Make virtual measurements, or simulate what was measured.
 
-    Writes raw/*.csv, as raw as measured ones, and raw/plan.csv, which says how each was
-    made.
+    With a simulate: section, writes raw/*.csv, as raw as measured ones, and
+    raw/plan.csv, which says how each was made. With a simulation: section, computes what
+    that physics model makes of the input of every recording, writes simulated/*.csv and
+    shows the distance to what was measured.
     """
     from hwid_cli.cli.session import open_session, say
 
     session = open_session(choices, "simulate")
-    simulate_stage(session)
-    say(session, f"results: {session.out / 'raw'}")
+    experiment = session.experiment
+    is_drive = experiment.simulation is not None
+    # Virtual measurements need no recordings section as long as nothing reads them.
+    is_read = experiment.simulate is None or experiment.recordings is not None
+    if experiment.simulate is not None or not is_drive:
+        simulate_stage(session)
+        say(session, f"results: {session.out / 'raw'}")
+    if is_drive and is_read:
+        simulate_drive(session)
 
 
 @once
@@ -49,8 +58,8 @@ def simulate_stage(session: "Session") -> None:
     if machine is None:
         raise ConfigError(
             f"{session.experiment.source}: simulate: missing; expected a machine to "
-            "simulate; add the section (configs/README.md explains it), or start with "
-            "'hwid calibrate' where measurements exist"
+            "simulate; add the section (configs/README.md explains it), or simulation: "
+            "where measurements exist"
         )
     timer = start_timer()
     key = task_key("simulate", STAGE_VERSION, machine, [])
@@ -60,3 +69,39 @@ def simulate_stage(session: "Session") -> None:
     measurements = simulate_machine(machine)
     write_virtual_measurements(session.out, measurements, key=key)
     say(session, f"simulate: {len(measurements)} measurements computed, {timer()}")
+
+
+def simulate_drive(session: "Session") -> None:
+    """Simulate the recordings by the physics model and show how far off it is.
+
+    Parameters
+    ----------
+    session : Session
+
+    Raises
+    ------
+    ConfigError
+        If the configuration has no such model, or names unknown recordings.
+    """
+    from hwid_cli.campaign.simulate_drive import simulate_recordings
+    from hwid_cli.cli.diagnose import what_to_diagnose
+    from hwid_cli.cli.session import say, start_timer
+    from hwid_cli.files.diagnosis_results import write_simulated_csv
+    from hwid_cli.report.text_table import number, text_table
+
+    given = what_to_diagnose(session)
+    timer = start_timer()
+    curves = simulate_recordings(given.recordings, given.simulation, given.options)
+    folder = session.out / "simulated"
+    for one in curves:
+        columns = (one.time_s, one.input, one.measured, one.simulated)
+        write_simulated_csv(folder / f"{one.name}.csv", columns)
+    say(session, f"simulate: {len(curves)} recordings simulated, {timer()}")
+    # In a closed loop it is the controller's command that the two are compared by.
+    side = "output" if given.simulation.controller is None else "input"
+    unit = getattr(given.recordings[0], f"{side}_unit")
+    rows = [(one.name, number(one.rms)) for one in curves]
+    title = f"RMS of measured minus simulated {side}"
+    heads = ("recording", f"RMS [{unit}]")
+    say(session, "\n" + text_table(title, heads, rows, text_columns=(0,)))
+    say(session, f"\nresults: {folder}")

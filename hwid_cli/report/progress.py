@@ -39,6 +39,7 @@ class StageProgress:
     def __init__(self, stage: str, total: int, unit: str, *, is_silent: bool) -> None:
         self.from_cache = 0
         self.computed = 0
+        self._computed_before = 0
         console = Console(file=sys.stderr)
         self._is_shown = console.is_terminal and not is_silent
         self._bar = Progress(
@@ -72,6 +73,25 @@ class StageProgress:
         if self._is_shown:
             self._bar.stop()
 
+    def begin_round(self, stage: str, total: int) -> None:
+        """Start the bar anew for another round of tasks; what was counted stays.
+
+        Parameters
+        ----------
+        stage : str
+        total : int, [-]
+            Tasks of this round.
+        """
+        self._computed_before = self.computed
+        # A bar that was never shown has no clock to set back.
+        self._bar.reset(
+            self._task,
+            start=self._is_shown,
+            total=total,
+            description=stage,
+            computed=0,
+        )
+
     def advance(self, *, from_cache: bool) -> None:
         """Count one more task.
 
@@ -84,7 +104,8 @@ class StageProgress:
             self.from_cache += 1
         else:
             self.computed += 1
-        self._bar.update(self._task, advance=1, computed=self.computed)
+        in_round = self.computed - self._computed_before
+        self._bar.update(self._task, advance=1, computed=in_round)
 
 
 class _Rate(ProgressColumn):

@@ -171,3 +171,11 @@ def test_a_setting_that_an_older_program_did_not_know_is_no_change():
 
     assert changed_sections("identify", now, {"fit": {"units": 10}}) == ()
     assert changed_sections("identify", now, {"fit": {"units": 9}}) == ("fit",)
+
+
+def test_a_diagnosis_builds_on_the_calibration_and_not_on_the_models():
+    now = {"calibrate": 1, "fit": 1, "group": 1, "test": 1, "simulation": 1}
+    stored = dict.fromkeys(now, 2)
+
+    assert changed_sections("diagnose", now, stored) == ("calibrate", "simulation")
+    assert "simulation" not in changed_sections("test", now, stored)

@@ -1,4 +1,3 @@
-import logging
 import shutil
 from pathlib import Path
 
@@ -25,12 +24,6 @@ fit: {units: 3, starts: 1, max_iterations: 4}
 identify: {}
 crossval: {threshold: 0.01}
 """
-
-
-@pytest.fixture(autouse=True)
-def _log_level_as_before():
-    yield
-    logging.getLogger("hwid_cli").setLevel(logging.NOTSET)
 
 
 @pytest.fixture

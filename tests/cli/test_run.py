@@ -29,15 +29,6 @@ def test_only_the_stages_that_are_named_run(hwid, edit, out):
     assert not (out / "results.h5").exists()
 
 
-@pytest.mark.slow
-def test_stages_of_later_versions_are_named_and_left_out(after_run, hwid, edit):
-    edit("identify: {}", "diagnose: {}")
-    result = hwid("run")
-
-    assert result.exit_code == 0
-    assert "diagnose: named in" in result.stdout
-
-
 def test_a_configuration_without_any_stage_is_refused(hwid, tmp_path):
     path = tmp_path / "nothing.yaml"
     path.write_text("name: nothing\n")

@@ -21,6 +21,7 @@ from hwid_cli.records.model import (
 from hwid_cli.records.recordings import CalibrationLog, Recording
 from hwid_cli.records.report import StageRun, StoredResults
 from hwid_cli.records.results import CrossValidation
+from tests.report.diagnosis_examples import named
 
 THRESHOLD = 0.01
 NB, NK = (1, 2), (1, 2)
@@ -256,6 +257,7 @@ def everything(count=15, levels=4):
         search=group_search(count - n_tested(count), levels=levels),
         final_test=final_test(count, levels),
         diagnosis=DIAGNOSIS,
+        diagnosis_record=named(),
     )
 
 

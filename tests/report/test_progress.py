@@ -10,3 +10,32 @@ def test_without_a_terminal_nothing_is_shown_and_counts_are_kept(capsys):
     assert (progress.from_cache, progress.computed) == (1, 2)
     captured = capsys.readouterr()
     assert (captured.out, captured.err) == ("", "")
+
+
+def test_another_round_goes_on_counting(capsys):
+    with StageProgress("diagnose", 0, "tasks", is_silent=False) as progress:
+        progress.begin_round("diagnose: base", 2)
+        progress.advance(from_cache=False)
+        progress.advance(from_cache=True)
+        progress.begin_round("diagnose: candidates", 1)
+        progress.advance(from_cache=False)
+
+    assert (progress.from_cache, progress.computed) == (1, 2)
+    captured = capsys.readouterr()
+    assert (captured.out, captured.err) == ("", "")
+
+
+def test_a_round_has_its_own_name_and_total():
+    progress = StageProgress("diagnose", 0, "tasks", is_silent=True)
+    progress.advance(from_cache=False)
+    progress.begin_round("diagnose: candidates", 3)
+    progress.advance(from_cache=False)
+
+    (task,) = progress._bar.tasks
+    assert (task.description, task.total, task.completed) == (
+        "diagnose: candidates",
+        3,
+        1,
+    )
+    # The rate is that of the round.
+    assert task.fields["computed"] == 1

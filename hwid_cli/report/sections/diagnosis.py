@@ -1,13 +1,36 @@
-"""Section about the diagnosis of the physics simulation, from ``diagnosis.json``."""
+"""Section about the diagnosis: with its figures, or from ``diagnosis.json`` alone."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
+from hwid_cli.records.diagnosis import Diagnosis, RecordingGap
 from hwid_cli.records.report import ReportContents
-from hwid_cli.report.page import Block, Section, Table, Text
-from hwid_cli.report.sections.words import listed
+from hwid_cli.report.diagnosis_cells import (
+    base_table,
+    closing_sentences,
+    effects_table,
+    explained_line,
+    gap_table,
+    ranking_table,
+    recordings_table,
+)
+from hwid_cli.report.figures.diagnosis import diagnosis_figures
+from hwid_cli.report.page import Block, Figures, Folded, Heading, Section, Table, Text
+from hwid_cli.report.sections.words import counted, drawn, listed, with_unit
 from hwid_cli.report.text_table import MISSING
 
+# Places that are told in words, and recordings that are called the worst.
+_MOST_PLACES, _MOST_NAMED = 5, 3
+_ALTS = {
+    "diagnosis_gap": "RMS of the residual of every recording, with the noise",
+    "diagnosis_overlay": "Measurement and simulations of the worst held-out recordings",
+    "diagnosis_force": "The missing force against what it follows",
+    "diagnosis_ranking": "Held-out RMS and explained share of the candidates",
+    "diagnosis_where": "Shares of the error by variable, segment and recording",
+}
 _VERDICTS = {
     "named": "The gap between simulation and measurement has a name.",
     "ambiguous": "Several effects explain the gap equally well.",
@@ -28,9 +51,11 @@ def diagnosis_section(contents: ReportContents) -> Section:
     -------
     Section
     """
-    found = contents.stored.diagnosis
+    found, record = contents.stored.diagnosis, contents.stored.diagnosis_record
     blocks: list[Block] = []
-    if found is None:
+    if record is not None:
+        blocks += _record_blocks(record)
+    elif found is None:
         blocks.append(Text("There is no diagnosis among these results.", is_note=True))
     else:
         blocks += [Text(line) for line in _sentences(found)]
@@ -48,6 +73,98 @@ def diagnosis_section(contents: ReportContents) -> Section:
             blocks.append(Text(f"{text} - {reason}" if reason else text))
     title = "Diagnosis of the simulation"
     return Section("diagnosis", title, "Diagnosis", tuple(blocks))
+
+
+def _record_blocks(diagnosis: Diagnosis) -> list[Block]:
+    """The verdict first, then the gap, where it is, the parameters and the candidates."""
+    figures = {
+        name: drawn(name.replace("_", "/", 1), figure, _ALTS[name])
+        for name, figure in diagnosis_figures(diagnosis).items()
+    }
+
+    def figure(name: str, sentence: str) -> list[Block]:
+        return [Figures((figures[name],), sentence)] if name in figures else []
+
+    blocks: list[Block] = [Text(diagnosis.summary)]
+    for effect in diagnosis.effects:
+        blocks.append(Text(f"{effect.sentence.rstrip('.')}. Law: {effect.equation}"))
+    if diagnosis.effects:
+        blocks.append(effects_table(diagnosis))
+    blocks += [Text(line) for line in closing_sentences(diagnosis)]
+    blocks += [Heading("The gap"), gap_table(diagnosis), Text(_gap_remark(diagnosis))]
+    blocks += figure("diagnosis_gap", _worst(diagnosis))
+    if diagnosis.gaps:
+        about = f"The gap in {counted(len(diagnosis.gaps), 'recording')} as a table"
+        blocks.append(Folded(about, (recordings_table(diagnosis),)))
+    blocks += figure("diagnosis_overlay", _overlay_sentence(diagnosis))
+    where = [Text(one.sentence) for one in diagnosis.places if one.sentence]
+    where_figure = "Shares of the error that parameters of the base cannot take away."
+    places: list[Block] = [
+        *where[:_MOST_PLACES],
+        *figure("diagnosis_where", where_figure),
+    ]
+    places += figure("diagnosis_force", _force_sentence(diagnosis))
+    blocks += [Heading("Where the error sits"), *places] if places else []
+    if diagnosis.base:
+        # The heading says what the caption would.
+        table = replace(base_table(diagnosis), caption="Shift: from given to the last")
+        blocks += [Heading("Parameters of the simulation"), table]
+    if diagnosis.candidates:
+        about = f"{counted(len(diagnosis.candidates), 'candidate')} as a table"
+        table = ranking_table(diagnosis, with_notes=True)
+        sentence = "The best candidates that were fitted, and the simulation alone."
+        blocks.append(Heading("Candidates"))
+        blocks += [*figure("diagnosis_ranking", sentence), Folded(about, (table,))]
+    return blocks
+
+
+def _gap_remark(diagnosis: Diagnosis) -> str:
+    used = (
+        f"Trained on {counted(len(diagnosis.train), 'recording')}, judged on "
+        f"{counted(len(diagnosis.held_out), 'recording')} held out."
+    )
+    parts = [explained_line(diagnosis)] if diagnosis.effects else []
+    return " ".join([*parts, diagnosis.noise.sentence, used]).strip()
+
+
+def _worst(diagnosis: Diagnosis) -> str:
+    """The held-out recordings with the largest gap that is left; of all if none is."""
+
+    def left(one: RecordingGap) -> float:
+        return one.rms_after if diagnosis.effects else one.rms_before
+
+    held_out = [one for one in diagnosis.gaps if one.is_held_out]
+    usable = [one for one in held_out or diagnosis.gaps if np.isfinite(left(one))]
+    worst = sorted(usable, key=left, reverse=True)[:_MOST_NAMED]
+    start = "Each recording's gap; the dashed line is the noise."
+    if not worst:
+        return start
+    unit = diagnosis.output_unit
+    names = listed([f"{one.name} ({with_unit(left(one), unit)})" for one in worst])
+    most = "the largest gap of the held-out recordings is" if held_out else "most is"
+    return f"{start} In the end {most} left in {names}."
+
+
+def _overlay_sentence(diagnosis: Diagnosis) -> str:
+    names = listed([one.name for one in diagnosis.overlays])
+    below = (
+        "beneath them both residuals, and those with the effects in their own scale"
+        if diagnosis.effects
+        else "beneath them the residuals"
+    )
+    return f"Where the simulation fails most: {names}; {below}. Grey is the noise."
+
+
+def _force_sentence(diagnosis: Diagnosis) -> str:
+    if not diagnosis.latent_force:
+        return ""
+    law = (
+        " The dashed line is what the simulation with the effects gives instead."
+        if diagnosis.latent_force[0].law.size
+        else ""
+    )
+    follows = diagnosis.latent_force[0].variable
+    return f"The force that the simulation lacks follows {follows} most.{law}"
 
 
 def _sentences(found: Mapping[str, Any]) -> list[str]:

@@ -1,0 +1,198 @@
+"""Stage ``diagnose``: what a simulation of the drive lacks, and what shows it.
+
+The base is re-fitted first, because wrong parameters are not a missing effect; then
+effects of the catalogue are tried, alone and in sets; held-out recordings decide.
+docs/method_diagnosis.md.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from hwid_cli.campaign.cache import task_key
+from hwid_cli.campaign.candidate_rounds import Found, run_rounds
+from hwid_cli.campaign.candidate_tasks import (
+    STAGE,
+    STAGE_VERSION,
+    Announce,
+    Rounds,
+)
+from hwid_cli.campaign.findings import Findings, describe
+from hwid_cli.campaign.runner import RunSettings
+from hwid_cli.maths.diagnosis.candidate import Footing, fit_candidate
+from hwid_cli.maths.diagnosis.comparing import compare
+from hwid_cli.maths.diagnosis.judge import Judge
+from hwid_cli.maths.diagnosis.noise import noise_floor
+from hwid_cli.maths.diagnosis.own_parameters import fit_own
+from hwid_cli.maths.diagnosis.preparing import prepare
+from hwid_cli.maths.diagnosis.problem import Compared, Problem, scales
+from hwid_cli.maths.diagnosis.splitting import held_out_names
+from hwid_cli.maths.diagnosis.stored_fit import fitted_drive, rebuilt
+from hwid_cli.maths.diagnosis.unknowns import first_point, layout
+from hwid_cli.maths.diagnosis.where import line_frequencies
+from hwid_cli.maths.drive.effects import CATALOGUE, public_id
+from hwid_cli.maths.drive.simulation import drive_effects
+from hwid_cli.records.diagnosis import Diagnosis
+from hwid_cli.records.experiment import DiagnoseOptions, SimulationOptions
+from hwid_cli.records.recordings import Recording
+
+
+def diagnosis_key(
+    recordings: Sequence[Recording],
+    simulation: SimulationOptions,
+    options: DiagnoseOptions,
+) -> str:
+    """Content key of a diagnosis: everything that its result depends on.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+    simulation : SimulationOptions
+    options : DiagnoseOptions
+
+    Returns
+    -------
+    str
+    """
+    about = [
+        {"name": one.name, "kind": one.kind, "sample_time_s": one.sample_time_s}
+        for one in recordings
+    ]
+    arrays = [array for one in recordings for array in (one.input, one.output)]
+    arrays += [one.reference for one in recordings if one.reference is not None]
+    settings = {"recordings": about, "simulation": simulation, "options": options}
+    return task_key(STAGE, STAGE_VERSION, settings, arrays)
+
+
+def diagnose_all(
+    recordings: Sequence[Recording],
+    simulation: SimulationOptions,
+    options: DiagnoseOptions,
+    settings: RunSettings,
+    on_stage: Announce,
+) -> Diagnosis:
+    """Find what a simulation lacks.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+        At least one.
+    simulation : SimulationOptions
+    options : DiagnoseOptions
+    settings : RunSettings
+    on_stage : callable
+        Called with what begins and its number of tasks.
+
+    Returns
+    -------
+    Diagnosis
+    """
+    held_out = (
+        held_out_names(recordings)
+        if isinstance(options.hold_out, str)
+        else options.hold_out
+    )
+    problem = prepare(recordings, simulation, options, held_out)
+    noise = noise_floor(problem)
+    on_stage("base", 0)
+    given = compared_as_given(problem)
+    sizes = scales(problem, [one.velocity for one in given])
+    present = drive_effects(problem.drive)
+    base = fit_candidate(problem, (), [present], Footing(problem.drive, sizes, noise))
+    judge = Judge.of(problem, noise)
+    found = Found((), (), {})
+    refitted = compare(problem, *rebuilt(problem, base, sizes))
+    if base.is_usable:
+        sizes = scales(
+            problem,
+            [one.velocity for one in refitted],
+            line_frequencies(refitted, noise),
+        )
+    if base.is_usable and not judge.is_complete(base):
+        rounds = Rounds(
+            problem=problem,
+            key=diagnosis_key(recordings, simulation, options),
+            footing=Footing(fitted_drive(problem.drive, base), sizes, noise),
+            judge=judge,
+            base=base,
+            allowed=_allowed(problem, options),
+            settings=settings,
+            announce=on_stage,
+        )
+        found = run_rounds(rounds, options.max_effects)
+    on_stage("verdict", 0)
+    return describe(Findings(problem, noise, judge, sizes, given, base, found))
+
+
+def compared_as_given(problem: Problem) -> list[Compared]:
+    """Simulate with the parameters that the configuration gives.
+
+    What belongs to one recording alone (a start, a phase) is found from it.
+
+    Parameters
+    ----------
+    problem : Problem
+
+    Returns
+    -------
+    list of Compared
+    """
+    present = drive_effects(problem.drive)
+    speeds = [
+        np.gradient(signals.output, signals.sample_time_s)
+        for signals in problem.signals
+    ]
+    rough = scales(problem, speeds)
+    fit_layout = layout(problem, tuple(present), present, rough)
+    point = first_point(problem, fit_layout, problem.drive, present)
+    own = fit_own(problem, fit_layout, point.shared)
+    return compare(problem, fit_layout, own)
+
+
+def _allowed(problem: Problem, options: DiagnoseOptions) -> tuple[str, ...]:
+    """Ids that may be named: those asked for that make sense for this drive."""
+    wanted = options.effects
+    has_spring = problem.drive.stiffness_N_per_m > 0
+    several = len(problem.part(held_out=False).signals) > 2
+    return tuple(
+        name
+        for name, effect in CATALOGUE.items()
+        if (wanted is None or public_id(name) in wanted)
+        and public_id(name)
+        not in {public_id(one) for one in drive_effects(problem.drive)}
+        and (has_spring or not effect.needs_spring)
+        and (several or not any(one.is_own for one in effect.parameters))
+        and not (problem.compares_command and effect.enters == "output")
+    )
+
+
+def extended_options(
+    diagnosis: Diagnosis, simulation: SimulationOptions
+) -> SimulationOptions:
+    """Simulation with the effects that were found and the fitted base.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+    simulation : SimulationOptions
+
+    Returns
+    -------
+    SimulationOptions
+        With a re-fitted base only, where no effect was found.
+    """
+    base: dict[str, Any] = {one.name: one.after for one in diagnosis.base}
+    effects: dict[str, dict[str, float | str]] = {}
+    for effect in (*diagnosis.present, *diagnosis.effects):
+        effects[effect.id] = {
+            one.name: one.text or one.value for one in effect.parameters
+        }
+    return replace(
+        simulation,
+        **base,
+        effects=effects,
+        reference_current_A=diagnosis.reference_current_A,
+        reference_displacement_m=diagnosis.reference_displacement_m,
+    )

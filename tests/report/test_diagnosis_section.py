@@ -1,0 +1,128 @@
+from dataclasses import replace
+
+import pytest
+
+from hwid_cli.records.report import ReportContents, StoredResults
+from hwid_cli.report.page import Folded, Heading, Table, Text, images_of
+from hwid_cli.report.sections.diagnosis import diagnosis_section
+from tests.report.diagnosis_examples import NAN, named, nothing_missing, unknown
+from tests.report.report_examples import DIAGNOSIS
+
+
+def section_of(record=None, diagnosis=None):
+    stored = StoredResults(
+        "a", "{}", "poles", diagnosis=diagnosis, diagnosis_record=record
+    )
+    return diagnosis_section(ReportContents(stored))
+
+
+def texts(section):
+    return [one.text for one in section.blocks if isinstance(one, Text)]
+
+
+def headings(section):
+    return [one.text for one in section.blocks if isinstance(one, Heading)]
+
+
+def sentences(section):
+    return [one.sentence for one in section.blocks if one.kind == "figures"]
+
+
+def tables(section):
+    return [one for one in section.blocks if isinstance(one, Table)]
+
+
+def test_the_summary_comes_first_and_the_effects_follow():
+    found = section_of(named())
+    effect = named().effects[0]
+
+    assert texts(found)[0] == named().summary
+    assert texts(found)[1] == f"{effect.sentence} Law: {effect.equation}"
+    assert tables(found)[0].rows[0][0] == "coulomb_friction"
+    assert headings(found) == [
+        "The gap",
+        "Where the error sits",
+        "Parameters of the simulation",
+        "Candidates",
+    ]
+
+
+def test_every_figure_lies_in_its_folder():
+    files = [one.file for one in images_of(section_of(named()).blocks)]
+
+    assert files == [
+        f"diagnosis/{name}.png"
+        for name in ("gap", "overlay", "where", "force", "ranking")
+    ]
+
+
+def test_the_worst_held_out_recordings_are_called_out():
+    found = named()
+    rms = {"step_03": 9e-4, "step_00": 8e-4, "sine_01": 1.0}
+    gaps = [
+        replace(one, rms_after=rms.get(one.name, one.rms_after)) for one in found.gaps
+    ]
+    sentence = sentences(section_of(replace(found, gaps=tuple(gaps))))[0]
+
+    told = sentence.replace("\N{NO-BREAK SPACE}", " ")
+    assert "left in step_03 (0.0009 m), step_00 (0.0008 m) and step_06" in told
+    assert "sine_01" not in told
+
+
+def test_without_numbers_no_recording_is_the_worst():
+    found = named()
+    gaps = tuple(replace(one, rms_after=NAN) for one in found.gaps)
+
+    assert sentences(section_of(replace(found, gaps=gaps)))[0].endswith("the noise.")
+
+
+def test_long_tables_are_folded():
+    folded = [one for one in section_of(named(43)).blocks if isinstance(one, Folded)]
+
+    assert [one.summary for one in folded] == [
+        "The gap in 43 recordings as a table",
+        "12 candidates as a table",
+    ]
+    assert [len(one.blocks[0].rows) for one in folded] == [43, 12]
+
+
+def test_where_nothing_is_missing_the_section_is_short():
+    found = section_of(nothing_missing())
+
+    assert texts(found)[0] == "Nothing is missing."
+    assert headings(found) == ["The gap", "Parameters of the simulation"]
+    assert len(images_of(found.blocks)) == 1
+
+
+def test_an_unknown_gap_shows_the_force_without_a_law():
+    found = section_of(unknown())
+
+    assert "The force that the simulation lacks follows velocity most." in sentences(
+        found
+    )
+    assert "coulomb_friction" not in str(tables(found))
+
+
+def test_the_record_goes_before_the_file():
+    found = section_of(named(), {"verdict": "none"})
+
+    assert "There is no gap beyond the noise." not in texts(found)
+
+
+def test_older_results_have_the_file_alone():
+    found = section_of(diagnosis=DIAGNOSIS)
+
+    assert texts(found)[0] == "The gap between simulation and measurement has a name."
+    assert "Near standstill." in texts(found)
+    effects, gap = tables(found)
+    assert effects.rows[0][2:] == ("force_N", "0.81", "0.79 to 0.83")
+    assert gap.rows[1] == ("with the effects", "2e-05", "2.2e-05", "1")
+    assert images_of(found.blocks) == ()
+
+
+@pytest.mark.parametrize("count", [1, 43])
+def test_counts_are_told(count):
+    remark = " ".join(texts(section_of(named(count))))
+    held_out = "1 recording held out" if count == 1 else "15 recordings held out"
+
+    assert held_out in remark
