@@ -15,11 +15,12 @@ from hwid_cli.maths.diagnosis.choosing import TIE, winner
 from hwid_cli.maths.diagnosis.comparing import total
 from hwid_cli.maths.diagnosis.forecast import Forecast, Ground, ground, pair_shares
 from hwid_cli.maths.diagnosis.judge import (
-    LEAST_EXPLAINED,
+    LEAST_EXPLAINED_SET,
     LEAST_GAIN,
     LEAST_IMPROVED,
 )
 from hwid_cli.maths.diagnosis.problem import Problem
+from hwid_cli.maths.diagnosis.scaling import scales_of
 from hwid_cli.maths.diagnosis.stored_fit import (
     fitted_drive,
     fitted_effects,
@@ -43,6 +44,8 @@ PROMISING_PAIR = 0.1
 KIN_OF = 3
 FITTED_PAIRS = 10
 FITTED_ON_TOP = 8
+# Starts of a simpler effect in the place of another one.
+MOST_STARTS = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,9 +170,11 @@ def _larger_sets(
     """Sets that may be better: the best one with another effect, and likely pairs."""
     best = found.best[-1]
     held = fitted_effects(best)
-    drive = fitted_drive(rounds.footing.drive, best)
+    drive = fitted_drive(rounds.problem.drive, best)
     others = [one for one in rounds.allowed if not _is_kin(one, best.effects)]
-    level = ground(thin, drive, held, rounds.footing.scales)
+    footing = rounds.footing
+    sizes = scales_of(rounds.problem, best, footing.scales, footing.noise)
+    level = ground(thin, drive, held, sizes)
     on_top = [
         one
         for one in forecast_all(rounds, level, others)[:FITTED_ON_TOP]
@@ -231,16 +236,38 @@ def _with_larger(
     size = len(found.best) + 1
     fits = fit_all(rounds, f"sets of {size} effects", sets, hopeless)
     larger = winner(rounds.judge, fits, rounds.base)
+    simpler = _simpler_sets(rounds, larger, [one.effects for one in fits])
+    fits += fit_all(rounds, "simpler effects in the best set", simpler, hopeless)
+    larger = winner(rounds.judge, fits, rounds.base)
     together = Found((*found.fits, *fits), found.best, found.shares)
     if larger is None or not _is_worth_it(rounds, larger, found.best[-1]):
         return together, False
     return Found(together.fits, (*found.best, larger), found.shares), True
 
 
+def _simpler_sets(
+    rounds: Rounds, best: CandidateFit | None, tried: Sequence[tuple[str, ...]]
+) -> list[EffectSet]:
+    """Sets with a limit case in the place of an effect of the best one."""
+    if best is None:
+        return []
+    values = fitted_effects(best)
+    found: list[EffectSet] = []
+    for effect in best.effects:
+        others = [one for one in best.effects if one != effect]
+        kept = {one: values[one] for one in others}
+        for simpler in CATALOGUE[effect].contains:
+            ids = tuple(sorted((*others, simpler)))
+            if simpler in rounds.allowed and ids not in tried:
+                starts = CATALOGUE[simpler].starts(rounds.footing.scales)[:MOST_STARTS]
+                found.append((ids, [{**kept, simpler: one} for one in starts]))
+    return found
+
+
 def _is_worth_it(rounds: Rounds, larger: CandidateFit, smaller: CandidateFit) -> bool:
     """Whether a further effect explains most of what the smaller set leaves."""
     judge = rounds.judge
     against = judge.evidence(larger, smaller)
-    explains = against.explained >= LEAST_EXPLAINED or judge.is_complete(larger)
+    explains = against.explained >= LEAST_EXPLAINED_SET or judge.is_complete(larger)
     is_clear = against.gain >= LEAST_GAIN and against.improved >= LEAST_IMPROVED
     return is_clear and explains

@@ -28,10 +28,10 @@ from hwid_cli.maths.diagnosis.noise import noise_floor
 from hwid_cli.maths.diagnosis.own_parameters import fit_own
 from hwid_cli.maths.diagnosis.preparing import prepare
 from hwid_cli.maths.diagnosis.problem import Compared, Problem, scales
+from hwid_cli.maths.diagnosis.scaling import scales_of
 from hwid_cli.maths.diagnosis.splitting import held_out_names
-from hwid_cli.maths.diagnosis.stored_fit import fitted_drive, rebuilt
+from hwid_cli.maths.diagnosis.stored_fit import fitted_drive
 from hwid_cli.maths.diagnosis.unknowns import first_point, layout
-from hwid_cli.maths.diagnosis.where import line_frequencies
 from hwid_cli.maths.drive.effects import CATALOGUE, public_id
 from hwid_cli.maths.drive.simulation import drive_effects
 from hwid_cli.records.diagnosis import Diagnosis
@@ -103,13 +103,8 @@ def diagnose_all(
     base = fit_candidate(problem, (), [present], Footing(problem.drive, sizes, noise))
     judge = Judge.of(problem, noise)
     found = Found((), (), {})
-    refitted = compare(problem, *rebuilt(problem, base, sizes))
     if base.is_usable:
-        sizes = scales(
-            problem,
-            [one.velocity for one in refitted],
-            line_frequencies(refitted, noise),
-        )
+        sizes = scales_of(problem, base, sizes, noise)
     if base.is_usable and not judge.is_complete(base):
         rounds = Rounds(
             problem=problem,

@@ -51,7 +51,7 @@ def variables(
     tuple of Variable
         Judged samples of all recordings, one after the other.
     """
-    position = _joined(compared, [one.position for one in smoothed])
+    position = judged_position(compared, smoothed)
     velocity = _joined(compared, [one.velocity for one in smoothed])
     inputs = [one.signals.input for one in compared]
     rates = [
@@ -96,6 +96,23 @@ def judged_force(
     ndarray, shape (n_samples,), [N]
     """
     return _joined(compared, [one.force for one in smoothed])
+
+
+def judged_position(
+    compared: Sequence[Compared], smoothed: Sequence[Smoothed]
+) -> np.ndarray:
+    """Measured position, smoothed, at the judged samples of all recordings.
+
+    Parameters
+    ----------
+    compared : sequence of Compared
+    smoothed : sequence of Smoothed
+
+    Returns
+    -------
+    ndarray, shape (n_samples,), [m]
+    """
+    return _joined(compared, [one.position for one in smoothed])
 
 
 def shares(

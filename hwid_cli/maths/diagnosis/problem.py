@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from hwid_cli.maths.drive.catalogue import Scales
+from hwid_cli.maths.drive.catalogue import Scales, Wave
 from hwid_cli.maths.drive.simulation import refined
 from hwid_cli.records.drive import Drive
 
@@ -161,6 +161,7 @@ def scales(
     problem: Problem,
     velocities: Sequence[np.ndarray],
     frequencies_Hz: tuple[float, ...] = (),
+    waves: tuple[Wave, ...] = (),
 ) -> Scales:
     """Sizes of what the recordings hold.
 
@@ -171,6 +172,8 @@ def scales(
         Of the base's simulation, one for each recording.
     frequencies_Hz : tuple of float, [Hz]
         Highest lines of the base's error.
+    waves : tuple of Wave
+        With which it repeats along the way.
 
     Returns
     -------
@@ -202,4 +205,5 @@ def scales(
         sample_time_s=min(one.sample_time_s for one in all_signals),
         duration_s=duration,
         frequencies_Hz=frequencies_Hz,
+        waves=waves,
     )

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.signal import lfilter
 
 from hwid_cli.maths.diagnosis.covariates import (
     Variable,
@@ -17,10 +16,9 @@ from hwid_cli.maths.diagnosis.covariates import (
     shares,
     variables,
 )
-from hwid_cli.maths.diagnosis.latent_force import Smoothed, finite, latent_force
+from hwid_cli.maths.diagnosis.latent_force import Smoothed, latent_force
 from hwid_cli.maths.diagnosis.noise import whiteness
 from hwid_cli.maths.diagnosis.problem import Compared
-from hwid_cli.maths.diagnosis.segments import parabolic_peak
 from hwid_cli.maths.diagnosis.sharing import (
     excess_of,
     harmonic_places,
@@ -37,8 +35,6 @@ from hwid_cli.records.diagnosis import LatentForce, NoiseFloor, Place
 from hwid_cli.records.drive import Drive
 
 _CURVE_BINS = 30
-_MOST_LINES = 3
-_FINER = 8
 # Below this share no variable is worth a sentence of its own.
 _LEAST_SHARE = 0.02
 # A constant above this share comes first whatever goes with the small rest.
@@ -156,73 +152,6 @@ def latent_force_curves(
             LatentForce(one.name, one.unit, at[used], mean[used], spread[used], law)
         )
     return tuple(curves)
-
-
-def line_frequencies(
-    compared: Sequence[Compared], noise: NoiseFloor
-) -> tuple[float, ...]:
-    """Frequencies at which nearly all residuals have a line in common.
-
-    Parameters
-    ----------
-    compared : sequence of Compared
-    noise : NoiseFloor
-        Its whitening takes the colour of the noise off.
-
-    Returns
-    -------
-    tuple of float, [Hz]
-        The highest line first, at most three, at least one.
-    """
-    pairs = [
-        (
-            lfilter(noise.whitening, [1.0], finite(one.residual)),
-            one.signals.sample_time_s,
-        )
-        for one in compared
-    ]
-    pairs = [(residual, time) for residual, time in pairs if residual.size >= 8]
-    if not pairs:
-        return (1.0,)
-    duration = max(residual.size * time for residual, time in pairs)
-    highest = min(0.5 / time for _, time in pairs)
-    frequencies = np.arange(1.5 / duration, highest, 1 / (_FINER * duration))
-    rows = [_spectrum(*pair, frequencies) for pair in pairs]
-    used = [row for row in rows if row.any()]
-    if frequencies.size < 3 or not used:
-        return (float(1.5 / duration),)
-    # The logarithm over its own median: a few recordings that are driven there, or that
-    # hold most of the error, do not count for more than the others.
-    middle = np.median(used, axis=0)
-    inner = np.flatnonzero((middle[1:-1] >= middle[:-2]) & (middle[1:-1] > middle[2:]))
-    peaks = inner + 1
-    if not peaks.size:
-        return (float(frequencies[np.argmax(middle)]),)
-    chosen: list[int] = []
-    for peak in peaks[np.argsort(-middle[peaks])]:
-        # The window's main lobe is two lines wide to either side.
-        if all(abs(peak - other) > 2 * _FINER for other in chosen):
-            chosen.append(int(peak))
-        if len(chosen) == _MOST_LINES:
-            break
-    step = frequencies[1] - frequencies[0]
-    return tuple(
-        float(frequencies[0] + step * parabolic_peak(middle, peak)) for peak in chosen
-    )
-
-
-def _spectrum(
-    residual: np.ndarray, sample_time_s: float, frequencies: np.ndarray
-) -> np.ndarray:
-    """Share of the residual's power at each frequency, on a common grid."""
-    n_points = 1 << int(np.ceil(np.log2(_FINER * residual.size)))
-    windowed = (residual - residual.mean()) * np.hanning(residual.size)
-    power = np.abs(np.fft.rfft(windowed, n_points)) ** 2
-    own = np.fft.rfftfreq(n_points, sample_time_s)
-    # What varies once or less in the recording is no line.
-    power[own < 1.5 / (residual.size * sample_time_s)] = 0.0
-    whole = float(power.sum())
-    return np.interp(frequencies, own, power / whole if whole > 0 else power)
 
 
 def _variable_places(

@@ -8,6 +8,22 @@ Values = Mapping[str, float]
 
 
 @dataclass(frozen=True)
+class Wave:
+    """A force that repeats along the way, ``amplitude sin(2 pi x / period + phase)``.
+
+    Parameters
+    ----------
+    period_m : float, [m]
+    amplitude_N : float, [N]
+    phase_rad : float, [rad]
+    """
+
+    period_m: float
+    amplitude_N: float
+    phase_rad: float
+
+
+@dataclass(frozen=True)
 class Scales:
     """Sizes of what the recordings hold, for start values and bounds.
 
@@ -26,6 +42,8 @@ class Scales:
         The duration is that of the longest recording.
     frequencies_Hz : tuple of float
         Where the error of the base has its highest lines.
+    waves : tuple of Wave
+        With which it repeats most along the way.
     """
 
     displacement_m: float
@@ -39,6 +57,7 @@ class Scales:
     sample_time_s: float
     duration_s: float
     frequencies_Hz: tuple[float, ...] = ()
+    waves: tuple[Wave, ...] = ()
 
     @property
     def stiffness_N_per_m(self) -> float:
@@ -104,6 +123,9 @@ class Effect:
         Effects that it includes as limit cases.
     needs_spring : bool
         Whether it means nothing on a free axis.
+    seen : callable or None
+        Values to start from that the recordings show, from the scales; where there are
+        some they stand in for the parameters' own.
     """
 
     id: str
@@ -115,9 +137,10 @@ class Effect:
     confused_with: Mapping[str, str] = field(default_factory=dict)
     contains: tuple[str, ...] = ()
     needs_spring: bool = False
+    seen: Callable[[Scales], tuple[dict[str, float], ...]] | None = None
 
     def starts(self, scales: Scales) -> list[dict[str, float]]:
-        """List all combinations of the parameters' start values.
+        """List what the recordings show, or all combinations of start values.
 
         Parameters
         ----------
@@ -127,6 +150,8 @@ class Effect:
         -------
         list of dict of str to float
         """
+        if self.seen is not None and self.seen(scales):
+            return list(self.seen(scales))
         names = [one.name for one in self.parameters]
         grids = [one.starts(scales) for one in self.parameters]
         return [dict(zip(names, values, strict=True)) for values in product(*grids)]

@@ -40,7 +40,8 @@ def _mode_slots(value: Values) -> dict[int, float]:
 GEAR = Effect(
     id="gear_backlash",
     sentence="play between motor and load: teeth that let go and hit again",
-    equation="m1 xm'' = kt i - T, m2 x'' = T - c x' - k x; T = kg (xm - x -+ g), 0 within",
+    equation="m1 xm'' = kt i - T, m2 x'' = T - c x' - k x; "
+    "T = kg (xm - x -+ g) + cg (xm' - x') while it pushes, else 0",
     enters="motion",
     parameters=(
         Parameter("half_gap_m", _displacement(0.003, 0.012, 0.04), _gap),
@@ -58,11 +59,19 @@ GEAR = Effect(
             lambda scales: (0.05, 0.95),
             is_reported=False,
         ),
+        # Without any, the teeth rattle chaotically.
+        Parameter(
+            "contact_damping_ratio",
+            lambda scales: (0.15,),
+            lambda scales: (1e-3, 1.0),
+            is_reported=False,
+        ),
     ),
     slots=lambda value: {
         slots.GEAR_GAP: value["half_gap_m"],
         slots.GEAR_STIFFNESS: value["stiffness_N_per_m"],
         slots.MOTOR_SHARE: value.get("motor_share", 0.5),
+        slots.GEAR_DAMPING_RATIO: value.get("contact_damping_ratio", 0.0),
     },
     confused_with={
         "output_backlash": "reversals with the spring unloaded",

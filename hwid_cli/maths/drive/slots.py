@@ -24,9 +24,10 @@ A parameter that is switched off is 0, except where the comment says infinite.
     SPRING_GAP,
     GEAR_GAP,
     GEAR_STIFFNESS,
+    GEAR_DAMPING_RATIO,
+    GEAR_DAMPING,  # set by the simulation: of the teeth, in contact
     MOTOR_SHARE,
     OUTPUT_GAP,
-    OUTPUT_ZERO,  # what the sensor reads at the start, taken off
     MODE_MASS,
     MODE_STIFFNESS,
     MODE_DAMPING,
@@ -67,4 +68,4 @@ A parameter that is switched off is 0, except where the comment says infinite.
     IS_START_GIVEN,
     OUTPUT_ZERO,  # position at which the sensor reads 0
     N_SLOTS,
-) = range(63)
+) = range(64)

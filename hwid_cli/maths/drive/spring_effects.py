@@ -36,8 +36,17 @@ def _gap(scales: Scales) -> tuple[float, float]:
 
 
 def _periods(scales: Scales) -> tuple[float, ...]:
+    return tuple(scales.stroke_m / count for count in (3.5, 5, 7, 10, 14, 20, 28))
+
+
+def _waves(scales: Scales) -> tuple[dict[str, float], ...]:
     return tuple(
-        scales.stroke_m / count for count in (3.5, 5, 7, 10, 14, 20, 28, 40, 56)
+        {
+            "amplitude_N": one.amplitude_N,
+            "period_m": one.period_m,
+            "phase_rad": one.phase_rad,
+        }
+        for one in scales.waves
     )
 
 
@@ -169,6 +178,7 @@ COGGING = Effect(
         slots.COGGING_PHASE: value.get("phase_rad", 0.0),
     },
     confused_with={"cubic_stiffness": "slow motion over the whole stroke"},
+    seen=_waves,
 )
 
 LOAD = Effect(

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from hwid_cli.maths.diagnosis.latent_force import latent_force
+from hwid_cli.maths.diagnosis.lines import line_frequencies
 from hwid_cli.maths.diagnosis.problem import Compared, Signals
 from hwid_cli.maths.diagnosis.where import (
     latent_force_curves,
-    line_frequencies,
     places,
 )
 from hwid_cli.maths.drive.simulation import simulate_drive

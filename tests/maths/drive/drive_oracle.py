@@ -5,6 +5,7 @@ two corners ``solve_ivp`` runs with tight tolerances and stops at every event.
 """
 
 import math
+from bisect import bisect_right
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -32,6 +33,7 @@ class _Run:
     def __init__(self, machine, times, command):
         self.machine = machine
         self.times, self.command = times, command
+        self.corners, self.heights = times.tolist(), command.tolist()
         self.way = 0.0
         self.is_dry = machine.has(
             "coulomb_friction", "asymmetric_friction", "stribeck_friction"
@@ -41,7 +43,13 @@ class _Run:
             self.origin = self._rest(0.0, with_cogging=False)
 
     def current(self, t):
-        return np.interp(t, self.times, self.command)
+        # Asked for half a million times: numpy would take most of it to get going.
+        n = bisect_right(self.corners, t)
+        if n in (0, len(self.corners)):
+            return self.heights[0 if n == 0 else -1]
+        before, after = self.corners[n - 1 : n + 1]
+        rise = self.heights[n] - self.heights[n - 1]
+        return self.heights[n - 1] + (t - before) / (after - before) * rise
 
     def solve(self, samples, start):
         one = self.machine
@@ -168,7 +176,12 @@ class _Run:
             found += [y[X] - edge, y[X] + edge]
         if one.has("gear_backlash"):
             edge = one.value("gear_backlash", "half_gap_m")
-            found += [y[MOTOR_X] - y[X] - edge, y[MOTOR_X] - y[X] + edge]
+            twist = y[MOTOR_X] - y[X]
+            found += [twist - edge, twist + edge]
+            if one.teeth_damping:
+                ahead = one.teeth_damping * (y[MOTOR_V] - y[V])
+                ahead /= one.value("gear_backlash", "stiffness_N_per_m")
+                found += [twist - edge + ahead, twist + edge + ahead]
         if one.has("voltage_limit"):
             wanted = self._wanted(t, y) + self._back(y)
             edge = one.value("voltage_limit", "limit_A")
@@ -248,10 +261,7 @@ class _Run:
         one, v = self.machine, y[V]
         push = self._push(self._wanted(t, y), y)
         if one.has("gear_backlash"):
-            gap = one.value("gear_backlash", "half_gap_m")
-            twist = y[MOTOR_X] - y[X]
-            twist = math.copysign(max(abs(twist) - gap, 0.0), twist)
-            push = one.value("gear_backlash", "stiffness_N_per_m") * twist
+            push = self._bite(y)
         net = push + one.value("constant_load", "force_N")
         net -= one.damping * v + self._spring(y[X])
         net -= one.value("quadratic_drag", "drag_N_s2_per_m2") * v * abs(v)
@@ -263,6 +273,17 @@ class _Run:
         if one.has("second_mode"):
             net += self._pull(y)
         return net - way * self._level(way, v)
+
+    def _bite(self, y):
+        """Spring and damper of the teeth, which push and never pull."""
+        one = self.machine
+        twist = y[MOTOR_X] - y[X]
+        into = abs(twist) - one.value("gear_backlash", "half_gap_m")
+        if into <= 0:
+            return 0.0
+        force = one.value("gear_backlash", "stiffness_N_per_m") * into
+        force += one.teeth_damping * math.copysign(1.0, twist) * (y[MOTOR_V] - y[V])
+        return math.copysign(max(force, 0.0), twist)
 
     def _pull(self, y):
         one = self.machine
@@ -278,12 +299,9 @@ class _Run:
         if one.has("gear_backlash"):
             inner = one.mass * one.value("gear_backlash", "motor_share", 0.5)
             mass -= inner
-            gap = one.value("gear_backlash", "half_gap_m")
-            twist = y[MOTOR_X] - y[X]
-            twist = math.copysign(max(abs(twist) - gap, 0.0), twist)
-            teeth = one.value("gear_backlash", "stiffness_N_per_m") * twist
             out[MOTOR_X] = y[MOTOR_V]
-            out[MOTOR_V] = (self._push(self._wanted(t, y), y) - teeth) / inner
+            push = self._push(self._wanted(t, y), y)
+            out[MOTOR_V] = (push - self._bite(y)) / inner
         is_held = (self.is_dry or one.has("hysteresis")) and self.way == 0.0
         if not is_held:
             out[X] = y[V]

@@ -24,8 +24,17 @@ class Machine:
     def value(self, effect, name, default=0.0):
         return self.effects.get(effect, {}).get(name, default)
 
+    @property
+    def teeth_damping(self):
+        """Damping of both masses that swing against each other on the teeth."""
+        share = self.value("gear_backlash", "motor_share", 0.5)
+        swinging = self.mass * share * (1 - share)
+        stiffness = self.value("gear_backlash", "stiffness_N_per_m")
+        ratio = self.value("gear_backlash", "contact_damping_ratio")
+        return 2 * ratio * math.sqrt(stiffness * swinging)
+
     def has(self, *effects):
-        return any(effect in self.effects for effect in effects)
+        return not self.effects.keys().isdisjoint(effects)
 
 
 def command_path(machine, times, command):

@@ -18,6 +18,7 @@ from tests.maths.drive.drive_cases import (
     SINGLE,
     TIMES_S,
     TOGETHER,
+    TOGETHER_SLOW,
     rms,
     tool,
 )
@@ -76,8 +77,25 @@ def test_effects_together_follow_the_oracle(effects):
     assert difference(effects) < tolerance(effects)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("effects", TOGETHER_SLOW, ids="+".join)
+def test_effects_of_many_events_together_follow_the_oracle(effects):
+    assert difference(effects) < tolerance(effects)
+
+
+# More damping with friction makes the oracle's events follow each other without end.
+@pytest.mark.parametrize(("ratio", "other"), [(0.02, {}), (0.3, {}), (0.02, COULOMB)])
+def test_teeth_that_are_damped_push_and_never_pull(ratio, other):
+    effects = {
+        "gear_backlash": {**GEAR["gear_backlash"], "contact_damping_ratio": ratio}
+    }
+    assert difference(effects | other) < EXACT_M
+
+
 @pytest.mark.parametrize("inductance", [0.002, 0.0])
-@pytest.mark.parametrize("effects", [{}, COULOMB, GEAR], ids="+".join)
+@pytest.mark.parametrize(
+    "effects", [{}, COULOMB, pytest.param(GEAR, marks=pytest.mark.slow)], ids="+".join
+)
 def test_a_voltage_drives_through_resistance_and_inductance(effects, inductance):
     circuit = {"resistance": 0.5, "inductance": inductance, "back_emf": 5.0}
     assert difference(effects, **circuit) < EXACT_M
@@ -95,7 +113,15 @@ def test_a_free_axis_follows_the_oracle(effects):
     assert difference(effects, stiffness=0.0) < RATTLING_M
 
 
-@pytest.mark.parametrize("effect", ["coulomb_friction", "hysteresis", "gear_backlash"])
+@pytest.mark.parametrize(
+    "effect",
+    [
+        "coulomb_friction",
+        "hysteresis",
+        # The free axis and the single effect are the fast tests of the gear.
+        pytest.param("gear_backlash", marks=pytest.mark.slow),
+    ],
+)
 def test_a_given_start_follows_the_oracle(effect):
     effects = {effect: SINGLE[effect]}
     expected = RATTLING_M if effects == GEAR else tolerance([effect])

@@ -214,6 +214,11 @@ def _start(
         state[V] = p[slots.START_VELOCITY]
     else:
         state[X] = resting_point(current, True, p)
+    if p[slots.GEAR_STIFFNESS] > 0.0:
+        # Of both masses that swing against each other on the teeth.
+        swinging = p[slots.MASS] * p[slots.MOTOR_SHARE] * (1.0 - p[slots.MOTOR_SHARE])
+        p[slots.GEAR_DAMPING] = 2.0 * p[slots.GEAR_DAMPING_RATIO]
+        p[slots.GEAR_DAMPING] *= np.sqrt(p[slots.GEAR_STIFFNESS] * swinging)
     limit = p[slots.CLIP_LIMIT]
     force = force_of(min(max(current, -limit), limit), 0.0, p)
     state[MOTOR_X] = state[X]

@@ -13,6 +13,7 @@ from hwid_cli.maths.drive.motion.forces.kernels import (
     MOTOR_X,
     V,
     X,
+    bite,
     wanted_current,
 )
 
@@ -76,7 +77,8 @@ def corner_of(
             stiffness += p[slots.SIDE_STIFFNESS]
             offset -= p[slots.SIDE_STIFFNESS] * edge
     if p[slots.GEAR_STIFFNESS] > 0.0:
-        side = _side(state[MOTOR_X] - x, p[slots.GEAR_GAP])
+        force = bite(state[MOTOR_X] - x, state[MOTOR_V] - state[V], p)
+        side = 1 + int(np.sign(force))
         code = 3 * code + side
         if side != 1:
             teeth = p[slots.GEAR_STIFFNESS]
@@ -115,8 +117,7 @@ def margin(state: np.ndarray, command: float, corner: int, p: np.ndarray) -> flo
         left = _inside(wanted, p[slots.CLIP_LIMIT], corner % 3) / p[slots.CLIP_LIMIT]
         corner //= 3
     if p[slots.GEAR_STIFFNESS] > 0.0:
-        gap = p[slots.GEAR_GAP]
-        left = min(left, _inside(state[MOTOR_X] - x, gap, corner % 3) / gap)
+        left = min(left, _inside_teeth(state, corner % 3, p) / p[slots.GEAR_GAP])
         corner //= 3
     if p[slots.SIDE_STIFFNESS] > 0.0:
         edge = p[slots.SIDE_POSITION]
@@ -131,6 +132,20 @@ def margin(state: np.ndarray, command: float, corner: int, p: np.ndarray) -> flo
         gap = p[slots.SPRING_GAP]
         left = min(left, _inside(x, gap, corner) / gap)
     return left
+
+
+@njit(**INNER)
+def _inside_teeth(state: np.ndarray, side: int, p: np.ndarray) -> float:
+    """Teeth touch beyond the gap, as long as their damping does not pull."""
+    twist = state[MOTOR_X] - state[X]
+    # Way for which the spring makes up for the damping.
+    ahead = p[slots.GEAR_DAMPING] / p[slots.GEAR_STIFFNESS]
+    ahead *= state[MOTOR_V] - state[V]
+    forward = min(twist, twist + ahead) - p[slots.GEAR_GAP]
+    backward = min(-twist, -twist - ahead) - p[slots.GEAR_GAP]
+    if side == 1:
+        return -max(forward, backward)
+    return forward if side == 2 else backward
 
 
 @njit(**INNER)

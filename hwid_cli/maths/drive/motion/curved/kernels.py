@@ -102,9 +102,10 @@ def step_limit(
     edge = p[slots.SIDE_POSITION]
     if p[slots.SIDE_STIFFNESS] > 0.0 and (x - edge) * edge > 0.0:
         stiffness += p[slots.SIDE_STIFFNESS]
+    damping = p[slots.DAMPING] + 2.0 * abs(p[slots.DRAG]) * speed
     if has_motor and abs(state[2] - x) > p[slots.GEAR_GAP]:
         stiffness += p[slots.GEAR_STIFFNESS]
-    damping = p[slots.DAMPING] + 2.0 * abs(p[slots.DRAG]) * speed
+        damping += p[slots.GEAR_DAMPING]
     if p[slots.CLIP_LIMIT] < np.inf:
         damping += p[slots.FORCE_CONSTANT] * p[slots.CLIP_SLOPE]
     if p[slots.RESISTANCE] > 0.0:

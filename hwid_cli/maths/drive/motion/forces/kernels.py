@@ -60,7 +60,7 @@ def acceleration(
     if has_motor:
         inner = p[slots.MOTOR_SHARE] * mass
         mass -= inner
-        teeth = p[slots.GEAR_STIFFNESS] * beyond(state[MOTOR_X] - x, p[slots.GEAR_GAP])
+        teeth = bite(state[MOTOR_X] - x, state[MOTOR_V] - v, p)
         motor = (force - teeth) / inner
         force = teeth
     net = force + value_of(push, OTHER, done) - resisting(x, v, memory, p)
@@ -178,6 +178,24 @@ def beyond(x: float, half_gap: float) -> float:
     if x < -half_gap:
         return x + half_gap
     return 0.0
+
+
+@njit(**INNER)
+def bite(twist: float, speed: float, p: np.ndarray) -> float:
+    """Return the force of the teeth, which push and never pull.
+
+    Parameters
+    ----------
+    twist : float, [m]
+        Of the motor against the mass.
+    speed : float, [m/s]
+    p : ndarray, shape (N_SLOTS,)
+    """
+    into = beyond(twist, p[slots.GEAR_GAP])
+    force = p[slots.GEAR_STIFFNESS] * into + p[slots.GEAR_DAMPING] * speed
+    if into > 0.0:
+        return max(force, 0.0)
+    return min(force, 0.0) if into < 0.0 else 0.0
 
 
 @njit(**INNER)
