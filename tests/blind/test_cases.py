@@ -1,6 +1,7 @@
 """The cases, their files and their seeds."""
 
 import json
+from functools import cache
 
 import numpy as np
 import pytest
@@ -47,6 +48,10 @@ REPORTED = {
 }
 
 
+# Cases are values and their truths are never changed here.
+measured = cache(measured_case)
+
+
 def short_case(*effects, **fields):
     return make_case("full", effects, 0, plan="short", **fields)
 
@@ -54,7 +59,7 @@ def short_case(*effects, **fields):
 def test_every_effect_is_hidden_with_the_parameters_that_must_be_reported():
     assert set(CATALOGUE) == set(REPORTED) == set(FAMILY_OF)
     for effect in ("gear_backlash", "cogging", "parameter_change", "end_stop"):
-        _, truth = measured_case(short_case(effect))
+        _, truth = measured(short_case(effect))
         (one,) = truth["effects"]
         assert set(one["parameters"]) - NOT_REPORTED == REPORTED[effect]
 
@@ -84,7 +89,7 @@ def test_a_case_is_the_same_at_every_call_and_another_for_another_number():
 
 
 def test_the_simulation_is_wrong_by_what_it_should_be():
-    _, truth = measured_case(short_case())
+    _, truth = measured(short_case())
 
     for name, value in truth["base"].items():
         assert 0.1 <= abs(truth["simulation"][name] / value - 1) <= 0.25
@@ -94,7 +99,7 @@ def test_the_simulation_is_wrong_by_what_it_should_be():
 
 @pytest.mark.parametrize("noise", [0.1, 3.0])
 def test_the_noise_has_the_power_that_the_truth_states(noise):
-    noisy, truth = measured_case(short_case(noise=noise))
+    noisy, truth = measured(short_case(noise=noise))
     at_rest = np.concatenate([one.displacement_m[:100] for one in noisy])
 
     # 1000 samples of rest: the standard error of the deviation is 2.2 %.
@@ -102,8 +107,8 @@ def test_the_noise_has_the_power_that_the_truth_states(noise):
 
 
 def test_the_largest_reading_is_the_reference_of_a_sensor_law():
-    recordings, truth = measured_case(short_case("sensor_cubic", noise=1e-6))
-    plain, _ = measured_case(short_case("sensor_cubic", noise=1e-6))
+    recordings, truth = measured(short_case("sensor_cubic", noise=1e-6))
+    plain, _ = measured(short_case("sensor_cubic", noise=1e-6))
     largest = max(np.abs(one.displacement_m).max() for one in recordings)
 
     # Noise of 1e-8 of the largest reading, and thirty rounds of the fixed point.
@@ -112,7 +117,7 @@ def test_the_largest_reading_is_the_reference_of_a_sensor_law():
 
 
 def test_the_spread_of_a_changing_parameter_is_the_drawn_one():
-    _, truth = measured_case(short_case("parameter_change"))
+    _, truth = measured(short_case("parameter_change"))
     factors = [one["factor"] for one in truth["recordings"].values()]
 
     spread = truth["effects"][0]["parameters"]["spread"]

@@ -12,7 +12,7 @@ from tests.blind.machine import SAMPLE_TIME_S, Machine
 from tests.blind.machine import move as moved
 
 BASE = Machine()
-COMMAND = sine(5.0, 7.0)[60:460]
+COMMAND = sine(5.0, 7.0)[60:310]
 TIMES = np.arange(len(COMMAND)) * SAMPLE_TIME_S
 # Kinks in a force inside a step of 50 us cost up to 2e-8 m; the motion is 0.025 m and
 # the smallest noise of a case 2e-5 m.

@@ -3,7 +3,7 @@ import sys
 import textwrap
 
 import pytest
-from threadpoolctl import threadpool_info
+from threadpoolctl import threadpool_info, threadpool_limits
 
 from hwid_cli.campaign.cache import MemoryStore
 from hwid_cli.campaign.runner import RunSettings, Task, Workers, run_tasks
@@ -80,9 +80,11 @@ def test_linear_algebra_runs_on_one_thread_in_a_task():
     def most_threads():
         return max((pool["num_threads"] for pool in threadpool_info()), default=1)
 
-    (done,) = run_tasks(
-        [Task("k", "t", most_threads, (), int)], RunSettings(MemoryStore(), Workers(1))
-    )
+    task = Task("k", "t", most_threads, (), int)
+    # The tests themselves run with one thread, which would hide that nobody limits them.
+    with threadpool_limits(2):
+        assert most_threads() == 2
+        (done,) = run_tasks([task], RunSettings(MemoryStore(), Workers(1)))
     assert done.result == 1
 
 

@@ -20,6 +20,7 @@ def test_a_second_run_computes_nothing_and_force_computes_all(after_run, hwid):
     assert "0 pairs from the cache, 9 computed" in text
 
 
+@pytest.mark.usefixtures("blank_figures")
 def test_only_the_stages_that_are_named_run(hwid, edit, out):
     edit("identify: {}\ncrossval: {threshold: 0.01}", "")
     result = hwid("run")
@@ -79,6 +80,7 @@ def test_an_unknown_key_is_refused_by_every_stage(hwid, edit, command):
     assert "'nk'" in result.stderr
 
 
+@pytest.mark.usefixtures("blank_figures")
 def test_a_stage_that_fails_still_leaves_a_report_of_those_before(
     after_run, config, hwid, out
 ):

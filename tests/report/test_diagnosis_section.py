@@ -8,6 +8,9 @@ from hwid_cli.report.sections.diagnosis import diagnosis_section
 from tests.report.diagnosis_examples import NAN, named, nothing_missing, unknown
 from tests.report.report_examples import DIAGNOSIS
 
+# What the figures show is the matter of tests/report/figures.
+blank = pytest.mark.usefixtures("blank_figures")
+
 
 def section_of(record=None, diagnosis=None):
     stored = StoredResults(
@@ -32,8 +35,14 @@ def tables(section):
     return [one for one in section.blocks if isinstance(one, Table)]
 
 
-def test_the_summary_comes_first_and_the_effects_follow():
-    found = section_of(named())
+@pytest.fixture(scope="module")
+def of_nine():
+    """Dry friction found in nine recordings, with its figures."""
+    return section_of(named())
+
+
+def test_the_summary_comes_first_and_the_effects_follow(of_nine):
+    found = of_nine
     effect = named().effects[0]
 
     assert texts(found)[0] == named().summary
@@ -47,8 +56,8 @@ def test_the_summary_comes_first_and_the_effects_follow():
     ]
 
 
-def test_every_figure_lies_in_its_folder():
-    files = [one.file for one in images_of(section_of(named()).blocks)]
+def test_every_figure_lies_in_its_folder(of_nine):
+    files = [one.file for one in images_of(of_nine.blocks)]
 
     assert files == [
         f"diagnosis/{name}.png"
@@ -56,6 +65,7 @@ def test_every_figure_lies_in_its_folder():
     ]
 
 
+@blank
 def test_the_worst_held_out_recordings_are_called_out():
     found = named()
     rms = {"step_03": 9e-4, "step_00": 8e-4, "sine_01": 1.0}
@@ -69,6 +79,7 @@ def test_the_worst_held_out_recordings_are_called_out():
     assert "sine_01" not in told
 
 
+@blank
 def test_without_numbers_no_recording_is_the_worst():
     found = named()
     gaps = tuple(replace(one, rms_after=NAN) for one in found.gaps)
@@ -76,6 +87,7 @@ def test_without_numbers_no_recording_is_the_worst():
     assert sentences(section_of(replace(found, gaps=gaps)))[0].endswith("the noise.")
 
 
+@blank
 def test_long_tables_are_folded():
     folded = [one for one in section_of(named(43)).blocks if isinstance(one, Folded)]
 
@@ -86,6 +98,7 @@ def test_long_tables_are_folded():
     assert [len(one.blocks[0].rows) for one in folded] == [43, 12]
 
 
+@blank
 def test_where_nothing_is_missing_the_section_is_short():
     found = section_of(nothing_missing())
 
@@ -94,6 +107,7 @@ def test_where_nothing_is_missing_the_section_is_short():
     assert len(images_of(found.blocks)) == 1
 
 
+@blank
 def test_an_unknown_gap_shows_the_force_without_a_law():
     found = section_of(unknown())
 
@@ -103,6 +117,7 @@ def test_an_unknown_gap_shows_the_force_without_a_law():
     assert "coulomb_friction" not in str(tables(found))
 
 
+@blank
 def test_the_record_goes_before_the_file():
     found = section_of(named(), {"verdict": "none"})
 
@@ -120,6 +135,7 @@ def test_older_results_have_the_file_alone():
     assert images_of(found.blocks) == ()
 
 
+@blank
 @pytest.mark.parametrize("count", [1, 43])
 def test_counts_are_told(count):
     remark = " ".join(texts(section_of(named(count))))

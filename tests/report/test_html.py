@@ -138,6 +138,7 @@ def test_a_missing_stage_is_one_line_with_the_command(bare):
     assert bare.all("img") == []
 
 
+@pytest.mark.usefixtures("blank_figures")
 def test_a_tensor_of_other_models_is_called_outdated(contents):
     outdated = replace(contents, cross=None, outdated=("crossval",))
     text = Reader(report_page(small(outdated), {}).html).text

@@ -26,6 +26,9 @@ from hwid_cli.report.sections.recordings import (
 from hwid_cli.report.sections.summary import summary_section
 from tests.report.report_examples import calibrated_only, log, names
 
+# Figures of rare shapes are rendered in the tests without this mark.
+blank = pytest.mark.usefixtures("blank_figures")
+
 
 def said(section):
     """Sentences of a section, those of its figures too."""
@@ -96,6 +99,7 @@ def test_without_a_chain_the_tree_says_that_nothing_is_covered(nothing_covered):
     assert "reach" not in text
 
 
+@blank
 def test_without_a_chain_no_command_is_asked_for_that_has_run(nothing_covered):
     text = said(models_section(nothing_covered))
 
@@ -113,6 +117,7 @@ def test_where_nothing_is_covered_no_model_is_the_widest(nothing_covered):
     assert "Grouping: no group covers any recording." in summary
 
 
+@blank
 def test_where_nothing_is_covered_there_is_no_set_of_models(nothing_covered):
     text = said(assignment_section(nothing_covered))
 
@@ -121,6 +126,7 @@ def test_where_nothing_is_covered_there_is_no_set_of_models(nothing_covered):
     )
 
 
+@blank
 def test_a_smallest_set_of_one_is_a_model(contents):
     final = replace(contents.stored.final_test, smallest_set=("step_01/2/2",))
     one = replace(contents, stored=replace(contents.stored, final_test=final))
@@ -159,6 +165,7 @@ def test_a_chain_of_one_neither_raises_nor_goes_anywhere(contents):
         assert not re.search("goes from|raises|with the last", text)
 
 
+@blank
 @pytest.mark.parametrize(
     ("covers", "expected"),
     [
@@ -178,6 +185,7 @@ def test_the_chain_says_how_its_coverage_goes(contents, covers, expected):
     assert expected in said(groups_section(replace(contents, stored=stored)))
 
 
+@blank
 def test_a_recording_that_nobody_covers_is_not_listed_twice(contents):
     assert contents.stored.final_test.hard_to_cover == ("step_01", "step_03")
 
@@ -186,6 +194,7 @@ def test_a_recording_that_nobody_covers_is_not_listed_twice(contents):
     assert "Hardly any foreign model covers step_01." in text
 
 
+@blank
 def test_a_peak_at_the_lowest_frequency_drawn_has_no_place(contents):
     view = contents.models[0]
     magnitude = np.linspace(1.0, 0.1, view.response.magnitude.size)
@@ -196,12 +205,14 @@ def test_a_peak_at_the_lowest_frequency_drawn_has_no_place(contents):
     assert "passes most at" not in text
 
 
+@blank
 def test_the_level_table_says_why_the_search_stopped(contents):
     caption = tables(groups_section(contents))[0].caption
 
     assert contents.stored.search.reason in caption
 
 
+@blank
 def test_add_ons_stand_in_the_order_of_the_experiment(contents):
     who = ("step_10", "sine_2", "step_9")
     pairs = [(a, b) for a in who for b in who if a != b]
@@ -225,6 +236,7 @@ def test_add_ons_stand_in_the_order_of_the_experiment(contents):
     assert joined.heads == ("base", *who)
 
 
+@blank
 def test_figures_of_names_that_look_alike_are_files_of_their_own(contents):
     shown = contents.simulated[0]
     who = ("c#", "c_", "C#", "d", "d_detail")
@@ -240,6 +252,7 @@ def test_figures_of_names_that_look_alike_are_files_of_their_own(contents):
     assert len(set(files)) == len(files) == 2 * len(who)
 
 
+@blank
 def test_figures_of_models_that_look_alike_are_files_of_their_own(contents):
     view = contents.models[0]
     alike = replace(

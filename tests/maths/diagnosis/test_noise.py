@@ -210,20 +210,25 @@ def test_white_residuals_raise_a_false_alarm_in_less_than_one_percent(driven_by)
     assert np.median(found) == pytest.approx(0.491, abs=0.03)
 
 
+@pytest.mark.parametrize(
+    ("seeds", "most"),
+    # Over 120 seeds 0 and 1 were above 1; two of 60 are more than chance at 1 %.
+    [(range(12), 0), pytest.param(range(60), 2, marks=pytest.mark.slow)],
+    ids=["few", "many"],
+)
 @pytest.mark.parametrize("make", [slow_noise, mixed_noise])
 def test_residuals_of_slow_noise_pass_after_the_estimated_whitening(
-    motions, driven_by, make
+    motions, driven_by, make, seeds, most
 ):
     found = []
-    for seed in range(60):
+    for seed in seeds:
         rng = np.random.default_rng(seed)
         parts = [make(rng, y.size, 3e-4) for y in motions]
         measured = [y + part for y, part in zip(motions, parts, strict=True)]
         noise = noise_floor(problem_of(measured, driven_by))
         found.append(whiteness(parts, noise))
 
-    # Over 120 seeds 0 and 1 were above 1; two of 60 are more than chance at 1 %.
-    assert np.sum(np.array(found) > 1) <= 2
+    assert np.sum(np.array(found) > 1) <= most
     assert np.median(found) == pytest.approx(0.5, abs=0.1)
 
 

@@ -36,7 +36,11 @@ def legend_of(figure):
     return [text.get_text() for one in figure.legends for text in one.get_texts()]
 
 
-@pytest.mark.parametrize("count", [1, 9, 43])
+@pytest.mark.parametrize(
+    "count",
+    # Nine are rendered for their section of the report as well.
+    [1, pytest.param(9, marks=pytest.mark.slow), 43],
+)
 def test_any_number_of_recordings_gives_all_figures(count):
     figures = diagnosis_figures(named(count))
 
