@@ -12,7 +12,7 @@ DEV := $(VENV)/installed-dev
 .DEFAULT_GOAL := help
 .PHONY: help install run test test-all check format smoke bench clean \
         simulate calibrate identify crossval group test-stage steps model1 model2 \
-        reproduction thesis chapter2 hsm150
+        reproduction thesis chapter2 hsm150 diagnose gun real effects blind
 
 help:  ## show these targets
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' Makefile
@@ -95,6 +95,29 @@ thesis: chapter2 steps model1 model2  ## everything of the thesis at full size, 
 
 chapter2: $(RUN)  ## all stages on the simulated servo
 	$(HWID) run configs/chapter2.yaml
+
+diagnose: $(RUN)  ## what a mass-spring-damper lacks to be the virtual gun
+	$(HWID) diagnose configs/diagnose_demo.yaml
+
+gun: $(RUN)  ## the same at full size, and docs/gun_diagnosis.md
+	$(HWID) diagnose configs/diagnose_gun.yaml
+	$(BIN)/python docs/gun_diagnosis.py results/diagnose_gun > docs/gun_diagnosis.tmp && mv docs/gun_diagnosis.tmp docs/gun_diagnosis.md
+
+REAL := emps silverbox hsm150 ffwheel
+real: $(RUN)  ## diagnose real machines (data in HWID_REALDATA), and docs/real_diagnosis.md
+	@for name in $(REAL); do $(HWID) diagnose configs/diagnose_$$name.yaml || exit 1; done
+	$(BIN)/python docs/real_diagnosis.py results > docs/real_diagnosis.tmp && mv docs/real_diagnosis.tmp docs/real_diagnosis.md
+
+effects: $(RUN)  ## docs/effects.md from the catalogue
+	$(BIN)/python docs/effects_document.py
+
+# Seconds are only true on a machine that does nothing else.
+BLIND ?= results/blind
+BLIND_NUMBER ?= 1
+blind: $(DEV)  ## effects hidden by a generator of its own, and docs/blind_test.md: an hour and more
+	$(BIN)/python tests/blind/run_blind.py --suite full --suite poor --suite clean --suite nuisance \
+	  --suite outside --suite near --suite pairs --suite small --seeds reporting \
+	  --number $(BLIND_NUMBER) --jobs 2 --work $(BLIND) --write docs/blind_test.md
 
 hsm150: $(RUN)  ## all stages on measurements of a real servo motor, and linear models of them
 	$(HWID) run configs/hsm150_linear.yaml

@@ -20,7 +20,7 @@ from hwid_cli.campaign.candidate_tasks import (
     Rounds,
 )
 from hwid_cli.campaign.findings import Findings, describe
-from hwid_cli.campaign.runner import RunSettings
+from hwid_cli.campaign.runner import RunSettings, one_thread
 from hwid_cli.maths.diagnosis.candidate import Footing, fit_candidate
 from hwid_cli.maths.diagnosis.comparing import compare
 from hwid_cli.maths.diagnosis.judge import Judge
@@ -89,6 +89,17 @@ def diagnose_all(
     -------
     Diagnosis
     """
+    with one_thread():
+        return _diagnose(recordings, simulation, options, settings, on_stage)
+
+
+def _diagnose(
+    recordings: Sequence[Recording],
+    simulation: SimulationOptions,
+    options: DiagnoseOptions,
+    settings: RunSettings,
+    on_stage: Announce,
+) -> Diagnosis:
     held_out = (
         held_out_names(recordings)
         if isinstance(options.hold_out, str)
@@ -109,7 +120,9 @@ def diagnose_all(
         rounds = Rounds(
             problem=problem,
             key=diagnosis_key(recordings, simulation, options),
-            footing=Footing(fitted_drive(problem.drive, base), sizes, noise),
+            footing=Footing(
+                fitted_drive(problem.drive, base), sizes, noise, problem.drive
+            ),
             judge=judge,
             base=base,
             allowed=_allowed(problem, options),

@@ -218,8 +218,15 @@ def _forget_stopping(problem: threading.ExceptHookArgs) -> None:
         threading.__excepthook__(problem)
 
 
-def _run(task: Task) -> tuple[str, Any]:
+@contextmanager
+def one_thread() -> Iterator[None]:
+    """Keep linear algebra to one thread: more change last bits, and fight over cores."""
     with _thread_pools().limit(limits=1):
+        yield
+
+
+def _run(task: Task) -> tuple[str, Any]:
+    with one_thread():
         return task.key, task.function(*task.arguments)
 
 

@@ -17,6 +17,7 @@ from hwid_cli.maths.diagnosis.problem import Problem
 from hwid_cli.maths.diagnosis.search import Fitted, fit
 from hwid_cli.maths.diagnosis.unknowns import (
     Point,
+    drive_at,
     effects_at,
     first_point,
     layout,
@@ -25,7 +26,7 @@ from hwid_cli.maths.drive.catalogue import Scales
 from hwid_cli.maths.drive.simulation import drive_effects
 from hwid_cli.records.candidates import CandidateFit
 from hwid_cli.records.diagnosis import NoiseFloor
-from hwid_cli.records.drive import Drive
+from hwid_cli.records.drive import BASE_PARAMETERS, Drive
 
 Start = Mapping[str, Mapping[str, float]]
 
@@ -37,6 +38,8 @@ FINALISTS = 2
 CLOSE_RACE = 1.5
 SAME_PLACE = 0.02
 MOST_ITERATIONS = 25
+# A base parameter that the re-fit changes by this factor or more is bent.
+BENT = 2.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,14 +49,41 @@ class Footing:
     Parameters
     ----------
     drive : Drive
-        With the base to start from.
+        With the re-fitted base.
     scales : Scales
     noise : NoiseFloor
+    given : Drive or None
+        With the base as given. Where the re-fit has bent it to imitate what is
+        missing, that is the better start.
     """
 
     drive: Drive
     scales: Scales
     noise: NoiseFloor
+    given: Drive | None = None
+
+    @property
+    def drives(self) -> list[Drive]:
+        """Drives whose bases a fit is started from."""
+        if self.given is None:
+            return [self.drive]
+        pairs = [
+            (getattr(self.given, one), getattr(self.drive, one))
+            for one in BASE_PARAMETERS
+        ]
+        is_bent = any(
+            abs(one) > BENT * abs(other) or abs(other) > BENT * abs(one)
+            for one, other in pairs
+        )
+        return [self.drive, self.given] if is_bent else [self.drive]
+
+
+@dataclass(frozen=True, eq=False)
+class _Begin:
+    """Where a fit begins: a drive with its base, and the values of all effects."""
+
+    drive: Drive
+    start: Start
 
 
 def thinned(problem: Problem, most_samples: int) -> Problem:
@@ -119,42 +149,47 @@ def fit_candidate(
     present = drive_effects(problem.drive)
     train = problem.part(held_out=False)
     everything = (*present, *effects)
-    full = [{**present, **start} for start in starts]
+    begins = [
+        _Begin(drive, {**present, **start})
+        for drive in footing.drives
+        for start in starts
+    ]
     most_iterations = MOST_ITERATIONS
     if effects:
         race = thinned(train, RACE_SAMPLES)
-        full, best_sse = _race(race, everything, full, footing)
+        begins, best_sse = _race(race, everything, begins, footing.scales)
         if best_sse > hopeless:
-            full, most_iterations = full[:1], 1
+            begins, most_iterations = begins[:1], 1
     found = [
-        _fit_from(train, everything, start, footing, most_iterations) for start in full
+        _fit_from(train, everything, begin, footing.scales, most_iterations)
+        for begin in begins
     ]
     best = min(found, key=lambda one: one.sse)
     return _judged(problem, effects, best, footing.noise)
 
 
 def _race(
-    problem: Problem,
-    effects: tuple[str, ...],
-    starts: list[dict[str, Mapping[str, float]]],
-    footing: Footing,
-) -> tuple[list[dict[str, Mapping[str, float]]], float]:
+    problem: Problem, effects: tuple[str, ...], begins: list[_Begin], scales: Scales
+) -> tuple[list[_Begin], float]:
     """Run the first iterations on few recordings.
 
     Returns where the best came to, with a second one where the race was close, and the
     sum of squares of the best.
     """
     found = [
-        _fit_from(problem, effects, start, footing, RACE_ITERATIONS) for start in starts
+        _fit_from(problem, effects, begin, scales, RACE_ITERATIONS) for begin in begins
     ]
     found.sort(key=lambda one: one.sse)
     if not np.isfinite(found[0].sse):
-        return starts[:1], float("inf")
+        return begins[:1], float("inf")
     close = [one for one in found[:FINALISTS] if one.sse <= CLOSE_RACE * found[0].sse]
-    finalists: list[dict[str, Mapping[str, float]]] = [
-        dict(effects_at(one.layout, one.point)) for one in close
+    finalists = [
+        _Begin(
+            drive_at(problem, one.layout, one.point), effects_at(one.layout, one.point)
+        )
+        for one in close
     ]
-    if len(finalists) > 1 and _is_same(finalists[0], finalists[1]):
+    if len(finalists) > 1 and _is_same(finalists[0].start, finalists[1].start):
         finalists.pop()
     return finalists, found[0].sse
 
@@ -171,12 +206,12 @@ def _is_same(one: Start, other: Start) -> bool:
 def _fit_from(
     problem: Problem,
     effects: tuple[str, ...],
-    start: Start,
-    footing: Footing,
+    begin: _Begin,
+    scales: Scales,
     max_iterations: int,
 ) -> Fitted:
-    fit_layout = layout(problem, effects, start, footing.scales)
-    point = first_point(problem, fit_layout, footing.drive, start)
+    fit_layout = layout(problem, effects, begin.start, scales)
+    point = first_point(problem, fit_layout, begin.drive, begin.start)
     point = with_own_trials(problem, fit_layout, point)
     return fit(problem, fit_layout, point, max_iterations=max_iterations)
 

@@ -22,7 +22,9 @@ LEAST_EXPLAINED = 0.5
 # ... and a set of several, which imitates more ...
 LEAST_EXPLAINED_SET = 0.8
 # ... in this share of the held-out recordings.
-LEAST_IMPROVED = 0.7
+LEAST_IMPROVED = 0.65
+# A recording counts where its sum of squares changes by this share or more.
+LEAST_CHANGE = 0.02
 # Changes of a parameter between recordings below this are scatter, [-].
 LEAST_SPREAD = 0.01
 # Residuals that go together all along still count as so many pieces of each recording:
@@ -43,7 +45,7 @@ class Evidence:
     explained : float, [-]
         Share of the other's held-out excess over the noise.
     improved : float, [-]
-        Share of the held-out recordings in which it is better.
+        Share of the held-out recordings that it changes in which it is better.
     """
 
     gain: float
@@ -131,7 +133,10 @@ class Judge:
         before, after = other.sse[held].sum(), found.sse[held].sum()
         excess = before - floor
         explained = (before - after) / excess if excess > 0 else 0.0
-        improved = float(np.mean(found.sse[held] < other.sse[held]))
+        change = other.sse[held] - found.sse[held]
+        # A stop that a recording never reaches says nothing there, for or against.
+        affected = np.abs(change) > LEAST_CHANGE * other.sse[held]
+        improved = float(np.mean(change[affected] > 0)) if affected.any() else 0.0
         return Evidence(self.gain(found, other), float(explained), improved)
 
     def gain(self, found: CandidateFit, other: CandidateFit) -> float:

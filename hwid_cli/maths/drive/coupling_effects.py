@@ -127,6 +127,8 @@ PERIODIC = Effect(
         slots.PERIODIC_PHASE: value.get("phase_rad", 0.0),
     },
     confused_with={"cogging": "recordings at rest, where only a force in time goes on"},
+    # A free axis drifts off with the phase at the start: that imitates anything.
+    needs_spring=True,
 )
 
 EFFECTS = (GEAR, MODE, PERIODIC)

@@ -42,11 +42,13 @@ def _periods(scales: Scales) -> tuple[float, ...]:
 def _waves(scales: Scales) -> tuple[dict[str, float], ...]:
     return tuple(
         {
-            "amplitude_N": one.amplitude_N,
+            "amplitude_N": multiple * one.amplitude_N,
             "period_m": one.period_m,
             "phase_rad": one.phase_rad,
         }
         for one in scales.waves
+        # The smoothed force that they were read from is too small where motion is fast.
+        for multiple in (1.0, 1.6, 2.5)
     )
 
 
