@@ -23,8 +23,8 @@ LEAST_EXPLAINED = 0.5
 LEAST_EXPLAINED_SET = 0.8
 # ... in this share of the held-out recordings.
 LEAST_IMPROVED = 0.65
-# A recording counts where its sum of squares changes by this share or more.
-LEAST_CHANGE = 0.02
+# A recording counts where its sum of squares changes by this share of the mean change.
+LEAST_CHANGE = 0.1
 # Changes of a parameter between recordings below this are scatter, [-].
 LEAST_SPREAD = 0.01
 # Residuals that go together all along still count as so many pieces of each recording:
@@ -135,7 +135,7 @@ class Judge:
         explained = (before - after) / excess if excess > 0 else 0.0
         change = other.sse[held] - found.sse[held]
         # A stop that a recording never reaches says nothing there, for or against.
-        affected = np.abs(change) > LEAST_CHANGE * other.sse[held]
+        affected = np.abs(change) > LEAST_CHANGE * np.mean(np.abs(change))
         improved = float(np.mean(change[affected] > 0)) if affected.any() else 0.0
         return Evidence(self.gain(found, other), float(explained), improved)
 
