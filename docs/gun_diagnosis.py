@@ -9,7 +9,10 @@ import json
 import sys
 from pathlib import Path
 
-from real_diagnosis import effect, rows_of
+# Run as a file, Python looks for modules beside it and not in the project.
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from docs.real_diagnosis import effect, rows_of
 
 INSIDE = (
     ("dry friction", "4.8 N sliding, 7.2 N to break away"),
