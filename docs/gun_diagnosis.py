@@ -5,6 +5,7 @@
 ``make gun`` runs all of it.
 """
 
+import csv
 import json
 import sys
 from pathlib import Path
@@ -30,7 +31,8 @@ def main() -> None:
     """Print the document."""
     folder = Path(sys.argv[1])
     found = json.loads((folder / "diagnosis.json").read_text())
-    sys.stdout.write("\n".join([*head(), *inside(), *verdict(found), *gaps(folder)]))
+    parts = [head(), inside(), verdict(found), candidates(folder), gaps(folder)]
+    sys.stdout.write("\n".join(line for part in parts for line in part))
 
 
 def head() -> list[str]:
@@ -69,6 +71,19 @@ def verdict(found: dict) -> list[str]:
         *(f"- {one['sentence']}" for one in found["where"][:6]),
         "",
     ]
+
+
+def candidates(folder: Path) -> list[str]:
+    """Sets of effects that explain most, whether they were named or not."""
+    with (folder / "ranking.csv").open(encoding="utf-8") as stream:
+        rows = [row for row in csv.DictReader(stream) if row["is_fitted"] == "1"]
+    rows.sort(key=lambda row: -float(row["explained_share"]))
+    lines = ["## What explains most", "", "| added | explained |", "|---|---|"]
+    lines += [
+        f"| {row['effects']} | {float(row['explained_share']):.1%} |"
+        for row in rows[:8]
+    ]
+    return [*lines, ""]
 
 
 def gaps(folder: Path) -> list[str]:

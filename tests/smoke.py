@@ -3,6 +3,7 @@
 ``make smoke`` runs this file; pytest does not.
 """
 
+import json
 import re
 import subprocess
 import sys
@@ -53,6 +54,10 @@ def main() -> None:
         for stage in ("identify", "crossval", "group", "test"):
             found = re.search(rf"^{stage}: (\d+) .* from the cache, 0 ", second, re.M)
             check(found is not None, f"{stage} was not cached:\n{second}")
+        found = re.search(r"^diagnose: \d+ recordings from the cache", second, re.M)
+        check(found is not None, f"diagnose was not cached:\n{second}")
+        diagnosis = json.loads((out / "diagnosis.json").read_text(encoding="utf-8"))
+        check(bool(diagnosis["summary"]), "the diagnosis says nothing")
         again, _ = read_tensor(out)
         check(bool(np.array_equal(tensor, again)), "the second run gave other numbers")
         page = (out / "report.html").read_text(encoding="utf-8")

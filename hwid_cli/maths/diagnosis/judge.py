@@ -3,7 +3,7 @@
 An information criterion alone names something even where nothing is missing: input
 noise or a coarse sensor is enough. Naming therefore also asks for held-out recordings:
 most of their error beyond the noise must be explained, in most of them.
-docs/method_diagnosis.md, eq. (D20), (D21) and (D24).
+docs/method_diagnosis.md, eq. (D21) and (D24).
 """
 
 from collections.abc import Sequence
