@@ -24,19 +24,25 @@ from hwid_cli.campaign.runner import RunSettings, one_thread
 from hwid_cli.maths.diagnosis.candidate import Footing, fit_candidate
 from hwid_cli.maths.diagnosis.comparing import compare
 from hwid_cli.maths.diagnosis.judge import Judge
+from hwid_cli.maths.diagnosis.lines import line_frequencies, line_share
 from hwid_cli.maths.diagnosis.noise import noise_floor
 from hwid_cli.maths.diagnosis.own_parameters import fit_own
 from hwid_cli.maths.diagnosis.preparing import prepare
 from hwid_cli.maths.diagnosis.problem import Compared, Problem, scales
 from hwid_cli.maths.diagnosis.scaling import scales_of
 from hwid_cli.maths.diagnosis.splitting import held_out_names
-from hwid_cli.maths.diagnosis.stored_fit import fitted_drive
+from hwid_cli.maths.diagnosis.stored_fit import fitted_drive, rebuilt
 from hwid_cli.maths.diagnosis.unknowns import first_point, layout
+from hwid_cli.maths.drive.catalogue import Scales
 from hwid_cli.maths.drive.effects import CATALOGUE, public_id
 from hwid_cli.maths.drive.simulation import drive_effects
-from hwid_cli.records.diagnosis import Diagnosis
+from hwid_cli.records.candidates import CandidateFit
+from hwid_cli.records.diagnosis import Diagnosis, NoiseFloor
 from hwid_cli.records.experiment import DiagnoseOptions, SimulationOptions
 from hwid_cli.records.recordings import Recording
+
+# A line that takes this share of what the base leaves is no colour of noise.
+LINE_SHARE = 0.3
 
 
 def diagnosis_key(
@@ -110,8 +116,10 @@ def _diagnose(
     on_stage("base", 0)
     given = compared_as_given(problem)
     sizes = scales(problem, [one.velocity for one in given])
-    present = drive_effects(problem.drive)
-    base = fit_candidate(problem, (), [present], Footing(problem.drive, sizes, noise))
+    base = _base(problem, sizes, noise)
+    if _shakes_at_rest(problem, base, sizes, noise):
+        noise = noise_floor(problem, rests=False)
+        base = _base(problem, sizes, noise)
     judge = Judge.of(problem, noise)
     found = Found((), (), {})
     if base.is_usable:
@@ -132,6 +140,24 @@ def _diagnose(
         found = run_rounds(rounds, options.max_effects)
     on_stage("verdict", 0)
     return describe(Findings(problem, noise, judge, sizes, given, base, found))
+
+
+def _base(problem: Problem, sizes: Scales, noise: NoiseFloor) -> CandidateFit:
+    """Base, and the effects that the simulation has already, fitted again."""
+    present = drive_effects(problem.drive)
+    return fit_candidate(problem, (), [present], Footing(problem.drive, sizes, noise))
+
+
+def _shakes_at_rest(
+    problem: Problem, base: CandidateFit, sizes: Scales, noise: NoiseFloor
+) -> bool:
+    """Whether the colour at rest is a line that goes on all the time: motion."""
+    if not (noise.is_coloured and noise.method == "rest" and base.is_usable):
+        return False
+    compared = compare(problem, *rebuilt(problem, base, sizes))
+    white = replace(noise, whitening=(1.0,))
+    line = line_frequencies(compared, white)[0]
+    return line_share(compared, line) > LINE_SHARE
 
 
 def compared_as_given(problem: Problem) -> list[Compared]:

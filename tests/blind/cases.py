@@ -9,7 +9,8 @@ from tests.blind.effects import CATALOGUE
 from tests.blind.nuisances import NUISANCES
 
 # The thresholds of the program are set while only development seeds are looked at.
-SEEDS = {"development": 1000, "reporting": 770000}
+# Reporting seeds from 770000 on were looked at once: a fault was mended after that.
+SEEDS = {"development": 1000, "reporting": 880000}
 NOISE_PERCENT = (0.1, 1.0, 3.0)
 NUISANCE_NOISE_PERCENT = 0.5
 SMALL_SIZES = (0.1, 0.3)

@@ -66,6 +66,32 @@ def line_frequencies(
     )
 
 
+def line_share(compared: Sequence[Compared], frequency_Hz: float) -> float:
+    """Share of all residuals that one line takes, with its own phase in each.
+
+    Parameters
+    ----------
+    compared : sequence of Compared
+    frequency_Hz : float, [Hz]
+
+    Returns
+    -------
+    float, [-]
+    """
+    before = after = 0.0
+    for one in compared:
+        residual = finite(one.residual)
+        residual = residual - residual.mean()
+        times = one.signals.sample_time_s * np.arange(residual.size)
+        angles = 2 * np.pi * frequency_Hz * times
+        columns = np.column_stack([np.sin(angles), np.cos(angles)])
+        found = np.linalg.lstsq(columns, residual, rcond=None)[0]
+        left = residual - columns @ found
+        before += float(residual @ residual)
+        after += float(left @ left)
+    return 1 - after / before if before > 0 else 0.0
+
+
 def _spectrum(
     residual: np.ndarray, sample_time_s: float, frequencies: np.ndarray
 ) -> np.ndarray:

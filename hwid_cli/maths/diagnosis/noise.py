@@ -43,12 +43,14 @@ class _Stretch:
     whitening: tuple[float, ...]
 
 
-def noise_floor(problem: Problem) -> NoiseFloor:
+def noise_floor(problem: Problem, *, rests: bool = True) -> NoiseFloor:
     """How much of what is compared is noise.
 
     Parameters
     ----------
     problem : Problem
+    rests : bool
+        Whether what is read before the input moves is noise.
 
     Returns
     -------
@@ -61,7 +63,7 @@ def noise_floor(problem: Problem) -> NoiseFloor:
     differences = _from_differences(pieces, step)
     is_limited = grid > 0 and step >= _GRID_SHARE * max(differences, step)
     repeats = _from_repeats(problem.signals, differences)
-    rest = None if is_limited else _from_rest(problem.signals)
+    rest = None if is_limited or not rests else _from_rest(problem.signals)
     if repeats is not None and not (is_limited and repeats.rms < step):
         found, method = repeats, "repeats"
     elif rest is not None and rest.is_coloured:
