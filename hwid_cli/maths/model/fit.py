@@ -22,6 +22,8 @@ from hwid_cli.maths.model.linear_block import is_stable, poles
 from hwid_cli.maths.model.normalise import normalise, rescaled
 from hwid_cli.maths.model.placing import with_maps
 from hwid_cli.maths.model.search import linear_search, nonlinear_search
+from hwid_cli.maths.model.starts import Start, linear_starts
+from hwid_cli.maths.model.static_map import has_free_shape
 from hwid_cli.maths.model.uncertainty import standard_errors
 from hwid_cli.maths.model.warm_start import warm_search
 from hwid_cli.records.model import Fit, FitOptions, HammersteinWiener, Orders
@@ -104,9 +106,14 @@ def fit(
     try:
         search = _warm_search(problem, options, starts)
         if search is None:
-            linear = linear_search(problem.experiments, orders, options)
+            starts_found = _starts(problem, orders, options)
+            linear = linear_search(problem.experiments, orders, options, starts_found)
             linear_rmsd = _rmsd(linear, problem)
-            search = _search(problem, orders, options, linear)
+            search = linear
+            if not _is_linear(options):
+                search = nonlinear_search(
+                    problem.experiments, orders, options, starts_found, linear
+                )
     except np.linalg.LinAlgError as error:
         return replace(blank, message=f"linear algebra failed: {error}")
     if not np.isfinite(search.cost) or not is_stable(
@@ -141,13 +148,20 @@ def _warm_search(
     return search if is_usable else None
 
 
-def _search(
-    problem: _Problem, orders: Orders, options: FitOptions, linear: Search
-) -> Search:
-    """Search from nothing but the linear model."""
-    if options.input_map == "none" and options.output_map == "none":
-        return linear
-    return nonlinear_search(problem.experiments, orders, options, linear)
+def _starts(
+    problem: _Problem, orders: Orders, options: FitOptions
+) -> tuple[Start, ...]:
+    return linear_starts(
+        problem.experiments,
+        orders,
+        options=options,
+        sees_input_map=has_free_shape(options.input_map),
+        count=options.starts,
+    )
+
+
+def _is_linear(options: FitOptions) -> bool:
+    return options.input_map == "none" and options.output_map == "none"
 
 
 def _reason_not_to_fit(

@@ -9,13 +9,19 @@ from dataclasses import replace
 import numpy as np
 
 from hwid_cli.maths.model import static_map
-from hwid_cli.maths.model.candidates import Candidate, Experiment, linear_output
-from hwid_cli.maths.model.maps.kernels import thinned_break_points
-from hwid_cli.maths.model.maps.piecewise_linear import break_points_and_values
+from hwid_cli.maths.model.candidates import Candidate, Experiment
+from hwid_cli.maths.model.maps.break_points.kernels import thinned_break_points
+from hwid_cli.maths.model.maps.piecewise_linear import (
+    N_ENDS,
+    break_points_and_values,
+)
+from hwid_cli.maths.model.points import block_signals, point_of
 from hwid_cli.records.model import StaticMap
 
 # Break-points of the fine maps from which the final ones are chosen, for each final one.
 _FINE_FACTOR = 3
+# Least distance of fine break-points, as a share of the range.
+_LEAST_GAP = 2e-3
 # Share of the samples that every fine break-point counts for beyond those near it, so
 # that the ends of a map, which few samples reach, keep theirs.
 _WEIGHT_OF_SHAPE = 1e-3
@@ -37,8 +43,9 @@ def reaching(
         Of all experiments, one after the other.
     """
     u = np.concatenate([one.input for one in experiments])
+    point = point_of(candidate)
     x = np.concatenate(
-        [linear_output(candidate, i, one)[1] for i, one in enumerate(experiments)]
+        [block_signals(point, i, one)[1] for i, one in enumerate(experiments)]
     )
     return u, x
 
@@ -73,7 +80,7 @@ def with_maps(
 
 
 def finer(one: StaticMap, argument: np.ndarray) -> StaticMap:
-    """Same map with more break-points, equally spaced over what reaches it.
+    """Same map with more break-points, spread over what reaches it.
 
     Parameters
     ----------
@@ -85,12 +92,26 @@ def finer(one: StaticMap, argument: np.ndarray) -> StaticMap:
     -------
     StaticMap
     """
-    low, high = float(argument.min()), float(argument.max())
-    if one.kind != "piecewise_linear" or not low < high:
+    if one.kind != "piecewise_linear" or not argument.min() < argument.max():
         return one
-    points = np.linspace(low, high, _FINE_FACTOR * (one.parameters.size // 2))
+    old, _ = break_points_and_values(one)
+    points = np.union1d(old, _spread(argument, (_FINE_FACTOR - 1) * old.size))
+    # A point closer to its neighbour than this would make a segment of no samples.
+    apart = np.diff(points, prepend=-np.inf) > _LEAST_GAP * np.ptp(points)
+    points = np.union1d(old, points[apart])
     values = static_map.evaluate(one, points)
-    return StaticMap(one.kind, np.concatenate([points, values]), (low, high))
+    domain = (float(argument.min()), float(argument.max()))
+    return StaticMap(one.kind, np.concatenate([points, values]), domain)
+
+
+def _spread(argument: np.ndarray, count: int) -> np.ndarray:
+    """Points half equally spaced, half where the samples are.
+
+    A signal that rarely goes far spends most samples in a small part of its range.
+    """
+    even = np.linspace(argument.min(), argument.max(), count - count // 2)
+    dense = np.quantile(argument, np.linspace(0.0, 1.0, count // 2 + 2)[1:-1])
+    return np.concatenate([even, dense])
 
 
 def thinner(one: StaticMap, argument: np.ndarray, units: int) -> StaticMap:
@@ -103,16 +124,17 @@ def thinner(one: StaticMap, argument: np.ndarray, units: int) -> StaticMap:
     argument : ndarray, shape (n,)
         What reaches the map; break-points near many samples weigh more.
     units : int
-        Break-points that stay.
+        Break-points that stay between the ends.
 
     Returns
     -------
     StaticMap
     """
-    if one.kind != "piecewise_linear" or one.parameters.size <= 2 * units:
+    count = units + N_ENDS
+    if one.kind != "piecewise_linear" or one.parameters.size <= 2 * count:
         return one
     points, values = break_points_and_values(one)
     middles = np.concatenate([[-np.inf], 0.5 * (points[1:] + points[:-1]), [np.inf]])
     weights = np.histogram(argument, middles)[0] + _WEIGHT_OF_SHAPE * argument.size
-    kept = thinned_break_points(points, values, weights, units)
+    kept = thinned_break_points(points, values, weights, count)
     return replace(one, parameters=np.concatenate([points[kept], values[kept]]))

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from hwid_cli.maths.model.maps import limits, piecewise_linear, polynomial
-from hwid_cli.maths.model.maps.rule import MapRule, Shape
+from hwid_cli.maths.model.maps.rule import Derivatives, MapRule, Shape
 from hwid_cli.records.model import FitOptions, StaticMap
 
 RULES: dict[str, MapRule] = {
@@ -76,6 +76,33 @@ def differentiate(
     """
     rule = RULES[static_map.kind]
     return rule.differentiate(static_map, argument, with_positions, out, first)
+
+
+def derivatives(
+    static_map: StaticMap, argument: np.ndarray, *, with_positions: bool
+) -> Derivatives:
+    """Value, slope and derivatives of a static map by its active parameters.
+
+    Parameters
+    ----------
+    static_map : StaticMap
+    argument : ndarray, shape (n,)
+    with_positions : bool
+        Whether the break-points of a piecewise linear map count as parameters.
+
+    Returns
+    -------
+    Derivatives
+    """
+    rule = RULES[static_map.kind]
+    if rule.derivatives is not None:
+        return rule.derivatives(static_map, argument, with_positions)
+    active = active_parameters(static_map, with_positions=with_positions)
+    count = active.stop - active.start
+    shares = np.empty((argument.size, count))
+    value, slope = rule.differentiate(static_map, argument, with_positions, shares, 0)
+    first = np.zeros(argument.size, dtype=np.int64)
+    return Derivatives(value, slope, first, shares, count)
 
 
 def starting_maps(
@@ -159,9 +186,11 @@ def move(static_map: StaticMap, step: np.ndarray, *, with_positions: bool) -> St
     -------
     StaticMap
     """
+    if step.size == 0:
+        return static_map
     parameters = static_map.parameters.copy()
     parameters[active_parameters(static_map, with_positions=with_positions)] += step
-    proposed = replace(static_map, parameters=parameters)
+    proposed = StaticMap(static_map.kind, parameters, static_map.domain)
     return RULES[static_map.kind].settle(static_map, proposed)
 
 

@@ -74,7 +74,7 @@ def options(
     return FitOptions(
         input_map=input_map,
         output_map=output_map,
-        units=4,
+        units=2,
         degree=3,
         initial_state=initial_state,
         **others,

@@ -52,6 +52,37 @@ def no_corners(static_map: StaticMap) -> np.ndarray:  # noqa: ARG001
     return np.zeros(0)
 
 
+@dataclass(frozen=True, eq=False)
+class Derivatives:
+    """Value, slope and derivatives of a static map along a signal.
+
+    At sample t the derivatives are ``shares[t]`` in the columns from ``first[t]`` on,
+    and zero in the others: most maps answer to a parameter in few places only.
+
+    Parameters
+    ----------
+    value, slope : ndarray, shape (n,)
+    first : ndarray of int, shape (n,)
+    shares : ndarray, shape (n, width)
+    count : int
+        Number of columns.
+    change : ndarray, shape (n_active, count), or None
+        Turns the columns into those of the parameters; None where they are.
+    """
+
+    value: np.ndarray
+    slope: np.ndarray
+    first: np.ndarray
+    shares: np.ndarray
+    count: int
+    change: np.ndarray | None = None
+
+    @property
+    def is_local(self) -> bool:
+        """Whether some columns are zero at every sample."""
+        return self.shares.shape[1] < self.count
+
+
 @dataclass(frozen=True)
 class MapRule:
     """What one kind of static map can do.
@@ -82,6 +113,8 @@ class MapRule:
         The proposed map with its parameters put into a legal order.
     corners : callable (StaticMap) -> ndarray
         Arguments at which the slope changes.
+    derivatives : callable (StaticMap, v, with_positions) -> Derivatives, or None
+        Faster than `differentiate` where they are local; None where they are not.
     """
 
     evaluate: Callable[[StaticMap, np.ndarray], np.ndarray]
@@ -98,3 +131,4 @@ class MapRule:
     n_positions: Callable[[StaticMap], int] = no_positions
     settle: Callable[[StaticMap, StaticMap], StaticMap] = keep_proposed
     corners: Callable[[StaticMap], np.ndarray] = no_corners
+    derivatives: Callable[[StaticMap, np.ndarray, bool], Derivatives] | None = None
