@@ -46,11 +46,7 @@ def place(
         with_positions=False,
         max_iterations=min(_PLACING_ITERATIONS, options.max_iterations),
     )
-    thinned = with_maps(
-        fine.candidate,
-        experiments,
-        lambda one, argument: thinner(one, argument, options.units),
-    )
+    thinned = with_maps(fine.candidate, experiments, thinner)
     return replace(fine, candidate=thinned, iterations=iterations + fine.iterations)
 
 

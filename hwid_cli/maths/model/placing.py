@@ -93,8 +93,8 @@ def finer(one: StaticMap, argument: np.ndarray) -> StaticMap:
     return StaticMap(one.kind, np.concatenate([points, values]), (low, high))
 
 
-def thinner(one: StaticMap, argument: np.ndarray, units: int) -> StaticMap:
-    """Map with fewer break-points, those that it needs most.
+def thinner(one: StaticMap, argument: np.ndarray) -> StaticMap:
+    """Map as `finer` found it, with the break-points that it needs most.
 
     Parameters
     ----------
@@ -102,14 +102,14 @@ def thinner(one: StaticMap, argument: np.ndarray, units: int) -> StaticMap:
         Kinds other than piecewise linear come back as they are.
     argument : ndarray, shape (n,)
         What reaches the map; break-points near many samples weigh more.
-    units : int
-        Break-points that stay.
 
     Returns
     -------
     StaticMap
     """
-    if one.kind != "piecewise_linear" or one.parameters.size <= 2 * units:
+    units = one.parameters.size // 2 // _FINE_FACTOR
+    is_constant = float(argument.min()) == float(argument.max())
+    if one.kind != "piecewise_linear" or is_constant:
         return one
     points, values = break_points_and_values(one)
     middles = np.concatenate([[-np.inf], 0.5 * (points[1:] + points[:-1]), [np.inf]])

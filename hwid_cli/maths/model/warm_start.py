@@ -50,7 +50,7 @@ def warm_search(
     """
     screened = [
         minimise(
-            _spread(_starting(one, experiments, options), experiments, options),
+            _spread(_starting(one, experiments, options), experiments),
             experiments,
             with_positions=False,
             max_iterations=min(_SCREENING_ITERATIONS, options.max_iterations),
@@ -78,13 +78,7 @@ def _starting(
     )
 
 
-def _spread(
-    candidate: Candidate, experiments: Sequence[Experiment], options: FitOptions
-) -> Candidate:
+def _spread(candidate: Candidate, experiments: Sequence[Experiment]) -> Candidate:
     """Maps whose break-points cover what the experiments reach, not the start's data."""
     fine = with_maps(candidate, experiments, finer)
-    return with_maps(
-        fine,
-        experiments,
-        lambda one, argument: thinner(one, argument, options.units),
-    )
+    return with_maps(fine, experiments, thinner)

@@ -14,7 +14,7 @@ from hwid_cli.maths.model.maps.kernels import (
     piecewise_linear_jacobian,
 )
 from hwid_cli.maths.model.maps.rule import MapRule, Shape
-from hwid_cli.records.model import FitOptions, StaticMap
+from hwid_cli.records.maps import MapOptions, StaticMap
 
 # A step of the fit may shrink a segment to this share of its width at most, so that
 # break-points stay in order and can still come close to each other over several steps.
@@ -59,7 +59,7 @@ def _differentiate(
 
 
 def _starts(
-    options: FitOptions, lowest: float, highest: float, shape: Shape
+    options: MapOptions, lowest: float, highest: float, shape: Shape
 ) -> tuple[StaticMap, ...]:
     points = np.linspace(lowest, highest, options.units)
     parameters = np.concatenate([points, shape(points)])
@@ -97,22 +97,38 @@ def _size(static_map: StaticMap) -> tuple[float, np.ndarray]:
     return float(np.ptp(values) / (high - low)), gradient
 
 
-def _settle(old: StaticMap, proposed: StaticMap) -> StaticMap:
-    """Keep the break-points in order."""
-    points, values = break_points_and_values(proposed)
-    old_points, _ = break_points_and_values(old)
-    old_widths = old_points[1:] - old_points[:-1]
-    least = np.maximum(
-        _LEAST_SHRINK * old_widths, _LEAST_WIDTH * (old_points[-1] - old_points[0])
-    )
+def in_order(old: np.ndarray, proposed: np.ndarray) -> np.ndarray:
+    """Positions after a step, kept in their order.
+
+    Parameters
+    ----------
+    old : ndarray, shape (n,)
+        Rising.
+    proposed : ndarray, shape (n,)
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Rising; the proposed ones where none comes too close to its neighbour.
+    """
+    old_widths = old[1:] - old[:-1]
+    least = np.maximum(_LEAST_SHRINK * old_widths, _LEAST_WIDTH * (old[-1] - old[0]))
     least = np.minimum(least, old_widths)
-    widths = points[1:] - points[:-1]
+    widths = proposed[1:] - proposed[:-1]
     if (widths >= least).all():
         return proposed
     laid_out = np.concatenate([[0.0], np.cumsum(np.maximum(widths, least))])
-    # Keep the mean of the break-points, so that widening pushes to both sides alike.
-    laid_out += points.mean() - laid_out.mean()
-    return replace(proposed, parameters=np.concatenate([laid_out, values]))
+    # Keep the mean, so that widening pushes to both sides alike.
+    return laid_out + (proposed.mean() - laid_out.mean())
+
+
+def _settle(old: StaticMap, proposed: StaticMap) -> StaticMap:
+    """Keep the break-points in order."""
+    points, values = break_points_and_values(proposed)
+    kept = in_order(break_points_and_values(old)[0], points)
+    if kept is points:
+        return proposed
+    return replace(proposed, parameters=np.concatenate([kept, values]))
 
 
 RULE = MapRule(
@@ -128,4 +144,6 @@ RULE = MapRule(
     n_positions=lambda static_map: static_map.parameters.size // 2,
     settle=_settle,
     corners=lambda static_map: break_points_and_values(static_map)[0],
+    # The outermost ones may slide along the straight line beyond them.
+    held=lambda static_map: (0, static_map.parameters.size // 2 - 1),
 )
