@@ -102,6 +102,7 @@ def fit(
     if reason:
         return replace(blank, message=reason)
     problem = _scaled(recordings, options)
+    options = options.in_units(problem.input_scale, problem.output_scale)
     linear_rmsd = float("nan")
     try:
         search = _warm_search(problem, options, starts)
@@ -184,8 +185,8 @@ def _reason_not_to_fit(
 def _least_parameters(orders: Orders, options: FitOptions) -> int:
     """Parameters of a model, each shared gain counted once."""
     maps = (
-        static_map.identity(kind, options, np.array([0.0, 1.0]))
-        for kind in (options.input_map, options.output_map)
+        static_map.identity(one.kind, one, np.array([0.0, 1.0]))
+        for one in (options.of_input, options.of_output)
     )
     return orders.nb + orders.nf + sum(one.parameters.size for one in maps)
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from hwid_cli.maths.model.candidates import Candidate, Experiment
 from hwid_cli.maths.model.levenberg_marquardt import LEAST_GAIN, Search, minimise
-from hwid_cli.maths.model.placing import finer, thinner, with_maps
+from hwid_cli.maths.model.placing import finer, thinned, with_maps
 from hwid_cli.records.model import FitOptions
 
 # Iterations at most with fixed break-points, and the share of the cost that a step must
@@ -50,12 +50,11 @@ def place(
         max_iterations=min(_PLACING_ITERATIONS, options.max_iterations),
         least_gain=_PLACING_GAIN,
     )
-    thinned = with_maps(
-        fine.candidate,
-        experiments,
-        lambda one, argument: thinner(one, argument, options.units),
+    return replace(
+        fine,
+        candidate=thinned(fine.candidate, experiments, options),
+        iterations=iterations + fine.iterations,
     )
-    return replace(fine, candidate=thinned, iterations=iterations + fine.iterations)
 
 
 def finish(

@@ -16,7 +16,7 @@ from hwid_cli.maths.model.maps.piecewise_linear import (
     break_points_and_values,
 )
 from hwid_cli.maths.model.points import block_signals, point_of
-from hwid_cli.records.model import StaticMap
+from hwid_cli.records.model import FitOptions, StaticMap
 
 # Break-points of the fine maps from which the final ones are chosen, for each final one.
 _FINE_FACTOR = 3
@@ -54,6 +54,7 @@ def with_maps(
     candidate: Candidate,
     experiments: Sequence[Experiment],
     change: Callable[[StaticMap, np.ndarray], StaticMap],
+    change_output: Callable[[StaticMap, np.ndarray], StaticMap] | None = None,
 ) -> Candidate:
     """Candidate with both maps changed, given the arguments that reach them.
 
@@ -62,6 +63,8 @@ def with_maps(
     candidate : Candidate
     experiments : sequence of Experiment
     change : callable (StaticMap, ndarray) -> StaticMap
+    change_output : callable, optional
+        For the output map, if it is another one.
 
     Returns
     -------
@@ -73,9 +76,32 @@ def with_maps(
         replace(
             model,
             input_map=change(model.input_map, u),
-            output_map=change(model.output_map, x),
+            output_map=(change_output or change)(model.output_map, x),
         ),
         candidate.free_responses,
+    )
+
+
+def thinned(
+    candidate: Candidate, experiments: Sequence[Experiment], options: FitOptions
+) -> Candidate:
+    """Candidate whose maps have as many break-points as asked for.
+
+    Parameters
+    ----------
+    candidate : Candidate
+    experiments : sequence of Experiment
+    options : FitOptions
+
+    Returns
+    -------
+    Candidate
+    """
+    return with_maps(
+        candidate,
+        experiments,
+        lambda one, argument: thinner(one, argument, options.of_input.units),
+        lambda one, argument: thinner(one, argument, options.of_output.units),
     )
 
 

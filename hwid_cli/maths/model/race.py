@@ -121,7 +121,7 @@ def starting_candidates(
     candidates = []
     for input_map in static_map.starting_maps(
         options.input_map,
-        options,
+        options.of_input,
         inputs.min(),
         inputs.max(),
         shape=lambda u: np.interp(u, start.input_points, start.input_values),
@@ -131,7 +131,7 @@ def starting_candidates(
             start.numerator,
             start.denominator,
             orders.nk,
-            static_map.identity("none", options, np.ones(1)),
+            static_map.identity("none", options.of_output, np.ones(1)),
             sample_time_s=1.0,
             initial_state=options.initial_state,
         )
@@ -140,7 +140,7 @@ def starting_candidates(
             Candidate(replace(model, output_map=output_map), states)
             for output_map in static_map.starting_maps(
                 options.output_map,
-                options,
+                options.of_output,
                 x.min(),
                 x.max(),
                 shape=lambda x: x + start.offset,
@@ -165,7 +165,7 @@ def _with_output_curve(
     values = np.linalg.solve(matrix, vector[:, 0])
     maps = static_map.starting_maps(
         options.output_map,
-        options,
+        options.of_output,
         points[0],
         points[-1],
         shape=lambda v: np.interp(v, points, values),

@@ -16,7 +16,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from hwid_cli.maths.model import static_map
+from hwid_cli.maths.model import sensitivities, static_map
 from hwid_cli.maths.model.candidates import Candidate, Experiment
 from hwid_cli.maths.model.levenberg_marquardt import Search, minimise
 from hwid_cli.maths.model.phases import finish, place
@@ -107,7 +107,10 @@ def nonlinear_search(
     if relaxed.cost < _WORTH_GOING_ON * best.cost:
         best = _best([best, finish(relaxed, experiments, options)])
     if linear.cost < best.cost:
-        passing = replace(linear, candidate=_passing(linear, experiments, options))
+        candidate = _passing(linear, experiments, options)
+        # Not that of the linear model where a kind cannot pass everything on.
+        passing_cost = sensitivities.cost(candidate, experiments)
+        passing = replace(linear, candidate=candidate, cost=passing_cost)
         best = _best([best, passing, finish(passing, experiments, options)])
     return best
 
@@ -120,8 +123,8 @@ def _passing(
     u, x = reaching(candidate, experiments)
     model = replace(
         candidate.model,
-        input_map=static_map.identity(options.input_map, options, u),
-        output_map=static_map.identity(options.output_map, options, x),
+        input_map=static_map.identity(options.input_map, options.of_input, u),
+        output_map=static_map.identity(options.output_map, options.of_output, x),
     )
     return replace(candidate, model=model)
 

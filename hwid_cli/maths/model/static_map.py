@@ -1,19 +1,28 @@
 """Static nonlinearities: one table from name to functions, and what fits do with them.
 
-Another nonlinearity is one more entry in `RULES` (and its name in `records.model`).
+Another nonlinearity is one more entry in `RULES` (and its name in `records.maps`).
 
 References
 ----------
-docs/method.md, eqs. (2)-(4).
+docs/method.md, eqs. (2)-(4f).
 """
 
 from dataclasses import replace
 
 import numpy as np
 
-from hwid_cli.maths.model.maps import limits, piecewise_linear, polynomial
+from hwid_cli.maths.model.maps import (
+    cubic_spline,
+    limits,
+    own_function,
+    piecewise_constant,
+    piecewise_linear,
+    polynomial,
+    sigmoid_network,
+    wavelet_network,
+)
 from hwid_cli.maths.model.maps.rule import Derivatives, MapRule, Shape
-from hwid_cli.records.model import FitOptions, StaticMap
+from hwid_cli.records.maps import MapOptions, StaticMap
 
 RULES: dict[str, MapRule] = {
     "piecewise_linear": piecewise_linear.RULE,
@@ -21,6 +30,11 @@ RULES: dict[str, MapRule] = {
     "dead_zone": limits.DEAD_ZONE,
     "polynomial": polynomial.RULE,
     "none": limits.NONE,
+    "sigmoid_network": sigmoid_network.RULE,
+    "wavelet_network": wavelet_network.RULE,
+    "cubic_spline": cubic_spline.RULE,
+    "piecewise_constant": piecewise_constant.RULE,
+    "own_function": own_function.RULE,
 }
 
 
@@ -38,7 +52,7 @@ def evaluate(static_map: StaticMap, argument: np.ndarray) -> np.ndarray:
 
     References
     ----------
-    docs/method.md, eqs. (2)-(4).
+    docs/method.md, eqs. (2)-(4f).
 
     Examples
     --------
@@ -68,7 +82,7 @@ def differentiate(
     first : int
         First column to write.
     with_positions : bool
-        Whether the break-points of a piecewise linear map count as parameters.
+        Whether positions, such as break-points, count as parameters.
 
     Returns
     -------
@@ -107,7 +121,7 @@ def derivatives(
 
 def starting_maps(
     kind: str,
-    options: FitOptions,
+    options: MapOptions,
     lowest: float,
     highest: float,
     *,
@@ -118,7 +132,7 @@ def starting_maps(
     Parameters
     ----------
     kind : str
-    options : FitOptions
+    options : MapOptions
     lowest, highest : float
         Range of the argument; widened where it is empty.
     shape : callable (ndarray) -> ndarray
@@ -132,13 +146,13 @@ def starting_maps(
     return RULES[kind].starts(options, lowest, highest, shape)
 
 
-def identity(kind: str, options: FitOptions, argument: np.ndarray) -> StaticMap:
+def identity(kind: str, options: MapOptions, argument: np.ndarray) -> StaticMap:
     """Map that passes an argument on unchanged.
 
     Parameters
     ----------
     kind : str
-    options : FitOptions
+    options : MapOptions
     argument : ndarray, shape (n,)
 
     Returns
@@ -190,7 +204,7 @@ def move(static_map: StaticMap, step: np.ndarray, *, with_positions: bool) -> St
         return static_map
     parameters = static_map.parameters.copy()
     parameters[active_parameters(static_map, with_positions=with_positions)] += step
-    proposed = StaticMap(static_map.kind, parameters, static_map.domain)
+    proposed = replace(static_map, parameters=parameters)
     return RULES[static_map.kind].settle(static_map, proposed)
 
 
@@ -227,13 +241,15 @@ def stretch(static_map: StaticMap, factor: float) -> StaticMap:
     -------
     StaticMap
     """
-    # Every parameter has the unit of argument or value, whatever the kind.
     low, high = static_map.domain
-    return replace(
-        static_map,
-        parameters=static_map.parameters * factor,
-        domain=(low * factor, high * factor),
-    )
+    domain = (low * factor, high * factor)
+    function = static_map.function
+    if function is not None:
+        # Nobody knows the units of its parameters: the function keeps its own.
+        kept = replace(function, unit=function.unit * factor)
+        return replace(static_map, function=kept, domain=domain)
+    # Every other parameter has the unit of argument or value, whatever the kind.
+    return replace(static_map, parameters=static_map.parameters * factor, domain=domain)
 
 
 def has_free_shape(kind: str) -> bool:

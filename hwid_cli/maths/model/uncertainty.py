@@ -2,9 +2,10 @@
 
 From the inverse of ``J'J`` at the optimum, for white residuals. J'J is singular in the
 directions of the shared gains (see `normalise`): they are held by one equation each, the
-same that `normalise` fulfils. The outermost break-points of a map that goes on straight
-beyond them are held too: they may slide along that line. Whatever is singular beyond that, the data do not
-determine: those parameters get NaN and the reason names them.
+same that `normalise` fulfils. Positions that a kind takes as known are held too, such as
+the outermost break-points of a map that goes on straight beyond them: they may slide
+along that line. Whatever is singular beyond that, the data do not determine: those
+parameters get NaN and the reason names them.
 
 References
 ----------
@@ -49,6 +50,9 @@ def standard_errors(
         Of the maps' active parameters, B and F; initial states count as parameters but
         are not listed.
     """
+    kind = candidate.model.output_map.kind
+    if not RULES[kind].has_slope:
+        return Uncertainty(reason=f"a {kind} output map has no slope to tell by")
     system = sensitivities.equations(
         candidate, experiments, with_positions=free_break_points
     )
@@ -91,18 +95,16 @@ def _gain_equations(candidate: Candidate, place: Columns) -> list[np.ndarray]:
         gradient = _value_gradient(model.input_map)
         held.append(_row(place, place.input_map, gradient))
     if place.with_positions:
-        held += _end_break_points(model.input_map, place, place.input_map)
-        held += _end_break_points(model.output_map, place, place.output_map)
+        held += _held_positions(model.input_map, place, place.input_map)
+        held += _held_positions(model.output_map, place, place.output_map)
     return held
 
 
-def _end_break_points(one: StaticMap, place: Columns, part: slice) -> list[np.ndarray]:
-    """Hold the outermost break-points of a piecewise linear map."""
-    rows = np.zeros((2, place.total))
-    last = RULES[one.kind].n_positions(one) - 1
-    if last < 0:
-        return []
-    rows[0, part.start], rows[1, part.start + last] = 1.0, 1.0
+def _held_positions(one: StaticMap, place: Columns, part: slice) -> list[np.ndarray]:
+    """Hold the positions that a kind takes as known."""
+    indices = RULES[one.kind].held(one)
+    rows = np.zeros((len(indices), place.total))
+    rows[np.arange(len(indices)), part.start + np.array(indices, dtype=int)] = 1.0
     return list(rows)
 
 
@@ -116,7 +118,9 @@ def _offset_is_shared(candidate: Candidate, place: Columns) -> bool:
     both_free = all(
         RULES[one.kind].size is not None for one in (model.input_map, model.output_map)
     )
-    can_shift = model.output_map.kind == "polynomial" or place.with_positions
+    rule = RULES[model.output_map.kind]
+    has_positions = rule.n_positions(model.output_map) > 0
+    can_shift = rule.shifts or (place.with_positions and has_positions)
     return both_free and can_shift and model.initial_state != "zero"
 
 

@@ -20,7 +20,7 @@ from hwid_cli.maths.model.maps.kernels import (
     piecewise_linear_value,
 )
 from hwid_cli.maths.model.maps.rule import Derivatives, MapRule, Shape
-from hwid_cli.records.model import FitOptions, StaticMap
+from hwid_cli.records.maps import MapOptions, StaticMap
 
 # Ends of a map, stored beside the break-points between them.
 N_ENDS = 2
@@ -95,7 +95,7 @@ def _by_segments(points: np.ndarray, values: np.ndarray) -> np.ndarray:
 
 
 def _starts(
-    options: FitOptions, lowest: float, highest: float, shape: Shape
+    options: MapOptions, lowest: float, highest: float, shape: Shape
 ) -> tuple[StaticMap, ...]:
     points = np.linspace(lowest, highest, options.units + N_ENDS)
     parameters = np.concatenate([points, shape(points)])
@@ -133,14 +133,30 @@ def _size(static_map: StaticMap) -> tuple[float, np.ndarray]:
     return float(np.ptp(values) / (high - low)), gradient
 
 
+def in_order(old: np.ndarray, proposed: np.ndarray) -> np.ndarray:
+    """Positions after a step, kept in their order.
+
+    Parameters
+    ----------
+    old : ndarray, shape (n,)
+        Rising.
+    proposed : ndarray, shape (n,)
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Rising; the proposed ones where none comes too close to its neighbour.
+    """
+    kept = proposed.copy()
+    settled_break_points(old, kept, _LEAST_SHRINK, _LEAST_WIDTH)
+    return kept
+
+
 def _settle(old: StaticMap, proposed: StaticMap) -> StaticMap:
     """Keep the break-points in order."""
-    units = old.parameters.size // 2
-    parameters = proposed.parameters.copy()
-    settled_break_points(
-        old.parameters[:units], parameters[:units], _LEAST_SHRINK, _LEAST_WIDTH
-    )
-    return StaticMap(old.kind, parameters, old.domain)
+    points, values = break_points_and_values(proposed)
+    kept = in_order(break_points_and_values(old)[0], points)
+    return StaticMap(old.kind, np.concatenate([kept, values]), old.domain)
 
 
 RULE = MapRule(
@@ -157,4 +173,6 @@ RULE = MapRule(
     settle=_settle,
     corners=lambda static_map: break_points_and_values(static_map)[0],
     derivatives=_derivatives,
+    # The outermost ones may slide along the straight line beyond them.
+    held=lambda static_map: (0, static_map.parameters.size // 2 - 1),
 )
