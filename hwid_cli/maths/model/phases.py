@@ -13,7 +13,7 @@ from hwid_cli.records.model import FitOptions
 
 # Iterations at most with fixed break-points, and the share of the cost that a step must
 # gain: far from the minimum, break-points that move get lost.
-_PLACING_ITERATIONS, _PLACING_GAIN = 30, 2e-2
+_PLACING_ITERATIONS, _PLACING_GAIN = 30, 5e-2
 
 
 def place(

@@ -29,14 +29,14 @@ from hwid_cli.records.model import FitOptions, Orders
 
 # Hat functions into which the input is expanded; few, because each brings nb unknowns.
 _HATS = 5
-_ITERATIONS = 4
-# Pole radii of the filters with which the iterations begin: none, and slower ones.
-_PREFILTER_RADII = (0.0, 0.9)
-_FEWER_POLES = (2,)
+_ITERATIONS = 3
+# Poles with which the iterations begin in place of those asked for: a rich model of a
+# simple plant, or of a poor input, is found this way, its other poles start at zero.
+_FEWER_POLES = 2
 # With more experiments the free responses would outnumber everything else.
 _MOST_FREE_RESPONSES = 3
 # Equations of a start's least squares; enough for a few dozen unknowns.
-_ROWS = 2000
+_ROWS = 1000
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,16 +125,9 @@ def linear_starts(
 
 
 def _prefilters(orders: Orders) -> list[np.ndarray]:
-    """Denominators with which the iterations begin.
-
-    Fewer poles than asked for find what a rich model of a simple plant, or of a poor
-    input, misses: the other poles then start at zero.
-    """
-    variants = [(orders.nf, radius) for radius in _PREFILTER_RADII]
-    variants += [(n_poles, 0.0) for n_poles in _FEWER_POLES if n_poles < orders.nf]
-    return [
-        np.atleast_1d(np.poly(np.full(n_poles, radius))) for n_poles, radius in variants
-    ]
+    """Denominators with which the iterations begin: no filter, of so many poles."""
+    counts = {orders.nf, min(orders.nf, _FEWER_POLES)}
+    return [np.eye(1, count + 1)[0] for count in sorted(counts, reverse=True)]
 
 
 def _iterations(one: Regression, denominator: np.ndarray) -> list[Solution]:
