@@ -5,17 +5,17 @@ keeps the RMSDs only: simulated signals are never held for more than one model.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 
 from hwid_cli.campaign.cache import task_key
-from hwid_cli.campaign.identify import recording_key
+from hwid_cli.campaign.content_keys import model_key, recording_key
 from hwid_cli.campaign.runner import RunSettings, Task, run_tasks
 from hwid_cli.maths.model.simulate import validation_output
 from hwid_cli.maths.scores import rmsd
 from hwid_cli.records.experiment import CrossvalOptions, OrdersOptions
-from hwid_cli.records.model import Fit, HammersteinWiener, StaticMap
+from hwid_cli.records.model import Fit, HammersteinWiener
 from hwid_cli.records.recordings import Recording
 from hwid_cli.records.results import CrossValidation
 
@@ -180,39 +180,6 @@ def crossval_key(
         "threshold": options.threshold,
     }
     return task_key(STAGE, STAGE_VERSION, settings, [])
-
-
-def model_key(model: HammersteinWiener) -> str:
-    """Content key of a model: every number and word that it consists of.
-
-    Parameters
-    ----------
-    model : HammersteinWiener
-
-    Returns
-    -------
-    str
-    """
-    settings, arrays = _content(model, "")
-    return task_key("model", 1, settings, arrays)
-
-
-def _content(
-    part: HammersteinWiener | StaticMap, prefix: str
-) -> tuple[dict[str, object], list[np.ndarray]]:
-    settings: dict[str, object] = {}
-    arrays: list[np.ndarray] = []
-    for item in fields(part):
-        value, name = getattr(part, item.name), prefix + item.name
-        if isinstance(value, StaticMap):
-            inner_settings, inner_arrays = _content(value, f"{name}.")
-            settings |= inner_settings
-            arrays += inner_arrays
-        elif isinstance(value, np.ndarray):
-            arrays.append(value)
-        else:
-            settings[name] = value
-    return settings, arrays
 
 
 def _deviations(

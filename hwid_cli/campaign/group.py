@@ -11,13 +11,15 @@ docs/method.md, section "Groups".
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from hwid_cli.campaign.cache import task_key
-from hwid_cli.campaign.crossval import deviation_tasks, model_key
+from hwid_cli.campaign.content_keys import model_key, recording_key
+from hwid_cli.campaign.crossval import deviation_tasks
 from hwid_cli.campaign.group_rules import search_groups
-from hwid_cli.campaign.identify import identify_tasks, recording_key
+from hwid_cli.campaign.identify import Run, fit_grid
 from hwid_cli.campaign.order_grid import candidate_orders
 from hwid_cli.campaign.runner import Task, TaskDone
 from hwid_cli.maths.model.fit import fit
@@ -28,10 +30,11 @@ from hwid_cli.records.model import Fit, FitOptions, HammersteinWiener, Orders
 from hwid_cli.records.recordings import Recording
 
 STAGE = "group"
-STAGE_VERSION = 1
+STAGE_VERSION = 2
 
-# Runs the tasks of a level; the text says what they are: "fits" or "pairs".
-RunLevel = Callable[[int, str, Sequence[Task]], Sequence[TaskDone]]
+# Does the work of a level with what runs its tasks. The text says what they are, "fits" or
+# "pairs", the second number how many there will be.
+RunLevel = Callable[[int, str, int, Callable[[Run], Any]], Any]
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,15 +161,16 @@ def _fit_singles(
         return {}
     # With explicit starts the others are fitted when they first join, as warm starts.
     wanted = [one for one in plan.recordings if one.name in names]
-    tasks = identify_tasks(wanted, plan.orders, plan.fit_options)
-    done = run(1, "fits", tasks)
-    n_grid = len(tasks) // len(wanted)
+    n_grid = len(candidate_orders(plan.orders))
+    fits = run(
+        1,
+        "fits",
+        n_grid * len(wanted),
+        lambda execute: fit_grid(wanted, plan.orders, plan.fit_options, execute),
+    )
     return {
-        one.name: [
-            replace(item.result, identified_on=(one.name,), options=plan.fit_options)
-            for item in done[first : first + n_grid]
-        ]
-        for one, first in zip(wanted, range(0, len(tasks), n_grid), strict=True)
+        one.name: list(fits[first : first + n_grid])
+        for one, first in zip(wanted, range(0, len(fits), n_grid), strict=True)
     }
 
 
@@ -202,7 +206,7 @@ def _fit_level(
                     result_type=Fit,
                 )
             )
-    done = run(level, "fits", tasks)
+    done = _run_all(run, level, "fits", tasks)
     n_grid = len(tasks) // len(tried)
     # A fit is cached by content; the names of its recordings are those of today.
     return [
@@ -250,13 +254,23 @@ def _validate_level(
     for group, models in zip(tried, passing, strict=True):
         if any(model is not None for model in models):
             tasks += deviation_tasks(models, judges, contents, "+".join(group))
-    done = iter(run(len(tried[0]), "pairs", tasks))
+    done = iter(_run_all(run, len(tried[0]), "pairs", tasks))
     return [
         np.transpose([next(done).result.rmsd for _ in judges])
         if any(model is not None for model in models)
         else np.full((len(models), len(judges)), np.nan)
         for models in passing
     ]
+
+
+def _run_all(
+    run: RunLevel, level: int, unit: str, tasks: Sequence[Task]
+) -> Sequence[TaskDone]:
+    """Run tasks that do not depend on each other."""
+    done: Sequence[TaskDone] = run(
+        level, unit, len(tasks), lambda execute: execute(tasks)
+    )
+    return done
 
 
 def _self_passed(

@@ -1,18 +1,22 @@
 """Stage ``identify``: one model for every recording and every pair of orders."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from hwid_cli.campaign.cache import task_key
-from hwid_cli.campaign.order_grid import candidate_orders
-from hwid_cli.campaign.runner import RunSettings, Task, run_tasks
+from hwid_cli.campaign.content_keys import model_key, recording_key
+from hwid_cli.campaign.order_grid import candidate_orders, growth
+from hwid_cli.campaign.runner import RunSettings, Task, TaskDone, run_tasks
 from hwid_cli.maths.model.fit import fit
 from hwid_cli.records.experiment import OrdersOptions
-from hwid_cli.records.model import Fit, FitOptions, Orders
+from hwid_cli.records.model import Fit, FitOptions, HammersteinWiener, Orders
 from hwid_cli.records.recordings import Recording
 
 STAGE = "identify"
-STAGE_VERSION = 1
+STAGE_VERSION = 2
+
+# Runs tasks and returns them with their results, in their order.
+Run = Callable[[Sequence[Task]], Sequence[TaskDone]]
 
 
 def identify_all(
@@ -35,49 +39,57 @@ def identify_all(
     tuple of Fit
         Recording by recording, each in the order of ``candidate_orders``.
     """
-    tasks = identify_tasks(recordings, orders, options)
-    done = run_tasks(tasks, settings)
-    names = [
-        recording.name for recording in recordings for _ in candidate_orders(orders)
-    ]
-    # A fit is cached by content: neither the name of its recording nor the rule for
-    # joining several, which does nothing to one, is part of it.
-    return tuple(
-        replace(item.result, identified_on=(name,), options=options)
-        for item, name in zip(done, names, strict=True)
+    return fit_grid(
+        recordings, orders, options, lambda tasks: run_tasks(tasks, settings)
     )
 
 
-def identify_tasks(
-    recordings: Sequence[Recording], orders: OrdersOptions, options: FitOptions
-) -> tuple[Task, ...]:
-    """List the fits of a campaign.
+def fit_grid(
+    recordings: Sequence[Recording],
+    orders: OrdersOptions,
+    options: FitOptions,
+    run: Run,
+) -> tuple[Fit, ...]:
+    """Fit every recording with every pair of orders, the smaller ones first.
+
+    A fit begins with those of the largest orders that its own contain, so that more
+    parameters never fit worse.
 
     Parameters
     ----------
     recordings : sequence of Recording
     orders : OrdersOptions
     options : FitOptions
+    run : callable
+        Runs the tasks of a round.
 
     Returns
     -------
-    tuple of Task
+    tuple of Fit
         Recording by recording, each in the order of ``candidate_orders``.
     """
     alone = replace(options, join=FitOptions().join)
     grid = candidate_orders(orders)
+    contents = [recording_key(recording) for recording in recordings]
+    found: list[dict[int, Fit]] = [{} for _ in recordings]
+    for places in growth(orders):
+        tasks = [
+            _task(recording, content, grid[place], (alone, fits, smaller))
+            for recording, content, fits in zip(
+                recordings, contents, found, strict=True
+            )
+            for place, smaller in places
+        ]
+        done = iter(run(tasks))
+        for fits in found:
+            for place, _ in places:
+                fits[place] = next(done).result
+    # A fit is cached by content: neither the name of its recording nor the rule for
+    # joining several, which does nothing to one, is part of it.
     return tuple(
-        Task(
-            key=_fit_key(content, candidate, alone),
-            name=f"{recording.name}/{nb}/{nk}",
-            function=_fit_one,
-            arguments=(recording, candidate, alone),
-            result_type=Fit,
-        )
-        for recording, content in (
-            (recording, recording_key(recording)) for recording in recordings
-        )
-        for nb, nk, candidate in grid
+        replace(fits[place], identified_on=(recording.name,), options=options)
+        for recording, fits in zip(recordings, found, strict=True)
+        for place in range(len(grid))
     )
 
 
@@ -97,7 +109,7 @@ def identify_key(
     str
     """
     settings = {
-        "fits": [task.key for task in identify_tasks(recordings, orders, options)],
+        "recordings": [recording_key(recording) for recording in recordings],
         "names": [recording.name for recording in recordings],
         "orders": orders,
         "options": options,
@@ -105,33 +117,36 @@ def identify_key(
     return task_key(STAGE, STAGE_VERSION, settings, [])
 
 
-def recording_key(recording: Recording) -> str:
-    """Content key of a recording: what a fit sees of it.
-
-    Parameters
-    ----------
-    recording : Recording
-
-    Returns
-    -------
-    str
-    """
-    settings = {
-        "sample_time_s": recording.sample_time_s,
-        "input_unit": recording.input_unit,
-        "output_unit": recording.output_unit,
-    }
-    return task_key("recording", 1, settings, [recording.input, recording.output])
-
-
-def _fit_key(content: str, orders: Orders, options: FitOptions) -> str:
-    settings = {
+def _task(
+    recording: Recording,
+    content: str,
+    place: tuple[int, int, Orders],
+    how: tuple[FitOptions, dict[int, Fit], Sequence[int]],
+) -> Task:
+    """One fit; its key holds the models that it begins with."""
+    nb, nk, candidate = place
+    options, fits, smaller = how
+    models = [fits[number].model for number in smaller]
+    contained = tuple(model for model in models if model is not None)
+    matters = {
         "recordings": [content],
-        "orders": orders,
+        "orders": candidate,
         "options": options,
+        "contained": [model_key(model) for model in contained],
     }
-    return task_key(STAGE, STAGE_VERSION, settings, [])
+    return Task(
+        key=task_key(STAGE, STAGE_VERSION, matters, []),
+        name=f"{recording.name}/{nb}/{nk}",
+        function=_fit_one,
+        arguments=(recording, candidate, options, contained),
+        result_type=Fit,
+    )
 
 
-def _fit_one(recording: Recording, orders: Orders, options: FitOptions) -> Fit:
-    return fit([recording], orders, options)
+def _fit_one(
+    recording: Recording,
+    orders: Orders,
+    options: FitOptions,
+    contained: Sequence[HammersteinWiener],
+) -> Fit:
+    return fit([recording], orders, options, contained=contained)

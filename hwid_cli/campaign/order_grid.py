@@ -1,6 +1,7 @@
 """Which candidate orders to try."""
 
 from hwid_cli.errors import ConfigError
+from hwid_cli.maths.model.contained import contains
 from hwid_cli.records.experiment import OrdersOptions
 from hwid_cli.records.model import Orders
 
@@ -40,6 +41,42 @@ def candidate_orders(options: OrdersOptions) -> tuple[tuple[int, int, Orders], .
     return tuple(
         (nb, nk, _orders(options, nb, nk)) for nb in options.nb for nk in options.nk
     )
+
+
+def growth(
+    options: OrdersOptions,
+) -> tuple[tuple[tuple[int, tuple[int, ...]], ...], ...]:
+    """List the grid in the order in which its models grow out of smaller ones.
+
+    Parameters
+    ----------
+    options : OrdersOptions
+
+    Returns
+    -------
+    tuple of tuple of (place, places)
+        Round by round: each place of the grid, as `candidate_orders` numbers them, with
+        those of the largest orders that it contains, which earlier rounds have fitted.
+
+    Examples
+    --------
+    >>> growth(OrdersOptions(nb=(1, 2), nk=(1, 2)))
+    (((0, ()),), ((1, (0,)), (2, (0,))), ((3, (1, 2)),))
+    """
+    grid = [orders for _, _, orders in candidate_orders(options)]
+    smaller = [
+        [j for j, other in enumerate(grid) if i != j and contains(orders, other)]
+        for i, orders in enumerate(grid)
+    ]
+    rounds: dict[int, list[tuple[int, tuple[int, ...]]]] = {}
+    depth: dict[int, int] = {}
+    for i in sorted(range(len(grid)), key=lambda place: len(smaller[place])):
+        largest = [
+            j for j in smaller[i] if not any(j in smaller[k] for k in smaller[i])
+        ]
+        depth[i] = 1 + max((depth[j] for j in largest), default=-1)
+        rounds.setdefault(depth[i], []).append((i, tuple(largest)))
+    return tuple(tuple(sorted(rounds[number])) for number in sorted(rounds))
 
 
 def _orders(options: OrdersOptions, nb: int, nk: int) -> Orders:

@@ -29,6 +29,8 @@ TASKS_AHEAD = 3
 CONNECT_TIMEOUT_S = 10
 
 _log = logging.getLogger(__name__)
+# Functions of which this process has run a task: their loops are compiled.
+_compiled: set[Callable[..., Any]] = set()
 
 
 @dataclass(frozen=True)
@@ -168,10 +170,11 @@ def _compute(tasks: Sequence[Task], workers: Workers) -> Iterator[tuple[str, Any
     if is_local and workers.count == 1:
         yield from (_run(task) for task in tasks)
         return
-    if is_local and tasks:
+    if is_local and tasks and tasks[0].function not in _compiled:
         # The first task runs here: it fills the on-disk cache of compiled loops, which
         # the workers then load instead of each compiling them. It goes through pickle
         # because arrays become writable on that way, which compiled loops see.
+        _compiled.add(tasks[0].function)
         yield _run(pickle.loads(pickle.dumps(tasks[0])))
         tasks = tasks[1:]
     if not tasks:

@@ -1,8 +1,8 @@
 """``hwid group``: recordings joined into models that cover more of them."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -12,8 +12,8 @@ from hwid_cli.cli.options import Choices, stage_options
 from hwid_cli.cli.stages import once
 
 if TYPE_CHECKING:
-    from hwid_cli.campaign.group import GroupPlan
-    from hwid_cli.campaign.runner import Task, TaskDone
+    from hwid_cli.campaign.group import GroupPlan, RunLevel
+    from hwid_cli.campaign.identify import Run
     from hwid_cli.cli.session import Session
     from hwid_cli.records.groups import GroupSearch
 
@@ -114,18 +114,17 @@ def _plan(session: "Session") -> "GroupPlan":
     )
 
 
-def _runner(
-    session: "Session",
-) -> "Callable[[int, str, Sequence[Task]], Sequence[TaskDone]]":
-    """Run the tasks of a level under a progress bar."""
+def _runner(session: "Session") -> "RunLevel":
+    """Do the work of a level under a progress bar."""
     from hwid_cli.campaign.runner import run_tasks
     from hwid_cli.cli.session import stage_tasks
 
-    def run(level: int, unit: str, tasks: "Sequence[Task]") -> "Sequence[TaskDone]":
+    def run(level: int, unit: str, total: int, work: "Callable[[Run], Any]") -> Any:
         part = f"level {level}"
-        with stage_tasks(session, "group", len(tasks), unit, part=part) as settings:
+        with stage_tasks(session, "group", total, unit, part=part) as settings:
             # Fits of single recordings are those of another stage: --force spares them.
             is_forced = settings.force and not (level == 1 and unit == "fits")
-            return run_tasks(tasks, replace(settings, force=is_forced))
+            own = replace(settings, force=is_forced)
+            return work(lambda tasks: run_tasks(tasks, own))
 
     return run

@@ -5,7 +5,7 @@ import pytest
 
 from hwid_cli.campaign.cache import MemoryStore
 from hwid_cli.campaign.group import GroupPlan, group_key, search_all
-from hwid_cli.campaign.identify import identify_tasks
+from hwid_cli.campaign.identify import identify_all
 from hwid_cli.campaign.runner import RunSettings, Workers, run_tasks
 from hwid_cli.maths.model.simulate import validation_output
 from hwid_cli.maths.scores import rmsd
@@ -69,9 +69,9 @@ class Bench:
             if len(self.computed) == self.stop_after:
                 raise KeyboardInterrupt
 
-    def __call__(self, _level, _unit, tasks):
+    def __call__(self, _level, _unit, _total, work):
         settings = RunSettings(self.store, Workers(1), on_done=self.on_done)
-        return run_tasks(tasks, settings)
+        return work(lambda tasks: run_tasks(tasks, settings))
 
 
 @pytest.fixture(scope="module")
@@ -131,9 +131,7 @@ def test_models_that_fail_on_their_own_recordings_are_not_simulated(search, benc
 
 def test_single_recordings_are_the_tasks_of_identify():
     bench = Bench()
-    run_tasks(
-        identify_tasks(RECORDINGS, GRID, QUICK), RunSettings(bench.store, Workers(1))
-    )
+    identify_all(RECORDINGS, GRID, QUICK, RunSettings(bench.store, Workers(1)))
     search_all(plan(options=GroupOptions(max_level=1)), bench)
 
     assert not [name for name in bench.computed if " on " not in name]

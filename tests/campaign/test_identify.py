@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hwid_cli.campaign.cache import MemoryStore
-from hwid_cli.campaign.identify import identify_all, identify_tasks
+from hwid_cli.campaign.identify import identify_all, identify_key
 from hwid_cli.campaign.runner import RunSettings, Workers
 from hwid_cli.files.hdf5_store import Hdf5Store
 from hwid_cli.records.experiment import OrdersOptions
@@ -124,7 +124,10 @@ def test_the_rule_for_joining_does_not_matter_for_single_recordings():
 
 
 def keys(recordings=RECORDINGS[:1], grid=GRID, options=QUICK):
-    return {task.key for task in identify_tasks(recordings, grid, options)}
+    items = []
+    settings = RunSettings(MemoryStore(), Workers(1), on_done=items.append)
+    identify_all(recordings, grid, options, settings)
+    return {item.task.key for item in items}
 
 
 CHANGED_OUTPUT = np.array(RECORDINGS[0].output)
@@ -159,6 +162,26 @@ def test_the_two_readings_of_the_second_order_share_their_common_fits():
     delay = keys(grid=OrdersOptions(nb=(1,), nk=(1,), nk_role="delay", nf=2))
 
     assert poles == delay
+
+
+def test_the_key_of_the_stage_holds_all_that_its_fits_see():
+    whole = identify_key(RECORDINGS, GRID, QUICK)
+    assert whole == identify_key(RECORDINGS, GRID, QUICK)
+    assert whole != identify_key(RECORDINGS[:1], GRID, QUICK)
+    assert whole != identify_key(RECORDINGS, OrdersOptions(nb=(1,), nk=(1,)), QUICK)
+    assert whole != identify_key(RECORDINGS, GRID, replace(QUICK, units=4))
+    renamed = (replace(RECORDINGS[0], name="c"), RECORDINGS[1])
+    assert whole != identify_key(renamed, GRID, QUICK)
+
+
+def test_more_parameters_never_fit_worse():
+    grid = OrdersOptions(nb=(1, 2, 3), nk=(1, 2, 3))
+    fits = identify_all(
+        RECORDINGS[:1], grid, QUICK, RunSettings(MemoryStore(), Workers(1))
+    )
+    rmsd = np.array([fit.rmsd for fit in fits]).reshape(3, 3)
+    assert np.all(np.diff(rmsd, axis=0) <= 1e-9 * rmsd[0, 0])
+    assert np.all(np.diff(rmsd, axis=1) <= 1e-9 * rmsd[0, 0])
 
 
 def test_a_recording_that_cannot_be_fitted_gives_a_failed_fit_and_no_exception():

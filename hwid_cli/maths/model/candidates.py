@@ -4,6 +4,7 @@ In the linear block the parameters of a step are the coefficients of ``(1 - q^-1
 (see `linear_block.difference_basis`).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import accumulate
 
@@ -102,3 +103,18 @@ def columns(
 def _count(one: StaticMap, with_positions: bool) -> int:
     active = static_map.active_parameters(one, with_positions=with_positions)
     return int(active.stop - active.start)
+
+
+def stride_for(experiments: Sequence[Experiment], rows: int) -> int:
+    """Samples from one that counts to the next, for about so many that count.
+
+    Parameters
+    ----------
+    experiments : sequence of Experiment
+    rows : int
+
+    Returns
+    -------
+    int, [samples]
+    """
+    return max(1, sum(one.output.size for one in experiments) // rows)

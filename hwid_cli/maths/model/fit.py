@@ -17,11 +17,16 @@ import numpy as np
 from hwid_cli.maths import scores
 from hwid_cli.maths.model import sensitivities, static_map
 from hwid_cli.maths.model.candidates import Candidate, Experiment
+from hwid_cli.maths.model.contained import enlarged
 from hwid_cli.maths.model.levenberg_marquardt import Search
 from hwid_cli.maths.model.linear_block import is_stable, poles
 from hwid_cli.maths.model.normalise import normalise, rescaled
 from hwid_cli.maths.model.placing import with_maps
-from hwid_cli.maths.model.search import linear_search, nonlinear_search
+from hwid_cli.maths.model.search import (
+    linear_search,
+    nonlinear_search,
+    search_beyond,
+)
 from hwid_cli.maths.model.starts import Start, linear_starts
 from hwid_cli.maths.model.static_map import has_free_shape
 from hwid_cli.maths.model.uncertainty import standard_errors
@@ -47,6 +52,7 @@ def fit(
     options: FitOptions = _DEFAULTS,
     *,
     starts: Sequence[HammersteinWiener] = (),
+    contained: Sequence[HammersteinWiener] = (),
 ) -> Fit:
     """Fit one model to one or several recordings.
 
@@ -60,6 +66,9 @@ def fit(
         Models of the same orders and kinds of maps to begin with, such as those of the
         single recordings of a group; several times faster than a search from nothing,
         which is what happens without a stable one or where theirs ends without a model.
+    contained : sequence of HammersteinWiener
+        Models of smaller orders fitted to the same recordings with the same options: the
+        result is not worse in training than any of them.
 
     Returns
     -------
@@ -110,11 +119,8 @@ def fit(
             starts_found = _starts(problem, orders, options)
             linear = linear_search(problem.experiments, orders, options, starts_found)
             linear_rmsd = _rmsd(linear, problem)
-            search = linear
-            if not _is_linear(options):
-                search = nonlinear_search(
-                    problem.experiments, orders, options, starts_found, linear
-                )
+            known = _contained(problem, orders, options, contained)
+            search = _search(problem, orders, options, (starts_found, linear, known))
     except np.linalg.LinAlgError as error:
         return replace(blank, message=f"linear algebra failed: {error}")
     if not np.isfinite(search.cost) or not is_stable(
@@ -147,6 +153,45 @@ def _warm_search(
         search.candidate.model.denominator
     )
     return search if is_usable else None
+
+
+def _search(
+    problem: _Problem,
+    orders: Orders,
+    options: FitOptions,
+    found: tuple[tuple[Start, ...], Search, list[Candidate]],
+) -> Search:
+    """Search from nothing but linear models and models of smaller orders."""
+    starts, linear, known = found
+    if _is_linear(options):
+        return linear
+    if known:
+        return search_beyond(
+            known, problem.experiments, orders, options, starts, linear
+        )
+    return nonlinear_search(problem.experiments, orders, options, starts, linear)
+
+
+def _contained(
+    problem: _Problem,
+    orders: Orders,
+    options: FitOptions,
+    models: Sequence[HammersteinWiener],
+) -> list[Candidate]:
+    """Models of smaller orders as candidates; of several experiments, of the first."""
+    count = len(problem.experiments)
+    is_estimated = options.initial_state == "estimated"
+    n_state = orders.n_state if is_estimated else 0
+    candidates = []
+    for model in models:
+        larger = enlarged(
+            rescaled(model, 1.0 / problem.input_scale, 1.0 / problem.output_scale),
+            orders,
+        )
+        states = np.zeros((count, n_state))
+        states[0] = larger.free_response[:n_state] if n_state else 0.0
+        candidates.append(Candidate(replace(larger, free_response=np.zeros(0)), states))
+    return candidates
 
 
 def _starts(

@@ -6,7 +6,7 @@ docs/method.md, section "The search".
 from collections.abc import Sequence
 from dataclasses import replace
 
-from hwid_cli.maths.model.candidates import Candidate, Experiment
+from hwid_cli.maths.model.candidates import Candidate, Experiment, stride_for
 from hwid_cli.maths.model.levenberg_marquardt import LEAST_GAIN, Search, minimise
 from hwid_cli.maths.model.placing import finer, thinned, with_maps
 from hwid_cli.records.model import FitOptions
@@ -14,6 +14,9 @@ from hwid_cli.records.model import FitOptions
 # Iterations at most with fixed break-points, and the share of the cost that a step must
 # gain: far from the minimum, break-points that move get lost.
 _PLACING_ITERATIONS, _PLACING_GAIN = 30, 5e-2
+# Samples that count before the last iterations, and the share of the cost that a step
+# must gain there: more of them change the minimum by less than the noise.
+_ROWS, _COARSE_GAIN = 2500, 1e-3
 
 
 def place(
@@ -39,6 +42,7 @@ def place(
         with_positions=False,
         max_iterations=min(_PLACING_ITERATIONS, options.max_iterations),
         least_gain=_PLACING_GAIN,
+        stride=stride_for(experiments, _ROWS),
     )
     iterations = screened.iterations + settled.iterations
     if not (options.free_break_points and _has_break_points(settled.candidate)):
@@ -49,6 +53,7 @@ def place(
         with_positions=False,
         max_iterations=min(_PLACING_ITERATIONS, options.max_iterations),
         least_gain=_PLACING_GAIN,
+        stride=stride_for(experiments, _ROWS),
     )
     return replace(
         fine,
@@ -78,14 +83,26 @@ def finish(
     -------
     Search
     """
+    candidate, iterations = placed.candidate, placed.iterations
+    stride = stride_for(experiments, _ROWS)
+    if stride > 1:
+        coarse = minimise(
+            candidate,
+            experiments,
+            with_positions=options.free_break_points,
+            max_iterations=options.max_iterations,
+            least_gain=max(_COARSE_GAIN, least_gain),
+            stride=stride,
+        )
+        candidate, iterations = coarse.candidate, iterations + coarse.iterations
     final = minimise(
-        placed.candidate,
+        candidate,
         experiments,
         with_positions=options.free_break_points,
         max_iterations=options.max_iterations,
         least_gain=least_gain,
     )
-    return replace(final, iterations=placed.iterations + final.iterations)
+    return replace(final, iterations=iterations + final.iterations)
 
 
 def _has_break_points(candidate: Candidate) -> bool:

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hwid_cli.maths.model import static_map
-from hwid_cli.maths.model.candidates import Candidate, Experiment
+from hwid_cli.maths.model.candidates import Candidate, Experiment, stride_for
 from hwid_cli.maths.model.levenberg_marquardt import Search, minimise
 from hwid_cli.maths.model.maps.kernels import piecewise_linear_shares
 from hwid_cli.maths.model.placing import reaching
@@ -25,10 +25,11 @@ from hwid_cli.maths.model.sensitivities import simulated
 from hwid_cli.maths.model.starts import Start
 from hwid_cli.records.model import FitOptions, HammersteinWiener, Orders
 
-# Iterations of each round, and how many candidates go on after it.
-_ROUNDS = ((2, 4), (4, 2))
+# Iterations of the first round and how many candidates go on after it; iterations of the
+# last round.
+_FIRST_ROUND, _LAST_ROUND = (2, 4), 4
 # Samples that count in a round; enough to tell candidates apart.
-_ROWS = 1000
+RACE_ROWS = 1000
 # Knots of the output map that a block's output asks for, and how stiff it is: the
 # weight of its second differences as a share of the mean number of samples at a knot.
 _CURVE_POINTS, _STIFFNESS = 12, 1e-2
@@ -46,25 +47,13 @@ class _Runner:
     search: Search
 
 
-def race_stride(experiments: Sequence[Experiment]) -> int:
-    """Samples from one that counts in the race to the next.
-
-    Parameters
-    ----------
-    experiments : sequence of Experiment
-
-    Returns
-    -------
-    int, [samples]
-    """
-    return max(1, sum(one.output.size for one in experiments) // _ROWS)
-
-
 def race(
     experiments: Sequence[Experiment],
     starts: Sequence[Start],
     orders: Orders,
     options: FitOptions,
+    *,
+    finalists: int = 2,
 ) -> list[Search]:
     """Let all starts run a few iterations; the slower ones drop out.
 
@@ -75,13 +64,15 @@ def race(
     starts : sequence of Start
     orders : Orders
     options : FitOptions
+    finalists : int
+        How many are left at the end.
 
     Returns
     -------
     list of Search
         The best, those of different kinds of starts first.
     """
-    stride = race_stride(experiments)
+    stride = stride_for(experiments, RACE_ROWS)
     racing = []
     for start in starts:
         for candidate in starting_candidates(experiments, start, orders, options):
@@ -90,7 +81,7 @@ def race(
                 curved = _with_output_curve(candidate, experiments, options)
                 racing.append(_entered((start.is_expanded, True), curved, experiments))
     racing = _leaders(racing, options.starts)
-    for iterations, count in _ROUNDS:
+    for iterations, count in (_FIRST_ROUND, (_LAST_ROUND, finalists)):
         racing = [_going_on(one, experiments, iterations, stride) for one in racing]
         racing = _leaders(racing, count, _HOPELESS)
     return [one.search for one in racing]
@@ -176,7 +167,7 @@ def _with_output_curve(
 def _entered(
     family: tuple[bool, bool], candidate: Candidate, experiments: Sequence[Experiment]
 ) -> _Runner:
-    stride = race_stride(experiments)
+    stride = stride_for(experiments, RACE_ROWS)
     cost = simulated(point_of(candidate), experiments, stride).cost
     return _Runner(family, Search(candidate, cost, 0, "iteration_limit", ""))
 

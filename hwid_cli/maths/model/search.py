@@ -22,17 +22,17 @@ from hwid_cli.maths.model.levenberg_marquardt import Search, minimise
 from hwid_cli.maths.model.phases import finish, place
 from hwid_cli.maths.model.placing import reaching
 from hwid_cli.maths.model.points import block_signals, point_of
-from hwid_cli.maths.model.race import race, race_stride, starting_candidates
+from hwid_cli.maths.model.race import race
 from hwid_cli.maths.model.starts import Start, linear_starts
 from hwid_cli.records.model import FitOptions, Orders
 
 _RELAXING_ITERATIONS = 8
 _RELAXED_BLOCKS = 2
-_LINEAR_STARTS = 2
-_LINEAR_ITERATIONS = 5
 # Cost that a relaxed block must reach, as a share of the best so far, to be finished;
 # nearer to it the search has only come back to where it was.
 _WORTH_GOING_ON = 0.995
+# The same of another start's maps with many break-points, against a contained model's.
+_WORTH_A_SECOND_LOOK = 0.97
 # Slopes of the output map below this share of their mean square say too little about x.
 _FLAT = 0.1
 
@@ -60,19 +60,9 @@ def linear_search(
     Search
     """
     linear = replace(options, input_map="none", output_map="none")
-    stride = race_stride(experiments)
-    found = [
-        minimise(
-            candidate,
-            experiments,
-            with_positions=False,
-            max_iterations=min(_LINEAR_ITERATIONS, options.max_iterations),
-            stride=stride,
-        )
-        for start in [one for one in starts if not one.is_expanded][:_LINEAR_STARTS]
-        for candidate in starting_candidates(experiments, start, orders, linear)
-    ]
-    return finish(_best(found), experiments, linear)
+    plain = [one for one in starts if not one.is_expanded]
+    found = race(experiments, plain, orders, linear, finalists=1)
+    return finish(found[0], experiments, linear)
 
 
 def nonlinear_search(
@@ -106,13 +96,63 @@ def nonlinear_search(
     relaxed = _relaxed(best, experiments, orders, options)
     if relaxed.cost < _WORTH_GOING_ON * best.cost:
         best = _best([best, finish(relaxed, experiments, options)])
-    if linear.cost < best.cost:
-        candidate = _passing(linear, experiments, options)
-        # Not that of the linear model where a kind cannot pass everything on.
-        passing_cost = sensitivities.cost(candidate, experiments)
-        passing = replace(linear, candidate=candidate, cost=passing_cost)
-        best = _best([best, passing, finish(passing, experiments, options)])
-    return best
+    return _not_worse_than(linear, best, experiments, options)
+
+
+def search_beyond(
+    contained: Sequence[Candidate],
+    experiments: Sequence[Experiment],
+    orders: Orders,
+    options: FitOptions,
+    starts: Sequence[Start],
+    linear: Search,
+) -> Search:
+    """Model that is never worse than those of smaller orders that it contains.
+
+    Parameters
+    ----------
+    contained : sequence of Candidate
+        Of the orders and kinds of maps asked for.
+    experiments : sequence of Experiment
+    orders : Orders
+    options : FitOptions
+    starts : sequence of Start
+    linear : Search
+
+    Returns
+    -------
+    Search
+        A shorter search than `nonlinear_search`: only what promises more than to go on
+        from the best of the contained models is finished.
+    """
+    known = [_standing(one, experiments) for one in contained]
+    best = _best(known)
+    best = _best([best, finish(best, experiments, options)])
+    (leader,) = race(experiments, starts, orders, options, finalists=1)
+    placed = place(leader, experiments, options)
+    if placed.cost < _WORTH_A_SECOND_LOOK * best.cost:
+        best = _best([best, finish(placed, experiments, options)])
+    return _not_worse_than(linear, best, experiments, options)
+
+
+def _not_worse_than(
+    linear: Search,
+    best: Search,
+    experiments: Sequence[Experiment],
+    options: FitOptions,
+) -> Search:
+    """The best so far, or what comes of the linear model where that is better."""
+    if linear.cost >= best.cost:
+        return best
+    passing = _standing(_passing(linear, experiments, options), experiments)
+    passing = replace(passing, iterations=linear.iterations)
+    return _best([best, passing, finish(passing, experiments, options)])
+
+
+def _standing(candidate: Candidate, experiments: Sequence[Experiment]) -> Search:
+    """A candidate as a search that ends where it begins."""
+    cost = sensitivities.cost(candidate, experiments)
+    return Search(candidate, cost, 0, "converged", "taken over as it is")
 
 
 def _passing(

@@ -183,7 +183,8 @@ def normal_equations(
             own, cross = local_sums(after.first, after.shares, rows, after.count)
             parts.append(_joined(own, cross, rows))
         else:
-            rows = np.hstack([after.shares, rows])
+            if after.count:
+                rows = np.hstack([after.shares, rows])
             parts.append(rows.T @ rows)
     return _by_parameters(stride * np.sum(parts, axis=0), place, before, after)
 

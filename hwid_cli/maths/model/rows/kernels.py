@@ -26,8 +26,9 @@ def derivative_rows(
 ) -> None:
     """Derivatives of x by input map, initial states, B and F, times a weight.
 
-    Every column obeys ``F(q) column = ...``, so all of them run through one recursion.
-    Those of the initial states, B and F are differences of three of its columns.
+    Everything obeys ``F(q) column = ...``, so all runs through one recursion. Those of
+    the input map are then combined by B, and those of the initial states, B and F are
+    differences of three of its columns.
 
     Parameters
     ----------
@@ -54,7 +55,9 @@ def derivative_rows(
     n, nb, nf, width = w.size, numerator.size, denominator.size - 1, shares.shape[1]
     taps = np.zeros(4 * max(1, (nf + 3) // 4))
     taps[:nf] = denominator[1:]
-    pad = max(taps.size, nb + delay, n_state) + 1
+    zeros = np.zeros(4 * ((nb + 3) // 4))
+    zeros[:nb] = numerator
+    pad = max(taps.size, zeros.size + delay, n_state) + 1
     wide = 4 * ((count + 3 + 3) // 4)
     chunk = min(n, _CHUNK)
     lines = np.zeros((pad + chunk, wide))
@@ -63,9 +66,10 @@ def derivative_rows(
         level = numerator.sum() * gain
         for t in range(pad):
             for m in range(width):
-                lines[t, first[0] + m] += shares[0, m] * level
+                lines[t, first[0] + m] += shares[0, m] * gain
             lines[t, count] = w[0] * gain
             lines[t, count + 1] = w[0] * level * gain
+    passed = np.empty((chunk, wide))
     table = np.empty((n_state + nb + nf, chunk + max(nb, nf, n_state, 1)))
     for begin in range(0, n, chunk):
         length = min(chunk, n - begin)
@@ -73,15 +77,8 @@ def derivative_rows(
             t = begin + k
             row = lines[pad + k]
             all_pole(lines, pad + k, taps)
-            for i in range(nb):
-                s = t - delay - i
-                if s < 0:
-                    if not steady:
-                        break
-                    s = 0
-                b, at = numerator[i], first[s]
-                for m in range(width):
-                    row[at + m] += b * shares[s, m]
+            for m in range(width):
+                row[first[t] + m] += shares[t, m]
             row[count] += w[t]
             row[count + 1] += x[t]
             if t == 0:
@@ -91,12 +88,13 @@ def derivative_rows(
                     if abs(row[m]) < _TINY:
                         row[m] = 0.0
         last = length - 1
+        _all_zero(lines.ravel(), (pad - delay) * wide, zeros, wide, passed.ravel())
         _differences(lines, pad, count + 2, n_state, length, table)
         _differences(lines, pad - delay, count, nb, length, table[n_state:])
         _differences(lines, pad - 1, count + 1, nf, length, table[n_state + nb :])
         for k in range((-begin) % stride, length, stride):
             r = (begin + k) // stride
-            row, source, weight = out[r], lines[pad + k], weights[r]
+            row, source, weight = out[r], passed[k], weights[r]
             for m in range(count):
                 row[m] = weight * source[m]
             for m in range(count, count + n_states):
@@ -137,6 +135,29 @@ def all_pole(lines: np.ndarray, at: int, taps: np.ndarray) -> None:
         else:
             for m in range(row.size):
                 row[m] -= f0 * s0[m] + f1 * s1[m] + f2 * s2[m] + f3 * s3[m]
+
+
+@njit(cache=True, fastmath=_FAST)
+def _all_zero(
+    lines: np.ndarray, at: int, zeros: np.ndarray, wide: int, out: np.ndarray
+) -> None:
+    """Write rows and their predecessors times the coefficients of B, four at a time.
+
+    The rows lie one after the other, so that one loop runs over all of them.
+    """
+    n = out.size
+    for i in range(0, zeros.size, 4):
+        b0, b1, b2, b3 = zeros[i], zeros[i + 1], zeros[i + 2], zeros[i + 3]
+        first = at - i * wide
+        s0, s1 = lines[first : first + n], lines[first - wide : first - wide + n]
+        first -= 2 * wide
+        s2, s3 = lines[first : first + n], lines[first - wide : first - wide + n]
+        if i == 0:
+            for m in range(n):
+                out[m] = b0 * s0[m] + b1 * s1[m] + b2 * s2[m] + b3 * s3[m]
+        else:
+            for m in range(n):
+                out[m] += b0 * s0[m] + b1 * s1[m] + b2 * s2[m] + b3 * s3[m]
 
 
 @njit(cache=True, fastmath=_FAST)

@@ -1,0 +1,47 @@
+import numpy as np
+import pytest
+
+from hwid_cli.maths.model.contained import contains, enlarged
+from hwid_cli.maths.model.fit import fit
+from hwid_cli.maths.model.simulate import simulate
+from hwid_cli.records.model import Orders
+from tests.maths.model.plants import level_input, measured, options, plant
+
+
+@pytest.mark.parametrize(
+    ("orders", "smaller", "expected"),
+    [
+        (Orders(2, 2, 1), Orders(2, 2, 1), True),
+        (Orders(2, 3, 1), Orders(2, 2, 1), True),
+        (Orders(2, 2, 1), Orders(2, 3, 1), False),
+        (Orders(3, 2, 1), Orders(2, 2, 2), True),
+        (Orders(2, 2, 1), Orders(2, 2, 2), False),
+        (Orders(3, 2, 2), Orders(3, 2, 1), False),
+    ],
+)
+def test_orders_contain_those_whose_coefficients_they_have(orders, smaller, expected):
+    assert contains(orders, smaller) is expected
+
+
+@pytest.mark.parametrize("initial_state", ["zero", "steady", "estimated"])
+def test_an_enlarged_model_is_the_same_model(initial_state):
+    model = plant("dead_zone", "saturation", initial_state)
+    larger = enlarged(model, Orders(4, 5, 1))
+    assert larger.orders == Orders(4, 5, 1)
+    u = level_input(300, 4)
+    np.testing.assert_allclose(simulate(larger, u), simulate(model, u), atol=1e-13)
+
+
+@pytest.mark.parametrize("initial_state", ["zero", "estimated"])
+def test_a_fit_is_never_worse_than_the_models_it_contains(initial_state):
+    recording = measured(
+        plant("piecewise_linear", "saturation", initial_state), noise=0.02
+    )
+    how = options("piecewise_linear", "saturation", initial_state)
+    small = fit([recording], Orders(2, 2, 2), how)
+    # Few iterations and starts: alone, the larger fit may well end worse.
+    hasty = options(
+        "piecewise_linear", "saturation", initial_state, max_iterations=1, starts=1
+    )
+    large = fit([recording], Orders(4, 4, 1), hasty, contained=[small.model])
+    assert large.rmsd <= small.rmsd * (1.0 + 1e-9)
