@@ -22,6 +22,7 @@ _PUBLIC = {
     "Orders": "hwid_cli.records.model",
     "Recording": "hwid_cli.records.recordings",
     "fit": "hwid_cli.maths.model.fit",
+    "parameter_covariance": "hwid_cli.maths.model.uncertainty",
     "simulate": "hwid_cli.maths.model.simulate",
 }
 
@@ -32,6 +33,7 @@ __all__ = [
     "Orders",
     "Recording",
     "fit",
+    "parameter_covariance",
     "simulate",
 ]
 

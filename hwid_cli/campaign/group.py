@@ -28,7 +28,7 @@ from hwid_cli.records.model import Fit, FitOptions, HammersteinWiener, Orders
 from hwid_cli.records.recordings import Recording
 
 STAGE = "group"
-STAGE_VERSION = 1
+STAGE_VERSION = 2
 
 # Runs the tasks of a level; the text says what they are: "fits" or "pairs".
 RunLevel = Callable[[int, str, Sequence[Task]], Sequence[TaskDone]]

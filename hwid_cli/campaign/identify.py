@@ -12,7 +12,7 @@ from hwid_cli.records.model import Fit, FitOptions, Orders
 from hwid_cli.records.recordings import Recording
 
 STAGE = "identify"
-STAGE_VERSION = 1
+STAGE_VERSION = 2
 
 
 def identify_all(

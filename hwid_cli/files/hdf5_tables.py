@@ -73,7 +73,14 @@ def read_table(group: h5py.Group, record_type: type[Record]) -> list[Record | No
     KeyError, TypeError, ValueError
         If the group does not hold such a table.
     """
-    columns = {field.name: _read_column(group, field) for field in schema(record_type)}
+    stored = schema(record_type)
+    known = [
+        field
+        for field in stored
+        if field.default is None or has_value(group, field.name)
+    ]
+    columns = {field.name: _read_column(group, field) for field in known}
+    # Fields that an earlier version did not write are left to their defaults.
     (count,) = {len(column) for column in columns.values()}
     is_present = [True] * count
     if has_value(group, _PRESENT):

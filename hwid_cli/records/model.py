@@ -4,7 +4,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from hwid_cli.records.information import Information
 from hwid_cli.records.recordings import frozen_vector
+from hwid_cli.records.stored import ADDED_LATER
 
 INITIAL_STATES = ("zero", "steady", "estimated")
 JOINS = ("concatenate", "experiments")
@@ -198,11 +200,15 @@ class Uncertainty:
         In the units of the parameters; NaN where the data do not determine one.
     reason : str
         Why some or all are missing; empty if all exist.
+    flat : tuple of str
+        What the data do not tell, or hardly: one sentence for each direction in which
+        parameters can move together, with the reason where there is one to tell.
     """
 
     names: tuple[str, ...] = ()
     standard_errors: np.ndarray = field(default_factory=lambda: np.zeros(0))
     reason: str = ""
+    flat: tuple[str, ...] = field(default=(), metadata=ADDED_LATER)
 
     def __post_init__(self) -> None:
         object.__setattr__(
@@ -210,6 +216,23 @@ class Uncertainty:
             "standard_errors",
             frozen_vector(self.standard_errors, "standard_errors"),
         )
+
+
+@dataclass(frozen=True, eq=False)
+class ParameterCovariance:
+    """Covariance of a model's parameters.
+
+    Parameters
+    ----------
+    names : tuple of str
+        As in ``Uncertainty``.
+    matrix : ndarray, shape (n_parameters, n_parameters)
+        In the units of the parameters; rows and columns of NaN where the data do not
+        determine one.
+    """
+
+    names: tuple[str, ...]
+    matrix: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -241,6 +264,8 @@ class Fit:
     is_stable : bool
         Whether every pole lies inside the unit circle.
     uncertainty : Uncertainty
+    information : Information
+        AIC, BIC and FPE; NaN if failed.
     """
 
     identified_on: tuple[str, ...]
@@ -256,6 +281,7 @@ class Fit:
     poles: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=complex))
     is_stable: bool = False
     uncertainty: Uncertainty = field(default_factory=Uncertainty)
+    information: Information = field(default_factory=Information, metadata=ADDED_LATER)
 
     def __post_init__(self) -> None:
         if self.status not in FIT_STATUSES:

@@ -6,6 +6,7 @@ import numpy as np
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
+from hwid_cli.records.information import Information
 from hwid_cli.records.model import (
     Fit,
     FitOptions,
@@ -111,7 +112,10 @@ def example_fit(name="step_01", nb=2, nf=2, seed=1):
         linear_rmsd=0.3,
         poles=rng.normal(size=nf) + 1j * rng.normal(size=nf),
         is_stable=True,
-        uncertainty=Uncertainty(("b[0]", "µ"), np.array([0.1, np.nan]), "one is flat"),
+        uncertainty=Uncertainty(
+            ("b[0]", "µ"), np.array([0.1, np.nan]), "one is flat", ("b[0], because µ",)
+        ),
+        information=Information(300, 17, -12.5, -12.25, 0.1, 1e-9),
     )
 
 

@@ -1,0 +1,260 @@
+"""Directions of a fit's parameters, and how firmly the data hold each.
+
+``J'J`` at the optimum is singular in the directions of the shared gains (see
+`normalise`): they are held by one equation each, the same that `normalise` fulfils. The
+outermost break-points of a map that goes on straight beyond them are held too: they may
+slide along that line. What is singular beyond that is flat: the data do not tell it.
+
+Everything is worked out for the coefficients of ``(1 - q^-1)^j``, whose signals are not
+nearly equal, and turned into those of B and F at the end.
+
+References
+----------
+Ljung, System Identification (1999), section 9.2. docs/method.md, eqs. (16), (28).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import eigh
+
+from hwid_cli.maths.model import sensitivities, static_map
+from hwid_cli.maths.model.candidates import Candidate, Columns, Experiment, columns
+from hwid_cli.maths.model.linear_block import difference_basis
+from hwid_cli.maths.model.normalise import uses_static_gain
+from hwid_cli.maths.model.static_map import RULES
+from hwid_cli.records.model import StaticMap
+
+# Eigenvalues of the scaled equations below this share of the largest are zero within
+# rounding.
+_SINGULAR = 1e-11
+
+
+@dataclass(frozen=True, eq=False)
+class Directions:
+    """Directions that keep what is held, from the weakest to the strongest.
+
+    Parameters
+    ----------
+    place : Columns
+        Where each group of parameters stands.
+    steps : ndarray, shape (n_parameters, n_directions)
+        Step of the parameters in each direction, B and F as coefficients.
+    strength : ndarray, shape (n_directions,), [output unit squared]
+        By how much a unit step raises the sum of squares.
+    sensitivity : ndarray, shape (n_parameters,)
+        Norm of the output's derivative by each parameter alone.
+    """
+
+    place: Columns
+    steps: np.ndarray
+    strength: np.ndarray
+    sensitivity: np.ndarray
+
+    @property
+    def is_flat(self) -> np.ndarray:
+        """Which directions the data do not tell at all, shape (n_directions,)."""
+        return self.strength <= _SINGULAR * self.strength[-1]
+
+    @property
+    def n_effective(self) -> int:
+        """Parameters that the data determine, initial states included."""
+        return int(np.sum(~self.is_flat))
+
+    @property
+    def flat_steps(self) -> np.ndarray:
+        """Flat directions in units in which all parameters matter alike.
+
+        A parameter without any effect has none to be measured by and keeps its own unit.
+        Shape (n_parameters, n_flat).
+        """
+        weight = np.where(self.sensitivity > 0.0, self.sensitivity, 1.0)
+        return self.steps[:, self.is_flat] * weight[:, None]
+
+    def covariance(self, variance: float) -> np.ndarray:
+        """Covariance of all parameters, flat directions left out.
+
+        Parameters
+        ----------
+        variance : float, [output unit squared]
+            Of the residuals.
+
+        Returns
+        -------
+        ndarray, shape (n_parameters, n_parameters)
+        """
+        firm = ~self.is_flat
+        scaled = self.steps[:, firm] * np.sqrt(variance / self.strength[firm])
+        return scaled @ scaled.T
+
+
+def directions(
+    candidate: Candidate, experiments: Sequence[Experiment], *, free_break_points: bool
+) -> Directions | None:
+    """Directions of the parameters of a normalised model at its optimum.
+
+    Parameters
+    ----------
+    candidate : Candidate
+        Normalised, in the units of the experiments.
+    experiments : sequence of Experiment
+    free_break_points : bool
+        Whether break-points were fitted; fixed ones are left out.
+
+    Returns
+    -------
+    Directions or None
+        None where the equations are not finite, or nothing is free.
+    """
+    system = sensitivities.equations(
+        candidate, experiments, with_positions=free_break_points
+    )
+    place = columns(candidate, with_positions=free_break_points)
+    change = _coefficients(place)
+    diagonal = np.diag(system.matrix)
+    # A parameter without any effect keeps its own scale.
+    scale = np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
+    held = _held(candidate, place)
+    if not np.isfinite(system.matrix).all() or len(held) >= place.total:
+        return None
+    free = np.eye(place.total)
+    if held:
+        # A basis of all steps that keep what is held.
+        _, _, basis = np.linalg.svd(np.array(held) @ change / scale)
+        free = basis[len(held) :].T
+    strength, parts = eigh(free.T @ (system.matrix / scale / scale[:, None]) @ free)
+    by_coefficient = np.einsum("ji,jk,ki->i", change, system.matrix, change)
+    return Directions(
+        place,
+        change @ ((free @ parts) / scale[:, None]),
+        strength,
+        np.sqrt(np.maximum(by_coefficient, 0.0)),
+    )
+
+
+def parameter_names(candidate: Candidate, place: Columns) -> tuple[str, ...]:
+    """Names of all parameters, initial states included.
+
+    Parameters
+    ----------
+    candidate : Candidate
+    place : Columns
+
+    Returns
+    -------
+    tuple of str
+        In the order of the columns; those of an initial state are named after it.
+    """
+    model = candidate.model
+    names = [""] * place.total
+    for label, one, part in (
+        ("input_map", model.input_map, place.input_map),
+        ("output_map", model.output_map, place.output_map),
+    ):
+        labels = static_map.parameter_names(one)
+        active = labels[len(labels) - (part.stop - part.start) :]
+        names[part] = [f"{label}.{name}" for name in active]
+    names[place.numerator] = [f"b[{i}]" for i in range(model.numerator.size)]
+    names[place.denominator] = [f"f[{i}]" for i in range(1, model.denominator.size)]
+    n_experiments = len(candidate.free_responses)
+    names[place.free_responses] = [
+        f"initial state {i}" + (f" of record {k + 1}" if n_experiments > 1 else "")
+        for k in range(n_experiments)
+        for i in range(place.n_state)
+    ]
+    return tuple(names)
+
+
+def listed(place: Columns) -> np.ndarray:
+    """Places of the parameters that a fit lists: all but the initial states.
+
+    Parameters
+    ----------
+    place : Columns
+
+    Returns
+    -------
+    ndarray of int, shape (n_listed,)
+        Input map, output map, B, F.
+    """
+    parts = (place.input_map, place.output_map, place.numerator, place.denominator)
+    return np.concatenate([np.arange(part.start, part.stop) for part in parts])
+
+
+def _coefficients(place: Columns) -> np.ndarray:
+    """Matrix from the parameters of a step to the coefficients of B and F."""
+    change = np.eye(place.total)
+    for part in (place.numerator, place.denominator, *_initial_states(place)):
+        change[part, part] = difference_basis(part.stop - part.start)
+    return change
+
+
+def _initial_states(place: Columns) -> list[slice]:
+    """Columns of each experiment's initial state."""
+    part, size = place.free_responses, place.n_state
+    if size == 0:
+        return []
+    return [slice(at, at + size) for at in range(part.start, part.stop, size)]
+
+
+def _held(candidate: Candidate, place: Columns) -> list[np.ndarray]:
+    """Gradients of what `normalise` holds fixed."""
+    model = candidate.model
+    held = []
+    input_rule, output_rule = RULES[model.input_map.kind], RULES[model.output_map.kind]
+    if input_rule.size is not None:
+        _, gradient = input_rule.size(model.input_map)
+        held.append(_row(place, place.input_map, gradient))
+    if output_rule.compress is not None:
+        row = np.zeros(place.total)
+        if uses_static_gain(model):
+            row[place.numerator], row[place.denominator] = 1.0, -1.0
+        else:
+            row[place.numerator] = model.numerator
+        held.append(row)
+    if _offset_is_shared(candidate, place):
+        gradient = _value_gradient(model.input_map)
+        held.append(_row(place, place.input_map, gradient))
+    if place.with_positions:
+        held += _end_break_points(model.input_map, place, place.input_map)
+        held += _end_break_points(model.output_map, place, place.output_map)
+    return held
+
+
+def _end_break_points(one: StaticMap, place: Columns, part: slice) -> list[np.ndarray]:
+    """Hold the outermost break-points of a piecewise linear map."""
+    rows = np.zeros((2, place.total))
+    last = RULES[one.kind].n_positions(one) - 1
+    if last < 0:
+        return []
+    rows[0, part.start], rows[1, part.start + last] = 1.0, 1.0
+    return list(rows)
+
+
+def _offset_is_shared(candidate: Candidate, place: Columns) -> bool:
+    """Tell whether a constant can move from one map to the other unnoticed.
+
+    A block that starts empty answers a constant with a transient, so there it cannot;
+    nor can break-points that are fixed take up the shift.
+    """
+    model = candidate.model
+    both_free = all(
+        RULES[one.kind].size is not None for one in (model.input_map, model.output_map)
+    )
+    can_shift = model.output_map.kind == "polynomial" or place.with_positions
+    return both_free and can_shift and model.initial_state != "zero"
+
+
+def _value_gradient(one: StaticMap) -> np.ndarray:
+    """Derivative of a map's value at zero, or at its domain's nearest end."""
+    at = np.clip(np.zeros(1), *one.domain)
+    row = np.zeros((1, one.parameters.size))
+    static_map.differentiate(one, at, row, 0, with_positions=True)
+    return row[0]
+
+
+def _row(place: Columns, part: slice, gradient: np.ndarray) -> np.ndarray:
+    row = np.zeros(place.total)
+    row[part] = gradient[gradient.size - (part.stop - part.start) :]
+    return row
