@@ -2,7 +2,7 @@
 
 from hwid_cli.errors import ConfigError
 from hwid_cli.records.experiment import OrdersOptions
-from hwid_cli.records.model import Orders
+from hwid_cli.records.model import Fit, Orders
 
 # Delay of the published grid, whose second axis counts poles, [samples].
 DELAY_OF_POLE_GRID = 1
@@ -40,6 +40,23 @@ def candidate_orders(options: OrdersOptions) -> tuple[tuple[int, int, Orders], .
     return tuple(
         (nb, nk, _orders(options, nb, nk)) for nb in options.nb for nk in options.nk
     )
+
+
+def grid_place(fit: Fit, nk_role: str) -> tuple[int, int]:
+    """Place of a fit in the order grid.
+
+    Parameters
+    ----------
+    fit : Fit
+    nk_role : str
+        What the second axis counts.
+
+    Returns
+    -------
+    nb, nk : int, [-]
+    """
+    nk = fit.orders.nf if nk_role == "poles" else fit.orders.nk
+    return fit.orders.nb, nk
 
 
 def _orders(options: OrdersOptions, nb: int, nk: int) -> Orders:
