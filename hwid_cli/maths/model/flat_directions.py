@@ -57,9 +57,11 @@ def flat_sentences(
     """
     names = parameter_names(candidate, found.place)
     told = [(parts, "") for parts in _flat_parts(found).T]
+    # Those that move nothing but initial states matter least.
+    told.sort(key=lambda one: not _moves_listed(one[0], found.place))
     told += [
         (parts, f"{100 * spread:.0f} %")
-        for parts, spread in _weak_parts(candidate.model, found, variance)
+        for parts, spread in _weak_parts(found, variance)
     ]
     if not told:
         return ()
@@ -70,9 +72,14 @@ def flat_sentences(
     )
 
 
+def _moves_listed(parts: np.ndarray, place: Columns) -> bool:
+    """Whether a direction moves more than initial states."""
+    return bool(np.abs(parts[listed(place)]).max() >= _NAMED_PART * np.abs(parts).max())
+
+
 def _flat_parts(found: Directions) -> np.ndarray:
     """Flat directions, each with as few parameters as can be, one column for each."""
-    flat = found.flat_steps
+    flat = found.steps[:, found.is_flat] / found.size[:, None]
     count = flat.shape[1]
     if count == 0:
         return flat
@@ -81,18 +88,14 @@ def _flat_parts(found: Directions) -> np.ndarray:
     return flat @ np.linalg.pinv(flat[order[:count]])
 
 
-def _weak_parts(
-    model: HammersteinWiener, found: Directions, variance: float
-) -> list[tuple[np.ndarray, float]]:
+def _weak_parts(found: Directions, variance: float) -> list[tuple[np.ndarray, float]]:
     """Weak directions, the weakest first, and their standard errors as shares."""
     place = found.place
-    size = _sizes(model, place)
     chosen = listed(place)
-    chosen = chosen[size[chosen] > 0.0]
     if chosen.size == 0 or variance == 0.0:
         return []
     covariance = found.covariance(variance)[np.ix_(chosen, chosen)]
-    covariance = covariance / size[chosen] / size[chosen][:, None]
+    covariance = covariance / found.size[chosen] / found.size[chosen][:, None]
     if not np.isfinite(covariance).all():
         return []
     spread, parts = np.linalg.eigh(covariance)
@@ -102,26 +105,6 @@ def _weak_parts(
         every[chosen] = parts[:, number]
         weak.append((every, float(np.sqrt(spread[number]))))
     return weak
-
-
-def _sizes(model: HammersteinWiener, place: Columns) -> np.ndarray:
-    """Size of what each parameter belongs to; zero for initial states."""
-    size = np.zeros(place.total)
-    size[place.numerator] = np.linalg.norm(model.numerator)
-    size[place.denominator] = np.linalg.norm(model.denominator[1:])
-    for one, part in (
-        (model.input_map, place.input_map),
-        (model.output_map, place.output_map),
-    ):
-        if part.stop == part.start:
-            continue
-        count = RULES[one.kind].n_positions(one)
-        positions, values = one.parameters[:count], one.parameters[count:]
-        sizes = np.full(one.parameters.size, np.ptp(values) or np.abs(values).max())
-        if count:
-            sizes[:count] = np.ptp(positions)
-        size[part] = sizes[sizes.size - (part.stop - part.start) :]
-    return size
 
 
 def _map_arguments(
@@ -169,6 +152,8 @@ def _why(
             reason = _why_of_map(getattr(model, label), moved, signals[label], part)
             if reason:
                 return reason.format(what=what)
+    if not _moves_listed(parts, place):
+        return "nothing that was recorded shows more"
     in_block = [
         np.abs(parts[part]).max(initial=0.0) >= largest
         for part in (place.numerator, place.denominator)
@@ -177,7 +162,7 @@ def _why(
         at = _cancellation(model)
         if at:
             return f"a pole and a zero nearly cancel at {at}"
-    return "the recordings show only their sum"
+    return "nothing that was recorded tells more"
 
 
 def _why_of_map(
@@ -196,17 +181,26 @@ def _why_of_map(
     slopes = np.diff(values) / np.diff(points)
     scale = np.ptp(values) / np.ptp(points)
     for number in (moved + first) % units:
-        low, high = max(number - 1, 0), min(number + 1, units - 1)
-        if not ((signal > points[low]) & (signal < points[high])).any():
-            return (
-                f"no sample of {{what}} lies between {points[low]:.3g} and "
-                f"{points[high]:.3g}"
-            )
+        gap = _gap_beside(points, int(number), signal)
+        if gap:
+            return f"no sample of {{what}} lies between {gap[0]:.3g} and {gap[1]:.3g}"
     for place in moved + first:
         inner = 0 < place < units - 1
         if inner and abs(slopes[place] - slopes[place - 1]) < _BENDS * scale:
             return f"the map does not bend at {points[place]:.3g}"
     return ""
+
+
+def _gap_beside(
+    points: np.ndarray, number: int, signal: np.ndarray
+) -> tuple[float, ...]:
+    """Ends of the segments without samples around a break-point; empty if none is."""
+    before, after = max(number - 1, 0), min(number + 1, points.size - 1)
+    for low, high in ((before, after), (before, number), (number, after)):
+        between = (signal > points[low]) & (signal < points[high])
+        if low < high and not between.any():
+            return float(points[low]), float(points[high])
+    return ()
 
 
 def _count_levels(signal: np.ndarray) -> int:

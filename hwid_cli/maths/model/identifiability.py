@@ -29,6 +29,9 @@ from hwid_cli.records.model import StaticMap
 # Eigenvalues of the scaled equations below this share of the largest are zero within
 # rounding.
 _SINGULAR = 1e-11
+# A parameter with this share of a flat direction's largest part is not determined: by its
+# effect on the output, and, where rounding is larger, by its size.
+_LEAST_EFFECT, _LEAST_SHARE = 1e-3, 1e-2
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,12 +48,16 @@ class Directions:
         By how much a unit step raises the sum of squares.
     sensitivity : ndarray, shape (n_parameters,)
         Norm of the output's derivative by each parameter alone.
+    size : ndarray, shape (n_parameters,)
+        Size of what each parameter belongs to: of B, F, an initial state, the range of a
+        map or of its break-points. Never zero.
     """
 
     place: Columns
     steps: np.ndarray
     strength: np.ndarray
     sensitivity: np.ndarray
+    size: np.ndarray
 
     @property
     def is_flat(self) -> np.ndarray:
@@ -63,14 +70,21 @@ class Directions:
         return int(np.sum(~self.is_flat))
 
     @property
-    def flat_steps(self) -> np.ndarray:
-        """Flat directions in units in which all parameters matter alike.
+    def is_moved_by_flat(self) -> np.ndarray:
+        """Which parameters a flat direction moves, shape (n_parameters,).
 
-        A parameter without any effect has none to be measured by and keeps its own unit.
-        Shape (n_parameters, n_flat).
+        Measured by what they do to the output and by their size: small coefficients of B
+        may do little and yet be free.
         """
-        weight = np.where(self.sensitivity > 0.0, self.sensitivity, 1.0)
-        return self.steps[:, self.is_flat] * weight[:, None]
+        flat = self.steps[:, self.is_flat]
+        # A parameter without any effect has only its size to be measured by.
+        effect = np.where(self.sensitivity > 0.0, self.sensitivity, 1.0 / self.size)
+        moved = np.zeros(self.size.size, dtype=bool)
+        for weight, least in ((effect, _LEAST_EFFECT), (1.0 / self.size, _LEAST_SHARE)):
+            parts = np.abs(flat) * weight[:, None]
+            largest = np.maximum(parts.max(axis=0, initial=0.0), 1e-300)
+            moved |= (parts > least * largest).any(axis=1)
+        return moved
 
     def covariance(self, variance: float) -> np.ndarray:
         """Covariance of all parameters, flat directions left out.
@@ -130,6 +144,7 @@ def directions(
         change @ ((free @ parts) / scale[:, None]),
         strength,
         np.sqrt(np.maximum(by_coefficient, 0.0)),
+        _sizes(candidate, place),
     )
 
 
@@ -188,6 +203,27 @@ def _coefficients(place: Columns) -> np.ndarray:
     for part in (place.numerator, place.denominator, *_initial_states(place)):
         change[part, part] = difference_basis(part.stop - part.start)
     return change
+
+
+def _sizes(candidate: Candidate, place: Columns) -> np.ndarray:
+    """Size of what each parameter belongs to; one where that is zero."""
+    model = candidate.model
+    size = np.zeros(place.total)
+    size[place.numerator] = np.linalg.norm(model.numerator)
+    size[place.denominator] = np.linalg.norm(model.denominator[1:])
+    size[place.free_responses] = np.linalg.norm(candidate.free_responses)
+    for one, part in (
+        (model.input_map, place.input_map),
+        (model.output_map, place.output_map),
+    ):
+        if part.stop > part.start:
+            count = RULES[one.kind].n_positions(one)
+            positions, values = one.parameters[:count], one.parameters[count:]
+            of_values = np.ptp(values) or np.max(np.abs(values))
+            sizes = np.full(one.parameters.size, of_values)
+            sizes[:count] = np.ptp(positions) if count else 0.0
+            size[part] = sizes[sizes.size - (part.stop - part.start) :]
+    return np.where(size > 0.0, size, 1.0)
 
 
 def _initial_states(place: Columns) -> list[slice]:

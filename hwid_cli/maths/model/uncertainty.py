@@ -31,8 +31,6 @@ from hwid_cli.records.information import Information
 from hwid_cli.records.model import Fit, ParameterCovariance, Uncertainty
 from hwid_cli.records.recordings import Recording
 
-# A parameter with this share of a flat direction's largest part is not determined.
-_LEAST_PART = 1e-3
 _MOST_NAMES = 4
 
 
@@ -152,9 +150,7 @@ def _as_fitted(
 def _covariance(found: Directions, variance: float) -> np.ndarray:
     """Covariance of all parameters; NaN for those that a flat direction moves."""
     covariance = found.covariance(variance)
-    flat = np.abs(found.flat_steps)
-    flat /= np.maximum(flat.max(axis=0, initial=0.0), 1e-300)
-    is_lost = (flat > _LEAST_PART).any(axis=1)
+    is_lost = found.is_moved_by_flat
     covariance[is_lost, :] = np.nan
     covariance[:, is_lost] = np.nan
     return covariance
