@@ -17,6 +17,7 @@ from hwid_cli.records.experiment import (
     Experiment,
     GroupOptions,
     IdentifyOptions,
+    OrderOptions,
     OrdersOptions,
 )
 
@@ -116,7 +117,19 @@ def _read_hold_out(value: Any, place: Place) -> str | tuple[str, ...]:
     )
 
 
+def _read_order(value: Any, place: Place) -> OrderOptions:
+    """The section ``order``; keys of ``orders`` in it are told from others."""
+    grid = {field.name for field in fields(OrdersOptions)}
+    for key in value if isinstance(value, dict) else ():
+        if key in grid:
+            raise ConfigError(
+                f"{place.below(key)}: unknown key; did you mean 'orders.{key}'?"
+            )
+    return build(OrderOptions, value, place, readers={})
+
+
 _READERS: dict[tuple[type, str], Reader] = {
+    (Experiment, "order"): _read_order,
     (OrdersOptions, "nb"): _read_orders_axis,
     (OrdersOptions, "nk"): _read_orders_axis,
     (IdentifyOptions, "recordings"): _read_names,

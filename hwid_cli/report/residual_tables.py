@@ -33,7 +33,7 @@ def residual_verdict(tests: ResidualTests) -> str:
     elif tests.is_white:
         left = "nothing left to model"
     else:
-        left = "coloured, but not by the input"
+        left = "coloured, not by the input or its square"
     return f"{start}: {left}{'; input follows them' if tests.leads_input else ''}"
 
 

@@ -20,7 +20,7 @@ WHITE = residual_tests(NOISE, INPUT)
     ("changes", "expected"),
     [
         ({}, "nothing left to model"),
-        ({"is_white": False}, "coloured, but not by the input"),
+        ({"is_white": False}, "coloured, not by the input or its square"),
         ({"follows_square": True}, "misses a nonlinearity"),
         ({"leads_input": True}, "nothing left to model; input follows them"),
     ],

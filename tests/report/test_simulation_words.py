@@ -26,6 +26,7 @@ from hwid_cli.report.sections.recordings import (
     recordings_section,
 )
 from hwid_cli.report.sections.residuals import residuals_section
+from hwid_cli.report.sections.summary import summary_section
 from hwid_cli.report.simulation_words import simulation_words
 from hwid_cli.report.tables import best_models_table, coverage_table, cross_table
 from tests.report.report_examples import fit, group_search
@@ -76,6 +77,7 @@ def test_every_table_of_validations_says_how_models_start(table, rule):
 @pytest.mark.parametrize(
     ("section", "is_validation"),
     [
+        (summary_section, True),
         (recordings_section, True),
         (residuals_section, True),
         (orders_section, False),

@@ -2,8 +2,9 @@
 
 White residuals that do not know the input leave nothing to model. Residuals that follow
 the input show missing dynamics, or a missing nonlinearity where they follow its square.
-Residuals that are coloured and independent of the input are noise of the sensor or the
-machine: an output-error model need not describe it, but its standard errors are wrong.
+Residuals that are coloured and follow neither are noise of the sensor or the machine,
+which an output-error model need not describe, or follow the input in a way that neither
+test sees; its standard errors are wrong in both cases.
 
 A fit takes the part of the noise with it that its parameters can follow, so residuals
 correlate even where the noise is white, by ``-tr(P S_k)`` with P the projection on the

@@ -18,7 +18,8 @@ _MOST_OPEN = 2
 _HOW = (
     "White residuals that do not follow the input leave nothing to model. Those that follow "
     "it show missing dynamics, those that follow its square a missing nonlinearity. "
-    "Coloured ones that follow neither are noise; standard errors are too small then. "
+    "Coloured ones that follow neither are noise, or follow the input in a way that these "
+    "tests do not see (a sine shows least); standard errors are too small then. "
     "With many samples the tests find what no user would mind: read the RMSD beside them."
 )
 
