@@ -29,6 +29,8 @@ _MOST_NAMES, _MOST_SENTENCES = 4, 3
 # Distance of a pole and a zero that counts as a cancellation, and the share of a map's
 # mean slope by which it must bend to have a break-point there.
 _CANCELS, _BENDS = 0.05, 1e-3
+# Fewer samples than this in a segment leave its line open.
+_FEW = 5
 # Levels of a signal nearer than this share of its range are one.
 _SAME_LEVEL = 1e-9
 _NO_MAP = StaticMap("none", np.zeros(0))
@@ -183,7 +185,7 @@ def _why_of_map(
     for number in (moved + first) % units:
         gap = _gap_beside(points, int(number), signal)
         if gap:
-            return f"no sample of {{what}} lies between {gap[0]:.3g} and {gap[1]:.3g}"
+            return gap
     for place in moved + first:
         inner = 0 < place < units - 1
         if inner and abs(slopes[place] - slopes[place - 1]) < _BENDS * scale:
@@ -191,16 +193,21 @@ def _why_of_map(
     return ""
 
 
-def _gap_beside(
-    points: np.ndarray, number: int, signal: np.ndarray
-) -> tuple[float, ...]:
-    """Ends of the segments without samples around a break-point; empty if none is."""
+def _gap_beside(points: np.ndarray, number: int, signal: np.ndarray) -> str:
+    """Segments beside a break-point with hardly any sample; empty where there are many."""
     before, after = max(number - 1, 0), min(number + 1, points.size - 1)
+    found = []
     for low, high in ((before, after), (before, number), (number, after)):
         between = (signal > points[low]) & (signal < points[high])
-        if low < high and not between.any():
-            return float(points[low]), float(points[high])
-    return ()
+        if low < high:
+            found.append((int(between.sum()), points[low], points[high]))
+    # The emptiest of them; of equally empty ones the longest, which comes first.
+    count, left, right = min(found, key=lambda one: one[0])
+    if count >= _FEW:
+        return ""
+    many = f"only {count} sample{'s' * (count > 1)}" if count else "no sample"
+    verb = "lie" if count > 1 else "lies"
+    return f"{many} of {{what}} {verb} between {left:.3g} and {right:.3g}"
 
 
 def _count_levels(signal: np.ndarray) -> int:

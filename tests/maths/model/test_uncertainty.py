@@ -106,6 +106,20 @@ def test_a_segment_without_samples_is_named_as_the_reason():
     assert all("no sample of the input lies between" in one for one in uncertainty.flat)
 
 
+def test_a_segment_with_one_sample_is_named_as_the_reason():
+    u = np.random.default_rng(0).uniform(-3, 0, 900)
+    u[450] = 3.0
+    bent = np.where(u > 0, 3 * u, u)
+    y = noisy(signal.lfilter([0.0, 0.5], [1.0, -0.5], bent), 1, 1e-3)
+    asked = replace(options("piecewise_linear", "none"), units=3)
+    result = fit([Recording("r", u, y, 1.0)], Orders(1, 1, 1), asked)
+
+    # The bend may lie anywhere between the many samples and the one.
+    (sentence,) = result.uncertainty.flat
+    assert "input_map.break_point[1]" in sentence
+    assert "of the input lies between" in sentence
+
+
 def test_poles_and_zeros_that_cancel_are_named_as_the_reason():
     u = np.random.default_rng(5).standard_normal(500)
     y = noisy(signal.lfilter([0.0, 0.5], [1.0, -0.5], u), 1, 0.05)
