@@ -14,6 +14,7 @@ from typing import Any, TypeVar
 
 import click
 
+from hwid_cli.campaign.own_functions import check_own_functions
 from hwid_cli.campaign.runner import RunSettings, TaskDone, Workers
 from hwid_cli.cli.options import Choices
 from hwid_cli.errors import CacheError, ConfigError
@@ -92,6 +93,7 @@ def open_session(choices: Choices, *stages: str) -> Session:
         If the configuration or the folder cannot be used.
     """
     experiment = load_experiment(choices.config)
+    check_own_functions(experiment)
     out = choices.out or Path("results") / experiment.name
     try:
         out.mkdir(parents=True, exist_ok=True)

@@ -11,6 +11,7 @@ from typing import Any
 from hwid_cli.errors import ConfigError
 from hwid_cli.files.config_checks import check_experiment
 from hwid_cli.files.config_fields import Place, Reader, build, convert
+from hwid_cli.files.own_functions import read_section
 from hwid_cli.records.experiment import (
     CrossvalOptions,
     DiagnoseOptions,
@@ -20,6 +21,7 @@ from hwid_cli.records.experiment import (
     OrderOptions,
     OrdersOptions,
 )
+from hwid_cli.records.model import FitOptions
 
 _ALL = "all"
 
@@ -128,8 +130,22 @@ def _read_order(value: Any, place: Place) -> OrderOptions:
     return build(OrderOptions, value, place, readers={})
 
 
+def _read_fit(content: Any, place: Place) -> FitOptions:
+    """Options of a fit; a map that is a section names the user's own function."""
+    content = dict(content) if isinstance(content, dict) else content
+    given: dict[str, Any] = {"input_function": None, "output_function": None}
+    for side in ("input", "output"):
+        key = f"{side}_map"
+        section = content.get(key) if isinstance(content, dict) else None
+        if isinstance(section, dict):
+            given[f"{side}_function"] = read_section(section, place.below(key))
+            content[key] = "own_function"
+    return build(FitOptions, content, place, readers=_READERS, given=given)
+
+
 _READERS: dict[tuple[type, str], Reader] = {
     (Experiment, "order"): _read_order,
+    (Experiment, "fit"): _read_fit,
     (OrdersOptions, "nb"): _read_orders_axis,
     (OrdersOptions, "nk"): _read_orders_axis,
     (IdentifyOptions, "recordings"): _read_names,

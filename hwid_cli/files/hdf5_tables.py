@@ -3,7 +3,8 @@
 For thousands of records this is a hundred times smaller and faster than a group for
 each. Arrays and tuples are rows padded to the longest (NaN, 0 or empty text); where
 lengths differ, ``<name>_length`` holds them. Records inside are groups of columns;
-where some are None, the group's ``is_present`` says which.
+where some are None, the group's ``is_present`` says which; for other optional fields
+``<name>_is_present`` does. An optional field that is None in every record has no column.
 """
 
 from collections.abc import Sequence
@@ -46,14 +47,20 @@ def write_table(
             None if record is None else getattr(record, field.name)
             for record in records
         ]
+        if field.is_optional and all(value is None for value in values):
+            continue
         if field.form == "record":
             write_table(group.create_group(field.name), values, field.member)
-        elif field.form == "scalar":
+            continue
+        if field.form == "scalar":
             _write_scalars(group, field, values, is_present)
         elif field.form in ("tuple", "array"):
             _write_rows(group, field, values)
         else:
             raise TypeError(f"{field.name}: a tuple of records has no place in columns")
+        if field.is_optional:
+            there = np.array([value is not None for value in values], dtype=bool)
+            write_array(group, f"{field.name}_{_PRESENT}", there)
 
 
 def read_table(group: h5py.Group, record_type: type[Record]) -> list[Record | None]:
@@ -74,14 +81,20 @@ def read_table(group: h5py.Group, record_type: type[Record]) -> list[Record | No
         If the group does not hold such a table.
     """
     stored = schema(record_type)
-    known = [
-        field
+    absent = {
+        field.name
         for field in stored
-        if field.default is None or has_value(group, field.name)
-    ]
-    columns = {field.name: _read_column(group, field) for field in known}
+        if field.is_optional and not has_value(group, field.name)
+    }
     # Fields that an earlier version did not write are left to their defaults.
+    columns = {
+        field.name: _read_column(group, field)
+        for field in stored
+        if field.name not in absent
+        if field.default is None or has_value(group, field.name)
+    }
     (count,) = {len(column) for column in columns.values()}
+    columns |= {name: [None] * count for name in absent}
     is_present = [True] * count
     if has_value(group, _PRESENT):
         is_present = read_array(group, _PRESENT).tolist()
@@ -97,7 +110,7 @@ def _write_scalars(
     group: h5py.Group, field: StoredField, values: list[Any], is_present: np.ndarray
 ) -> None:
     filler = {str: "", bool: False, int: 0, float: np.nan}[field.member]
-    if any(
+    if not field.is_optional and any(
         value is None for value, there in zip(values, is_present, strict=True) if there
     ):
         raise TypeError(f"{field.name}: a scalar that is None has no place in columns")
@@ -127,6 +140,18 @@ def _write_rows(group: h5py.Group, field: StoredField, values: list[Any]) -> Non
 def _read_column(group: h5py.Group, field: StoredField) -> list[Any]:
     if field.form == "record":
         return read_table(group[field.name], field.member)
+    values = _read_values(group, field)
+    if not field.is_optional:
+        return values
+    there = read_array(group, f"{field.name}_{_PRESENT}")
+    return [
+        value if is_there else None
+        for value, is_there in zip(values, there, strict=True)
+    ]
+
+
+def _read_values(group: h5py.Group, field: StoredField) -> list[Any]:
+    """Scalars or rows of a column, filling included."""
     values = read_array(group, field.name)
     if field.form == "scalar":
         return values.tolist()

@@ -1,16 +1,17 @@
 """The Hammerstein-Wiener model, its orders, the options of a fit and its result."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from hwid_cli.records.information import Information
+from hwid_cli.records.maps import MAP_KINDS, MapOptions, OwnFunction, StaticMap
 from hwid_cli.records.recordings import frozen_vector
 from hwid_cli.records.stored import ADDED_LATER
+from hwid_cli.records.uncertainty import Uncertainty
 
 INITIAL_STATES = ("zero", "steady", "estimated")
 JOINS = ("concatenate", "experiments")
-MAP_KINDS = ("piecewise_linear", "saturation", "dead_zone", "polynomial", "none")
 FIT_STATUSES = ("converged", "iteration_limit", "stalled", "failed")
 
 
@@ -59,8 +60,9 @@ class FitOptions:
     input_map, output_map : str
         One of ``MAP_KINDS``.
     units : int, [-]
-        Break-points of a piecewise linear map; degree of a polynomial is
-        ``degree``.
+        Break-points, network units, knots or levels of both maps.
+    input_units, output_units : int or None, [-]
+        The same for one of the maps; None means ``units``.
     degree : int, [-]
         Degree of a polynomial map.
     initial_state : str
@@ -75,6 +77,8 @@ class FitOptions:
         Limit for each phase of the search from one start.
     starts : int, [-]
         Number of linear starts that are screened.
+    input_function, output_function : OwnFunction or None
+        The functions of maps that are ``own_function``.
     """
 
     input_map: str = "piecewise_linear"
@@ -86,6 +90,10 @@ class FitOptions:
     free_break_points: bool = True
     max_iterations: int = 60
     starts: int = 6
+    input_units: int | None = None
+    output_units: int | None = None
+    input_function: OwnFunction | None = None
+    output_function: OwnFunction | None = None
 
     def __post_init__(self) -> None:
         for name, allowed in (
@@ -108,36 +116,47 @@ class FitOptions:
             value = getattr(self, name)
             if value != int(value) or value < least:
                 raise ValueError(f"{name} must be an integer >= {least}, got {value!r}")
+        for side in ("input", "output"):
+            try:
+                getattr(self, f"of_{side}")
+            except ValueError as error:
+                # What a map refuses, under the name of the key that asked for it.
+                raise ValueError(f"{side}_{error}") from None
 
+    @property
+    def of_input(self) -> MapOptions:
+        """What is asked of the input map."""
+        units = self.units if self.input_units is None else self.input_units
+        return MapOptions(self.input_map, units, self.degree, self.input_function)
 
-@dataclass(frozen=True, eq=False)
-class StaticMap:
-    """A static nonlinearity: its kind and the numbers that fix it.
+    @property
+    def of_output(self) -> MapOptions:
+        """What is asked of the output map."""
+        units = self.units if self.output_units is None else self.output_units
+        return MapOptions(self.output_map, units, self.degree, self.output_function)
 
-    Parameters
-    ----------
-    kind : str
-        One of ``MAP_KINDS``.
-    parameters : ndarray, shape (n_parameters,)
-        ``piecewise_linear``: break-points, then the values there. ``saturation``: lower
-        and upper limit. ``dead_zone``: lower and upper edge. ``polynomial``: Chebyshev
-        coefficients over ``domain``, constant first. ``none``: empty.
-    domain : tuple of float
-        Range of the argument in the fit; outside it the map extrapolates.
-    """
+    def in_units(self, input_unit: float, output_unit: float) -> "FitOptions":
+        """Give the same options for data that are divided by these units.
 
-    kind: str
-    parameters: np.ndarray
-    domain: tuple[float, float] = (-1.0, 1.0)
+        Parameters
+        ----------
+        input_unit, output_unit : float
+            Positive.
 
-    def __post_init__(self) -> None:
-        if self.kind not in MAP_KINDS:
-            raise ValueError(
-                f"map kind {self.kind!r} is none of {', '.join(MAP_KINDS)}"
-            )
-        object.__setattr__(
-            self, "parameters", frozen_vector(self.parameters, "parameters")
+        Returns
+        -------
+        FitOptions
+            Own functions go on seeing the data as they were.
+        """
+        return replace(
+            self,
+            input_function=_in_unit(self.input_function, input_unit),
+            output_function=_in_unit(self.output_function, output_unit),
         )
+
+
+def _in_unit(function: OwnFunction | None, unit: float) -> OwnFunction | None:
+    return None if function is None else replace(function, unit=function.unit / unit)
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,53 +205,6 @@ class HammersteinWiener:
     def orders(self) -> Orders:
         """Orders ``[nb nf nk]`` of the linear block."""
         return Orders(self.numerator.size, self.denominator.size - 1, self.delay)
-
-
-@dataclass(frozen=True, eq=False)
-class Uncertainty:
-    """Standard errors of a model's parameters, or the reason why there are none.
-
-    Parameters
-    ----------
-    names : tuple of str
-        Parameter names, such as ``b[0]``, ``f[1]``, ``input_map.value[3]``.
-    standard_errors : ndarray, shape (n_parameters,)
-        In the units of the parameters; NaN where the data do not determine one.
-    reason : str
-        Why some or all are missing; empty if all exist.
-    flat : tuple of str
-        What the data do not tell, or hardly: one sentence for each direction in which
-        parameters can move together, with the reason where there is one to tell.
-    """
-
-    names: tuple[str, ...] = ()
-    standard_errors: np.ndarray = field(default_factory=lambda: np.zeros(0))
-    reason: str = ""
-    flat: tuple[str, ...] = field(default=(), metadata=ADDED_LATER)
-
-    def __post_init__(self) -> None:
-        object.__setattr__(
-            self,
-            "standard_errors",
-            frozen_vector(self.standard_errors, "standard_errors"),
-        )
-
-
-@dataclass(frozen=True, eq=False)
-class ParameterCovariance:
-    """Covariance of a model's parameters.
-
-    Parameters
-    ----------
-    names : tuple of str
-        As in ``Uncertainty``.
-    matrix : ndarray, shape (n_parameters, n_parameters)
-        In the units of the parameters; rows and columns of NaN where the data do not
-        determine one.
-    """
-
-    names: tuple[str, ...]
-    matrix: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,11 +8,33 @@ from hwid_cli.campaign.identify import identify_all, identify_tasks
 from hwid_cli.campaign.runner import RunSettings, Workers
 from hwid_cli.files.hdf5_store import Hdf5Store
 from hwid_cli.records.experiment import OrdersOptions
+from hwid_cli.records.maps import OwnFunction
 from hwid_cli.records.model import FitOptions, Orders
 from hwid_cli.records.recordings import Recording
 
 QUICK = FitOptions(units=3, max_iterations=5, starts=1, initial_state="zero")
 GRID = OrdersOptions(nb=(1, 2), nk=(1,))
+
+
+SOFT_LIMIT = """
+import numpy as np
+from hwid_cli import MapFunction
+
+soft_limit = MapFunction(
+    value=lambda v, p: p[0] * np.tanh(v / p[0]),
+    by_argument=lambda v, p: 1.0 - np.tanh(v / p[0]) ** 2,
+    by_parameters=lambda v, p: (
+        np.tanh(v / p[0]) - v / p[0] * (1.0 - np.tanh(v / p[0]) ** 2)
+    )[:, None],
+    start=[0.7],
+)
+"""
+OWN = replace(
+    QUICK,
+    input_map="own_function",
+    output_map="cubic_spline",
+    input_function=OwnFunction("soft_limit", SOFT_LIMIT),
+)
 
 
 def recording_of(name="r1", seed=1):
@@ -52,9 +74,12 @@ def test_every_recording_gets_a_fit_for_every_pair_of_orders():
     assert all(np.isfinite(fit.rmsd) for fit in fits)
 
 
-def test_the_number_of_workers_changes_no_number():
+@pytest.mark.parametrize("options", [QUICK, OWN], ids=["default", "own_function"])
+def test_the_number_of_workers_changes_no_number(options):
     one, two = (
-        identify_all(RECORDINGS, GRID, QUICK, RunSettings(MemoryStore(), Workers(jobs)))
+        identify_all(
+            RECORDINGS, GRID, options, RunSettings(MemoryStore(), Workers(jobs))
+        )
         for jobs in (1, 2)
     )
 
@@ -114,6 +139,7 @@ CHANGED_OUTPUT[7] += 1e-12
         {"recordings": [replace(RECORDINGS[0], output_unit="rad")]},
         {"options": replace(QUICK, units=4)},
         {"options": replace(QUICK, initial_state="steady")},
+        {"options": replace(QUICK, input_units=4)},
         {"grid": OrdersOptions(nb=(1, 2), nk=(2,))},
         {"grid": OrdersOptions(nb=(1, 2), nk=(0,), nk_role="delay", nf=1)},
     ],
@@ -121,6 +147,11 @@ CHANGED_OUTPUT[7] += 1e-12
 )
 def test_everything_that_a_fit_sees_alters_its_key(changes):
     assert not keys() & keys(**changes)
+
+
+def test_the_text_of_an_own_function_alters_the_key():
+    other = OwnFunction("soft_limit", SOFT_LIMIT + "# changed")
+    assert not keys(options=OWN) & keys(options=replace(OWN, input_function=other))
 
 
 def test_the_two_readings_of_the_second_order_share_their_common_fits():

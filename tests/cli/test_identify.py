@@ -1,3 +1,7 @@
+from pathlib import Path
+
+import pytest
+
 from hwid_cli.files.results import read_fits
 
 
@@ -60,3 +64,37 @@ def test_quiet_says_nothing(after_run, hwid):
     result = hwid("identify", "--quiet")
 
     assert (result.exit_code, result.output) == (0, "")
+
+
+README = Path(__file__).parents[2] / "configs" / "README.md"
+OWN_MAP = README.read_text(encoding="utf-8").split("```python\n")[1].split("```")[0]
+
+
+@pytest.fixture
+def own_map(config, edit):
+    """Let the input map be the example of configs/README.md."""
+    edit("fit: {", "fit: {input_map: {file: my_map.py, name: friction_curve}, ")
+    path = config.parent / "my_map.py"
+    path.write_text(OWN_MAP, encoding="utf-8")
+    return path
+
+
+def test_a_map_of_ones_own_is_fitted_and_kept(own_map, hwid, out):
+    assert hwid("identify").exit_code == 0
+    fit = read_fits(out / "results.h5")[0]
+
+    assert fit.model.input_map.function.source == OWN_MAP
+    assert "input_map.loss" in fit.uncertainty.names
+    own_map.write_text(OWN_MAP.replace("start=[0.3", "start=[0.4"), encoding="utf-8")
+    assert "0 fits from the cache, 6 computed" in hwid("identify").stdout
+
+
+def test_a_map_of_ones_own_that_contradicts_itself_is_one_line(own_map, hwid):
+    own_map.write_text(OWN_MAP.replace("1.0 - p[0]", "1.0 + p[0]"), encoding="utf-8")
+    result = hwid("identify")
+
+    assert result.exit_code == 1
+    assert (
+        "tiny.yaml: fit.input_map: friction_curve: by_argument: found" in result.stderr
+    )
+    assert len(result.stderr.splitlines()) == 1

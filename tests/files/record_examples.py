@@ -1,20 +1,21 @@
 """Records with every kind of field, and a way to compare them bit by bit."""
 
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass, replace
 
 import numpy as np
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from hwid_cli.records.information import Information
+from hwid_cli.records.maps import OwnFunction
 from hwid_cli.records.model import (
     Fit,
     FitOptions,
     HammersteinWiener,
     Orders,
     StaticMap,
-    Uncertainty,
 )
+from hwid_cli.records.uncertainty import Uncertainty
 
 # HDF5 text ends at a null character, and lone surrogates are no text at all.
 TEXTS = st.text(st.characters(exclude_characters="\0", exclude_categories=["Cs"]))
@@ -48,12 +49,19 @@ class Everything:
 
 
 @dataclass(frozen=True, eq=False)
-class WithMore(Everything):
-    """Fields that a group can hold and a table cannot."""
+class WithGaps(Everything):
+    """Fields that may be missing."""
 
     perhaps_word: str | None
+    perhaps_count: int | None
     perhaps_counts: tuple[int, ...] | None
     perhaps_vector: np.ndarray | None
+
+
+@dataclass(frozen=True, eq=False)
+class WithMore(WithGaps):
+    """Fields that a group can hold and a table cannot."""
+
     inners: tuple[Inner, ...]
 
 
@@ -79,11 +87,18 @@ ARRAYS = hnp.arrays(
     | hnp.complex_number_dtypes(endianness="<"),
     hnp.array_shapes(min_dims=0, min_side=0, max_dims=3),
 )
+_GAPS = {
+    "perhaps_word": st.none() | TEXTS,
+    "perhaps_count": st.none() | INTEGERS,
+    "perhaps_counts": st.none() | st.lists(INTEGERS, max_size=4).map(tuple),
+}
+WITH_GAPS = st.builds(
+    WithGaps, **_EVERYTHING, **_GAPS, perhaps_vector=st.none() | VECTORS
+)
 WITH_MORE = st.builds(
     WithMore,
     **_EVERYTHING,
-    perhaps_word=st.none() | TEXTS,
-    perhaps_counts=st.none() | st.lists(INTEGERS, max_size=4).map(tuple),
+    **_GAPS,
     perhaps_vector=st.none() | ARRAYS,
     inners=st.lists(INNERS, max_size=3).map(tuple),
 )
@@ -117,6 +132,22 @@ def example_fit(name="step_01", nb=2, nf=2, seed=1):
         ),
         information=Information(300, 17, -12.5, -12.25, 0.1, 1e-9),
     )
+
+
+def fit_with_own_function(name="step_01", nb=2):
+    """A fit whose input map is the user's own and whose output map has 7 units."""
+    fit = example_fit(name, nb)
+    function = OwnFunction("curve", "curve = 'µ'\n", unit=0.1)
+    own = StaticMap("own_function", np.array([0.1, 1 / 3]), (-1.0, 2.0), function)
+    options = FitOptions(
+        input_map="own_function",
+        output_map="sigmoid_network",
+        output_units=7,
+        input_function=function,
+    )
+    network = StaticMap("sigmoid_network", np.arange(23.0) / 7.0, (-1.0, 2.0))
+    model = replace(fit.model, input_map=own, output_map=network)
+    return replace(fit, options=options, model=model)
 
 
 def failed_fit(name="step_01", nb=3, nf=1):

@@ -8,9 +8,16 @@ from typing import get_args, get_origin, get_type_hints
 import pytest
 
 from hwid_cli.records.experiment import Experiment
+from hwid_cli.records.model import FitOptions
 
 README = Path(__file__).parents[2] / "configs" / "README.md"
 
+# Fields that the program sets: no keys.
+SET_BY_THE_PROGRAM = {
+    (Experiment, "source"),
+    (FitOptions, "input_function"),
+    (FitOptions, "output_function"),
+}
 WORDS = {str: "text", int: "integer", float: "number", bool: "true or false"}
 
 
@@ -31,7 +38,7 @@ def keys_of(record_type, prefix="", kind=""):
     """Every key below a dataclass: (kind, dotted key, type, default) as written."""
     hints = get_type_hints(record_type)
     for field in fields(record_type):
-        if (record_type, field.name) == (Experiment, "source"):
+        if (record_type, field.name) in SET_BY_THE_PROGRAM:
             continue
         key, hint = prefix + field.name, hints[field.name]
         members = [m for m in get_args(hint) or (hint,) if is_dataclass(m)]

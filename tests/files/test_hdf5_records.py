@@ -16,6 +16,7 @@ from tests.files.record_examples import (
     assert_same,
     example_fit,
     failed_fit,
+    fit_with_own_function,
 )
 
 
@@ -37,7 +38,11 @@ def test_every_record_comes_back_bit_by_bit(record):
     assert_same(round_trip(record), record)
 
 
-@pytest.mark.parametrize("fit", [example_fit(), failed_fit()], ids=["fit", "failure"])
+@pytest.mark.parametrize(
+    "fit",
+    [example_fit(), failed_fit(), fit_with_own_function()],
+    ids=["fit", "failure", "own_function"],
+)
 def test_fit_comes_back_bit_by_bit(fit):
     assert_same(round_trip(fit), fit)
 

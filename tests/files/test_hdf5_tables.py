@@ -10,11 +10,14 @@ from hwid_cli.files.hdf5_tables import read_table, write_table
 from hwid_cli.records.model import Fit
 from tests.files.record_examples import (
     EVERYTHING,
+    WITH_GAPS,
     Everything,
+    WithGaps,
     WithMore,
     assert_same,
     example_fit,
     failed_fit,
+    fit_with_own_function,
 )
 
 
@@ -32,8 +35,30 @@ def test_every_list_of_records_comes_back_bit_by_bit(records):
         assert_same(one, other)
 
 
+@given(st.lists(st.none() | WITH_GAPS, max_size=4))
+def test_every_list_of_records_with_gaps_comes_back_bit_by_bit(records):
+    with in_memory() as file:
+        write_table(file, records, WithGaps)
+        found = read_table(file, WithGaps)
+    for one, other in zip(found, records, strict=True):
+        assert_same(one, other)
+
+
+def test_options_that_nobody_set_have_no_column():
+    with in_memory() as file:
+        write_table(file, [example_fit(), failed_fit()], Fit)
+        # Files of versions that did not know them look the same.
+        assert not {"input_units", "input_function"} & set(file["options"])
+        assert "function" not in file["model/input_map"]
+
+
 def test_fits_with_and_without_a_model_come_back():
-    fits = [example_fit(nb=1), failed_fit(), example_fit(nb=7, nf=0, seed=2)]
+    fits = [
+        example_fit(nb=1),
+        failed_fit(),
+        fit_with_own_function(),
+        example_fit(nb=7, nf=0, seed=2),
+    ]
     with in_memory() as file:
         write_table(file, fits, Fit)
         for found, fit in zip(read_table(file, Fit), fits, strict=True):

@@ -22,6 +22,8 @@ from hwid_cli.maths.model.linear_block import is_stable, poles
 from hwid_cli.maths.model.normalise import normalise, rescaled
 from hwid_cli.maths.model.placing import with_maps
 from hwid_cli.maths.model.search import linear_search, nonlinear_search
+from hwid_cli.maths.model.starts import Start, linear_starts
+from hwid_cli.maths.model.static_map import has_free_shape
 from hwid_cli.maths.model.uncertainty import judged_parameters
 from hwid_cli.maths.model.warm_start import warm_search
 from hwid_cli.records.model import Fit, FitOptions, HammersteinWiener, Orders
@@ -100,13 +102,19 @@ def fit(
     if reason:
         return replace(blank, message=reason)
     problem = _scaled(recordings, options)
+    options = options.in_units(problem.input_scale, problem.output_scale)
     linear_rmsd = float("nan")
     try:
         search = _warm_search(problem, options, starts)
         if search is None:
-            linear = linear_search(problem.experiments, orders, options)
+            starts_found = _starts(problem, orders, options)
+            linear = linear_search(problem.experiments, orders, options, starts_found)
             linear_rmsd = _rmsd(linear, problem)
-            search = _search(problem, orders, options, linear)
+            search = linear
+            if not _is_linear(options):
+                search = nonlinear_search(
+                    problem.experiments, orders, options, starts_found, linear
+                )
     except np.linalg.LinAlgError as error:
         return replace(blank, message=f"linear algebra failed: {error}")
     if not np.isfinite(search.cost) or not is_stable(
@@ -141,13 +149,20 @@ def _warm_search(
     return search if is_usable else None
 
 
-def _search(
-    problem: _Problem, orders: Orders, options: FitOptions, linear: Search
-) -> Search:
-    """Search from nothing but the linear model."""
-    if options.input_map == "none" and options.output_map == "none":
-        return linear
-    return nonlinear_search(problem.experiments, orders, options, linear)
+def _starts(
+    problem: _Problem, orders: Orders, options: FitOptions
+) -> tuple[Start, ...]:
+    return linear_starts(
+        problem.experiments,
+        orders,
+        options=options,
+        sees_input_map=has_free_shape(options.input_map),
+        count=options.starts,
+    )
+
+
+def _is_linear(options: FitOptions) -> bool:
+    return options.input_map == "none" and options.output_map == "none"
 
 
 def _reason_not_to_fit(
@@ -170,8 +185,8 @@ def _reason_not_to_fit(
 def _least_parameters(orders: Orders, options: FitOptions) -> int:
     """Parameters of a model, each shared gain counted once."""
     maps = (
-        static_map.identity(kind, options, np.array([0.0, 1.0]))
-        for kind in (options.input_map, options.output_map)
+        static_map.identity(one.kind, one, np.array([0.0, 1.0]))
+        for one in (options.of_input, options.of_output)
     )
     return orders.nb + orders.nf + sum(one.parameters.size for one in maps)
 

@@ -13,7 +13,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.linalg import qr
 
 from hwid_cli.maths.model import sensitivities
 from hwid_cli.maths.model.candidates import Candidate, Columns, Experiment
@@ -58,7 +57,7 @@ def flat_sentences(
         Flat ones first; the least firm of the others follow. Three at most.
     """
     names = parameter_names(candidate, found.place)
-    told = [(parts, "") for parts in _flat_parts(found).T]
+    told = [(parts, "") for parts in found.flat_parts.T]
     # Those that move nothing but initial states matter least.
     told.sort(key=lambda one: not _moves_listed(one[0], found.place))
     told += [
@@ -77,17 +76,6 @@ def flat_sentences(
 def _moves_listed(parts: np.ndarray, place: Columns) -> bool:
     """Whether a direction moves more than initial states."""
     return bool(np.abs(parts[listed(place)]).max() >= _NAMED_PART * np.abs(parts).max())
-
-
-def _flat_parts(found: Directions) -> np.ndarray:
-    """Flat directions, each with as few parameters as can be, one column for each."""
-    flat = found.steps[:, found.is_flat] / found.size[:, None]
-    count = flat.shape[1]
-    if count == 0:
-        return flat
-    # Eigenvectors of equal eigenvalues are any mixture; one parameter each parts them.
-    _, _, order = qr(flat.T, mode="economic", pivoting=True)
-    return flat @ np.linalg.pinv(flat[order[:count]])
 
 
 def _weak_parts(found: Directions, variance: float) -> list[tuple[np.ndarray, float]]:
@@ -175,6 +163,8 @@ def _why_of_map(
     count = one.parameters.size - RULES[one.kind].n_positions(one)
     if n_levels < max(count, 2):
         return f"{{what}} visits only {n_levels} level{'s' * (n_levels > 1)}"
+    if one.kind == "saturation":
+        return _limit_not_reached(one, signal)
     if one.kind != "piecewise_linear":
         return ""
     units = one.parameters.size // 2
@@ -190,6 +180,16 @@ def _why_of_map(
         inner = 0 < place < units - 1
         if inner and abs(slopes[place] - slopes[place - 1]) < _BENDS * scale:
             return f"the map does not bend at {points[place]:.3g}"
+    return ""
+
+
+def _limit_not_reached(one: StaticMap, signal: np.ndarray) -> str:
+    """Which limit no sample reaches; empty where both are reached."""
+    low, high = one.parameters
+    if not (signal < low).any():
+        return f"no sample of {{what}} lies below {low:.3g}"
+    if not (signal > high).any():
+        return f"no sample of {{what}} lies above {high:.3g}"
     return ""
 
 

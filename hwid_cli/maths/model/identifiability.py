@@ -1,9 +1,10 @@
 """Directions of a fit's parameters, and how firmly the data hold each.
 
 ``J'J`` at the optimum is singular in the directions of the shared gains (see
-`normalise`): they are held by one equation each, the same that `normalise` fulfils. The
-outermost break-points of a map that goes on straight beyond them are held too: they may
-slide along that line. What is singular beyond that is flat: the data do not tell it.
+`normalise`): they are held by one equation each, the same that `normalise` fulfils.
+Positions that a kind takes as known are held too, such as the outermost break-points of a
+map that goes on straight beyond them: they may slide along that line. What is singular
+beyond that is flat: the data do not tell it.
 
 Everything is worked out for the coefficients of ``(1 - q^-1)^j``, whose signals are not
 nearly equal, and turned into those of B and F at the end.
@@ -17,21 +18,19 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import eigh
+from scipy.linalg import eigh, qr
 
 from hwid_cli.maths.model import sensitivities, static_map
 from hwid_cli.maths.model.candidates import Candidate, Columns, Experiment, columns
+from hwid_cli.maths.model.held_directions import held_gradients
 from hwid_cli.maths.model.linear_block import difference_basis
-from hwid_cli.maths.model.normalise import uses_static_gain
 from hwid_cli.maths.model.static_map import RULES
-from hwid_cli.records.model import StaticMap
 
 # Eigenvalues of the scaled equations below this share of the largest are zero within
 # rounding.
 _SINGULAR = 1e-11
-# A parameter with this share of a flat direction's largest part is not determined: by its
-# effect on the output, and, where rounding is larger, by its size.
-_LEAST_EFFECT, _LEAST_SHARE = 1e-3, 1e-2
+# A parameter with this share of a flat direction's largest part is not determined.
+_LEAST_SHARE = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,8 +45,6 @@ class Directions:
         Step of the parameters in each direction, B and F as coefficients.
     strength : ndarray, shape (n_directions,), [output unit squared]
         By how much a unit step raises the sum of squares.
-    sensitivity : ndarray, shape (n_parameters,)
-        Norm of the output's derivative by each parameter alone.
     size : ndarray, shape (n_parameters,)
         Size of what each parameter belongs to: of B, F, an initial state, the range of a
         map or of its break-points. Never zero.
@@ -56,7 +53,6 @@ class Directions:
     place: Columns
     steps: np.ndarray
     strength: np.ndarray
-    sensitivity: np.ndarray
     size: np.ndarray
 
     @property
@@ -70,21 +66,27 @@ class Directions:
         return int(np.sum(~self.is_flat))
 
     @property
+    def flat_parts(self) -> np.ndarray:
+        """Flat directions in shares of the sizes, shape (n_parameters, n_flat).
+
+        Eigenvectors of equal eigenvalues are any mixture; one parameter each parts them.
+        """
+        flat = self.steps[:, self.is_flat] / self.size[:, None]
+        count = flat.shape[1]
+        if count == 0:
+            return flat
+        _, _, order = qr(flat.T, mode="economic", pivoting=True)
+        return flat @ np.linalg.pinv(flat[order[:count]])
+
+    @property
     def is_moved_by_flat(self) -> np.ndarray:
         """Which parameters a flat direction moves, shape (n_parameters,).
 
-        Measured by what they do to the output and by their size: small coefficients of B
-        may do little and yet be free.
+        Measured by their size: one that stays while another grows a thousandfold is
+        known for all purposes.
         """
-        flat = self.steps[:, self.is_flat]
-        # A parameter without any effect has only its size to be measured by.
-        effect = np.where(self.sensitivity > 0.0, self.sensitivity, 1.0 / self.size)
-        moved = np.zeros(self.size.size, dtype=bool)
-        for weight, least in ((effect, _LEAST_EFFECT), (1.0 / self.size, _LEAST_SHARE)):
-            parts = np.abs(flat) * weight[:, None]
-            largest = np.maximum(parts.max(axis=0, initial=0.0), 1e-300)
-            moved |= (parts > least * largest).any(axis=1)
-        return moved
+        parts = np.abs(self.flat_parts)
+        return (parts > _LEAST_SHARE * parts.max(axis=0, initial=0.0)).any(axis=1)
 
     def covariance(self, variance: float) -> np.ndarray:
         """Covariance of all parameters, flat directions left out.
@@ -129,7 +131,7 @@ def directions(
     diagonal = np.diag(system.matrix)
     # A parameter without any effect keeps its own scale.
     scale = np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
-    held = _held(candidate, place)
+    held = held_gradients(candidate, place)
     if not np.isfinite(system.matrix).all() or len(held) >= place.total:
         return None
     free = np.eye(place.total)
@@ -138,14 +140,28 @@ def directions(
         _, _, basis = np.linalg.svd(np.array(held) @ change / scale)
         free = basis[len(held) :].T
     strength, parts = eigh(free.T @ (system.matrix / scale / scale[:, None]) @ free)
-    by_coefficient = np.einsum("ji,jk,ki->i", change, system.matrix, change)
     return Directions(
         place,
         change @ ((free @ parts) / scale[:, None]),
         strength,
-        np.sqrt(np.maximum(by_coefficient, 0.0)),
         _sizes(candidate, place),
     )
+
+
+def n_free(candidate: Candidate, *, free_break_points: bool) -> int:
+    """Parameters less what is held, whatever the data tell of them.
+
+    Parameters
+    ----------
+    candidate : Candidate
+    free_break_points : bool
+
+    Returns
+    -------
+    int
+    """
+    place = columns(candidate, with_positions=free_break_points)
+    return place.total - len(held_gradients(candidate, place))
 
 
 def parameter_names(candidate: Candidate, place: Columns) -> tuple[str, ...]:
@@ -222,6 +238,9 @@ def _sizes(candidate: Candidate, place: Columns) -> np.ndarray:
             of_values = np.ptp(values) or np.max(np.abs(values))
             sizes = np.full(one.parameters.size, of_values)
             sizes[:count] = np.ptp(positions) if count else 0.0
+            if one.kind == "own_function":
+                # Parameters of any kind and unit: each has its own size.
+                sizes = np.abs(one.parameters)
             size[part] = sizes[sizes.size - (part.stop - part.start) :]
     return np.where(size > 0.0, size, 1.0)
 
@@ -232,65 +251,3 @@ def _initial_states(place: Columns) -> list[slice]:
     if size == 0:
         return []
     return [slice(at, at + size) for at in range(part.start, part.stop, size)]
-
-
-def _held(candidate: Candidate, place: Columns) -> list[np.ndarray]:
-    """Gradients of what `normalise` holds fixed."""
-    model = candidate.model
-    held = []
-    input_rule, output_rule = RULES[model.input_map.kind], RULES[model.output_map.kind]
-    if input_rule.size is not None:
-        _, gradient = input_rule.size(model.input_map)
-        held.append(_row(place, place.input_map, gradient))
-    if output_rule.compress is not None:
-        row = np.zeros(place.total)
-        if uses_static_gain(model):
-            row[place.numerator], row[place.denominator] = 1.0, -1.0
-        else:
-            row[place.numerator] = model.numerator
-        held.append(row)
-    if _offset_is_shared(candidate, place):
-        gradient = _value_gradient(model.input_map)
-        held.append(_row(place, place.input_map, gradient))
-    if place.with_positions:
-        held += _end_break_points(model.input_map, place, place.input_map)
-        held += _end_break_points(model.output_map, place, place.output_map)
-    return held
-
-
-def _end_break_points(one: StaticMap, place: Columns, part: slice) -> list[np.ndarray]:
-    """Hold the outermost break-points of a piecewise linear map."""
-    rows = np.zeros((2, place.total))
-    last = RULES[one.kind].n_positions(one) - 1
-    if last < 0:
-        return []
-    rows[0, part.start], rows[1, part.start + last] = 1.0, 1.0
-    return list(rows)
-
-
-def _offset_is_shared(candidate: Candidate, place: Columns) -> bool:
-    """Tell whether a constant can move from one map to the other unnoticed.
-
-    A block that starts empty answers a constant with a transient, so there it cannot;
-    nor can break-points that are fixed take up the shift.
-    """
-    model = candidate.model
-    both_free = all(
-        RULES[one.kind].size is not None for one in (model.input_map, model.output_map)
-    )
-    can_shift = model.output_map.kind == "polynomial" or place.with_positions
-    return both_free and can_shift and model.initial_state != "zero"
-
-
-def _value_gradient(one: StaticMap) -> np.ndarray:
-    """Derivative of a map's value at zero, or at its domain's nearest end."""
-    at = np.clip(np.zeros(1), *one.domain)
-    row = np.zeros((1, one.parameters.size))
-    static_map.differentiate(one, at, row, 0, with_positions=True)
-    return row[0]
-
-
-def _row(place: Columns, part: slice, gradient: np.ndarray) -> np.ndarray:
-    row = np.zeros(place.total)
-    row[part] = gradient[gradient.size - (part.stop - part.start) :]
-    return row

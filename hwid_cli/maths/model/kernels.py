@@ -16,53 +16,6 @@ _TINY = 1e-200
 
 
 @njit(cache=True, fastmath=_FAST)
-def filter_columns(
-    columns: np.ndarray,
-    block: tuple[np.ndarray, np.ndarray, int],
-    past: tuple[np.ndarray, np.ndarray],
-    gain: np.ndarray,
-    out: np.ndarray,
-    first: int,
-) -> None:
-    """Run ``q^-delay B(q)/F(q)`` down every column, then multiply by ``gain(t)``.
-
-    Parameters
-    ----------
-    columns : ndarray, shape (n, k)
-    block : tuple of numerator (nb,), monic denominator (nf + 1,), delay
-    past : tuple of ndarray, shape (k,)
-        Constant values before the first sample: of the columns, of the result.
-    gain : ndarray, shape (n,)
-    out : ndarray, shape (n, at least first + k)
-        Columns ``first ... first + k - 1`` are written.
-    first : int
-    """
-    numerator, denominator, delay = block
-    n_rows, n_columns = columns.shape
-    for t in range(n_rows):
-        row = out[t, first : first + n_columns]
-        for k in range(n_columns):
-            row[k] = 0.0
-        for i in range(numerator.size):
-            b = numerator[i]
-            s = t - delay - i
-            source = columns[s] if s >= 0 else past[0]
-            for k in range(n_columns):
-                row[k] += b * source[k]
-        for j in range(1, denominator.size):
-            f = denominator[j]
-            source = out[t - j, first : first + n_columns] if t >= j else past[1]
-            for k in range(n_columns):
-                row[k] -= f * source[k]
-        for k in range(n_columns):
-            if abs(row[k]) < _TINY:
-                row[k] = 0.0
-    for t in range(n_rows):
-        for k in range(first, first + n_columns):
-            out[t, k] *= gain[t]
-
-
-@njit(cache=True, fastmath=_FAST)
 def filter_signal(
     signal: np.ndarray,
     pad: int,
@@ -96,6 +49,61 @@ def filter_signal(
         if abs(value) < _TINY:
             value = 0.0
         out[t] = value
+
+
+@njit(cache=True, fastmath=_FAST)
+def block_output(
+    signal: np.ndarray,
+    numerator: np.ndarray,
+    denominator: np.ndarray,
+    delay: int,
+    states: np.ndarray,
+    steady: bool,
+) -> np.ndarray:
+    """Run ``q^-delay B/F`` along a signal and add the response of ``C/F``.
+
+    Parameters
+    ----------
+    signal : ndarray, shape (n,)
+    numerator : ndarray, shape (nb,)
+    denominator : ndarray, shape (nf + 1,)
+        Monic.
+    delay : int, [samples]
+    states : ndarray, shape (n_state,) or (0,)
+        Coefficients of C.
+    steady : bool
+        Start in equilibrium with the first value instead of empty.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+    """
+    n, nb, nf = signal.size, numerator.size, denominator.size - 1
+    past, rest = 0.0, 0.0
+    if steady:
+        past = signal[0]
+        rest = past * numerator.sum() / denominator.sum()
+    lead = max(nf, nb - 1 + delay, states.size)
+    out = np.empty(n)
+    for t in range(n):
+        value = 0.0
+        if t < lead:
+            if t < states.size:
+                value = states[t]
+            for i in range(nb):
+                s = t - delay - i
+                value += numerator[i] * (signal[s] if s >= 0 else past)
+            for j in range(nf, 0, -1):
+                value -= denominator[j] * (out[t - j] if t >= j else rest)
+        else:
+            for i in range(nb):
+                value += numerator[i] * signal[t - delay - i]
+            for j in range(nf, 0, -1):
+                value -= denominator[j] * out[t - j]
+        if abs(value) < _TINY:
+            value = 0.0
+        out[t] = value
+    return out
 
 
 @njit(cache=True)

@@ -18,15 +18,25 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg.lapack import dposv
 
-from hwid_cli.maths.model import sensitivities
-from hwid_cli.maths.model.candidates import Candidate, Experiment, columns, moved
+from hwid_cli.maths.model.candidates import Candidate, Columns, Experiment, columns
 from hwid_cli.maths.model.linear_block import is_stable
-from hwid_cli.maths.model.maps.kernels import bends
+from hwid_cli.maths.model.maps.break_points.kernels import (
+    add_bends,
+    mean_slope,
+    squared_bends,
+)
 from hwid_cli.maths.model.maps.piecewise_linear import break_points_and_values
-from hwid_cli.maths.model.sensitivities import Equations
+from hwid_cli.maths.model.points import Point, candidate_at, moved, point_of
+from hwid_cli.maths.model.sensitivities import (
+    Equations,
+    Simulated,
+    normal_equations,
+    simulated,
+)
+from hwid_cli.records.model import StaticMap
 
 # Share of the cost that a step must gain; smaller gains in a row end the search.
-LEAST_GAIN = 1e-5
+LEAST_GAIN = 1e-4
 _SMALL_GAINS_IN_A_ROW = 2
 _FIRST_DAMPING = 1e-2
 _LEAST_DAMPING = 1e-14
@@ -67,13 +77,26 @@ class Search:
 class _Step:
     """A step that lowered the total, and the damping to go on with.
 
-    Without a candidate no step did; the gain is then what the first one promised.
+    Without a point no step did; the gain is then what the first one promised.
     """
 
-    candidate: Candidate | None
-    cost: float
+    point: Point | None
+    found: Simulated
     gain: float
     damping: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Descent:
+    """What stays the same along a search."""
+
+    experiments: Sequence[Experiment]
+    place: Columns
+    stride: int
+
+    @property
+    def samples(self) -> int:
+        return sum(one.output.size for one in self.experiments)
 
 
 def minimise(
@@ -83,6 +106,7 @@ def minimise(
     with_positions: bool,
     max_iterations: int,
     least_gain: float = LEAST_GAIN,
+    stride: int = 1,
 ) -> Search:
     """Improve a candidate until it stands still or the iterations are used up.
 
@@ -97,53 +121,55 @@ def minimise(
         Limit on accepted steps.
     least_gain : float, [-]
         Share of the cost that a step must gain.
+    stride : int, [samples]
+        Every `stride`-th sample counts.
 
     Returns
     -------
     Search
     """
-    cost = sensitivities.cost(candidate, experiments)
+    place = columns(candidate, with_positions=with_positions)
+    descent = _Descent(experiments, place, stride)
+    point = point_of(candidate)
+    found = simulated(point, experiments, stride)
     enough = _ROUNDING * sum(float(one.output @ one.output) for one in experiments)
-    damping, small_gains = _FIRST_DAMPING, 0
-    for iteration in range(max_iterations):
-        if cost <= enough:
-            why = "the residual is rounding error"
-            return Search(candidate, cost, iteration, "converged", why)
-        step = _accepted_step(
-            candidate, experiments, cost, damping, with_positions=with_positions
+    damping, small_gains, iteration = _FIRST_DAMPING, 0, 0
+
+    def end(status: str, why: str) -> Search:
+        return Search(
+            candidate_at(point, candidate), found.cost, iteration, status, why
         )
-        if step.candidate is None:
-            status, why = "stalled", "no damping gave a better step"
+
+    while iteration < max_iterations:
+        if found.cost <= enough:
+            return end("converged", "the residual is rounding error")
+        step = _accepted_step(point, found, damping, descent)
+        if step.point is None:
             if step.gain < least_gain:
-                status, why = "converged", f"no step gains {least_gain:g} of the cost"
-            return Search(candidate, cost, iteration, status, why)
-        candidate, cost, damping = step.candidate, step.cost, step.damping
+                return end("converged", f"no step gains {least_gain:g} of the cost")
+            return end("stalled", "no damping gave a better step")
+        point, found, damping = step.point, step.found, step.damping
+        iteration += 1
         small_gains = small_gains + 1 if step.gain < least_gain else 0
         if small_gains == _SMALL_GAINS_IN_A_ROW:
-            why = f"two steps in a row gained less than {least_gain:g} of the cost"
-            return Search(candidate, cost, iteration + 1, "converged", why)
-    why = f"reached the limit of {max_iterations} iterations"
-    return Search(candidate, cost, max_iterations, "iteration_limit", why)
+            return end(
+                "converged",
+                f"two steps in a row gained less than {least_gain:g} of the cost",
+            )
+    return end("iteration_limit", f"reached the limit of {max_iterations} iterations")
 
 
 def _accepted_step(
-    candidate: Candidate,
-    experiments: Sequence[Experiment],
-    cost: float,
-    damping: float,
-    *,
-    with_positions: bool,
+    point: Point, found: Simulated, damping: float, descent: _Descent
 ) -> _Step:
     """Raise the damping until a step lowers the total and stays stable."""
-    weight = cost / sum(one.output.size for one in experiments) / _USUAL_BEND**2
-    system = sensitivities.equations(
-        candidate, experiments, with_positions=with_positions
-    )
-    system = _with_prior(system, candidate, weight, with_positions=with_positions)
-    total = cost + weight * _squared_bends(candidate)
-    diagonal = np.diag(system.matrix)
+    place = descent.place
+    weight = found.cost / descent.samples / _USUAL_BEND**2
+    system = normal_equations(point, place, descent.experiments, found, descent.stride)
+    total = found.cost + _add_prior(system, point, weight, place)
+    diagonal = system.matrix.diagonal()
     if not np.isfinite(diagonal).all():
-        return _Step(None, cost, float("inf"), damping)
+        return _Step(None, found, float("inf"), damping)
     scale = 1.0 / np.sqrt(np.maximum(diagonal, _LEAST_DIAGONAL * diagonal.max()))
     matrix = system.matrix * scale[:, None] * scale
     vector = system.vector * scale
@@ -153,24 +179,18 @@ def _accepted_step(
         if step is not None:
             predicted = float(step @ (damping * step + vector))
             promised = predicted if promised is None else promised
-            proposed = moved(candidate, scale * step, with_positions=with_positions)
-            proposed_cost = _stable_cost(proposed, experiments)
-            lowered = total - proposed_cost - weight * _squared_bends(proposed)
-            if lowered > 0.0:
-                ratio = lowered / predicted
-                easing = min(2.0, max(0.1, 1.0 - (2.0 * ratio - 1.0) ** 3))
-                damping = max(_LEAST_DAMPING, damping * easing)
-                return _Step(proposed, proposed_cost, lowered / total, damping)
+            proposed = moved(point, scale * step, place)
+            if is_stable(proposed.denominator):
+                tried = simulated(proposed, descent.experiments, descent.stride)
+                lowered = total - tried.cost - weight * _squared_bends(proposed, point)
+                if lowered > 0.0:
+                    ratio = lowered / predicted
+                    easing = min(2.0, max(0.1, 1.0 - (2.0 * ratio - 1.0) ** 3))
+                    damping = max(_LEAST_DAMPING, damping * easing)
+                    return _Step(proposed, tried, lowered / total, damping)
         damping, growth = damping * growth, growth * 2.0
     gain = float("inf") if promised is None else promised / total
-    return _Step(None, cost, gain, damping)
-
-
-def _stable_cost(proposed: Candidate, experiments: Sequence[Experiment]) -> float:
-    """Cost of a candidate; infinite for an unstable one, which is thereby rejected."""
-    if not is_stable(proposed.model.denominator):
-        return float("inf")
-    return sensitivities.cost(proposed, experiments)
+    return _Step(None, found, gain, damping)
 
 
 def _solve(matrix: np.ndarray, vector: np.ndarray, damping: float) -> np.ndarray | None:
@@ -181,29 +201,42 @@ def _solve(matrix: np.ndarray, vector: np.ndarray, damping: float) -> np.ndarray
     return step if info == 0 and np.isfinite(step).all() else None
 
 
-def _squared_bends(candidate: Candidate) -> float:
-    """Sum of the squared bends of both maps."""
+def _squared_bends(point: Point, measured_by: Point) -> float:
+    """Sum of the squared bends of both maps, in units of another point's mean slopes.
+
+    A step is judged in the units in which it was computed.
+    """
+    pairs = (
+        (point.output_map, measured_by.output_map),
+        (point.input_map, measured_by.input_map),
+    )
+    return sum(
+        squared_bends(
+            *break_points_and_values(one), mean_slope(*break_points_and_values(other))
+        )
+        for one, other in pairs
+        if _bends(one)
+    )
+
+
+def _add_prior(system: Equations, point: Point, weight: float, place: Columns) -> float:
+    """Add the bends' rows to the normal equations; their share of the total."""
     total = 0.0
-    for one in (candidate.model.output_map, candidate.model.input_map):
-        if one.kind == "piecewise_linear" and one.parameters.size > 4:
-            bend, _ = bends(*break_points_and_values(one), False)
-            total += float(bend @ bend)
-    return total
-
-
-def _with_prior(
-    system: Equations, candidate: Candidate, weight: float, *, with_positions: bool
-) -> Equations:
-    """Add the bends' rows to the normal equations."""
-    matrix, vector = system.matrix.copy(), system.vector.copy()
-    place = columns(candidate, with_positions=with_positions)
-    model = candidate.model
     for one, part in (
-        (model.output_map, place.output_map),
-        (model.input_map, place.input_map),
+        (point.output_map, place.output_map),
+        (point.input_map, place.input_map),
     ):
-        if one.kind == "piecewise_linear" and one.parameters.size > 4:
-            bend, jacobian = bends(*break_points_and_values(one), with_positions)
-            matrix[part, part] += weight * (jacobian.T @ jacobian)
-            vector[part] -= weight * (jacobian.T @ bend)
-    return Equations(matrix, vector)
+        if _bends(one):
+            total += add_bends(
+                *break_points_and_values(one),
+                place.with_positions,
+                weight,
+                system.matrix,
+                system.vector,
+                part.start,
+            )
+    return weight * total
+
+
+def _bends(one: StaticMap) -> bool:
+    return one.kind == "piecewise_linear" and one.parameters.size > 4

@@ -41,12 +41,15 @@ def pull(
     Returns
     -------
     ndarray, shape (n_lags + 1,), [-]
-        For lags 0 (the number of parameters that the data determine) to ``n_lags``.
+        For lags 0 (the number of parameters that the data determine) to ``n_lags``;
+        zeros where the output map has no slope to tell by.
 
     References
     ----------
     docs/method.md, eq. (30).
     """
+    if not static_map.RULES[model.output_map.kind].has_slope:
+        return np.zeros(n_lags + 1)
     derivatives = output_derivatives(
         model, recording.input, free_break_points=free_break_points
     )

@@ -8,10 +8,12 @@ from dataclasses import replace
 
 from hwid_cli.maths.model.candidates import Candidate, Experiment
 from hwid_cli.maths.model.levenberg_marquardt import LEAST_GAIN, Search, minimise
-from hwid_cli.maths.model.placing import finer, thinner, with_maps
+from hwid_cli.maths.model.placing import finer, thinned, with_maps
 from hwid_cli.records.model import FitOptions
 
-_PLACING_ITERATIONS = 6
+# Iterations at most with fixed break-points, and the share of the cost that a step must
+# gain: far from the minimum, break-points that move get lost.
+_PLACING_ITERATIONS, _PLACING_GAIN = 30, 2e-2
 
 
 def place(
@@ -36,6 +38,7 @@ def place(
         experiments,
         with_positions=False,
         max_iterations=min(_PLACING_ITERATIONS, options.max_iterations),
+        least_gain=_PLACING_GAIN,
     )
     iterations = screened.iterations + settled.iterations
     if not (options.free_break_points and _has_break_points(settled.candidate)):
@@ -45,13 +48,13 @@ def place(
         experiments,
         with_positions=False,
         max_iterations=min(_PLACING_ITERATIONS, options.max_iterations),
+        least_gain=_PLACING_GAIN,
     )
-    thinned = with_maps(
-        fine.candidate,
-        experiments,
-        lambda one, argument: thinner(one, argument, options.units),
+    return replace(
+        fine,
+        candidate=thinned(fine.candidate, experiments, options),
+        iterations=iterations + fine.iterations,
     )
-    return replace(fine, candidate=thinned, iterations=iterations + fine.iterations)
 
 
 def finish(

@@ -9,13 +9,19 @@ from dataclasses import replace
 import numpy as np
 
 from hwid_cli.maths.model import static_map
-from hwid_cli.maths.model.candidates import Candidate, Experiment, linear_output
-from hwid_cli.maths.model.maps.kernels import thinned_break_points
-from hwid_cli.maths.model.maps.piecewise_linear import break_points_and_values
-from hwid_cli.records.model import StaticMap
+from hwid_cli.maths.model.candidates import Candidate, Experiment
+from hwid_cli.maths.model.maps.break_points.kernels import thinned_break_points
+from hwid_cli.maths.model.maps.piecewise_linear import (
+    N_ENDS,
+    break_points_and_values,
+)
+from hwid_cli.maths.model.points import block_signals, point_of
+from hwid_cli.records.model import FitOptions, StaticMap
 
 # Break-points of the fine maps from which the final ones are chosen, for each final one.
 _FINE_FACTOR = 3
+# Least distance of fine break-points, as a share of the range.
+_LEAST_GAP = 2e-3
 # Share of the samples that every fine break-point counts for beyond those near it, so
 # that the ends of a map, which few samples reach, keep theirs.
 _WEIGHT_OF_SHAPE = 1e-3
@@ -37,8 +43,9 @@ def reaching(
         Of all experiments, one after the other.
     """
     u = np.concatenate([one.input for one in experiments])
+    point = point_of(candidate)
     x = np.concatenate(
-        [linear_output(candidate, i, one)[1] for i, one in enumerate(experiments)]
+        [block_signals(point, i, one)[1] for i, one in enumerate(experiments)]
     )
     return u, x
 
@@ -47,6 +54,7 @@ def with_maps(
     candidate: Candidate,
     experiments: Sequence[Experiment],
     change: Callable[[StaticMap, np.ndarray], StaticMap],
+    change_output: Callable[[StaticMap, np.ndarray], StaticMap] | None = None,
 ) -> Candidate:
     """Candidate with both maps changed, given the arguments that reach them.
 
@@ -55,6 +63,8 @@ def with_maps(
     candidate : Candidate
     experiments : sequence of Experiment
     change : callable (StaticMap, ndarray) -> StaticMap
+    change_output : callable, optional
+        For the output map, if it is another one.
 
     Returns
     -------
@@ -66,14 +76,37 @@ def with_maps(
         replace(
             model,
             input_map=change(model.input_map, u),
-            output_map=change(model.output_map, x),
+            output_map=(change_output or change)(model.output_map, x),
         ),
         candidate.free_responses,
     )
 
 
+def thinned(
+    candidate: Candidate, experiments: Sequence[Experiment], options: FitOptions
+) -> Candidate:
+    """Candidate whose maps have as many break-points as asked for.
+
+    Parameters
+    ----------
+    candidate : Candidate
+    experiments : sequence of Experiment
+    options : FitOptions
+
+    Returns
+    -------
+    Candidate
+    """
+    return with_maps(
+        candidate,
+        experiments,
+        lambda one, argument: thinner(one, argument, options.of_input.units),
+        lambda one, argument: thinner(one, argument, options.of_output.units),
+    )
+
+
 def finer(one: StaticMap, argument: np.ndarray) -> StaticMap:
-    """Same map with more break-points, equally spaced over what reaches it.
+    """Same map with more break-points, spread over what reaches it.
 
     Parameters
     ----------
@@ -85,12 +118,26 @@ def finer(one: StaticMap, argument: np.ndarray) -> StaticMap:
     -------
     StaticMap
     """
-    low, high = float(argument.min()), float(argument.max())
-    if one.kind != "piecewise_linear" or not low < high:
+    if one.kind != "piecewise_linear" or not argument.min() < argument.max():
         return one
-    points = np.linspace(low, high, _FINE_FACTOR * (one.parameters.size // 2))
+    old, _ = break_points_and_values(one)
+    points = np.union1d(old, _spread(argument, (_FINE_FACTOR - 1) * old.size))
+    # A point closer to its neighbour than this would make a segment of no samples.
+    apart = np.diff(points, prepend=-np.inf) > _LEAST_GAP * np.ptp(points)
+    points = np.union1d(old, points[apart])
     values = static_map.evaluate(one, points)
-    return StaticMap(one.kind, np.concatenate([points, values]), (low, high))
+    domain = (float(argument.min()), float(argument.max()))
+    return StaticMap(one.kind, np.concatenate([points, values]), domain)
+
+
+def _spread(argument: np.ndarray, count: int) -> np.ndarray:
+    """Points half equally spaced, half where the samples are.
+
+    A signal that rarely goes far spends most samples in a small part of its range.
+    """
+    even = np.linspace(argument.min(), argument.max(), count - count // 2)
+    dense = np.quantile(argument, np.linspace(0.0, 1.0, count // 2 + 2)[1:-1])
+    return np.concatenate([even, dense])
 
 
 def thinner(one: StaticMap, argument: np.ndarray, units: int) -> StaticMap:
@@ -103,16 +150,17 @@ def thinner(one: StaticMap, argument: np.ndarray, units: int) -> StaticMap:
     argument : ndarray, shape (n,)
         What reaches the map; break-points near many samples weigh more.
     units : int
-        Break-points that stay.
+        Break-points that stay between the ends.
 
     Returns
     -------
     StaticMap
     """
-    if one.kind != "piecewise_linear" or one.parameters.size <= 2 * units:
+    count = units + N_ENDS
+    if one.kind != "piecewise_linear" or one.parameters.size <= 2 * count:
         return one
     points, values = break_points_and_values(one)
     middles = np.concatenate([[-np.inf], 0.5 * (points[1:] + points[:-1]), [np.inf]])
     weights = np.histogram(argument, middles)[0] + _WEIGHT_OF_SHAPE * argument.size
-    kept = thinned_break_points(points, values, weights, units)
+    kept = thinned_break_points(points, values, weights, count)
     return replace(one, parameters=np.concatenate([points[kept], values[kept]]))

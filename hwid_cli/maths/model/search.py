@@ -16,20 +16,20 @@ from dataclasses import replace
 
 import numpy as np
 
-from hwid_cli.maths.model import static_map
-from hwid_cli.maths.model.candidates import Candidate, Experiment, linear_output
+from hwid_cli.maths.model import sensitivities, static_map
+from hwid_cli.maths.model.candidates import Candidate, Experiment
 from hwid_cli.maths.model.levenberg_marquardt import Search, minimise
-from hwid_cli.maths.model.linear_block import filtered
 from hwid_cli.maths.model.phases import finish, place
 from hwid_cli.maths.model.placing import reaching
+from hwid_cli.maths.model.points import block_signals, point_of
+from hwid_cli.maths.model.race import race, race_stride, starting_candidates
 from hwid_cli.maths.model.starts import Start, linear_starts
-from hwid_cli.records.model import FitOptions, HammersteinWiener, Orders
+from hwid_cli.records.model import FitOptions, Orders
 
-_SCREENING_ITERATIONS = 6
 _RELAXING_ITERATIONS = 8
-_FINALISTS = 2
 _RELAXED_BLOCKS = 2
-_LINEAR_STARTS = 3
+_LINEAR_STARTS = 2
+_LINEAR_ITERATIONS = 5
 # Cost that a relaxed block must reach, as a share of the best so far, to be finished;
 # nearer to it the search has only come back to where it was.
 _WORTH_GOING_ON = 0.995
@@ -38,7 +38,10 @@ _FLAT = 0.1
 
 
 def linear_search(
-    experiments: Sequence[Experiment], orders: Orders, options: FitOptions
+    experiments: Sequence[Experiment],
+    orders: Orders,
+    options: FitOptions,
+    starts: Sequence[Start],
 ) -> Search:
     """Linear output-error model: both maps are left out.
 
@@ -49,28 +52,34 @@ def linear_search(
     orders : Orders
     options : FitOptions
         Its maps are ignored.
+    starts : sequence of Start
+        Best first; only those of the input as it is are used.
 
     Returns
     -------
     Search
     """
     linear = replace(options, input_map="none", output_map="none")
-    starts = linear_starts(
-        experiments,
-        orders,
-        options=linear,
-        sees_input_map=False,
-        count=_LINEAR_STARTS,
-    )
-    return finish(
-        _screened(experiments, starts, orders, linear)[0], experiments, linear
-    )
+    stride = race_stride(experiments)
+    found = [
+        minimise(
+            candidate,
+            experiments,
+            with_positions=False,
+            max_iterations=min(_LINEAR_ITERATIONS, options.max_iterations),
+            stride=stride,
+        )
+        for start in [one for one in starts if not one.is_expanded][:_LINEAR_STARTS]
+        for candidate in starting_candidates(experiments, start, orders, linear)
+    ]
+    return finish(_best(found), experiments, linear)
 
 
 def nonlinear_search(
     experiments: Sequence[Experiment],
     orders: Orders,
     options: FitOptions,
+    starts: Sequence[Start],
     linear: Search,
 ) -> Search:
     """Hammerstein-Wiener model of given orders and kinds of maps.
@@ -81,6 +90,7 @@ def nonlinear_search(
         Scaled to about one.
     orders : Orders
     options : FitOptions
+    starts : sequence of Start
     linear : Search
         What `linear_search` found: with maps that pass everything on it is a model of
         every kind, and the result is never worse.
@@ -90,21 +100,17 @@ def nonlinear_search(
     Search
         Its iterations are those of the winning chain.
     """
-    starts = linear_starts(
-        experiments,
-        orders,
-        options=options,
-        sees_input_map=static_map.has_free_shape(options.input_map),
-        count=options.starts,
-    )
-    finalists = _finalists(experiments, starts, orders, options)
+    finalists = race(experiments, starts, orders, options)
     placed = [place(one, experiments, options) for one in finalists]
     best = finish(_best(placed), experiments, options)
     relaxed = _relaxed(best, experiments, orders, options)
     if relaxed.cost < _WORTH_GOING_ON * best.cost:
         best = _best([best, finish(relaxed, experiments, options)])
     if linear.cost < best.cost:
-        passing = replace(linear, candidate=_passing(linear, experiments, options))
+        candidate = _passing(linear, experiments, options)
+        # Not that of the linear model where a kind cannot pass everything on.
+        passing_cost = sensitivities.cost(candidate, experiments)
+        passing = replace(linear, candidate=candidate, cost=passing_cost)
         best = _best([best, passing, finish(passing, experiments, options)])
     return best
 
@@ -117,100 +123,10 @@ def _passing(
     u, x = reaching(candidate, experiments)
     model = replace(
         candidate.model,
-        input_map=static_map.identity(options.input_map, options, u),
-        output_map=static_map.identity(options.output_map, options, x),
+        input_map=static_map.identity(options.input_map, options.of_input, u),
+        output_map=static_map.identity(options.output_map, options.of_output, x),
     )
     return replace(candidate, model=model)
-
-
-def _finalists(
-    experiments: Sequence[Experiment],
-    starts: Sequence[Start],
-    orders: Orders,
-    options: FitOptions,
-) -> list[Search]:
-    """Best screened candidate of each family, then the best of the rest."""
-    by_family: dict[int, list[Search]] = {}
-    for start in starts:
-        family = by_family.setdefault(start.input_points.size, [])
-        family.extend(_screened(experiments, (start,), orders, options))
-    leaders, rest = [], []
-    for family in by_family.values():
-        family.sort(key=lambda one: one.cost)
-        leaders.append(family[0])
-        rest.extend(family[1:])
-    rest.sort(key=lambda one: one.cost)
-    return (leaders + rest)[:_FINALISTS]
-
-
-def _screened(
-    experiments: Sequence[Experiment],
-    starts: Sequence[Start],
-    orders: Orders,
-    options: FitOptions,
-) -> list[Search]:
-    """A few iterations from every start and every starting map, best first."""
-    found = [
-        minimise(
-            candidate,
-            experiments,
-            with_positions=False,
-            max_iterations=min(_SCREENING_ITERATIONS, options.max_iterations),
-        )
-        for start in starts
-        for candidate in _candidates(experiments, start, orders, options)
-    ]
-    return sorted(found, key=lambda one: one.cost)
-
-
-def _candidates(
-    experiments: Sequence[Experiment],
-    start: Start,
-    orders: Orders,
-    options: FitOptions,
-) -> list[Candidate]:
-    """Models that begin with one linear block, one for each pair of starting maps."""
-    inputs = np.concatenate([one.input for one in experiments])
-    is_estimated = options.initial_state == "estimated"
-    states = start.free_responses if is_estimated else np.zeros((len(experiments), 0))
-    candidates = []
-    for input_map in static_map.starting_maps(
-        options.input_map,
-        options,
-        inputs.min(),
-        inputs.max(),
-        shape=lambda u: np.interp(u, start.input_points, start.input_values),
-    ):
-        x = np.concatenate(
-            [
-                filtered(
-                    static_map.evaluate(input_map, one.input),
-                    start.numerator,
-                    start.denominator,
-                    orders.nk,
-                    steady=options.initial_state == "steady",
-                )
-                for one in experiments
-            ]
-        )
-        for output_map in static_map.starting_maps(
-            options.output_map,
-            options,
-            x.min(),
-            x.max(),
-            shape=lambda x: x + start.offset,
-        ):
-            model = HammersteinWiener(
-                input_map,
-                start.numerator,
-                start.denominator,
-                orders.nk,
-                output_map,
-                sample_time_s=1.0,
-                initial_state=options.initial_state,
-            )
-            candidates.append(Candidate(model, states))
-    return candidates
 
 
 def _relaxed(
@@ -255,9 +171,9 @@ def _between_maps(
     where the output map is flat.
     """
     result = []
-    output_map = candidate.model.output_map
+    point, output_map = point_of(candidate), candidate.model.output_map
     for index, one in enumerate(experiments):
-        w, x = linear_output(candidate, index, one)
+        w, x = block_signals(point, index, one)
         scratch = np.empty((x.size, output_map.parameters.size))
         y, slope = static_map.differentiate(
             output_map, x, scratch, 0, with_positions=True

@@ -2,7 +2,9 @@
 
 Derivatives by the coefficients of B and F need one filtered signal each, because
 coefficient i only delays it; those by the input map's parameters pass through B/F; those
-by the output map are local in time.
+by the output map are local in time. None is kept: what a search needs of them are the
+normal equations, and those of an output map whose derivatives are zero nearly everywhere
+are summed without ever forming its columns.
 
 References
 ----------
@@ -15,24 +17,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from hwid_cli.maths.model import static_map
-from hwid_cli.maths.model.candidates import (
-    Candidate,
-    Columns,
-    Experiment,
-    columns,
-    linear_output,
-)
-from hwid_cli.maths.model.kernels import (
-    difference_columns,
-    filter_columns,
-    filter_signal,
-)
-from hwid_cli.maths.model.linear_block import (
-    free_response,
-    padded_signal,
-    static_gain,
-)
-from hwid_cli.records.model import HammersteinWiener
+from hwid_cli.maths.model.candidates import Candidate, Columns, Experiment, columns
+from hwid_cli.maths.model.maps.rule import Derivatives
+from hwid_cli.maths.model.points import Point, block_signals, point_of
+from hwid_cli.maths.model.rows.kernels import derivative_rows, local_sums
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +39,26 @@ class Equations:
     vector: np.ndarray
 
 
+@dataclass(frozen=True, eq=False, slots=True)
+class Simulated:
+    """What a point makes of the experiments.
+
+    Parameters
+    ----------
+    signals : tuple of (w, x)
+        Before and after the linear block, for each experiment.
+    residuals : tuple of ndarray, shape (n_rows,)
+        Measured minus simulated, at the samples that count.
+    cost : float
+        Sum of squares over all samples, from those that count; infinite where the
+        simulation is not finite.
+    """
+
+    signals: tuple[tuple[np.ndarray, np.ndarray], ...]
+    residuals: tuple[np.ndarray, ...]
+    cost: float
+
+
 def simulated_outputs(
     candidate: Candidate, experiments: Sequence[Experiment]
 ) -> list[np.ndarray]:
@@ -65,9 +73,9 @@ def simulated_outputs(
     -------
     list of ndarray
     """
-    model = candidate.model
+    point = point_of(candidate)
     return [
-        static_map.evaluate(model.output_map, linear_output(candidate, index, one)[1])
+        static_map.evaluate(point.output_map, block_signals(point, index, one)[1])
         for index, one in enumerate(experiments)
     ]
 
@@ -84,13 +92,7 @@ def cost(candidate: Candidate, experiments: Sequence[Experiment]) -> float:
     -------
     float, [output unit squared]
     """
-    total = 0.0
-    with np.errstate(over="ignore", invalid="ignore"):
-        outputs = simulated_outputs(candidate, experiments)
-        for one, simulated in zip(experiments, outputs, strict=True):
-            residual = one.output - simulated
-            total += float(residual @ residual)
-    return total if np.isfinite(total) else float("inf")
+    return simulated(point_of(candidate), experiments).cost
 
 
 def equations(
@@ -109,147 +111,142 @@ def equations(
     -------
     Equations
     """
-    matrix, vector = 0.0, 0.0
-    for index, one in enumerate(experiments):
-        jacobian, residual = jacobian_and_residual(
-            candidate, index, one, with_positions=with_positions
-        )
-        matrix = matrix + jacobian.T @ jacobian
-        vector = vector + jacobian.T @ residual
-    return Equations(np.asarray(matrix), np.asarray(vector))
+    point = point_of(candidate)
+    place = columns(candidate, with_positions=with_positions)
+    return normal_equations(point, place, experiments, simulated(point, experiments))
 
 
-def jacobian_and_residual(
-    candidate: Candidate, index: int, experiment: Experiment, *, with_positions: bool
-) -> tuple[np.ndarray, np.ndarray]:
-    """Derivatives of one experiment's simulated output, and its residual.
+def simulated(
+    point: Point, experiments: Sequence[Experiment], stride: int = 1
+) -> Simulated:
+    """Simulate every experiment and compare it with what was measured.
 
     Parameters
     ----------
-    candidate : Candidate
-    index : int
-        Place of the experiment among those of the fit.
-    experiment : Experiment
-    with_positions : bool
+    point : Point
+    experiments : sequence of Experiment
+    stride : int, [samples]
+        Every `stride`-th sample counts.
 
     Returns
     -------
-    jacobian : ndarray, shape (n, n_parameters)
-        Columns in the order of `columns`.
-    residual : ndarray, shape (n,)
-        Measured minus simulated.
+    Simulated
     """
-    model = candidate.model
-    w, x = linear_output(candidate, index, experiment)
-    place = columns(candidate, with_positions=with_positions)
-    # Not zeros: fresh zeroed memory costs more than the arithmetic that fills it.
-    jacobian = np.empty((x.size, place.total))
-    y, gain = static_map.differentiate(
-        model.output_map,
-        x,
-        jacobian,
-        place.output_map.start,
-        with_positions=with_positions,
-    )
-    _fill_linear(jacobian, place, model, (w, x, gain))
-    _fill_input_map(jacobian, place, model, (experiment.input, gain))
-    if place.n_state:
-        jacobian[:, place.free_responses] = 0.0
-        _fill_free_response(jacobian, place, index, (model.denominator, gain))
-    return jacobian, experiment.output - y
+    signals, residuals, total = [], [], 0.0
+    with np.errstate(over="ignore", invalid="ignore"):
+        for index, one in enumerate(experiments):
+            w, x = block_signals(point, index, one)
+            seen = static_map.evaluate(point.output_map, x[::stride])
+            residual = one.output[::stride] - seen
+            signals.append((w, x))
+            residuals.append(residual)
+            total += float(residual @ residual)
+    total = stride * total if np.isfinite(total) else float("inf")
+    return Simulated(tuple(signals), tuple(residuals), total)
 
 
-def _fill_linear(
-    jacobian: np.ndarray,
+def normal_equations(
+    point: Point,
     place: Columns,
-    model: HammersteinWiener,
-    signals: tuple[np.ndarray, np.ndarray, np.ndarray],
-) -> None:
-    """Columns of B and F: differences of w/F and x/F."""
-    w, x, gain = signals
-    pad = model.orders.n_state + 1
-    w_filtered = _over_denominator(w, model, pad, w[0])
-    difference_columns(
-        w_filtered,
-        pad,
-        model.delay,
-        gain,
-        place.numerator.start,
-        model.numerator.size,
-        jacobian,
-    )
-    # x before the first sample: the equilibrium for a steady start, else zero.
-    rest = w[0] * static_gain(model.numerator, model.denominator)
-    x_filtered = _over_denominator(x, model, pad, rest)
-    difference_columns(
-        x_filtered,
-        pad,
-        1,
-        -gain,
-        place.denominator.start,
-        model.denominator.size - 1,
-        jacobian,
-    )
+    experiments: Sequence[Experiment],
+    found: Simulated,
+    stride: int = 1,
+) -> Equations:
+    """Normal equations at a point.
+
+    Parameters
+    ----------
+    point : Point
+    place : Columns
+        Which parameters move and where they stand.
+    experiments : sequence of Experiment
+    found : Simulated
+        What the point makes of the experiments, with the same stride.
+    stride : int, [samples]
+
+    Returns
+    -------
+    Equations
+        As if the samples that count stood for all.
+    """
+    parts = []
+    for index, one in enumerate(experiments):
+        before = static_map.derivatives(
+            point.input_map, one.input, with_positions=place.with_positions
+        )
+        x = found.signals[index][1][::stride]
+        after = static_map.derivatives(
+            point.output_map, x, with_positions=place.with_positions
+        )
+        rows = _rows(point, place, (before, after), (index, found, stride))
+        if after.is_local:
+            own, cross = local_sums(after.first, after.shares, rows, after.count)
+            parts.append(_joined(own, cross, rows))
+        else:
+            rows = np.hstack([after.shares, rows])
+            parts.append(rows.T @ rows)
+    return _by_parameters(stride * np.sum(parts, axis=0), place, before, after)
 
 
-def _over_denominator(
-    signal: np.ndarray, model: HammersteinWiener, pad: int, past: float
+def _rows(
+    point: Point,
+    place: Columns,
+    maps: tuple[Derivatives, Derivatives],
+    where: tuple[int, Simulated, int],
 ) -> np.ndarray:
-    """``signal / F`` with its padded past."""
-    if model.initial_state != "steady":
-        past = 0.0
-    padded = padded_signal(signal, pad, past)
-    out = np.full(padded.size, past / model.denominator.sum() if past else 0.0)
-    filter_signal(padded, pad, np.ones(1), model.denominator, 0, out)
-    return out
-
-
-def _fill_input_map(
-    jacobian: np.ndarray,
-    place: Columns,
-    model: HammersteinWiener,
-    signals: tuple[np.ndarray, np.ndarray],
-) -> None:
-    """Columns of the input map: its derivatives through the linear block."""
-    u, gain = signals
-    count = place.input_map.stop - place.input_map.start
-    if count == 0:
-        return
-    by_parameter = np.empty((u.size, count))
-    static_map.differentiate(
-        model.input_map, u, by_parameter, 0, with_positions=place.with_positions
+    """Dense columns of one experiment, and its residual as the last."""
+    (before, after), (index, found, stride) = maps, where
+    n_states = place.free_responses.stop - place.free_responses.start
+    nb, nf = point.numerator.size, point.denominator.size - 1
+    rows = np.empty(
+        (found.residuals[index].size, n_states + before.count + nb + nf + 1)
     )
-    before = np.zeros(count)
-    rest = before
-    if model.initial_state == "steady":
-        before = by_parameter[0].copy()
-        rest = before * static_gain(model.numerator, model.denominator)
-    filter_columns(
-        by_parameter,
-        (model.numerator, model.denominator, model.delay),
-        (before, rest),
-        gain,
-        jacobian,
-        place.input_map.start,
+    derivative_rows(
+        found.signals[index],
+        (point.numerator, point.denominator, point.delay),
+        (before.first, before.shares, before.count),
+        (point.is_steady, place.n_state, index * place.n_state, n_states),
+        after.slope,
+        stride,
+        rows,
     )
+    rows[:, -1] = found.residuals[index]
+    return rows
 
 
-def _fill_free_response(
-    jacobian: np.ndarray,
-    place: Columns,
-    index: int,
-    denominator_and_gain: tuple[np.ndarray, np.ndarray],
-) -> None:
-    """Columns of C of this experiment: differences of the impulse response of 1/F."""
-    denominator, gain = denominator_and_gain
-    pad = place.n_state + 1
-    impulse = free_response(np.ones(1), denominator, gain.size)
-    difference_columns(
-        padded_signal(impulse, pad, 0.0),
-        pad,
-        0,
-        gain,
-        place.free_responses.start + index * place.n_state,
-        place.n_state,
-        jacobian,
+def _joined(own: np.ndarray, cross: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """Products of all columns, those of the output map first."""
+    count = own.shape[0]
+    total = np.empty((count + rows.shape[1],) * 2)
+    total[:count, :count] = own
+    total[:count, count:] = cross
+    total[count:, :count] = cross.T
+    total[count:, count:] = rows.T @ rows
+    return total
+
+
+def _by_parameters(
+    total: np.ndarray, place: Columns, before: Derivatives, after: Derivatives
+) -> Equations:
+    """Turn the products of columns into those of the parameters' derivatives."""
+    for derivatives, first in ((before, after.count), (after, 0)):
+        if derivatives.change is not None:
+            total = _changed(total, derivatives.change, first)
+    count = place.total
+    return Equations(total[:count, :count], total[:count, -1])
+
+
+def _changed(total: np.ndarray, change: np.ndarray, first: int) -> np.ndarray:
+    """Products after some columns are replaced by combinations of them."""
+    old = change.shape[1]
+    rows = np.concatenate(
+        [total[:first], change @ total[first : first + old], total[first + old :]]
+    )
+    return np.concatenate(
+        [
+            rows[:, :first],
+            rows[:, first : first + old] @ change.T,
+            rows[:, first + old :],
+        ],
+        axis=1,
     )

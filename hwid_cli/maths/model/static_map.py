@@ -1,19 +1,28 @@
 """Static nonlinearities: one table from name to functions, and what fits do with them.
 
-Another nonlinearity is one more entry in `RULES` (and its name in `records.model`).
+Another nonlinearity is one more entry in `RULES` (and its name in `records.maps`).
 
 References
 ----------
-docs/method.md, eqs. (2)-(4).
+docs/method.md, eqs. (2)-(4f).
 """
 
 from dataclasses import replace
 
 import numpy as np
 
-from hwid_cli.maths.model.maps import limits, piecewise_linear, polynomial
-from hwid_cli.maths.model.maps.rule import MapRule, Shape
-from hwid_cli.records.model import FitOptions, StaticMap
+from hwid_cli.maths.model.maps import (
+    cubic_spline,
+    limits,
+    own_function,
+    piecewise_constant,
+    piecewise_linear,
+    polynomial,
+    sigmoid_network,
+    wavelet_network,
+)
+from hwid_cli.maths.model.maps.rule import Derivatives, MapRule, Shape
+from hwid_cli.records.maps import MapOptions, StaticMap
 
 RULES: dict[str, MapRule] = {
     "piecewise_linear": piecewise_linear.RULE,
@@ -21,6 +30,11 @@ RULES: dict[str, MapRule] = {
     "dead_zone": limits.DEAD_ZONE,
     "polynomial": polynomial.RULE,
     "none": limits.NONE,
+    "sigmoid_network": sigmoid_network.RULE,
+    "wavelet_network": wavelet_network.RULE,
+    "cubic_spline": cubic_spline.RULE,
+    "piecewise_constant": piecewise_constant.RULE,
+    "own_function": own_function.RULE,
 }
 
 
@@ -38,7 +52,7 @@ def evaluate(static_map: StaticMap, argument: np.ndarray) -> np.ndarray:
 
     References
     ----------
-    docs/method.md, eqs. (2)-(4).
+    docs/method.md, eqs. (2)-(4f).
 
     Examples
     --------
@@ -68,7 +82,7 @@ def differentiate(
     first : int
         First column to write.
     with_positions : bool
-        Whether the break-points of a piecewise linear map count as parameters.
+        Whether positions, such as break-points, count as parameters.
 
     Returns
     -------
@@ -78,9 +92,36 @@ def differentiate(
     return rule.differentiate(static_map, argument, with_positions, out, first)
 
 
+def derivatives(
+    static_map: StaticMap, argument: np.ndarray, *, with_positions: bool
+) -> Derivatives:
+    """Value, slope and derivatives of a static map by its active parameters.
+
+    Parameters
+    ----------
+    static_map : StaticMap
+    argument : ndarray, shape (n,)
+    with_positions : bool
+        Whether the break-points of a piecewise linear map count as parameters.
+
+    Returns
+    -------
+    Derivatives
+    """
+    rule = RULES[static_map.kind]
+    if rule.derivatives is not None:
+        return rule.derivatives(static_map, argument, with_positions)
+    active = active_parameters(static_map, with_positions=with_positions)
+    count = active.stop - active.start
+    shares = np.empty((argument.size, count))
+    value, slope = rule.differentiate(static_map, argument, with_positions, shares, 0)
+    first = np.zeros(argument.size, dtype=np.int64)
+    return Derivatives(value, slope, first, shares, count)
+
+
 def starting_maps(
     kind: str,
-    options: FitOptions,
+    options: MapOptions,
     lowest: float,
     highest: float,
     *,
@@ -91,7 +132,7 @@ def starting_maps(
     Parameters
     ----------
     kind : str
-    options : FitOptions
+    options : MapOptions
     lowest, highest : float
         Range of the argument; widened where it is empty.
     shape : callable (ndarray) -> ndarray
@@ -105,13 +146,13 @@ def starting_maps(
     return RULES[kind].starts(options, lowest, highest, shape)
 
 
-def identity(kind: str, options: FitOptions, argument: np.ndarray) -> StaticMap:
+def identity(kind: str, options: MapOptions, argument: np.ndarray) -> StaticMap:
     """Map that passes an argument on unchanged.
 
     Parameters
     ----------
     kind : str
-    options : FitOptions
+    options : MapOptions
     argument : ndarray, shape (n,)
 
     Returns
@@ -159,6 +200,8 @@ def move(static_map: StaticMap, step: np.ndarray, *, with_positions: bool) -> St
     -------
     StaticMap
     """
+    if step.size == 0:
+        return static_map
     parameters = static_map.parameters.copy()
     parameters[active_parameters(static_map, with_positions=with_positions)] += step
     proposed = replace(static_map, parameters=parameters)
@@ -198,13 +241,15 @@ def stretch(static_map: StaticMap, factor: float) -> StaticMap:
     -------
     StaticMap
     """
-    # Every parameter has the unit of argument or value, whatever the kind.
     low, high = static_map.domain
-    return replace(
-        static_map,
-        parameters=static_map.parameters * factor,
-        domain=(low * factor, high * factor),
-    )
+    domain = (low * factor, high * factor)
+    function = static_map.function
+    if function is not None:
+        # Nobody knows the units of its parameters: the function keeps its own.
+        kept = replace(function, unit=function.unit * factor)
+        return replace(static_map, function=kept, domain=domain)
+    # Every other parameter has the unit of argument or value, whatever the kind.
+    return replace(static_map, parameters=static_map.parameters * factor, domain=domain)
 
 
 def has_free_shape(kind: str) -> bool:

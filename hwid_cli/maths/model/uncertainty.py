@@ -23,13 +23,16 @@ from hwid_cli.maths.model.identifiability import (
     Directions,
     directions,
     listed,
+    n_free,
     parameter_names,
 )
 from hwid_cli.maths.model.information import information
 from hwid_cli.maths.model.simulate import estimated_state
+from hwid_cli.maths.model.static_map import RULES
 from hwid_cli.records.information import Information
-from hwid_cli.records.model import Fit, ParameterCovariance, Uncertainty
+from hwid_cli.records.model import Fit
 from hwid_cli.records.recordings import Recording
+from hwid_cli.records.uncertainty import ParameterCovariance, Uncertainty
 
 _MOST_NAMES = 4
 
@@ -55,6 +58,14 @@ def judged_parameters(
     Information
     """
     n_samples = sum(one.output.size for one in experiments)
+    kind = candidate.model.output_map.kind
+    if not RULES[kind].has_slope:
+        count = n_free(candidate, free_break_points=free_break_points)
+        squared_error = sensitivities.cost(candidate, experiments)
+        return (
+            Uncertainty(reason=f"a {kind} output map has no slope to tell by"),
+            information(squared_error, n_samples, count),
+        )
     found = directions(candidate, experiments, free_break_points=free_break_points)
     if found is None or found.n_effective >= n_samples:
         return Uncertainty(reason="the data are too few to tell"), Information()
@@ -96,7 +107,7 @@ def parameter_covariance(
     Raises
     ------
     ValueError
-        If the fit failed, the recordings are others, or too few to tell.
+        If the fit failed, the recordings are others, or they cannot tell.
 
     References
     ----------
@@ -106,6 +117,9 @@ def parameter_covariance(
     if names != fit.identified_on:
         raise ValueError(f"the fit is of {fit.identified_on}, not of {names}")
     candidate, experiments = _as_fitted(fit, recordings)
+    kind = candidate.model.output_map.kind
+    if not RULES[kind].has_slope:
+        raise ValueError(f"a {kind} output map has no slope to tell by")
     found = directions(
         candidate, experiments, free_break_points=fit.options.free_break_points
     )

@@ -23,7 +23,7 @@ _WIDTH = 0.66 * HALF_WIDTH
 
 @styled
 def maps_figure(view: ModelView) -> Figure:
-    """Draw the two static maps with their break-points.
+    """Draw the two static maps with their corners: break-points, knots or edges.
 
     Parameters
     ----------

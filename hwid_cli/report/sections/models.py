@@ -58,7 +58,7 @@ def _figures(view: ModelView, file: str) -> Figures:
         drawn(
             maps,
             maps_figure(view),
-            f"Input and output map of {view.model} with their break-points",
+            f"Input and output map of {view.model} with their corners",
         ),
         drawn(
             bode,

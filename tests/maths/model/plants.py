@@ -3,6 +3,7 @@
 import numpy as np
 
 from hwid_cli.maths.model.simulate import simulate
+from hwid_cli.records.maps import OwnFunction
 from hwid_cli.records.model import (
     FitOptions,
     HammersteinWiener,
@@ -14,6 +15,28 @@ from hwid_cli.records.recordings import Recording
 POLES = 0.9 * np.exp(np.array([0.3j, -0.3j]))
 ORDERS = Orders(nb=2, nf=2, nk=2)
 
+SOFT_LIMIT = OwnFunction(
+    "soft_limit",
+    """
+import numpy as np
+from hwid_cli import MapFunction
+
+def value(v, p):
+    return p[0] * np.tanh(v / p[0]) + p[1]
+
+def by_argument(v, p):
+    return 1.0 / np.cosh(v / p[0]) ** 2
+
+def by_parameters(v, p):
+    bent = np.tanh(v / p[0])
+    return np.stack([bent - v / p[0] * (1.0 - bent**2), np.ones_like(v)], axis=1)
+
+soft_limit = MapFunction(
+    value, by_argument, by_parameters, start=[3.0, 0.0], names=["limit", "offset"]
+)
+""",
+)
+
 MAPS = {
     "none": StaticMap("none", np.zeros(0), (-3.0, 3.0)),
     "saturation": StaticMap("saturation", np.array([-1.4, 1.1]), (-3.0, 3.0)),
@@ -24,7 +47,32 @@ MAPS = {
         np.array([-3.0, -0.8, 0.7, 3.0, -2.0, -1.2, 0.4, 2.6]),
         (-3.0, 3.0),
     ),
+    "sigmoid_network": StaticMap(
+        "sigmoid_network",
+        np.array([-1.2, 0.1, 1.5, 0.3, 0.2, 0.5, 1.5, -0.8, 2.0, -1.0, 1.2]),
+        (-3.0, 3.0),
+    ),
+    "wavelet_network": StaticMap(
+        "wavelet_network",
+        np.array([-1.0, 0.3, 1.6, 0.9, 0.5, 0.4, 0.8, -0.5, 0.6, -2.0, 2.2]),
+        (-3.0, 3.0),
+    ),
+    "cubic_spline": StaticMap(
+        "cubic_spline", np.array([-3.0, 3.0, -2.0, -1.5, 0.3, 0.5, 2.6]), (-3.0, 3.0)
+    ),
+    "piecewise_constant": StaticMap(
+        "piecewise_constant",
+        np.array([-1.7, -0.4, 0.9, -2.0, -0.7, 0.8, 2.4]),
+        (-3.0, 3.0),
+    ),
+    "own_function": StaticMap(
+        "own_function", np.array([1.3, 0.2]), (-3.0, 3.0), SOFT_LIMIT
+    ),
 }
+# What has no slope is searched by a stand-in, which is no derivative of its values.
+WITHOUT_SLOPE = ("piecewise_constant",)
+# Kinds that cannot pass a signal on unchanged.
+NO_IDENTITY = ("piecewise_constant", "own_function")
 
 
 def level_input(n_samples: int, seed: int) -> np.ndarray:
@@ -74,8 +122,10 @@ def options(
     return FitOptions(
         input_map=input_map,
         output_map=output_map,
-        units=4,
+        units=2,
         degree=3,
         initial_state=initial_state,
+        input_function=MAPS[input_map].function,
+        output_function=MAPS[output_map].function,
         **others,
     )

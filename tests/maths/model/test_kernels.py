@@ -3,22 +3,40 @@ import pytest
 from scipy import signal
 
 from hwid_cli.maths.model import kernels
-from hwid_cli.maths.model.maps import kernels as map_kernels
+from hwid_cli.maths.model.maps.break_points import kernels as map_kernels
+from hwid_cli.maths.model.rows import kernels as row_kernels
 
 POINTS = np.array([-3.0, -1.0, 0.5, 2.0, 3.0])
 VALUES = np.array([-1.0, -0.5, 0.4, 2.0, 2.1])
 
 
-def test_filtered_columns_agree_with_scipy_in_the_columns_asked_for():
+@pytest.mark.parametrize("order", [0, 1, 4, 5, 9])
+def test_all_pole_recursion_agrees_with_scipy(order):
+    rng = np.random.default_rng(order)
+    f = np.real(np.poly(rng.uniform(-0.9, 0.9, order))) if order else np.ones(1)
+    taps = np.zeros(4 * max(1, (order + 3) // 4))
+    taps[:order] = f[1:]
+    columns = rng.standard_normal((100, 3))
+    lines = np.zeros((taps.size + 100, 3))
+    for t in range(100):
+        row_kernels.all_pole(lines, taps.size + t, taps)
+        lines[taps.size + t] += columns[t]
+    expected = signal.lfilter([1.0], f, columns, axis=0)
+    np.testing.assert_allclose(lines[taps.size :], expected, atol=1e-11)
+
+
+def test_block_output_agrees_with_scipy_and_starts_as_told():
     rng = np.random.default_rng(0)
-    columns, gain = rng.standard_normal((200, 3)), rng.standard_normal(200)
-    b, f = np.array([0.3, 0.1]), np.array([1.0, -1.4, 0.6])
-    out = np.full((200, 5), 7.0)
-    zeros = np.zeros(3)
-    kernels.filter_columns(columns, (b, f, 1), (zeros, zeros), gain, out, 1)
-    expected = signal.lfilter(np.r_[0.0, b], f, columns, axis=0) * gain[:, None]
-    np.testing.assert_allclose(out[:, 1:4], expected, atol=1e-12)
-    np.testing.assert_array_equal(out[:, [0, 4]], 7.0)
+    w, b, f = rng.standard_normal(80), np.array([0.3, 0.1]), np.array([1.0, -1.4, 0.6])
+    forced = signal.lfilter(np.r_[0.0, 0.0, b], f, w)
+    free = signal.lfilter([1.0, -0.5, 0.2], f, np.r_[1.0, np.zeros(79)])
+    states = np.array([1.0, -0.5, 0.2])
+    got = kernels.block_output(w, b, f, 2, states, False)
+    np.testing.assert_allclose(got, forced + free, atol=1e-12)
+    # In equilibrium with the first value: as if that value had been there for ever.
+    long = signal.lfilter(np.r_[0.0, 0.0, b], f, np.r_[np.full(400, w[0]), w])
+    got = kernels.block_output(w, b, f, 2, np.zeros(0), True)
+    np.testing.assert_allclose(got, long[400:], atol=1e-12)
 
 
 def test_decaying_response_ends_in_zeros_instead_of_subnormal_numbers():
@@ -50,6 +68,35 @@ def test_bends_are_changes_of_slope_with_the_stated_derivatives(with_positions):
             np.testing.assert_allclose(
                 (above - bend) / step, jacobian[:, column], atol=1e-4
             )
+
+
+@pytest.mark.parametrize("with_positions", [True, False])
+def test_the_prior_and_its_gradient_are_of_one_function(with_positions):
+    # A gradient of another function than the one that judges a step ends in a stall.
+    parameters = np.r_[POINTS, VALUES]
+    first = 0 if with_positions else 5
+    matrix, vector = np.zeros((12, 12)), np.zeros(12)
+    total = map_kernels.add_bends(
+        POINTS, VALUES, with_positions, 0.7, matrix, vector, 1
+    )
+    size = map_kernels.mean_slope(POINTS, VALUES)
+    assert total == pytest.approx(map_kernels.squared_bends(POINTS, VALUES, size))
+    for k in range(first, 10):
+        step = 1e-6 * np.eye(10)[k]
+        above, below = (
+            map_kernels.squared_bends(*np.split(parameters + sign * step, 2), size)
+            for sign in (1.0, -1.0)
+        )
+        slope = 0.7 * (above - below) / 2e-6
+        assert vector[1 + k - first] == pytest.approx(-0.5 * slope, abs=1e-8)
+    np.testing.assert_allclose(matrix, matrix.T)
+
+
+def test_break_points_that_came_too_close_part_to_both_sides():
+    old = np.array([0.0, 1.0, 2.0, 3.0])
+    proposed = np.array([0.0, 1.6, 1.5, 3.0])
+    map_kernels.settled_break_points(old, proposed, 0.2, 1e-4)
+    np.testing.assert_allclose(proposed, [0.0, 1.45, 1.65, 3.0])
 
 
 def test_thinning_keeps_the_break_points_where_a_map_bends():

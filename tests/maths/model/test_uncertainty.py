@@ -89,7 +89,7 @@ def test_a_segment_without_samples_is_named_as_the_reason():
     )
     y = noisy(signal.lfilter([0.0, 0.5], [1.0, -0.5], u), 1, 1e-3)
     asked = replace(
-        options("piecewise_linear", "none", free_break_points=False), units=7
+        options("piecewise_linear", "none", free_break_points=False), units=5
     )
     result = fit([Recording("r", u, y, 1.0)], Orders(1, 1, 1), asked)
 
@@ -111,13 +111,31 @@ def test_a_segment_with_one_sample_is_named_as_the_reason():
     u[450] = 3.0
     bent = np.where(u > 0, 3 * u, u)
     y = noisy(signal.lfilter([0.0, 0.5], [1.0, -0.5], bent), 1, 1e-3)
-    asked = replace(options("piecewise_linear", "none"), units=3)
+    asked = replace(options("piecewise_linear", "none"), units=2)
     result = fit([Recording("r", u, y, 1.0)], Orders(1, 1, 1), asked)
 
     # The bend may lie anywhere between the many samples and the one.
+    sentences = result.uncertainty.flat
+    assert any("input_map.break_point[" in one for one in sentences)
+    assert all("sample of the input lies between" in one for one in sentences)
+    # Only what these directions move is lost.
+    uncertainty = result.uncertainty
+    nan = np.isnan(uncertainty.standard_errors)
+    for name, is_nan in zip(uncertainty.names, nan, strict=True):
+        assert is_nan == any(name in one for one in sentences)
+
+
+def test_a_limit_that_is_never_reached_is_named_as_the_reason():
+    u = np.random.default_rng(2).uniform(-1, 1, 500)
+    y = noisy(signal.lfilter([0.0, 0.5], [1.0, -0.5], np.minimum(u, 0.4)), 1, 1e-3)
+    asked = options("saturation", "none")
+    result = fit([Recording("r", u, y, 1.0)], Orders(1, 1, 1), asked)
+
     (sentence,) = result.uncertainty.flat
-    assert "input_map.break_point[1]" in sentence
-    assert "of the input lies between" in sentence
+    assert sentence.startswith(
+        "not identifiable: input_map.lower, because no sample of"
+    )
+    assert "the input lies below" in sentence
 
 
 def test_poles_and_zeros_that_cancel_are_named_as_the_reason():

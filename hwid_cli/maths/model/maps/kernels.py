@@ -81,90 +81,73 @@ def piecewise_linear_jacobian(
 
 
 @njit(cache=True)
-def bends(
-    break_points: np.ndarray, values: np.ndarray, with_positions: bool
-) -> tuple[np.ndarray, np.ndarray]:
-    """Changes of slope of a piecewise linear map, in units of its mean slope.
-
-    Parameters
-    ----------
-    break_points, values : ndarray, shape (units,)
-    with_positions : bool
-        Whether the break-points have columns in the jacobian.
-
-    Returns
-    -------
-    bend : ndarray, shape (units - 2,)
-    jacobian : ndarray, shape (units - 2, 2 units) or (units - 2, units)
-        By the break-points (if asked for) and the values, at a fixed mean slope.
-    """
-    units = break_points.size
-    offset = units if with_positions else 0
-    bend = np.zeros(units - 2)
-    jacobian = np.zeros((units - 2, offset + units))
-    size = (values.max() - values.min()) / (break_points[-1] - break_points[0])
-    if size == 0.0:
-        size = 1.0
-    for i in range(units - 2):
-        left = 1.0 / ((break_points[i + 1] - break_points[i]) * size)
-        right = 1.0 / ((break_points[i + 2] - break_points[i + 1]) * size)
-        rise_left = (values[i + 1] - values[i]) * left
-        rise_right = (values[i + 2] - values[i + 1]) * right
-        bend[i] = rise_right - rise_left
-        jacobian[i, offset + i] = left
-        jacobian[i, offset + i + 1] = -left - right
-        jacobian[i, offset + i + 2] = right
-        if with_positions:
-            left, right = rise_left * left * size, rise_right * right * size
-            jacobian[i, i] = -left
-            jacobian[i, i + 1] = left + right
-            jacobian[i, i + 2] = -right
-    return bend, jacobian
-
-
-@njit(cache=True)
-def thinned_break_points(
-    break_points: np.ndarray, values: np.ndarray, weights: np.ndarray, count: int
+def piecewise_linear_value(
+    argument: np.ndarray, break_points: np.ndarray, values: np.ndarray
 ) -> np.ndarray:
-    """Choose the break-points that a coarser map needs most.
-
-    One after the other, the inner break-point goes whose absence adds least to the
-    weighted squared error at all given break-points.
+    """Evaluate a piecewise linear map.
 
     Parameters
     ----------
-    break_points, values, weights : ndarray, shape (n,)
-    count : int
-        How many stay.
+    argument : ndarray, shape (n,)
+    break_points, values : ndarray, shape (units,)
 
     Returns
     -------
-    ndarray of int, shape (count,)
-        Their indices.
+    ndarray, shape (n,)
     """
-    kept = np.arange(break_points.size)
-    while kept.size > count:
-        cheapest, least = 1, np.inf
-        for j in range(1, kept.size - 1):
-            first, middle, last = kept[j - 1], kept[j], kept[j + 1]
-            added = 0.0
-            for i in range(first + 1, last):
-                near, far = (first, middle) if i <= middle else (middle, last)
-                with_it = _between(break_points, values, near, far, i)
-                without = _between(break_points, values, first, last, i)
-                added += weights[i] * (
-                    (without - values[i]) ** 2 - (with_it - values[i]) ** 2
-                )
-            if added < least:
-                cheapest, least = j, added
-        kept = np.concatenate((kept[:cheapest], kept[cheapest + 1 :]))
-    return kept
+    last = break_points.size - 2
+    result = np.empty(argument.size)
+    slopes = (values[1:] - values[:-1]) / (break_points[1:] - break_points[:-1])
+    k = 0
+    for t in range(argument.size):
+        v = argument[t]
+        # Signals move little from sample to sample: walk from the last segment.
+        while k < last and v >= break_points[k + 1]:
+            k += 1
+        while k > 0 and v < break_points[k]:
+            k -= 1
+        result[t] = values[k] + slopes[k] * (v - break_points[k])
+    return result
 
 
 @njit(cache=True)
-def _between(
-    points: np.ndarray, values: np.ndarray, first: int, last: int, at: int
-) -> float:
-    """Straight line through two break-points, read at a third."""
-    share = (points[at] - points[first]) / (points[last] - points[first])
-    return values[first] + share * (values[last] - values[first])
+def piecewise_linear_shares(
+    argument: np.ndarray, break_points: np.ndarray, values: np.ndarray, spacing: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Value and slope of a piecewise linear map, and its derivatives, which are local.
+
+    Parameters
+    ----------
+    argument : ndarray, shape (n,)
+    break_points, values : ndarray, shape (units,)
+    spacing : int
+        1: columns are those of the values. 2: every segment has two columns, those of
+        its own left and right value.
+
+    Returns
+    -------
+    value, slope : ndarray, shape (n,)
+    first : ndarray of int, shape (n,)
+        First of the two columns that are not zero.
+    shares : ndarray, shape (n, 2)
+        What stands in them.
+    """
+    n, last = argument.size, break_points.size - 2
+    value, slope = np.empty(n), np.empty(n)
+    first, shares = np.empty(n, dtype=np.int64), np.empty((n, 2))
+    widths = 1.0 / (break_points[1:] - break_points[:-1])
+    slopes = (values[1:] - values[:-1]) * widths
+    k = 0
+    for t in range(n):
+        v = argument[t]
+        while k < last and v >= break_points[k + 1]:
+            k += 1
+        while k > 0 and v < break_points[k]:
+            k -= 1
+        beyond = v - break_points[k]
+        first[t] = spacing * k
+        slope[t] = slopes[k]
+        value[t] = values[k] + slopes[k] * beyond
+        shares[t, 1] = beyond * widths[k]
+        shares[t, 0] = 1.0 - shares[t, 1]
+    return value, slope, first, shares

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from hwid_cli.maths.model.maps.rule import MapRule, Shape
-from hwid_cli.records.model import FitOptions, StaticMap
+from hwid_cli.records.maps import MapOptions, StaticMap
 
 # Shares of the signal's range at which the limits start. A limit that no sample reaches
 # has no derivative, so a fit from there could never move it: several starts are tried.
@@ -58,11 +58,11 @@ def _differentiate_dead_zone(
 
 def _starts_at(
     kind: str, shares: tuple[float, ...]
-) -> Callable[[FitOptions, float, float, Shape], tuple[StaticMap, ...]]:
+) -> Callable[[MapOptions, float, float, Shape], tuple[StaticMap, ...]]:
     """Start with both limits at shares of the range around zero or its middle."""
 
     def starts(
-        options: FitOptions,  # noqa: ARG001 - a rule's signature
+        options: MapOptions,  # noqa: ARG001 - a rule's signature
         lowest: float,
         highest: float,
         shape: Shape,  # noqa: ARG001

@@ -1,5 +1,8 @@
 """Piecewise linear map: break-points and the values there, linear beyond the ends.
 
+A map of n units changes its slope at n break-points, as in the reference toolbox. Its
+two ends, at which nothing breaks, are stored like break-points.
+
 References
 ----------
 docs/method.md, eq. (2).
@@ -9,13 +12,18 @@ from dataclasses import replace
 
 import numpy as np
 
+from hwid_cli.maths.model.maps.break_points.kernels import settled_break_points
 from hwid_cli.maths.model.maps.kernels import (
     piecewise_linear,
     piecewise_linear_jacobian,
+    piecewise_linear_shares,
+    piecewise_linear_value,
 )
-from hwid_cli.maths.model.maps.rule import MapRule, Shape
-from hwid_cli.records.model import FitOptions, StaticMap
+from hwid_cli.maths.model.maps.rule import Derivatives, MapRule, Shape
+from hwid_cli.records.maps import MapOptions, StaticMap
 
+# Ends of a map, stored beside the break-points between them.
+N_ENDS = 2
 # A step of the fit may shrink a segment to this share of its width at most, so that
 # break-points stay in order and can still come close to each other over several steps.
 _LEAST_SHRINK = 0.2
@@ -40,7 +48,7 @@ def break_points_and_values(static_map: StaticMap) -> tuple[np.ndarray, np.ndarr
 
 def _evaluate(static_map: StaticMap, argument: np.ndarray) -> np.ndarray:
     argument = np.ascontiguousarray(argument, dtype=float)
-    return piecewise_linear(argument, *break_points_and_values(static_map))[0]
+    return piecewise_linear_value(argument, *break_points_and_values(static_map))
 
 
 def _differentiate(
@@ -58,10 +66,38 @@ def _differentiate(
     return value, slope
 
 
+def _derivatives(
+    static_map: StaticMap, argument: np.ndarray, with_positions: bool
+) -> Derivatives:
+    points, values = break_points_and_values(static_map)
+    spacing = 2 if with_positions else 1
+    found = piecewise_linear_shares(argument, points, values, spacing)
+    if not with_positions:
+        return Derivatives(*found, count=points.size)
+    return Derivatives(*found, 2 * (points.size - 1), _by_segments(points, values))
+
+
+def _by_segments(points: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Parameters' columns out of those of each segment's own end values.
+
+    A break-point that moves to the right lowers the line through it by its slope: on
+    either side by another one.
+    """
+    units = points.size
+    slopes = (values[1:] - values[:-1]) / (points[1:] - points[:-1])
+    change = np.zeros((2 * units, 2 * (units - 1)))
+    segment = np.arange(units - 1)
+    change[segment, 2 * segment] = -slopes
+    change[segment + 1, 2 * segment + 1] = -slopes
+    change[units + segment, 2 * segment] = 1.0
+    change[units + segment + 1, 2 * segment + 1] = 1.0
+    return change
+
+
 def _starts(
-    options: FitOptions, lowest: float, highest: float, shape: Shape
+    options: MapOptions, lowest: float, highest: float, shape: Shape
 ) -> tuple[StaticMap, ...]:
-    points = np.linspace(lowest, highest, options.units)
+    points = np.linspace(lowest, highest, options.units + N_ENDS)
     parameters = np.concatenate([points, shape(points)])
     return (StaticMap("piecewise_linear", parameters, (lowest, highest)),)
 
@@ -97,22 +133,30 @@ def _size(static_map: StaticMap) -> tuple[float, np.ndarray]:
     return float(np.ptp(values) / (high - low)), gradient
 
 
+def in_order(old: np.ndarray, proposed: np.ndarray) -> np.ndarray:
+    """Positions after a step, kept in their order.
+
+    Parameters
+    ----------
+    old : ndarray, shape (n,)
+        Rising.
+    proposed : ndarray, shape (n,)
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Rising; the proposed ones where none comes too close to its neighbour.
+    """
+    kept = proposed.copy()
+    settled_break_points(old, kept, _LEAST_SHRINK, _LEAST_WIDTH)
+    return kept
+
+
 def _settle(old: StaticMap, proposed: StaticMap) -> StaticMap:
     """Keep the break-points in order."""
     points, values = break_points_and_values(proposed)
-    old_points, _ = break_points_and_values(old)
-    old_widths = old_points[1:] - old_points[:-1]
-    least = np.maximum(
-        _LEAST_SHRINK * old_widths, _LEAST_WIDTH * (old_points[-1] - old_points[0])
-    )
-    least = np.minimum(least, old_widths)
-    widths = points[1:] - points[:-1]
-    if (widths >= least).all():
-        return proposed
-    laid_out = np.concatenate([[0.0], np.cumsum(np.maximum(widths, least))])
-    # Keep the mean of the break-points, so that widening pushes to both sides alike.
-    laid_out += points.mean() - laid_out.mean()
-    return replace(proposed, parameters=np.concatenate([laid_out, values]))
+    kept = in_order(break_points_and_values(old)[0], points)
+    return StaticMap(old.kind, np.concatenate([kept, values]), old.domain)
 
 
 RULE = MapRule(
@@ -128,4 +172,7 @@ RULE = MapRule(
     n_positions=lambda static_map: static_map.parameters.size // 2,
     settle=_settle,
     corners=lambda static_map: break_points_and_values(static_map)[0],
+    derivatives=_derivatives,
+    # The outermost ones may slide along the straight line beyond them.
+    held=lambda static_map: (0, static_map.parameters.size // 2 - 1),
 )

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.polynomial import chebyshev
 
 from hwid_cli.maths.model.maps.rule import MapRule, Shape
-from hwid_cli.records.model import FitOptions, StaticMap
+from hwid_cli.records.maps import MapOptions, StaticMap
 
 
 def _scaled(argument: np.ndarray, domain: tuple[float, float]) -> np.ndarray:
@@ -44,7 +44,7 @@ def _differentiate(
 
 
 def _starts(
-    options: FitOptions, lowest: float, highest: float, shape: Shape
+    options: MapOptions, lowest: float, highest: float, shape: Shape
 ) -> tuple[StaticMap, ...]:
     return (_interpolated(options.degree, lowest, highest, shape),)
 
@@ -100,4 +100,5 @@ RULE = MapRule(
     amplify=_amplify,
     compress=_compress,
     size=_size,
+    shifts=True,
 )

@@ -5,9 +5,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hwid_cli.records.model import FitOptions, StaticMap
+from hwid_cli.records.maps import MapOptions, StaticMap
 
 Shape = Callable[[np.ndarray], np.ndarray]
+Differentiate = Callable[
+    [StaticMap, np.ndarray, bool, np.ndarray, int], tuple[np.ndarray, np.ndarray]
+]
 
 
 def no_positions(static_map: StaticMap) -> int:  # noqa: ARG001 - a rule's signature
@@ -22,6 +25,20 @@ def no_positions(static_map: StaticMap) -> int:  # noqa: ARG001 - a rule's signa
     int
     """
     return 0
+
+
+def none_held(static_map: StaticMap) -> tuple[int, ...]:  # noqa: ARG001
+    """Tell that data may determine every parameter.
+
+    Parameters
+    ----------
+    static_map : StaticMap
+
+    Returns
+    -------
+    tuple of int
+    """
+    return ()
 
 
 def keep_proposed(old: StaticMap, proposed: StaticMap) -> StaticMap:  # noqa: ARG001
@@ -52,6 +69,37 @@ def no_corners(static_map: StaticMap) -> np.ndarray:  # noqa: ARG001
     return np.zeros(0)
 
 
+@dataclass(frozen=True, eq=False)
+class Derivatives:
+    """Value, slope and derivatives of a static map along a signal.
+
+    At sample t the derivatives are ``shares[t]`` in the columns from ``first[t]`` on,
+    and zero in the others: most maps answer to a parameter in few places only.
+
+    Parameters
+    ----------
+    value, slope : ndarray, shape (n,)
+    first : ndarray of int, shape (n,)
+    shares : ndarray, shape (n, width)
+    count : int
+        Number of columns.
+    change : ndarray, shape (n_active, count), or None
+        Turns the columns into those of the parameters; None where they are.
+    """
+
+    value: np.ndarray
+    slope: np.ndarray
+    first: np.ndarray
+    shares: np.ndarray
+    count: int
+    change: np.ndarray | None = None
+
+    @property
+    def is_local(self) -> bool:
+        """Whether some columns are zero at every sample."""
+        return self.shares.shape[1] < self.count
+
+
 @dataclass(frozen=True)
 class MapRule:
     """What one kind of static map can do.
@@ -61,10 +109,11 @@ class MapRule:
     evaluate : callable (StaticMap, v) -> ndarray
     differentiate : callable (StaticMap, v, with_positions, out, first) -> (value, slope)
         Writes a column for each active parameter into `out`, from column `first` on.
-    starts : callable (FitOptions, lowest, highest, shape) -> tuple of StaticMap
+    starts : callable (MapOptions, lowest, highest, shape) -> tuple of StaticMap
         Maps over the given range that follow the function `shape` where the kind can.
-    identity : callable (FitOptions, lowest, highest) -> StaticMap
-        A map that passes on what lies in the range unchanged.
+    identity : callable (MapOptions, lowest, highest) -> StaticMap
+        A map that passes on what lies in the range unchanged; kinds that cannot give
+        one that comes near.
     with_domain : callable (StaticMap, (lowest, highest)) -> StaticMap
         The same map with another domain.
     names : callable (StaticMap) -> tuple of str
@@ -82,14 +131,21 @@ class MapRule:
         The proposed map with its parameters put into a legal order.
     corners : callable (StaticMap) -> ndarray
         Arguments at which the slope changes.
+    derivatives : callable (StaticMap, v, with_positions) -> Derivatives, or None
+        Faster than `differentiate` where they are local; None where they are not.
+    held : callable (StaticMap) -> tuple of int
+        Positions that count as known where standard errors are computed.
+    shifts : bool
+        Whether maps with fixed positions can be shifted along their argument.
+    has_slope : bool
+        Whether the slope in `differentiate` is that of the map, not a stand-in that
+        serves the search only.
     """
 
     evaluate: Callable[[StaticMap, np.ndarray], np.ndarray]
-    differentiate: Callable[
-        [StaticMap, np.ndarray, bool, np.ndarray, int], tuple[np.ndarray, np.ndarray]
-    ]
-    starts: Callable[[FitOptions, float, float, Shape], tuple[StaticMap, ...]]
-    identity: Callable[[FitOptions, float, float], StaticMap]
+    differentiate: Differentiate
+    starts: Callable[[MapOptions, float, float, Shape], tuple[StaticMap, ...]]
+    identity: Callable[[MapOptions, float, float], StaticMap]
     with_domain: Callable[[StaticMap, tuple[float, float]], StaticMap]
     names: Callable[[StaticMap], tuple[str, ...]]
     amplify: Callable[[StaticMap, float], StaticMap] | None = None
@@ -98,3 +154,7 @@ class MapRule:
     n_positions: Callable[[StaticMap], int] = no_positions
     settle: Callable[[StaticMap, StaticMap], StaticMap] = keep_proposed
     corners: Callable[[StaticMap], np.ndarray] = no_corners
+    derivatives: Callable[[StaticMap, np.ndarray, bool], Derivatives] | None = None
+    held: Callable[[StaticMap], tuple[int, ...]] = none_held
+    shifts: bool = False
+    has_slope: bool = True

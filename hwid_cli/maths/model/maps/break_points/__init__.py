@@ -1,0 +1,1 @@
+"""Where a piecewise linear map bends, and by how much."""

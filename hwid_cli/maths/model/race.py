@@ -1,0 +1,208 @@
+"""The first phase of a search: many starts, a few iterations each, the best go on.
+
+A linear block alone does not tell on which side of it a nonlinearity lies, so every block
+starts twice: with what it says of the input map, and with the output map that its own
+output asks for.
+
+References
+----------
+docs/method.md, section "The search".
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from hwid_cli.maths.model import static_map
+from hwid_cli.maths.model.candidates import Candidate, Experiment
+from hwid_cli.maths.model.levenberg_marquardt import Search, minimise
+from hwid_cli.maths.model.maps.kernels import piecewise_linear_shares
+from hwid_cli.maths.model.placing import reaching
+from hwid_cli.maths.model.points import point_of
+from hwid_cli.maths.model.rows.kernels import local_sums
+from hwid_cli.maths.model.sensitivities import simulated
+from hwid_cli.maths.model.starts import Start
+from hwid_cli.records.model import FitOptions, HammersteinWiener, Orders
+
+# Iterations of each round, and how many candidates go on after it.
+_ROUNDS = ((2, 4), (4, 2))
+# Samples that count in a round; enough to tell candidates apart.
+_ROWS = 1000
+# Knots of the output map that a block's output asks for, and how stiff it is: the
+# weight of its second differences as a share of the mean number of samples at a knot.
+_CURVE_POINTS, _STIFFNESS = 12, 1e-2
+
+
+# Cost from which on a candidate drops out, as a multiple of the best's.
+_HOPELESS = 9.0
+
+
+@dataclass(frozen=True, eq=False)
+class _Runner:
+    """A candidate in the race and the kind of start that it came from."""
+
+    family: tuple[bool, bool]
+    search: Search
+
+
+def race_stride(experiments: Sequence[Experiment]) -> int:
+    """Samples from one that counts in the race to the next.
+
+    Parameters
+    ----------
+    experiments : sequence of Experiment
+
+    Returns
+    -------
+    int, [samples]
+    """
+    return max(1, sum(one.output.size for one in experiments) // _ROWS)
+
+
+def race(
+    experiments: Sequence[Experiment],
+    starts: Sequence[Start],
+    orders: Orders,
+    options: FitOptions,
+) -> list[Search]:
+    """Let all starts run a few iterations; the slower ones drop out.
+
+    Parameters
+    ----------
+    experiments : sequence of Experiment
+        Scaled to about one.
+    starts : sequence of Start
+    orders : Orders
+    options : FitOptions
+
+    Returns
+    -------
+    list of Search
+        The best, those of different kinds of starts first.
+    """
+    stride = race_stride(experiments)
+    racing = []
+    for start in starts:
+        for candidate in starting_candidates(experiments, start, orders, options):
+            racing.append(_entered((start.is_expanded, False), candidate, experiments))
+            if static_map.has_free_shape(options.output_map):
+                curved = _with_output_curve(candidate, experiments, options)
+                racing.append(_entered((start.is_expanded, True), curved, experiments))
+    racing = _leaders(racing, options.starts)
+    for iterations, count in _ROUNDS:
+        racing = [_going_on(one, experiments, iterations, stride) for one in racing]
+        racing = _leaders(racing, count, _HOPELESS)
+    return [one.search for one in racing]
+
+
+def starting_candidates(
+    experiments: Sequence[Experiment],
+    start: Start,
+    orders: Orders,
+    options: FitOptions,
+) -> list[Candidate]:
+    """Models that begin with one linear block, one for each pair of starting maps.
+
+    Parameters
+    ----------
+    experiments : sequence of Experiment
+    start : Start
+    orders : Orders
+    options : FitOptions
+
+    Returns
+    -------
+    list of Candidate
+    """
+    inputs = np.concatenate([one.input for one in experiments])
+    is_estimated = options.initial_state == "estimated"
+    states = start.free_responses if is_estimated else np.zeros((len(experiments), 0))
+    candidates = []
+    for input_map in static_map.starting_maps(
+        options.input_map,
+        options.of_input,
+        inputs.min(),
+        inputs.max(),
+        shape=lambda u: np.interp(u, start.input_points, start.input_values),
+    ):
+        model = HammersteinWiener(
+            input_map,
+            start.numerator,
+            start.denominator,
+            orders.nk,
+            static_map.identity("none", options.of_output, np.ones(1)),
+            sample_time_s=1.0,
+            initial_state=options.initial_state,
+        )
+        _, x = reaching(Candidate(model, states), experiments)
+        candidates += [
+            Candidate(replace(model, output_map=output_map), states)
+            for output_map in static_map.starting_maps(
+                options.output_map,
+                options.of_output,
+                x.min(),
+                x.max(),
+                shape=lambda x: x + start.offset,
+            )
+        ]
+    return candidates
+
+
+def _with_output_curve(
+    candidate: Candidate, experiments: Sequence[Experiment], options: FitOptions
+) -> Candidate:
+    """Candidate with the output map that comes closest for its linear block."""
+    _, x = reaching(candidate, experiments)
+    measured = np.concatenate([one.output for one in experiments])
+    points = np.linspace(x.min(), x.max(), _CURVE_POINTS)
+    if not points[0] < points[-1]:
+        return candidate
+    _, _, first, shares = piecewise_linear_shares(x, points, points, 1)
+    matrix, vector = local_sums(first, shares, measured[:, None], points.size)
+    bending = np.diff(np.eye(points.size), 2, axis=0)
+    matrix += _STIFFNESS * x.size / points.size * (bending.T @ bending)
+    values = np.linalg.solve(matrix, vector[:, 0])
+    maps = static_map.starting_maps(
+        options.output_map,
+        options.of_output,
+        points[0],
+        points[-1],
+        shape=lambda v: np.interp(v, points, values),
+    )
+    return replace(candidate, model=replace(candidate.model, output_map=maps[0]))
+
+
+def _entered(
+    family: tuple[bool, bool], candidate: Candidate, experiments: Sequence[Experiment]
+) -> _Runner:
+    stride = race_stride(experiments)
+    cost = simulated(point_of(candidate), experiments, stride).cost
+    return _Runner(family, Search(candidate, cost, 0, "iteration_limit", ""))
+
+
+def _going_on(
+    one: _Runner, experiments: Sequence[Experiment], iterations: int, stride: int
+) -> _Runner:
+    found = minimise(
+        one.search.candidate,
+        experiments,
+        with_positions=False,
+        max_iterations=iterations,
+        stride=stride,
+    )
+    total = one.search.iterations + found.iterations
+    return replace(one, search=replace(found, iterations=total))
+
+
+def _leaders(
+    racing: Sequence[_Runner], count: int, hopeless: float = np.inf
+) -> list[_Runner]:
+    """Best of each family unless it is hopeless, then the best of the rest."""
+    ordered = sorted(racing, key=lambda one: one.search.cost)
+    limit = hopeless * ordered[0].search.cost
+    ordered = [one for one in ordered if one.search.cost <= limit] or ordered
+    families = [one.family for one in ordered]
+    firsts = sorted({families.index(family) for family in set(families)})
+    rest = [number for number in range(len(ordered)) if number not in firsts]
+    return [ordered[number] for number in (firsts + rest)[:count]]

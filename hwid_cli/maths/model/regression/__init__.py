@@ -1,0 +1,1 @@
+"""Least squares that find linear blocks without a model to begin with."""

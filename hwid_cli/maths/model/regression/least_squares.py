@@ -1,0 +1,235 @@
+"""One pass over the data, two least-squares problems: a better F, and how good F is.
+
+Filtered by 1/F, the data give both the next denominator of the Steiglitz-McBride
+iterations and the best numerator of the present one. Both are solved from the same
+products of columns.
+
+References
+----------
+Steiglitz, McBride (1965). docs/method.md, section "Starts".
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg.lapack import dposv
+
+from hwid_cli.maths.model.candidates import Experiment
+from hwid_cli.maths.model.linear_block import difference_basis, is_stable, reflected
+from hwid_cli.maths.model.maps.kernels import piecewise_linear_shares
+from hwid_cli.maths.model.regression.kernels import regression_rows
+from hwid_cli.records.model import Orders
+
+# Poles further out than this settle too slowly to be found by least squares.
+LARGEST_RADIUS = 0.9995
+# Added to the diagonal of the scaled products: directions weaker than this are noise.
+_RIDGE, _RIDGE_GROWTH = 1e-12, 1e3
+
+
+@dataclass(frozen=True, eq=False)
+class Regression:
+    """What the least-squares problems of all denominators share.
+
+    Parameters
+    ----------
+    experiments : tuple of Experiment
+    bases : tuple of (first, shares)
+        The input of each experiment expanded into hat functions at `points`, or as it is.
+    points : ndarray, shape (n_points,)
+        Two for an input as it is.
+    orders : Orders
+    has_level, has_free_response : bool
+        Whether the output may have an offset and an initial state of its own.
+    stride : int, [samples]
+        Every `stride`-th sample is an equation.
+    """
+
+    experiments: tuple[Experiment, ...]
+    bases: tuple[tuple[np.ndarray, np.ndarray], ...]
+    points: np.ndarray
+    orders: Orders
+    has_level: bool
+    has_free_response: bool
+    stride: int
+
+    @property
+    def is_expanded(self) -> bool:
+        """Whether the input is expanded."""
+        return self.points.size > 2
+
+    @property
+    def n_inputs(self) -> int:
+        """Columns of the input; the level makes up for the first hat function."""
+        return self.points.size - 1 if self.is_expanded else 1
+
+    @property
+    def n_states(self) -> int:
+        """Initial states of all experiments."""
+        if not self.has_free_response:
+            return 0
+        return len(self.experiments) * self.orders.n_state
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """Best numerator and all else for one denominator.
+
+    Parameters
+    ----------
+    denominator : ndarray, shape (n_poles + 1,)
+    cost : float
+        Sum of squared residuals.
+    inputs : ndarray, shape (nb, n_inputs)
+        Coefficients of the differences of the expanded input.
+    states : ndarray, shape (n_experiments, n_state)
+        Of differences too; empty without.
+    level : float
+    """
+
+    denominator: np.ndarray
+    cost: float
+    inputs: np.ndarray
+    states: np.ndarray
+    level: float
+
+
+def regression(
+    experiments: Sequence[Experiment],
+    orders: Orders,
+    points: np.ndarray,
+    *,
+    has_level: bool,
+    has_free_response: bool,
+    stride: int,
+) -> Regression:
+    """Expand the inputs.
+
+    Parameters
+    ----------
+    experiments : sequence of Experiment
+    orders : Orders
+    points : ndarray, shape (n_points,)
+        Knots of the hat functions; two for an input as it is.
+    has_level, has_free_response : bool
+    stride : int, [samples]
+
+    Returns
+    -------
+    Regression
+    """
+    bases = []
+    for one in experiments:
+        if points.size > 2:
+            _, _, first, shares = piecewise_linear_shares(one.input, points, points, 1)
+        else:
+            first = np.zeros(one.input.size, dtype=np.int64)
+            shares = np.ascontiguousarray(one.input)[:, None]
+        bases.append((first, shares))
+    return Regression(
+        tuple(experiments),
+        tuple(bases),
+        points,
+        orders,
+        has_level,
+        has_free_response,
+        stride,
+    )
+
+
+def solve(one: Regression, denominator: np.ndarray) -> tuple[Solution, np.ndarray]:
+    """Best numerator for a denominator, and the denominator that follows it.
+
+    Parameters
+    ----------
+    one : Regression
+    denominator : ndarray, shape (n_poles + 1,)
+        Stable and monic.
+
+    Returns
+    -------
+    solution : Solution
+    following : ndarray, shape (n_poles + 1,)
+        Stable.
+    """
+    products = _products(one, denominator)
+    n_poles = denominator.size - 1
+    known = n_poles + one.orders.nb * one.n_inputs + one.n_states
+    middle = np.arange(n_poles, known)
+    shared = np.append(middle, known + 1) if one.has_level else middle
+    target = products.shape[0] - 1
+    found, cost = _least_squares(products, shared, target)
+    count = one.orders.nb * one.n_inputs
+    states = found[count : count + one.n_states]
+    solution = Solution(
+        denominator,
+        cost,
+        found[:count].reshape(one.orders.nb, -1),
+        states.reshape(len(one.experiments), -1),
+        float(found[-1]) if one.has_level else 0.0,
+    )
+    if n_poles == 0:
+        return solution, denominator
+    all_known = (
+        np.append(np.arange(known), known) if one.has_level else np.arange(known)
+    )
+    past, _ = _least_squares(products, all_known, target - 1)
+    tail = difference_basis(n_poles) @ past[:n_poles]
+    return solution, _stabilised(np.concatenate([[1.0], tail]))
+
+
+def _products(one: Regression, denominator: np.ndarray) -> np.ndarray:
+    """Products of all columns, summed over the experiments."""
+    orders, n_poles = one.orders, denominator.size - 1
+    n_state = orders.n_state if one.has_free_response else 0
+    skipped = 1 if one.is_expanded else 0
+    count = one.n_inputs + skipped
+    n_columns = n_poles + orders.nb * one.n_inputs + one.n_states + 4
+    total = np.zeros((n_columns, n_columns))
+    for index, (experiment, (first, shares)) in enumerate(
+        zip(one.experiments, one.bases, strict=True)
+    ):
+        n_rows = -(-experiment.output.size // one.stride)
+        rows = np.empty((n_rows, n_columns))
+        regression_rows(
+            experiment.output,
+            (first, shares, count, skipped),
+            denominator,
+            orders.nk,
+            (orders.nb, n_state, index * n_state, one.n_states),
+            one.stride,
+            rows,
+        )
+        total += rows.T @ rows
+    return total
+
+
+def _least_squares(
+    products: np.ndarray, known: np.ndarray, target: int
+) -> tuple[np.ndarray, float]:
+    """Solve from products of columns; the solution and the squared residual."""
+    matrix = products[np.ix_(known, known)]
+    scale = np.sqrt(matrix.diagonal())
+    scale[scale == 0.0] = 1.0
+    matrix = matrix / scale / scale[:, None]
+    vector = products[known, target] / scale
+    ridge = _RIDGE
+    while True:
+        damped = matrix.copy()
+        damped.flat[:: known.size + 1] += ridge
+        _, solution, info = dposv(damped, vector, lower=1)
+        if info == 0 and np.isfinite(solution).all():
+            break
+        ridge *= _RIDGE_GROWTH
+        if ridge > 1.0:
+            return np.zeros(known.size), float(products[target, target])
+    cost = products[target, target] - solution @ (2.0 * vector - matrix @ solution)
+    return solution / scale, max(float(cost), 0.0)
+
+
+def _stabilised(denominator: np.ndarray) -> np.ndarray:
+    """Denominator with all poles well inside the unit circle."""
+    drawn_in = denominator * LARGEST_RADIUS ** -np.arange(denominator.size)
+    if is_stable(drawn_in):
+        return denominator
+    return reflected(denominator, LARGEST_RADIUS)

@@ -1,0 +1,1 @@
+"""Rows of the derivatives of a model's output."""

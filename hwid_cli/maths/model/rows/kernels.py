@@ -1,0 +1,202 @@
+"""Compiled rows of a model's derivatives and sums over them; nothing else compiles here."""
+
+import numpy as np
+from numba import njit
+
+# Reassociation lets the compiler use vector instructions; NaN and infinity keep their
+# meaning because 'nnan' and 'ninf' are left out.
+_FAST = {"reassoc", "contract", "arcp", "nsz"}
+# Decaying responses end in subnormal numbers, which processors handle a hundred times
+# slower; anything this small is far below the rounding of the values it is added to.
+_TINY = 1e-200
+# Samples between two looks for such numbers, and samples worked on at a time: the
+# recursions of all columns over a chunk stay in the cache.
+_FLUSH, _CHUNK = 16, 256
+
+
+@njit(cache=True, fastmath=_FAST)
+def derivative_rows(
+    signals: tuple[np.ndarray, np.ndarray],
+    block: tuple[np.ndarray, np.ndarray, int],
+    basis: tuple[np.ndarray, np.ndarray, int],
+    start: tuple[bool, int, int, int],
+    weights: np.ndarray,
+    stride: int,
+    out: np.ndarray,
+) -> None:
+    """Derivatives of x by input map, initial states, B and F, times a weight.
+
+    Every column obeys ``F(q) column = ...``, so all of them run through one recursion.
+    Those of the initial states, B and F are differences of three of its columns.
+
+    Parameters
+    ----------
+    signals : tuple of ndarray, shape (n,)
+        Before and after the linear block.
+    block : tuple of numerator (nb,), monic denominator (nf + 1,), delay
+    basis : tuple of first (n,), shares (n, width), count
+        Derivatives of the input map: at sample t they are ``shares[t]`` in the columns
+        from ``first[t]`` on, and zero in the others of `count` columns.
+    start : tuple of bool, int, int, int
+        Whether it is steady, the number of initial states, the place of the first of
+        this experiment among those of all, and how many these are.
+    weights : ndarray, shape (n_rows,)
+        For the rows that are written.
+    stride : int, [samples]
+        Every `stride`-th sample has a row.
+    out : ndarray, shape (n_rows, at least count + n_states + nb + nf)
+        Columns of the input map, the initial states, B and F are written.
+    """
+    w, x = signals
+    numerator, denominator, delay = block
+    first, shares, count = basis
+    steady, n_state, own_state, n_states = start
+    n, nb, nf, width = w.size, numerator.size, denominator.size - 1, shares.shape[1]
+    taps = np.zeros(4 * max(1, (nf + 3) // 4))
+    taps[:nf] = denominator[1:]
+    pad = max(taps.size, nb + delay, n_state) + 1
+    wide = 4 * ((count + 3 + 3) // 4)
+    chunk = min(n, _CHUNK)
+    lines = np.zeros((pad + chunk, wide))
+    if steady:
+        gain = 1.0 / denominator.sum()
+        level = numerator.sum() * gain
+        for t in range(pad):
+            for m in range(width):
+                lines[t, first[0] + m] += shares[0, m] * level
+            lines[t, count] = w[0] * gain
+            lines[t, count + 1] = w[0] * level * gain
+    table = np.empty((n_state + nb + nf, chunk + max(nb, nf, n_state, 1)))
+    for begin in range(0, n, chunk):
+        length = min(chunk, n - begin)
+        for k in range(length):
+            t = begin + k
+            row = lines[pad + k]
+            all_pole(lines, pad + k, taps)
+            for i in range(nb):
+                s = t - delay - i
+                if s < 0:
+                    if not steady:
+                        break
+                    s = 0
+                b, at = numerator[i], first[s]
+                for m in range(width):
+                    row[at + m] += b * shares[s, m]
+            row[count] += w[t]
+            row[count + 1] += x[t]
+            if t == 0:
+                row[count + 2] += 1.0
+            if t % _FLUSH == 0:
+                for m in range(wide):
+                    if abs(row[m]) < _TINY:
+                        row[m] = 0.0
+        last = length - 1
+        _differences(lines, pad, count + 2, n_state, length, table)
+        _differences(lines, pad - delay, count, nb, length, table[n_state:])
+        _differences(lines, pad - 1, count + 1, nf, length, table[n_state + nb :])
+        for k in range((-begin) % stride, length, stride):
+            r = (begin + k) // stride
+            row, source, weight = out[r], lines[pad + k], weights[r]
+            for m in range(count):
+                row[m] = weight * source[m]
+            for m in range(count, count + n_states):
+                row[m] = 0.0
+            place = count + own_state
+            for m in range(n_state):
+                row[place + m] = weight * table[m, k]
+            place = count + n_states
+            for m in range(nb):
+                row[place + m] = weight * table[n_state + m, k]
+            place += nb
+            for m in range(nf):
+                row[place + m] = -weight * table[n_state + nb + m, k]
+        for k in range(pad):
+            lines[k] = lines[last + 1 + k]
+
+
+@njit(cache=True, fastmath=_FAST)
+def all_pole(lines: np.ndarray, at: int, taps: np.ndarray) -> None:
+    """Set a row to minus its predecessors times the taps, four at a time.
+
+    Parameters
+    ----------
+    lines : ndarray, shape (n, width)
+        Row `at` is written; it has as many predecessors as there are taps.
+    at : int
+    taps : ndarray, shape (n_taps,)
+        A multiple of four.
+    """
+    row = lines[at]
+    for j in range(0, taps.size, 4):
+        f0, f1, f2, f3 = taps[j], taps[j + 1], taps[j + 2], taps[j + 3]
+        s0, s1 = lines[at - j - 1], lines[at - j - 2]
+        s2, s3 = lines[at - j - 3], lines[at - j - 4]
+        if j == 0:
+            for m in range(row.size):
+                row[m] = -(f0 * s0[m] + f1 * s1[m] + f2 * s2[m] + f3 * s3[m])
+        else:
+            for m in range(row.size):
+                row[m] -= f0 * s0[m] + f1 * s1[m] + f2 * s2[m] + f3 * s3[m]
+
+
+@njit(cache=True, fastmath=_FAST)
+def _differences(
+    lines: np.ndarray, at: int, column: int, count: int, length: int, table: np.ndarray
+) -> None:
+    """Write ``(1 - q^-1)^j`` of a column from row `at` on into row j of a table."""
+    if count == 0:
+        return
+    before = np.empty(count)
+    for j in range(count):
+        before[j] = lines[at - 1 - j, column]
+    for order in range(1, count):
+        for j in range(count - 1, order - 1, -1):
+            before[j] = before[j - 1] - before[j]
+    for k in range(length):
+        table[0, k] = lines[at + k, column]
+    for j in range(1, count):
+        lower, higher = table[j - 1], table[j]
+        higher[0] = lower[0] - before[j - 1]
+        for k in range(1, length):
+            higher[k] = lower[k] - lower[k - 1]
+
+
+@njit(cache=True, fastmath=_FAST)
+def local_sums(
+    first: np.ndarray, shares: np.ndarray, rows: np.ndarray, count: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Products of columns that are zero but in few places with dense ones.
+
+    Parameters
+    ----------
+    first : ndarray of int, shape (n,)
+    shares : ndarray, shape (n, width)
+        At row t the local columns are ``shares[t]`` from column ``first[t]`` on.
+    rows : ndarray, shape (n, n_dense)
+    count : int
+        Number of local columns.
+
+    Returns
+    -------
+    own : ndarray, shape (count, count)
+        Local columns times local columns.
+    cross : ndarray, shape (count, n_dense)
+        Local columns times dense ones.
+    """
+    own = np.zeros((count, count))
+    cross = np.zeros((count, rows.shape[1]))
+    width = shares.shape[1]
+    for t in range(first.size):
+        at = first[t]
+        row = rows[t]
+        for m in range(width):
+            share = shares[t, m]
+            for k in range(m + 1):
+                own[at + m, at + k] += share * shares[t, k]
+            into = cross[at + m]
+            for k in range(row.size):
+                into[k] += share * row[k]
+    for m in range(count):
+        for k in range(m):
+            own[k, m] = own[m, k]
+    return own, cross

@@ -1,0 +1,171 @@
+"""Static maps: the kinds, what a fit is asked for, and a map with its numbers."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from hwid_cli.records.recordings import frozen_vector
+
+MAP_KINDS = (
+    "piecewise_linear",
+    "saturation",
+    "dead_zone",
+    "polynomial",
+    "none",
+    "sigmoid_network",
+    "wavelet_network",
+    "cubic_spline",
+    "piecewise_constant",
+    "own_function",
+)
+# Networks have a linear part beside their units; other kinds need two to have a slope.
+_LEAST_UNITS = {"piecewise_linear": 2, "cubic_spline": 2, "piecewise_constant": 2}
+
+
+@dataclass(frozen=True)
+class MapFunction:
+    """A static map of the user's own, as Python functions.
+
+    v is the argument in the unit of the data, p the parameters.
+
+    Parameters
+    ----------
+    value : callable (v, p) -> ndarray, shape (n,)
+        For v of shape (n,) and p of shape (n_parameters,).
+    by_argument : callable (v, p) -> ndarray, shape (n,)
+        Derivative of the value by v.
+    by_parameters : callable (v, p) -> ndarray, shape (n, n_parameters)
+        Derivatives of the value by p.
+    start : sequence of float, or of such sequences
+        Parameters from which a fit starts; several rows are several starts.
+    names : sequence of str
+        Names of the parameters; ``p[0]``, ``p[1]``, ... where empty.
+    check_range : tuple of float
+        Lowest and highest argument at which the derivatives are checked once.
+
+    Examples
+    --------
+    >>> cubic = MapFunction(
+    ...     value=lambda v, p: v + p[0] * v**3,
+    ...     by_argument=lambda v, p: 1.0 + 3.0 * p[0] * v**2,
+    ...     by_parameters=lambda v, p: v[:, None] ** 3,
+    ...     start=[0.0],
+    ...     names=["cubic"],
+    ... )
+    """
+
+    value: Callable[[np.ndarray, np.ndarray], np.ndarray]
+    by_argument: Callable[[np.ndarray, np.ndarray], np.ndarray]
+    by_parameters: Callable[[np.ndarray, np.ndarray], np.ndarray]
+    start: Sequence[float] | Sequence[Sequence[float]]
+    names: Sequence[str] = ()
+    check_range: tuple[float, float] = (-1.0, 1.0)
+
+
+@dataclass(frozen=True)
+class OwnFunction:
+    """Where a map of the user's own comes from: the text of its Python file.
+
+    Workers, caches and results hold the text, so they need no file and notice every
+    change of it.
+
+    Parameters
+    ----------
+    name : str
+        Name of a ``MapFunction`` in the file.
+    source : str
+        Text of the file. It runs when the map is used.
+    unit : float
+        One unit of the function's argument and value, in the unit of the signals: a
+        fit scales its data and sets it; 1 for data as they are.
+    """
+
+    name: str
+    source: str
+    unit: float = 1.0
+
+
+@dataclass(frozen=True)
+class MapOptions:
+    """What a fit asks of one of its two maps.
+
+    Parameters
+    ----------
+    kind : str
+        One of ``MAP_KINDS``.
+    units : int, [-]
+        Break-points, network units, knots or levels.
+    degree : int, [-]
+        Degree of a polynomial.
+    function : OwnFunction or None
+        Of the kind ``own_function``; other kinds take no notice of it.
+
+    Raises
+    ------
+    ValueError
+        If the kind is unknown, cannot have so few units, or lacks its function.
+    """
+
+    kind: str
+    units: int = 10
+    degree: int = 5
+    function: OwnFunction | None = None
+
+    def __post_init__(self) -> None:
+        if self.kind not in MAP_KINDS:
+            raise ValueError(
+                f"map must be one of {', '.join(MAP_KINDS)}, got {self.kind!r}"
+            )
+        least = _LEAST_UNITS.get(self.kind, 1)
+        if self.units != int(self.units) or self.units < least:
+            raise ValueError(
+                f"units must be an integer >= {least} for {self.kind}, "
+                f"got {self.units!r}"
+            )
+        if self.kind == "own_function" and self.function is None:
+            raise ValueError(
+                "map own_function needs a function; name its file: "
+                "{file: my_map.py, name: my_function}"
+            )
+
+
+@dataclass(frozen=True, eq=False)
+class StaticMap:
+    """A static nonlinearity: its kind and the numbers that fix it.
+
+    Parameters
+    ----------
+    kind : str
+        One of ``MAP_KINDS``.
+    parameters : ndarray, shape (n_parameters,)
+        All but those of an own function have the unit of the argument or of the value.
+        ``piecewise_linear``: break-points, then the values there. ``saturation``: lower
+        and upper limit. ``dead_zone``: lower and upper edge. ``polynomial``: Chebyshev
+        coefficients over ``domain``, constant first. ``none``: empty.
+        ``sigmoid_network``, ``wavelet_network``: centres, widths and heights of the
+        units, then the values of the straight line at the ends of ``domain``.
+        ``cubic_spline``: first and last knot, then the values at all knots.
+        ``piecewise_constant``: edges, then the levels between and beyond them.
+        ``own_function``: as the function says.
+    domain : tuple of float
+        Range of the argument in the fit; outside it the map extrapolates.
+    function : OwnFunction or None
+        Only with ``own_function``.
+    """
+
+    kind: str
+    parameters: np.ndarray
+    domain: tuple[float, float] = (-1.0, 1.0)
+    function: OwnFunction | None = None
+
+    def __post_init__(self) -> None:
+        if self.kind not in MAP_KINDS:
+            raise ValueError(
+                f"map kind {self.kind!r} is none of {', '.join(MAP_KINDS)}"
+            )
+        if (self.kind == "own_function") != (self.function is not None):
+            raise ValueError("a map has a function exactly with kind own_function")
+        object.__setattr__(
+            self, "parameters", frozen_vector(self.parameters, "parameters")
+        )
