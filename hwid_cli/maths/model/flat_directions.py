@@ -164,7 +164,7 @@ def _why_of_map(
     if n_levels < max(count, 2):
         return f"{{what}} visits only {n_levels} level{'s' * (n_levels > 1)}"
     if one.kind == "saturation":
-        return _limit_not_reached(one, signal)
+        return _limit_not_reached(one, moved, signal)
     if one.kind != "piecewise_linear":
         return ""
     units = one.parameters.size // 2
@@ -183,12 +183,12 @@ def _why_of_map(
     return ""
 
 
-def _limit_not_reached(one: StaticMap, signal: np.ndarray) -> str:
-    """Which limit no sample reaches; empty where both are reached."""
+def _limit_not_reached(one: StaticMap, moved: np.ndarray, signal: np.ndarray) -> str:
+    """Which of the limits that move no sample reaches; empty where all are reached."""
     low, high = one.parameters
-    if not (signal < low).any():
+    if 0 in moved and not (signal < low).any():
         return f"no sample of {{what}} lies below {low:.3g}"
-    if not (signal > high).any():
+    if 1 in moved and not (signal > high).any():
         return f"no sample of {{what}} lies above {high:.3g}"
     return ""
 
