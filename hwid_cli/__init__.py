@@ -24,6 +24,7 @@ _PUBLIC = {
     "OwnFunction": "hwid_cli.records.maps",
     "Recording": "hwid_cli.records.recordings",
     "fit": "hwid_cli.maths.model.fit",
+    "parameter_covariance": "hwid_cli.maths.model.uncertainty",
     "simulate": "hwid_cli.maths.model.simulate",
 }
 
@@ -36,6 +37,7 @@ __all__ = [
     "OwnFunction",
     "Recording",
     "fit",
+    "parameter_covariance",
     "simulate",
 ]
 

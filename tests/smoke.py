@@ -61,6 +61,8 @@ def main() -> None:
         again, _ = read_tensor(out)
         check(bool(np.array_equal(tensor, again)), "the second run gave other numbers")
         page = (out / "report.html").read_text(encoding="utf-8")
+        advice = (out / "order.csv").read_text(encoding="utf-8")
+        check("all recordings" in advice, "no orders are recommended")
         check("<h2" in page and "data:image/png" in page, "the report is empty")
     sys.stdout.write(first)
     sys.stdout.write(f"smoke: passed, {tensor.size} RMSDs, cached in the second run\n")

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from hwid_cli.campaign.order_grid import grid_place
 from hwid_cli.maths.model.frequency_response import (
     frequency_response,
     response_frequencies,
@@ -29,23 +30,6 @@ class _Shown:
     fit: Fit
     coverage: int
     of: int
-
-
-def grid_place(fit: Fit, nk_role: str) -> tuple[int, int]:
-    """Place of a fit in the order grid.
-
-    Parameters
-    ----------
-    fit : Fit
-    nk_role : str
-        What the second axis counts.
-
-    Returns
-    -------
-    nb, nk : int, [-]
-    """
-    nk = fit.orders.nf if nk_role == "poles" else fit.orders.nk
-    return fit.orders.nb, nk
 
 
 def named_fits(stored: StoredResults) -> dict[str, Fit]:

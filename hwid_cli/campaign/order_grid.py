@@ -3,7 +3,7 @@
 from hwid_cli.errors import ConfigError
 from hwid_cli.maths.model.contained import contains
 from hwid_cli.records.experiment import OrdersOptions
-from hwid_cli.records.model import Orders
+from hwid_cli.records.model import Fit, Orders
 
 # Delay of the published grid, whose second axis counts poles, [samples].
 DELAY_OF_POLE_GRID = 1
@@ -77,6 +77,23 @@ def growth(
         depth[i] = 1 + max((depth[j] for j in largest), default=-1)
         rounds.setdefault(depth[i], []).append((i, tuple(largest)))
     return tuple(tuple(sorted(rounds[number])) for number in sorted(rounds))
+
+
+def grid_place(fit: Fit, nk_role: str) -> tuple[int, int]:
+    """Place of a fit in the order grid.
+
+    Parameters
+    ----------
+    fit : Fit
+    nk_role : str
+        What the second axis counts.
+
+    Returns
+    -------
+    nb, nk : int, [-]
+    """
+    nk = fit.orders.nf if nk_role == "poles" else fit.orders.nk
+    return fit.orders.nb, nk
 
 
 def _orders(options: OrdersOptions, nb: int, nk: int) -> Orders:

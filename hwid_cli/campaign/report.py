@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 
 from hwid_cli.campaign.cache import task_key
-from hwid_cli.campaign.model_views import grid_place, model_views, named_fits
+from hwid_cli.campaign.model_views import model_views, named_fits
+from hwid_cli.campaign.order_grid import grid_place
 from hwid_cli.campaign.ranking import (
     best_fits,
     best_of_each,
@@ -20,11 +21,12 @@ from hwid_cli.campaign.report_matrices import (
     final_matrix,
     own_grid,
 )
+from hwid_cli.campaign.residuals import judge_residual
 from hwid_cli.maths.detail_window import detail_window
 from hwid_cli.maths.model.simulate import validation_output
 from hwid_cli.maths.scores import fit_percent, rmsd
 from hwid_cli.records.groups import FinalTest
-from hwid_cli.records.model import Fit, HammersteinWiener
+from hwid_cli.records.model import Fit
 from hwid_cli.records.recordings import Recording
 from hwid_cli.records.report import (
     PredictionCounts,
@@ -48,7 +50,7 @@ _SECTIONS = {
 _BESIDE = {"diagnose": ("identify", "crossval", "group", "test")}
 STAGES = tuple(_SECTIONS)
 # Raised when the page or a figure changes, so that pages are drawn again.
-REPORT_VERSION = 2
+REPORT_VERSION = 3
 
 
 def report_key(stored: StoredResults, figures: Mapping[str, bytes]) -> str:
@@ -169,9 +171,8 @@ def _simulated(
         if chosen is None or chosen[0] not in named:
             continue
         name, choice = chosen
-        model = named[name].model
-        if model is not None:
-            found.append(_simulate(recording, model, name, choice))
+        if named[name].model is not None:
+            found.append(_simulate(recording, named[name], name, choice))
     return tuple(found)
 
 
@@ -198,9 +199,11 @@ def _choose(
 
 
 def _simulate(
-    recording: Recording, model: HammersteinWiener, name: str, choice: str
+    recording: Recording, fit: Fit, name: str, choice: str
 ) -> SimulatedRecording:
-    output = validation_output(model, recording)
+    output = recording.output
+    if fit.model is not None:
+        output = validation_output(fit.model, recording)
     return SimulatedRecording(
         recording=recording,
         model=name,
@@ -212,6 +215,7 @@ def _simulate(
         detail=detail_window(
             recording.input, recording.output, is_periodic=recording.kind == "sine"
         ),
+        tests=judge_residual(recording.output - output, recording, fit),
     )
 
 

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from hwid_cli.campaign.model_views import grid_place
+from hwid_cli.campaign.order_grid import grid_place
 from hwid_cli.maths.scores import coverage
 from hwid_cli.records.groups import FinalTest
 from hwid_cli.records.report import ChainOnTests, OrderGrid, RmsdMatrix, StoredResults

@@ -96,7 +96,7 @@ def identify_stage(session: "Session") -> Identified:
 
 
 def show_fits(session: "Session", identified: Identified) -> None:
-    """Show the best models of each recording and how the fits ended.
+    """Show the best models of each recording, what they leave, and how the fits ended.
 
     Parameters
     ----------
@@ -104,12 +104,22 @@ def show_fits(session: "Session", identified: Identified) -> None:
     identified : Identified
     """
     from hwid_cli.campaign.ranking import best_fits, count_statuses
+    from hwid_cli.campaign.residuals import own_residuals
     from hwid_cli.cli.session import say
+    from hwid_cli.report.residual_tables import residual_table
     from hwid_cli.report.tables import best_models_table, status_line
 
+    if session.is_quiet:
+        return
+    nk_role = session.experiment.orders.nk_role
     table = best_models_table(
         best_fits(identified.fits),
         identified.recordings[0].output_unit,
-        nk_is_delay=session.experiment.orders.nk_role == "delay",
+        nk_is_delay=nk_role == "delay",
     )
-    say(session, f"\n{table}\n\n{status_line(count_statuses(identified.fits))}")
+    say(session, f"\n{table}")
+    left = own_residuals(identified.fits, identified.recordings, nk_role)
+    if left:
+        rule = session.experiment.fit.initial_state
+        say(session, f"\n{residual_table(left, rule)}")
+    say(session, f"\n{status_line(count_statuses(identified.fits))}")

@@ -83,6 +83,12 @@ def _crossval(session: "Session") -> None:
     show_coverage(session, *crossval_stage(session))
 
 
+def _order(session: "Session") -> None:
+    from hwid_cli.cli.order import order_stage, show_advice
+
+    show_advice(session, order_stage(session))
+
+
 def _group(session: "Session") -> None:
     from hwid_cli.cli.group import group_stage, show_groups
 
@@ -115,6 +121,7 @@ _STAGES = {
     "calibrate": _calibrate,
     "identify": _identify,
     "crossval": _crossval,
+    "order": _order,
     "group": _group,
     "test": _test,
     "diagnose": _diagnose,

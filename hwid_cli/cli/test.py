@@ -172,23 +172,28 @@ def show_final_test(session: "Session", final: "FinalTest") -> None:
     from hwid_cli.report import assignment_tables, final_test_tables
 
     width = screen_width()
+    rule = session.experiment.fit.initial_state
     parts = []
     if final.chain:
         recordings = read_calibrated(session.calibrated_path).recordings
         kinds = {recording.name: recording.kind for recording in recordings}
         trend = chain_trend(final, kinds)
         parts += [
-            final_test_tables.chain_on_tests_table(final, trend, width=width),
-            final_test_tables.chain_coverage_table(
-                final, trend, nf=session.experiment.orders.nf
+            final_test_tables.chain_on_tests_table(
+                final, trend, initial_state=rule, width=width
             ),
-            final_test_tables.chain_tables(final, trend, kinds, width=width),
+            final_test_tables.chain_coverage_table(
+                final, trend, initial_state=rule, nf=session.experiment.orders.nf
+            ),
+            final_test_tables.chain_tables(
+                final, trend, kinds, initial_state=rule, width=width
+            ),
         ]
     parts += [
-        final_test_tables.coverage_matrix_table(final, width=width),
+        final_test_tables.coverage_matrix_table(final, initial_state=rule, width=width),
         final_test_tables.gaps_text(final, width=width),
-        assignment_tables.smallest_set_table(final, width=width),
-        assignment_tables.prediction_table(final),
+        assignment_tables.smallest_set_table(final, initial_state=rule, width=width),
+        assignment_tables.prediction_table(final, initial_state=rule),
     ]
     for part in parts:
         say(session, f"\n{part}")

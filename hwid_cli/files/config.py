@@ -18,6 +18,7 @@ from hwid_cli.records.experiment import (
     Experiment,
     GroupOptions,
     IdentifyOptions,
+    OrderOptions,
     OrdersOptions,
 )
 from hwid_cli.records.model import FitOptions
@@ -118,6 +119,17 @@ def _read_hold_out(value: Any, place: Place) -> str | tuple[str, ...]:
     )
 
 
+def _read_order(value: Any, place: Place) -> OrderOptions:
+    """The section ``order``; keys of ``orders`` in it are told from others."""
+    grid = {field.name for field in fields(OrdersOptions)}
+    for key in value if isinstance(value, dict) else ():
+        if key in grid:
+            raise ConfigError(
+                f"{place.below(key)}: unknown key; did you mean 'orders.{key}'?"
+            )
+    return build(OrderOptions, value, place, readers={})
+
+
 def _read_fit(content: Any, place: Place) -> FitOptions:
     """Options of a fit; a map that is a section names the user's own function."""
     content = dict(content) if isinstance(content, dict) else content
@@ -132,6 +144,7 @@ def _read_fit(content: Any, place: Place) -> FitOptions:
 
 
 _READERS: dict[tuple[type, str], Reader] = {
+    (Experiment, "order"): _read_order,
     (Experiment, "fit"): _read_fit,
     (OrdersOptions, "nb"): _read_orders_axis,
     (OrdersOptions, "nk"): _read_orders_axis,

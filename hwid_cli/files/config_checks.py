@@ -59,6 +59,13 @@ def check_experiment(experiment: Experiment) -> None:
             experiment.crossval.threshold,
             "a number > 0",
         )
+    if experiment.order is not None:
+        require(
+            experiment.order.tolerance >= 0,
+            f"{file}: order.tolerance",
+            experiment.order.tolerance,
+            "a number >= 0",
+        )
     if experiment.group is not None:
         _check_group(experiment.group, file)
     check_simulation(experiment)

@@ -6,7 +6,7 @@ absent. Floats come back bit by bit.
 """
 
 from collections.abc import Callable
-from dataclasses import fields, is_dataclass
+from dataclasses import MISSING, Field, fields, is_dataclass
 from functools import cache
 from types import NoneType, UnionType
 from typing import Any, NamedTuple, TypeVar, Union, get_args, get_origin, get_type_hints
@@ -28,12 +28,17 @@ _SCALARS = (str, bool, int, float)
 
 
 class StoredField(NamedTuple):
-    """How a dataclass field is stored; ``member`` is its type, or that of its items."""
+    """How a dataclass field is stored; ``member`` is its type, or that of its items.
+
+    ``default`` gives the value where a file of an earlier version lacks the field; None
+    where every file must have it.
+    """
 
     name: str
     form: str
     member: Any
     is_optional: bool
+    default: Callable[[], Any] | None = None
 
 
 def write_record(group: h5py.Group, record: Any) -> None:
@@ -49,7 +54,7 @@ def write_record(group: h5py.Group, record: Any) -> None:
     TypeError
         If a field is of a kind that has no place in HDF5.
     """
-    for name, form, member, _ in schema(type(record)):
+    for name, form, member, *_ in schema(type(record)):
         value = getattr(record, name)
         if value is None:
             continue
@@ -87,13 +92,15 @@ def read_record(group: h5py.Group, record_type: type[Record]) -> Record:
     for field in schema(record_type):
         if field.is_optional and not has_value(group, field.name):
             values[field.name] = None
+        elif field.default is not None and not has_value(group, field.name):
+            values[field.name] = field.default()
         else:
             values[field.name] = _read_field(group, field)
     return record_type(**values)
 
 
 def _read_field(group: h5py.Group, field: StoredField) -> Any:
-    name, form, member, _ = field
+    name, form, member, *_ = field
     if form == "array":
         return read_array(group, name)
     if form == "record":
@@ -114,13 +121,24 @@ def _read_schema(record_type: Any) -> list[StoredField]:
     """How each field of a dataclass is stored, from its annotation."""
     hints = get_type_hints(record_type)
     return [
-        _field(record_type, field.name, hints[field.name])
+        _field(record_type, field.name, hints[field.name])._replace(
+            default=_default(field)
+        )
         for field in fields(record_type)
     ]
 
 
 # mypy does not take a class for hashable, hence the plain annotation.
 schema: Callable[[Any], list[StoredField]] = cache(_read_schema)
+
+
+def _default(field: Field) -> Callable[[], Any] | None:
+    """What a field holds that was added after files had been written."""
+    if not field.metadata.get("added_later"):
+        return None
+    if field.default_factory is not MISSING:
+        return field.default_factory
+    return lambda: field.default
 
 
 def _field(record_type: type, name: str, hint: Any) -> StoredField:

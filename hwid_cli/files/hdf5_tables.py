@@ -80,15 +80,18 @@ def read_table(group: h5py.Group, record_type: type[Record]) -> list[Record | No
     KeyError, TypeError, ValueError
         If the group does not hold such a table.
     """
+    stored = schema(record_type)
     absent = {
         field.name
-        for field in schema(record_type)
+        for field in stored
         if field.is_optional and not has_value(group, field.name)
     }
+    # Fields that an earlier version did not write are left to their defaults.
     columns = {
         field.name: _read_column(group, field)
-        for field in schema(record_type)
+        for field in stored
         if field.name not in absent
+        if field.default is None or has_value(group, field.name)
     }
     (count,) = {len(column) for column in columns.values()}
     columns |= {name: [None] * count for name in absent}

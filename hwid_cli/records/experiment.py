@@ -89,6 +89,13 @@ class CrossvalOptions:
 
 
 @dataclass(frozen=True)
+class OrderOptions:
+    """When smaller orders count as good as the best of the grid."""
+
+    tolerance: float = 0.05
+
+
+@dataclass(frozen=True)
 class GroupOptions:
     """The greedy search for groups of recordings."""
 
@@ -157,6 +164,7 @@ class Experiment:
     fit: FitOptions = field(default_factory=FitOptions)
     identify: IdentifyOptions | None = None
     crossval: CrossvalOptions | None = None
+    order: OrderOptions | None = None
     group: GroupOptions | None = None
     test: FinalTestOptions | None = None
     simulation: SimulationOptions | None = None

@@ -4,8 +4,11 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from hwid_cli.records.information import Information
 from hwid_cli.records.maps import MAP_KINDS, MapOptions, OwnFunction, StaticMap
 from hwid_cli.records.recordings import frozen_vector
+from hwid_cli.records.stored import ADDED_LATER
+from hwid_cli.records.uncertainty import Uncertainty
 
 INITIAL_STATES = ("zero", "steady", "estimated")
 JOINS = ("concatenate", "experiments")
@@ -205,32 +208,6 @@ class HammersteinWiener:
 
 
 @dataclass(frozen=True, eq=False)
-class Uncertainty:
-    """Standard errors of a model's parameters, or the reason why there are none.
-
-    Parameters
-    ----------
-    names : tuple of str
-        Parameter names, such as ``b[0]``, ``f[1]``, ``input_map.value[3]``.
-    standard_errors : ndarray, shape (n_parameters,)
-        In the units of the parameters; NaN where the data do not determine one.
-    reason : str
-        Why some or all are missing; empty if all exist.
-    """
-
-    names: tuple[str, ...] = ()
-    standard_errors: np.ndarray = field(default_factory=lambda: np.zeros(0))
-    reason: str = ""
-
-    def __post_init__(self) -> None:
-        object.__setattr__(
-            self,
-            "standard_errors",
-            frozen_vector(self.standard_errors, "standard_errors"),
-        )
-
-
-@dataclass(frozen=True, eq=False)
 class Fit:
     """The result of one fit, successful or not.
 
@@ -259,6 +236,8 @@ class Fit:
     is_stable : bool
         Whether every pole lies inside the unit circle.
     uncertainty : Uncertainty
+    information : Information
+        AIC, BIC and FPE; NaN if failed.
     """
 
     identified_on: tuple[str, ...]
@@ -274,6 +253,7 @@ class Fit:
     poles: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=complex))
     is_stable: bool = False
     uncertainty: Uncertainty = field(default_factory=Uncertainty)
+    information: Information = field(default_factory=Information, metadata=ADDED_LATER)
 
     def __post_init__(self) -> None:
         if self.status not in FIT_STATUSES:

@@ -10,6 +10,7 @@ from hwid_cli.records.diagnosis import Diagnosis
 from hwid_cli.records.groups import FinalTest, GroupSearch
 from hwid_cli.records.model import Fit
 from hwid_cli.records.recordings import CalibrationLog, Recording
+from hwid_cli.records.residuals import ResidualTests
 from hwid_cli.records.results import CrossValidation
 
 # Why a recording is shown with a model: it is the best of those fitted to it, the one
@@ -103,6 +104,8 @@ class SimulatedRecording:
     fit_percent : float, [%]
     detail : tuple of int, [samples]
         First sample of the stretch worth a closer look, and the one after its last.
+    tests : ResidualTests or None
+        None where the output is not finite or nobody asked.
     """
 
     recording: Recording
@@ -113,6 +116,7 @@ class SimulatedRecording:
     rmsd: float
     fit_percent: float
     detail: tuple[int, int]
+    tests: ResidualTests | None = None
 
 
 @dataclass(frozen=True, eq=False)

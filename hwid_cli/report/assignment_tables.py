@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 from hwid_cli.records.groups import FinalTest, Prediction
+from hwid_cli.report.simulation_words import simulation_words
 from hwid_cli.report.text_table import (
     GAP,
     MISSING,
@@ -16,12 +17,16 @@ from hwid_cli.report.text_table import (
 _LEAST_ROOM = 24
 
 
-def smallest_set_table(final: FinalTest, *, width: int = WIDTH) -> str:
+def smallest_set_table(
+    final: FinalTest, *, initial_state: str, width: int = WIDTH
+) -> str:
     """Show the smallest set of models and what each serves (as T3.4.3-2).
 
     Parameters
     ----------
     final : FinalTest
+    initial_state : str
+        Rule of the fits.
     width : int, [characters]
         Of the screen.
 
@@ -45,7 +50,8 @@ def smallest_set_table(final: FinalTest, *, width: int = WIDTH) -> str:
     title = (
         f"Fewest models that cover all that any model covers: {len(final.smallest_set)} of "
         f"{len(final.models)} models\nfor {n_covered} of {len(final.recordings)} "
-        "recordings; each served by the lowest RMSD, * covered\n(form of T3.4.3-2)"
+        "recordings; each served by the lowest RMSD, * covered\n(form of T3.4.3-2)\n"
+        f"{simulation_words(initial_state, is_validation=True)}"
     )
     heads = ("", "model", "serves", "recordings")
     return text_table(title, heads, rows, text_columns=(0, 1, 3))
@@ -68,12 +74,14 @@ def _short_labels(final: FinalTest) -> dict[str, str]:
     return labels | {"": MISSING}
 
 
-def prediction_table(final: FinalTest) -> str:
+def prediction_table(final: FinalTest, *, initial_state: str) -> str:
     """Show which model the input alone tells to use, and how that went.
 
     Parameters
     ----------
     final : FinalTest
+    initial_state : str
+        Rule of the fits.
 
     Returns
     -------
@@ -107,7 +115,7 @@ def prediction_table(final: FinalTest) -> str:
     title = (
         "Model for a recording told from its input: that of the recording of nearest input,"
         f"\nRMSD [{final.unit}], * covered; models fitted to the recording itself are "
-        "left out"
+        f"left out\n{simulation_words(initial_state, is_validation=True)}"
     )
     table = text_table(title, heads, rows, text_columns=(0, 1, 2))
     return f"{table}\n{prediction_line(final)}"

@@ -6,6 +6,7 @@ from itertools import pairwise
 import numpy as np
 
 from hwid_cli.records.groups import ChainTrend, FinalTest
+from hwid_cli.report.simulation_words import simulation_words
 from hwid_cli.report.tables import thesis_name
 from hwid_cli.report.text_table import (
     GAP,
@@ -25,7 +26,7 @@ _LONGEST_NAME = 36
 
 
 def chain_on_tests_table(
-    final: FinalTest, trend: ChainTrend, *, width: int = WIDTH
+    final: FinalTest, trend: ChainTrend, *, initial_state: str, width: int = WIDTH
 ) -> str:
     """Show the chain on the recordings that nothing else has used (as T3.3.3.4-1).
 
@@ -33,6 +34,8 @@ def chain_on_tests_table(
     ----------
     final : FinalTest
     trend : ChainTrend
+    initial_state : str
+        Rule of the fits.
     width : int, [characters]
         Of the screen.
 
@@ -44,7 +47,8 @@ def chain_on_tests_table(
     rows = _chain_rows(final, final.tested_on, map(number, trend.tested_rmsd))
     title = (
         f"The chain on the test recordings: RMSD [{final.unit}], * below "
-        f"{final.threshold:g}\n(form of T3.3.3.4-1)"
+        f"{final.threshold:g}\n(form of T3.3.3.4-1)\n"
+        f"{simulation_words(initial_state, is_validation=True)}"
     )
     table = split_table(title, ("model", *final.tested_on, "mean"), rows, width=width)
     legend = [f"{label}: {model}" for model, label in _labels(final).items()]
@@ -84,7 +88,11 @@ def trend_line(trend: ChainTrend) -> str:
 
 
 def chain_coverage_table(
-    final: FinalTest, trend: ChainTrend, *, nf: int | None = None
+    final: FinalTest,
+    trend: ChainTrend,
+    *,
+    initial_state: str,
+    nf: int | None = None,
 ) -> str:
     """Show how many recordings the chain covers, level by level (as T3.4.1-1).
 
@@ -92,6 +100,8 @@ def chain_coverage_table(
     ----------
     final : FinalTest
     trend : ChainTrend
+    initial_state : str
+        Rule of the fits.
     nf : int or None, [-]
         As for ``tables.thesis_name``.
 
@@ -107,7 +117,8 @@ def chain_coverage_table(
     ]
     title = (
         f"Recordings that the chain covers, its own included, of {len(final.recordings)}"
-        "\n(form of T3.4.1-1 and T3.4.2-1)"
+        "\n(form of T3.4.1-1 and T3.4.2-1)\n"
+        f"{simulation_words(initial_state, is_validation=True)}"
     )
     heads = ("model", *trend.kinds, "all", "thesis's name")
     return text_table(title, heads, rows, text_columns=(0, len(heads) - 1))
@@ -123,6 +134,7 @@ def chain_tables(
     trend: ChainTrend,
     kinds: Mapping[str, str],
     *,
+    initial_state: str,
     width: int = WIDTH,
 ) -> str:
     """Show the chain on all recordings, kind by kind (as T3.4.1-2 and T3.4.1-3).
@@ -133,6 +145,8 @@ def chain_tables(
     trend : ChainTrend
     kinds : mapping of str to str
         Kind of each recording by its name.
+    initial_state : str
+        Rule of the fits.
     width : int, [characters]
         Of the screen.
 
@@ -147,7 +161,8 @@ def chain_tables(
         form = f" (form of {_FORMS[kind]})" if kind in _FORMS else ""
         title = (
             f"The chain on all recordings of kind {kind}: RMSD [{final.unit}], * below "
-            f"{final.threshold:g}{form}"
+            f"{final.threshold:g}{form}\n"
+            f"{simulation_words(initial_state, is_validation=True)}"
         )
         tables.append(
             split_table(title, ("model", *names, "covers"), rows, width=width)
@@ -188,12 +203,16 @@ def _marked(value: float, final: FinalTest) -> str:
     return number(value) + ("*" if value < final.threshold else " ")
 
 
-def coverage_matrix_table(final: FinalTest, *, width: int = WIDTH) -> str:
+def coverage_matrix_table(
+    final: FinalTest, *, initial_state: str, width: int = WIDTH
+) -> str:
     """Show which model covers which recording (as T3.4.3-1).
 
     Parameters
     ----------
     final : FinalTest
+    initial_state : str
+        Rule of the fits.
     width : int, [characters]
         Of the screen; more recordings than fit go into further blocks.
 
@@ -210,7 +229,8 @@ def coverage_matrix_table(final: FinalTest, *, width: int = WIDTH) -> str:
     title = (
         f"Coverage of all models on all recordings: 1 RMSD below {final.threshold:g} "
         f"{final.unit}, . not,\nblank its own; a + adds to the model above it (form of "
-        "T3.4.3-1)"
+        "T3.4.3-1)\n"
+        f"{simulation_words(initial_state, is_validation=True)}"
     )
     blocks = [
         _matrix_block(final, slice(first, first + per_block), labels[1:-1], label)

@@ -1,6 +1,7 @@
 """The search for groups as plain text, in the forms of the published tables."""
 
 from hwid_cli.records.groups import Group, GroupSearch
+from hwid_cli.report.simulation_words import joined_words, simulation_words
 from hwid_cli.report.text_table import WIDTH, number, split_table, text_table
 
 # Tables of the thesis for groups of two, three and four.
@@ -49,7 +50,7 @@ def levels_table(search: GroupSearch) -> str:
     title = (
         f"Search for groups: models above {search.threshold:g} {search.unit} on their "
         "own recordings\n(not self), models below it on no recording (not cross), "
-        "and the widest coverage"
+        f"and the widest coverage{_started(search)}"
     )
     return text_table(title, heads, rows, text_columns=())
 
@@ -85,7 +86,7 @@ def join_table(search: GroupSearch, level: int, *, width: int = WIDTH) -> str:
     form = f" (form of {_PUBLISHED[level]})" if level in _PUBLISHED else ""
     title = (
         f"Groups of {level}: recordings covered of {len(search.validated_on)}, base by "
-        f"add-on,\n* goes on{form}"
+        f"add-on,\n* goes on{form}{_started(search)}"
     )
     return split_table(title, ("base", *heads, "widest"), rows, width=width)
 
@@ -132,10 +133,22 @@ def chain_table(search: GroupSearch) -> str:
         for one in search.chain_groups
     ]
     heads = ("model", "covers", "own RMSD", "validation RMSD")
-    table = text_table(
-        f"The chain of groups, RMSD [{search.unit}]", heads, rows, text_columns=(0,)
-    )
+    title = f"The chain of groups, RMSD [{search.unit}]{_started(search)}"
+    for rule in _rules(search):
+        title += f"\n{joined_words(rule, search.join)}"
+    table = text_table(title, heads, rows, text_columns=(0,))
     return f"{table}\nThe search stopped: {search.reason}."
+
+
+def _started(search: GroupSearch) -> str:
+    """A line that says how the models were simulated; none without models."""
+    lines = [simulation_words(rule, is_validation=True) for rule in _rules(search)]
+    return "".join(f"\n{line}" for line in lines)
+
+
+def _rules(search: GroupSearch) -> list[str]:
+    """How the models start; one rule, unless nothing was fitted."""
+    return sorted({one.options.initial_state for one in search.fits if one is not None})
 
 
 def _cell(group: Group | None) -> str:

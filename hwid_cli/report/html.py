@@ -22,6 +22,7 @@ from hwid_cli.report.sections.recordings import (
     orders_section,
     recordings_section,
 )
+from hwid_cli.report.sections.residuals import residuals_section
 from hwid_cli.report.sections.summary import summary_section
 
 TEMPLATE = "report.html"
@@ -62,6 +63,7 @@ def report_page(
         summary_section(contents),
         calibration_section(contents, calibration_figures),
         recordings_section(contents),
+        residuals_section(contents),
         orders_section(contents),
         crossval_section(contents),
         models_section(contents),

@@ -8,7 +8,8 @@ import numpy as np
 from hwid_cli.records.model import Fit
 from hwid_cli.records.recordings import CalibrationLog
 from hwid_cli.records.results import CrossValidation, ModelScore
-from hwid_cli.report.text_table import WIDTH, number, split_table, text_table
+from hwid_cli.report.simulation_words import simulation_words
+from hwid_cli.report.text_table import MISSING, WIDTH, number, split_table, text_table
 
 # Words for the statuses of fits.
 _STATUS_WORDS = {
@@ -150,13 +151,27 @@ def best_models_table(
                     number(fit.rmsd),
                     _percent(fit.fit_percent),
                     number(fit.linear_rmsd),
+                    str(fit.information.n_parameters or MISSING),
+                    _criterion(fit.information.bic),
                 )
             )
-    heads = ("model", "thesis's name", "RMSD", "fit %", "linear RMSD")
+    heads = (
+        "model",
+        "thesis's name",
+        "RMSD",
+        "fit %",
+        "linear RMSD",
+        "par.",
+        "BIC",
+    )
+    started = sorted({fit.options.initial_state for group in best for fit in group})
     title = (
         f"Best models of each recording, RMSD [{unit}] on that recording; beside it the "
-        "best\nlinear output-error model of the same orders (form of T3.2.2-1)"
+        "best\nlinear output-error model of the same orders, the parameters that the "
+        "data\ndetermine, and BIC (form of T3.2.2-1)"
     )
+    for one in started:
+        title += f"\n{simulation_words(one, is_validation=False)}"
     return text_table(title, heads, rows, text_columns=(0, 1))
 
 
@@ -164,6 +179,7 @@ def coverage_table(
     scores: Sequence[ModelScore],
     crossval: CrossValidation,
     *,
+    initial_state: str,
     nf: int | None = None,
     count: int = 15,
 ) -> str:
@@ -174,6 +190,8 @@ def coverage_table(
     scores : sequence of ModelScore
         As ``ranking.score_models`` gives them.
     crossval : CrossValidation
+    initial_state : str
+        Rule of the fits.
     nf : int or None, [-]
         As for ``thesis_name``.
     count : int, [-]
@@ -198,12 +216,17 @@ def coverage_table(
     title = (
         f"Models that cover the most recordings: RMSD below {crossval.threshold:g} "
         f"{crossval.unit}\n(form of T3.2.2.2-2)"
+        f"\n{simulation_words(initial_state, is_validation=True)}"
     )
     return text_table(title, heads, rows, text_columns=(0, 5))
 
 
 def cross_table(
-    best: Sequence[ModelScore], crossval: CrossValidation, *, width: int = WIDTH
+    best: Sequence[ModelScore],
+    crossval: CrossValidation,
+    *,
+    initial_state: str,
+    width: int = WIDTH,
 ) -> str:
     """Show the widest model of each recording on all recordings (as T3.2.2.2-3).
 
@@ -212,6 +235,8 @@ def cross_table(
     best : sequence of ModelScore
         As ``ranking.best_of_each`` gives them.
     crossval : CrossValidation
+    initial_state : str
+        Rule of the fits.
     width : int, [characters]
         Of the screen; more recordings than fit go into further blocks.
 
@@ -231,6 +256,7 @@ def cross_table(
     title = (
         f"Widest model of each recording on all recordings: RMSD [{crossval.unit}], "
         f"* below\n{crossval.threshold:g} (form of T3.2.2.2-3)"
+        f"\n{simulation_words(initial_state, is_validation=True)}"
     )
     heads = ("model", *crossval.validated_on, "covers")
     return split_table(title, heads, rows, width=width)
@@ -266,6 +292,10 @@ def status_line(counts: Mapping[str, int]) -> str:
     """
     parts = [f"{n} {_STATUS_WORDS.get(status, status)}" for status, n in counts.items()]
     return f"Fits: {', '.join(parts) or 'none'}"
+
+
+def _criterion(value: float) -> str:
+    return f"{value:.0f}" if np.isfinite(value) else MISSING
 
 
 def _percent(value: float) -> str:

@@ -6,6 +6,7 @@ import numpy as np
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
+from hwid_cli.records.information import Information
 from hwid_cli.records.maps import OwnFunction
 from hwid_cli.records.model import (
     Fit,
@@ -13,8 +14,8 @@ from hwid_cli.records.model import (
     HammersteinWiener,
     Orders,
     StaticMap,
-    Uncertainty,
 )
+from hwid_cli.records.uncertainty import Uncertainty
 
 # HDF5 text ends at a null character, and lone surrogates are no text at all.
 TEXTS = st.text(st.characters(exclude_characters="\0", exclude_categories=["Cs"]))
@@ -126,7 +127,10 @@ def example_fit(name="step_01", nb=2, nf=2, seed=1):
         linear_rmsd=0.3,
         poles=rng.normal(size=nf) + 1j * rng.normal(size=nf),
         is_stable=True,
-        uncertainty=Uncertainty(("b[0]", "µ"), np.array([0.1, np.nan]), "one is flat"),
+        uncertainty=Uncertainty(
+            ("b[0]", "µ"), np.array([0.1, np.nan]), "one is flat", ("b[0], because µ",)
+        ),
+        information=Information(300, 17, -12.5, -12.25, 0.1, 1e-9),
     )
 
 

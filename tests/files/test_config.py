@@ -114,7 +114,10 @@ def test_source_is_the_path_as_given_and_no_key(load, write_config):
             "orders: {nkk: 3}",
             r"tiny.yaml: orders.nkk: unknown key; did you mean 'nk'\?",
         ),
-        ("order: {nb: 3}", r"tiny.yaml: order: unknown key; did you mean 'orders'\?"),
+        (
+            "order: {nb: 3}",
+            r"tiny.yaml: order.nb: unknown key; did you mean 'orders.nb'\?",
+        ),
         ("zzz: 1", r"zzz: unknown key; expected one of name, recordings, simulate"),
         ("identify: {recordings: 3}", r"identify.recordings.0: found 3; .*in quotes"),
         ("fit: {units: ten}", r"fit.units: found 'ten'; expected an integer"),

@@ -95,6 +95,17 @@ def test_missing_field_is_an_error():
             read_record(file, type(example_fit()))
 
 
+def test_fields_that_earlier_versions_did_not_write_hold_their_defaults():
+    fit = example_fit()
+    with in_memory() as file:
+        write_record(file, fit)
+        del file["information"], file["uncertainty"].attrs["flat"]
+        found = read_record(file, type(fit))
+    assert found.information.n_parameters == 0
+    assert found.uncertainty.flat == ()
+    assert_same(found.model, fit.model)
+
+
 def test_value_of_another_shape_is_an_error():
     @dataclass(frozen=True)
     class One:

@@ -78,6 +78,16 @@ def test_one_row_of_every_data_set_is_one_record():
         assert np.isnan(numerator[0, 1:]).all()
 
 
+def test_columns_that_earlier_versions_did_not_write_hold_their_defaults():
+    with in_memory() as file:
+        write_table(file, [example_fit(), failed_fit()], Fit)
+        del file["information"], file["uncertainty/flat"]
+        del file["uncertainty/flat_length"]
+        first, _ = read_table(file, Fit)
+    assert np.isnan(first.information.bic)
+    assert first.uncertainty.flat == ()
+
+
 def test_form_without_a_place_in_columns_is_an_error():
     with in_memory() as file, pytest.raises(TypeError, match="inners: a tuple of reco"):
         write_table(file, [], WithMore)

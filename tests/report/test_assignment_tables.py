@@ -14,7 +14,7 @@ FINAL = example_final_test()
 
 
 def test_the_smallest_set_serves_every_recording_once():
-    text = smallest_set_table(FINAL)
+    text = smallest_set_table(FINAL, initial_state="estimated")
 
     assert f"{len(FINAL.smallest_set)} of 38 models\nfor 38 of 38 recordings" in text
     listed = text.split("\n", 5)[5]
@@ -37,21 +37,23 @@ def test_the_smallest_set_serves_every_recording_once():
 def test_what_the_set_serves_without_covering_bears_no_mark():
     last = FINAL.rmsd.copy()
     last[:, -1] = 0.5
-    text = smallest_set_table(replace(FINAL, rmsd=last))
+    text = smallest_set_table(replace(FINAL, rmsd=last), initial_state="estimated")
 
     assert "sine_23*" not in text
     assert "sine_22*" in text
 
 
 def test_without_a_set_it_is_said_that_there_is_none():
-    text = smallest_set_table(replace(FINAL, smallest_set=()))
+    text = smallest_set_table(
+        replace(FINAL, smallest_set=()), initial_state="estimated"
+    )
 
     assert text == "No model covers any recording, so no set of models is of use."
 
 
 def test_the_predictions_show_what_was_chosen_and_what_was_best():
-    text = prediction_table(FINAL)
-    rows = {line.split()[0]: line for line in text.splitlines()[4:-2]}
+    text = prediction_table(FINAL, initial_state="estimated")
+    rows = {line.split()[0]: line for line in text.splitlines()[5:-2]}
 
     assert list(rows) == list(FINAL.recordings)
     labels = {model: f"M{n}" for n, model in enumerate(FINAL.smallest_set, 1)}
@@ -77,7 +79,7 @@ def test_no_model_to_choose_from_is_a_dash():
         "step_01", "", np.nan, "", np.nan, "", np.nan, is_right=False, is_possible=False
     )
     final = replace(FINAL, predictions=(nothing, *FINAL.predictions[1:]))
-    row = prediction_table(final).splitlines()[4]
+    row = prediction_table(final, initial_state="estimated").splitlines()[5]
 
     assert row.split() == ["step_01", "-", "-", "-", "-", "-", "-"]
 

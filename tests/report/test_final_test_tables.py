@@ -27,7 +27,7 @@ def widest_line(text):
 
 
 def test_the_chain_on_the_tests_shows_each_rmsd_and_the_mean():
-    text = chain_on_tests_table(FINAL, TREND)
+    text = chain_on_tests_table(FINAL, TREND, initial_state="estimated")
     *_, last, line = text.splitlines()
 
     values = FINAL.rmsd[-1][[FINAL.recordings.index(n) for n in FINAL.tested_on]]
@@ -58,20 +58,20 @@ def test_the_trend_is_told_in_words(values, expected):
 
 
 def test_the_chain_covers_kind_by_kind():
-    text = chain_coverage_table(FINAL, TREND)
+    text = chain_coverage_table(FINAL, TREND, initial_state="estimated")
 
-    assert text.splitlines()[2].split()[:4] == ["model", "step", "sine", "all"]
+    assert text.splitlines()[3].split()[:4] == ["model", "step", "sine", "all"]
     steps, sines = TREND.coverage[-1]
     assert text.splitlines()[-1].split() == [
         WINNER, str(steps), str(sines), str(steps + sines), "NLHW-Step-6-9-1-8-7-7-1",
     ]  # fmt: skip
     assert widest_line(text) <= 80
-    delay = chain_coverage_table(FINAL, TREND, nf=2)
+    delay = chain_coverage_table(FINAL, TREND, nf=2, initial_state="estimated")
     assert delay.endswith("NLHW-Step-6-9-1-8-7-2-7")
 
 
 def test_the_chain_is_shown_on_every_recording_once():
-    text = chain_tables(FINAL, TREND, KINDS)
+    text = chain_tables(FINAL, TREND, KINDS, initial_state="estimated")
 
     for name in FINAL.recordings:
         assert text.count(f" {name}") == 1
@@ -97,10 +97,10 @@ def matrix_rows(text):
 
 @pytest.mark.parametrize("width", [80, 40])
 def test_the_matrix_holds_every_pair_and_fits_the_screen(width):
-    text = coverage_matrix_table(FINAL, width=width)
+    text = coverage_matrix_table(FINAL, width=width, initial_state="estimated")
     rows = matrix_rows(text)
 
-    assert widest_line(text.split("\n", 2)[2]) <= width
+    assert widest_line(text.split("\n", 3)[3]) <= width
     labels = list(rows)
     assert labels[0] == FINAL.models[0]
     # The chain's first model has its own name; those above it are what they add.
@@ -118,7 +118,7 @@ def test_the_matrix_holds_every_pair_and_fits_the_screen(width):
 
 
 def test_recordings_names_run_downwards_over_their_column():
-    lines = coverage_matrix_table(FINAL).splitlines()[2:]
+    lines = coverage_matrix_table(FINAL, initial_state="estimated").splitlines()[3:]
     heads = [line.ljust(80) for line in lines[:7]]
     row = next(line for line in lines if line.startswith("sine_23"))
     # The only blank cell of this row that is no gap is its own, the last one.
@@ -134,7 +134,9 @@ def test_recordings_names_run_downwards_over_their_column():
 
 def test_counts_above_nine_run_downwards_too():
     counts = np.full(38, 12)
-    text = coverage_matrix_table(replace(FINAL, covered_by=counts))
+    text = coverage_matrix_table(
+        replace(FINAL, covered_by=counts), initial_state="estimated"
+    )
     tens, units = text.splitlines()[-2:]
 
     assert tens.split(maxsplit=2)[2].replace(" ", "") == "1" * 38
@@ -144,7 +146,7 @@ def test_counts_above_nine_run_downwards_too():
 def test_long_names_are_never_cut():
     names = tuple(f"idf_neg_0.045_{n}" for n in range(38))
     final = replace(FINAL, recordings=names)
-    lines = coverage_matrix_table(final).splitlines()[2:]
+    lines = coverage_matrix_table(final, initial_state="estimated").splitlines()[3:]
     height = max(map(len, names))
     columns = {"".join(letters).strip() for letters in zip(
         *(line.ljust(80) for line in lines[:height]), strict=True
@@ -158,7 +160,7 @@ def test_a_model_of_another_family_keeps_its_whole_name():
     names = (*FINAL.models[:-1], "step_09+step_06+step_01+step_08/7/7")
     final = replace(FINAL, models=names, chain=names[-4:])
 
-    assert names[-1] in coverage_matrix_table(final)
+    assert names[-1] in coverage_matrix_table(final, initial_state="estimated")
 
 
 def test_gaps_are_named_and_counted():
@@ -181,10 +183,10 @@ def test_long_names_of_groups_stand_beneath_the_table_once():
         chain=tuple(longer.values()),
     )
     trend = chain_trend(final, KINDS)
-    lines = chain_on_tests_table(final, trend).splitlines()
+    lines = chain_on_tests_table(final, trend, initial_state="estimated").splitlines()
 
     assert f"C1: {final.chain[0]}" in lines
     assert sum(final.chain[-1] in line for line in lines) == 1
     # All test recordings stand in one block.
     assert sum(line.startswith("model") for line in lines) == 1
-    assert "\nC1 " in chain_tables(final, trend, KINDS)
+    assert "\nC1 " in chain_tables(final, trend, KINDS, initial_state="estimated")

@@ -18,6 +18,7 @@ SECTIONS = [
     "summary",
     "calibration",
     "recordings",
+    "residuals",
     "orders",
     "crossval",
     "models",

@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from hwid_cli.records.information import Information
 from hwid_cli.records.model import (
     Fit,
     FitOptions,
@@ -52,11 +53,14 @@ def test_the_best_models_carry_both_names_and_the_linear_rmsd():
         rmsd=1.06e-4,
         fit_percent=99.125,
         linear_rmsd=float("nan"),
+        information=Information(7500, 41, bic=-12345.6),
     )
     text = best_models_table([(fit,)], "m")
 
     last = text.splitlines()[-1].split()
-    assert last == ["step_06/3/7", "NLHW-Step-6-3-7-1", "1.06e-04", "99.12", "-"]
+    assert last == [
+        "step_06/3/7", "NLHW-Step-6-3-7-1", "1.06e-04", "99.12", "-", "41", "-12346",
+    ]  # fmt: skip
     assert_fits_the_screen(text)
 
 
@@ -68,9 +72,9 @@ def test_in_the_delay_reading_the_place_in_the_grid_is_the_delay():
 
 
 def test_the_coverage_table_shows_the_first_models_only():
-    text = coverage_table(SCORES, CROSSVAL, count=4)
+    text = coverage_table(SCORES, CROSSVAL, count=4, initial_state="estimated")
 
-    rows = text.splitlines()[4:]
+    rows = text.splitlines()[5:]
     assert len(rows) == 4
     assert rows[3].split() == [
         "step_04", "10", "10", "7", "of", "15", "1.23e-04", "NLHW-Step-4-10-10-1",
@@ -79,7 +83,7 @@ def test_the_coverage_table_shows_the_first_models_only():
 
 
 def test_the_cross_table_holds_every_value_once_and_marks_what_is_covered():
-    text = cross_table(SCORES, CROSSVAL)
+    text = cross_table(SCORES, CROSSVAL, initial_state="estimated")
 
     for row in CROSSVAL.rmsd[:, 1, 1]:
         for value in row:
@@ -95,7 +99,11 @@ def test_a_missing_rmsd_is_a_dash():
     crossval = CrossValidation(
         **{**CROSSVAL.__dict__, "rmsd": np.full((15, 2, 2, 15), np.nan)}
     )
-    row = cross_table(SCORES[:1], crossval).splitlines()[-1].split()
+    row = (
+        cross_table(SCORES[:1], crossval, initial_state="estimated")
+        .splitlines()[-1]
+        .split()
+    )
 
     assert set(row[1:-1]) == {"-"}
 
@@ -114,7 +122,7 @@ def test_long_names_take_more_blocks_and_are_never_cut():
         threshold=0.1,
     )
     scores = [ModelScore(name, 1, 1, 1.0, 0) for name in names]
-    text = cross_table(scores, crossval)
+    text = cross_table(scores, crossval, initial_state="estimated")
 
     assert all(f" {name}" in text for name in names)
     assert_fits_the_screen(text)

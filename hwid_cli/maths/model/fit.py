@@ -29,7 +29,7 @@ from hwid_cli.maths.model.search import (
 )
 from hwid_cli.maths.model.starts import Start, linear_starts
 from hwid_cli.maths.model.static_map import has_free_shape
-from hwid_cli.maths.model.uncertainty import standard_errors
+from hwid_cli.maths.model.uncertainty import judged_parameters
 from hwid_cli.maths.model.warm_start import warm_search
 from hwid_cli.records.model import Fit, FitOptions, HammersteinWiener, Orders
 from hwid_cli.records.recordings import Recording
@@ -272,6 +272,9 @@ def _described(
     simulated = np.concatenate(sensitivities.simulated_outputs(candidate, experiments))
     measured = np.concatenate([one.output for one in experiments])
     first = candidate.free_responses[0]
+    uncertainty, information = judged_parameters(
+        candidate, experiments, free_break_points=blank.options.free_break_points
+    )
     return replace(
         blank,
         model=replace(candidate.model, free_response=first),
@@ -282,11 +285,8 @@ def _described(
         fit_percent=scores.fit_percent(measured, simulated),
         poles=poles(candidate.model.denominator),
         is_stable=True,
-        uncertainty=standard_errors(
-            candidate,
-            experiments,
-            free_break_points=blank.options.free_break_points,
-        ),
+        uncertainty=uncertainty,
+        information=information,
     )
 
 

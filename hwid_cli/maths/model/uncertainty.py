@@ -1,40 +1,46 @@
-"""Standard errors of a fitted model's parameters.
+"""Standard errors and covariance of a fitted model's parameters.
 
-From the inverse of ``J'J`` at the optimum, for white residuals. J'J is singular in the
-directions of the shared gains (see `normalise`): they are held by one equation each, the
-same that `normalise` fulfils. Positions that a kind takes as known are held too, such as
-the outermost break-points of a map that goes on straight beyond them: they may slide
-along that line. Whatever is singular beyond that, the data do not determine: those
-parameters get NaN and the reason names them.
+From the inverse of ``J'J`` at the optimum, for white residuals, in the directions that
+keep what `normalise` holds (see `identifiability`). Parameters with a part in a flat
+direction get NaN; the directions are named, and so are those that the data hardly tell.
+
+The covariance is not stored: 50 x 50 numbers for each fit are many times the fit itself,
+hardly anybody reads them, and model and recordings give them back in milliseconds.
 
 References
 ----------
-Ljung, System Identification (1999), section 9.2. docs/method.md, eq. (16).
+Ljung, System Identification (1999), section 9.2. docs/method.md, eqs. (16), (28).
 """
 
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.linalg import eigh
 
-from hwid_cli.maths.model import sensitivities, static_map
-from hwid_cli.maths.model.candidates import Candidate, Columns, Experiment, columns
-from hwid_cli.maths.model.linear_block import difference_basis
-from hwid_cli.maths.model.normalise import uses_static_gain
+from hwid_cli.maths.model import sensitivities
+from hwid_cli.maths.model.candidates import Candidate, Experiment
+from hwid_cli.maths.model.flat_directions import flat_sentences
+from hwid_cli.maths.model.identifiability import (
+    Directions,
+    directions,
+    listed,
+    n_free,
+    parameter_names,
+)
+from hwid_cli.maths.model.information import information
+from hwid_cli.maths.model.simulate import estimated_state
 from hwid_cli.maths.model.static_map import RULES
-from hwid_cli.records.model import StaticMap, Uncertainty
+from hwid_cli.records.information import Information
+from hwid_cli.records.model import Fit
+from hwid_cli.records.recordings import Recording
+from hwid_cli.records.uncertainty import ParameterCovariance, Uncertainty
 
-# Eigenvalues of the scaled equations below this share of the largest are zero within
-# rounding; a parameter with this much of such a direction in it is not determined.
-_SINGULAR = 1e-11
-_LEAST_PART = 1e-6
 _MOST_NAMES = 4
 
 
-def standard_errors(
+def judged_parameters(
     candidate: Candidate, experiments: Sequence[Experiment], *, free_break_points: bool
-) -> Uncertainty:
-    """Standard errors of the parameters of a normalised model at its optimum.
+) -> tuple[Uncertainty, Information]:
+    """What the data say about the parameters of a normalised model at its optimum.
 
     Parameters
     ----------
@@ -49,131 +55,119 @@ def standard_errors(
     Uncertainty
         Of the maps' active parameters, B and F; initial states count as parameters but
         are not listed.
+    Information
     """
+    n_samples = sum(one.output.size for one in experiments)
     kind = candidate.model.output_map.kind
     if not RULES[kind].has_slope:
-        return Uncertainty(reason=f"a {kind} output map has no slope to tell by")
-    system = sensitivities.equations(
-        candidate, experiments, with_positions=free_break_points
+        count = n_free(candidate, free_break_points=free_break_points)
+        squared_error = sensitivities.cost(candidate, experiments)
+        return (
+            Uncertainty(reason=f"a {kind} output map has no slope to tell by"),
+            information(squared_error, n_samples, count),
+        )
+    found = directions(candidate, experiments, free_break_points=free_break_points)
+    if found is None or found.n_effective >= n_samples:
+        return Uncertainty(reason="the data are too few to tell"), Information()
+    squared_error = sensitivities.cost(candidate, experiments)
+    variance = squared_error / (n_samples - found.n_effective)
+    covariance = _covariance(found, variance)
+    order = listed(found.place)
+    every = parameter_names(candidate, found.place)
+    names = tuple(every[place] for place in order)
+    errors = np.sqrt(np.diag(covariance)[order])
+    return (
+        Uncertainty(
+            names,
+            errors,
+            _reason(names, errors),
+            flat_sentences(candidate, experiments, found, variance),
+        ),
+        information(squared_error, n_samples, found.n_effective),
     )
-    place = columns(candidate, with_positions=free_break_points)
-    matrix = _by_coefficients(system.matrix, place)
-    held = _gain_equations(candidate, place)
-    freedom = sum(one.output.size for one in experiments) - place.total + len(held)
-    if freedom <= 0 or not np.isfinite(matrix).all():
-        return Uncertainty(reason="the data are too few to tell")
-    variance = sensitivities.cost(candidate, experiments) / freedom
-    errors = np.sqrt(variance * _diagonal_of_inverse(matrix, held))
-    names, order = _listed(candidate, place)
-    return Uncertainty(names, errors[order], _reason(names, errors[order]))
 
 
-def _by_coefficients(matrix: np.ndarray, place: Columns) -> np.ndarray:
-    """Turn the equations for differences into those for B's and F's coefficients."""
-    change = np.eye(place.total)
-    for part in (place.numerator, place.denominator):
-        change[part, part] = difference_basis(part.stop - part.start)
-    return change.T @ matrix @ change
+def parameter_covariance(
+    fit: Fit, recordings: Sequence[Recording]
+) -> ParameterCovariance:
+    """Covariance of the parameters that a fit lists.
 
+    Parameters
+    ----------
+    fit : Fit
+        Of these recordings.
+    recordings : sequence of Recording
+        In the order of ``fit.identified_on``. A fit keeps the initial state of its first
+        recording only; with ``join: experiments`` those of the others are estimated.
 
-def _gain_equations(candidate: Candidate, place: Columns) -> list[np.ndarray]:
-    """Gradients of what `normalise` holds fixed."""
-    model = candidate.model
-    held = []
-    input_rule, output_rule = RULES[model.input_map.kind], RULES[model.output_map.kind]
-    if input_rule.size is not None:
-        _, gradient = input_rule.size(model.input_map)
-        held.append(_row(place, place.input_map, gradient))
-    if output_rule.compress is not None:
-        row = np.zeros(place.total)
-        if uses_static_gain(model):
-            row[place.numerator], row[place.denominator] = 1.0, -1.0
-        else:
-            row[place.numerator] = model.numerator
-        held.append(row)
-    if _offset_is_shared(candidate, place):
-        gradient = _value_gradient(model.input_map)
-        held.append(_row(place, place.input_map, gradient))
-    if place.with_positions:
-        held += _held_positions(model.input_map, place, place.input_map)
-        held += _held_positions(model.output_map, place, place.output_map)
-    return held
+    Returns
+    -------
+    ParameterCovariance
 
+    Raises
+    ------
+    ValueError
+        If the fit failed, the recordings are others, or they cannot tell.
 
-def _held_positions(one: StaticMap, place: Columns, part: slice) -> list[np.ndarray]:
-    """Hold the positions that a kind takes as known."""
-    indices = RULES[one.kind].held(one)
-    rows = np.zeros((len(indices), place.total))
-    rows[np.arange(len(indices)), part.start + np.array(indices, dtype=int)] = 1.0
-    return list(rows)
-
-
-def _offset_is_shared(candidate: Candidate, place: Columns) -> bool:
-    """Tell whether a constant can move from one map to the other unnoticed.
-
-    A block that starts empty answers a constant with a transient, so there it cannot;
-    nor can break-points that are fixed take up the shift.
+    References
+    ----------
+    docs/method.md, eq. (16).
     """
-    model = candidate.model
-    both_free = all(
-        RULES[one.kind].size is not None for one in (model.input_map, model.output_map)
+    names = tuple(one.name for one in recordings)
+    if names != fit.identified_on:
+        raise ValueError(f"the fit is of {fit.identified_on}, not of {names}")
+    candidate, experiments = _as_fitted(fit, recordings)
+    kind = candidate.model.output_map.kind
+    if not RULES[kind].has_slope:
+        raise ValueError(f"a {kind} output map has no slope to tell by")
+    found = directions(
+        candidate, experiments, free_break_points=fit.options.free_break_points
     )
-    rule = RULES[model.output_map.kind]
-    has_positions = rule.n_positions(model.output_map) > 0
-    can_shift = rule.shifts or (place.with_positions and has_positions)
-    return both_free and can_shift and model.initial_state != "zero"
+    freedom = sum(one.output.size for one in experiments)
+    if found is None or found.n_effective >= freedom:
+        raise ValueError(f"the recordings of {fit.name} are too few to tell")
+    variance = sensitivities.cost(candidate, experiments) / (
+        freedom - found.n_effective
+    )
+    order = listed(found.place)
+    every = parameter_names(candidate, found.place)
+    return ParameterCovariance(
+        tuple(every[place] for place in order),
+        _covariance(found, variance)[np.ix_(order, order)],
+    )
 
 
-def _value_gradient(one: StaticMap) -> np.ndarray:
-    """Derivative of a map's value at zero, or at its domain's nearest end."""
-    at = np.clip(np.zeros(1), *one.domain)
-    row = np.zeros((1, one.parameters.size))
-    static_map.differentiate(one, at, row, 0, with_positions=True)
-    return row[0]
+def _as_fitted(
+    fit: Fit, recordings: Sequence[Recording]
+) -> tuple[Candidate, tuple[Experiment, ...]]:
+    """A fit's model with the initial states of its experiments."""
+    model = fit.model
+    if model is None:
+        raise ValueError(f"the fit of {fit.name} failed: there is no model")
+    if fit.options.join == "experiments":
+        experiments = tuple(Experiment(one.input, one.output) for one in recordings)
+        others = recordings[1:]
+    else:
+        inputs, outputs = (
+            [getattr(one, side) for one in recordings] for side in ("input", "output")
+        )
+        experiments = (Experiment(np.concatenate(inputs), np.concatenate(outputs)),)
+        others = ()
+    states = [model.free_response]
+    if model.initial_state == "estimated":
+        states += [estimated_state(model, one) for one in others]
+    else:
+        states = [np.zeros(0) for _ in experiments]
+    return Candidate(model, np.array(states)), experiments
 
 
-def _row(place: Columns, part: slice, gradient: np.ndarray) -> np.ndarray:
-    row = np.zeros(place.total)
-    row[part] = gradient[gradient.size - (part.stop - part.start) :]
-    return row
-
-
-def _diagonal_of_inverse(matrix: np.ndarray, held: list[np.ndarray]) -> np.ndarray:
-    """Diagonal of the constrained inverse; NaN where it does not exist."""
-    diagonal = np.diag(matrix)
-    scale = np.sqrt(np.maximum(diagonal, 1e-300))
-    free = np.eye(scale.size)
-    if held:
-        # A basis of all steps that keep what is held.
-        gradients = np.array(held) / scale
-        _, _, directions = np.linalg.svd(gradients)
-        free = directions[len(held) :].T
-    reduced = free.T @ (matrix / scale / scale[:, None]) @ free
-    strength, directions = eigh(reduced)
-    weak = strength <= _SINGULAR * strength[-1]
-    parts = free @ directions
-    result = (parts[:, ~weak] ** 2) @ (1.0 / strength[~weak]) / scale**2
-    result[(parts[:, weak] ** 2).sum(axis=1) > _LEAST_PART] = np.nan
-    return result
-
-
-def _listed(candidate: Candidate, place: Columns) -> tuple[tuple[str, ...], np.ndarray]:
-    """Names of the listed parameters and where they stand."""
-    model = candidate.model
-    names: list[str] = []
-    order: list[int] = []
-    for label, one, part in (
-        ("input_map", model.input_map, place.input_map),
-        ("output_map", model.output_map, place.output_map),
-    ):
-        count = part.stop - part.start
-        labels = static_map.parameter_names(one)
-        names += [f"{label}.{name}" for name in labels[len(labels) - count :]]
-        order += range(part.start, part.stop)
-    names += [f"b[{i}]" for i in range(model.numerator.size)]
-    names += [f"f[{i}]" for i in range(1, model.denominator.size)]
-    order += range(place.numerator.start, place.denominator.stop)
-    return tuple(names), np.array(order, dtype=int)
+def _covariance(found: Directions, variance: float) -> np.ndarray:
+    """Covariance of all parameters; NaN for those that a flat direction moves."""
+    covariance = found.covariance(variance)
+    is_lost = found.is_moved_by_flat
+    covariance[is_lost, :] = np.nan
+    covariance[:, is_lost] = np.nan
+    return covariance
 
 
 def _reason(names: tuple[str, ...], errors: np.ndarray) -> str:

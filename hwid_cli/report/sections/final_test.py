@@ -7,7 +7,7 @@ from hwid_cli.records.report import ChainOnTests, ReportContents, RmsdMatrix
 from hwid_cli.report.figures.final_test import trend_figure
 from hwid_cli.report.figures.matrices import rmsd_matrix_figure
 from hwid_cli.report.page import Block, Cell, Figures, Folded, Section, Table, Text
-from hwid_cli.report.sections.words import drawn, listed, with_unit
+from hwid_cli.report.sections.words import drawn, listed, simulation_note, with_unit
 from hwid_cli.report.text_table import number
 
 _NOT_RUN = Text("Not run yet: run 'hwid test CONFIG'.", is_note=True)
@@ -33,6 +33,7 @@ def final_test_section(contents: ReportContents) -> Section:
     elif not trend.models:
         blocks.append(Text("There is no chain of groups to test.", is_note=True))
     else:
+        blocks += simulation_note(contents, is_validation=True)
         if trend.recordings:
             alt = "RMSD on the test recordings along the chain of groups"
             figure = drawn("test/trend", trend_figure(trend), alt)
@@ -79,6 +80,7 @@ def coverage_section(contents: ReportContents) -> Section:
     if final is None or matrix is None:
         blocks.append(_NOT_RUN)
     else:
+        blocks += simulation_note(contents, is_validation=True)
         alt = "Heat map of the RMSD of all models on all recordings"
         figure = drawn("coverage/matrix", rmsd_matrix_figure(matrix), alt)
         blocks.append(Figures((figure,), _matrix_sentence(matrix)))
@@ -128,6 +130,8 @@ def assignment_section(contents: ReportContents) -> Section:
         blocks.append(_NOT_RUN)
     else:
         blocks.append(Text(_smallest_set(final)))
+        if final.smallest_set:
+            blocks += simulation_note(contents, is_validation=True)
         blocks.append(_maybe_folded("The assignment", _assignment_table(final)))
         counts = contents.predictions
         if counts is not None and counts.total:

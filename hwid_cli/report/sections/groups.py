@@ -5,7 +5,13 @@ from hwid_cli.records.report import ReportContents
 from hwid_cli.report.figures.groups import coverage_histogram_figure, tree_figure
 from hwid_cli.report.group_tables import add_ons_of
 from hwid_cli.report.page import Block, Cell, Figures, Folded, Section, Table, Text
-from hwid_cli.report.sections.words import NOTHING_COVERED, counted, drawn, with_unit
+from hwid_cli.report.sections.words import (
+    NOTHING_COVERED,
+    counted,
+    drawn,
+    simulation_note,
+    with_unit,
+)
 
 _JOINS = {
     "concatenate": "one after the other, so that their order matters",
@@ -31,6 +37,7 @@ def groups_section(contents: ReportContents) -> Section:
     else:
         joined = _JOINS.get(search.join, search.join)
         blocks.append(Text(f"Recordings are joined {joined}. {_stop(search)}"))
+        blocks += simulation_note(contents, is_validation=True)
         blocks += [_tree(search), _histogram(search), _levels_table(search)]
         tables = [_join_table(search, level) for level in search.levels if level > 1]
         for level, table in zip(search.levels[1:], tables, strict=True):

@@ -8,6 +8,7 @@ from hwid_cli.report.sections.words import (
     counted,
     drawn,
     file_names,
+    simulation_note,
     with_unit,
 )
 
@@ -33,6 +34,8 @@ def models_section(contents: ReportContents) -> Section:
         blocks.append(Text("The chain of groups, from one recording to the winner."))
     else:
         blocks.append(Text("The models that cover the most recordings."))
+    if contents.models:
+        blocks += simulation_note(contents, is_validation=True)
     files = file_names([view.model for view in contents.models], _FIGURES)
     for view in contents.models:
         file = f"models/{files[view.model]}"

@@ -31,6 +31,7 @@ from hwid_cli.report.sections.words import (
     image,
     listed,
     percent,
+    simulation_note,
     with_unit,
 )
 from hwid_cli.report.tables import calibration_cells
@@ -125,6 +126,8 @@ def recordings_section(contents: ReportContents) -> Section:
     names = [one.recording.name for one in contents.simulated]
     files = file_names(names, ("", _DETAIL))
     shown = [_simulation(one, files[one.recording.name]) for one in contents.simulated]
+    if shown:
+        blocks += simulation_note(contents, is_validation=True)
     blocks += shown[:_MOST_OPEN]
     if shown[_MOST_OPEN:]:
         what = f"{counted(len(shown) - _MOST_OPEN, 'more recording')}"
@@ -185,6 +188,7 @@ def orders_section(contents: ReportContents) -> Section:
     elif not np.isfinite(grid.rmsd).any():
         blocks.append(Text("Every fit failed: there is no RMSD to show.", is_note=True))
     else:
+        blocks += simulation_note(contents, is_validation=False)
         alt = "Heat maps of RMSD over the orders nb and nk, one for each recording"
         figure = drawn("orders/rmsd", order_grid_figure(grid), alt)
         blocks.append(Figures((figure,), _grid_sentence(grid)))
@@ -230,6 +234,7 @@ def crossval_section(contents: ReportContents) -> Section:
     elif matrix is None:
         blocks.append(Text("Not run yet: run 'hwid crossval CONFIG'.", is_note=True))
     else:
+        blocks += simulation_note(contents, is_validation=True)
         alt = "Heat map of the RMSD of each recording's widest model on all recordings"
         figure = drawn("crossval/matrix", rmsd_matrix_figure(matrix), alt)
         sentence = (

@@ -2,7 +2,13 @@
 
 from hwid_cli.records.report import ChainOnTests, ReportContents
 from hwid_cli.report.page import Block, Cell, Code, Folded, Section, Table, Text
-from hwid_cli.report.sections.words import NOTHING_COVERED, counted, listed, with_unit
+from hwid_cli.report.sections.words import (
+    NOTHING_COVERED,
+    counted,
+    listed,
+    simulation_note,
+    with_unit,
+)
 from hwid_cli.report.tables import status_line
 from hwid_cli.report.text_table import MISSING
 
@@ -27,6 +33,7 @@ def summary_section(contents: ReportContents) -> Section:
     recordings = _recordings_table(contents)
     many = len(stored.recordings) > _MOST_OPEN
     blocks: list[Block] = [Text(line) for line in _headline(contents)]
+    blocks += simulation_note(contents, is_validation=True)
     blocks.append(_stages_table(contents))
     blocks += [Text(line, is_note=True) for line in _remarks(contents)]
     if many:

@@ -7,8 +7,10 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
+from hwid_cli.records.report import ReportContents
 from hwid_cli.report.figures.style import DOTS, as_png
-from hwid_cli.report.page import Image
+from hwid_cli.report.page import Image, Text
+from hwid_cli.report.simulation_words import simulation_words
 from hwid_cli.report.text_table import MISSING
 
 NOTHING_COVERED = "no group covers any recording."
@@ -169,3 +171,27 @@ def file_names(names: Iterable[str], endings: Sequence[str] = ("",)) -> dict[str
         taken |= files
         found[name] = file
     return found
+
+
+def simulation_note(contents: ReportContents, *, is_validation: bool) -> list[Text]:
+    """Say how the models of a section were simulated.
+
+    Parameters
+    ----------
+    contents : ReportContents
+    is_validation : bool
+        As for ``simulation_words``.
+
+    Returns
+    -------
+    list of Text
+        One note; none where there are no models.
+    """
+    fits = list(contents.stored.fits)
+    if contents.stored.search is not None:
+        fits += [one for one in contents.stored.search.fits if one is not None]
+    rules = dict.fromkeys(one.options.initial_state for one in fits)
+    return [
+        Text(simulation_words(rule, is_validation=is_validation), is_note=True)
+        for rule in rules
+    ]

@@ -1,0 +1,80 @@
+"""What the best models leave of their own recordings."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from hwid_cli.campaign.order_grid import grid_place
+from hwid_cli.campaign.ranking import best_fits
+from hwid_cli.maths.model.leverage import pull
+from hwid_cli.maths.model.residual_tests import n_tested_lags, residual_tests
+from hwid_cli.maths.model.simulate import validation_output
+from hwid_cli.records.model import Fit
+from hwid_cli.records.recordings import Recording
+from hwid_cli.records.residuals import ModelResiduals, ResidualTests
+
+
+def own_residuals(
+    fits: Sequence[Fit], recordings: Sequence[Recording], nk_role: str
+) -> tuple[ModelResiduals, ...]:
+    """Test the residuals of the best model of each recording on that recording.
+
+    Parameters
+    ----------
+    fits : sequence of Fit
+        Of single recordings.
+    recordings : sequence of Recording
+        All that fits are named after.
+    nk_role : str
+        What the second axis of the order grid counts.
+
+    Returns
+    -------
+    tuple of ModelResiduals
+        One for each recording that has a model.
+    """
+    by_name = {recording.name: recording for recording in recordings}
+    found = []
+    for best in best_fits(fits, 1):
+        for fit in best:
+            recording = by_name[fit.name]
+            residual = recording.output
+            if fit.model is not None:
+                residual = residual - validation_output(fit.model, recording)
+            tests = judge_residual(residual, recording, fit)
+            if tests is not None:
+                nb, nk = grid_place(fit, nk_role)
+                name = f"{fit.name}/{nb}/{nk}"
+                found.append(ModelResiduals(name, tests, fit.uncertainty.flat))
+    return tuple(found)
+
+
+def judge_residual(
+    residual: np.ndarray, recording: Recording, fit: Fit
+) -> ResidualTests | None:
+    """Test the residual of a model on one recording.
+
+    Parameters
+    ----------
+    residual : ndarray, shape (n_samples,), [output unit]
+    recording : Recording
+    fit : Fit
+        That gave the model; of this recording or of others.
+
+    Returns
+    -------
+    ResidualTests or None
+        None where the model's output is not finite.
+    """
+    if fit.model is None or not np.isfinite(residual).all():
+        return None
+    pulled = None
+    # Only a fit to this very recording has taken a part of its noise.
+    if fit.identified_on == (recording.name,):
+        pulled = pull(
+            fit.model,
+            recording,
+            n_tested_lags(recording.n_samples),
+            free_break_points=fit.options.free_break_points,
+        )
+    return residual_tests(residual, recording.input, pull=pulled)

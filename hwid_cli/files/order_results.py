@@ -1,0 +1,72 @@
+"""``order.csv``: recommended orders, over all recordings and for each."""
+
+from pathlib import Path
+
+from hwid_cli.files.result_tables import write_table_csv
+from hwid_cli.records.order import OrderAdvice, OrderChoice
+
+ORDER_COLUMNS = (
+    "recording",
+    "nb",
+    "nk",
+    "rmsd",
+    "factor",
+    "standard_error",
+    "judges",
+    "best_nb",
+    "best_nk",
+    "best_rmsd",
+    "aic_nb",
+    "aic_nk",
+    "bic_nb",
+    "bic_nk",
+    "delay",
+    "poles",
+)
+# The first row, which is of no single recording.
+ALL = "all recordings"
+
+
+def write_order_csv(path: Path, advice: OrderAdvice) -> None:
+    """Write ``order.csv``: a row for all recordings, then one for each.
+
+    Parameters
+    ----------
+    path : Path
+    advice : OrderAdvice
+
+    Raises
+    ------
+    CacheError
+        If it cannot be written.
+    """
+    seen = {
+        one.recording: (_known(one.delay, -1), _known(one.n_poles, 0))
+        for one in advice.responses
+    }
+    total = (_known(advice.delay, -1), _known(advice.n_poles, 0))
+    rows = [(ALL, *_cells(advice.overall), *total)]
+    rows += [
+        (one.recording, *_cells(one), *seen.get(one.recording, (None, None)))
+        for one in advice.choices
+    ]
+    write_table_csv(path, ORDER_COLUMNS, rows)
+
+
+def _cells(one: OrderChoice) -> tuple[object, ...]:
+    return (
+        one.nb,
+        one.nk,
+        one.rmsd,
+        one.factor,
+        one.standard_error,
+        one.n_judges,
+        one.best_nb,
+        one.best_nk,
+        one.best_rmsd,
+        *(_known(n, 0) for n in (one.aic_nb, one.aic_nk, one.bic_nb, one.bic_nk)),
+    )
+
+
+def _known(value: int, missing: int) -> int | None:
+    return None if value == missing else value

@@ -1,0 +1,108 @@
+"""Which orders to take, and what speaks for them."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True, eq=False)
+class ResponseEstimate:
+    """What a linear model of high order says about a recording, whatever the grid.
+
+    Parameters
+    ----------
+    recording : str
+    delay : int, [samples]
+        Largest delay that the recording does not contradict; -1 where the output does not
+        answer the input at all.
+    hankel : ndarray, shape (n,), [-]
+        Singular values of the impulse response's Hankel matrix, the first one 1; empty
+        where the response does not decay.
+    n_poles : int, [-]
+        Singular values before their deepest fall; 0 where the response does not decay.
+    """
+
+    recording: str
+    delay: int
+    hankel: np.ndarray
+    n_poles: int
+
+
+@dataclass(frozen=True)
+class OrderChoice:
+    """The smallest orders of a grid that are as good as its best, and other opinions.
+
+    Parameters
+    ----------
+    recording : str
+        Whose models; empty for those of all recordings together.
+    nb, nk : int, [-]
+        The recommended place in the grid.
+    best_nb, best_nk : int, [-]
+        The place of the lowest cross-validated RMSD.
+    rmsd, best_rmsd : float, [output unit]
+        Cross-validated: geometric mean over the judging recordings.
+    factor : float, [-]
+        By how much the recommended orders are worse than the best ones, on average.
+    standard_error : float, [-]
+        Of that factor, from its spread over the judging recordings; NaN with one judge.
+    n_judges : int, [-]
+        Recordings that judge and were not fitted; 0 where only the own one is there.
+    aic_nb, aic_nk, bic_nb, bic_nk : int, [-]
+        What AIC and BIC of the fits choose; 0 where no fit has them.
+    """
+
+    recording: str
+    nb: int
+    nk: int
+    best_nb: int
+    best_nk: int
+    rmsd: float
+    best_rmsd: float
+    factor: float
+    standard_error: float
+    n_judges: int
+    aic_nb: int
+    aic_nk: int
+    bic_nb: int
+    bic_nk: int
+
+
+@dataclass(frozen=True, eq=False)
+class OrderAdvice:
+    """Recommended orders, over all recordings and for each.
+
+    Parameters
+    ----------
+    overall : OrderChoice
+    choices : tuple of OrderChoice
+        One for each recording that has models.
+    responses : tuple of ResponseEstimate
+        One for each recording that was identified.
+    delay : int, [samples]
+        A quarter of the recordings contradict any longer one; -1 where none shows a delay.
+    n_poles : int, [-]
+        Median over the recordings; 0 where none shows it.
+    tolerance : float, [-]
+        Share by which smaller orders may be worse than the best ones.
+    nb, nk : tuple of int
+        The grid.
+    nk_role : str
+        ``poles`` or ``delay``.
+    nf : int or None, [-]
+        Number of poles where ``nk`` is the delay.
+    unit : str
+        Of the output.
+    """
+
+    overall: OrderChoice
+    choices: tuple[OrderChoice, ...]
+    responses: tuple[ResponseEstimate, ...]
+    delay: int
+    n_poles: int
+    tolerance: float
+    nb: tuple[int, ...]
+    nk: tuple[int, ...]
+    nk_role: str
+    nf: int | None
+    unit: str

@@ -1,0 +1,74 @@
+"""How a printed number was simulated: in free run, and from which initial state.
+
+Prediction or simulation, and from which state, decides what an RMSD means; every table
+and figure of fits says it in these words.
+"""
+
+_OWN = {
+    "zero": "initial state zero",
+    "steady": "initial state steady at the first input",
+    "estimated": "initial state estimated with the model",
+}
+_VALIDATED = {
+    "zero": "initial state zero",
+    "steady": "initial state steady at the first input",
+    "estimated": "initial state estimated on each recording",
+}
+
+
+def simulation_words(initial_state: str, *, is_validation: bool) -> str:
+    """Say that numbers are of a free-run simulation, and how it starts.
+
+    Parameters
+    ----------
+    initial_state : str
+        Rule of the fit; one of ``model.INITIAL_STATES``.
+    is_validation : bool
+        Whether the models are simulated after the fit, on whatever recordings: then an
+        estimated initial state, and nothing else, is fitted to each of them. Else the
+        numbers are those of the fit itself.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> simulation_words("zero", is_validation=True)
+    'Free-run simulation, no prediction; initial state zero.'
+    >>> simulation_words("estimated", is_validation=False)
+    'Free-run simulation, no prediction; initial state estimated with the model.'
+    """
+    start = (_VALIDATED if is_validation else _OWN)[initial_state]
+    return f"Free-run simulation, no prediction; {start}."
+
+
+def joined_words(initial_state: str, join: str) -> str:
+    """Say how the fit of several joined recordings starts.
+
+    Parameters
+    ----------
+    initial_state : str
+        Rule of the fit; one of ``model.INITIAL_STATES``.
+    join : str
+        One of ``model.JOINS``.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> joined_words("estimated", "concatenate")
+    'In a fit, joined recordings start once, with an estimated state.'
+    >>> joined_words("zero", "experiments")
+    'In a fit, each joined recording starts by itself, with a zero state.'
+    """
+    state = {
+        "zero": "a zero state",
+        "steady": "the steady state",
+        "estimated": "an estimated state",
+    }[initial_state]
+    if join == "concatenate":
+        return f"In a fit, joined recordings start once, with {state}."
+    return f"In a fit, each joined recording starts by itself, with {state}."

@@ -1,0 +1,19 @@
+import csv
+from dataclasses import replace
+
+from hwid_cli.files.order_results import ORDER_COLUMNS, write_order_csv
+from tests.report.test_order_tables import ADVICE
+
+
+def test_all_recordings_come_first_and_unknown_cells_are_blank(tmp_path):
+    path = tmp_path / "order.csv"
+    write_order_csv(path, replace(ADVICE, delay=-1))
+    with path.open(newline="") as file:
+        rows = list(csv.DictReader(file))
+
+    assert tuple(rows[0]) == ORDER_COLUMNS
+    assert [row["recording"] for row in rows] == [
+        "all recordings", "step_00", "step_01", "step_02",
+    ]  # fmt: skip
+    assert (rows[0]["delay"], rows[1]["delay"], rows[1]["poles"]) == ("", "1", "2")
+    assert (rows[0]["nb"], rows[0]["nk"], rows[0]["bic_nk"]) == ("2", "3", "3")
