@@ -23,6 +23,8 @@ _MOST_HALVINGS = 8
 # Damping of the initial state's equations against directions that the output does not
 # show, and the share of the cost that an iteration must gain.
 _DAMPING = 1e-9
+# Share of its largest value below which an impulse response has died away.
+_DIED_AWAY = 1e-12
 _LEAST_GAIN = 1e-6
 
 
@@ -116,24 +118,30 @@ def estimated_state(model: HammersteinWiener, recording: Recording) -> np.ndarra
     ----------
     docs/method.md, eq. (7).
     """
-    n_state = model.orders.n_state
     forced = _forced(model, np.ascontiguousarray(recording.input))
-    best = np.zeros(n_state)
-    if n_state == 0 or not np.isfinite(forced).all():
+    best = np.zeros(model.orders.n_state)
+    if best.size == 0 or not np.isfinite(forced).all():
         return best
+    responses = _free_responses(model, forced.size)
+    # Where the free responses have died away, the initial state changes nothing.
+    n = responses.shape[0]
+    beginning, measured = forced[:n], recording.output[:n]
+    basis = difference_basis(best.size)
 
     def deviation(coefficients: np.ndarray) -> float:
-        x = forced + _free(model, coefficients, forced)
-        residual = recording.output - static_map.evaluate(model.output_map, x)
+        # The basis is its own inverse.
+        x = beginning + responses @ (basis @ coefficients)
+        residual = measured - static_map.evaluate(model.output_map, x)
         return float(residual @ residual)
 
     cost = deviation(best)
-    if model.free_response.size == n_state:
+    if model.free_response.size == best.size:
         of_fit = deviation(model.free_response)
         if of_fit < cost:
             best, cost = model.free_response, of_fit
     for _ in range(_ESTIMATE_ITERATIONS):
-        step = _state_step(model, forced, best, recording.output)
+        x = beginning + responses @ (basis @ best)
+        step = basis @ _state_step(model, x, measured, responses)
         halvings = 0.5 ** np.arange(_MOST_HALVINGS)
         tried = (best + share * step for share in halvings)
         better = ((one, deviation(one)) for one in tried)
@@ -147,34 +155,25 @@ def estimated_state(model: HammersteinWiener, recording: Recording) -> np.ndarra
     return best
 
 
+def _free_responses(model: HammersteinWiener, n_samples: int) -> np.ndarray:
+    """Differences of the impulse response of 1/F, shape (n, n_state), while they last."""
+    n_state = model.orders.n_state
+    impulse = free_response(np.ones(1), model.denominator, n_samples)
+    lasting = np.flatnonzero(np.abs(impulse) > _DIED_AWAY * np.abs(impulse).max())
+    n = min(n_samples, int(lasting[-1]) + 1 + n_state) if lasting.size else n_samples
+    columns = np.empty((n, n_state))
+    padded = padded_signal(impulse[:n], n_state + 1, 0.0)
+    difference_columns(padded, n_state + 1, 0, np.ones(n), 0, n_state, columns)
+    return columns
+
+
 def _state_step(
-    model: HammersteinWiener,
-    forced: np.ndarray,
-    coefficients: np.ndarray,
-    output: np.ndarray,
+    model: HammersteinWiener, x: np.ndarray, output: np.ndarray, responses: np.ndarray
 ) -> np.ndarray:
-    """Gauss-Newton step of the free response's coefficients."""
-    n_state = model.orders.n_state
-    impulse = padded_signal(
-        free_response(np.ones(1), model.denominator, forced.size), n_state + 1, 0.0
-    )
-    x = forced + _free(model, coefficients, forced)
-    residual, jacobian = _state_equations(model, x, output, impulse)
-    return difference_basis(n_state) @ _damped_solution(jacobian, residual)
-
-
-def _state_equations(
-    model: HammersteinWiener, x: np.ndarray, output: np.ndarray, impulse: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Residual and its derivatives by the free response's coefficients."""
-    n_state = model.orders.n_state
-    scratch = np.empty((x.size, model.output_map.parameters.size))
-    y, slope = static_map.differentiate(
-        model.output_map, x, scratch, 0, with_positions=True
-    )
-    jacobian = np.empty((x.size, n_state))
-    difference_columns(impulse, n_state + 1, 0, slope, 0, n_state, jacobian)
-    return output - y, jacobian
+    """Gauss-Newton step of the free response, in the basis of differences."""
+    found = static_map.derivatives(model.output_map, x, with_positions=True)
+    jacobian = found.slope[:, None] * responses
+    return _damped_solution(jacobian, output - found.value)
 
 
 def _damped_solution(jacobian: np.ndarray, residual: np.ndarray) -> np.ndarray:
