@@ -5,13 +5,16 @@ In the linear block the parameters of a step are the coefficients of ``(1 - q^-1
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from itertools import accumulate
 
 import numpy as np
 
 from hwid_cli.maths.model import static_map
 from hwid_cli.records.model import HammersteinWiener, StaticMap
+
+# Samples at the beginning that always count.
+_BEGINNING = 50
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,10 +24,48 @@ class Experiment:
     Parameters
     ----------
     input, output : ndarray, shape (n,)
+    counted : ndarray of int, shape (n_rows,), optional
+        Samples at which the output is compared; all unless given.
     """
 
     input: np.ndarray
     output: np.ndarray
+    counted: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+
+    def __post_init__(self) -> None:
+        if self.counted.size == 0:
+            object.__setattr__(self, "counted", np.arange(self.output.size))
+
+
+def thinned(experiments: Sequence[Experiment], rows: int) -> tuple[Experiment, ...]:
+    """Experiments of which about so many samples count.
+
+    The first ones all do: they alone tell the initial state.
+
+    Parameters
+    ----------
+    experiments : sequence of Experiment
+    rows : int
+
+    Returns
+    -------
+    tuple of Experiment
+    """
+    stride = max(1, sum(one.output.size for one in experiments) // rows)
+    if stride == 1:
+        return tuple(experiments)
+    return tuple(
+        replace(
+            one,
+            counted=np.concatenate(
+                [
+                    np.arange(min(_BEGINNING, one.output.size)),
+                    np.arange(_BEGINNING, one.output.size, stride),
+                ]
+            ),
+        )
+        for one in experiments
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,18 +144,3 @@ def columns(
 def _count(one: StaticMap, with_positions: bool) -> int:
     active = static_map.active_parameters(one, with_positions=with_positions)
     return int(active.stop - active.start)
-
-
-def stride_for(experiments: Sequence[Experiment], rows: int) -> int:
-    """Samples from one that counts to the next, for about so many that count.
-
-    Parameters
-    ----------
-    experiments : sequence of Experiment
-    rows : int
-
-    Returns
-    -------
-    int, [samples]
-    """
-    return max(1, sum(one.output.size for one in experiments) // rows)

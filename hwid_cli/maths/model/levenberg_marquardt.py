@@ -92,7 +92,6 @@ class _Descent:
 
     experiments: Sequence[Experiment]
     place: Columns
-    stride: int
 
     @property
     def samples(self) -> int:
@@ -106,7 +105,6 @@ def minimise(
     with_positions: bool,
     max_iterations: int,
     least_gain: float = LEAST_GAIN,
-    stride: int = 1,
 ) -> Search:
     """Improve a candidate until it stands still or the iterations are used up.
 
@@ -121,17 +119,15 @@ def minimise(
         Limit on accepted steps.
     least_gain : float, [-]
         Share of the cost that a step must gain.
-    stride : int, [samples]
-        Every `stride`-th sample counts.
 
     Returns
     -------
     Search
     """
     place = columns(candidate, with_positions=with_positions)
-    descent = _Descent(experiments, place, stride)
+    descent = _Descent(experiments, place)
     point = point_of(candidate)
-    found = simulated(point, experiments, stride)
+    found = simulated(point, experiments)
     enough = _ROUNDING * sum(float(one.output @ one.output) for one in experiments)
     damping, small_gains, iteration = _FIRST_DAMPING, 0, 0
 
@@ -165,7 +161,7 @@ def _accepted_step(
     """Raise the damping until a step lowers the total and stays stable."""
     place = descent.place
     weight = found.cost / descent.samples / _USUAL_BEND**2
-    system = normal_equations(point, place, descent.experiments, found, descent.stride)
+    system = normal_equations(point, place, descent.experiments, found)
     total = found.cost + _add_prior(system, point, weight, place)
     diagonal = system.matrix.diagonal()
     if not np.isfinite(diagonal).all():
@@ -181,7 +177,7 @@ def _accepted_step(
             promised = predicted if promised is None else promised
             proposed = moved(point, scale * step, place)
             if is_stable(proposed.denominator):
-                tried = simulated(proposed, descent.experiments, descent.stride)
+                tried = simulated(proposed, descent.experiments)
                 lowered = total - tried.cost - weight * _squared_bends(proposed, point)
                 if lowered > 0.0:
                     ratio = lowered / predicted

@@ -6,9 +6,9 @@ docs/method.md, section "The search".
 from collections.abc import Sequence
 from dataclasses import replace
 
-from hwid_cli.maths.model.candidates import Candidate, Experiment, stride_for
+from hwid_cli.maths.model.candidates import Candidate, Experiment, thinned
 from hwid_cli.maths.model.levenberg_marquardt import LEAST_GAIN, Search, minimise
-from hwid_cli.maths.model.placing import finer, thinned, with_maps
+from hwid_cli.maths.model.placing import coarser, finer, with_maps
 from hwid_cli.records.model import FitOptions
 
 # Iterations at most with fixed break-points, and the share of the cost that a step must
@@ -36,28 +36,27 @@ def place(
         Its cost is that of the fine maps: how well the final break-points happen to lie
         before they move does not tell which candidate is worth freeing.
     """
+    few = thinned(experiments, _ROWS)
     settled = minimise(
         screened.candidate,
-        experiments,
+        few,
         with_positions=False,
         max_iterations=min(_PLACING_ITERATIONS, options.max_iterations),
         least_gain=_PLACING_GAIN,
-        stride=stride_for(experiments, _ROWS),
     )
     iterations = screened.iterations + settled.iterations
     if not (options.free_break_points and _has_break_points(settled.candidate)):
         return replace(settled, iterations=iterations)
     fine = minimise(
         with_maps(settled.candidate, experiments, finer),
-        experiments,
+        few,
         with_positions=False,
         max_iterations=min(_PLACING_ITERATIONS, options.max_iterations),
         least_gain=_PLACING_GAIN,
-        stride=stride_for(experiments, _ROWS),
     )
     return replace(
         fine,
-        candidate=thinned(fine.candidate, experiments, options),
+        candidate=coarser(fine.candidate, experiments, options),
         iterations=iterations + fine.iterations,
     )
 
@@ -84,15 +83,14 @@ def finish(
     Search
     """
     candidate, iterations = placed.candidate, placed.iterations
-    stride = stride_for(experiments, _ROWS)
-    if stride > 1:
+    few = thinned(experiments, _ROWS)
+    if few != tuple(experiments):
         coarse = minimise(
             candidate,
-            experiments,
+            few,
             with_positions=options.free_break_points,
             max_iterations=options.max_iterations,
             least_gain=max(_COARSE_GAIN, least_gain),
-            stride=stride,
         )
         candidate, iterations = coarse.candidate, iterations + coarse.iterations
     final = minimise(

@@ -82,7 +82,7 @@ def with_maps(
     )
 
 
-def thinned(
+def coarser(
     candidate: Candidate, experiments: Sequence[Experiment], options: FitOptions
 ) -> Candidate:
     """Candidate whose maps have as many break-points as asked for.

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hwid_cli.maths.model import static_map
-from hwid_cli.maths.model.candidates import Candidate, Experiment, stride_for
+from hwid_cli.maths.model.candidates import Candidate, Experiment, thinned
 from hwid_cli.maths.model.levenberg_marquardt import Search, minimise
 from hwid_cli.maths.model.maps.kernels import piecewise_linear_shares
 from hwid_cli.maths.model.placing import reaching
@@ -72,7 +72,7 @@ def race(
     list of Search
         The best, those of different kinds of starts first.
     """
-    stride = stride_for(experiments, RACE_ROWS)
+    experiments = thinned(experiments, RACE_ROWS)
     racing = []
     for start in starts:
         for candidate in starting_candidates(experiments, start, orders, options):
@@ -82,7 +82,7 @@ def race(
                 racing.append(_entered((start.is_expanded, True), curved, experiments))
     racing = _leaders(racing, options.starts)
     for iterations, count in (_FIRST_ROUND, (_LAST_ROUND, finalists)):
-        racing = [_going_on(one, experiments, iterations, stride) for one in racing]
+        racing = [_going_on(one, experiments, iterations) for one in racing]
         racing = _leaders(racing, count, _HOPELESS)
     return [one.search for one in racing]
 
@@ -167,20 +167,18 @@ def _with_output_curve(
 def _entered(
     family: tuple[bool, bool], candidate: Candidate, experiments: Sequence[Experiment]
 ) -> _Runner:
-    stride = stride_for(experiments, RACE_ROWS)
-    cost = simulated(point_of(candidate), experiments, stride).cost
+    cost = simulated(point_of(candidate), experiments).cost
     return _Runner(family, Search(candidate, cost, 0, "iteration_limit", ""))
 
 
 def _going_on(
-    one: _Runner, experiments: Sequence[Experiment], iterations: int, stride: int
+    one: _Runner, experiments: Sequence[Experiment], iterations: int
 ) -> _Runner:
     found = minimise(
         one.search.candidate,
         experiments,
         with_positions=False,
         max_iterations=iterations,
-        stride=stride,
     )
     total = one.search.iterations + found.iterations
     return replace(one, search=replace(found, iterations=total))

@@ -116,17 +116,13 @@ def equations(
     return normal_equations(point, place, experiments, simulated(point, experiments))
 
 
-def simulated(
-    point: Point, experiments: Sequence[Experiment], stride: int = 1
-) -> Simulated:
+def simulated(point: Point, experiments: Sequence[Experiment]) -> Simulated:
     """Simulate every experiment and compare it with what was measured.
 
     Parameters
     ----------
     point : Point
     experiments : sequence of Experiment
-    stride : int, [samples]
-        Every `stride`-th sample counts.
 
     Returns
     -------
@@ -136,12 +132,13 @@ def simulated(
     with np.errstate(over="ignore", invalid="ignore"):
         for index, one in enumerate(experiments):
             w, x = block_signals(point, index, one)
-            seen = static_map.evaluate(point.output_map, x[::stride])
-            residual = one.output[::stride] - seen
+            seen = static_map.evaluate(point.output_map, x[one.counted])
+            residual = one.output[one.counted] - seen
             signals.append((w, x))
             residuals.append(residual)
-            total += float(residual @ residual)
-    total = stride * total if np.isfinite(total) else float("inf")
+            total += one.output.size / residual.size * float(residual @ residual)
+    if not np.isfinite(total):
+        total = float("inf")
     return Simulated(tuple(signals), tuple(residuals), total)
 
 
@@ -150,7 +147,6 @@ def normal_equations(
     place: Columns,
     experiments: Sequence[Experiment],
     found: Simulated,
-    stride: int = 1,
 ) -> Equations:
     """Normal equations at a point.
 
@@ -161,8 +157,7 @@ def normal_equations(
         Which parameters move and where they stand.
     experiments : sequence of Experiment
     found : Simulated
-        What the point makes of the experiments, with the same stride.
-    stride : int, [samples]
+        What the point makes of the experiments.
 
     Returns
     -------
@@ -174,29 +169,30 @@ def normal_equations(
         before = static_map.derivatives(
             point.input_map, one.input, with_positions=place.with_positions
         )
-        x = found.signals[index][1][::stride]
+        x = found.signals[index][1][one.counted]
         after = static_map.derivatives(
             point.output_map, x, with_positions=place.with_positions
         )
-        rows = _rows(point, place, (before, after), (index, found, stride))
+        rows = _rows(point, place, (before, after), (index, found, one.counted))
         if after.is_local:
             own, cross = local_sums(after.first, after.shares, rows, after.count)
-            parts.append(_joined(own, cross, rows))
+            part = _joined(own, cross, rows)
         else:
             if after.count:
                 rows = np.hstack([after.shares, rows])
-            parts.append(rows.T @ rows)
-    return _by_parameters(stride * np.sum(parts, axis=0), place, before, after)
+            part = rows.T @ rows
+        parts.append(one.output.size / one.counted.size * part)
+    return _by_parameters(np.sum(parts, axis=0), place, before, after)
 
 
 def _rows(
     point: Point,
     place: Columns,
     maps: tuple[Derivatives, Derivatives],
-    where: tuple[int, Simulated, int],
+    where: tuple[int, Simulated, np.ndarray],
 ) -> np.ndarray:
     """Dense columns of one experiment, and its residual as the last."""
-    (before, after), (index, found, stride) = maps, where
+    (before, after), (index, found, counted) = maps, where
     n_states = place.free_responses.stop - place.free_responses.start
     nb, nf = point.numerator.size, point.denominator.size - 1
     rows = np.empty(
@@ -208,7 +204,7 @@ def _rows(
         (before.first, before.shares, before.count),
         (point.is_steady, place.n_state, index * place.n_state, n_states),
         after.slope,
-        stride,
+        counted,
         rows,
     )
     rows[:, -1] = found.residuals[index]

@@ -12,11 +12,11 @@ Steiglitz, McBride (1965); Bai (1998) for the expanded input. docs/method.md, se
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hwid_cli.maths.model.candidates import Experiment
+from hwid_cli.maths.model.candidates import Experiment, thinned
 from hwid_cli.maths.model.linear_block import difference_basis
 from hwid_cli.maths.model.regression.least_squares import (
     Regression,
@@ -107,13 +107,12 @@ def linear_starts(
     chosen: list[Start] = []
     for n_points in families:
         problem = regression(
-            experiments,
+            thinned(experiments, _ROWS),
             orders,
             np.linspace(joined.min(), joined.max(), n_points),
             has_level=n_points > 2 or has_free_shape(options.output_map),
             has_free_response=options.initial_state == "estimated"
             and len(experiments) <= _MOST_FREE_RESPONSES,
-            stride=max(1, joined.size // _ROWS),
         )
         found: list[Solution] = []
         for prefilter in prefilters or _prefilters(orders):
@@ -142,25 +141,43 @@ def _iterations(one: Regression, denominator: np.ndarray) -> list[Solution]:
 
 
 def _start(one: Regression, solution: Solution) -> Start:
-    """Split the coefficients into a numerator and an input map."""
+    """Turn a solution into a linear block and an input map."""
+    values = one.points
+    if one.is_expanded:
+        # The best rank-one split of the coefficients is a numerator times an input map.
+        # What it cuts off may be large where the expansion is hardly determined, so all
+        # but the map is found anew.
+        _, _, right = np.linalg.svd(solution.inputs, full_matrices=False)
+        values = np.concatenate([[0.0], right[0]])
+        solution, _ = solve(_mapped(one, values), solution.denominator)
     orders = one.orders
-    # The best rank-one split of the coefficients is a numerator times an input map.
-    left, strength, right = np.linalg.svd(solution.inputs, full_matrices=False)
-    values = np.concatenate([[0.0], right[0]]) if one.is_expanded else one.points
-    gain = strength[0] * (1.0 if one.is_expanded else right[0, 0])
-    numerator = difference_basis(orders.nb) @ left[:, 0] * gain
-    missing = np.zeros(orders.nf + 1 - solution.denominator.size)
     states = np.zeros((len(one.experiments), orders.n_state))
     if one.has_free_response:
         states = solution.states @ difference_basis(orders.n_state).T
+    missing = np.zeros(orders.nf + 1 - solution.denominator.size)
     return Start(
-        numerator,
+        difference_basis(orders.nb) @ solution.inputs[:, 0],
         np.concatenate([solution.denominator, missing]),
         solution.cost,
         one.points,
         values,
         solution.level,
         states,
+    )
+
+
+def _mapped(one: Regression, values: np.ndarray) -> Regression:
+    """The same problem for inputs that have passed a map."""
+    mapped = [
+        replace(experiment, input=np.interp(experiment.input, one.points, values))
+        for experiment in one.experiments
+    ]
+    return regression(
+        mapped,
+        one.orders,
+        np.array([values.min(), values.max()]),
+        has_level=one.has_level,
+        has_free_response=one.has_free_response,
     )
 
 

@@ -17,7 +17,7 @@ import numpy as np
 from hwid_cli.maths.model.candidates import Candidate, Experiment
 from hwid_cli.maths.model.levenberg_marquardt import Search, minimise
 from hwid_cli.maths.model.phases import finish, place
-from hwid_cli.maths.model.placing import finer, thinned, with_maps
+from hwid_cli.maths.model.placing import coarser, finer, with_maps
 from hwid_cli.records.model import FitOptions, HammersteinWiener
 
 # Enough to adapt initial states and offsets, so that starts can be compared.
@@ -83,4 +83,4 @@ def _spread(
 ) -> Candidate:
     """Maps whose break-points cover what the experiments reach, not the start's data."""
     fine = with_maps(candidate, experiments, finer)
-    return thinned(fine, experiments, options)
+    return coarser(fine, experiments, options)

@@ -17,10 +17,10 @@ def regression_rows(
     denominator: np.ndarray,
     delay: int,
     counts: tuple[int, int, int, int],
-    stride: int,
+    counted: np.ndarray,
     rows: np.ndarray,
 ) -> None:
-    """Signals filtered by 1/F and their differences, every `stride`-th sample.
+    """Signals filtered by 1/F and their differences, at the samples that count.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ def regression_rows(
     counts : tuple of int
         Numerator coefficients, initial states, the column of the first of this
         experiment's, and those of all experiments.
-    stride : int, [samples]
+    counted : ndarray of int, shape (n_rows,)
     rows : ndarray, shape (n_rows, n_columns)
         Columns: past outputs, the expanded input (order by order of its differences),
         initial states, the filtered level, the level, the filtered output, the output.
@@ -63,8 +63,9 @@ def regression_rows(
             for m in range(wide):
                 if abs(row[m]) < _TINY:
                     row[m] = 0.0
-    for t in range(0, n, stride):
-        out, at = rows[t // stride], pad + t
+    for r in range(counted.size):
+        t = counted[r]
+        out, at = rows[r], pad + t
         for j in range(n_poles):
             table[j, 0] = lines[at - 1 - j, count + 1]
         _difference(table, n_poles, 1)

@@ -24,7 +24,9 @@ from hwid_cli.records.model import Orders
 # Poles further out than this settle too slowly to be found by least squares.
 LARGEST_RADIUS = 0.9995
 # Added to the diagonal of the scaled products: directions weaker than this are noise.
-_RIDGE, _RIDGE_GROWTH = 1e-12, 1e3
+_RIDGE, _RIDGE_GROWTH = 1e-10, 1e3
+# Share of the cost without a level that one with it must reach.
+_WORTH_A_LEVEL = 0.95
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,8 +43,6 @@ class Regression:
     orders : Orders
     has_level, has_free_response : bool
         Whether the output may have an offset and an initial state of its own.
-    stride : int, [samples]
-        Every `stride`-th sample is an equation.
     """
 
     experiments: tuple[Experiment, ...]
@@ -51,7 +51,6 @@ class Regression:
     orders: Orders
     has_level: bool
     has_free_response: bool
-    stride: int
 
     @property
     def is_expanded(self) -> bool:
@@ -101,7 +100,6 @@ def regression(
     *,
     has_level: bool,
     has_free_response: bool,
-    stride: int,
 ) -> Regression:
     """Expand the inputs.
 
@@ -112,7 +110,6 @@ def regression(
     points : ndarray, shape (n_points,)
         Knots of the hat functions; two for an input as it is.
     has_level, has_free_response : bool
-    stride : int, [samples]
 
     Returns
     -------
@@ -133,7 +130,6 @@ def regression(
         orders,
         has_level,
         has_free_response,
-        stride,
     )
 
 
@@ -155,27 +151,38 @@ def solve(one: Regression, denominator: np.ndarray) -> tuple[Solution, np.ndarra
     products = _products(one, denominator)
     n_poles = denominator.size - 1
     known = n_poles + one.orders.nb * one.n_inputs + one.n_states
-    middle = np.arange(n_poles, known)
-    shared = np.append(middle, known + 1) if one.has_level else middle
-    target = products.shape[0] - 1
-    found, cost = _least_squares(products, shared, target)
-    count = one.orders.nb * one.n_inputs
-    states = found[count : count + one.n_states]
-    solution = Solution(
-        denominator,
-        cost,
-        found[:count].reshape(one.orders.nb, -1),
-        states.reshape(len(one.experiments), -1),
-        float(found[-1]) if one.has_level else 0.0,
-    )
+    solution = _solution(one, denominator, products, known)
     if n_poles == 0:
         return solution, denominator
     all_known = (
         np.append(np.arange(known), known) if one.has_level else np.arange(known)
     )
-    past, _ = _least_squares(products, all_known, target - 1)
+    past, _ = _least_squares(products, all_known, products.shape[0] - 2)
     tail = difference_basis(n_poles) @ past[:n_poles]
     return solution, _stabilised(np.concatenate([[1.0], tail]))
+
+
+def _solution(
+    one: Regression, denominator: np.ndarray, products: np.ndarray, known: int
+) -> Solution:
+    """Best numerator; with a level only where it explains something."""
+    middle, target = np.arange(denominator.size - 1, known), products.shape[0] - 1
+    found, cost = _least_squares(products, middle, target)
+    level = 0.0
+    if one.has_level:
+        with_it, lower = _least_squares(products, np.append(middle, known + 1), target)
+        # A level and a slow free response that cancel are no start.
+        if lower < _WORTH_A_LEVEL * cost:
+            found, cost, level = with_it, lower, float(with_it[-1])
+    count = one.orders.nb * one.n_inputs
+    states = found[count : count + one.n_states]
+    return Solution(
+        denominator,
+        cost,
+        found[:count].reshape(one.orders.nb, -1),
+        states.reshape(len(one.experiments), -1),
+        level,
+    )
 
 
 def _products(one: Regression, denominator: np.ndarray) -> np.ndarray:
@@ -189,15 +196,14 @@ def _products(one: Regression, denominator: np.ndarray) -> np.ndarray:
     for index, (experiment, (first, shares)) in enumerate(
         zip(one.experiments, one.bases, strict=True)
     ):
-        n_rows = -(-experiment.output.size // one.stride)
-        rows = np.empty((n_rows, n_columns))
+        rows = np.empty((experiment.counted.size, n_columns))
         regression_rows(
             experiment.output,
             (first, shares, count, skipped),
             denominator,
             orders.nk,
             (orders.nb, n_state, index * n_state, one.n_states),
-            one.stride,
+            experiment.counted,
             rows,
         )
         total += rows.T @ rows

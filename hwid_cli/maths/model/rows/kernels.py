@@ -21,7 +21,7 @@ def derivative_rows(
     basis: tuple[np.ndarray, np.ndarray, int],
     start: tuple[bool, int, int, int],
     weights: np.ndarray,
-    stride: int,
+    counted: np.ndarray,
     out: np.ndarray,
 ) -> None:
     """Derivatives of x by input map, initial states, B and F, times a weight.
@@ -43,8 +43,8 @@ def derivative_rows(
         this experiment among those of all, and how many these are.
     weights : ndarray, shape (n_rows,)
         For the rows that are written.
-    stride : int, [samples]
-        Every `stride`-th sample has a row.
+    counted : ndarray of int, shape (n_rows,)
+        Rising; the samples that have a row.
     out : ndarray, shape (n_rows, at least count + n_states + nb + nf)
         Columns of the input map, the initial states, B and F are written.
     """
@@ -71,6 +71,7 @@ def derivative_rows(
             lines[t, count + 1] = w[0] * level * gain
     passed = np.empty((chunk, wide))
     table = np.empty((n_state + nb + nf, chunk + max(nb, nf, n_state, 1)))
+    r = 0
     for begin in range(0, n, chunk):
         length = min(chunk, n - begin)
         for k in range(length):
@@ -92,8 +93,8 @@ def derivative_rows(
         _differences(lines, pad, count + 2, n_state, length, table)
         _differences(lines, pad - delay, count, nb, length, table[n_state:])
         _differences(lines, pad - 1, count + 1, nf, length, table[n_state + nb :])
-        for k in range((-begin) % stride, length, stride):
-            r = (begin + k) // stride
+        while r < counted.size and counted[r] < begin + length:
+            k = counted[r] - begin
             row, source, weight = out[r], passed[k], weights[r]
             for m in range(count):
                 row[m] = weight * source[m]
@@ -108,6 +109,7 @@ def derivative_rows(
             place += nb
             for m in range(nf):
                 row[place + m] = -weight * table[n_state + nb + m, k]
+            r += 1
         for k in range(pad):
             lines[k] = lines[last + 1 + k]
 
