@@ -21,6 +21,7 @@ from hwid_cli.maths.model.contained import enlarged
 from hwid_cli.maths.model.levenberg_marquardt import Search
 from hwid_cli.maths.model.linear_block import is_stable, poles
 from hwid_cli.maths.model.normalise import normalise, rescaled
+from hwid_cli.maths.model.phases import finish
 from hwid_cli.maths.model.placing import with_maps
 from hwid_cli.maths.model.search import (
     linear_search,
@@ -164,7 +165,7 @@ def _search(
     """Search from nothing but linear models and models of smaller orders."""
     starts, linear, known = found
     if _is_linear(options):
-        return linear
+        return finish(linear, problem.experiments, options)
     if known:
         return search_beyond(
             known, problem.experiments, orders, options, starts, linear

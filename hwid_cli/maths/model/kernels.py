@@ -83,27 +83,40 @@ def block_output(
     if steady:
         past = signal[0]
         rest = past * numerator.sum() / denominator.sum()
-    lead = max(nf, nb - 1 + delay, states.size)
-    out = np.empty(n)
-    for t in range(n):
-        value = 0.0
-        if t < lead:
-            if t < states.size:
-                value = states[t]
-            for i in range(nb):
-                s = t - delay - i
-                value += numerator[i] * (signal[s] if s >= 0 else past)
-            for j in range(nf, 0, -1):
-                value -= denominator[j] * (out[t - j] if t >= j else rest)
+    # What does not depend on the result first: that loop runs on vectors.
+    lead = min(n, nb - 1 + delay)
+    passed = np.empty(n)
+    for t in range(lead):
+        passed[t] = 0.0
+        for i in range(nb):
+            s = t - delay - i
+            passed[t] += numerator[i] * (signal[s] if s >= 0 else past)
+    for i in range(nb):
+        b, source = numerator[i], signal[lead - delay - i : n - delay - i]
+        if i == 0:
+            for t in range(n - lead):
+                passed[lead + t] = b * source[t]
         else:
-            for i in range(nb):
-                value += numerator[i] * signal[t - delay - i]
-            for j in range(nf, 0, -1):
-                value -= denominator[j] * out[t - j]
+            for t in range(n - lead):
+                passed[lead + t] += b * source[t]
+    for t in range(min(n, states.size)):
+        passed[t] += states[t]
+    taps = np.zeros(4 * ((nf + 3) // 4))
+    taps[:nf] = denominator[1:]
+    out = np.empty(taps.size + n)
+    out[: taps.size] = rest
+    for t in range(n):
+        at = taps.size + t
+        value = passed[t]
+        for j in range(taps.size - 4, -1, -4):
+            # The newest value comes last: all else is ready before it is.
+            value -= taps[j + 3] * out[at - j - 4] + taps[j + 2] * out[at - j - 3]
+            value -= taps[j + 1] * out[at - j - 2]
+            value -= taps[j] * out[at - j - 1]
         if abs(value) < _TINY:
             value = 0.0
-        out[t] = value
-    return out
+        out[at] = value
+    return out[taps.size :]
 
 
 @njit(cache=True)

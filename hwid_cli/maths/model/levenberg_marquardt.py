@@ -36,7 +36,7 @@ from hwid_cli.maths.model.sensitivities import (
 from hwid_cli.records.model import StaticMap
 
 # Share of the cost that a step must gain; smaller gains in a row end the search.
-LEAST_GAIN = 1e-4
+LEAST_GAIN = 3e-4
 _SMALL_GAINS_IN_A_ROW = 2
 _FIRST_DAMPING = 1e-2
 _LEAST_DAMPING = 1e-14

@@ -25,9 +25,11 @@ from hwid_cli.maths.model.sensitivities import simulated
 from hwid_cli.maths.model.starts import Start
 from hwid_cli.records.model import FitOptions, HammersteinWiener, Orders
 
-# Iterations of the first round and how many candidates go on after it; iterations of the
-# last round.
-_FIRST_ROUND, _LAST_ROUND = (2, 4), 4
+# Iterations of each round, and how many candidates go on after it.
+Rounds = tuple[tuple[int, int], ...]
+THOROUGH: Rounds = ((2, 4), (4, 2))
+# For one of many fits that help each other.
+SHORT: Rounds = ((2, 2), (4, 1))
 # Samples that count in a round; enough to tell candidates apart.
 RACE_ROWS = 1000
 # Knots of the output map that a block's output asks for, and how stiff it is: the
@@ -53,7 +55,7 @@ def race(
     orders: Orders,
     options: FitOptions,
     *,
-    finalists: int = 2,
+    rounds: Rounds = THOROUGH,
 ) -> list[Search]:
     """Let all starts run a few iterations; the slower ones drop out.
 
@@ -64,8 +66,8 @@ def race(
     starts : sequence of Start
     orders : Orders
     options : FitOptions
-    finalists : int
-        How many are left at the end.
+    rounds : tuple of (int, int)
+        Iterations of each round, and how many candidates go on after it.
 
     Returns
     -------
@@ -81,7 +83,7 @@ def race(
                 curved = _with_output_curve(candidate, experiments, options)
                 racing.append(_entered((start.is_expanded, True), curved, experiments))
     racing = _leaders(racing, options.starts)
-    for iterations, count in (_FIRST_ROUND, (_LAST_ROUND, finalists)):
+    for iterations, count in rounds:
         racing = [_going_on(one, experiments, iterations) for one in racing]
         racing = _leaders(racing, count, _HOPELESS)
     return [one.search for one in racing]

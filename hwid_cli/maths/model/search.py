@@ -17,12 +17,12 @@ from dataclasses import replace
 import numpy as np
 
 from hwid_cli.maths.model import sensitivities, static_map
-from hwid_cli.maths.model.candidates import Candidate, Experiment
+from hwid_cli.maths.model.candidates import Candidate, Experiment, thinned
 from hwid_cli.maths.model.levenberg_marquardt import Search, minimise
 from hwid_cli.maths.model.phases import finish, place
 from hwid_cli.maths.model.placing import reaching
 from hwid_cli.maths.model.points import block_signals, point_of
-from hwid_cli.maths.model.race import race
+from hwid_cli.maths.model.race import SHORT, race
 from hwid_cli.maths.model.starts import Start, linear_starts
 from hwid_cli.records.model import FitOptions, Orders
 
@@ -33,6 +33,11 @@ _RELAXED_BLOCKS = 2
 _WORTH_GOING_ON = 0.995
 # The same of another start's maps with many break-points, against a contained model's.
 _WORTH_A_SECOND_LOOK = 0.97
+# The same before its break-points are placed, which gains this much at most.
+_WORTH_PLACING = 4.0
+# Samples that count for the linear model, and the share of the cost that a step must gain:
+# it is a yardstick and one more start.
+_LINEAR_ROWS, _LINEAR_GAIN = 2500, 1e-3
 # Slopes of the output map below this share of their mean square say too little about x.
 _FLAT = 0.1
 
@@ -43,7 +48,7 @@ def linear_search(
     options: FitOptions,
     starts: Sequence[Start],
 ) -> Search:
-    """Linear output-error model: both maps are left out.
+    """Linear output-error model, nearly converged: both maps are left out.
 
     Parameters
     ----------
@@ -61,8 +66,18 @@ def linear_search(
     """
     linear = replace(options, input_map="none", output_map="none")
     plain = [one for one in starts if not one.is_expanded]
-    found = race(experiments, plain, orders, linear, finalists=1)
-    return finish(found[0], experiments, linear)
+    (leader,) = race(experiments, plain, orders, linear, rounds=SHORT)
+    few = thinned(experiments, _LINEAR_ROWS)
+    found = minimise(
+        leader.candidate,
+        few,
+        with_positions=False,
+        max_iterations=options.max_iterations,
+        least_gain=_LINEAR_GAIN,
+    )
+    iterations = leader.iterations + found.iterations
+    cost = sensitivities.cost(found.candidate, experiments)
+    return replace(found, cost=cost, iterations=iterations)
 
 
 def nonlinear_search(
@@ -128,10 +143,11 @@ def search_beyond(
     known = [_standing(one, experiments) for one in contained]
     best = _best(known)
     best = _best([best, finish(best, experiments, options)])
-    (leader,) = race(experiments, starts, orders, options, finalists=1)
-    placed = place(leader, experiments, options)
-    if placed.cost < _WORTH_A_SECOND_LOOK * best.cost:
-        best = _best([best, finish(placed, experiments, options)])
+    (leader,) = race(experiments, starts, orders, options, rounds=SHORT)
+    if leader.cost < _WORTH_PLACING * best.cost:
+        placed = place(leader, experiments, options)
+        if placed.cost < _WORTH_A_SECOND_LOOK * best.cost:
+            best = _best([best, finish(placed, experiments, options)])
     return _not_worse_than(linear, best, experiments, options)
 
 
@@ -144,6 +160,7 @@ def _not_worse_than(
     """The best so far, or what comes of the linear model where that is better."""
     if linear.cost >= best.cost:
         return best
+    linear = finish(linear, experiments, options)
     passing = _standing(_passing(linear, experiments, options), experiments)
     passing = replace(passing, iterations=linear.iterations)
     return _best([best, passing, finish(passing, experiments, options)])

@@ -16,11 +16,11 @@ def test_all_pole_recursion_agrees_with_scipy(order):
     f = np.real(np.poly(rng.uniform(-0.9, 0.9, order))) if order else np.ones(1)
     taps = np.zeros(4 * max(1, (order + 3) // 4))
     taps[:order] = f[1:]
-    columns = rng.standard_normal((100, 3))
-    lines = np.zeros((taps.size + 100, 3))
-    for t in range(100):
-        row_kernels.all_pole(lines, taps.size + t, taps)
-        lines[taps.size + t] += columns[t]
+    columns = rng.standard_normal((101, 3))
+    lines = np.concatenate([np.zeros((taps.size, 3)), columns])
+    # In two parts, of even and odd length: the second goes on from the first.
+    row_kernels.all_pole(lines, taps.size, 40, taps)
+    row_kernels.all_pole(lines, taps.size + 40, 61, taps)
     expected = signal.lfilter([1.0], f, columns, axis=0)
     np.testing.assert_allclose(lines[taps.size :], expected, atol=1e-11)
 

@@ -6,8 +6,6 @@ from numba import njit
 from hwid_cli.maths.model.rows.kernels import all_pole
 
 _FAST = {"reassoc", "contract", "arcp", "nsz"}
-# Decaying responses end in subnormal numbers, which are slow.
-_TINY, _FLUSH = 1e-200, 16
 
 
 @njit(cache=True, fastmath=_FAST)
@@ -52,17 +50,12 @@ def regression_rows(
     table = np.empty((max(nb, n_poles, n_state, 1), inputs))
     for t in range(n):
         row = lines[pad + t]
-        all_pole(lines, pad + t, taps)
         for m in range(width):
-            row[first[t] + m] += shares[t, m]
-        row[count] += 1.0
-        row[count + 1] += output[t]
-        if t == 0:
-            row[count + 2] += 1.0
-        if t % _FLUSH == 0:
-            for m in range(wide):
-                if abs(row[m]) < _TINY:
-                    row[m] = 0.0
+            row[first[t] + m] = shares[t, m]
+        row[count] = 1.0
+        row[count + 1] = output[t]
+    lines[pad, count + 2] = 1.0
+    all_pole(lines, pad, n, taps)
     for r in range(counted.size):
         t = counted[r]
         out, at = rows[r], pad + t
