@@ -20,7 +20,7 @@ from hwid_cli.campaign.content_keys import model_key, recording_key
 from hwid_cli.campaign.crossval import deviation_tasks
 from hwid_cli.campaign.group_rules import search_groups
 from hwid_cli.campaign.identify import Run, fit_grid
-from hwid_cli.campaign.order_grid import candidate_orders
+from hwid_cli.campaign.order_grid import candidate_orders, growth
 from hwid_cli.campaign.runner import Task, TaskDone
 from hwid_cli.maths.model.fit import fit
 from hwid_cli.maths.scores import coverage
@@ -184,38 +184,55 @@ def _fit_level(
     level = len(tried[0])
     if level == 1:
         return [singles[name] for (name,) in tried]
+    grid = candidate_orders(plan.orders)
+    contents = {one.name: recording_key(one) for one in plan.recordings}
+    found: list[dict[int, Fit]] = [{} for _ in tried]
+
+    def work(execute: Run) -> None:
+        for places in growth(plan.orders):
+            tasks = [
+                _fit_task(plan, singles, group, (place, smaller, fits, contents))
+                for group, fits in zip(tried, found, strict=True)
+                for place, smaller in places
+            ]
+            done = iter(execute(tasks))
+            for group, fits in zip(tried, found, strict=True):
+                for place, _ in places:
+                    # A fit is cached by content; the names are those of today.
+                    fits[place] = replace(next(done).result, identified_on=group)
+
+    run(level, "fits", len(tried) * len(grid), work)
+    return [[fits[place] for place in range(len(grid))] for fits in found]
+
+
+def _fit_task(
+    plan: GroupPlan,
+    singles: Mapping[str, Sequence[Fit]],
+    group: tuple[str, ...],
+    cell: tuple[int, Sequence[int], Mapping[int, Fit], Mapping[str, str]],
+) -> Task:
+    """One fit of a group; its key holds the models that it begins with."""
+    place, smaller, fits, contents = cell
+    nb, nk, orders = candidate_orders(plan.orders)[place]
     by_name = {one.name: one for one in plan.recordings}
-    contents = {name: recording_key(one) for name, one in by_name.items()}
-    tasks = []
-    for group in tried:
-        recordings = tuple(by_name[name] for name in group)
-        for number, (nb, nk, orders) in enumerate(candidate_orders(plan.orders)):
-            starts = _starts(plan, singles, group, number)
-            matters = {
-                "recordings": [contents[name] for name in group],
-                "orders": orders,
-                "options": plan.fit_options,
-                "starts": [model_key(one) for one in starts],
-            }
-            tasks.append(
-                Task(
-                    key=task_key(STAGE, STAGE_VERSION, matters, []),
-                    name=f"{'+'.join(group)}/{nb}/{nk}",
-                    function=_fit_group,
-                    arguments=(recordings, orders, plan.fit_options, starts),
-                    result_type=Fit,
-                )
-            )
-    done = _run_all(run, level, "fits", tasks)
-    n_grid = len(tasks) // len(tried)
-    # A fit is cached by content; the names of its recordings are those of today.
-    return [
-        [
-            replace(item.result, identified_on=group)
-            for item in done[number * n_grid : (number + 1) * n_grid]
-        ]
-        for number, group in enumerate(tried)
-    ]
+    recordings = tuple(by_name[name] for name in group)
+    starts = _starts(plan, singles, group, place)
+    models = [fits[number].model for number in smaller]
+    contained = tuple(model for model in models if model is not None)
+    matters = {
+        "recordings": [contents[name] for name in group],
+        "orders": orders,
+        "options": plan.fit_options,
+        "starts": [model_key(one) for one in starts],
+        "contained": [model_key(one) for one in contained],
+    }
+    return Task(
+        key=task_key(STAGE, STAGE_VERSION, matters, []),
+        name=f"{'+'.join(group)}/{nb}/{nk}",
+        function=_fit_group,
+        arguments=(recordings, orders, plan.fit_options, starts, contained),
+        result_type=Fit,
+    )
 
 
 def _starts(
@@ -233,8 +250,9 @@ def _fit_group(
     orders: Orders,
     options: FitOptions,
     starts: Sequence[HammersteinWiener],
+    contained: Sequence[HammersteinWiener],
 ) -> Fit:
-    return fit(recordings, orders, options, starts=starts)
+    return fit(recordings, orders, options, starts=starts, contained=contained)
 
 
 def _validate_level(

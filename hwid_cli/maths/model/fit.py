@@ -115,12 +115,12 @@ def fit(
     options = options.in_units(problem.input_scale, problem.output_scale)
     linear_rmsd = float("nan")
     try:
-        search = _warm_search(problem, options, starts)
+        known = _contained(problem, orders, options, contained)
+        search = _warm_search(problem, options, starts, known)
         if search is None:
             starts_found = _starts(problem, orders, options)
             linear = linear_search(problem.experiments, orders, options, starts_found)
             linear_rmsd = _rmsd(linear, problem)
-            known = _contained(problem, orders, options, contained)
             search = _search(problem, orders, options, (starts_found, linear, known))
     except np.linalg.LinAlgError as error:
         return replace(blank, message=f"linear algebra failed: {error}")
@@ -136,7 +136,10 @@ def fit(
 
 
 def _warm_search(
-    problem: _Problem, options: FitOptions, starts: Sequence[HammersteinWiener]
+    problem: _Problem,
+    options: FitOptions,
+    starts: Sequence[HammersteinWiener],
+    known: Sequence[Candidate],
 ) -> Search | None:
     """Search near the starts; None where none is stable or no model came of them."""
     scaled = [
@@ -147,7 +150,7 @@ def _warm_search(
     if not scaled:
         return None
     try:
-        search = warm_search(problem.experiments, options, scaled)
+        search = warm_search(problem.experiments, options, scaled, known)
     except np.linalg.LinAlgError:
         return None
     is_usable = np.isfinite(search.cost) and is_stable(

@@ -6,6 +6,7 @@ docs/method.md, section "The search".
 from collections.abc import Sequence
 from dataclasses import replace
 
+from hwid_cli.maths.model import sensitivities
 from hwid_cli.maths.model.candidates import Candidate, Experiment, thinned
 from hwid_cli.maths.model.levenberg_marquardt import LEAST_GAIN, Search, minimise
 from hwid_cli.maths.model.placing import coarser, finer, with_maps
@@ -101,6 +102,22 @@ def finish(
         least_gain=least_gain,
     )
     return replace(final, iterations=iterations + final.iterations)
+
+
+def standing(candidate: Candidate, experiments: Sequence[Experiment]) -> Search:
+    """Take a candidate for a search that ends where it begins.
+
+    Parameters
+    ----------
+    candidate : Candidate
+    experiments : sequence of Experiment
+
+    Returns
+    -------
+    Search
+    """
+    cost = sensitivities.cost(candidate, experiments)
+    return Search(candidate, cost, 0, "converged", "taken over as it is")
 
 
 def _has_break_points(candidate: Candidate) -> bool:

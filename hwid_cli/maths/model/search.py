@@ -19,7 +19,7 @@ import numpy as np
 from hwid_cli.maths.model import sensitivities, static_map
 from hwid_cli.maths.model.candidates import Candidate, Experiment, thinned
 from hwid_cli.maths.model.levenberg_marquardt import Search, minimise
-from hwid_cli.maths.model.phases import finish, place
+from hwid_cli.maths.model.phases import finish, place, standing
 from hwid_cli.maths.model.placing import reaching
 from hwid_cli.maths.model.points import block_signals, point_of
 from hwid_cli.maths.model.race import SHORT, race
@@ -140,7 +140,7 @@ def search_beyond(
         A shorter search than `nonlinear_search`: only what promises more than to go on
         from the best of the contained models is finished.
     """
-    known = [_standing(one, experiments) for one in contained]
+    known = [standing(one, experiments) for one in contained]
     best = _best(known)
     best = _best([best, finish(best, experiments, options)])
     (leader,) = race(experiments, starts, orders, options, rounds=SHORT)
@@ -161,15 +161,9 @@ def _not_worse_than(
     if linear.cost >= best.cost:
         return best
     linear = finish(linear, experiments, options)
-    passing = _standing(_passing(linear, experiments, options), experiments)
+    passing = standing(_passing(linear, experiments, options), experiments)
     passing = replace(passing, iterations=linear.iterations)
     return _best([best, passing, finish(passing, experiments, options)])
-
-
-def _standing(candidate: Candidate, experiments: Sequence[Experiment]) -> Search:
-    """A candidate as a search that ends where it begins."""
-    cost = sensitivities.cost(candidate, experiments)
-    return Search(candidate, cost, 0, "converged", "taken over as it is")
 
 
 def _passing(

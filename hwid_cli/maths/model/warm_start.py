@@ -14,23 +14,27 @@ from dataclasses import replace
 
 import numpy as np
 
-from hwid_cli.maths.model.candidates import Candidate, Experiment
+from hwid_cli.maths.model.candidates import Candidate, Experiment, thinned
 from hwid_cli.maths.model.levenberg_marquardt import Search, minimise
-from hwid_cli.maths.model.phases import finish, place
+from hwid_cli.maths.model.phases import finish, place, standing
 from hwid_cli.maths.model.placing import coarser, finer, with_maps
 from hwid_cli.records.model import FitOptions, HammersteinWiener
 
-# Enough to adapt initial states and offsets, so that starts can be compared.
-_SCREENING_ITERATIONS = 4
+# Samples that count where starts are compared, and iterations of the best: enough to
+# adapt initial states and offsets.
+_ROWS, _SCREENING_ITERATIONS = 1000, 3
 # Groups are told apart by a threshold: the last tenth of a percent of the deviation is
 # not worth half of the time.
 _LEAST_GAIN = 1e-3
+# Cost that a start must reach, as a share of that of a contained model, to be finished.
+_WORTH_A_SECOND_LOOK = 0.9
 
 
 def warm_search(
     experiments: Sequence[Experiment],
     options: FitOptions,
     starts: Sequence[HammersteinWiener],
+    contained: Sequence[Candidate] = (),
 ) -> Search:
     """Hammerstein-Wiener model found from models that are near it.
 
@@ -42,28 +46,42 @@ def warm_search(
     starts : sequence of HammersteinWiener
         At least one; in the units of the experiments, with the orders and the kinds of
         maps that the result has.
+    contained : sequence of Candidate
+        Models of smaller orders, written with those of the result, which is not worse
+        than any of them.
 
     Returns
     -------
     Search
-        From the start that screens best; of equal ones the first.
+        From the start that is best for these experiments; of equal ones the first.
     """
-    screened = [
-        minimise(
-            _spread(_starting(one, experiments, options), experiments, options),
-            experiments,
-            with_positions=False,
-            max_iterations=min(_SCREENING_ITERATIONS, options.max_iterations),
-        )
-        for one in starts
-    ]
-    best = min(screened, key=lambda one: one.cost)
-    return finish(
-        place(best, experiments, options),
-        experiments,
-        options,
-        least_gain=_LEAST_GAIN,
+    few = thinned(experiments, _ROWS)
+    best = min(
+        (standing(_starting(one, experiments, options), few) for one in starts),
+        key=lambda one: one.cost,
     )
+    screened = minimise(
+        _spread(best.candidate, experiments, options),
+        few,
+        with_positions=False,
+        max_iterations=min(_SCREENING_ITERATIONS, options.max_iterations),
+    )
+    if not contained:
+        return _finished(place(screened, experiments, options), experiments, options)
+    known = min(
+        (standing(one, experiments) for one in contained), key=lambda one: one.cost
+    )
+    found = [known, _finished(known, experiments, options)]
+    if screened.cost < _WORTH_A_SECOND_LOOK * found[-1].cost:
+        placed = place(screened, experiments, options)
+        found.append(_finished(placed, experiments, options))
+    return min(found, key=lambda one: one.cost)
+
+
+def _finished(
+    one: Search, experiments: Sequence[Experiment], options: FitOptions
+) -> Search:
+    return finish(one, experiments, options, least_gain=_LEAST_GAIN)
 
 
 def _starting(
