@@ -12,7 +12,7 @@ from hwid_cli.cli.options import Choices, stage_options
 from hwid_cli.cli.stages import once
 
 if TYPE_CHECKING:
-    from hwid_cli.campaign.group import GroupPlan, RunLevel
+    from hwid_cli.campaign.group_plan import GroupPlan, RunLevel
     from hwid_cli.campaign.identify import Run
     from hwid_cli.cli.session import Session
     from hwid_cli.records.groups import GroupSearch
@@ -83,7 +83,7 @@ def show_groups(session: "Session", search: "GroupSearch") -> None:
 
 def _plan(session: "Session") -> "GroupPlan":
     """Everything that the search depends on, from the configuration."""
-    from hwid_cli.campaign.group import GroupPlan
+    from hwid_cli.campaign.group_plan import GroupPlan
     from hwid_cli.campaign.selection import select_recordings
     from hwid_cli.records.experiment import CrossvalOptions, GroupOptions
 

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from hwid_cli.campaign.cache import MemoryStore
-from hwid_cli.campaign.group import GroupPlan, group_key, search_all
+from hwid_cli.campaign.group import group_key, search_all
+from hwid_cli.campaign.group_plan import GroupPlan
 from hwid_cli.campaign.identify import identify_all
 from hwid_cli.campaign.runner import RunSettings, Workers, run_tasks
 from hwid_cli.maths.model.simulate import validation_output
