@@ -28,6 +28,8 @@ from hwid_cli.records.model import FitOptions, HammersteinWiener, Orders
 # Iterations of each round, and how many candidates go on after it.
 Rounds = tuple[tuple[int, int], ...]
 THOROUGH: Rounds = ((2, 4), (4, 2))
+# For where that has found no good minimum: everything that entered.
+LONG: Rounds = ((6, 5), (15, 2))
 # For one of many fits that help each other.
 SHORT: Rounds = ((2, 2), (4, 1))
 # Samples that count in a round; enough to tell candidates apart.
@@ -82,7 +84,8 @@ def race(
             if static_map.has_free_shape(options.output_map):
                 curved = _with_output_curve(candidate, experiments, options)
                 racing.append(_entered((start.is_expanded, True), curved, experiments))
-    racing = _leaders(racing, options.starts)
+    if rounds != LONG:
+        racing = _leaders(racing, options.starts)
     for iterations, count in rounds:
         racing = [_going_on(one, experiments, iterations) for one in racing]
         racing = _leaders(racing, count, _HOPELESS)

@@ -22,7 +22,7 @@ from hwid_cli.maths.model.levenberg_marquardt import Search, minimise
 from hwid_cli.maths.model.phases import finish, place, standing
 from hwid_cli.maths.model.placing import reaching
 from hwid_cli.maths.model.points import block_signals, point_of
-from hwid_cli.maths.model.race import SHORT, race
+from hwid_cli.maths.model.race import LONG, SHORT, race
 from hwid_cli.maths.model.starts import Start, linear_starts
 from hwid_cli.records.model import FitOptions, Orders
 
@@ -31,6 +31,8 @@ _RELAXED_BLOCKS = 2
 # Cost that a relaxed block must reach, as a share of the best so far, to be finished;
 # nearer to it the search has only come back to where it was.
 _WORTH_GOING_ON = 0.995
+# Correlation of neighbouring residuals from which on the search is not taken for done.
+_COLOURED = 0.5
 # The same of another start's maps with many break-points, against a contained model's.
 _WORTH_A_SECOND_LOOK = 0.97
 # The same before its break-points are placed, which gains this much at most.
@@ -111,7 +113,28 @@ def nonlinear_search(
     relaxed = _relaxed(best, experiments, orders, options)
     if relaxed.cost < _WORTH_GOING_ON * best.cost:
         best = _best([best, finish(relaxed, experiments, options)])
+    if _leaves_structure(best, experiments):
+        best = _best([best, *_searched_again(experiments, starts, orders, options)])
     return _not_worse_than(linear, best, experiments, options)
+
+
+def _searched_again(
+    experiments: Sequence[Experiment],
+    starts: Sequence[Start],
+    orders: Orders,
+    options: FitOptions,
+) -> list[Search]:
+    """A long race of all starts, for where the short one has found no good minimum."""
+    found = race(experiments, starts, orders, options, rounds=LONG)
+    placed = [place(one, experiments, options) for one in found]
+    return [finish(_best(placed), experiments, options)]
+
+
+def _leaves_structure(best: Search, experiments: Sequence[Experiment]) -> bool:
+    """Tell whether residuals follow their neighbours, as noise of a sensor does not."""
+    residuals = sensitivities.simulated(point_of(best.candidate), experiments).residuals
+    following = sum(float(one[1:] @ one[:-1]) for one in residuals)
+    return following > _COLOURED * sum(float(one @ one) for one in residuals)
 
 
 def search_beyond(

@@ -25,6 +25,9 @@ from hwid_cli.records.model import Orders
 LARGEST_RADIUS = 0.9995
 # Added to the diagonal of the scaled products: directions weaker than this are noise.
 _RIDGE, _RIDGE_GROWTH = 1e-10, 1e3
+# Added to the squared norm of the free responses' columns: an initial state far beyond the
+# output's size, which is one, is no start.
+_STATE_RIDGE = 1e-2
 # Share of the cost without a level that one with it must reach.
 _WORTH_A_LEVEL = 0.95
 
@@ -207,6 +210,9 @@ def _products(one: Regression, denominator: np.ndarray) -> np.ndarray:
             rows,
         )
         total += rows.T @ rows
+    first = n_poles + orders.nb * one.n_inputs
+    states = np.arange(first, first + one.n_states)
+    total[states, states] += _STATE_RIDGE
     return total
 
 
