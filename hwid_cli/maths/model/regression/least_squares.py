@@ -211,8 +211,8 @@ def _products(one: Regression, denominator: np.ndarray) -> np.ndarray:
         )
         total += rows.T @ rows
     first = n_poles + orders.nb * one.n_inputs
-    states = np.arange(first, first + one.n_states)
-    total[states, states] += _STATE_RIDGE
+    states = slice(first, first + one.n_states)
+    total[states, states] += _STATE_RIDGE * np.eye(one.n_states)
     return total
 
 
