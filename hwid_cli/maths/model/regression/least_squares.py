@@ -210,8 +210,8 @@ def _products(one: Regression, denominator: np.ndarray) -> np.ndarray:
             rows,
         )
         total += rows.T @ rows
-    first = n_poles + orders.nb * one.n_inputs
-    states = slice(first, first + one.n_states)
+    begin = n_poles + orders.nb * one.n_inputs
+    states = slice(begin, begin + one.n_states)
     total[states, states] += _STATE_RIDGE * np.eye(one.n_states)
     return total
 
