@@ -1,10 +1,11 @@
-"""The Hammerstein-Wiener model, its orders, the options of a fit and its result."""
+"""The Hammerstein-Wiener model, the options of a fit and its result."""
 
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from hwid_cli.records.information import Information
+from hwid_cli.records.linear_block import Orders
 from hwid_cli.records.maps import MAP_KINDS, MapOptions, OwnFunction, StaticMap
 from hwid_cli.records.recordings import frozen_vector
 from hwid_cli.records.stored import ADDED_LATER
@@ -12,43 +13,8 @@ from hwid_cli.records.uncertainty import Uncertainty
 
 INITIAL_STATES = ("zero", "steady", "estimated")
 JOINS = ("concatenate", "experiments")
+LOSSES = ("squared", "huber")
 FIT_STATUSES = ("converged", "iteration_limit", "stalled", "failed")
-
-
-@dataclass(frozen=True, order=True)
-class Orders:
-    """Orders of the linear block B(q)/F(q), as in MATLAB's ``[nb nf nk]``.
-
-    Parameters
-    ----------
-    nb : int, [-]
-        Number of numerator coefficients, at least 1.
-    nf : int, [-]
-        Number of poles, at least 0.
-    nk : int, [samples]
-        Delay from input to output, at least 0.
-
-    Raises
-    ------
-    ValueError
-        If an order is out of its range.
-    """
-
-    nb: int
-    nf: int
-    nk: int
-
-    def __post_init__(self) -> None:
-        for name, least in (("nb", 1), ("nf", 0), ("nk", 0)):
-            value = getattr(self, name)
-            if value != int(value) or value < least:
-                raise ValueError(f"{name} must be an integer >= {least}, got {value!r}")
-            object.__setattr__(self, name, int(value))
-
-    @property
-    def n_state(self) -> int:
-        """Number of past values that the linear block remembers."""
-        return max(self.nf, self.nb + self.nk - 1)
 
 
 @dataclass(frozen=True)
@@ -79,6 +45,9 @@ class FitOptions:
         Number of linear starts that are screened.
     input_function, output_function : OwnFunction or None
         The functions of maps that are ``own_function``.
+    loss : str
+        How residuals count in the search: ``squared``, or ``huber``, which takes large
+        ones for outliers.
     """
 
     input_map: str = "piecewise_linear"
@@ -94,6 +63,7 @@ class FitOptions:
     output_units: int | None = None
     input_function: OwnFunction | None = None
     output_function: OwnFunction | None = None
+    loss: str = field(default="squared", metadata=ADDED_LATER)
 
     def __post_init__(self) -> None:
         for name, allowed in (
@@ -101,6 +71,7 @@ class FitOptions:
             ("output_map", MAP_KINDS),
             ("initial_state", INITIAL_STATES),
             ("join", JOINS),
+            ("loss", LOSSES),
         ):
             if getattr(self, name) not in allowed:
                 raise ValueError(

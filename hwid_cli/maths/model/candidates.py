@@ -21,10 +21,14 @@ class Experiment:
     Parameters
     ----------
     input, output : ndarray, shape (n,)
+    threshold : float
+        Size from which on a residual counts in proportion instead of squared (see
+        `loss`); the same for all experiments of a fit.
     """
 
     input: np.ndarray
     output: np.ndarray
+    threshold: float = float("inf")
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,7 @@ docs/method.md, sections "The fit" and "The search".
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -22,6 +22,8 @@ from hwid_cli.maths.model.levenberg_marquardt import Search
 from hwid_cli.maths.model.linear_block import is_stable, poles
 from hwid_cli.maths.model.normalise import normalise, rescaled
 from hwid_cli.maths.model.placing import with_maps
+from hwid_cli.maths.model.problem import Problem, joined, rmsd, scaled
+from hwid_cli.maths.model.robust import rejudged, renewed, settled, winsorised
 from hwid_cli.maths.model.search import (
     linear_search,
     nonlinear_search,
@@ -35,15 +37,6 @@ from hwid_cli.records.model import Fit, FitOptions, HammersteinWiener, Orders
 from hwid_cli.records.recordings import Recording
 
 _DEFAULTS = FitOptions()
-
-
-@dataclass(frozen=True, eq=False)
-class _Problem:
-    """Scaled experiments and what they were divided by."""
-
-    experiments: tuple[Experiment, ...]
-    input_scale: float
-    output_scale: float
 
 
 def fit(
@@ -110,17 +103,20 @@ def fit(
     reason = _reason_not_to_fit(recordings, orders, options)
     if reason:
         return replace(blank, message=reason)
-    problem = _scaled(recordings, options)
+    problem = scaled(recordings, options)
     options = options.in_units(problem.input_scale, problem.output_scale)
     linear_rmsd = float("nan")
     try:
         search = _warm_search(problem, options, starts)
         if search is None:
-            starts_found = _starts(problem, orders, options)
-            linear = linear_search(problem.experiments, orders, options, starts_found)
-            linear_rmsd = _rmsd(linear, problem)
+            starts_found, linear = _linear(problem, orders, options)
+            linear_rmsd = rmsd(linear, problem)
+            problem = _with_threshold(problem, linear)
             known = _contained(problem, orders, options, contained)
-            search = _search(problem, orders, options, (starts_found, linear, known))
+            found = (starts_found, linear, known)
+            search = _search(problem, orders, options, found)
+            search = _again(search, problem, orders, options, found)
+        search, experiments = settled(search, problem.experiments, options)
     except np.linalg.LinAlgError as error:
         return replace(blank, message=f"linear algebra failed: {error}")
     if not np.isfinite(search.cost) or not is_stable(
@@ -130,12 +126,15 @@ def fit(
             blank, message="no start gave a stable model", linear_rmsd=linear_rmsd
         )
     return _described(
-        replace(blank, linear_rmsd=linear_rmsd), search, recordings, problem
+        replace(blank, linear_rmsd=linear_rmsd),
+        search,
+        recordings,
+        replace(problem, experiments=tuple(experiments)),
     )
 
 
 def _warm_search(
-    problem: _Problem, options: FitOptions, starts: Sequence[HammersteinWiener]
+    problem: Problem, options: FitOptions, starts: Sequence[HammersteinWiener]
 ) -> Search | None:
     """Search near the starts; None where none is stable or no model came of them."""
     scaled = [
@@ -156,7 +155,7 @@ def _warm_search(
 
 
 def _search(
-    problem: _Problem,
+    problem: Problem,
     orders: Orders,
     options: FitOptions,
     found: tuple[tuple[Start, ...], Search, list[Candidate]],
@@ -173,7 +172,7 @@ def _search(
 
 
 def _contained(
-    problem: _Problem,
+    problem: Problem,
     orders: Orders,
     options: FitOptions,
     models: Sequence[HammersteinWiener],
@@ -194,11 +193,51 @@ def _contained(
     return candidates
 
 
+def _again(
+    first: Search,
+    problem: Problem,
+    orders: Orders,
+    options: FitOptions,
+    found: tuple[tuple[Start, ...], Search, list[Candidate]],
+) -> Search:
+    """The better of a search and a second one that knows which samples are outliers."""
+    if options.loss == "squared" or _is_linear(options):
+        return first
+    first, experiments = settled(first, problem.experiments, options)
+    starts = _starts(winsorised(first, experiments), orders, options)
+    second = _search(problem, orders, options, (starts, *found[1:]))
+    second, experiments = settled(second, problem.experiments, options)
+    first = rejudged(first, experiments)
+    return min(first, rejudged(second, experiments), key=lambda one: one.cost)
+
+
+def _with_threshold(problem: Problem, search: Search) -> Problem:
+    """Problem with the threshold that a search's residuals ask for."""
+    experiments = renewed(problem.experiments, [search.candidate])
+    return replace(problem, experiments=tuple(experiments))
+
+
+def _linear(
+    problem: Problem, orders: Orders, options: FitOptions
+) -> tuple[tuple[Start, ...], Search]:
+    """Linear starts and linear model; found again where outliers were in the way."""
+    experiments: Sequence[Experiment] = problem.experiments
+    starts = _starts(experiments, orders, options)
+    linear = linear_search(experiments, orders, options, starts)
+    if options.loss == "squared":
+        return starts, linear
+    starts = _starts(winsorised(linear, experiments), orders, options)
+    experiments = renewed(experiments, [linear.candidate])
+    again = linear_search(experiments, orders, options, starts)
+    linear = rejudged(linear, experiments)
+    return starts, min(linear, again, key=lambda one: one.cost)
+
+
 def _starts(
-    problem: _Problem, orders: Orders, options: FitOptions
+    experiments: Sequence[Experiment], orders: Orders, options: FitOptions
 ) -> tuple[Start, ...]:
     return linear_starts(
-        problem.experiments,
+        experiments,
         orders,
         options=options,
         sees_input_map=has_free_shape(options.input_map),
@@ -236,44 +275,21 @@ def _least_parameters(orders: Orders, options: FitOptions) -> int:
     return orders.nb + orders.nf + sum(one.parameters.size for one in maps)
 
 
-def _joined(
-    recordings: Sequence[Recording], options: FitOptions
-) -> tuple[Experiment, ...]:
-    """Recordings joined as the options say."""
-    if options.join == "experiments":
-        return tuple(Experiment(one.input, one.output) for one in recordings)
-    return (
-        Experiment(
-            np.concatenate([one.input for one in recordings]),
-            np.concatenate([one.output for one in recordings]),
-        ),
-    )
-
-
-def _scaled(recordings: Sequence[Recording], options: FitOptions) -> _Problem:
-    """Experiments divided by their size, so that one damping suits all."""
-    experiments = _joined(recordings, options)
-    input_scale = max(float(np.max(np.abs(one.input))) for one in experiments)
-    output_scale = float(np.std(np.concatenate([one.output for one in experiments])))
-    scaled = tuple(
-        Experiment(one.input / input_scale, one.output / output_scale)
-        for one in experiments
-    )
-    return _Problem(scaled, input_scale, output_scale)
-
-
 def _described(
-    blank: Fit, search: Search, recordings: Sequence[Recording], problem: _Problem
+    blank: Fit, search: Search, recordings: Sequence[Recording], problem: Problem
 ) -> Fit:
     """The winner in the units of the data, with all that is said about it."""
     candidate = with_maps(search.candidate, problem.experiments, static_map.with_domain)
     candidate = _in_units(candidate, problem, recordings[0])
-    experiments = _joined(recordings, blank.options)
+    experiments = joined(recordings, blank.options)
     simulated = np.concatenate(sensitivities.simulated_outputs(candidate, experiments))
     measured = np.concatenate([one.output for one in experiments])
     first = candidate.free_responses[0]
+    threshold = problem.experiments[0].threshold * problem.output_scale
     uncertainty, information = judged_parameters(
-        candidate, experiments, free_break_points=blank.options.free_break_points
+        candidate,
+        [replace(one, threshold=threshold) for one in experiments],
+        free_break_points=blank.options.free_break_points,
     )
     return replace(
         blank,
@@ -290,7 +306,7 @@ def _described(
     )
 
 
-def _in_units(candidate: Candidate, problem: _Problem, like: Recording) -> Candidate:
+def _in_units(candidate: Candidate, problem: Problem, like: Recording) -> Candidate:
     """Normalised candidate for the data as they are."""
     states = candidate.free_responses
     # The initial states of all experiments change their unit together with the model.
@@ -303,8 +319,3 @@ def _in_units(candidate: Candidate, problem: _Problem, like: Recording) -> Candi
     )
     model = normalise(rescaled(scaled, problem.input_scale, problem.output_scale))
     return Candidate(model, model.free_response.reshape(states.shape))
-
-
-def _rmsd(search: Search, problem: _Problem) -> float:
-    samples = sum(one.output.size for one in problem.experiments)
-    return float(np.sqrt(search.cost / samples)) * problem.output_scale

@@ -59,7 +59,7 @@ class Search:
     ----------
     candidate : Candidate
     cost : float
-        Sum of squared residuals.
+        Sum of squared residuals, or of their losses.
     iterations : int, [-]
     status : str
         ``converged``, ``iteration_limit`` or ``stalled``.

@@ -23,6 +23,7 @@ from hwid_cli.maths.model.phases import finish, place
 from hwid_cli.maths.model.placing import reaching
 from hwid_cli.maths.model.points import block_signals, point_of
 from hwid_cli.maths.model.race import race
+from hwid_cli.maths.model.robust import rejudged, renewed
 from hwid_cli.maths.model.starts import Start, linear_starts
 from hwid_cli.records.model import FitOptions, Orders
 
@@ -91,6 +92,7 @@ def nonlinear_search(
         Its iterations are those of the winning chain.
     """
     finalists = race(experiments, starts, orders, options)
+    experiments = renewed(experiments, [one.candidate for one in finalists])
     placed = [place(one, experiments, options) for one in finalists]
     best = finish(_best(placed), experiments, options)
     relaxed = _relaxed(best, experiments, orders, options)
@@ -125,6 +127,7 @@ def search_beyond(
         A shorter search than `nonlinear_search`: only what promises more than to go on
         from the best of the contained models is finished.
     """
+    experiments = renewed(experiments, contained)
     known = [_standing(one, experiments) for one in contained]
     best = _best(known)
     best = _best([best, finish(best, experiments, options)])
@@ -142,6 +145,7 @@ def _not_worse_than(
     options: FitOptions,
 ) -> Search:
     """The best so far, or what comes of the linear model where that is better."""
+    linear = rejudged(linear, experiments)
     if linear.cost >= best.cost:
         return best
     passing = _standing(_passing(linear, experiments, options), experiments)
@@ -219,7 +223,8 @@ def _between_maps(
             output_map, x, scratch, 0, with_positions=True
         )
         held_back = slope**2 + _FLAT * float(np.mean(slope**2)) + 1e-300
-        result.append(Experiment(w, x + (one.output - y) * slope / held_back))
+        error = np.clip(one.output - y, -one.threshold, one.threshold)
+        result.append(Experiment(w, x + error * slope / held_back))
     return result
 
 

@@ -18,6 +18,7 @@ from hwid_cli.maths.model.candidates import Candidate, Experiment
 from hwid_cli.maths.model.levenberg_marquardt import Search, minimise
 from hwid_cli.maths.model.phases import finish, place
 from hwid_cli.maths.model.placing import finer, thinned, with_maps
+from hwid_cli.maths.model.robust import renewed
 from hwid_cli.records.model import FitOptions, HammersteinWiener
 
 # Enough to adapt initial states and offsets, so that starts can be compared.
@@ -57,6 +58,7 @@ def warm_search(
         )
         for one in starts
     ]
+    experiments = renewed(experiments, [one.candidate for one in screened])
     best = min(screened, key=lambda one: one.cost)
     return finish(
         place(best, experiments, options),
