@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from hwid_cli.records.information import Information
-from hwid_cli.records.linear_block import Orders
+from hwid_cli.records.linear_block import LinearBlock, Orders
 from hwid_cli.records.maps import MAP_KINDS, MapOptions, OwnFunction, StaticMap
 from hwid_cli.records.recordings import frozen_vector
 from hwid_cli.records.stored import ADDED_LATER
@@ -48,6 +48,11 @@ class FitOptions:
     loss : str
         How residuals count in the search: ``squared``, or ``huber``, which takes large
         ones for outliers.
+    linear_block : LinearBlock or None
+        One that is known. Frozen it stays bit by bit, and only maps and initial states
+        are fitted; else it is one more start for all orders that contain it.
+    largest_pole_radius : float, [-]
+        No pole lies further from zero; 1 asks for stability only.
     """
 
     input_map: str = "piecewise_linear"
@@ -64,6 +69,8 @@ class FitOptions:
     input_function: OwnFunction | None = None
     output_function: OwnFunction | None = None
     loss: str = field(default="squared", metadata=ADDED_LATER)
+    linear_block: LinearBlock | None = None
+    largest_pole_radius: float = field(default=1.0, metadata=ADDED_LATER)
 
     def __post_init__(self) -> None:
         for name, allowed in (
@@ -87,12 +94,22 @@ class FitOptions:
             value = getattr(self, name)
             if value != int(value) or value < least:
                 raise ValueError(f"{name} must be an integer >= {least}, got {value!r}")
+        if not 0.0 < self.largest_pole_radius <= 1.0:
+            raise ValueError(
+                "largest_pole_radius must be a number above 0 and at most 1, got "
+                f"{self.largest_pole_radius!r}"
+            )
         for side in ("input", "output"):
             try:
                 getattr(self, f"of_{side}")
             except ValueError as error:
                 # What a map refuses, under the name of the key that asked for it.
                 raise ValueError(f"{side}_{error}") from None
+
+    @property
+    def keeps_block(self) -> bool:
+        """Whether the linear block is given and stays as it is."""
+        return self.linear_block is not None and self.linear_block.frozen
 
     @property
     def of_input(self) -> MapOptions:
@@ -117,12 +134,14 @@ class FitOptions:
         Returns
         -------
         FitOptions
-            Own functions go on seeing the data as they were.
+            Own functions and a given linear block mean the same as before.
         """
+        block = self.linear_block
         return replace(
             self,
             input_function=_in_unit(self.input_function, input_unit),
             output_function=_in_unit(self.output_function, output_unit),
+            linear_block=block and block.in_units(input_unit, output_unit),
         )
 
 

@@ -93,6 +93,7 @@ class _Descent:
     experiments: Sequence[Experiment]
     place: Columns
     stride: int
+    largest_pole_radius: float
 
     @property
     def samples(self) -> int:
@@ -129,7 +130,8 @@ def minimise(
     Search
     """
     place = columns(candidate, with_positions=with_positions)
-    descent = _Descent(experiments, place, stride)
+    radius = candidate.limits.largest_pole_radius
+    descent = _Descent(experiments, place, stride, radius)
     point = point_of(candidate)
     found = simulated(point, experiments, stride)
     enough = _ROUNDING * sum(float(one.output @ one.output) for one in experiments)
@@ -140,6 +142,8 @@ def minimise(
             candidate_at(point, candidate), found.cost, iteration, status, why
         )
 
+    if place.total == 0:
+        return end("converged", "no parameter may move")
     while iteration < max_iterations:
         if found.cost <= enough:
             return end("converged", "the residual is rounding error")
@@ -180,7 +184,7 @@ def _accepted_step(
             predicted = float(step @ (damping * step + vector))
             promised = predicted if promised is None else promised
             proposed = moved(point, scale * step, place)
-            if is_stable(proposed.denominator):
+            if is_stable(proposed.denominator, descent.largest_pole_radius):
                 tried = simulated(proposed, descent.experiments, descent.stride)
                 lowered = total - tried.cost - weight * _squared_bends(proposed, point)
                 if lowered > 0.0:

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hwid_cli.maths.model import static_map
-from hwid_cli.maths.model.candidates import Candidate, Experiment, stride_for
+from hwid_cli.maths.model.candidates import Candidate, Experiment, limits_of, stride_for
 from hwid_cli.maths.model.levenberg_marquardt import Search, minimise
 from hwid_cli.maths.model.maps.kernels import piecewise_linear_shares
 from hwid_cli.maths.model.placing import reaching
@@ -43,7 +43,7 @@ _HOPELESS = 9.0
 class _Runner:
     """A candidate in the race and the kind of start that it came from."""
 
-    family: tuple[bool, bool]
+    family: tuple[bool, ...]
     search: Search
 
 
@@ -75,11 +75,12 @@ def race(
     stride = stride_for(experiments, RACE_ROWS)
     racing = []
     for start in starts:
+        kind = (start.is_given, start.is_expanded)
         for candidate in starting_candidates(experiments, start, orders, options):
-            racing.append(_entered((start.is_expanded, False), candidate, experiments))
+            racing.append(_entered((*kind, False), candidate, experiments))
             if static_map.has_free_shape(options.output_map):
                 curved = _with_output_curve(candidate, experiments, options)
-                racing.append(_entered((start.is_expanded, True), curved, experiments))
+                racing.append(_entered((*kind, True), curved, experiments))
     racing = _leaders(racing, options.starts)
     for iterations, count in (_FIRST_ROUND, (_LAST_ROUND, finalists)):
         racing = [_going_on(one, experiments, iterations, stride) for one in racing]
@@ -128,7 +129,7 @@ def starting_candidates(
         )
         _, x = reaching(Candidate(model, states), experiments)
         candidates += [
-            Candidate(replace(model, output_map=output_map), states)
+            Candidate(replace(model, output_map=output_map), states, limits_of(options))
             for output_map in static_map.starting_maps(
                 options.output_map,
                 options.of_output,
@@ -165,7 +166,7 @@ def _with_output_curve(
 
 
 def _entered(
-    family: tuple[bool, bool], candidate: Candidate, experiments: Sequence[Experiment]
+    family: tuple[bool, ...], candidate: Candidate, experiments: Sequence[Experiment]
 ) -> _Runner:
     stride = stride_for(experiments, RACE_ROWS)
     cost = simulated(point_of(candidate), experiments, stride).cost

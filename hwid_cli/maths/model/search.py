@@ -95,7 +95,9 @@ def nonlinear_search(
     experiments = renewed(experiments, [one.candidate for one in finalists])
     placed = [place(one, experiments, options) for one in finalists]
     best = finish(_best(placed), experiments, options)
-    relaxed = _relaxed(best, experiments, orders, options)
+    relaxed = best
+    if not options.keeps_block:
+        relaxed = _relaxed(best, experiments, orders, options)
     if relaxed.cost < _WORTH_GOING_ON * best.cost:
         best = _best([best, finish(relaxed, experiments, options)])
     return _not_worse_than(linear, best, experiments, options)
@@ -181,7 +183,7 @@ def _relaxed(
 ) -> Search:
     """Find the linear block anew between the maps of the best model."""
     between = _between_maps(best.candidate, experiments)
-    model = best.candidate.model
+    model, n_state = best.candidate.model, best.candidate.free_responses.shape[1]
     starts = linear_starts(
         between,
         orders,
@@ -192,9 +194,12 @@ def _relaxed(
     )
     found = [
         minimise(
-            Candidate(
-                replace(model, numerator=one.numerator, denominator=one.denominator),
-                one.free_responses[:, : best.candidate.free_responses.shape[1]],
+            replace(
+                best.candidate,
+                model=replace(
+                    model, numerator=one.numerator, denominator=one.denominator
+                ),
+                free_responses=one.free_responses[:, :n_state],
             ),
             experiments,
             with_positions=False,

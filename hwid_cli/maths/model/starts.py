@@ -12,13 +12,14 @@ Steiglitz, McBride (1965); Bai (1998) for the expanded input. docs/method.md, se
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from hwid_cli.maths.model.candidates import Experiment
 from hwid_cli.maths.model.linear_block import difference_basis
 from hwid_cli.maths.model.regression.least_squares import (
+    LARGEST_RADIUS,
     Regression,
     Solution,
     regression,
@@ -55,6 +56,8 @@ class Start:
         Constant that belongs to the output.
     free_responses : ndarray, shape (n_experiments, n_state)
         Initial states that belong to it; zero where none were sought.
+    is_given : bool
+        Whether it comes from the user instead of the data.
     """
 
     numerator: np.ndarray
@@ -64,6 +67,7 @@ class Start:
     input_values: np.ndarray
     offset: float
     free_responses: np.ndarray
+    is_given: bool = False
 
     @property
     def is_expanded(self) -> bool:
@@ -115,6 +119,8 @@ def linear_starts(
             and len(experiments) <= _MOST_FREE_RESPONSES,
             stride=max(1, joined.size // _ROWS),
         )
+        radius = LARGEST_RADIUS * options.largest_pole_radius
+        problem = replace(problem, largest_radius=radius)
         found: list[Solution] = []
         for prefilter in prefilters or _prefilters(orders):
             found += _iterations(problem, prefilter)

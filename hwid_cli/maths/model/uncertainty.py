@@ -18,7 +18,7 @@ from dataclasses import replace
 import numpy as np
 
 from hwid_cli.maths.model import sensitivities
-from hwid_cli.maths.model.candidates import Candidate, Experiment
+from hwid_cli.maths.model.candidates import Candidate, Experiment, limits_of
 from hwid_cli.maths.model.flat_directions import flat_sentences
 from hwid_cli.maths.model.identifiability import (
     Directions,
@@ -163,7 +163,8 @@ def _as_fitted(
         states += [estimated_state(model, one) for one in others]
     else:
         states = [np.zeros(0) for _ in experiments]
-    return Candidate(model, np.array(states)), experiments
+    limits = limits_of(fit.options)
+    return Candidate(model, np.array(states), limits), experiments
 
 
 def _covariance(found: Directions, variance: float) -> np.ndarray:

@@ -14,7 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from hwid_cli.maths.model.candidates import Candidate, Experiment
+from hwid_cli.maths.model.candidates import Candidate, Experiment, limits_of
 from hwid_cli.maths.model.levenberg_marquardt import Search, minimise
 from hwid_cli.maths.model.phases import finish, place
 from hwid_cli.maths.model.placing import finer, thinned, with_maps
@@ -77,6 +77,7 @@ def _starting(
     return Candidate(
         replace(model, free_response=np.zeros(0), initial_state=options.initial_state),
         np.zeros((len(experiments), n_state)),
+        limits_of(options),
     )
 
 

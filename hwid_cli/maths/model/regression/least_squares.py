@@ -43,6 +43,8 @@ class Regression:
         Whether the output may have an offset and an initial state of its own.
     stride : int, [samples]
         Every `stride`-th sample is an equation.
+    largest_radius : float, [-]
+        Poles further out are drawn in.
     """
 
     experiments: tuple[Experiment, ...]
@@ -52,6 +54,7 @@ class Regression:
     has_level: bool
     has_free_response: bool
     stride: int
+    largest_radius: float = LARGEST_RADIUS
 
     @property
     def is_expanded(self) -> bool:
@@ -175,7 +178,7 @@ def solve(one: Regression, denominator: np.ndarray) -> tuple[Solution, np.ndarra
     )
     past, _ = _least_squares(products, all_known, target - 1)
     tail = difference_basis(n_poles) @ past[:n_poles]
-    return solution, _stabilised(np.concatenate([[1.0], tail]))
+    return solution, _stabilised(np.concatenate([[1.0], tail]), one.largest_radius)
 
 
 def _products(one: Regression, denominator: np.ndarray) -> np.ndarray:
@@ -227,9 +230,9 @@ def _least_squares(
     return solution / scale, max(float(cost), 0.0)
 
 
-def _stabilised(denominator: np.ndarray) -> np.ndarray:
-    """Denominator with all poles well inside the unit circle."""
-    drawn_in = denominator * LARGEST_RADIUS ** -np.arange(denominator.size)
+def _stabilised(denominator: np.ndarray, largest_radius: float) -> np.ndarray:
+    """Denominator with all poles well inside the circle that they may fill."""
+    drawn_in = denominator * largest_radius ** -np.arange(denominator.size)
     if is_stable(drawn_in):
         return denominator
-    return reflected(denominator, LARGEST_RADIUS)
+    return reflected(denominator, largest_radius)
