@@ -53,6 +53,11 @@ def check_experiment(experiment: Experiment) -> None:
         _check_calibrate(experiment.calibrate, file)
     _check_orders(experiment.orders, file)
     _check_block(experiment, file)
+    if experiment.fit.delays and experiment.orders.nk_role == "delay":
+        raise ConfigError(
+            f"{file}: fit.delays: found {list(experiment.fit.delays)}; expected none with "
+            "orders.nk_role: delay, where the grid tries the delays; remove one of the two"
+        )
     if experiment.crossval is not None:
         require(
             experiment.crossval.threshold > 0,

@@ -1,5 +1,6 @@
 """The Hammerstein-Wiener model, the options of a fit and its result."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -53,6 +54,9 @@ class FitOptions:
         are fitted; else it is one more start for all orders that contain it.
     largest_pole_radius : float, [-]
         No pole lies further from zero; 1 asks for stability only.
+    delays : tuple of int, [samples]
+        Delays that are tried; the one of the orders where there are none. The result's
+        orders say which one was found.
     """
 
     input_map: str = "piecewise_linear"
@@ -71,6 +75,7 @@ class FitOptions:
     loss: str = field(default="squared", metadata=ADDED_LATER)
     linear_block: LinearBlock | None = None
     largest_pole_radius: float = field(default=1.0, metadata=ADDED_LATER)
+    delays: tuple[int, ...] = field(default=(), metadata=ADDED_LATER)
 
     def __post_init__(self) -> None:
         for name, allowed in (
@@ -99,12 +104,31 @@ class FitOptions:
                 "largest_pole_radius must be a number above 0 and at most 1, got "
                 f"{self.largest_pole_radius!r}"
             )
+        object.__setattr__(self, "delays", _checked_delays(self.delays))
+        if self.delays and self.keeps_block:
+            raise ValueError(
+                f"delays must be empty beside a frozen linear block, got {self.delays}"
+            )
         for side in ("input", "output"):
             try:
                 getattr(self, f"of_{side}")
             except ValueError as error:
                 # What a map refuses, under the name of the key that asked for it.
                 raise ValueError(f"{side}_{error}") from None
+
+    def delays_for(self, orders: Orders) -> tuple[int, ...]:
+        """Delays that a fit of some orders tries, that of the orders first if it may.
+
+        Parameters
+        ----------
+        orders : Orders
+
+        Returns
+        -------
+        tuple of int, [samples]
+        """
+        delays = self.delays or (orders.nk,)
+        return tuple(sorted(delays, key=lambda nk: (nk != orders.nk, nk)))
 
     @property
     def keeps_block(self) -> bool:
@@ -143,6 +167,12 @@ class FitOptions:
             output_function=_in_unit(self.output_function, output_unit),
             linear_block=block and block.in_units(input_unit, output_unit),
         )
+
+
+def _checked_delays(delays: Sequence[int]) -> tuple[int, ...]:
+    if any(value != int(value) or value < 0 for value in delays):
+        raise ValueError(f"delays must be integers >= 0, got {list(delays)}")
+    return tuple(sorted({int(value) for value in delays}))
 
 
 def _in_unit(function: OwnFunction | None, unit: float) -> OwnFunction | None:
@@ -206,6 +236,7 @@ class Fit:
     identified_on : tuple of str
         Names of the recordings, in the order in which they were joined.
     orders : Orders
+        With the delay that was found, where several were tried.
     options : FitOptions
     model : HammersteinWiener or None
         None where no usable model was found.

@@ -73,3 +73,15 @@ def test_a_block_that_is_a_start_may_be_of_any_orders(tmp_path):
     assert load(
         tmp_path, "{nb: [1, 3], nk: [1, 3]}", BLOCK.replace("true", "false")
     ).fit.linear_block
+
+
+def test_delays_are_read_and_refused_where_the_grid_tries_them(tmp_path):
+    path = tmp_path / "c.yaml"
+    path.write_text("name: c\nfit: {delays: [3, 1]}\n", encoding="utf-8")
+    assert load_experiment(path).fit.delays == (1, 3)
+    path.write_text(
+        "name: c\norders: {nk_role: delay, nf: 2}\nfit: {delays: [3, 1]}\n",
+        encoding="utf-8",
+    )
+    with pytest.raises(ConfigError, match=r"fit.delays: found \[1, 3\]; expected none"):
+        load_experiment(path)

@@ -14,6 +14,7 @@ import numpy as np
 
 from hwid_cli.maths.model.candidates import Candidate, Experiment, limits_of
 from hwid_cli.maths.model.contained import contains, enlarged
+from hwid_cli.maths.model.delays import starts_of_delays
 from hwid_cli.maths.model.levenberg_marquardt import Search
 from hwid_cli.maths.model.linear_block import filtered, is_stable, reflected
 from hwid_cli.maths.model.normalise import rescaled
@@ -21,7 +22,7 @@ from hwid_cli.maths.model.problem import Problem
 from hwid_cli.maths.model.regression.least_squares import LARGEST_RADIUS
 from hwid_cli.maths.model.robust import rejudged, renewed, winsorised
 from hwid_cli.maths.model.search import linear_search
-from hwid_cli.maths.model.starts import Start, linear_starts
+from hwid_cli.maths.model.starts import Start
 from hwid_cli.maths.model.static_map import has_free_shape
 from hwid_cli.records.model import FitOptions, HammersteinWiener, Orders
 
@@ -46,12 +47,12 @@ def linear_beginnings(
     """
     experiments: Sequence[Experiment] = problem.experiments
     starts = block_starts(experiments, orders, options)
-    linear = linear_search(experiments, orders, options, starts)
+    linear = linear_search(experiments, options, starts)
     if options.loss == "squared":
         return starts, linear
     starts = block_starts(winsorised(linear, experiments), orders, options)
     experiments = renewed(experiments, [linear.candidate])
-    again = linear_search(experiments, orders, options, starts)
+    again = linear_search(experiments, options, starts)
     linear = rejudged(linear, experiments)
     return starts, min(linear, again, key=lambda one: one.cost)
 
@@ -73,17 +74,21 @@ def block_starts(
     tuple of Start
         At least one; a frozen block is the only one.
     """
-    given = _given_start(experiments, orders, options)
     if options.keeps_block:
-        return given
-    found = linear_starts(
+        return _given_start(experiments, orders, options)
+    of_delays = starts_of_delays(
         experiments,
         orders,
         options=options,
         sees_input_map=has_free_shape(options.input_map),
         count=options.starts,
     )
-    return found + given
+    found: tuple[Start, ...] = ()
+    for starts in of_delays:
+        found += starts
+        at = replace(orders, nk=starts[0].delay)
+        found += _given_start(experiments, at, options)
+    return found
 
 
 def contained_candidates(
@@ -109,14 +114,18 @@ def contained_candidates(
     """
     if options.keeps_block:
         return []
-    count, is_estimated = len(problem.experiments), options.initial_state == "estimated"
-    n_state = orders.n_state if is_estimated else 0
+    count = len(problem.experiments)
     candidates = []
     for model in models:
+        # With several delays a smaller model may have found another one than this one.
+        tried = [replace(orders, nk=nk) for nk in (orders.nk, model.delay)]
+        at = next((one for one in tried if contains(one, model.orders)), None)
+        if at is None:
+            continue
         larger = enlarged(
-            rescaled(model, 1.0 / problem.input_scale, 1.0 / problem.output_scale),
-            orders,
+            rescaled(model, 1.0 / problem.input_scale, 1.0 / problem.output_scale), at
         )
+        n_state = at.n_state if options.initial_state == "estimated" else 0
         states = np.zeros((count, n_state))
         states[0] = larger.free_response[:n_state] if n_state else 0.0
         bare = replace(
@@ -192,6 +201,7 @@ def _given_start(
             offset,
             np.zeros((len(experiments), orders.n_state)),
             is_given=True,
+            delay=orders.nk,
         ),
     )
 

@@ -55,6 +55,7 @@ def described(
     )
     return replace(
         blank,
+        orders=candidate.model.orders,
         model=replace(candidate.model, free_response=first),
         status=search.status,
         message=search.message,

@@ -91,8 +91,9 @@ def fit(
         raise ValueError("recordings of one fit must share their sample time")
     kinds = (options.input_map, options.output_map)
     for start in starts:
+        nk = start.delay if start.delay in options.delays else orders.nk
         if (start.input_map.kind, start.output_map.kind) != kinds or (
-            start.orders != orders
+            start.orders != replace(orders, nk=nk)
         ):
             raise ValueError(f"a start must have the orders {orders} and maps {kinds}")
     _check_block(orders, options)
@@ -110,9 +111,10 @@ def fit(
             starts_found, linear = linear_beginnings(problem, orders, options)
             linear_rmsd = rmsd(linear, problem)
             problem = _with_threshold(problem, linear)
+            orders = replace(orders, nk=starts_found[0].delay)
             known = contained_candidates(problem, orders, options, contained)
             found = (starts_found, linear, known)
-            search = _search(problem, orders, options, found)
+            search = _search(problem, options, found)
             search = _again(search, problem, orders, options, found)
         search, experiments = settled(search, problem.experiments, options)
     except np.linalg.LinAlgError as error:
@@ -162,7 +164,6 @@ def _is_usable(search: Search) -> bool:
 
 def _search(
     problem: Problem,
-    orders: Orders,
     options: FitOptions,
     found: tuple[tuple[Start, ...], Search, list[Candidate]],
 ) -> Search:
@@ -171,10 +172,8 @@ def _search(
     if _is_linear(options):
         return linear
     if known:
-        return search_beyond(
-            known, problem.experiments, orders, options, starts, linear
-        )
-    return nonlinear_search(problem.experiments, orders, options, starts, linear)
+        return search_beyond(known, problem.experiments, options, starts, linear)
+    return nonlinear_search(problem.experiments, options, starts, linear)
 
 
 def _again(
@@ -189,7 +188,7 @@ def _again(
         return first
     first, experiments = settled(first, problem.experiments, options)
     starts = block_starts(winsorised(first, experiments), orders, options)
-    second = _search(problem, orders, options, (starts, *found[1:]))
+    second = _search(problem, options, (starts, *found[1:]))
     second, experiments = settled(second, problem.experiments, options)
     first = rejudged(first, experiments)
     return min(first, rejudged(second, experiments), key=lambda one: one.cost)

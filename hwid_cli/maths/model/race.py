@@ -23,7 +23,7 @@ from hwid_cli.maths.model.points import point_of
 from hwid_cli.maths.model.rows.kernels import local_sums
 from hwid_cli.maths.model.sensitivities import simulated
 from hwid_cli.maths.model.starts import Start
-from hwid_cli.records.model import FitOptions, HammersteinWiener, Orders
+from hwid_cli.records.model import FitOptions, HammersteinWiener
 
 # Iterations of the first round and how many candidates go on after it; iterations of the
 # last round.
@@ -50,7 +50,6 @@ class _Runner:
 def race(
     experiments: Sequence[Experiment],
     starts: Sequence[Start],
-    orders: Orders,
     options: FitOptions,
     *,
     finalists: int = 2,
@@ -62,7 +61,6 @@ def race(
     experiments : sequence of Experiment
         Scaled to about one.
     starts : sequence of Start
-    orders : Orders
     options : FitOptions
     finalists : int
         How many are left at the end.
@@ -76,7 +74,7 @@ def race(
     racing = []
     for start in starts:
         kind = (start.is_given, start.is_expanded)
-        for candidate in starting_candidates(experiments, start, orders, options):
+        for candidate in starting_candidates(experiments, start, options):
             racing.append(_entered((*kind, False), candidate, experiments))
             if static_map.has_free_shape(options.output_map):
                 curved = _with_output_curve(candidate, experiments, options)
@@ -91,7 +89,6 @@ def race(
 def starting_candidates(
     experiments: Sequence[Experiment],
     start: Start,
-    orders: Orders,
     options: FitOptions,
 ) -> list[Candidate]:
     """Models that begin with one linear block, one for each pair of starting maps.
@@ -100,7 +97,6 @@ def starting_candidates(
     ----------
     experiments : sequence of Experiment
     start : Start
-    orders : Orders
     options : FitOptions
 
     Returns
@@ -122,7 +118,7 @@ def starting_candidates(
             input_map,
             start.numerator,
             start.denominator,
-            orders.nk,
+            start.delay,
             static_map.identity("none", options.of_output, np.ones(1)),
             sample_time_s=1.0,
             initial_state=options.initial_state,

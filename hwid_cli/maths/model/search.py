@@ -18,14 +18,15 @@ import numpy as np
 
 from hwid_cli.maths.model import sensitivities, static_map
 from hwid_cli.maths.model.candidates import Candidate, Experiment
+from hwid_cli.maths.model.delays import relaxed_starts
 from hwid_cli.maths.model.levenberg_marquardt import Search, minimise
 from hwid_cli.maths.model.phases import finish, place
 from hwid_cli.maths.model.placing import reaching
 from hwid_cli.maths.model.points import block_signals, point_of
 from hwid_cli.maths.model.race import race
 from hwid_cli.maths.model.robust import rejudged, renewed
-from hwid_cli.maths.model.starts import Start, linear_starts
-from hwid_cli.records.model import FitOptions, Orders
+from hwid_cli.maths.model.starts import Start
+from hwid_cli.records.model import FitOptions
 
 _RELAXING_ITERATIONS = 8
 _RELAXED_BLOCKS = 2
@@ -40,7 +41,6 @@ _FLAT = 0.1
 
 def linear_search(
     experiments: Sequence[Experiment],
-    orders: Orders,
     options: FitOptions,
     starts: Sequence[Start],
 ) -> Search:
@@ -50,7 +50,6 @@ def linear_search(
     ----------
     experiments : sequence of Experiment
         Scaled to about one.
-    orders : Orders
     options : FitOptions
         Its maps are ignored.
     starts : sequence of Start
@@ -62,13 +61,12 @@ def linear_search(
     """
     linear = replace(options, input_map="none", output_map="none")
     plain = [one for one in starts if not one.is_expanded]
-    found = race(experiments, plain, orders, linear, finalists=1)
+    found = race(experiments, plain, linear, finalists=1)
     return finish(found[0], experiments, linear)
 
 
 def nonlinear_search(
     experiments: Sequence[Experiment],
-    orders: Orders,
     options: FitOptions,
     starts: Sequence[Start],
     linear: Search,
@@ -79,7 +77,6 @@ def nonlinear_search(
     ----------
     experiments : sequence of Experiment
         Scaled to about one.
-    orders : Orders
     options : FitOptions
     starts : sequence of Start
     linear : Search
@@ -91,13 +88,13 @@ def nonlinear_search(
     Search
         Its iterations are those of the winning chain.
     """
-    finalists = race(experiments, starts, orders, options)
+    finalists = race(experiments, starts, options)
     experiments = renewed(experiments, [one.candidate for one in finalists])
     placed = [place(one, experiments, options) for one in finalists]
     best = finish(_best(placed), experiments, options)
     relaxed = best
     if not options.keeps_block:
-        relaxed = _relaxed(best, experiments, orders, options)
+        relaxed = _relaxed(best, experiments, options)
     if relaxed.cost < _WORTH_GOING_ON * best.cost:
         best = _best([best, finish(relaxed, experiments, options)])
     return _not_worse_than(linear, best, experiments, options)
@@ -106,7 +103,6 @@ def nonlinear_search(
 def search_beyond(
     contained: Sequence[Candidate],
     experiments: Sequence[Experiment],
-    orders: Orders,
     options: FitOptions,
     starts: Sequence[Start],
     linear: Search,
@@ -118,7 +114,6 @@ def search_beyond(
     contained : sequence of Candidate
         Of the orders and kinds of maps asked for.
     experiments : sequence of Experiment
-    orders : Orders
     options : FitOptions
     starts : sequence of Start
     linear : Search
@@ -133,7 +128,7 @@ def search_beyond(
     known = [_standing(one, experiments) for one in contained]
     best = _best(known)
     best = _best([best, finish(best, experiments, options)])
-    (leader,) = race(experiments, starts, orders, options, finalists=1)
+    (leader,) = race(experiments, starts, options, finalists=1)
     placed = place(leader, experiments, options)
     if placed.cost < _WORTH_A_SECOND_LOOK * best.cost:
         best = _best([best, finish(placed, experiments, options)])
@@ -178,28 +173,30 @@ def _passing(
 def _relaxed(
     best: Search,
     experiments: Sequence[Experiment],
-    orders: Orders,
     options: FitOptions,
 ) -> Search:
     """Find the linear block anew between the maps of the best model."""
     between = _between_maps(best.candidate, experiments)
-    model, n_state = best.candidate.model, best.candidate.free_responses.shape[1]
-    starts = linear_starts(
+    model, no_states = best.candidate.model, best.candidate.free_responses[:, :0]
+    has_states = options.initial_state == "estimated"
+    starts = relaxed_starts(
         between,
-        orders,
-        options=options,
-        sees_input_map=False,
+        model.orders,
+        options,
         count=_RELAXED_BLOCKS,
-        prefilters=(model.denominator,),
+        denominator=model.denominator,
     )
     found = [
         minimise(
             replace(
                 best.candidate,
                 model=replace(
-                    model, numerator=one.numerator, denominator=one.denominator
+                    model,
+                    numerator=one.numerator,
+                    denominator=one.denominator,
+                    delay=one.delay,
                 ),
-                free_responses=one.free_responses[:, :n_state],
+                free_responses=one.free_responses if has_states else no_states,
             ),
             experiments,
             with_positions=False,
