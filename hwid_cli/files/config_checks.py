@@ -52,6 +52,12 @@ def check_experiment(experiment: Experiment) -> None:
     if experiment.calibrate is not None:
         _check_calibrate(experiment.calibrate, file)
     _check_orders(experiment.orders, file)
+    _check_block(experiment, file)
+    if experiment.fit.delays and experiment.orders.nk_role == "delay":
+        raise ConfigError(
+            f"{file}: fit.delays: found {list(experiment.fit.delays)}; expected none with "
+            "orders.nk_role: delay, where the grid tries the delays; remove one of the two"
+        )
     if experiment.crossval is not None:
         require(
             experiment.crossval.threshold > 0,
@@ -71,6 +77,30 @@ def check_experiment(experiment: Experiment) -> None:
     check_simulation(experiment)
     _check_name_lists(experiment, file)
     _check_test(experiment, file)
+
+
+def _check_block(experiment: Experiment, file: str) -> None:
+    """A given linear block must have a place in the grid; a frozen one fills it."""
+    block, grid = experiment.fit.linear_block, experiment.orders
+    if block is None:
+        return
+    own, at = block.orders, f"{file}: fit.linear_block"
+    counts_poles = grid.nk_role == "poles"
+    second = own.nf if counts_poles else own.nk
+    other = ("delay", own.nk, 1) if counts_poles else ("poles", own.nf, grid.nf)
+    word, found, wanted = other
+    if block.frozen and (grid.nb, grid.nk) != ((own.nb,), (second,)):
+        raise ConfigError(
+            f"{at}: found a frozen block of {own.nb} numerator coefficients, {own.nf} "
+            f"poles and delay {own.nk}; expected the orders of the grid; set orders: "
+            f"{{nb: {own.nb}, nk: {second}}}"
+        )
+    if block.frozen and found != wanted:
+        raise ConfigError(
+            f"{at}: found {word} {found}; expected {wanted} as in the grid of "
+            f"orders.nk_role: {grid.nk_role}; set orders: {{nb: {own.nb}, nf: {own.nf}, "
+            f"nk: {own.nk}, nk_role: delay}}"
+        )
 
 
 def _check_name(name: str, file: str) -> None:

@@ -1,10 +1,12 @@
-"""The Hammerstein-Wiener model, its orders, the options of a fit and its result."""
+"""The Hammerstein-Wiener model, the options of a fit and its result."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from hwid_cli.records.information import Information
+from hwid_cli.records.linear_block import LinearBlock, Orders
 from hwid_cli.records.maps import MAP_KINDS, MapOptions, OwnFunction, StaticMap
 from hwid_cli.records.recordings import frozen_vector
 from hwid_cli.records.stored import ADDED_LATER
@@ -12,43 +14,8 @@ from hwid_cli.records.uncertainty import Uncertainty
 
 INITIAL_STATES = ("zero", "steady", "estimated")
 JOINS = ("concatenate", "experiments")
+LOSSES = ("squared", "huber")
 FIT_STATUSES = ("converged", "iteration_limit", "stalled", "failed")
-
-
-@dataclass(frozen=True, order=True)
-class Orders:
-    """Orders of the linear block B(q)/F(q), as in MATLAB's ``[nb nf nk]``.
-
-    Parameters
-    ----------
-    nb : int, [-]
-        Number of numerator coefficients, at least 1.
-    nf : int, [-]
-        Number of poles, at least 0.
-    nk : int, [samples]
-        Delay from input to output, at least 0.
-
-    Raises
-    ------
-    ValueError
-        If an order is out of its range.
-    """
-
-    nb: int
-    nf: int
-    nk: int
-
-    def __post_init__(self) -> None:
-        for name, least in (("nb", 1), ("nf", 0), ("nk", 0)):
-            value = getattr(self, name)
-            if value != int(value) or value < least:
-                raise ValueError(f"{name} must be an integer >= {least}, got {value!r}")
-            object.__setattr__(self, name, int(value))
-
-    @property
-    def n_state(self) -> int:
-        """Number of past values that the linear block remembers."""
-        return max(self.nf, self.nb + self.nk - 1)
 
 
 @dataclass(frozen=True)
@@ -79,6 +46,17 @@ class FitOptions:
         Number of linear starts that are screened.
     input_function, output_function : OwnFunction or None
         The functions of maps that are ``own_function``.
+    loss : str
+        How residuals count in the search: ``squared``, or ``huber``, which takes large
+        ones for outliers.
+    linear_block : LinearBlock or None
+        One that is known. Frozen it stays bit by bit, and only maps and initial states
+        are fitted; else it is one more start for all orders that contain it.
+    largest_pole_radius : float, [-]
+        No pole lies further from zero; 1 asks for stability only.
+    delays : tuple of int, [samples]
+        Delays that are tried; the one of the orders where there are none. The result's
+        orders say which one was found.
     """
 
     input_map: str = "piecewise_linear"
@@ -94,6 +72,10 @@ class FitOptions:
     output_units: int | None = None
     input_function: OwnFunction | None = None
     output_function: OwnFunction | None = None
+    loss: str = field(default="squared", metadata=ADDED_LATER)
+    linear_block: LinearBlock | None = None
+    largest_pole_radius: float = field(default=1.0, metadata=ADDED_LATER)
+    delays: tuple[int, ...] = field(default=(), metadata=ADDED_LATER)
 
     def __post_init__(self) -> None:
         for name, allowed in (
@@ -101,6 +83,7 @@ class FitOptions:
             ("output_map", MAP_KINDS),
             ("initial_state", INITIAL_STATES),
             ("join", JOINS),
+            ("loss", LOSSES),
         ):
             if getattr(self, name) not in allowed:
                 raise ValueError(
@@ -116,12 +99,41 @@ class FitOptions:
             value = getattr(self, name)
             if value != int(value) or value < least:
                 raise ValueError(f"{name} must be an integer >= {least}, got {value!r}")
+        if not 0.0 < self.largest_pole_radius <= 1.0:
+            raise ValueError(
+                "largest_pole_radius must be a number above 0 and at most 1, got "
+                f"{self.largest_pole_radius!r}"
+            )
+        object.__setattr__(self, "delays", _checked_delays(self.delays))
+        if self.delays and self.keeps_block:
+            raise ValueError(
+                f"delays must be empty beside a frozen linear block, got {self.delays}"
+            )
         for side in ("input", "output"):
             try:
                 getattr(self, f"of_{side}")
             except ValueError as error:
                 # What a map refuses, under the name of the key that asked for it.
                 raise ValueError(f"{side}_{error}") from None
+
+    def delays_for(self, orders: Orders) -> tuple[int, ...]:
+        """Delays that a fit of some orders tries, that of the orders first if it may.
+
+        Parameters
+        ----------
+        orders : Orders
+
+        Returns
+        -------
+        tuple of int, [samples]
+        """
+        delays = self.delays or (orders.nk,)
+        return tuple(sorted(delays, key=lambda nk: (nk != orders.nk, nk)))
+
+    @property
+    def keeps_block(self) -> bool:
+        """Whether the linear block is given and stays as it is."""
+        return self.linear_block is not None and self.linear_block.frozen
 
     @property
     def of_input(self) -> MapOptions:
@@ -146,13 +158,21 @@ class FitOptions:
         Returns
         -------
         FitOptions
-            Own functions go on seeing the data as they were.
+            Own functions and a given linear block mean the same as before.
         """
+        block = self.linear_block
         return replace(
             self,
             input_function=_in_unit(self.input_function, input_unit),
             output_function=_in_unit(self.output_function, output_unit),
+            linear_block=block and block.in_units(input_unit, output_unit),
         )
+
+
+def _checked_delays(delays: Sequence[int]) -> tuple[int, ...]:
+    if any(value != int(value) or value < 0 for value in delays):
+        raise ValueError(f"delays must be integers >= 0, got {list(delays)}")
+    return tuple(sorted({int(value) for value in delays}))
 
 
 def _in_unit(function: OwnFunction | None, unit: float) -> OwnFunction | None:
@@ -216,6 +236,7 @@ class Fit:
     identified_on : tuple of str
         Names of the recordings, in the order in which they were joined.
     orders : Orders
+        With the delay that was found, where several were tried.
     options : FitOptions
     model : HammersteinWiener or None
         None where no usable model was found.

@@ -143,11 +143,10 @@ def best_models_table(
     for group in best:
         for fit in group:
             nk = fit.orders.nk if nk_is_delay else fit.orders.nf
-            nf = fit.orders.nf if nk_is_delay else None
             rows.append(
                 (
                     f"{fit.name}/{fit.orders.nb}/{nk}",
-                    thesis_name(fit.name, fit.orders.nb, nk, nf),
+                    thesis_name(fit.name, fit.orders.nb, fit.orders.nk, fit.orders.nf),
                     number(fit.rmsd),
                     _percent(fit.fit_percent),
                     number(fit.linear_rmsd),

@@ -11,7 +11,7 @@ from itertools import accumulate
 import numpy as np
 
 from hwid_cli.maths.model import static_map
-from hwid_cli.records.model import HammersteinWiener, StaticMap
+from hwid_cli.records.model import FitOptions, HammersteinWiener, StaticMap
 
 # Samples at the beginning that always count.
 _BEGINNING = 50
@@ -24,12 +24,16 @@ class Experiment:
     Parameters
     ----------
     input, output : ndarray, shape (n,)
+    threshold : float
+        Size from which on a residual counts in proportion instead of squared (see
+        `loss`); the same for all experiments of a fit.
     counted : ndarray of int, shape (n_rows,), optional
         Samples at which the output is compared; all unless given.
     """
 
     input: np.ndarray
     output: np.ndarray
+    threshold: float = float("inf")
     counted: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
     def __post_init__(self) -> None:
@@ -68,6 +72,36 @@ def thinned(experiments: Sequence[Experiment], rows: int) -> tuple[Experiment, .
     )
 
 
+@dataclass(frozen=True)
+class Limits:
+    """What a search may do with the linear block.
+
+    Parameters
+    ----------
+    largest_pole_radius : float, [-]
+        Every accepted step keeps all poles inside.
+    is_block_frozen : bool
+        Whether B and F stay as they are.
+    """
+
+    largest_pole_radius: float = 1.0
+    is_block_frozen: bool = False
+
+
+def limits_of(options: FitOptions) -> Limits:
+    """Limits that the options of a fit set.
+
+    Parameters
+    ----------
+    options : FitOptions
+
+    Returns
+    -------
+    Limits
+    """
+    return Limits(options.largest_pole_radius, options.keeps_block)
+
+
 @dataclass(frozen=True, eq=False)
 class Candidate:
     """A model together with the initial states of the experiments that it is fitted to.
@@ -78,10 +112,12 @@ class Candidate:
         Its ``initial_state`` rules how every experiment starts.
     free_responses : ndarray, shape (n_experiments, n_state) or (n_experiments, 0)
         Coefficients of C for each experiment.
+    limits : Limits
     """
 
     model: HammersteinWiener
     free_responses: np.ndarray
+    limits: Limits = Limits()
 
 
 @dataclass(frozen=True)
@@ -102,9 +138,7 @@ class Columns:
         return int(self.denominator.stop)
 
 
-def columns(
-    candidate: Candidate, *, with_positions: bool, with_block: bool = True
-) -> Columns:
+def columns(candidate: Candidate, *, with_positions: bool) -> Columns:
     """Places of a candidate's parameters in a step.
 
     Parameters
@@ -112,20 +146,18 @@ def columns(
     candidate : Candidate
     with_positions : bool
         Whether break-points move.
-    with_block : bool
-        Whether B and F move.
 
     Returns
     -------
     Columns
     """
-    model = candidate.model
+    model, moves = candidate.model, not candidate.limits.is_block_frozen
     sizes = [
         _count(model.output_map, with_positions),
         _count(model.input_map, with_positions),
         candidate.free_responses.size,
-        model.numerator.size if with_block else 0,
-        model.denominator.size - 1 if with_block else 0,
+        model.numerator.size if moves else 0,
+        model.denominator.size - 1 if moves else 0,
     ]
     stops = list(accumulate(sizes))
     slices = [slice(stop - size, stop) for stop, size in zip(stops, sizes, strict=True)]

@@ -10,41 +10,31 @@ docs/method.md, sections "The fit" and "The search".
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from hwid_cli.maths import scores
-from hwid_cli.maths.model import sensitivities, static_map
-from hwid_cli.maths.model.candidates import Candidate, Experiment
-from hwid_cli.maths.model.contained import enlarged
-from hwid_cli.maths.model.levenberg_marquardt import Search
-from hwid_cli.maths.model.linear_block import is_stable, poles
-from hwid_cli.maths.model.normalise import normalise, rescaled
-from hwid_cli.maths.model.phases import finish
-from hwid_cli.maths.model.placing import with_maps
-from hwid_cli.maths.model.search import (
-    linear_search,
-    nonlinear_search,
-    search_beyond,
+from hwid_cli.maths.model import static_map
+from hwid_cli.maths.model.beginnings import (
+    block_starts,
+    contained_candidates,
+    linear_beginnings,
+    member_models,
 )
-from hwid_cli.maths.model.starts import Start, linear_starts
-from hwid_cli.maths.model.static_map import has_free_shape
-from hwid_cli.maths.model.uncertainty import judged_parameters
+from hwid_cli.maths.model.candidates import Candidate
+from hwid_cli.maths.model.description import described
+from hwid_cli.maths.model.levenberg_marquardt import Search
+from hwid_cli.maths.model.linear_block import is_stable
+from hwid_cli.maths.model.phases import finish
+from hwid_cli.maths.model.problem import Problem, rmsd, scaled
+from hwid_cli.maths.model.robust import rejudged, renewed, settled, winsorised
+from hwid_cli.maths.model.search import nonlinear_search, search_beyond
+from hwid_cli.maths.model.starts import Start
 from hwid_cli.maths.model.warm_start import warm_search
 from hwid_cli.records.model import Fit, FitOptions, HammersteinWiener, Orders
 from hwid_cli.records.recordings import Recording
 
 _DEFAULTS = FitOptions()
-
-
-@dataclass(frozen=True, eq=False)
-class _Problem:
-    """Scaled experiments and what they were divided by."""
-
-    experiments: tuple[Experiment, ...]
-    input_scale: float
-    output_scale: float
 
 
 def fit(
@@ -79,8 +69,8 @@ def fit(
     Raises
     ------
     ValueError
-        If there is no recording, the sample times differ, or a start has other orders
-        or kinds of maps.
+        If there is no recording, the sample times differ, a start has other orders or
+        kinds of maps, or a frozen linear block has other orders.
 
     References
     ----------
@@ -102,66 +92,83 @@ def fit(
         raise ValueError("recordings of one fit must share their sample time")
     kinds = (options.input_map, options.output_map)
     for start in starts:
+        nk = start.delay if start.delay in options.delays else orders.nk
         if (start.input_map.kind, start.output_map.kind) != kinds or (
-            start.orders != orders
+            start.orders != replace(orders, nk=nk)
         ):
             raise ValueError(f"a start must have the orders {orders} and maps {kinds}")
+    _check_block(orders, options)
     names = tuple(one.name for one in recordings)
     blank = Fit(names, orders, options, None, "failed", "")
     reason = _reason_not_to_fit(recordings, orders, options)
     if reason:
         return replace(blank, message=reason)
-    problem = _scaled(recordings, options)
+    problem = scaled(recordings, options)
     options = options.in_units(problem.input_scale, problem.output_scale)
     linear_rmsd = float("nan")
     try:
-        known = _contained(problem, orders, options, contained)
+        known = contained_candidates(problem, orders, options, contained)
         search = _warm_search(problem, options, starts, known)
         if search is None:
-            starts_found = _starts(problem, orders, options)
-            linear = linear_search(problem.experiments, orders, options, starts_found)
-            linear_rmsd = _rmsd(linear, problem)
-            search = _search(problem, orders, options, (starts_found, linear, known))
+            starts_found, linear = linear_beginnings(problem, orders, options)
+            linear_rmsd = rmsd(linear, problem)
+            problem = _with_threshold(problem, linear)
+            orders = replace(orders, nk=starts_found[0].delay)
+            known = contained_candidates(problem, orders, options, contained)
+            found = (starts_found, linear, known)
+            search = _search(problem, options, found)
+            search = _again(search, problem, orders, options, found)
+        search, experiments = settled(search, problem.experiments, options)
     except np.linalg.LinAlgError as error:
         return replace(blank, message=f"linear algebra failed: {error}")
-    if not np.isfinite(search.cost) or not is_stable(
-        search.candidate.model.denominator
-    ):
+    if not _is_usable(search):
         return replace(
             blank, message="no start gave a stable model", linear_rmsd=linear_rmsd
         )
-    return _described(
-        replace(blank, linear_rmsd=linear_rmsd), search, recordings, problem
+    return described(
+        replace(blank, linear_rmsd=linear_rmsd),
+        search,
+        recordings,
+        replace(problem, experiments=tuple(experiments)),
     )
 
 
+def _check_block(orders: Orders, options: FitOptions) -> None:
+    block = options.linear_block
+    if block is not None and block.frozen and block.orders != orders:
+        raise ValueError(
+            f"the frozen linear block has the orders {block.orders}, not {orders}"
+        )
+
+
 def _warm_search(
-    problem: _Problem,
+    problem: Problem,
     options: FitOptions,
     starts: Sequence[HammersteinWiener],
     known: Sequence[Candidate],
 ) -> Search | None:
     """Search near the starts; None where none is stable or no model came of them."""
-    scaled = [
-        rescaled(one, 1.0 / problem.input_scale, 1.0 / problem.output_scale)
-        for one in starts
-        if is_stable(one.denominator)
-    ]
-    if not scaled:
+    models = member_models(problem, options, starts)
+    if not models:
         return None
     try:
-        search = warm_search(problem.experiments, options, scaled, known)
+        search = warm_search(problem.experiments, options, models, known)
     except np.linalg.LinAlgError:
         return None
-    is_usable = np.isfinite(search.cost) and is_stable(
-        search.candidate.model.denominator
+    return search if _is_usable(search) else None
+
+
+def _is_usable(search: Search) -> bool:
+    """Tell whether a search ended with a model whose poles are where they may be."""
+    candidate = search.candidate
+    radius = candidate.limits.largest_pole_radius
+    return bool(np.isfinite(search.cost)) and is_stable(
+        candidate.model.denominator, radius
     )
-    return search if is_usable else None
 
 
 def _search(
-    problem: _Problem,
-    orders: Orders,
+    problem: Problem,
     options: FitOptions,
     found: tuple[tuple[Start, ...], Search, list[Candidate]],
 ) -> Search:
@@ -170,44 +177,32 @@ def _search(
     if _is_linear(options):
         return finish(linear, problem.experiments, options)
     if known:
-        return search_beyond(
-            known, problem.experiments, orders, options, starts, linear
-        )
-    return nonlinear_search(problem.experiments, orders, options, starts, linear)
+        return search_beyond(known, problem.experiments, options, starts, linear)
+    return nonlinear_search(problem.experiments, options, starts, linear)
 
 
-def _contained(
-    problem: _Problem,
+def _again(
+    first: Search,
+    problem: Problem,
     orders: Orders,
     options: FitOptions,
-    models: Sequence[HammersteinWiener],
-) -> list[Candidate]:
-    """Models of smaller orders as candidates; of several experiments, of the first."""
-    count = len(problem.experiments)
-    is_estimated = options.initial_state == "estimated"
-    n_state = orders.n_state if is_estimated else 0
-    candidates = []
-    for model in models:
-        larger = enlarged(
-            rescaled(model, 1.0 / problem.input_scale, 1.0 / problem.output_scale),
-            orders,
-        )
-        states = np.zeros((count, n_state))
-        states[0] = larger.free_response[:n_state] if n_state else 0.0
-        candidates.append(Candidate(replace(larger, free_response=np.zeros(0)), states))
-    return candidates
+    found: tuple[tuple[Start, ...], Search, list[Candidate]],
+) -> Search:
+    """The better of a search and a second one that knows which samples are outliers."""
+    if options.loss == "squared" or _is_linear(options):
+        return first
+    first, experiments = settled(first, problem.experiments, options)
+    starts = block_starts(winsorised(first, experiments), orders, options)
+    second = _search(problem, options, (starts, *found[1:]))
+    second, experiments = settled(second, problem.experiments, options)
+    first = rejudged(first, experiments)
+    return min(first, rejudged(second, experiments), key=lambda one: one.cost)
 
 
-def _starts(
-    problem: _Problem, orders: Orders, options: FitOptions
-) -> tuple[Start, ...]:
-    return linear_starts(
-        problem.experiments,
-        orders,
-        options=options,
-        sees_input_map=has_free_shape(options.input_map),
-        count=options.starts,
-    )
+def _with_threshold(problem: Problem, search: Search) -> Problem:
+    """Problem with the threshold that a search's residuals ask for."""
+    experiments = renewed(problem.experiments, [search.candidate])
+    return replace(problem, experiments=tuple(experiments))
 
 
 def _is_linear(options: FitOptions) -> bool:
@@ -218,6 +213,11 @@ def _reason_not_to_fit(
     recordings: Sequence[Recording], orders: Orders, options: FitOptions
 ) -> str:
     """Why these data cannot determine a model; empty if they can."""
+    block = options.linear_block
+    if block is not None and block.frozen:
+        radius = options.largest_pole_radius
+        if not is_stable(np.array(block.denominator), radius):
+            return f"the frozen linear block has a pole at or beyond radius {radius:g}"
     total = sum(one.n_samples for one in recordings)
     needed = _least_parameters(orders, options) + orders.n_state
     if total <= needed:
@@ -237,78 +237,5 @@ def _least_parameters(orders: Orders, options: FitOptions) -> int:
         static_map.identity(one.kind, one, np.array([0.0, 1.0]))
         for one in (options.of_input, options.of_output)
     )
-    return orders.nb + orders.nf + sum(one.parameters.size for one in maps)
-
-
-def _joined(
-    recordings: Sequence[Recording], options: FitOptions
-) -> tuple[Experiment, ...]:
-    """Recordings joined as the options say."""
-    if options.join == "experiments":
-        return tuple(Experiment(one.input, one.output) for one in recordings)
-    return (
-        Experiment(
-            np.concatenate([one.input for one in recordings]),
-            np.concatenate([one.output for one in recordings]),
-        ),
-    )
-
-
-def _scaled(recordings: Sequence[Recording], options: FitOptions) -> _Problem:
-    """Experiments divided by their size, so that one damping suits all."""
-    experiments = _joined(recordings, options)
-    input_scale = max(float(np.max(np.abs(one.input))) for one in experiments)
-    output_scale = float(np.std(np.concatenate([one.output for one in experiments])))
-    scaled = tuple(
-        Experiment(one.input / input_scale, one.output / output_scale)
-        for one in experiments
-    )
-    return _Problem(scaled, input_scale, output_scale)
-
-
-def _described(
-    blank: Fit, search: Search, recordings: Sequence[Recording], problem: _Problem
-) -> Fit:
-    """The winner in the units of the data, with all that is said about it."""
-    candidate = with_maps(search.candidate, problem.experiments, static_map.with_domain)
-    candidate = _in_units(candidate, problem, recordings[0])
-    experiments = _joined(recordings, blank.options)
-    simulated = np.concatenate(sensitivities.simulated_outputs(candidate, experiments))
-    measured = np.concatenate([one.output for one in experiments])
-    first = candidate.free_responses[0]
-    uncertainty, information = judged_parameters(
-        candidate, experiments, free_break_points=blank.options.free_break_points
-    )
-    return replace(
-        blank,
-        model=replace(candidate.model, free_response=first),
-        status=search.status,
-        message=search.message,
-        iterations=search.iterations,
-        rmsd=scores.rmsd(measured, simulated),
-        fit_percent=scores.fit_percent(measured, simulated),
-        poles=poles(candidate.model.denominator),
-        is_stable=True,
-        uncertainty=uncertainty,
-        information=information,
-    )
-
-
-def _in_units(candidate: Candidate, problem: _Problem, like: Recording) -> Candidate:
-    """Normalised candidate for the data as they are."""
-    states = candidate.free_responses
-    # The initial states of all experiments change their unit together with the model.
-    scaled = replace(
-        candidate.model,
-        free_response=states.ravel(),
-        sample_time_s=like.sample_time_s,
-        input_unit=like.input_unit,
-        output_unit=like.output_unit,
-    )
-    model = normalise(rescaled(scaled, problem.input_scale, problem.output_scale))
-    return Candidate(model, model.free_response.reshape(states.shape))
-
-
-def _rmsd(search: Search, problem: _Problem) -> float:
-    samples = sum(one.output.size for one in problem.experiments)
-    return float(np.sqrt(search.cost / samples)) * problem.output_scale
+    n_block = 0 if options.keeps_block else orders.nb + orders.nf
+    return n_block + sum(one.parameters.size for one in maps)

@@ -34,10 +34,12 @@ def held_gradients(candidate: Candidate, place: Columns) -> list[np.ndarray]:
     model = candidate.model
     held = []
     input_rule, output_rule = RULES[model.input_map.kind], RULES[model.output_map.kind]
-    if input_rule.size is not None:
+    frozen = candidate.limits.is_block_frozen
+    # Around a frozen block there is a gain to share only where both maps have one.
+    if input_rule.size is not None and not (frozen and output_rule.compress is None):
         _, gradient = input_rule.size(model.input_map)
         held.append(_row(place, place.input_map, gradient))
-    if output_rule.compress is not None:
+    if output_rule.compress is not None and not frozen:
         row = np.zeros(place.total)
         if uses_static_gain(model):
             row[place.numerator], row[place.denominator] = 1.0, -1.0

@@ -186,8 +186,9 @@ def parameter_names(candidate: Candidate, place: Columns) -> tuple[str, ...]:
         labels = static_map.parameter_names(one)
         active = labels[len(labels) - (part.stop - part.start) :]
         names[part] = [f"{label}.{name}" for name in active]
-    names[place.numerator] = [f"b[{i}]" for i in range(model.numerator.size)]
-    names[place.denominator] = [f"f[{i}]" for i in range(1, model.denominator.size)]
+    if not candidate.limits.is_block_frozen:
+        names[place.numerator] = [f"b[{i}]" for i in range(model.numerator.size)]
+        names[place.denominator] = [f"f[{i}]" for i in range(1, model.denominator.size)]
     n_experiments = len(candidate.free_responses)
     names[place.free_responses] = [
         f"initial state {i}" + (f" of record {k + 1}" if n_experiments > 1 else "")

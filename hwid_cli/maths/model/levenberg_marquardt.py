@@ -59,7 +59,7 @@ class Search:
     ----------
     candidate : Candidate
     cost : float
-        Sum of squared residuals.
+        Sum of squared residuals, or of their losses.
     iterations : int, [-]
     status : str
         ``converged``, ``iteration_limit`` or ``stalled``.
@@ -92,6 +92,7 @@ class _Descent:
 
     experiments: Sequence[Experiment]
     place: Columns
+    largest_pole_radius: float
 
     @property
     def samples(self) -> int:
@@ -125,7 +126,8 @@ def minimise(
     Search
     """
     place = columns(candidate, with_positions=with_positions)
-    descent = _Descent(experiments, place)
+    radius = candidate.limits.largest_pole_radius
+    descent = _Descent(experiments, place, radius)
     point = point_of(candidate)
     found = simulated(point, experiments)
     enough = _ROUNDING * sum(float(one.output @ one.output) for one in experiments)
@@ -136,6 +138,8 @@ def minimise(
             candidate_at(point, candidate), found.cost, iteration, status, why
         )
 
+    if place.total == 0:
+        return end("converged", "no parameter may move")
     while iteration < max_iterations:
         if found.cost <= enough:
             return end("converged", "the residual is rounding error")
@@ -176,7 +180,7 @@ def _accepted_step(
             predicted = float(step @ (damping * step + vector))
             promised = predicted if promised is None else promised
             proposed = moved(point, scale * step, place)
-            if is_stable(proposed.denominator):
+            if is_stable(proposed.denominator, descent.largest_pole_radius):
                 tried = simulated(proposed, descent.experiments)
                 lowered = total - tried.cost - weight * _squared_bends(proposed, point)
                 if lowered > 0.0:

@@ -110,17 +110,25 @@ def poles(denominator: np.ndarray) -> np.ndarray:
     return found[np.lexsort((np.angle(found), -np.abs(found)))]
 
 
-def is_stable(denominator: np.ndarray) -> bool:
-    """Tell whether every pole lies inside the unit circle.
+def is_stable(denominator: np.ndarray, largest_radius: float = 1.0) -> bool:
+    """Tell whether every pole lies inside the unit circle, or a smaller one.
 
     Parameters
     ----------
     denominator : ndarray, shape (nf + 1,)
+    largest_radius : float, [-]
 
     Returns
     -------
     bool
+
+    Examples
+    --------
+    >>> is_stable(np.array([1.0, -0.9])), is_stable(np.array([1.0, -0.9]), 0.8)
+    (True, False)
     """
+    if largest_radius != 1.0:
+        denominator = denominator / largest_radius ** np.arange(denominator.size)
     return bool(is_schur_stable(np.ascontiguousarray(denominator)))
 
 

@@ -25,18 +25,24 @@ _LEAST_STATIC_SHARE = 1e-3
 _FREQUENCIES = np.linspace(0.0, np.pi, 128)
 
 
-def normalise(model: HammersteinWiener) -> HammersteinWiener:
+def normalise(
+    model: HammersteinWiener, *, keeps_block: bool = False
+) -> HammersteinWiener:
     """Same model with its shared gain in a fixed place.
 
     Parameters
     ----------
     model : HammersteinWiener
+    keeps_block : bool
+        Whether B and F stay as they are; the gain that the two maps share is fixed then.
 
     Returns
     -------
     HammersteinWiener
         Gives the same output for every input.
     """
+    if keeps_block:
+        return _around_block(model)
     model = _with_unit_input_map(model)
     rule = RULES[model.output_map.kind]
     gain = block_gain(model)
@@ -112,15 +118,36 @@ def rescaled(
     )
 
 
-def _with_unit_input_map(model: HammersteinWiener) -> HammersteinWiener:
+def _around_block(model: HammersteinWiener) -> HammersteinWiener:
+    """Input map of mean slope one where the output map can take up its gain."""
+    rule, factor = RULES[model.output_map.kind], _unit_factor(model)
+    amplify = RULES[model.input_map.kind].amplify
+    if factor is None or amplify is None or rule.compress is None:
+        return model
+    return replace(
+        model,
+        input_map=amplify(model.input_map, factor),
+        free_response=model.free_response * factor,
+        output_map=rule.compress(model.output_map, 1.0 / factor),
+    )
+
+
+def _unit_factor(model: HammersteinWiener) -> float | None:
+    """Factor that gives the input map the mean slope one; None where there is none."""
     rule = RULES[model.input_map.kind]
     if rule.amplify is None or rule.size is None:
-        return model
+        return None
     size, _ = rule.size(model.input_map)
     if not np.isfinite(size) or size == 0.0:
-        return model
+        return None
     ends = static_map.evaluate(model.input_map, np.array(model.input_map.domain))
-    factor = 1.0 / size if ends[1] >= ends[0] else -1.0 / size
+    return 1.0 / size if ends[1] >= ends[0] else -1.0 / size
+
+
+def _with_unit_input_map(model: HammersteinWiener) -> HammersteinWiener:
+    rule, factor = RULES[model.input_map.kind], _unit_factor(model)
+    if factor is None or rule.amplify is None:
+        return model
     return replace(
         model,
         input_map=rule.amplify(model.input_map, factor),

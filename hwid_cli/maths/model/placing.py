@@ -72,14 +72,12 @@ def with_maps(
     """
     model = candidate.model
     u, x = reaching(candidate, experiments)
-    return Candidate(
-        replace(
-            model,
-            input_map=change(model.input_map, u),
-            output_map=(change_output or change)(model.output_map, x),
-        ),
-        candidate.free_responses,
+    changed = replace(
+        model,
+        input_map=change(model.input_map, u),
+        output_map=(change_output or change)(model.output_map, x),
     )
+    return replace(candidate, model=changed)
 
 
 def coarser(

@@ -75,16 +75,14 @@ def candidate_at(point: Point, like: Candidate) -> Candidate:
     -------
     Candidate
     """
-    return Candidate(
-        replace(
-            like.model,
-            input_map=point.input_map,
-            numerator=point.numerator,
-            denominator=point.denominator,
-            output_map=point.output_map,
-        ),
-        point.states,
+    model = replace(
+        like.model,
+        input_map=point.input_map,
+        numerator=point.numerator,
+        denominator=point.denominator,
+        output_map=point.output_map,
     )
+    return replace(like, model=model, free_responses=point.states)
 
 
 def moved(point: Point, step: np.ndarray, place: Columns) -> Point:

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hwid_cli.maths.model import static_map
-from hwid_cli.maths.model.candidates import Candidate, Experiment, thinned
+from hwid_cli.maths.model.candidates import Candidate, Experiment, limits_of, thinned
 from hwid_cli.maths.model.levenberg_marquardt import Search, minimise
 from hwid_cli.maths.model.maps.kernels import piecewise_linear_shares
 from hwid_cli.maths.model.placing import reaching
@@ -23,7 +23,7 @@ from hwid_cli.maths.model.points import point_of
 from hwid_cli.maths.model.rows.kernels import local_sums
 from hwid_cli.maths.model.sensitivities import simulated
 from hwid_cli.maths.model.starts import Start
-from hwid_cli.records.model import FitOptions, HammersteinWiener, Orders
+from hwid_cli.records.model import FitOptions, HammersteinWiener
 
 # Iterations of each round, and how many candidates go on after it.
 Rounds = tuple[tuple[int, int], ...]
@@ -47,14 +47,13 @@ _HOPELESS = 9.0
 class _Runner:
     """A candidate in the race and the kind of start that it came from."""
 
-    family: tuple[bool, bool]
+    family: tuple[bool, ...]
     search: Search
 
 
 def race(
     experiments: Sequence[Experiment],
     starts: Sequence[Start],
-    orders: Orders,
     options: FitOptions,
     *,
     rounds: Rounds = THOROUGH,
@@ -66,7 +65,6 @@ def race(
     experiments : sequence of Experiment
         Scaled to about one.
     starts : sequence of Start
-    orders : Orders
     options : FitOptions
     rounds : tuple of (int, int)
         Iterations of each round, and how many candidates go on after it.
@@ -79,11 +77,12 @@ def race(
     experiments = thinned(experiments, RACE_ROWS)
     racing = []
     for start in starts:
-        for candidate in starting_candidates(experiments, start, orders, options):
-            racing.append(_entered((start.is_expanded, False), candidate, experiments))
+        kind = (start.is_given, start.is_expanded)
+        for candidate in starting_candidates(experiments, start, options):
+            racing.append(_entered((*kind, False), candidate, experiments))
             if static_map.has_free_shape(options.output_map):
                 curved = _with_output_curve(candidate, experiments, options)
-                racing.append(_entered((start.is_expanded, True), curved, experiments))
+                racing.append(_entered((*kind, True), curved, experiments))
     if rounds != LONG:
         racing = _leaders(racing, options.starts)
     for iterations, count in rounds:
@@ -95,7 +94,6 @@ def race(
 def starting_candidates(
     experiments: Sequence[Experiment],
     start: Start,
-    orders: Orders,
     options: FitOptions,
 ) -> list[Candidate]:
     """Models that begin with one linear block, one for each pair of starting maps.
@@ -104,7 +102,6 @@ def starting_candidates(
     ----------
     experiments : sequence of Experiment
     start : Start
-    orders : Orders
     options : FitOptions
 
     Returns
@@ -126,14 +123,14 @@ def starting_candidates(
             input_map,
             start.numerator,
             start.denominator,
-            orders.nk,
+            start.delay,
             static_map.identity("none", options.of_output, np.ones(1)),
             sample_time_s=1.0,
             initial_state=options.initial_state,
         )
         _, x = reaching(Candidate(model, states), experiments)
         candidates += [
-            Candidate(replace(model, output_map=output_map), states)
+            Candidate(replace(model, output_map=output_map), states, limits_of(options))
             for output_map in static_map.starting_maps(
                 options.output_map,
                 options.of_output,
@@ -170,7 +167,7 @@ def _with_output_curve(
 
 
 def _entered(
-    family: tuple[bool, bool], candidate: Candidate, experiments: Sequence[Experiment]
+    family: tuple[bool, ...], candidate: Candidate, experiments: Sequence[Experiment]
 ) -> _Runner:
     cost = simulated(point_of(candidate), experiments).cost
     return _Runner(family, Search(candidate, cost, 0, "iteration_limit", ""))

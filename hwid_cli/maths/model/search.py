@@ -18,13 +18,15 @@ import numpy as np
 
 from hwid_cli.maths.model import sensitivities, static_map
 from hwid_cli.maths.model.candidates import Candidate, Experiment, thinned
+from hwid_cli.maths.model.delays import relaxed_starts
 from hwid_cli.maths.model.levenberg_marquardt import Search, minimise
 from hwid_cli.maths.model.phases import finish, place, standing
 from hwid_cli.maths.model.placing import reaching
 from hwid_cli.maths.model.points import block_signals, point_of
 from hwid_cli.maths.model.race import LONG, SHORT, race
-from hwid_cli.maths.model.starts import Start, linear_starts
-from hwid_cli.records.model import FitOptions, Orders
+from hwid_cli.maths.model.robust import rejudged, renewed
+from hwid_cli.maths.model.starts import Start
+from hwid_cli.records.model import FitOptions
 
 _RELAXING_ITERATIONS = 8
 _RELAXED_BLOCKS = 2
@@ -46,7 +48,6 @@ _FLAT = 0.1
 
 def linear_search(
     experiments: Sequence[Experiment],
-    orders: Orders,
     options: FitOptions,
     starts: Sequence[Start],
 ) -> Search:
@@ -56,7 +57,6 @@ def linear_search(
     ----------
     experiments : sequence of Experiment
         Scaled to about one.
-    orders : Orders
     options : FitOptions
         Its maps are ignored.
     starts : sequence of Start
@@ -68,7 +68,7 @@ def linear_search(
     """
     linear = replace(options, input_map="none", output_map="none")
     plain = [one for one in starts if not one.is_expanded]
-    (leader,) = race(experiments, plain, orders, linear, rounds=SHORT)
+    (leader,) = race(experiments, plain, linear, rounds=SHORT)
     few = thinned(experiments, _LINEAR_ROWS)
     found = minimise(
         leader.candidate,
@@ -84,7 +84,6 @@ def linear_search(
 
 def nonlinear_search(
     experiments: Sequence[Experiment],
-    orders: Orders,
     options: FitOptions,
     starts: Sequence[Start],
     linear: Search,
@@ -95,7 +94,6 @@ def nonlinear_search(
     ----------
     experiments : sequence of Experiment
         Scaled to about one.
-    orders : Orders
     options : FitOptions
     starts : sequence of Start
     linear : Search
@@ -107,25 +105,27 @@ def nonlinear_search(
     Search
         Its iterations are those of the winning chain.
     """
-    finalists = race(experiments, starts, orders, options)
+    finalists = race(experiments, starts, options)
+    experiments = renewed(experiments, [one.candidate for one in finalists])
     placed = [place(one, experiments, options) for one in finalists]
     best = finish(_best(placed), experiments, options)
-    relaxed = _relaxed(best, experiments, orders, options)
+    relaxed = best
+    if not options.keeps_block:
+        relaxed = _relaxed(best, experiments, options)
     if relaxed.cost < _WORTH_GOING_ON * best.cost:
         best = _best([best, finish(relaxed, experiments, options)])
     if _leaves_structure(best, experiments):
-        best = _best([best, *_searched_again(experiments, starts, orders, options)])
+        best = _best([best, *_searched_again(experiments, starts, options)])
     return _not_worse_than(linear, best, experiments, options)
 
 
 def _searched_again(
     experiments: Sequence[Experiment],
     starts: Sequence[Start],
-    orders: Orders,
     options: FitOptions,
 ) -> list[Search]:
     """A long race of all starts, for where the short one has found no good minimum."""
-    found = race(experiments, starts, orders, options, rounds=LONG)
+    found = race(experiments, starts, options, rounds=LONG)
     placed = [place(one, experiments, options) for one in found]
     return [finish(_best(placed), experiments, options)]
 
@@ -140,7 +140,6 @@ def _leaves_structure(best: Search, experiments: Sequence[Experiment]) -> bool:
 def search_beyond(
     contained: Sequence[Candidate],
     experiments: Sequence[Experiment],
-    orders: Orders,
     options: FitOptions,
     starts: Sequence[Start],
     linear: Search,
@@ -152,7 +151,6 @@ def search_beyond(
     contained : sequence of Candidate
         Of the orders and kinds of maps asked for.
     experiments : sequence of Experiment
-    orders : Orders
     options : FitOptions
     starts : sequence of Start
     linear : Search
@@ -163,10 +161,11 @@ def search_beyond(
         A shorter search than `nonlinear_search`: only what promises more than to go on
         from the best of the contained models is finished.
     """
+    experiments = renewed(experiments, contained)
     known = [standing(one, experiments) for one in contained]
     best = _best(known)
     best = _best([best, finish(best, experiments, options)])
-    (leader,) = race(experiments, starts, orders, options, rounds=SHORT)
+    (leader,) = race(experiments, starts, options, rounds=SHORT)
     if leader.cost < _WORTH_PLACING * best.cost:
         placed = place(leader, experiments, options)
         if placed.cost < _WORTH_A_SECOND_LOOK * best.cost:
@@ -181,6 +180,7 @@ def _not_worse_than(
     options: FitOptions,
 ) -> Search:
     """The best so far, or what comes of the linear model where that is better."""
+    linear = rejudged(linear, experiments)
     if linear.cost >= best.cost:
         return best
     linear = finish(linear, experiments, options)
@@ -206,25 +206,30 @@ def _passing(
 def _relaxed(
     best: Search,
     experiments: Sequence[Experiment],
-    orders: Orders,
     options: FitOptions,
 ) -> Search:
     """Find the linear block anew between the maps of the best model."""
     between = _between_maps(best.candidate, experiments)
-    model = best.candidate.model
-    starts = linear_starts(
+    model, no_states = best.candidate.model, best.candidate.free_responses[:, :0]
+    has_states = options.initial_state == "estimated"
+    starts = relaxed_starts(
         between,
-        orders,
-        options=options,
-        sees_input_map=False,
+        model.orders,
+        options,
         count=_RELAXED_BLOCKS,
-        prefilters=(model.denominator,),
+        denominator=model.denominator,
     )
     found = [
         minimise(
-            Candidate(
-                replace(model, numerator=one.numerator, denominator=one.denominator),
-                one.free_responses[:, : best.candidate.free_responses.shape[1]],
+            replace(
+                best.candidate,
+                model=replace(
+                    model,
+                    numerator=one.numerator,
+                    denominator=one.denominator,
+                    delay=one.delay,
+                ),
+                free_responses=one.free_responses if has_states else no_states,
             ),
             experiments,
             with_positions=False,
@@ -253,7 +258,8 @@ def _between_maps(
             output_map, x, scratch, 0, with_positions=True
         )
         held_back = slope**2 + _FLAT * float(np.mean(slope**2)) + 1e-300
-        result.append(Experiment(w, x + (one.output - y) * slope / held_back))
+        error = np.clip(one.output - y, -one.threshold, one.threshold)
+        result.append(Experiment(w, x + error * slope / held_back))
     return result
 
 

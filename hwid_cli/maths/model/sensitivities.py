@@ -12,12 +12,13 @@ docs/method.md, eqs. (11)-(14).
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from hwid_cli.maths.model import static_map
 from hwid_cli.maths.model.candidates import Candidate, Columns, Experiment, columns
+from hwid_cli.maths.model.loss import loss_sum, root_weights
 from hwid_cli.maths.model.maps.rule import Derivatives
 from hwid_cli.maths.model.points import Point, block_signals, point_of
 from hwid_cli.maths.model.rows.kernels import derivative_rows, local_sums
@@ -50,8 +51,8 @@ class Simulated:
     residuals : tuple of ndarray, shape (n_rows,)
         Measured minus simulated, at the samples that count.
     cost : float
-        Sum of squares over all samples, from those that count; infinite where the
-        simulation is not finite.
+        Sum of squares, or of losses, over all samples, from those that count; infinite
+        where the simulation is not finite.
     """
 
     signals: tuple[tuple[np.ndarray, np.ndarray], ...]
@@ -81,7 +82,7 @@ def simulated_outputs(
 
 
 def cost(candidate: Candidate, experiments: Sequence[Experiment]) -> float:
-    """Sum of squared residuals; infinite where the simulation is not finite.
+    """Sum of squares, or of losses; infinite where the simulation is not finite.
 
     Parameters
     ----------
@@ -136,7 +137,8 @@ def simulated(point: Point, experiments: Sequence[Experiment]) -> Simulated:
             residual = one.output[one.counted] - seen
             signals.append((w, x))
             residuals.append(residual)
-            total += one.output.size / residual.size * float(residual @ residual)
+            loss = loss_sum(residual, one.threshold)
+            total += one.output.size / residual.size * loss
     if not np.isfinite(total):
         total = float("inf")
     return Simulated(tuple(signals), tuple(residuals), total)
@@ -173,7 +175,11 @@ def normal_equations(
         after = static_map.derivatives(
             point.output_map, x, with_positions=place.with_positions
         )
+        residual = found.residuals[index]
+        if one.threshold < np.inf:
+            after, residual = _weighted(after, residual, one.threshold)
         rows = _rows(point, place, (before, after), (index, found, one.counted))
+        rows[:, -1] = residual
         if after.is_local:
             own, cross = local_sums(after.first, after.shares, rows, after.count)
             part = _joined(own, cross, rows)
@@ -191,7 +197,7 @@ def _rows(
     maps: tuple[Derivatives, Derivatives],
     where: tuple[int, Simulated, np.ndarray],
 ) -> np.ndarray:
-    """Dense columns of one experiment, and its residual as the last."""
+    """Dense columns of one experiment; the last is left for its residual."""
     (before, after), (index, found, counted) = maps, where
     n_states = place.free_responses.stop - place.free_responses.start
     nb, nf = point.numerator.size, point.denominator.size - 1
@@ -207,8 +213,16 @@ def _rows(
         counted,
         rows,
     )
-    rows[:, -1] = found.residuals[index]
     return rows
+
+
+def _weighted(
+    after: Derivatives, residual: np.ndarray, threshold: float
+) -> tuple[Derivatives, np.ndarray]:
+    """Rows of a sum of squares with the gradient of Huber's loss."""
+    root = root_weights(residual, threshold)
+    shares = after.shares * root[:, None]
+    return replace(after, slope=after.slope * root, shares=shares), residual * root
 
 
 def _joined(own: np.ndarray, cross: np.ndarray, rows: np.ndarray) -> np.ndarray:

@@ -19,6 +19,7 @@ import numpy as np
 from hwid_cli.maths.model.candidates import Experiment, thinned
 from hwid_cli.maths.model.linear_block import difference_basis
 from hwid_cli.maths.model.regression.least_squares import (
+    LARGEST_RADIUS,
     Regression,
     Solution,
     regression,
@@ -55,6 +56,9 @@ class Start:
         Constant that belongs to the output.
     free_responses : ndarray, shape (n_experiments, n_state)
         Initial states that belong to it; zero where none were sought.
+    is_given : bool
+        Whether it comes from the user instead of the data.
+    delay : int, [samples]
     """
 
     numerator: np.ndarray
@@ -64,11 +68,28 @@ class Start:
     input_values: np.ndarray
     offset: float
     free_responses: np.ndarray
+    is_given: bool = False
+    delay: int = 0
 
     @property
     def is_expanded(self) -> bool:
         """Whether the input was expanded."""
         return self.input_points.size > 2
+
+
+@dataclass(frozen=True, eq=False)
+class Known:
+    """A denominator from which the iterations begin, and how many there are.
+
+    Parameters
+    ----------
+    denominator : ndarray, shape (n_poles + 1,)
+        Stable.
+    iterations : int
+    """
+
+    denominator: np.ndarray
+    iterations: int = _ITERATIONS
 
 
 def linear_starts(
@@ -78,7 +99,7 @@ def linear_starts(
     options: FitOptions,
     sees_input_map: bool,
     count: int,
-    prefilters: Sequence[np.ndarray] = (),
+    known: Known | None = None,
 ) -> tuple[Start, ...]:
     """Stable linear blocks, best first.
 
@@ -94,8 +115,8 @@ def linear_starts(
         Whether the input may be expanded into hat functions.
     count : int
         How many to return at most.
-    prefilters : sequence of ndarray
-        Denominators to begin with where some are known; else several are tried.
+    known : Known, optional
+        What to begin with; else several prefilters are tried.
 
     Returns
     -------
@@ -114,9 +135,12 @@ def linear_starts(
             has_free_response=options.initial_state == "estimated"
             and len(experiments) <= _MOST_FREE_RESPONSES,
         )
+        radius = LARGEST_RADIUS * options.largest_pole_radius
+        problem = replace(problem, largest_radius=radius)
         found: list[Solution] = []
-        for prefilter in prefilters or _prefilters(orders):
-            found += _iterations(problem, prefilter)
+        for prefilter in _prefilters(orders) if known is None else (known.denominator,):
+            count_of_steps = _ITERATIONS if known is None else known.iterations
+            found += _iterations(problem, prefilter, count_of_steps)
         found.sort(key=lambda one: one.cost)
         count_here = -(-count // len(families))
         chosen += [_start(problem, one) for one in _distinct(found, count_here)]
@@ -129,12 +153,12 @@ def _prefilters(orders: Orders) -> list[np.ndarray]:
     return [np.eye(1, count + 1)[0] for count in sorted(counts, reverse=True)]
 
 
-def _iterations(one: Regression, denominator: np.ndarray) -> list[Solution]:
+def _iterations(one: Regression, denominator: np.ndarray, count: int) -> list[Solution]:
     """Steiglitz-McBride from a prefilter with as many poles as the start shall have."""
     # The prefilter itself counts too: inputs of few frequencies lead the iterations
     # astray.
     found = []
-    for _ in range(_ITERATIONS + 1 if denominator.size > 1 else 1):
+    for _ in range(count + 1 if denominator.size > 1 else 1):
         solution, denominator = solve(one, denominator)
         found.append(solution)
     return found
@@ -163,6 +187,7 @@ def _start(one: Regression, solution: Solution) -> Start:
         values,
         solution.level,
         states,
+        delay=orders.nk,
     )
 
 

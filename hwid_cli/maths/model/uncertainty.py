@@ -13,11 +13,12 @@ Ljung, System Identification (1999), section 9.2. docs/method.md, eqs. (16), (28
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from hwid_cli.maths.model import sensitivities
-from hwid_cli.maths.model.candidates import Candidate, Experiment
+from hwid_cli.maths.model.candidates import Candidate, Experiment, limits_of
 from hwid_cli.maths.model.flat_directions import flat_sentences
 from hwid_cli.maths.model.identifiability import (
     Directions,
@@ -27,6 +28,7 @@ from hwid_cli.maths.model.identifiability import (
     parameter_names,
 )
 from hwid_cli.maths.model.information import information
+from hwid_cli.maths.model.robust import plain, renewed, residual_variance
 from hwid_cli.maths.model.simulate import estimated_state
 from hwid_cli.maths.model.static_map import RULES
 from hwid_cli.records.information import Information
@@ -47,6 +49,7 @@ def judged_parameters(
     candidate : Candidate
         Normalised, in the units of the experiments.
     experiments : sequence of Experiment
+        With the threshold of the fit.
     free_break_points : bool
         Whether break-points were fitted; fixed ones are left out.
 
@@ -61,16 +64,17 @@ def judged_parameters(
     kind = candidate.model.output_map.kind
     if not RULES[kind].has_slope:
         count = n_free(candidate, free_break_points=free_break_points)
-        squared_error = sensitivities.cost(candidate, experiments)
+        squared_error = sensitivities.cost(candidate, plain(experiments))
         return (
             Uncertainty(reason=f"a {kind} output map has no slope to tell by"),
             information(squared_error, n_samples, count),
         )
-    found = directions(candidate, experiments, free_break_points=free_break_points)
+    squared = plain(experiments)
+    found = directions(candidate, squared, free_break_points=free_break_points)
     if found is None or found.n_effective >= n_samples:
         return Uncertainty(reason="the data are too few to tell"), Information()
-    squared_error = sensitivities.cost(candidate, experiments)
-    variance = squared_error / (n_samples - found.n_effective)
+    squared_error = sensitivities.cost(candidate, squared)
+    variance = residual_variance(candidate, experiments, found.n_effective)
     covariance = _covariance(found, variance)
     order = listed(found.place)
     every = parameter_names(candidate, found.place)
@@ -81,7 +85,7 @@ def judged_parameters(
             names,
             errors,
             _reason(names, errors),
-            flat_sentences(candidate, experiments, found, variance),
+            flat_sentences(candidate, squared, found, variance),
         ),
         information(squared_error, n_samples, found.n_effective),
     )
@@ -126,9 +130,10 @@ def parameter_covariance(
     freedom = sum(one.output.size for one in experiments)
     if found is None or found.n_effective >= freedom:
         raise ValueError(f"the recordings of {fit.name} are too few to tell")
-    variance = sensitivities.cost(candidate, experiments) / (
-        freedom - found.n_effective
-    )
+    if fit.options.loss != "squared":
+        experiments = tuple(replace(one, threshold=1.0) for one in experiments)
+        experiments = tuple(renewed(experiments, [candidate]))
+    variance = residual_variance(candidate, experiments, found.n_effective)
     order = listed(found.place)
     every = parameter_names(candidate, found.place)
     return ParameterCovariance(
@@ -158,7 +163,8 @@ def _as_fitted(
         states += [estimated_state(model, one) for one in others]
     else:
         states = [np.zeros(0) for _ in experiments]
-    return Candidate(model, np.array(states)), experiments
+    limits = limits_of(fit.options)
+    return Candidate(model, np.array(states), limits), experiments
 
 
 def _covariance(found: Directions, variance: float) -> np.ndarray:

@@ -14,7 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from hwid_cli.maths.model.candidates import Candidate, Experiment, thinned
+from hwid_cli.maths.model.candidates import Candidate, Experiment, limits_of, thinned
 from hwid_cli.maths.model.levenberg_marquardt import Search, minimise
 from hwid_cli.maths.model.phases import finish, place, standing
 from hwid_cli.maths.model.placing import coarser, finer, with_maps
@@ -93,6 +93,7 @@ def _starting(
     return Candidate(
         replace(model, free_response=np.zeros(0), initial_state=options.initial_state),
         np.zeros((len(experiments), n_state)),
+        limits_of(options),
     )
 
 

@@ -46,6 +46,8 @@ class Regression:
     orders : Orders
     has_level, has_free_response : bool
         Whether the output may have an offset and an initial state of its own.
+    largest_radius : float, [-]
+        Poles further out are drawn in.
     """
 
     experiments: tuple[Experiment, ...]
@@ -54,6 +56,7 @@ class Regression:
     orders: Orders
     has_level: bool
     has_free_response: bool
+    largest_radius: float = LARGEST_RADIUS
 
     @property
     def is_expanded(self) -> bool:
@@ -162,7 +165,7 @@ def solve(one: Regression, denominator: np.ndarray) -> tuple[Solution, np.ndarra
     )
     past, _ = _least_squares(products, all_known, products.shape[0] - 2)
     tail = difference_basis(n_poles) @ past[:n_poles]
-    return solution, _stabilised(np.concatenate([[1.0], tail]))
+    return solution, _stabilised(np.concatenate([[1.0], tail]), one.largest_radius)
 
 
 def _solution(
@@ -239,9 +242,9 @@ def _least_squares(
     return solution / scale, max(float(cost), 0.0)
 
 
-def _stabilised(denominator: np.ndarray) -> np.ndarray:
-    """Denominator with all poles well inside the unit circle."""
-    drawn_in = denominator * LARGEST_RADIUS ** -np.arange(denominator.size)
+def _stabilised(denominator: np.ndarray, largest_radius: float) -> np.ndarray:
+    """Denominator with all poles well inside the circle that they may fill."""
+    drawn_in = denominator * largest_radius ** -np.arange(denominator.size)
     if is_stable(drawn_in):
         return denominator
-    return reflected(denominator, LARGEST_RADIUS)
+    return reflected(denominator, largest_radius)

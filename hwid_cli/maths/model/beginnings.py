@@ -1,0 +1,233 @@
+"""Where the search of a fit begins: linear blocks, smaller models, models of members.
+
+All are for the scaled experiments of a problem.
+
+References
+----------
+docs/method.md, sections "Starts", "Warm starts" and "A linear block that is known".
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from hwid_cli.maths.model.candidates import Candidate, Experiment, limits_of
+from hwid_cli.maths.model.contained import contains, enlarged
+from hwid_cli.maths.model.delays import starts_of_delays
+from hwid_cli.maths.model.levenberg_marquardt import Search
+from hwid_cli.maths.model.linear_block import filtered, is_stable, reflected
+from hwid_cli.maths.model.normalise import rescaled
+from hwid_cli.maths.model.problem import Problem
+from hwid_cli.maths.model.regression.least_squares import LARGEST_RADIUS
+from hwid_cli.maths.model.robust import rejudged, renewed, winsorised
+from hwid_cli.maths.model.search import linear_search
+from hwid_cli.maths.model.starts import Start
+from hwid_cli.maths.model.static_map import has_free_shape
+from hwid_cli.records.model import FitOptions, HammersteinWiener, Orders
+
+
+def linear_beginnings(
+    problem: Problem, orders: Orders, options: FitOptions
+) -> tuple[tuple[Start, ...], Search]:
+    """Linear starts and linear model; found again where outliers were in the way.
+
+    Parameters
+    ----------
+    problem : Problem
+    orders : Orders
+    options : FitOptions
+        In the units of the problem.
+
+    Returns
+    -------
+    starts : tuple of Start
+        At least one.
+    linear : Search
+    """
+    experiments: Sequence[Experiment] = problem.experiments
+    starts = block_starts(experiments, orders, options)
+    linear = linear_search(experiments, options, starts)
+    if options.loss == "squared":
+        return starts, linear
+    starts = block_starts(winsorised(linear, experiments), orders, options)
+    experiments = renewed(experiments, [linear.candidate])
+    again = linear_search(experiments, options, starts)
+    linear = rejudged(linear, experiments)
+    return starts, min(linear, again, key=lambda one: one.cost)
+
+
+def block_starts(
+    experiments: Sequence[Experiment], orders: Orders, options: FitOptions
+) -> tuple[Start, ...]:
+    """Linear blocks from the data, and the one that is given.
+
+    Parameters
+    ----------
+    experiments : sequence of Experiment
+    orders : Orders
+    options : FitOptions
+        In the units of the experiments.
+
+    Returns
+    -------
+    tuple of Start
+        At least one; a frozen block is the only one.
+    """
+    if options.keeps_block:
+        return _given_start(experiments, orders, options)
+    of_delays = starts_of_delays(
+        experiments,
+        orders,
+        options=options,
+        sees_input_map=has_free_shape(options.input_map),
+        count=options.starts,
+    )
+    found: tuple[Start, ...] = ()
+    for starts in of_delays:
+        found += starts
+        at = replace(orders, nk=starts[0].delay)
+        found += _given_start(experiments, at, options)
+    return found
+
+
+def contained_candidates(
+    problem: Problem,
+    orders: Orders,
+    options: FitOptions,
+    models: Sequence[HammersteinWiener],
+) -> list[Candidate]:
+    """Models of smaller orders as candidates; of several experiments, of the first.
+
+    Parameters
+    ----------
+    problem : Problem
+    orders : Orders
+    options : FitOptions
+    models : sequence of HammersteinWiener
+        In the units of the recordings.
+
+    Returns
+    -------
+    list of Candidate
+        None beside a frozen block.
+    """
+    if options.keeps_block:
+        return []
+    count = len(problem.experiments)
+    candidates = []
+    for model in models:
+        # With several delays a smaller model may have found another one than this one.
+        tried = [replace(orders, nk=nk) for nk in (orders.nk, model.delay)]
+        at = next((one for one in tried if contains(one, model.orders)), None)
+        if at is None:
+            continue
+        larger = enlarged(
+            rescaled(model, 1.0 / problem.input_scale, 1.0 / problem.output_scale), at
+        )
+        n_state = at.n_state if options.initial_state == "estimated" else 0
+        states = np.zeros((count, n_state))
+        states[0] = larger.free_response[:n_state] if n_state else 0.0
+        bare = replace(
+            larger,
+            denominator=_drawn_in(larger.denominator, options.largest_pole_radius),
+            free_response=np.zeros(0),
+        )
+        candidates.append(Candidate(bare, states, limits_of(options)))
+    return candidates
+
+
+def member_models(
+    problem: Problem, options: FitOptions, models: Sequence[HammersteinWiener]
+) -> list[HammersteinWiener]:
+    """Stable models in the units of a problem, their poles where they may be.
+
+    Parameters
+    ----------
+    problem : Problem
+    options : FitOptions
+        In the units of the problem.
+    models : sequence of HammersteinWiener
+        In the units of the recordings.
+
+    Returns
+    -------
+    list of HammersteinWiener
+    """
+    found = []
+    for model in models:
+        if not is_stable(model.denominator):
+            continue
+        one = rescaled(model, 1.0 / problem.input_scale, 1.0 / problem.output_scale)
+        numerator, denominator = one.numerator, one.denominator
+        if options.keeps_block and options.linear_block is not None:
+            numerator = np.array(options.linear_block.numerator)
+            denominator = np.array(options.linear_block.denominator)
+        found.append(
+            replace(
+                one,
+                numerator=numerator,
+                denominator=_drawn_in(denominator, options.largest_pole_radius),
+            )
+        )
+    return found
+
+
+def _given_start(
+    experiments: Sequence[Experiment], orders: Orders, options: FitOptions
+) -> tuple[Start, ...]:
+    """Start from the block that the user gives, where the orders contain it."""
+    block = options.linear_block
+    if block is None or not contains(orders, block.orders):
+        return ()
+    first = block.delay - orders.nk
+    numerator = np.zeros(orders.nb)
+    numerator[first : first + block.orders.nb] = block.numerator
+    denominator = np.zeros(orders.nf + 1)
+    denominator[: block.orders.nf + 1] = block.denominator
+    denominator = _drawn_in(denominator, options.largest_pole_radius)
+    gain, offset, cost = _gain(experiments, numerator, denominator, orders.nk)
+    inputs = np.concatenate([one.input for one in experiments])
+    points = np.array([inputs.min(), inputs.max()])
+    # The gain of a frozen block is known: what is missing is that of a map.
+    in_map = gain if block.frozen else 1.0
+    return (
+        Start(
+            numerator if block.frozen else gain * numerator,
+            denominator,
+            cost,
+            points,
+            in_map * points,
+            offset,
+            np.zeros((len(experiments), orders.n_state)),
+            is_given=True,
+            delay=orders.nk,
+        ),
+    )
+
+
+def _gain(
+    experiments: Sequence[Experiment],
+    numerator: np.ndarray,
+    denominator: np.ndarray,
+    delay: int,
+) -> tuple[float, float, float]:
+    """Gain and offset that bring a block closest to the outputs, and its cost."""
+    x = np.concatenate(
+        [filtered(one.input, numerator, denominator, delay) for one in experiments]
+    )
+    y = np.concatenate([one.output for one in experiments])
+    if not np.isfinite(x).all() or np.ptp(x) == 0.0:
+        return 1.0, 0.0, float("inf")
+    columns = np.column_stack([x, np.ones(x.size)])
+    gain, offset = np.linalg.lstsq(columns, y, rcond=None)[0]
+    residual = y - gain * x - offset
+    cost = float(residual @ residual)
+    return (float(gain) if gain != 0.0 else 1.0), float(offset), cost
+
+
+def _drawn_in(denominator: np.ndarray, largest_radius: float) -> np.ndarray:
+    """Denominator with its poles inside the circle that they may fill."""
+    if is_stable(denominator, largest_radius):
+        return denominator
+    return reflected(denominator, LARGEST_RADIUS * largest_radius)

@@ -1,0 +1,98 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hwid_cli.maths.model.fit import fit
+from hwid_cli.maths.model.simulate import simulate
+from hwid_cli.maths.scores import fit_percent
+from hwid_cli.records.linear_block import LinearBlock
+from hwid_cli.records.model import FitOptions, Orders
+from tests.maths.model.plants import measured, plant
+
+ANY = FitOptions(delays=(1, 2, 3, 4), units=6)
+
+
+def delayed(delay, output_map="polynomial", input_map="dead_zone"):
+    """A plant whose first coefficient is large: its delay can be told."""
+    return replace(plant(input_map, output_map), delay=delay)
+
+
+@pytest.mark.parametrize("delay", [1, 2, 3, 4])
+@pytest.mark.parametrize(
+    ("input_map", "output_map"),
+    [("dead_zone", "polynomial"), ("none", "saturation"), ("polynomial", "none")],
+)
+def test_the_delay_of_a_nonlinear_plant_is_found(delay, input_map, output_map):
+    true = delayed(delay, output_map, input_map)
+    recording = measured(true, noise=0.01)
+    # Two coefficients of B leave no room to make up for a wrong delay.
+    result = fit([recording], Orders(2, 2, 1), ANY)
+    assert result.orders == result.model.orders == Orders(2, 2, delay)
+    alone = fit([recording], Orders(2, 2, delay), FitOptions(units=6))
+    # Other starts lead to the same optimum within what two small gains may leave.
+    assert result.rmsd < 1.02 * alone.rmsd
+
+
+@pytest.mark.parametrize("initial_state", ["zero", "steady", "estimated"])
+def test_a_linear_model_has_the_delay_too(initial_state):
+    true = plant("none", "none", initial_state)
+    linear = FitOptions(input_map="none", output_map="none", delays=(1, 2, 3))
+    options = replace(linear, initial_state=initial_state)
+    result = fit([measured(true)], Orders(2, 2, 1), options)
+    assert result.orders.nk == 2
+    assert result.rmsd < 1e-9
+
+
+def test_one_delay_is_that_delay():
+    recording = measured(delayed(3), noise=0.01)
+    listed = fit([recording], Orders(2, 2, 1), FitOptions(delays=(3,), units=6))
+    plain = fit([recording], Orders(2, 2, 3), FitOptions(units=6))
+    assert listed.orders == plain.orders
+    assert listed.rmsd == plain.rmsd
+
+
+def test_more_parameters_never_fit_worse_whatever_delays_are_found():
+    recording = measured(delayed(3), noise=0.01)
+    small = fit([recording], Orders(1, 2, 1), ANY)
+    for orders in (Orders(2, 2, 1), Orders(1, 3, 1), Orders(4, 3, 1)):
+        large = fit([recording], orders, ANY, contained=[small.model])
+        assert large.rmsd <= small.rmsd * (1.0 + 1e-9)
+        assert large.orders.nk in ANY.delays
+
+
+def test_a_group_begins_with_members_of_different_delays():
+    pair = [measured(delayed(3), seed=seed, noise=0.01) for seed in (1, 2)]
+    given = replace(ANY, join="experiments")
+    right = fit(pair[:1], Orders(2, 2, 1), given).model
+    wrong = fit(pair[1:], Orders(2, 2, 2), FitOptions(units=6)).model
+    result = fit(pair, Orders(2, 2, 1), given, starts=[wrong, right])
+    assert result.orders == Orders(2, 2, 3)
+    other = measured(delayed(3), seed=3)
+    y = simulate(result.model, other.input, initial_state=np.zeros(0))
+    assert fit_percent(other.output, y) > 97.0
+
+
+def test_a_start_of_a_delay_that_is_not_tried_is_refused():
+    recording = measured(delayed(3), noise=0.01)
+    model = fit([recording], Orders(2, 2, 3), FitOptions(units=6)).model
+    with pytest.raises(ValueError, match="a start must have the orders"):
+        fit([recording], Orders(2, 2, 1), replace(ANY, delays=(1, 2)), starts=[model])
+
+
+def test_a_given_block_starts_with_every_delay_that_contains_it():
+    true = delayed(2)
+    recording = measured(true, noise=0.01)
+    block = LinearBlock(tuple(true.numerator), tuple(true.denominator), 2)
+    given = replace(ANY, linear_block=block)
+    assert fit([recording], Orders(2, 2, 1), given).orders.nk == 2
+
+
+@pytest.mark.parametrize("delays", [(-1,), (1.5,)])
+def test_delays_that_are_none_are_refused(delays):
+    with pytest.raises(ValueError, match="delays must be integers >= 0"):
+        FitOptions(delays=delays)
+
+
+def test_delays_are_sorted_and_counted_once():
+    assert FitOptions(delays=(3, 1, 3)).delays == (1, 3)
