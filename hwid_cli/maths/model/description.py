@@ -19,6 +19,7 @@ from hwid_cli.maths.model.normalise import normalise, rescaled
 from hwid_cli.maths.model.placing import with_maps
 from hwid_cli.maths.model.problem import Problem, joined
 from hwid_cli.maths.model.uncertainty import judged_parameters
+from hwid_cli.maths.model.unvisited import straightened
 from hwid_cli.records.model import Fit, FitOptions
 from hwid_cli.records.recordings import Recording
 
@@ -41,7 +42,8 @@ def described(
     -------
     Fit
     """
-    candidate = with_maps(search.candidate, problem.experiments, static_map.with_domain)
+    candidate = with_maps(search.candidate, problem.experiments, straightened)
+    candidate = with_maps(candidate, problem.experiments, static_map.with_domain)
     candidate = _in_units(candidate, problem, recordings[0], blank.options)
     experiments = joined(recordings, blank.options)
     simulated = np.concatenate(sensitivities.simulated_outputs(candidate, experiments))

@@ -3,7 +3,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from hwid_cli.maths.model.beginnings import contained_candidates
 from hwid_cli.maths.model.fit import fit
+from hwid_cli.maths.model.problem import scaled
 from hwid_cli.maths.model.simulate import simulate
 from hwid_cli.maths.scores import fit_percent
 from hwid_cli.records.linear_block import LinearBlock
@@ -96,3 +98,13 @@ def test_delays_that_are_none_are_refused(delays):
 
 def test_delays_are_sorted_and_counted_once():
     assert FitOptions(delays=(3, 1, 3)).delays == (1, 3)
+
+
+def test_a_smaller_model_keeps_its_own_delay_where_that_is_needed():
+    recording = measured(plant("dead_zone", "polynomial"), noise=0.01)
+    options = FitOptions(units=4, delays=(1, 2, 3))
+    small = fit([recording], Orders(1, 2, 1), FitOptions(units=4)).model
+    problem = scaled([recording], options)
+    (one,) = contained_candidates(problem, Orders(2, 2, 3), options, [small])
+    assert one.model.orders == Orders(2, 2, 1)
+    assert one.free_responses.shape == (1, 2)
