@@ -46,7 +46,7 @@ def seconds_of(orders, options, *, samples=2000, count=1) -> float:
 
 def show(title, sizes, seconds) -> None:
     """Print one line of sizes, one of seconds and the exponent."""
-    half = len(sizes) // 2
+    half = (len(sizes) - 1) // 2  # at least three of four sizes
     print(
         f"\n{title}: exponent {exponent(sizes, seconds):.2f}, "
         f"of the larger half {exponent(sizes[half:], seconds[half:]):.2f}"

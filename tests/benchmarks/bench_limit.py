@@ -107,8 +107,8 @@ def measure(orders: Orders, u, y, *, free: bool) -> None:
     floor = recursions_s + product_s
     print(
         f"[{orders.nb:2} {orders.nf:2} {orders.nk}]  "
-        f"{'free ' if free else 'fixed'}{width - 1:11}{done[-1]:12}"
-        f"{1e3 * search_s:14.2f}{1e3 * recursions_s:14.2f}{1e3 * product_s:10.2f}"
+        f"{'free ' if free else 'fixed'}{width - 1:13}{done[-1]:12}"
+        f"{1e3 * search_s:14.2f}{1e3 * recursions_s:14.2f}{1e3 * product_s:12.2f}"
         f"{search_s / floor:8.2f}"
     )
 
@@ -119,8 +119,8 @@ def main() -> None:
     u, y = u / np.max(np.abs(u)), y / np.std(y)
     print(f"\none iteration at {N_SAMPLES} samples, one thread")
     print(
-        f"{'orders':11}{'points':6}{'parameters':>10}{'iterations':>12}"
-        f"{'iteration ms':>14}{'recursions ms':>14}{'J J ms':>10}{'ratio':>8}"
+        f"{'orders':11}{'points':6}{'parameters':>12}{'iterations':>12}"
+        f"{'iteration ms':>14}{'recursions ms':>14}{'product ms':>12}{'ratio':>8}"
     )
     with one_thread():
         for orders in ORDERS:
