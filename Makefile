@@ -10,12 +10,13 @@ RUN := $(VENV)/installed-run
 DEV := $(VENV)/installed-dev
 
 .DEFAULT_GOAL := help
-.PHONY: help install run test test-all check format smoke bench clean \
+.PHONY: help install run test test-all check format smoke clean \
+        bench bench-campaign bench-growth bench-real \
         simulate calibrate identify crossval group test-stage steps model1 model2 \
         reproduction thesis chapter2 hsm150 diagnose gun real effects blind
 
 help:  ## show these targets
-	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' Makefile
+	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / {printf "  make %-14s %s\n", $$1, $$2}' Makefile
 
 $(RUN): pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { \
@@ -55,8 +56,19 @@ format: $(DEV)  ## put the code into form
 smoke: $(DEV)  ## every stage on tiny recordings, twice
 	$(BIN)/python tests/smoke.py
 
-bench: $(DEV)  ## speed and accuracy against what a user would write
-	@for file in tests/benchmarks/bench_*.py; do $(BIN)/python "$$file" || exit 1; done
+# As modules, from here, so that they find each other; one thread of linear algebra.
+BENCH := OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.benchmarks
+bench: $(DEV)  ## speed and accuracy against what a user would write: about four minutes
+	@for name in fit grid warm_start limit growth startup; do $(BENCH).bench_$$name || exit 1; done
+
+bench-campaign: $(DEV)  ## 15 recordings with 100 orders each from an empty cache
+	@$(BENCH).bench_campaign
+
+bench-growth: $(DEV)  ## how a fit's time grows, up to 100 000 samples
+	@$(BENCH).bench_growth --full
+
+bench-real: $(DEV)  ## public benchmarks beside the published errors (data in HWID_REALDATA)
+	@$(BENCH).bench_real
 
 simulate: $(RUN)  ## stage: virtual measurements of the gun
 	$(HWID) simulate configs/thesis.yaml $(THESIS)
