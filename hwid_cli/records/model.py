@@ -259,6 +259,9 @@ class Fit:
     uncertainty : Uncertainty
     information : Information
         AIC, BIC and FPE; NaN if failed.
+    output_folds : tuple of float, [x]
+        Where the output map turns back, by more than the residuals and within the range
+        of nearly all samples; empty for a monotonic one.
     """
 
     identified_on: tuple[str, ...]
@@ -275,6 +278,7 @@ class Fit:
     is_stable: bool = False
     uncertainty: Uncertainty = field(default_factory=Uncertainty)
     information: Information = field(default_factory=Information, metadata=ADDED_LATER)
+    output_folds: tuple[float, ...] = field(default=(), metadata=ADDED_LATER)
 
     def __post_init__(self) -> None:
         if self.status not in FIT_STATUSES:

@@ -8,6 +8,7 @@ import numpy as np
 from hwid_cli.records.model import Fit
 from hwid_cli.records.recordings import CalibrationLog
 from hwid_cli.records.results import CrossValidation, ModelScore
+from hwid_cli.report.fold_words import folds_note
 from hwid_cli.report.simulation_words import simulation_words
 from hwid_cli.report.text_table import MISSING, WIDTH, number, split_table, text_table
 
@@ -171,7 +172,9 @@ def best_models_table(
     )
     for one in started:
         title += f"\n{simulation_words(one, is_validation=False)}"
-    return text_table(title, heads, rows, text_columns=(0, 1))
+    table = text_table(title, heads, rows, text_columns=(0, 1))
+    note = folds_note([fit for group in best for fit in group], nk_is_delay=nk_is_delay)
+    return f"{table}\n{note}" if note else table
 
 
 def coverage_table(

@@ -131,6 +131,7 @@ def example_fit(name="step_01", nb=2, nf=2, seed=1):
             ("b[0]", "µ"), np.array([0.1, np.nan]), "one is flat", ("b[0], because µ",)
         ),
         information=Information(300, 17, -12.5, -12.25, 0.1, 1e-9),
+        output_folds=(-1.25, 1 / 3),
     )
 
 

@@ -7,7 +7,9 @@ import pytest
 from hypothesis import given
 
 from hwid_cli.files.hdf5_records import read_record, write_record
+from hwid_cli.files.hdf5_tables import read_table, write_table
 from hwid_cli.files.hdf5_values import LONGEST_ATTRIBUTE
+from hwid_cli.records.linear_block import LinearBlock
 from tests.files.record_examples import (
     WITH_MORE,
     Everything,
@@ -100,7 +102,12 @@ def test_fields_that_earlier_versions_did_not_write_hold_their_defaults():
     with in_memory() as file:
         write_record(file, fit)
         del file["information"], file["uncertainty"].attrs["flat"]
+        del file.attrs["output_folds"], file["options"].attrs["loss"]
+        del file["options"].attrs["largest_pole_radius"]
+        del file["options"].attrs["delays"]
         found = read_record(file, type(fit))
+    assert found.output_folds == ()
+    assert found.options == fit.options
     assert found.information.n_parameters == 0
     assert found.uncertainty.flat == ()
     assert_same(found.model, fit.model)
@@ -164,3 +171,20 @@ def test_record_type_has_every_form_that_is_stored():
     from hwid_cli.files.hdf5_records import schema  # noqa: PLC0415, RUF100
 
     assert {field.form for field in schema(WithMore)} == forms
+
+
+def test_a_given_linear_block_comes_back():
+    block = LinearBlock((0.1, 1 / 3), (1.0, -0.9), 2, frozen=True)
+    fit = example_fit()
+    frozen = replace(fit, options=replace(fit.options, linear_block=block))
+    other = replace(fit, options=replace(fit.options, delays=(1, 3), loss="huber"))
+    with in_memory() as file:
+        write_record(file.create_group("one"), frozen)
+        write_table(file.create_group("many"), [frozen, fit, other], type(fit))
+        assert read_record(file["one"], type(fit)).options == frozen.options
+        found = read_table(file["many"], type(fit))
+    assert [one.options for one in found] == [
+        frozen.options,
+        fit.options,
+        other.options,
+    ]

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -61,6 +63,21 @@ def test_the_best_models_carry_both_names_and_the_linear_rmsd():
     assert last == [
         "step_06/3/7", "NLHW-Step-6-3-7-1", "1.06e-04", "99.12", "-", "41", "-12346",
     ]  # fmt: skip
+    assert_fits_the_screen(text)
+
+
+def test_output_maps_that_fold_are_named_below_the_best_models():
+    fit = Fit(("step_06",), Orders(3, 7, 1), FitOptions(), MODEL, "converged", "")
+    folded = replace(fit, output_folds=(0.25, 1.5, 3.0))
+
+    assert "fold" not in best_models_table([(fit,)], "m")
+    text = best_models_table([(fit, folded), (folded,) * 4], "m")
+    note = " ".join(text[text.index("Output maps") :].split())
+    assert note.startswith(
+        "Output maps that fold, so that two positions give one output: "
+        "step_06/3/7 (x = 0.25, 1.5, ... A); step_06/3/7"
+    )
+    assert note.endswith("1 more")
     assert_fits_the_screen(text)
 
 

@@ -13,15 +13,21 @@ import numpy as np
 from hwid_cli.maths import scores
 from hwid_cli.maths.model import sensitivities, static_map
 from hwid_cli.maths.model.candidates import Candidate
+from hwid_cli.maths.model.folding import folds
 from hwid_cli.maths.model.levenberg_marquardt import Search
 from hwid_cli.maths.model.linear_block import poles
 from hwid_cli.maths.model.normalise import normalise, rescaled
-from hwid_cli.maths.model.placing import with_maps
+from hwid_cli.maths.model.placing import reaching, with_maps
 from hwid_cli.maths.model.problem import Problem, joined
 from hwid_cli.maths.model.uncertainty import judged_parameters
 from hwid_cli.maths.model.unvisited import straightened
 from hwid_cli.records.model import Fit, FitOptions
 from hwid_cli.records.recordings import Recording
+
+# RMSDs by which an output map must turn back to be called folded: less may be noise.
+_TOLD = 2.0
+# Share of the samples at either end of a map that says too little about its shape.
+_RARE = 0.005
 
 
 def described(
@@ -55,6 +61,12 @@ def described(
         [replace(one, threshold=threshold) for one in experiments],
         free_break_points=blank.options.free_break_points,
     )
+    deviation = scores.rmsd(measured, simulated)
+    _, x = reaching(candidate, experiments)
+    low, high = np.quantile(x, [_RARE, 1.0 - _RARE])
+    turns = folds(
+        candidate.model.output_map, least=_TOLD * deviation, between=(low, high)
+    )
     return replace(
         blank,
         orders=candidate.model.orders,
@@ -62,12 +74,13 @@ def described(
         status=search.status,
         message=search.message,
         iterations=search.iterations,
-        rmsd=scores.rmsd(measured, simulated),
+        rmsd=deviation,
         fit_percent=scores.fit_percent(measured, simulated),
         poles=poles(candidate.model.denominator),
         is_stable=True,
         uncertainty=uncertainty,
         information=information,
+        output_folds=tuple(float(x) for x in turns),
     )
 
 
