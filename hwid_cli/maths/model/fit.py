@@ -25,10 +25,9 @@ from hwid_cli.maths.model.candidates import Candidate
 from hwid_cli.maths.model.description import described
 from hwid_cli.maths.model.levenberg_marquardt import Search
 from hwid_cli.maths.model.linear_block import is_stable
-from hwid_cli.maths.model.phases import finish
 from hwid_cli.maths.model.problem import Problem, rmsd, scaled
 from hwid_cli.maths.model.robust import rejudged, renewed, settled, winsorised
-from hwid_cli.maths.model.search import nonlinear_search, search_beyond
+from hwid_cli.maths.model.search import linear_beyond, nonlinear_search, search_beyond
 from hwid_cli.maths.model.starts import Start
 from hwid_cli.maths.model.warm_start import warm_search
 from hwid_cli.records.model import Fit, FitOptions, HammersteinWiener, Orders
@@ -175,7 +174,7 @@ def _search(
     """Search from nothing but linear models and models of smaller orders."""
     starts, linear, known = found
     if _is_linear(options):
-        return finish(linear, problem.experiments, options)
+        return linear_beyond(known, problem.experiments, options, linear)
     if known:
         return search_beyond(known, problem.experiments, options, starts, linear)
     return nonlinear_search(problem.experiments, options, starts, linear)

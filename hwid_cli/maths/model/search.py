@@ -173,6 +173,35 @@ def search_beyond(
     return _not_worse_than(linear, best, experiments, options)
 
 
+def linear_beyond(
+    contained: Sequence[Candidate],
+    experiments: Sequence[Experiment],
+    options: FitOptions,
+    linear: Search,
+) -> Search:
+    """Linear model that is never worse than those of smaller orders that it contains.
+
+    Parameters
+    ----------
+    contained : sequence of Candidate
+        Of the orders asked for, without maps; may be empty.
+    experiments : sequence of Experiment
+    options : FitOptions
+    linear : Search
+        What `linear_search` found.
+
+    Returns
+    -------
+    Search
+    """
+    known = [standing(one, experiments) for one in contained]
+    found = [finish(rejudged(linear, experiments), experiments, options)]
+    if known:
+        best = _best(known)
+        found += [best, finish(best, experiments, options)]
+    return _best(found)
+
+
 def _not_worse_than(
     linear: Search,
     best: Search,

@@ -45,3 +45,13 @@ def test_a_fit_is_never_worse_than_the_models_it_contains(initial_state):
     )
     large = fit([recording], Orders(4, 4, 1), hasty, contained=[small.model])
     assert large.rmsd <= small.rmsd * (1.0 + 1e-9)
+
+
+def test_a_linear_fit_is_never_worse_than_the_models_it_contains():
+    recording = measured(plant("none", "saturation"), noise=0.02)
+    small = fit([recording], Orders(2, 2, 2), options("none", "none", "estimated"))
+    hasty = options("none", "none", "estimated", max_iterations=1, starts=1)
+    alone = fit([recording], Orders(4, 6, 1), hasty)
+    large = fit([recording], Orders(4, 6, 1), hasty, contained=[small.model])
+    assert large.rmsd <= small.rmsd * (1.0 + 1e-9)
+    assert large.rmsd <= alone.rmsd * (1.0 + 1e-9)
