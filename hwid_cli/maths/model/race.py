@@ -31,7 +31,7 @@ THOROUGH: Rounds = ((2, 4), (4, 2))
 # For where that has found no good minimum: everything that entered.
 LONG: Rounds = ((6, 5), (15, 2))
 # For one of many fits that help each other.
-SHORT: Rounds = ((2, 2), (4, 1))
+SHORT: Rounds = ((0, 4), (2, 1), (3, 1))
 # Samples that count in a round; enough to tell candidates apart.
 RACE_ROWS = 1000
 # Knots of the output map that a block's output asks for, and how stiff it is: the
@@ -86,7 +86,8 @@ def race(
     if rounds != LONG:
         racing = _leaders(racing, options.starts)
     for iterations, count in rounds:
-        racing = [_going_on(one, experiments, iterations) for one in racing]
+        if iterations:
+            racing = [_going_on(one, experiments, iterations) for one in racing]
         racing = _leaders(racing, count, _HOPELESS)
     return [one.search for one in racing]
 

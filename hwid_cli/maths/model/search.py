@@ -38,7 +38,9 @@ _COLOURED = 0.5
 # The same of another start's maps with many break-points, against a contained model's.
 _WORTH_A_SECOND_LOOK = 0.97
 # The same before its break-points are placed, which gains this much at most.
-_WORTH_PLACING = 4.0
+_WORTH_PLACING = 2.0
+# Share of the cost that a step must gain where larger models go on from the result.
+_SMALL_GAIN = 1e-3
 # Samples that count for the linear model, and the share of the cost that a step must gain:
 # it is a yardstick and one more start.
 _LINEAR_ROWS, _LINEAR_GAIN = 2500, 1e-3
@@ -164,12 +166,13 @@ def search_beyond(
     experiments = renewed(experiments, contained)
     known = [standing(one, experiments) for one in contained]
     best = _best(known)
-    best = _best([best, finish(best, experiments, options)])
+    best = _best([best, finish(best, experiments, options, least_gain=_SMALL_GAIN)])
     (leader,) = race(experiments, starts, options, rounds=SHORT)
     if leader.cost < _WORTH_PLACING * best.cost:
         placed = place(leader, experiments, options)
         if placed.cost < _WORTH_A_SECOND_LOOK * best.cost:
-            best = _best([best, finish(placed, experiments, options)])
+            placed = finish(placed, experiments, options, least_gain=_SMALL_GAIN)
+            best = _best([best, placed])
     return _not_worse_than(linear, best, experiments, options)
 
 

@@ -24,7 +24,7 @@ _MOST_HALVINGS = 8
 # show, and the share of the cost that an iteration must gain.
 _DAMPING = 1e-9
 # Share of its largest value below which an impulse response has died away.
-_DIED_AWAY = 1e-12
+_DIED_AWAY = 1e-9
 _LEAST_GAIN = 1e-6
 
 
