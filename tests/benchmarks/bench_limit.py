@@ -77,7 +77,7 @@ def recursions(candidate: Candidate, one: Experiment, *, free: bool):
             (before.first, before.shares, before.count),
             (False, place.n_state, 0, place.n_state),
             np.ones(1),
-            2 * one.input.size,
+            np.zeros(1, dtype=np.int64),
             row,
         )
 

@@ -27,7 +27,7 @@ from hwid_cli.records.model import FitOptions, HammersteinWiener
 
 # Iterations of each round, and how many candidates go on after it.
 Rounds = tuple[tuple[int, int], ...]
-THOROUGH: Rounds = ((2, 4), (4, 2))
+THOROUGH: Rounds = ((2, 3), (4, 2))
 # For where that has found no good minimum: everything that entered.
 LONG: Rounds = ((6, 5), (15, 2))
 # For one of many fits that help each other.

@@ -204,7 +204,9 @@ def move(static_map: StaticMap, step: np.ndarray, *, with_positions: bool) -> St
         return static_map
     parameters = static_map.parameters.copy()
     parameters[active_parameters(static_map, with_positions=with_positions)] += step
-    proposed = replace(static_map, parameters=parameters)
+    proposed = StaticMap(
+        static_map.kind, parameters, static_map.domain, static_map.function
+    )
     return RULES[static_map.kind].settle(static_map, proposed)
 
 
