@@ -5,6 +5,9 @@ References
 docs/method.md, eqs. (1)-(7).
 """
 
+from dataclasses import replace
+from typing import Literal
+
 import numpy as np
 
 from hwid_cli.maths.model import static_map
@@ -32,7 +35,7 @@ def simulate(
     model: HammersteinWiener,
     input: np.ndarray,  # noqa: A002 - the field's word
     *,
-    initial_state: np.ndarray | None = None,
+    initial_state: np.ndarray | Literal["steady"] | None = None,
 ) -> np.ndarray:
     """Output of a model for an input, without any measured output.
 
@@ -40,9 +43,11 @@ def simulate(
     ----------
     model : HammersteinWiener
     input : ndarray, shape (n_samples,), [input unit]
-    initial_state : ndarray, shape (n_state,), optional, [x]
-        Coefficients of the free response to start with. Unless given, a model fitted with
-        an estimated initial state starts like the first recording of its fit.
+    initial_state : ndarray, shape (n_state,), or "steady", optional, [x]
+        Coefficients of the free response to start with, or equilibrium with the first
+        input. Unless given, a model fitted with an estimated initial state starts like
+        the first recording of its fit. Zeros are an empty linear block, which is no rest
+        where the input map is not zero at rest.
 
     Returns
     -------
@@ -51,7 +56,8 @@ def simulate(
     Raises
     ------
     ValueError
-        If the input is not a 1-D array of at least one sample.
+        If the input is not a 1-D array of at least one sample, or the initial state is
+        another word.
 
     References
     ----------
@@ -64,11 +70,22 @@ def simulate(
     >>> model = HammersteinWiener(none, [0.5], [1.0, -0.5], 1, none, 1e-3)
     >>> simulate(model, np.ones(3))
     array([0.  , 0.5 , 0.75])
+    >>> simulate(model, np.ones(3), initial_state="steady")
+    array([1., 1., 1.])
     """
     signal = np.ascontiguousarray(input, dtype=float)
     if signal.ndim != 1 or signal.size == 0:
         raise ValueError(f"input must be a 1-D array with samples, got {signal.shape}")
-    coefficients = model.free_response if initial_state is None else initial_state
+    if isinstance(initial_state, str):
+        if initial_state != "steady":
+            raise ValueError(
+                f'initial_state must be an array or "steady", got {initial_state!r}'
+            )
+        model, coefficients = replace(model, initial_state="steady"), np.zeros(0)
+    elif initial_state is None:
+        coefficients = model.free_response
+    else:
+        coefficients = initial_state
     with np.errstate(over="ignore", invalid="ignore"):
         return static_map.evaluate(
             model.output_map,

@@ -1,4 +1,5 @@
 import numpy as np
+import pytest
 
 from hwid_cli.maths import scores
 from hwid_cli.maths.model.fit import fit
@@ -90,3 +91,16 @@ def test_validation_of_a_steady_model_starts_in_equilibrium_with_the_recording()
     other = measured(true, seed=7)
     output = validation_output(result.model, other)
     assert scores.rmsd(other.output, output) < 1e-8
+
+
+def test_a_steady_start_is_equilibrium_whatever_the_rule_of_the_fit():
+    model = plant("piecewise_linear", "polynomial", "estimated")
+    resting = simulate(model, np.full(50, 1.3), initial_state="steady")
+    np.testing.assert_allclose(resting, resting[0], rtol=1e-12)
+    long = simulate(model, np.full(900, 1.3), initial_state=np.zeros(0))
+    assert resting[0] == pytest.approx(long[-1], rel=1e-9)
+
+
+def test_a_word_for_the_initial_state_that_is_none_is_refused():
+    with pytest.raises(ValueError, match="array or \"steady\", got 'rest'"):
+        simulate(plant(), np.ones(5), initial_state="rest")
