@@ -2,20 +2,20 @@
 
 Signals that a filter reads carry ``pad`` rows in front that hold their values before
 the first sample, so that no loop asks whether a past value exists.
+
+Arithmetic is strict IEEE everywhere: with reassociation or contraction the last bits would
+depend on whether a process compiled a loop or loaded it, and so on the number of workers.
 """
 
 import numpy as np
 from numba import njit
 
-# Reassociation lets the compiler use vector instructions in sums; NaN and infinity keep
-# their meaning because 'nnan' and 'ninf' are left out.
-_FAST = {"reassoc", "contract", "arcp", "nsz"}
 # Decaying responses end in subnormal numbers, which processors handle a hundred times
 # slower; anything this small is far below the rounding of the values it is added to.
 _TINY = 1e-200
 
 
-@njit(cache=True, fastmath=_FAST)
+@njit(cache=True)
 def filter_signal(
     signal: np.ndarray,
     pad: int,
@@ -51,7 +51,7 @@ def filter_signal(
         out[t] = value
 
 
-@njit(cache=True, fastmath=_FAST)
+@njit(cache=True)
 def block_output(
     signal: np.ndarray,
     numerator: np.ndarray,

@@ -5,10 +5,8 @@ from numba import njit
 
 from hwid_cli.maths.model.rows.kernels import all_pole
 
-_FAST = {"reassoc", "contract", "arcp", "nsz"}
 
-
-@njit(cache=True, fastmath=_FAST)
+@njit(cache=True)
 def regression_rows(
     output: np.ndarray,
     basis: tuple[np.ndarray, np.ndarray, int, int],
@@ -87,7 +85,7 @@ def regression_rows(
         out[place + 3] = output[t]
 
 
-@njit(cache=True, fastmath=_FAST)
+@njit(cache=True)
 def _difference(table: np.ndarray, count: int, width: int) -> None:
     """Turn values at rising lags into differences of rising order."""
     for order in range(1, count):

@@ -3,9 +3,6 @@
 import numpy as np
 from numba import njit
 
-# Reassociation lets the compiler use vector instructions; NaN and infinity keep their
-# meaning because 'nnan' and 'ninf' are left out.
-_FAST = {"reassoc", "contract", "arcp", "nsz"}
 # Decaying responses end in subnormal numbers, which processors handle a hundred times
 # slower; anything this small is far below the rounding of the values it is added to.
 _TINY = 1e-200
@@ -14,7 +11,7 @@ _TINY = 1e-200
 _FLUSH, _CHUNK = 16, 256
 
 
-@njit(cache=True, fastmath=_FAST)
+@njit(cache=True)
 def derivative_rows(
     signals: tuple[np.ndarray, np.ndarray],
     block: tuple[np.ndarray, np.ndarray, int],
@@ -110,7 +107,7 @@ def derivative_rows(
             lines[k] = lines[last + 1 + k]
 
 
-@njit(cache=True, fastmath=_FAST)
+@njit(cache=True)
 def all_pole(lines: np.ndarray, begin: int, length: int, taps: np.ndarray) -> None:
     """Subtract from each row its predecessors times the taps, in place.
 
@@ -153,7 +150,7 @@ def all_pole(lines: np.ndarray, begin: int, length: int, taps: np.ndarray) -> No
                 row[m] -= taps[j] * source[m]
 
 
-@njit(cache=True, fastmath=_FAST)
+@njit(cache=True)
 def _flush(row: np.ndarray) -> None:
     """Set what has all but died away to zero."""
     for m in range(row.size):
@@ -161,7 +158,7 @@ def _flush(row: np.ndarray) -> None:
             row[m] = 0.0
 
 
-@njit(cache=True, fastmath=_FAST)
+@njit(cache=True)
 def _all_zero(
     lines: np.ndarray, at: int, zeros: np.ndarray, wide: int, out: np.ndarray
 ) -> None:
@@ -184,7 +181,7 @@ def _all_zero(
                 out[m] += b0 * s0[m] + b1 * s1[m] + b2 * s2[m] + b3 * s3[m]
 
 
-@njit(cache=True, fastmath=_FAST)
+@njit(cache=True)
 def _differences(
     lines: np.ndarray, at: int, column: int, count: int, length: int, table: np.ndarray
 ) -> None:
@@ -206,7 +203,7 @@ def _differences(
             higher[k] = lower[k] - lower[k - 1]
 
 
-@njit(cache=True, fastmath=_FAST)
+@njit(cache=True)
 def local_sums(
     first: np.ndarray, shares: np.ndarray, rows: np.ndarray, count: int
 ) -> tuple[np.ndarray, np.ndarray]:
