@@ -11,7 +11,7 @@ DEV := $(VENV)/installed-dev
 
 .DEFAULT_GOAL := help
 .PHONY: help install run test test-all check format smoke clean \
-        bench bench-campaign bench-growth bench-real \
+        bench bench-campaign bench-growth bench-wide bench-real \
         simulate calibrate identify crossval group test-stage steps model1 model2 \
         reproduction thesis chapter2 hsm150 diagnose gun real effects blind
 
@@ -66,6 +66,9 @@ bench-campaign: $(DEV)  ## 15 recordings with 100 orders each from an empty cach
 
 bench-growth: $(DEV)  ## how a fit's time grows, up to 100 000 samples
 	@$(BENCH).bench_growth --full
+
+bench-wide: $(DEV)  ## many kinds of plants against fits that begin at the truth
+	@$(BENCH).bench_wide
 
 bench-real: $(DEV)  ## public benchmarks beside the published errors (data in HWID_REALDATA)
 	@$(BENCH).bench_real
