@@ -19,6 +19,7 @@ from hwid_cli.maths.model.fit import fit
 from hwid_cli.maths.model.maps.break_points.kernels import thinned_break_points
 from hwid_cli.records.model import FitOptions, HammersteinWiener, Orders, StaticMap
 from hwid_cli.records.recordings import Recording
+from tests.benchmarks.plants import linear_block
 
 Curve = Callable[[np.ndarray], np.ndarray]
 INPUT_MAPS: dict[str, Curve] = {
@@ -73,18 +74,10 @@ def signal(kind: int, n: int, rng: np.random.Generator) -> np.ndarray:
 def block(rng: np.random.Generator) -> tuple[Orders, np.ndarray, np.ndarray]:
     """Random orders, B and F with static gain one."""
     nf, nk = int(rng.integers(1, 7)), int(rng.integers(1, 4))
-    poles: list[complex] = []
-    while len(poles) < nf:
-        if nf - len(poles) > 1 and rng.random() < 0.7:
-            pole = rng.uniform(0.5, 0.985) * np.exp(1j * rng.uniform(0.02, 1.5))
-            poles += [pole, pole.conjugate()]
-        else:
-            poles.append(rng.uniform(0.2, 0.98))
-    denominator = np.real(np.poly(poles))
-    nb = int(rng.integers(1, nf + 1))
-    numerator = np.atleast_1d(np.real(np.poly(rng.uniform(-0.9, 0.9, nb - 1))))
-    gain = denominator.sum() / numerator.sum()
-    return Orders(nb, nf, nk), numerator * gain, denominator
+    numerator, denominator = linear_block(
+        rng, nf, radii=(0.5, 0.985), angles=(0.02, 1.5), reals=(0.2, 0.98)
+    )
+    return Orders(numerator.size, nf, nk), numerator, denominator
 
 
 def wide_plant(seed: int) -> WidePlant:

@@ -25,21 +25,27 @@ OUTPUT_MAPS = (
 )
 
 
+def linear_block(rng, nf, radii=(0.6, 0.98), angles=(0.03, 1.2), reals=(0.4, 0.97)):
+    """B and F of nf random poles and at most as many coefficients, static gain one."""
+    poles = []
+    while len(poles) < nf:
+        if nf - len(poles) > 1 and rng.random() < 0.7:
+            pole = rng.uniform(*radii) * np.exp(1j * rng.uniform(*angles))
+            poles += [pole, pole.conjugate()]
+        else:
+            poles.append(rng.uniform(*reals))
+    denominator = np.real(np.poly(poles))
+    nb = int(rng.integers(1, nf + 1))
+    numerator = np.atleast_1d(np.real(np.poly(rng.uniform(-0.9, 0.9, nb - 1))))
+    return numerator * (denominator.sum() / numerator.sum()), denominator
+
+
 def random_plant(seed, samples=N_SAMPLES):
     """Training and test data of a plant of orders up to 6 and delays up to 3."""
     rng = np.random.default_rng([seed, 77])
     nf, nk = int(rng.integers(2, 7)), int(rng.integers(1, 4))
-    poles = []
-    while len(poles) < nf:
-        if nf - len(poles) > 1 and rng.random() < 0.7:
-            pole = rng.uniform(0.6, 0.98) * np.exp(1j * rng.uniform(0.03, 1.2))
-            poles += [pole, pole.conjugate()]
-        else:
-            poles.append(rng.uniform(0.4, 0.97))
-    denominator = np.real(np.poly(poles))
-    nb = int(rng.integers(1, nf + 1))
-    numerator = np.atleast_1d(np.real(np.poly(rng.uniform(-0.9, 0.9, nb - 1))))
-    numerator *= denominator.sum() / numerator.sum()
+    numerator, denominator = linear_block(rng, nf)
+    nb = numerator.size
     numerator = np.r_[np.zeros(nk), numerator]
     f, g = (maps[rng.integers(4)] for maps in (INPUT_MAPS, OUTPUT_MAPS))
     data = []

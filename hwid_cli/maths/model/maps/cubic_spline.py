@@ -14,6 +14,11 @@ from functools import lru_cache
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from hwid_cli.maths.model.maps.positions_and_values import (
+    amplified,
+    compressed,
+    mean_slope,
+)
 from hwid_cli.maths.model.maps.rule import MapRule, Shape
 from hwid_cli.records.maps import MapOptions, StaticMap
 
@@ -111,29 +116,6 @@ def _names(one: StaticMap) -> tuple[str, ...]:
     return ("first_knot", "last_knot", *values)
 
 
-def _amplify(one: StaticMap, factor: float) -> StaticMap:
-    parameters = one.parameters.copy()
-    parameters[2:] *= factor
-    return replace(one, parameters=parameters)
-
-
-def _compress(one: StaticMap, factor: float) -> StaticMap:
-    first, last, values = _parts(one)
-    ends = np.array([first, last]) / factor
-    low, high = (edge / factor for edge in one.domain)
-    if factor < 0:
-        ends, values, low, high = ends[::-1], values[::-1], high, low
-    return replace(one, parameters=np.concatenate([ends, values]), domain=(low, high))
-
-
-def _size(one: StaticMap) -> tuple[float, np.ndarray]:
-    values, (low, high) = one.parameters[2:], one.domain
-    gradient = np.zeros(one.parameters.size)
-    gradient[2 + np.argmax(values)] = 1.0 / (high - low)
-    gradient[2 + np.argmin(values)] = -1.0 / (high - low)
-    return float(np.ptp(values) / (high - low)), gradient
-
-
 def _settle(old: StaticMap, proposed: StaticMap) -> StaticMap:
     """Keep the first knot before the last one."""
     old_first, old_last, _ = _parts(old)
@@ -153,9 +135,9 @@ RULE = MapRule(
     identity=lambda options, low, high: _starts(options, low, high, np.asarray)[0],
     with_domain=lambda one, domain: replace(one, domain=domain),
     names=_names,
-    amplify=_amplify,
-    compress=_compress,
-    size=_size,
+    amplify=lambda one, factor: amplified(one, 2, factor),
+    compress=lambda one, factor: compressed(one, 2, factor),
+    size=lambda one: mean_slope(one, 2),
     n_positions=lambda one: 2,
     settle=_settle,
     corners=knots,

@@ -17,6 +17,11 @@ from dataclasses import replace
 import numpy as np
 
 from hwid_cli.maths.model.maps.piecewise_linear import in_order
+from hwid_cli.maths.model.maps.positions_and_values import (
+    amplified,
+    compressed,
+    mean_slope,
+)
 from hwid_cli.maths.model.maps.rule import MapRule, Shape
 from hwid_cli.records.maps import MapOptions, StaticMap
 
@@ -105,29 +110,6 @@ def _names(one: StaticMap) -> tuple[str, ...]:
     )
 
 
-def _amplify(one: StaticMap, factor: float) -> StaticMap:
-    edges, levels = edges_and_levels(one)
-    return replace(one, parameters=np.concatenate([edges, levels * factor]))
-
-
-def _compress(one: StaticMap, factor: float) -> StaticMap:
-    edges, levels = edges_and_levels(one)
-    low, high = (edge / factor for edge in one.domain)
-    edges = edges / factor
-    if factor < 0:
-        edges, levels, low, high = edges[::-1], levels[::-1], high, low
-    return replace(one, parameters=np.concatenate([edges, levels]), domain=(low, high))
-
-
-def _size(one: StaticMap) -> tuple[float, np.ndarray]:
-    edges, levels = edges_and_levels(one)
-    low, high = one.domain
-    gradient = np.zeros(one.parameters.size)
-    gradient[edges.size + np.argmax(levels)] = 1.0 / (high - low)
-    gradient[edges.size + np.argmin(levels)] = -1.0 / (high - low)
-    return float(np.ptp(levels) / (high - low)), gradient
-
-
 def _settle(old: StaticMap, proposed: StaticMap) -> StaticMap:
     """Keep the edges in order."""
     edges, levels = edges_and_levels(proposed)
@@ -142,9 +124,9 @@ RULE = MapRule(
     identity=lambda options, low, high: _starts(options, low, high, np.asarray)[0],
     with_domain=lambda one, domain: replace(one, domain=domain),
     names=_names,
-    amplify=_amplify,
-    compress=_compress,
-    size=_size,
+    amplify=lambda one, factor: amplified(one, one.parameters.size // 2, factor),
+    compress=lambda one, factor: compressed(one, one.parameters.size // 2, factor),
+    size=lambda one: mean_slope(one, one.parameters.size // 2),
     n_positions=lambda one: one.parameters.size // 2,
     settle=_settle,
     corners=lambda one: edges_and_levels(one)[0],

@@ -19,6 +19,11 @@ from hwid_cli.maths.model.maps.kernels import (
     piecewise_linear_shares,
     piecewise_linear_value,
 )
+from hwid_cli.maths.model.maps.positions_and_values import (
+    amplified,
+    compressed,
+    mean_slope,
+)
 from hwid_cli.maths.model.maps.rule import Derivatives, MapRule, Shape
 from hwid_cli.records.maps import MapOptions, StaticMap
 
@@ -108,31 +113,6 @@ def _names(static_map: StaticMap) -> tuple[str, ...]:
     return points + tuple(f"value[{i}]" for i in range(units))
 
 
-def _amplify(static_map: StaticMap, factor: float) -> StaticMap:
-    points, values = break_points_and_values(static_map)
-    return replace(static_map, parameters=np.concatenate([points, values * factor]))
-
-
-def _compress(static_map: StaticMap, factor: float) -> StaticMap:
-    points, values = break_points_and_values(static_map)
-    low, high = (edge / factor for edge in static_map.domain)
-    points = points / factor
-    if factor < 0:
-        points, values, low, high = points[::-1], values[::-1], high, low
-    return replace(
-        static_map, parameters=np.concatenate([points, values]), domain=(low, high)
-    )
-
-
-def _size(static_map: StaticMap) -> tuple[float, np.ndarray]:
-    points, values = break_points_and_values(static_map)
-    low, high = static_map.domain
-    gradient = np.zeros(static_map.parameters.size)
-    gradient[points.size + np.argmax(values)] = 1.0 / (high - low)
-    gradient[points.size + np.argmin(values)] = -1.0 / (high - low)
-    return float(np.ptp(values) / (high - low)), gradient
-
-
 def in_order(old: np.ndarray, proposed: np.ndarray) -> np.ndarray:
     """Positions after a step, kept in their order.
 
@@ -166,9 +146,9 @@ RULE = MapRule(
     identity=lambda options, low, high: _starts(options, low, high, np.asarray)[0],
     with_domain=lambda one, domain: replace(one, domain=domain),
     names=_names,
-    amplify=_amplify,
-    compress=_compress,
-    size=_size,
+    amplify=lambda one, factor: amplified(one, one.parameters.size // 2, factor),
+    compress=lambda one, factor: compressed(one, one.parameters.size // 2, factor),
+    size=lambda one: mean_slope(one, one.parameters.size // 2),
     n_positions=lambda static_map: static_map.parameters.size // 2,
     settle=_settle,
     corners=lambda static_map: break_points_and_values(static_map)[0],
