@@ -20,7 +20,7 @@ from hwid_cli.records.recordings import Recording
 from hwid_cli.records.results import CrossValidation
 
 STAGE = "crossval"
-STAGE_VERSION = 1
+STAGE_VERSION = 2
 
 # Why an RMSD is there or missing.
 OK, NO_MODEL, NOT_FINITE = "ok", "no model", "not finite"

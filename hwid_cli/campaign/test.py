@@ -30,7 +30,7 @@ from hwid_cli.records.recordings import Recording
 from hwid_cli.records.results import CrossValidation
 
 STAGE = "test"
-STAGE_VERSION = 1
+STAGE_VERSION = 2
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,42 +16,6 @@ _TINY = 1e-200
 
 
 @njit(cache=True)
-def filter_signal(
-    signal: np.ndarray,
-    pad: int,
-    numerator: np.ndarray,
-    denominator: np.ndarray,
-    delay: int,
-    out: np.ndarray,
-) -> None:
-    """Run ``q^-delay B(q)/F(q)`` along one signal.
-
-    Parameters
-    ----------
-    signal : ndarray, shape (pad + n,)
-        With its past in front.
-    pad : int, [samples]
-        At least ``max(nf, nb - 1 + delay)``.
-    numerator : ndarray, shape (nb,)
-    denominator : ndarray, shape (nf + 1,)
-        Monic.
-    delay : int, [samples]
-    out : ndarray, shape (pad + n,)
-        The first ``pad`` values are read, the others written.
-    """
-    nf = denominator.size - 1
-    for t in range(pad, signal.size):
-        value = 0.0
-        for i in range(numerator.size):
-            value += numerator[i] * signal[t - delay - i]
-        for j in range(1, nf + 1):
-            value -= denominator[j] * out[t - j]
-        if abs(value) < _TINY:
-            value = 0.0
-        out[t] = value
-
-
-@njit(cache=True)
 def block_output(
     signal: np.ndarray,
     numerator: np.ndarray,
@@ -82,7 +46,8 @@ def block_output(
     past, rest = 0.0, 0.0
     if steady:
         past = signal[0]
-        rest = past * numerator.sum() / denominator.sum()
+        below = denominator.sum()
+        rest = past * (numerator.sum() / below if below != 0.0 else np.inf)
     # What does not depend on the result first: that loop runs on vectors.
     lead = min(n, nb - 1 + delay)
     passed = np.empty(n)
@@ -102,9 +67,11 @@ def block_output(
     for t in range(min(n, states.size)):
         passed[t] += states[t]
     taps = np.zeros(4 * ((nf + 3) // 4))
-    taps[:nf] = denominator[1:]
+    for j in range(nf):
+        taps[j] = denominator[1 + j]
     out = np.empty(taps.size + n)
-    out[: taps.size] = rest
+    for j in range(taps.size):
+        out[j] = rest
     for t in range(n):
         at = taps.size + t
         value = passed[t]

@@ -14,7 +14,9 @@ from functools import lru_cache
 import numpy as np
 from scipy.special import binom
 
-from hwid_cli.maths.model.kernels import filter_signal, is_schur_stable
+from hwid_cli.maths.model.kernels import block_output, is_schur_stable
+
+_NO_STATES = np.zeros(0)
 
 
 def filtered(
@@ -46,13 +48,14 @@ def filtered(
     >>> filtered(np.ones(4), np.array([0.5]), np.array([1.0, -0.5]), 1)
     array([0.   , 0.5  , 0.75 , 0.875])
     """
-    pad = max(denominator.size - 1, numerator.size - 1 + delay)
-    past = signal[0] if steady else 0.0
-    rest = past * static_gain(numerator, denominator) if steady else 0.0
-    padded = padded_signal(signal, pad, past)
-    out = np.full(padded.size, rest)
-    filter_signal(padded, pad, numerator, denominator, delay, out)
-    return out[pad:]
+    return block_output(
+        as_loops_take_it(signal),
+        as_loops_take_it(numerator),
+        as_loops_take_it(denominator),
+        delay,
+        _NO_STATES,
+        steady,
+    )
 
 
 def free_response(
@@ -129,7 +132,8 @@ def is_stable(denominator: np.ndarray, largest_radius: float = 1.0) -> bool:
     """
     if largest_radius != 1.0:
         denominator = denominator / largest_radius ** np.arange(denominator.size)
-    return bool(is_schur_stable(np.ascontiguousarray(denominator)))
+    denominator = np.ascontiguousarray(denominator)
+    return bool(is_schur_stable(as_loops_take_it(denominator)))
 
 
 def reflected(denominator: np.ndarray, largest_radius: float) -> np.ndarray:
@@ -182,6 +186,23 @@ def difference_basis(count: int) -> np.ndarray:
     matrix = binom(j, i) * (-1.0) ** i
     matrix.flags.writeable = False
     return matrix
+
+
+def as_loops_take_it(array: np.ndarray) -> np.ndarray:
+    """Array itself, or a copy of a read-only one.
+
+    A compiled loop is compiled again, which takes seconds, for arguments that may not be
+    written, although it does not write them.
+
+    Parameters
+    ----------
+    array : ndarray
+
+    Returns
+    -------
+    ndarray
+    """
+    return array if array.flags.writeable else array.copy()
 
 
 def padded_signal(signal: np.ndarray, pad: int, past: float) -> np.ndarray:

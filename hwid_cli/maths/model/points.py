@@ -11,7 +11,7 @@ import numpy as np
 from hwid_cli.maths.model import static_map
 from hwid_cli.maths.model.candidates import Candidate, Columns, Experiment
 from hwid_cli.maths.model.kernels import block_output
-from hwid_cli.maths.model.linear_block import difference_basis
+from hwid_cli.maths.model.linear_block import as_loops_take_it, difference_basis
 from hwid_cli.records.model import StaticMap
 
 
@@ -53,11 +53,11 @@ def point_of(candidate: Candidate) -> Point:
     model = candidate.model
     return Point(
         model.input_map,
-        model.numerator,
-        model.denominator,
+        as_loops_take_it(model.numerator),
+        as_loops_take_it(model.denominator),
         model.delay,
         model.output_map,
-        candidate.free_responses,
+        as_loops_take_it(candidate.free_responses),
         model.initial_state == "steady",
     )
 

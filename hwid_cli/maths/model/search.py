@@ -23,7 +23,7 @@ from hwid_cli.maths.model.levenberg_marquardt import Search, minimise
 from hwid_cli.maths.model.phases import finish, place, standing
 from hwid_cli.maths.model.placing import reaching
 from hwid_cli.maths.model.points import block_signals, point_of
-from hwid_cli.maths.model.race import LONG, SHORT, race
+from hwid_cli.maths.model.race import LONG, SHORT, Rounds, race
 from hwid_cli.maths.model.robust import rejudged, renewed
 from hwid_cli.maths.model.starts import Start
 from hwid_cli.records.model import FitOptions
@@ -44,6 +44,8 @@ _SMALL_GAIN = 1e-3
 # Samples that count for the linear model, and the share of the cost that a step must gain:
 # it is a yardstick and one more start.
 _LINEAR_ROWS, _LINEAR_GAIN = 2500, 1e-3
+# A race that ends at its first comparison: linear starts hardly change places in one.
+_ENTERED: Rounds = ((0, 1),)
 # Slopes of the output map below this share of their mean square say too little about x.
 _FLAT = 0.1
 
@@ -70,7 +72,7 @@ def linear_search(
     """
     linear = replace(options, input_map="none", output_map="none")
     plain = [one for one in starts if not one.is_expanded]
-    (leader,) = race(experiments, plain, linear, rounds=SHORT)
+    (leader,) = race(experiments, plain, linear, rounds=_ENTERED)
     few = thinned(experiments, _LINEAR_ROWS)
     found = minimise(
         leader.candidate,

@@ -110,9 +110,12 @@ def validation_output(model: HammersteinWiener, recording: Recording) -> np.ndar
     """
     if model.initial_state != "estimated":
         return simulate(model, recording.input, initial_state=np.zeros(0))
-    return simulate(
-        model, recording.input, initial_state=estimated_state(model, recording)
-    )
+    with np.errstate(over="ignore", invalid="ignore"):
+        forced = _forced(model, np.ascontiguousarray(recording.input))
+        state = _state_from(model, forced, recording.output)
+        return static_map.evaluate(
+            model.output_map, forced + _free(model, state, forced)
+        )
 
 
 def estimated_state(model: HammersteinWiener, recording: Recording) -> np.ndarray:
@@ -136,13 +139,20 @@ def estimated_state(model: HammersteinWiener, recording: Recording) -> np.ndarra
     docs/method.md, eq. (7).
     """
     forced = _forced(model, np.ascontiguousarray(recording.input))
+    return _state_from(model, forced, recording.output)
+
+
+def _state_from(
+    model: HammersteinWiener, forced: np.ndarray, output: np.ndarray
+) -> np.ndarray:
+    """The same from the output of an empty linear block."""
     best = np.zeros(model.orders.n_state)
     if best.size == 0 or not np.isfinite(forced).all():
         return best
     responses = _free_responses(model, forced.size)
     # Where the free responses have died away, the initial state changes nothing.
     n = responses.shape[0]
-    beginning, measured = forced[:n], recording.output[:n]
+    beginning, measured = forced[:n], output[:n]
     basis = difference_basis(best.size)
 
     def deviation(coefficients: np.ndarray) -> float:
@@ -158,7 +168,10 @@ def estimated_state(model: HammersteinWiener, recording: Recording) -> np.ndarra
             best, cost = model.free_response, of_fit
     for _ in range(_ESTIMATE_ITERATIONS):
         x = beginning + responses @ (basis @ best)
-        step = basis @ _state_step(model, x, measured, responses)
+        step, promised = _state_step(model, x, measured, responses)
+        if promised < _LEAST_GAIN * cost:
+            break
+        step = basis @ step
         halvings = 0.5 ** np.arange(_MOST_HALVINGS)
         tried = (best + share * step for share in halvings)
         better = ((one, deviation(one)) for one in tried)
@@ -186,19 +199,19 @@ def _free_responses(model: HammersteinWiener, n_samples: int) -> np.ndarray:
 
 def _state_step(
     model: HammersteinWiener, x: np.ndarray, output: np.ndarray, responses: np.ndarray
-) -> np.ndarray:
-    """Gauss-Newton step of the free response, in the basis of differences."""
-    found = static_map.derivatives(model.output_map, x, with_positions=True)
+) -> tuple[np.ndarray, float]:
+    """Gauss-Newton step of the free response, in the basis of differences, and its gain.
+
+    The gain is what the sum of squares would lose if the output map were straight.
+    """
+    found = static_map.derivatives(model.output_map, x, with_positions=False)
     jacobian = found.slope[:, None] * responses
-    return _damped_solution(jacobian, output - found.value)
-
-
-def _damped_solution(jacobian: np.ndarray, residual: np.ndarray) -> np.ndarray:
-    matrix = jacobian.T @ jacobian
+    matrix, vector = jacobian.T @ jacobian, jacobian.T @ (output - found.value)
     scale = np.sqrt(np.diag(matrix))
     scale[scale == 0.0] = 1.0
     matrix = matrix / scale / scale[:, None] + _DAMPING * np.eye(scale.size)
-    return np.linalg.solve(matrix, (jacobian.T @ residual) / scale) / scale
+    step = np.linalg.solve(matrix, vector / scale) / scale
+    return step, float(step @ vector)
 
 
 def _forced(model: HammersteinWiener, signal: np.ndarray) -> np.ndarray:

@@ -46,10 +46,12 @@ def straightened(one: StaticMap, argument: np.ndarray) -> StaticMap:
     if one.kind != "piecewise_linear" or one.parameters.size < 6:
         return one
     points, values = break_points_and_values(one)
-    if not np.isfinite(argument).all() or _is_told(points, argument):
+    if not np.isfinite(argument).all():
         return one
-    levels = np.unique(argument)
-    seen = _shares(points, levels)
+    levels = np.sort(argument)
+    if _is_told(points, levels):
+        return one
+    seen = _shares(points, np.unique(levels))
     _, strength, directions = np.linalg.svd(np.linalg.qr(seen, mode="r"))
     rank = int(np.sum(strength > _UNSEEN * strength[0]))
     unseen = directions[rank:].T
@@ -60,16 +62,14 @@ def straightened(one: StaticMap, argument: np.ndarray) -> StaticMap:
     return replace(one, parameters=np.concatenate([points, values + unseen @ steps]))
 
 
-def _is_told(points: np.ndarray, argument: np.ndarray) -> bool:
+def _is_told(points: np.ndarray, levels: np.ndarray) -> bool:
     """Tell whether the samples in every segment spread enough to know its line."""
-    edges = points.copy()
-    edges[0], edges[-1] = -np.inf, np.inf
-    segment = np.searchsorted(edges[1:-1], argument, side="right")
-    low = np.full(points.size - 1, np.inf)
-    high = -low
-    np.minimum.at(low, segment, argument)
-    np.maximum.at(high, segment, argument)
-    return bool(np.all(high - low > _LEAST_SPREAD * np.diff(points)))
+    inner = np.searchsorted(levels, points[1:-1], side="left")
+    first, end = np.append(0, inner), np.append(inner, levels.size)
+    if np.any(first == end):
+        return False
+    spread = levels[end - 1] - levels[first]
+    return bool(np.all(spread > _LEAST_SPREAD * np.diff(points)))
 
 
 def _shares(points: np.ndarray, argument: np.ndarray) -> np.ndarray:

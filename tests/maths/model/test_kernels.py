@@ -1,3 +1,6 @@
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 from scipy import signal
@@ -41,9 +44,9 @@ def test_block_output_agrees_with_scipy_and_starts_as_told():
 
 def test_decaying_response_ends_in_zeros_instead_of_subnormal_numbers():
     pulse = np.zeros(4000)
-    pulse[1] = 1.0
-    out = np.zeros(4000)
-    kernels.filter_signal(pulse, 1, np.ones(1), np.array([1.0, -0.5]), 0, out)
+    pulse[0] = 1.0
+    pole = np.array([1.0, -0.5])
+    out = kernels.block_output(pulse, np.ones(1), pole, 0, np.zeros(0), False)
     small = np.abs(out[out != 0.0])
     assert small.min() > np.finfo(float).tiny
     assert out[-1] == 0.0
@@ -112,3 +115,28 @@ def test_thinning_heeds_where_the_samples_are():
     weights = np.where(points < 5.0, 1.0, 1e-6)
     kept = map_kernels.thinned_break_points(points, values, weights, 3)
     assert points[kept][1] == 2.0
+
+
+COUNT = """
+import numpy as np
+from hwid_cli import FitOptions, Orders, Recording, fit
+from hwid_cli.maths.model import kernels
+from hwid_cli.maths.model.regression.kernels import regression_rows
+from hwid_cli.maths.model.rows.kernels import derivative_rows
+from hwid_cli.maths.model.simulate import validation_output
+
+u = np.random.default_rng(1).standard_normal(400)
+one = Recording("one", u, np.convolve(np.tanh(u), [0.0, 0.5, 0.2])[:400], 1e-3)
+found = fit([one], Orders(2, 2, 1), FitOptions(units=4))
+validation_output(found.model, one)
+for loop in (kernels.block_output, derivative_rows, regression_rows):
+    print(len(loop.signatures))
+"""
+
+
+def test_a_fit_compiles_each_loop_once():
+    """Read-only arguments would be compiled for again, which takes seconds."""
+    done = subprocess.run(
+        [sys.executable, "-c", COUNT], capture_output=True, text=True, check=True
+    )
+    assert done.stdout.split() == ["1", "1", "1"]

@@ -42,7 +42,8 @@ def regression_rows(
     used = count + 3
     wide = 4 * ((used + 3) // 4)
     taps = np.zeros(4 * max(1, (n_poles + 3) // 4))
-    taps[:n_poles] = denominator[1:]
+    for j in range(n_poles):
+        taps[j] = denominator[1 + j]
     pad = max(taps.size + 1, nb + delay, n_state) + 1
     lines = np.zeros((pad + n, wide))
     table = np.empty((max(nb, n_poles, n_state, 1), inputs))

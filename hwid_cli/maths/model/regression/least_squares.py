@@ -16,7 +16,12 @@ import numpy as np
 from scipy.linalg.lapack import dposv
 
 from hwid_cli.maths.model.candidates import Experiment
-from hwid_cli.maths.model.linear_block import difference_basis, is_stable, reflected
+from hwid_cli.maths.model.linear_block import (
+    as_loops_take_it,
+    difference_basis,
+    is_stable,
+    reflected,
+)
 from hwid_cli.maths.model.maps.kernels import piecewise_linear_shares
 from hwid_cli.maths.model.regression.kernels import regression_rows
 from hwid_cli.records.model import Orders
@@ -206,7 +211,7 @@ def _products(one: Regression, denominator: np.ndarray) -> np.ndarray:
         regression_rows(
             experiment.output,
             (first, shares, count, skipped),
-            denominator,
+            as_loops_take_it(denominator),
             orders.nk,
             (orders.nb, n_state, index * n_state, one.n_states),
             experiment.counted,

@@ -51,9 +51,11 @@ def derivative_rows(
     steady, n_state, own_state, n_states = start
     n, nb, nf, width = w.size, numerator.size, denominator.size - 1, shares.shape[1]
     taps = np.zeros(4 * max(1, (nf + 3) // 4))
-    taps[:nf] = denominator[1:]
+    for j in range(nf):
+        taps[j] = denominator[1 + j]
     zeros = np.zeros(4 * ((nb + 3) // 4))
-    zeros[:nb] = numerator
+    for i in range(nb):
+        zeros[i] = numerator[i]
     pad = max(taps.size, zeros.size + delay, n_state) + 1
     wide = 4 * ((count + 3 + 3) // 4)
     chunk = min(n, _CHUNK)
@@ -71,9 +73,10 @@ def derivative_rows(
     r = 0
     for begin in range(0, n, chunk):
         length = min(chunk, n - begin)
-        lines[pad : pad + length] = 0.0
         for k in range(length):
             t, row = begin + k, lines[pad + k]
+            for m in range(wide):
+                row[m] = 0.0
             for m in range(width):
                 row[first[t] + m] = shares[t, m]
             row[count] = w[t]
@@ -104,7 +107,8 @@ def derivative_rows(
                 row[place + m] = -weight * table[n_state + nb + m, k]
             r += 1
         for k in range(pad):
-            lines[k] = lines[last + 1 + k]
+            for m in range(wide):
+                lines[k, m] = lines[last + 1 + k, m]
 
 
 @njit(cache=True)

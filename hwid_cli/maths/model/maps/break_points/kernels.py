@@ -19,7 +19,10 @@ def mean_slope(break_points: np.ndarray, values: np.ndarray) -> float:
     -------
     float
     """
-    size = (values.max() - values.min()) / (break_points[-1] - break_points[0])
+    low = high = values[0]
+    for value in values:
+        low, high = min(low, value), max(high, value)
+    size = (high - low) / (break_points[-1] - break_points[0])
     return size if size != 0.0 else 1.0
 
 
@@ -208,7 +211,9 @@ def thinned_break_points(
                 )
             if added < least:
                 cheapest, least = j, added
-        kept = np.concatenate((kept[:cheapest], kept[cheapest + 1 :]))
+        for j in range(cheapest, kept.size - 1):
+            kept[j] = kept[j + 1]
+        kept = kept[: kept.size - 1]
     return kept
 
 
