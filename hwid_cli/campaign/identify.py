@@ -53,7 +53,8 @@ def fit_grid(
     """Fit every recording with every pair of orders, the smaller ones first.
 
     A fit begins with those of the largest orders that its own contain, so that more
-    parameters never fit worse.
+    parameters never fit worse. The linear model beside it is not worse than theirs
+    either: it contains them.
 
     Parameters
     ----------
@@ -82,8 +83,8 @@ def fit_grid(
         ]
         done = iter(run(tasks))
         for fits in found:
-            for place, _ in places:
-                fits[place] = next(done).result
+            for place, smaller in places:
+                fits[place] = _with_linear(next(done).result, fits, smaller)
     # A fit is cached by content: neither the name of its recording nor the rule for
     # joining several, which does nothing to one, is part of it.
     return tuple(
@@ -141,6 +142,13 @@ def _task(
         arguments=(recording, candidate, options, contained),
         result_type=Fit,
     )
+
+
+def _with_linear(fit: Fit, fits: dict[int, Fit], smaller: Sequence[int]) -> Fit:
+    """Fit beside the best of the linear models that its orders contain."""
+    known = [fit.linear_rmsd, *(fits[number].linear_rmsd for number in smaller)]
+    least = min((rmsd for rmsd in known if rmsd == rmsd), default=fit.linear_rmsd)
+    return replace(fit, linear_rmsd=least)
 
 
 def _fit_one(

@@ -3,6 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from hwid_cli.campaign import identify
 from hwid_cli.campaign.cache import MemoryStore
 from hwid_cli.campaign.identify import identify_all, identify_key
 from hwid_cli.campaign.runner import RunSettings, Workers
@@ -182,6 +183,22 @@ def test_more_parameters_never_fit_worse():
     rmsd = np.array([fit.rmsd for fit in fits]).reshape(3, 3)
     assert np.all(np.diff(rmsd, axis=0) <= 1e-9 * rmsd[0, 0])
     assert np.all(np.diff(rmsd, axis=1) <= 1e-9 * rmsd[0, 0])
+
+
+def test_more_parameters_never_worsen_the_linear_model_beside_a_fit(monkeypatch):
+    """A search that begins anew for all orders may well end in a worse minimum."""
+    found = {(1, 1): 3.0, (1, 2): 5.0, (2, 1): 2.0, (2, 2): float("nan")}
+
+    def fit(recordings, orders, options, *, contained=()):
+        alone = fit_alone(recordings, orders, options, contained=contained)
+        return replace(alone, linear_rmsd=found[orders.nb, orders.nf])
+
+    fit_alone = identify.fit
+    monkeypatch.setattr(identify, "fit", fit)
+    grid = OrdersOptions(nb=(1, 2), nk=(1, 2))
+    settings = RunSettings(MemoryStore(), Workers(1))
+    fits = identify_all(RECORDINGS[:1], grid, QUICK, settings)
+    assert [one.linear_rmsd for one in fits] == [3.0, 3.0, 2.0, 2.0]
 
 
 def test_a_recording_that_cannot_be_fitted_gives_a_failed_fit_and_no_exception():
