@@ -21,7 +21,7 @@ from typing import Any
 import joblib
 from joblib.externals.loky.backend import resource_tracker as loky_tracker
 
-from hwid_cli.campaign.tasks import Task, run_task
+from hwid_cli.campaign.tasks import Computed, Task, run_task
 from hwid_cli.errors import WorkerError
 
 # Tasks handed out ahead for each worker, [-]: enough that none waits for the parent.
@@ -41,7 +41,7 @@ _log = logging.getLogger(__name__)
 _watched: list[int] = []
 
 
-def compute_here(tasks: Sequence[Task], count: int) -> Iterator[tuple[str, Any]]:
+def compute_here(tasks: Sequence[Task], count: int) -> Iterator[tuple[str, Computed]]:
     """Results of workers on this machine as they come.
 
     Parameters
@@ -55,7 +55,7 @@ def compute_here(tasks: Sequence[Task], count: int) -> Iterator[tuple[str, Any]]
     ------
     str
         Key of the task.
-    object
+    Computed
         Its result.
 
     Raises
@@ -90,7 +90,7 @@ def compute_here(tasks: Sequence[Task], count: int) -> Iterator[tuple[str, Any]]
                 yield key, result
 
 
-def _one_at_a_time(tasks: Sequence[Task], count: int) -> Iterator[tuple[str, Any]]:
+def _one_at_a_time(tasks: Sequence[Task], count: int) -> Iterator[tuple[str, Computed]]:
     """Try tasks again of which one may be too much for a worker."""
     for task in tasks:
         try:
@@ -134,7 +134,7 @@ def _stream(
     count: int,
     ahead: int,
     handed_out: list[Task] | None = None,
-) -> Iterator[tuple[str, Any]]:
+) -> Iterator[tuple[str, Computed]]:
     """Results of workers as they come; notes which tasks were handed to them."""
     noted = [] if handed_out is None else handed_out
     run = joblib.delayed(_run_for)
@@ -193,7 +193,7 @@ def _forget_stopping(problem: threading.ExceptHookArgs) -> None:
         threading.__excepthook__(problem)
 
 
-def _run_for(parent: int, task: Task) -> tuple[str, Any]:
+def _run_for(parent: int, task: Task) -> tuple[str, Computed]:
     """Run a task in a worker, for as long as somebody waits for its result."""
     if not _watched:
         _watched.append(parent)

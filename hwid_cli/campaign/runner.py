@@ -8,7 +8,7 @@ the number of workers never changes a number.
 
 from collections.abc import Callable, Sequence
 from contextlib import closing
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from hwid_cli.campaign.cache import Store
@@ -94,10 +94,11 @@ def run_tasks(tasks: Sequence[Task], settings: RunSettings) -> tuple[TaskDone, .
             missing.setdefault(task.key, []).append(number)
         else:
             finish([number], found, from_cache=True)
-    unique = [tasks[numbers[0]] for numbers in missing.values()]
+    pack = settings.store.pack
+    unique = [replace(tasks[numbers[0]], pack=pack) for numbers in missing.values()]
     # Closed at once where the store fails: workers must not go on for nobody.
     with closing(compute(unique, settings.workers)) as results:
-        for key, result in results:
-            settings.store.put(key, result)
+        for key, (result, packed) in results:
+            settings.store.put_packed(key, packed)
             finish(missing[key], result, from_cache=False)
     return tuple(done[number] for number in range(len(tasks)))

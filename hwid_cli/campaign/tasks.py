@@ -1,10 +1,10 @@
 """A task, and how it runs wherever it runs."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 from threadpoolctl import ThreadpoolController
 
@@ -24,6 +24,9 @@ class Task:
     arguments : tuple
     result_type : type
         Record type of the result.
+    pack : callable or None
+        Turns key and result into what the store keeps, where the task is computed; the
+        process that writes has the results of all workers to keep.
     """
 
     key: str
@@ -31,6 +34,7 @@ class Task:
     function: Callable[..., Any]
     arguments: tuple[Any, ...]
     result_type: type
+    pack: Callable[[str, Any], Any] | None = None
 
 
 @contextmanager
@@ -40,7 +44,14 @@ def one_thread() -> Iterator[None]:
         yield
 
 
-def run_task(task: Task) -> tuple[str, Any]:
+class Computed(NamedTuple):
+    """Result of a task, and what the store keeps of it; None if it was not packed."""
+
+    result: Any
+    packed: Any
+
+
+def run_task(task: Task) -> tuple[str, Computed]:
     """Run a task with one thread of linear algebra.
 
     Parameters
@@ -51,11 +62,33 @@ def run_task(task: Task) -> tuple[str, Any]:
     -------
     str
         Its key.
-    object
-        Its result.
+    Computed
     """
     with one_thread():
-        return task.key, task.function(*task.arguments)
+        return task.key, computed(task.key, task.function, task.arguments, task.pack)
+
+
+def computed(
+    key: str,
+    function: Callable[..., Any],
+    arguments: Sequence[Any],
+    pack: Callable[[str, Any], Any] | None,
+) -> Computed:
+    """Run a task that comes in parts.
+
+    Parameters
+    ----------
+    key : str
+    function : callable
+    arguments : sequence
+    pack : callable or None
+
+    Returns
+    -------
+    Computed
+    """
+    result = function(*arguments)
+    return Computed(result, None if pack is None else pack(key, result))
 
 
 @lru_cache(maxsize=1)

@@ -11,13 +11,12 @@ from typing import Any
 
 import joblib
 
-from hwid_cli.campaign.local_workers import TASKS_AHEAD, compute_here
-from hwid_cli.campaign.tasks import Task, run_task
+from hwid_cli.campaign.dask_cluster import cluster_results
+from hwid_cli.campaign.local_workers import compute_here
+from hwid_cli.campaign.tasks import Computed, Task, run_task
 from hwid_cli.errors import ConfigError
 
 BACKENDS = ("loky", "dask")
-# A scheduler that does not answer within this time is not there, [s].
-CONNECT_TIMEOUT_S = 10
 
 _log = logging.getLogger(__name__)
 # Functions of which this process has run a task: their loops are compiled.
@@ -50,7 +49,7 @@ class Workers:
 
 def compute(
     tasks: Sequence[Task], workers: Workers
-) -> Generator[tuple[str, Any], None, None]:
+) -> Generator[tuple[str, Computed], None, None]:
     """Results as they come, each with its key.
 
     Parameters
@@ -63,7 +62,7 @@ def compute(
     ------
     str
         Key of the task.
-    object
+    Computed
         Its result.
 
     Raises
@@ -96,30 +95,4 @@ def compute(
     if is_local:
         yield from compute_here(tasks, workers.count)
         return
-    with _dask_client(workers), joblib.parallel_config(backend="dask"):
-        yield from joblib.Parallel(
-            n_jobs=workers.count,
-            return_as="generator_unordered",
-            pre_dispatch=TASKS_AHEAD * workers.count,
-            batch_size=1,
-            max_nbytes=None,
-        )(joblib.delayed(run_task)(task) for task in tasks)
-
-
-def _dask_client(workers: Workers) -> Any:
-    try:
-        from distributed import Client
-    except ImportError as error:
-        raise ConfigError(
-            f"--backend dask: {error}; expected dask[distributed] in this environment; "
-            "run: pip install 'hwid[dask]', or leave --backend out"
-        ) from error
-    if workers.scheduler is None:
-        return Client(n_workers=workers.count, threads_per_worker=1)
-    try:
-        return Client(workers.scheduler, timeout=CONNECT_TIMEOUT_S)
-    except (OSError, ValueError) as error:
-        raise ConfigError(
-            f"--scheduler {workers.scheduler}: {error}; expected the address of a "
-            "running dask scheduler, such as tcp://127.0.0.1:8786"
-        ) from error
+    yield from cluster_results(tasks, workers.scheduler, workers.count)

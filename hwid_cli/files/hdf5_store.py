@@ -13,7 +13,7 @@ from typing import TypeVar
 import h5py
 
 from hwid_cli.files.hdf5_records import read_record, write_record
-from hwid_cli.files.replaced_files import check_format, replaced_hdf5
+from hwid_cli.files.replaced_files import check_format, hdf5_image, replace_file
 
 Record = TypeVar("Record")
 
@@ -22,6 +22,27 @@ _log = logging.getLogger(__name__)
 FORMAT = "hwid-cache"
 SCHEMA_VERSION = 1
 _SEAL_BYTES = hashlib.sha256().digest_size
+
+
+def pack_entry(key: str, record: object) -> bytes:
+    """Turn a result into what its file will hold.
+
+    Parameters
+    ----------
+    key : str
+    record : dataclass instance
+
+    Returns
+    -------
+    bytes
+    """
+
+    def fill(file: h5py.File) -> None:
+        file.attrs["key"] = key
+        file.attrs["record"] = type(record).__name__
+        write_record(file.create_group("record"), record)
+
+    return _sealed(hdf5_image(fill, format_name=FORMAT, version=SCHEMA_VERSION))
 
 
 class Hdf5Store:
@@ -39,6 +60,8 @@ class Hdf5Store:
     unusable : list of str
         What was wrong with each entry that was there and could not be used.
     """
+
+    pack = staticmethod(pack_entry)
 
     def __init__(self, folder: Path) -> None:
         self._folder = Path(folder)
@@ -100,12 +123,23 @@ class Hdf5Store:
         CacheError
             If it cannot be written.
         """
-        with replaced_hdf5(
-            self._path(key), format_name=FORMAT, version=SCHEMA_VERSION, seal=_sealed
-        ) as file:
-            file.attrs["key"] = key
-            file.attrs["record"] = type(record).__name__
-            write_record(file.create_group("record"), record)
+        self.put_packed(key, pack_entry(key, record))
+
+    def put_packed(self, key: str, packed: bytes) -> None:
+        """Keep a result that was packed, perhaps by a worker.
+
+        Parameters
+        ----------
+        key : str
+        packed : bytes
+            As ``pack`` gives it for the same key.
+
+        Raises
+        ------
+        CacheError
+            If it cannot be written.
+        """
+        replace_file(self._path(key), packed)
 
     def _path(self, key: str) -> Path:
         return self._folder / key[:2] / f"{key}.h5"

@@ -104,13 +104,46 @@ def replaced_hdf5(
         If ``start`` is no HDF5 file.
     """
     with _in_memory(start) as file:
-        file.attrs["format"] = format_name
-        file.attrs["schema_version"] = version
-        file.attrs["created_by"] = _CREATED_BY
+        _sign(file, format_name, version)
         yield file
-        file.flush()
-        image = file.id.get_file_image()
+        image = _image(file)
     replace_file(path, seal(image), is_lasting=is_lasting)
+
+
+def hdf5_image(
+    fill: Callable[[h5py.File], None], *, format_name: str, version: int
+) -> bytes:
+    """Bytes of an HDF5 file that never was on a disk.
+
+    Parameters
+    ----------
+    fill : callable
+        Writes into the file.
+    format_name : str
+        Root attribute ``format``.
+    version : int
+        Root attribute ``schema_version``.
+
+    Returns
+    -------
+    bytes
+    """
+    with _in_memory(b"") as file:
+        _sign(file, format_name, version)
+        fill(file)
+        return _image(file)
+
+
+def _sign(file: h5py.File, format_name: str, version: int) -> None:
+    file.attrs["format"] = format_name
+    file.attrs["schema_version"] = version
+    file.attrs["created_by"] = _CREATED_BY
+
+
+def _image(file: h5py.File) -> bytes:
+    file.flush()
+    image: bytes = file.id.get_file_image()
+    return image
 
 
 def _in_memory(start: bytes) -> h5py.File:
