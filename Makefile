@@ -10,7 +10,7 @@ RUN := $(VENV)/installed-run
 DEV := $(VENV)/installed-dev
 
 .DEFAULT_GOAL := help
-.PHONY: help install run test test-all check format smoke clean \
+.PHONY: help install run test test-all check format smoke clean reliability \
         bench bench-campaign bench-growth bench-wide bench-real \
         simulate calibrate identify crossval group test-stage steps model1 model2 \
         reproduction thesis chapter2 hsm150 diagnose gun real effects blind
@@ -42,6 +42,9 @@ test: $(DEV)  ## fast tests
 
 test-all: $(DEV)  ## all tests, also the slow ones
 	$(BIN)/python -m pytest --quiet --numprocesses auto -m ''
+
+reliability: $(DEV)  ## kills, full disks, torn files, errors at every write: twenty minutes
+	$(BIN)/python -m pytest --quiet -s -m '' tests/reliability
 
 check: $(DEV)  ## lint, format, types, import contracts
 	$(BIN)/ruff check

@@ -19,3 +19,7 @@ class MeasurementError(HwidError):
 
 class CacheError(HwidError):
     """The cache or a results file cannot be read or written."""
+
+
+class WorkerError(HwidError):
+    """A process that computes was killed, and killed again."""

@@ -7,7 +7,7 @@ renamed file is not fitted again.
 
 import hashlib
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, is_dataclass
 from typing import Any, Protocol, TypeVar
 
@@ -43,6 +43,20 @@ class Store(Protocol):
         record : dataclass instance
         """
 
+    @property
+    def pack(self) -> Callable[[str, Any], Any]:
+        """Turns key and result into what ``put_packed`` keeps; may run in a worker."""
+
+    def put_packed(self, key: str, packed: Any) -> None:
+        """Keep a result that was packed, which takes the least time.
+
+        Parameters
+        ----------
+        key : str
+        packed : object
+            As ``pack`` gives it for the same key.
+        """
+
 
 class MemoryStore:
     """A store that forgets everything when the program ends."""
@@ -75,6 +89,25 @@ class MemoryStore:
         record : dataclass instance
         """
         self._records[key] = record
+
+    @property
+    def pack(self) -> Callable[[str, Any], Any]:
+        """Nothing to do."""
+        return _as_it_is
+
+    def put_packed(self, key: str, packed: Any) -> None:
+        """Keep a result.
+
+        Parameters
+        ----------
+        key : str
+        packed : dataclass instance
+        """
+        self.put(key, packed)
+
+
+def _as_it_is(_: str, record: Any) -> Any:
+    return record
 
 
 def task_key(

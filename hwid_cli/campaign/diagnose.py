@@ -20,7 +20,8 @@ from hwid_cli.campaign.candidate_tasks import (
     Rounds,
 )
 from hwid_cli.campaign.findings import Findings, describe
-from hwid_cli.campaign.runner import RunSettings, one_thread
+from hwid_cli.campaign.runner import RunSettings
+from hwid_cli.campaign.tasks import one_thread
 from hwid_cli.maths.diagnosis.candidate import Footing, fit_candidate
 from hwid_cli.maths.diagnosis.comparing import compare
 from hwid_cli.maths.diagnosis.judge import Judge

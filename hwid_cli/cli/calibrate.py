@@ -60,6 +60,7 @@ def calibrate_stage(session: "Session") -> "Calibrated":
     find_measurements(session)
     timer = start_timer()
     raws = read_recordings(session.experiment, session.out)
+    session.read.update({raw.source: raw.sha256 for raw in raws})
     options = session.experiment.calibrate
     key = calibration_key(raws, options)
     calibrated = read_unchanged(session, "calibrate", key, read_calibrated)

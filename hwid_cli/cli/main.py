@@ -18,6 +18,7 @@ from hwid_cli.cli import (
     simulate,
     test,
 )
+from hwid_cli.cli.stopping import Stopped, stop_signals
 from hwid_cli.errors import HwidError
 
 # What a disk or a folder may refuse, which is no fault of the program.
@@ -27,8 +28,10 @@ _MENDABLE = (
     errno.EACCES,
     errno.EPERM,
     errno.EROFS,
+    errno.EIO,
+    errno.ESTALE,
 )
-EXIT_ERROR, EXIT_INTERRUPTED = 1, 130
+EXIT_ERROR = 1
 
 
 class _Commands(click.Group):
@@ -47,18 +50,20 @@ class _Commands(click.Group):
             What the command returns.
         """
         try:
-            return super().invoke(ctx)
+            with stop_signals(ctx):
+                return super().invoke(ctx)
         except HwidError as error:
             _complain(str(error))
             ctx.exit(EXIT_ERROR)
         except OSError as error:
             if error.errno not in _MENDABLE:
                 raise
-            _complain(f"{error.filename}: {error.strerror}; mend it, or choose --out")
+            place = error.filename or "a file or the screen"
+            _complain(f"{place}: {error.strerror}; mend it, or choose --out")
             ctx.exit(EXIT_ERROR)
-        except KeyboardInterrupt:
-            _complain("interrupted; what was finished is kept, run again to go on")
-            ctx.exit(EXIT_INTERRUPTED)
+        except Stopped as stopped:
+            _complain(stopped.sentence)
+            ctx.exit(stopped.exit_code)
 
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002
         """Name the commands in the order in which they work.

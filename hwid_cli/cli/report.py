@@ -28,7 +28,7 @@ def command(choices: Choices) -> None:
     """
     from hwid_cli.cli.session import open_session
 
-    session = open_session(choices, "report")
+    session = open_session(choices, "report", is_alone=False)
     report_stage(session)
 
 

@@ -5,7 +5,6 @@ Imported by commands when they run, so that ``hwid --help`` stays fast.
 
 import logging
 import shutil
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -16,10 +15,13 @@ import click
 
 from hwid_cli.campaign.own_functions import check_own_functions
 from hwid_cli.campaign.runner import RunSettings, TaskDone, Workers
+from hwid_cli.cli.folders import enter_folders
 from hwid_cli.cli.options import Choices
+from hwid_cli.cli.timing import start_timer
 from hwid_cli.errors import CacheError, ConfigError
 from hwid_cli.files.config import describe_experiment, load_experiment
 from hwid_cli.files.hdf5_store import Hdf5Store
+from hwid_cli.files.recordings import check_unchanged
 from hwid_cli.files.result_files import (
     Provenance,
     current_versions,
@@ -53,6 +55,8 @@ class Session:
     is_quiet : bool
     finished : dict
         Results of the stages that ran in this session, see ``stages.once``.
+    read : dict of str to str
+        SHA-256 of the recordings' files that were read, by file.
     """
 
     experiment: Experiment
@@ -62,6 +66,7 @@ class Session:
     forced: tuple[str, ...]
     is_quiet: bool
     finished: dict[str, Any] = field(default_factory=dict)
+    read: dict[str, str] = field(default_factory=dict)
 
     @property
     def calibrated_path(self) -> Path:
@@ -74,7 +79,7 @@ class Session:
         return self.out / "results.h5"
 
 
-def open_session(choices: Choices, *stages: str) -> Session:
+def open_session(choices: Choices, *stages: str, is_alone: bool = True) -> Session:
     """Read the configuration and make the folder of the results.
 
     Parameters
@@ -82,6 +87,8 @@ def open_session(choices: Choices, *stages: str) -> Session:
     choices : Choices
     *stages : str
         What ``--force`` computes again.
+    is_alone : bool
+        Whether no other run may work in the folder meanwhile.
 
     Returns
     -------
@@ -91,6 +98,8 @@ def open_session(choices: Choices, *stages: str) -> Session:
     ------
     ConfigError
         If the configuration or the folder cannot be used.
+    CacheError
+        If another run works in the folder.
     """
     experiment = load_experiment(choices.config)
     check_own_functions(experiment)
@@ -102,10 +111,12 @@ def open_session(choices: Choices, *stages: str) -> Session:
             f"--out {out}: {error.strerror}; expected a folder that can be made and "
             "written; choose another one"
         ) from error
+    cache = choices.cache or out / "cache"
+    enter_folders(out, cache, is_alone=is_alone)
     return Session(
         experiment=experiment,
         out=out,
-        cache=choices.cache or out / "cache",
+        cache=cache,
         workers=Workers(choices.jobs, choices.backend, choices.scheduler),
         forced=stages if choices.force else (),
         is_quiet=choices.quiet,
@@ -192,7 +203,7 @@ def provenance(
     *,
     seconds: float = float("nan"),
 ) -> Provenance:
-    """Say where results come from.
+    """Say where results come from, right before they are stored.
 
     Parameters
     ----------
@@ -207,7 +218,13 @@ def provenance(
     Returns
     -------
     Provenance
+
+    Raises
+    ------
+    MeasurementError
+        If the file of a recording has changed since it was read.
     """
+    check_unchanged(session.read)
     return Provenance(
         key,
         describe_experiment(session.experiment),
@@ -278,47 +295,23 @@ def _progress(
         def on_done(item: TaskDone) -> None:
             progress.advance(from_cache=item.from_cache)
 
+        store = Hdf5Store(session.cache)
         settings = RunSettings(
-            store=Hdf5Store(session.cache),
+            store=store,
             workers=session.workers,
             force=stage in session.forced,
             on_done=on_done,
         )
         yield settings, progress
+    if store.unusable:
+        _log.warning(
+            "%s: %d damaged entries of the cache set aside, computed again (such as %s)",
+            label,
+            len(store.unusable),
+            store.unusable[0],
+        )
     say(
         session,
         f"{label}: {progress.from_cache} {unit} from the cache, "
         f"{progress.computed} computed, {timer()}",
     )
-
-
-@dataclass(frozen=True)
-class Timer:
-    """A running clock; a call gives the time since its start as text with its unit.
-
-    Parameters
-    ----------
-    start_s : float, [s]
-        Reading of the system's steady clock at the start.
-    """
-
-    start_s: float
-
-    @property
-    def seconds(self) -> float:
-        """Time since the start, in seconds."""
-        return time.perf_counter() - self.start_s
-
-    def __call__(self) -> str:
-        """Time since the start, as text."""
-        return f"{self.seconds:.1f} s"
-
-
-def start_timer() -> Timer:
-    """Start a clock.
-
-    Returns
-    -------
-    Timer
-    """
-    return Timer(time.perf_counter())

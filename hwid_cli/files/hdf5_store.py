@@ -1,7 +1,8 @@
 """The cache on disk: one small HDF5 file for each task, safe to kill at any moment.
 
 ``<folder>/<first two digits of the key>/<key>.h5``. Entries may be thrown away: what
-cannot be read is set aside with the ending ``.bad`` and computed again.
+cannot be read is set aside with the ending ``.bad``, counted and computed again. Runs
+may share a folder: an entry appears as a whole, and two of one key hold the same.
 """
 
 import hashlib
@@ -12,7 +13,7 @@ from typing import TypeVar
 import h5py
 
 from hwid_cli.files.hdf5_records import read_record, write_record
-from hwid_cli.files.replaced_files import check_format, replaced_hdf5
+from hwid_cli.files.replaced_files import check_format, hdf5_image, replace_file
 
 Record = TypeVar("Record")
 
@@ -23,8 +24,29 @@ SCHEMA_VERSION = 1
 _SEAL_BYTES = hashlib.sha256().digest_size
 
 
+def pack_entry(key: str, record: object) -> bytes:
+    """Turn a result into what its file will hold.
+
+    Parameters
+    ----------
+    key : str
+    record : dataclass instance
+
+    Returns
+    -------
+    bytes
+    """
+
+    def fill(file: h5py.File) -> None:
+        file.attrs["key"] = key
+        file.attrs["record"] = type(record).__name__
+        write_record(file.create_group("record"), record)
+
+    return _sealed(hdf5_image(fill, format_name=FORMAT, version=SCHEMA_VERSION))
+
+
 class Hdf5Store:
-    """Results of tasks by key, in a folder; only one process may write a key at a time.
+    """Results of tasks by key, in a folder.
 
     Holds no open file, so it may be sent to a worker.
 
@@ -32,10 +54,18 @@ class Hdf5Store:
     ----------
     folder : Path
         Made when the first entry is put.
+
+    Attributes
+    ----------
+    unusable : list of str
+        What was wrong with each entry that was there and could not be used.
     """
+
+    pack = staticmethod(pack_entry)
 
     def __init__(self, folder: Path) -> None:
         self._folder = Path(folder)
+        self.unusable: list[str] = []
 
     def get(self, key: str, record_type: type[Record]) -> Record | None:
         """Look a result up.
@@ -57,7 +87,7 @@ class Hdf5Store:
         except FileNotFoundError:
             return None
         except OSError as error:
-            _log.warning("%s: cannot be read (%s); computed again", path, error)
+            self._complain(path, error)
             return None
         try:
             image = h5py.h5f.open_file_image(_unsealed(content))
@@ -75,9 +105,9 @@ class Hdf5Store:
             RuntimeError,
             TypeError,
         ) as error:
-            _set_aside(path, error)
+            self._set_aside(path, error)
         except ValueError as error:
-            _set_aside(path, error)
+            self._set_aside(path, error)
         return None
 
     def put(self, key: str, record: object) -> None:
@@ -93,15 +123,53 @@ class Hdf5Store:
         CacheError
             If it cannot be written.
         """
-        with replaced_hdf5(
-            self._path(key), format_name=FORMAT, version=SCHEMA_VERSION, seal=_sealed
-        ) as file:
-            file.attrs["key"] = key
-            file.attrs["record"] = type(record).__name__
-            write_record(file.create_group("record"), record)
+        self.put_packed(key, pack_entry(key, record))
+
+    def put_packed(self, key: str, packed: bytes) -> None:
+        """Keep a result that was packed, perhaps by a worker.
+
+        Parameters
+        ----------
+        key : str
+        packed : bytes
+            As ``pack`` gives it for the same key.
+
+        Raises
+        ------
+        CacheError
+            If it cannot be written.
+        """
+        replace_file(self._path(key), packed)
 
     def _path(self, key: str) -> Path:
         return self._folder / key[:2] / f"{key}.h5"
+
+    def _set_aside(self, path: Path, error: Exception) -> None:
+        """Rename an entry that cannot be read, so that it is not tried again."""
+        self._complain(path, error)
+        try:
+            path.replace(path.with_suffix(".bad"))
+        except OSError as failure:
+            self.unusable[-1] += f" (it cannot be set aside: {failure.strerror})"
+
+    def _complain(self, path: Path, error: Exception) -> None:
+        """Note why an entry cannot be used; a damaged disk has thousands of them."""
+        self.unusable.append(f"{path}: {' '.join(str(error).split())}")
+        _log.debug("unusable, computed again: %s", self.unusable[-1])
+
+
+def count_entries(folder: Path) -> int:
+    """Count the results that a cache holds.
+
+    Parameters
+    ----------
+    folder : Path
+
+    Returns
+    -------
+    int, [-]
+    """
+    return sum(1 for _ in Path(folder).glob("??/*.h5"))
 
 
 def _sealed(image: bytes) -> bytes:
@@ -115,13 +183,3 @@ def _unsealed(content: bytes) -> bytes:
     if hashlib.sha256(image).digest() != content[-_SEAL_BYTES:]:
         raise ValueError("content and checksum do not match")
     return image
-
-
-def _set_aside(path: Path, error: Exception) -> None:
-    """Rename an entry that cannot be read, so that it is not tried again."""
-    said = " ".join(str(error).split())
-    _log.warning("%s: unusable (%s); set aside and computed again", path, said)
-    try:
-        path.replace(path.with_suffix(".bad"))
-    except OSError as failure:
-        _log.warning("%s: cannot be set aside (%s)", path, failure)

@@ -2,9 +2,11 @@
 
 import hashlib
 import logging
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
+from hwid_cli.errors import MeasurementError
 from hwid_cli.files import recording_checks as checks
 from hwid_cli.files.columns import FileColumns, block_means, with_each
 from hwid_cli.files.recording_formats import read_columns
@@ -57,7 +59,13 @@ def read_recordings(experiment: Experiment, out: Path) -> list[RawRecording]:
     plans = {folder: read_plan(folder) for folder in {path.parent for path in paths}}
     recordings = []
     for path in paths:
-        columns, digest = read_columns(path, options.columns), _sha256(path)
+        digest = _sha256(path)
+        columns = read_columns(path, options.columns)
+        if _sha256(path) != digest:
+            raise MeasurementError(
+                f"{path}: changed while it was read; expected a finished recording; "
+                "run again when it is written"
+            )
         for part in parts:
             if part.path == path:
                 kind = kind_of(path, options.kind, plans[path.parent], name=part.name)
@@ -104,9 +112,37 @@ def _read_recording(
     )
 
 
+def check_unchanged(digests: Mapping[str, str]) -> None:
+    """Refuse recordings that are no longer what was read.
+
+    Parameters
+    ----------
+    digests : mapping of str to str
+        SHA-256 by file.
+
+    Raises
+    ------
+    MeasurementError
+        If a file has changed or is gone.
+    """
+    for name, digest in digests.items():
+        if _sha256(Path(name)) != digest:
+            raise MeasurementError(
+                f"{name}: changed while this run used it; expected the recording as it "
+                "was read at the start; results of this stage are not stored; run again "
+                "(what was computed is kept for the earlier recording)"
+            )
+
+
 def _sha256(path: Path) -> str:
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
+    try:
+        with path.open("rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError as error:
+        raise MeasurementError(
+            f"{path}: cannot be read ({error.strerror}); expected a recording that "
+            "stays where it is during the run; put it back and run again"
+        ) from error
 
 
 def _warn_of_unused_kinds(

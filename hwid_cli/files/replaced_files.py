@@ -4,6 +4,7 @@ HDF5 files are built in memory first: h5py was seen to crash the interpreter at 
 when the disk is full.
 """
 
+import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -19,7 +20,7 @@ _CREATED_BY = f"hwid {__version__}"
 _IMAGE_MAY_CHANGE = 1
 
 
-def replace_file(path: Path, content: bytes) -> None:
+def replace_file(path: Path, content: bytes, *, is_lasting: bool = False) -> None:
     """Put content into a file in one step.
 
     Parameters
@@ -27,6 +28,8 @@ def replace_file(path: Path, content: bytes) -> None:
     path : Path
         Missing folders are made.
     content : bytes
+    is_lasting : bool
+        Whether to wait until the disk has it, so that it outlives a power cut.
 
     Raises
     ------
@@ -37,7 +40,13 @@ def replace_file(path: Path, content: bytes) -> None:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         temporary.write_bytes(content)
+        if is_lasting:
+            _wait_for_disk(temporary)
         temporary.replace(path)
+        if is_lasting:
+            # Some file systems cannot wait for a folder; the file is whole all the same.
+            with suppress(OSError):
+                _wait_for_disk(path.parent)
     except OSError as error:
         raise CacheError(
             f"{path}: cannot be written ({error.strerror or error}); expected a folder "
@@ -48,6 +57,14 @@ def replace_file(path: Path, content: bytes) -> None:
             temporary.unlink(missing_ok=True)
 
 
+def _wait_for_disk(path: Path) -> None:
+    number = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(number)
+    finally:
+        os.close(number)
+
+
 @contextmanager
 def replaced_hdf5(
     path: Path,
@@ -56,6 +73,7 @@ def replaced_hdf5(
     version: int,
     start: bytes = b"",
     seal: Callable[[bytes], bytes] = bytes,
+    is_lasting: bool = False,
 ) -> Iterator[h5py.File]:
     """Give an HDF5 file in memory that becomes the file on disk at the end.
 
@@ -70,6 +88,8 @@ def replaced_hdf5(
         HDF5 file to begin with; none gives an empty one.
     seal : callable
         From the finished file's bytes to those that are written.
+    is_lasting : bool
+        As for ``replace_file``.
 
     Yields
     ------
@@ -84,13 +104,46 @@ def replaced_hdf5(
         If ``start`` is no HDF5 file.
     """
     with _in_memory(start) as file:
-        file.attrs["format"] = format_name
-        file.attrs["schema_version"] = version
-        file.attrs["created_by"] = _CREATED_BY
+        _sign(file, format_name, version)
         yield file
-        file.flush()
-        image = file.id.get_file_image()
-    replace_file(path, seal(image))
+        image = _image(file)
+    replace_file(path, seal(image), is_lasting=is_lasting)
+
+
+def hdf5_image(
+    fill: Callable[[h5py.File], None], *, format_name: str, version: int
+) -> bytes:
+    """Bytes of an HDF5 file that never was on a disk.
+
+    Parameters
+    ----------
+    fill : callable
+        Writes into the file.
+    format_name : str
+        Root attribute ``format``.
+    version : int
+        Root attribute ``schema_version``.
+
+    Returns
+    -------
+    bytes
+    """
+    with _in_memory(b"") as file:
+        _sign(file, format_name, version)
+        fill(file)
+        return _image(file)
+
+
+def _sign(file: h5py.File, format_name: str, version: int) -> None:
+    file.attrs["format"] = format_name
+    file.attrs["schema_version"] = version
+    file.attrs["created_by"] = _CREATED_BY
+
+
+def _image(file: h5py.File) -> bytes:
+    file.flush()
+    image: bytes = file.id.get_file_image()
+    return image
 
 
 def _in_memory(start: bytes) -> h5py.File:

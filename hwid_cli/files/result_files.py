@@ -18,12 +18,15 @@ from hwid_cli import __version__
 from hwid_cli.errors import CacheError
 from hwid_cli.files.hdf5_values import read_array, write_array
 from hwid_cli.files.replaced_files import check_format, replaced_hdf5
+from hwid_cli.files.seals import has_seal, sealed, unsealed
 
 Result = TypeVar("Result")
 
 CALIBRATED_FORMAT = "hwid-calibrated"
 RESULTS_FORMAT = "hwid-results"
 SCHEMA_VERSION = 1
+# Root attribute of files with a checksum behind them; earlier versions had none.
+SEALED = "sealed"
 
 _log = logging.getLogger(__name__)
 
@@ -86,12 +89,10 @@ def read_stage_key(path: Path, stage: str) -> str | None:
         None if there are no results of that stage, or none that can be read.
     """
     try:
-        with h5py.File(path, "r") as file:
+        with _opened(path, stage) as file:
             group = file if stage == "calibrate" else file[stage]
-            expected = CALIBRATED_FORMAT if stage == "calibrate" else RESULTS_FORMAT
-            check_format(file, format_name=expected, version=SCHEMA_VERSION)
             return str(group.attrs["key"])
-    except (KeyError, OSError, RuntimeError, ValueError):
+    except (CacheError, KeyError, OSError):
         return None
 
 
@@ -182,7 +183,10 @@ def replaced_stage(
         format_name=RESULTS_FORMAT,
         version=SCHEMA_VERSION,
         start=_readable_bytes(path, stage),
+        seal=sealed,
+        is_lasting=True,
     ) as file:
+        file.attrs[SEALED] = True
         if stage in file:
             # HDF5 gives the room to what is written before the file is closed.
             del file[stage]
@@ -199,10 +203,16 @@ def _readable_bytes(path: Path, stage: str) -> bytes:
         with _opened(path, stage) as file:
             # Damage below the root shows only where it is looked at.
             file.visititems(_look_at)
-            return path.read_bytes()
+            return unsealed(path.read_bytes())
     except CacheError:
         aside = path.with_name(f"{path.name}.bad")
-        path.replace(aside)
+        try:
+            path.replace(aside)
+        except OSError as error:
+            raise CacheError(
+                f"{path}: damaged, and cannot be set aside ({error.strerror}); expected "
+                "a folder that may be written; mend it or choose another with --out"
+            ) from error
         _log.warning(
             "%s: cannot be read; set aside as %s; other stages than %s come back from "
             "the cache when they are run",
@@ -257,8 +267,13 @@ def _opened(path: Path, stage: str) -> Iterator[h5py.File]:
     is_calibrated = stage == "calibrate"
     format_name = CALIBRATED_FORMAT if is_calibrated else RESULTS_FORMAT
     try:
+        content = path.read_bytes()
+        unsealed(content)
         with h5py.File(path, "r") as file:
             check_format(file, format_name=format_name, version=SCHEMA_VERSION)
+            if SEALED in file.attrs and not has_seal(content):
+                raise ValueError("its checksum is gone: cut off, or changed since")
+            del content
             yield file
     except (KeyError, OSError, RuntimeError, TypeError, ValueError) as error:
         said = " ".join(str(error).split())

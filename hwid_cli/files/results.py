@@ -18,11 +18,13 @@ from hwid_cli.files.replaced_files import replaced_hdf5
 from hwid_cli.files.result_files import (
     CALIBRATED_FORMAT,
     SCHEMA_VERSION,
+    SEALED,
     Provenance,
     read_results,
     replaced_stage,
     write_provenance,
 )
+from hwid_cli.files.seals import sealed
 from hwid_cli.records.experiment import OrdersOptions
 from hwid_cli.records.model import Fit
 from hwid_cli.records.recordings import CalibrationLog, Recording
@@ -69,8 +71,13 @@ def write_calibrated(
         If it cannot be written; an old file is untouched then.
     """
     with replaced_hdf5(
-        path, format_name=CALIBRATED_FORMAT, version=SCHEMA_VERSION
+        path,
+        format_name=CALIBRATED_FORMAT,
+        version=SCHEMA_VERSION,
+        seal=sealed,
+        is_lasting=True,
     ) as file:
+        file.attrs[SEALED] = True
         write_provenance(file, provenance)
         names = [recording.name for recording in recordings]
         write_array(file, "names", np.array(names, dtype=object))

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from hwid_cli.campaign.runner import one_thread
+from hwid_cli.campaign.tasks import one_thread
 from hwid_cli.maths.model.fit import fit
 from hwid_cli.records.model import FitOptions, Orders
 from hwid_cli.records.recordings import Recording

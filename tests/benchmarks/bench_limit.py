@@ -12,7 +12,7 @@ import time
 import numpy as np
 from scipy.linalg.blas import dsyrk
 
-from hwid_cli.campaign.runner import one_thread
+from hwid_cli.campaign.tasks import one_thread
 from hwid_cli.maths.model import static_map
 from hwid_cli.maths.model.candidates import Candidate, Experiment, columns
 from hwid_cli.maths.model.fit import fit

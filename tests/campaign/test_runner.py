@@ -5,7 +5,7 @@ import textwrap
 import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from hwid_cli.campaign import runner
+from hwid_cli.campaign import workers
 from hwid_cli.campaign.cache import MemoryStore
 from hwid_cli.campaign.runner import RunSettings, Task, Workers, run_tasks
 from hwid_cli.errors import ConfigError
@@ -92,7 +92,7 @@ def test_linear_algebra_runs_on_one_thread_in_a_task():
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_an_exception_in_a_task_is_a_bug_and_comes_through(jobs, monkeypatch):
     # The first task of a function runs here, before the one that fails is handed out.
-    monkeypatch.setattr(runner, "_compiled", set())
+    monkeypatch.setattr(workers, "_compiled", set())
     tasks = [*order_tasks(3), Task("bad", "bad", Orders, (0, 0, 0), Orders)]
     store = MemoryStore()
     with pytest.raises(ValueError, match="nb must be an integer >= 1"):

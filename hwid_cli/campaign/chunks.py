@@ -1,0 +1,111 @@
+"""Which tasks go out together, and which are tried again after workers have died.
+
+A chunk lasts long enough for its way there and back not to matter. One over which workers
+died is taken apart; a task whose workers die again although it is alone is given up.
+"""
+
+import statistics
+from collections import Counter, deque
+from collections.abc import Sequence
+
+from hwid_cli.campaign.tasks import Task
+from hwid_cli.errors import WorkerError
+
+# How long a chunk shall last, [s], and how many tasks it holds at most.
+CHUNK_S, MOST_IN_CHUNK = 0.5, 64
+# Chunks from whose duration that of the next ones is taken.
+_RECENT = 30
+# Names of tasks in a message.
+_MOST_NAMES = 4
+
+
+class Chunks:
+    """Tasks that wait for a worker.
+
+    Parameters
+    ----------
+    tasks : sequence of Task
+    """
+
+    def __init__(self, tasks: Sequence[Task]) -> None:
+        self._waiting = deque(tasks)
+        self._alone: deque[Task] = deque()
+        self._deaths: Counter[str] = Counter()
+        self._given_up: list[Task] = []
+        self._seconds: deque[float] = deque(maxlen=_RECENT)
+
+    def __bool__(self) -> bool:
+        """Whether a task waits."""
+        return bool(self._waiting or self._alone)
+
+    def take(self, ahead: int) -> tuple[Task, ...]:
+        """Take the next chunk.
+
+        Parameters
+        ----------
+        ahead : int, [-]
+            Chunks under way at a time; the last tasks are divided among so many.
+
+        Returns
+        -------
+        tuple of Task
+            At least one.
+        """
+        if self._alone:
+            return (self._alone.popleft(),)
+        count = 1
+        if self._seconds:
+            typical = max(statistics.median(self._seconds), 1e-6)
+            longest = min(int(CHUNK_S / typical), MOST_IN_CHUNK)
+            count = max(1, min(longest, len(self._waiting) // ahead))
+        return tuple(self._waiting.popleft() for _ in range(count))
+
+    def is_done(self, chunk: Sequence[Task], seconds: float) -> None:
+        """Note how long a chunk took.
+
+        Parameters
+        ----------
+        chunk : sequence of Task
+        seconds : float, [s]
+        """
+        self._seconds.append(seconds / len(chunk))
+
+    def has_died(self, chunk: Sequence[Task]) -> str:
+        """Try the tasks of a chunk again, each alone, unless they were already.
+
+        Parameters
+        ----------
+        chunk : sequence of Task
+
+        Returns
+        -------
+        str
+            Their names.
+        """
+        for task in chunk:
+            self._deaths[task.key] += 1
+            is_first = self._deaths[task.key] == 1
+            (self._alone if is_first else self._given_up).append(task)
+        return _names(chunk)
+
+    def check(self) -> None:
+        """Refuse to end well where tasks were given up.
+
+        Raises
+        ------
+        WorkerError
+            Naming them.
+        """
+        if self._given_up:
+            raise WorkerError(
+                f"{_names(self._given_up)}: workers died over it again and again, most "
+                "likely for lack of memory; expected a task that fits into theirs; what "
+                "was finished is kept: look into their logs and run the same command "
+                "again"
+            )
+
+
+def _names(tasks: Sequence[Task]) -> str:
+    named = ", ".join(task.name for task in tasks[:_MOST_NAMES])
+    more = len(tasks) - _MOST_NAMES
+    return f"{named} and {more} more" if more > 0 else named

@@ -1,0 +1,274 @@
+"""Tasks on a dask cluster: data sent once, results back to this process, which writes.
+
+Workers need this package in the same version and nothing else: no shared disk and no
+configuration. Large arguments, such as recordings, are tasks of their own: the scheduler
+hands them to another worker when one has died, with what that one was computing. Tasks
+go out in chunks that last long enough for the way there and back not to matter; what a
+chunk holds changes no number.
+"""
+
+import atexit
+import logging
+import pickle
+import queue
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from hashlib import sha256
+from typing import Any
+from uuid import uuid4
+
+from threadpoolctl import threadpool_limits
+
+from hwid_cli import __version__
+from hwid_cli.campaign.chunks import Chunks
+from hwid_cli.campaign.tasks import Computed, Task, computed
+from hwid_cli.errors import ConfigError
+
+# A scheduler that does not answer within this time is not there, [s].
+CONNECT_TIMEOUT_S = 10
+# Chunks handed out ahead for each thread of a worker.
+CHUNKS_AHEAD = 3
+# Arguments with a longer pickle are sent once, [bytes].
+LARGE = 8192
+# Time between two looks at the workers, and after which a message says there are none.
+_LOOK_S, _PATIENCE_S = 2.0, 15.0
+
+_log = logging.getLogger(__name__)
+
+# Key, function, arguments, and what packs the result.
+Call = tuple[str, Callable[..., Any], Sequence[Any], Callable[[str, Any], Any] | None]
+
+
+@dataclass(frozen=True)
+class ChunkDone:
+    """What a worker sends back.
+
+    Parameters
+    ----------
+    results : tuple of (str, Computed)
+        Keys and results.
+    seconds : float, [s]
+        That the worker took.
+    """
+
+    results: tuple[tuple[str, Computed], ...]
+    seconds: float
+
+
+def cluster_results(
+    tasks: Sequence[Task], scheduler: str | None, count: int
+) -> Iterator[tuple[str, Computed]]:
+    """Results of tasks as they come from a cluster, each with its key.
+
+    Parameters
+    ----------
+    tasks : sequence of Task
+    scheduler : str or None
+        Address; None starts a cluster on this machine.
+    count : int
+        Processes of that.
+
+    Yields
+    ------
+    key : str
+    result : Computed
+
+    Raises
+    ------
+    ConfigError
+        If dask is not installed, the scheduler does not answer or goes away, or a worker
+        has no package of this version.
+    WorkerError
+        If workers died over the same tasks again and again.
+    """
+    cluster = _cluster(scheduler, count)
+    chunks, on_way = Chunks(tasks), dict[Any, tuple[Task, ...]]()
+    arrived: queue.Queue[Any] = queue.Queue()
+    try:
+        while chunks or on_way:
+            ahead = CHUNKS_AHEAD * max(1, cluster.threads())
+            while chunks and len(on_way) < ahead:
+                chunk = chunks.take(ahead)
+                future = cluster.submit(chunk)
+                on_way[future] = chunk
+                future.add_done_callback(arrived.put)
+            for future in _arrived(arrived, cluster):
+                chunk = on_way.pop(future)
+                done = cluster.result(future)
+                if done is None:
+                    names = chunks.has_died(chunk)
+                    _log.warning("workers died over %s; tried once more", names)
+                    continue
+                chunks.is_done(chunk, done.seconds)
+                yield from done.results
+    finally:
+        cluster.forget(list(on_way))
+    chunks.check()
+
+
+def run_chunk(version: str, calls: Sequence[Call]) -> ChunkDone:
+    """Run calls on a worker, one after the other.
+
+    Parameters
+    ----------
+    version : str
+        Of the package in the process that asks.
+    calls : sequence of (key, function, arguments, pack)
+
+    Returns
+    -------
+    ChunkDone
+
+    Raises
+    ------
+    ConfigError
+        If this worker has another version.
+    """
+    if version != __version__:
+        raise ConfigError(
+            f"a worker has hwid {__version__}; expected {version}, as here; install the "
+            "same version on all workers"
+        )
+    _one_thread_for_good()
+    begin = time.perf_counter()
+    results = tuple((call[0], computed(*call)) for call in calls)
+    return ChunkDone(results, time.perf_counter() - begin)
+
+
+@lru_cache(maxsize=1)
+def _one_thread_for_good() -> None:
+    """Keep linear algebra to one thread, also where a worker runs several tasks at once."""
+    threadpool_limits(limits=1)
+
+
+class _Cluster:
+    """A connection to a scheduler, and what has been sent to it."""
+
+    def __init__(self, client: Any, address: str) -> None:
+        self.client, self.address = client, address
+        self._sent: dict[int, tuple[Any, Any]] = {}
+        self._threads, self._looked_at = 0, -_LOOK_S
+
+    def threads(self) -> int:
+        """Threads of all workers; looked up every few seconds."""
+        if time.monotonic() - self._looked_at >= _LOOK_S:
+            before = self._threads
+            self._threads = sum(self.client.nthreads().values())
+            self._looked_at = time.monotonic()
+            if self._threads < before:
+                _log.warning(
+                    "a worker of %s is gone; what it was computing is computed again",
+                    self.address,
+                )
+        return self._threads
+
+    def submit(self, chunk: Sequence[Task]) -> Any:
+        """Hand a chunk to the scheduler; gives dask's future."""
+        calls = [
+            (
+                task.key,
+                task.function,
+                [self._reference(one) for one in task.arguments],
+                task.pack,
+            )
+            for task in chunk
+        ]
+        name = f"hwid-tasks-{uuid4().hex}"
+        return self.client.submit(run_chunk, __version__, calls, key=name)
+
+    def result(self, future: Any) -> ChunkDone | None:
+        """What came of a chunk; None where workers died over it."""
+        from distributed.scheduler import KilledWorker
+
+        if future.status == "cancelled":
+            raise ConfigError(
+                f"--scheduler {self.address}: went away while computing; expected a "
+                "running dask scheduler; start it and give the same command again"
+            )
+        try:
+            return future.result()
+        except KilledWorker:
+            return None
+        except ImportError as error:
+            raise ConfigError(
+                f"--scheduler {self.address}: a worker cannot run tasks ({error}); "
+                f"expected hwid {__version__} there too; install it on all workers"
+            ) from error
+
+    def forget(self, futures: Sequence[Any]) -> None:
+        """Give up what is still on its way."""
+        if futures and self.client.status == "running":
+            self.client.cancel(futures)
+
+    def _reference(self, argument: Any) -> Any:
+        """Argument, or what stands for it where it is large."""
+        known = self._sent.get(id(argument))
+        if known is not None:
+            return known[1]
+        if isinstance(argument, list | tuple):
+            members = [self._reference(one) for one in argument]
+            if any(
+                one is not other for one, other in zip(members, argument, strict=True)
+            ):
+                return type(argument)(members)
+        content = pickle.dumps(argument, protocol=pickle.HIGHEST_PROTOCOL)
+        if len(content) <= LARGE:
+            return argument
+        name = f"hwid-data-{sha256(content).hexdigest()}"
+        future = self.client.submit(pickle.loads, content, key=name)
+        # The argument stays with it: its id is its name here.
+        self._sent[id(argument)] = (argument, future)
+        return future
+
+
+def _arrived(arrived: queue.Queue[Any], cluster: _Cluster) -> list[Any]:
+    """Futures that are done: at least one, and all others that have come meanwhile."""
+    futures: list[Any] = []
+    since, told = time.monotonic(), False
+    while not futures:
+        try:
+            futures.append(arrived.get(timeout=_LOOK_S))
+        except queue.Empty:
+            is_late = time.monotonic() - since > _PATIENCE_S
+            if is_late and not told and cluster.threads() == 0:
+                _log.warning("%s has no workers; waiting for one", cluster.address)
+                told = True
+    while not arrived.empty():
+        futures.append(arrived.get_nowait())
+    return futures
+
+
+def _quieten(package: str) -> None:
+    """Keep dask from telling of lost workers: what matters is told here."""
+    for name in logging.root.manager.loggerDict:
+        if name.partition(".")[0] == package:
+            logging.getLogger(name).setLevel(logging.CRITICAL)
+
+
+@lru_cache(maxsize=4)
+def _cluster(scheduler: str | None, count: int) -> _Cluster:
+    """Connection that lasts as long as the program."""
+    try:
+        from distributed import Client
+    except ImportError as error:
+        raise ConfigError(
+            f"--backend dask: {error}; expected dask[distributed] in this environment; "
+            "run: pip install 'hwid[dask]', or leave --backend out"
+        ) from error
+    _quieten("distributed")
+    try:
+        if scheduler is None:
+            client = Client(
+                n_workers=count, threads_per_worker=1, dashboard_address=None
+            )
+        else:
+            client = Client(scheduler, timeout=CONNECT_TIMEOUT_S)
+    except (OSError, ValueError) as error:
+        raise ConfigError(
+            f"--scheduler {scheduler}: {error}; expected the address of a "
+            "running dask scheduler, such as tcp://127.0.0.1:8786"
+        ) from error
+    atexit.register(client.close)
+    return _Cluster(client, scheduler or "the cluster on this machine")

@@ -1,0 +1,23 @@
+import pytest
+
+from tests.reliability import harness
+
+
+@pytest.fixture(scope="session")
+def undisturbed(tmp_path_factory):
+    """What the tiny campaign finds when nothing happens to it."""
+    folder = tmp_path_factory.mktemp("undisturbed")
+    out = folder / "out"
+    done = harness.run_here(harness.write_config(folder), out)
+    assert harness.count_computed(done.stdout) == len(harness.entries(out))
+    return out
+
+
+@pytest.fixture
+def config(tmp_path):
+    return harness.write_config(tmp_path)
+
+
+@pytest.fixture
+def out(tmp_path):
+    return tmp_path / "out"
