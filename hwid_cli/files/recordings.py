@@ -57,11 +57,11 @@ def read_recordings(experiment: Experiment, out: Path) -> list[RawRecording]:
     plans = {folder: read_plan(folder) for folder in {path.parent for path in paths}}
     recordings = []
     for path in paths:
-        columns, digest = read_columns(path, options.columns), _sha256(path)
+        columns, digest = read_columns(path, options.columns), file_sha256(path)
         for part in parts:
             if part.path == path:
                 kind = kind_of(path, options.kind, plans[path.parent], name=part.name)
-                raw = _read_recording(part, columns, kind, experiment)
+                raw = read_part(part, columns, kind, experiment)
                 recordings.append(replace(raw, sha256=digest))
     _warn_of_unused_kinds(recordings, experiment.source, options)
     recordings.sort(key=lambda recording: KINDS.index(recording.kind))
@@ -73,9 +73,30 @@ def read_recordings(experiment: Experiment, out: Path) -> list[RawRecording]:
     ]
 
 
-def _read_recording(
+def read_part(
     part: FilePart, columns: FileColumns, kind: str, experiment: Experiment
 ) -> RawRecording:
+    """Read and check one recording, apart from what it has in common with others.
+
+    Parameters
+    ----------
+    part : FilePart
+        Stretch of the file.
+    columns : FileColumns
+        Of the whole file.
+    kind : str
+    experiment : Experiment
+
+    Returns
+    -------
+    RawRecording
+        Without the hash of its file.
+
+    Raises
+    ------
+    MeasurementError
+        For the first fault.
+    """
     options = recordings_options(experiment)
     place = part.place
     columns = cut_part(columns, part)
@@ -104,7 +125,17 @@ def _read_recording(
     )
 
 
-def _sha256(path: Path) -> str:
+def file_sha256(path: Path) -> str:
+    """Hash of a file's bytes, hexadecimal.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    str
+    """
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
