@@ -8,10 +8,13 @@ import click
 from hwid_cli import __version__
 from hwid_cli.cli import (
     calibrate,
+    check,
+    compare,
     crossval,
     diagnose,
     group,
     identify,
+    init,
     order,
     report,
     run,
@@ -117,6 +120,8 @@ def main(ctx: click.Context) -> None:
 
 
 _MODULES = (
+    init,
+    check,
     run,
     simulate,
     calibrate,
@@ -127,6 +132,7 @@ _MODULES = (
     test,
     diagnose,
     report,
+    compare,
 )
 for _module in _MODULES:
     main.add_command(_module.command)

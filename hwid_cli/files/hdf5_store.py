@@ -32,10 +32,14 @@ class Hdf5Store:
     ----------
     folder : Path
         Made when the first entry is put.
+    sets_aside : bool
+        Whether entries that cannot be read are renamed; not where nothing may be
+        written.
     """
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, *, sets_aside: bool = True) -> None:
         self._folder = Path(folder)
+        self._sets_aside = sets_aside
 
     def get(self, key: str, record_type: type[Record]) -> Record | None:
         """Look a result up.
@@ -75,10 +79,14 @@ class Hdf5Store:
             RuntimeError,
             TypeError,
         ) as error:
-            _set_aside(path, error)
+            self._refuse(path, error)
         except ValueError as error:
-            _set_aside(path, error)
+            self._refuse(path, error)
         return None
+
+    def _refuse(self, path: Path, error: Exception) -> None:
+        if self._sets_aside:
+            _set_aside(path, error)
 
     def put(self, key: str, record: object) -> None:
         """Keep a result.

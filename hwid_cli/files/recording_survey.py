@@ -4,15 +4,18 @@
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TypeVar
 
+import numpy as np
+
 from hwid_cli.errors import HwidError
 from hwid_cli.files import recording_checks as checks
+from hwid_cli.files.columns import FileColumns
 from hwid_cli.files.recording_formats import read_columns
 from hwid_cli.files.recording_kinds import kind_of, read_plan
-from hwid_cli.files.recording_parts import FilePart, parts_of_files
+from hwid_cli.files.recording_parts import FilePart, cut_part, parts_of_files
 from hwid_cli.files.recording_paths import (
     find_files,
     recordings_base,
@@ -37,11 +40,15 @@ class Survey:
         One line each.
     unusable : tuple of str
         Names of the recordings with a fault.
+    jitter : dict of str to float, [-]
+        Largest deviation of a step of the time column from the median one, as a share of
+        it, by name; without recordings that have no time column.
     """
 
     recordings: tuple[RawRecording, ...]
     problems: tuple[str, ...]
     unusable: tuple[str, ...] = ()
+    jitter: dict[str, float] = field(default_factory=dict)
 
 
 def survey_recordings(experiment: Experiment, out: Path) -> Survey:
@@ -68,19 +75,24 @@ def survey_recordings(experiment: Experiment, out: Path) -> Survey:
         problems, lambda: checks.check_names([(part.path, part.name) for part in parts])
     )
     read: list[RawRecording] = []
+    jitter: dict[str, float] = {}
     for path in paths:
         own = [part for part in parts if part.path == path]
-        read += _read_file(path, own, experiment, problems)
+        read += _read_file(path, own, experiment, (problems, jitter))
     common = _of_one_clock(read, experiment, problems)
     common.sort(key=lambda recording: KINDS.index(recording.kind))
     good = {recording.name for recording in common}
     bad = tuple(part.name for part in parts if part.name not in good)
-    return Survey(tuple(common), tuple(problems), bad)
+    return Survey(tuple(common), tuple(problems), bad, jitter)
 
 
 def _read_file(
-    path: Path, parts: list[FilePart], experiment: Experiment, problems: list[str]
+    path: Path,
+    parts: list[FilePart],
+    experiment: Experiment,
+    notes: tuple[list[str], dict[str, float]],
 ) -> list[RawRecording]:
+    problems, jitter = notes
     options = recordings_options(experiment)
     columns = _noting(problems, lambda: read_columns(path, options.columns))
     plan = _noting(problems, lambda: read_plan(path.parent))
@@ -97,7 +109,16 @@ def _read_file(
         one = _noting(problems, read)
         if one is not None:
             found.append(one)
+            if columns.time is not None:
+                jitter[part.name] = _jitter(cut_part(columns, part))
     return found
+
+
+def _jitter(columns: FileColumns) -> float:
+    stamps = columns.time.values if columns.time is not None else np.zeros(0)
+    steps = np.diff(stamps)
+    median = float(np.median(steps))
+    return float(np.max(np.abs(steps - median))) / median
 
 
 def _of_one_clock(
