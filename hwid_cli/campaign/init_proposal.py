@@ -9,7 +9,7 @@ import numpy as np
 from hwid_cli.campaign.calibrate import calibrate_all
 from hwid_cli.errors import HwidError
 from hwid_cli.maths import column_signs as signs
-from hwid_cli.maths.calibration import LEAST_QUIET
+from hwid_cli.maths.calibration import LEAST_QUIET, find_onset
 from hwid_cli.records.experiment import CalibrateOptions
 from hwid_cli.records.recordings import KINDS, RawRecording
 from hwid_cli.records.starter import Proposal
@@ -193,8 +193,10 @@ def _works(recipe: tuple[str, ...], kind: str, raws: Sequence[RawRecording]) -> 
         for log in logs
     )
     differ = any(log.n_raw_input != log.n_raw_output for log in logs)
-    rests = [log.first_sample >= LEAST_QUIET for log in logs]
-    return is_long and (all(rests) or differ)
+    is_random = kind == "random"
+    onsets = [find_onset(raw.input, quiet_is_rest=not is_random) for raw in raws]
+    rests = all((onset or 0) >= LEAST_QUIET for onset in onsets)
+    return is_long and (rests or differ)
 
 
 def _of_kind(raw: RawRecording, kind: str) -> RawRecording:

@@ -1,7 +1,7 @@
 """``hwid check``: is a configuration sound, what would it run, and for how long."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NoReturn
 
 import click
 
@@ -49,19 +49,17 @@ def command(
     the cache already, and an estimate of time and disk. Computes no result and writes
     nothing. Every problem is one line; the exit code is 1 if there is any.
     """
-    from hwid_cli.files.config import load_experiment
     from hwid_cli.files.config_problems import config_problems
 
-    problems = config_problems(config)
-    if problems:
+    problems, experiment = config_problems(config)
+    if experiment is None:
         _end_with(problems)
-    experiment = load_experiment(config)
     folder = out or Path("results") / experiment.name
-    if _is_waiting(experiment, folder):
+    if not problems and _is_waiting(experiment, folder):
         return
-    checked, problems = _data(experiment, folder)
-    if problems:
-        _end_with(problems)
+    checked, more = _data(experiment, folder)
+    if problems or more:
+        _end_with((*problems, *more))
     _show_plan(experiment, checked, (cache or folder / "cache", jobs, timing))
 
 
@@ -114,11 +112,6 @@ def _data(experiment: "Experiment", folder: Path) -> "tuple[Checked, tuple[str, 
     known = {one.name for one in survey.recordings} | set(survey.unusable)
     if known:
         problems += _names(experiment, known)
-    if experiment.diagnose is not None and experiment.simulation is None:
-        problems.append(
-            f"{experiment.source}: simulation: missing; expected the physics model that "
-            "diagnose judges; add the section (configs/README.md explains it)"
-        )
     return checked, tuple(dict.fromkeys(problems))
 
 
@@ -176,7 +169,7 @@ def _cost(experiment: "Experiment", checked: "Checked", *, timing: bool) -> "Fit
     return time_one_fit(checked.recordings, experiment.orders, experiment.fit)
 
 
-def _end_with(problems: tuple[str, ...]) -> None:
+def _end_with(problems: tuple[str, ...]) -> NoReturn:
     for problem in problems:
         click.echo(f"hwid: {' '.join(problem.split())}", err=True)
     raise click.exceptions.Exit(_EXIT_PROBLEMS)

@@ -21,6 +21,7 @@ from hwid_cli.cli import (
     simulate,
     test,
 )
+from hwid_cli.cli.examples import add_examples
 from hwid_cli.errors import HwidError
 
 # What a disk or a folder may refuse, which is no fault of the program.
@@ -135,4 +136,4 @@ _MODULES = (
     compare,
 )
 for _module in _MODULES:
-    main.add_command(_module.command)
+    main.add_command(add_examples(_module.command))

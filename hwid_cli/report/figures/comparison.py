@@ -1,5 +1,7 @@
 """The figure of models side by side."""
 
+from typing import Any
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -12,10 +14,12 @@ from hwid_cli.report.figures.style import (
     GREY,
     LINES,
     new_figure,
+    number_decades,
     styled,
 )
 
-_HEIGHT = 7.0
+# Of the figure, and of a line of its legend, [inch].
+_HEIGHT, _LINE = 7.5, 0.2
 # More recordings than this leave no room for their names, [-].
 _MOST_NAMES = 40
 # Names of models are cut to this length in the legend, [characters].
@@ -37,14 +41,17 @@ def comparison_figure(comparison: Comparison) -> Figure:
         measured and simulated outputs where the models differ most, and what they leave.
     """
     figure = new_figure(FULL_WIDTH, _HEIGHT)
-    figure.subplots_adjust(left=0.075, right=0.99, top=0.8, bottom=0.08, hspace=0.75)
-    upper, middle, lower = figure.subplots(
-        3, 1, gridspec_kw={"height_ratios": [1.2, 1.2, 1]}
-    )
+    head = 1.0 - (0.55 + _LINE * len(comparison.models)) / _HEIGHT
+    edges: dict[str, Any] = {"left": 0.075, "right": 0.99}
+    above = figure.add_gridspec(1, 1, top=head, bottom=0.62, **edges)
+    below = figure.add_gridspec(2, 1, top=0.48, bottom=0.08, hspace=0.12, **edges)
+    upper = figure.add_subplot(above[0])
+    middle = figure.add_subplot(below[0])
+    lower = figure.add_subplot(below[1], sharex=middle)
+    middle.tick_params(labelbottom=False)
     _draw_deviations(upper, comparison)
     _draw_outputs(middle, comparison)
     _draw_rests(lower, comparison)
-    middle.sharex(lower)
     handles, labels = upper.get_legend_handles_labels()
     figure.legend(handles, labels, loc="upper left", bbox_to_anchor=(0.07, 0.995))
     return figure
@@ -64,6 +71,11 @@ def _draw_deviations(axes: Axes, comparison: Comparison) -> None:
         )
         axes.plot(places[own], comparison.rmsd[n][own], **common)
     axes.set_yscale("log")
+    known = comparison.rmsd[np.isfinite(comparison.rmsd) & (comparison.rmsd > 0)]
+    if known.size:
+        low, high = 0.7 * float(known.min()), 1.4 * float(known.max())
+        axes.set_ylim(low, high)
+        number_decades(axes.yaxis, low, high)
     axes.set_ylabel(f"RMSD [{comparison.output_unit}]")
     words = start_words(comparison).split("\n")[0]
     axes.set_title(f"{words} Filled: identified on it.")
@@ -93,6 +105,8 @@ def _draw_rests(axes: Axes, comparison: Comparison) -> None:
         line = LINES[n % len(LINES)]
         rest = _finite(shown.measured - simulated)
         axes.plot(shown.time_s, rest, color=line["color"], ls=line["ls"], lw=1)
+    low, high = _limits(shown.measured)
+    axes.set_ylim(-0.5 * (high - low), 0.5 * (high - low))
     axes.set_ylabel(f"y - yh [{comparison.output_unit}]")
     axes.set_xlabel("time t [s]")
 
