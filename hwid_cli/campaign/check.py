@@ -1,97 +1,31 @@
 """``check``: what the stages of an experiment would do, and what is there already."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from math import comb, nan
 
 import numpy as np
 
 from hwid_cli.campaign.cache import Store
-from hwid_cli.campaign.calibrate import calibrate_all
 from hwid_cli.campaign.crossval import Deviations, crossval_tasks
 from hwid_cli.campaign.fit_seconds import SECONDS_PER_SIMULATED_SAMPLE, fit_seconds
 from hwid_cli.campaign.identify import fit_grid
 from hwid_cli.campaign.order_grid import candidate_orders, growth
 from hwid_cli.campaign.runner import Task, TaskDone
 from hwid_cli.campaign.selection import select_recordings
-from hwid_cli.errors import HwidError
-from hwid_cli.maths.signal_oddities import signal_oddities
-from hwid_cli.records.check import FitCost, RecordingFacts, StagePlan
+from hwid_cli.records.check import FitCost, StagePlan
 from hwid_cli.records.experiment import CrossvalOptions, Experiment, GroupOptions
 from hwid_cli.records.maps import StaticMap
 from hwid_cli.records.model import Fit, HammersteinWiener, Orders
-from hwid_cli.records.recordings import RawRecording, Recording
+from hwid_cli.records.recordings import Recording
 
 # Measured on the demo: a stored fit and a stored list of RMSDs, in the cache and again in
 # the results, [bytes]; figures of a recording, [bytes]; the page, [bytes].
 _FIT_BYTES, _PAIR_BYTES, _FIGURE_BYTES, _PAGE_BYTES = 22e3, 9e3, 80e3, 4e6
 _SAMPLE_BYTES = 16
+# Sections that need a cross-validation.
+_NEED_CROSSVAL = ("crossval", "order", "group", "test")
 # Warm starts make the fits of groups so much shorter (docs/benchmarks.md), [-].
 _WARM_SHARE = 0.5
-# Clocks that deviate by a larger share of the sample time are worth a note, [-].
-_NOTED_JITTER = 1e-3
-
-
-@dataclass(frozen=True, eq=False)
-class Checked:
-    """What calibration makes of the recordings.
-
-    Parameters
-    ----------
-    facts : tuple of RecordingFacts
-    recordings : tuple of Recording
-        Those that can be calibrated.
-    problems : tuple of str
-    """
-
-    facts: tuple[RecordingFacts, ...]
-    recordings: tuple[Recording, ...]
-    problems: tuple[str, ...]
-
-
-def check_recordings(
-    raws: Sequence[RawRecording], experiment: Experiment, jitter: dict[str, float]
-) -> Checked:
-    """Calibrate in memory, and say what each recording is like.
-
-    Parameters
-    ----------
-    raws : sequence of RawRecording
-    experiment : Experiment
-    jitter : dict of str to float, [-]
-        Largest deviation of a step of the time column by name, as a share of the step.
-
-    Returns
-    -------
-    Checked
-    """
-    facts, recordings, problems = [], [], []
-    for raw in raws:
-        n_used, notes = 0, _notes(raw, jitter.get(raw.name, 0.0))
-        try:
-            (recording,), _ = calibrate_all([raw], experiment.calibrate)
-        except HwidError as error:
-            if str(error) not in problems:
-                problems.append(str(error))
-        else:
-            recordings.append(recording)
-            n_used = recording.n_samples
-        facts.append(
-            RecordingFacts(
-                name=raw.name,
-                kind=raw.kind,
-                n_input=raw.input.size,
-                n_output=raw.output.size,
-                n_used=n_used,
-                sample_time_s=raw.sample_time_s,
-                input_range=(float(raw.input.min()), float(raw.input.max())),
-                output_range=(float(raw.output.min()), float(raw.output.max())),
-                input_unit=raw.input_unit,
-                output_unit=raw.output_unit,
-                notes=notes,
-            )
-        )
-    return Checked(tuple(facts), tuple(recordings), tuple(problems))
 
 
 def plan_stages(
@@ -131,7 +65,7 @@ def plan_stages(
             _SAMPLE_BYTES * samples + _FIGURE_BYTES * len(recordings) + _PAGE_BYTES,
         )
     ]
-    wants_fits = ("identify", "crossval", "order", "group", "test")
+    wants_fits = ("identify", *_NEED_CROSSVAL)
     if any(getattr(experiment, stage) is not None for stage in wants_fits):
         plans += _identify_and_crossval(experiment, recordings, (cost, workers), store)
     if experiment.group is not None:
@@ -189,17 +123,6 @@ def group_bound(
     return tuple(counts)
 
 
-def _notes(raw: RawRecording, jitter: float) -> tuple[str, ...]:
-    notes = [
-        f"{side} {note}"
-        for side, values in (("input", raw.input), ("output", raw.output))
-        for note in signal_oddities(values)
-    ]
-    if jitter > _NOTED_JITTER:
-        notes.append(f"the clock jitters by up to {100 * jitter:.2g} % of a step")
-    return tuple(notes)
-
-
 def _identify_and_crossval(
     experiment: Experiment,
     recordings: Sequence[Recording],
@@ -232,29 +155,31 @@ def _identify_and_crossval(
         seconds * (1 - n_cached / total),
         _FIT_BYTES * (2 * total - n_cached),
     )
-    if all(
-        getattr(experiment, s) is None for s in ("crossval", "order", "group", "test")
-    ):
+    if all(getattr(experiment, one) is None for one in _NEED_CROSSVAL):
         return [plan]
-    pairs = len(chosen) * len(judges)
     done = 0
     if n_cached == total:
         tasks = crossval_tasks(fits, judges, experiment.orders)
         done = sum(store.get(task.key, Deviations) is not None for task in tasks)
-    judged = sum(one.n_samples for one in judges)
-    simulated = total * judged * (1 - done / pairs) / min(speed[1], pairs)
-    return [
-        plan,
-        StagePlan(
-            "crossval",
-            f"{total} models on {len(judges)} recordings = {total * len(judges)} "
-            f"validations in {pairs} tasks",
-            pairs,
-            done,
-            SECONDS_PER_SIMULATED_SAMPLE * simulated,
-            _PAIR_BYTES * pairs,
-        ),
-    ]
+    return [plan, _crossval(len(chosen), total, judges, (done, speed[1]))]
+
+
+def _crossval(
+    n_chosen: int, n_models: int, judges: Sequence[Recording], known: tuple[int, int]
+) -> StagePlan:
+    """Plan of the cross-validation; known are its stored tasks and the processes."""
+    done, workers = known
+    pairs = n_chosen * len(judges)
+    samples = n_models * sum(one.n_samples for one in judges) * (1 - done / pairs)
+    return StagePlan(
+        "crossval",
+        f"{n_models} models on {len(judges)} recordings = {n_models * len(judges)} "
+        f"validations in {pairs} tasks",
+        pairs,
+        done,
+        SECONDS_PER_SIMULATED_SAMPLE * samples / min(workers, pairs),
+        _PAIR_BYTES * pairs,
+    )
 
 
 def _seconds_of_rounds(

@@ -8,7 +8,7 @@ import click
 from hwid_cli.cli.calibrate import NAME_LISTS
 
 if TYPE_CHECKING:
-    from hwid_cli.campaign.check import Checked
+    from hwid_cli.campaign.recording_facts import Checked
     from hwid_cli.records.check import FitCost
     from hwid_cli.records.experiment import Experiment
 
@@ -93,8 +93,8 @@ def _is_waiting(experiment: "Experiment", folder: Path) -> bool:
 
 def _data(experiment: "Experiment", folder: Path) -> "tuple[Checked, tuple[str, ...]]":
     """Show the recordings, and collect what is wrong with them or their names."""
-    from hwid_cli.campaign.check import check_recordings
     from hwid_cli.campaign.own_functions import check_own_functions
+    from hwid_cli.campaign.recording_facts import check_recordings
     from hwid_cli.errors import HwidError
     from hwid_cli.files.recording_survey import survey_recordings
     from hwid_cli.report.check_tables import recordings_table

@@ -18,13 +18,15 @@ _LIMIT_RUN = 5
 _DEAD_SHARE = 0.05
 
 
-def signal_oddities(values: np.ndarray) -> tuple[str, ...]:
+def signal_oddities(values: np.ndarray, *, may_hold: bool = False) -> tuple[str, ...]:
     """Say what looks odd in a signal.
 
     Parameters
     ----------
     values : ndarray, shape (n,)
         Finite.
+    may_hold : bool
+        Whether long stretches without change are nothing odd, as in an input.
 
     Returns
     -------
@@ -34,7 +36,7 @@ def signal_oddities(values: np.ndarray) -> tuple[str, ...]:
     --------
     >>> t = np.arange(400) / 400
     >>> signal_oddities(np.minimum(np.sin(20 * t), 0.8))
-    ('at its largest value 0.8 for 29 % of the time: clipped?',)
+    ('at its largest value 0.8 for 20 % of the time: clipped?',)
     """
     notes = []
     if held_share(values) < _HOLDS:
@@ -48,7 +50,7 @@ def signal_oddities(values: np.ndarray) -> tuple[str, ...]:
                 )
         inside = (values != values.max()) & (values != values.min())
         run = longest_run((np.diff(values) == 0) & inside[1:])
-        if run >= _DEAD_SHARE * values.size:
+        if not may_hold and run >= _DEAD_SHARE * values.size:
             notes.append(f"does not change for {run + 1} samples in a row")
     damaged = find_damaged(values).size
     if damaged:
