@@ -72,9 +72,12 @@ def _is_waiting(experiment: "Experiment", folder: Path) -> bool:
         recordings_base,
     )
 
-    base = recordings_base(experiment, folder)
+    if experiment.recordings is None and experiment.simulate is not None:
+        click.echo(f"{experiment.source} is sound; it simulates and does nothing else.")
+        return True
     if experiment.recordings is None:
         return False
+    base = recordings_base(experiment, folder)
     try:
         if find_files(experiment, base):
             return False

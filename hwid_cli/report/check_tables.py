@@ -83,11 +83,13 @@ def stages_table(plans: Sequence[StagePlan], cost: FitCost, workers: int) -> str
     total = duration(sum(known))
     if least < sum(known):
         total = f"{duration(least)} to {total} (the search may end early)"
+    apart = ["start of the program"]
+    apart += [plan.stage for plan in plans if not math.isfinite(plan.seconds)]
     return "\n".join(
         [
             table,
             f"Estimate, to a factor of 2: {total} on {workers} "
-            f"{'process' if workers == 1 else 'processes'}, start of the program apart.",
+            f"{'process' if workers == 1 else 'processes'}, {' and '.join(apart)} apart.",
             f"Scaled from {cost.source}: {cost.seconds:.3f} s for {cost.n_samples} "
             "samples.",
             f"Disk: about {size(sum(plan.size_bytes for plan in plans))} more.",

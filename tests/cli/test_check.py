@@ -163,3 +163,21 @@ def test_missing_measurements_are_one_problem(tmp_path):
     assert result.exit_code == 1
     assert result.stderr.count("\n") == 1
     assert "no file matches" in result.stderr
+
+
+def test_an_experiment_that_only_simulates_is_sound(tmp_path):
+    path = tmp_path / "servo.yaml"
+    path.write_text("name: servo\nsimulate: {kind: servo}\n")
+    result = check(path)
+
+    assert result.exit_code == 0
+    assert "simulates and does nothing else" in result.stdout
+
+
+def test_time_that_cannot_be_estimated_is_said_to_be_left_out(simulated):
+    config, out = simulated
+    text = config.read_text() + "simulation: {mass_kg: 1.0}\ndiagnose:\n"
+    config.write_text(text)
+    result = check(config, "--out", str(out), "--no-timing")
+
+    assert "start of the program and diagnose apart" in result.stdout
