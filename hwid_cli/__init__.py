@@ -7,6 +7,24 @@ The rooms, and the only direction in which they import each other::
 ``records`` holds the data handed between rooms, ``maths`` is pure functions on it,
 ``files`` reads and writes, ``campaign`` runs whole experiments, ``report`` makes
 tables and figures, ``cli`` joins them behind the ``hwid`` command.
+
+From Python, the names below do on records in memory what the commands do on files.
+
+Examples
+--------
+>>> import numpy as np
+>>> from hwid_cli import FitOptions, Orders, Recording, fit, fit_percent, simulate
+>>> u = np.repeat(np.random.default_rng(1).uniform(-1, 1, 40), 25)
+>>> y = np.zeros(u.size)
+>>> for k in range(1, u.size):
+...     y[k] = 0.9 * y[k - 1] + 0.1 * np.tanh(2 * u[k - 1])
+>>> recording = Recording("r1", input=u, output=y, sample_time_s=1e-3)
+>>> result = fit([recording], Orders(nb=1, nf=1, nk=1), FitOptions())
+>>> result.status, result.fit_percent > 99
+('converged', True)
+>>> y_hat = simulate(result.model, u)
+>>> fit_percent(y, y_hat) > 99
+True
 """
 
 from importlib import import_module
@@ -14,30 +32,49 @@ from typing import Any
 
 __version__ = "0.1.0"
 
-# Loaded on first use: `hwid --help` must not wait for the compiled loops.
+# Loaded on first use: `hwid --help` must not wait for the compiled loops. Type checkers
+# read __init__.pyi, which names the same.
 _PUBLIC = {
+    "Columns": "hwid_cli.records.experiment",
+    "DiagnoseOptions": "hwid_cli.records.experiment",
+    "Diagnosis": "hwid_cli.records.diagnosis",
     "Fit": "hwid_cli.records.model",
     "FitOptions": "hwid_cli.records.model",
     "HammersteinWiener": "hwid_cli.records.model",
+    "HwidError": "hwid_cli.errors",
     "MapFunction": "hwid_cli.records.maps",
     "Orders": "hwid_cli.records.model",
     "OwnFunction": "hwid_cli.records.maps",
     "Recording": "hwid_cli.records.recordings",
+    "SimulationOptions": "hwid_cli.records.experiment",
+    "diagnose": "hwid_cli.campaign.diagnose_recordings",
     "fit": "hwid_cli.maths.model.fit",
+    "fit_percent": "hwid_cli.maths.scores",
+    "load_recording": "hwid_cli.files.single_recording",
     "parameter_covariance": "hwid_cli.maths.model.uncertainty",
+    "rmsd": "hwid_cli.maths.scores",
     "simulate": "hwid_cli.maths.model.simulate",
 }
 
 __all__ = [
+    "Columns",
+    "DiagnoseOptions",
+    "Diagnosis",
     "Fit",
     "FitOptions",
     "HammersteinWiener",
+    "HwidError",
     "MapFunction",
     "Orders",
     "OwnFunction",
     "Recording",
+    "SimulationOptions",
+    "diagnose",
     "fit",
+    "fit_percent",
+    "load_recording",
     "parameter_covariance",
+    "rmsd",
     "simulate",
 ]
 

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 # Keys of the configuration that name recordings.
-_NAME_LISTS = {
+NAME_LISTS = {
     "identify": ("recordings",),
     "crossval": ("recordings",),
     "group": ("start", "candidates", "validate"),
@@ -87,7 +87,7 @@ def _check_names(session: "Session", calibrated: "Calibrated") -> None:
     from hwid_cli.campaign.selection import select_recordings
 
     experiment = session.experiment
-    for section, keys in _NAME_LISTS.items():
+    for section, keys in NAME_LISTS.items():
         options = getattr(experiment, section)
         for key in keys if options is not None else ():
             names = getattr(options, key)

@@ -8,16 +8,20 @@ import click
 from hwid_cli import __version__
 from hwid_cli.cli import (
     calibrate,
+    check,
+    compare,
     crossval,
     diagnose,
     group,
     identify,
+    init,
     order,
     report,
     run,
     simulate,
     test,
 )
+from hwid_cli.cli.examples import add_examples
 from hwid_cli.cli.stopping import Stopped, stop_signals
 from hwid_cli.errors import HwidError
 
@@ -122,6 +126,8 @@ def main(ctx: click.Context) -> None:
 
 
 _MODULES = (
+    init,
+    check,
     run,
     simulate,
     calibrate,
@@ -132,6 +138,7 @@ _MODULES = (
     test,
     diagnose,
     report,
+    compare,
 )
 for _module in _MODULES:
-    main.add_command(_module.command)
+    main.add_command(add_examples(_module.command))

@@ -17,6 +17,7 @@ from hwid_cli.errors import MeasurementError
 from hwid_cli.files.columns import ROLES, Column, FileColumns, array_column
 from hwid_cli.files.suggestions import did_you_mean
 from hwid_cli.records.experiment import Columns
+from hwid_cli.records.starter import FoundColumn
 
 # A file's variables by name; arrays are loaded only when they are asked for.
 _Load = Callable[[], Any]
@@ -42,12 +43,15 @@ def read_mat_columns(path: Path, columns: Columns) -> FileColumns:
     """
     if h5py.is_hdf5(path):
         return _from_hdf5(path, columns, is_transposed=True)
-    content = scipy.io.loadmat(path)
+    return _pick(path, columns, _mat_variables(path))
+
+
+def _mat_variables(path: Path) -> dict[str, _Load]:
     variables: dict[str, _Load] = {}
-    for name, value in content.items():
+    for name, value in scipy.io.loadmat(path).items():
         if not name.startswith("__"):
             variables.update(_with_members(name, value))
-    return _pick(path, columns, variables)
+    return variables
 
 
 def read_npz_columns(path: Path, columns: Columns) -> FileColumns:
@@ -98,7 +102,51 @@ def read_h5_columns(path: Path, columns: Columns) -> FileColumns:
     return _from_hdf5(path, columns, is_transposed=False)
 
 
+def list_array_columns(path: Path) -> tuple[FoundColumn, ...]:
+    """List the columns of numbers in a MAT, NPZ or HDF5 file.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    tuple of FoundColumn
+        Vectors and single numbers by their names, and columns of tables by number.
+    """
+    if h5py.is_hdf5(path):
+        with h5py.File(path, "r") as file:
+            is_mat = path.suffix.lower() == ".mat"
+            return _list(_hdf5_variables(file, is_mat))
+    if path.suffix.lower() == ".mat":
+        return _list(_mat_variables(path))
+    with np.load(path, allow_pickle=False) as content:
+        return _list({name: _item(content, name) for name in content})
+
+
+def _list(variables: _Variables) -> tuple[FoundColumn, ...]:
+    found = []
+    for name, load in variables.items():
+        values = np.asarray(load())
+        if values.dtype.kind not in "fiub" or values.size == 0:
+            continue
+        vector = np.squeeze(values)
+        if vector.ndim <= 1:
+            found.append(FoundColumn(name, name, np.atleast_1d(vector).astype(float)))
+        elif values.ndim == 2 and values.shape[0] > values.shape[1]:
+            found += [
+                FoundColumn("", number, values[:, number].astype(float), name)
+                for number in range(values.shape[1])
+            ]
+    return tuple(found)
+
+
 def _from_hdf5(path: Path, columns: Columns, *, is_transposed: bool) -> FileColumns:
+    with h5py.File(path, "r") as file:
+        return _pick(path, columns, _hdf5_variables(file, is_transposed))
+
+
+def _hdf5_variables(file: h5py.File, is_transposed: bool) -> dict[str, _Load]:
     separator = "." if is_transposed else "/"
     variables: dict[str, _Load] = {}
 
@@ -106,9 +154,8 @@ def _from_hdf5(path: Path, columns: Columns, *, is_transposed: bool) -> FileColu
         if isinstance(item, h5py.Dataset) and not name.startswith("#"):
             variables[name.replace("/", separator)] = _dataset(item, is_transposed)
 
-    with h5py.File(path, "r") as file:
-        file.visititems(note)
-        return _pick(path, columns, variables)
+    file.visititems(note)
+    return variables
 
 
 def _loader(value: Any) -> _Load:

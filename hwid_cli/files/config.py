@@ -47,12 +47,34 @@ def load_experiment(path: Path) -> Experiment:
     # PyYAML is loaded only by commands that read a configuration.
     from hwid_cli.files.yaml_text import read_yaml  # noqa: PLC0415, RUF100
 
+    return experiment_of(read_yaml(Path(path)), str(path))
+
+
+def experiment_of(content: dict[Any, Any], source: str) -> Experiment:
+    """Experiment that plain data describe, as a YAML file would hold them.
+
+    Parameters
+    ----------
+    content : dict
+        Sections by name.
+    source : str
+        Names the file in messages; paths are relative to its folder.
+
+    Returns
+    -------
+    Experiment
+
+    Raises
+    ------
+    ConfigError
+        As for ``load_experiment``.
+    """
     experiment = build(
         Experiment,
-        read_yaml(Path(path)),
-        Place(str(path)),
+        content,
+        Place(source),
         readers=_READERS,
-        given={"source": str(path)},
+        given={"source": source},
     )
     check_experiment(experiment)
     return experiment

@@ -16,6 +16,7 @@ from hwid_cli.errors import MeasurementError
 from hwid_cli.files.columns import ROLES, Column, FileColumns
 from hwid_cli.files.suggestions import did_you_mean
 from hwid_cli.records.experiment import Columns
+from hwid_cli.records.starter import FoundColumn
 
 # Semicolons and tabs come first: with decimal commas a comma is no separator.
 _SEPARATORS = ("\t", ";", ",")
@@ -70,6 +71,38 @@ def read_csv_columns(path: Path, columns: Columns) -> FileColumns:
         for role, place in places.items()
     }
     return FileColumns(**found)
+
+
+def list_csv_columns(path: Path) -> tuple[FoundColumn, ...]:
+    """List the columns of numbers in a CSV file.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    tuple of FoundColumn
+        Named by their header, or by their number where it is missing or not unique.
+
+    Raises
+    ------
+    MeasurementError
+        If the file holds no rows that can be told apart.
+    """
+    sheet = _read_sheet(path)
+    cells = [cell for cell in sheet.rows[0] if cell]
+    has_header = not any(_number(cell.replace(",", ".")) is not None for cell in cells)
+    header = sheet.rows[0] if has_header else sheet.comment
+    body = int(has_header)
+    found = []
+    for place in range(len(sheet.rows[0])):
+        column = _column(path, f"column {place}", sheet, body, place)
+        title = header[place] if place < len(header) else ""
+        is_name = bool(title) and header.count(title) == 1
+        if np.isfinite(column.values).any():
+            found.append(FoundColumn(title, title if is_name else place, column.values))
+    return tuple(found)
 
 
 def _read_sheet(path: Path) -> _Sheet:

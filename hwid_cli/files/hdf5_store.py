@@ -54,6 +54,9 @@ class Hdf5Store:
     ----------
     folder : Path
         Made when the first entry is put.
+    sets_aside : bool
+        Whether entries that cannot be used are renamed; not where nothing may be
+        written.
 
     Attributes
     ----------
@@ -63,8 +66,9 @@ class Hdf5Store:
 
     pack = staticmethod(pack_entry)
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, *, sets_aside: bool = True) -> None:
         self._folder = Path(folder)
+        self._sets_aside = sets_aside
         self.unusable: list[str] = []
 
     def get(self, key: str, record_type: type[Record]) -> Record | None:
@@ -147,6 +151,8 @@ class Hdf5Store:
     def _set_aside(self, path: Path, error: Exception) -> None:
         """Rename an entry that cannot be read, so that it is not tried again."""
         self._complain(path, error)
+        if not self._sets_aside:
+            return
         try:
             path.replace(path.with_suffix(".bad"))
         except OSError as failure:

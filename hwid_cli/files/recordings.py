@@ -59,9 +59,9 @@ def read_recordings(experiment: Experiment, out: Path) -> list[RawRecording]:
     plans = {folder: read_plan(folder) for folder in {path.parent for path in paths}}
     recordings = []
     for path in paths:
-        digest = _sha256(path)
+        digest = file_sha256(path)
         columns = read_columns(path, options.columns)
-        if _sha256(path) != digest:
+        if file_sha256(path) != digest:
             raise MeasurementError(
                 f"{path}: changed while it was read; expected a finished recording; "
                 "run again when it is written"
@@ -69,7 +69,7 @@ def read_recordings(experiment: Experiment, out: Path) -> list[RawRecording]:
         for part in parts:
             if part.path == path:
                 kind = kind_of(path, options.kind, plans[path.parent], name=part.name)
-                raw = _read_recording(part, columns, kind, experiment)
+                raw = read_part(part, columns, kind, experiment)
                 recordings.append(replace(raw, sha256=digest))
     _warn_of_unused_kinds(recordings, experiment.source, options)
     recordings.sort(key=lambda recording: KINDS.index(recording.kind))
@@ -81,9 +81,30 @@ def read_recordings(experiment: Experiment, out: Path) -> list[RawRecording]:
     ]
 
 
-def _read_recording(
+def read_part(
     part: FilePart, columns: FileColumns, kind: str, experiment: Experiment
 ) -> RawRecording:
+    """Read and check one recording, apart from what it has in common with others.
+
+    Parameters
+    ----------
+    part : FilePart
+        Stretch of the file.
+    columns : FileColumns
+        Of the whole file.
+    kind : str
+    experiment : Experiment
+
+    Returns
+    -------
+    RawRecording
+        Without the hash of its file.
+
+    Raises
+    ------
+    MeasurementError
+        For the first fault.
+    """
     options = recordings_options(experiment)
     place = part.place
     columns = cut_part(columns, part)
@@ -126,7 +147,7 @@ def check_unchanged(digests: Mapping[str, str]) -> None:
         If a file has changed or is gone.
     """
     for name, digest in digests.items():
-        if _sha256(Path(name)) != digest:
+        if file_sha256(Path(name)) != digest:
             raise MeasurementError(
                 f"{name}: changed while this run used it; expected the recording as it "
                 "was read at the start; results of this stage are not stored; run again "
@@ -134,7 +155,22 @@ def check_unchanged(digests: Mapping[str, str]) -> None:
             )
 
 
-def _sha256(path: Path) -> str:
+def file_sha256(path: Path) -> str:
+    """Hash of a file's bytes, hexadecimal.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    str
+
+    Raises
+    ------
+    MeasurementError
+        If the file cannot be read.
+    """
     try:
         with path.open("rb") as file:
             return hashlib.file_digest(file, "sha256").hexdigest()

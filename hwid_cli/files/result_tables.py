@@ -8,9 +8,19 @@ from pathlib import Path
 import numpy as np
 
 from hwid_cli.files.replaced_files import replace_file
+from hwid_cli.records.comparison import Comparison
 from hwid_cli.records.results import CrossValidation, ModelScore
 
 CROSSVAL_COLUMNS = ("identified_on", "nb", "nk", "validated_on", "rmsd", "status")
+COMPARE_COLUMNS = (
+    "recording",
+    "model",
+    "rmsd",
+    "fit_percent",
+    "unit",
+    "identified_on_it",
+    "initial_state",
+)
 COVERAGE_COLUMNS = ("identified_on", "nb", "nk", "coverage", "of")
 
 
@@ -87,3 +97,33 @@ def write_coverage_csv(path: Path, scores: Sequence[ModelScore], of: int) -> Non
         for score in scores
     )
     write_table_csv(path, COVERAGE_COLUMNS, rows)
+
+
+def write_compare_csv(path: Path, comparison: Comparison) -> None:
+    """Write ``compare.csv``: one row for each recording and model.
+
+    Parameters
+    ----------
+    path : Path
+    comparison : Comparison
+        Where a model diverges, ``nan`` is written.
+
+    Raises
+    ------
+    CacheError
+        If it cannot be written.
+    """
+    rows = (
+        (
+            recording,
+            one.name,
+            float(comparison.rmsd[n, m]),
+            float(comparison.fit_percent[n, m]),
+            comparison.output_unit,
+            int(comparison.is_own[n, m]),
+            one.model.initial_state,
+        )
+        for m, recording in enumerate(comparison.recordings)
+        for n, one in enumerate(comparison.models)
+    )
+    write_table_csv(path, COMPARE_COLUMNS, rows)

@@ -1,0 +1,40 @@
+"""What ``from hwid_cli import ...`` gives, for type checkers: the same as ``_PUBLIC``."""
+
+from hwid_cli.campaign.diagnose_recordings import diagnose as diagnose
+from hwid_cli.errors import HwidError as HwidError
+from hwid_cli.files.single_recording import load_recording as load_recording
+from hwid_cli.maths.model.fit import fit as fit
+from hwid_cli.maths.model.simulate import simulate as simulate
+from hwid_cli.maths.model.uncertainty import (
+    parameter_covariance as parameter_covariance,
+)
+from hwid_cli.maths.scores import fit_percent as fit_percent
+from hwid_cli.maths.scores import rmsd as rmsd
+from hwid_cli.records.diagnosis import Diagnosis as Diagnosis
+from hwid_cli.records.experiment import (
+    Columns as Columns,
+)
+from hwid_cli.records.experiment import (
+    DiagnoseOptions as DiagnoseOptions,
+)
+from hwid_cli.records.experiment import (
+    SimulationOptions as SimulationOptions,
+)
+from hwid_cli.records.maps import MapFunction as MapFunction
+from hwid_cli.records.maps import OwnFunction as OwnFunction
+from hwid_cli.records.model import (
+    Fit as Fit,
+)
+from hwid_cli.records.model import (
+    FitOptions as FitOptions,
+)
+from hwid_cli.records.model import (
+    HammersteinWiener as HammersteinWiener,
+)
+from hwid_cli.records.model import (
+    Orders as Orders,
+)
+from hwid_cli.records.recordings import Recording as Recording
+
+__version__: str
+__all__: list[str]

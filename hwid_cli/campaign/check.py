@@ -1,0 +1,281 @@
+"""``check``: what the stages of an experiment would do, and what is there already."""
+
+from collections.abc import Sequence
+from math import comb, nan
+
+import numpy as np
+
+from hwid_cli.campaign.cache import Store
+from hwid_cli.campaign.crossval import Deviations, crossval_tasks
+from hwid_cli.campaign.fit_seconds import SECONDS_PER_SIMULATED_SAMPLE, fit_seconds
+from hwid_cli.campaign.identify import fit_grid
+from hwid_cli.campaign.order_grid import candidate_orders, growth
+from hwid_cli.campaign.runner import Task, TaskDone
+from hwid_cli.campaign.selection import select_recordings
+from hwid_cli.records.check import FitCost, StagePlan
+from hwid_cli.records.experiment import CrossvalOptions, Experiment, GroupOptions
+from hwid_cli.records.maps import StaticMap
+from hwid_cli.records.model import Fit, HammersteinWiener, Orders
+from hwid_cli.records.recordings import Recording
+
+# Measured on the demo: a stored fit and a stored list of RMSDs, in the cache and again in
+# the results, [bytes]; figures of a recording, [bytes]; the page, [bytes].
+_FIT_BYTES, _PAIR_BYTES, _FIGURE_BYTES, _PAGE_BYTES = 22e3, 9e3, 80e3, 4e6
+_SAMPLE_BYTES = 16
+# Sections that need a cross-validation.
+_NEED_CROSSVAL = ("crossval", "order", "group", "test")
+# Warm starts make the fits of groups so much shorter (docs/benchmarks.md), [-].
+_WARM_SHARE = 0.5
+
+
+def plan_stages(
+    experiment: Experiment,
+    recordings: Sequence[Recording],
+    cost: FitCost,
+    store: Store,
+    *,
+    workers: int = 1,
+) -> tuple[StagePlan, ...]:
+    """Say what each stage that the configuration names would do.
+
+    Parameters
+    ----------
+    experiment : Experiment
+    recordings : sequence of Recording
+        Calibrated; at least one.
+    cost : FitCost
+    store : Store
+        What was computed before.
+    workers : int, [-]
+        Processes that share the work.
+
+    Returns
+    -------
+    tuple of StagePlan
+        In the order in which they run.
+    """
+    samples = sum(one.n_samples for one in recordings)
+    plans = [
+        StagePlan(
+            "calibrate",
+            f"{len(recordings)} recordings, {samples} samples",
+            len(recordings),
+            None,
+            0.0,
+            _SAMPLE_BYTES * samples + _FIGURE_BYTES * len(recordings) + _PAGE_BYTES,
+        )
+    ]
+    wants_fits = ("identify", *_NEED_CROSSVAL)
+    if any(getattr(experiment, stage) is not None for stage in wants_fits):
+        plans += _identify_and_crossval(experiment, recordings, (cost, workers), store)
+    if experiment.group is not None:
+        plans.append(_group(experiment, recordings, (cost, workers)))
+    if experiment.test is not None:
+        n = len(recordings)
+        plans.append(
+            StagePlan("test", f"{n} recordings", n, None, 0.0, n * _PAIR_BYTES)
+        )
+    if experiment.diagnose is not None:
+        what = f"up to {len(recordings)} recordings; time depends on what is missing"
+        plans.append(StagePlan("diagnose", what, len(recordings), None, nan, 1e6))
+    return tuple(plans)
+
+
+def group_bound(
+    n_start: int, n_candidates: int, options: GroupOptions, *, is_ordered: bool
+) -> tuple[int, ...]:
+    """Count the groups that a search may try, level by level from the second one.
+
+    Parameters
+    ----------
+    n_start, n_candidates : int, [-]
+    options : GroupOptions
+    is_ordered : bool
+        Whether the order of recordings makes another group.
+
+    Returns
+    -------
+    tuple of int
+
+    Examples
+    --------
+    >>> group_bound(5, 5, GroupOptions(keep={"top": 2}, max_level=3), is_ordered=False)
+    (8, 6)
+    >>> group_bound(5, 5, GroupOptions(keep={"best": True}), is_ordered=False)
+    (10, 10, 5)
+    """
+    counts: list[int] = []
+    going_on = n_start
+    for level in range(2, options.max_level + 1):
+        # All explicit starts go on; the rule of keeping holds from the next level.
+        if counts or options.start is None:
+            rule = options.keep.get("top")
+            values = rule if isinstance(rule, tuple) else (rule,)
+            turn = len(counts) - (options.start is not None)
+            most = values[min(turn, len(values) - 1)]
+            if most is not None:
+                going_on = min(going_on, int(most))
+        tried = going_on * max(n_candidates - level + 1, 0)
+        if not is_ordered and n_start <= n_candidates:
+            tried = min(tried, comb(n_candidates, level))
+        counts.append(tried)
+        going_on = tried
+    return tuple(counts)
+
+
+def _identify_and_crossval(
+    experiment: Experiment,
+    recordings: Sequence[Recording],
+    speed: tuple[FitCost, int],
+    store: Store,
+) -> list[StagePlan]:
+    held_out = () if experiment.test is None else experiment.test.recordings
+    identify, crossval = experiment.identify, experiment.crossval or CrossvalOptions()
+    chosen = select_recordings(
+        recordings,
+        None if identify is None else identify.recordings,
+        key=f"{experiment.source}: identify.recordings",
+        held_out=held_out,
+    )
+    judges = select_recordings(
+        recordings,
+        crossval.recordings,
+        key=f"{experiment.source}: crossval.recordings",
+        held_out=held_out,
+    )
+    grid = [orders for _, _, orders in candidate_orders(experiment.orders)]
+    fits, n_cached = _stored_fits(experiment, chosen, store)
+    total = len(chosen) * len(grid)
+    seconds = _seconds_of_rounds(experiment, chosen, speed)
+    plan = StagePlan(
+        "identify",
+        f"{len(chosen)} recordings x {len(grid)} orders = {total} fits",
+        total,
+        n_cached,
+        seconds * (1 - n_cached / total),
+        _FIT_BYTES * (2 * total - n_cached),
+    )
+    if all(getattr(experiment, one) is None for one in _NEED_CROSSVAL):
+        return [plan]
+    done = 0
+    if n_cached == total:
+        tasks = crossval_tasks(fits, judges, experiment.orders)
+        done = sum(store.get(task.key, Deviations) is not None for task in tasks)
+    return [plan, _crossval(len(chosen), total, judges, (done, speed[1]))]
+
+
+def _crossval(
+    n_chosen: int, n_models: int, judges: Sequence[Recording], known: tuple[int, int]
+) -> StagePlan:
+    """Plan of the cross-validation; known are its stored tasks and the processes."""
+    done, workers = known
+    pairs = n_chosen * len(judges)
+    samples = n_models * sum(one.n_samples for one in judges) * (1 - done / pairs)
+    return StagePlan(
+        "crossval",
+        f"{n_models} models on {len(judges)} recordings = {n_models * len(judges)} "
+        f"validations in {pairs} tasks",
+        pairs,
+        done,
+        SECONDS_PER_SIMULATED_SAMPLE * samples / min(workers, pairs),
+        _PAIR_BYTES * pairs,
+    )
+
+
+def _seconds_of_rounds(
+    experiment: Experiment,
+    recordings: Sequence[Recording],
+    speed: tuple[FitCost, int],
+) -> float:
+    """Time of a grid: its rounds wait for each other, so few fits leave workers idle."""
+    cost, workers = speed
+    grid = [orders for _, _, orders in candidate_orders(experiment.orders)]
+    total = 0.0
+    for places in growth(experiment.orders):
+        each = [
+            fit_seconds(cost, grid[place], one.n_samples, units=experiment.fit.units)
+            for one in recordings
+            for place, _ in places
+        ]
+        total += max(sum(each) / workers, sum(each) / len(each))
+    return total
+
+
+def _stored_fits(
+    experiment: Experiment, recordings: Sequence[Recording], store: Store
+) -> tuple[tuple[Fit, ...], int]:
+    """Fits as far as they are stored, and their number.
+
+    The key of a fit holds the models that it begins with. Where one of those is missing,
+    a model that nobody can have stored stands for it, and what follows is missing too.
+    """
+    found = 0
+
+    def look_up(tasks: Sequence[Task]) -> list[TaskDone]:
+        nonlocal found
+        done = []
+        for task in tasks:
+            stored = store.get(task.key, Fit)
+            found += stored is not None
+            result = _absent(task) if stored is None else stored
+            done.append(TaskDone(task, result, stored is not None))
+        return done
+
+    fits = fit_grid(recordings, experiment.orders, experiment.fit, look_up)
+    return fits, found
+
+
+def _absent(task: Task) -> Fit:
+    recording, orders, options, _ = task.arguments
+    none = StaticMap("none", np.zeros(0))
+    nobody = HammersteinWiener(
+        none, np.array([nan]), np.array([1.0]), 0, none, recording.sample_time_s
+    )
+    return Fit((recording.name,), orders, options, nobody, "stalled", "not stored")
+
+
+def _group(
+    experiment: Experiment,
+    recordings: Sequence[Recording],
+    speed: tuple[FitCost, int],
+) -> StagePlan:
+    options = experiment.group or GroupOptions()
+    held_out = () if experiment.test is None else experiment.test.recordings
+    usable = [one for one in recordings if one.name not in held_out]
+    n_candidates = len(options.candidates or usable)
+    n_validate = len(options.validate or usable)
+    bounds = group_bound(
+        len(options.start) if options.start is not None else n_candidates,
+        n_candidates,
+        options,
+        is_ordered=experiment.fit.join == "concatenate",
+    )
+    grid = [orders for _, _, orders in candidate_orders(experiment.orders)]
+    n = int(np.median([one.n_samples for one in usable] or [0]))
+    fits = sum(bounds) * len(grid)
+    share = _WARM_SHARE if options.warm_start else 1.0
+    seconds = (
+        sum(
+            count * share * _grid_seconds(speed[0], grid, n, experiment, level)
+            for level, count in enumerate(bounds, start=2)
+        )
+        + SECONDS_PER_SIMULATED_SAMPLE * n * n_validate * fits
+    )
+    return StagePlan(
+        "group",
+        f"at most {sum(bounds)} groups ({' + '.join(map(str, bounds))}), {fits} fits",
+        fits,
+        None,
+        seconds / speed[1],
+        _FIT_BYTES * fits + _PAIR_BYTES * sum(bounds) * n_validate,
+        is_bound=True,
+    )
+
+
+def _grid_seconds(
+    cost: FitCost, grid: Sequence[Orders], n: int, experiment: Experiment, level: int
+) -> float:
+    units = experiment.fit.units
+    return sum(
+        fit_seconds(cost, orders, n, units=units, n_recordings=level) for orders in grid
+    )

@@ -1,0 +1,235 @@
+"""Which column of a file is the time, the input, the output: by name, else by content.
+
+A guess that says why, for a person to check.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from hwid_cli.campaign.column_words import (
+    TIME_UNITS,
+    Meaning,
+    meaning_of,
+    sample_time_named,
+)
+from hwid_cli.errors import MeasurementError
+from hwid_cli.maths import column_signs as signs
+from hwid_cli.records.starter import FoundColumn, Role
+
+# Jitter up to here is rounding of time stamps; more needs resampling, [-].
+_ROUND_STAMPS = 0.009
+# A measurement has more samples than this; shorter columns are settings, [samples].
+FEWEST_SAMPLES = 60
+
+
+@dataclass(frozen=True)
+class TimeGuess:
+    """How a file tells time.
+
+    Parameters
+    ----------
+    role : Role or None
+        The column, where it counts seconds.
+    sample_time_s : float or None, [s]
+        Where there is no such column.
+    resample : bool
+    reason : str
+    """
+
+    role: Role | None
+    sample_time_s: float | None
+    resample: bool
+    reason: str
+
+
+@dataclass(frozen=True)
+class _Named:
+    """A column with what its name says."""
+
+    column: FoundColumn
+    meaning: Meaning
+
+
+def long_columns(columns: Sequence[FoundColumn]) -> list[FoundColumn]:
+    """Columns that are as long as a measurement.
+
+    Parameters
+    ----------
+    columns : sequence of FoundColumn
+
+    Returns
+    -------
+    list of FoundColumn
+        In their order, the most usual length only, apart from columns that end early.
+    """
+    return [one for one in columns if one.values.size > FEWEST_SAMPLES]
+
+
+def guess_time(columns: Sequence[FoundColumn]) -> TimeGuess:
+    """Find out how a file tells time.
+
+    Parameters
+    ----------
+    columns : sequence of FoundColumn
+        All of the file, single numbers too.
+
+    Returns
+    -------
+    TimeGuess
+    """
+    clocks = [
+        (one, meaning_of(one.title), clock)
+        for one in long_columns(columns)
+        if (clock := signs.clock_of(one.values)) is not None
+    ]
+    clocks.sort(key=lambda found: found[1].role != "time")
+    for column, meaning, clock in clocks:
+        is_counter = clock.step == 1.0 and clock.jitter == 0.0
+        if meaning.role != "time" and (meaning.role or is_counter):
+            continue
+        why = "named so, and it grows evenly" if meaning.role else "it grows evenly"
+        scale = TIME_UNITS.get(meaning.unit.lower(), 1.0)
+        if scale != 1.0:
+            step = float(f"{clock.step * scale:.6g}")
+            return TimeGuess(
+                None, step, False, f"{_called(column)} counts {meaning.unit}"
+            )
+        role = Role(column.key, column.title, "s", why)
+        return TimeGuess(role, None, clock.jitter > _ROUND_STAMPS, why)
+    for column in columns:
+        if column.values.size <= 1:
+            step_s = sample_time_named(column.title, float(column.values[0]))
+            if step_s is not None:
+                return TimeGuess(None, step_s, False, f"the file's {column.title}")
+    return TimeGuess(None, None, False, "nothing in the file tells the time")
+
+
+def guess_signals(
+    columns: Sequence[FoundColumn],
+) -> tuple[FoundColumn, FoundColumn, FoundColumn | None, dict[str, str], list[str]]:
+    """Find input, output and, where there is one, the reference.
+
+    Parameters
+    ----------
+    columns : sequence of FoundColumn
+        All of the file.
+
+    Returns
+    -------
+    input, output : FoundColumn
+    reference : FoundColumn or None
+    reasons : dict of str to str
+        For ``input`` and ``output``.
+    notes : list of str
+        About columns that might have been meant too.
+
+    Raises
+    ------
+    MeasurementError
+        If fewer than two columns change.
+    """
+    named = [
+        _Named(one, meaning_of(one.title))
+        for one in long_columns(columns)
+        if signs.changes(one.values) and signs.clock_of(one.values) is None
+    ]
+    if len(named) < 2:
+        raise MeasurementError(
+            f"has {len(named)} columns of more than {FEWEST_SAMPLES} numbers that "
+            "change; expected at least an input and an output"
+        )
+    inputs, outputs = _of_role(named, "input"), _of_role(named, "output")
+    unnamed = [one for one in named if not one.meaning.role] or [
+        one for one in named if one not in (*inputs, *outputs)
+    ]
+    reasons: dict[str, str] = {}
+    first = _chosen_input(inputs, outputs, unnamed or named, reasons)
+    last = _chosen_output(first, outputs, [one for one in named if one != first])
+    reasons["output"] = last[1]
+    notes = _other_columns(named, first, last[0])
+    reference = next(
+        (
+            one.column
+            for one in _of_role(named, "reference")
+            if one not in (first, last[0])
+        ),
+        None,
+    )
+    return first.column, last[0].column, reference, reasons, notes
+
+
+def _of_role(named: Sequence[_Named], role: str) -> list[_Named]:
+    found = [one for one in named if one.meaning.role == role]
+    return sorted(found, key=lambda one: one.meaning.rank)
+
+
+def _chosen_input(
+    inputs: list[_Named],
+    outputs: list[_Named],
+    others: list[_Named],
+    reasons: dict[str, str],
+) -> _Named:
+    if inputs:
+        reasons["input"] = "by its name"
+        return inputs[0]
+    if outputs:
+        candidates = [one for one in others if one not in outputs[:1]]
+        score = _score(lambda one: signs.answers(one, outputs[0].column.values))
+        reasons["input"] = "by its content: the output answers to it"
+        return max(candidates or outputs[1:], key=score)
+    reasons["input"] = "by its content: other columns answer to it"
+
+    def leads(one: _Named) -> float:
+        gains = [
+            signs.answers(one.column.values, other.column.values)
+            for other in others
+            if other is not one
+            and not signs.are_same(one.column.values, other.column.values)
+        ]
+        return max(gains, default=0.0) + signs.roughness(one.column.values)
+
+    return max(others, key=leads)
+
+
+def _chosen_output(
+    first: _Named, outputs: list[_Named], others: list[_Named]
+) -> tuple[_Named, str]:
+    outputs = [one for one in outputs if one != first]
+    # Columns that share the rest of their names belong together: u2 and y2.
+    together = [one for one in outputs if one.meaning.rest == first.meaning.rest]
+    chosen = together or outputs
+    if chosen:
+        settled = [one for one in chosen if not signs.runs_away(one.column.values)]
+        if settled and settled[0] is not chosen[0]:
+            title = chosen[0].column.title
+            return settled[0], f"by its name; {title!r} runs away in one direction"
+        return chosen[0], "by its name"
+    apart = [
+        one
+        for one in others
+        if not signs.are_same(one.column.values, first.column.values)
+        and one.meaning.role not in ("reference", "counter")
+    ]
+    score = _score(
+        lambda one: signs.answers(first.column.values, one) - signs.roughness(one)
+    )
+    return max(apart or others, key=score), "by its content: it answers to the input"
+
+
+def _score(of_values: Callable) -> Callable[[_Named], float]:
+    return lambda one: float(of_values(one.column.values))
+
+
+def _other_columns(named: list[_Named], first: _Named, last: _Named) -> list[str]:
+    """Say which columns were left, if a reader may have meant them."""
+    left = [one for one in named if one not in (first, last)]
+    shown = ", ".join(_called(one.column) for one in left[:8])
+    more = ", ..." if len(left) > 8 else ""
+    return [f"other columns that change: {shown}{more}"] if left else []
+
+
+def _called(column: FoundColumn) -> str:
+    if column.title:
+        return repr(column.title)
+    inside = f" of {column.variable}" if column.variable else ""
+    return f"column {column.key}{inside}"

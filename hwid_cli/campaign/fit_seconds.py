@@ -1,0 +1,132 @@
+"""How long fits will take: one is timed, the others are scaled from it.
+
+The exponents are those that docs/benchmarks.md measures ("How times grow"), for sizes of
+the larger half. An estimate to a factor of two: the number of iterations depends on the
+data.
+"""
+
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+
+from hwid_cli.maths.model.fit import fit
+from hwid_cli.maths.model.rows.kernels import derivative_rows
+from hwid_cli.records.check import FitCost
+from hwid_cli.records.experiment import OrdersOptions
+from hwid_cli.records.model import FitOptions, Orders
+from hwid_cli.records.recordings import Recording
+
+# Growth with samples, units, orders and recordings (docs/benchmarks.md), [-].
+_P_SAMPLES, _P_UNITS, _P_ORDERS, _P_RECORDINGS = 0.56, 0.44, 0.54, 0.85
+# Beyond this many the last phase, which sees all of them, decides, [samples].
+_LONG_SAMPLES = 20_000
+# Below this many samples the fixed work of the search decides, [samples].
+_LEAST_SAMPLES = 1000
+# What docs/benchmarks.md measured: [3 3 1], 2000 samples, 10 units.
+MEASURED = FitCost(0.055, 2000, 3.0, 10, "the table in docs/benchmarks.md")
+# A fit of so many samples stays below two seconds on a slow machine, [samples].
+_MOST_TIMED = 10_000
+# Simulating one model on one sample, its initial state included (docs/benchmarks.md: 1 ms
+# for 7500 samples on two cores), [s].
+SECONDS_PER_SIMULATED_SAMPLE = 2.7e-7
+
+
+def compiled_loops_place() -> str:
+    """Folder in which the compiled loops of a fit are kept.
+
+    Returns
+    -------
+    str
+        Where files ``kernels.derivative_rows*.nbi`` are missing, the first fit compiles.
+    """
+    return str(derivative_rows.stats.cache_path)
+
+
+def time_one_fit(
+    recordings: Sequence[Recording], orders: OrdersOptions, options: FitOptions
+) -> FitCost:
+    """Time a fit of middle orders on the recording of middle length.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+        At least one.
+    orders : OrdersOptions
+    options : FitOptions
+
+    Returns
+    -------
+    FitCost
+    """
+    by_length = sorted(recordings, key=lambda one: one.n_samples)
+    whole = by_length[len(by_length) // 2]
+    n = min(whole.n_samples, _MOST_TIMED)
+    cut = replace(
+        whole,
+        input=whole.input[:n],
+        output=whole.output[:n],
+        reference=None if whole.reference is None else whole.reference[:n],
+    )
+    middle = _middle(orders)
+    short = replace(options, starts=1, max_iterations=1, join=FitOptions().join)
+    # The first call loads the compiled loops, which no later fit does.
+    fit([cut], Orders(1, 1, 1), short)
+    start = time.perf_counter()
+    fit([cut], middle, replace(options, join=FitOptions().join))
+    return FitCost(
+        seconds=time.perf_counter() - start,
+        n_samples=n,
+        order=(middle.nb + middle.nf) / 2,
+        units=options.units,
+        source=f"one fit of {whole.name} with orders {middle.nb} {middle.nf} "
+        f"{middle.nk}",
+    )
+
+
+def fit_seconds(
+    cost: FitCost, orders: Orders, n_samples: int, *, units: int, n_recordings: int = 1
+) -> float:
+    """Estimate the time of a fit on one core.
+
+    Parameters
+    ----------
+    cost : FitCost
+    orders : Orders
+    n_samples : int, [samples]
+        Of each recording.
+    units : int, [-]
+    n_recordings : int, [-]
+        That are joined.
+
+    Returns
+    -------
+    float, [s]
+
+    Examples
+    --------
+    >>> round(fit_seconds(MEASURED, Orders(3, 3, 1), 2000, units=10), 3)
+    0.055
+    """
+    samples = _work(n_samples) / _work(cost.n_samples)
+    order = max((orders.nb + orders.nf) / 2, 1.0) / max(cost.order, 1.0)
+    return (
+        cost.seconds
+        * samples
+        * order**_P_ORDERS
+        * (units / cost.units) ** _P_UNITS
+        * n_recordings**_P_RECORDINGS
+    )
+
+
+def _work(n_samples: int) -> float:
+    """Time against the number of samples, up to a factor."""
+    short = min(max(n_samples, _LEAST_SAMPLES), _LONG_SAMPLES)
+    return float(short**_P_SAMPLES * max(n_samples / _LONG_SAMPLES, 1.0))
+
+
+def _middle(orders: OrdersOptions) -> Orders:
+    nb = sorted(orders.nb)[len(orders.nb) // 2]
+    nk = sorted(orders.nk)[len(orders.nk) // 2]
+    if orders.nk_role == "delay":
+        return Orders(nb, orders.nf or 0, nk)
+    return Orders(nb, nk, 1)

@@ -1,0 +1,47 @@
+"""Examples at the end of every command's help; a test parses each of them."""
+
+from collections.abc import Mapping
+
+import click
+
+EXAMPLES: Mapping[str, tuple[str, ...]] = {
+    "init": ("hwid init measured/", "hwid init measured/ --out configs/gun.yaml"),
+    "check": ("hwid check gun.yaml", "hwid check gun.yaml --no-timing --jobs 8"),
+    "run": ("hwid run gun.yaml", "hwid run gun.yaml --out results/second --jobs 2"),
+    "simulate": ("hwid simulate gun.yaml", "hwid simulate gun.yaml --force"),
+    "calibrate": ("hwid calibrate gun.yaml",),
+    "identify": (
+        "hwid identify gun.yaml",
+        "hwid identify gun.yaml --cache results/cache -v",
+    ),
+    "crossval": ("hwid crossval gun.yaml", "hwid crossval gun.yaml --quiet"),
+    "order": ("hwid order gun.yaml",),
+    "group": ("hwid group gun.yaml", "hwid group gun.yaml --force"),
+    "test": ("hwid test gun.yaml",),
+    "diagnose": ("hwid diagnose gun.yaml", "hwid diagnose gun.yaml --jobs 1"),
+    "report": ("hwid report gun.yaml",),
+    "compare": (
+        "hwid compare step_06/3/7 linear:step_06/3/7 --on gun.yaml",
+        "hwid compare step_06/3/7 results/old:step_06/3/7 --on gun.yaml "
+        "--recording step_10",
+    ),
+}
+
+
+def add_examples(command: click.Command) -> click.Command:
+    """Give a command's help its examples.
+
+    Parameters
+    ----------
+    command : click.Command
+
+    Returns
+    -------
+    click.Command
+        The same one.
+    """
+    lines = EXAMPLES.get(command.name or "", ())
+    if lines:
+        # The mark keeps click from joining the lines.
+        command.epilog = "\n".join(["\b", "Examples:", *(f"  {one}" for one in lines)])
+    return command

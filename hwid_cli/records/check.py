@@ -1,0 +1,86 @@
+"""What a check of a configuration and its data found, before anything is computed."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class RecordingFacts:
+    """One recording as it is read.
+
+    Parameters
+    ----------
+    name, kind : str
+    n_input, n_output : int, [samples]
+        Lengths of the raw columns.
+    n_used : int, [samples]
+        After calibration; 0 where calibration fails.
+    sample_time_s : float, [s]
+    input_range, output_range : tuple of float
+        Smallest and largest value.
+    input_unit, output_unit : str
+    notes : tuple of str
+        What looks odd, in words.
+    """
+
+    name: str
+    kind: str
+    n_input: int
+    n_output: int
+    n_used: int
+    sample_time_s: float
+    input_range: tuple[float, float]
+    output_range: tuple[float, float]
+    input_unit: str
+    output_unit: str
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class StagePlan:
+    """What one stage would do.
+
+    Parameters
+    ----------
+    stage : str
+    what : str
+        Its tasks in words, with their number.
+    tasks : int, [-]
+        Of the largest kind; an upper bound where ``is_bound``.
+    cached : int or None, [-]
+        Tasks whose results are there; None where that cannot be told beforehand.
+    seconds : float, [s]
+        For what is not cached; NaN where there is no estimate.
+    size_bytes : float, [bytes]
+        What it adds to the disk.
+    is_bound : bool
+    """
+
+    stage: str
+    what: str
+    tasks: int
+    cached: int | None
+    seconds: float
+    size_bytes: float
+    is_bound: bool = False
+
+
+@dataclass(frozen=True)
+class FitCost:
+    """Time of one fit, from which others are scaled.
+
+    Parameters
+    ----------
+    seconds : float, [s]
+    n_samples : int, [samples]
+    order : float, [-]
+        Mean of nb and the number of poles.
+    units : int, [-]
+    source : str
+        Where the time comes from, in words.
+    """
+
+    seconds: float
+    n_samples: int
+    order: float
+    units: int
+    source: str

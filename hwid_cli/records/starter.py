@@ -1,0 +1,151 @@
+"""What is found in a folder of measurements, and the configuration proposed for it."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+
+@dataclass(frozen=True, eq=False)
+class FoundColumn:
+    """A column of numbers in a measurement file.
+
+    Parameters
+    ----------
+    title : str
+        Header or name of the variable; empty where a column has only a number.
+    key : str or int
+        As ``recordings.columns`` names it.
+    values : ndarray, shape (n,)
+        NaN where the file holds no number.
+    variable : str or None
+        Table that a numbered column belongs to.
+    """
+
+    title: str
+    key: str | int
+    values: np.ndarray
+    variable: str | None = None
+
+    @property
+    def place(self) -> tuple[str | None, str | int]:
+        """What tells the column from others of its file."""
+        return self.variable, self.key
+
+
+@dataclass(frozen=True, eq=False)
+class FoundFile:
+    """A file that may be a measurement.
+
+    Parameters
+    ----------
+    name : str
+        Path below the folder, with ``/``.
+    columns : tuple of FoundColumn
+        Long ones first come as they stand in the file; single numbers are among them.
+    problem : str
+        Why nothing was found; empty if something was.
+    """
+
+    name: str
+    columns: tuple[FoundColumn, ...] = ()
+    problem: str = ""
+
+
+@dataclass(frozen=True)
+class Role:
+    """A column with the role that it is taken for.
+
+    Parameters
+    ----------
+    key : str or int
+    title : str
+    unit : str
+        Empty where the name says none.
+    reason : str
+        Why this column.
+    """
+
+    key: str | int
+    title: str
+    unit: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class Layout:
+    """How the files of a folder are read.
+
+    Parameters
+    ----------
+    patterns : tuple of str
+        Below the folder.
+    input, output : Role
+    time : Role or None
+    reference : Role or None
+    variable : str or None
+    sample_time_s : float or None, [s]
+        Only where there is no usable time column.
+    clock_reason : str
+        Where the sample time comes from.
+    resample : bool
+    notes : tuple of str
+        What else a reader of the configuration must know.
+    """
+
+    patterns: tuple[str, ...]
+    input: Role
+    output: Role
+    time: Role | None = None
+    reference: Role | None = None
+    variable: str | None = None
+    sample_time_s: float | None = None
+    clock_reason: str = ""
+    resample: bool = False
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """What is proposed to do with the recordings.
+
+    Parameters
+    ----------
+    kinds : dict of str to tuple of str
+        Patterns of each kind.
+    kind_reason : str
+    recipes : dict of str to tuple of str
+        Steps of calibration of each kind.
+    recipe_reason : str
+    exclude : tuple of str
+    parts : dict of str to tuple of int
+    nb, nk : tuple of int
+        First and last order.
+    order_reason : str
+    threshold : float, [output unit]
+    threshold_reason : str
+    identify : tuple of str
+        Empty for all.
+    held_out : tuple of str
+        Recordings that only judge; empty for none.
+    average : int, [samples]
+        1 for no advice.
+    sample_time_s : float, [s]
+    notes : tuple of str
+    """
+
+    kinds: dict[str, tuple[str, ...]]
+    kind_reason: str
+    recipes: dict[str, tuple[str, ...]]
+    recipe_reason: str
+    nb: tuple[int, int]
+    nk: tuple[int, int]
+    order_reason: str
+    threshold: float
+    threshold_reason: str
+    sample_time_s: float
+    exclude: tuple[str, ...] = ()
+    parts: dict[str, tuple[int, ...]] = field(default_factory=dict)
+    identify: tuple[str, ...] = ()
+    held_out: tuple[str, ...] = ()
+    average: int = 1
+    notes: tuple[str, ...] = ()

@@ -1,0 +1,128 @@
+"""Models side by side, as text."""
+
+from string import ascii_uppercase
+
+import numpy as np
+
+from hwid_cli.records.comparison import Comparison
+from hwid_cli.report.simulation_words import simulation_words
+from hwid_cli.report.text_table import MISSING, WIDTH, number, split_table
+
+_OWN, _OTHER = "'", " "
+
+
+def model_letters(comparison: Comparison) -> list[str]:
+    """Short names of the models, in their order.
+
+    Parameters
+    ----------
+    comparison : Comparison
+
+    Returns
+    -------
+    list of str
+        A, B, ... and numbers beyond Z.
+    """
+    count = len(comparison.models)
+    return [ascii_uppercase[n] if n < 26 else str(n + 1) for n in range(count)]
+
+
+def comparison_table(comparison: Comparison, *, width: int = WIDTH) -> str:
+    """Show RMSD and fit percent of each model on each recording.
+
+    Parameters
+    ----------
+    comparison : Comparison
+    width : int, [characters]
+        Of the screen.
+
+    Returns
+    -------
+    str
+        An apostrophe marks recordings that took part in a model's fit.
+    """
+    letters = model_letters(comparison)
+    deviations = [
+        (name, *_deviations(comparison, m), _best(comparison.rmsd[:, m], letters))
+        for m, name in enumerate(comparison.recordings)
+    ]
+    percents = [
+        (name, *map(_percent, column), _best(-column, letters))
+        for name, column in zip(
+            comparison.recordings, comparison.fit_percent.T, strict=True
+        )
+    ]
+    if len(comparison.recordings) > 1:
+        pooled = np.sqrt(np.mean(comparison.rmsd**2, axis=1))
+        middle = np.mean(comparison.fit_percent, axis=1)
+        cells = [number(one) + _OTHER for one in pooled]
+        deviations.append(("all", *cells, _best(pooled, letters)))
+        percents.append(("all", *map(_percent, middle), _best(-middle, letters)))
+    tables = [
+        split_table(
+            _title(comparison) if what == "RMSD" else "",
+            ("recording", *[f"{one} {what}" for one in letters], "best"),
+            rows,
+            width=width,
+        )
+        for what, rows in (("RMSD", deviations), ("fit %", percents))
+    ]
+    names = [f"{a}: {_about(comparison, n)}" for n, a in enumerate(letters)]
+    marks = (
+        [f"{_OWN} the model was identified on this recording"]
+        if comparison.is_own.any()
+        else []
+    )
+    return "\n".join(["\n\n".join(tables), *marks, *names])
+
+
+def start_words(comparison: Comparison) -> str:
+    """Say how the simulations start.
+
+    Parameters
+    ----------
+    comparison : Comparison
+
+    Returns
+    -------
+    str
+        One sentence for each rule that a model has.
+    """
+    letters = model_letters(comparison)
+    rules: dict[str, list[str]] = {}
+    for letter, one in zip(letters, comparison.models, strict=True):
+        rules.setdefault(one.model.initial_state, []).append(letter)
+    if len(rules) == 1:
+        return simulation_words(next(iter(rules)), is_validation=True)
+    return "\n".join(
+        f"{', '.join(own)}: {simulation_words(rule, is_validation=True)}"
+        for rule, own in rules.items()
+    )
+
+
+def _title(comparison: Comparison) -> str:
+    return (
+        f"Models side by side: RMSD [{comparison.output_unit}] and fit percent; all: "
+        f"pooled RMSD, mean fit\n{start_words(comparison)}"
+    )
+
+
+def _about(comparison: Comparison, number_: int) -> str:
+    one = comparison.models[number_]
+    orders = one.model.orders
+    maps = f"{one.model.input_map.kind} -> {one.model.output_map.kind}"
+    return f"{one.name} [{orders.nb} {orders.nf} {orders.nk}], {maps}"
+
+
+def _deviations(comparison: Comparison, m: int) -> list[str]:
+    own = [_OWN if flag else _OTHER for flag in comparison.is_own[:, m]]
+    values = map(number, comparison.rmsd[:, m])
+    return [text + mark for text, mark in zip(values, own, strict=True)]
+
+
+def _percent(value: float) -> str:
+    return f"{value:.2f}" if np.isfinite(value) else MISSING
+
+
+def _best(values: np.ndarray, letters: list[str]) -> str:
+    return letters[int(np.nanargmin(values))] if np.isfinite(values).any() else MISSING

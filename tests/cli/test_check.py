@@ -1,0 +1,183 @@
+import re
+
+import h5py
+import pytest
+from click.testing import CliRunner
+
+from hwid_cli.cli.main import main
+
+
+def check(path, *options):
+    return CliRunner().invoke(main, ["check", str(path), *options])
+
+
+def snapshot(folder):
+    return {
+        path: (path.stat().st_mtime_ns, path.stat().st_size)
+        for path in folder.rglob("*")
+    }
+
+
+@pytest.fixture
+def simulated(after_run, config, out):
+    """The tiny experiment with all of its results."""
+    return config, out
+
+
+def test_a_finished_experiment_is_all_in_the_cache(simulated):
+    config, out = simulated
+    result = check(config, "--out", str(out), "--no-timing", "--jobs", "1")
+
+    assert result.exit_code == 0, result.output
+    text = result.stdout
+    assert "3 recordings x 2 orders = 6 fits" in text
+    assert re.search(r"6 fits +6 of 6", text)
+    assert "6 models on 3 recordings = 18 validations in 9 tasks" in text
+    assert re.search(r"9 tasks +9 of 9", text)
+    assert "to a factor of 2" in text
+    assert re.search(r"sine_12 +sine +\d+/\d+ +400 ", text)
+
+
+def test_nothing_is_written(simulated, tmp_path):
+    config, out = simulated
+    before = snapshot(tmp_path)
+    assert check(config, "--out", str(out)).exit_code == 0
+    assert check(config, "--out", str(tmp_path / "new")).exit_code == 0
+
+    assert snapshot(tmp_path) == before
+
+
+def test_a_damaged_entry_of_the_cache_stays_where_it_is(simulated, tmp_path):
+    config, out = simulated
+    entry = next(iter(sorted((out / "cache").rglob("*.h5"))))
+    entry.write_bytes(entry.read_bytes()[:-40])
+    before = snapshot(tmp_path)
+    result = check(config, "--out", str(out), "--no-timing")
+
+    assert result.exit_code == 0, result.output
+    assert snapshot(tmp_path) == before
+
+
+def test_what_is_missing_in_the_cache_is_counted(simulated):
+    config, out = simulated
+    fits = [path for path in (out / "cache").rglob("*.h5") if _is_fit(path)]
+    fits[0].unlink()
+    text = check(config, "--out", str(out), "--no-timing").stdout
+
+    # What grows out of a missing fit is missing too.
+    assert re.search(r"6 fits +[45] of 6", text)
+    assert re.search(r"9 tasks +0 of 9", text)
+
+
+def _is_fit(path):
+    with h5py.File(path) as file:
+        return file.attrs["record"] == "Fit"
+
+
+def test_a_timed_fit_is_named(simulated):
+    config, out = simulated
+    result = check(config, "--out", str(out))
+
+    assert re.search(
+        r"Scaled from one fit of \w+ with orders 1 2 1: 0\.\d+ s", result.stdout
+    )
+
+
+def test_every_problem_of_the_configuration_is_one_line(tmp_path):
+    path = tmp_path / "bad.yaml"
+    path.write_text(
+        "name: bad\n"
+        "recordings: {files: no/*.csv, columns: {input: u, output: 3.5}}\n"
+        "orders: {nb: [3, 1], nkk: 2}\n"
+        "crossval: {threshold: -1}\n"
+        "colour: red\n"
+    )
+    result = check(path)
+
+    assert result.exit_code == 1
+    lines = result.stderr.splitlines()
+    assert all(line.startswith(f"hwid: {path}: ") for line in lines)
+    places = {line.removeprefix(f"hwid: {path}: ").split(":")[0] for line in lines}
+    assert places >= {
+        "recordings.columns.output",
+        "orders.nb",
+        "orders.nkk",
+        "crossval.threshold",
+        "colour",
+    }
+    assert len(lines) == len(set(lines))
+    assert result.stdout == ""
+
+
+def test_every_bad_file_and_every_bad_name_is_one_line(tmp_path):
+    for number in range(4):
+        rows = [f"{k},{(k * (number + 3)) % 7}" for k in range(120)]
+        if number == 1:
+            rows[40] = "40,x"
+        if number == 2:
+            rows = [f"{k},1" for k in range(120)]
+        (tmp_path / f"run{number}.csv").write_text("u,y\n" + "\n".join(rows))
+    path = tmp_path / "mine.yaml"
+    path.write_text(
+        "name: mine\n"
+        "recordings: {files: run*.csv, columns: {input: u, output: y}, sample_time_s: 1}\n"
+        "identify: {recordings: [run0, run9]}\n"
+        "test: {recordings: [rum3]}\n"
+        "diagnose:\n"
+    )
+    result = check(path, "--out", str(tmp_path / "out"))
+
+    assert result.exit_code == 1
+    lines = result.stderr.splitlines()
+    assert len(lines) == 5, result.stderr
+    said = "\n".join(lines)
+    for words in (
+        "run1.csv, row 42",
+        "run2.csv: output 'y' is 1",
+        "identify.recordings: no recording 'run9'",
+        "test.recordings: no recording 'rum3'; did you mean 'run3'?",
+        "simulation: missing",
+    ):
+        assert words in said
+    # The good ones are shown all the same.
+    assert "run0" in result.stdout
+    assert not (tmp_path / "out").exists()
+
+
+def test_measurements_that_are_still_to_be_simulated_are_no_fault(config, tmp_path):
+    result = check(config, "--out", str(tmp_path / "new"))
+
+    assert result.exit_code == 0
+    assert "not simulated yet" in result.stdout
+
+
+def test_missing_measurements_are_one_problem(tmp_path):
+    path = tmp_path / "mine.yaml"
+    path.write_text(
+        "name: mine\n"
+        "recordings: {files: no/*.csv, columns: {input: u, output: y}, sample_time_s: 1}\n"
+        "identify:\n"
+    )
+    result = check(path)
+
+    assert result.exit_code == 1
+    assert result.stderr.count("\n") == 1
+    assert "no file matches" in result.stderr
+
+
+def test_an_experiment_that_only_simulates_is_sound(tmp_path):
+    path = tmp_path / "servo.yaml"
+    path.write_text("name: servo\nsimulate: {kind: servo}\n")
+    result = check(path)
+
+    assert result.exit_code == 0
+    assert "simulates and does nothing else" in result.stdout
+
+
+def test_time_that_cannot_be_estimated_is_said_to_be_left_out(simulated):
+    config, out = simulated
+    text = config.read_text() + "simulation: {mass_kg: 1.0}\ndiagnose:\n"
+    config.write_text(text)
+    result = check(config, "--out", str(out), "--no-timing")
+
+    assert "start of the program and diagnose apart" in result.stdout

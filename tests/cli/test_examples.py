@@ -1,0 +1,55 @@
+import os
+import shlex
+import subprocess
+import sys
+
+import pytest
+from click.testing import CliRunner
+
+from hwid_cli.cli.examples import EXAMPLES
+from hwid_cli.cli.main import main
+
+LINES = [line for lines in EXAMPLES.values() for line in lines]
+
+
+def test_every_command_has_examples_and_no_other_has():
+    assert set(EXAMPLES) == set(main.commands)
+
+
+@pytest.mark.parametrize("line", LINES)
+def test_every_example_parses(line):
+    program, name, *arguments = shlex.split(line)
+    command = main.commands[name]
+
+    assert program == "hwid"
+    # Parses the words and calls nothing; wrong usage raises.
+    assert command.make_context(name, arguments).params
+
+
+@pytest.mark.parametrize("name", list(EXAMPLES))
+def test_the_help_shows_each_example_on_a_line_of_its_own(name):
+    lines = CliRunner().invoke(main, [name, "--help"]).output.splitlines()
+
+    shown = [line.strip() for line in lines]
+    assert all(line in shown for line in EXAMPLES[name])
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_shells_get_a_script_and_names_to_complete(shell):
+    def hwid(**environment):
+        code = "from hwid_cli.cli.main import main; main(prog_name='hwid')"
+        done = subprocess.run(
+            [sys.executable, "-c", code],
+            env={**os.environ, **environment},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        return done.stdout
+
+    script = hwid(_HWID_COMPLETE=f"{shell}_source")
+    if not script and shell == "bash":
+        pytest.skip("no bash here whose version click could ask for")
+    assert "_HWID_COMPLETE" in script
+    words = {"COMP_WORDS": "hwid di", "COMP_CWORD": "1" if shell != "fish" else "di"}
+    assert "diagnose" in hwid(_HWID_COMPLETE=f"{shell}_complete", **words)

@@ -1,0 +1,200 @@
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from hwid_cli.cli.main import main
+from hwid_cli.files.config import load_experiment
+from hwid_cli.files.recordings import read_recordings
+from tests.cli.measured_folders import (
+    EXPECTED,
+    LAYOUTS,
+    STEP_S,
+    measurements,
+    write_english_csv,
+    write_german_csv,
+)
+
+
+def invoke(*arguments):
+    return CliRunner().invoke(main, [str(one) for one in arguments])
+
+
+@pytest.fixture
+def folder(tmp_path):
+    made = tmp_path / "Messung 1 [neu]"
+    made.mkdir()
+    return made
+
+
+@pytest.mark.parametrize("layout", LAYOUTS)
+def test_columns_clock_and_units_are_found(folder, tmp_path, layout):
+    LAYOUTS[layout](folder)
+    out = tmp_path / "configs" / "mine.yaml"
+    result = invoke("init", folder, "--out", out)
+
+    assert result.exit_code == 0, result.output
+    experiment = load_experiment(out)
+    options = experiment.recordings
+    columns = options.columns
+    assert (
+        columns.time,
+        columns.input,
+        columns.output,
+        options.input_unit,
+        options.output_unit,
+    ) == EXPECTED[layout]
+    raws = read_recordings(experiment, tmp_path)
+    assert len(raws) == 6
+    if layout == "bare csv":
+        assert "SAMPLE TIME IS NOT KNOWN" in result.stdout
+        assert "SAMPLE TIME IS NOT KNOWN" in out.read_text()
+    else:
+        assert raws[0].sample_time_s == STEP_S
+    wanted = {tuple(np.round(u, 5)) for _, u, _ in measurements().values()}
+    assert {tuple(np.round(raw.input, 5)) for raw in raws} == wanted
+
+
+def test_the_configuration_is_sound_and_says_why(folder, tmp_path):
+    write_german_csv(folder)
+    out = tmp_path / "mine.yaml"
+    invoke("init", folder, "--out", out)
+    text = out.read_text()
+
+    assert "step: [Sprung*]" in text
+    assert "random:" in text
+    assert "step: [cut, output_offset]" in text
+    assert "5 % of the usual swing" in text
+    assert "# simulation:" in text
+    experiment = load_experiment(out)
+    assert set(experiment.test.recordings) == {"Sprung_2"}
+    # A swing of 1e3 tanh(1.5) mm; the threshold is rounded to one digit.
+    assert experiment.crossval.threshold == pytest.approx(45.0, abs=5.0)
+    assert "# diagnose:" in text
+
+    checked = invoke("check", out, "--no-timing")
+    assert checked.exit_code == 0, checked.output
+    assert "5 recordings x 12 orders = 60 fits" in checked.stdout
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("layout", LAYOUTS)
+def test_the_configuration_runs_at_once(folder, tmp_path, layout):
+    LAYOUTS[layout](folder)
+    out = tmp_path / "mine.yaml"
+    assert invoke("init", folder, "--out", out).exit_code == 0
+    # The guess stays; only the work is made small.
+    text = out.read_text().replace("nb: [1, 3], nk: [1, 4]", "nb: 1, nk: 1")
+    out.write_text(text.replace("units: 10", "units: 3, starts: 1, max_iterations: 3"))
+    result = invoke("run", out, "--out", tmp_path / "results", "--jobs", "1")
+
+    assert result.exit_code == 0, result.output
+    assert (tmp_path / "results" / "report.html").is_file()
+
+
+def test_an_existing_file_stays_unless_it_may_go(folder, tmp_path):
+    write_english_csv(folder)
+    out = tmp_path / "mine.yaml"
+    out.write_text("mine")
+    result = invoke("init", folder, "--out", out)
+
+    assert result.exit_code == 1
+    assert result.stderr.count("\n") == 1
+    assert "exists already" in result.stderr
+    assert "--force" in result.stderr
+    assert out.read_text() == "mine"
+    assert invoke("init", folder, "--out", out, "--force", "-q").stdout == ""
+    assert load_experiment(out).recordings is not None
+
+
+def test_a_reference_is_told_from_an_output(folder, tmp_path):
+    write_english_csv(folder)
+    invoke("init", folder, "--out", tmp_path / "mine.yaml")
+    text = (tmp_path / "mine.yaml").read_text()
+
+    assert "reference: position_ref_m" in text
+    assert "output: position_m}" in text
+
+
+def test_a_file_that_cannot_be_used_is_left_out_by_name(folder, tmp_path):
+    write_english_csv(folder)
+    constant = folder / "step_3.csv"
+    head, *rows = [row.split(",") for row in constant.read_text().splitlines()]
+    rows = [[time, current, "1", reference] for time, current, _, reference in rows]
+    constant.write_text("\n".join(",".join(row) for row in [head, *rows]))
+    out = tmp_path / "mine.yaml"
+    result = invoke("init", folder, "--out", out)
+
+    assert result.exit_code == 0, result.output
+    assert "left out" in result.stdout
+    assert "step_3" in load_experiment(out).recordings.exclude
+    assert invoke("check", out, "--no-timing").exit_code == 0
+
+
+def test_a_single_file_is_cut_into_one_to_learn_from_and_one_to_judge(folder, tmp_path):
+    rng = np.random.default_rng(2)
+    u = np.repeat(rng.uniform(-1, 1, 90), 10)
+    y = np.zeros(900)
+    for k in range(1, 900):
+        y[k] = 0.8 * y[k - 1] + 0.2 * u[k - 1]
+    np.savez(folder / "long.npz", u=u, y=y, Ts=0.01)
+    out = tmp_path / "mine.yaml"
+    assert invoke("init", folder, "--out", out).exit_code == 0
+
+    experiment = load_experiment(out)
+    assert experiment.recordings.parts == {"first": (0, 600), "last": (600, 900)}
+    assert experiment.test.recordings == ("last",)
+    assert experiment.recordings.sample_time_s == 0.01
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda folder: folder / "no", "is no folder"),
+        (lambda folder: folder, "holds no measurement file"),
+        (
+            lambda folder: (folder / "a.csv").write_text("a,b\n1,2\n") and folder,
+            "expected a file with an input and an output",
+        ),
+        (
+            lambda folder: (folder / "a.mat").write_text("no") and folder,
+            "a.mat",
+        ),
+    ],
+    ids=["no folder", "empty", "two rows", "damaged"],
+)
+def test_a_folder_that_cannot_be_used_is_one_line(tmp_path, folder, make, words):
+    result = invoke("init", make(folder), "--out", tmp_path / "mine.yaml")
+
+    assert result.exit_code == 1
+    assert words in result.stderr
+    assert result.stderr.count("\n") == 1
+    assert not (tmp_path / "mine.yaml").exists()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "columns"),
+    [
+        ("cascaded_tanks", {"input": "uEst", "output": "yEst"}),
+        ("ced", {"input": "u1", "output": "z1"}),
+        ("emps", {"time": "t", "input": "vir"}),
+        ("ffwheel_motor", {"input": "data.input", "output": "data.output"}),
+        ("hsm150_motor", {"variable": "data", "time": 0}),
+        ("silverbox", {"input": "u", "output": "y"}),
+    ],
+)
+def test_real_folders_are_understood(tmp_path, name, columns):
+    """What a name or a clock says; columns without a name are left to the reader."""
+    place = os.environ.get("HWID_REALDATA")
+    if not place or not (Path(place) / name).is_dir():
+        pytest.skip("HWID_REALDATA names no folder with these data")
+    out = tmp_path / "mine.yaml"
+    result = invoke("init", Path(place) / name, "--out", out)
+
+    assert result.exit_code == 0, result.output
+    found = load_experiment(out).recordings.columns
+    assert {role: getattr(found, role) for role in columns} == columns
+    assert invoke("check", out, "--no-timing").exit_code == 0
