@@ -24,6 +24,7 @@ _PUBLIC = {
     "OwnFunction": "hwid_cli.records.maps",
     "Recording": "hwid_cli.records.recordings",
     "fit": "hwid_cli.maths.model.fit",
+    "load_model": "hwid_cli.files.exported.loading",
     "parameter_covariance": "hwid_cli.maths.model.uncertainty",
     "simulate": "hwid_cli.maths.model.simulate",
 }
@@ -37,6 +38,7 @@ __all__ = [
     "OwnFunction",
     "Recording",
     "fit",
+    "load_model",
     "parameter_covariance",
     "simulate",
 ]

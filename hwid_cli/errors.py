@@ -19,3 +19,7 @@ class MeasurementError(HwidError):
 
 class CacheError(HwidError):
     """The cache or a results file cannot be read or written."""
+
+
+class ModelFileError(HwidError):
+    """An exported model cannot be used as it is."""

@@ -10,9 +10,11 @@ from hwid_cli.cli import (
     calibrate,
     crossval,
     diagnose,
+    export,
     group,
     identify,
     order,
+    predict,
     report,
     run,
     simulate,
@@ -127,6 +129,8 @@ _MODULES = (
     test,
     diagnose,
     report,
+    export,
+    predict,
 )
 for _module in _MODULES:
     main.add_command(_module.command)
