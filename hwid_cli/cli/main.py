@@ -111,9 +111,9 @@ class _ToStderr(logging.Handler):
 def main(ctx: click.Context) -> None:
     """Identify models of servo drives from few measurements, and diagnose simulations.
 
-    Every command takes one configuration file; configs/README.md explains its keys. A
-    stage runs the stages before it where they are missing, and answers from the cache
-    what it has computed before.
+    Commands take one configuration file; configs/README.md explains its keys. A stage
+    runs the stages before it where they are missing, and answers from the cache what it
+    has computed before.
     """
     ctx.obj = set_log_levels
 

@@ -170,6 +170,19 @@ def model_rows(folder: Path) -> Iterator[tuple[str, str, float]]:
                 yield about, name, check(here, exported, u)
 
 
+def print_table(worst: dict[tuple[str, str], float]) -> None:
+    names = list(CHECKS)
+    print(
+        "| " + " | ".join(["what", *names]) + " |\n" + "|---" * (len(names) + 1) + "|"
+    )
+    for about in dict.fromkeys(about for about, _ in worst):
+        cells = [about]
+        for name in names:
+            found = worst.get((about, name))
+            cells.append("-" if found is None else f"{found:.1e}" if found else "0")
+        print(f"| {' | '.join(cells)} |")
+
+
 def main() -> int:
     worst: dict[tuple[str, str], float] = {}
     with tempfile.TemporaryDirectory() as folder:
@@ -178,9 +191,7 @@ def main() -> int:
                 if not np.isnan(found):
                     key = (about, name)
                     worst[key] = max(found, worst.get(key, 0.0))
-    print("| what | format, checked with | largest deviation |\n|---|---|---|")
-    for (about, name), found in worst.items():
-        print(f"| {about} | {name} | {f'{found:.1e}' if found else '0'} |")
+    print_table(worst)
     return 0
 
 

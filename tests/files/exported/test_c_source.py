@@ -45,6 +45,17 @@ def test_default_maps_give_the_same_last_bit(tmp_path):
     assert np.array_equal(found, predict(exported, u))
 
 
+@pytest.mark.parametrize("kind", ["sigmoid_network", "wavelet_network", "cubic_spline"])
+def test_close_poles_do_not_enlarge_a_last_bit(kind, tmp_path):
+    # Poles of a drive that is sampled fast: 1/F has a gain of ten million.
+    model = example_model(7, kinds=(kind, kind), nb=5, nf=5, nk=1, rule="zero")
+    block = {
+        "numerator": np.array([1.0, 1.0, 1.0, 1.0, 1.0]) * 1e-9,
+        "denominator": np.poly([0.97, 0.965, 0.96, 0.955, 0.95]),
+    }
+    check(tmp_path, type(model)(**{**vars(model), **block}), 7)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("nf", range(11))
 @pytest.mark.parametrize("rule", ["zero", "steady", "estimated"])

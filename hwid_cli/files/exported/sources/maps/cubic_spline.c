@@ -13,11 +13,11 @@ static double @side@_map(double v)
     const double inside = fmin(fmax(share, 0.0), 1.0);
     const double rest = 1.0 - inside;
     const double bend = @side@_bends[left], next = @side@_bends[left + 1];
-    const double slope = @side@_values[left + 1] - @side@_values[left]
-        + (1.0 - 3.0 * rest * rest) / 6.0 * bend
-        + (3.0 * inside * inside - 1.0) / 6.0 * next;
-    return rest * @side@_values[left] + inside * @side@_values[left + 1]
-        + (rest * rest * rest - rest) / 6.0 * bend
-        + (inside * inside * inside - inside) / 6.0 * next
-        + (share - inside) * slope;
+    double slope = @side@_values[left + 1] - @side@_values[left], value;
+    slope += (1.0 - 3.0 * rest * rest) / 6.0 * bend;
+    slope += (3.0 * inside * inside - 1.0) / 6.0 * next;
+    value = rest * @side@_values[left] + inside * @side@_values[left + 1];
+    value += (rest * rest * rest - rest) / 6.0 * bend;
+    value += (inside * inside * inside - inside) / 6.0 * next;
+    return value + (share - inside) * slope;
 }
