@@ -108,6 +108,10 @@ def test_the_extended_simulation_is_exported(hwid, config, out):
 
     exported = read_exported(out / "models" / "simulation.json")
     extended = yaml.safe_load((out / "extended_simulation.yaml").read_text())
-    assert exported.drive.effects == extended["simulation"]["effects"]
+    found = extended["simulation"]
+    assert exported.drive.effects == found.get("effects", {})
+    # Re-fitted: not what the configuration says.
+    assert exported.drive.damping_N_s_per_m == found["damping_N_s_per_m"] != 15.0
+    assert exported.drive.reference_current_A == found["reference_current_A"]
     assert exported.card.origin["stage"] == "diagnose"
     assert "hwid_step" in (out / "models" / "simulation.c").read_text()

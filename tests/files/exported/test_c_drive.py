@@ -84,8 +84,12 @@ def check(folder, effects, values, n):
 
 @pytest.mark.parametrize(
     "effects",
-    [cases.COULOMB | cases.END_STOP | cases.DELAY, cases.GEAR | cases.HYSTERESIS],
-    ids=["friction, stop, delay", "gear, hysteresis"],
+    [
+        cases.COULOMB | cases.END_STOP | cases.DELAY,
+        cases.GEAR | cases.HYSTERESIS,
+        {"quadratic_drag": {"drag_N_s2_per_m2": 200.0}} | cases.CUBIC,
+    ],
+    ids=["friction, stop, delay", "gear, hysteresis", "curved"],
 )
 def test_the_program_simulates_as_hwid_does(effects, tmp_path):
     check(tmp_path, effects, {}, 1500)
