@@ -1,7 +1,7 @@
 """Which model leaves the program, and what is said about it."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from difflib import get_close_matches
 from typing import Any
 
@@ -188,10 +188,23 @@ def export_simulation(
     about = {**origin, "recordings": _hashes(recordings)}
     card = _card(SIMULATION, SIMULATION, recordings, options, inputs, about)
     return ExportedSimulation(
-        card,
+        card if drive.controller is None else _following_reference(card),
         drive,
         recordings[0].sample_time_s,
         parameter_vector(drive, drive_effects(drive)),
+    )
+
+
+def _following_reference(card: ModelCard) -> ModelCard:
+    """Under a controller the input is the reference, in the unit of the output."""
+    reference = card.columns.reference
+    if reference is None:
+        return card
+    return replace(
+        card,
+        columns=replace(card.columns, input=reference),
+        input_unit=card.output_unit,
+        input_scale=card.output_scale,
     )
 
 

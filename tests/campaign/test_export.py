@@ -3,10 +3,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hwid_cli.campaign.export import completed, export_model, find_fit
+from hwid_cli.campaign.export import (
+    completed,
+    export_model,
+    export_simulation,
+    find_fit,
+)
 from hwid_cli.campaign.predict import outside_share
 from hwid_cli.errors import ConfigError
-from hwid_cli.records.experiment import Columns, RecordingsOptions
+from hwid_cli.records.drive import Controller
+from hwid_cli.records.experiment import (
+    Columns,
+    DiagnoseOptions,
+    RecordingsOptions,
+    SimulationOptions,
+)
 from hwid_cli.records.exported import ModelCard
 from hwid_cli.records.recordings import Recording
 from tests.files.exported.model_examples import example_model
@@ -65,6 +76,22 @@ def test_an_exported_model_says_where_it_comes_from():
     assert card.origin["fit"]["rmsd"] == 0.5
     assert card.origin["stage"] == "group"
     assert exported.model is model
+
+
+def test_under_a_controller_the_input_is_the_reference():
+    ramp = np.linspace(0.0, 0.3, 50)
+    recording = Recording("a", 9.0 * ramp, ramp, 1e-3, reference=2.0 * ramp)
+    columns = Columns("u", "y", reference="r")
+    options = RecordingsOptions(("*",), columns, input_scale=5.0, output_scale=3.0)
+    simulation = SimulationOptions(controller=Controller(20.0, 3.0))
+    exported = export_simulation(
+        simulation, [recording], options, DiagnoseOptions(), origin={}
+    )
+
+    card = exported.card
+    assert (card.columns.input, card.input_unit, card.input_scale) == ("r", "m", 3.0)
+    assert card.input_range == (0.0, 0.6)
+    assert exported.drive.reference_current_A == recording.input.max()
 
 
 def test_a_pole_at_one_has_no_static_gain():
