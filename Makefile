@@ -13,7 +13,7 @@ DEV := $(VENV)/installed-dev
 .PHONY: help install run test test-all check format smoke clean reliability \
         bench bench-campaign bench-growth bench-wide bench-real \
         simulate calibrate identify crossval group test-stage steps model1 model2 \
-        reproduction thesis chapter2 hsm150 diagnose gun real effects blind
+        reproduction thesis chapter2 hsm150 diagnose gun real effects drive-source export-check blind
 
 help:  ## show these targets
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / {printf "  make %-14s %s\n", $$1, $$2}' Makefile
@@ -128,6 +128,12 @@ real: $(RUN)  ## diagnose real machines (data in HWID_REALDATA), and docs/real_d
 
 effects: $(RUN)  ## docs/effects.md from the catalogue
 	$(BIN)/python docs/effects_document.py
+
+drive-source: $(RUN)  ## the C form of the drive's compiled loops, for hwid export
+	$(BIN)/python docs/drive_source.py
+
+export-check: $(DEV)  ## every format of hwid export against hwid predict: the table of docs/export.md
+	$(BIN)/python -m tests.benchmarks.export_check
 
 # Seconds are only true on a machine that does nothing else.
 BLIND ?= results/blind

@@ -2,6 +2,7 @@
 
 from hwid_cli.campaign.diagnose_recordings import diagnose as diagnose
 from hwid_cli.errors import HwidError as HwidError
+from hwid_cli.files.exported.loading import load_model as load_model
 from hwid_cli.files.single_recording import load_recording as load_recording
 from hwid_cli.maths.model.fit import fit as fit
 from hwid_cli.maths.model.simulate import simulate as simulate

@@ -23,3 +23,7 @@ class CacheError(HwidError):
 
 class WorkerError(HwidError):
     """A process that computes was killed, and killed again."""
+
+
+class ModelFileError(HwidError):
+    """An exported model cannot be used as it is."""

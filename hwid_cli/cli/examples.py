@@ -20,6 +20,14 @@ EXAMPLES: Mapping[str, tuple[str, ...]] = {
     "test": ("hwid test gun.yaml",),
     "diagnose": ("hwid diagnose gun.yaml", "hwid diagnose gun.yaml --jobs 1"),
     "report": ("hwid report gun.yaml",),
+    "export": (
+        "hwid export gun.yaml --model step_06/3/7",
+        "hwid export gun.yaml --model step_06+step_09/3/7 --format c",
+    ),
+    "predict": (
+        "hwid predict results/gun/models/step_06_3_7.json measured/step_10.csv",
+        "hwid predict step_06_3_7.json step_10.csv --initial-state steady",
+    ),
     "compare": (
         "hwid compare step_06/3/7 linear:step_06/3/7 --on gun.yaml",
         "hwid compare step_06/3/7 results/old:step_06/3/7 --on gun.yaml "

@@ -12,10 +12,12 @@ from hwid_cli.cli import (
     compare,
     crossval,
     diagnose,
+    export,
     group,
     identify,
     init,
     order,
+    predict,
     report,
     run,
     simulate,
@@ -118,9 +120,9 @@ class _ToStderr(logging.Handler):
 def main(ctx: click.Context) -> None:
     """Identify models of servo drives from few measurements, and diagnose simulations.
 
-    Every command takes one configuration file; configs/README.md explains its keys. A
-    stage runs the stages before it where they are missing, and answers from the cache
-    what it has computed before.
+    Commands take one configuration file; configs/README.md explains its keys. A stage
+    runs the stages before it where they are missing, and answers from the cache what it
+    has computed before.
     """
     ctx.obj = set_log_levels
 
@@ -139,6 +141,8 @@ _MODULES = (
     diagnose,
     report,
     compare,
+    export,
+    predict,
 )
 for _module in _MODULES:
     main.add_command(add_examples(_module.command))

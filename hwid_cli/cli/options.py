@@ -1,7 +1,7 @@
 """Arguments and options that every stage command has."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import wraps
 from pathlib import Path
 from typing import Any
@@ -83,13 +83,13 @@ _OPTIONS: tuple[Callable[..., Any], ...] = (
 )
 
 
-def stage_options(function: Callable[[Choices], None]) -> Callable[..., None]:
+def stage_options(function: Callable[..., None]) -> Callable[..., None]:
     """Give a command the common argument and options.
 
     Parameters
     ----------
     function : callable
-        Takes ``Choices``.
+        Takes ``Choices``, and by name what the command has of its own.
 
     Returns
     -------
@@ -99,7 +99,8 @@ def stage_options(function: Callable[[Choices], None]) -> Callable[..., None]:
 
     @wraps(function)
     def with_choices(**values: Any) -> None:
-        choices = Choices(**values)
+        common = {field.name: values.pop(field.name) for field in fields(Choices)}
+        choices = Choices(**common)
         if choices.scheduler is not None and choices.backend != "dask":
             raise click.UsageError(
                 f"--scheduler {choices.scheduler}: needs --backend dask"
@@ -109,7 +110,7 @@ def stage_options(function: Callable[[Choices], None]) -> Callable[..., None]:
         set_log_levels = click.get_current_context().obj
         if set_log_levels is not None:
             set_log_levels(verbose=choices.verbose, quiet=choices.quiet)
-        function(choices)
+        function(choices, **values)
 
     decorated: Callable[..., None] = with_choices
     for option in reversed(_OPTIONS):

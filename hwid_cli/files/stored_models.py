@@ -6,6 +6,7 @@ A model is named ``<identified_on>/<nb>/<nk>``; a group joins its recordings wit
 from pathlib import Path
 
 from hwid_cli.errors import ConfigError
+from hwid_cli.files.exported.loading import load_model
 from hwid_cli.files.group_results import read_group
 from hwid_cli.files.result_files import read_provenance
 from hwid_cli.files.results import read_fits
@@ -115,11 +116,7 @@ def read_exported_model(path: Path) -> NamedModel:
 
     Raises
     ------
-    ConfigError
-        If it cannot be read.
+    ModelFileError
+        If it cannot be read, or carries Python of its own.
     """
-    # The reader of exported models goes here; it gives a HammersteinWiener.
-    raise ConfigError(
-        f"{path}: this version reads no exported models; expected a model of a folder "
-        "of results; name it as FOLDER:NAME"
-    )
+    return NamedModel(str(path), load_model(path), ())

@@ -10,7 +10,7 @@ from typing import Literal
 
 import numpy as np
 
-from hwid_cli.maths.model import static_map
+from hwid_cli.maths.model import repeatable, static_map
 from hwid_cli.maths.model.kernels import difference_columns
 from hwid_cli.maths.model.linear_block import (
     difference_basis,
@@ -87,7 +87,7 @@ def simulate(
     else:
         coefficients = initial_state
     with np.errstate(over="ignore", invalid="ignore"):
-        return static_map.evaluate(
+        return repeatable.evaluate(
             model.output_map,
             _forced(model, signal) + _free(model, coefficients, signal),
         )
@@ -216,7 +216,7 @@ def _state_step(
 
 def _forced(model: HammersteinWiener, signal: np.ndarray) -> np.ndarray:
     return filtered(
-        static_map.evaluate(model.input_map, signal),
+        repeatable.evaluate(model.input_map, signal),
         model.numerator,
         model.denominator,
         model.delay,

@@ -58,6 +58,21 @@ def _bends(count: int) -> np.ndarray:
     return bends
 
 
+def bends(one: StaticMap) -> np.ndarray:
+    """Second derivatives of a spline at its knots, as if these were one apart.
+
+    Parameters
+    ----------
+    one : StaticMap
+
+    Returns
+    -------
+    ndarray, shape (units,), [value]
+    """
+    values = _parts(one)[2]
+    return _bends(values.size) @ values
+
+
 def _basis(place: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
     """Columns of value and slope by the values, for places counted in knots."""
     left = np.clip(np.floor(place), 0, count - 2).astype(int)

@@ -1,0 +1,70 @@
+"""``hwid predict``: what an exported model makes of an input."""
+
+from pathlib import Path
+
+import click
+
+_STARTS = ("fitted", "steady", "empty")
+
+
+@click.command("predict")
+@click.argument("model", type=click.Path(path_type=Path), metavar="MODEL.json")
+@click.argument("input_file", type=click.Path(path_type=Path), metavar="INPUT.csv")
+@click.option(
+    "--out",
+    type=click.Path(path_type=Path),
+    default=Path("prediction.csv"),
+    show_default=True,
+    metavar="FILE",
+    help="File of the prediction.",
+)
+@click.option(
+    "--initial-state",
+    type=click.Choice(_STARTS),
+    default="fitted",
+    show_default=True,
+    help="How it starts: by the model's own rule (a model with an estimated state like "
+    "the first recording of its fit), in equilibrium with the first input, or empty.",
+)
+@click.option(
+    "--run-own-functions",
+    is_flag=True,
+    help="Run Python that the model's file carries; only for files that you trust.",
+)
+def command(
+    model: Path,
+    input_file: Path,
+    out: Path,
+    initial_state: str,
+    run_own_functions: bool,
+) -> None:
+    """Predict the output for an input, with a model that 'hwid export' wrote.
+
+    Reads the columns that the model's file names, and writes time, the input and the
+    predicted output.
+    """
+    from hwid_cli.campaign.predict import outside_share, predict
+    from hwid_cli.files.exported.json_reader import read_exported
+    from hwid_cli.files.exported.loading import check_trust
+    from hwid_cli.files.exported.prediction import read_input, write_prediction
+
+    exported = read_exported(model)
+    check_trust(exported, model, is_trusted=run_own_functions)
+    time, values = read_input(input_file, exported)
+    card = exported.card
+    signal = values * card.input_scale
+    predicted = predict(exported, signal, initial_state=initial_state, place=str(model))
+    share, lowest, highest = outside_share(signal, card.input_range)
+    if share > 0.0:
+        low, high = card.input_range
+        click.echo(
+            f"hwid: {input_file}: the input goes from {lowest:.4g} to {highest:.4g} "
+            f"{card.input_unit}; the model knows {low:.4g} to {high:.4g}, so {share:.1%} "
+            "of the samples are extrapolated",
+            err=True,
+        )
+    write_prediction(out, exported, time, values, predicted)
+    click.echo(
+        f"{out}: {predicted.size} samples of {card.name}; time in s, predicted in "
+        f"{card.output_unit}"
+    )

@@ -1,0 +1,1 @@
+"""Models as files for other programs: JSON, MAT, C and FMU, and JSON back again."""

@@ -1,0 +1,363 @@
+/* @title@
+ *
+ * Physics simulation of a drive: @effects@.
+ * @about@
+ *
+ * Call hwid_init once, then hwid_step once every @sample_time@ s with the input
+ * [@input_unit@]; it returns what the sensor reads [@output_unit@] at the same instant:
+ *
+ *     hwid_state state;
+ *     hwid_init(&state);
+ *     y = hwid_step(&state, u);
+ *
+ * The drive starts at rest in equilibrium with the first input. The input is @hold@
+ * between samples. Once the simulation runs away, everything is NaN.
+ *
+ * C99, no heap, no other files than the mathematical library. Several models in one
+ * program need names of their own: -D'HWID_NAME(x)=left_##x' makes left_init of
+ * hwid_init. With HWID_DECLARE_ONLY this file is its own header.
+ */
+#ifndef HWID_NAME
+#define HWID_NAME(name) hwid_##name
+#endif
+
+/* Parameters, motion, memory of friction and command, and the commands of a while. */
+typedef struct {
+    double p[@n_slots@];
+    double motion[8];
+    double memory[6];
+    double room[17];
+    double starts[@n_history@];
+    double ends[@n_history@];
+    double before;
+    double followed;
+    double previous;
+    double played;
+    double position;
+    double velocity;
+    long sample;
+    int listed;
+    int trusted;
+} HWID_NAME(state);
+
+void HWID_NAME(init)(HWID_NAME(state) *state);
+double HWID_NAME(step)(HWID_NAME(state) *state, double u);
+
+#ifndef HWID_DECLARE_ONLY
+#include <math.h>
+
+@kernels@
+/* Pieces of the command that are looked at together, as far as limits of steps go. */
+enum { MANY_TOGETHER = 1000, FAR_FROM_LIMIT_PIECES = 4, N_HISTORY = @n_history@ };
+
+static const double sample_time = @sample_time@;
+static const double parameters[N_SLOTS] = {@parameters@};
+
+typedef tuple_iiiiid drive_kind;
+
+static double step_and_kind(double *p, drive_kind *kind)
+{
+    const double rate = drive_fastest(p);
+    const int n_edges = drive_count_edges(p);
+    const int is_watched = drive_has_dry_friction(p) || p[HYSTERESIS_FORCE] != 0.0;
+    double count = 1.0;
+    kind->m0 = p[GEAR_STIFFNESS] > 0.0 || p[MODE_MASS] > 0.0
+        || drive_depends_on_motion(p);
+    kind->m1 = n_edges > 0;
+    kind->m2 = drive_is_always_curved(p);
+    kind->m3 = is_watched;
+    kind->m4 = p[STATIC_EXCESS] != 0.0 || p[HYSTERESIS_FORCE] != 0.0;
+    kind->m5 = rate;
+    if (n_edges > 0 || is_watched) {
+        count = least(most(ceil(sample_time * rate / 0.5), 1.0), MOST_STEPS);
+    }
+    return sample_time / count;
+}
+
+/* As far into a piece as nothing happens, without inner states. */
+static double glide_plain(HWID_NAME(state) *s, double *push, double length, double step,
+                          drive_kind kind)
+{
+    double *p = s->p, *state = s->motion, *memory = s->memory;
+    const double way = memory[WAY];
+    const int is_held = kind.m3 && way == 0.0;
+    double low = -HUGE_VAL, high = HUGE_VAL, slow = 0.0, steady, done = 0.0;
+    double x = state[X], v = state[V];
+    tuple_iddddd corner = {0, p[STIFFNESS], 0.0, 0.0, 0.0, 0.0};
+    if (kind.m1) {
+        const tuple_dd range = drive_bounds(x, p);
+        low = range.m0;
+        high = range.m1;
+        corner = drive_corner_of(state, 0.0, p);
+    }
+    steady = drive_steady_force(memory, p) - corner.m2;
+    if (p[STATIC_EXCESS] != 0.0) {
+        slow = 5.0 * p[STRIBECK_VELOCITY];
+    }
+    if (is_held) {
+        if (drive_excess(state, memory, push, 0.0, p).m1 > 0.0
+            || drive_excess(state, memory, push, length, p).m1 > 0.0) {
+            return 0.0;
+        }
+        return length;
+    }
+    while (done < length) {
+        const double left = length - done;
+        double h = left;
+        int is_curved = kind.m2;
+        tuple_dd next;
+        if (kind.m4 && !is_curved) {
+            state[X] = x;
+            state[V] = v;
+            is_curved = drive_is_curved_here(state, memory, p);
+        }
+        if (is_curved) {
+            if (s->trusted <= 0) {
+                double limit;
+                state[X] = x;
+                state[V] = v;
+                limit = drive_step_limit(state, memory, push, done, p);
+                limit = most(limit, length / MOST_STEPS);
+                if (limit < left) {
+                    h = left / ceil(left / limit);
+                } else if (limit > 2.0 * left && !kind.m4) {
+                    s->trusted = FAR_FROM_LIMIT_PIECES;
+                }
+            }
+            next = drive_step_plain(x, v, memory, push, done, h, p);
+        } else {
+            const tuple_dddd one = drive_shift(push, DRIVE, done);
+            const tuple_dddd two = drive_shift(push, OTHER, done);
+            const tuple_dddd all = {one.m0 + two.m0 + steady, one.m1 + two.m1,
+                                    one.m2 + two.m2, one.m3 + two.m3};
+            if (h > step * (1.0 + 1e-9) || fabs(h - step) < 1e-9 * step) {
+                h = step;
+            }
+            next = drive_sum_plain(x, v, all, h, corner.m1, kind.m5, p);
+            if (kind.m3 && way * next.m1 < slow) {
+                break;
+            }
+        }
+        if ((kind.m3 && way * next.m1 < 0.0) || next.m0 < low || next.m0 > high) {
+            break;
+        }
+        x = next.m0;
+        v = next.m1;
+        done = h >= left * (1.0 - 1e-12) ? length : done + h;
+    }
+    state[X] = x;
+    state[V] = v;
+    return done;
+}
+
+/* The same with inner states. */
+static double glide_inner(HWID_NAME(state) *s, double *push, double length, double step,
+                          drive_kind kind)
+{
+    double *p = s->p, *state = s->motion, *memory = s->memory;
+    const int is_held = kind.m3 && memory[WAY] == 0.0;
+    double trial[N_STATE], inputs[N_INPUT], done = 0.0;
+    tuple_iddddd corner;
+    int n;
+    if (kind.m2 || kind.m4
+        || (is_held && drive_excess(state, memory, push, 0.0, p).m1 > 0.0)) {
+        return 0.0;
+    }
+    for (n = 0; n < N_INPUT; ++n) {
+        inputs[n] = 0.0;
+    }
+    corner = drive_corner_of(state, push[DRIVE], p);
+    while (done < length) {
+        const double left = length - done;
+        double h = left;
+        if (h > step * (1.0 + 1e-9) || fabs(h - step) < 1e-9 * step) {
+            h = step;
+        }
+        drive_set_inputs(inputs, memory, push, done, p);
+        drive_sum_series(state, trial, inputs, h, corner, is_held, kind.m5, p);
+        if (is_held) {
+            if (drive_excess(trial, memory, push, done + h, p).m1 > 0.0) {
+                return done;
+            }
+        } else if (kind.m3 && memory[WAY] * trial[V] < 0.0) {
+            return done;
+        }
+        if (kind.m1) {
+            const double command = drive_value_of(push, DRIVE, done + h);
+            if (drive_corner_of(trial, command, p).m0 != corner.m0) {
+                return done;
+            }
+        }
+        for (n = 0; n < N_STATE; ++n) {
+            state[n] = trial[n];
+        }
+        done = h >= left * (1.0 - 1e-12) ? length : done + h;
+    }
+    return length;
+}
+
+/* One straight piece of the command. */
+static void move_along(HWID_NAME(state) *s, double *push, double length, double step,
+                       drive_kind kind)
+{
+    double trial[N_STATE], inputs[N_INPUT], done;
+    int n;
+    done = kind.m0 ? glide_inner(s, push, length, step, kind)
+                   : glide_plain(s, push, length, step, kind);
+    if (done >= length) {
+        s->trusted -= s->trusted > 0;
+        return;
+    }
+    s->trusted = 0;
+    for (n = 0; n < N_STATE; ++n) {
+        trial[n] = s->motion[n];
+    }
+    for (n = 0; n < N_INPUT; ++n) {
+        inputs[n] = 0.0;
+    }
+    drive_move_piece(s->motion, trial, s->memory, push, done, length, step, kind, inputs,
+                     s->p);
+}
+
+/* One sampling interval, from the previous command to this one. */
+static void interval(HWID_NAME(state) *s, double first, double last)
+{
+    double *p = s->p;
+    const int is_single = p[VELOCITY_GAIN] > 0.0
+        || (drive_depends_on_motion(p) && p[THERMAL_LOSS] != 0.0);
+    const double gain = drive_depends_on_motion(p) ? 1.0 : p[FORCE_CONSTANT];
+    const double now = is_single ? drive_current_now(first, s->motion, p) : 0.0;
+    double rows[MOST_PIECES][3], push[N_PUSH];
+    double time = (double)(s->sample - 1) * sample_time;
+    drive_kind kind = {0, 0, 0, 0, 0, 0.0};
+    const double step = step_and_kind(p, &kind);
+    int n, count = 1;
+    for (n = 0; n + 1 < N_HISTORY; ++n) {
+        s->starts[n] = s->starts[n + 1];
+        s->ends[n] = s->ends[n + 1];
+    }
+    s->starts[N_HISTORY - 1] = first;
+    s->ends[N_HISTORY - 1] = last;
+    rows[0][0] = sample_time;
+    rows[0][1] = first;
+    rows[0][2] = last;
+    if (!drive_is_untouched(p)) {
+        const tuple_id made = drive_command_pieces(
+            N_HISTORY - 1, sample_time, s->starts, s->ends, s->before, p, s->followed,
+            rows);
+        count = made.m0;
+        s->followed = made.m1;
+    }
+    for (n = 0; n < N_PUSH; ++n) {
+        push[n] = 0.0;
+    }
+    for (n = 0; n < count; ++n) {
+        const double length = rows[n][0];
+        if (length <= 0.0) {
+            continue;
+        }
+        if (drive_is_straight(p)) {
+            push[DRIVE] = gain * rows[n][1];
+            push[OTHER] = p[LOAD];
+            push[DRIVE + 1] = gain * (rows[n][2] - rows[n][1]) / length;
+        } else {
+            const tuple_dddd piece = {time, length, rows[n][1], rows[n][2]};
+            drive_set_push(push, s->room, s->memory, piece, now, p);
+        }
+        time += length;
+        s->listed += 1;
+        move_along(s, push, length, step, kind);
+    }
+    if (is_single || s->listed > MANY_TOGETHER) {
+        s->listed = 0;
+        s->trusted = 0;
+    }
+}
+
+/* Play at the output, also around a turning point between two samples. */
+static double played(HWID_NAME(state) *s, double x0, double v0)
+{
+    const double gap = s->p[OUTPUT_GAP], x1 = s->position;
+    double y = s->played;
+    v0 *= sample_time;
+    if (v0 * (sample_time * s->velocity) < 0.0) {
+        const double extreme = drive_extreme(x0, v0, x1, sample_time * s->velocity);
+        y = least(most(y, extreme - gap), extreme + gap);
+    }
+    return least(most(y, x1 - gap), x1 + gap);
+}
+
+static double sensed(HWID_NAME(state) *s)
+{
+    double *p = s->p;
+    double y = p[OUTPUT_GAP] > 0.0 ? s->played : s->position;
+    if (p[OUTPUT_ZERO] != 0.0) {
+        y -= p[OUTPUT_ZERO];
+    }
+    if (p[SENSOR_QUADRATIC] != 0.0 || p[SENSOR_CUBIC] != 0.0) {
+        const double share = y / p[REFERENCE_DISPLACEMENT];
+        y *= 1.0 + (p[SENSOR_QUADRATIC] + p[SENSOR_CUBIC] * share) * share;
+    }
+    if (p[SENSOR_DRIFT] != 0.0) {
+        y += p[SENSOR_DRIFT] * (sample_time * (double)s->sample);
+    }
+    return y;
+}
+
+void HWID_NAME(init)(HWID_NAME(state) *state)
+{
+    int n;
+    for (n = 0; n < N_SLOTS; ++n) {
+        state->p[n] = parameters[n];
+    }
+    for (n = 0; n < N_STATE; ++n) {
+        state->motion[n] = 0.0;
+    }
+    for (n = 0; n < N_MEMORY; ++n) {
+        state->memory[n] = 0.0;
+    }
+    for (n = 0; n < N_ROOM; ++n) {
+        state->room[n] = 0.0;
+    }
+    state->sample = 0;
+    state->listed = 0;
+    state->trusted = 0;
+}
+
+double HWID_NAME(step)(HWID_NAME(state) *state, double u)
+{
+    double *p = state->p;
+    const int is_closed = p[VELOCITY_GAIN] > 0.0;
+    const int is_held = is_closed || p[ZERO_ORDER_HOLD] > 0.0;
+    const double x0 = state->position, v0 = state->velocity;
+    if (state->sample == 0) {
+        int n;
+        state->before = is_closed ? 0.0 : u;
+        state->followed = drive_start(state->motion, state->memory, state->before, p);
+        for (n = 0; n < N_HISTORY; ++n) {
+            state->starts[n] = state->before;
+            state->ends[n] = state->before;
+        }
+        state->played = state->motion[X];
+    } else if (isfinite(state->position)) {
+        interval(state, state->previous, is_held ? state->previous : u);
+    }
+    state->position = state->motion[X];
+    state->velocity = state->motion[V];
+    if (!isfinite(state->position)) {
+        state->position = NAN;
+        state->velocity = NAN;
+        state->motion[X] = NAN;
+    }
+    if (state->sample > 0 && p[OUTPUT_GAP] > 0.0) {
+        state->played = played(state, x0, v0);
+    }
+    state->previous = u;
+    if (is_closed) {
+        state->previous = drive_controlled(u, state->position, state->velocity, p);
+    }
+    u = sensed(state);
+    state->sample += 1;
+    return u;
+}
+#endif

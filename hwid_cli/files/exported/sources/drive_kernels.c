@@ -1,0 +1,1885 @@
+/* Forces and steps of the drive: the loops of hwid's own simulation, translated. */
+
+enum {
+    MASS = 0,
+    DAMPING = 1,
+    STIFFNESS = 2,
+    FORCE_CONSTANT = 3,
+    FRICTION_FORWARD = 4,
+    FRICTION_BACKWARD = 5,
+    STATIC_EXCESS = 6,
+    STRIBECK_VELOCITY = 7,
+    HYSTERESIS_FORCE = 8,
+    HYSTERESIS_YIELD = 9,
+    DRAG = 10,
+    CUBIC = 11,
+    QUADRATIC = 12,
+    STOP_POSITION = 13,
+    STOP_STIFFNESS = 14,
+    SIDE_POSITION = 15,
+    SIDE_STIFFNESS = 16,
+    SPRING_GAP = 17,
+    GEAR_GAP = 18,
+    GEAR_STIFFNESS = 19,
+    GEAR_DAMPING_RATIO = 20,
+    GEAR_DAMPING = 21,
+    MOTOR_SHARE = 22,
+    OUTPUT_GAP = 23,
+    MODE_MASS = 24,
+    MODE_STIFFNESS = 25,
+    MODE_DAMPING = 26,
+    COGGING_FORCE = 27,
+    COGGING_PERIOD = 28,
+    COGGING_PHASE = 29,
+    COGGING_ORIGIN = 30,
+    COGGING_REST = 31,
+    LOAD = 32,
+    DEAD_ZONE = 33,
+    SATURATION = 34,
+    RATE = 35,
+    DELAY = 36,
+    LAG = 37,
+    SATURATION_LOSS = 38,
+    SAG_LOSS = 39,
+    THERMAL_LOSS = 40,
+    THERMAL_TIME = 41,
+    REFERENCE_CURRENT = 42,
+    CLIP_LIMIT = 43,
+    CLIP_SLOPE = 44,
+    SENSOR_QUADRATIC = 45,
+    SENSOR_CUBIC = 46,
+    SENSOR_DRIFT = 47,
+    REFERENCE_DISPLACEMENT = 48,
+    PERIODIC_FORCE = 49,
+    PERIODIC_FREQUENCY = 50,
+    PERIODIC_PHASE = 51,
+    RESISTANCE = 52,
+    INDUCTANCE = 53,
+    BACK_EMF = 54,
+    POSITION_GAIN = 55,
+    VELOCITY_GAIN = 56,
+    COMMAND_LIMIT = 57,
+    ZERO_ORDER_HOLD = 58,
+    START_POSITION = 59,
+    START_VELOCITY = 60,
+    IS_START_GIVEN = 61,
+    OUTPUT_ZERO = 62,
+    N_SLOTS = 63,
+    MOST_PIECES = 40,
+    DRIVE = 0,
+    OTHER = 4,
+    WARMTH = 8,
+    N_PUSH = 9,
+    N_ROOM = 17,
+    X = 0,
+    V = 1,
+    MOTOR_X = 2,
+    MOTOR_V = 3,
+    PART_X = 4,
+    PART_V = 5,
+    CIRCUIT = 6,
+    N_STATE = 7,
+    WAY = 0,
+    TURNED_AT = 1,
+    DEFLECTION = 2,
+    LAGGED = 3,
+    HEAT = 4,
+    N_MEMORY = 5,
+    MOST_TRIES = 120,
+    NARROWING = 90,
+    OFFSET = 0,
+    STEADY = 1,
+    DRIVEN = 2,
+    OTHERS = 6,
+    N_INPUT = 9,
+    N_COLUMNS = 17,
+    FILLED = 16,
+    N_TERMS = 20,
+    FEW_TERMS = 12,
+    LOCATING = 40,
+    LEAVING = 0,
+    REVERSAL = 1,
+    EDGE = 2,
+    LENGTH = 0,
+    SAMPLE = 1,
+    FAR_FROM_LIMIT = 4,
+    MOST_STEPS = 400,
+    N_PIECE = 2,
+    MANY_PIECES = 1000,
+    MOST_EVENTS = 100
+};
+
+static const double half_weights[5] = {
+    0.11846344252809464, 0.23931433524968315, 0.28444444444444433, 0.23931433524968315, 0.11846344252809464
+};
+
+static const double parts[20] = {
+    1.0, 0.5, 0.3333333333333333, 0.25, 0.2, 0.16666666666666666, 0.14285714285714285, 0.125, 0.1111111111111111, 0.1, 0.09090909090909091, 0.08333333333333333, 0.07692307692307693, 0.07142857142857142, 0.06666666666666667, 0.0625, 0.058823529411764705, 0.05555555555555555, 0.05263157894736842, 0.05
+};
+
+static const double project[5][4] = {
+    {1.2894120331738688, -8.230364182785971, 15.064857622504128, -8.309542827016658},
+    {-0.15116237607962646, 8.084413237314822, -21.4431693953228, 13.983972897784664},
+    {-0.42666666666666647, 4.266666666666665, -4.266666666666665, 0.0},
+    {0.47405436369705767, -7.149993140023212, 20.508749298031194, -13.983972897784664},
+    {-0.1856373541246325, 3.0292774188276894, -9.863770858545848, 8.309542827016658}
+};
+
+static const double shares[5] = {
+    0.04691007703066802, 0.23076534494715845, 0.5, 0.7692346550528415, 0.9530899229693319
+};
+
+typedef struct { double m0; double m1; } tuple_dd;
+
+typedef struct { double m0; double m1; double m2; double m3; } tuple_dddd;
+
+typedef struct { int m0; double m1; } tuple_id;
+
+typedef struct { int m0; double m1; double m2; double m3; double m4; double m5; } tuple_iddddd;
+
+typedef struct { int m0; int m1; int m2; int m3; int m4; double m5; } tuple_iiiiid;
+
+static double least(double a, double b)
+{
+    return b < a ? b : a;
+}
+
+static double most(double a, double b)
+{
+    return b > a ? b : a;
+}
+
+static double sign_of(double a)
+{
+    return a > 0.0 ? 1.0 : (a < 0.0 ? -1.0 : a);
+}
+
+static int drive_delayed(int n, double sample_time, double *starts, double *ends, double before, double delay, double (*pieces)[3])
+{
+    int whole = 0;
+    double part = 0.0;
+    int count = 0;
+    int at = 0;
+    double slope = 0.0;
+    double left = 0.0;
+    whole = (int)(floor(delay / sample_time));
+    part = delay - (whole * sample_time);
+    count = 0;
+    if (part > 0.0) {
+        at = (n - whole) - 1;
+        pieces[count][0] = part;
+        if (at < 0) {
+            pieces[count][1] = before;
+            pieces[count][2] = before;
+        } else {
+            slope = (ends[at] - starts[at]) / sample_time;
+            pieces[count][1] = ends[at] - (slope * part);
+            pieces[count][2] = ends[at];
+        }
+        count += 1;
+    }
+    at = n - whole;
+    left = sample_time - part;
+    if (left > 0.0) {
+        pieces[count][0] = left;
+        if (at < 0) {
+            pieces[count][1] = before;
+            pieces[count][2] = before;
+        } else {
+            slope = (ends[at] - starts[at]) / sample_time;
+            pieces[count][1] = starts[at];
+            pieces[count][2] = starts[at] + (slope * left);
+        }
+        count += 1;
+    }
+    return count;
+}
+
+static int drive_split(double (*pieces)[3], int count, double level)
+{
+    double side = 0.0;
+    int k1 = 0;
+    double at = 0.0;
+    int j = 0;
+    double first = 0.0;
+    double last = 0.0;
+    int row = 0;
+    int k = 0;
+    double share = 0.0;
+    double length = 0.0;
+    for (k1 = 0; k1 < 2; ++k1) {
+        static const double list1[2] = {-1.0, 1.0};
+        side = list1[k1];
+        at = side * level;
+        j = 0;
+        while ((j < count) && (count < MOST_PIECES)) {
+            first = pieces[j][1];
+            last = pieces[j][2];
+            if (((first - at) * (last - at)) < 0.0) {
+                for (row = count; row > j; --row) {
+                    for (k = 0; k < 3; ++k) {
+                        pieces[row][k] = pieces[row - 1][k];
+                    }
+                }
+                count += 1;
+                share = (at - first) / (last - first);
+                length = pieces[j][0];
+                pieces[j][0] = share * length;
+                pieces[j][2] = at;
+                pieces[j + 1][0] = (1.0 - share) * length;
+                pieces[j + 1][1] = at;
+                j += 1;
+            }
+            j += 1;
+        }
+    }
+    return count;
+}
+
+static tuple_id drive_limit_rate(double (*pieces)[3], int count, double rate, double followed)
+{
+    int j = 0;
+    double length = 0.0;
+    double first = 0.0;
+    double last = 0.0;
+    double behind = 0.0;
+    double slope = 0.0;
+    double pace = 0.0;
+    double closing = 0.0;
+    double catch = 0.0;
+    int row = 0;
+    int k = 0;
+    double met = 0.0;
+    j = 0;
+    while (j < count) {
+        length = pieces[j][0];
+        first = pieces[j][1];
+        last = pieces[j][2];
+        behind = first - followed;
+        slope = (last - first) / length;
+        if ((behind == 0.0) && (fabs(slope) <= rate)) {
+            followed = last;
+            j += 1;
+            continue;
+        }
+        pace = ((behind > 0.0) || ((behind == 0.0) && (slope > 0.0))) ? rate : (-rate);
+        closing = pace - slope;
+        catch = ((closing * behind) > 0.0) ? (behind / closing) : HUGE_VAL;
+        pieces[j][1] = followed;
+        if ((catch < length) && (count < MOST_PIECES)) {
+            for (row = count; row > j; --row) {
+                for (k = 0; k < 3; ++k) {
+                    pieces[row][k] = pieces[row - 1][k];
+                }
+            }
+            count += 1;
+            met = first + (slope * catch);
+            pieces[j][0] = catch;
+            pieces[j][2] = met;
+            pieces[j + 1][0] = length - catch;
+            pieces[j + 1][1] = met;
+            pieces[j + 1][2] = last;
+            followed = met;
+        } else {
+            followed = followed + (pace * length);
+            pieces[j][2] = followed;
+        }
+        j += 1;
+    }
+    return (tuple_id){count, followed};
+}
+
+static double drive_dead_zone(double value, double half)
+{
+    if (value > half) {
+        return value - half;
+    }
+    if (value < (-half)) {
+        return value + half;
+    }
+    return 0.0;
+}
+
+static tuple_id drive_command_pieces(int n, double sample_time, double *starts, double *ends, double before, double *p, double followed, double (*pieces)[3])
+{
+    int count = 0;
+    int j = 0;
+    double limit = 0.0;
+    if (p[DELAY] > 0.0) {
+        count = drive_delayed(n, sample_time, starts, ends, before, p[DELAY], pieces);
+    } else {
+        pieces[0][0] = sample_time;
+        pieces[0][1] = starts[n];
+        pieces[0][2] = ends[n];
+        count = 1;
+    }
+    if (p[DEAD_ZONE] > 0.0) {
+        count = drive_split(pieces, count, p[DEAD_ZONE]);
+        for (j = 0; j < count; ++j) {
+            pieces[j][1] = drive_dead_zone(pieces[j][1], p[DEAD_ZONE]);
+            pieces[j][2] = drive_dead_zone(pieces[j][2], p[DEAD_ZONE]);
+        }
+    }
+    limit = p[SATURATION];
+    if (limit < HUGE_VAL) {
+        count = drive_split(pieces, count, limit);
+        for (j = 0; j < count; ++j) {
+            pieces[j][1] = least(most(pieces[j][1], -limit), limit);
+            pieces[j][2] = least(most(pieces[j][2], -limit), limit);
+        }
+    }
+    if (p[RATE] < HUGE_VAL) {
+        return drive_limit_rate(pieces, count, p[RATE], followed);
+    }
+    return (tuple_id){count, followed};
+}
+
+static int drive_is_untouched(double *p)
+{
+    return !((p[DELAY] > 0.0) || (p[DEAD_ZONE] > 0.0) || (p[SATURATION] < HUGE_VAL) || (p[RATE] < HUGE_VAL));
+}
+
+static double drive_static_command(double value, double *p)
+{
+    double limit = 0.0;
+    if (p[DEAD_ZONE] > 0.0) {
+        value = drive_dead_zone(value, p[DEAD_ZONE]);
+    }
+    limit = p[SATURATION];
+    return least(most(value, -limit), limit);
+}
+
+static int drive_depends_on_motion(double *p)
+{
+    return (p[RESISTANCE] > 0.0) || (p[CLIP_LIMIT] < HUGE_VAL);
+}
+
+static int drive_has_losses(double *p)
+{
+    return (p[SATURATION_LOSS] != 0.0) || (p[SAG_LOSS] != 0.0) || (p[THERMAL_LOSS] != 0.0);
+}
+
+static int drive_is_straight(double *p)
+{
+    int is_bent = 0;
+    is_bent = (!drive_depends_on_motion(p)) && drive_has_losses(p);
+    is_bent = is_bent || (p[LAG] > 0.0) || (p[PERIODIC_FORCE] != 0.0);
+    return !is_bent;
+}
+
+static double drive_force_of(double current, double warmth, double *p)
+{
+    double share = 0.0;
+    double loss = 0.0;
+    share = fabs(current) / p[REFERENCE_CURRENT];
+    loss = ((p[SATURATION_LOSS] * share) + p[SAG_LOSS]) * share;
+    loss += p[THERMAL_LOSS] * warmth;
+    return (p[FORCE_CONSTANT] * (1.0 - loss)) * current;
+}
+
+static void drive_prepare_push(double *room, double length, double *p)
+{
+    int j = 0;
+    int n = 0;
+    double angle = 0.0;
+    room[0] = length;
+    if (p[LAG] > 0.0) {
+        for (j = 0; j < 5; ++j) {
+            room[1 + j] = exp(((-shares[j]) * length) / p[LAG]);
+        }
+        room[6] = exp((-length) / p[LAG]);
+    }
+    if (p[THERMAL_LOSS] != 0.0) {
+        room[7] = exp((-length) / p[THERMAL_TIME]);
+        room[8] = sqrt(room[7]);
+    }
+    if (p[PERIODIC_FORCE] != 0.0) {
+        for (n = 9; n < N_ROOM; ++n) {
+            room[n] = 0.0;
+        }
+        for (j = 0; j < 5; ++j) {
+            angle = ((6.283185307179586 * p[PERIODIC_FREQUENCY]) * shares[j]) * length;
+            for (n = 0; n < 4; ++n) {
+                room[9 + n] += project[j][n] * cos(angle);
+                room[13 + n] += project[j][n] * sin(angle);
+            }
+        }
+    }
+}
+
+static void drive_set_push(double *push, double *room, double *memory, tuple_dddd piece, double current_now, double *p)
+{
+    tuple_dddd t1 = {0};
+    double time = 0.0;
+    double length = 0.0;
+    double first = 0.0;
+    double last = 0.0;
+    double lag = 0.0;
+    double swing = 0.0;
+    int depends = 0;
+    int is_hot = 0;
+    int is_force = 0;
+    double rise = 0.0;
+    double steady = 0.0;
+    double fading = 0.0;
+    int n = 0;
+    double cold = 0.0;
+    double square = 0.0;
+    int j = 0;
+    double share = 0.0;
+    double value = 0.0;
+    double gain = 0.0;
+    double angle = 0.0;
+    double sine = 0.0;
+    double cosine = 0.0;
+    double scale = 0.0;
+    t1 = piece;
+    time = t1.m0;
+    length = t1.m1;
+    first = t1.m2;
+    last = t1.m3;
+    if (room[0] != length) {
+        drive_prepare_push(room, length, p);
+    }
+    lag = p[LAG];
+    swing = p[PERIODIC_FORCE];
+    depends = drive_depends_on_motion(p);
+    is_hot = p[THERMAL_LOSS] != 0.0;
+    is_force = drive_has_losses(p) && (!depends);
+    rise = last - first;
+    steady = first;
+    fading = 0.0;
+    if (lag > 0.0) {
+        steady = first - ((rise * lag) / length);
+        fading = memory[3] - steady;
+    }
+    for (n = 0; n < 4; ++n) {
+        push[DRIVE + n] = 0.0;
+        push[OTHER + n] = 0.0;
+    }
+    push[OTHER] = p[LOAD];
+    cold = memory[4];
+    if (is_hot) {
+        square = current_now / p[REFERENCE_CURRENT];
+        square *= square;
+        if (!depends) {
+            square = 0.0;
+            for (j = 0; j < 5; ++j) {
+                share = (steady + (rise * shares[j])) + (fading * room[1 + j]);
+                share /= p[REFERENCE_CURRENT];
+                square += (half_weights[j] * share) * share;
+            }
+        }
+        push[WARMTH] = square + ((cold - square) * room[8]);
+        memory[4] = square + ((cold - square) * room[7]);
+    }
+    if ((lag > 0.0) || is_force) {
+        for (j = 0; j < 5; ++j) {
+            value = (steady + (rise * shares[j])) + (fading * room[1 + j]);
+            if (is_force) {
+                value = drive_force_of(value, cold + ((memory[4] - cold) * shares[j]), p);
+            } else {
+                if (!depends) {
+                    value *= p[FORCE_CONSTANT];
+                }
+            }
+            for (n = 0; n < 4; ++n) {
+                push[DRIVE + n] += project[j][n] * value;
+            }
+        }
+    } else {
+        gain = depends ? 1.0 : p[FORCE_CONSTANT];
+        push[DRIVE] = gain * first;
+        push[DRIVE + 1] = gain * rise;
+    }
+    if (swing != 0.0) {
+        angle = ((6.283185307179586 * p[PERIODIC_FREQUENCY]) * time) + p[PERIODIC_PHASE];
+        sine = swing * sin(angle);
+        cosine = swing * cos(angle);
+        for (n = 0; n < 4; ++n) {
+            push[OTHER + n] += (sine * room[9 + n]) + (cosine * room[13 + n]);
+        }
+    }
+    memory[3] = last;
+    if (lag > 0.0) {
+        memory[3] = (steady + rise) + (fading * room[6]);
+    }
+    scale = 1.0;
+    for (n = 1; n < 4; ++n) {
+        scale /= length;
+        push[DRIVE + n] *= scale;
+        push[OTHER + n] *= scale;
+    }
+}
+
+static double drive_value_of(double *push, int which, double done)
+{
+    double rest = 0.0;
+    rest = push[which + 2] + (done * push[which + 3]);
+    return push[which] + (done * (push[which + 1] + (done * rest)));
+}
+
+static tuple_dddd drive_shift(double *push, int which, double done)
+{
+    double a = 0.0;
+    double b = 0.0;
+    double c = 0.0;
+    double d = 0.0;
+    a = push[which];
+    b = push[which + 1];
+    c = push[which + 2];
+    d = push[which + 3];
+    if (done == 0.0) {
+        return (tuple_dddd){a, b, c, d};
+    }
+    return (tuple_dddd){a + (done * (b + (done * (c + (done * d))))), b + (done * ((2.0 * c) + ((3.0 * done) * d))), c + ((3.0 * done) * d), d};
+}
+
+static double drive_wanted_current(double command, double *state, double *p)
+{
+    double speed = 0.0;
+    if (p[RESISTANCE] <= 0.0) {
+        return command;
+    }
+    if (p[INDUCTANCE] > 0.0) {
+        return state[CIRCUIT];
+    }
+    speed = (p[GEAR_STIFFNESS] > 0.0) ? state[MOTOR_V] : state[V];
+    return (command - (p[BACK_EMF] * speed)) / p[RESISTANCE];
+}
+
+static double drive_beyond(double x, double half_gap)
+{
+    if (x > half_gap) {
+        return x - half_gap;
+    }
+    if (x < (-half_gap)) {
+        return x + half_gap;
+    }
+    return 0.0;
+}
+
+static double drive_bite(double twist, double speed, double *p)
+{
+    double into = 0.0;
+    double force = 0.0;
+    into = drive_beyond(twist, p[GEAR_GAP]);
+    force = (p[GEAR_STIFFNESS] * into) + (p[GEAR_DAMPING] * speed);
+    if (into > 0.0) {
+        return most(force, 0.0);
+    }
+    return (into < 0.0) ? least(force, 0.0) : 0.0;
+}
+
+static double drive_cogging(double x, double *p)
+{
+    double angle = 0.0;
+    double swing = 0.0;
+    angle = (6.283185307179586 * (x - p[COGGING_ORIGIN])) / p[COGGING_PERIOD];
+    swing = sin(angle + p[COGGING_PHASE]) - p[COGGING_REST];
+    return p[COGGING_FORCE] * swing;
+}
+
+static double drive_spring_force(double x, double *p)
+{
+    double free = 0.0;
+    double force = 0.0;
+    double edge = 0.0;
+    double into = 0.0;
+    free = (p[SPRING_GAP] > 0.0) ? drive_beyond(x, p[SPRING_GAP]) : x;
+    force = p[STIFFNESS] * free;
+    force += (((p[CUBIC] * x) + p[QUADRATIC]) * x) * x;
+    if (p[STOP_STIFFNESS] > 0.0) {
+        force += p[STOP_STIFFNESS] * drive_beyond(x, p[STOP_POSITION]);
+    }
+    if (p[SIDE_STIFFNESS] > 0.0) {
+        edge = p[SIDE_POSITION];
+        into = x - edge;
+        if ((into * edge) > 0.0) {
+            force += p[SIDE_STIFFNESS] * into;
+        }
+    }
+    if (p[COGGING_FORCE] != 0.0) {
+        force -= drive_cogging(x, p);
+    }
+    return force;
+}
+
+static double drive_yielded(double x, double *memory, double *p)
+{
+    double way = 0.0;
+    double gone = 0.0;
+    way = memory[WAY];
+    if (way == 0.0) {
+        return memory[DEFLECTION];
+    }
+    gone = fabs(x - memory[TURNED_AT]) / p[HYSTERESIS_YIELD];
+    return way - ((way - memory[DEFLECTION]) * exp(-gone));
+}
+
+static double drive_sliding_friction(double way, double v, double *p)
+{
+    double level = 0.0;
+    double share = 0.0;
+    level = (way > 0.0) ? p[FRICTION_FORWARD] : p[FRICTION_BACKWARD];
+    if (p[STATIC_EXCESS] != 0.0) {
+        share = v / p[STRIBECK_VELOCITY];
+        level += p[STATIC_EXCESS] * exp((-share) * share);
+    }
+    return level;
+}
+
+static double drive_resisting(double x, double v, double *memory, double *p)
+{
+    double force = 0.0;
+    double way = 0.0;
+    force = (p[DAMPING] * v) + drive_spring_force(x, p);
+    if (p[DRAG] != 0.0) {
+        force += (p[DRAG] * v) * fabs(v);
+    }
+    if (p[HYSTERESIS_FORCE] != 0.0) {
+        force += p[HYSTERESIS_FORCE] * drive_yielded(x, memory, p);
+    }
+    way = memory[WAY];
+    if (way != 0.0) {
+        force += way * drive_sliding_friction(way, v, p);
+    }
+    return force;
+}
+
+static tuple_dddd drive_acceleration(double *state, double *memory, double *push, double done, double *p)
+{
+    double x = 0.0;
+    double v = 0.0;
+    int has_motor = 0;
+    double force = 0.0;
+    double rate = 0.0;
+    double speed = 0.0;
+    double voltage = 0.0;
+    double current = 0.0;
+    double middle = 0.0;
+    double limit = 0.0;
+    double mass = 0.0;
+    double motor = 0.0;
+    double inner = 0.0;
+    double teeth = 0.0;
+    double net = 0.0;
+    double mode = 0.0;
+    double pull = 0.0;
+    x = state[X];
+    v = state[V];
+    has_motor = p[GEAR_STIFFNESS] > 0.0;
+    force = drive_value_of(push, DRIVE, done);
+    rate = 0.0;
+    if (drive_depends_on_motion(p)) {
+        speed = has_motor ? state[MOTOR_V] : v;
+        if (p[INDUCTANCE] > 0.0) {
+            voltage = force - (p[BACK_EMF] * speed);
+            rate = voltage - (p[RESISTANCE] * state[CIRCUIT]);
+            rate /= p[INDUCTANCE];
+        }
+        current = drive_wanted_current(force, state, p);
+        middle = (-p[CLIP_SLOPE]) * speed;
+        limit = p[CLIP_LIMIT];
+        current = least(most(current, middle - limit), middle + limit);
+        force = drive_force_of(current, push[WARMTH], p);
+    }
+    mass = p[MASS];
+    motor = 0.0;
+    if (has_motor) {
+        inner = p[MOTOR_SHARE] * mass;
+        mass -= inner;
+        teeth = drive_bite(state[MOTOR_X] - x, state[MOTOR_V] - v, p);
+        motor = (force - teeth) / inner;
+        force = teeth;
+    }
+    net = (force + drive_value_of(push, OTHER, done)) - drive_resisting(x, v, memory, p);
+    mode = 0.0;
+    if (p[MODE_MASS] > 0.0) {
+        pull = p[MODE_STIFFNESS] * (state[PART_X] - x);
+        pull += p[MODE_DAMPING] * (state[PART_V] - v);
+        net += pull;
+        mode = (-pull) / p[MODE_MASS];
+    }
+    return (tuple_dddd){net / mass, motor, mode, rate};
+}
+
+static double drive_moved_mass(double *p)
+{
+    if (p[GEAR_STIFFNESS] > 0.0) {
+        return p[MASS] * (1.0 - p[MOTOR_SHARE]);
+    }
+    return p[MASS];
+}
+
+static int drive_has_dry_friction(double *p)
+{
+    double level = 0.0;
+    level = most(p[FRICTION_FORWARD], p[FRICTION_BACKWARD]);
+    return (level > 0.0) || (p[STATIC_EXCESS] != 0.0);
+}
+
+static double drive_surplus(double net, double *p)
+{
+    int way = 0;
+    way = (net > 0.0) ? FRICTION_FORWARD : FRICTION_BACKWARD;
+    return fabs(net) - most(p[way] + p[STATIC_EXCESS], 0.0);
+}
+
+static double drive_away(double x, double force, int has_cogging, double *p)
+{
+    double left = 0.0;
+    left = force - drive_spring_force(x, p);
+    if ((!has_cogging) && (p[COGGING_FORCE] != 0.0)) {
+        left -= drive_cogging(x, p);
+    }
+    return left;
+}
+
+static double drive_resting_point(double current, int has_cogging, double *p)
+{
+    double limit = 0.0;
+    double force = 0.0;
+    double stiffness = 0.0;
+    double far = 0.0;
+    double near = 0.0;
+    int _ = 0;
+    double middle = 0.0;
+    if ((p[STIFFNESS] <= 0.0) && (p[CUBIC] <= 0.0)) {
+        return p[START_POSITION];
+    }
+    limit = p[CLIP_LIMIT];
+    force = drive_force_of(least(most(current, -limit), limit), 0.0, p) + p[LOAD];
+    if (force == 0.0) {
+        return 0.0;
+    }
+    stiffness = p[STIFFNESS];
+    stiffness += cbrt((most(p[CUBIC], 0.0) * force) * force);
+    far = (0.001 * force) / stiffness;
+    near = 0.0;
+    for (_ = 0; _ < MOST_TRIES; ++_) {
+        if ((drive_away(far, force, has_cogging, p) * force) <= 0.0) {
+            break;
+        }
+        near = far;
+        far *= 1.3;
+    }
+    for (_ = 0; _ < NARROWING; ++_) {
+        middle = 0.5 * (near + far);
+        if ((drive_away(middle, force, has_cogging, p) * force) > 0.0) {
+            near = middle;
+        } else {
+            far = middle;
+        }
+    }
+    return far;
+}
+
+static int drive_count_edges(double *p)
+{
+    int count = 0;
+    int slot = 0;
+    int k1 = 0;
+    count = 0;
+    for (k1 = 0; k1 < 3; ++k1) {
+        static const int list1[3] = {STOP_STIFFNESS, SIDE_STIFFNESS, SPRING_GAP};
+        slot = list1[k1];
+        count += p[slot] > 0.0;
+    }
+    count += p[GEAR_STIFFNESS] > 0.0;
+    count += p[CLIP_LIMIT] < HUGE_VAL;
+    return count;
+}
+
+static int drive_side(double x, double edge)
+{
+    if (x > edge) {
+        return 2;
+    }
+    if (x < (-edge)) {
+        return 0;
+    }
+    return 1;
+}
+
+static tuple_iddddd drive_corner_of(double *state, double command, double *p)
+{
+    double x = 0.0;
+    int code = 0;
+    double stiffness = 0.0;
+    double offset = 0.0;
+    double teeth = 0.0;
+    double teeth_offset = 0.0;
+    double clip = 0.0;
+    int side = 0;
+    double edge = 0.0;
+    double force = 0.0;
+    double speed = 0.0;
+    double wanted = 0.0;
+    x = state[X];
+    code = 0;
+    stiffness = p[STIFFNESS];
+    offset = 0.0;
+    teeth = 0.0;
+    teeth_offset = 0.0;
+    clip = 0.0;
+    if (p[SPRING_GAP] > 0.0) {
+        side = drive_side(x, p[SPRING_GAP]);
+        code = side;
+        if (side == 1) {
+            stiffness = 0.0;
+        }
+        offset = ((1 - side) * stiffness) * p[SPRING_GAP];
+    }
+    if (p[STOP_STIFFNESS] > 0.0) {
+        side = drive_side(x, p[STOP_POSITION]);
+        code = (3 * code) + side;
+        if (side != 1) {
+            stiffness += p[STOP_STIFFNESS];
+            offset += ((1 - side) * p[STOP_STIFFNESS]) * p[STOP_POSITION];
+        }
+    }
+    if (p[SIDE_STIFFNESS] > 0.0) {
+        edge = p[SIDE_POSITION];
+        code *= 3;
+        if (((x - edge) * edge) > 0.0) {
+            code += 1;
+            stiffness += p[SIDE_STIFFNESS];
+            offset -= p[SIDE_STIFFNESS] * edge;
+        }
+    }
+    if (p[GEAR_STIFFNESS] > 0.0) {
+        force = drive_bite(state[MOTOR_X] - x, state[MOTOR_V] - state[V], p);
+        side = 1 + (int)(sign_of(force));
+        code = (3 * code) + side;
+        if (side != 1) {
+            teeth = p[GEAR_STIFFNESS];
+            teeth_offset = ((1 - side) * teeth) * p[GEAR_GAP];
+        }
+    }
+    if (p[CLIP_LIMIT] < HUGE_VAL) {
+        speed = (p[GEAR_STIFFNESS] > 0.0) ? state[MOTOR_V] : state[V];
+        wanted = drive_wanted_current(command, state, p) + (p[CLIP_SLOPE] * speed);
+        side = drive_side(wanted, p[CLIP_LIMIT]);
+        code = (3 * code) + side;
+        clip = side - 1.0;
+    }
+    return (tuple_iddddd){code, stiffness, offset, teeth, teeth_offset, clip};
+}
+
+static double drive_inside(double x, double edge, int side)
+{
+    if (side == 1) {
+        return edge - fabs(x);
+    }
+    return (side == 2) ? (x - edge) : ((-edge) - x);
+}
+
+static double drive_inside_teeth(double *state, int side, double *p)
+{
+    double twist = 0.0;
+    double ahead = 0.0;
+    double forward = 0.0;
+    double backward = 0.0;
+    twist = state[MOTOR_X] - state[X];
+    ahead = p[GEAR_DAMPING] / p[GEAR_STIFFNESS];
+    ahead *= state[MOTOR_V] - state[V];
+    forward = least(twist, twist + ahead) - p[GEAR_GAP];
+    backward = least(-twist, (-twist) - ahead) - p[GEAR_GAP];
+    if (side == 1) {
+        return -most(forward, backward);
+    }
+    return (side == 2) ? forward : backward;
+}
+
+static double drive_margin(double *state, double command, int corner, double *p)
+{
+    double x = 0.0;
+    double left = 0.0;
+    double speed = 0.0;
+    double wanted = 0.0;
+    double edge = 0.0;
+    double into = 0.0;
+    double gap = 0.0;
+    x = state[X];
+    left = HUGE_VAL;
+    if (p[CLIP_LIMIT] < HUGE_VAL) {
+        speed = (p[GEAR_STIFFNESS] > 0.0) ? state[MOTOR_V] : state[V];
+        wanted = drive_wanted_current(command, state, p) + (p[CLIP_SLOPE] * speed);
+        left = drive_inside(wanted, p[CLIP_LIMIT], corner % 3) / p[CLIP_LIMIT];
+        corner /= 3;
+    }
+    if (p[GEAR_STIFFNESS] > 0.0) {
+        left = least(left, drive_inside_teeth(state, corner % 3, p) / p[GEAR_GAP]);
+        corner /= 3;
+    }
+    if (p[SIDE_STIFFNESS] > 0.0) {
+        edge = p[SIDE_POSITION];
+        into = (x - edge) * sign_of(edge);
+        left = least(left, (((corner % 3) == 1) ? into : (-into)) / fabs(edge));
+        corner /= 3;
+    }
+    if (p[STOP_STIFFNESS] > 0.0) {
+        edge = p[STOP_POSITION];
+        left = least(left, drive_inside(x, edge, corner % 3) / edge);
+        corner /= 3;
+    }
+    if (p[SPRING_GAP] > 0.0) {
+        gap = p[SPRING_GAP];
+        left = least(left, drive_inside(x, gap, corner) / gap);
+    }
+    return left;
+}
+
+static int drive_is_always_curved(double *p)
+{
+    return (p[CUBIC] != 0.0) || (p[QUADRATIC] != 0.0) || (p[COGGING_FORCE] != 0.0) || (p[DRAG] != 0.0) || (drive_depends_on_motion(p) && drive_has_losses(p));
+}
+
+static int drive_is_curved_here(double *state, double *memory, double *p)
+{
+    double speed = 0.0;
+    double gone = 0.0;
+    if (p[STATIC_EXCESS] != 0.0) {
+        speed = memory[WAY] * state[V];
+        if ((memory[WAY] != 0.0) && (speed < (6.1 * p[STRIBECK_VELOCITY]))) {
+            return 1;
+        }
+    }
+    if ((p[HYSTERESIS_FORCE] != 0.0) && (memory[WAY] != 0.0)) {
+        gone = fabs(state[X] - memory[TURNED_AT]);
+        return gone < (37.0 * p[HYSTERESIS_YIELD]);
+    }
+    return 0;
+}
+
+static double drive_rate_of_yielding(double *state, double *memory, double mass, double *p)
+{
+    double gone = 0.0;
+    double fading = 0.0;
+    double stiffness = 0.0;
+    double speed = 0.0;
+    gone = fabs(state[X] - memory[TURNED_AT]) / p[HYSTERESIS_YIELD];
+    if (gone >= 37.0) {
+        return 0.0;
+    }
+    fading = exp(-gone);
+    stiffness = (2.0 * fabs(p[HYSTERESIS_FORCE])) / p[HYSTERESIS_YIELD];
+    speed = fabs(state[V]) / p[HYSTERESIS_YIELD];
+    return sqrt((stiffness * fading) / mass) + ((0.6 * speed) * sqrt(sqrt(fading)));
+}
+
+static double drive_step_limit(double *state, double *memory, double *push, double done, double *p)
+{
+    double mass = 0.0;
+    int has_motor = 0;
+    double x = 0.0;
+    double v = 0.0;
+    double speed = 0.0;
+    double stiffness = 0.0;
+    double bend = 0.0;
+    double edge = 0.0;
+    double damping = 0.0;
+    double turn = 0.0;
+    double rate = 0.0;
+    double both = 0.0;
+    double slow = 0.0;
+    double pull = 0.0;
+    mass = p[MASS];
+    has_motor = p[GEAR_STIFFNESS] > 0.0;
+    if (has_motor) {
+        mass *= least(p[MOTOR_SHARE], 1.0 - p[MOTOR_SHARE]);
+    }
+    x = state[X];
+    v = state[V];
+    speed = fabs(v);
+    stiffness = p[STIFFNESS];
+    if ((p[CUBIC] != 0.0) || (p[QUADRATIC] != 0.0)) {
+        bend = ((3.0 * p[CUBIC]) * x) + (2.0 * p[QUADRATIC]);
+        stiffness += fabs(bend * x);
+    }
+    if ((p[STOP_STIFFNESS] > 0.0) && (fabs(x) > p[STOP_POSITION])) {
+        stiffness += p[STOP_STIFFNESS];
+    }
+    edge = p[SIDE_POSITION];
+    if ((p[SIDE_STIFFNESS] > 0.0) && (((x - edge) * edge) > 0.0)) {
+        stiffness += p[SIDE_STIFFNESS];
+    }
+    damping = p[DAMPING] + ((2.0 * fabs(p[DRAG])) * speed);
+    if (has_motor && (fabs(state[2] - x) > p[GEAR_GAP])) {
+        stiffness += p[GEAR_STIFFNESS];
+        damping += p[GEAR_DAMPING];
+    }
+    if (p[CLIP_LIMIT] < HUGE_VAL) {
+        damping += p[FORCE_CONSTANT] * p[CLIP_SLOPE];
+    }
+    if (p[RESISTANCE] > 0.0) {
+        damping += (p[FORCE_CONSTANT] * p[BACK_EMF]) / p[RESISTANCE];
+    }
+    if (p[COGGING_FORCE] != 0.0) {
+        turn = 6.283185307179586 / p[COGGING_PERIOD];
+        stiffness += fabs(p[COGGING_FORCE]) * turn;
+        damping += ((0.12 * mass) * turn) * speed;
+    }
+    rate = sqrt(stiffness / mass) + (damping / mass);
+    if (p[MODE_MASS] > 0.0) {
+        both = (1.0 / p[MODE_MASS]) + (1.0 / mass);
+        rate += sqrt(p[MODE_STIFFNESS] * both) + (p[MODE_DAMPING] * both);
+    }
+    if (p[INDUCTANCE] > 0.0) {
+        rate += p[RESISTANCE] / p[INDUCTANCE];
+    }
+    if (p[HYSTERESIS_FORCE] != 0.0) {
+        rate += drive_rate_of_yielding(state, memory, mass, p);
+    }
+    slow = p[STRIBECK_VELOCITY];
+    if ((p[STATIC_EXCESS] != 0.0) && (memory[WAY] != 0.0) && (speed < (6.1 * slow))) {
+        pull = fabs(drive_acceleration(state, memory, push, done, p).m0);
+        rate += (fabs(p[STATIC_EXCESS]) / (mass * slow)) + ((0.5 * pull) / slow);
+    }
+    return 0.3 / most(rate, 1e-09);
+}
+
+static tuple_dd drive_step_plain(double x, double v, double *memory, double *push, double done, double h, double *p)
+{
+    double half = 0.0;
+    double inverse = 0.0;
+    tuple_dddd t1 = {0};
+    double a0 = 0.0;
+    double b0 = 0.0;
+    double c0 = 0.0;
+    double d0 = 0.0;
+    tuple_dddd t2 = {0};
+    double a1 = 0.0;
+    double b1 = 0.0;
+    double c1 = 0.0;
+    double d1 = 0.0;
+    double first = 0.0;
+    double b = 0.0;
+    double c = 0.0;
+    double d = 0.0;
+    double middle = 0.0;
+    double last = 0.0;
+    double k1 = 0.0;
+    double v2 = 0.0;
+    double k2 = 0.0;
+    double v3 = 0.0;
+    double k3 = 0.0;
+    double v4 = 0.0;
+    double k4 = 0.0;
+    double sixth = 0.0;
+    half = 0.5 * h;
+    inverse = 1.0 / p[MASS];
+    t1 = drive_shift(push, DRIVE, done);
+    a0 = t1.m0;
+    b0 = t1.m1;
+    c0 = t1.m2;
+    d0 = t1.m3;
+    t2 = drive_shift(push, OTHER, done);
+    a1 = t2.m0;
+    b1 = t2.m1;
+    c1 = t2.m2;
+    d1 = t2.m3;
+    first = a0 + a1;
+    b = b0 + b1;
+    c = c0 + c1;
+    d = d0 + d1;
+    middle = first + (half * (b + (half * (c + (half * d)))));
+    last = first + (h * (b + (h * (c + (h * d)))));
+    k1 = (first - drive_resisting(x, v, memory, p)) * inverse;
+    v2 = v + (half * k1);
+    k2 = (middle - drive_resisting(x + (half * v), v2, memory, p)) * inverse;
+    v3 = v + (half * k2);
+    k3 = (middle - drive_resisting(x + (half * v2), v3, memory, p)) * inverse;
+    v4 = v + (h * k3);
+    k4 = (last - drive_resisting(x + (h * v3), v4, memory, p)) * inverse;
+    sixth = h / 6.0;
+    return (tuple_dd){x + (sixth * ((v + (2.0 * (v2 + v3))) + v4)), v + (sixth * ((k1 + (2.0 * (k2 + k3))) + k4))};
+}
+
+static void drive_step_all(double *state, double *trial, double *memory, double *push, double done, double h, int is_held, double *p)
+{
+    int each = 0;
+    int n = 0;
+    int stage = 0;
+    double at = 0.0;
+    tuple_dddd t1 = {0};
+    double a = 0.0;
+    double motor = 0.0;
+    double part = 0.0;
+    double circuit = 0.0;
+    double weight = 0.0;
+    double way = 0.0;
+    double total[N_STATE];
+    double slope[N_STATE];
+    for (each = 0; each < N_STATE; ++each) {
+        total[each] = 0.0;
+    }
+    for (each = 0; each < N_STATE; ++each) {
+        slope[each] = 0.0;
+    }
+    for (n = 0; n < N_STATE; ++n) {
+        trial[n] = state[n];
+    }
+    for (stage = 0; stage < 4; ++stage) {
+        at = (stage == 0) ? 0.0 : ((stage == 3) ? h : (0.5 * h));
+        t1 = drive_acceleration(trial, memory, push, done + at, p);
+        a = t1.m0;
+        motor = t1.m1;
+        part = t1.m2;
+        circuit = t1.m3;
+        slope[0] = trial[V];
+        slope[1] = a;
+        if (is_held) {
+            slope[0] = 0.0;
+            slope[1] = 0.0;
+        }
+        slope[2] = trial[MOTOR_V];
+        slope[3] = motor;
+        slope[4] = trial[PART_V];
+        slope[5] = part;
+        slope[6] = circuit;
+        weight = (stage == 0 || stage == 3) ? 1.0 : 2.0;
+        way = (stage == 2) ? h : (0.5 * h);
+        for (n = 0; n < N_STATE; ++n) {
+            total[n] += weight * slope[n];
+            trial[n] = state[n] + (way * slope[n]);
+        }
+    }
+    for (n = 0; n < N_STATE; ++n) {
+        trial[n] = state[n] + ((h / 6.0) * total[n]);
+    }
+}
+
+static double drive_fastest(double *p)
+{
+    double mass = 0.0;
+    double stiffness = 0.0;
+    double damping = 0.0;
+    double share = 0.0;
+    double rate = 0.0;
+    double both = 0.0;
+    mass = p[MASS];
+    stiffness = p[STIFFNESS];
+    stiffness += p[STOP_STIFFNESS] + p[SIDE_STIFFNESS];
+    damping = p[DAMPING];
+    if (p[GEAR_STIFFNESS] > 0.0) {
+        share = p[MOTOR_SHARE];
+        mass *= least(share, 1.0 - share);
+        stiffness += p[GEAR_STIFFNESS];
+        damping += p[GEAR_DAMPING];
+    }
+    if (p[CLIP_LIMIT] < HUGE_VAL) {
+        damping += p[FORCE_CONSTANT] * p[CLIP_SLOPE];
+    }
+    if (p[RESISTANCE] > 0.0) {
+        damping += (p[FORCE_CONSTANT] * p[BACK_EMF]) / p[RESISTANCE];
+    }
+    rate = sqrt(stiffness / mass) + (damping / mass);
+    if (p[MODE_MASS] > 0.0) {
+        both = (1.0 / p[MODE_MASS]) + (1.0 / mass);
+        rate += sqrt(p[MODE_STIFFNESS] * both);
+        rate += p[MODE_DAMPING] * both;
+    }
+    if (p[INDUCTANCE] > 0.0) {
+        rate += p[RESISTANCE] / p[INDUCTANCE];
+    }
+    return rate;
+}
+
+static double drive_coefficient(double *inputs, int first, int n, double at)
+{
+    double d = 0.0;
+    double c = 0.0;
+    double b = 0.0;
+    double a = 0.0;
+    d = inputs[first + 3];
+    if (n == 3) {
+        return d;
+    }
+    c = inputs[first + 2];
+    if (n == 2) {
+        return c + ((3.0 * at) * d);
+    }
+    b = inputs[first + 1];
+    if (n == 1) {
+        return b + (at * ((2.0 * c) + ((3.0 * at) * d)));
+    }
+    a = (first == DRIVEN) ? inputs[first] : 0.0;
+    return a + (at * (b + (at * (c + (at * d)))));
+}
+
+static void drive_sum_series(double *state, double *out, double *inputs, double length, tuple_iddddd corner, int is_held, double rate, double *p)
+{
+    tuple_iddddd t1 = {0};
+    double k = 0.0;
+    double offset = 0.0;
+    double teeth = 0.0;
+    double teeth_offset = 0.0;
+    double clip = 0.0;
+    int has_motor = 0;
+    int has_mode = 0;
+    double resistance = 0.0;
+    double inductance = 0.0;
+    int is_current = 0;
+    double gain = 0.0;
+    double emf = 0.0;
+    double damping = 0.0;
+    double k2 = 0.0;
+    double c2 = 0.0;
+    double inner = 0.0;
+    double mass = 0.0;
+    double part = 0.0;
+    double teeth_damping = 0.0;
+    int count = 0;
+    double h = 0.0;
+    int n_terms = 0;
+    int n = 0;
+    int turn = 0;
+    double at = 0.0;
+    double x = 0.0;
+    double v = 0.0;
+    double xm = 0.0;
+    double vm = 0.0;
+    double xp = 0.0;
+    double vp = 0.0;
+    double i = 0.0;
+    double power = 0.0;
+    double drive = 0.0;
+    double other = 0.0;
+    double one = 0.0;
+    double step = 0.0;
+    double speed = 0.0;
+    double di = 0.0;
+    double current = 0.0;
+    double force = 0.0;
+    double am = 0.0;
+    double bite = 0.0;
+    double net = 0.0;
+    double ap = 0.0;
+    double pull = 0.0;
+    t1 = corner;
+    k = t1.m1;
+    offset = t1.m2;
+    teeth = t1.m3;
+    teeth_offset = t1.m4;
+    clip = t1.m5;
+    has_motor = p[GEAR_STIFFNESS] > 0.0;
+    has_mode = p[MODE_MASS] > 0.0;
+    resistance = p[RESISTANCE];
+    inductance = p[INDUCTANCE];
+    is_current = (resistance > 0.0) || (p[CLIP_LIMIT] < HUGE_VAL);
+    gain = is_current ? p[FORCE_CONSTANT] : 1.0;
+    emf = p[BACK_EMF];
+    damping = p[DAMPING];
+    k2 = p[MODE_STIFFNESS];
+    c2 = p[MODE_DAMPING];
+    inner = has_motor ? (p[MOTOR_SHARE] * p[MASS]) : 1.0;
+    mass = has_motor ? (p[MASS] - inner) : p[MASS];
+    part = has_mode ? p[MODE_MASS] : 1.0;
+    teeth_damping = (teeth > 0.0) ? p[GEAR_DAMPING] : 0.0;
+    count = (int)most(1, (int)(ceil((length * rate) / 1.0)));
+    h = length / count;
+    n_terms = ((h * rate) <= 0.25) ? FEW_TERMS : N_TERMS;
+    for (n = 0; n < N_STATE; ++n) {
+        out[n] = state[n];
+    }
+    for (turn = 0; turn < count; ++turn) {
+        at = turn * h;
+        x = out[0];
+        v = out[1];
+        xm = out[2];
+        vm = out[3];
+        xp = out[4];
+        vp = out[5];
+        i = out[6];
+        power = 1.0;
+        for (n = 0; n < n_terms; ++n) {
+            drive = 0.0;
+            other = 0.0;
+            one = 0.0;
+            if (n < 4) {
+                drive = drive_coefficient(inputs, DRIVEN, n, at) * power;
+                other = drive_coefficient(inputs, OTHERS - 1, n, at) * power;
+                power *= h;
+            }
+            if (n == 0) {
+                one = inputs[OFFSET];
+                other += inputs[STEADY];
+            }
+            step = h * parts[n];
+            speed = has_motor ? vm : v;
+            di = 0.0;
+            current = drive;
+            if (resistance > 0.0) {
+                if (inductance > 0.0) {
+                    di = ((drive - (emf * speed)) - (resistance * i)) / inductance;
+                    current = i;
+                } else {
+                    current = (drive - (emf * speed)) / resistance;
+                }
+            }
+            if (clip != 0.0) {
+                current = ((clip * p[CLIP_LIMIT]) * one) - (p[CLIP_SLOPE] * speed);
+            }
+            force = gain * current;
+            am = 0.0;
+            if (has_motor) {
+                bite = ((teeth * (xm - x)) + (teeth_offset * one)) + (teeth_damping * (vm - v));
+                am = (force - bite) / inner;
+                force = bite;
+            }
+            net = (((force + other) - (offset * one)) - (damping * v)) - (k * x);
+            ap = 0.0;
+            if (has_mode) {
+                pull = (k2 * (xp - x)) + (c2 * (vp - v));
+                net += pull;
+                ap = (-pull) / part;
+            }
+            if (is_held) {
+                x = 0.0;
+                v = 0.0;
+            } else {
+                x = step * v;
+                v = (step * net) / mass;
+            }
+            xm = step * vm;
+            vm = step * am;
+            xp = step * vp;
+            vp = step * ap;
+            i = step * di;
+            out[0] += x;
+            out[1] += v;
+            out[2] += xm;
+            out[3] += vm;
+            out[4] += xp;
+            out[5] += vp;
+            out[6] += i;
+        }
+    }
+}
+
+static tuple_dd drive_sum_plain(double x, double v, tuple_dddd inputs, double length, double stiffness, double rate, double *p)
+{
+    tuple_dddd t1 = {0};
+    double a = 0.0;
+    double b = 0.0;
+    double c = 0.0;
+    double d = 0.0;
+    double per_mass = 0.0;
+    double t2 = 0.0;
+    double damping = 0.0;
+    double t3 = 0.0;
+    int count = 0;
+    double h = 0.0;
+    int n_terms = 0;
+    int _ = 0;
+    double dx = 0.0;
+    double dv = 0.0;
+    double one = 0.0;
+    double two = 0.0;
+    double force = 0.0;
+    double power = 0.0;
+    int n = 0;
+    double push = 0.0;
+    double step = 0.0;
+    double t4 = 0.0;
+    double t5 = 0.0;
+    t1 = inputs;
+    a = t1.m0;
+    b = t1.m1;
+    c = t1.m2;
+    d = t1.m3;
+    per_mass = 1.0 / p[MASS];
+    t2 = p[DAMPING] * per_mass;
+    t3 = stiffness * per_mass;
+    damping = t2;
+    stiffness = t3;
+    count = (int)most(1, (int)(ceil((length * rate) / 1.0)));
+    h = length / count;
+    n_terms = ((h * rate) <= 0.25) ? FEW_TERMS : N_TERMS;
+    for (_ = 0; _ < count; ++_) {
+        dx = h * v;
+        dv = h * (((a * per_mass) - (damping * v)) - (stiffness * x));
+        one = x + dx;
+        two = v + dv;
+        force = b * per_mass;
+        power = h;
+        for (n = 1; n < n_terms; ++n) {
+            push = 0.0;
+            if (n < 4) {
+                push = force * power;
+                force = ((n == 1) ? c : d) * per_mass;
+                power *= h;
+            }
+            step = h * parts[n];
+            t4 = step * dv;
+            t5 = step * ((push - (damping * dv)) - (stiffness * dx));
+            dx = t4;
+            dv = t5;
+            one += dx;
+            two += dv;
+        }
+        x = one;
+        v = two;
+        a += h * (b + (h * (c + (h * d))));
+        b += h * ((2.0 * c) + ((3.0 * h) * d));
+        c += (3.0 * h) * d;
+    }
+    return (tuple_dd){x, v};
+}
+
+static double drive_steady_force(double *memory, double *p)
+{
+    double way = 0.0;
+    double level = 0.0;
+    way = memory[WAY];
+    if (way == 0.0) {
+        return (-p[HYSTERESIS_FORCE]) * memory[DEFLECTION];
+    }
+    level = (way > 0.0) ? p[FRICTION_FORWARD] : p[FRICTION_BACKWARD];
+    return (-way) * (level + p[HYSTERESIS_FORCE]);
+}
+
+static void drive_set_inputs(double *inputs, double *memory, double *push, double done, double *p)
+{
+    tuple_dddd t1 = {0};
+    double a = 0.0;
+    double b = 0.0;
+    double c = 0.0;
+    double d = 0.0;
+    tuple_dddd t2 = {0};
+    t1 = drive_shift(push, DRIVE, done);
+    a = t1.m0;
+    b = t1.m1;
+    c = t1.m2;
+    d = t1.m3;
+    inputs[DRIVEN] = a;
+    inputs[DRIVEN + 1] = b;
+    inputs[DRIVEN + 2] = c;
+    inputs[DRIVEN + 3] = d;
+    t2 = drive_shift(push, OTHER, done);
+    a = t2.m0;
+    b = t2.m1;
+    c = t2.m2;
+    d = t2.m3;
+    inputs[OFFSET] = 1.0;
+    inputs[STEADY] = a + drive_steady_force(memory, p);
+    inputs[OTHERS] = b;
+    inputs[OTHERS + 1] = c;
+    inputs[OTHERS + 2] = d;
+}
+
+static void drive_advance(double *state, double *trial, double *memory, double *push, double done, double h, tuple_iddddd corner, int is_held, tuple_iiiiid kind, double *inputs, double *p)
+{
+    tuple_iiiiid t1 = {0};
+    int has_inner = 0;
+    int is_curved = 0;
+    int is_curved_at_times = 0;
+    double rate = 0.0;
+    tuple_dddd cubic = {0};
+    tuple_dd t2 = {0};
+    double x = 0.0;
+    double v = 0.0;
+    tuple_dd t3 = {0};
+    t1 = kind;
+    has_inner = t1.m0;
+    is_curved = t1.m2;
+    is_curved_at_times = t1.m4;
+    rate = t1.m5;
+    if (is_held && (!has_inner)) {
+        trial[X] = state[X];
+        trial[V] = state[V];
+        return;
+    }
+    if (is_curved_at_times && (!is_curved)) {
+        is_curved = drive_is_curved_here(state, memory, p);
+    }
+    if (!is_curved) {
+        drive_set_inputs(inputs, memory, push, done, p);
+        if (has_inner) {
+            drive_sum_series(state, trial, inputs, h, corner, is_held, rate, p);
+        } else {
+            cubic = (tuple_dddd){(inputs[DRIVEN] + inputs[STEADY]) - corner.m2, inputs[DRIVEN + 1] + inputs[OTHERS], inputs[DRIVEN + 2] + inputs[OTHERS + 1], inputs[DRIVEN + 3] + inputs[OTHERS + 2]};
+            t2 = drive_sum_plain(state[X], state[V], cubic, h, corner.m1, rate, p);
+            x = t2.m0;
+            v = t2.m1;
+            trial[X] = x;
+            trial[V] = v;
+        }
+        if (is_held || (p[STATIC_EXCESS] == 0.0)) {
+            return;
+        }
+        if ((memory[WAY] * trial[V]) > (5.0 * p[STRIBECK_VELOCITY])) {
+            return;
+        }
+    }
+    if (has_inner) {
+        drive_step_all(state, trial, memory, push, done, h, is_held, p);
+    } else {
+        t3 = drive_step_plain(state[X], state[V], memory, push, done, h, p);
+        x = t3.m0;
+        v = t3.m1;
+        trial[X] = x;
+        trial[V] = v;
+    }
+}
+
+static tuple_dd drive_excess(double *state, double *memory, double *push, double done, double *p)
+{
+    double net = 0.0;
+    net = drive_acceleration(state, memory, push, done, p).m0 * drive_moved_mass(p);
+    return (tuple_dd){net, drive_surplus(net, p) - (1e-12 * p[FORCE_CONSTANT])};
+}
+
+static void drive_stop(double *state, double *memory, double *push, double done, double *p)
+{
+    tuple_dd t1 = {0};
+    double net = 0.0;
+    double more = 0.0;
+    state[V] = 0.0;
+    if (p[HYSTERESIS_FORCE] != 0.0) {
+        memory[DEFLECTION] = drive_yielded(state[X], memory, p);
+        memory[TURNED_AT] = state[X];
+    }
+    memory[WAY] = 0.0;
+    t1 = drive_excess(state, memory, push, done, p);
+    net = t1.m0;
+    more = t1.m1;
+    if (more > 0.0) {
+        memory[WAY] = sign_of(net);
+    }
+}
+
+static double drive_time_of(int event, double *state, double *trial, double *memory, double *push, double done, double h, tuple_iddddd corner, int is_held, tuple_iiiiid kind, double *inputs, double *p)
+{
+    double way = 0.0;
+    double low = 0.0;
+    double high = 0.0;
+    double at_high = 0.0;
+    double at_low = 0.0;
+    int is_found = 0;
+    double enough = 0.0;
+    double weight_high = 0.0;
+    double weight_low = 0.0;
+    int last = 0;
+    double time = 0.0;
+    int n = 0;
+    double one = 0.0;
+    double two = 0.0;
+    double value = 0.0;
+    double there = 0.0;
+    int is_passed = 0;
+    way = memory[WAY];
+    low = 0.0;
+    high = h;
+    at_high = 0.0;
+    at_low = at_high;
+    is_found = (event != REVERSAL) || ((way * state[V]) > 0.0);
+    if (event == REVERSAL) {
+        at_low = way * state[V];
+        at_high = way * trial[V];
+    } else {
+        if (event == LEAVING) {
+            at_low = -drive_excess(state, memory, push, done, p).m1;
+            at_high = -drive_excess(trial, memory, push, done + h, p).m1;
+        } else {
+            at_low = drive_margin(state, drive_value_of(push, DRIVE, done), corner.m0, p);
+            at_high = drive_margin(trial, drive_value_of(push, DRIVE, done + h), corner.m0, p);
+        }
+    }
+    enough = 1e-13 * (fabs(at_low) + fabs(at_high));
+    weight_high = 1.0;
+    weight_low = weight_high;
+    last = 0;
+    time = h;
+    for (n = 0; n < 2 * LOCATING; ++n) {
+        if ((!is_found) || (at_low <= at_high) || (n > LOCATING)) {
+            time = 0.5 * (low + high);
+        } else {
+            one = weight_low * at_low;
+            two = weight_high * at_high;
+            time = low + (((high - low) * one) / (one - two));
+        }
+        if ((high - low) <= (1e-12 * h)) {
+            time = high;
+        }
+        drive_advance(state, trial, memory, push, done, time, corner, is_held, kind, inputs, p);
+        if (time == high) {
+            break;
+        }
+        if (event == REVERSAL) {
+            value = way * trial[V];
+        } else {
+            if (event == LEAVING) {
+                value = -drive_excess(trial, memory, push, done + time, p).m1;
+            } else {
+                there = drive_value_of(push, DRIVE, done + time);
+                value = drive_margin(trial, there, corner.m0, p);
+                if (value == 0.0) {
+                    is_passed = drive_corner_of(trial, there, p).m0 != corner.m0;
+                    value = is_passed ? (-1e-300) : 1e-300;
+                }
+            }
+        }
+        if (value > 0.0) {
+            is_found = 1;
+            weight_low = 1.0;
+            weight_high *= (last == 1) ? 0.5 : 1.0;
+            low = time;
+            at_low = value;
+            last = 1;
+        } else {
+            weight_high = 1.0;
+            weight_low *= (last == (-1)) ? 0.5 : 1.0;
+            high = time;
+            at_high = value;
+            last = -1;
+        }
+        if ((fabs(value) <= enough) && is_found && ((event != EDGE) || (value < 0.0))) {
+            break;
+        }
+    }
+    if (!is_found) {
+        return 0.0;
+    }
+    if (event == REVERSAL) {
+        trial[V] = 0.0;
+    }
+    return time;
+}
+
+static tuple_dd drive_bounds(double x, double *p)
+{
+    double low = 0.0;
+    double high = 0.0;
+    int n = 0;
+    double edge = 0.0;
+    low = -HUGE_VAL;
+    high = HUGE_VAL;
+    for (n = 0; n < 5; ++n) {
+        edge = HUGE_VAL;
+        if ((n < 2) && (p[SPRING_GAP] > 0.0)) {
+            edge = p[SPRING_GAP];
+        }
+        if (((2 <= n) && (n < 4)) && (p[STOP_STIFFNESS] > 0.0)) {
+            edge = p[STOP_POSITION];
+        }
+        if ((n == 4) && (p[SIDE_STIFFNESS] > 0.0)) {
+            edge = p[SIDE_POSITION];
+        }
+        if (edge == HUGE_VAL) {
+            continue;
+        }
+        if ((n % 2) == 1) {
+            edge = -edge;
+        }
+        if ((x > edge) || ((x == edge) && (edge < 0.0))) {
+            low = most(low, edge);
+        } else {
+            high = least(high, edge);
+        }
+    }
+    return (tuple_dd){low, high};
+}
+
+static double drive_controlled(double reference, double x, double v, double *p)
+{
+    double wanted = 0.0;
+    double limit = 0.0;
+    wanted = p[VELOCITY_GAIN] * ((p[POSITION_GAIN] * (reference - x)) - v);
+    limit = p[COMMAND_LIMIT];
+    return least(most(wanted, -limit), limit);
+}
+
+static double drive_start(double *state, double *memory, double command, double *p)
+{
+    double current = 0.0;
+    double swinging = 0.0;
+    double limit = 0.0;
+    double force = 0.0;
+    command = drive_static_command(command, p);
+    memory[LAGGED] = command;
+    current = command;
+    if (p[RESISTANCE] > 0.0) {
+        current = command / p[RESISTANCE];
+        state[CIRCUIT] = current;
+    }
+    p[COGGING_REST] = sin(p[COGGING_PHASE]);
+    if (p[STIFFNESS] > 0.0) {
+        p[COGGING_ORIGIN] = drive_resting_point(0.0, 0, p);
+    }
+    if (p[IS_START_GIVEN] > 0.0) {
+        state[X] = p[START_POSITION];
+        state[V] = p[START_VELOCITY];
+    } else {
+        state[X] = drive_resting_point(current, 1, p);
+    }
+    if (p[GEAR_STIFFNESS] > 0.0) {
+        swinging = (p[MASS] * p[MOTOR_SHARE]) * (1.0 - p[MOTOR_SHARE]);
+        p[GEAR_DAMPING] = 2.0 * p[GEAR_DAMPING_RATIO];
+        p[GEAR_DAMPING] *= sqrt(p[GEAR_STIFFNESS] * swinging);
+    }
+    limit = p[CLIP_LIMIT];
+    force = drive_force_of(least(most(current, -limit), limit), 0.0, p);
+    state[MOTOR_X] = state[X];
+    if ((p[GEAR_STIFFNESS] > 0.0) && (force != 0.0)) {
+        state[MOTOR_X] += sign_of(force) * p[GEAR_GAP];
+        state[MOTOR_X] += force / p[GEAR_STIFFNESS];
+    }
+    state[MOTOR_V] = state[V];
+    state[PART_X] = state[X];
+    state[PART_V] = state[V];
+    memory[WAY] = sign_of(state[V]);
+    memory[TURNED_AT] = state[X];
+    return command;
+}
+
+static double drive_current_now(double command, double *state, double *p)
+{
+    double speed = 0.0;
+    double middle = 0.0;
+    double limit = 0.0;
+    double current = 0.0;
+    speed = (p[GEAR_STIFFNESS] > 0.0) ? state[MOTOR_V] : state[V];
+    middle = (-p[CLIP_SLOPE]) * speed;
+    limit = p[CLIP_LIMIT];
+    current = drive_wanted_current(command, state, p);
+    return least(most(current, middle - limit), middle + limit);
+}
+
+static void drive_move_piece(double *state, double *trial, double *memory, double *push, double done, double length, double step, tuple_iiiiid kind, double *inputs, double *p)
+{
+    tuple_iiiiid t1 = {0};
+    int has_edges = 0;
+    int is_curved = 0;
+    int is_watched = 0;
+    int is_curved_at_times = 0;
+    tuple_iddddd corner = {0};
+    int events = 0;
+    int is_stuck = 0;
+    double left = 0.0;
+    double h = 0.0;
+    int is_held = 0;
+    int is_wild = 0;
+    tuple_dd t2 = {0};
+    double net = 0.0;
+    double more = 0.0;
+    double limit = 0.0;
+    int is_turned = 0;
+    int event = 0;
+    int is_leaving = 0;
+    int stage = 0;
+    tuple_iddddd there = {0};
+    double when = 0.0;
+    int n = 0;
+    t1 = kind;
+    has_edges = t1.m1;
+    is_curved = t1.m2;
+    is_watched = t1.m3;
+    is_curved_at_times = t1.m4;
+    corner = drive_corner_of(state, drive_value_of(push, DRIVE, done), p);
+    events = 0;
+    is_stuck = 0;
+    while (done < length) {
+        left = length - done;
+        h = (left <= step) ? left : (left / ceil(left / step));
+        is_held = is_watched && (memory[WAY] == 0.0);
+        is_wild = events > MOST_EVENTS;
+        if (is_held && (!is_wild) && (!is_stuck)) {
+            t2 = drive_excess(state, memory, push, done, p);
+            net = t2.m0;
+            more = t2.m1;
+            if (more > 0.0) {
+                memory[WAY] = sign_of(net);
+                is_held = 0;
+                events += 1;
+            }
+        }
+        if (is_curved || is_curved_at_times) {
+            limit = drive_step_limit(state, memory, push, done, p);
+            limit = most(limit, length / MOST_STEPS);
+            if (limit < h) {
+                h = left / ceil(left / limit);
+            }
+        }
+        drive_advance(state, trial, memory, push, done, h, corner, is_held, kind, inputs, p);
+        is_turned = is_watched && (!is_held) && ((memory[WAY] * trial[V]) < 0.0);
+        event = -1;
+        if (is_turned) {
+            event = REVERSAL;
+        } else {
+            if (is_held && (!is_stuck)) {
+                more = drive_excess(trial, memory, push, done + h, p).m1;
+                event = (more > 0.0) ? LEAVING : (-1);
+            }
+        }
+        is_stuck = 0;
+        is_leaving = (event == LEAVING) && (!is_wild);
+        for (stage = 0; stage < 2; ++stage) {
+            if (stage == 1) {
+                event = -1;
+                if (has_edges) {
+                    there = drive_corner_of(trial, drive_value_of(push, DRIVE, done + h), p);
+                    event = (there.m0 != corner.m0) ? EDGE : (-1);
+                }
+            }
+            if ((event < 0) || is_wild) {
+                continue;
+            }
+            events += 1;
+            when = drive_time_of(event, state, trial, memory, push, done, h, corner, is_held, kind, inputs, p);
+            if ((when == 0.0) && (event == REVERSAL)) {
+                is_stuck = 1;
+                break;
+            }
+            if (event == EDGE) {
+                is_leaving = is_leaving && (when == h);
+                is_turned = is_turned && (when == h);
+                trial[V] = is_turned ? 0.0 : trial[V];
+            }
+            h = when;
+        }
+        if (is_stuck) {
+            state[V] = 0.0;
+            memory[WAY] = 0.0;
+            continue;
+        }
+        for (n = 0; n < N_STATE; ++n) {
+            state[n] = trial[n];
+        }
+        done = (h >= (left * (1.0 - 1e-12))) ? length : (done + h);
+        if (has_edges) {
+            corner = drive_corner_of(state, drive_value_of(push, DRIVE, done), p);
+        }
+        if (is_leaving) {
+            memory[WAY] = sign_of(drive_excess(state, memory, push, done, p).m0);
+        }
+        if (is_turned && is_wild) {
+            memory[WAY] = sign_of(state[V]);
+        } else {
+            if (is_turned) {
+                drive_stop(state, memory, push, done, p);
+            }
+        }
+    }
+}
+
+static double drive_extreme(double x0, double v0, double x1, double v1)
+{
+    double a = 0.0;
+    double b = 0.0;
+    double root = 0.0;
+    double half = 0.0;
+    double t = 0.0;
+    a = 3.0 * (((2.0 * (x0 - x1)) + v0) + v1);
+    b = 2.0 * (((3.0 * (x1 - x0)) - (2.0 * v0)) - v1);
+    root = sqrt(most((b * b) - ((4.0 * a) * v0), 0.0));
+    half = (-0.5) * (b + ((b >= 0.0) ? root : (-root)));
+    t = (half != 0.0) ? (v0 / half) : 0.5;
+    if (!((0.0 <= t) && (t <= 1.0))) {
+        t = (a != 0.0) ? (half / a) : 0.5;
+    }
+    t = least(most(t, 0.0), 1.0);
+    return x0 + (t * (v0 + (t * ((0.5 * b) + ((t * a) / 3.0)))));
+}

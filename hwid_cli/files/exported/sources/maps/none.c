@@ -1,0 +1,4 @@
+static double @side@_map(double v)
+{
+    return v;
+}

@@ -1,0 +1,1 @@
+"""Values of smooth maps, in an order of arithmetic that other programs can repeat."""

@@ -1,0 +1,112 @@
+import csv
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from hwid_cli import load_model, simulate
+from hwid_cli.cli.main import main
+from hwid_cli.files.exported.json_writer import write_json
+from tests.files.exported.model_examples import (
+    example_input,
+    example_model,
+    exported_of,
+)
+from tests.files.exported.test_json import exported_drive
+
+
+@pytest.fixture
+def model(tmp_path):
+    path = tmp_path / "m.json"
+    write_json(path, exported_of(example_model(1), input_range=(-9.0, 9.0)))
+    return path
+
+
+def write_input(path, u):
+    lines = [f"{n / 1000!r},{value!r}" for n, value in enumerate(u.tolist())]
+    path.write_text("\n".join(["time_s,current_A", *lines]) + "\n")
+    return path
+
+
+def predict(*arguments):
+    return CliRunner().invoke(main, ["predict", *map(str, arguments)])
+
+
+def predicted(path):
+    with path.open(newline="") as file:
+        return np.array([float(row["predicted"]) for row in csv.DictReader(file)])
+
+
+@pytest.mark.parametrize("start", ["fitted", "steady", "empty"])
+def test_a_prediction_is_what_simulate_gives(start, model, tmp_path):
+    u = example_input(1)
+    out = tmp_path / "deep" / "p.csv"
+    given = write_input(tmp_path / "u.csv", u)
+    result = predict(model, given, "--out", out, "--initial-state", start)
+    state = {"fitted": None, "steady": "steady", "empty": np.zeros(2)}[start]
+
+    assert result.exit_code == 0, result.output
+    assert result.stderr == ""
+    assert result.stdout == (
+        f"{out}: 400 samples of step_06/3/7; time in s, predicted in m\n"
+    )
+    expected = simulate(load_model(model), u, initial_state=state)
+    assert np.array_equal(predicted(out), expected)
+
+
+def test_prediction_csv_lies_here_unless_told(model, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    write_input(tmp_path / "u.csv", np.ones(3))
+
+    assert predict("m.json", "u.csv").exit_code == 0
+    assert (tmp_path / "prediction.csv").is_file()
+
+
+def test_a_scale_of_the_configuration_is_applied(tmp_path):
+    path = tmp_path / "m.json"
+    write_json(path, exported_of(example_model(1), input_scale=0.001))
+    u = example_input(1)
+    write_input(tmp_path / "u.csv", u)
+    out = tmp_path / "p.csv"
+    predict(path, tmp_path / "u.csv", "--out", out)
+
+    assert np.array_equal(predicted(out), simulate(load_model(path), u * 0.001))
+
+
+def test_an_input_beyond_the_data_is_warned_of_in_one_line(tmp_path):
+    path = tmp_path / "m.json"
+    write_json(path, exported_of(example_model(1), input_range=(-1.0, 1.0)))
+    given = write_input(tmp_path / "u.csv", np.array([0.0, 2.0, 0.5, -1.0]))
+    result = predict(path, given, "--out", tmp_path / "p.csv")
+
+    assert result.exit_code == 0
+    assert result.stderr == (
+        f"hwid: {given}: the input goes from -1 to 2 A; the model knows -1 to 1, so "
+        "25.0% of the samples are extrapolated\n"
+    )
+
+
+def test_a_simulation_predicts_too(tmp_path):
+    path = tmp_path / "s.json"
+    drive = exported_drive(effects={"coulomb_friction": {"force_N": 0.7}})
+    write_json(path, drive)
+    given = tmp_path / "u.csv"
+    given.write_text("t,u\n0,1\n0.001,1\n0.002,1\n")
+    out = tmp_path / "p.csv"
+
+    assert predict(path, given, "--out", out).exit_code == 0
+    assert np.allclose(predicted(out), 1e-3, rtol=1e-12)
+    result = predict(path, given, "--out", out, "--initial-state", "empty")
+    assert result.exit_code == 1
+    assert "starts at rest; expected steady" in result.stderr
+
+
+def test_a_fault_is_one_line_and_leaves_an_old_prediction(model, tmp_path):
+    out = tmp_path / "p.csv"
+    out.write_text("old")
+    result = predict(model, tmp_path / "no.csv", "--out", out)
+
+    assert result.exit_code == 1
+    assert result.stderr.count("\n") == 1
+    assert "no.csv: no such file" in result.stderr
+    assert out.read_text() == "old"
