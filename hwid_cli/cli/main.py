@@ -19,6 +19,7 @@ from hwid_cli.cli import (
     test,
 )
 from hwid_cli.errors import HwidError
+from hwid_cli.files.plain_text import escaped
 
 # What a disk or a folder may refuse, which is no fault of the program.
 _MENDABLE = (
@@ -27,6 +28,11 @@ _MENDABLE = (
     errno.EACCES,
     errno.EPERM,
     errno.EROFS,
+    errno.EIO,
+    errno.EISDIR,
+    errno.ENOTDIR,
+    errno.ENAMETOOLONG,
+    errno.ELOOP,
 )
 EXIT_ERROR, EXIT_INTERRUPTED = 1, 130
 
@@ -75,7 +81,8 @@ class _Commands(click.Group):
 
 
 def _complain(message: str) -> None:
-    click.echo(f"hwid: {' '.join(message.split())}", err=True)
+    # Names of files may hold what a terminal would obey.
+    click.echo(f"hwid: {escaped(' '.join(message.split()))}", err=True)
 
 
 def set_log_levels(*, verbose: bool, quiet: bool) -> None:

@@ -5,18 +5,28 @@ a struct or group), or a numbered column of one table, the ``variable``. MATLAB'
 version 7.3 files are HDF5 with every array transposed, which is undone here.
 """
 
+import warnings
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
+from zipfile import ZipFile
 
 import h5py
 import numpy as np
 import scipy.io
 
 from hwid_cli.errors import MeasurementError
+from hwid_cli.files.array_bounds import check_archive, check_dataset
 from hwid_cli.files.columns import ROLES, Column, FileColumns, array_column
+from hwid_cli.files.mat_structure import check_mat
 from hwid_cli.files.suggestions import did_you_mean
 from hwid_cli.records.experiment import Columns
+
+_MATLAB_NUMBERS = {
+    *(b"double", b"single", b"logical"),
+    *(b"int8", b"int16", b"int32", b"int64"),
+    *(b"uint8", b"uint16", b"uint32", b"uint64"),
+}
 
 # A file's variables by name; arrays are loaded only when they are asked for.
 _Load = Callable[[], Any]
@@ -42,7 +52,11 @@ def read_mat_columns(path: Path, columns: Columns) -> FileColumns:
     """
     if h5py.is_hdf5(path):
         return _from_hdf5(path, columns, is_transposed=True)
-    content = scipy.io.loadmat(path)
+    check_mat(path)
+    with warnings.catch_warnings():
+        # Such as two variables of one name: which one was meant?
+        warnings.simplefilter("error")
+        content = scipy.io.loadmat(path)
     variables: dict[str, _Load] = {}
     for name, value in content.items():
         if not name.startswith("__"):
@@ -75,6 +89,7 @@ def read_npz_columns(path: Path, columns: Columns) -> FileColumns:
                 f"{path}: holds a single array; expected an archive of named arrays; "
                 "save it with numpy.savez"
             )
+        check_archive(ZipFile(file))
         return _pick(path, columns, {name: _item(content, name) for name in content})
 
 
@@ -121,15 +136,22 @@ def _item(content: Any, name: str) -> _Load:
 
 def _dataset(dataset: h5py.Dataset, is_transposed: bool) -> _Load:
     def load() -> Any:
-        if is_transposed and dataset.attrs.get("MATLAB_class", b"double") in (
-            b"char",
-            b"cell",
-        ):
-            return np.array("text")
+        if is_transposed and not _is_matlab_array(dataset):
+            is_text = dataset.attrs.get("MATLAB_class") == b"char"
+            return np.array("text") if is_text else None
+        check_dataset(dataset)
+        if is_transposed and "MATLAB_empty" in dataset.attrs:
+            return np.zeros(0)
         values = dataset[()]
         return values.T if is_transposed and values.dtype.names is None else values
 
     return load
+
+
+def _is_matlab_array(dataset: h5py.Dataset) -> bool:
+    """Whether MATLAB stored numbers: objects and functions are stored as such too."""
+    kind = dataset.attrs.get("MATLAB_class", b"double")
+    return kind in _MATLAB_NUMBERS and "MATLAB_object_decode" not in dataset.attrs
 
 
 def _with_members(name: str, value: Any) -> dict[str, _Load]:

@@ -133,7 +133,11 @@ def _read_manifest(folder: Path) -> dict[str, Any]:
         and content.get("format") == _FORMAT
         and content.get("schema_version") == _SCHEMA_VERSION
     )
-    return content if is_known else {}
+    files = content.get("files") if is_known else None
+    # A file may say anything: only plain names of files lie in this folder.
+    if not isinstance(files, dict) or any(name != Path(name).name for name in files):
+        return {}
+    return content
 
 
 def _remove_left_over(folder: Path, old_files: Mapping[str, str], kept: set) -> None:
