@@ -19,6 +19,7 @@ from hwid_cli.errors import MeasurementError
 from hwid_cli.files.array_bounds import check_archive, check_dataset
 from hwid_cli.files.columns import ROLES, Column, FileColumns, array_column
 from hwid_cli.files.mat_structure import check_mat
+from hwid_cli.files.rehearsed_reading import rehearse
 from hwid_cli.files.suggestions import did_you_mean
 from hwid_cli.records.experiment import Columns
 
@@ -114,6 +115,11 @@ def read_h5_columns(path: Path, columns: Columns) -> FileColumns:
 
 
 def _from_hdf5(path: Path, columns: Columns, *, is_transposed: bool) -> FileColumns:
+    rehearse(lambda: _read_hdf5(path, columns, is_transposed=is_transposed))
+    return _read_hdf5(path, columns, is_transposed=is_transposed)
+
+
+def _read_hdf5(path: Path, columns: Columns, *, is_transposed: bool) -> FileColumns:
     separator = "." if is_transposed else "/"
     variables: dict[str, _Load] = {}
 

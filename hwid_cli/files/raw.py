@@ -126,7 +126,7 @@ def _read_manifest(folder: Path) -> dict[str, Any]:
     """What an earlier simulation wrote; empty if that cannot be told."""
     try:
         content = json.loads((folder / _MANIFEST_NAME).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+    except (OSError, RecursionError, ValueError):
         return {}
     is_known = (
         isinstance(content, dict)

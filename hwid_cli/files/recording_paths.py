@@ -7,10 +7,13 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 
 from hwid_cli.errors import ConfigError, MeasurementError
+from hwid_cli.files.plain_text import shown
 from hwid_cli.files.recording_kinds import PLAN_NAME
 from hwid_cli.records.experiment import Experiment, RecordingsOptions
 
 REAL_DATA_VARIABLE = "HWID_REALDATA"
+# Of a path in a message.
+_LONGEST_PATH = 400
 
 
 def recordings_base(experiment: Experiment, out: Path) -> Path:
@@ -104,8 +107,8 @@ def missing_files_message(experiment: Experiment, base: Path) -> str:
     else:
         step = "put the files there or correct recordings.files"
     return (
-        f"{experiment.source}: recordings.files: no file matches {pattern!r}; "
-        f"expected {full}; {step}"
+        f"{experiment.source}: recordings.files: no file matches {shown(pattern)}; "
+        f"expected {full[:_LONGEST_PATH]}; {step}"
     )
 
 

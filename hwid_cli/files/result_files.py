@@ -18,6 +18,7 @@ from hwid_cli import __version__
 from hwid_cli.errors import CacheError
 from hwid_cli.files.hdf5_values import read_array, write_array
 from hwid_cli.files.replaced_files import check_format, replaced_hdf5
+from hwid_cli.files.seals import check_seal, sealed, unsealed
 
 Result = TypeVar("Result")
 
@@ -86,6 +87,7 @@ def read_stage_key(path: Path, stage: str) -> str | None:
         None if there are no results of that stage, or none that can be read.
     """
     try:
+        check_seal(path)
         with h5py.File(path, "r") as file:
             group = file if stage == "calibrate" else file[stage]
             expected = CALIBRATED_FORMAT if stage == "calibrate" else RESULTS_FORMAT
@@ -146,13 +148,20 @@ def read_provenance(path: Path, stage: str) -> Provenance:
         stored = inner["versions"].attrs if "versions" in inner else {}
         return Provenance(
             key=str(group.attrs["key"]),
-            config=json.loads(str(read_array(inner, "config"))),
+            config=_config(str(read_array(inner, "config"))),
             inputs=dict(zip(names, hashes, strict=True)),
             seconds=float(inner.attrs.get("seconds", math.nan)),
             versions={str(name): str(number) for name, number in stored.items()},
         )
 
     return read_results(path, stage, read)
+
+
+def _config(text: str) -> dict[str, Any]:
+    config = json.loads(text)
+    if not isinstance(config, dict):
+        raise ValueError(f"the configuration is a {type(config).__name__}")
+    return config
 
 
 @contextmanager
@@ -182,6 +191,7 @@ def replaced_stage(
         format_name=RESULTS_FORMAT,
         version=SCHEMA_VERSION,
         start=_readable_bytes(path, stage),
+        seal=sealed,
     ) as file:
         if stage in file:
             # HDF5 gives the room to what is written before the file is closed.
@@ -199,7 +209,7 @@ def _readable_bytes(path: Path, stage: str) -> bytes:
         with _opened(path, stage) as file:
             # Damage below the root shows only where it is looked at.
             file.visititems(_look_at)
-            return path.read_bytes()
+            return unsealed(path.read_bytes())
     except CacheError:
         aside = path.with_name(f"{path.name}.bad")
         path.replace(aside)
@@ -257,10 +267,11 @@ def _opened(path: Path, stage: str) -> Iterator[h5py.File]:
     is_calibrated = stage == "calibrate"
     format_name = CALIBRATED_FORMAT if is_calibrated else RESULTS_FORMAT
     try:
+        check_seal(path)
         with h5py.File(path, "r") as file:
             check_format(file, format_name=format_name, version=SCHEMA_VERSION)
             yield file
-    except (KeyError, OSError, RuntimeError, TypeError, ValueError) as error:
+    except (LookupError, OSError, RuntimeError, TypeError, ValueError) as error:
         said = " ".join(str(error).split())
         raise CacheError(
             f"{path}: cannot be read ({said}); expected the results of {stage}; "

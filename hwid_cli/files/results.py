@@ -23,6 +23,7 @@ from hwid_cli.files.result_files import (
     replaced_stage,
     write_provenance,
 )
+from hwid_cli.files.seals import sealed
 from hwid_cli.records.experiment import OrdersOptions
 from hwid_cli.records.model import Fit
 from hwid_cli.records.recordings import CalibrationLog, Recording
@@ -69,7 +70,7 @@ def write_calibrated(
         If it cannot be written; an old file is untouched then.
     """
     with replaced_hdf5(
-        path, format_name=CALIBRATED_FORMAT, version=SCHEMA_VERSION
+        path, format_name=CALIBRATED_FORMAT, version=SCHEMA_VERSION, seal=sealed
     ) as file:
         write_provenance(file, provenance)
         names = [recording.name for recording in recordings]

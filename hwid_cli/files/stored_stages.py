@@ -4,6 +4,8 @@ from pathlib import Path
 
 import h5py
 
+from hwid_cli.files.seals import check_seal
+
 
 def has_left_results(path: Path, stage: str) -> bool:
     """Whether a stage has left results, be they readable or not.
@@ -23,6 +25,7 @@ def has_left_results(path: Path, stage: str) -> bool:
     if not path.exists():
         return False
     try:
+        check_seal(path)
         with h5py.File(path, "r") as file:
             return stage == "calibrate" or "format" not in file.attrs or stage in file
     except (KeyError, OSError, RuntimeError, ValueError):
