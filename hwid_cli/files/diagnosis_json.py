@@ -27,7 +27,7 @@ _FORMS: dict[str, type] = {
     "provenance": dict,
     "next_experiment": dict,
 }
-_WORDS = {list: "a list", dict: "an object"}
+_WORDS: dict[type, str] = {list: "a list", dict: "an object"}
 # Longer ones are no counts; as floats they can be shown.
 _MOST_DIGITS = 18
 
