@@ -10,7 +10,7 @@ RUN := $(VENV)/installed-run
 DEV := $(VENV)/installed-dev
 
 .DEFAULT_GOAL := help
-.PHONY: help install run test test-all check format smoke clean reliability \
+.PHONY: help install run test test-all check audit format smoke clean reliability \
         bench bench-campaign bench-growth bench-wide bench-real \
         simulate calibrate identify crossval group test-stage steps model1 model2 \
         reproduction thesis chapter2 hsm150 diagnose gun real effects drive-source export-check blind
@@ -51,6 +51,16 @@ check: $(DEV)  ## lint, format, types, import contracts
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+# Of what is installed, and of the lowest versions that pyproject.toml allows. Asks a
+# public list of known faults over the network, so it is no part of the tests.
+audit: $(DEV)  ## known faults of installed packages and of the lowest allowed versions
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check pip-audit
+	$(BIN)/pip-audit --local --skip-editable
+	$(BIN)/python -c 'import tomllib; project = tomllib.load(open("pyproject.toml", "rb")); \
+	  print(*(one.replace(">=", "==") for one in project["project"]["dependencies"]), sep="\n")' \
+	  > $(VENV)/lowest.txt
+	$(BIN)/pip-audit --no-deps --disable-pip --requirement $(VENV)/lowest.txt
 
 format: $(DEV)  ## put the code into form
 	$(BIN)/ruff check --fix

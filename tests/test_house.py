@@ -160,7 +160,16 @@ def test_tests_mirror_the_package():
         for path in TESTS
         if path.name.startswith("test_") and path.parent != PROJECT / "tests"
         if not (rooms / path.parent.relative_to(PROJECT / "tests")).is_dir()
-        if not {"benchmarks", "blind", "docs", "reference", "reliability"}
+        if not {
+            "bad_input",
+            "benchmarks",
+            "blind",
+            "docs",
+            "numerics",
+            "reference",
+            "reliability",
+            "security",
+        }
         & set(path.parts)
     ]
     assert strays == []

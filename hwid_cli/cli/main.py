@@ -26,6 +26,7 @@ from hwid_cli.cli import (
 from hwid_cli.cli.examples import add_examples
 from hwid_cli.cli.stopping import Stopped, stop_signals
 from hwid_cli.errors import HwidError
+from hwid_cli.files.plain_text import escaped
 
 # What a disk or a folder may refuse, which is no fault of the program.
 _MENDABLE = (
@@ -36,6 +37,10 @@ _MENDABLE = (
     errno.EROFS,
     errno.EIO,
     errno.ESTALE,
+    errno.EISDIR,
+    errno.ENOTDIR,
+    errno.ENAMETOOLONG,
+    errno.ELOOP,
 )
 EXIT_ERROR = 1
 
@@ -86,7 +91,8 @@ class _Commands(click.Group):
 
 
 def _complain(message: str) -> None:
-    click.echo(f"hwid: {' '.join(message.split())}", err=True)
+    # Names of files may hold what a terminal would obey.
+    click.echo(f"hwid: {escaped(' '.join(message.split()))}", err=True)
 
 
 def set_log_levels(*, verbose: bool, quiet: bool) -> None:

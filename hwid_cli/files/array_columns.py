@@ -5,23 +5,33 @@ a struct or group), or a numbered column of one table, the ``variable``. MATLAB'
 version 7.3 files are HDF5 with every array transposed, which is undone here.
 """
 
+import warnings
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
+from zipfile import ZipFile
 
 import h5py
 import numpy as np
 import scipy.io
 
 from hwid_cli.errors import MeasurementError
+from hwid_cli.files.array_bounds import check_archive, check_dataset
 from hwid_cli.files.columns import ROLES, Column, FileColumns, array_column
+from hwid_cli.files.mat_structure import check_mat
+from hwid_cli.files.rehearsed_reading import rehearse
 from hwid_cli.files.suggestions import did_you_mean
 from hwid_cli.records.experiment import Columns
-from hwid_cli.records.starter import FoundColumn
+
+_MATLAB_NUMBERS = {
+    *(b"double", b"single", b"logical"),
+    *(b"int8", b"int16", b"int32", b"int64"),
+    *(b"uint8", b"uint16", b"uint32", b"uint64"),
+}
 
 # A file's variables by name; arrays are loaded only when they are asked for.
-_Load = Callable[[], Any]
-_Variables = Mapping[str, _Load]
+Load = Callable[[], Any]
+_Variables = Mapping[str, Load]
 
 
 def read_mat_columns(path: Path, columns: Columns) -> FileColumns:
@@ -43,12 +53,33 @@ def read_mat_columns(path: Path, columns: Columns) -> FileColumns:
     """
     if h5py.is_hdf5(path):
         return _from_hdf5(path, columns, is_transposed=True)
-    return _pick(path, columns, _mat_variables(path))
+    return _pick(path, columns, mat_variables(path))
 
 
-def _mat_variables(path: Path) -> dict[str, _Load]:
-    variables: dict[str, _Load] = {}
-    for name, value in scipy.io.loadmat(path).items():
+def mat_variables(path: Path) -> dict[str, Load]:
+    """Variables of a MAT file up to version 7, members of structs included.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    dict of str to callable
+        Each gives its array.
+
+    Raises
+    ------
+    ValueError
+        If it holds what is no array of numbers, too much, or two of one name.
+    """
+    check_mat(path)
+    with warnings.catch_warnings():
+        # Such as two variables of one name: which one was meant?
+        warnings.simplefilter("error")
+        content = scipy.io.loadmat(path)
+    variables: dict[str, Load] = {}
+    for name, value in content.items():
         if not name.startswith("__"):
             variables.update(_with_members(name, value))
     return variables
@@ -73,13 +104,38 @@ def read_npz_columns(path: Path, columns: Columns) -> FileColumns:
     """
     # np.load does not close a file that it cannot read.
     with path.open("rb") as file:
-        content = np.load(file, allow_pickle=False)
-        if not isinstance(content, np.lib.npyio.NpzFile):
-            raise MeasurementError(
-                f"{path}: holds a single array; expected an archive of named arrays; "
-                "save it with numpy.savez"
-            )
-        return _pick(path, columns, {name: _item(content, name) for name in content})
+        return _pick(path, columns, npz_variables(path, file))
+
+
+def npz_variables(path: Path, file: BinaryIO) -> dict[str, Load]:
+    """Arrays of an open NPZ file by their names.
+
+    Parameters
+    ----------
+    path : Path
+        For messages.
+    file : binary file
+
+    Returns
+    -------
+    dict of str to callable
+        Each reads its array, as long as the file is open.
+
+    Raises
+    ------
+    MeasurementError
+        If it is no archive.
+    ValueError
+        If it unpacks to too much.
+    """
+    content = np.load(file, allow_pickle=False)
+    if not isinstance(content, np.lib.npyio.NpzFile):
+        raise MeasurementError(
+            f"{path}: holds a single array; expected an archive of named arrays; "
+            "save it with numpy.savez"
+        )
+    check_archive(ZipFile(file))
+    return {name: _item(content, name) for name in content}
 
 
 def read_h5_columns(path: Path, columns: Columns) -> FileColumns:
@@ -102,53 +158,33 @@ def read_h5_columns(path: Path, columns: Columns) -> FileColumns:
     return _from_hdf5(path, columns, is_transposed=False)
 
 
-def list_array_columns(path: Path) -> tuple[FoundColumn, ...]:
-    """List the columns of numbers in a MAT, NPZ or HDF5 file.
+def _from_hdf5(path: Path, columns: Columns, *, is_transposed: bool) -> FileColumns:
+    rehearse(lambda: _read_hdf5(path, columns, is_transposed=is_transposed))
+    return _read_hdf5(path, columns, is_transposed=is_transposed)
+
+
+def _read_hdf5(path: Path, columns: Columns, *, is_transposed: bool) -> FileColumns:
+    with h5py.File(path, "r") as file:
+        variables = hdf5_variables(file, is_transposed=is_transposed)
+        return _pick(path, columns, variables)
+
+
+def hdf5_variables(file: h5py.File, *, is_transposed: bool) -> dict[str, Load]:
+    """Data sets of an open HDF5 file by their paths.
 
     Parameters
     ----------
-    path : Path
+    file : h5py.File
+    is_transposed : bool
+        Whether MATLAB wrote it: columns come first, members are named with dots.
 
     Returns
     -------
-    tuple of FoundColumn
-        Vectors and single numbers by their names, and columns of tables by number.
+    dict of str to callable
+        Each reads its array.
     """
-    if h5py.is_hdf5(path):
-        with h5py.File(path, "r") as file:
-            is_mat = path.suffix.lower() == ".mat"
-            return _list(_hdf5_variables(file, is_mat))
-    if path.suffix.lower() == ".mat":
-        return _list(_mat_variables(path))
-    with np.load(path, allow_pickle=False) as content:
-        return _list({name: _item(content, name) for name in content})
-
-
-def _list(variables: _Variables) -> tuple[FoundColumn, ...]:
-    found = []
-    for name, load in variables.items():
-        values = np.asarray(load())
-        if values.dtype.kind not in "fiub" or values.size == 0:
-            continue
-        vector = np.squeeze(values)
-        if vector.ndim <= 1:
-            found.append(FoundColumn(name, name, np.atleast_1d(vector).astype(float)))
-        elif values.ndim == 2 and values.shape[0] > values.shape[1]:
-            found += [
-                FoundColumn("", number, values[:, number].astype(float), name)
-                for number in range(values.shape[1])
-            ]
-    return tuple(found)
-
-
-def _from_hdf5(path: Path, columns: Columns, *, is_transposed: bool) -> FileColumns:
-    with h5py.File(path, "r") as file:
-        return _pick(path, columns, _hdf5_variables(file, is_transposed))
-
-
-def _hdf5_variables(file: h5py.File, is_transposed: bool) -> dict[str, _Load]:
     separator = "." if is_transposed else "/"
-    variables: dict[str, _Load] = {}
+    variables: dict[str, Load] = {}
 
     def note(name: str, item: Any) -> None:
         if isinstance(item, h5py.Dataset) and not name.startswith("#"):
@@ -158,30 +194,37 @@ def _hdf5_variables(file: h5py.File, is_transposed: bool) -> dict[str, _Load]:
     return variables
 
 
-def _loader(value: Any) -> _Load:
+def _loader(value: Any) -> Load:
     return lambda: value
 
 
-def _item(content: Any, name: str) -> _Load:
+def _item(content: Any, name: str) -> Load:
     return lambda: content[name]
 
 
-def _dataset(dataset: h5py.Dataset, is_transposed: bool) -> _Load:
+def _dataset(dataset: h5py.Dataset, is_transposed: bool) -> Load:
     def load() -> Any:
-        if is_transposed and dataset.attrs.get("MATLAB_class", b"double") in (
-            b"char",
-            b"cell",
-        ):
-            return np.array("text")
+        if is_transposed and not _is_matlab_array(dataset):
+            is_text = dataset.attrs.get("MATLAB_class") == b"char"
+            return np.array("text") if is_text else None
+        check_dataset(dataset)
+        if is_transposed and "MATLAB_empty" in dataset.attrs:
+            return np.zeros(0)
         values = dataset[()]
         return values.T if is_transposed and values.dtype.names is None else values
 
     return load
 
 
-def _with_members(name: str, value: Any) -> dict[str, _Load]:
+def _is_matlab_array(dataset: h5py.Dataset) -> bool:
+    """Whether MATLAB stored numbers: objects and functions are stored as such too."""
+    kind = dataset.attrs.get("MATLAB_class", b"double")
+    return kind in _MATLAB_NUMBERS and "MATLAB_object_decode" not in dataset.attrs
+
+
+def _with_members(name: str, value: Any) -> dict[str, Load]:
     """A MATLAB variable, and all that lies inside if it is a struct."""
-    variables: dict[str, _Load] = {name: _loader(value)}
+    variables: dict[str, Load] = {name: _loader(value)}
     for member in getattr(getattr(value, "dtype", None), "names", None) or ():
         variables.update(_with_members(f"{name}.{member}", _member(value, member)))
     return variables

@@ -85,7 +85,10 @@ def array_column(title: str, values: np.ndarray) -> Column:
     -------
     Column
     """
-    return Column(title, np.asarray(values, np.float64), np.arange(values.size))
+    # What is too large for 64 bits becomes infinite and is refused by the checks.
+    with np.errstate(over="ignore"):
+        numbers = np.asarray(values, np.float64)
+    return Column(title, numbers, np.arange(values.size))
 
 
 def keep_rows(column: Column, selection: slice) -> Column:

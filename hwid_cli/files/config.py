@@ -9,8 +9,11 @@ from pathlib import Path
 from typing import Any
 
 from hwid_cli.errors import ConfigError
+from hwid_cli.files.config_bounds import MOST_ORDER
 from hwid_cli.files.config_checks import check_experiment
-from hwid_cli.files.config_fields import Place, Reader, build, convert
+from hwid_cli.files.config_fields import Reader, build, convert
+from hwid_cli.files.config_place import Place
+from hwid_cli.files.config_requirements import require
 from hwid_cli.files.own_functions import read_section
 from hwid_cli.records.experiment import (
     CrossvalOptions,
@@ -114,6 +117,8 @@ def _plain_data(value: Any) -> Any:
 def _read_orders_axis(value: Any, place: Place) -> tuple[int, ...]:
     """``[first, last]``, one order, or a list of three or more."""
     orders = convert(value, tuple[int, ...], place, readers={})
+    for number in orders:
+        require(number <= MOST_ORDER, str(place), number, f"orders <= {MOST_ORDER}")
     if len(orders) == 2:
         first, last = orders
         if first > last:

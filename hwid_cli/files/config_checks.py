@@ -3,11 +3,13 @@
 import math
 
 from hwid_cli.errors import ConfigError
+from hwid_cli.files.config_bounds import check_bounds
 from hwid_cli.files.config_requirements import (
     require,
     require_distinct,
     require_known,
 )
+from hwid_cli.files.plain_text import name_fault
 from hwid_cli.files.simulation_checks import check_simulation
 from hwid_cli.files.suggestions import did_you_mean
 from hwid_cli.records.experiment import (
@@ -47,6 +49,7 @@ def check_experiment(experiment: Experiment) -> None:
     """
     file = experiment.source
     _check_name(experiment.name, file)
+    check_bounds(experiment)
     if experiment.recordings is not None:
         _check_recordings(experiment.recordings, file)
     if experiment.calibrate is not None:
@@ -104,12 +107,11 @@ def _check_block(experiment: Experiment, file: str) -> None:
 
 
 def _check_name(name: str, file: str) -> None:
-    is_folder_name = bool(name) and name == name.strip() and name[0] != "."
     require(
-        is_folder_name and not set(name) & set('/\\:*?"<>|'),
+        not name_fault(name),
         f"{file}: name",
         name,
-        "a name that can be a folder (letters, digits, - and _)",
+        f"a name that can be a folder (letters, digits, - and _): {name_fault(name)}",
     )
 
 
@@ -145,9 +147,8 @@ def _check_recordings(options: RecordingsOptions, file: str) -> None:
 def _check_parts(options: RecordingsOptions, at: str) -> None:
     for name, bounds in options.parts.items():
         place = f"{at}.parts.{name}"
-        is_name = bool(name) and name == name.strip() and name[0] != "."
         require(
-            is_name and not set(name) & set('/\\:*?"<>|+'),
+            not name_fault(name) and "+" not in name,
             place,
             name,
             "a name of letters, digits, - and _",

@@ -4,55 +4,18 @@ The annotations of the dataclasses are the schema: a field added there is a key 
 configuration, with its type and default.
 """
 
-import math
 from collections.abc import Callable, Mapping
-from dataclasses import MISSING, Field, dataclass, fields, is_dataclass
+from dataclasses import MISSING, Field, fields, is_dataclass
 from types import NoneType, UnionType
 from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
 
 from hwid_cli.errors import ConfigError
+from hwid_cli.files.config_place import Place
+from hwid_cli.files.config_scalars import SCALARS, convert_scalar
+from hwid_cli.files.plain_text import shown
 from hwid_cli.files.suggestions import did_you_mean
 
 Record = TypeVar("Record")
-
-_SCALARS: dict[type, str] = {
-    str: "text",
-    bool: "true or false",
-    int: "an integer",
-    float: "a finite number",
-}
-
-
-@dataclass(frozen=True)
-class Place:
-    """Where in a configuration file a value stands.
-
-    Parameters
-    ----------
-    file : str
-    key : str
-        Dotted path of the key; empty at the top.
-    """
-
-    file: str
-    key: str = ""
-
-    def below(self, key: object) -> "Place":
-        """Give the place of a key inside this one.
-
-        Parameters
-        ----------
-        key : object
-
-        Returns
-        -------
-        Place
-        """
-        return Place(self.file, f"{self.key}.{key}" if self.key else str(key))
-
-    def __str__(self) -> str:
-        return f"{self.file}: {self.key}" if self.key else self.file
-
 
 # Reads one field in its own way: value and place in, checked value out.
 Reader = Callable[[Any, Place], Any]
@@ -92,7 +55,9 @@ def build(
     """
     content = {} if content is None else content
     if not isinstance(content, dict):
-        raise ConfigError(f"{place}: found {content!r}; expected a section with keys")
+        raise ConfigError(
+            f"{place}: found {shown(content)}; expected a section with keys"
+        )
     given = dict(given or {})
     # mypy has no public name for "a class that is a dataclass".
     schema = {field.name: field for field in fields(record_type)}  # type: ignore[arg-type]
@@ -150,7 +115,7 @@ def convert(
         return _convert_tuple(value, get_args(hint), place, readers)
     if origin is dict:
         return _convert_dict(value, get_args(hint)[1], place, readers)
-    return _convert_scalar(value, hint, place)
+    return convert_scalar(value, hint, place)
 
 
 def expected(hint: Any) -> str:
@@ -179,7 +144,7 @@ def expected(hint: Any) -> str:
         return f"a list (each {expected(args[0])})"
     if origin is dict or is_dataclass(hint):
         return "a section with keys"
-    return _SCALARS[hint]
+    return SCALARS[hint]
 
 
 def _require_default(field: Field, hint: Any, place: Place) -> None:
@@ -199,25 +164,6 @@ def _refusal(place: Place, error: ValueError, keys: list[str]) -> str:
     return f"{place}: {said}"
 
 
-def _convert_scalar(value: Any, hint: Any, place: Place) -> Any:
-    is_number = isinstance(value, int | float) and not isinstance(value, bool)
-    if hint is float and is_number and math.isfinite(value):
-        return float(value)
-    if hint is int and is_number and math.isfinite(value) and value == int(value):
-        return int(value)
-    if hint in (str, bool) and isinstance(value, hint):
-        return value
-    hint_to_quote = (
-        "; put it in quotes"
-        if hint is str and value is not None and not isinstance(value, list | dict)
-        else ""
-    )
-    found = "no value" if value is None else repr(value)
-    raise ConfigError(
-        f"{place}: found {found}; expected {_SCALARS[hint]}{hint_to_quote}"
-    )
-
-
 def _convert_tuple(
     value: Any,
     args: tuple[Any, ...],
@@ -225,7 +171,7 @@ def _convert_tuple(
     readers: Mapping[tuple[type, str], Reader],
 ) -> tuple[Any, ...]:
     if isinstance(value, dict) or value is None:
-        found = "no value" if value is None else repr(value)
+        found = "no value" if value is None else shown(value)
         raise ConfigError(
             f"{place}: found {found}; expected a list (each {expected(args[0])})"
         )
@@ -247,11 +193,13 @@ def _convert_dict(
 ) -> dict[str, Any]:
     value = {} if value is None else value
     if not isinstance(value, dict):
-        raise ConfigError(f"{place}: found {value!r}; expected a section with keys")
+        raise ConfigError(
+            f"{place}: found {shown(value)}; expected a section with keys"
+        )
     for key in value:
         if not isinstance(key, str):
             raise ConfigError(
-                f"{place.below(key)}: the key is {key!r}; expected text; "
+                f"{place.below(key)}: the key is {shown(key)}; expected text; "
                 "put it in quotes"
             )
     return {
@@ -280,7 +228,7 @@ def _convert_union(
     if len(others) == 1:
         return convert(value, others[0], place, readers=readers)
     words = " or ".join(expected(member) for member in others)
-    raise ConfigError(f"{place}: found {value!r}; expected {words}")
+    raise ConfigError(f"{place}: found {shown(value)}; expected {words}")
 
 
 def _is_of(value: Any, member: Any) -> bool:
@@ -288,7 +236,8 @@ def _is_of(value: Any, member: Any) -> bool:
     if isinstance(value, bool | str):
         return member is type(value)
     if isinstance(value, int | float):
-        return member is float or (member is int and float(value).is_integer())
+        is_whole = isinstance(value, int) or value.is_integer()
+        return member is float or (member is int and is_whole)
     return (isinstance(value, list) and get_origin(member) is tuple) or (
         isinstance(value, dict) and get_origin(member) is dict
     )
@@ -307,5 +256,5 @@ def _by_kind(value: Any, records: list[Any], place: Place) -> Any:
             f"{place.below('kind')}: missing; expected one of {', '.join(kinds)}"
         )
     raise ConfigError(
-        f"{place.below('kind')}: found {found!r}; {did_you_mean(found, kinds)}"
+        f"{place.below('kind')}: found {shown(found)}; {did_you_mean(found, kinds)}"
     )

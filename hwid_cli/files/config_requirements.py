@@ -4,6 +4,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from hwid_cli.errors import ConfigError
+from hwid_cli.files.plain_text import shown
 from hwid_cli.files.suggestions import did_you_mean
 
 
@@ -23,7 +24,7 @@ def require(holds: bool, place: str, found: object, expected: str) -> None:
     ConfigError
     """
     if not holds:
-        raise ConfigError(f"{place}: found {found!r}; expected {expected}")
+        raise ConfigError(f"{place}: found {shown(found)}; expected {expected}")
 
 
 def require_known(
@@ -45,7 +46,9 @@ def require_known(
     """
     for name in found:
         if name not in known:
-            raise ConfigError(f"{place}: found {name!r}; {did_you_mean(name, known)}")
+            raise ConfigError(
+                f"{place}: found {shown(name)}; {did_you_mean(name, known)}"
+            )
 
 
 def require_distinct(values: tuple[Any, ...], place: str) -> None:
@@ -62,9 +65,11 @@ def require_distinct(values: tuple[Any, ...], place: str) -> None:
     ConfigError
         For the first such value.
     """
+    seen = set()
     for value in values:
-        if values.count(value) > 1:
+        if value in seen:
             raise ConfigError(
-                f"{place}: {value!r} is listed twice; expected every value once; "
+                f"{place}: {shown(value)} is listed twice; expected every value once; "
                 "remove one"
             )
+        seen.add(value)

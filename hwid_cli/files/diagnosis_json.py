@@ -9,9 +9,27 @@ from pathlib import Path
 from typing import Any
 
 from hwid_cli.errors import CacheError
+from hwid_cli.files.plain_text import shown
 from hwid_cli.files.replaced_files import replace_file
 from hwid_cli.files.result_files import Provenance
 from hwid_cli.records.diagnosis import Diagnosis, FittedEffect, FittedParameter
+
+# What the report relies on; a value that is absent or null is not shown.
+_FORMS: dict[str, type] = {
+    "effects": list,
+    "ambiguous_with": list,
+    "not_observable": list,
+    "where": list,
+    "figures": list,
+    "gap": dict,
+    "gap.before": dict,
+    "gap.after": dict,
+    "provenance": dict,
+    "next_experiment": dict,
+}
+_WORDS: dict[type, str] = {list: "a list", dict: "an object"}
+# Longer ones are no counts; as floats they can be shown.
+_MOST_DIGITS = 18
 
 
 def read_diagnosis(path: Path) -> dict[str, Any] | None:
@@ -34,8 +52,8 @@ def read_diagnosis(path: Path) -> dict[str, Any] | None:
     if not path.is_file():
         return None
     try:
-        found = json.loads(path.read_text(encoding="utf-8"))
-    except ValueError as error:
+        found = json.loads(path.read_text(encoding="utf-8"), parse_int=_integer)
+    except (OSError, RecursionError, ValueError) as error:
         raise CacheError(
             f"{path}: cannot be read ({error}); expected the results of diagnose; run "
             "'hwid diagnose' again"
@@ -45,7 +63,49 @@ def read_diagnosis(path: Path) -> dict[str, Any] | None:
             f"{path}: holds a {type(found).__name__}; expected an object with the "
             "results of diagnose; run 'hwid diagnose' again"
         )
+    _check_forms(path, found)
     return found
+
+
+def _check_forms(path: Path, found: dict[str, Any]) -> None:
+    """Refuse what cannot have been written here; readers rely on these forms."""
+    for key, form in _FORMS.items():
+        value: Any = found
+        for name in key.split("."):
+            value = value.get(name) if isinstance(value, dict) else None
+        if value is not None and not isinstance(value, form):
+            raise CacheError(
+                f"{path}: {key}: found {shown(value)}; expected {_WORDS[form]} as "
+                "diagnose writes it; run 'hwid diagnose' again"
+            )
+    for number, effect in enumerate(found.get("effects") or ()):
+        parameters = effect.get("parameters", {}) if isinstance(effect, dict) else None
+        is_known = isinstance(parameters, dict) and all(
+            isinstance(one, dict) and isinstance(one.get("ci95") or [], list)
+            for one in parameters.values()
+        )
+        if not is_known:
+            raise CacheError(
+                f"{path}: effects.{number}: found {shown(effect)}; expected an object "
+                "with parameters as diagnose writes it; run 'hwid diagnose' again"
+            )
+    for one in found.get("ambiguous_with") or ():
+        if not isinstance(one, str | list):
+            raise CacheError(
+                f"{path}: ambiguous_with: found {shown(one)}; expected ids of effects, "
+                "or lists of them; run 'hwid diagnose' again"
+            )
+    for name in found.get("figures") or ():
+        # They are looked for in a folder, which a name must not leave.
+        if not isinstance(name, str) or name != Path(name).name:
+            raise CacheError(
+                f"{path}: figures: found {shown(name)}; expected names of files; run "
+                "'hwid diagnose' again"
+            )
+
+
+def _integer(digits: str) -> float:
+    return int(digits) if len(digits) <= _MOST_DIGITS else float(digits)
 
 
 def write_diagnosis_json(

@@ -8,8 +8,8 @@ import errno
 import json
 import logging
 import os
+import platform
 import re
-import socket
 import sys
 from collections.abc import Iterator
 from datetime import datetime
@@ -116,7 +116,7 @@ def _lock(file: IO[str], *, is_shared: bool) -> bool:
 def _sign(file: IO[str]) -> None:
     """Write who has the lock, for whoever is refused."""
     since = datetime.now().astimezone().isoformat(sep=" ", timespec="seconds")
-    owner = {"pid": os.getpid(), "host": socket.gethostname(), "since": since}
+    owner = {"pid": os.getpid(), "host": platform.node(), "since": since}
     try:
         # Past the buffer, which would try again when the file is closed.
         os.ftruncate(file.fileno(), 0)

@@ -5,6 +5,7 @@ cannot be read is set aside with the ending ``.bad``, counted and computed again
 may share a folder: an entry appears as a whole, and two of one key hold the same.
 """
 
+import errno
 import hashlib
 import logging
 from pathlib import Path
@@ -87,6 +88,9 @@ class Hdf5Store:
         """
         path = self._path(key)
         try:
+            if not path.is_file():
+                path.stat()
+                raise OSError(errno.EINVAL, "is no plain file")
             content = path.read_bytes()
         except FileNotFoundError:
             return None
@@ -97,6 +101,9 @@ class Hdf5Store:
             image = h5py.h5f.open_file_image(_unsealed(content))
             with h5py.File(image, "r") as file:
                 check_format(file, format_name=FORMAT, version=SCHEMA_VERSION)
+                if file.attrs.get("key") != key:
+                    # A copy under another name would be another task's result.
+                    raise ValueError("holds the result of another task")
                 found = file.attrs.get("record")
                 if found != record_type.__name__:
                     raise ValueError(f"holds a {found}, no {record_type.__name__}")

@@ -4,9 +4,13 @@ h5py's low-level calls are used where the type is known beforehand: they are thr
 times faster than ``group.attrs`` and a campaign reads thousands of records.
 """
 
+import math
+
 import h5py
 import numpy as np
 from h5py import h5a, h5d, h5s, h5t
+
+from hwid_cli.files.array_bounds import check_declared
 
 Scalar = str | bool | int | float
 
@@ -142,10 +146,13 @@ def read_array(group: h5py.Group, name: str) -> np.ndarray:
     ------
     KeyError
         If there is no such data set.
+    ValueError
+        If it unpacks to more than ``array_bounds.MOST_BYTES``.
     """
     dataset = h5d.open(group.id, name.encode())
     if h5py.check_string_dtype(dataset.dtype) is not None:
         return np.array(h5py.Dataset(dataset).asstr()[()], dtype=np.str_)
+    check_declared(name, math.prod(dataset.shape) * dataset.dtype.itemsize)
     values = np.zeros(dataset.shape, dtype=dataset.dtype)
     if values.size:
         dataset.read(h5s.ALL, h5s.ALL, values)

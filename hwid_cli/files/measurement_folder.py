@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from hwid_cli.errors import ConfigError
-from hwid_cli.files.array_columns import list_array_columns
+from hwid_cli.files.array_listing import list_array_columns
 from hwid_cli.files.csv_columns import list_csv_columns
 from hwid_cli.files.recording_formats import READERS
 from hwid_cli.files.recording_kinds import PLAN_NAME

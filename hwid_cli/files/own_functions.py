@@ -5,7 +5,8 @@ from pathlib import Path
 from typing import Any
 
 from hwid_cli.errors import ConfigError
-from hwid_cli.files.config_fields import Place
+from hwid_cli.files.config_place import Place
+from hwid_cli.files.plain_files import read_small_file
 from hwid_cli.files.suggestions import did_you_mean
 from hwid_cli.records.maps import OwnFunction
 
@@ -69,14 +70,14 @@ def read_own_function(path: Path, name: str, *, place: str = "") -> OwnFunction:
     """
     at = place or str(path)
     try:
-        source = Path(path).read_text(encoding="utf-8")
+        source = read_small_file(Path(path)).decode("utf-8")
         tree = ast.parse(source, str(path))
     except OSError as error:
         raise ConfigError(
             f"{at}: found {str(path)!r}, {error.strerror}; expected a Python file; "
             "paths are relative to the configuration"
         ) from error
-    except (UnicodeDecodeError, SyntaxError, ValueError) as error:
+    except (UnicodeDecodeError, SyntaxError, ValueError, RecursionError) as error:
         line = getattr(error, "lineno", None)
         where = f" in line {line}" if line else ""
         said = getattr(error, "msg", None) or str(error)

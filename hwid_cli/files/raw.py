@@ -126,14 +126,18 @@ def _read_manifest(folder: Path) -> dict[str, Any]:
     """What an earlier simulation wrote; empty if that cannot be told."""
     try:
         content = json.loads((folder / _MANIFEST_NAME).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+    except (OSError, RecursionError, ValueError):
         return {}
     is_known = (
         isinstance(content, dict)
         and content.get("format") == _FORMAT
         and content.get("schema_version") == _SCHEMA_VERSION
     )
-    return content if is_known else {}
+    files = content.get("files") if is_known else None
+    # A file may say anything: only plain names of files lie in this folder.
+    if not isinstance(files, dict) or any(name != Path(name).name for name in files):
+        return {}
+    return content
 
 
 def _remove_left_over(folder: Path, old_files: Mapping[str, str], kept: set) -> None:

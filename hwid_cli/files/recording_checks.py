@@ -7,11 +7,20 @@ import numpy as np
 
 from hwid_cli.errors import MeasurementError
 from hwid_cli.files.columns import Column, FileColumns, place_of
-from hwid_cli.records.experiment import CalibrateOptions, OrdersOptions
+from hwid_cli.files.plain_text import name_fault, shown
+from hwid_cli.records.experiment import (
+    CalibrateOptions,
+    OrdersOptions,
+    RecordingsOptions,
+)
 from hwid_cli.records.recordings import RawRecording
 
 # Samples that must remain beyond the largest orders, to estimate anything at all.
 SPARE_SAMPLES = 50
+# Sizes whose squares, and those of their ratios, still are numbers of 64 bits.
+_SMALLEST, _LARGEST = 1e-60, 1e60
+# A picosecond, faster than any sampler; and thirty years.
+_SHORTEST_S, _LONGEST_S = 1e-12, 1e9
 
 
 def check_numbers(path: Path, columns: FileColumns) -> None:
@@ -60,7 +69,7 @@ def check_excitation(path: Path, columns: FileColumns) -> None:
         If one of the two never changes.
     """
     for column in (columns.input, columns.output):
-        if np.ptp(column.values) == 0.0:
+        if np.min(column.values) == np.max(column.values):
             raise MeasurementError(
                 f"{path}: {column.title} is {column.values[0]:.9g} in all "
                 f"{column.values.size} rows; expected a signal that changes; name "
@@ -68,7 +77,56 @@ def check_excitation(path: Path, columns: FileColumns) -> None:
             )
 
 
-def check_length(path: Path, columns: FileColumns, orders: OrdersOptions) -> None:
+def check_sizes(path: Path, columns: FileColumns, options: RecordingsOptions) -> None:
+    """Refuse signals too large or too small to compute with.
+
+    Parameters
+    ----------
+    path : Path
+    columns : FileColumns
+    options : RecordingsOptions
+        ``input_scale`` and ``output_scale``.
+
+    Raises
+    ------
+    MeasurementError
+        If a scaled signal goes beyond 1e60, or spans less than 1e-60.
+    """
+    for role in ("input", "output"):
+        column, scale = getattr(columns, role), getattr(options, f"{role}_scale")
+        with np.errstate(over="ignore", under="ignore"):
+            scaled = column.values * scale
+            sizes = (float(np.max(np.abs(scaled))), float(np.ptp(scaled)))
+        if not _SMALLEST <= sizes[1] <= 2 * _LARGEST or sizes[0] > _LARGEST:
+            raise MeasurementError(
+                f"{path}: {column.title} reaches {sizes[0]:.3g} and spans "
+                f"{sizes[1]:.3g}; expected numbers up to {_LARGEST:g} that span at "
+                f"least {_SMALLEST:g}; choose a unit with recordings.{role}_scale"
+            )
+
+
+def check_clock(path: Path, step: float) -> None:
+    """Refuse a sample time that no instrument has.
+
+    Parameters
+    ----------
+    path : Path
+    step : float, [s]
+
+    Raises
+    ------
+    MeasurementError
+    """
+    if not _SHORTEST_S <= step <= _LONGEST_S:
+        raise MeasurementError(
+            f"{path}: has a sample time of {step:.3g} s; expected {_SHORTEST_S:g} to "
+            f"{_LONGEST_S:g} s; give time in seconds, or recordings.sample_time_s"
+        )
+
+
+def check_length(
+    path: Path, columns: FileColumns, orders: OrdersOptions, *, longest_delay: int = 0
+) -> None:
     """Refuse a recording too short for the largest orders.
 
     Parameters
@@ -76,20 +134,24 @@ def check_length(path: Path, columns: FileColumns, orders: OrdersOptions) -> Non
     path : Path
     columns : FileColumns
     orders : OrdersOptions
+    longest_delay : int, [samples]
+        That is tried beside those of the orders.
 
     Raises
     ------
     MeasurementError
-        If there are not more samples than ``max(nb) + max(nk) + nf`` plus
+        If there are not more samples than ``max(nb) + max(nk) + nf``, the delay and
         ``SPARE_SAMPLES``.
     """
     samples = min(columns.input.values.size, columns.output.values.size)
     least = max(orders.nb) + max(orders.nk) + (orders.nf or 0) + SPARE_SAMPLES
+    least += longest_delay
     if samples <= least:
+        delay = f" and a delay of {longest_delay}" if longest_delay else ""
         raise MeasurementError(
             f"{path}: has {samples} samples; expected more than {least} for orders up "
-            f"to nb {max(orders.nb)} and nk {max(orders.nk)}; use a longer recording "
-            "or lower orders"
+            f"to nb {max(orders.nb)} and nk {max(orders.nk)}{delay}; use a longer "
+            "recording or lower orders"
         )
 
 
@@ -144,6 +206,12 @@ def check_names(named: Sequence[tuple[Path, str]]) -> None:
     """
     first: dict[str, Path] = {}
     for path, name in named:
+        fault = name_fault(name)
+        if fault:
+            raise MeasurementError(
+                f"{path}: gives the recording name {shown(name)}; expected {fault}; "
+                "rename the file"
+            )
         if "+" in name:
             raise MeasurementError(
                 f"{path}: gives the recording name {name!r}; expected a name "

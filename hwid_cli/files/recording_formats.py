@@ -11,6 +11,7 @@ from hwid_cli.files.array_columns import (
 )
 from hwid_cli.files.columns import FileColumns
 from hwid_cli.files.csv_columns import read_csv_columns
+from hwid_cli.files.plain_text import escaped
 from hwid_cli.records.experiment import Columns
 
 READERS: dict[str, Callable[[Path, Columns], FileColumns]] = {
@@ -56,7 +57,7 @@ def read_columns(path: Path, columns: Columns) -> FileColumns:
         raise
     except Exception as error:
         # The readers of foreign formats raise whatever their parser stumbles on.
-        said = " ".join(str(error).split())[:120] or type(error).__name__
+        said = escaped(" ".join(str(error).split())[:120]) or type(error).__name__
         raise MeasurementError(
             f"{path}: cannot be read ({said}); expected a readable {path.suffix} file; "
             "export it again or leave it out"

@@ -1,11 +1,14 @@
 """Which kind a recording is: by the configuration's patterns, else by ``plan.csv``."""
 
 import csv
+import io
 from collections.abc import Mapping
 from fnmatch import fnmatchcase
 from pathlib import Path
 
 from hwid_cli.errors import MeasurementError
+from hwid_cli.files.plain_files import read_small_file
+from hwid_cli.files.plain_text import shown
 from hwid_cli.files.suggestions import did_you_mean
 from hwid_cli.records.recordings import KINDS
 
@@ -82,16 +85,22 @@ def read_plan(folder: Path) -> dict[str, str]:
     if not path.is_file():
         return {}
     kinds = {}
-    with path.open(encoding="utf-8-sig", errors="replace", newline="") as file:
-        reader = csv.DictReader(file)
+    try:
+        text = read_small_file(path).decode("utf-8-sig", errors="replace")
+        reader = csv.DictReader(io.StringIO(text, newline=""))
         if not {"name", "kind"} <= set(reader.fieldnames or ()):
             return {}
         for row in reader:
             kind = (row["kind"] or "").strip()
             if kind not in KINDS:
                 raise MeasurementError(
-                    f"{path}, row {reader.line_num}: the kind is {kind!r}; "
+                    f"{path}, row {reader.line_num}: the kind is {shown(kind)}; "
                     f"{did_you_mean(kind, KINDS)}"
                 )
             kinds[(row["name"] or "").strip()] = kind
+    except (OSError, csv.Error) as error:
+        raise MeasurementError(
+            f"{path}: cannot be read ({getattr(error, 'strerror', None) or error}); "
+            "expected a table with the columns name and kind; mend the file or remove it"
+        ) from error
     return kinds

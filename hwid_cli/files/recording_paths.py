@@ -7,10 +7,13 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 
 from hwid_cli.errors import ConfigError, MeasurementError
+from hwid_cli.files.plain_text import shown
 from hwid_cli.files.recording_kinds import PLAN_NAME
 from hwid_cli.records.experiment import Experiment, RecordingsOptions
 
 REAL_DATA_VARIABLE = "HWID_REALDATA"
+# Of a path in a message.
+_LONGEST_PATH = 400
 
 
 def recordings_base(experiment: Experiment, out: Path) -> Path:
@@ -104,8 +107,8 @@ def missing_files_message(experiment: Experiment, base: Path) -> str:
     else:
         step = "put the files there or correct recordings.files"
     return (
-        f"{experiment.source}: recordings.files: no file matches {pattern!r}; "
-        f"expected {full}; {step}"
+        f"{experiment.source}: recordings.files: no file matches {shown(pattern)}; "
+        f"expected {full[:_LONGEST_PATH]}; {step}"
     )
 
 
@@ -139,10 +142,19 @@ def _matches(pattern: str, experiment: Experiment, base: Path) -> list[Path]:
     # Path.glob refuses absolute patterns.
     found = glob.glob(expanded, root_dir=base, recursive=True)  # noqa: PTH207
     plain = _readable(expanded)
-    if not found and (base / plain).is_file():
+    if not found and _is_file(base / plain):
         found = [plain]
-    paths = [_short(base / match) for match in found]
-    return [path for path in paths if path.is_file() and path.name != PLAN_NAME]
+    paths = [base / match for match in found]
+    return [_short(path) for path in paths if _is_file(path) and path.name != PLAN_NAME]
+
+
+def _is_file(path: Path) -> bool:
+    """Whether a path is a plain file: no folder, no pipe, no device."""
+    try:
+        return path.is_file()
+    except OSError:
+        # Such as a name that is too long; some folders may not be looked into.
+        return False
 
 
 def _is_excluded(path: Path, options: RecordingsOptions) -> bool:

@@ -110,12 +110,15 @@ def read_part(
     columns = cut_part(columns, part)
     checks.check_numbers(place, columns)
     columns, step = sample_uniformly(place, columns, options)
+    checks.check_clock(place, step)
     columns = with_each(columns, lambda one: block_means(one, options.average))
     checks.check_equal_lengths(
         place, columns, kind, experiment.calibrate or CalibrateOptions()
     )
-    checks.check_length(place, columns, experiment.orders)
+    delay = max(experiment.fit.delays, default=0)
+    checks.check_length(place, columns, experiment.orders, longest_delay=delay)
     checks.check_excitation(place, columns)
+    checks.check_sizes(place, columns, options)
     _log.debug("%s: %s, %d samples", place, kind, columns.input.values.size)
     reference = columns.reference
     return RawRecording(

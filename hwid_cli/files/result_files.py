@@ -147,13 +147,20 @@ def read_provenance(path: Path, stage: str) -> Provenance:
         stored = inner["versions"].attrs if "versions" in inner else {}
         return Provenance(
             key=str(group.attrs["key"]),
-            config=json.loads(str(read_array(inner, "config"))),
+            config=_config(str(read_array(inner, "config"))),
             inputs=dict(zip(names, hashes, strict=True)),
             seconds=float(inner.attrs.get("seconds", math.nan)),
             versions={str(name): str(number) for name, number in stored.items()},
         )
 
     return read_results(path, stage, read)
+
+
+def _config(text: str) -> dict[str, Any]:
+    config = json.loads(text)
+    if not isinstance(config, dict):
+        raise ValueError(f"the configuration is a {type(config).__name__}")
+    return config
 
 
 @contextmanager
@@ -267,6 +274,8 @@ def _opened(path: Path, stage: str) -> Iterator[h5py.File]:
     is_calibrated = stage == "calibrate"
     format_name = CALIBRATED_FORMAT if is_calibrated else RESULTS_FORMAT
     try:
+        if not path.is_file():
+            raise ValueError("it is no plain file")
         content = path.read_bytes()
         unsealed(content)
         with h5py.File(path, "r") as file:
@@ -275,7 +284,7 @@ def _opened(path: Path, stage: str) -> Iterator[h5py.File]:
                 raise ValueError("its checksum is gone: cut off, or changed since")
             del content
             yield file
-    except (KeyError, OSError, RuntimeError, TypeError, ValueError) as error:
+    except (LookupError, OSError, RuntimeError, TypeError, ValueError) as error:
         said = " ".join(str(error).split())
         raise CacheError(
             f"{path}: cannot be read ({said}); expected the results of {stage}; "

@@ -4,6 +4,8 @@ from pathlib import Path
 
 import h5py
 
+from hwid_cli.files.seals import unsealed
+
 
 def has_left_results(path: Path, stage: str) -> bool:
     """Whether a stage has left results, be they readable or not.
@@ -22,7 +24,10 @@ def has_left_results(path: Path, stage: str) -> bool:
     """
     if not path.exists():
         return False
+    if not path.is_file():
+        return True
     try:
+        unsealed(path.read_bytes())
         with h5py.File(path, "r") as file:
             return stage == "calibrate" or "format" not in file.attrs or stage in file
     except (KeyError, OSError, RuntimeError, ValueError):

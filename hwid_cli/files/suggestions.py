@@ -3,9 +3,13 @@
 from collections.abc import Iterable
 from difflib import get_close_matches
 
+from hwid_cli.files.plain_text import escaped
+
 # Below this likeness a suggestion misleads more often than it helps.
 _LIKENESS = 0.6
 _LISTED = 12
+# Longer names are cut: a message is one line to read.
+_LONGEST = 60
 
 
 def did_you_mean(found: object, known: Iterable[object]) -> str:
@@ -32,12 +36,17 @@ def did_you_mean(found: object, known: Iterable[object]) -> str:
     >>> did_you_mean("voltage", [])
     'expected none'
     """
-    names = [str(name) for name in known]
+    names = [_short(str(name)) for name in known]
     folded = {name.casefold(): name for name in reversed(names)}
-    close = get_close_matches(str(found).casefold(), folded, n=1, cutoff=_LIKENESS)
+    wanted = _short(str(found)).casefold()
+    close = get_close_matches(wanted, folded, n=1, cutoff=_LIKENESS)
     if close:
         return f"did you mean {folded[close[0]]!r}?"
     if not names:
         return "expected none"
     more = f" and {len(names) - _LISTED} more" if len(names) > _LISTED else ""
     return f"expected one of {', '.join(names[:_LISTED])}{more}"
+
+
+def _short(name: str) -> str:
+    return escaped(name if len(name) <= _LONGEST else f"{name[: _LONGEST - 3]}...")

@@ -2,8 +2,8 @@
 
 Every fault is one line with its place.
 
-Stricter than ``yaml.safe_load`` where it would be silently wrong: a key that is given
-twice is an error, and ``1e-3`` is a number as in YAML 1.2, not text.
+As safe as ``yaml.safe_load``, and stricter where that would be silently wrong: a key
+that is given twice is an error, and ``1e-3`` is a number as in YAML 1.2, not text.
 """
 
 import re
@@ -13,12 +13,21 @@ from typing import Any
 import yaml
 
 from hwid_cli.errors import ConfigError
+from hwid_cli.files.plain_files import read_small_file
+from hwid_cli.files.yaml_nodes import count_values
 
 _EXPONENT_WITHOUT_POINT = re.compile(r"^[-+]?(?:\d+\.?\d*|\.\d+)[eE][-+]?\d+$")
 
 
 class _StrictLoader(yaml.SafeLoader):
-    """Safe loader that refuses repeated keys."""
+    """Safe loader that refuses repeated keys, and knows where it is."""
+
+    building = 0
+
+    def construct_object(self, node: yaml.Node, deep: bool = False) -> Any:
+        """Build a value, and remember its line for a message."""
+        self.building = node.start_mark.line + 1
+        return super().construct_object(node, deep=deep)
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict:
         """Build a dict; raise where a key is repeated before merges are resolved."""
@@ -96,20 +105,19 @@ def read_yaml(path: Path) -> dict[Any, Any]:
         mapping.
     """
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        text = read_small_file(path).decode("utf-8-sig")
     except FileNotFoundError:
         raise ConfigError(
             f"{path}: no such file; expected a YAML file that describes an experiment; "
             "check the path"
         ) from None
     except (OSError, UnicodeDecodeError) as error:
+        said = getattr(error, "strerror", None) or error
         raise ConfigError(
-            f"{path}: cannot be read ({error}); expected a YAML file in UTF-8"
+            f"{path}: cannot be read ({said}); expected a YAML file in UTF-8; check the "
+            "path, or save the file again"
         ) from None
-    try:
-        content = yaml.load(text, Loader=_StrictLoader)
-    except yaml.YAMLError as error:
-        raise ConfigError(_one_line(path, error)) from None
+    content = _content(path, text)
     if not isinstance(content, dict):
         found = "nothing" if content is None else f"a {type(content).__name__}"
         raise ConfigError(
@@ -117,6 +125,35 @@ def read_yaml(path: Path) -> dict[Any, Any]:
             "'recordings:'; see configs/README.md"
         )
     return content
+
+
+def _content(path: Path, text: str) -> Any:
+    """What the text holds; every fault of text or values is one line."""
+    loader = None
+    try:
+        loader = _StrictLoader(text)
+        node = loader.get_single_node()
+        if node is None:
+            return None
+        count_values(node)
+        return loader.construct_document(node)
+    except yaml.YAMLError as error:
+        raise ConfigError(_one_line(path, error)) from None
+    except RecursionError:
+        raise ConfigError(
+            f"{path}: is nested too deeply; expected a few levels of sections; look for "
+            "brackets that are not closed"
+        ) from None
+    except (ArithmeticError, AttributeError, LookupError, ValueError) as error:
+        # What PyYAML stumbles on where a value is not what its tag or look says.
+        line = loader.building if loader else 0
+        raise ConfigError(
+            f"{path}, line {line}: holds a value that cannot be read ({error}); "
+            "expected plain numbers and text; put text in quotes"
+        ) from None
+    finally:
+        if loader is not None:
+            loader.dispose()
 
 
 def _one_line(path: Path, error: yaml.YAMLError) -> str:

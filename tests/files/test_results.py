@@ -1,5 +1,4 @@
 import json
-from dataclasses import replace
 from pathlib import Path
 
 import h5py
@@ -9,8 +8,6 @@ import pytest
 from hwid_cli import __version__
 from hwid_cli.errors import CacheError
 from hwid_cli.files.result_files import (
-    current_versions,
-    read_provenance,
     read_stage_key,
 )
 from hwid_cli.files.results import (
@@ -23,44 +20,13 @@ from hwid_cli.files.results import (
     write_fits,
 )
 from hwid_cli.records.experiment import OrdersOptions
-from hwid_cli.records.recordings import CalibrationLog, Recording
-from hwid_cli.records.results import CrossValidation
 from tests.files.record_examples import assert_same, example_fit, failed_fit
-
-PROVENANCE = Provenance(
-    key="k1", config={"name": "tiny", "orders": {"nb": [1, 2]}}, inputs={"r10": "ff"}
-)
+from tests.files.result_examples import PROVENANCE, crossval, logs, recordings
 
 
 @pytest.fixture
 def path(tmp_path):
     return tmp_path / "out" / "results.h5"
-
-
-def recordings():
-    rng = np.random.default_rng(1)
-    return tuple(
-        Recording(name, rng.normal(size=9), rng.normal(size=9), 0.001, "sine", "ff")
-        for name in ("r2", "r10", "r1.5 µ")
-    )
-
-
-def logs():
-    return tuple(
-        CalibrationLog(r.name, ("cut",), 3, 9, 15, 14, 0.1, 0.2, 7.5, (4,), ())
-        for r in recordings()
-    )
-
-
-def crossval(unit="m"):
-    rng = np.random.default_rng(2)
-    rmsd = rng.normal(size=(2, 3, 1, 4)) ** 2
-    rmsd[0, 1, 0, 2] = np.nan
-    status = np.where(np.isnan(rmsd), "not finite", "ok")
-    names = ("step_2", "step_10", "µ", "step_2+step_10")
-    return CrossValidation(
-        names[:2], (1, 2, 5), (3,), "poles", names, rmsd, status, unit, 0.01
-    )
 
 
 def write_all(path):
@@ -271,49 +237,6 @@ def test_nothing_to_write_comes_back_as_nothing(path):
     assert read_fits(path) == ()
     write_calibrated(path, [], [], PROVENANCE)
     assert read_calibrated(path).recordings == ()
-
-
-def test_provenance_comes_back_with_seconds_and_versions(path):
-    origin = Provenance(
-        "k1", {"name": "a"}, {"r2": "ff", "r10": ""}, 12.5, {"h5py": "3"}
-    )
-    write_crossval(path, crossval(), origin)
-
-    assert read_provenance(path, "crossval") == origin
-
-
-def test_provenance_of_calibrated_recordings_comes_back(path):
-    write_calibrated(path, recordings(), logs(), replace(PROVENANCE, seconds=0.5))
-
-    found = read_provenance(path, "calibrate")
-    assert (found.key, found.seconds, found.inputs) == ("k1", 0.5, {"r10": "ff"})
-
-
-def test_provenance_of_an_older_program_has_unknown_seconds_and_no_versions(path):
-    write_crossval(path, crossval(), replace(PROVENANCE, seconds=3.0))
-    with h5py.File(path, "r+") as file:
-        del file["crossval/provenance"].attrs["seconds"]
-        del file["crossval/provenance/versions"]
-        del file.attrs["sealed"]
-
-    found = read_provenance(path, "crossval")
-    assert np.isnan(found.seconds)
-    assert found.versions == {}
-    assert found.config == PROVENANCE.config
-
-
-def test_a_missing_stage_has_no_provenance(path):
-    write_crossval(path, crossval(), PROVENANCE)
-
-    with pytest.raises(CacheError, match="run 'hwid identify'"):
-        read_provenance(path, "identify")
-
-
-def test_versions_name_the_program_and_what_computes():
-    versions = current_versions()
-
-    assert versions["hwid"] == __version__
-    assert set(versions) == {"hwid", "python", "numpy", "scipy", "numba", "h5py"}
 
 
 def test_results_with_damaged_inner_parts_are_set_aside_too(path, caplog):

@@ -44,6 +44,9 @@ def c_source(exported: ExportedModel) -> str:
     """
     model = exported.model
     orders, free = model.orders, model.free_response
+    # The recursion takes four coefficients at a time.
+    size_f = 4 * max(1, -(-orders.nf // 4))
+    missing = np.zeros(size_f - orders.nf)
     return filled(
         "model.c",
         {
@@ -52,15 +55,13 @@ def c_source(exported: ExportedModel) -> str:
             "input_map": _map("input", model.input_map, exported.input_bends),
             "output_map": _map("output", model.output_map, exported.output_bends),
             "nb": orders.nb,
-            "nf": orders.nf,
             "nk": orders.nk,
             "size_w": orders.nb + orders.nk,
-            "size_f": max(orders.nf, 1),
-            "size_a": orders.nf + 1,
+            "size_f": size_f,
             "size_c": max(free.size, 1),
             "n_free": free.size,
             "numerator": numbers(model.numerator),
-            "denominator": numbers(model.denominator),
+            "denominator": numbers(np.append(model.denominator[1:], missing)),
             "free_response": numbers(free if free.size else np.zeros(1)),
             "static_gain": number(exported.static_gain),
             "is_steady": int(model.initial_state == "steady"),

@@ -17,7 +17,7 @@ from hwid_cli.maths.model.contained import contains, enlarged
 from hwid_cli.maths.model.delays import starts_of_delays
 from hwid_cli.maths.model.levenberg_marquardt import Search
 from hwid_cli.maths.model.linear_block import filtered, is_stable, reflected
-from hwid_cli.maths.model.normalise import rescaled
+from hwid_cli.maths.model.normalise import normalise, rescaled
 from hwid_cli.maths.model.problem import Problem
 from hwid_cli.maths.model.regression.least_squares import LARGEST_RADIUS
 from hwid_cli.maths.model.robust import rejudged, renewed, winsorised
@@ -122,8 +122,13 @@ def contained_candidates(
         at = next((one for one in tried if contains(one, model.orders)), None)
         if at is None:
             continue
+        # The gain that the blocks share is fixed anew: in the units of the recordings it
+        # would make the search's steps depend on those units.
         larger = enlarged(
-            rescaled(model, 1.0 / problem.input_scale, 1.0 / problem.output_scale), at
+            normalise(
+                rescaled(model, 1.0 / problem.input_scale, 1.0 / problem.output_scale)
+            ),
+            at,
         )
         n_state = at.n_state if options.initial_state == "estimated" else 0
         states = np.zeros((count, n_state))
@@ -159,6 +164,8 @@ def member_models(
         if not is_stable(model.denominator):
             continue
         one = rescaled(model, 1.0 / problem.input_scale, 1.0 / problem.output_scale)
+        if not options.keeps_block:
+            one = normalise(one)
         numerator, denominator = one.numerator, one.denominator
         if options.keeps_block and options.linear_block is not None:
             numerator = np.array(options.linear_block.numerator)

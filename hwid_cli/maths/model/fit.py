@@ -34,6 +34,8 @@ from hwid_cli.records.model import Fit, FitOptions, HammersteinWiener, Orders
 from hwid_cli.records.recordings import Recording
 
 _DEFAULTS = FitOptions()
+# Sizes whose squares, and those of their ratios, still are numbers of 64 bits.
+_SMALLEST, _LARGEST = 1e-60, 1e60
 
 
 def fit(
@@ -221,12 +223,16 @@ def _reason_not_to_fit(
     needed = _least_parameters(orders, options) + orders.n_state
     if total <= needed:
         return f"{total} samples cannot determine a model that needs more than {needed}"
-    inputs = np.concatenate([one.input for one in recordings])
-    if np.ptp(inputs) == 0.0:
-        return f"the input is constant at {inputs[0]:g}"
-    outputs = np.concatenate([one.output for one in recordings])
-    if np.ptp(outputs) == 0.0:
-        return f"the output is constant at {outputs[0]:g}"
+    for side in ("input", "output"):
+        signal = np.concatenate([getattr(one, side) for one in recordings])
+        largest = float(np.max(np.abs(signal)))
+        if largest > _LARGEST:
+            return f"the {side} reaches {largest:.3g}, beyond {_LARGEST:g}"
+        span = float(np.ptp(signal))
+        if span == 0.0:
+            return f"the {side} is constant at {signal[0]:g}"
+        if span < _SMALLEST:
+            return f"the {side} spans {span:.3g}, less than {_SMALLEST:g}"
     return ""
 
 

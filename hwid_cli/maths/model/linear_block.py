@@ -93,8 +93,9 @@ def static_gain(numerator: np.ndarray, denominator: np.ndarray) -> float:
     -------
     float, [-]
     """
-    below = float(denominator.sum())
-    return float(numerator.sum()) / below if below != 0.0 else float("inf")
+    # Term by term, as the compiled recursion does: numpy adds long arrays in blocks.
+    below = sum(denominator.tolist())
+    return sum(numerator.tolist()) / below if below != 0.0 else float("inf")
 
 
 def poles(denominator: np.ndarray) -> np.ndarray:

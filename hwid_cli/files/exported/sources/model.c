@@ -42,9 +42,10 @@ double HWID_NAME(step)(HWID_NAME(state) *state, double u);
 
 @input_map@
 @output_map@
-/* B in q^-@nk@ ..., F in q^0 ..., and the response to the initial state. */
+/* B in q^-@nk@ ..., F in q^-1 ... filled up with zeros, and the response to the initial
+ * state. */
 static const double numerator[@nb@] = {@numerator@};
-static const double denominator[@size_a@] = {@denominator@};
+static const double denominator[@size_f@] = {@denominator@};
 static const double free_response[@size_c@] = {@free_response@};
 static const double static_gain = @static_gain@;
 
@@ -52,19 +53,20 @@ static const double static_gain = @static_gain@;
 static double recursion(double value, double *past)
 {
     int j;
-    for (j = 0; j < @nf@; ++j) {
-        value -= denominator[j + 1] * past[j];
+    /* In the order of 'hwid predict', so that the last bit is the same. */
+    for (j = @size_f@ - 4; j >= 0; j -= 4) {
+        value -= denominator[j + 3] * past[j + 3] + denominator[j + 2] * past[j + 2];
+        value -= denominator[j + 1] * past[j + 1];
+        value -= denominator[j] * past[j];
     }
     /* What has died away is zero: subnormal numbers are slow. */
     if (fabs(value) < 1e-200) {
         value = 0.0;
     }
-    for (j = @nf@ - 1; j > 0; --j) {
+    for (j = @size_f@ - 1; j > 0; --j) {
         past[j] = past[j - 1];
     }
-    if (@nf@ > 0) {
-        past[0] = value;
-    }
+    past[0] = value;
     return value;
 }
 
