@@ -295,7 +295,6 @@ def test_provenance_of_an_older_program_has_unknown_seconds_and_no_versions(path
         del file["crossval/provenance"].attrs["seconds"]
         del file["crossval/provenance/versions"]
         del file.attrs["sealed"]
-
     found = read_provenance(path, "crossval")
     assert np.isnan(found.seconds)
     assert found.versions == {}
