@@ -70,6 +70,8 @@ def test_results_that_lack_a_part_come_back_from_the_cache(grouped, hwid, out):
     before = (out / "groups.csv").read_bytes()
     with h5py.File(out / "results.h5", "a") as file:
         del file["group/rmsd"]
+        # As of a version without checksums: with one, nothing in the file is believed.
+        del file.attrs["sealed"]
     result = hwid("group")
 
     assert result.exit_code == 0, result.output

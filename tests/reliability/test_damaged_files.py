@@ -86,6 +86,20 @@ def test_damaged_results_come_back_from_the_cache(run, out, undisturbed, name, d
     harness.assert_readable(out)
 
 
+def test_one_bit_of_a_number_that_hdf5_cannot_notice_is_not_believed(
+    run, out, undisturbed
+):
+    path = out / "results.h5"
+    content = bytearray(path.read_bytes())
+    content[content.index(harness.results(undisturbed)["test/rmsd"]) + 3] ^= 1
+    path.write_bytes(content)
+    assert harness.results(out) != harness.results(undisturbed)
+    done = run()
+
+    assert "results.h5: cannot be read; set aside as results.h5.bad" in done.stderr
+    assert harness.results(out) == harness.results(undisturbed)
+
+
 @pytest.mark.slow
 def test_a_changed_number_in_the_results_is_not_shown(run, out):
     path = out / "results.h5"

@@ -65,6 +65,8 @@ def test_an_error_at_each_write_in_turn(small, tmp_path, whole):
     for number in range(1, len(whole[1]) + 1):
         codes.append(check_fault(small, out, number, whole))
         shutil.rmtree(out)
+        sys.stdout.write(f"\r{number} of {len(whole[1])} writes")
+        sys.stdout.flush()
     sys.stdout.write(
         f"\n{len(codes)} writes failed in turn, {codes.count(0)} of no consequence\n"
     )
