@@ -7,8 +7,9 @@ from pathlib import Path
 from docs.reproduction_here import Results
 from hwid_cli.files.final_test_results import read_final_test
 from hwid_cli.files.group_results import read_group
-from hwid_cli.files.result_files import Provenance, read_provenance, read_stage_key
+from hwid_cli.files.result_files import Provenance, read_provenance
 from hwid_cli.files.results import read_crossval, read_fits
+from hwid_cli.files.stored_stages import has_left_results
 from hwid_cli.records.groups import FinalTest, GroupSearch
 
 STAGES = ("identify", "crossval", "group", "test")
@@ -96,7 +97,7 @@ def has(path: Path, stage: str) -> bool:
     -------
     bool
     """
-    return read_stage_key(path, stage) is not None
+    return has_left_results(path, stage)
 
 
 def _group(path: Path) -> GroupSearch | None:

@@ -1,9 +1,9 @@
 """Two runs at once: never on one folder of results, as many as one likes on a cache."""
 
 import os
+import platform
 import re
 import shutil
-import socket
 
 import pytest
 
@@ -19,7 +19,7 @@ def test_the_second_run_on_a_folder_is_refused_in_one_line(config, out):
         done = harness.run_here(config, out, code=1)
 
         assert re.fullmatch(
-            rf"hwid: {out}: in use by process {os.getpid()} on {socket.gethostname()} "
+            rf"hwid: {out}: in use by process {os.getpid()} on {platform.node()} "
             r"since 2\d{3}-.*; expected one run at a time on a folder of results; wait "
             r"until that one has ended or stop it, or choose another folder with --out\n",
             done.stderr,
