@@ -43,7 +43,7 @@ test: $(DEV)  ## fast tests
 test-all: $(DEV)  ## all tests, also the slow ones
 	$(BIN)/python -m pytest --quiet --numprocesses auto -m ''
 
-reliability: $(DEV)  ## kills, full disks, torn files, errors at every write: twenty minutes
+reliability: $(DEV)  ## kills, full disks, torn files, errors at every write: half an hour
 	$(BIN)/python -m pytest --quiet -s -m '' tests/reliability
 
 check: $(DEV)  ## lint, format, types, import contracts

@@ -144,6 +144,8 @@ def _stream(
             noted.append(task)
             yield run(os.getpid(), task)
 
+    # An interrupt, or a disk that is full, leaves results that nobody waits for.
+    warnings.filterwarnings("ignore", message=_UNUSED, category=UserWarning)
     # max_nbytes: a memory-mapped array would not be a plain array in the worker.
     parallel = joblib.Parallel(
         n_jobs=count,
@@ -156,8 +158,6 @@ def _stream(
     # The call starts the workers, and they inherit what is held back.
     with _interrupts_held_back():
         results = parallel(calls())
-    # An interrupt, or a disk that is full, leaves results that nobody waits for.
-    warnings.filterwarnings("ignore", message=_UNUSED, category=UserWarning)
     yield from results
 
 
@@ -175,12 +175,28 @@ def _interrupts_held_back() -> Iterator[None]:
     before = signal.pthread_sigmask(signal.SIG_BLOCK, held)
     try:
         # These let Ctrl-C through again when they start, some of them.
-        multiprocessing.resource_tracker.ensure_running()
-        loky_tracker.ensure_running()
+        with _quiet_trackers():
+            multiprocessing.resource_tracker.ensure_running()
+            loky_tracker.ensure_running()
         signal.pthread_sigmask(signal.SIG_BLOCK, held)
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@contextmanager
+def _quiet_trackers() -> Iterator[None]:
+    """Let what cleans up after this process do so without a word."""
+    before = os.environ.get("PYTHONWARNINGS")
+    own = "ignore:resource_tracker"
+    os.environ["PYTHONWARNINGS"] = own if before is None else f"{before},{own}"
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ["PYTHONWARNINGS"]
+        else:
+            os.environ["PYTHONWARNINGS"] = before
 
 
 def _forget_stopping(problem: threading.ExceptHookArgs) -> None:

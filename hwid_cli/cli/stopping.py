@@ -4,6 +4,7 @@ Everything on disk is whole at any moment, so that a process may simply end. It 
 tries to unwind, which stops the workers; where that takes too long it ends at once.
 """
 
+import _thread
 import multiprocessing
 import os
 import signal
@@ -50,6 +51,10 @@ class Stopped(Exception):
         return _BY_SIGNAL + self.number
 
 
+class _Interrupt(KeyboardInterrupt):
+    """Unwinds the program; Python takes note of KeyboardInterrupt itself at the end."""
+
+
 @contextmanager
 def stop_signals(context: click.Context) -> Iterator[None]:
     """Let signals stop what runs inside.
@@ -64,36 +69,68 @@ def stop_signals(context: click.Context) -> Iterator[None]:
     Stopped
         After a signal, whatever came of it on its way up.
     """
-    seen: list[int] = []
-    said: list[str] = []
-
-    def end() -> None:
-        _end(seen[0], said or [_sentence(context, seen[0])])
-
-    def stop(number: int, _: FrameType | None) -> None:
-        seen.append(number)
-        if len(seen) > 1:
-            # Somebody is in a hurry.
-            end()
-        timer = threading.Timer(GRACE_S, end)
-        timer.daemon = True
-        timer.start()
-        raise KeyboardInterrupt
-
-    before = _listen(stop)
+    stopping = _Stopping(context)
+    before, hook = _listen(stopping.on_signal), sys.unraisablehook
+    sys.unraisablehook = stopping.on_lost
     try:
         yield
     except BaseException as error:
         # An interrupted import or solver may end with an error of its own.
-        if not seen and not isinstance(error, KeyboardInterrupt):
+        if stopping.signal is None and not isinstance(error, KeyboardInterrupt):
             raise
-        number = seen[0] if seen else signal.SIGINT
-        said.append("")
-        raise Stopped(number, _sentence(context, number)) from None
+        stopping.is_said = True
+        came: int = stopping.signal or signal.SIGINT
+        raise Stopped(came, _sentence(context, came)) from None
     finally:
+        is_over = stopping.signal is not None
         for number, handler in before.items():
             # Once stopped there is nothing left to stop but the end of the program.
-            signal.signal(number, signal.SIG_IGN if seen else handler)
+            signal.signal(number, signal.SIG_IGN if is_over else handler)
+        if not is_over:
+            sys.unraisablehook = hook
+
+
+class _Stopping:
+    """Which signal came, and what became of it; handlers need a memory."""
+
+    def __init__(self, context: click.Context) -> None:
+        self.signal: signal.Signals | None = None
+        self.is_said = False
+        self._context = context
+        self._is_lost = False
+
+    def on_signal(self, number: int, _: FrameType | None) -> None:
+        """Unwind the program; end it at a second signal, or when that takes long."""
+        if self.signal is not None and not self._is_lost:
+            # Somebody is in a hurry.
+            self._end()
+        if self.signal is None:
+            self.signal = signal.Signals(number)
+            timer = threading.Timer(GRACE_S, self._end)
+            timer.daemon = True
+            timer.start()
+        self._is_lost = False
+        raise _Interrupt
+
+    def on_lost(self, problem: Any) -> None:
+        """Unwind once more: Python forgets what is raised while it frees an object."""
+        if not issubclass(problem.exc_type, _Interrupt):
+            sys.__unraisablehook__(problem)
+        elif self.signal is not None and not self._is_lost:
+            self._is_lost = True
+            _thread.interrupt_main(self.signal)
+
+    def _end(self) -> None:
+        """End the process and its workers without unwinding."""
+        number = self.signal or signal.SIGTERM
+        with suppress(Exception):
+            if not self.is_said:
+                sys.stderr.write(f"hwid: {_sentence(self._context, number)}\n")
+            sys.stderr.flush()
+        for worker in multiprocessing.active_children():
+            with suppress(OSError, AttributeError):
+                worker.kill()
+        os._exit(_BY_SIGNAL + number)
 
 
 def _listen(stop: Handler) -> dict[int, Any]:
@@ -105,18 +142,6 @@ def _listen(stop: Handler) -> dict[int, Any]:
     deaf = (signal.SIG_IGN, None)
     heard = [one for one in numbers if signal.getsignal(one) not in deaf]
     return {number: signal.signal(number, stop) for number in heard}
-
-
-def _end(number: int, sentences: list[str]) -> None:
-    """End the process and its workers without unwinding."""
-    with suppress(Exception):
-        # An empty one has been said already.
-        sys.stderr.write("".join(f"hwid: {one}\n" for one in sentences if one))
-        sys.stderr.flush()
-    for worker in multiprocessing.active_children():
-        with suppress(OSError, AttributeError):
-            worker.kill()
-    os._exit(_BY_SIGNAL + number)
 
 
 def _sentence(context: click.Context, number: int) -> str:
