@@ -11,7 +11,7 @@ DEV := $(VENV)/installed-dev
 
 .DEFAULT_GOAL := help
 .PHONY: help install run test test-all check audit format smoke clean reliability \
-        bench bench-campaign bench-growth bench-wide bench-real \
+        bench bench-campaign bench-growth bench-wide bench-real scale \
         simulate calibrate identify crossval group test-stage steps model1 model2 \
         reproduction thesis chapter2 hsm150 diagnose gun real effects drive-source export-check blind
 
@@ -82,6 +82,10 @@ bench-growth: $(DEV)  ## how a fit's time grows, up to 100 000 samples
 
 bench-wide: $(DEV)  ## many kinds of plants against fits that begin at the truth
 	@$(BENCH).bench_wide
+
+scale: $(DEV)  ## what a cluster costs, and docs/scale.md
+	@$(BENCH).bench_dask --json docs/scale.json
+	$(BIN)/python docs/scale.py docs/scale.json > docs/scale.tmp && mv docs/scale.tmp docs/scale.md
 
 bench-real: $(DEV)  ## public benchmarks beside the published errors (data in HWID_REALDATA)
 	@$(BENCH).bench_real
