@@ -94,9 +94,8 @@ def cluster_results(
                 future = cluster.submit(chunk)
                 on_way[future] = chunk
                 future.add_done_callback(arrived.put)
-            for future in _arrived(arrived, cluster):
+            for future, done in cluster.results(_arrived(arrived, cluster)):
                 chunk = on_way.pop(future)
-                done = cluster.result(future)
                 if done is None:
                     names = chunks.has_died(chunk)
                     _log.warning("workers died over %s; tried once more", names)
@@ -178,8 +177,22 @@ class _Cluster:
         name = f"hwid-tasks-{uuid4().hex}"
         return self.client.submit(run_chunk, __version__, calls, key=name)
 
-    def result(self, future: Any) -> ChunkDone | None:
-        """What came of a chunk; None where workers died over it."""
+    def results(self, futures: Sequence[Any]) -> list[tuple[Any, ChunkDone | None]]:
+        """What came of chunks; None where workers died over one."""
+        from distributed.scheduler import KilledWorker
+
+        finished = [one for one in futures if one.status == "finished"]
+        try:
+            # All in one message: each alone would cost milliseconds.
+            found = dict(zip(finished, self.client.gather(finished), strict=True))
+        except KilledWorker:
+            # What had finished was lost with its worker, and killed those after it.
+            found = {}
+        return [
+            (one, found[one] if one in found else self._result(one)) for one in futures
+        ]
+
+    def _result(self, future: Any) -> ChunkDone | None:
         from distributed.scheduler import KilledWorker
 
         if future.status == "cancelled":
