@@ -137,7 +137,11 @@ def chain_table(search: GroupSearch) -> str:
     for rule in _rules(search):
         title += f"\n{joined_words(rule, search.join)}"
     table = text_table(title, heads, rows, text_columns=(0,))
-    return f"{table}\nThe search stopped: {search.reason}."
+    return (
+        f"{table}\nWhat a model covers, and its validation RMSD, which pools all "
+        "samples, include the\nrecordings of its own fit. The search stopped: "
+        f"{search.reason}."
+    )
 
 
 def _started(search: GroupSearch) -> str:

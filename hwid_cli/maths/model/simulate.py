@@ -35,19 +35,23 @@ def simulate(
     model: HammersteinWiener,
     input: np.ndarray,  # noqa: A002 - the field's word
     *,
-    initial_state: np.ndarray | Literal["steady"] | None = None,
+    initial_state: np.ndarray | Literal["steady", "estimated"] | None = None,
+    output: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Output of a model for an input, without any measured output.
+    """Output of a model for an input: a free run, which sees no measured output.
 
     Parameters
     ----------
     model : HammersteinWiener
     input : ndarray, shape (n_samples,), [input unit]
-    initial_state : ndarray, shape (n_state,), or "steady", optional, [x]
-        Coefficients of the free response to start with, or equilibrium with the first
-        input. Unless given, a model fitted with an estimated initial state starts like
-        the first recording of its fit. Zeros are an empty linear block, which is no rest
-        where the input map is not zero at rest.
+    initial_state : ndarray, shape (n_state,), "steady" or "estimated", optional, [x]
+        Coefficients of the free response to start with, equilibrium with the first
+        input, or the state with which the model comes closest to ``output``. Unless
+        given, a model fitted with an estimated initial state starts like the first
+        recording of its fit. Zeros are an empty linear block, which is no rest where the
+        input map is not zero at rest.
+    output : ndarray, shape (n_samples,), optional, [output unit]
+        What was measured; needed, and used, to estimate the initial state only.
 
     Returns
     -------
@@ -56,8 +60,8 @@ def simulate(
     Raises
     ------
     ValueError
-        If the input is not a 1-D array of at least one sample, or the initial state is
-        another word.
+        If the input is not a 1-D array of at least one sample, the initial state is
+        another word, or there is no output of the same length to estimate it from.
 
     References
     ----------
@@ -76,21 +80,40 @@ def simulate(
     signal = np.ascontiguousarray(input, dtype=float)
     if signal.ndim != 1 or signal.size == 0:
         raise ValueError(f"input must be a 1-D array with samples, got {signal.shape}")
-    if isinstance(initial_state, str):
-        if initial_state != "steady":
-            raise ValueError(
-                f'initial_state must be an array or "steady", got {initial_state!r}'
-            )
-        model, coefficients = replace(model, initial_state="steady"), np.zeros(0)
-    elif initial_state is None:
-        coefficients = model.free_response
-    else:
-        coefficients = initial_state
     with np.errstate(over="ignore", invalid="ignore"):
+        if isinstance(initial_state, str):
+            model, coefficients = _started(model, signal, initial_state, output)
+        elif initial_state is None:
+            coefficients = model.free_response
+        else:
+            coefficients = initial_state
         return repeatable.evaluate(
             model.output_map,
             _forced(model, signal) + _free(model, coefficients, signal),
         )
+
+
+def _started(
+    model: HammersteinWiener,
+    signal: np.ndarray,
+    word: str,
+    output: np.ndarray | None,
+) -> tuple[HammersteinWiener, np.ndarray]:
+    """Model of another rule, and the free response that it begins with."""
+    if word == "steady":
+        return replace(model, initial_state="steady"), np.zeros(0)
+    if word != "estimated":
+        raise ValueError(
+            f'initial_state must be an array, "steady" or "estimated", got {word!r}'
+        )
+    if output is None or np.shape(output) != signal.shape:
+        raise ValueError(
+            'initial_state "estimated" needs output, the measured one, of '
+            f"{signal.size} samples"
+        )
+    model = replace(model, initial_state="estimated")
+    measured = np.asarray(output, dtype=float)
+    return model, _state_from(model, _forced(model, signal), measured)
 
 
 def validation_output(model: HammersteinWiener, recording: Recording) -> np.ndarray:
