@@ -96,6 +96,10 @@ def test_only_named_recordings_judge(compare, out):
         ("linear:step_02", "expected linear:RECORDING/NB/NK"),
         ("linear:step_99/1/1", "no recording 'step_99'"),
         ("model.json", "model.json"),
+        (
+            "models/step_02_1_1.c",
+            "step_02_1_1.c: expected the name of a model or a .js",
+        ),
     ],
 )
 def test_a_model_that_is_not_there_is_one_line(compare, word, said):
