@@ -55,6 +55,7 @@ def command(
         read_input,
         write_prediction,
     )
+    from hwid_cli.report.text_table import behind
 
     exported = read_exported(model)
     check_trust(exported, model, is_trusted=run_own_functions)
@@ -67,9 +68,9 @@ def command(
     if share > 0.0:
         low, high = card.input_range
         click.echo(
-            f"hwid: {input_file}: the input goes from {lowest:.4g} to {highest:.4g} "
-            f"{card.input_unit}; the model knows {low:.4g} to {high:.4g}, so {share:.1%} "
-            "of the samples are extrapolated",
+            f"hwid: {input_file}: the input goes from {lowest:.4g} to {highest:.4g}"
+            f"{behind(card.input_unit)}; the model knows {low:.4g} to {high:.4g}, so "
+            f"{share:.1%} of the samples are extrapolated",
             err=True,
         )
     write_prediction(out, exported, time, values, predicted)
