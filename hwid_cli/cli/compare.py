@@ -70,12 +70,14 @@ def command(
 
     session = open_session(Choices(**values), "compare")
     comparison = _compared(session, models, recordings)
+    had_results = (session.out / "compare.csv").exists()
     _write(session, comparison)
     say(session, f"\n{comparison_table(comparison, width=screen_width())}")
     say(
         session,
         f"\nresults: {session.out / 'compare.csv'}, "
-        f"{session.out / 'figures' / 'compare.png'}",
+        f"{session.out / 'figures' / 'compare.png'}"
+        f"{' (those of the last comparison are replaced)' * had_results}",
     )
 
 

@@ -40,6 +40,13 @@ def test_own_models_have_the_numbers_of_the_cross_validation(compare, out):
     assert (out / "figures" / "compare.png").read_bytes()[:4] == b"\x89PNG"
 
 
+def test_the_end_says_that_an_older_comparison_is_replaced(compare):
+    words = "(those of the last comparison are replaced)"
+
+    assert words not in compare("step_02/1/1").stdout
+    assert words in compare("step_02/1/2").stdout
+
+
 def test_fit_percent_stands_beside_the_rmsd(compare, out):
     compare("step_02/1/2")
     fit = next(
