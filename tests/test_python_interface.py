@@ -12,6 +12,7 @@ import pytest
 import hwid_cli
 from hwid_cli import (
     DiagnoseOptions,
+    Fit,
     FitOptions,
     HwidError,
     Orders,
@@ -61,6 +62,25 @@ def test_a_program_of_a_user_is_type_checked(tmp_path):
     )
     assert 'Revealed type is "float"' in done.stdout.replace("builtins.", "")
     assert 'Argument "nk" to "Orders" has incompatible type "str"' in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda one: fit(one, Orders(1, 1, 1)), "recordings must be a sequence of"),
+        (lambda one: fit([one], [2, 3, 1]), r"orders must be Orders\(nb=.*2, 3, 1"),
+        (
+            lambda one: simulate(
+                Fit(("r1",), Orders(1, 1, 1), FitOptions(), None, "failed", ""), one
+            ),
+            "simulate takes a model: give result.model",
+        ),
+    ],
+)
+def test_a_mistaken_argument_is_said_in_words(call, said):
+    recording = Recording("r1", np.ones(9), np.ones(9), 1e-3)
+    with pytest.raises(TypeError, match=said):
+        call(recording)
 
 
 def test_a_file_is_read_fitted_and_simulated(tmp_path):

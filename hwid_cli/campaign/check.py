@@ -58,7 +58,7 @@ def plan_stages(
     plans = [
         StagePlan(
             "calibrate",
-            f"{len(recordings)} recordings, {samples} samples",
+            f"{_counted(len(recordings), 'recording')}, {_counted(samples, 'sample')}",
             len(recordings),
             None,
             0.0,
@@ -73,10 +73,10 @@ def plan_stages(
     if experiment.test is not None:
         n = len(recordings)
         plans.append(
-            StagePlan("test", f"{n} recordings", n, None, 0.0, n * _PAIR_BYTES)
+            StagePlan("test", _counted(n, "recording"), n, None, 0.0, n * _PAIR_BYTES)
         )
     if experiment.diagnose is not None:
-        what = f"up to {len(recordings)} recordings; time depends on what is missing"
+        what = f"up to {_counted(len(recordings), 'recording')}; time depends on what is missing"
         plans.append(StagePlan("diagnose", what, len(recordings), None, nan, 1e6))
     return tuple(plans)
 
@@ -149,7 +149,8 @@ def _identify_and_crossval(
     seconds = _seconds_of_rounds(experiment, chosen, speed)
     plan = StagePlan(
         "identify",
-        f"{len(chosen)} recordings x {len(grid)} orders = {total} fits",
+        f"{_counted(len(chosen), 'recording')} x {_counted(len(grid), 'order')} = "
+        f"{_counted(total, 'fit')}",
         total,
         n_cached,
         seconds * (1 - n_cached / total),
@@ -173,8 +174,8 @@ def _crossval(
     samples = n_models * sum(one.n_samples for one in judges) * (1 - done / pairs)
     return StagePlan(
         "crossval",
-        f"{n_models} models on {len(judges)} recordings = {n_models * len(judges)} "
-        f"validations in {pairs} tasks",
+        f"{_counted(n_models, 'model')} on {_counted(len(judges), 'recording')} = "
+        f"{_counted(n_models * len(judges), 'validation')} in {_counted(pairs, 'task')}",
         pairs,
         done,
         SECONDS_PER_SIMULATED_SAMPLE * samples / min(workers, pairs),
@@ -279,3 +280,7 @@ def _grid_seconds(
     return sum(
         fit_seconds(cost, orders, n, units=units, n_recordings=level) for orders in grid
     )
+
+
+def _counted(count: int, thing: str) -> str:
+    return f"{count} {thing}{'s' * (count != 1)}"

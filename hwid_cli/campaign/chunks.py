@@ -98,8 +98,8 @@ class Chunks:
         """
         if self._given_up:
             raise WorkerError(
-                f"{_names(self._given_up)}: workers died over it again and again, most "
-                "likely for lack of memory; expected a task that fits into theirs; what "
+                f"{_names(self._given_up)}: workers died over it again and again; "
+                "expected a task that fits into their memory and that they finish; what "
                 "was finished is kept: look into their logs and run the same command "
                 "again"
             )

@@ -102,10 +102,11 @@ def propose(findings: "Findings", verdict: Verdict) -> NextExperiment:
         )
     models = [Model(*rebuilt(findings.problem, one, findings.scales)) for one in pair]
     best = best_separation(findings.problem, models[0], models[1], findings.scales)
+    # The dash of a dimensionless output would be a minus behind a number.
+    by = f"{best.rms:.2g} {findings.problem.unit}".removesuffix(" -")
     return NextExperiment(
         best.input,
-        f"{_name(pair[0])} and {_name(pair[1])} then differ by {best.rms:.2g} "
-        f"{findings.problem.unit} "
+        f"{_name(pair[0])} and {_name(pair[1])} then differ by {by} "
         f"({best.rms / max(findings.noise.rms, 1e-300):.2g} times the noise) after the "
         "parameters have been fitted again",
     )

@@ -80,8 +80,7 @@ def compute_here(tasks: Sequence[Task], count: int) -> Iterator[tuple[str, Compu
             # None of them is to blame where a worker was killed before it began.
             suspects = suspects or list(left.values())[:1]
             _log.warning(
-                "a worker was killed by the system%s, most likely for lack of memory; "
-                "under way were %s; tried once more, one at a time",
+                "a worker %s; under way were %s; tried once more, one at a time",
                 _how(error),
                 _names(suspects),
             )
@@ -104,11 +103,10 @@ def _one_at_a_time(tasks: Sequence[Task], count: int) -> Iterator[tuple[str, Com
             except BrokenExecutor as error:
                 time.sleep(SIGNAL_DELAY_S)
                 raise WorkerError(
-                    f"{task.name}: the system killed the worker that computed it twice"
-                    f"{_how(error)}, most likely for lack of memory; expected a task "
-                    "that fits into memory; what was finished is kept: run the same "
-                    f"command again with fewer processes (--jobs, now {count}) or when "
-                    "other programs have ended"
+                    f"{task.name}: tried twice, and each time its worker {_how(error)}; "
+                    "expected a task that a worker finishes; what was finished is kept: "
+                    "run the same command again with fewer processes (--jobs, now "
+                    f"{count}) or when other programs have ended"
                 ) from error
 
 
@@ -118,9 +116,12 @@ def _alone(task: Task) -> Iterator[tuple[str, Any]]:
 
 
 def _how(error: BrokenExecutor) -> str:
-    """Signal that ended workers, as loky tells it."""
+    """What became of a worker: only one signal hints at memory that ran out."""
     found = re.search(r"\{(.*?)\}", str(error))
-    return "" if found is None else f" ({found[1]})"
+    signals = "" if found is None else f" ({found[1]})"
+    if "SIGKILL" in signals:
+        return f"was killed by the system{signals}, most likely for lack of memory"
+    return f"ended before its time{signals}"
 
 
 def _names(tasks: Sequence[Task]) -> str:

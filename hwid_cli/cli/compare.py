@@ -14,6 +14,8 @@ if TYPE_CHECKING:
     from hwid_cli.records.model import Fit, Orders
 
 _LINEAR = "linear:"
+# Exported models that say less than their JSON.
+_OTHER_FORMATS = (".c", ".m", ".mat", ".fmu")
 
 
 @click.command("compare")
@@ -68,12 +70,14 @@ def command(
 
     session = open_session(Choices(**values), "compare")
     comparison = _compared(session, models, recordings)
+    had_results = (session.out / "compare.csv").exists()
     _write(session, comparison)
     say(session, f"\n{comparison_table(comparison, width=screen_width())}")
     say(
         session,
         f"\nresults: {session.out / 'compare.csv'}, "
-        f"{session.out / 'figures' / 'compare.png'}",
+        f"{session.out / 'figures' / 'compare.png'}"
+        f"{' (those of the last comparison are replaced)' * had_results}",
     )
 
 
@@ -91,6 +95,7 @@ def _compared(
 
 def _model(session: "Session", text: str) -> "NamedModel":
     """Model that a word of the command line names."""
+    from hwid_cli.errors import ConfigError
     from hwid_cli.files.stored_models import (
         chosen_model,
         read_exported_model,
@@ -101,6 +106,11 @@ def _model(session: "Session", text: str) -> "NamedModel":
         return _linear(session, text)
     if text.lower().endswith(".json"):
         return read_exported_model(Path(text))
+    if text.lower().endswith(_OTHER_FORMATS):
+        raise ConfigError(
+            f"{text}: expected the name of a model or a .json file, the only exported "
+            "models that can be compared; export it with --format json"
+        )
     # The last colon: a folder of Windows has one of its own.
     folder, colon, name = text.rpartition(":")
     if colon:

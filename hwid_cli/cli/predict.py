@@ -27,6 +27,9 @@ _STARTS = ("fitted", "steady", "empty")
     "the first recording of its fit), in equilibrium with the first input, or empty.",
 )
 @click.option(
+    "--force", is_flag=True, help="Replace a file that is no prediction, too."
+)
+@click.option(
     "--run-own-functions",
     is_flag=True,
     help="Run Python that the model's file carries; only for files that you trust.",
@@ -36,6 +39,7 @@ def command(
     input_file: Path,
     out: Path,
     initial_state: str,
+    force: bool,
     run_own_functions: bool,
 ) -> None:
     """Predict the output for an input, with a model that 'hwid export' wrote.
@@ -46,11 +50,17 @@ def command(
     from hwid_cli.campaign.predict import outside_share, predict
     from hwid_cli.files.exported.json_reader import read_exported
     from hwid_cli.files.exported.loading import check_trust
-    from hwid_cli.files.exported.prediction import read_input, write_prediction
+    from hwid_cli.files.exported.prediction import (
+        check_target,
+        read_input,
+        write_prediction,
+    )
+    from hwid_cli.report.text_table import behind
 
     exported = read_exported(model)
     check_trust(exported, model, is_trusted=run_own_functions)
     time, values = read_input(input_file, exported)
+    check_target(out, (model, input_file), is_forced=force)
     card = exported.card
     signal = values * card.input_scale
     predicted = predict(exported, signal, initial_state=initial_state, place=str(model))
@@ -58,9 +68,9 @@ def command(
     if share > 0.0:
         low, high = card.input_range
         click.echo(
-            f"hwid: {input_file}: the input goes from {lowest:.4g} to {highest:.4g} "
-            f"{card.input_unit}; the model knows {low:.4g} to {high:.4g}, so {share:.1%} "
-            "of the samples are extrapolated",
+            f"hwid: {input_file}: the input goes from {lowest:.4g} to {highest:.4g}"
+            f"{behind(card.input_unit)}; the model knows {low:.4g} to {high:.4g}, so "
+            f"{share:.1%} of the samples are extrapolated",
             err=True,
         )
     write_prediction(out, exported, time, values, predicted)

@@ -13,7 +13,7 @@ from hwid_cli.files.config_bounds import MOST_ORDER
 from hwid_cli.files.config_checks import check_experiment
 from hwid_cli.files.config_fields import Reader, build, convert
 from hwid_cli.files.config_place import Place
-from hwid_cli.files.config_requirements import require
+from hwid_cli.files.config_requirements import require, require_known
 from hwid_cli.files.own_functions import read_section
 from hwid_cli.records.experiment import (
     CrossvalOptions,
@@ -24,7 +24,8 @@ from hwid_cli.records.experiment import (
     OrderOptions,
     OrdersOptions,
 )
-from hwid_cli.records.model import FitOptions
+from hwid_cli.records.maps import MAP_KINDS
+from hwid_cli.records.model import INITIAL_STATES, JOINS, LOSSES, FitOptions
 
 _ALL = "all"
 
@@ -137,6 +138,17 @@ def _read_names(value: Any, place: Place) -> tuple[str, ...] | None:
     return convert(value, tuple[str, ...], place, readers={})
 
 
+def _word_of(known: tuple[str, ...]) -> Reader:
+    """Reader of a key that holds one of a few words."""
+
+    def read(value: Any, place: Place) -> str:
+        word: str = convert(value, str, place, readers={})
+        require_known([word], known, str(place))
+        return word
+
+    return read
+
+
 def _read_hold_out(value: Any, place: Place) -> str | tuple[str, ...]:
     """``auto`` or a list of names."""
     return (
@@ -175,6 +187,11 @@ _READERS: dict[tuple[type, str], Reader] = {
     (Experiment, "fit"): _read_fit,
     (OrdersOptions, "nb"): _read_orders_axis,
     (OrdersOptions, "nk"): _read_orders_axis,
+    (FitOptions, "input_map"): _word_of(MAP_KINDS),
+    (FitOptions, "output_map"): _word_of(MAP_KINDS),
+    (FitOptions, "initial_state"): _word_of(INITIAL_STATES),
+    (FitOptions, "join"): _word_of(JOINS),
+    (FitOptions, "loss"): _word_of(LOSSES),
     (IdentifyOptions, "recordings"): _read_names,
     (CrossvalOptions, "recordings"): _read_names,
     (GroupOptions, "start"): _read_names,

@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 
 from hwid_cli.records.check import FitCost, RecordingFacts, StagePlan
-from hwid_cli.report.text_table import MISSING, text_table
+from hwid_cli.report.text_table import MISSING, behind, text_table
 
 _KILO = 1000.0
 
@@ -150,4 +150,4 @@ def size(n_bytes: float) -> str:
 
 def _range(limits: tuple[float, float], unit: str) -> str:
     # Adding zero takes the sign off a negative one.
-    return f"{limits[0] + 0.0:.3g} to {limits[1] + 0.0:.3g} {unit}"
+    return f"{limits[0] + 0.0:.3g} to {limits[1] + 0.0:.3g}{behind(unit)}"

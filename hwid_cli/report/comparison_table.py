@@ -1,5 +1,6 @@
 """Models side by side, as text."""
 
+from collections.abc import Callable
 from string import ascii_uppercase
 
 import numpy as np
@@ -9,6 +10,7 @@ from hwid_cli.report.simulation_words import simulation_words
 from hwid_cli.report.text_table import MISSING, WIDTH, number, split_table
 
 _OWN, _OTHER = "'", " "
+_TIE = "="
 
 
 def model_letters(comparison: Comparison) -> list[str]:
@@ -23,7 +25,10 @@ def model_letters(comparison: Comparison) -> list[str]:
     list of str
         A, B, ... and numbers beyond Z.
     """
-    count = len(comparison.models)
+    return _letters(len(comparison.models))
+
+
+def _letters(count: int) -> list[str]:
     return [ascii_uppercase[n] if n < 26 else str(n + 1) for n in range(count)]
 
 
@@ -39,29 +44,32 @@ def comparison_table(comparison: Comparison, *, width: int = WIDTH) -> str:
     Returns
     -------
     str
-        An apostrophe marks recordings that took part in a model's fit.
+        An apostrophe marks recordings that took part in a model's fit; where several
+        models are best to the digits shown, the best is an equals sign.
     """
     letters = model_letters(comparison)
+    pooled = np.sqrt(np.mean(comparison.rmsd**2, axis=1))
+    middle = np.mean(comparison.fit_percent, axis=1)
     deviations = [
-        (name, *_deviations(comparison, m), _best(comparison.rmsd[:, m], letters))
+        (name, *_deviations(comparison, m), *_best(comparison.rmsd[:, m], number))
         for m, name in enumerate(comparison.recordings)
     ]
     percents = [
-        (name, *map(_percent, column), _best(-column, letters))
+        (name, *map(_percent, column), *_best(column, _percent, is_high=True))
         for name, column in zip(
             comparison.recordings, comparison.fit_percent.T, strict=True
         )
     ]
     if len(comparison.recordings) > 1:
-        pooled = np.sqrt(np.mean(comparison.rmsd**2, axis=1))
-        middle = np.mean(comparison.fit_percent, axis=1)
         cells = [number(one) + _OTHER for one in pooled]
-        deviations.append(("all", *cells, _best(pooled, letters)))
-        percents.append(("all", *map(_percent, middle), _best(-middle, letters)))
+        deviations.append(("all", *cells, *_best(pooled, number)))
+        best = _best(middle, _percent, is_high=True)
+        percents.append(("all", *map(_percent, middle), *best))
+    best_head = ("best",) if len(letters) > 1 else ()
     tables = [
         split_table(
             _title(comparison) if what == "RMSD" else "",
-            ("recording", *[f"{one} {what}" for one in letters], "best"),
+            ("recording", *[f"{one} {what}" for one in letters], *best_head),
             rows,
             width=width,
         )
@@ -124,5 +132,14 @@ def _percent(value: float) -> str:
     return f"{value:.2f}" if np.isfinite(value) else MISSING
 
 
-def _best(values: np.ndarray, letters: list[str]) -> str:
-    return letters[int(np.nanargmin(values))] if np.isfinite(values).any() else MISSING
+def _best(
+    values: np.ndarray, shown: Callable[[float], str], *, is_high: bool = False
+) -> tuple[str, ...]:
+    """Cell of the best model, if there are others; a tie in the digits shown is none."""
+    if values.size < 2:
+        return ()
+    if not np.isfinite(values).any():
+        return (MISSING,)
+    place = int(np.nanargmax(values) if is_high else np.nanargmin(values))
+    texts = [shown(value) for value in values]
+    return (_TIE if texts.count(texts[place]) > 1 else _letters(values.size)[place],)

@@ -13,7 +13,7 @@ from hwid_cli.records.diagnosis import (
 )
 from hwid_cli.report.page import Table
 from hwid_cli.report.parameter_names import quantity_and_unit
-from hwid_cli.report.text_table import MISSING, number
+from hwid_cli.report.text_table import MISSING, behind, number
 
 # Joins the effects of a candidate.
 AND = " + "
@@ -107,8 +107,8 @@ def gap_table(diagnosis: Diagnosis) -> Table:
     ]
     unit = diagnosis.output_unit
     return Table(
-        f"Gap between simulation and measurement; noise {number(diagnosis.noise.rms)} "
-        f"{unit}",
+        f"Gap between simulation and measurement; noise {number(diagnosis.noise.rms)}"
+        f"{behind(unit)}",
         (
             "simulation",
             f"train RMS [{unit}]",

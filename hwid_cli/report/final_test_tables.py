@@ -6,11 +6,13 @@ from itertools import pairwise
 import numpy as np
 
 from hwid_cli.records.groups import ChainTrend, FinalTest
+from hwid_cli.report.sections.words import counted
 from hwid_cli.report.simulation_words import simulation_words
 from hwid_cli.report.tables import thesis_name
 from hwid_cli.report.text_table import (
     GAP,
     WIDTH,
+    behind,
     joined_names,
     number,
     split_table,
@@ -227,9 +229,9 @@ def coverage_matrix_table(
     # Each group of columns takes one more character for the gap behind it.
     per_block = max(1, room * _TOGETHER // (_TOGETHER + 1))
     title = (
-        f"Coverage of all models on all recordings: 1 RMSD below {final.threshold:g} "
-        f"{final.unit}, . not,\nblank its own; a + adds to the model above it (form of "
-        "T3.4.3-1)\n"
+        f"Coverage of all models on all recordings: 1 RMSD below {final.threshold:g}"
+        f"{behind(final.unit)}, . not,\nblank its own; a + adds to the model above it "
+        "(form of T3.4.3-1)\n"
         f"{simulation_words(initial_state, is_validation=True)}"
     )
     blocks = [
@@ -304,6 +306,7 @@ def gaps_text(final: FinalTest, *, width: int = WIDTH) -> str:
     ]
     lines = []
     for what, names in parts:
-        lines.append(f"{what}: {len(names)} of {len(final.recordings)} recordings")
+        every = counted(len(final.recordings), "recording")
+        lines.append(f"{what}: {len(names)} of {every}")
         lines += [f"  {line}" for line in joined_names(names, width=width - 2) if line]
     return "\n".join(lines)

@@ -4,7 +4,7 @@ import textwrap
 from collections.abc import Sequence
 
 from hwid_cli.records.model import Fit
-from hwid_cli.report.text_table import WIDTH
+from hwid_cli.report.text_table import WIDTH, behind
 
 # Models that are named, and places of each.
 _MOST_MODELS, _MOST_PLACES = 4, 2
@@ -30,7 +30,7 @@ def folds_note(fits: Sequence[Fit], *, nk_is_delay: bool = False) -> str:
             nk = fit.orders.nk if nk_is_delay else fit.orders.nf
             places = ", ".join(f"{x:.3g}" for x in fit.output_folds[:_MOST_PLACES])
             more = ", ..." if len(fit.output_folds) > _MOST_PLACES else ""
-            where = f"x = {places}{more} {fit.model.input_unit}"
+            where = f"x = {places}{more}{behind(fit.model.input_unit)}"
             folded.append(f"{fit.name}/{fit.orders.nb}/{nk} ({where})")
     if not folded:
         return ""

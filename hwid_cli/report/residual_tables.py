@@ -4,6 +4,7 @@ import textwrap
 from collections.abc import Sequence
 
 from hwid_cli.records.residuals import ModelResiduals, ResidualTests
+from hwid_cli.report.sections.words import counted
 from hwid_cli.report.simulation_words import simulation_words
 from hwid_cli.report.text_table import WIDTH, text_table
 
@@ -102,8 +103,8 @@ def flat_lines(found: Sequence[ModelResiduals]) -> list[str]:
             f"{one.model}: {one.flat[0]}{more}.", WIDTH, subsequent_indent="  "
         )
     if len(told) > _MOST_SHOWN:
+        more = counted(len(told) - _MOST_SHOWN, "more model")
         lines.append(
-            f"Such directions in {len(told) - _MOST_SHOWN} more models: "
-            "results.h5:/identify/fit/uncertainty/flat"
+            f"Such directions in {more}: results.h5:/identify/fit/uncertainty/flat"
         )
     return lines

@@ -10,7 +10,14 @@ from hwid_cli.records.recordings import CalibrationLog
 from hwid_cli.records.results import CrossValidation, ModelScore
 from hwid_cli.report.fold_words import folds_note
 from hwid_cli.report.simulation_words import simulation_words
-from hwid_cli.report.text_table import MISSING, WIDTH, number, split_table, text_table
+from hwid_cli.report.text_table import (
+    MISSING,
+    WIDTH,
+    behind,
+    number,
+    split_table,
+    text_table,
+)
 
 # Words for the statuses of fits.
 _STATUS_WORDS = {
@@ -216,8 +223,8 @@ def coverage_table(
     ]
     heads = ("identified on", "nb", "nk", "covers", "own RMSD", "thesis's name")
     title = (
-        f"Models that cover the most recordings: RMSD below {crossval.threshold:g} "
-        f"{crossval.unit}\n(form of T3.2.2.2-2)"
+        f"Models that cover the most recordings: RMSD below {crossval.threshold:g}"
+        f"{behind(crossval.unit)}\n(form of T3.2.2.2-2)"
         f"\n{simulation_words(initial_state, is_validation=True)}"
     )
     return text_table(title, heads, rows, text_columns=(0, 5))

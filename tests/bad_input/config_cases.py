@@ -81,7 +81,7 @@ SYNTAX = [
     _case("/dev/zero", _instead(lambda path: path.symlink_to("/dev/zero")), "no plain"),
 ]
 VALUES = [
-    _case("unknown section", more("orderz: {}"), "orderz", "did you mean 'order'?"),
+    _case("unknown section", more("orderz: {}"), "orderz", "mean 'order' or 'orders'?"),
     _case("unknown key", key("nb:", "nbb:"), "orders.nbb", "did you mean 'nb'?"),
     _case("control key", more('"\\e[31mfit": 3'), "\\x1b[31mfit: unknown key"),
     _case("number as a key", more("5: 3"), "5: unknown key"),

@@ -74,6 +74,17 @@ def _is_fit(path):
         return file.attrs["record"] == "Fit"
 
 
+def test_one_of_a_kind_is_no_plural(simulated, edit):
+    edit("nk: [1, 2]}", "nk: 1}")
+    edit("identify: {}", "identify: {recordings: [step_02]}")
+    edit("threshold: 0.01}", "threshold: 0.01, recordings: [step_02]}")
+    config, out = simulated
+    text = check(config, "--out", str(out), "--no-timing").stdout
+
+    assert "1 recording x 1 order = 1 fit " in text
+    assert "1 model on 1 recording = 1 validation in 1 task " in text
+
+
 def test_a_timed_fit_is_named(simulated):
     config, out = simulated
     result = check(config, "--out", str(out))

@@ -40,6 +40,13 @@ def test_own_models_have_the_numbers_of_the_cross_validation(compare, out):
     assert (out / "figures" / "compare.png").read_bytes()[:4] == b"\x89PNG"
 
 
+def test_the_end_says_that_an_older_comparison_is_replaced(compare):
+    words = "(those of the last comparison are replaced)"
+
+    assert words not in compare("step_02/1/1").stdout
+    assert words in compare("step_02/1/2").stdout
+
+
 def test_fit_percent_stands_beside_the_rmsd(compare, out):
     compare("step_02/1/2")
     fit = next(
@@ -96,6 +103,10 @@ def test_only_named_recordings_judge(compare, out):
         ("linear:step_02", "expected linear:RECORDING/NB/NK"),
         ("linear:step_99/1/1", "no recording 'step_99'"),
         ("model.json", "model.json"),
+        (
+            "models/step_02_1_1.c",
+            "step_02_1_1.c: expected the name of a model or a .js",
+        ),
     ],
 )
 def test_a_model_that_is_not_there_is_one_line(compare, word, said):

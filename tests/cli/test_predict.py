@@ -40,7 +40,7 @@ def predicted(path):
 @pytest.mark.parametrize("start", ["fitted", "steady", "empty"])
 def test_a_prediction_is_what_simulate_gives(start, model, tmp_path):
     u = example_input(1)
-    out = tmp_path / "deep" / "p.csv"
+    out = tmp_path / "p.csv"
     given = write_input(tmp_path / "u.csv", u)
     result = predict(model, given, "--out", out, "--initial-state", start)
     state = {"fitted": None, "steady": "steady", "empty": np.zeros(2)}[start]
@@ -110,3 +110,43 @@ def test_a_fault_is_one_line_and_leaves_an_old_prediction(model, tmp_path):
     assert result.stderr.count("\n") == 1
     assert "no.csv: no such file" in result.stderr
     assert out.read_text() == "old"
+
+
+@pytest.mark.parametrize("name", ["u.csv", "m.json", "link.csv"])
+def test_what_is_read_is_never_written(name, model, tmp_path):
+    given = write_input(tmp_path / "u.csv", np.ones(3))
+    (tmp_path / "link.csv").symlink_to(given)
+    before = (tmp_path / name).read_bytes()
+    result = predict(model, given, "--out", tmp_path / name, "--force")
+
+    assert result.exit_code == 1
+    assert result.stderr.count("\n") == 1
+    assert f"--out: found {tmp_path / name}, which is read" in result.stderr
+    assert (tmp_path / name).read_bytes() == before
+
+
+def test_only_predictions_are_replaced_unless_forced(model, tmp_path):
+    given = write_input(tmp_path / "u.csv", np.ones(3))
+    out = tmp_path / "other.csv"
+    out.write_text("time_s,current_A,displacement_m\n0,1,2\n")
+    refused = predict(model, given, "--out", out)
+
+    assert refused.exit_code == 1
+    assert refused.stderr.count("\n") == 1
+    assert "an existing file that is no prediction" in refused.stderr
+    assert out.read_text().startswith("time_s,current_A,displacement_m")
+    assert predict(model, given, "--out", out, "--force").exit_code == 0
+    first = predicted(out)
+    write_input(given, np.full(3, 2.0))
+    assert predict(model, given, "--out", out).exit_code == 0
+    assert not np.array_equal(predicted(out), first)
+
+
+def test_a_missing_folder_is_said_and_not_made(model, tmp_path):
+    given = write_input(tmp_path / "u.csv", np.ones(3))
+    result = predict(model, given, "--out", tmp_path / "deep" / "p.csv")
+
+    assert result.exit_code == 1
+    assert f"there is no folder {tmp_path / 'deep'};" in result.stderr
+    assert result.stderr.count("\n") == 1
+    assert not (tmp_path / "deep").exists()

@@ -52,7 +52,7 @@ def test_python_may_read_a_file_itself(write_map):
             "own_function",
             r"fit.input_map: own_function needs a function; name its file",
         ),
-        ("sigmoid", r"fit.input_map: must be one of piecewise_linear, saturation"),
+        ("sigmoid", r"fit.input_map: found 'sigmoid'; did you mean 'sigmoid_net"),
     ],
 )
 def test_section_that_cannot_be_used_is_one_line(write_config, section, message):

@@ -14,17 +14,13 @@ from hwid_cli.errors import WorkerError
 from hwid_cli.records.model import Orders
 
 
-def kill_this_worker():
-    # As the system does when memory runs out: without a word.
-    os.kill(os.getpid(), signal.SIGKILL)
-
-
-def orders_after_deaths(number, deaths, folder):
+def orders_after_deaths(number, deaths, folder, by=signal.SIGKILL):
     """Orders, after so many workers have died of making them."""
     begun = Path(folder) / f"{number}-{os.getpid()}"
     if len(list(Path(folder).glob(f"{number}-*"))) < deaths:
         begun.touch()
-        kill_this_worker()
+        # As the system does when memory runs out: without a word.
+        os.kill(os.getpid(), by)
     return Orders(number, 1, 1)
 
 
@@ -34,13 +30,13 @@ def tasks(tmp_path, monkeypatch):
     # The first task would run in this process.
     monkeypatch.setattr(workers, "_compiled", {orders_after_deaths})
 
-    def make(deaths):
+    def make(deaths, by=signal.SIGKILL):
         return [
             Task(
                 f"{n:064x}",
                 f"step_{n:02d}/1/1",
                 orders_after_deaths,
-                (n, deaths if n == 5 else 0, str(tmp_path)),
+                (n, deaths if n == 5 else 0, str(tmp_path), by),
                 Orders,
             )
             for n in range(1, 13)
@@ -61,6 +57,17 @@ def test_the_tasks_of_a_killed_worker_are_tried_once_more(tasks, caplog):
         r"memory; under way were .*; tried once more, one at a time",
         record.getMessage(),
     )
+
+
+@pytest.mark.slow
+def test_memory_is_blamed_for_one_signal_only(tasks, caplog):
+    made = tasks(99, by=signal.SIGTERM)
+    with pytest.raises(WorkerError) as refused:
+        run_tasks(made, RunSettings(MemoryStore(), Workers(2)))
+
+    assert "SIGTERM(-15)" in str(refused.value)
+    said = [str(refused.value), *(one.getMessage() for one in caplog.records)]
+    assert all("lack of memory" not in text for text in said)
 
 
 @pytest.mark.slow

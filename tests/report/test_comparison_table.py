@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 
 from hwid_cli.records.comparison import Comparison, NamedModel, ShownRecording
@@ -42,6 +44,50 @@ def test_the_best_own_recordings_and_pooled_numbers_are_shown():
     assert ["step_2", "4.00e-01", "-", "A"] in rows
     assert ["all", "3.54e-01", "-", "A"] in rows
     assert ["all", "65.00", "-", "A"] in rows
+
+
+def test_a_tie_in_the_printed_digits_has_no_winner():
+    tied = replace(
+        comparison(),
+        rmsd=np.array([[0.3, 0.4], [0.300000001, 0.5]]),
+        fit_percent=np.array([[70.0, 60.0], [70.001, 50.0]]),
+    )
+    rows = [line.split() for line in comparison_table(tied).splitlines()]
+
+    assert ["step_1", "3.00e-01'", "3.00e-01", "="] in rows
+    assert ["step_1", "70.00", "70.00", "="] in rows
+    assert ["step_2", "60.00", "50.00", "A"] in rows
+
+
+def alone(compared):
+    """Compare with nothing, on one recording."""
+    return replace(
+        compared,
+        models=compared.models[:1],
+        recordings=compared.recordings[:1],
+        is_own=compared.is_own[:1, :1],
+        rmsd=compared.rmsd[:1, :1],
+        fit_percent=compared.fit_percent[:1, :1],
+        shown=replace(compared.shown, simulated=compared.shown.simulated[:1]),
+    )
+
+
+def test_a_single_model_wins_nothing():
+    text = comparison_table(alone(comparison()))
+    assert "best" not in text
+    assert ["step_1", "70.00"] in [line.split() for line in text.splitlines()]
+
+
+def test_a_single_recording_is_only_drawn_in_full():
+    figure = comparison_figure(alone(comparison()))
+    middle, lower = figure.axes
+    (legend,) = figure.legends
+
+    assert middle.get_ylabel() == "output y [m]"
+    assert lower.get_ylabel() == "y - yh [m]"
+    assert [text.get_text() for text in legend.get_texts()] == [
+        "A: m0/1/1, RMSD 3.00e-01 m"
+    ]
 
 
 def test_the_figure_names_models_units_and_the_recording():

@@ -57,6 +57,7 @@ def test_only_a_few_models_tell_what_is_not_identifiable():
 
     assert text.count("flat: b") == 5
     assert "in 4 more models" in text
+    assert "in 1 more model:" in residual_table(found[:6], "zero")
 
 
 def test_the_section_has_a_row_and_a_figure_for_each_recording(contents):

@@ -1,8 +1,10 @@
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from hwid_cli.records.check import RecordingFacts
 from hwid_cli.records.information import Information
 from hwid_cli.records.model import (
     Fit,
@@ -13,6 +15,7 @@ from hwid_cli.records.model import (
 )
 from hwid_cli.records.recordings import CalibrationLog
 from hwid_cli.records.results import CrossValidation, ModelScore
+from hwid_cli.report.check_tables import recordings_table
 from hwid_cli.report.tables import (
     best_models_table,
     calibration_table,
@@ -86,6 +89,17 @@ def test_in_the_delay_reading_the_place_in_the_grid_is_the_delay():
     last = best_models_table([(fit,)], "m", nk_is_delay=True).splitlines()[-1]
 
     assert last.split()[:2] == ["step_06/3/7", "NLHW-Step-6-3-2-7"]
+
+
+def test_no_dash_of_a_dimensionless_output_stands_behind_a_number():
+    cross = replace(CROSSVAL, unit="-")
+    text = coverage_table(SCORES, cross, count=4, initial_state="zero")
+    facts = RecordingFacts(
+        "a", "step", 9, 9, 9, 1e-3, (-0.288, 0.129), (0.0, 2.0), "-", "V"
+    )
+
+    assert "RMSD below 0.01\n" in text
+    assert re.search(r"-0\.288 to 0\.129  +0 to 2 V", recordings_table([facts]))
 
 
 def test_the_coverage_table_shows_the_first_models_only():

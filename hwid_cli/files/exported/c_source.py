@@ -84,9 +84,11 @@ def card_words(card: ModelCard, sample_time_s: float) -> dict[str, str]:
         Safe inside a comment.
     """
     low, high = card.input_range
+    # The dash of a dimensionless input would be a minus behind a number.
+    ends = f"{low:.6g} to {high:.6g} {card.input_unit}".removesuffix(" -")
     about = (
         f"Model {card.name}, written by hwid {__version__}. Its data have inputs from "
-        f"{low:.6g} to {high:.6g} {card.input_unit}."
+        f"{ends}."
     )
     lines = textwrap.wrap(in_comment(about), _WIDTH)
     return {

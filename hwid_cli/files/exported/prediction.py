@@ -1,10 +1,12 @@
 """The input that a prediction reads, and the file that it writes."""
 
+import csv
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
-from hwid_cli.errors import MeasurementError
+from hwid_cli.errors import ConfigError, MeasurementError
 from hwid_cli.files.columns import Column, keep_rows, place_of
 from hwid_cli.files.recording_formats import read_columns
 from hwid_cli.files.result_tables import write_table_csv
@@ -13,6 +15,8 @@ from hwid_cli.records.exported import Exported
 
 # A time column may jitter by this share of a step, and differ so much in its mean step.
 _TOLERANCE = 0.01
+# So much of a file's first line tells whether it is a prediction, [characters].
+_LONGEST_HEADER = 10_000
 
 
 def read_input(path: Path, exported: Exported) -> tuple[np.ndarray, np.ndarray]:
@@ -100,6 +104,52 @@ def _check_steps(path: Path, time: Column, step: float) -> None:
             f"{place_of(path, time, at + 1)}: {time.title} steps by {steps[at]:.6g} s; "
             f"expected {step:.6g} s throughout; cut the file there or resample it"
         )
+
+
+def check_target(path: Path, read: Sequence[Path], *, is_forced: bool) -> None:
+    """Refuse to write a prediction over a file that is none.
+
+    Parameters
+    ----------
+    path : Path
+        Of the prediction.
+    read : sequence of Path
+        Files that were read; they are never written.
+    is_forced : bool
+        Whether any other file may be replaced.
+
+    Raises
+    ------
+    ConfigError
+        If the folder is missing, or another file would be lost.
+    """
+    if not path.parent.is_dir():
+        raise ConfigError(
+            f"--out: found {path}, and there is no folder {path.parent}; expected a file "
+            "in a folder that exists; make the folder or correct the path"
+        )
+    if not path.is_file():
+        return
+    if any(path.samefile(one) for one in read):
+        raise ConfigError(
+            f"--out: found {path}, which is read for the prediction; expected another "
+            "file; choose one"
+        )
+    if not (is_forced or _is_prediction(path)):
+        raise ConfigError(
+            f"--out: found {path}, an existing file that is no prediction; expected a "
+            "new file or an old prediction; choose another one, or replace it with --force"
+        )
+
+
+def _is_prediction(path: Path) -> bool:
+    """Whether the first line is the header that ``write_prediction`` writes."""
+    try:
+        with path.open(encoding="utf-8", newline="") as file:
+            names = next(csv.reader([file.readline(_LONGEST_HEADER)]), [])
+    except (OSError, UnicodeDecodeError, csv.Error):
+        return False
+    return len(names) == 3 and (names[0], names[2]) == ("time", "predicted")
 
 
 def write_prediction(

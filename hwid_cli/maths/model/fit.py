@@ -69,6 +69,8 @@ def fit(
 
     Raises
     ------
+    TypeError
+        If ``recordings`` is a single one, or ``orders`` are no ``Orders``.
     ValueError
         If there is no recording, the sample times differ, a start has other orders or
         kinds of maps, or a frozen linear block has other orders.
@@ -87,6 +89,7 @@ def fit(
     >>> result.status, np.round(result.model.denominator, 6)
     ('converged', array([ 1. , -0.8]))
     """
+    _check_types(recordings, orders)
     if not recordings:
         raise ValueError("fit needs at least one recording")
     if len({one.sample_time_s for one in recordings}) > 1:
@@ -132,6 +135,18 @@ def fit(
         recordings,
         replace(problem, experiments=tuple(experiments)),
     )
+
+
+def _check_types(recordings: object, orders: object) -> None:
+    """Refuse what a program that nobody type-checks hands over easily."""
+    if isinstance(recordings, Recording):
+        raise TypeError(
+            "recordings must be a sequence of Recording; put it into a list"
+        )
+    if not isinstance(orders, Orders):
+        raise TypeError(
+            f"orders must be Orders(nb=..., nf=..., nk=...), got {orders!r}"
+        )
 
 
 def _check_block(orders: Orders, options: FitOptions) -> None:

@@ -18,7 +18,7 @@ from hwid_cli.maths.model.linear_block import (
     free_response,
     padded_signal,
 )
-from hwid_cli.records.model import HammersteinWiener
+from hwid_cli.records.model import Fit, HammersteinWiener
 from hwid_cli.records.recordings import Recording
 
 _ESTIMATE_ITERATIONS = 8
@@ -59,6 +59,8 @@ def simulate(
 
     Raises
     ------
+    TypeError
+        If a ``Fit`` is given for its model.
     ValueError
         If the input is not a 1-D array of at least one sample, the initial state is
         another word, or there is no output of the same length to estimate it from.
@@ -77,6 +79,8 @@ def simulate(
     >>> simulate(model, np.ones(3), initial_state="steady")
     array([1., 1., 1.])
     """
+    if isinstance(model, Fit):
+        raise TypeError("simulate takes a model: give result.model")
     signal = np.ascontiguousarray(input, dtype=float)
     if signal.ndim != 1 or signal.size == 0:
         raise ValueError(f"input must be a 1-D array with samples, got {signal.shape}")

@@ -17,9 +17,10 @@ from hwid_cli.report.figures.style import (
     number_decades,
     styled,
 )
+from hwid_cli.report.text_table import behind, number
 
-# Of the figure, and of a line of its legend, [inch].
-_HEIGHT, _LINE = 7.5, 0.2
+# Of the figure, of that of one recording, and of a line of its legend, [inch].
+_HEIGHT, _HEIGHT_OF_ONE, _LINE = 7.5, 5.0, 0.2
 # More recordings than this leave no room for their names, [-].
 _MOST_NAMES = 40
 # Names of models are cut to this length in the legend, [characters].
@@ -39,36 +40,52 @@ def comparison_figure(comparison: Comparison) -> Figure:
     Figure
         Above the RMSDs, filled where the model was identified on the recording; below
         measured and simulated outputs where the models differ most, and what they leave.
+        A single recording is only shown in full.
     """
-    figure = new_figure(FULL_WIDTH, _HEIGHT)
-    head = 1.0 - (0.55 + _LINE * len(comparison.models)) / _HEIGHT
-    edges: dict[str, Any] = {"left": 0.075, "right": 0.99}
-    above = figure.add_gridspec(1, 1, top=head, bottom=0.62, **edges)
-    below = figure.add_gridspec(2, 1, top=0.48, bottom=0.08, hspace=0.12, **edges)
-    upper = figure.add_subplot(above[0])
+    is_single = len(comparison.recordings) == 1
+    height = _HEIGHT_OF_ONE if is_single else _HEIGHT
+    figure = new_figure(FULL_WIDTH, height)
+    head = 1.0 - (0.55 + _LINE * len(comparison.models)) / height
+    edges: dict[str, Any] = {"left": 0.075, "right": 0.99, "hspace": 0.12}
+    if not is_single:
+        upper = figure.add_subplot(
+            figure.add_gridspec(1, 1, top=head, bottom=0.62, **edges)[0]
+        )
+        _draw_deviations(upper, comparison)
+    below = figure.add_gridspec(
+        2, 1, top=head if is_single else 0.48, bottom=0.6 / height, **edges
+    )
     middle = figure.add_subplot(below[0])
     lower = figure.add_subplot(below[1], sharex=middle)
     middle.tick_params(labelbottom=False)
-    _draw_deviations(upper, comparison)
     _draw_outputs(middle, comparison)
     _draw_rests(lower, comparison)
-    handles, labels = upper.get_legend_handles_labels()
+    # Lines where there are no markers.
+    handles, labels = figure.axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="upper left", bbox_to_anchor=(0.07, 0.995))
     return figure
 
 
+def _labels(comparison: Comparison) -> list[str]:
+    """Names in the legend; the RMSD too where no panel shows it."""
+    labels = []
+    for n, letter in enumerate(model_letters(comparison)):
+        name = comparison.models[n].name
+        name = name if len(name) <= _LONGEST else f"...{name[-_LONGEST:]}"
+        labels.append(f"{letter}: {name}")
+        if len(comparison.recordings) == 1:
+            unit = behind(comparison.output_unit)
+            labels[-1] += f", RMSD {number(comparison.rmsd[n, 0])}{unit}"
+    return labels
+
+
 def _draw_deviations(axes: Axes, comparison: Comparison) -> None:
     places = np.arange(len(comparison.recordings))
-    for n, (letter, one) in enumerate(
-        zip(model_letters(comparison), comparison.models, strict=True)
-    ):
+    for n, label in enumerate(_labels(comparison)):
         line = LINES[n % len(LINES)]
         own = comparison.is_own[n]
-        name = one.name if len(one.name) <= _LONGEST else f"...{one.name[-_LONGEST:]}"
         common = {"ls": "none", "marker": line["marker"], "color": line["color"]}
-        axes.plot(
-            places, comparison.rmsd[n], **common, mfc="none", label=f"{letter}: {name}"
-        )
+        axes.plot(places, comparison.rmsd[n], **common, mfc="none", label=label)
         axes.plot(places[own], comparison.rmsd[n][own], **common)
     axes.set_yscale("log")
     known = comparison.rmsd[np.isfinite(comparison.rmsd) & (comparison.rmsd > 0)]
@@ -87,15 +104,18 @@ def _draw_deviations(axes: Axes, comparison: Comparison) -> None:
 
 def _draw_outputs(axes: Axes, comparison: Comparison) -> None:
     shown = comparison.shown
-    axes.plot(shown.time_s, shown.measured, color=GREY, lw=2.0, label="measured")
-    for n, simulated in enumerate(shown.simulated):
-        line = LINES[n % len(LINES)]
-        axes.plot(
-            shown.time_s, _finite(simulated), color=line["color"], ls=line["ls"], lw=1
-        )
+    axes.plot(shown.time_s, shown.measured, color=GREY, lw=2.0)
+    for n, label in enumerate(_labels(comparison)):
+        line, simulated = LINES[n % len(LINES)], _finite(shown.simulated[n])
+        style = {"color": line["color"], "ls": line["ls"], "lw": 1, "label": label}
+        axes.plot(shown.time_s, simulated, **style)
     axes.set_ylim(*_limits(shown.measured))
     axes.set_ylabel(f"output y [{comparison.output_unit}]")
-    axes.set_title(f"{shown.name}, where the models differ most (grey: measured)")
+    if len(comparison.recordings) > 1:
+        axes.set_title(f"{shown.name}, where the models differ most (grey: measured)")
+        return
+    words = start_words(comparison).split("\n")[0]
+    axes.set_title(f"{shown.name} (grey: measured). {words}")
 
 
 def _draw_rests(axes: Axes, comparison: Comparison) -> None:

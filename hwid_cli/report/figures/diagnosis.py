@@ -26,6 +26,7 @@ from hwid_cli.report.figures.style import (
     new_figure,
     styled,
 )
+from hwid_cli.report.text_table import behind
 
 # Width, a row, the room above a panel for its title and below all, [inch].
 _WIDTH, _ROW, _TITLE, _BELOW = 7.2, 0.19, 0.34, 0.48
@@ -125,7 +126,7 @@ def _draw_gaps(axes: Axes, gaps: Sequence[RecordingGap], diagnosis: Diagnosis) -
     noise = diagnosis.noise.rms
     has_noise = np.isfinite(noise) and noise > 0.0
     if has_noise:
-        told = f"noise {noise:.2g} {diagnosis.output_unit}"
+        told = f"noise {noise:.2g}{behind(diagnosis.output_unit)}"
         axes.axvline(noise, color=BLACK, lw=1.1, ls=(0, (2, 2)), label=told)
     values = [every for _, every, _ in _series(diagnosis.gaps, diagnosis)]
     set_log_limits(axes, np.append(np.concatenate(values), noise))

@@ -13,6 +13,7 @@ from hwid_cli.report.figures.style import (
     number_decades,
     styled,
 )
+from hwid_cli.report.text_table import behind
 
 # Lines with a legend of their own; more are told apart by nobody.
 _MOST_NAMED = 10
@@ -49,7 +50,7 @@ def trend_figure(trend: ChainOnTests) -> Figure:
         style = LINES[number % len(LINES)]
         axes.plot(levels, trend.rmsd[:, number], lw=1.2, ms=5, label=label, **style)
     axes.plot(levels, trend.mean, color=BLACK, lw=2.8, marker="o", ms=6, label="mean")
-    told = f"threshold {trend.threshold:g} {trend.unit}"
+    told = f"threshold {trend.threshold:g}{behind(trend.unit)}"
     axes.axhline(trend.threshold, color=BLACK, lw=1.0, ls=(0, (2, 2)), label=told)
     axes.set_yscale("log")
     number_decades(axes.yaxis, *axes.get_ylim())

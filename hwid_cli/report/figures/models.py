@@ -10,6 +10,7 @@ from hwid_cli.report.figures.style import (
     BLUE,
     HALF_WIDTH,
     VERMILLION,
+    label_with_factor,
     new_figure,
     number_decades,
     styled,
@@ -45,13 +46,14 @@ def maps_figure(view: ModelView) -> Figure:
     right.set_title("output map y = g(x)")
     right.set_xlabel(f"x [{view.input_unit}]")
     right.set_ylabel(f"output y [{view.output_unit}]")
+    for axes in (left, right):
+        label_with_factor(axes)
     return figure
 
 
 def _draw_map(axes: Axes, curve: MapCurve) -> None:
     axes.plot(curve.argument, curve.value, color=BLUE, lw=1.5)
     axes.plot(curve.corners, curve.corner_values, "o", color=BLUE, ms=4, mfc="w")
-    axes.ticklabel_format(axis="y", scilimits=(-2, 3))
     axes.locator_params(nbins=5)
 
 

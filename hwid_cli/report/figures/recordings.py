@@ -10,6 +10,7 @@ from hwid_cli.report.figures.style import (
     GREY,
     HALF_WIDTH,
     VERMILLION,
+    label_with_factor,
     new_figure,
     styled,
 )
@@ -52,8 +53,7 @@ def simulation_figure(simulated: SimulatedRecording, *, is_detail: bool) -> Figu
         if not is_detail:
             shown = (step * simulated.detail[0], step * simulated.detail[1])
             axes.axvspan(*shown, color=BLUE, alpha=0.10, lw=0)
-        axes.ticklabel_format(axis="y", scilimits=(-2, 3), useMathText=False)
-        axes.yaxis.get_offset_text().set_size(8.0)
+        label_with_factor(axes)
         # One column of labels, whatever the width of the ticks.
         axes.yaxis.set_label_coords(-0.125, 0.5)
     # Above the axes, where no curve is.

@@ -139,6 +139,27 @@ def number_decades(axis: Axis, low: float, high: float) -> None:
     axis.set_minor_formatter(NullFormatter())
 
 
+def label_with_factor(axes: Axes) -> None:
+    """Move the factor of large and small numbers along y into the label's unit.
+
+    Elsewhere it would stand above the axes, where the title is.
+
+    Parameters
+    ----------
+    axes : Axes
+        Drawn and labelled, with the unit in brackets.
+    """
+    axes.ticklabel_format(
+        axis="y", scilimits=(-2, 3), useOffset=False, useMathText=False
+    )
+    formatter = axes.yaxis.get_major_formatter()
+    formatter.set_locs(list(axes.yaxis.get_majorticklocs()))
+    factor = formatter.get_offset()
+    axes.yaxis.get_offset_text().set_visible(False)
+    if factor:
+        axes.set_ylabel(axes.get_ylabel().replace("[", f"[{factor} ", 1))
+
+
 def mark_missing(axes: Axes) -> None:
     """Hatch whatever a heat map leaves blank.
 

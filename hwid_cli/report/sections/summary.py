@@ -60,7 +60,7 @@ def _headline(contents: ReportContents) -> list[str]:
         below = f"with an RMSD below {with_unit(cross.threshold, cross.unit)}"
         lines.append(
             f"The widest model of a single recording, {cross.models[row]}, covers "
-            f"{cross.covers[row]} of {len(cross.recordings)} recordings {below}."
+            f"{cross.covers[row]} of {counted(len(cross.recordings), 'recording')} {below}."
             if cross.covers[row]
             else f"No model of a single recording covers any recording {below}."
         )

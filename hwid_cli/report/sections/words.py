@@ -11,7 +11,7 @@ from hwid_cli.records.report import ReportContents
 from hwid_cli.report.figures.style import DOTS, as_png
 from hwid_cli.report.page import Image, Text
 from hwid_cli.report.simulation_words import simulation_words
-from hwid_cli.report.text_table import MISSING
+from hwid_cli.report.text_table import MISSING, behind
 
 NOTHING_COVERED = "no group covers any recording."
 
@@ -36,8 +36,11 @@ def with_unit(value: float, unit: str) -> str:
     --------
     >>> with_unit(0.0012345, "m").split(), with_unit(float("nan"), "m")
     (['0.00123', 'm'], '-')
+    >>> with_unit(0.0012345, "-")
+    '0.00123'
     """
-    return f"{value:.3g}{_GLUE}{unit}".rstrip() if np.isfinite(value) else MISSING
+    known = f"{value:.3g}{behind(unit).replace(' ', _GLUE)}"
+    return known if np.isfinite(value) else MISSING
 
 
 def percent(value: float) -> str:

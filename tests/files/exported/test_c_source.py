@@ -1,3 +1,8 @@
+import re
+import shlex
+import subprocess
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -18,6 +23,7 @@ from tests.files.exported.model_examples import (
 
 # What the C source promises over a whole recording, of the largest output.
 PROMISED = 1e-12
+DOCUMENT = Path(__file__).parents[3] / "docs" / "export.md"
 
 
 def check(folder, model, seed):
@@ -65,6 +71,26 @@ def test_all_maps_orders_delays_and_rules(nf, rule, tmp_path):
         nb, nk = 1 + (nf + place) % 10, (nf + place) % 6
         model = example_model(place, kinds=kinds, nb=nb, nf=nf, nk=nk, rule=rule)
         check(tmp_path / kind, model, nf)
+
+
+def test_the_program_of_the_document_predicts(tmp_path):
+    text = DOCUMENT.read_text()
+    (main,) = re.findall(r"```c\n(#include <stdio.h>.*?)```", text, re.DOTALL)
+    (build,) = re.findall(r"^cc .*main\.c.*$", text, re.MULTILINE)
+    exported, u = exported_of(example_model(5, nb=3, nf=4, nk=1)), example_input(5)
+    (tmp_path / "main.c").write_text(main)
+    (tmp_path / "step_06_3_7.c").write_text(c_source(exported))
+    subprocess.run(shlex.split(build), cwd=tmp_path, check=True)
+    done = subprocess.run(
+        [str(tmp_path / "predict")],
+        input="\n".join(map(repr, u.tolist())),
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    found = np.array(done.stdout.split(), dtype=float)
+
+    assert deviation(found, predict(exported, u)) <= PROMISED
 
 
 def test_names_cannot_break_the_source(tmp_path):

@@ -31,6 +31,14 @@ y = [{name}(u), {name}(u, 'empty'), {name}(u, 'steady')];
 file = fopen('y.bin', 'w');
 fwrite(file, y, 'double');
 fclose(file);
+for wrong = {{'stedy', 'Steady', 1}}
+    try
+        {name}(u, wrong{{1}});
+        error('none of the three words was taken');
+    catch problem
+        assert(strcmp(problem.identifier, 'hwid:start'));
+    end
+end
 """
 
 

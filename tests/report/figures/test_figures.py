@@ -32,6 +32,25 @@ def test_a_simulation_has_the_residual_beneath_with_quantities_and_units(content
     )
 
 
+def test_large_numbers_leave_the_title_alone(contents):
+    shown = contents.simulated[0]
+    large = replace(
+        shown,
+        recording=replace(shown.recording, output=4e7 * shown.recording.output),
+        output=4e7 * shown.output,
+        residual=4e7 * shown.residual,
+    )
+    figure = simulation_figure(large, is_detail=False)
+    as_png(figure)
+    upper, lower = figure.axes
+
+    for axes, quantity in ((upper, "output y"), (lower, "residual e")):
+        assert not axes.yaxis.get_offset_text().get_visible()
+        factor = axes.yaxis.get_major_formatter().get_offset()
+        assert factor
+        assert axes.get_ylabel() == f"{quantity} [{factor} m]"
+
+
 def test_the_detail_shows_its_stretch_only(contents):
     shown = contents.simulated[0]
     upper, _ = simulation_figure(shown, is_detail=True).axes

@@ -11,6 +11,9 @@ function y = @identifier@(u, start)
 if nargin < 2
     start = 'fitted';
 end
+if ~any(strcmp(start, {'fitted', 'steady', 'empty'}))
+    error('hwid:start', 'start must be ''fitted'', ''steady'' or ''empty''');
+end
 m = load(fullfile(fileparts(mfilename('fullpath')), '@mat_file@'));
 u = u(:);
 
