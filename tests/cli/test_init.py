@@ -198,3 +198,42 @@ def test_real_folders_are_understood(tmp_path, name, columns):
     found = load_experiment(out).recordings.columns
     assert {role: getattr(found, role) for role in columns} == columns
     assert invoke("check", out, "--no-timing").exit_code == 0
+
+
+def write_twins(folder, heads):
+    """Three columns, of which the first two are multiples of each other."""
+    for name, (time, u, y) in measurements().items():
+        columns = (time, u, 2.5 * u + 0.1, y)
+        table = np.column_stack(columns)
+        rows = [",".join(f"{value:.9g}" for value in row) for row in table]
+        (folder / f"{name}.csv").write_text("\n".join([*heads, *rows]))
+
+
+@pytest.mark.parametrize(
+    ("heads", "chosen", "other"),
+    [
+        ([], 1, "column 2 is a multiple of column 1"),
+        (["time_s,Kanal1 [V],Kanal2 [A],position_m"], "Kanal2 [A]", "'Kanal1 [V]' is"),
+        (["time_s,input [V],Kanal2 [A],position_m"], "Kanal2 [A]", "'input [V]' is"),
+    ],
+)
+def test_a_multiple_of_the_input_is_told_and_a_current_preferred(
+    folder, tmp_path, heads, chosen, other
+):
+    write_twins(folder, heads)
+    out = tmp_path / "mine.yaml"
+    result = invoke("init", folder, "--out", out)
+
+    assert result.exit_code == 0, result.output
+    assert load_experiment(out).recordings.columns.input == chosen
+    text = " ".join(out.read_text().replace("#", " ").split())
+    assert other in text
+    assert "either may be the input" in text
+
+
+def test_a_reference_is_no_second_input(folder, tmp_path):
+    write_english_csv(folder)
+    out = tmp_path / "mine.yaml"
+
+    assert invoke("init", folder, "--out", out).exit_code == 0
+    assert "either may be" not in out.read_text()
