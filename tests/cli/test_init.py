@@ -12,6 +12,8 @@ from tests.cli.measured_folders import (
     EXPECTED,
     LAYOUTS,
     STEP_S,
+    N,
+    answer,
     measurements,
     write_english_csv,
     write_german_csv,
@@ -237,3 +239,44 @@ def test_a_reference_is_no_second_input(folder, tmp_path):
 
     assert invoke("init", folder, "--out", out).exit_code == 0
     assert "either may be" not in out.read_text()
+
+
+def write_sines(folder, *, rest):
+    """Two sines, after a rest or not."""
+    time = np.arange(N)
+    for number in (1, 2):
+        u = number * np.sin(2 * np.pi * np.maximum(time - rest, 0) / 60.0)
+        rows = [
+            f"{STEP_S * k:.3f},{a},{b}"
+            for k, a, b in zip(time, u, answer(u), strict=True)
+        ]
+        (folder / f"sine_{number}.csv").write_text(
+            "\n".join(["time_s,current_A,position_m", *rows])
+        )
+
+
+@pytest.mark.parametrize(("rest", "rule"), [(60, "held"), (0, "estimated")])
+def test_the_diagnosis_begins_as_the_recordings_do(folder, tmp_path, rest, rule):
+    write_sines(folder, rest=rest)
+    out = tmp_path / "mine.yaml"
+
+    assert invoke("init", folder, "--out", out).exit_code == 0
+    text = out.read_text()
+    assert f"# diagnose: {{max_effects: 2, initial_state: {rule}}}" in text
+    # As a user does: the marks away.
+    start = text.index("# simulation:")
+    simulation = [
+        line if "begin with" in line or "'cut'" in line else line.removeprefix("# ")
+        for line in text[start:].splitlines()
+    ]
+    out.write_text("\n".join([text[:start], *simulation]))
+    assert load_experiment(out).diagnose.initial_state == rule
+
+
+def test_steps_that_keep_their_rest_start_in_equilibrium(folder, tmp_path):
+    write_german_csv(folder)
+    (folder / "Rauschen_1.csv").unlink()
+    out = tmp_path / "mine.yaml"
+
+    assert invoke("init", folder, "--out", out).exit_code == 0
+    assert "# diagnose: {max_effects: 2}\n" in out.read_text()
