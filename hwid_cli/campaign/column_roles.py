@@ -18,6 +18,11 @@ from hwid_cli.records.starter import FoundColumn, Role
 
 # Jitter up to here is rounding of time stamps; more needs resampling, [-].
 _ROUND_STAMPS = 0.009
+# Columns that agree so far may both be the input, noise apart (a correlation), [-].
+_TWINS = 0.9999
+_CURRENT_UNITS = ("a", "ma", "ka")
+# Rank up to which words of an input say a current.
+_LAST_CURRENT_RANK = meaning_of("iz").rank
 # A measurement has more samples than this; shorter columns are settings, [samples].
 FEWEST_SAMPLES = 60
 
@@ -144,9 +149,13 @@ def guess_signals(
     ]
     reasons: dict[str, str] = {}
     first = _chosen_input(inputs, outputs, unnamed or named, reasons)
+    first, twins = _current_of_twins(first, named, reasons)
     last = _chosen_output(first, outputs, [one for one in named if one != first])
     reasons["output"] = last[1]
-    notes = _other_columns(named, first, last[0])
+    notes = [
+        *_twin_notes(first, [one for one in twins if one != last[0]]),
+        *_other_columns(named, first, last[0]),
+    ]
     reference = next(
         (
             one.column
@@ -189,6 +198,41 @@ def _chosen_input(
         return max(gains, default=0.0) + signs.roughness(one.column.values)
 
     return max(others, key=leads)
+
+
+def _current_of_twins(
+    first: _Named, named: list[_Named], reasons: dict[str, str]
+) -> tuple[_Named, list[_Named]]:
+    """Of columns that are multiples of the input the current, and the others."""
+    alike = [
+        one
+        for one in named
+        if one == first
+        or (
+            one.meaning.role in ("", "input")
+            and signs.are_same(one.column.values, first.column.values, least=_TWINS)
+        )
+    ]
+    currents = [one for one in alike if _is_current(one.meaning)]
+    if currents and first not in currents:
+        first = currents[0]
+        reasons["input"] = "by its name, a current"
+    return first, [one for one in alike if one != first]
+
+
+def _is_current(meaning: Meaning) -> bool:
+    """Whether a name says a current: by its unit, else by one of the first words."""
+    if meaning.unit:
+        return meaning.unit.lower() in _CURRENT_UNITS
+    return meaning.role == "input" and meaning.rank <= _LAST_CURRENT_RANK
+
+
+def _twin_notes(first: _Named, twins: list[_Named]) -> list[str]:
+    return [
+        f"{_called(one.column)} is a multiple of {_called(first.column)}; either may be "
+        "the input"
+        for one in twins
+    ]
 
 
 def _chosen_output(

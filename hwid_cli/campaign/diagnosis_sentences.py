@@ -18,6 +18,11 @@ if TYPE_CHECKING:
 # Share of the largest displacement that counts as motion to one side.
 _ONE_SIDE = 0.05
 _MOST_RIVALS = 3
+# The gap sits in recordings that hold this share of it ...
+_NEARLY_ALL = 0.95
+# ... and are of one kind, or no more than this share of all.
+_FEW = 1 / 3
+_MOST_NAMED = 6
 
 
 def summarise(
@@ -53,6 +58,7 @@ def summarise(
         return (
             f"The simulation differs from the recordings by {before:.3g} times their "
             "noise, and no effect of the catalogue explains most of it."
+            f"{_where_it_sits(findings, verdict.chosen)}"
         )
     meaning = "; ".join(one.sentence for one in effects)
     text = (
@@ -65,6 +71,40 @@ def summarise(
     if not verdict.is_complete:
         text += " Something smaller remains."
     return text
+
+
+def _where_it_sits(findings: "Findings", chosen: CandidateFit) -> str:
+    """Name the recordings that hold the gap, if they are of one kind or few."""
+    problem = findings.problem
+    signals = problem.signals
+    floor = np.array([one.n_judged for one in signals]) * findings.noise.rms**2
+    excess = np.maximum(chosen.sse - floor, 0.0)
+    if not 0 < excess.sum() < np.inf:
+        return ""
+    rows = _rows_of_gap(excess, [one.kind for one in signals])
+    if not rows:
+        return ""
+    shown = ", ".join(signals[row].name for row in rows[:_MOST_NAMED])
+    more = len(rows) - _MOST_NAMED
+    shown += f" and {more} more" if more > 0 else ""
+    text = f" Nearly all of the gap sits in {shown}"
+    if problem.compares_command or problem.start == "estimated":
+        return f"{text}."
+    return f"{text}: check how they start (diagnose.initial_state)."
+
+
+def _rows_of_gap(excess: np.ndarray, kinds: list[str]) -> list[int]:
+    """Rows of the kind, or of the few recordings, that hold nearly all; else none."""
+    least = _NEARLY_ALL * excess.sum()
+    largest = np.argsort(-excess)
+    n_most = int(np.searchsorted(np.cumsum(excess[largest]), least)) + 1
+    kind = kinds[largest[0]]
+    of_kind = [row for row, one in enumerate(kinds) if one == kind]
+    # Where one recording of many is off, its kind is not to blame.
+    is_kind = excess[of_kind].sum() >= least and n_most > len(of_kind) / 2
+    if is_kind and len(of_kind) < len(kinds):
+        return of_kind
+    return sorted(largest[:n_most]) if n_most <= _FEW * len(kinds) else []
 
 
 def _name(found: CandidateFit) -> str:

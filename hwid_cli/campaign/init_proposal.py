@@ -89,6 +89,7 @@ def propose(raws: Sequence[RawRecording], excluded: Sequence[str] = ()) -> Propo
         identify=identify if held_out else (),
         held_out=held_out,
         average=max(1, memory // _ENOUGH_SAMPLES),
+        initial_state=_initial_state(raws, kinds, recipes, is_cut=bool(parts)),
     )
 
 
@@ -202,6 +203,27 @@ def _works(recipe: tuple[str, ...], kind: str, raws: Sequence[RawRecording]) -> 
 def _of_kind(raw: RawRecording, kind: str) -> RawRecording:
     about = {name: getattr(raw, name) for name in RawRecording.__dataclass_fields__}
     return RawRecording(**{**about, "kind": kind})
+
+
+def _initial_state(
+    raws: Sequence[RawRecording],
+    kinds: dict[str, str],
+    recipes: dict[str, tuple[str, ...]],
+    *,
+    is_cut: bool,
+) -> str:
+    """How a diagnosis must take the recordings to start, rests cut as proposed."""
+    if is_cut or any(not _begins_at_rest(raw, kinds[raw.name]) for raw in raws):
+        return "estimated"
+    # Of these kinds 'cut' keeps no rest: the drive is still where it was before.
+    if any("cut" in recipes.get(kind, ()) for kind in ("sine", "random")):
+        return "held"
+    return "rest"
+
+
+def _begins_at_rest(raw: RawRecording, kind: str) -> bool:
+    onset = find_onset(raw.input, quiet_is_rest=kind != "random")
+    return onset is None or onset >= LEAST_QUIET
 
 
 def _held_out(names: Sequence[str], kinds: dict[str, str]) -> tuple[str, ...]:

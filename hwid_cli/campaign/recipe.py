@@ -207,10 +207,16 @@ def _rest_length(draft: Draft, step: str) -> int:
 
 def _with_period(draft: Draft) -> Draft:
     period = find_period(draft.input)
+    known = draft.log.period_samples
+    if period is None and known and whole_periods(draft.input.size, known):
+        # One period alone crosses its middle too seldom to be measured again.
+        period = known
     if period is None:
+        size, total = draft.input.size, draft.raw.input.size
+        left = "" if size == total else f" left of the file's {total}"
         raise MeasurementError(
-            f"{draft.place}: no whole period was found in the input's "
-            f"{draft.input.size} samples; expected a sine of at least one period: "
+            f"{draft.place}: no whole period was found in the input's {size} samples"
+            f"{left}; expected a sine of at least one period: "
             "check recordings.kind, or take the offsets and 'recut' out of "
             "calibrate.sine"
         )

@@ -2,23 +2,26 @@
 
 from collections.abc import Sequence
 from difflib import get_close_matches
+from typing import TypeVar
 
 from hwid_cli.errors import ConfigError
-from hwid_cli.records.recordings import Recording
+from hwid_cli.records.recordings import RawRecording, Recording
+
+Chosen = TypeVar("Chosen", Recording, RawRecording)
 
 
 def select_recordings(
-    recordings: Sequence[Recording],
+    recordings: Sequence[Chosen],
     names: Sequence[str] | None,
     *,
     key: str,
     held_out: Sequence[str] = (),
-) -> tuple[Recording, ...]:
+) -> tuple[Chosen, ...]:
     """Choose recordings by name, in their own order.
 
     Parameters
     ----------
-    recordings : sequence of Recording
+    recordings : sequence of Recording or RawRecording
     names : sequence of str or None
         None means all that are not held out.
     key : str
@@ -28,7 +31,7 @@ def select_recordings(
 
     Returns
     -------
-    tuple of Recording
+    tuple of Recording or RawRecording
 
     Raises
     ------

@@ -61,6 +61,7 @@ def calibrate_stage(session: "Session") -> "Calibrated":
     timer = start_timer()
     raws = read_recordings(session.experiment, session.out)
     session.read.update({raw.source: raw.sha256 for raw in raws})
+    _check_names(session, raws)
     options = session.experiment.calibrate
     key = calibration_key(raws, options)
     calibrated = read_unchanged(session, "calibrate", key, read_calibrated)
@@ -78,12 +79,11 @@ def calibrate_stage(session: "Session") -> "Calibrated":
         f"calibrate: {len(raws)} recordings {state}, "
         f"{_what_changed(session, calibrated)}, {timer()}",
     )
-    _check_names(session, calibrated)
     return calibrated
 
 
-def _check_names(session: "Session", calibrated: "Calibrated") -> None:
-    """Refuse a misspelt recording in any section before hours of fitting."""
+def _check_names(session: "Session", raws: "list[RawRecording]") -> None:
+    """Refuse a misspelt recording in any section before anything is computed."""
     from hwid_cli.campaign.selection import select_recordings
 
     experiment = session.experiment
@@ -94,7 +94,7 @@ def _check_names(session: "Session", calibrated: "Calibrated") -> None:
             # The one word that stands for a choice of names.
             if names != "auto":
                 place = f"{experiment.source}: {section}.{key}"
-                select_recordings(calibrated.recordings, names, key=place)
+                select_recordings(raws, names, key=place)
 
 
 def _what_changed(session: "Session", calibrated: "Calibrated") -> str:

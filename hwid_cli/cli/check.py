@@ -60,6 +60,7 @@ def command(
     checked, more = _data(experiment, folder)
     if problems or more:
         _end_with((*problems, *more))
+    _show_starts(experiment, checked)
     _show_plan(experiment, checked, (cache or folder / "cache", jobs, timing))
 
 
@@ -134,6 +135,22 @@ def _names(experiment: "Experiment", known: set[str]) -> list[str]:
                         f"{place}: no recording {name!r}; {did_you_mean(name, known)}"
                     )
     return problems
+
+
+def _show_starts(experiment: "Experiment", checked: "Checked") -> None:
+    """Warn of recordings that a diagnosis would start wrongly."""
+    from hwid_cli.campaign.selection import select_recordings
+    from hwid_cli.cli.diagnose import ToDiagnose, start_warning
+
+    simulation, options = experiment.simulation, experiment.diagnose
+    if simulation is None or options is None:
+        return
+    recordings = select_recordings(
+        checked.recordings, options.recordings, key="diagnose.recordings"
+    )
+    warning = start_warning(experiment, ToDiagnose(recordings, simulation, options))
+    if warning:
+        click.echo(f"hwid: {warning}", err=True)
 
 
 def _show_plan(

@@ -1,5 +1,6 @@
 """``hwid diagnose``: what a physics simulation lacks, and by how much that mends it."""
 
+import logging
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,10 +15,15 @@ if TYPE_CHECKING:
     from hwid_cli.cli.session import Session
     from hwid_cli.files.result_files import Provenance
     from hwid_cli.records.diagnosis import Diagnosis
-    from hwid_cli.records.experiment import DiagnoseOptions, SimulationOptions
+    from hwid_cli.records.experiment import (
+        DiagnoseOptions,
+        Experiment,
+        SimulationOptions,
+    )
     from hwid_cli.records.recordings import Recording
 
 _FIGURES = "figures"
+_log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,6 +92,9 @@ def diagnose_stage(session: "Session") -> "Diagnosis":
     from hwid_cli.files.result_files import read_provenance
 
     given, path = what_to_diagnose(session), session.results_path
+    warning = start_warning(session.experiment, given)
+    if warning:
+        _log.warning("%s", warning)
     timer = start_timer()
     key = diagnosis_key(given.recordings, given.simulation, given.options)
     diagnosis = read_unchanged(session, "diagnose", key, read_diagnosis_record)
@@ -102,6 +111,26 @@ def diagnose_stage(session: "Session") -> "Diagnosis":
         write_diagnosis(path, diagnosis, origin)
     write_files(session, diagnosis, given.simulation, origin)
     return diagnosis
+
+
+def start_warning(experiment: "Experiment", given: ToDiagnose) -> str:
+    """Say which recordings cannot start in equilibrium, as the diagnosis takes them to.
+
+    Parameters
+    ----------
+    experiment : Experiment
+    given : ToDiagnose
+
+    Returns
+    -------
+    str
+        One line; empty if there is none.
+    """
+    from hwid_cli.campaign.diagnosis_starts import doubtful_starts, starts_sentence
+
+    names = doubtful_starts(given.recordings, given.simulation, given.options)
+    sentence = starts_sentence(names, given.recordings, experiment.calibrate)
+    return f"{experiment.source}: {sentence}" if sentence else ""
 
 
 def what_to_diagnose(session: "Session") -> ToDiagnose:

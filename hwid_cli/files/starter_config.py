@@ -14,6 +14,19 @@ from hwid_cli.records.starter import Layout, Proposal, Role
 
 # Stands for a unit that no name says.
 _UNKNOWN_UNIT = "-"
+# Diagnose section by how recordings start, and why so.
+_STARTS = {
+    "rest": ("# diagnose: {max_effects: 2}",),
+    "held": (
+        "# 'cut' takes away the rest before sines and random signals: the drive still "
+        "holds its level.",
+        "# diagnose: {max_effects: 2, initial_state: held}",
+    ),
+    "estimated": (
+        "# Recordings do not all begin with a rest: how they start is fitted too.",
+        "# diagnose: {max_effects: 2, initial_state: estimated}",
+    ),
+}
 
 
 def draft_experiment(layout: Layout, folder: Path) -> Experiment:
@@ -85,7 +98,7 @@ def starter_text(layout: Layout, proposal: Proposal, folder: Path, path: Path) -
         _fit_lines(proposal),
         _judging_lines(layout, proposal),
         _group_lines(proposal),
-        _diagnose_lines(layout),
+        _diagnose_lines(layout, proposal),
     ]
     return "\n\n".join("\n".join(lines) for lines in blocks if lines) + "\n"
 
@@ -278,7 +291,7 @@ def _group_lines(proposal: Proposal) -> list[str]:
     ]
 
 
-def _diagnose_lines(layout: Layout) -> list[str]:
+def _diagnose_lines(layout: Layout, proposal: Proposal) -> list[str]:
     lines = [
         "# What does a physics simulation of the drive lack? Put the values that you "
         "simulate with,",
@@ -295,7 +308,7 @@ def _diagnose_lines(layout: Layout) -> list[str]:
         "#   damping_N_s_per_m: 10.0",
         "#   stiffness_N_per_m: 0.0   # 0: no spring",
         "#   force_constant_N_per_A: 10.0",
-        "# diagnose: {max_effects: 2}",
+        *_STARTS[proposal.initial_state],
     ]
 
 

@@ -116,18 +116,20 @@ def roughness(values: np.ndarray) -> float:
     return float(np.std(np.diff(values))) / spread if spread > 0 else 0.0
 
 
-def are_same(one: np.ndarray, other: np.ndarray) -> bool:
+def are_same(one: np.ndarray, other: np.ndarray, *, least: float = SAME) -> bool:
     """Whether a column is a multiple of another one, apart from an offset.
 
     Parameters
     ----------
     one, other : ndarray, shape (n,)
+    least : float, [-]
+        Correlation beyond which it is one.
 
     Returns
     -------
     bool
     """
-    return one.size == other.size and abs(_correlation(one, other)) > SAME
+    return one.size == other.size and abs(_correlation(one, other)) > least
 
 
 def answers(first: np.ndarray, second: np.ndarray) -> float:

@@ -129,6 +129,8 @@ class Proposal:
         Recordings that only judge; empty for none.
     average : int, [samples]
         1 for no advice.
+    initial_state : str
+        How a diagnosis takes the recordings to start.
     sample_time_s : float, [s]
     notes : tuple of str
     """
@@ -148,4 +150,5 @@ class Proposal:
     identify: tuple[str, ...] = ()
     held_out: tuple[str, ...] = ()
     average: int = 1
+    initial_state: str = "rest"
     notes: tuple[str, ...] = ()

@@ -140,7 +140,7 @@ def _criteria(one: OrderChoice) -> str:
 def _edges(advice: OrderAdvice) -> str:
     one = advice.overall
     axes = [
-        f"orders.{name} (to {axis[-1]})"
+        f"orders.{name} (beyond {max(axis)})"
         for name, value, axis in (
             ("nb", one.best_nb, advice.nb),
             ("nk", one.best_nk, advice.nk),

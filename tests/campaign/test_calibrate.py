@@ -259,3 +259,20 @@ def test_unequal_lengths_are_refused_where_nothing_cuts_them():
 def test_options_that_make_no_sense_are_refused(options, message):
     with pytest.raises(ConfigError, match=message):
         calibrate_all([], options)
+
+
+def test_a_sine_of_less_than_two_periods_keeps_its_one_whole_period():
+    times = np.arange(400)
+    sine = np.where(times < 40, 0.0, np.sin(2 * np.pi * (times - 40) / 200.0))
+    (recording,), (log,) = calibrate_all([raw(sine, 0.5 * sine, "sine")], THESIS)
+
+    assert log.period_samples == pytest.approx(200.0, abs=0.5)
+    assert recording.n_samples == 200
+
+
+def test_a_sine_without_a_whole_period_is_told_with_the_samples_of_its_file():
+    times = np.arange(400)
+    sine = np.where(times < 240, 0.0, np.sin(2 * np.pi * (times - 240) / 400.0))
+    with pytest.raises(MeasurementError, match="left of the file's 400") as error:
+        calibrate_all([raw(sine, sine, "sine")], THESIS)
+    assert "no whole period was found" in str(error.value)

@@ -257,3 +257,21 @@ def test_quiet_says_nothing(again):
     result = again("--quiet")
 
     assert (result.exit_code, result.stdout, result.stderr) == (0, "", "")
+
+
+@blank
+def test_a_start_away_from_equilibrium_is_one_line_of_warning(config, edit, again):
+    for path in (config.parent / "data").glob("sine_*.csv"):
+        head, *rows = path.read_text().splitlines()
+        path.write_text("\n".join([head, *rows[5:]]))
+    edit("[coulomb_friction, quadratic_drag]", "[quadratic_drag]")
+    result = again()
+
+    assert result.exit_code == 0, result.output
+    (line,) = result.stderr.splitlines()
+    assert "diagnose.initial_state: 'rest'" in line
+    assert "sine_01" in line
+    # The cache alters nothing of it.
+    assert again().stderr == result.stderr
+    edit("max_effects: 1}", "max_effects: 1, initial_state: held}")
+    assert again().stderr == ""

@@ -12,6 +12,8 @@ from tests.cli.measured_folders import (
     EXPECTED,
     LAYOUTS,
     STEP_S,
+    N,
+    answer,
     measurements,
     write_english_csv,
     write_german_csv,
@@ -198,3 +200,83 @@ def test_real_folders_are_understood(tmp_path, name, columns):
     found = load_experiment(out).recordings.columns
     assert {role: getattr(found, role) for role in columns} == columns
     assert invoke("check", out, "--no-timing").exit_code == 0
+
+
+def write_twins(folder, heads):
+    """Three columns, of which the first two are multiples of each other."""
+    for name, (time, u, y) in measurements().items():
+        columns = (time, u, 2.5 * u + 0.1, y)
+        table = np.column_stack(columns)
+        rows = [",".join(f"{value:.9g}" for value in row) for row in table]
+        (folder / f"{name}.csv").write_text("\n".join([*heads, *rows]))
+
+
+@pytest.mark.parametrize(
+    ("heads", "chosen", "other"),
+    [
+        ([], 1, "column 2 is a multiple of column 1"),
+        (["time_s,Kanal1 [V],Kanal2 [A],position_m"], "Kanal2 [A]", "'Kanal1 [V]' is"),
+        (["time_s,input [V],Kanal2 [A],position_m"], "Kanal2 [A]", "'input [V]' is"),
+    ],
+)
+def test_a_multiple_of_the_input_is_told_and_a_current_preferred(
+    folder, tmp_path, heads, chosen, other
+):
+    write_twins(folder, heads)
+    out = tmp_path / "mine.yaml"
+    result = invoke("init", folder, "--out", out)
+
+    assert result.exit_code == 0, result.output
+    assert load_experiment(out).recordings.columns.input == chosen
+    text = " ".join(out.read_text().replace("#", " ").split())
+    assert other in text
+    assert "either may be the input" in text
+
+
+def test_a_reference_is_no_second_input(folder, tmp_path):
+    write_english_csv(folder)
+    out = tmp_path / "mine.yaml"
+
+    assert invoke("init", folder, "--out", out).exit_code == 0
+    assert "either may be" not in out.read_text()
+
+
+def write_sines(folder, *, rest):
+    """Two sines, after a rest or not."""
+    time = np.arange(N)
+    for number in (1, 2):
+        u = number * np.sin(2 * np.pi * np.maximum(time - rest, 0) / 60.0)
+        rows = [
+            f"{STEP_S * k:.3f},{a},{b}"
+            for k, a, b in zip(time, u, answer(u), strict=True)
+        ]
+        (folder / f"sine_{number}.csv").write_text(
+            "\n".join(["time_s,current_A,position_m", *rows])
+        )
+
+
+@pytest.mark.parametrize(("rest", "rule"), [(60, "held"), (0, "estimated")])
+def test_the_diagnosis_begins_as_the_recordings_do(folder, tmp_path, rest, rule):
+    write_sines(folder, rest=rest)
+    out = tmp_path / "mine.yaml"
+
+    assert invoke("init", folder, "--out", out).exit_code == 0
+    text = out.read_text()
+    assert f"# diagnose: {{max_effects: 2, initial_state: {rule}}}" in text
+    # As a user does: the marks away.
+    start = text.index("# simulation:")
+    simulation = [
+        line if "begin with" in line or "'cut'" in line else line.removeprefix("# ")
+        for line in text[start:].splitlines()
+    ]
+    out.write_text("\n".join([text[:start], *simulation]))
+    assert load_experiment(out).diagnose.initial_state == rule
+
+
+def test_steps_that_keep_their_rest_start_in_equilibrium(folder, tmp_path):
+    write_german_csv(folder)
+    (folder / "Rauschen_1.csv").unlink()
+    out = tmp_path / "mine.yaml"
+
+    assert invoke("init", folder, "--out", out).exit_code == 0
+    assert "# diagnose: {max_effects: 2}\n" in out.read_text()

@@ -30,6 +30,20 @@ def test_only_the_stages_that_are_named_run(hwid, edit, out):
     assert not (out / "results.h5").exists()
 
 
+@pytest.mark.parametrize(
+    "section", ["test: {recordings: [step_9]}", "group: {start: [step_9]}"]
+)
+def test_a_wrong_name_is_told_before_anything_is_computed(hwid, edit, out, section):
+    edit("identify: {}\ncrossval: {threshold: 0.01}", f"identify: {{}}\n{section}")
+    result = hwid("run")
+
+    assert result.exit_code == 1
+    assert result.stderr.count("\n") == 1
+    assert "no recording 'step_9'" in result.stderr
+    assert not (out / "calibrated.h5").exists()
+    assert not (out / "figures").exists()
+
+
 def test_a_configuration_without_any_stage_is_refused(hwid, tmp_path):
     path = tmp_path / "nothing.yaml"
     path.write_text("name: nothing\n")

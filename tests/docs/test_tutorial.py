@@ -55,13 +55,14 @@ def test_every_link_leads_somewhere(page):
 
 @pytest.mark.slow
 def test_the_commands_run_on_a_clean_folder(tmp_path):
-    said = ""
+    said = warned = ""
     for words, body, skipped in blocks():
         if skipped:
             continue
         if words[0] == "sh":
             for line in body.splitlines():
-                said += run(line, tmp_path)
+                done = run(line, tmp_path)
+                said, warned = said + done.stdout, warned + done.stderr
         elif words[0] == "text":
             for line in body.splitlines():
                 assert line in said, line
@@ -74,6 +75,10 @@ def test_the_commands_run_on_a_clean_folder(tmp_path):
     assert (results / "figures" / "compare.png").is_file()
     found = json.loads((results / "diagnosis.json").read_text())
     assert found["verdict"] == "named"
+    # The data are made with nothing but friction: noise remains, and no warning is due.
+    assert found["complete"]
+    assert found["gap"]["after"]["ratio_to_noise"] < 1.3
+    assert "initial_state" not in warned
     force = found["effects"][0]["parameters"]["force_N"]
     # Made with 0.8 N; an Euler integration and an offset leave some per cent.
     assert force["value"] == pytest.approx(0.8, rel=0.1)
@@ -96,4 +101,4 @@ def run(line, folder):
         check=False,
     )
     assert done.returncode == 0, f"{line}\n{done.stdout}\n{done.stderr}"
-    return done.stdout
+    return done

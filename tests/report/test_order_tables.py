@@ -62,7 +62,10 @@ def test_the_recommendation_says_why():
         ({"factor": 1.09, "standard_error": 0.1}, "within one standard error (0.1)"),
         ({"best_nb": 2, "best_nk": 3}, "they have the lowest RMSD on recordings"),
         ({"n_judges": 0, "standard_error": NAN}, "No other recording judges"),
-        ({"best_nb": 4, "best_nk": 5}, "widen orders.nb (to 4) and orders.nk (to 5)"),
+        (
+            {"best_nb": 4, "best_nk": 5},
+            "widen orders.nb (beyond 4) and orders.nk (beyond 5)",
+        ),
     ],
 )
 def test_each_case_has_its_reason(changes, words):
