@@ -56,6 +56,10 @@ def is_chosen(candidate: RankedCandidate, diagnosis: Diagnosis) -> bool:
     return bool(found) and set(candidate.effects) == found
 
 
+# Where something else remains, an effect also takes up some of that.
+INTERVALS_OF_A_PART = "intervals hold as if nothing else were missing"
+
+
 def effects_table(diagnosis: Diagnosis) -> Table:
     """Show the parameters of the effects that the simulation lacks.
 
@@ -75,8 +79,11 @@ def effects_table(diagnosis: Diagnosis) -> Table:
             value = parameter.text or _value(parameter.value)
             rows.append((name, quantity, value, _interval(parameter), unit))
             name = ""
+    title = "Effects that the simulation lacks"
+    if rows and not diagnosis.complete:
+        title += f"; {INTERVALS_OF_A_PART}"
     return Table(
-        "Effects that the simulation lacks",
+        title,
         ("effect", "parameter", "value", "95 % interval", "unit"),
         tuple(rows),
         text_columns=(0, 1, 4),

@@ -226,3 +226,9 @@ def test_hostile_words_stay_as_they_are():
     )
 
     assert text.count(hostile) == 4
+
+
+def test_intervals_say_when_something_else_remains():
+    words = "intervals hold as if nothing else were missing"
+    assert words in effects_table(replace(named(), complete=False)).caption
+    assert words not in effects_table(replace(named(), complete=True)).caption

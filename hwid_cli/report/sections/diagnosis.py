@@ -9,6 +9,7 @@ import numpy as np
 from hwid_cli.records.diagnosis import Diagnosis, RecordingGap
 from hwid_cli.records.report import ReportContents
 from hwid_cli.report.diagnosis_cells import (
+    INTERVALS_OF_A_PART,
     base_table,
     closing_sentences,
     effects_table,
@@ -59,7 +60,9 @@ def diagnosis_section(contents: ReportContents) -> Section:
         blocks.append(Text("There is no diagnosis among these results.", is_note=True))
     else:
         blocks += [Text(line) for line in _sentences(found)]
-        effects = _effects_table(_items(found, "effects"))
+        effects = _effects_table(
+            _items(found, "effects"), is_all=found.get("complete") is True
+        )
         blocks += [table for table in (effects, _gap_table(found)) if table is not None]
         where = [
             str(one.get("sentence") or one.get("variable", ""))
@@ -189,7 +192,9 @@ def _items(found: Mapping[str, Any], key: str) -> list[Mapping[str, Any]]:
     return [one for one in found.get(key) or () if isinstance(one, Mapping)]
 
 
-def _effects_table(effects: Sequence[Mapping[str, Any]]) -> Table | None:
+def _effects_table(
+    effects: Sequence[Mapping[str, Any]], *, is_all: bool
+) -> Table | None:
     if not effects:
         return None
     rows = []
@@ -202,6 +207,8 @@ def _effects_table(effects: Sequence[Mapping[str, Any]]) -> Table | None:
             name = about = ""
     heads = ("effect", "meaning", "parameter", "value", "95 % interval")
     caption = "Effects that the simulation lacks; the unit ends each parameter's name"
+    if not is_all:
+        caption += f"; {INTERVALS_OF_A_PART}"
     return Table(caption, heads, tuple(rows), text_columns=(0, 1, 2))
 
 
