@@ -90,8 +90,6 @@ def fit(
     ('converged', array([ 1. , -0.8]))
     """
     _check_types(recordings, orders)
-    if not recordings:
-        raise ValueError("fit needs at least one recording")
     if len({one.sample_time_s for one in recordings}) > 1:
         raise ValueError("recordings of one fit must share their sample time")
     kinds = (options.input_map, options.output_map)
@@ -137,7 +135,7 @@ def fit(
     )
 
 
-def _check_types(recordings: object, orders: object) -> None:
+def _check_types(recordings: Sequence[Recording], orders: Orders) -> None:
     """Refuse what a program that nobody type-checks hands over easily."""
     if isinstance(recordings, Recording):
         raise TypeError(
@@ -147,6 +145,8 @@ def _check_types(recordings: object, orders: object) -> None:
         raise TypeError(
             f"orders must be Orders(nb=..., nf=..., nk=...), got {orders!r}"
         )
+    if not recordings:
+        raise ValueError("fit needs at least one recording")
 
 
 def _check_block(orders: Orders, options: FitOptions) -> None:
