@@ -11,8 +11,12 @@ import matplotlib.pyplot as plt
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from hwid_cli.campaign.chunks import CHUNK_S, MOST_IN_CHUNK
-from hwid_cli.campaign.dask_cluster import CHUNKS_AHEAD
+from hwid_cli.campaign.chunks import (
+    CHUNK_S,
+    CHUNKS_AHEAD,
+    LEAST_CHUNK_S,
+    MOST_IN_CHUNK,
+)
 from tests.benchmarks.cluster_model import Costs, Played, Round, grid_rounds, play
 
 FIGURE = Path(__file__).with_name("figures") / "scale.png"
@@ -125,6 +129,8 @@ def document(measured: dict[str, float]) -> str:
         ratio=f"{measured['dask_s'] / measured['local_s']:.3f}",
         packed=f"{measured['entry_bytes'] / 1e3:.0f}",
         chunk_s=CHUNK_S,
+        least_s=LEAST_CHUNK_S,
+        least_share=f"{measured['wall_chunk_s'] / LEAST_CHUNK_S:.1%}",
         most=MOST_IN_CHUNK,
         fit_chunk=stages["identify"][0].chunk,
         fit_ms=f"{FIT_S * 1e3:.0f}",

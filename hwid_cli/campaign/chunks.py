@@ -4,6 +4,7 @@ A chunk lasts long enough for its way there and back not to matter. One over whi
 died is taken apart; a task whose workers die again although it is alone is given up.
 """
 
+import math
 import statistics
 from collections import Counter, deque
 from collections.abc import Sequence
@@ -11,10 +12,14 @@ from collections.abc import Sequence
 from hwid_cli.campaign.tasks import Task
 from hwid_cli.errors import WorkerError
 
-# How long a chunk shall last, [s], and how many tasks it holds at most.
-CHUNK_S, MOST_IN_CHUNK = 0.5, 64
+# How long a chunk shall last, [s], and how many tasks it holds at most. Near the end
+# chunks get shorter, so that none is waited for long, down to a length, [s], at which the
+# way to a worker and back (docs/scale.md) is still less than a twentieth of it.
+CHUNK_S, LEAST_CHUNK_S, MOST_IN_CHUNK = 0.5, 0.2, 64
+# Chunks handed out ahead for each thread of a worker.
+CHUNKS_AHEAD = 3
 # Chunks from whose duration that of the next ones is taken.
-_RECENT = 30
+RECENT = 30
 # Names of tasks in a message.
 _MOST_NAMES = 4
 
@@ -25,26 +30,31 @@ class Chunks:
     Parameters
     ----------
     tasks : sequence of Task
+        Of one kind.
+    recent : deque of float, optional, [s]
+        How long tasks of that kind took last; goes on with these.
     """
 
-    def __init__(self, tasks: Sequence[Task]) -> None:
+    def __init__(
+        self, tasks: Sequence[Task], recent: deque[float] | None = None
+    ) -> None:
         self._waiting = deque(tasks)
         self._alone: deque[Task] = deque()
         self._deaths: Counter[str] = Counter()
         self._given_up: list[Task] = []
-        self._seconds: deque[float] = deque(maxlen=_RECENT)
+        self._seconds = deque(maxlen=RECENT) if recent is None else recent
 
     def __bool__(self) -> bool:
         """Whether a task waits."""
         return bool(self._waiting or self._alone)
 
-    def take(self, ahead: int) -> tuple[Task, ...]:
+    def take(self, threads: int) -> tuple[Task, ...]:
         """Take the next chunk.
 
         Parameters
         ----------
-        ahead : int, [-]
-            Chunks under way at a time; the last tasks are divided among so many.
+        threads : int, [-]
+            That compute; the last tasks are divided among them.
 
         Returns
         -------
@@ -56,8 +66,11 @@ class Chunks:
         count = 1
         if self._seconds:
             typical = max(statistics.median(self._seconds), 1e-6)
+            left = len(self._waiting)
             longest = min(int(CHUNK_S / typical), MOST_IN_CHUNK)
-            count = max(1, min(longest, len(self._waiting) // ahead))
+            shortest = min(math.ceil(LEAST_CHUNK_S / typical), -(-left // threads))
+            fair = left // (CHUNKS_AHEAD * threads)
+            count = max(1, min(longest, max(shortest, fair)))
         return tuple(self._waiting.popleft() for _ in range(count))
 
     def is_done(self, chunk: Sequence[Task], seconds: float) -> None:

@@ -12,6 +12,7 @@ import logging
 import pickle
 import queue
 import time
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -22,14 +23,12 @@ from uuid import uuid4
 from threadpoolctl import threadpool_limits
 
 from hwid_cli import __version__
-from hwid_cli.campaign.chunks import Chunks
+from hwid_cli.campaign.chunks import CHUNKS_AHEAD, RECENT, Chunks
 from hwid_cli.campaign.tasks import Computed, Task, computed
 from hwid_cli.errors import ConfigError
 
 # A scheduler that does not answer within this time is not there, [s].
 CONNECT_TIMEOUT_S = 10
-# Chunks handed out ahead for each thread of a worker.
-CHUNKS_AHEAD = 3
 # Arguments with a longer pickle are sent once, [bytes].
 LARGE = 8192
 # Time between two looks at the workers, and after which a message says there are none.
@@ -84,13 +83,14 @@ def cluster_results(
         If workers died over the same tasks again and again.
     """
     cluster = _cluster(scheduler, count)
-    chunks, on_way = Chunks(tasks), dict[Any, tuple[Task, ...]]()
+    chunks = Chunks(tasks, cluster.recent(tasks))
+    on_way: dict[Any, tuple[Task, ...]] = {}
     arrived: queue.Queue[Any] = queue.Queue()
     try:
         while chunks or on_way:
-            ahead = CHUNKS_AHEAD * max(1, cluster.threads())
-            while chunks and len(on_way) < ahead:
-                chunk = chunks.take(ahead)
+            threads = max(1, cluster.threads())
+            while chunks and len(on_way) < CHUNKS_AHEAD * threads:
+                chunk = chunks.take(threads)
                 future = cluster.submit(chunk)
                 on_way[future] = chunk
                 future.add_done_callback(arrived.put)
@@ -149,6 +149,11 @@ class _Cluster:
         self.client, self.address = client, address
         self._sent: dict[int, tuple[Any, Any]] = {}
         self._threads, self._looked_at = 0, -_LOOK_S
+        self._recent: dict[Callable[..., Any], deque[float]] = {}
+
+    def recent(self, tasks: Sequence[Task]) -> deque[float]:
+        """How long tasks of this kind took last, in the rounds before."""
+        return self._recent.setdefault(tasks[0].function, deque(maxlen=RECENT))
 
     def threads(self) -> int:
         """Threads of all workers; looked up every few seconds."""

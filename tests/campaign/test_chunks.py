@@ -18,26 +18,54 @@ def keys(chunk):
 
 def test_the_first_chunks_hold_one_task():
     found = waiting(100)
-    assert keys(found.take(6)) == ["key 0"]
-    assert keys(found.take(6)) == ["key 1"]
+    assert keys(found.take(2)) == ["key 0"]
+    assert keys(found.take(2)) == ["key 1"]
 
 
 def test_chunks_last_as_long_as_they_shall():
     found = waiting(1000)
-    found.is_done(found.take(6), chunks.CHUNK_S / 5)
-    assert keys(found.take(6)) == [f"key {n}" for n in range(1, 6)]
+    found.is_done(found.take(2), chunks.CHUNK_S / 5)
+    assert keys(found.take(2)) == [f"key {n}" for n in range(1, 6)]
 
 
 def test_short_tasks_are_not_packed_without_limit():
     found = waiting(1000)
-    found.is_done(found.take(6), 1e-9)
-    assert len(found.take(6)) == chunks.MOST_IN_CHUNK
+    found.is_done(found.take(2), 1e-9)
+    assert len(found.take(2)) == chunks.MOST_IN_CHUNK
 
 
 def test_the_last_tasks_are_divided_among_all():
-    found = waiting(19)
-    found.is_done(found.take(6), 1e-9)
-    assert [len(found.take(6)) for _ in range(8)] == [3, 2, 2, 1, 1, 1, 1, 1]
+    found = waiting(43)
+    found.is_done(found.take(2), chunks.LEAST_CHUNK_S / 2)
+    assert [len(found.take(2)) for _ in range(12)] == [
+        5,
+        5,
+        5,
+        4,
+        3,
+        3,
+        2,
+        2,
+        2,
+        2,
+        2,
+        2,
+    ]
+    assert [len(found.take(2)) for _ in range(3)] == [2, 2, 1]
+
+
+def test_the_last_tasks_do_not_wait_for_one_worker_to_take_them_all():
+    found = waiting(4)
+    found.is_done(found.take(2), 1e-9)
+    assert [len(found.take(2)) for _ in range(2)] == [2, 1]
+
+
+def test_a_round_goes_on_at_the_pace_of_the_one_before():
+    recent = chunks.deque(maxlen=chunks.RECENT)
+    first = Chunks([Task("k", "t", sum, ((1,),), int)], recent)
+    first.is_done(first.take(2), chunks.CHUNK_S / 4)
+    tasks = [Task(f"k {n}", "t", sum, ((1,),), int) for n in range(99)]
+    assert len(Chunks(tasks, recent).take(2)) == 4
 
 
 def test_a_chunk_over_which_workers_died_is_taken_apart():
@@ -54,8 +82,8 @@ def test_a_chunk_over_which_workers_died_is_taken_apart():
 def test_a_task_over_which_workers_die_twice_is_given_up_and_named():
     found = waiting(2)
     for _ in range(2):
-        found.has_died(found.take(6))
-    assert keys(found.take(6)) == ["key 1"]
+        found.has_died(found.take(2))
+    assert keys(found.take(2)) == ["key 1"]
     assert not found
     with pytest.raises(WorkerError, match="task 0: workers died"):
         found.check()
