@@ -14,8 +14,8 @@ from hwid_cli.errors import WorkerError
 
 # How long a chunk shall last, [s], and how many tasks it holds at most. Near the end
 # chunks get shorter, so that none is waited for long, down to a length, [s], at which the
-# way to a worker and back (docs/scale.md) is still less than a twentieth of it.
-CHUNK_S, LEAST_CHUNK_S, MOST_IN_CHUNK = 0.5, 0.2, 64
+# way to a worker and back (docs/scale.md) is still a small share of it.
+CHUNK_S, LEAST_CHUNK_S, MOST_IN_CHUNK = 1.0, 0.2, 64
 # Chunks handed out ahead for each thread of a worker.
 CHUNKS_AHEAD = 3
 # Chunks from whose duration that of the next ones is taken.
