@@ -188,7 +188,7 @@ def test_controller_needs_the_column_that_it_follows(load):
         ("recordings: [a, a]", r"diagnose.recordings: 'a' is listed twice"),
         (
             "recordings: [run_1, run_2], hold_out: [run_3]",
-            r"diagnose.hold_out: found 'run_3'; did you mean 'run_[12]'\?",
+            r"diagnose.hold_out: found 'run_3'; did you mean 'run_2' or 'run_1'\?",
         ),
         (
             "recordings: [a, b], hold_out: [b, a]",
