@@ -102,5 +102,7 @@ def test_a_steady_start_is_equilibrium_whatever_the_rule_of_the_fit():
 
 
 def test_a_word_for_the_initial_state_that_is_none_is_refused():
-    with pytest.raises(ValueError, match="array, \"steady\" or \"estimated\", got 'rest'"):
+    with pytest.raises(
+        ValueError, match='array, "steady" or "estimated", got \'rest\''
+    ):
         simulate(plant(), np.ones(5), initial_state="rest")
