@@ -7,7 +7,11 @@ import numpy as np
 
 from hwid_cli.campaign.cache import Store
 from hwid_cli.campaign.crossval import Deviations, crossval_tasks
-from hwid_cli.campaign.fit_seconds import SECONDS_PER_SIMULATED_SAMPLE, fit_seconds
+from hwid_cli.campaign.fit_seconds import (
+    SECONDS_PER_SIMULATED_SAMPLE,
+    fit_seconds,
+    share_of_round,
+)
 from hwid_cli.campaign.identify import fit_grid
 from hwid_cli.campaign.order_grid import candidate_orders, growth
 from hwid_cli.campaign.runner import Task, TaskDone
@@ -24,8 +28,6 @@ _FIT_BYTES, _PAIR_BYTES, _FIGURE_BYTES, _PAGE_BYTES = 22e3, 9e3, 80e3, 4e6
 _SAMPLE_BYTES = 16
 # Sections that need a cross-validation.
 _NEED_CROSSVAL = ("crossval", "order", "group", "test")
-# Warm starts make the fits of groups so much shorter (docs/benchmarks.md), [-].
-_WARM_SHARE = 0.5
 
 
 def plan_stages(
@@ -192,9 +194,11 @@ def _seconds_of_rounds(
     cost, workers = speed
     grid = [orders for _, _, orders in candidate_orders(experiment.orders)]
     total = 0.0
-    for places in growth(experiment.orders):
+    for number, places in enumerate(growth(experiment.orders)):
+        share = share_of_round(number)
         each = [
-            fit_seconds(cost, grid[place], one.n_samples, units=experiment.fit.units)
+            share
+            * fit_seconds(cost, grid[place], one.n_samples, units=experiment.fit.units)
             for one in recordings
             for place, _ in places
         ]
@@ -227,7 +231,7 @@ def _stored_fits(
 
 
 def _absent(task: Task) -> Fit:
-    recording, orders, options, _ = task.arguments
+    recording, orders, options, *_ = task.arguments
     none = StaticMap("none", np.zeros(0))
     nobody = HammersteinWiener(
         none, np.array([nan]), np.array([1.0]), 0, none, recording.sample_time_s
@@ -251,13 +255,11 @@ def _group(
         options,
         is_ordered=experiment.fit.join == "concatenate",
     )
-    grid = [orders for _, _, orders in candidate_orders(experiment.orders)]
     n = int(np.median([one.n_samples for one in usable] or [0]))
-    fits = sum(bounds) * len(grid)
-    share = _WARM_SHARE if options.warm_start else 1.0
+    fits = sum(bounds) * len(candidate_orders(experiment.orders))
     seconds = (
         sum(
-            count * share * _grid_seconds(speed[0], grid, n, experiment, level)
+            count * _grid_seconds(speed[0], n, experiment, level)
             for level, count in enumerate(bounds, start=2)
         )
         + SECONDS_PER_SIMULATED_SAMPLE * n * n_validate * fits
@@ -273,12 +275,16 @@ def _group(
     )
 
 
-def _grid_seconds(
-    cost: FitCost, grid: Sequence[Orders], n: int, experiment: Experiment, level: int
-) -> float:
+def _grid_seconds(cost: FitCost, n: int, experiment: Experiment, level: int) -> float:
+    """Time of all fits of one group."""
+    grid = [orders for _, _, orders in candidate_orders(experiment.orders)]
+    is_warm = (experiment.group or GroupOptions()).warm_start
     units = experiment.fit.units
     return sum(
-        fit_seconds(cost, orders, n, units=units, n_recordings=level) for orders in grid
+        share_of_round(number, is_warm=is_warm)
+        * fit_seconds(cost, grid[place], n, units=units, n_recordings=level)
+        for number, places in enumerate(growth(experiment.orders))
+        for place, _ in places
     )
 
 

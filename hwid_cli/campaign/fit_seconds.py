@@ -9,6 +9,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import replace
 
+from hwid_cli.campaign.order_grid import SEARCHED_ROUNDS
 from hwid_cli.maths.model.fit import fit
 from hwid_cli.maths.model.rows.kernels import derivative_rows
 from hwid_cli.records.check import FitCost
@@ -26,6 +27,10 @@ _LEAST_SAMPLES = 1000
 MEASURED = FitCost(0.055, 2000, 3.0, 10, "the table in docs/benchmarks.md")
 # A fit of so many samples stays below two seconds on a slow machine, [samples].
 _MOST_TIMED = 10_000
+# Time of a grid's fit against that of one alone from nothing: in the rounds in which fits
+# are searched for too, in the later ones, and both for groups that begin with the models
+# of their members (docs/benchmarks.md, "A campaign" and "Groups of recordings"), [-].
+_SEARCHED, _GROWN, _WARM_SEARCHED, _WARM_GROWN = 0.5, 0.2, 0.25, 0.1
 # Simulating one model on one sample, its initial state included (docs/benchmarks.md: 1 ms
 # for 7500 samples on two cores), [s].
 SECONDS_PER_SIMULATED_SAMPLE = 2.7e-7
@@ -116,6 +121,33 @@ def fit_seconds(
         * (units / cost.units) ** _P_UNITS
         * n_recordings**_P_RECORDINGS
     )
+
+
+def share_of_round(number: int, *, is_warm: bool = False) -> float:
+    """Time of a fit in a round of a grid's growth, against one alone from nothing.
+
+    Parameters
+    ----------
+    number : int
+        From zero.
+    is_warm : bool
+        Whether it begins with the models of a group's members.
+
+    Returns
+    -------
+    float, [-]
+
+    Examples
+    --------
+    >>> share_of_round(0), share_of_round(0) > share_of_round(1) > share_of_round(9)
+    (1.0, True)
+    """
+    is_searched = number < SEARCHED_ROUNDS
+    if is_warm:
+        return _WARM_SEARCHED if is_searched else _WARM_GROWN
+    if number == 0:
+        return 1.0
+    return _SEARCHED if is_searched else _GROWN
 
 
 def _work(n_samples: int) -> float:

@@ -10,7 +10,7 @@ from hwid_cli.campaign.cache import task_key
 from hwid_cli.campaign.content_keys import model_key, recording_key
 from hwid_cli.campaign.group_plan import STAGE, STAGE_VERSION, GroupPlan, RunLevel
 from hwid_cli.campaign.identify import Run, fit_grid
-from hwid_cli.campaign.order_grid import candidate_orders, growth
+from hwid_cli.campaign.order_grid import SEARCHED_ROUNDS, candidate_orders, growth
 from hwid_cli.campaign.runner import Task
 from hwid_cli.maths.model.fit import fit
 from hwid_cli.records.model import Fit, FitOptions, HammersteinWiener, Orders
@@ -79,9 +79,10 @@ def fit_level(
     found: list[dict[int, Fit]] = [{} for _ in tried]
 
     def work(execute: Run) -> None:
-        for places in growth(plan.orders):
+        for number, places in enumerate(growth(plan.orders)):
+            anew = number < SEARCHED_ROUNDS
             tasks = [
-                _fit_task(plan, singles, group, (place, smaller, fits, contents))
+                _fit_task(plan, singles, group, (place, smaller, fits, contents, anew))
                 for group, fits in zip(tried, found, strict=True)
                 for place, smaller in places
             ]
@@ -99,10 +100,10 @@ def _fit_task(
     plan: GroupPlan,
     singles: Mapping[str, Sequence[Fit]],
     group: tuple[str, ...],
-    cell: tuple[int, Sequence[int], Mapping[int, Fit], Mapping[str, str]],
+    cell: tuple[int, Sequence[int], Mapping[int, Fit], Mapping[str, str], bool],
 ) -> Task:
     """One fit of a group; its key holds the models that it begins with."""
-    place, smaller, fits, contents = cell
+    place, smaller, fits, contents, anew = cell
     nb, nk, orders = candidate_orders(plan.orders)[place]
     by_name = {one.name: one for one in plan.recordings}
     recordings = tuple(by_name[name] for name in group)
@@ -115,12 +116,13 @@ def _fit_task(
         "options": plan.fit_options,
         "starts": [model_key(one) for one in starts],
         "contained": [model_key(one) for one in contained],
+        "search_anew": anew,
     }
     return Task(
         key=task_key(STAGE, STAGE_VERSION, matters, []),
         name=f"{'+'.join(group)}/{nb}/{nk}",
         function=_fit_group,
-        arguments=(recordings, orders, plan.fit_options, starts, contained),
+        arguments=(recordings, orders, plan.fit_options, starts, contained, anew),
         result_type=Fit,
     )
 
@@ -141,5 +143,13 @@ def _fit_group(
     options: FitOptions,
     starts: Sequence[HammersteinWiener],
     contained: Sequence[HammersteinWiener],
+    anew: bool,
 ) -> Fit:
-    return fit(recordings, orders, options, starts=starts, contained=contained)
+    return fit(
+        recordings,
+        orders,
+        options,
+        starts=starts,
+        contained=contained,
+        search_anew=anew,
+    )

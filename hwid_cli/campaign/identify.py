@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from hwid_cli.campaign.cache import task_key
 from hwid_cli.campaign.content_keys import model_key, recording_key
-from hwid_cli.campaign.order_grid import candidate_orders, growth
+from hwid_cli.campaign.order_grid import SEARCHED_ROUNDS, candidate_orders, growth
 from hwid_cli.campaign.runner import RunSettings, Task, TaskDone, run_tasks
 from hwid_cli.maths.model.fit import fit
 from hwid_cli.records.experiment import OrdersOptions
@@ -13,7 +13,7 @@ from hwid_cli.records.model import Fit, FitOptions, HammersteinWiener, Orders
 from hwid_cli.records.recordings import Recording
 
 STAGE = "identify"
-STAGE_VERSION = 4
+STAGE_VERSION = 5
 
 # Runs tasks and returns them with their results, in their order.
 Run = Callable[[Sequence[Task]], Sequence[TaskDone]]
@@ -53,7 +53,7 @@ def fit_grid(
     """Fit every recording with every pair of orders, the smaller ones first.
 
     A fit begins with those of the largest orders that its own contain, so that more
-    parameters never fit worse. The linear model beside it is not worse than theirs
+    parameters never fit worse; in the first rounds a search anew may find better. The linear model beside it is not worse than theirs
     either: it contains them.
 
     Parameters
@@ -73,9 +73,10 @@ def fit_grid(
     grid = candidate_orders(orders)
     contents = [recording_key(recording) for recording in recordings]
     found: list[dict[int, Fit]] = [{} for _ in recordings]
-    for places in growth(orders):
+    for number, places in enumerate(growth(orders)):
+        anew = number < SEARCHED_ROUNDS
         tasks = [
-            _task(recording, content, grid[place], (alone, fits, smaller))
+            _task(recording, content, grid[place], (alone, fits, smaller, anew))
             for recording, content, fits in zip(
                 recordings, contents, found, strict=True
             )
@@ -122,11 +123,11 @@ def _task(
     recording: Recording,
     content: str,
     place: tuple[int, int, Orders],
-    how: tuple[FitOptions, dict[int, Fit], Sequence[int]],
+    how: tuple[FitOptions, dict[int, Fit], Sequence[int], bool],
 ) -> Task:
     """One fit; its key holds the models that it begins with."""
     nb, nk, candidate = place
-    options, fits, smaller = how
+    options, fits, smaller, anew = how
     models = [fits[number].model for number in smaller]
     contained = tuple(model for model in models if model is not None)
     matters = {
@@ -134,12 +135,13 @@ def _task(
         "orders": candidate,
         "options": options,
         "contained": [model_key(model) for model in contained],
+        "search_anew": anew,
     }
     return Task(
         key=task_key(STAGE, STAGE_VERSION, matters, []),
         name=f"{recording.name}/{nb}/{nk}",
         function=_fit_one,
-        arguments=(recording, candidate, options, contained),
+        arguments=(recording, candidate, options, contained, anew),
         result_type=Fit,
     )
 
@@ -156,5 +158,6 @@ def _fit_one(
     orders: Orders,
     options: FitOptions,
     contained: Sequence[HammersteinWiener],
+    anew: bool,
 ) -> Fit:
-    return fit([recording], orders, options, contained=contained)
+    return fit([recording], orders, options, contained=contained, search_anew=anew)

@@ -7,6 +7,9 @@ from hwid_cli.records.model import Fit, Orders
 
 # Delay of the published grid, whose second axis counts poles, [samples].
 DELAY_OF_POLE_GRID = 1
+# Rounds of a grid's growth in which fits are also searched for anew: what is found there
+# all later models contain, and beyond it a search anew hardly ever finds better.
+SEARCHED_ROUNDS = 4
 
 
 def candidate_orders(options: OrdersOptions) -> tuple[tuple[int, int, Orders], ...]:

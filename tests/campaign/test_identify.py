@@ -189,8 +189,8 @@ def test_more_parameters_never_worsen_the_linear_model_beside_a_fit(monkeypatch)
     """A search that begins anew for all orders may well end in a worse minimum."""
     found = {(1, 1): 3.0, (1, 2): 5.0, (2, 1): 2.0, (2, 2): float("nan")}
 
-    def fit(recordings, orders, options, *, contained=()):
-        alone = fit_alone(recordings, orders, options, contained=contained)
+    def fit(recordings, orders, options, **how):
+        alone = fit_alone(recordings, orders, options, **how)
         return replace(alone, linear_rmsd=found[orders.nb, orders.nf])
 
     fit_alone = identify.fit

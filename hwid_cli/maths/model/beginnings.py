@@ -28,7 +28,11 @@ from hwid_cli.records.model import FitOptions, HammersteinWiener, Orders
 
 
 def linear_beginnings(
-    problem: Problem, orders: Orders, options: FitOptions
+    problem: Problem,
+    orders: Orders,
+    options: FitOptions,
+    *,
+    sees_input_map: bool = True,
 ) -> tuple[tuple[Start, ...], Search]:
     """Linear starts and linear model; found again where outliers were in the way.
 
@@ -38,6 +42,9 @@ def linear_beginnings(
     orders : Orders
     options : FitOptions
         In the units of the problem.
+    sees_input_map : bool
+        Whether there shall be starts that see through an input map too; the linear
+        model needs none of them.
 
     Returns
     -------
@@ -46,11 +53,12 @@ def linear_beginnings(
     linear : Search
     """
     experiments: Sequence[Experiment] = problem.experiments
-    starts = block_starts(experiments, orders, options)
+    kinds = options if sees_input_map else replace(options, input_map="none")
+    starts = block_starts(experiments, orders, kinds)
     linear = linear_search(experiments, options, starts)
     if options.loss == "squared":
         return starts, linear
-    starts = block_starts(winsorised(linear, experiments), orders, options)
+    starts = block_starts(winsorised(linear, experiments), orders, kinds)
     experiments = renewed(experiments, [linear.candidate])
     again = linear_search(experiments, options, starts)
     linear = rejudged(linear, experiments)

@@ -83,25 +83,45 @@ def finish(
     -------
     Search
     """
-    candidate, iterations = placed.candidate, placed.iterations
     few = thinned(experiments, _ROWS)
-    if few != tuple(experiments):
-        coarse = minimise(
-            candidate,
-            few,
-            with_positions=options.free_break_points,
-            max_iterations=options.max_iterations,
-            least_gain=max(_COARSE_GAIN, least_gain),
-        )
-        candidate, iterations = coarse.candidate, iterations + coarse.iterations
-    final = minimise(
-        candidate,
+    if few == tuple(experiments):
+        return converge(placed, experiments, options, least_gain=least_gain)
+    coarse = converge(placed, few, options, least_gain=max(_COARSE_GAIN, least_gain))
+    return converge(coarse, experiments, options, least_gain=least_gain)
+
+
+def converge(
+    near: Search,
+    experiments: Sequence[Experiment],
+    options: FitOptions,
+    *,
+    least_gain: float = LEAST_GAIN,
+) -> Search:
+    """Run on all samples that count until the search stands still.
+
+    What begins at a minimum of fewer parameters only needs this: a minimum of fewer
+    samples would lead away from it.
+
+    Parameters
+    ----------
+    near : Search
+    experiments : sequence of Experiment
+    options : FitOptions
+    least_gain : float, [-]
+        Share of the cost that a step must gain.
+
+    Returns
+    -------
+    Search
+    """
+    found = minimise(
+        near.candidate,
         experiments,
         with_positions=options.free_break_points,
         max_iterations=options.max_iterations,
         least_gain=least_gain,
     )
-    return replace(final, iterations=iterations + final.iterations)
+    return replace(found, iterations=near.iterations + found.iterations)
 
 
 def standing(candidate: Candidate, experiments: Sequence[Experiment]) -> Search:

@@ -20,7 +20,7 @@ from hwid_cli.maths.model import sensitivities, static_map
 from hwid_cli.maths.model.candidates import Candidate, Experiment, thinned
 from hwid_cli.maths.model.delays import relaxed_starts
 from hwid_cli.maths.model.levenberg_marquardt import Search, minimise
-from hwid_cli.maths.model.phases import finish, place, standing
+from hwid_cli.maths.model.phases import converge, finish, place, standing
 from hwid_cli.maths.model.placing import reaching
 from hwid_cli.maths.model.points import block_signals, point_of
 from hwid_cli.maths.model.race import LONG, SHORT, Rounds, race
@@ -35,10 +35,6 @@ _RELAXED_BLOCKS = 2
 _WORTH_GOING_ON = 0.995
 # Correlation of neighbouring residuals from which on the search is not taken for done.
 _COLOURED = 0.5
-# The same of another start's maps with many break-points, against a contained model's.
-_WORTH_A_SECOND_LOOK = 0.97
-# The same before its break-points are placed, which gains this much at most.
-_WORTH_PLACING = 2.0
 # Share of the cost that a step must gain where larger models go on from the result.
 _SMALL_GAIN = 1e-3
 # Samples that count for the linear model, and the share of the cost that a step must gain:
@@ -141,6 +137,33 @@ def _leaves_structure(best: Search, experiments: Sequence[Experiment]) -> bool:
     return following > _COLOURED * sum(float(one @ one) for one in residuals)
 
 
+def grown(
+    contained: Sequence[Candidate],
+    experiments: Sequence[Experiment],
+    options: FitOptions,
+    linear: Search,
+) -> Search:
+    """Model that goes on from the best of those of smaller orders that it contains.
+
+    Parameters
+    ----------
+    contained : sequence of Candidate
+        Of the orders and kinds of maps asked for.
+    experiments : sequence of Experiment
+    options : FitOptions
+    linear : Search
+
+    Returns
+    -------
+    Search
+        Never worse than any of the contained models, nor than the linear one.
+    """
+    experiments = renewed(experiments, contained)
+    known = _best([standing(one, experiments) for one in contained])
+    near = converge(known, experiments, options, least_gain=_SMALL_GAIN)
+    return _not_worse_than(linear, _best([known, near]), experiments, options)
+
+
 def search_beyond(
     contained: Sequence[Candidate],
     experiments: Sequence[Experiment],
@@ -148,7 +171,7 @@ def search_beyond(
     starts: Sequence[Start],
     linear: Search,
 ) -> Search:
-    """Model that is never worse than those of smaller orders that it contains.
+    """The better of a model that goes on from smaller orders and one found anew.
 
     Parameters
     ----------
@@ -162,20 +185,15 @@ def search_beyond(
     Returns
     -------
     Search
-        A shorter search than `nonlinear_search`: only what promises more than to go on
-        from the best of the contained models is finished.
+        Never worse than any of the contained models, nor than the linear one. The search
+        anew is a shorter one than `nonlinear_search`.
     """
+    near = grown(contained, experiments, options, linear)
     experiments = renewed(experiments, contained)
-    known = [standing(one, experiments) for one in contained]
-    best = _best(known)
-    best = _best([best, finish(best, experiments, options, least_gain=_SMALL_GAIN)])
     (leader,) = race(experiments, starts, options, rounds=SHORT)
-    if leader.cost < _WORTH_PLACING * best.cost:
-        placed = place(leader, experiments, options)
-        if placed.cost < _WORTH_A_SECOND_LOOK * best.cost:
-            placed = finish(placed, experiments, options, least_gain=_SMALL_GAIN)
-            best = _best([best, placed])
-    return _not_worse_than(linear, best, experiments, options)
+    placed = place(leader, experiments, options)
+    anew = finish(placed, experiments, options, least_gain=_SMALL_GAIN)
+    return _best([near, anew])
 
 
 def linear_beyond(
@@ -203,7 +221,7 @@ def linear_beyond(
     found = [finish(rejudged(linear, experiments), experiments, options)]
     if known:
         best = _best(known)
-        found += [best, finish(best, experiments, options)]
+        found += [best, converge(best, experiments, options)]
     return _best(found)
 
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from hwid_cli.maths.model.candidates import Candidate, Experiment, limits_of, thinned
 from hwid_cli.maths.model.levenberg_marquardt import Search, minimise
-from hwid_cli.maths.model.phases import finish, place, standing
+from hwid_cli.maths.model.phases import converge, finish, place, standing
 from hwid_cli.maths.model.placing import coarser, finer, with_maps
 from hwid_cli.records.model import FitOptions, HammersteinWiener
 
@@ -26,8 +26,6 @@ _ROWS, _SCREENING_ITERATIONS = 1000, 3
 # Groups are told apart by a threshold: the last tenth of a percent of the deviation is
 # not worth half of the time.
 _LEAST_GAIN = 1e-3
-# Cost that a start must reach, as a share of that of a contained model, to be finished.
-_WORTH_A_SECOND_LOOK = 0.9
 
 
 def warm_search(
@@ -35,6 +33,8 @@ def warm_search(
     options: FitOptions,
     starts: Sequence[HammersteinWiener],
     contained: Sequence[Candidate] = (),
+    *,
+    search_anew: bool = True,
 ) -> Search:
     """Hammerstein-Wiener model found from models that are near it.
 
@@ -49,39 +49,45 @@ def warm_search(
     contained : sequence of Candidate
         Models of smaller orders, written with those of the result, which is not worse
         than any of them.
+    search_anew : bool
+        Whether the starts are tried beside contained models.
 
     Returns
     -------
     Search
         From the start that is best for these experiments; of equal ones the first.
     """
+    found = []
+    if contained:
+        known = min(
+            (standing(one, experiments) for one in contained), key=lambda one: one.cost
+        )
+        near = converge(known, experiments, options, least_gain=_LEAST_GAIN)
+        found = [known, near]
+    if search_anew or not contained:
+        screened = _screened(experiments, options, starts)
+        placed = place(screened, experiments, options)
+        found.append(finish(placed, experiments, options, least_gain=_LEAST_GAIN))
+    return min(found, key=lambda one: one.cost)
+
+
+def _screened(
+    experiments: Sequence[Experiment],
+    options: FitOptions,
+    starts: Sequence[HammersteinWiener],
+) -> Search:
+    """The start that is best for these experiments, after a few iterations."""
     few = thinned(experiments, _ROWS)
     best = min(
         (standing(_starting(one, experiments, options), few) for one in starts),
         key=lambda one: one.cost,
     )
-    screened = minimise(
+    return minimise(
         _spread(best.candidate, experiments, options),
         few,
         with_positions=False,
         max_iterations=min(_SCREENING_ITERATIONS, options.max_iterations),
     )
-    if not contained:
-        return _finished(place(screened, experiments, options), experiments, options)
-    known = min(
-        (standing(one, experiments) for one in contained), key=lambda one: one.cost
-    )
-    found = [known, _finished(known, experiments, options)]
-    if screened.cost < _WORTH_A_SECOND_LOOK * found[-1].cost:
-        placed = place(screened, experiments, options)
-        found.append(_finished(placed, experiments, options))
-    return min(found, key=lambda one: one.cost)
-
-
-def _finished(
-    one: Search, experiments: Sequence[Experiment], options: FitOptions
-) -> Search:
-    return finish(one, experiments, options, least_gain=_LEAST_GAIN)
 
 
 def _starting(

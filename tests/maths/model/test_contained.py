@@ -55,3 +55,33 @@ def test_a_linear_fit_is_never_worse_than_the_models_it_contains():
     large = fit([recording], Orders(4, 6, 1), hasty, contained=[small.model])
     assert large.rmsd <= small.rmsd * (1.0 + 1e-9)
     assert large.rmsd <= alone.rmsd * (1.0 + 1e-9)
+
+
+@pytest.mark.parametrize("starts", ["none", "members"])
+def test_a_fit_that_only_goes_on_improves_the_best_of_the_models_it_contains(starts):
+    recording = measured(plant("piecewise_linear", "saturation"), noise=0.02)
+    how = options("piecewise_linear", "saturation")
+    narrow = fit([recording], Orders(1, 1, 1), how)
+    small = fit([recording], Orders(2, 2, 1), how)
+    orders = Orders(3, 3, 1)
+    members = [fit([recording], orders, how).model] if starts == "members" else []
+    contained = [narrow.model, small.model]
+    large = fit(
+        [recording],
+        orders,
+        how,
+        starts=members,
+        contained=contained,
+        search_anew=False,
+    )
+    # The plant has two poles: one is too few, so going on from two is the only way here.
+    assert narrow.rmsd > 2.0 * small.rmsd
+    assert large.rmsd <= small.rmsd * (1.0 + 1e-9)
+    assert large.iterations <= 5
+
+
+def test_without_models_to_go_on_from_a_fit_is_searched_anyway():
+    recording = measured(plant("piecewise_linear", "saturation"), noise=0.02)
+    how = options("piecewise_linear", "saturation")
+    anyway = fit([recording], Orders(2, 2, 1), how, search_anew=False)
+    assert anyway.rmsd == fit([recording], Orders(2, 2, 1), how).rmsd

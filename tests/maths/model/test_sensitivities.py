@@ -91,6 +91,29 @@ def test_thinned_equations_are_those_of_the_samples_that_count(output_map):
     assert np.all(np.abs(got.matrix - expected) <= 3e-2 * size + 1e-9)
 
 
+@pytest.mark.parametrize("stride", [2, 3, 40])
+def test_rows_of_few_samples_are_those_rows_of_all(stride):
+    """B is applied to whole chunks or to single rows; both are the same sums."""
+    candidate = make_candidate("piecewise_linear", "saturation", "estimated", 1)
+    point = points.point_of(candidate)
+    place = candidates.columns(candidate, with_positions=True)
+    # Three chunks of the recursions, the last one short.
+    whole = candidates.Experiment(level_input(600, 1), np.zeros(600))
+    found = sensitivities.simulated(point, [whole])
+    before = static_map.derivatives(point.input_map, whole.input, with_positions=True)
+
+    def rows(counted):
+        x = found.signals[0][1][counted]
+        after = static_map.derivatives(point.output_map, x, with_positions=True)
+        few = sensitivities.Simulated(found.signals, (np.zeros(counted.size),), 0.0)
+        return sensitivities._rows(point, place, (before, after), (0, few, counted))
+
+    counted = np.arange(1, 600, stride)
+    np.testing.assert_array_equal(
+        rows(counted)[:, :-1], rows(np.arange(600))[counted, :-1]
+    )
+
+
 def test_cost_is_the_sum_of_squared_residuals():
     candidate = make_candidate("none", "none", "zero")
     experiments = make_experiments()

@@ -9,6 +9,8 @@ _TINY = 1e-200
 # Samples between two looks for such numbers, and samples worked on at a time: the
 # recursions of all columns over a chunk stay in the cache.
 _FLUSH, _CHUNK = 16, 256
+# Where fewer than one sample in so many counts, B is applied to those alone.
+_DENSE = 2
 
 
 @njit(cache=True)
@@ -84,12 +86,20 @@ def derivative_rows(
         if begin == 0:
             lines[pad, count + 2] = 1.0
         all_pole(lines, pad, length, taps)
-        last = length - 1
-        _all_zero(lines.ravel(), (pad - delay) * wide, zeros, wide, passed.ravel())
+        last, stop = length - 1, r
+        while stop < counted.size and counted[stop] < begin + length:
+            stop += 1
+        if _DENSE * (stop - r) < length:
+            for k in range(r, stop):
+                at = counted[k] - begin
+                first_value = (pad - delay + at) * wide
+                _all_zero(lines.ravel(), first_value, zeros, wide, passed[at])
+        else:
+            _all_zero(lines.ravel(), (pad - delay) * wide, zeros, wide, passed.ravel())
         _differences(lines, pad, count + 2, n_state, length, table)
         _differences(lines, pad - delay, count, nb, length, table[n_state:])
         _differences(lines, pad - 1, count + 1, nf, length, table[n_state + nb :])
-        while r < counted.size and counted[r] < begin + length:
+        while r < stop:
             k = counted[r] - begin
             row, source, weight = out[r], passed[k], weights[r]
             for m in range(count):
