@@ -19,7 +19,7 @@ from hwid_cli.campaign.selection import select_recordings
 from hwid_cli.records.check import FitCost, StagePlan
 from hwid_cli.records.experiment import CrossvalOptions, Experiment, GroupOptions
 from hwid_cli.records.maps import StaticMap
-from hwid_cli.records.model import Fit, HammersteinWiener, Orders
+from hwid_cli.records.model import Fit, HammersteinWiener
 from hwid_cli.records.recordings import Recording
 
 # Measured on the demo: a stored fit and a stored list of RMSDs, in the cache and again in

@@ -1,8 +1,9 @@
 """Stage ``group``: recordings joined greedily into models that cover more of them.
 
-Every level is two rounds of tasks: the fits of all new groups for all orders, then the
-RMSDs of those models that pass on their own recordings. Groups of more than one
-recording begin with the models of their members (``group.warm_start``).
+Every level is three rounds of tasks: the fits of all new groups for all orders, the
+RMSDs of those models that pass on their own recordings, and the standard errors of the
+best ones. Groups of more than one recording begin with the models of their members
+(``group.warm_start``).
 
 References
 ----------
@@ -17,7 +18,7 @@ import numpy as np
 from hwid_cli.campaign.cache import task_key
 from hwid_cli.campaign.content_keys import recording_key
 from hwid_cli.campaign.crossval import deviation_tasks
-from hwid_cli.campaign.group_fits import fit_level, fit_singles
+from hwid_cli.campaign.group_fits import fit_level, fit_singles, judged, judging_task
 from hwid_cli.campaign.group_plan import STAGE, STAGE_VERSION, GroupPlan, RunLevel
 from hwid_cli.campaign.group_rules import search_groups
 from hwid_cli.campaign.order_grid import candidate_orders
@@ -63,6 +64,8 @@ def search_all(plan: GroupPlan, run: RunLevel) -> GroupSearch:
             _score_group(plan, group, of_group, values)
             for group, of_group, values in zip(tried, fits, deviations, strict=True)
         ]
+        if len(tried[0]) > 1:
+            level = _with_standard_errors(plan, level, run)
         scored.update((one.group.name, one) for one in level)
         return [one.group for one in level]
 
@@ -138,6 +141,20 @@ def _validate_level(
         if any(model is not None for model in models)
         else np.full((len(models), len(judges)), np.nan)
         for models in passing
+    ]
+
+
+def _with_standard_errors(
+    plan: GroupPlan, level: Sequence[_Scored], run: RunLevel
+) -> list[_Scored]:
+    """The same, with the standard errors of every group's best model."""
+    best = [one.fit for one in level if one.fit is not None]
+    tasks = [judging_task(plan, one) for one in best]
+    size = len(level[0].group.recordings)
+    done = iter(_run_all(run, size, "models", tasks) if tasks else ())
+    return [
+        one if one.fit is None else replace(one, fit=judged(one.fit, next(done).result))
+        for one in level
     ]
 
 

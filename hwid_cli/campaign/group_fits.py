@@ -1,6 +1,8 @@
 """All fits of a level of groups.
 
 A fit begins with the models of the group's members and with those of smaller orders.
+Standard errors take a third of the time of such a fit, so only the best model of a group
+gets them.
 """
 
 from collections.abc import Collection, Mapping, Sequence
@@ -12,7 +14,8 @@ from hwid_cli.campaign.group_plan import STAGE, STAGE_VERSION, GroupPlan, RunLev
 from hwid_cli.campaign.identify import Run, fit_grid
 from hwid_cli.campaign.order_grid import SEARCHED_ROUNDS, candidate_orders, growth
 from hwid_cli.campaign.runner import Task
-from hwid_cli.maths.model.fit import fit
+from hwid_cli.maths.model.fit import fit_without_standard_errors
+from hwid_cli.maths.model.uncertainty import with_standard_errors
 from hwid_cli.records.model import Fit, FitOptions, HammersteinWiener, Orders
 from hwid_cli.records.recordings import Recording
 
@@ -96,6 +99,52 @@ def fit_level(
     return [[fits[place] for place in range(len(grid))] for fits in found]
 
 
+def judging_task(plan: GroupPlan, fit: Fit) -> Task:
+    """Task that works out the standard errors of a group's best model.
+
+    Parameters
+    ----------
+    plan : GroupPlan
+    fit : Fit
+        With a model.
+
+    Returns
+    -------
+    Task
+        Its result is the fit with its standard errors and criteria.
+    """
+    by_name = {one.name: one for one in plan.recordings}
+    recordings = tuple(by_name[name] for name in fit.identified_on)
+    matters = {
+        "recordings": [recording_key(one) for one in recordings],
+        "options": fit.options,
+        "standard_errors_of": None if fit.model is None else model_key(fit.model),
+    }
+    return Task(
+        key=task_key(STAGE, STAGE_VERSION, matters, []),
+        name=f"{fit.name}/standard errors",
+        function=with_standard_errors,
+        arguments=(fit, recordings),
+        result_type=Fit,
+    )
+
+
+def judged(fit: Fit, found: Fit) -> Fit:
+    """Fit with the standard errors that its task found.
+
+    Parameters
+    ----------
+    fit : Fit
+    found : Fit
+        Cached by content: its names may be those of another day.
+
+    Returns
+    -------
+    Fit
+    """
+    return replace(fit, uncertainty=found.uncertainty, information=found.information)
+
+
 def _fit_task(
     plan: GroupPlan,
     singles: Mapping[str, Sequence[Fit]],
@@ -145,7 +194,7 @@ def _fit_group(
     contained: Sequence[HammersteinWiener],
     anew: bool,
 ) -> Fit:
-    return fit(
+    return fit_without_standard_errors(
         recordings,
         orders,
         options,

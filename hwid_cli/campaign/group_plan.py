@@ -12,8 +12,8 @@ from hwid_cli.records.recordings import Recording
 STAGE = "group"
 STAGE_VERSION = 5
 
-# Does the work of a level with what runs its tasks. The text says what they are, "fits" or
-# "pairs", the second number how many there will be.
+# Does the work of a level with what runs its tasks. The text says what they are, "fits",
+# "pairs" or "models", the second number how many there will be.
 RunLevel = Callable[[int, str, int, Callable[[Run], Any]], Any]
 
 

@@ -1,3 +1,4 @@
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -9,6 +10,7 @@ from hwid_cli.campaign.group_plan import GroupPlan
 from hwid_cli.campaign.identify import identify_all
 from hwid_cli.campaign.runner import RunSettings, Workers, run_tasks
 from hwid_cli.maths.model.simulate import validation_output
+from hwid_cli.maths.model.uncertainty import parameter_covariance
 from hwid_cli.maths.scores import rmsd
 from hwid_cli.records.experiment import GroupOptions, OrdersOptions
 from hwid_cli.records.model import FitOptions
@@ -120,6 +122,22 @@ def test_a_group_is_scored_by_simulating_its_best_model(search):
         assert fit.name == group.name
 
 
+def test_the_best_model_of_every_group_has_standard_errors(search):
+    by_name = {one.name: one for one in RECORDINGS}
+    groups = [one for one in search.fits if one is not None and "+" in one.name]
+
+    assert groups
+    for one in groups:
+        whole = [by_name[name] for name in one.identified_on]
+        expected = parameter_covariance(one, whole)
+        np.testing.assert_allclose(
+            one.uncertainty.standard_errors,
+            np.sqrt(np.diag(expected.matrix)),
+            rtol=1e-12,
+        )
+        assert np.isfinite(one.information.bic)
+
+
 def test_models_that_fail_on_their_own_recordings_are_not_simulated(search, bench):
     failed = [one for one in search.groups if one.n_self_passed == 0]
 
@@ -180,13 +198,17 @@ def test_concatenated_groups_keep_their_order():
     assert search.groups[2].rmsd != search.groups[3].rmsd
 
 
+def _fitted(bench):
+    """Names of the fits among what was computed."""
+    return [name for name in bench.computed if re.fullmatch(r"[a-d+]+/\d+/\d+", name)]
+
+
 def test_a_recording_that_only_joins_is_fitted_alone_for_its_warm_start():
     bench = Bench()
     options = GroupOptions(keep={"best": True}, max_level=2)
     search_all(plan(start=("a",), candidates=("a", "b"), options=options), bench)
 
-    names = [name for name in bench.computed if " on " not in name]
-    assert names == ["a/1/1", "a/2/1", "b/1/1", "b/2/1", "a+b/1/1", "a+b/2/1"]
+    assert _fitted(bench) == ["a/1/1", "a/2/1", "b/1/1", "b/2/1", "a+b/1/1", "a+b/2/1"]
 
 
 def test_cold_fits_are_other_tasks_than_warm_ones():
@@ -207,8 +229,7 @@ def test_cold_fits_need_no_models_of_recordings_that_only_join():
     options = GroupOptions(keep={"best": True}, max_level=2, warm_start=False)
     search_all(plan(start=("a",), candidates=("a", "b"), options=options), bench)
 
-    names = [name for name in bench.computed if " on " not in name]
-    assert names == ["a/1/1", "a/2/1", "a+b/1/1", "a+b/2/1"]
+    assert _fitted(bench) == ["a/1/1", "a/2/1", "a+b/1/1", "a+b/2/1"]
 
 
 @pytest.mark.parametrize(

@@ -19,7 +19,7 @@ from hwid_cli.maths.model.linear_block import poles
 from hwid_cli.maths.model.normalise import normalise, rescaled
 from hwid_cli.maths.model.placing import reaching, with_maps
 from hwid_cli.maths.model.problem import Problem, joined
-from hwid_cli.maths.model.uncertainty import judged_parameters
+from hwid_cli.maths.model.uncertainty import NOT_WORKED_OUT, judged_parameters
 from hwid_cli.maths.model.unvisited import straightened
 from hwid_cli.records.model import Fit, FitOptions
 from hwid_cli.records.recordings import Recording
@@ -31,7 +31,12 @@ _RARE = 0.005
 
 
 def described(
-    blank: Fit, search: Search, recordings: Sequence[Recording], problem: Problem
+    blank: Fit,
+    search: Search,
+    recordings: Sequence[Recording],
+    problem: Problem,
+    *,
+    standard_errors: bool = True,
 ) -> Fit:
     """Winner of a search in the units of the data, with all that is said about it.
 
@@ -43,6 +48,8 @@ def described(
     recordings : sequence of Recording
     problem : Problem
         With the last threshold of the search.
+    standard_errors : bool
+        Whether they are worked out, and the criteria too.
 
     Returns
     -------
@@ -55,12 +62,14 @@ def described(
     simulated = np.concatenate(sensitivities.simulated_outputs(candidate, experiments))
     measured = np.concatenate([one.output for one in experiments])
     first = candidate.free_responses[0]
-    threshold = problem.experiments[0].threshold * problem.output_scale
-    uncertainty, information = judged_parameters(
-        candidate,
-        [replace(one, threshold=threshold) for one in experiments],
-        free_break_points=blank.options.free_break_points,
-    )
+    uncertainty, information = NOT_WORKED_OUT
+    if standard_errors:
+        threshold = problem.experiments[0].threshold * problem.output_scale
+        uncertainty, information = judged_parameters(
+            candidate,
+            [replace(one, threshold=threshold) for one in experiments],
+            free_break_points=blank.options.free_break_points,
+        )
     deviation = scores.rmsd(measured, simulated)
     _, x = reaching(candidate, experiments)
     low, high = np.quantile(x, [_RARE, 1.0 - _RARE])

@@ -37,6 +37,8 @@ from hwid_cli.records.recordings import Recording
 from hwid_cli.records.uncertainty import ParameterCovariance, Uncertainty
 
 _MOST_NAMES = 4
+# Of a fit whose caller does without.
+NOT_WORKED_OUT = (Uncertainty(reason="not worked out for this fit"), Information())
 
 
 def judged_parameters(
@@ -91,6 +93,32 @@ def judged_parameters(
     )
 
 
+def with_standard_errors(fit: Fit, recordings: Sequence[Recording]) -> Fit:
+    """Fit with what the data say about its parameters, where it was left out.
+
+    Parameters
+    ----------
+    fit : Fit
+        Of these recordings.
+    recordings : sequence of Recording
+        In the order of ``fit.identified_on``; see `parameter_covariance`.
+
+    Returns
+    -------
+    Fit
+
+    Raises
+    ------
+    ValueError
+        If the fit failed or the recordings are others.
+    """
+    candidate, experiments = _as_fitted(fit, recordings)
+    uncertainty, information = judged_parameters(
+        candidate, experiments, free_break_points=fit.options.free_break_points
+    )
+    return replace(fit, uncertainty=uncertainty, information=information)
+
+
 def parameter_covariance(
     fit: Fit, recordings: Sequence[Recording]
 ) -> ParameterCovariance:
@@ -117,22 +145,16 @@ def parameter_covariance(
     ----------
     docs/method.md, eq. (16).
     """
-    names = tuple(one.name for one in recordings)
-    if names != fit.identified_on:
-        raise ValueError(f"the fit is of {fit.identified_on}, not of {names}")
     candidate, experiments = _as_fitted(fit, recordings)
     kind = candidate.model.output_map.kind
     if not RULES[kind].has_slope:
         raise ValueError(f"a {kind} output map has no slope to tell by")
     found = directions(
-        candidate, experiments, free_break_points=fit.options.free_break_points
+        candidate, plain(experiments), free_break_points=fit.options.free_break_points
     )
     freedom = sum(one.output.size for one in experiments)
     if found is None or found.n_effective >= freedom:
         raise ValueError(f"the recordings of {fit.name} are too few to tell")
-    if fit.options.loss != "squared":
-        experiments = tuple(replace(one, threshold=1.0) for one in experiments)
-        experiments = tuple(renewed(experiments, [candidate]))
     variance = residual_variance(candidate, experiments, found.n_effective)
     order = listed(found.place)
     every = parameter_names(candidate, found.place)
@@ -145,7 +167,10 @@ def parameter_covariance(
 def _as_fitted(
     fit: Fit, recordings: Sequence[Recording]
 ) -> tuple[Candidate, tuple[Experiment, ...]]:
-    """A fit's model with the initial states of its experiments."""
+    """A fit's model with its experiments, their initial states and their threshold."""
+    names = tuple(one.name for one in recordings)
+    if names != fit.identified_on:
+        raise ValueError(f"the fit is of {fit.identified_on}, not of {names}")
     model = fit.model
     if model is None:
         raise ValueError(f"the fit of {fit.name} failed: there is no model")
@@ -163,8 +188,11 @@ def _as_fitted(
         states += [estimated_state(model, one) for one in others]
     else:
         states = [np.zeros(0) for _ in experiments]
-    limits = limits_of(fit.options)
-    return Candidate(model, np.array(states), limits), experiments
+    candidate = Candidate(model, np.array(states), limits_of(fit.options))
+    if fit.options.loss != "squared":
+        experiments = tuple(replace(one, threshold=1.0) for one in experiments)
+        experiments = tuple(renewed(experiments, [candidate]))
+    return candidate, experiments
 
 
 def _covariance(found: Directions, variance: float) -> np.ndarray:

@@ -5,7 +5,8 @@ import pytest
 from scipy import signal
 
 from hwid_cli import parameter_covariance
-from hwid_cli.maths.model.fit import fit
+from hwid_cli.maths.model.fit import fit, fit_without_standard_errors
+from hwid_cli.maths.model.uncertainty import with_standard_errors
 from hwid_cli.records.model import Fit, FitOptions, Orders
 from hwid_cli.records.recordings import Recording
 from tests.maths.model.plants import ORDERS, measured, options, plant
@@ -44,6 +45,30 @@ def test_the_diagonal_holds_the_squares_of_the_standard_errors(join):
     np.testing.assert_allclose(
         np.sqrt(np.diag(found.matrix)), result.uncertainty.standard_errors, rtol=1e-3
     )
+
+
+@pytest.mark.parametrize("join", ["concatenate", "experiments"])
+@pytest.mark.parametrize("loss", ["squared", "huber"])
+def test_standard_errors_can_be_worked_out_afterwards(join, loss):
+    true = plant("dead_zone", "polynomial", "estimated")
+    pair = [measured(true, 600, seed=seed, noise=0.02) for seed in (1, 2)]
+    asked = options("dead_zone", "polynomial", "estimated", join=join, loss=loss)
+    whole = fit(pair, ORDERS, asked)
+    bare = fit_without_standard_errors(pair, ORDERS, asked)
+    later = with_standard_errors(bare, pair)
+
+    assert bare.uncertainty.names == ()
+    assert bare.uncertainty.reason == "not worked out for this fit"
+    assert np.isnan(bare.information.bic)
+    assert bare.rmsd == whole.rmsd
+    assert later.uncertainty.names == whole.uncertainty.names
+    # The second recording's initial state and the threshold are found anew.
+    np.testing.assert_allclose(
+        later.uncertainty.standard_errors, whole.uncertainty.standard_errors, rtol=2e-2
+    )
+    assert later.information.bic == pytest.approx(whole.information.bic, rel=1e-3)
+    with pytest.raises(ValueError, match="the fit is of"):
+        with_standard_errors(bare, pair[:1])
 
 
 def test_estimates_spread_as_their_covariance_says():
