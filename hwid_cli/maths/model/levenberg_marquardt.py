@@ -35,9 +35,10 @@ from hwid_cli.maths.model.sensitivities import (
 )
 from hwid_cli.records.model import StaticMap
 
-# Share of the cost that a step must gain; smaller gains in a row end the search.
+# Share of the cost that a step must gain, and how many smaller gains in a row end the
+# search.
 LEAST_GAIN = 3e-4
-_SMALL_GAINS_IN_A_ROW = 2
+PATIENCE = 2
 _FIRST_DAMPING = 1e-2
 _LEAST_DAMPING = 1e-14
 _LARGEST_DAMPING = 1e10
@@ -106,6 +107,7 @@ def minimise(
     with_positions: bool,
     max_iterations: int,
     least_gain: float = LEAST_GAIN,
+    patience: int = PATIENCE,
 ) -> Search:
     """Improve a candidate until it stands still or the iterations are used up.
 
@@ -120,6 +122,8 @@ def minimise(
         Limit on accepted steps.
     least_gain : float, [-]
         Share of the cost that a step must gain.
+    patience : int
+        How many steps in a row that gain less end the search.
 
     Returns
     -------
@@ -151,10 +155,10 @@ def minimise(
         point, found, damping = step.point, step.found, step.damping
         iteration += 1
         small_gains = small_gains + 1 if step.gain < least_gain else 0
-        if small_gains == _SMALL_GAINS_IN_A_ROW:
+        if small_gains == patience:
+            steps = "a step" if patience == 1 else f"{patience} steps in a row"
             return end(
-                "converged",
-                f"two steps in a row gained less than {least_gain:g} of the cost",
+                "converged", f"{steps} gained less than {least_gain:g} of the cost"
             )
     return end("iteration_limit", f"reached the limit of {max_iterations} iterations")
 

@@ -8,7 +8,12 @@ from dataclasses import replace
 
 from hwid_cli.maths.model import sensitivities
 from hwid_cli.maths.model.candidates import Candidate, Experiment, thinned
-from hwid_cli.maths.model.levenberg_marquardt import LEAST_GAIN, Search, minimise
+from hwid_cli.maths.model.levenberg_marquardt import (
+    LEAST_GAIN,
+    PATIENCE,
+    Search,
+    minimise,
+)
 from hwid_cli.maths.model.placing import coarser, finer, with_maps
 from hwid_cli.records.model import FitOptions
 
@@ -96,6 +101,7 @@ def converge(
     options: FitOptions,
     *,
     least_gain: float = LEAST_GAIN,
+    patience: int = PATIENCE,
 ) -> Search:
     """Run on all samples that count until the search stands still.
 
@@ -109,6 +115,8 @@ def converge(
     options : FitOptions
     least_gain : float, [-]
         Share of the cost that a step must gain.
+    patience : int
+        How many steps in a row that gain less end the search.
 
     Returns
     -------
@@ -120,6 +128,7 @@ def converge(
         with_positions=options.free_break_points,
         max_iterations=options.max_iterations,
         least_gain=least_gain,
+        patience=patience,
     )
     return replace(found, iterations=near.iterations + found.iterations)
 

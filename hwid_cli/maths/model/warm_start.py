@@ -26,6 +26,9 @@ _ROWS, _SCREENING_ITERATIONS = 1000, 3
 # Groups are told apart by a threshold: the last tenth of a percent of the deviation is
 # not worth half of the time.
 _LEAST_GAIN = 1e-3
+# Smaller gains in a row that end the going on from a contained model: the next orders go
+# on from here again.
+_PATIENCE = 1
 
 
 def warm_search(
@@ -62,7 +65,13 @@ def warm_search(
         known = min(
             (standing(one, experiments) for one in contained), key=lambda one: one.cost
         )
-        near = converge(known, experiments, options, least_gain=_LEAST_GAIN)
+        near = converge(
+            known,
+            experiments,
+            options,
+            least_gain=_LEAST_GAIN,
+            patience=_PATIENCE,
+        )
         found = [known, near]
     if search_anew or not contained:
         screened = _screened(experiments, options, starts)
