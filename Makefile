@@ -11,7 +11,8 @@ DEV := $(VENV)/installed-dev
 
 .DEFAULT_GOAL := help
 .PHONY: help install run test test-all check audit format smoke clean reliability \
-        bench bench-campaign bench-growth bench-wide bench-real scale \
+        bench bench-campaign bench-growth bench-rounds bench-search bench-wide \
+        bench-real scale \
         simulate calibrate identify crossval group test-stage steps model1 model2 \
         reproduction thesis chapter2 hsm150 diagnose gun real effects drive-source export-check blind
 
@@ -79,6 +80,12 @@ bench-campaign: $(DEV)  ## 15 recordings with 100 orders each from an empty cach
 
 bench-growth: $(DEV)  ## how a fit's time grows, up to 100 000 samples
 	@$(BENCH).bench_growth --full
+
+bench-rounds: $(DEV)  ## where in a grid a search anew is worth its time: three minutes
+	@$(BENCH).bench_rounds
+
+bench-search: $(DEV)  ## the whole search for groups of the thesis: most of an hour
+	@$(BENCH).bench_search
 
 bench-wide: $(DEV)  ## many kinds of plants against fits that begin at the truth
 	@$(BENCH).bench_wide
