@@ -11,6 +11,7 @@ from hwid_cli.maths.diagnosis.verdict import Verdict
 from hwid_cli.maths.drive.effects import public_id
 from hwid_cli.records.candidates import CandidateFit
 from hwid_cli.records.diagnosis import FittedEffect, NextExperiment
+from hwid_cli.records.units import behind
 
 if TYPE_CHECKING:
     from hwid_cli.campaign.findings import Findings
@@ -143,7 +144,7 @@ def propose(findings: "Findings", verdict: Verdict) -> NextExperiment:
     models = [Model(*rebuilt(findings.problem, one, findings.scales)) for one in pair]
     best = best_separation(findings.problem, models[0], models[1], findings.scales)
     # The dash of a dimensionless output would be a minus behind a number.
-    by = f"{best.rms:.2g} {findings.problem.unit}".removesuffix(" -")
+    by = f"{best.rms:.2g}{behind(findings.problem.unit)}"
     return NextExperiment(
         best.input,
         f"{_name(pair[0])} and {_name(pair[1])} then differ by {by} "

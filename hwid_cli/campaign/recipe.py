@@ -29,6 +29,7 @@ from hwid_cli.maths.calibration import (
 )
 from hwid_cli.records.experiment import CalibrateOptions
 from hwid_cli.records.recordings import CalibrationLog, RawRecording
+from hwid_cli.records.units import behind
 
 OFFSETS = ("input_offset", "output_offset")
 # Rounds of repairing or cutting one signal; two settle nearly all of them.
@@ -152,8 +153,8 @@ def _onset(draft: Draft, values: np.ndarray) -> int:
     onset = find_onset(values, quiet_is_rest=quiet_is_rest)
     if onset is None:
         raise MeasurementError(
-            f"{draft.place}: the input stays at {np.median(values):.6g} "
-            f"{draft.raw.input_unit} over {values.size} samples, no onset of an "
+            f"{draft.place}: the input stays at {np.median(values):.6g}"
+            f"{behind(draft.raw.input_unit)} over {values.size} samples, no onset of an "
             "excitation was found; check the input column, or take 'cut' and the "
             f"offsets out of calibrate.{draft.raw.kind}"
         )

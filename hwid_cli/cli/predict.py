@@ -55,7 +55,7 @@ def command(
         read_input,
         write_prediction,
     )
-    from hwid_cli.report.text_table import behind
+    from hwid_cli.records.units import behind
 
     exported = read_exported(model)
     check_trust(exported, model, is_trusted=run_own_functions)

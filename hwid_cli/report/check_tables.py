@@ -4,7 +4,8 @@ import math
 from collections.abc import Sequence
 
 from hwid_cli.records.check import FitCost, RecordingFacts, StagePlan
-from hwid_cli.report.text_table import MISSING, behind, text_table
+from hwid_cli.records.units import behind
+from hwid_cli.report.text_table import MISSING, text_table
 
 _KILO = 1000.0
 

@@ -11,9 +11,10 @@ from hwid_cli.records.diagnosis import (
     Gap,
     RankedCandidate,
 )
+from hwid_cli.records.units import behind
 from hwid_cli.report.page import Table
 from hwid_cli.report.parameter_names import quantity_and_unit
-from hwid_cli.report.text_table import MISSING, behind, number
+from hwid_cli.report.text_table import MISSING, number
 
 # Joins the effects of a candidate.
 AND = " + "

@@ -6,13 +6,13 @@ from itertools import pairwise
 import numpy as np
 
 from hwid_cli.records.groups import ChainTrend, FinalTest
+from hwid_cli.records.units import behind
 from hwid_cli.report.sections.words import counted
 from hwid_cli.report.simulation_words import simulation_words
 from hwid_cli.report.tables import thesis_name
 from hwid_cli.report.text_table import (
     GAP,
     WIDTH,
-    behind,
     joined_names,
     number,
     split_table,

@@ -4,7 +4,8 @@ import textwrap
 from collections.abc import Sequence
 
 from hwid_cli.records.model import Fit
-from hwid_cli.report.text_table import WIDTH, behind
+from hwid_cli.records.units import behind
+from hwid_cli.report.text_table import WIDTH
 
 # Models that are named, and places of each.
 _MOST_MODELS, _MOST_PLACES = 4, 2

@@ -1,6 +1,7 @@
 """The search for groups as plain text, in the forms of the published tables."""
 
 from hwid_cli.records.groups import Group, GroupSearch
+from hwid_cli.records.units import behind
 from hwid_cli.report.simulation_words import joined_words, simulation_words
 from hwid_cli.report.text_table import WIDTH, number, split_table, text_table
 
@@ -48,7 +49,7 @@ def levels_table(search: GroupSearch) -> str:
         "go on",
     )
     title = (
-        f"Search for groups: models above {search.threshold:g} {search.unit} on their "
+        f"Search for groups: models above {search.threshold:g}{behind(search.unit)} on their "
         "own recordings\n(not self), models below it on no recording (not cross), "
         f"and the widest coverage{_started(search)}"
     )

@@ -8,12 +8,12 @@ import numpy as np
 from hwid_cli.records.model import Fit
 from hwid_cli.records.recordings import CalibrationLog
 from hwid_cli.records.results import CrossValidation, ModelScore
+from hwid_cli.records.units import behind
 from hwid_cli.report.fold_words import folds_note
 from hwid_cli.report.simulation_words import simulation_words
 from hwid_cli.report.text_table import (
     MISSING,
     WIDTH,
-    behind,
     number,
     split_table,
     text_table,

@@ -127,25 +127,6 @@ def joined_names(names: Sequence[str], *, width: int = WIDTH) -> list[str]:
     return lines
 
 
-def behind(unit: str) -> str:
-    """Write a unit behind a number; the dash of a dimensionless one would be a minus.
-
-    Parameters
-    ----------
-    unit : str
-
-    Returns
-    -------
-    str
-
-    Examples
-    --------
-    >>> f"0.4{behind('m')} and 0.4{behind('-')}"
-    '0.4 m and 0.4'
-    """
-    return "" if unit in ("", "-") else f" {unit}"
-
-
 def number(value: float) -> str:
     """Show a number with three digits.
 

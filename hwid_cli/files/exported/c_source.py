@@ -13,6 +13,7 @@ from hwid_cli.files.exported.map_parts import parts_of
 from hwid_cli.files.exported.names import in_comment
 from hwid_cli.records.exported import ExportedModel, ModelCard
 from hwid_cli.records.maps import StaticMap
+from hwid_cli.records.units import behind
 
 _SOURCES = files("hwid_cli.files.exported") / "sources"
 _WIDTH = 84
@@ -85,7 +86,7 @@ def card_words(card: ModelCard, sample_time_s: float) -> dict[str, str]:
     """
     low, high = card.input_range
     # The dash of a dimensionless input would be a minus behind a number.
-    ends = f"{low:.6g} to {high:.6g} {card.input_unit}".removesuffix(" -")
+    ends = f"{low:.6g} to {high:.6g}{behind(card.input_unit)}"
     about = (
         f"Model {card.name}, written by hwid {__version__}. Its data have inputs from "
         f"{ends}."

@@ -14,6 +14,7 @@ import numpy as np
 from hwid_cli.maths.diagnosis.colour import is_white, portmanteau, whitening_filter
 from hwid_cli.maths.diagnosis.problem import Problem, Signals, rest_length
 from hwid_cli.records.diagnosis import NoiseFloor
+from hwid_cli.records.units import behind
 
 # Inputs that differ by less than this share of their largest value are repeats.
 _SAME_INPUT = 0.02
@@ -299,8 +300,8 @@ def _sentence(found: _Stretch, method: str, resolution: float, unit: str) -> str
     """What was found, in words."""
     if resolution > 0 and not found.is_coloured:
         return (
-            f"the sensor shows steps of {resolution:.2g} {unit}, which is a noise of "
-            f"{found.rms:.2g} {unit}"
+            f"the sensor shows steps of {resolution:.2g}{behind(unit)}, which is a noise of "
+            f"{found.rms:.2g}{behind(unit)}"
         )
     source = {
         "repeats": "from what repeats differ by",
@@ -310,4 +311,4 @@ def _sentence(found: _Stretch, method: str, resolution: float, unit: str) -> str
     if found.rms == 0:
         return f"no noise, {source}"
     colour = "coloured" if found.is_coloured else "white"
-    return f"{colour} noise of {found.rms:.2g} {unit}, {source}"
+    return f"{colour} noise of {found.rms:.2g}{behind(unit)}, {source}"

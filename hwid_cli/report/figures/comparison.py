@@ -7,6 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from hwid_cli.records.comparison import Comparison
+from hwid_cli.records.units import behind
 from hwid_cli.report.comparison_table import model_letters, start_words
 from hwid_cli.report.figures.style import (
     BLACK,
@@ -17,7 +18,7 @@ from hwid_cli.report.figures.style import (
     number_decades,
     styled,
 )
-from hwid_cli.report.text_table import behind, number
+from hwid_cli.report.text_table import number
 
 # Of the figure, of that of one recording, and of a line of its legend, [inch].
 _HEIGHT, _HEIGHT_OF_ONE, _LINE = 7.5, 5.0, 0.2

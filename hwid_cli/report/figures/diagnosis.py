@@ -8,6 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from hwid_cli.records.diagnosis import Diagnosis, RecordingGap
+from hwid_cli.records.units import behind
 from hwid_cli.report.figures.diagnosis_bars import (
     label_room,
     ranking_figure,
@@ -26,7 +27,6 @@ from hwid_cli.report.figures.style import (
     new_figure,
     styled,
 )
-from hwid_cli.report.text_table import behind
 
 # Width, a row, the room above a panel for its title and below all, [inch].
 _WIDTH, _ROW, _TITLE, _BELOW = 7.2, 0.19, 0.34, 0.48

@@ -6,6 +6,7 @@ from itertools import pairwise
 from matplotlib.figure import Figure
 
 from hwid_cli.records.report import ChainOnTests
+from hwid_cli.records.units import behind
 from hwid_cli.report.figures.style import (
     BLACK,
     LINES,
@@ -13,7 +14,6 @@ from hwid_cli.report.figures.style import (
     number_decades,
     styled,
 )
-from hwid_cli.report.text_table import behind
 
 # Lines with a legend of their own; more are told apart by nobody.
 _MOST_NAMED = 10

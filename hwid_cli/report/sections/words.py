@@ -8,10 +8,11 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from hwid_cli.records.report import ReportContents
+from hwid_cli.records.units import behind
 from hwid_cli.report.figures.style import DOTS, as_png
 from hwid_cli.report.page import Image, Text
 from hwid_cli.report.simulation_words import simulation_words
-from hwid_cli.report.text_table import MISSING, behind
+from hwid_cli.report.text_table import MISSING
 
 NOTHING_COVERED = "no group covers any recording."
 
