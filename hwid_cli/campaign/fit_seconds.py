@@ -9,6 +9,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import replace
 
+from hwid_cli.campaign.group_fits import SEARCHED_ROUNDS_OF_GROUPS
 from hwid_cli.campaign.order_grid import SEARCHED_ROUNDS
 from hwid_cli.maths.model.fit import fit
 from hwid_cli.maths.model.rows.kernels import derivative_rows
@@ -142,12 +143,12 @@ def share_of_round(number: int, *, is_warm: bool = False) -> float:
     >>> share_of_round(0), share_of_round(0) > share_of_round(1) > share_of_round(9)
     (1.0, True)
     """
-    is_searched = number < SEARCHED_ROUNDS
     if is_warm:
+        is_searched = number < SEARCHED_ROUNDS_OF_GROUPS
         return _WARM_SEARCHED if is_searched else _WARM_GROWN
     if number == 0:
         return 1.0
-    return _SEARCHED if is_searched else _GROWN
+    return _SEARCHED if number < SEARCHED_ROUNDS else _GROWN
 
 
 def _work(n_samples: int) -> float:

@@ -12,12 +12,16 @@ from hwid_cli.campaign.cache import task_key
 from hwid_cli.campaign.content_keys import model_key, recording_key
 from hwid_cli.campaign.group_plan import STAGE, STAGE_VERSION, GroupPlan, RunLevel
 from hwid_cli.campaign.identify import Run, fit_grid
-from hwid_cli.campaign.order_grid import SEARCHED_ROUNDS, candidate_orders, growth
+from hwid_cli.campaign.order_grid import candidate_orders, growth
 from hwid_cli.campaign.runner import Task
 from hwid_cli.maths.model.fit import fit_without_standard_errors
 from hwid_cli.maths.model.uncertainty import with_standard_errors
 from hwid_cli.records.model import Fit, FitOptions, HammersteinWiener, Orders
 from hwid_cli.records.recordings import Recording
+
+# As for single recordings, but one round less: a fit from the members' models takes many
+# times as long as going on from smaller orders, and groups are told apart by a threshold.
+SEARCHED_ROUNDS_OF_GROUPS = 3
 
 
 def fit_singles(
@@ -83,7 +87,7 @@ def fit_level(
 
     def work(execute: Run) -> None:
         for number, places in enumerate(growth(plan.orders)):
-            anew = number < SEARCHED_ROUNDS
+            anew = number < SEARCHED_ROUNDS_OF_GROUPS
             tasks = [
                 _fit_task(plan, singles, group, (place, smaller, fits, contents, anew))
                 for group, fits in zip(tried, found, strict=True)
