@@ -11,7 +11,7 @@ DEV := $(VENV)/installed-dev
 
 .DEFAULT_GOAL := help
 .PHONY: help install run test test-all check audit format smoke clean reliability \
-        bench bench-campaign bench-growth bench-rounds bench-search bench-wide \
+        bench bench-campaign bench-growth bench-rounds bench-search bench-starts bench-wide \
         bench-real scale \
         simulate calibrate identify crossval group test-stage steps model1 model2 \
         reproduction thesis chapter2 hsm150 diagnose gun real effects drive-source export-check blind
@@ -83,6 +83,9 @@ bench-growth: $(DEV)  ## how a fit's time grows, up to 100 000 samples
 
 bench-rounds: $(DEV)  ## where in a grid a search anew is worth its time: three minutes
 	@$(BENCH).bench_rounds
+
+bench-starts: $(DEV)  ## what each part of the search is worth: a minute
+	@$(BENCH).bench_starts
 
 bench-search: $(DEV)  ## the whole search for groups of the thesis: most of an hour
 	@$(BENCH).bench_search

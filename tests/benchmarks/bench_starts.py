@@ -5,6 +5,7 @@ plants, and plants of many kinds (`bench_wide`) against fits that begin at the t
 plant. Everything is changed from outside; the project has no switches for it.
 """
 
+import argparse
 import time
 from contextlib import contextmanager
 from unittest.mock import patch
@@ -21,7 +22,7 @@ from tests.benchmarks.bench_wide import true_model, wide_plant
 from tests.benchmarks.other_starts import by_instruments, by_reduction
 from tests.benchmarks.plants import public_plants, random_plant
 
-N_RANDOM, N_WIDE, MOST_SAMPLES = 20, 100, 10_000
+N_RANDOM, MOST_SAMPLES = 20, 10_000
 
 
 @contextmanager
@@ -93,8 +94,11 @@ def wide(plants, possible):
 
 def main():
     """Print one line for each variant."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--wide", type=int, default=24, help="plants of many kinds")
+    n_wide = parser.parse_args().wide
     known = [*public_plants(), *(random_plant(seed) for seed in range(N_RANDOM))]
-    every = [wide_plant(seed) for seed in range(N_WIDE)]
+    every = [wide_plant(seed) for seed in range(n_wide)]
     many = [one for one in every if one.recording.n_samples <= MOST_SAMPLES]
     possible = np.array(
         [
