@@ -90,6 +90,9 @@ bench-starts: $(DEV)  ## what each part of the search is worth: a minute
 bench-search: $(DEV)  ## the whole search for groups of the thesis: most of an hour
 	@$(BENCH).bench_search
 
+bench-beyond: $(DEV)  ## how maps go on beyond the data of their fit: two minutes
+	@$(BENCH).bench_beyond
+
 bench-wide: $(DEV)  ## many kinds of plants against fits that begin at the truth
 	@$(BENCH).bench_wide
 

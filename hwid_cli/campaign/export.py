@@ -10,6 +10,7 @@ import numpy as np
 from hwid_cli.errors import ConfigError, ModelFileError
 from hwid_cli.maths.diagnosis.preparing import drive_of, prepare
 from hwid_cli.maths.drive.simulation import drive_effects, parameter_vector
+from hwid_cli.maths.model.beyond import outlined_model
 from hwid_cli.maths.model.linear_block import poles, static_gain
 from hwid_cli.maths.model.maps.cubic_spline import bends
 from hwid_cli.records.experiment import (
@@ -147,7 +148,7 @@ def completed(card: ModelCard, model: HammersteinWiener) -> ExportedModel:
     """
     return ExportedModel(
         card,
-        model,
+        outlined_model(model),
         static_gain(model.numerator, model.denominator),
         _bends(model.input_map),
         _bends(model.output_map),

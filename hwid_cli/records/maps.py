@@ -152,12 +152,16 @@ class StaticMap:
         Range of the argument in the fit; outside it the map extrapolates.
     function : OwnFunction or None
         Only with ``own_function``.
+    slopes_beyond : tuple of float, or None
+        Slopes below and above ``domain`` of a piecewise linear map, value over argument;
+        None where its outermost segments go on.
     """
 
     kind: str
     parameters: np.ndarray
     domain: tuple[float, float] = (-1.0, 1.0)
     function: OwnFunction | None = None
+    slopes_beyond: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
         if self.kind not in MAP_KINDS:
@@ -166,6 +170,8 @@ class StaticMap:
             )
         if (self.kind == "own_function") != (self.function is not None):
             raise ValueError("a map has a function exactly with kind own_function")
+        if self.slopes_beyond is not None and self.kind != "piecewise_linear":
+            raise ValueError(f"a {self.kind} map has no slopes beyond its domain")
         object.__setattr__(
             self, "parameters", frozen_vector(self.parameters, "parameters")
         )

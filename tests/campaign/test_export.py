@@ -11,6 +11,7 @@ from hwid_cli.campaign.export import (
 )
 from hwid_cli.campaign.predict import outside_share
 from hwid_cli.errors import ConfigError
+from hwid_cli.maths.model.simulate import simulate
 from hwid_cli.records.drive import Controller
 from hwid_cli.records.experiment import (
     Columns,
@@ -75,7 +76,25 @@ def test_an_exported_model_says_where_it_comes_from():
     assert card.origin["recordings"] == {"a": "aaa", "c": "ccc"}
     assert card.origin["fit"]["rmsd"] == 0.5
     assert card.origin["stage"] == "group"
-    assert exported.model is model
+    u = recordings[0].input
+    assert simulate(exported.model, u).tolist() == simulate(model, u).tolist()
+
+
+def test_an_exported_map_needs_nothing_but_its_break_points_and_values():
+    model = example_model(1)
+    low, high = model.input_map.domain
+    bent = replace(model.input_map, slopes_beyond=(3.0, -2.0))
+    model = replace(model, input_map=bent)
+    u = np.linspace(2 * low - high, 2 * high - low, 50)
+    card = ModelCard("a/2/2", "A", Columns("u", "y"), (low, high))
+    exported = completed(card, model)
+
+    assert exported.model.input_map.slopes_beyond is None
+    points, values = np.split(exported.model.input_map.parameters, 2)
+    slopes = np.diff(values) / np.diff(points)
+    assert points[[1, -2]] == pytest.approx([low, high])
+    assert slopes[[0, -1]] == pytest.approx([3.0, -2.0])
+    assert simulate(exported.model, u).tolist() == simulate(model, u).tolist()
 
 
 def test_under_a_controller_the_input_is_the_reference():

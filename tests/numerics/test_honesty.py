@@ -7,7 +7,6 @@ import pytest
 from scipy.signal import lfilter
 
 from hwid_cli.campaign import crossval
-from hwid_cli.records.model import StaticMap
 from hwid_cli.records.recordings import Recording
 from tests.campaign.diagnosed_drive import FRICTION, diagnosed, parameters
 from tests.maths.diagnosis import small_drive
@@ -32,8 +31,12 @@ def output_by_hand(model, current):
     def through(table, values):
         xs, ys = np.split(table.parameters, 2)
         slopes = np.diff(ys) / np.diff(xs)
-        place = np.clip(np.searchsorted(xs, values) - 1, 0, slopes.size - 1)
-        return ys[place] + slopes[place] * (values - xs[place])
+        low, high = table.domain
+        within = np.clip(values, low, high)
+        place = np.clip(np.searchsorted(xs, within) - 1, 0, slopes.size - 1)
+        inside = ys[place] + slopes[place] * (within - xs[place])
+        below, above = table.slopes_beyond
+        return inside + np.where(values < low, below, above) * (values - within)
 
     numerator = np.r_[np.zeros(model.delay), model.numerator]
     inner = lfilter(numerator, model.denominator, through(model.input_map, current))
@@ -74,7 +77,7 @@ def test_a_bias_in_the_scoring_is_seen(fits, data, bias, monkeypatch):
 def test_an_offset_of_the_model_shows_with_its_closed_form(fits, data, bias):
     model = fits[0].model
     xs, ys = np.split(model.output_map.parameters, 2)
-    table = StaticMap("piecewise_linear", np.r_[xs, ys + bias], model.output_map.domain)
+    table = replace(model.output_map, parameters=np.r_[xs, ys + bias])
     biased = replace(fits[0], model=replace(model, output_map=table))
     found = validated([biased, *fits[1:]], data).rmsd[0, 0, 0]
 

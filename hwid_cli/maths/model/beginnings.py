@@ -12,6 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from hwid_cli.maths.model.beyond import for_search
 from hwid_cli.maths.model.candidates import Candidate, Experiment, limits_of
 from hwid_cli.maths.model.contained import contains, enlarged
 from hwid_cli.maths.model.delays import starts_of_delays
@@ -134,7 +135,11 @@ def contained_candidates(
         # would make the search's steps depend on those units.
         larger = enlarged(
             normalise(
-                rescaled(model, 1.0 / problem.input_scale, 1.0 / problem.output_scale)
+                rescaled(
+                    for_search(model),
+                    1.0 / problem.input_scale,
+                    1.0 / problem.output_scale,
+                )
             ),
             at,
         )
@@ -171,7 +176,9 @@ def member_models(
     for model in models:
         if not is_stable(model.denominator):
             continue
-        one = rescaled(model, 1.0 / problem.input_scale, 1.0 / problem.output_scale)
+        one = rescaled(
+            for_search(model), 1.0 / problem.input_scale, 1.0 / problem.output_scale
+        )
         if not options.keeps_block:
             one = normalise(one)
         numerator, denominator = one.numerator, one.denominator

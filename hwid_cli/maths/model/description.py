@@ -12,6 +12,7 @@ import numpy as np
 
 from hwid_cli.maths import scores
 from hwid_cli.maths.model import sensitivities, static_map
+from hwid_cli.maths.model.beyond import continued
 from hwid_cli.maths.model.candidates import Candidate
 from hwid_cli.maths.model.folding import folds
 from hwid_cli.maths.model.levenberg_marquardt import Search
@@ -79,7 +80,7 @@ def described(
     return replace(
         blank,
         orders=candidate.model.orders,
-        model=replace(candidate.model, free_response=first),
+        model=continued(replace(candidate.model, free_response=first)),
         status=search.status,
         message=search.message,
         iterations=search.iterations,

@@ -25,6 +25,11 @@ from hwid_cli.maths.model.placing import reaching
 from hwid_cli.maths.model.points import block_signals, point_of
 from hwid_cli.maths.model.race import LONG, SHORT, Rounds, race
 from hwid_cli.maths.model.robust import rejudged, renewed
+from hwid_cli.maths.model.second_search import (
+    doubted_input_maps,
+    leaves_structure,
+    maps_anew,
+)
 from hwid_cli.maths.model.starts import Start
 from hwid_cli.records.model import FitOptions
 
@@ -33,8 +38,9 @@ _RELAXED_BLOCKS = 2
 # Cost that a relaxed block must reach, as a share of the best so far, to be finished;
 # nearer to it the search has only come back to where it was.
 _WORTH_GOING_ON = 0.995
-# Correlation of neighbouring residuals from which on the search is not taken for done.
-_COLOURED = 0.5
+# Searches that follow one whose residuals are not noise, and the share of the cost that
+# one must reach for another to follow it.
+_MOST_DOUBTS, _WORTH_DOUBTING = 3, 0.9
 # Share of the cost that a step must gain where larger models go on from the result.
 _SMALL_GAIN = 1e-3
 # Samples that count for the linear model, and the share of the cost that a step must gain:
@@ -114,27 +120,31 @@ def nonlinear_search(
         relaxed = _relaxed(best, experiments, options)
     if relaxed.cost < _WORTH_GOING_ON * best.cost:
         best = _best([best, finish(relaxed, experiments, options)])
-    if _leaves_structure(best, experiments):
-        best = _best([best, *_searched_again(experiments, starts, options)])
+    best = _doubted(best, experiments, options, starts)
     return _not_worse_than(linear, best, experiments, options)
 
 
-def _searched_again(
+def _doubted(
+    best: Search,
     experiments: Sequence[Experiment],
-    starts: Sequence[Start],
     options: FitOptions,
-) -> list[Search]:
-    """A long race of all starts, for where the short one has found no good minimum."""
-    found = race(experiments, starts, options, rounds=LONG)
-    placed = [place(one, experiments, options) for one in found]
-    return [finish(_best(placed), experiments, options)]
-
-
-def _leaves_structure(best: Search, experiments: Sequence[Experiment]) -> bool:
-    """Tell whether residuals follow their neighbours, as noise of a sensor does not."""
-    residuals = sensitivities.simulated(point_of(best.candidate), experiments).residuals
-    following = sum(float(one[1:] @ one[:-1]) for one in residuals)
-    return following > _COLOURED * sum(float(one @ one) for one in residuals)
+    starts: Sequence[Start],
+) -> Search:
+    """The best so far, or what long races find where its residuals are not noise."""
+    entered = [*starts, *doubted_input_maps(starts, experiments)]
+    for _ in range(_MOST_DOUBTS):
+        if not leaves_structure(best.candidate, experiments):
+            break
+        entered += maps_anew(best.candidate, experiments)
+        found = race(experiments, entered, options, rounds=LONG)
+        placed = [place(one, experiments, options) for one in found]
+        again = finish(_best(placed), experiments, options)
+        gained = again.cost < _WORTH_DOUBTING * best.cost
+        best = _best([best, again])
+        if not gained:
+            break
+        entered = []
+    return best
 
 
 def grown(

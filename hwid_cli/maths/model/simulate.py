@@ -231,7 +231,8 @@ def _state_step(
 
     The gain is what the sum of squares would lose if the output map were straight.
     """
-    found = static_map.derivatives(model.output_map, x, with_positions=False)
+    plain = static_map.outlined(model.output_map)
+    found = static_map.derivatives(plain, x, with_positions=False)
     jacobian = found.slope[:, None] * responses
     matrix, vector = jacobian.T @ jacobian, jacobian.T @ (output - found.value)
     scale = np.sqrt(np.diag(matrix))

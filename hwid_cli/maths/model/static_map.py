@@ -254,6 +254,24 @@ def stretch(static_map: StaticMap, factor: float) -> StaticMap:
     return replace(static_map, parameters=static_map.parameters * factor, domain=domain)
 
 
+def outlined(static_map: StaticMap) -> StaticMap:
+    """Same map, its parameters alone giving its values everywhere.
+
+    Parameters
+    ----------
+    static_map : StaticMap
+
+    Returns
+    -------
+    StaticMap
+        A piecewise linear map that goes on beyond its domain with slopes of its own has
+        them as segments.
+    """
+    if static_map.slopes_beyond is None:
+        return static_map
+    return piecewise_linear.outlined(static_map)
+
+
 def has_free_shape(kind: str) -> bool:
     """Tell whether maps of a kind have a gain and an offset of their own.
 

@@ -18,6 +18,7 @@ from dataclasses import replace
 import numpy as np
 
 from hwid_cli.maths.model import sensitivities
+from hwid_cli.maths.model.beyond import for_search
 from hwid_cli.maths.model.candidates import Candidate, Experiment, limits_of
 from hwid_cli.maths.model.flat_directions import flat_sentences
 from hwid_cli.maths.model.identifiability import (
@@ -188,7 +189,7 @@ def _as_fitted(
         states += [estimated_state(model, one) for one in others]
     else:
         states = [np.zeros(0) for _ in experiments]
-    candidate = Candidate(model, np.array(states), limits_of(fit.options))
+    candidate = Candidate(for_search(model), np.array(states), limits_of(fit.options))
     if fit.options.loss != "squared":
         experiments = tuple(replace(one, threshold=1.0) for one in experiments)
         experiments = tuple(renewed(experiments, [candidate]))

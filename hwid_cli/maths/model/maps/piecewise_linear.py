@@ -34,6 +34,8 @@ N_ENDS = 2
 _LEAST_SHRINK = 0.2
 # Segments narrower than this share of the whole would be jumps, not slopes.
 _LEAST_WIDTH = 1e-4
+# Share of the domain: break-points closer to its ends are taken for them.
+_EDGE = 1e-9
 
 
 def break_points_and_values(static_map: StaticMap) -> tuple[np.ndarray, np.ndarray]:
@@ -51,9 +53,53 @@ def break_points_and_values(static_map: StaticMap) -> tuple[np.ndarray, np.ndarr
     return static_map.parameters[:units], static_map.parameters[units:]
 
 
+def outlined(static_map: StaticMap) -> StaticMap:
+    """Same map with nothing but break-points and values, also beyond its domain.
+
+    Parameters
+    ----------
+    static_map : StaticMap
+        Piecewise linear.
+
+    Returns
+    -------
+    StaticMap
+        Itself where its outermost segments go on. Else the domain's ends are break-points,
+        and what lies beyond them is one straight line on each side.
+
+    Examples
+    --------
+    >>> one = StaticMap("piecewise_linear", np.array([0.0, 1, 0, 5]), (0.0, 1.0))
+    >>> outlined(replace(one, slopes_beyond=(1.0, 2.0))).parameters
+    array([-1.,  0.,  1.,  2., -1.,  0.,  5.,  7.])
+    """
+    if static_map.slopes_beyond is None:
+        return static_map
+    (low, high), (below, above) = static_map.domain, static_map.slopes_beyond
+    width = high - low
+    points, values = break_points_and_values(static_map)
+    at_ends = piecewise_linear_value(np.array([low, high]), points, values)
+    near = _EDGE * width
+    inside = (points > low + near) & (points < high - near)
+    # The ends of a map in a fit are no break-points.
+    inside[[0, -1]] = False
+    points = np.concatenate([[low - width, low], points[inside], [high, high + width]])
+    values = np.concatenate(
+        [
+            [at_ends[0] - below * width, at_ends[0]],
+            values[inside],
+            [at_ends[1], at_ends[1] + above * width],
+        ]
+    )
+    return replace(
+        static_map, parameters=np.concatenate([points, values]), slopes_beyond=None
+    )
+
+
 def _evaluate(static_map: StaticMap, argument: np.ndarray) -> np.ndarray:
     argument = np.ascontiguousarray(argument, dtype=float)
-    return piecewise_linear_value(argument, *break_points_and_values(static_map))
+    plain = outlined(static_map)
+    return piecewise_linear_value(argument, *break_points_and_values(plain))
 
 
 def _differentiate(
@@ -151,7 +197,7 @@ RULE = MapRule(
     size=lambda one: mean_slope(one, one.parameters.size // 2),
     n_positions=lambda static_map: static_map.parameters.size // 2,
     settle=_settle,
-    corners=lambda static_map: break_points_and_values(static_map)[0],
+    corners=lambda static_map: break_points_and_values(outlined(static_map))[0],
     derivatives=_derivatives,
     # The outermost ones may slide along the straight line beyond them.
     held=lambda static_map: (0, static_map.parameters.size // 2 - 1),

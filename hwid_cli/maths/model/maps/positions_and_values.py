@@ -21,7 +21,11 @@ def amplified(one: StaticMap, n_positions: int, factor: float) -> StaticMap:
     StaticMap
     """
     positions, values = np.split(one.parameters, [n_positions])
-    return replace(one, parameters=np.concatenate([positions, values * factor]))
+    return replace(
+        one,
+        parameters=np.concatenate([positions, values * factor]),
+        slopes_beyond=_steeper(one, factor),
+    )
 
 
 def compressed(one: StaticMap, n_positions: int, factor: float) -> StaticMap:
@@ -44,8 +48,21 @@ def compressed(one: StaticMap, n_positions: int, factor: float) -> StaticMap:
     if factor < 0:
         positions, values, low, high = positions[::-1], values[::-1], high, low
     return replace(
-        one, parameters=np.concatenate([positions, values]), domain=(low, high)
+        one,
+        parameters=np.concatenate([positions, values]),
+        domain=(low, high),
+        slopes_beyond=_steeper(one, factor, turned=factor < 0),
     )
+
+
+def _steeper(
+    one: StaticMap, factor: float, *, turned: bool = False
+) -> tuple[float, float] | None:
+    """Slopes beyond a map's domain times a factor, in turned order where it is turned."""
+    if one.slopes_beyond is None:
+        return None
+    below, above = (factor * slope for slope in one.slopes_beyond)
+    return (above, below) if turned else (below, above)
 
 
 def mean_slope(one: StaticMap, n_positions: int) -> tuple[float, np.ndarray]:

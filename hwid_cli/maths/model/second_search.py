@@ -1,0 +1,105 @@
+"""Where a search may have ended in a poor minimum, and from where to begin again.
+
+The error of a poor minimum is of another shape than noise: it follows itself from sample
+to sample, or it is large at few moments. Then what the first search took for granted is
+doubted: the input maps that came with the linear starts (where an output folds, least
+squares on the output see a wrong one), and the maps that it found around its own block.
+
+References
+----------
+docs/method.md, section "The search".
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from hwid_cli.maths.model import static_map
+from hwid_cli.maths.model.candidates import Candidate, Experiment
+from hwid_cli.maths.model.points import point_of
+from hwid_cli.maths.model.sensitivities import simulated
+from hwid_cli.maths.model.starts import Start
+
+# Correlation of neighbouring residuals, and mean fourth power over squared mean square
+# (3 for normal noise), from which on residuals are not taken for noise.
+_COLOURED, _PEAKED = 0.5, 4.0
+# Values by which a start takes over an input map.
+_MAP_POINTS = 12
+
+
+def leaves_structure(candidate: Candidate, experiments: Sequence[Experiment]) -> bool:
+    """Tell whether residuals look like the error of a poor minimum.
+
+    Parameters
+    ----------
+    candidate : Candidate
+    experiments : sequence of Experiment
+
+    Returns
+    -------
+    bool
+        Whether they follow their neighbours, or are large at few moments, as the noise
+        of a sensor does and is not.
+    """
+    residuals = simulated(point_of(candidate), experiments).residuals
+    following = sum(float(one[1:] @ one[:-1]) for one in residuals)
+    joined = np.concatenate(residuals)
+    power = float(joined @ joined)
+    peaks = joined.size * float(np.sum(joined**4))
+    return following > _COLOURED * power or peaks > _PEAKED * power**2
+
+
+def doubted_input_maps(
+    starts: Sequence[Start], experiments: Sequence[Experiment]
+) -> list[Start]:
+    """Blocks that came with an input map of their own, without it.
+
+    Parameters
+    ----------
+    starts : sequence of Start
+    experiments : sequence of Experiment
+
+    Returns
+    -------
+    list of Start
+    """
+    return [_straight(one, experiments) for one in starts if one.is_expanded]
+
+
+def maps_anew(candidate: Candidate, experiments: Sequence[Experiment]) -> list[Start]:
+    """The block that a search found, to find maps around it again.
+
+    Parameters
+    ----------
+    candidate : Candidate
+    experiments : sequence of Experiment
+
+    Returns
+    -------
+    list of Start
+        With its input map at equal distances, and without.
+    """
+    model = candidate.model
+    points = np.linspace(*_range(experiments), _MAP_POINTS)
+    found = Start(
+        model.numerator,
+        model.denominator,
+        np.inf,
+        points,
+        static_map.evaluate(model.input_map, points),
+        0.0,
+        candidate.free_responses,
+        delay=model.delay,
+    )
+    return [found, _straight(found, experiments)]
+
+
+def _straight(start: Start, experiments: Sequence[Experiment]) -> Start:
+    ends = np.array(_range(experiments))
+    return replace(start, input_points=ends, input_values=ends)
+
+
+def _range(experiments: Sequence[Experiment]) -> tuple[float, float]:
+    lowest = min(float(one.input.min()) for one in experiments)
+    return lowest, max(float(one.input.max()) for one in experiments)
