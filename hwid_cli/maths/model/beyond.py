@@ -21,9 +21,7 @@ from hwid_cli.records.model import HammersteinWiener
 _OUTER = 1.0 / 8.0
 
 
-def continued(
-    model: HammersteinWiener, *, outer: float = _OUTER
-) -> HammersteinWiener:
+def continued(model: HammersteinWiener, *, outer: float = _OUTER) -> HammersteinWiener:
     """Same model on the data of its fit, its maps going on straight beyond them.
 
     Parameters
@@ -74,6 +72,9 @@ def outlined_model(model: HammersteinWiener) -> HammersteinWiener:
     HammersteinWiener
         Values to the last bit as before.
     """
+    maps = (model.input_map, model.output_map)
+    if all(one.slopes_beyond is None for one in maps):
+        return model
     return replace(
         model,
         input_map=outlined(model.input_map),

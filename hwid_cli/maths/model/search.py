@@ -139,11 +139,9 @@ def _doubted(
         found = race(experiments, entered, options, rounds=LONG)
         placed = [place(one, experiments, options) for one in found]
         again = finish(_best(placed), experiments, options)
-        gained = again.cost < _WORTH_DOUBTING * best.cost
-        best = _best([best, again])
-        if not gained:
+        if again.cost >= _WORTH_DOUBTING * best.cost:
             break
-        entered = []
+        best, entered = again, []
     return best
 
 

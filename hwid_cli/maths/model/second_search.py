@@ -24,6 +24,9 @@ from hwid_cli.maths.model.starts import Start
 # Correlation of neighbouring residuals, and mean fourth power over squared mean square
 # (3 for normal noise), from which on residuals are not taken for noise.
 _COLOURED, _PEAKED = 0.5, 4.0
+# Deviation, as a share of the output's own, below which peaks are let be. Models of too
+# few poles can come closer still, by maps that bend for this one record.
+_CLOSE = 0.005
 # Values by which a start takes over an input map.
 _MAP_POINTS = 12
 
@@ -39,15 +42,19 @@ def leaves_structure(candidate: Candidate, experiments: Sequence[Experiment]) ->
     Returns
     -------
     bool
-        Whether they follow their neighbours, or are large at few moments, as the noise
-        of a sensor does and is not.
+        Whether they follow their neighbours, or are not small and large at few moments.
     """
     residuals = simulated(point_of(candidate), experiments).residuals
     following = sum(float(one[1:] @ one[:-1]) for one in residuals)
     joined = np.concatenate(residuals)
     power = float(joined @ joined)
+    if following > _COLOURED * power:
+        return True
+    spread = sum(
+        float(np.sum((one.output - np.mean(one.output)) ** 2)) for one in experiments
+    )
     peaks = joined.size * float(np.sum(joined**4))
-    return following > _COLOURED * power or peaks > _PEAKED * power**2
+    return power > _CLOSE**2 * spread and peaks > _PEAKED * power**2
 
 
 def doubted_input_maps(

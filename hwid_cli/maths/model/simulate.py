@@ -11,6 +11,7 @@ from typing import Literal
 import numpy as np
 
 from hwid_cli.maths.model import repeatable, static_map
+from hwid_cli.maths.model.beyond import outlined_model
 from hwid_cli.maths.model.kernels import difference_columns
 from hwid_cli.maths.model.linear_block import (
     difference_basis,
@@ -81,6 +82,8 @@ def simulate(
     """
     if isinstance(model, Fit):
         raise TypeError("simulate takes a model: give result.model")
+    # Once for all the evaluations below.
+    model = outlined_model(model)
     signal = np.ascontiguousarray(input, dtype=float)
     if signal.ndim != 1 or signal.size == 0:
         raise ValueError(f"input must be a 1-D array with samples, got {signal.shape}")
@@ -137,6 +140,7 @@ def validation_output(model: HammersteinWiener, recording: Recording) -> np.ndar
     """
     if model.initial_state != "estimated":
         return simulate(model, recording.input, initial_state=np.zeros(0))
+    model = outlined_model(model)
     with np.errstate(over="ignore", invalid="ignore"):
         forced = _forced(model, np.ascontiguousarray(recording.input))
         state = _state_from(model, forced, recording.output)
@@ -165,6 +169,7 @@ def estimated_state(model: HammersteinWiener, recording: Recording) -> np.ndarra
     ----------
     docs/method.md, eq. (7).
     """
+    model = outlined_model(model)
     forced = _forced(model, np.ascontiguousarray(recording.input))
     return _state_from(model, forced, recording.output)
 
@@ -231,8 +236,7 @@ def _state_step(
 
     The gain is what the sum of squares would lose if the output map were straight.
     """
-    plain = static_map.outlined(model.output_map)
-    found = static_map.derivatives(plain, x, with_positions=False)
+    found = static_map.derivatives(model.output_map, x, with_positions=False)
     jacobian = found.slope[:, None] * responses
     matrix, vector = jacobian.T @ jacobian, jacobian.T @ (output - found.value)
     scale = np.sqrt(np.diag(matrix))
