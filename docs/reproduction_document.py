@@ -22,9 +22,8 @@ from docs.reproduction_verdict import FAILS, HOLDS, IN_PART, NOT_JUDGED
 PROCEDURE = """\
 The thesis measured a spot-welding gun and published tables, not measurements. Here a simulated gun takes its place: the same plan
 of steps and sines, the same orders, the same threshold, another machine. So figures are not expected to agree; the effects are.
-Five things are done differently. Recordings of a group are fitted as separate experiments, each with its own initial state, where
-the thesis put one behind the other; the order in a group then does not matter, and 6-8 and 8-6 are one group. A group's fits begin
-with the models of its recordings instead of from nothing (`group.warm_start`; docs/results.md has the difference). The sines fade in
+Four things are done differently. Recordings of a group are fitted as separate experiments, each with its own initial state, where
+the thesis put one behind the other; the order in a group then does not matter, and 6-8 and 8-6 are one group. The sines fade in
 over 2.5 s, because the mean over their first period, which the thesis takes for the offset, is a transient otherwise. Groups go on
 by a coverage at or above a number, chosen from the tables as in the thesis, for Model 1; the text's other rule, the best of a level,
 serves for Model 2, whose candidates are two to three recordings of every row of the plan. And Model 2 keeps three steps and three

@@ -281,7 +281,7 @@ def _grid_seconds(cost: FitCost, n: int, experiment: Experiment, level: int) -> 
     is_warm = (experiment.group or GroupOptions()).warm_start
     units = experiment.fit.units
     return sum(
-        share_of_round(number, is_warm=is_warm)
+        share_of_round(number, of_group=True, is_warm=is_warm)
         * fit_seconds(cost, grid[place], n, units=units, n_recordings=level)
         for number, places in enumerate(growth(experiment.orders))
         for place, _ in places

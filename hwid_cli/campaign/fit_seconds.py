@@ -124,13 +124,17 @@ def fit_seconds(
     )
 
 
-def share_of_round(number: int, *, is_warm: bool = False) -> float:
+def share_of_round(
+    number: int, *, of_group: bool = False, is_warm: bool = False
+) -> float:
     """Time of a fit in a round of a grid's growth, against one alone from nothing.
 
     Parameters
     ----------
     number : int
         From zero.
+    of_group : bool
+        Whether it is a group's grid, of which fewer rounds are searched.
     is_warm : bool
         Whether it begins with the models of a group's members.
 
@@ -143,12 +147,12 @@ def share_of_round(number: int, *, is_warm: bool = False) -> float:
     >>> share_of_round(0), share_of_round(0) > share_of_round(1) > share_of_round(9)
     (1.0, True)
     """
+    searched = SEARCHED_ROUNDS_OF_GROUPS if of_group else SEARCHED_ROUNDS
     if is_warm:
-        is_searched = number < SEARCHED_ROUNDS_OF_GROUPS
-        return _WARM_SEARCHED if is_searched else _WARM_GROWN
+        return _WARM_SEARCHED if number < searched else _WARM_GROWN
     if number == 0:
         return 1.0
-    return _SEARCHED if number < SEARCHED_ROUNDS else _GROWN
+    return _SEARCHED if number < searched else _GROWN
 
 
 def _work(n_samples: int) -> float:

@@ -67,9 +67,11 @@ VARIANTS = {
     "- relaxed linear blocks": lambda: patch.object(
         search, "_relaxed", lambda best, *_: best
     ),
-    "- second, long race": lambda: patch.object(
-        search, "_leaves_structure", lambda *_: False
+    "- doubt": lambda: patch.object(search, "leaves_structure", lambda *_: False),
+    "- doubted input maps": lambda: patch.object(
+        search, "doubted_input_maps", lambda *_: []
     ),
+    "- maps anew": lambda: patch.object(search, "maps_anew", lambda *_: []),
     "+ instrumental variables": lambda: added(by_instruments),
     "+ reduced FIR": lambda: added(by_reduction),
 }
@@ -95,7 +97,7 @@ def wide(plants, possible):
 def main():
     """Print one line for each variant."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--wide", type=int, default=24, help="plants of many kinds")
+    parser.add_argument("--wide", type=int, default=80, help="plants of many kinds")
     n_wide = parser.parse_args().wide
     known = [*public_plants(), *(random_plant(seed) for seed in range(N_RANDOM))]
     every = [wide_plant(seed) for seed in range(n_wide)]

@@ -3,7 +3,7 @@ from dataclasses import replace
 import pytest
 
 from hwid_cli.campaign.check import group_bound
-from hwid_cli.campaign.fit_seconds import MEASURED, fit_seconds
+from hwid_cli.campaign.fit_seconds import MEASURED, fit_seconds, share_of_round
 from hwid_cli.campaign.group_rules import search_groups
 from hwid_cli.records.experiment import GroupOptions
 from hwid_cli.records.groups import Group
@@ -73,3 +73,11 @@ def test_a_fit_of_the_timed_size_takes_the_timed_seconds():
     assert fit_seconds(cost, Orders(3, 3, 1), 50_000, units=10) == pytest.approx(0.3)
     # Beyond 20 000 samples the time grows with their number.
     assert fit_seconds(cost, Orders(3, 3, 1), 100_000, units=10) == pytest.approx(0.6)
+
+
+def test_the_grid_of_a_group_is_searched_in_fewer_rounds():
+    fourth = 3
+
+    assert share_of_round(fourth) == share_of_round(1)
+    assert share_of_round(fourth, of_group=True) == share_of_round(9)
+    assert share_of_round(fourth - 1, of_group=True) == share_of_round(1)

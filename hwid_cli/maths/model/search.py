@@ -139,9 +139,10 @@ def _doubted(
         found = race(experiments, entered, options, rounds=LONG)
         placed = [place(one, experiments, options) for one in found]
         again = finish(_best(placed), experiments, options)
-        if again.cost >= _WORTH_DOUBTING * best.cost:
+        gained = again.cost < _WORTH_DOUBTING * best.cost
+        best, entered = _best([best, again]), []
+        if not gained:
             break
-        best, entered = again, []
     return best
 
 

@@ -44,7 +44,12 @@ def leaves_structure(candidate: Candidate, experiments: Sequence[Experiment]) ->
     bool
         Whether they follow their neighbours, or are not small and large at few moments.
     """
-    residuals = simulated(point_of(candidate), experiments).residuals
+    found = simulated(point_of(candidate), experiments).residuals
+    # Outliers, where they are to be borne, are no error of the model.
+    residuals = [
+        np.clip(one, -experiment.threshold, experiment.threshold)
+        for one, experiment in zip(found, experiments, strict=True)
+    ]
     following = sum(float(one[1:] @ one[:-1]) for one in residuals)
     joined = np.concatenate(residuals)
     power = float(joined @ joined)

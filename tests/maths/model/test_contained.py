@@ -58,7 +58,7 @@ def test_a_linear_fit_is_never_worse_than_the_models_it_contains():
 
 
 @pytest.mark.parametrize("starts", ["none", "members"])
-def test_a_fit_that_only_goes_on_improves_the_best_of_the_models_it_contains(starts):
+def test_a_fit_that_only_goes_on_keeps_the_best_of_the_models_it_contains(starts):
     recording = measured(plant("piecewise_linear", "saturation"), noise=0.02)
     how = options("piecewise_linear", "saturation")
     narrow = fit([recording], Orders(1, 1, 1), how)

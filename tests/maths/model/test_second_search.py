@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -59,6 +61,16 @@ def test_peaks_of_a_model_that_is_close_are_no_sign():
     # The deviation of the peaks is 1.34, of the wave 212: 0.5 % is a share of 0.79.
     assert not said(0.7)
     assert said(0.9)
+
+
+def test_outliers_that_the_loss_bears_are_no_sign():
+    noise = np.random.default_rng(5).standard_normal(N)
+    noise[::200] += 30.0
+    candidate, experiments = passing_on(noise)
+
+    assert leaves_structure(candidate, experiments)
+    bearing = [replace(one, threshold=1.345) for one in experiments]
+    assert not leaves_structure(candidate, bearing)
 
 
 def test_only_blocks_with_an_input_map_are_doubted():
