@@ -84,7 +84,7 @@ bench-growth: $(DEV)  ## how a fit's time grows, up to 100 000 samples
 bench-rounds: $(DEV)  ## where in a grid a search anew is worth its time: three minutes
 	@$(BENCH).bench_rounds
 
-bench-starts: $(DEV)  ## what each part of the search is worth: five minutes
+bench-starts: $(DEV)  ## what each part of the search is worth: two minutes
 	@$(BENCH).bench_starts
 
 bench-search: $(DEV)  ## the whole search for groups of the thesis: most of an hour

@@ -71,7 +71,10 @@ VARIANTS = {
     "- doubted input maps": lambda: patch.object(
         search, "doubted_input_maps", lambda *_: []
     ),
-    "- maps anew": lambda: patch.object(search, "maps_anew", lambda *_: []),
+    # Further doubts have nothing but the found block to begin with.
+    "- maps anew": lambda: patch.multiple(
+        search, maps_anew=lambda *_: [], _MOST_DOUBTS=1
+    ),
     "+ instrumental variables": lambda: added(by_instruments),
     "+ reduced FIR": lambda: added(by_reduction),
 }
