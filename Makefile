@@ -11,7 +11,7 @@ DEV := $(VENV)/installed-dev
 
 .DEFAULT_GOAL := help
 .PHONY: help install run test test-all check audit format smoke clean reliability \
-        bench bench-campaign bench-growth bench-rounds bench-search bench-starts bench-wide \
+        bench bench-campaign bench-growth bench-maps bench-rounds bench-search bench-starts bench-wide \
         bench-real scale \
         simulate calibrate identify crossval group test-stage steps model1 model2 \
         reproduction thesis chapter2 hsm150 diagnose gun real effects drive-source export-check blind
@@ -92,6 +92,9 @@ bench-search: $(DEV)  ## the whole search for groups of the thesis: most of an h
 
 bench-beyond: $(DEV)  ## how maps go on beyond the data of their fit: two minutes
 	@$(BENCH).bench_beyond
+
+bench-maps: $(DEV)  ## maps of the default size against maps that the data choose: seven minutes
+	@$(BENCH).bench_maps
 
 bench-wide: $(DEV)  ## many kinds of plants against fits that begin at the truth
 	@$(BENCH).bench_wide

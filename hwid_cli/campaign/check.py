@@ -9,17 +9,24 @@ from hwid_cli.campaign.cache import Store
 from hwid_cli.campaign.crossval import Deviations, crossval_tasks
 from hwid_cli.campaign.fit_seconds import (
     SECONDS_PER_SIMULATED_SAMPLE,
-    fit_seconds,
-    share_of_round,
+    grid_seconds,
+    group_grid_seconds,
+    map_seconds,
 )
 from hwid_cli.campaign.identify import fit_grid
-from hwid_cli.campaign.order_grid import candidate_orders, growth
+from hwid_cli.campaign.map_choice import candidate_maps
+from hwid_cli.campaign.order_grid import candidate_orders
 from hwid_cli.campaign.runner import Task, TaskDone
 from hwid_cli.campaign.selection import select_recordings
 from hwid_cli.records.check import FitCost, StagePlan
-from hwid_cli.records.experiment import CrossvalOptions, Experiment, GroupOptions
+from hwid_cli.records.experiment import (
+    CrossvalOptions,
+    Experiment,
+    GroupOptions,
+    OrderOptions,
+)
 from hwid_cli.records.maps import StaticMap
-from hwid_cli.records.model import Fit, HammersteinWiener
+from hwid_cli.records.model import Fit, FitOptions, HammersteinWiener
 from hwid_cli.records.recordings import Recording
 
 # Measured on the demo: a stored fit and a stored list of RMSDs, in the cache and again in
@@ -148,7 +155,7 @@ def _identify_and_crossval(
     grid = [orders for _, _, orders in candidate_orders(experiment.orders)]
     fits, n_cached = _stored_fits(experiment, chosen, store)
     total = len(chosen) * len(grid)
-    seconds = _seconds_of_rounds(experiment, chosen, speed)
+    seconds = grid_seconds(experiment, chosen, speed)
     plan = StagePlan(
         "identify",
         f"{_counted(len(chosen), 'recording')} x {_counted(len(grid), 'order')} = "
@@ -164,7 +171,11 @@ def _identify_and_crossval(
     if n_cached == total:
         tasks = crossval_tasks(fits, judges, experiment.orders)
         done = sum(store.get(task.key, Deviations) is not None for task in tasks)
-    return [plan, _crossval(len(chosen), total, judges, (done, speed[1]))]
+    plans = [plan, _crossval(len(chosen), total, judges, (done, speed[1]))]
+    maps = candidate_maps(experiment.fit, experiment.order or OrderOptions())
+    if len(maps) > 1:
+        plans.append(_maps(experiment, chosen, maps, speed))
+    return plans
 
 
 def _crossval(
@@ -185,25 +196,23 @@ def _crossval(
     )
 
 
-def _seconds_of_rounds(
+def _maps(
     experiment: Experiment,
     recordings: Sequence[Recording],
+    maps: Sequence[FitOptions],
     speed: tuple[FitCost, int],
-) -> float:
-    """Time of a grid: its rounds wait for each other, so few fits leave workers idle."""
-    cost, workers = speed
-    grid = [orders for _, _, orders in candidate_orders(experiment.orders)]
-    total = 0.0
-    for number, places in enumerate(growth(experiment.orders)):
-        share = share_of_round(number)
-        each = [
-            share
-            * fit_seconds(cost, grid[place], one.n_samples, units=experiment.fit.units)
-            for one in recordings
-            for place, _ in places
-        ]
-        total += max(sum(each) / workers, sum(each) / len(each))
-    return total
+) -> StagePlan:
+    """Plan of the comparison of maps; the orders are not known yet."""
+    total = len(recordings) * len(maps)
+    return StagePlan(
+        "order",
+        f"{_counted(len(recordings), 'recording')} x {len(maps)} pairs of maps = "
+        f"{_counted(total, 'fit')}",
+        total,
+        None,
+        map_seconds(speed[0], experiment.orders, recordings, maps) / speed[1],
+        _FIT_BYTES * total,
+    )
 
 
 def _stored_fits(
@@ -259,7 +268,7 @@ def _group(
     fits = sum(bounds) * len(candidate_orders(experiment.orders))
     seconds = (
         sum(
-            count * _grid_seconds(speed[0], n, experiment, level)
+            count * group_grid_seconds(speed[0], n, experiment, level)
             for level, count in enumerate(bounds, start=2)
         )
         + SECONDS_PER_SIMULATED_SAMPLE * n * n_validate * fits
@@ -272,19 +281,6 @@ def _group(
         seconds / speed[1],
         _FIT_BYTES * fits + _PAIR_BYTES * sum(bounds) * n_validate,
         is_bound=True,
-    )
-
-
-def _grid_seconds(cost: FitCost, n: int, experiment: Experiment, level: int) -> float:
-    """Time of all fits of one group."""
-    grid = [orders for _, _, orders in candidate_orders(experiment.orders)]
-    is_warm = (experiment.group or GroupOptions()).warm_start
-    units = experiment.fit.units
-    return sum(
-        share_of_round(number, of_group=True, is_warm=is_warm)
-        * fit_seconds(cost, grid[place], n, units=units, n_recordings=level)
-        for number, places in enumerate(growth(experiment.orders))
-        for place, _ in places
     )
 
 

@@ -10,11 +10,15 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from hwid_cli.campaign.group_fits import SEARCHED_ROUNDS_OF_GROUPS
-from hwid_cli.campaign.order_grid import SEARCHED_ROUNDS
+from hwid_cli.campaign.order_grid import (
+    SEARCHED_ROUNDS,
+    candidate_orders,
+    growth,
+)
 from hwid_cli.maths.model.fit import fit
 from hwid_cli.maths.model.rows.kernels import derivative_rows
 from hwid_cli.records.check import FitCost
-from hwid_cli.records.experiment import OrdersOptions
+from hwid_cli.records.experiment import Experiment, GroupOptions, OrdersOptions
 from hwid_cli.records.model import FitOptions, Orders
 from hwid_cli.records.recordings import Recording
 
@@ -73,7 +77,7 @@ def time_one_fit(
         output=whole.output[:n],
         reference=None if whole.reference is None else whole.reference[:n],
     )
-    middle = _middle(orders)
+    middle = middle_orders(orders)
     short = replace(options, starts=1, max_iterations=1, join=FitOptions().join)
     # The first call loads the compiled loops, which no later fit does.
     fit([cut], Orders(1, 1, 1), short)
@@ -90,7 +94,12 @@ def time_one_fit(
 
 
 def fit_seconds(
-    cost: FitCost, orders: Orders, n_samples: int, *, units: int, n_recordings: int = 1
+    cost: FitCost,
+    orders: Orders,
+    n_samples: int,
+    *,
+    units: float,
+    n_recordings: int = 1,
 ) -> float:
     """Estimate the time of a fit on one core.
 
@@ -100,7 +109,8 @@ def fit_seconds(
     orders : Orders
     n_samples : int, [samples]
         Of each recording.
-    units : int, [-]
+    units : float, [-]
+        Mean of both maps.
     n_recordings : int, [-]
         That are joined.
 
@@ -155,15 +165,120 @@ def share_of_round(
     return _SEARCHED if number < searched else _GROWN
 
 
-def _work(n_samples: int) -> float:
-    """Time against the number of samples, up to a factor."""
-    short = min(max(n_samples, _LEAST_SAMPLES), _LONG_SAMPLES)
-    return float(short**_P_SAMPLES * max(n_samples / _LONG_SAMPLES, 1.0))
+def grid_seconds(
+    experiment: Experiment,
+    recordings: Sequence[Recording],
+    speed: tuple[FitCost, int],
+) -> float:
+    """Time of grids: their rounds wait for each other, so few fits leave workers idle.
+
+    Parameters
+    ----------
+    experiment : Experiment
+    recordings : sequence of Recording
+        Each with a grid of its own.
+    speed : tuple of (FitCost, int)
+        What a fit costs, and the workers.
+
+    Returns
+    -------
+    float, [s]
+    """
+    cost, workers = speed
+    grid = [orders for _, _, orders in candidate_orders(experiment.orders)]
+    total = 0.0
+    for number, places in enumerate(growth(experiment.orders)):
+        share = share_of_round(number)
+        each = [
+            share
+            * fit_seconds(cost, grid[place], one.n_samples, units=experiment.fit.units)
+            for one in recordings
+            for place, _ in places
+        ]
+        total += max(sum(each) / workers, sum(each) / len(each))
+    return total
 
 
-def _middle(orders: OrdersOptions) -> Orders:
+def group_grid_seconds(
+    cost: FitCost, n_samples: int, experiment: Experiment, level: int
+) -> float:
+    """Time of all fits of one group on one core.
+
+    Parameters
+    ----------
+    cost : FitCost
+    n_samples : int, [samples]
+        Of each recording.
+    experiment : Experiment
+    level : int, [-]
+        Recordings in the group.
+
+    Returns
+    -------
+    float, [s]
+    """
+    grid = [orders for _, _, orders in candidate_orders(experiment.orders)]
+    is_warm = (experiment.group or GroupOptions()).warm_start
+    units = experiment.fit.units
+    return sum(
+        share_of_round(number, of_group=True, is_warm=is_warm)
+        * fit_seconds(cost, grid[place], n_samples, units=units, n_recordings=level)
+        for number, places in enumerate(growth(experiment.orders))
+        for place, _ in places
+    )
+
+
+def map_seconds(
+    cost: FitCost,
+    orders: OrdersOptions,
+    recordings: Sequence[Recording],
+    maps: Sequence[FitOptions],
+) -> float:
+    """Time of fits with several pairs of maps on one core; their orders are not known yet.
+
+    Parameters
+    ----------
+    cost : FitCost
+    orders : OrdersOptions
+    recordings : sequence of Recording
+    maps : sequence of FitOptions
+
+    Returns
+    -------
+    float, [s]
+    """
+    middle = middle_orders(orders)
+    return sum(
+        fit_seconds(
+            cost,
+            middle,
+            one.n_samples,
+            units=(options.of_input.units + options.of_output.units) / 2,
+        )
+        for one in recordings
+        for options in maps
+    )
+
+
+def middle_orders(orders: OrdersOptions) -> Orders:
+    """Orders that stand for a whole grid.
+
+    Parameters
+    ----------
+    orders : OrdersOptions
+
+    Returns
+    -------
+    Orders
+    """
     nb = sorted(orders.nb)[len(orders.nb) // 2]
     nk = sorted(orders.nk)[len(orders.nk) // 2]
     if orders.nk_role == "delay":
         return Orders(nb, orders.nf or 0, nk)
     return Orders(nb, nk, 1)
+
+
+def _work(n_samples: int) -> float:
+    """Time against the number of samples, up to a factor."""
+    short = min(max(n_samples, _LEAST_SAMPLES), _LONG_SAMPLES)
+    return float(short**_P_SAMPLES * max(n_samples / _LONG_SAMPLES, 1.0))

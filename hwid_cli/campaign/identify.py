@@ -76,7 +76,14 @@ def fit_grid(
     for number, places in enumerate(growth(orders)):
         anew = number < SEARCHED_ROUNDS
         tasks = [
-            _task(recording, content, grid[place], (alone, fits, smaller, anew))
+            fit_task(
+                f"{recording.name}/{grid[place][0]}/{grid[place][1]}",
+                (recording, content),
+                grid[place][2],
+                alone,
+                contained=[fits[number].model for number in smaller],
+                search_anew=anew,
+            )
             for recording, content, fits in zip(
                 recordings, contents, found, strict=True
             )
@@ -119,29 +126,48 @@ def identify_key(
     return task_key(STAGE, STAGE_VERSION, settings, [])
 
 
-def _task(
-    recording: Recording,
-    content: str,
-    place: tuple[int, int, Orders],
-    how: tuple[FitOptions, dict[int, Fit], Sequence[int], bool],
+def fit_task(
+    name: str,
+    source: tuple[Recording, str],
+    orders: Orders,
+    options: FitOptions,
+    *,
+    contained: Sequence[HammersteinWiener | None] = (),
+    search_anew: bool = True,
 ) -> Task:
-    """One fit; its key holds the models that it begins with."""
-    nb, nk, candidate = place
-    options, fits, smaller, anew = how
-    models = [fits[number].model for number in smaller]
-    contained = tuple(model for model in models if model is not None)
+    """Describe one fit; its key holds the models that it begins with.
+
+    Parameters
+    ----------
+    name : str
+        For people.
+    source : tuple of (Recording, str)
+        The recording and its ``recording_key``.
+    orders : Orders
+    options : FitOptions
+    contained : sequence of HammersteinWiener or None
+        Models of smaller orders; None stands for a failed fit.
+    search_anew : bool
+
+    Returns
+    -------
+    Task
+        Gives a ``Fit``.
+    """
+    recording, content = source
+    known = tuple(model for model in contained if model is not None)
     matters = {
         "recordings": [content],
-        "orders": candidate,
+        "orders": orders,
         "options": options,
-        "contained": [model_key(model) for model in contained],
-        "search_anew": anew,
+        "contained": [model_key(model) for model in known],
+        "search_anew": search_anew,
     }
     return Task(
         key=task_key(STAGE, STAGE_VERSION, matters, []),
-        name=f"{recording.name}/{nb}/{nk}",
+        name=name,
         function=_fit_one,
-        arguments=(recording, candidate, options, contained, anew),
+        arguments=(recording, orders, options, known, search_anew),
         result_type=Fit,
     )
 

@@ -6,10 +6,10 @@ docs/method.md, eqs. (33)-(36).
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
+from hwid_cli.campaign.judging import Judged, judged, smallest_good
 from hwid_cli.campaign.order_grid import grid_place
 from hwid_cli.maths.model.response_estimate import estimate_response
 from hwid_cli.records.experiment import OrderOptions, OrdersOptions
@@ -17,19 +17,6 @@ from hwid_cli.records.model import Fit
 from hwid_cli.records.order import OrderAdvice, OrderChoice
 from hwid_cli.records.recordings import Recording
 from hwid_cli.records.results import CrossValidation
-
-# A model that is this many times worse than the best, or missing, is just bad: how bad
-# must not decide between the others.
-_MOST_FACTOR = 10.0
-
-
-@dataclass(frozen=True, eq=False)
-class _Judged:
-    """Log factors above the best of each pair of model and judge, and who judged."""
-
-    factors: np.ndarray
-    rmsd: np.ndarray
-    judges: np.ndarray
 
 
 def recommend_orders(
@@ -47,7 +34,7 @@ def recommend_orders(
         Of which the tensor was made.
     crossval : CrossValidation
     recordings : sequence of Recording
-        Among them those of the fits.
+        Among them those of the fits and those that judge.
     orders : OrdersOptions
     options : OrderOptions
 
@@ -62,8 +49,8 @@ def recommend_orders(
     """
     criteria = {name: _criterion(fits, crossval, name) for name in ("aic", "bic")}
     places = range(len(crossval.identified_on))
-    single = [_judged(crossval, [place]) for place in places]
-    total = _judged(crossval, places)
+    single = [_judged_by(crossval, [place], recordings) for place in places]
+    total = _judged_by(crossval, places, recordings)
     if total is None:
         return None
     responses = tuple(
@@ -76,13 +63,13 @@ def recommend_orders(
         choices=tuple(
             _choice(
                 crossval.identified_on[place],
-                judged,
+                found,
                 {name: values[place] for name, values in criteria.items()},
                 crossval,
                 options,
             )
-            for place, judged in zip(places, single, strict=True)
-            if judged is not None
+            for place, found in zip(places, single, strict=True)
+            if found is not None
         ),
         responses=responses,
         delay=_quantile([one.delay for one in responses if one.delay >= 0], 0.25, -1),
@@ -103,62 +90,29 @@ def _quantile(values: list[int], share: float, missing: int) -> int:
     return int(np.quantile(values, share, method="inverted_cdf"))
 
 
-def _judged(crossval: CrossValidation, places: Sequence[int]) -> _Judged | None:
-    """What others say of some recordings' models, or they themselves where alone."""
-    pairs = [
-        (place, judge)
-        for place in places
-        for judge, name in enumerate(crossval.validated_on)
-        if name != crossval.identified_on[place]
-    ]
-    is_alone = not pairs
-    if is_alone:
-        pairs = [
-            (place, crossval.validated_on.index(crossval.identified_on[place]))
-            for place in places
-            if crossval.identified_on[place] in crossval.validated_on
-        ]
-    rmsd = np.array([crossval.rmsd[place, :, :, judge] for place, judge in pairs])
-    known = [number for number, one in enumerate(rmsd) if np.isfinite(one).any()]
-    if not known:
-        return None
-    rmsd = rmsd[known]
-    with np.errstate(divide="ignore"):
-        logs = np.log(np.maximum(rmsd, 1e-300))
-    factors = logs - np.nanmin(logs, axis=(1, 2), keepdims=True)
-    factors = np.minimum(np.nan_to_num(factors, nan=np.inf), np.log(_MOST_FACTOR))
-    judges = np.array([-1 if is_alone else pairs[number][1] for number in known])
-    return _Judged(factors, rmsd, judges)
+def _judged_by(
+    crossval: CrossValidation, places: Sequence[int], recordings: Sequence[Recording]
+) -> Judged | None:
+    """What recordings say of the models of some, the grid in one row."""
+    names = [crossval.identified_on[place] for place in places]
+    shape = (len(names), -1, len(crossval.validated_on))
+    rmsd = crossval.rmsd[list(places)].reshape(shape)
+    return judged(rmsd, names, crossval.validated_on, recordings)
 
 
 def _choice(
     recording: str,
-    judged: _Judged,
+    found: Judged,
     criteria: dict[str, np.ndarray],
     crossval: CrossValidation,
     options: OrderOptions,
 ) -> OrderChoice:
     """The smallest orders that are as good as the best."""
-    by_judge = np.array(
-        [
-            judged.factors[judged.judges == one].mean(axis=0)
-            for one in np.unique(judged.judges)
-        ]
-    )
-    mean = by_judge.mean(axis=0)
-    best = _lowest(mean)
-    worse = by_judge - by_judge[(slice(None), *best)][:, None, None]
-    error = np.full(mean.shape, np.nan)
-    if len(by_judge) > 1:
-        error = worse.std(axis=0, ddof=1) / np.sqrt(len(by_judge))
-    allowed = np.maximum(np.log1p(options.tolerance), np.nan_to_num(error))
-    is_good = mean - mean[best] <= allowed
-    size = np.add.outer(
+    sizes = np.add.outer(
         np.array(crossval.nb),
         np.array(crossval.nk) * (crossval.nk_role == "poles"),
     )
-    smallest = is_good & (size == size[is_good].min())
-    chosen = _lowest(np.where(smallest, mean, np.inf))
+    verdict = smallest_good(found, sizes.ravel(), options.tolerance)
     said = {
         f"{name}_{axis}": value
         for name, values in criteria.items()
@@ -166,13 +120,9 @@ def _choice(
     }
     return OrderChoice(
         recording,
-        *_named(chosen, crossval),
-        *_named(best, crossval),
-        rmsd=_typical(judged.rmsd[(slice(None), *chosen)]),
-        best_rmsd=_typical(judged.rmsd[(slice(None), *best)]),
-        factor=float(np.exp(mean[chosen] - mean[best])),
-        standard_error=float(error[chosen]),
-        n_judges=int(np.sum(np.unique(judged.judges) >= 0)),
+        *_named(verdict.chosen, crossval),
+        *_named(verdict.best, crossval),
+        verdict.judgement,
         **said,
     )
 
@@ -201,21 +151,10 @@ def _summed(criteria: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
 def _place_of(values: np.ndarray, crossval: CrossValidation) -> tuple[int, int]:
     if np.isposinf(values).all():
         return 0, 0
-    return _named(_lowest(values), crossval)
+    return _named(int(np.argmin(values)), crossval)
 
 
-def _named(place: tuple[int, int], crossval: CrossValidation) -> tuple[int, int]:
-    return crossval.nb[place[0]], crossval.nk[place[1]]
-
-
-def _lowest(values: np.ndarray) -> tuple[int, int]:
-    row, column = np.unravel_index(int(np.argmin(values)), values.shape)
-    return int(row), int(column)
-
-
-def _typical(rmsd: np.ndarray) -> float:
-    """Geometric mean of what is known."""
-    known = rmsd[np.isfinite(rmsd) & (rmsd > 0.0)]
-    if known.size == 0:
-        return float("nan") if not (rmsd == 0.0).any() else 0.0
-    return float(np.exp(np.mean(np.log(known))))
+def _named(place: int, crossval: CrossValidation) -> tuple[int, int]:
+    """Orders at a place of the grid, counted row by row."""
+    row, column = divmod(place, len(crossval.nk))
+    return crossval.nb[row], crossval.nk[column]

@@ -11,9 +11,6 @@ from hwid_cli.maths.model.simulate import simulate
 from hwid_cli.records.exported import Exported, ExportedSimulation
 from hwid_cli.records.model import HammersteinWiener
 
-# Share of the range by which an input may leave it without a word: rounding in a file.
-_ROUNDING = 1e-9
-
 
 def predict(
     exported: Exported,
@@ -61,27 +58,3 @@ def predict(
 
 def _emptied(model: HammersteinWiener) -> HammersteinWiener:
     return replace(model, initial_state="zero", free_response=np.zeros(0))
-
-
-def outside_share(
-    signal: np.ndarray, input_range: tuple[float, float]
-) -> tuple[float, float, float]:
-    """How much of an input a model has never seen.
-
-    Parameters
-    ----------
-    signal : ndarray, shape (n_samples,), [input unit]
-    input_range : tuple of float, [input unit]
-        Lowest and highest input of the model's data.
-
-    Returns
-    -------
-    share : float, [-]
-        Of the samples.
-    lowest, highest : float, [input unit]
-        Of the signal.
-    """
-    low, high = input_range
-    margin = _ROUNDING * max(abs(low), abs(high))
-    is_outside = (signal < low - margin) | (signal > high + margin)
-    return float(is_outside.mean()), float(signal.min()), float(signal.max())

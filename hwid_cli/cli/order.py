@@ -1,4 +1,4 @@
-"""``hwid order``: which orders to take, and why."""
+"""``hwid order``: which orders and maps to take, and why."""
 
 from typing import TYPE_CHECKING
 
@@ -10,23 +10,30 @@ from hwid_cli.cli.stages import once
 
 if TYPE_CHECKING:
     from hwid_cli.cli.session import Session
-    from hwid_cli.records.order import OrderAdvice
+    from hwid_cli.records.model import Orders
+    from hwid_cli.records.order import MapAdvice, OrderAdvice
 
 
 @click.command("order")
 @stage_options
 def command(choices: Choices) -> None:
-    """Recommend orders, and say why.
+    """Recommend orders and maps, and say why.
 
     Takes the smallest orders that predict other recordings about as well as the best of
     the grid, and compares them with AIC, BIC, and the delay and poles that the data show
-    by themselves. Writes order.csv.
+    by themselves. Writes order.csv. Where the section 'order' names maps or units, fits
+    every pair of them with these orders and recommends one in the same way; writes
+    maps.csv.
     """
     from hwid_cli.cli.session import open_session, say
 
     session = open_session(choices, "order")
-    show_advice(session, order_stage(session))
-    say(session, f"\nresults: {session.out / 'order.csv'}")
+    advice = order_stage(session)
+    show_advice(session, advice)
+    maps = map_stage(session)
+    show_maps(session, maps)
+    written = "order.csv" if maps is None else "order.csv, maps.csv"
+    say(session, f"\nresults: {session.out / written}")
 
 
 @once
@@ -86,3 +93,78 @@ def show_advice(session: "Session", advice: "OrderAdvice") -> None:
     rule = session.experiment.fit.initial_state
     say(session, f"\n{order_table(advice, initial_state=rule)}")
     say(session, f"\n{order_sentences(advice)}")
+
+
+@once
+def map_stage(session: "Session") -> "MapAdvice | None":
+    """Bring ``maps.csv`` up to date, for the recommended orders.
+
+    Parameters
+    ----------
+    session : Session
+
+    Returns
+    -------
+    MapAdvice or None
+        None where the configuration names no maps to compare.
+
+    Raises
+    ------
+    ConfigError
+        If no model could be judged.
+    """
+    from hwid_cli.campaign.map_choice import candidate_maps, fit_maps, recommend_maps
+    from hwid_cli.cli.session import stage_tasks
+    from hwid_cli.errors import ConfigError
+    from hwid_cli.files.order_results import write_maps_csv
+    from hwid_cli.records.experiment import OrderOptions
+
+    experiment = session.experiment
+    options = experiment.order or OrderOptions()
+    candidates = candidate_maps(experiment.fit, options)
+    if len(candidates) == 1:
+        return None
+    identified, crossval = crossval_stage(session)
+    by_name = {one.name: one for one in identified.recordings}
+    chosen = [by_name[name] for name in crossval.identified_on]
+    judges = [by_name[name] for name in crossval.validated_on]
+    orders, n_fits = _recommended(session), len(chosen) * len(candidates)
+    with stage_tasks(session, "order", n_fits, "fits", part="maps") as settings:
+        fits = fit_maps(chosen, orders, candidates, settings)
+    n_pairs = len(chosen) * len(judges)
+    with stage_tasks(session, "order", n_pairs, "pairs", part="maps") as settings:
+        advice = recommend_maps(fits, chosen, judges, options.tolerance, settings)
+    if advice is None:
+        raise ConfigError(
+            f"{experiment.source}: order.maps: no recording judges a usable model; "
+            "expected at least one RMSD; change order.maps or order.units"
+        )
+    write_maps_csv(session.out / "maps.csv", advice)
+    return advice
+
+
+def show_maps(session: "Session", advice: "MapAdvice | None") -> None:
+    """Show the recommended maps and the reasons.
+
+    Parameters
+    ----------
+    session : Session
+    advice : MapAdvice or None
+    """
+    from hwid_cli.cli.session import say
+    from hwid_cli.report.map_tables import map_sentences, map_table
+
+    if advice is None:
+        return
+    rule = session.experiment.fit.initial_state
+    say(session, f"\n{map_table(advice, initial_state=rule)}")
+    say(session, f"\n{map_sentences(advice)}")
+
+
+def _recommended(session: "Session") -> "Orders":
+    """The recommended orders, of the candidates of the grid."""
+    from hwid_cli.campaign.order_grid import candidate_orders
+
+    one = order_stage(session).overall
+    grid = candidate_orders(session.experiment.orders)
+    return next(orders for nb, nk, orders in grid if (nb, nk) == (one.nb, one.nk))

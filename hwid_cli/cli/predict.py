@@ -47,7 +47,7 @@ def command(
     Reads the columns that the model's file names, and writes time, the input and the
     predicted output.
     """
-    from hwid_cli.campaign.predict import outside_share, predict
+    from hwid_cli.campaign.predict import predict
     from hwid_cli.files.exported.json_reader import read_exported
     from hwid_cli.files.exported.loading import check_trust
     from hwid_cli.files.exported.prediction import (
@@ -55,6 +55,7 @@ def command(
         read_input,
         write_prediction,
     )
+    from hwid_cli.maths.input_range import outside_share
     from hwid_cli.records.units import behind
 
     exported = read_exported(model)

@@ -84,9 +84,10 @@ def _crossval(session: "Session") -> None:
 
 
 def _order(session: "Session") -> None:
-    from hwid_cli.cli.order import order_stage, show_advice
+    from hwid_cli.cli.order import map_stage, order_stage, show_advice, show_maps
 
     show_advice(session, order_stage(session))
+    show_maps(session, map_stage(session))
 
 
 def _group(session: "Session") -> None:

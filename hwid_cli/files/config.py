@@ -149,6 +149,14 @@ def _word_of(known: tuple[str, ...]) -> Reader:
     return read
 
 
+def _read_maps(value: Any, place: Place) -> tuple[str, ...]:
+    """Kinds of maps that need no file beside them."""
+    known = tuple(kind for kind in MAP_KINDS if kind != "own_function")
+    words = convert(value, tuple[str, ...], place, readers={})
+    require_known(words, known, str(place))
+    return words
+
+
 def _read_hold_out(value: Any, place: Place) -> str | tuple[str, ...]:
     """``auto`` or a list of names."""
     return (
@@ -166,7 +174,7 @@ def _read_order(value: Any, place: Place) -> OrderOptions:
             raise ConfigError(
                 f"{place.below(key)}: unknown key; did you mean 'orders.{key}'?"
             )
-    return build(OrderOptions, value, place, readers={})
+    return build(OrderOptions, value, place, readers=_READERS)
 
 
 def _read_fit(content: Any, place: Place) -> FitOptions:
@@ -185,6 +193,7 @@ def _read_fit(content: Any, place: Place) -> FitOptions:
 _READERS: dict[tuple[type, str], Reader] = {
     (Experiment, "order"): _read_order,
     (Experiment, "fit"): _read_fit,
+    (OrderOptions, "maps"): _read_maps,
     (OrdersOptions, "nb"): _read_orders_axis,
     (OrdersOptions, "nk"): _read_orders_axis,
     (FitOptions, "input_map"): _word_of(MAP_KINDS),

@@ -19,6 +19,7 @@ _MOST: dict[str, int] = {
     "fit.input_units": 1000,
     "fit.output_units": 1000,
     "fit.degree": 100,
+    "order.units": 1000,
     "fit.starts": 1000,
     "fit.max_iterations": 1_000_000,
     "fit.delays": 100_000,

@@ -75,6 +75,8 @@ def check_experiment(experiment: Experiment) -> None:
             experiment.order.tolerance,
             "a number >= 0",
         )
+        for units in experiment.order.units:
+            require(units >= 2, f"{file}: order.units", units, "integers >= 2")
     if experiment.group is not None:
         _check_group(experiment.group, file)
     check_simulation(experiment)

@@ -1,9 +1,9 @@
-"""``order.csv``: recommended orders, over all recordings and for each."""
+"""``order.csv`` and ``maps.csv``: recommended orders and maps."""
 
 from pathlib import Path
 
 from hwid_cli.files.result_tables import write_table_csv
-from hwid_cli.records.order import OrderAdvice, OrderChoice
+from hwid_cli.records.order import MapAdvice, OrderAdvice, OrderChoice
 
 ORDER_COLUMNS = (
     "recording",
@@ -13,6 +13,7 @@ ORDER_COLUMNS = (
     "factor",
     "standard_error",
     "judges",
+    "beyond",
     "best_nb",
     "best_nk",
     "best_rmsd",
@@ -22,6 +23,17 @@ ORDER_COLUMNS = (
     "bic_nk",
     "delay",
     "poles",
+)
+MAP_COLUMNS = (
+    "input_map",
+    "input_units",
+    "output_map",
+    "output_units",
+    "parameters",
+    "rmsd",
+    "factor",
+    "bic",
+    "take",
 )
 # The first row, which is of no single recording.
 ALL = "all recordings"
@@ -53,17 +65,48 @@ def write_order_csv(path: Path, advice: OrderAdvice) -> None:
     write_table_csv(path, ORDER_COLUMNS, rows)
 
 
+def write_maps_csv(path: Path, advice: MapAdvice) -> None:
+    """Write ``maps.csv``: a row for each pair of maps, the best first.
+
+    Parameters
+    ----------
+    path : Path
+    advice : MapAdvice
+
+    Raises
+    ------
+    CacheError
+        If it cannot be written.
+    """
+    rows = [
+        (
+            one.input_map,
+            _known(one.input_units, 0),
+            one.output_map,
+            _known(one.output_units, 0),
+            one.n_parameters,
+            one.rmsd,
+            one.factor,
+            one.bic,
+            int(one == advice.chosen),
+        )
+        for one in advice.candidates
+    ]
+    write_table_csv(path, MAP_COLUMNS, rows)
+
+
 def _cells(one: OrderChoice) -> tuple[object, ...]:
     return (
         one.nb,
         one.nk,
-        one.rmsd,
-        one.factor,
-        one.standard_error,
-        one.n_judges,
+        one.judgement.rmsd,
+        one.judgement.factor,
+        one.judgement.standard_error,
+        one.judgement.n_judges,
+        one.judgement.n_beyond,
         one.best_nb,
         one.best_nk,
-        one.best_rmsd,
+        one.judgement.best_rmsd,
         *(_known(n, 0) for n in (one.aic_nb, one.aic_nk, one.bic_nb, one.bic_nk)),
     )
 

@@ -274,7 +274,8 @@ def _judging_lines(layout: Layout, proposal: Proposal) -> list[str]:
         f"# A model covers a recording when its RMSD lies below, in {unit}:",
         f"# {proposal.threshold_reason}. Put the deviation that you can live with.",
         f"crossval: {{threshold: {proposal.threshold!r}}}",
-        "order:   # which orders to take, and why",
+        "# Which orders to take, which maps and how many break-points, and why.",
+        "order: {maps: [none], units: [3, 5]}",
     ]
     if proposal.held_out:
         lines += ["# Kept away from everything else: they judge the final models."]

@@ -90,9 +90,11 @@ class CrossvalOptions:
 
 @dataclass(frozen=True)
 class OrderOptions:
-    """When smaller orders count as good as the best of the grid."""
+    """When smaller ones count as good as the best, and which maps to compare."""
 
     tolerance: float = 0.05
+    maps: tuple[str, ...] = ()
+    units: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)

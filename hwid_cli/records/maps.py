@@ -19,6 +19,14 @@ MAP_KINDS = (
     "piecewise_constant",
     "own_function",
 )
+# Those whose size the number of units sets.
+KINDS_WITH_UNITS = (
+    "piecewise_linear",
+    "sigmoid_network",
+    "wavelet_network",
+    "cubic_spline",
+    "piecewise_constant",
+)
 # Networks have a linear part beside their units; other kinds need two to have a slope.
 _LEAST_UNITS = {"piecewise_linear": 2, "cubic_spline": 2, "piecewise_constant": 2}
 

@@ -1,4 +1,4 @@
-"""Which orders to take, and what speaks for them."""
+"""Which orders and maps to take, and what speaks for them."""
 
 from dataclasses import dataclass
 
@@ -29,6 +29,33 @@ class ResponseEstimate:
 
 
 @dataclass(frozen=True)
+class Judgement:
+    """How the smallest good candidate compares with the best one.
+
+    Parameters
+    ----------
+    rmsd, best_rmsd : float, [output unit]
+        Cross-validated: geometric mean over the pairs of model and judging recording.
+    factor : float, [-]
+        By how much the smallest good candidate is worse than the best one, on average.
+    standard_error : float, [-]
+        Of that factor, from its spread over the judging recordings; NaN with one judge.
+    n_judges : int, [-]
+        Recordings that judge and were not fitted; 0 where only the own one is there.
+    n_beyond : int, [-]
+        Pairs of model and recording that do not judge, because the recording's input goes
+        beyond what the model has seen.
+    """
+
+    rmsd: float
+    best_rmsd: float
+    factor: float
+    standard_error: float
+    n_judges: int
+    n_beyond: int = 0
+
+
+@dataclass(frozen=True)
 class OrderChoice:
     """The smallest orders of a grid that are as good as its best, and other opinions.
 
@@ -40,14 +67,7 @@ class OrderChoice:
         The recommended place in the grid.
     best_nb, best_nk : int, [-]
         The place of the lowest cross-validated RMSD.
-    rmsd, best_rmsd : float, [output unit]
-        Cross-validated: geometric mean over the judging recordings.
-    factor : float, [-]
-        By how much the recommended orders are worse than the best ones, on average.
-    standard_error : float, [-]
-        Of that factor, from its spread over the judging recordings; NaN with one judge.
-    n_judges : int, [-]
-        Recordings that judge and were not fitted; 0 where only the own one is there.
+    judgement : Judgement
     aic_nb, aic_nk, bic_nb, bic_nk : int, [-]
         What AIC and BIC of the fits choose; 0 where no fit has them.
     """
@@ -57,11 +77,7 @@ class OrderChoice:
     nk: int
     best_nb: int
     best_nk: int
-    rmsd: float
-    best_rmsd: float
-    factor: float
-    standard_error: float
-    n_judges: int
+    judgement: Judgement
     aic_nb: int
     aic_nk: int
     bic_nb: int
@@ -105,4 +121,64 @@ class OrderAdvice:
     nk: tuple[int, ...]
     nk_role: str
     nf: int | None
+    unit: str
+
+
+@dataclass(frozen=True)
+class MapCandidate:
+    """A pair of maps, and how its models predict.
+
+    Parameters
+    ----------
+    input_map, output_map : str
+        One of ``MAP_KINDS``.
+    input_units, output_units : int, [-]
+        Size of the maps; 0 for kinds that have none.
+    n_parameters : int, [-]
+        That the data determine; the most over the recordings, 0 where no fit has them.
+    rmsd : float, [output unit]
+        Cross-validated, as in ``Judgement``.
+    factor : float, [-]
+        Average over the judging recordings of RMSD over that of the best pair of maps.
+    bic : float, [-]
+        Sum over the fits of all recordings; infinite where one has none.
+    """
+
+    input_map: str
+    input_units: int
+    output_map: str
+    output_units: int
+    n_parameters: int
+    rmsd: float
+    factor: float
+    bic: float
+
+
+@dataclass(frozen=True)
+class MapAdvice:
+    """Recommended maps and their sizes, for models of all recordings with given orders.
+
+    Parameters
+    ----------
+    orders : tuple of int, [-]
+        nb, nf, nk of all models.
+    candidates : tuple of MapCandidate
+        The best first.
+    chosen : MapCandidate
+        The one to take.
+    given : MapCandidate
+        That of the configuration.
+    judgement : Judgement
+        The one to take against the best; where nobody judges, BIC has chosen.
+    tolerance : float, [-]
+    unit : str
+        Of the output.
+    """
+
+    orders: tuple[int, int, int]
+    candidates: tuple[MapCandidate, ...]
+    chosen: MapCandidate
+    given: MapCandidate
+    judgement: Judgement
+    tolerance: float
     unit: str

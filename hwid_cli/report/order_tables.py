@@ -3,6 +3,7 @@
 import textwrap
 
 from hwid_cli.records.order import OrderAdvice, OrderChoice
+from hwid_cli.report.judgement_words import beyond_sentence, reason_to_take
 from hwid_cli.report.simulation_words import simulation_words
 from hwid_cli.report.text_table import MISSING, WIDTH, number, text_table
 
@@ -33,8 +34,8 @@ def order_table(advice: OrderAdvice, *, initial_state: str) -> str:
             (
                 one.recording or _ALL,
                 _pair(one.nb, one.nk),
-                number(one.rmsd),
-                f"{one.factor:.2f}",
+                number(one.judgement.rmsd),
+                f"{one.judgement.factor:.2f}",
                 _pair(one.best_nb, one.best_nk),
                 _pair(one.aic_nb, one.aic_nk),
                 _pair(one.bic_nb, one.bic_nk),
@@ -78,6 +79,7 @@ def order_sentences(advice: OrderAdvice, *, width: int = WIDTH) -> str:
     sentences = [
         _recommendation(advice),
         _criteria(advice.overall),
+        beyond_sentence(advice.overall.judgement),
         _edges(advice),
         _delays(advice),
         _poles(advice),
@@ -101,30 +103,16 @@ def _orders(nb: int, nk: int, advice: OrderAdvice) -> str:
 def _recommendation(advice: OrderAdvice) -> str:
     one = advice.overall
     take = f"Take nb = {one.nb}, nk = {one.nk} (orders {_orders(one.nb, one.nk, advice)}): "
-    if not one.n_judges:
+    if not one.judgement.n_judges:
         return (
             f"{take}the smallest orders within {100 * advice.tolerance:g} % of the best on "
             "the recording of the fit itself. No other recording judges, so this rewards "
             "models that follow noise; trust BIC more, or add a recording."
         )
-    on = (
-        "recordings that the models were not fitted to"
-        if one.n_judges > 1
-        else "the one recording that it was not fitted to"
-    )
-    if (one.nb, one.nk) == (one.best_nb, one.best_nk):
-        return (
-            f"{take}they have the lowest RMSD on {on}, and no smaller ones come within "
-            f"{100 * advice.tolerance:g} % or one standard error of it."
-        )
-    within = f"the tolerance of {100 * advice.tolerance:g} %"
-    if one.factor > 1.0 + advice.tolerance:
-        within = f"one standard error ({one.standard_error:.2g}) of the difference"
-    return (
-        f"{take}on {on} they are on average {one.factor:.3g} times as far off as the best "
-        f"orders of the grid, {_orders(one.best_nb, one.best_nk, advice)}; that is within "
-        f"{within}, and no smaller orders are."
-    )
+    best = None
+    if (one.nb, one.nk) != (one.best_nb, one.best_nk):
+        best = f"orders of the grid, {_orders(one.best_nb, one.best_nk, advice)}"
+    return take + reason_to_take(one.judgement, advice.tolerance, "orders", best)
 
 
 def _criteria(one: OrderChoice) -> str:

@@ -16,10 +16,9 @@ import numpy as np
 from scipy.signal import lfilter
 
 from hwid_cli.maths.model.fit import fit
-from hwid_cli.maths.model.maps.break_points.kernels import thinned_break_points
-from hwid_cli.records.model import FitOptions, HammersteinWiener, Orders, StaticMap
+from hwid_cli.records.model import HammersteinWiener, Orders
 from hwid_cli.records.recordings import Recording
-from tests.benchmarks.plants import linear_block
+from tests.benchmarks.plants import cut_model, linear_block
 
 Curve = Callable[[np.ndarray], np.ndarray]
 INPUT_MAPS: dict[str, Curve] = {
@@ -104,24 +103,10 @@ def wide_plant(seed: int) -> WidePlant:
 
 def true_model(plant: WidePlant) -> HammersteinWiener:
     """The plant with as many break-points as a fit has."""
-    ends = (plant.recording.input, plant.x)
     curves = (INPUT_MAPS[plant.maps[0]], OUTPUT_MAPS[plant.maps[1]])
-    maps = []
-    for curve, reached in zip(curves, ends, strict=True):
-        points = np.linspace(reached.min(), reached.max(), 120)
-        values = curve(points)
-        units = FitOptions().units + 2
-        kept = thinned_break_points(points, values, np.ones(points.size), units)
-        parameters = np.concatenate([points[kept], values[kept]])
-        maps.append(StaticMap("piecewise_linear", parameters, (points[0], points[-1])))
-    return HammersteinWiener(
-        maps[0],
-        plant.numerator,
-        plant.denominator,
-        plant.orders.nk,
-        maps[1],
-        1.0,
-        "estimated",
+    reached = (plant.recording.input, plant.x)
+    return cut_model(
+        curves, reached, plant.numerator, plant.denominator, plant.orders.nk
     )
 
 

@@ -6,7 +6,8 @@ The public ones are looked for in a folder ``peers`` beside the measured data.
 import numpy as np
 from scipy.signal import lfilter
 
-from hwid_cli.records.model import Orders
+from hwid_cli.maths.model.maps.break_points.kernels import thinned_break_points
+from hwid_cli.records.model import FitOptions, HammersteinWiener, Orders, StaticMap
 from tests.benchmarks.real_data import folder
 
 N_SAMPLES = 2000
@@ -43,18 +44,46 @@ def linear_block(rng, nf, radii=(0.6, 0.98), angles=(0.03, 1.2), reals=(0.4, 0.9
 def random_plant(seed, samples=N_SAMPLES):
     """Training and test data of a plant of orders up to 6 and delays up to 3."""
     rng = np.random.default_rng([seed, 77])
-    nf, nk = int(rng.integers(2, 7)), int(rng.integers(1, 4))
-    numerator, denominator = linear_block(rng, nf)
-    nb = numerator.size
-    numerator = np.r_[np.zeros(nk), numerator]
-    f, g = (maps[rng.integers(4)] for maps in (INPUT_MAPS, OUTPUT_MAPS))
+    (f, g), numerator, denominator, nk = _drawn(rng)
     data = []
     for _ in range(2):
         held = np.repeat(rng.uniform(-2.8, 2.8, samples // 15 + 1), 15)[:samples]
         u = held + 0.2 * rng.standard_normal(samples)
-        y = g(lfilter(numerator, denominator, f(u)))
+        y = g(lfilter(np.r_[np.zeros(nk), numerator], denominator, f(u)))
         data += [u, y + NOISE * np.std(y) * rng.standard_normal(samples)]
-    return Orders(nb, nf, nk), *data
+    return Orders(numerator.size, denominator.size - 1, nk), *data
+
+
+def true_random_plant(seed):
+    """The plant of `random_plant`, its maps cut to as many break-points as a fit has."""
+    curves, numerator, denominator, nk = _drawn(np.random.default_rng([seed, 77]))
+    _, u, *_ = random_plant(seed)
+    x = lfilter(np.r_[np.zeros(nk), numerator], denominator, curves[0](u))
+    return cut_model(curves, (u, x), numerator, denominator, nk)
+
+
+def cut_model(curves, reached, numerator, denominator, nk):
+    """A plant with as many break-points as a fit has, over what reaches its two maps."""
+    maps = []
+    for curve, signal in zip(curves, reached, strict=True):
+        points = np.linspace(signal.min(), signal.max(), 120)
+        values = curve(points)
+        units = FitOptions().units + 2
+        kept = thinned_break_points(points, values, np.ones(points.size), units)
+        parameters = np.concatenate([points[kept], values[kept]])
+        maps.append(StaticMap("piecewise_linear", parameters, (points[0], points[-1])))
+    first, second = maps
+    return HammersteinWiener(
+        first, numerator, denominator, nk, second, 1.0, "estimated"
+    )
+
+
+def _drawn(rng):
+    """Maps, B, F and delay of a plant of orders up to 6 and delays up to 3."""
+    nf, nk = int(rng.integers(2, 7)), int(rng.integers(1, 4))
+    numerator, denominator = linear_block(rng, nf)
+    curves = [maps[rng.integers(4)] for maps in (INPUT_MAPS, OUTPUT_MAPS)]
+    return curves, numerator, denominator, nk
 
 
 def public_plants():

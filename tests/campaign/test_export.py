@@ -9,7 +9,6 @@ from hwid_cli.campaign.export import (
     export_simulation,
     find_fit,
 )
-from hwid_cli.campaign.predict import outside_share
 from hwid_cli.errors import ConfigError
 from hwid_cli.maths.model.simulate import simulate
 from hwid_cli.records.drive import Controller
@@ -118,10 +117,3 @@ def test_a_pole_at_one_has_no_static_gain():
     card = ModelCard("a", "a", Columns("u", "y"), (0.0, 1.0))
 
     assert completed(card, model).static_gain == np.inf
-
-
-def test_what_lies_outside_the_data_is_counted():
-    share, low, high = outside_share(np.array([-2.0, 0.0, 1.0, 3.0]), (-1.0, 1.0))
-
-    assert (share, low, high) == (0.5, -2.0, 3.0)
-    assert outside_share(np.array([1.0 + 1e-12]), (-1.0, 1.0))[0] == 0.0

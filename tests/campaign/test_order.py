@@ -48,9 +48,11 @@ def test_true_orders_of_a_plant_are_recommended():
     # A hint: one recording of four shows more, of its noise.
     assert np.median([found.n_poles for found in advice.responses]) == 2
     assert {found.delay for found in advice.responses} == {1}
-    assert one.n_judges == 4
-    assert all(choice.n_judges == 3 for choice in advice.choices)
-    assert one.factor <= 1.0 + max(advice.tolerance, np.expm1(one.standard_error))
+    assert one.judgement.n_judges == 4
+    assert all(choice.judgement.n_judges == 3 for choice in advice.choices)
+    assert one.judgement.factor <= 1.0 + max(
+        advice.tolerance, np.expm1(one.judgement.standard_error)
+    )
 
 
 def test_true_delay_is_recommended_where_the_grid_has_delays():
@@ -65,9 +67,9 @@ def test_a_single_recording_judges_itself_and_says_so():
     chosen = recordings(1, [0.0, 0.3], [0.8])
     one = advice_on(chosen, OrdersOptions(nb=(1, 2), nk=(1, 2))).overall
 
-    assert one.n_judges == 0
+    assert one.judgement.n_judges == 0
     assert (one.nb, one.nk) == (1, 1)
-    assert np.isnan(one.standard_error)
+    assert np.isnan(one.judgement.standard_error)
 
 
 def made_up(rmsd, bic=None):
@@ -93,7 +95,10 @@ def made_up(rmsd, bic=None):
         for b in nb
         for k in nk
     ]
-    return recommend_orders(fits, crossval, (), OrdersOptions(nb, nk), OrderOptions())
+    same = np.array([0.0, 1.0])
+    chosen = [Recording(name, same, same, 1.0) for name in names]
+    grid = OrdersOptions(nb, nk)
+    return recommend_orders(fits, crossval, chosen, grid, OrderOptions())
 
 
 def test_smaller_orders_within_the_tolerance_are_taken():
@@ -103,7 +108,7 @@ def test_smaller_orders_within_the_tolerance_are_taken():
 
     assert (one.nb, one.nk) == (1, 1)
     assert (one.best_nb, one.best_nk) == (2, 2)
-    assert one.factor == pytest.approx(1.04 / 0.999)
+    assert one.judgement.factor == pytest.approx(1.04 / 0.999)
 
 
 def test_smaller_orders_beyond_the_tolerance_are_not():
@@ -120,7 +125,7 @@ def test_judges_that_disagree_allow_smaller_orders():
     one = made_up(rmsd).overall
 
     assert one.nk == 1
-    assert one.standard_error > np.log(1.05)
+    assert one.judgement.standard_error > np.log(1.05)
 
 
 def test_a_model_that_goes_astray_does_not_decide_alone():

@@ -1,5 +1,7 @@
 import csv
 
+import pytest
+
 
 def rows_of(path):
     with path.open(newline="") as file:
@@ -18,7 +20,8 @@ def test_stages_before_run_and_orders_are_recommended(hwid, out):
     assert [row["recording"] for row in rows] == [
         "all recordings", "step_02", "step_12", "sine_12",
     ]  # fmt: skip
-    assert rows[0]["judges"] == "3"
+    # Of the six pairs only the larger step has seen what another one's input does.
+    assert (rows[0]["judges"], rows[0]["beyond"]) == ("1", "5")
 
 
 def test_a_second_run_says_the_same(after_run, hwid, out):
@@ -72,3 +75,67 @@ def test_without_a_model_the_user_is_told(after_run, hwid, edit):
 
 def test_wrong_usage_is_told_from_what_can_be_mended(hwid):
     assert hwid("order", "--jobs", "0").exit_code == 2
+
+
+MAPS = "identify: {}\norder: {maps: [none], units: [2]}"
+
+
+def test_maps_are_recommended_where_the_configuration_names_some(
+    after_run, hwid, edit, out
+):
+    edit("identify: {}", MAPS)
+    result = hwid("order")
+
+    assert result.exit_code == 0, result.output
+    # Sizes 3 and 2, and none, on both sides; three recordings.
+    assert "order maps: 0 fits from the cache, 27 computed" in result.stdout
+    assert "order maps: 0 pairs from the cache, 9 computed" in result.stdout
+    assert "Take fit: {input_map: " in result.stdout
+    assert "order.csv, maps.csv" in result.stdout
+    rows = rows_of(out / "maps.csv")
+    assert (len(rows), [row["take"] for row in rows].count("1")) == (9, 1)
+
+
+def test_maps_come_from_the_cache_and_are_the_same(after_run, hwid, edit, out):
+    edit("identify: {}", MAPS)
+    hwid("order")
+    first = (out / "maps.csv").read_bytes()
+    result = hwid("order")
+
+    assert "order maps: 27 fits from the cache, 0 computed" in result.stdout
+    assert (out / "maps.csv").read_bytes() == first
+
+
+def test_run_recommends_maps_too(after_run, hwid, edit, out):
+    edit("identify: {}", MAPS)
+    result = hwid("run")
+
+    assert result.exit_code == 0, result.output
+    assert "Take fit: {input_map: " in result.stdout
+
+
+def test_check_counts_the_fits_of_maps(after_run, hwid, edit):
+    edit("identify: {}", MAPS)
+    result = hwid("check")
+
+    assert result.exit_code == 0, result.output
+    assert "3 recordings x 9 pairs of maps = 27 fits" in result.stdout
+
+
+@pytest.mark.parametrize(
+    ("section", "key", "words"),
+    [
+        ("{maps: [nonne]}", "order.maps", "did you mean 'none'"),
+        ("{maps: [own_function]}", "order.maps", "expected"),
+        ("{units: [1]}", "order.units", "integers >= 2"),
+        ("{units: [2000]}", "order.units", "at most 1000"),
+        ("{nb: [1]}", "order.nb", "orders.nb"),
+    ],
+)
+def test_maps_that_cannot_be_are_refused(after_run, hwid, edit, section, key, words):
+    edit("identify: {}", f"identify: {{}}\norder: {section}")
+    result = hwid("order")
+
+    assert result.exit_code == 1
+    assert key in result.stderr
+    assert words in result.stderr

@@ -3,12 +3,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hwid_cli.records.order import OrderAdvice, OrderChoice, ResponseEstimate
+from hwid_cli.records.order import Judgement, OrderAdvice, OrderChoice, ResponseEstimate
 from hwid_cli.report.order_tables import order_sentences, order_table
 from hwid_cli.report.simulation_words import simulation_words
 
 NAN = float("nan")
-OVERALL = OrderChoice("", 2, 3, 3, 4, 1.2e-3, 1.15e-3, 1.04, 0.02, 4, 4, 4, 2, 3)
+JUDGEMENT = Judgement(1.2e-3, 1.15e-3, 1.04, 0.02, 4)
+OVERALL = OrderChoice("", 2, 3, 3, 4, JUDGEMENT, 4, 4, 2, 3)
 ADVICE = OrderAdvice(
     overall=OVERALL,
     choices=tuple(replace(OVERALL, recording=f"step_0{n}") for n in range(3)),
@@ -69,7 +70,25 @@ def test_the_recommendation_says_why():
     ],
 )
 def test_each_case_has_its_reason(changes, words):
-    assert words in said(overall=replace(OVERALL, **changes))
+    places = {key: value for key, value in changes.items() if key.startswith("best_n")}
+    others = {key: value for key, value in changes.items() if key not in places}
+    judgement = replace(JUDGEMENT, **others)
+
+    assert words in said(overall=replace(OVERALL, judgement=judgement, **places))
+
+
+@pytest.mark.parametrize(
+    ("count", "words"),
+    [
+        (1, "1 pair of model and recording does not judge"),
+        (48, "48 pairs of model and recording do not judge"),
+    ],
+)
+def test_pairs_that_do_not_judge_are_told(count, words):
+    judgement = replace(JUDGEMENT, n_beyond=count)
+
+    assert words in said(overall=replace(OVERALL, judgement=judgement))
+    assert "not judge" not in said()
 
 
 def test_a_delay_that_the_grid_does_not_have_is_told():

@@ -1,0 +1,65 @@
+"""Why the smallest good one of some candidates is to be taken, in words."""
+
+from hwid_cli.records.order import Judgement
+
+
+def reason_to_take(
+    judgement: Judgement, tolerance: float, things: str, best: str | None
+) -> str:
+    """Say why candidates are taken that other recordings have judged.
+
+    Parameters
+    ----------
+    judgement : Judgement
+    tolerance : float, [-]
+    things : str
+        What the candidates are, in the plural.
+    best : str or None
+        The best ones; None where these are taken.
+
+    Returns
+    -------
+    str
+        Goes on behind a colon.
+    """
+    on = (
+        "recordings that the models were not fitted to"
+        if judgement.n_judges > 1
+        else "the one recording that it was not fitted to"
+    )
+    if best is None:
+        return (
+            f"they have the lowest RMSD on {on}, and no smaller ones come within "
+            f"{100 * tolerance:g} % or one standard error of it."
+        )
+    within = f"the tolerance of {100 * tolerance:g} %"
+    if judgement.factor > 1.0 + tolerance:
+        within = (
+            f"one standard error ({judgement.standard_error:.2g}) of the difference"
+        )
+    return (
+        f"on {on} they are on average {judgement.factor:.3g} times as far off as the best "
+        f"{best}; that is within {within}, and no smaller {things} are."
+    )
+
+
+def beyond_sentence(judgement: Judgement) -> str:
+    """Say which pairs of model and recording do not judge.
+
+    Parameters
+    ----------
+    judgement : Judgement
+
+    Returns
+    -------
+    str
+        Empty where all do.
+    """
+    count = judgement.n_beyond
+    if not count:
+        return ""
+    return (
+        f"{count} pair{'s' * (count != 1)} of model and recording {'do' if count != 1 else 'does'} "
+        "not judge: there the input goes beyond what the model has seen, and a map is only "
+        "a continuation."
+    )
