@@ -65,7 +65,7 @@ VARIANTS = {
         phases, "_has_break_points", lambda _: False
     ),
     "- relaxed linear blocks": lambda: patch.object(
-        search, "_relaxed", lambda best, *_: best
+        search, "relaxed_search", lambda best, *_: best
     ),
     "- doubt": lambda: patch.object(search, "leaves_structure", lambda *_: False),
     "- doubted input maps": lambda: patch.object(

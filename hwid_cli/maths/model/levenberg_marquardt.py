@@ -22,6 +22,7 @@ from hwid_cli.maths.model.candidates import Candidate, Columns, Experiment, colu
 from hwid_cli.maths.model.linear_block import is_stable
 from hwid_cli.maths.model.maps.break_points.kernels import (
     add_bends,
+    growth,
     mean_slope,
     squared_bends,
 )
@@ -205,22 +206,20 @@ def _solve(matrix: np.ndarray, vector: np.ndarray, damping: float) -> np.ndarray
     return step if info == 0 and np.isfinite(step).all() else None
 
 
-def _squared_bends(point: Point, measured_by: Point) -> float:
-    """Sum of the squared bends of both maps, in units of another point's mean slopes.
+def _squared_bends(point: Point, before: Point) -> float:
+    """Sum of the squared bends of both maps after a step, as the step saw them.
 
-    A step is judged in the units in which it was computed.
+    The unit is the mean slope before the step, times the growth of the map in it.
     """
-    pairs = (
-        (point.output_map, measured_by.output_map),
-        (point.input_map, measured_by.input_map),
-    )
-    return sum(
-        squared_bends(
-            *break_points_and_values(one), mean_slope(*break_points_and_values(other))
-        )
-        for one, other in pairs
-        if _bends(one)
-    )
+    total = 0.0
+    for one, other in (
+        (point.output_map, before.output_map),
+        (point.input_map, before.input_map),
+    ):
+        if _bends(one):
+            now, old = break_points_and_values(one), break_points_and_values(other)
+            total += squared_bends(*now, mean_slope(*old) * growth(*now, *old))
+    return total
 
 
 def _add_prior(system: Equations, point: Point, weight: float, place: Columns) -> float:

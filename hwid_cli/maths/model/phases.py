@@ -14,12 +14,14 @@ from hwid_cli.maths.model.levenberg_marquardt import (
     Search,
     minimise,
 )
-from hwid_cli.maths.model.placing import coarser, finer, with_maps
+from hwid_cli.maths.model.placing import coarser, cut, finer, with_maps
 from hwid_cli.records.model import FitOptions
 
 # Iterations at most with fixed break-points, and the share of the cost that a step must
 # gain: far from the minimum, break-points that move get lost.
 _PLACING_ITERATIONS, _PLACING_GAIN = 30, 5e-2
+# The same where the rest of the model is right already.
+_REFINING_GAIN = 1e-2
 # Samples that count before the last iterations, and the share of the cost that a step
 # must gain there: more of them change the minimum by less than the noise.
 _ROWS, _COARSE_GAIN = 2500, 1e-3
@@ -65,6 +67,41 @@ def place(
         candidate=coarser(fine.candidate, experiments, options),
         iterations=iterations + fine.iterations,
     )
+
+
+def refine(
+    found: Search, experiments: Sequence[Experiment], options: FitOptions
+) -> Search:
+    """Cut the segments of maps that were found, and keep what matters most.
+
+    Parameters
+    ----------
+    found : Search
+        To the end.
+    experiments : sequence of Experiment
+    options : FitOptions
+
+    Returns
+    -------
+    Search
+        To the end too; the better of both where break-points may move.
+    """
+    if not (options.free_break_points and _has_break_points(found.candidate)):
+        return found
+    cut_up = minimise(
+        with_maps(found.candidate, experiments, cut),
+        thinned(experiments, _ROWS),
+        with_positions=False,
+        max_iterations=min(_PLACING_ITERATIONS, options.max_iterations),
+        least_gain=_REFINING_GAIN,
+    )
+    placed = replace(
+        cut_up,
+        candidate=coarser(cut_up.candidate, experiments, options),
+        iterations=found.iterations + cut_up.iterations,
+    )
+    again = finish(placed, experiments, options)
+    return again if again.cost < found.cost else found
 
 
 def finish(

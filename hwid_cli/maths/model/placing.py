@@ -22,6 +22,9 @@ from hwid_cli.records.model import FitOptions, StaticMap
 _FINE_FACTOR = 3
 # Least distance of fine break-points, as a share of the range.
 _LEAST_GAP = 2e-3
+# Pieces into which a segment is cut, and their least width as a share of the range: a
+# map that jumps needs two break-points far nearer than any even grid has.
+_PIECES, _LEAST_CUT = 3, 1e-4
 # Share of the samples that every fine break-point counts for beyond those near it, so
 # that the ends of a map, which few samples reach, keep theirs.
 _WEIGHT_OF_SHAPE = 1e-3
@@ -120,8 +123,46 @@ def finer(one: StaticMap, argument: np.ndarray) -> StaticMap:
         return one
     old, _ = break_points_and_values(one)
     points = np.union1d(old, _spread(argument, (_FINE_FACTOR - 1) * old.size))
-    # A point closer to its neighbour than this would make a segment of no samples.
-    apart = np.diff(points, prepend=-np.inf) > _LEAST_GAP * np.ptp(points)
+    return _at(one, old, points, _LEAST_GAP * np.ptp(points), argument)
+
+
+def cut(one: StaticMap, argument: np.ndarray) -> StaticMap:
+    """Same map with every segment cut into pieces that equally many samples reach.
+
+    Parameters
+    ----------
+    one : StaticMap
+        Kinds other than piecewise linear come back as they are.
+    argument : ndarray, shape (n,)
+
+    Returns
+    -------
+    StaticMap
+        Segments of few samples stay whole.
+    """
+    if one.kind != "piecewise_linear" or not argument.min() < argument.max():
+        return one
+    old, _ = break_points_and_values(one)
+    ordered = np.sort(argument)
+    pieces = np.split(ordered, np.searchsorted(ordered, old))[1:-1]
+    inner = [
+        np.quantile(piece, np.arange(1, _PIECES) / _PIECES)
+        for piece in pieces
+        if piece.size >= 2 * _PIECES
+    ]
+    points = np.union1d(old, np.concatenate([old, *inner]))
+    return _at(one, old, points, _LEAST_CUT * np.ptp(argument), argument)
+
+
+def _at(
+    one: StaticMap,
+    old: np.ndarray,
+    points: np.ndarray,
+    least_gap: float,
+    argument: np.ndarray,
+) -> StaticMap:
+    """Same map with more break-points; new ones that make segments of no samples fall."""
+    apart = np.diff(points, prepend=-np.inf) > least_gap
     points = np.union1d(old, points[apart])
     values = static_map.evaluate(one, points)
     domain = (float(argument.min()), float(argument.max()))

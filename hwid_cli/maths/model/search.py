@@ -14,16 +14,19 @@ The best candidate seen wins. docs/method.md, section "The search".
 from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
-
 from hwid_cli.maths.model import sensitivities, static_map
 from hwid_cli.maths.model.candidates import Candidate, Experiment, thinned
-from hwid_cli.maths.model.delays import relaxed_starts
 from hwid_cli.maths.model.levenberg_marquardt import Search, minimise
-from hwid_cli.maths.model.phases import converge, finish, place, standing
+from hwid_cli.maths.model.phases import (
+    converge,
+    finish,
+    place,
+    refine,
+    standing,
+)
 from hwid_cli.maths.model.placing import reaching
-from hwid_cli.maths.model.points import block_signals, point_of
 from hwid_cli.maths.model.race import LONG, SHORT, Rounds, race
+from hwid_cli.maths.model.relaxing import relaxed_search
 from hwid_cli.maths.model.robust import rejudged, renewed
 from hwid_cli.maths.model.second_search import (
     doubted_input_maps,
@@ -33,8 +36,6 @@ from hwid_cli.maths.model.second_search import (
 from hwid_cli.maths.model.starts import Start
 from hwid_cli.records.model import FitOptions
 
-_RELAXING_ITERATIONS = 8
-_RELAXED_BLOCKS = 2
 # Cost that a relaxed block must reach, as a share of the best so far, to be finished;
 # nearer to it the search has only come back to where it was.
 _WORTH_GOING_ON = 0.995
@@ -48,8 +49,6 @@ _SMALL_GAIN = 1e-3
 _LINEAR_ROWS, _LINEAR_GAIN = 2500, 1e-3
 # A race that ends at its first comparison: linear starts hardly change places in one.
 _ENTERED: Rounds = ((0, 1),)
-# Slopes of the output map below this share of their mean square say too little about x.
-_FLAT = 0.1
 
 
 def linear_search(
@@ -117,7 +116,7 @@ def nonlinear_search(
     best = finish(_best(placed), experiments, options)
     relaxed = best
     if not options.keeps_block:
-        relaxed = _relaxed(best, experiments, options)
+        relaxed = relaxed_search(best, experiments, options)
     if relaxed.cost < _WORTH_GOING_ON * best.cost:
         best = _best([best, finish(relaxed, experiments, options)])
     best = _doubted(best, experiments, options, starts)
@@ -131,6 +130,7 @@ def _doubted(
     starts: Sequence[Start],
 ) -> Search:
     """The best so far, or what long races find where its residuals are not noise."""
+    best = _refined(best, experiments, options)
     entered = [*starts, *doubted_input_maps(starts, experiments)]
     for _ in range(_MOST_DOUBTS):
         if not leaves_structure(best.candidate, experiments):
@@ -143,7 +143,16 @@ def _doubted(
         best, entered = _best([best, again]), []
         if not gained:
             break
-    return best
+    return _refined(best, experiments, options)
+
+
+def _refined(
+    best: Search, experiments: Sequence[Experiment], options: FitOptions
+) -> Search:
+    """The same with break-points nearer to where maps bend, if residuals are not noise."""
+    if not leaves_structure(best.candidate, experiments):
+        return best
+    return refine(best, experiments, options)
 
 
 def grown(
@@ -262,66 +271,6 @@ def _passing(
         output_map=static_map.identity(options.output_map, options.of_output, x),
     )
     return replace(candidate, model=model)
-
-
-def _relaxed(
-    best: Search,
-    experiments: Sequence[Experiment],
-    options: FitOptions,
-) -> Search:
-    """Find the linear block anew between the maps of the best model."""
-    between = _between_maps(best.candidate, experiments)
-    model, no_states = best.candidate.model, best.candidate.free_responses[:, :0]
-    has_states = options.initial_state == "estimated"
-    starts = relaxed_starts(
-        between,
-        model.orders,
-        options,
-        count=_RELAXED_BLOCKS,
-        denominator=model.denominator,
-    )
-    found = [
-        minimise(
-            replace(
-                best.candidate,
-                model=replace(
-                    model,
-                    numerator=one.numerator,
-                    denominator=one.denominator,
-                    delay=one.delay,
-                ),
-                free_responses=one.free_responses if has_states else no_states,
-            ),
-            experiments,
-            with_positions=False,
-            max_iterations=min(_RELAXING_ITERATIONS, options.max_iterations),
-        )
-        for one in starts
-    ]
-    leader = _best(found)
-    return replace(leader, iterations=best.iterations + leader.iterations)
-
-
-def _between_maps(
-    candidate: Candidate, experiments: Sequence[Experiment]
-) -> list[Experiment]:
-    """Signals before and after the linear block; the latter corrected by the output.
-
-    The correction is a Gauss-Newton step of x towards the measured output, held back
-    where the output map is flat.
-    """
-    result = []
-    point, output_map = point_of(candidate), candidate.model.output_map
-    for index, one in enumerate(experiments):
-        w, x = block_signals(point, index, one)
-        scratch = np.empty((x.size, output_map.parameters.size))
-        y, slope = static_map.differentiate(
-            output_map, x, scratch, 0, with_positions=True
-        )
-        held_back = slope**2 + _FLAT * float(np.mean(slope**2)) + 1e-300
-        error = np.clip(one.output - y, -one.threshold, one.threshold)
-        result.append(Experiment(w, x + error * slope / held_back))
-    return result
 
 
 def _best(searches: Sequence[Search]) -> Search:

@@ -27,6 +27,8 @@ _COLOURED, _PEAKED = 0.5, 4.0
 # Deviation, as a share of the output's own, below which peaks are let be. Models of too
 # few poles can come closer still, by maps that bend for this one record.
 _CLOSE = 0.005
+# The same share from which on next to nothing has been found, whatever the error's shape.
+_FAR = 0.5
 # Values by which a start takes over an input map.
 _MAP_POINTS = 12
 
@@ -42,7 +44,8 @@ def leaves_structure(candidate: Candidate, experiments: Sequence[Experiment]) ->
     Returns
     -------
     bool
-        Whether they follow their neighbours, or are not small and large at few moments.
+        Whether they follow their neighbours, are half as large as the output, or are not
+        small and large at few moments.
     """
     found = simulated(point_of(candidate), experiments).residuals
     # Outliers, where they are to be borne, are no error of the model.
@@ -53,11 +56,11 @@ def leaves_structure(candidate: Candidate, experiments: Sequence[Experiment]) ->
     following = sum(float(one[1:] @ one[:-1]) for one in residuals)
     joined = np.concatenate(residuals)
     power = float(joined @ joined)
-    if following > _COLOURED * power:
-        return True
     spread = sum(
         float(np.sum((one.output - np.mean(one.output)) ** 2)) for one in experiments
     )
+    if following > _COLOURED * power or power > _FAR**2 * spread:
+        return True
     peaks = joined.size * float(np.sum(joined**4))
     return power > _CLOSE**2 * spread and peaks > _PEAKED * power**2
 

@@ -84,15 +84,38 @@ def test_the_prior_and_its_gradient_are_of_one_function(with_positions):
     )
     size = map_kernels.mean_slope(POINTS, VALUES)
     assert total == pytest.approx(map_kernels.squared_bends(POINTS, VALUES, size))
+
+    def judged(moved):
+        now, before = np.split(moved, 2), (POINTS, VALUES)
+        grown = size * map_kernels.growth(*now, *before)
+        return map_kernels.squared_bends(*now, grown)
+
     for k in range(first, 10):
         step = 1e-6 * np.eye(10)[k]
-        above, below = (
-            map_kernels.squared_bends(*np.split(parameters + sign * step, 2), size)
-            for sign in (1.0, -1.0)
-        )
+        above, below = (judged(parameters + sign * step) for sign in (1.0, -1.0))
         slope = 0.7 * (above - below) / 2e-6
         assert vector[1 + k - first] == pytest.approx(-0.5 * slope, abs=1e-8)
-    np.testing.assert_allclose(matrix, matrix.T)
+    np.testing.assert_allclose(matrix, matrix.T, atol=1e-14)
+
+
+def test_a_factor_on_a_map_or_on_its_argument_gains_nothing_from_the_prior():
+    # Else every step makes a map smaller and the block larger, and nothing better.
+    matrix, vector = np.zeros((10, 10)), np.zeros(10)
+    map_kernels.add_bends(POINTS, VALUES, True, 0.7, matrix, vector, 0)
+    by_value, by_argument = np.r_[np.zeros(5), VALUES], np.r_[POINTS, np.zeros(5)]
+    for direction in (by_value, by_argument):
+        assert vector @ direction == pytest.approx(0.0, abs=1e-12)
+        np.testing.assert_allclose(matrix @ direction, 0.0, atol=1e-10)
+    grown = map_kernels.growth(2.0 * POINTS, 0.1 * VALUES, POINTS, VALUES)
+    assert grown == pytest.approx(0.05)
+
+
+def test_sliding_an_end_along_its_line_does_not_make_a_map_steeper():
+    points, values = POINTS.copy(), VALUES.copy()
+    slope = (values[1] - values[0]) / (points[1] - points[0])
+    points[0] -= 7.0
+    values[0] -= 7.0 * slope
+    assert map_kernels.growth(points, values, POINTS, VALUES) == 1.0
 
 
 def test_break_points_that_came_too_close_part_to_both_sides():

@@ -18,10 +18,11 @@ NONE = StaticMap("none", np.zeros(0))
 N = 4000
 
 
-def passing_on(output):
-    """Candidate that gives nothing, so that the outputs are its residuals."""
-    model = HammersteinWiener(NONE, np.zeros(1), np.ones(1), 0, NONE, 1.0, "rest")
-    return Candidate(model, np.zeros((1, 0))), [Experiment(np.ones(N), output)]
+def leaving(residuals):
+    """Candidate that gives a large wave, and what it leaves."""
+    wave = 10.0 * np.std(residuals) * np.sin(np.arange(N) / 50.0)
+    model = HammersteinWiener(NONE, np.ones(1), np.ones(1), 0, NONE, 1.0, "rest")
+    return Candidate(model, np.zeros((1, 0))), [Experiment(wave, wave + residuals)]
 
 
 @pytest.mark.parametrize(
@@ -44,7 +45,7 @@ def test_an_error_of_another_shape_than_noise_is_seen(residuals, said):
         "peaked": rng.standard_normal(N) * np.where(np.arange(N) % 10 == 0, 3.0, 1.0),
     }[residuals]
 
-    assert leaves_structure(*passing_on(noise)) == said
+    assert leaves_structure(*leaving(noise)) == said
 
 
 def test_peaks_of_a_model_that_is_close_are_no_sign():
@@ -63,10 +64,24 @@ def test_peaks_of_a_model_that_is_close_are_no_sign():
     assert said(0.9)
 
 
+def test_half_of_the_output_is_no_noise():
+    noise = np.random.default_rng(6).standard_normal(N)
+    wave = np.sin(np.arange(N) / 50.0)
+    gain = HammersteinWiener(NONE, np.ones(1), np.ones(1), 0, NONE, 1.0, "rest")
+    candidate = Candidate(gain, np.zeros((1, 0)))
+
+    def said(share):
+        output = wave + share / np.sqrt(1.0 - share**2) * np.sqrt(0.5) * noise
+        return leaves_structure(candidate, [Experiment(wave, output)])
+
+    assert not said(0.45)
+    assert said(0.55)
+
+
 def test_outliers_that_the_loss_bears_are_no_sign():
     noise = np.random.default_rng(5).standard_normal(N)
     noise[::200] += 30.0
-    candidate, experiments = passing_on(noise)
+    candidate, experiments = leaving(noise)
 
     assert leaves_structure(candidate, experiments)
     bearing = [replace(one, threshold=1.345) for one in experiments]
@@ -107,7 +122,8 @@ def test_maps_are_sought_anew_around_the_block_that_was_found():
 
 # Plants on which the first search stops 2 to 19 points short: outputs that fold, whose
 # least squares see a wrong input map, or that need their maps anew.
-@pytest.mark.parametrize("seed", [128, 333, 354])
+# Inputs that jump within a sample's distance (163) need break-points nearer together.
+@pytest.mark.parametrize("seed", [128, 163, 333, 354])
 def test_poor_minima_are_left(seed):
     plant = wide_plant(seed)
     possible = fit([plant.recording], plant.orders, starts=[true_model(plant)])

@@ -185,12 +185,27 @@ def _settle(old: StaticMap, proposed: StaticMap) -> StaticMap:
     return StaticMap(old.kind, np.concatenate([kept, values]), old.domain)
 
 
+def _with_domain(one: StaticMap, domain: tuple[float, float]) -> StaticMap:
+    """Outermost break-points beyond the domain come back to its ends.
+
+    They may slide along their line while a search runs, as far as a hundred ranges away.
+    """
+    points, _ = break_points_and_values(one)
+    ends = points.copy()
+    if points[0] < domain[0] < points[1]:
+        ends[0] = domain[0]
+    if points[-2] < domain[1] < points[-1]:
+        ends[-1] = domain[1]
+    values = _evaluate(replace(one, slopes_beyond=None), ends)
+    return replace(one, parameters=np.concatenate([ends, values]), domain=domain)
+
+
 RULE = MapRule(
     evaluate=_evaluate,
     differentiate=_differentiate,
     starts=_starts,
     identity=lambda options, low, high: _starts(options, low, high, np.asarray)[0],
-    with_domain=lambda one, domain: replace(one, domain=domain),
+    with_domain=_with_domain,
     names=_names,
     amplify=lambda one, factor: amplified(one, one.parameters.size // 2, factor),
     compress=lambda one, factor: compressed(one, one.parameters.size // 2, factor),

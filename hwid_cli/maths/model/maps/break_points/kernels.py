@@ -78,6 +78,10 @@ def add_bends(
 ) -> float:
     """Add the rows of all bends to normal equations.
 
+    The slope that counts as one is the mean slope here and grows as the map does, so that
+    a factor on the map changes nothing: measured by a slope that stays, every search would
+    win by making the map smaller and the next block larger, for ever.
+
     Parameters
     ----------
     break_points, values : ndarray, shape (units,)
@@ -97,25 +101,95 @@ def add_bends(
     bend, jacobian = bends(break_points, values, with_positions)
     units = break_points.size
     offset = units if with_positions else 0
+    rates, growing = _relative_growth(break_points, values, with_positions)
     total = 0.0
-    places = np.empty(6, dtype=np.int64)
+    places = np.empty(10, dtype=np.int64)
+    slopes = np.empty(10)
     for i in range(bend.size):
         total += bend[i] * bend[i]
         count = 0
         for k in range(3):
-            places[count] = offset + i + k
+            places[count], slopes[count] = (
+                offset + i + k,
+                jacobian[i, offset + i + k],
+            )
             count += 1
             if with_positions:
-                places[count] = i + k
+                places[count], slopes[count] = i + k, jacobian[i, i + k]
                 count += 1
+        for k in range(growing.size):
+            places[count], slopes[count] = growing[k], -bend[i] * rates[k]
+            count += 1
         for a in range(count):
-            left = weight * jacobian[i, places[a]]
+            left = weight * slopes[a]
             vector[first + places[a]] -= left * bend[i]
             for b in range(count):
-                matrix[first + places[a], first + places[b]] += (
-                    left * jacobian[i, places[b]]
-                )
+                matrix[first + places[a], first + places[b]] += left * slopes[b]
     return total
+
+
+@njit(cache=True)
+def _relative_growth(
+    break_points: np.ndarray, values: np.ndarray, with_positions: bool
+) -> tuple[np.ndarray, np.ndarray]:
+    """Derivatives of the logarithm of `growth`, and the columns that have any."""
+    units = break_points.size
+    first, last = _inner_ends(units)
+    low = first + np.argmin(values[first : last + 1])
+    high = first + np.argmax(values[first : last + 1])
+    size = values[high] - values[low]
+    if size == 0.0:
+        return np.empty(0), np.empty(0, dtype=np.int64)
+    offset = units if with_positions else 0
+    if not with_positions:
+        return (
+            np.array([-1.0 / size, 1.0 / size]),
+            np.array([offset + low, offset + high]),
+        )
+    width = break_points[last] - break_points[first]
+    return (
+        np.array([-1.0 / size, 1.0 / size, 1.0 / width, -1.0 / width]),
+        np.array([offset + low, offset + high, first, last]),
+    )
+
+
+@njit(cache=True)
+def _inner_ends(units: int) -> tuple[int, int]:
+    """Break-points between which a map's growth is measured.
+
+    The outermost ones may slide along the line on which the map goes on; they would run
+    away if that made the bends look smaller.
+    """
+    return (1, units - 2) if units > 3 else (0, units - 1)
+
+
+@njit(cache=True)
+def growth(
+    break_points: np.ndarray,
+    values: np.ndarray,
+    before: np.ndarray,
+    values_before: np.ndarray,
+) -> float:
+    """Factor by which a map has become steeper, measured between its inner break-points.
+
+    Parameters
+    ----------
+    break_points, values : ndarray, shape (units,)
+    before, values_before : ndarray, shape (units,)
+        Of the map as it was.
+
+    Returns
+    -------
+    float
+        1 where one of the two is constant.
+    """
+    first, last = _inner_ends(values.size)
+    size = np.ptp(values[first : last + 1])
+    size_before = np.ptp(values_before[first : last + 1])
+    if size == 0.0 or size_before == 0.0:
+        return 1.0
+    width = break_points[last] - break_points[first]
+    return size / size_before * (before[last] - before[first]) / width
 
 
 @njit(cache=True)
