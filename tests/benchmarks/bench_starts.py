@@ -75,6 +75,9 @@ VARIANTS = {
     "- maps anew": lambda: patch.multiple(
         search, maps_anew=lambda *_: [], _MOST_DOUBTS=1
     ),
+    "- cutting found maps": lambda: patch.object(
+        search, "refine", lambda found, *_: found
+    ),
     "+ instrumental variables": lambda: added(by_instruments),
     "+ reduced FIR": lambda: added(by_reduction),
 }
