@@ -5,6 +5,7 @@ import pytest
 
 from hwid_cli.maths.model.candidates import Candidate, Experiment
 from hwid_cli.maths.model.fit import fit
+from hwid_cli.maths.model.maps.piecewise_linear import break_points_and_values
 from hwid_cli.maths.model.second_search import (
     doubted_input_maps,
     leaves_structure,
@@ -131,3 +132,14 @@ def test_poor_minima_are_left(seed):
     found = fit([plant.recording], plant.orders)
 
     assert found.fit_percent >= possible.fit_percent - 0.3
+
+
+# An input that jumps: measured by a slope that stays, its bends made every step shrink
+# the map, to 1e-12 of its offset.
+@pytest.mark.parametrize("seed", [386, 484])
+def test_the_shape_of_a_map_is_not_lost_beside_its_offset(seed):
+    plant = wide_plant(seed)
+    found = fit([plant.recording], plant.orders).model.input_map
+    _, values = break_points_and_values(found)
+
+    assert abs(np.mean(values)) < 2.0 * np.ptp(values)

@@ -200,3 +200,30 @@ def test_identity_passes_on_what_lies_in_its_range(kind):
     argument = np.linspace(-2.0, 5.0, 30)
     one = static_map.identity(kind, wanted(kind), argument)
     np.testing.assert_allclose(static_map.evaluate(one, argument), argument, atol=1e-14)
+
+
+def test_ends_that_slid_away_along_their_line_come_back_to_the_data():
+    points, values = np.array([-90.0, -1.0, 0.5, 1.0, 40.0]), np.arange(5.0) ** 2
+    far = StaticMap("piecewise_linear", np.concatenate([points, values]), (-90.0, 40.0))
+    argument = np.linspace(-2.0, 3.0, 101)
+    one = static_map.with_domain(far, argument)
+
+    assert one.parameters[:5].tolist() == [-2.0, -1.0, 0.5, 1.0, 3.0]
+    assert one.domain == (-2.0, 3.0)
+    np.testing.assert_allclose(
+        static_map.evaluate(one, argument), static_map.evaluate(far, argument)
+    )
+
+
+def test_ends_within_the_data_stay():
+    near = StaticMap(
+        "piecewise_linear", np.array([-1.0, 0.0, 1.0, 0.0, 2.0, 3.0]), (0.0, 1.0)
+    )
+    one = static_map.with_domain(near, np.array([-2.0, 0.5]))
+
+    # The last two lie beyond, but then the last segment would have no width.
+    assert one.parameters[:3].tolist() == [-1.0, 0.0, 0.5]
+    assert static_map.with_domain(near, np.array([-2.0, 2.0])).parameters is not None
+    np.testing.assert_array_equal(
+        static_map.with_domain(near, np.array([-2.0, 2.0])).parameters, near.parameters
+    )
