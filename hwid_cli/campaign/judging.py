@@ -89,11 +89,12 @@ def judged(
         None where there is no RMSD at all. Where every recording's input goes beyond what
         the models have seen, all judge.
     """
+    inputs = {one.name: one.input for one in recordings}
     others = _known_pairs(rmsd, identified_on, validated_on, is_own=False)
     pairs = [
         (place, judge)
         for place, judge in others
-        if _is_within(recordings, identified_on[place], validated_on[judge])
+        if _is_within(inputs[identified_on[place]], inputs[validated_on[judge]])
     ] or others
     is_alone = not pairs
     if is_alone:
@@ -170,11 +171,9 @@ def _known_pairs(
     ]
 
 
-def _is_within(recordings: Sequence[Recording], model: str, judge: str) -> bool:
+def _is_within(seen: np.ndarray, judging: np.ndarray) -> bool:
     """Whether a judging recording's input stays in what a model has seen."""
-    inputs = {one.name: one.input for one in recordings}
-    seen = inputs[model]
-    share, *_ = outside_share(inputs[judge], (float(seen.min()), float(seen.max())))
+    share, *_ = outside_share(judging, (float(seen.min()), float(seen.max())))
     return share <= _MOST_BEYOND
 
 
