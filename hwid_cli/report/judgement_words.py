@@ -1,5 +1,8 @@
 """Why the smallest good one of some candidates is to be taken, in words."""
 
+import textwrap
+from collections.abc import Sequence
+
 from hwid_cli.records.order import Judgement
 
 
@@ -62,4 +65,23 @@ def beyond_sentence(judgement: Judgement) -> str:
         f"{count} pair{'s' * (count != 1)} of model and recording {'do' if count != 1 else 'does'} "
         "not judge: there the input goes beyond what the model has seen, and a map is only "
         "a continuation."
+    )
+
+
+def paragraphs(sentences: Sequence[str], width: int) -> str:
+    """Give each reason a paragraph of its own.
+
+    Parameters
+    ----------
+    sentences : sequence of str
+        Empty ones are left out.
+    width : int, [characters]
+        Of a line.
+
+    Returns
+    -------
+    str
+    """
+    return "\n".join(
+        textwrap.fill(one, width, subsequent_indent="  ") for one in sentences if one
     )

@@ -1,9 +1,11 @@
 """Recommended maps as a table, and the reasons as sentences."""
 
-import textwrap
-
 from hwid_cli.records.order import MapAdvice, MapCandidate
-from hwid_cli.report.judgement_words import beyond_sentence, reason_to_take
+from hwid_cli.report.judgement_words import (
+    beyond_sentence,
+    paragraphs,
+    reason_to_take,
+)
 from hwid_cli.report.simulation_words import simulation_words
 from hwid_cli.report.text_table import MISSING, WIDTH, number, text_table
 
@@ -64,9 +66,7 @@ def map_sentences(advice: MapAdvice, *, width: int = WIDTH) -> str:
         A paragraph for each reason.
     """
     sentences = (_recommendation(advice), beyond_sentence(advice.judgement))
-    return "\n".join(
-        textwrap.fill(one, width, subsequent_indent="  ") for one in sentences if one
-    )
+    return paragraphs(sentences, width)
 
 
 def _recommendation(advice: MapAdvice) -> str:

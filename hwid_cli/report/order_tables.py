@@ -1,9 +1,11 @@
 """Recommended orders as a table, and the reasons as sentences."""
 
-import textwrap
-
 from hwid_cli.records.order import OrderAdvice, OrderChoice
-from hwid_cli.report.judgement_words import beyond_sentence, reason_to_take
+from hwid_cli.report.judgement_words import (
+    beyond_sentence,
+    paragraphs,
+    reason_to_take,
+)
 from hwid_cli.report.simulation_words import simulation_words
 from hwid_cli.report.text_table import MISSING, WIDTH, number, text_table
 
@@ -84,9 +86,7 @@ def order_sentences(advice: OrderAdvice, *, width: int = WIDTH) -> str:
         _delays(advice),
         _poles(advice),
     ]
-    return "\n".join(
-        textwrap.fill(one, width, subsequent_indent="  ") for one in sentences if one
-    )
+    return paragraphs(sentences, width)
 
 
 def _pair(nb: int, nk: int) -> str:
