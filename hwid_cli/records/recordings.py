@@ -28,7 +28,7 @@ def frozen_vector(values: np.ndarray, name: str) -> np.ndarray:
     vector = np.array(values, dtype=np.float64)
     if vector.ndim != 1:
         raise ValueError(f"{name} must be 1-D, got shape {vector.shape}")
-    vector.flags.writeable = False
+    vector.setflags(write=False)
     return vector
 
 

@@ -11,6 +11,7 @@ from itertools import accumulate
 import numpy as np
 
 from hwid_cli.maths.model import static_map
+from hwid_cli.maths.model.linear_block import as_loops_take_it
 from hwid_cli.records.model import FitOptions, HammersteinWiener, StaticMap
 
 # Samples at the beginning that always count.
@@ -39,6 +40,24 @@ class Experiment:
     def __post_init__(self) -> None:
         if self.counted.size == 0:
             object.__setattr__(self, "counted", np.arange(self.output.size))
+        for name in ("input", "output"):
+            object.__setattr__(self, name, as_loops_take_it(getattr(self, name)))
+
+    def at_counted(self, signal: np.ndarray) -> np.ndarray:
+        """A signal at the samples that count.
+
+        Parameters
+        ----------
+        signal : ndarray, shape (n,)
+
+        Returns
+        -------
+        ndarray, shape (n_rows,)
+            The signal itself where all count.
+        """
+        if self.counted.size == signal.size:
+            return signal
+        return signal[self.counted]
 
 
 def thinned(experiments: Sequence[Experiment], rows: int) -> tuple[Experiment, ...]:

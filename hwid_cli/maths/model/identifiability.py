@@ -18,7 +18,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import eigh, qr
+from scipy.linalg import qr
 
 from hwid_cli.maths.model import sensitivities, static_map
 from hwid_cli.maths.model.candidates import Candidate, Columns, Experiment, columns
@@ -139,7 +139,9 @@ def directions(
         # A basis of all steps that keep what is held.
         _, _, basis = np.linalg.svd(np.array(held) @ change / scale)
         free = basis[len(held) :].T
-    strength, parts = eigh(free.T @ (system.matrix / scale / scale[:, None]) @ free)
+    strength, parts = np.linalg.eigh(
+        free.T @ (system.matrix / scale / scale[:, None]) @ free
+    )
     return Directions(
         place,
         change @ ((free @ parts) / scale[:, None]),

@@ -13,6 +13,8 @@ from numba import njit
 # Decaying responses end in subnormal numbers, which processors handle a hundred times
 # slower; anything this small is far below the rounding of the values it is added to.
 _TINY = 1e-200
+# Samples between two looks for such numbers.
+_FLUSH = 64
 
 
 @njit(cache=True)
@@ -42,7 +44,7 @@ def block_output(
     -------
     ndarray, shape (n,)
     """
-    n, nb, nf = signal.size, numerator.size, denominator.size - 1
+    n, nb = signal.size, numerator.size
     past, rest = 0.0, 0.0
     if steady:
         past = signal[0]
@@ -56,34 +58,97 @@ def block_output(
         for i in range(nb):
             s = t - delay - i
             passed[t] += numerator[i] * (signal[s] if s >= 0 else past)
+    later = passed[lead:]
     for i in range(nb):
         b, source = numerator[i], signal[lead - delay - i : n - delay - i]
         if i == 0:
-            for t in range(n - lead):
-                passed[lead + t] = b * source[t]
+            for t in range(later.size):
+                later[t] = b * source[t]
         else:
-            for t in range(n - lead):
-                passed[lead + t] += b * source[t]
+            for t in range(later.size):
+                later[t] += b * source[t]
     for t in range(min(n, states.size)):
         passed[t] += states[t]
-    taps = np.zeros(4 * ((nf + 3) // 4))
+    return _all_pole(passed, denominator, rest)
+
+
+@njit(cache=True)
+def _all_pole(signal: np.ndarray, denominator: np.ndarray, rest: float) -> np.ndarray:
+    """Run 1/F along a signal; before it the result was at rest."""
+    n, nf = signal.size, denominator.size - 1
+    taps = np.zeros(4 * max(1, (nf + 3) // 4))
+    far = taps.size - 4
     for j in range(nf):
-        taps[j] = denominator[1 + j]
+        taps[taps.size - 1 - j] = denominator[1 + j]
+    f1, f2, f3, f4 = taps[far + 3], taps[far + 2], taps[far + 1], taps[far]
     out = np.empty(taps.size + n)
     for j in range(taps.size):
         out[j] = rest
+    x1 = x2 = x3 = x4 = rest
     for t in range(n):
-        at = taps.size + t
-        value = passed[t]
-        for j in range(taps.size - 4, -1, -4):
-            # The newest value comes last: all else is ready before it is.
-            value -= taps[j + 3] * out[at - j - 4] + taps[j + 2] * out[at - j - 3]
-            value -= taps[j + 1] * out[at - j - 2]
-            value -= taps[j] * out[at - j - 1]
-        if abs(value) < _TINY:
-            value = 0.0
-        out[at] = value
+        value = signal[t]
+        older = out[t : t + far]
+        # The newest value comes last: all else is ready before it is.
+        for j in range(0, far, 4):
+            value -= taps[j] * older[j] + taps[j + 1] * older[j + 1]
+            value -= taps[j + 2] * older[j + 2]
+            value -= taps[j + 3] * older[j + 3]
+        value -= f4 * x4 + f3 * x3
+        value -= f2 * x2
+        value -= f1 * x1
+        out[taps.size + t] = value
+        x4, x3, x2, x1 = x3, x2, x1, value
+        if t % _FLUSH == 0:
+            recent = out[t + 1 : t + 1 + taps.size]
+            for j in range(recent.size):
+                recent[j] = 0.0 if abs(recent[j]) < _TINY else recent[j]
+            x4, x3, x2, x1 = (
+                recent[far],
+                recent[far + 1],
+                recent[far + 2],
+                recent[far + 3],
+            )
     return out[taps.size :]
+
+
+@njit(cache=True)
+def residuals_and_loss(
+    measured: np.ndarray, simulated: np.ndarray, counted: np.ndarray, threshold: float
+) -> tuple[np.ndarray, float]:
+    """Measured minus simulated, and the sum of the losses.
+
+    Parameters
+    ----------
+    measured : ndarray, shape (n,)
+    simulated : ndarray, shape (n_rows,)
+        At the samples that count.
+    counted : ndarray of int, shape (n_rows,)
+    threshold : float
+        In the unit of the residuals; infinite for the sum of squares.
+
+    Returns
+    -------
+    residuals : ndarray, shape (n_rows,)
+    total : float
+        In that unit squared.
+
+    References
+    ----------
+    docs/method.md, eq. (15a).
+    """
+    residuals = np.empty(counted.size)
+    for r in range(counted.size):
+        residuals[r] = measured[counted[r]] - simulated[r]
+    total = 0.0
+    if threshold == np.inf:
+        for value in residuals:
+            total += value * value
+    else:
+        for value in residuals:
+            size = abs(value)
+            inner = min(size, threshold)
+            total += inner * (2.0 * size - inner)
+    return residuals, total
 
 
 @njit(cache=True)

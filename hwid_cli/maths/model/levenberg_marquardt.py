@@ -19,6 +19,7 @@ import numpy as np
 from scipy.linalg.lapack import dposv
 
 from hwid_cli.maths.model.candidates import Candidate, Columns, Experiment, columns
+from hwid_cli.maths.model.equations.kernels import scaled_equations
 from hwid_cli.maths.model.linear_block import is_stable
 from hwid_cli.maths.model.maps.break_points.kernels import (
     add_bends,
@@ -172,12 +173,11 @@ def _accepted_step(
     weight = found.cost / descent.samples / _USUAL_BEND**2
     system = normal_equations(point, place, descent.experiments, found)
     total = found.cost + _add_prior(system, point, weight, place)
-    diagonal = system.matrix.diagonal()
-    if not np.isfinite(diagonal).all():
+    if not np.isfinite(system.matrix.diagonal()).all():
         return _Step(None, found, float("inf"), damping)
-    scale = 1.0 / np.sqrt(np.maximum(diagonal, _LEAST_DIAGONAL * diagonal.max()))
-    matrix = system.matrix * scale[:, None] * scale
-    vector = system.vector * scale
+    matrix, vector, scale = scaled_equations(
+        system.matrix, system.vector, _LEAST_DIAGONAL
+    )
     growth, promised = 2.0, None
     while damping < _LARGEST_DAMPING:
         step = _solve(matrix, vector, damping)
@@ -202,8 +202,9 @@ def _solve(matrix: np.ndarray, vector: np.ndarray, damping: float) -> np.ndarray
     """Damped step, or None where rounding made the matrix indefinite."""
     damped = matrix.copy()
     damped.flat[:: vector.size + 1] += damping
-    _, step, info = dposv(damped, vector, lower=1)
-    return step if info == 0 and np.isfinite(step).all() else None
+    # The transpose of a symmetric matrix lies in memory as LAPACK takes it.
+    _, step, info = dposv(damped.T, vector, lower=1, overwrite_a=1)
+    return step if info == 0 and np.isfinite(step @ step) else None
 
 
 def _squared_bends(point: Point, before: Point) -> float:

@@ -12,36 +12,6 @@ Huber (1964), p. 79; Holland, Welsch (1977). docs/method.md, eqs. (15a)-(15b).
 import numpy as np
 
 
-def loss_sum(residual: np.ndarray, threshold: float) -> float:
-    """Sum of the losses of residuals.
-
-    Parameters
-    ----------
-    residual : ndarray, shape (n,)
-    threshold : float
-        In the unit of the residuals; infinite for the sum of squares.
-
-    Returns
-    -------
-    float
-        In the unit of the residuals squared.
-
-    References
-    ----------
-    docs/method.md, eq. (15a).
-
-    Examples
-    --------
-    >>> loss_sum(np.array([1.0, -3.0]), 2.0), loss_sum(np.array([1.0, -3.0]), np.inf)
-    (9.0, 10.0)
-    """
-    if threshold == np.inf:
-        return float(residual @ residual)
-    size = np.abs(residual)
-    inner = np.minimum(size, threshold)
-    return float(inner @ (2.0 * size - inner))
-
-
 def root_weights(residual: np.ndarray, threshold: float) -> np.ndarray:
     """Square roots of the weights with which residuals enter the normal equations.
 

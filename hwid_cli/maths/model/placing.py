@@ -175,7 +175,9 @@ def _spread(argument: np.ndarray, count: int) -> np.ndarray:
     A signal that rarely goes far spends most samples in a small part of its range.
     """
     even = np.linspace(argument.min(), argument.max(), count - count // 2)
-    dense = np.quantile(argument, np.linspace(0.0, 1.0, count // 2 + 2)[1:-1])
+    ordered = np.sort(argument)
+    places = np.linspace(0.0, argument.size - 1.0, count // 2 + 2)[1:-1]
+    dense = np.interp(places, np.arange(argument.size), ordered)
     return np.concatenate([even, dense])
 
 
@@ -199,7 +201,8 @@ def thinner(one: StaticMap, argument: np.ndarray, units: int) -> StaticMap:
     if one.kind != "piecewise_linear" or one.parameters.size <= 2 * count:
         return one
     points, values = break_points_and_values(one)
-    middles = np.concatenate([[-np.inf], 0.5 * (points[1:] + points[:-1]), [np.inf]])
-    weights = np.histogram(argument, middles)[0] + _WEIGHT_OF_SHAPE * argument.size
+    below = np.searchsorted(np.sort(argument), 0.5 * (points[1:] + points[:-1]))
+    near = np.diff(below, prepend=0, append=argument.size)
+    weights = near + _WEIGHT_OF_SHAPE * argument.size
     kept = thinned_break_points(points, values, weights, count)
     return replace(one, parameters=np.concatenate([points[kept], values[kept]]))

@@ -99,7 +99,6 @@ def moved(point: Point, step: np.ndarray, place: Columns) -> Point:
     -------
     Point
     """
-    positions = place.with_positions
     numerator, denominator, states = point.numerator, point.denominator, point.states
     b_step, f_step = step[place.numerator], step[place.denominator]
     if b_step.size:
@@ -111,15 +110,11 @@ def moved(point: Point, step: np.ndarray, place: Columns) -> Point:
         c_step = step[place.free_responses].reshape(states.shape)
         states = states + c_step @ difference_basis(place.n_state).T
     return Point(
-        static_map.move(
-            point.input_map, step[place.input_map], with_positions=positions
-        ),
+        static_map.move(point.input_map, step[place.input_map]),
         numerator,
         denominator,
         point.delay,
-        static_map.move(
-            point.output_map, step[place.output_map], with_positions=positions
-        ),
+        static_map.move(point.output_map, step[place.output_map]),
         states,
         point.is_steady,
     )

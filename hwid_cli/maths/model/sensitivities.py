@@ -18,7 +18,9 @@ import numpy as np
 
 from hwid_cli.maths.model import static_map
 from hwid_cli.maths.model.candidates import Candidate, Columns, Experiment, columns
-from hwid_cli.maths.model.loss import loss_sum, root_weights
+from hwid_cli.maths.model.equations.kernels import combined
+from hwid_cli.maths.model.kernels import residuals_and_loss
+from hwid_cli.maths.model.loss import root_weights
 from hwid_cli.maths.model.maps.rule import Derivatives
 from hwid_cli.maths.model.points import Point, block_signals, point_of
 from hwid_cli.maths.model.rows.kernels import derivative_rows, local_sums
@@ -133,11 +135,12 @@ def simulated(point: Point, experiments: Sequence[Experiment]) -> Simulated:
     with np.errstate(over="ignore", invalid="ignore"):
         for index, one in enumerate(experiments):
             w, x = block_signals(point, index, one)
-            seen = static_map.evaluate(point.output_map, x[one.counted])
-            residual = one.output[one.counted] - seen
+            seen = static_map.evaluate(point.output_map, one.at_counted(x))
+            residual, loss = residuals_and_loss(
+                one.output, seen, one.counted, one.threshold
+            )
             signals.append((w, x))
             residuals.append(residual)
-            loss = loss_sum(residual, one.threshold)
             total += one.output.size / residual.size * loss
     if not np.isfinite(total):
         total = float("inf")
@@ -166,12 +169,12 @@ def normal_equations(
     Equations
         As if the samples that count stood for all.
     """
-    parts = []
+    total = np.zeros(())
     for index, one in enumerate(experiments):
         before = static_map.derivatives(
             point.input_map, one.input, with_positions=place.with_positions
         )
-        x = found.signals[index][1][one.counted]
+        x = one.at_counted(found.signals[index][1])
         after = static_map.derivatives(
             point.output_map, x, with_positions=place.with_positions
         )
@@ -187,8 +190,9 @@ def normal_equations(
             if after.count:
                 rows = np.hstack([after.shares, rows])
             part = rows.T @ rows
-        parts.append(one.output.size / one.counted.size * part)
-    return _by_parameters(np.sum(parts, axis=0), place, before, after)
+        part *= one.output.size / one.counted.size
+        total = part if index == 0 else total + part
+    return _by_parameters(total, place, before, after)
 
 
 def _rows(
@@ -242,22 +246,6 @@ def _by_parameters(
     """Turn the products of columns into those of the parameters' derivatives."""
     for derivatives, first in ((before, after.count), (after, 0)):
         if derivatives.change is not None:
-            total = _changed(total, derivatives.change, first)
+            total = combined(total, derivatives.change, first)
     count = place.total
     return Equations(total[:count, :count], total[:count, -1])
-
-
-def _changed(total: np.ndarray, change: np.ndarray, first: int) -> np.ndarray:
-    """Products after some columns are replaced by combinations of them."""
-    old = change.shape[1]
-    rows = np.concatenate(
-        [total[:first], change @ total[first : first + old], total[first + old :]]
-    )
-    return np.concatenate(
-        [
-            rows[:, :first],
-            rows[:, first : first + old] @ change.T,
-            rows[:, first + old :],
-        ],
-        axis=1,
-    )

@@ -13,6 +13,7 @@ Steiglitz, McBride (1965); Bai (1998) for the expanded input. docs/method.md, se
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -22,8 +23,10 @@ from hwid_cli.maths.model.regression.least_squares import (
     LARGEST_RADIUS,
     Regression,
     Solution,
+    best_numerator,
+    next_denominator,
+    products,
     regression,
-    solve,
 )
 from hwid_cli.maths.model.static_map import has_free_shape
 from hwid_cli.records.model import FitOptions, Orders
@@ -157,10 +160,11 @@ def _iterations(one: Regression, denominator: np.ndarray, count: int) -> list[So
     """Steiglitz-McBride from a prefilter with as many poles as the start shall have."""
     # The prefilter itself counts too: inputs of few frequencies lead the iterations
     # astray.
-    found = []
-    for _ in range(count + 1 if denominator.size > 1 else 1):
-        solution, denominator = solve(one, denominator)
-        found.append(solution)
+    at = products(one, denominator)
+    found = [best_numerator(at)]
+    for _ in range(count if denominator.size > 1 else 0):
+        at = products(one, next_denominator(at))
+        found.append(best_numerator(at))
     return found
 
 
@@ -173,7 +177,8 @@ def _start(one: Regression, solution: Solution) -> Start:
         # but the map is found anew.
         _, _, right = np.linalg.svd(solution.inputs, full_matrices=False)
         values = np.concatenate([[0.0], right[0]])
-        solution, _ = solve(_mapped(one, values), solution.denominator)
+        mapped = _mapped(one, values)
+        solution = best_numerator(products(mapped, solution.denominator))
     orders = one.orders
     states = np.zeros((len(one.experiments), orders.n_state))
     if one.has_free_response:
@@ -210,9 +215,8 @@ def _distinct(solutions: Sequence[Solution], count: int) -> list[Solution]:
     """Best solutions whose frequency responses differ from one another."""
     chosen: list[Solution] = []
     responses: list[np.ndarray] = []
-    frequencies = np.geomspace(1e-3, np.pi, 40)
     for one in solutions:
-        response = _response(one, frequencies)
+        response = _response(one)
         if all(np.linalg.norm(response - other) > 0.05 for other in responses):
             chosen.append(one)
             responses.append(response)
@@ -221,8 +225,13 @@ def _distinct(solutions: Sequence[Solution], count: int) -> list[Solution]:
     return chosen
 
 
-def _response(solution: Solution, frequencies: np.ndarray) -> np.ndarray:
+def _response(solution: Solution) -> np.ndarray:
     """Frequency response of 1/F, scaled to norm one: what tells two starts apart."""
-    delay = np.exp(-1j * np.outer(frequencies, np.arange(solution.denominator.size)))
-    response = 1.0 / (delay @ solution.denominator)
+    response = 1.0 / (_delays(solution.denominator.size) @ solution.denominator)
     return response / np.linalg.norm(response)
+
+
+@lru_cache(maxsize=64)
+def _delays(count: int) -> np.ndarray:
+    """Frequency responses of delays by 0, 1 ... samples, shape (n_frequencies, count)."""
+    return np.exp(-1j * np.outer(np.geomspace(1e-3, np.pi, 40), np.arange(count)))

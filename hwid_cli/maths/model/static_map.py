@@ -187,14 +187,14 @@ def active_parameters(static_map: StaticMap, *, with_positions: bool) -> slice:
     return slice(first, static_map.parameters.size)
 
 
-def move(static_map: StaticMap, step: np.ndarray, *, with_positions: bool) -> StaticMap:
+def move(static_map: StaticMap, step: np.ndarray) -> StaticMap:
     """Map after a step of its active parameters, put into a legal order.
 
     Parameters
     ----------
     static_map : StaticMap
     step : ndarray, shape (n_active,)
-    with_positions : bool
+        Of its last parameters: positions, which may stay, come first.
 
     Returns
     -------
@@ -203,11 +203,11 @@ def move(static_map: StaticMap, step: np.ndarray, *, with_positions: bool) -> St
     if step.size == 0:
         return static_map
     parameters = static_map.parameters.copy()
-    parameters[active_parameters(static_map, with_positions=with_positions)] += step
-    proposed = StaticMap(
+    parameters[parameters.size - step.size :] += step
+    RULES[static_map.kind].settle(static_map, parameters)
+    return StaticMap(
         static_map.kind, parameters, static_map.domain, static_map.function
     )
-    return RULES[static_map.kind].settle(static_map, proposed)
 
 
 def with_domain(static_map: StaticMap, argument: np.ndarray) -> StaticMap:

@@ -144,7 +144,7 @@ COUNT = """
 import numpy as np
 from hwid_cli import FitOptions, Orders, Recording, fit
 from hwid_cli.maths.model import kernels
-from hwid_cli.maths.model.regression.kernels import regression_rows
+from hwid_cli.maths.model.regression.kernels import regression_columns
 from hwid_cli.maths.model.rows.kernels import derivative_rows
 from hwid_cli.maths.model.simulate import validation_output
 
@@ -152,7 +152,7 @@ u = np.random.default_rng(1).standard_normal(400)
 one = Recording("one", u, np.convolve(np.tanh(u), [0.0, 0.5, 0.2])[:400], 1e-3)
 found = fit([one], Orders(2, 2, 1), FitOptions(units=4))
 validation_output(found.model, one)
-for loop in (kernels.block_output, derivative_rows, regression_rows):
+for loop in (kernels.block_output, derivative_rows, regression_columns):
     print(len(loop.signatures))
 """
 

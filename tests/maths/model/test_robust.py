@@ -6,7 +6,7 @@ from scipy import signal
 
 from hwid_cli.maths.model import candidates, points, robust, sensitivities
 from hwid_cli.maths.model.fit import fit
-from hwid_cli.maths.model.loss import loss_sum
+from hwid_cli.maths.model.kernels import residuals_and_loss
 from hwid_cli.maths.model.simulate import validation_output
 from hwid_cli.maths.model.uncertainty import parameter_covariance
 from hwid_cli.maths.scores import fit_percent, rmsd
@@ -42,7 +42,10 @@ def linear_options(loss):
 
 def test_loss_is_squared_inside_the_threshold_and_straight_beyond_it():
     e = np.linspace(-5.0, 5.0, 401)
-    values = np.array([loss_sum(np.array([one]), 2.0) for one in e])
+    nothing, only = np.zeros(1), np.zeros(1, dtype=np.int64)
+    values = np.array(
+        [residuals_and_loss(np.array([one]), nothing, only, 2.0)[1] for one in e]
+    )
     inside = np.abs(e) <= 2.0
     np.testing.assert_allclose(values[inside], e[inside] ** 2, rtol=1e-13)
     np.testing.assert_allclose(

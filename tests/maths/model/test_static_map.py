@@ -82,9 +82,7 @@ def test_derivatives_agree_with_central_differences(kind):
         change = np.zeros(one.parameters.size)
         change[k] = step
         above, below = (
-            static_map.evaluate(
-                static_map.move(one, sign * change, with_positions=True), argument
-            )
+            static_map.evaluate(static_map.move(one, sign * change), argument)
             for sign in (1.0, -1.0)
         )
         np.testing.assert_allclose(
@@ -97,7 +95,7 @@ def test_without_positions_only_the_values_of_break_points_move():
     _, _, all_columns = derivatives(one, ARGUMENT)
     _, _, values_only = derivatives(one, ARGUMENT, with_positions=False)
     np.testing.assert_array_equal(values_only, all_columns[:, 4:])
-    moved = static_map.move(one, np.ones(4), with_positions=False)
+    moved = static_map.move(one, np.ones(4))
     np.testing.assert_array_equal(moved.parameters[:4], one.parameters[:4])
 
 
@@ -105,7 +103,7 @@ def test_without_positions_only_the_values_of_break_points_move():
 def test_break_points_stay_in_order_whatever_the_step(steps):
     one = MAPS["piecewise_linear"]
     step = np.concatenate([steps, np.zeros(4)])
-    points = static_map.move(one, step, with_positions=True).parameters[:4]
+    points = static_map.move(one, step).parameters[:4]
     assert (np.diff(points) > 0.0).all()
 
 
@@ -146,7 +144,7 @@ def test_size_grows_with_the_values_and_has_the_stated_gradient(kind):
     for k in range(one.parameters.size):
         change = np.zeros(one.parameters.size)
         change[k] = step
-        above = rule.size(static_map.move(one, change, with_positions=True))[0]
+        above = rule.size(static_map.move(one, change))[0]
         # One-sided difference of a nearly linear function.
         assert (above - size) / step == pytest.approx(gradient[k], abs=1e-5)
 

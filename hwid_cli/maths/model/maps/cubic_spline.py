@@ -131,16 +131,14 @@ def _names(one: StaticMap) -> tuple[str, ...]:
     return ("first_knot", "last_knot", *values)
 
 
-def _settle(old: StaticMap, proposed: StaticMap) -> StaticMap:
+def _settle(old: StaticMap, parameters: np.ndarray) -> None:
     """Keep the first knot before the last one."""
     old_first, old_last, _ = _parts(old)
-    first, last, values = _parts(proposed)
+    first, last = parameters[:2]
     reach = old_last - old_first
     kept = np.clip(last - first, reach / _MOST_CHANGE, reach * _MOST_CHANGE)
-    if kept == last - first:
-        return proposed
-    ends = 0.5 * (first + last) + 0.5 * kept * np.array([-1.0, 1.0])
-    return replace(proposed, parameters=np.concatenate([ends, values]))
+    if kept != last - first:
+        parameters[:2] = 0.5 * (first + last) + 0.5 * kept * np.array([-1.0, 1.0])
 
 
 RULE = MapRule(

@@ -151,3 +151,29 @@ def piecewise_linear_shares(
         shares[t, 1] = beyond * widths[k]
         shares[t, 0] = 1.0 - shares[t, 1]
     return value, slope, first, shares
+
+
+@njit(cache=True)
+def columns_of_segments(break_points: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Parameters' columns out of those of each segment's own end values.
+
+    A break-point that moves to the right lowers the line through it by its slope: on
+    either side by another one.
+
+    Parameters
+    ----------
+    break_points, values : ndarray, shape (units,)
+
+    Returns
+    -------
+    ndarray, shape (2 units, 2 (units - 1))
+    """
+    units = values.size
+    change = np.zeros((2 * units, 2 * (units - 1)))
+    for i in range(units - 1):
+        slope = (values[i + 1] - values[i]) / (break_points[i + 1] - break_points[i])
+        change[i, 2 * i] = -slope
+        change[i + 1, 2 * i + 1] = -slope
+        change[units + i, 2 * i] = 1.0
+        change[units + i + 1, 2 * i + 1] = 1.0
+    return change

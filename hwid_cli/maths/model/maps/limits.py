@@ -81,8 +81,8 @@ def _with_domain(static_map: StaticMap, domain: tuple[float, float]) -> StaticMa
     return replace(static_map, domain=domain)
 
 
-def _settle(old: StaticMap, proposed: StaticMap) -> StaticMap:  # noqa: ARG001
-    return replace(proposed, parameters=np.sort(proposed.parameters))
+def _settle(old: StaticMap, parameters: np.ndarray) -> None:  # noqa: ARG001
+    parameters.sort()
 
 
 def _differentiate_none(

@@ -215,17 +215,19 @@ def _compress(unit: Unit, one: StaticMap, factor: float) -> StaticMap:
     return replace(_joined(one, centres, widths, heights, ends), domain=(low, high))
 
 
-def _settle(old: StaticMap, proposed: StaticMap) -> StaticMap:
+def _settle(old: StaticMap, parameters: np.ndarray) -> None:
     """Keep units where and as wide as they can matter."""
     old_centres, old_widths, _, _ = _parts(old)
-    centres, widths, heights, ends = _parts(proposed)
+    count = old_centres.size
+    centres, widths = parameters[:count], parameters[count : 2 * count]
     low, high = old.domain
     reach, margin = high - low, _MOST_OUTSIDE * (high - low)
     # A map that begins beyond these limits may stay where it is.
-    centres = np.clip(
+    np.clip(
         centres,
         np.minimum(old_centres, low - margin),
         np.maximum(old_centres, high + margin),
+        out=centres,
     )
     least = np.maximum(
         old_widths / _MOST_CHANGE, np.minimum(old_widths, _LEAST_WIDTH * reach)
@@ -233,4 +235,4 @@ def _settle(old: StaticMap, proposed: StaticMap) -> StaticMap:
     most = np.minimum(
         old_widths * _MOST_CHANGE, np.maximum(old_widths, _MOST_WIDTH * reach)
     )
-    return _joined(proposed, centres, np.clip(widths, least, most), heights, ends)
+    np.clip(widths, least, most, out=widths)

@@ -16,7 +16,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from hwid_cli.maths.model.maps.piecewise_linear import in_order
+from hwid_cli.maths.model.maps.piecewise_linear import put_in_order
 from hwid_cli.maths.model.maps.positions_and_values import (
     amplified,
     compressed,
@@ -110,11 +110,10 @@ def _names(one: StaticMap) -> tuple[str, ...]:
     )
 
 
-def _settle(old: StaticMap, proposed: StaticMap) -> StaticMap:
+def _settle(old: StaticMap, parameters: np.ndarray) -> None:
     """Keep the edges in order."""
-    edges, levels = edges_and_levels(proposed)
-    kept = in_order(edges_and_levels(old)[0], edges)
-    return replace(proposed, parameters=np.concatenate([kept, levels]))
+    edges, _ = edges_and_levels(old)
+    put_in_order(edges, parameters[: edges.size])
 
 
 RULE = MapRule(

@@ -14,6 +14,7 @@ import numpy as np
 
 from hwid_cli.maths.model.maps.break_points.kernels import settled_break_points
 from hwid_cli.maths.model.maps.kernels import (
+    columns_of_segments,
     piecewise_linear,
     piecewise_linear_jacobian,
     piecewise_linear_shares,
@@ -125,24 +126,9 @@ def _derivatives(
     found = piecewise_linear_shares(argument, points, values, spacing)
     if not with_positions:
         return Derivatives(*found, count=points.size)
-    return Derivatives(*found, 2 * (points.size - 1), _by_segments(points, values))
-
-
-def _by_segments(points: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Parameters' columns out of those of each segment's own end values.
-
-    A break-point that moves to the right lowers the line through it by its slope: on
-    either side by another one.
-    """
-    units = points.size
-    slopes = (values[1:] - values[:-1]) / (points[1:] - points[:-1])
-    change = np.zeros((2 * units, 2 * (units - 1)))
-    segment = np.arange(units - 1)
-    change[segment, 2 * segment] = -slopes
-    change[segment + 1, 2 * segment + 1] = -slopes
-    change[units + segment, 2 * segment] = 1.0
-    change[units + segment + 1, 2 * segment + 1] = 1.0
-    return change
+    return Derivatives(
+        *found, 2 * (points.size - 1), columns_of_segments(points, values)
+    )
 
 
 def _starts(
@@ -159,30 +145,23 @@ def _names(static_map: StaticMap) -> tuple[str, ...]:
     return points + tuple(f"value[{i}]" for i in range(units))
 
 
-def in_order(old: np.ndarray, proposed: np.ndarray) -> np.ndarray:
-    """Positions after a step, kept in their order.
+def put_in_order(old: np.ndarray, proposed: np.ndarray) -> None:
+    """Keep positions in their order after a step, in place.
 
     Parameters
     ----------
     old : ndarray, shape (n,)
         Rising.
     proposed : ndarray, shape (n,)
-
-    Returns
-    -------
-    ndarray, shape (n,)
-        Rising; the proposed ones where none comes too close to its neighbour.
+        Stay as they are where none comes too close to its neighbour.
     """
-    kept = proposed.copy()
-    settled_break_points(old, kept, _LEAST_SHRINK, _LEAST_WIDTH)
-    return kept
+    settled_break_points(old, proposed, _LEAST_SHRINK, _LEAST_WIDTH)
 
 
-def _settle(old: StaticMap, proposed: StaticMap) -> StaticMap:
+def _settle(old: StaticMap, parameters: np.ndarray) -> None:
     """Keep the break-points in order."""
-    points, values = break_points_and_values(proposed)
-    kept = in_order(break_points_and_values(old)[0], points)
-    return StaticMap(old.kind, np.concatenate([kept, values]), old.domain)
+    points, _ = break_points_and_values(old)
+    put_in_order(points, parameters[: points.size])
 
 
 def _with_domain(one: StaticMap, domain: tuple[float, float]) -> StaticMap:

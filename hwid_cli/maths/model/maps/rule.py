@@ -41,18 +41,14 @@ def none_held(static_map: StaticMap) -> tuple[int, ...]:  # noqa: ARG001
     return ()
 
 
-def keep_proposed(old: StaticMap, proposed: StaticMap) -> StaticMap:  # noqa: ARG001
-    """Accept every proposed map.
+def keep_proposed(old: StaticMap, parameters: np.ndarray) -> None:
+    """Accept all proposed parameters.
 
     Parameters
     ----------
-    old, proposed : StaticMap
-
-    Returns
-    -------
-    StaticMap
+    old : StaticMap
+    parameters : ndarray, shape (n_parameters,)
     """
-    return proposed
 
 
 def no_corners(static_map: StaticMap) -> np.ndarray:  # noqa: ARG001
@@ -127,8 +123,8 @@ class MapRule:
         parameters; None where the kind has no free gain.
     n_positions : callable (StaticMap) -> int
         Leading parameters that stay fixed in the first phase of a fit.
-    settle : callable (old, proposed) -> StaticMap
-        The proposed map with its parameters put into a legal order.
+    settle : callable (old StaticMap, parameters) -> None
+        Puts the parameters that a step proposes into a legal order, in place.
     corners : callable (StaticMap) -> ndarray
         Arguments at which the slope changes.
     derivatives : callable (StaticMap, v, with_positions) -> Derivatives, or None
@@ -152,7 +148,7 @@ class MapRule:
     compress: Callable[[StaticMap, float], StaticMap] | None = None
     size: Callable[[StaticMap], tuple[float, np.ndarray]] | None = None
     n_positions: Callable[[StaticMap], int] = no_positions
-    settle: Callable[[StaticMap, StaticMap], StaticMap] = keep_proposed
+    settle: Callable[[StaticMap, np.ndarray], None] = keep_proposed
     corners: Callable[[StaticMap], np.ndarray] = no_corners
     derivatives: Callable[[StaticMap, np.ndarray, bool], Derivatives] | None = None
     held: Callable[[StaticMap], tuple[int, ...]] = none_held

@@ -1,20 +1,20 @@
-"""Compiled rows of the regressions that find linear blocks; nothing else compiles here."""
+"""Compiled columns of the regressions that find linear blocks; nothing else compiles here."""
 
 import numpy as np
 from numba import njit
 
-from hwid_cli.maths.model.rows.kernels import all_pole
+from hwid_cli.maths.model.rows.kernels import all_pole, differences
 
 
 @njit(cache=True)
-def regression_rows(
+def regression_columns(
     output: np.ndarray,
     basis: tuple[np.ndarray, np.ndarray, int, int],
     denominator: np.ndarray,
     delay: int,
     counts: tuple[int, int, int, int],
     counted: np.ndarray,
-    rows: np.ndarray,
+    columns: np.ndarray,
 ) -> None:
     """Signals filtered by 1/F and their differences, at the samples that count.
 
@@ -31,9 +31,9 @@ def regression_rows(
         Numerator coefficients, initial states, the column of the first of this
         experiment's, and those of all experiments.
     counted : ndarray of int, shape (n_rows,)
-    rows : ndarray, shape (n_rows, n_columns)
-        Columns: past outputs, the expanded input (order by order of its differences),
-        initial states, the filtered level, the level, the filtered output, the output.
+    columns : ndarray, shape (n_columns, n_rows)
+        Each in a row of its own: the filtered level, past outputs, the expanded input (order by order of
+        its differences), initial states, the level, the filtered output, the output.
     """
     first, shares, count, skipped = basis
     nb, n_state, own_state, n_states = counts
@@ -41,12 +41,11 @@ def regression_rows(
     inputs = count - skipped
     used = count + 3
     wide = 4 * ((used + 3) // 4)
-    taps = np.zeros(4 * max(1, (n_poles + 3) // 4))
+    taps = np.zeros(max(4, n_poles))
     for j in range(n_poles):
         taps[j] = denominator[1 + j]
     pad = max(taps.size + 1, nb + delay, n_state) + 1
     lines = np.zeros((pad + n, wide))
-    table = np.empty((max(nb, n_poles, n_state, 1), inputs))
     for t in range(n):
         row = lines[pad + t]
         for m in range(width):
@@ -55,41 +54,31 @@ def regression_rows(
         row[count + 1] = output[t]
     lines[pad, count + 2] = 1.0
     all_pole(lines, pad, n, taps)
-    for r in range(counted.size):
-        t = counted[r]
-        out, at = rows[r], pad + t
-        for j in range(n_poles):
-            table[j, 0] = lines[at - 1 - j, count + 1]
-        _difference(table, n_poles, 1)
-        for j in range(n_poles):
-            out[j] = -table[j, 0]
+    table = np.empty((max(nb, n_poles, n_state), n))
+    _pick(lines[pad:, count], counted, 1.0, columns[0])
+    differences(lines, pad - 1, count + 1, n_poles, n, table)
+    for j in range(n_poles):
+        _pick(table[j], counted, -1.0, columns[1 + j])
+    place = 1 + n_poles
+    for m in range(inputs):
+        differences(lines, pad - delay, skipped + m, nb, n, table)
         for j in range(nb):
-            for m in range(inputs):
-                table[j, m] = lines[at - delay - j, skipped + m]
-        _difference(table, nb, inputs)
-        place = n_poles
-        for j in range(nb):
-            for m in range(inputs):
-                out[place + m] = table[j, m]
-            place += inputs
-        for m in range(n_states):
-            out[place + m] = 0.0
-        for j in range(n_state):
-            table[j, 0] = lines[at - j, count + 2]
-        _difference(table, n_state, 1)
-        for j in range(n_state):
-            out[place + own_state + j] = table[j, 0]
-        place += n_states
-        out[place] = lines[at, count]
-        out[place + 1] = 1.0
-        out[place + 2] = lines[at, count + 1]
-        out[place + 3] = output[t]
+            _pick(table[j], counted, 1.0, columns[place + j * inputs + m])
+    place += nb * inputs
+    columns[place : place + n_states] = 0.0
+    differences(lines, pad, count + 2, n_state, n, table)
+    for j in range(n_state):
+        _pick(table[j], counted, 1.0, columns[place + own_state + j])
+    place += n_states
+    columns[place] = 1.0
+    _pick(lines[pad:, count + 1], counted, 1.0, columns[place + 1])
+    _pick(output, counted, 1.0, columns[place + 2])
 
 
 @njit(cache=True)
-def _difference(table: np.ndarray, count: int, width: int) -> None:
-    """Turn values at rising lags into differences of rising order."""
-    for order in range(1, count):
-        for j in range(count - 1, order - 1, -1):
-            for m in range(width):
-                table[j, m] = table[j - 1, m] - table[j, m]
+def _pick(
+    signal: np.ndarray, counted: np.ndarray, factor: float, out: np.ndarray
+) -> None:
+    """Write a signal at the samples that count, times a factor."""
+    for r in range(counted.size):
+        out[r] = factor * signal[counted[r]]

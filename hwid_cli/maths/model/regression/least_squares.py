@@ -23,7 +23,7 @@ from hwid_cli.maths.model.linear_block import (
     reflected,
 )
 from hwid_cli.maths.model.maps.kernels import piecewise_linear_shares
-from hwid_cli.maths.model.regression.kernels import regression_rows
+from hwid_cli.maths.model.regression.kernels import regression_columns
 from hwid_cli.records.model import Orders
 
 # Poles further out than this settle too slowly to be found by least squares.
@@ -144,8 +144,37 @@ def regression(
     )
 
 
-def solve(one: Regression, denominator: np.ndarray) -> tuple[Solution, np.ndarray]:
-    """Best numerator for a denominator, and the denominator that follows it.
+@dataclass(frozen=True, eq=False)
+class Products:
+    """Products of all columns of the data filtered by one denominator.
+
+    Parameters
+    ----------
+    regression : Regression
+    denominator : ndarray, shape (n_poles + 1,)
+        Stable and monic.
+    table : ndarray, shape (n_columns, n_columns)
+        Summed over the experiments; the columns are those of `regression_columns`.
+    """
+
+    regression: Regression
+    denominator: np.ndarray
+    table: np.ndarray
+
+    @property
+    def first_input(self) -> int:
+        """Column of the first expanded input: past outputs stand before it."""
+        return self.denominator.size
+
+    @property
+    def level(self) -> int:
+        """Column of the level, which follows all that every problem solves for."""
+        one = self.regression
+        return self.first_input + one.orders.nb * one.n_inputs + one.n_states
+
+
+def products(one: Regression, denominator: np.ndarray) -> Products:
+    """Products of all columns of the data filtered by 1/F.
 
     Parameters
     ----------
@@ -155,95 +184,111 @@ def solve(one: Regression, denominator: np.ndarray) -> tuple[Solution, np.ndarra
 
     Returns
     -------
-    solution : Solution
-    following : ndarray, shape (n_poles + 1,)
-        Stable.
+    Products
     """
-    products = _products(one, denominator)
-    n_poles = denominator.size - 1
-    known = n_poles + one.orders.nb * one.n_inputs + one.n_states
-    solution = _solution(one, denominator, products, known)
-    if n_poles == 0:
-        return solution, denominator
-    all_known = (
-        np.append(np.arange(known), known) if one.has_level else np.arange(known)
-    )
-    past, _ = _least_squares(products, all_known, products.shape[0] - 2)
-    tail = difference_basis(n_poles) @ past[:n_poles]
-    return solution, _stabilised(np.concatenate([[1.0], tail]), one.largest_radius)
-
-
-def _solution(
-    one: Regression, denominator: np.ndarray, products: np.ndarray, known: int
-) -> Solution:
-    """Best numerator; with a level only where it explains something."""
-    middle, target = np.arange(denominator.size - 1, known), products.shape[0] - 1
-    found, cost = _least_squares(products, middle, target)
-    level = 0.0
-    if one.has_level:
-        with_it, lower = _least_squares(products, np.append(middle, known + 1), target)
-        # A level and a slow free response that cancel are no start.
-        if lower < _WORTH_A_LEVEL * cost:
-            found, cost, level = with_it, lower, float(with_it[-1])
-    count = one.orders.nb * one.n_inputs
-    states = found[count : count + one.n_states]
-    return Solution(
-        denominator,
-        cost,
-        found[:count].reshape(one.orders.nb, -1),
-        states.reshape(len(one.experiments), -1),
-        level,
-    )
-
-
-def _products(one: Regression, denominator: np.ndarray) -> np.ndarray:
-    """Products of all columns, summed over the experiments."""
     orders, n_poles = one.orders, denominator.size - 1
     n_state = orders.n_state if one.has_free_response else 0
     skipped = 1 if one.is_expanded else 0
     count = one.n_inputs + skipped
     n_columns = n_poles + orders.nb * one.n_inputs + one.n_states + 4
     total = np.zeros((n_columns, n_columns))
+    taps = as_loops_take_it(denominator)
     for index, (experiment, (first, shares)) in enumerate(
         zip(one.experiments, one.bases, strict=True)
     ):
-        rows = np.empty((experiment.counted.size, n_columns))
-        regression_rows(
+        columns = np.empty((n_columns, experiment.counted.size))
+        regression_columns(
             experiment.output,
             (first, shares, count, skipped),
-            as_loops_take_it(denominator),
+            taps,
             orders.nk,
             (orders.nb, n_state, index * n_state, one.n_states),
             experiment.counted,
-            rows,
+            columns,
         )
-        total += rows.T @ rows
-    begin = n_poles + orders.nb * one.n_inputs
-    states = slice(begin, begin + one.n_states)
-    total[states, states] += _STATE_RIDGE * np.eye(one.n_states)
-    return total
+        total += columns @ columns.T
+    found = Products(one, denominator, total)
+    states = np.arange(found.level - one.n_states, found.level)
+    total[states, states] += _STATE_RIDGE
+    return found
+
+
+def best_numerator(one: Products) -> Solution:
+    """Best numerator for a denominator; with a level only where it explains something.
+
+    Parameters
+    ----------
+    one : Products
+
+    Returns
+    -------
+    Solution
+    """
+    first, level_column = one.first_input, one.level
+    target = one.table.shape[0] - 1
+    found, cost = _least_squares(one.table, slice(first, level_column), target)
+    level = 0.0
+    if one.regression.has_level:
+        with_it, lower = _least_squares(
+            one.table, slice(first, level_column + 1), target
+        )
+        # A level and a slow free response that cancel are no start.
+        if lower < _WORTH_A_LEVEL * cost:
+            found, cost, level = with_it, lower, float(with_it[-1])
+    nb = one.regression.orders.nb
+    count = nb * one.regression.n_inputs
+    states = found[count : count + one.regression.n_states]
+    return Solution(
+        one.denominator,
+        cost,
+        found[:count].reshape(nb, -1),
+        states.reshape(len(one.regression.experiments), -1),
+        level,
+    )
+
+
+def next_denominator(one: Products) -> np.ndarray:
+    """Denominator that follows in the Steiglitz-McBride iterations.
+
+    Parameters
+    ----------
+    one : Products
+
+    Returns
+    -------
+    ndarray, shape (n_poles + 1,)
+        Stable.
+    """
+    n_poles = one.denominator.size - 1
+    # The filtered level comes first: problems without one begin behind it.
+    first = 0 if one.regression.has_level else 1
+    filtered_output = one.table.shape[0] - 2
+    found, _ = _least_squares(one.table, slice(first, one.level), filtered_output)
+    past = found[1 - first : 1 - first + n_poles]
+    tail = difference_basis(n_poles) @ past
+    return _stabilised(np.concatenate([[1.0], tail]), one.regression.largest_radius)
 
 
 def _least_squares(
-    products: np.ndarray, known: np.ndarray, target: int
+    table: np.ndarray, known: slice, target: int
 ) -> tuple[np.ndarray, float]:
-    """Solve from products of columns; the solution and the squared residual."""
-    matrix = products[np.ix_(known, known)]
+    """Solve from a table of products; the solution and the squared residual."""
+    matrix, vector = table[known, known], table[known, target]
     scale = np.sqrt(matrix.diagonal())
     scale[scale == 0.0] = 1.0
-    matrix = matrix / scale / scale[:, None]
-    vector = products[known, target] / scale
+    matrix = matrix / (scale[:, None] * scale)
+    vector = vector / scale
     ridge = _RIDGE
     while True:
         damped = matrix.copy()
-        damped.flat[:: known.size + 1] += ridge
+        damped.flat[:: scale.size + 1] += ridge
         _, solution, info = dposv(damped, vector, lower=1)
         if info == 0 and np.isfinite(solution).all():
             break
         ridge *= _RIDGE_GROWTH
         if ridge > 1.0:
-            return np.zeros(known.size), float(products[target, target])
-    cost = products[target, target] - solution @ (2.0 * vector - matrix @ solution)
+            return np.zeros(scale.size), float(table[target, target])
+    cost = table[target, target] - solution @ (2.0 * vector - matrix @ solution)
     return solution / scale, max(float(cost), 0.0)
 
 

@@ -8,7 +8,7 @@ from numba import njit
 _TINY = 1e-200
 # Samples between two looks for such numbers, and samples worked on at a time: the
 # recursions of all columns over a chunk stay in the cache.
-_FLUSH, _CHUNK = 16, 256
+_FLUSH, _CHUNK = 64, 256
 # Where fewer than one sample in so many counts, B is applied to those alone.
 _DENSE = 2
 
@@ -52,7 +52,7 @@ def derivative_rows(
     first, shares, count = basis
     steady, n_state, own_state, n_states = start
     n, nb, nf, width = w.size, numerator.size, denominator.size - 1, shares.shape[1]
-    taps = np.zeros(4 * max(1, (nf + 3) // 4))
+    taps = np.zeros(max(4, nf))
     for j in range(nf):
         taps[j] = denominator[1 + j]
     zeros = np.zeros(4 * ((nb + 3) // 4))
@@ -96,9 +96,9 @@ def derivative_rows(
                 _all_zero(lines.ravel(), first_value, zeros, wide, passed[at])
         else:
             _all_zero(lines.ravel(), (pad - delay) * wide, zeros, wide, passed.ravel())
-        _differences(lines, pad, count + 2, n_state, length, table)
-        _differences(lines, pad - delay, count, nb, length, table[n_state:])
-        _differences(lines, pad - 1, count + 1, nf, length, table[n_state + nb :])
+        differences(lines, pad, count + 2, n_state, length, table)
+        differences(lines, pad - delay, count, nb, length, table[n_state:])
+        differences(lines, pad - 1, count + 1, nf, length, table[n_state + nb :])
         while r < stop:
             k = counted[r] - begin
             row, source, weight = out[r], passed[k], weights[r]
@@ -133,12 +133,18 @@ def all_pole(lines: np.ndarray, begin: int, length: int, taps: np.ndarray) -> No
     begin, length : int
         The rows; the first has as many predecessors as there are taps.
     taps : ndarray, shape (n_taps,)
-        A multiple of four.
+        At least four.
     """
     wide = lines.shape[1]
     for k in range(begin, begin + length - 1, 2):
         row, after = lines[k], lines[k + 1]
-        for j in range(4, taps.size, 4):
+        grouped = taps.size // 4 * 4
+        for j in range(grouped, taps.size):
+            f1, s0, s1 = taps[j], lines[k - j], lines[k - j - 1]
+            for m in range(wide):
+                row[m] -= f1 * s1[m]
+                after[m] -= f1 * s0[m]
+        for j in range(4, grouped, 4):
             f1, f2, f3, f4 = taps[j], taps[j + 1], taps[j + 2], taps[j + 3]
             s0, s1, s2 = lines[k - j], lines[k - j - 1], lines[k - j - 2]
             s3, s4 = lines[k - j - 3], lines[k - j - 4]
@@ -154,8 +160,8 @@ def all_pole(lines: np.ndarray, begin: int, length: int, taps: np.ndarray) -> No
             row[m] = value
             after[m] -= f1 * value + f2 * v1 + f3 * v2 + f4 * v3
         if k % _FLUSH < 2:
-            _flush(row)
-            _flush(after)
+            for j in range(taps.size):
+                _flush(lines[k + 1 - j])
     if length % 2:
         row = lines[begin + length - 1]
         for j in range(taps.size):
@@ -168,8 +174,7 @@ def all_pole(lines: np.ndarray, begin: int, length: int, taps: np.ndarray) -> No
 def _flush(row: np.ndarray) -> None:
     """Set what has all but died away to zero."""
     for m in range(row.size):
-        if abs(row[m]) < _TINY:
-            row[m] = 0.0
+        row[m] = 0.0 if abs(row[m]) < _TINY else row[m]
 
 
 @njit(cache=True)
@@ -196,10 +201,18 @@ def _all_zero(
 
 
 @njit(cache=True)
-def _differences(
+def differences(
     lines: np.ndarray, at: int, column: int, count: int, length: int, table: np.ndarray
 ) -> None:
-    """Write ``(1 - q^-1)^j`` of a column from row `at` on into row j of a table."""
+    """Write ``(1 - q^-1)^j`` of a column from row `at` on into row j of a table.
+
+    Parameters
+    ----------
+    lines : ndarray, shape (n, width)
+        With at least `count` rows before row `at`.
+    at, column, count, length : int
+    table : ndarray, shape (at least count, at least length)
+    """
     if count == 0:
         return
     before = np.empty(count)

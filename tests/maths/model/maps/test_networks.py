@@ -67,7 +67,7 @@ def test_widths_stay_positive_and_centres_near_the_range_whatever_the_step(
     step = np.zeros(one.parameters.size)
     step[:6] = change
     for _ in range(20):
-        one = static_map.move(one, step, with_positions=True)
+        one = static_map.move(one, step)
     centres, widths = one.parameters[:3], one.parameters[3:6]
     assert (np.abs(centres) <= 6.0).all()
     assert (widths >= 6e-3).all()

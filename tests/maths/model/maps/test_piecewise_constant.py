@@ -45,9 +45,7 @@ def test_slope_and_edges_are_searched_by_narrow_ramps():
         change = np.zeros(7)
         change[k] = step
         above, below = (
-            with_ramps(
-                static_map.move(ONE, sign * change, with_positions=True), half, ARGUMENT
-            )
+            with_ramps(static_map.move(ONE, sign * change), half, ARGUMENT)
             for sign in (1.0, -1.0)
         )
         np.testing.assert_allclose(out[:, k], (above - below) / (2 * step), atol=1e-8)
@@ -62,11 +60,11 @@ def test_ramps_do_not_overlap_nor_does_a_single_edge_lack_one():
 @given(steps=st.lists(st.floats(-5.0, 5.0), min_size=3, max_size=3))
 def test_edges_stay_in_order_whatever_the_step(steps):
     step = np.concatenate([steps, np.zeros(4)])
-    edges, _ = edges_and_levels(static_map.move(ONE, step, with_positions=True))
+    edges, _ = edges_and_levels(static_map.move(ONE, step))
     assert (np.diff(edges) > 0.0).all()
 
 
 def test_a_single_edge_may_move():
     single = StaticMap("piecewise_constant", np.array([0.5, -1.0, 1.0]), (-1.0, 1.0))
-    moved = static_map.move(single, np.array([0.2, 0.0, 0.0]), with_positions=True)
+    moved = static_map.move(single, np.array([0.2, 0.0, 0.0]))
     assert moved.parameters[0] == pytest.approx(0.7)
