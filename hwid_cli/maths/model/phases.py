@@ -3,11 +3,14 @@
 docs/method.md, section "The search".
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+
+import numpy as np
 
 from hwid_cli.maths.model import sensitivities
 from hwid_cli.maths.model.candidates import Candidate, Experiment, thinned
+from hwid_cli.maths.model.distinct import WHILE_FIXED, distinct
 from hwid_cli.maths.model.levenberg_marquardt import (
     LEAST_GAIN,
     PATIENCE,
@@ -15,7 +18,7 @@ from hwid_cli.maths.model.levenberg_marquardt import (
     minimise,
 )
 from hwid_cli.maths.model.placing import coarser, cut, finer, with_maps
-from hwid_cli.records.model import FitOptions
+from hwid_cli.records.model import FitOptions, StaticMap
 
 # Iterations at most with fixed break-points, and the share of the cost that a step must
 # gain: far from the minimum, break-points that move get lost.
@@ -28,45 +31,63 @@ _ROWS, _COARSE_GAIN = 2500, 1e-3
 
 
 def place(
-    screened: Search, experiments: Sequence[Experiment], options: FitOptions
-) -> Search:
+    screened: Sequence[Search],
+    experiments: Sequence[Experiment],
+    options: FitOptions,
+) -> list[Search]:
     """Go on with fixed break-points, then put them where the maps bend.
 
     Parameters
     ----------
-    screened : Search
+    screened : sequence of Search
     experiments : sequence of Experiment
     options : FitOptions
 
     Returns
     -------
-    Search
-        Its cost is that of the fine maps: how well the final break-points happen to lie
-        before they move does not tell which candidate is worth freeing.
+    list of Search
+        Those that came to different models. Their costs are those of the fine maps: how
+        well the final break-points happen to lie before they move does not tell which
+        candidate is worth freeing.
     """
     few = thinned(experiments, _ROWS)
+    settled = distinct(
+        [_settled(one, few, options) for one in screened], few, WHILE_FIXED
+    )
+    if not (options.free_break_points and _has_break_points(settled[0].candidate)):
+        return settled
+    return [_placed(one, experiments, options, finer, _PLACING_GAIN) for one in settled]
+
+
+def _settled(
+    found: Search,
+    experiments: Sequence[Experiment],
+    options: FitOptions,
+    least_gain: float = _PLACING_GAIN,
+) -> Search:
+    """The same nearer to its minimum for the break-points that it has."""
     settled = minimise(
-        screened.candidate,
-        few,
+        found.candidate,
+        experiments,
         with_positions=False,
         max_iterations=min(_PLACING_ITERATIONS, options.max_iterations),
-        least_gain=_PLACING_GAIN,
+        least_gain=least_gain,
     )
-    iterations = screened.iterations + settled.iterations
-    if not (options.free_break_points and _has_break_points(settled.candidate)):
-        return replace(settled, iterations=iterations)
-    fine = minimise(
-        with_maps(settled.candidate, experiments, finer),
-        few,
-        with_positions=False,
-        max_iterations=min(_PLACING_ITERATIONS, options.max_iterations),
-        least_gain=_PLACING_GAIN,
-    )
-    return replace(
-        fine,
-        candidate=coarser(fine.candidate, experiments, options),
-        iterations=iterations + fine.iterations,
-    )
+    return replace(settled, iterations=found.iterations + settled.iterations)
+
+
+def _placed(
+    found: Search,
+    experiments: Sequence[Experiment],
+    options: FitOptions,
+    more: Callable[[StaticMap, np.ndarray], StaticMap],
+    least_gain: float,
+) -> Search:
+    """Break-points where they matter most, of more of them."""
+    few = thinned(experiments, _ROWS)
+    fine = replace(found, candidate=with_maps(found.candidate, experiments, more))
+    fine = _settled(fine, few, options, least_gain)
+    return replace(fine, candidate=coarser(fine.candidate, experiments, options))
 
 
 def refine(
@@ -88,18 +109,7 @@ def refine(
     """
     if not (options.free_break_points and _has_break_points(found.candidate)):
         return found
-    cut_up = minimise(
-        with_maps(found.candidate, experiments, cut),
-        thinned(experiments, _ROWS),
-        with_positions=False,
-        max_iterations=min(_PLACING_ITERATIONS, options.max_iterations),
-        least_gain=_REFINING_GAIN,
-    )
-    placed = replace(
-        cut_up,
-        candidate=coarser(cut_up.candidate, experiments, options),
-        iterations=found.iterations + cut_up.iterations,
-    )
+    placed = _placed(found, experiments, options, cut, _REFINING_GAIN)
     again = finish(placed, experiments, options)
     return again if again.cost < found.cost else found
 

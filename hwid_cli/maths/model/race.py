@@ -16,6 +16,7 @@ import numpy as np
 
 from hwid_cli.maths.model import static_map
 from hwid_cli.maths.model.candidates import Candidate, Experiment, limits_of, thinned
+from hwid_cli.maths.model.distinct import WHILE_FIXED, distinct
 from hwid_cli.maths.model.levenberg_marquardt import Search, minimise
 from hwid_cli.maths.model.maps.kernels import piecewise_linear_shares
 from hwid_cli.maths.model.placing import reaching
@@ -37,10 +38,12 @@ RACE_ROWS = 1000
 # Knots of the output map that a block's output asks for, and how stiff it is: the
 # weight of its second differences as a share of the mean number of samples at a knot.
 _CURVE_POINTS, _STIFFNESS = 12, 1e-2
+_SECOND = np.diff(np.eye(_CURVE_POINTS), 2, axis=0)
+_BENDING = _SECOND.T @ _SECOND
 
 
 # Cost from which on a candidate drops out, as a multiple of the best's.
-_HOPELESS = 9.0
+_HOPELESS = 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,10 +81,10 @@ def race(
     racing = []
     for start in starts:
         kind = (start.is_given, start.is_expanded)
-        for candidate in starting_candidates(experiments, start, options):
+        for candidate, x in starting_candidates(experiments, start, options):
             racing.append(_entered((*kind, False), candidate, experiments))
             if static_map.has_free_shape(options.output_map):
-                curved = _with_output_curve(candidate, experiments, options)
+                curved = _with_output_curve(candidate, x, experiments, options)
                 racing.append(_entered((*kind, True), curved, experiments))
     if rounds != LONG:
         racing = _leaders(racing, options.starts)
@@ -89,6 +92,8 @@ def race(
         if iterations:
             racing = [_going_on(one, experiments, iterations) for one in racing]
         racing = _leaders(racing, count, _HOPELESS)
+        kept = distinct([one.search for one in racing], experiments, WHILE_FIXED)
+        racing = [one for one in racing if one.search in kept]
     return [one.search for one in racing]
 
 
@@ -96,7 +101,7 @@ def starting_candidates(
     experiments: Sequence[Experiment],
     start: Start,
     options: FitOptions,
-) -> list[Candidate]:
+) -> list[tuple[Candidate, np.ndarray]]:
     """Models that begin with one linear block, one for each pair of starting maps.
 
     Parameters
@@ -107,7 +112,8 @@ def starting_candidates(
 
     Returns
     -------
-    list of Candidate
+    list of (Candidate, ndarray)
+        Each with what reaches its output map, all experiments one after the other.
     """
     inputs = np.concatenate([one.input for one in experiments])
     is_estimated = options.initial_state == "estimated"
@@ -131,7 +137,12 @@ def starting_candidates(
         )
         _, x = reaching(Candidate(model, states), experiments)
         candidates += [
-            Candidate(replace(model, output_map=output_map), states, limits_of(options))
+            (
+                Candidate(
+                    replace(model, output_map=output_map), states, limits_of(options)
+                ),
+                x,
+            )
             for output_map in static_map.starting_maps(
                 options.output_map,
                 options.of_output,
@@ -144,18 +155,19 @@ def starting_candidates(
 
 
 def _with_output_curve(
-    candidate: Candidate, experiments: Sequence[Experiment], options: FitOptions
+    candidate: Candidate,
+    x: np.ndarray,
+    experiments: Sequence[Experiment],
+    options: FitOptions,
 ) -> Candidate:
-    """Candidate with the output map that comes closest for its linear block."""
-    _, x = reaching(candidate, experiments)
+    """Candidate with the output map that comes closest for what reaches it."""
     measured = np.concatenate([one.output for one in experiments])
     points = np.linspace(x.min(), x.max(), _CURVE_POINTS)
     if not points[0] < points[-1]:
         return candidate
     _, _, first, shares = piecewise_linear_shares(x, points, points, 1)
     matrix, vector = local_sums(first, shares, measured[:, None], points.size)
-    bending = np.diff(np.eye(points.size), 2, axis=0)
-    matrix += _STIFFNESS * x.size / points.size * (bending.T @ bending)
+    matrix += _STIFFNESS * x.size / points.size * _BENDING
     values = np.linalg.solve(matrix, vector[:, 0])
     maps = static_map.starting_maps(
         options.output_map,

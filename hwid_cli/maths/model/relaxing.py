@@ -13,7 +13,9 @@ import numpy as np
 from hwid_cli.maths.model import static_map
 from hwid_cli.maths.model.candidates import Candidate, Experiment
 from hwid_cli.maths.model.delays import relaxed_starts
+from hwid_cli.maths.model.distinct import WHEN_FREE, distinct
 from hwid_cli.maths.model.levenberg_marquardt import Search, minimise
+from hwid_cli.maths.model.phases import standing
 from hwid_cli.maths.model.points import block_signals, point_of
 from hwid_cli.records.model import FitOptions
 
@@ -39,7 +41,8 @@ def relaxed_search(
     Returns
     -------
     Search
-        With fixed break-points; not to the end, and not always better.
+        With fixed break-points; not to the end, and not always better. The best itself
+        where the new blocks come to the same model.
     """
     between = _between_maps(best.candidate, experiments)
     model, no_states = best.candidate.model, best.candidate.free_responses[:, :0]
@@ -51,24 +54,34 @@ def relaxed_search(
         count=_RELAXED_BLOCKS,
         denominator=model.denominator,
     )
-    found = [
-        minimise(
-            replace(
-                best.candidate,
-                model=replace(
+    entered = [
+        standing(
+            Candidate(
+                replace(
                     model,
                     numerator=one.numerator,
                     denominator=one.denominator,
                     delay=one.delay,
                 ),
-                free_responses=one.free_responses if has_states else no_states,
+                one.free_responses if has_states else no_states,
+                best.candidate.limits,
             ),
+            experiments,
+        )
+        for one in starts
+    ]
+    found = [
+        minimise(
+            one.candidate,
             experiments,
             with_positions=False,
             max_iterations=min(_RELAXING_ITERATIONS, options.max_iterations),
         )
-        for one in starts
+        for one in distinct([best, *entered], experiments, WHEN_FREE)
+        if one is not best
     ]
+    if not found:
+        return best
     leader = min(found, key=lambda one: one.cost)
     return replace(leader, iterations=best.iterations + leader.iterations)
 

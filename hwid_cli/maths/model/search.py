@@ -112,8 +112,7 @@ def nonlinear_search(
     """
     finalists = race(experiments, starts, options)
     experiments = renewed(experiments, [one.candidate for one in finalists])
-    placed = [place(one, experiments, options) for one in finalists]
-    best = finish(_best(placed), experiments, options)
+    best = finish(_best(place(finalists, experiments, options)), experiments, options)
     relaxed = best
     if not options.keeps_block:
         relaxed = relaxed_search(best, experiments, options)
@@ -137,7 +136,7 @@ def _doubted(
             break
         entered += maps_anew(best.candidate, experiments)
         found = race(experiments, entered, options, rounds=LONG)
-        placed = [place(one, experiments, options) for one in found]
+        placed = place(found, experiments, options)
         again = finish(_best(placed), experiments, options)
         gained = again.cost < _WORTH_DOUBTING * best.cost
         best, entered = _best([best, again]), []
@@ -208,8 +207,8 @@ def search_beyond(
     """
     near = grown(contained, experiments, options, linear)
     experiments = renewed(experiments, contained)
-    (leader,) = race(experiments, starts, options, rounds=SHORT)
-    placed = place(leader, experiments, options)
+    leaders = race(experiments, starts, options, rounds=SHORT)
+    (placed,) = place(leaders, experiments, options)
     anew = finish(placed, experiments, options, least_gain=_SMALL_GAIN)
     return _best([near, anew])
 

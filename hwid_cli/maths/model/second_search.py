@@ -17,8 +17,7 @@ import numpy as np
 
 from hwid_cli.maths.model import static_map
 from hwid_cli.maths.model.candidates import Candidate, Experiment
-from hwid_cli.maths.model.points import point_of
-from hwid_cli.maths.model.sensitivities import simulated
+from hwid_cli.maths.model.distinct import borne_residuals
 from hwid_cli.maths.model.starts import Start
 
 # Correlation of neighbouring residuals, and mean fourth power over squared mean square
@@ -47,12 +46,8 @@ def leaves_structure(candidate: Candidate, experiments: Sequence[Experiment]) ->
         Whether they follow their neighbours, are half as large as the output, or are not
         small and large at few moments.
     """
-    found = simulated(point_of(candidate), experiments).residuals
     # Outliers, where they are to be borne, are no error of the model.
-    residuals = [
-        np.clip(one, -experiment.threshold, experiment.threshold)
-        for one, experiment in zip(found, experiments, strict=True)
-    ]
+    residuals = borne_residuals(candidate, experiments)
     following = sum(float(one[1:] @ one[:-1]) for one in residuals)
     joined = np.concatenate(residuals)
     power = float(joined @ joined)
@@ -61,7 +56,8 @@ def leaves_structure(candidate: Candidate, experiments: Sequence[Experiment]) ->
     )
     if following > _COLOURED * power or power > _FAR**2 * spread:
         return True
-    peaks = joined.size * float(np.sum(joined**4))
+    squares = joined * joined
+    peaks = joined.size * float(squares @ squares)
     return power > _CLOSE**2 * spread and peaks > _PEAKED * power**2
 
 

@@ -75,7 +75,7 @@ def warm_search(
         found = [known, near]
     if search_anew or not contained:
         screened = _screened(experiments, options, starts)
-        placed = place(screened, experiments, options)
+        (placed,) = place([screened], experiments, options)
         found.append(finish(placed, experiments, options, least_gain=_LEAST_GAIN))
     return min(found, key=lambda one: one.cost)
 
