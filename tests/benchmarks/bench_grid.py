@@ -19,7 +19,7 @@ from hwid_cli.maths.model.simulate import simulate
 from hwid_cli.records.experiment import OrdersOptions
 from hwid_cli.records.model import FitOptions
 from hwid_cli.records.recordings import Recording
-from tests.benchmarks.by_hand import fit_by_hand
+from tests.benchmarks.by_hand import MOST_IN_GRID, fit_by_hand
 from tests.benchmarks.grid_scores import Scored, n_not_monotone, n_worse_than
 from tests.benchmarks.plants import grid_plant
 
@@ -53,7 +53,10 @@ def by_hand(data, grid):
     u, y, u_test, y_test = data
     begun = time.perf_counter()
     orders = [one for _, _, one in candidate_orders(grid)]
-    fits = [fit_by_hand(one, u, y, free=False) for one in orders]
+    fits = [
+        fit_by_hand(one, u, y, free=False, most_evaluations=MOST_IN_GRID)
+        for one in orders
+    ]
     seconds = time.perf_counter() - begun
     found = [
         Scored(
