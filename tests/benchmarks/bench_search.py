@@ -5,7 +5,8 @@ steps may join and judge, seven begin, records are put one after the other and e
 of a group is a group of its own; as many groups go on at each level as went on in the
 thesis: 77 pairs, 340 groups of three and 279 of four, 100 orders each, 69 600 fits. The
 recordings are those of ``configs/model1.yaml``, simulated outside the clock;
-``hwid identify`` and ``hwid group`` then run as a user runs them.
+``hwid identify`` and ``hwid group`` then run as a user runs them, groups beginning with the
+models of their members unless told otherwise.
 """
 
 import argparse
@@ -33,6 +34,7 @@ def options() -> argparse.Namespace:
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--top", type=int, nargs=2, default=GOING_ON)
     parser.add_argument("--start", nargs="+", default=START)
+    parser.add_argument("--from-nothing", action="store_true", help="no warm starts")
     return parser.parse_args()
 
 
@@ -46,6 +48,7 @@ def write_config(chosen: argparse.Namespace, where: Path) -> Path:
     config["crossval"]["threshold"] = chosen.threshold
     config["group"]["start"] = [f"step_{one}" for one in chosen.start]
     config["group"]["keep"] = {"top": list(chosen.top)}
+    config["group"]["warm_start"] = not chosen.from_nothing
     del config["test"]
     path = where / "search.yaml"
     path.write_text(yaml.safe_dump(config))
