@@ -29,6 +29,13 @@ def test_of_two_that_give_the_same_output_the_better_one_stays():
     assert distinct([near, far, best], [PLAIN], WHEN_FREE) == [far, best]
 
 
+def test_a_model_is_compared_with_every_better_one():
+    # In the order of their costs: the last is like the first, not like the second.
+    best, other, like_best = (search(2.0 + off, PLAIN) for off in (0.2, -0.3, 0.28))
+    assert best.cost < other.cost < like_best.cost
+    assert distinct([like_best, other, best], [PLAIN], WHEN_FREE) == [other, best]
+
+
 @pytest.mark.parametrize(
     ("off", "apart", "count"),
     [(0.05, WHEN_FREE, 1), (0.2, WHEN_FREE, 2), (0.2, WHILE_FIXED, 1)],
