@@ -87,7 +87,7 @@ bench-rounds: $(DEV)  ## where in a grid a search anew is worth its time: three 
 bench-starts: $(DEV)  ## what each part of the search is worth: two minutes
 	@$(BENCH).bench_starts
 
-bench-search: $(DEV)  ## the whole search for groups of the thesis: most of an hour
+bench-search: $(DEV)  ## the whole search for groups of the thesis: half an hour
 	@$(BENCH).bench_search
 
 bench-beyond: $(DEV)  ## how maps go on beyond the data of their fit: two minutes

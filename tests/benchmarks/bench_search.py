@@ -1,6 +1,6 @@
 """The whole search for groups of the thesis (section 3.3) from an empty cache.
 
-``make bench-search`` runs this file at full size, which takes most of an hour. Twelve
+``make bench-search`` runs this file at full size, which takes half an hour. Twelve
 steps may join and judge, seven begin, records are put one after the other and every order
 of a group is a group of its own; as many groups go on at each level as went on in the
 thesis: 77 pairs, 340 groups of three and 279 of four, 100 orders each, 69 600 fits. The
