@@ -13,14 +13,15 @@ section "The search".
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.linalg import null_space
 from scipy.linalg.lapack import dposv
 
 from hwid_cli.maths.model.candidates import Candidate, Columns, Experiment, columns
 from hwid_cli.maths.model.equations.kernels import scaled_equations
-from hwid_cli.maths.model.linear_block import is_stable
+from hwid_cli.maths.model.linear_block import difference_basis, is_stable
 from hwid_cli.maths.model.maps.break_points.kernels import (
     add_bends,
     growth,
@@ -29,6 +30,7 @@ from hwid_cli.maths.model.maps.break_points.kernels import (
 )
 from hwid_cli.maths.model.maps.piecewise_linear import break_points_and_values
 from hwid_cli.maths.model.points import Point, candidate_at, moved, point_of
+from hwid_cli.maths.model.pole_bound import drawn_back, radii_held
 from hwid_cli.maths.model.sensitivities import (
     Equations,
     Simulated,
@@ -96,6 +98,11 @@ class _Descent:
     experiments: Sequence[Experiment]
     place: Columns
     largest_pole_radius: float
+
+    @property
+    def is_bounded(self) -> bool:
+        """Whether poles have to lie inside a circle that the user gave."""
+        return self.largest_pole_radius < 1.0
 
     @property
     def samples(self) -> int:
@@ -182,9 +189,12 @@ def _accepted_step(
     while damping < _LARGEST_DAMPING:
         step = _solve(matrix, vector, damping)
         if step is not None:
+            proposed = moved(point, scale * step, place)
+            if descent.is_bounded:
+                along = (matrix, vector, scale, damping)
+                step, proposed = _within_bound(point, step, proposed, along, descent)
             predicted = float(step @ (damping * step + vector))
             promised = predicted if promised is None else promised
-            proposed = moved(point, scale * step, place)
             if is_stable(proposed.denominator, descent.largest_pole_radius):
                 tried = simulated(proposed, descent.experiments)
                 lowered = total - tried.cost - weight * _squared_bends(proposed, point)
@@ -196,6 +206,32 @@ def _accepted_step(
         damping, growth = damping * growth, growth * 2.0
     gain = float("inf") if promised is None else promised / total
     return _Step(None, found, gain, damping)
+
+
+def _within_bound(
+    point: Point,
+    step: np.ndarray,
+    proposed: Point,
+    equations: tuple[np.ndarray, np.ndarray, np.ndarray, float],
+    descent: _Descent,
+) -> tuple[np.ndarray, Point]:
+    """The same step, or one along the bound on the poles where it would cross it."""
+    radius = descent.largest_pole_radius
+    if is_stable(proposed.denominator, radius):
+        return step, proposed
+    matrix, vector, scale, damping = equations
+    change = (proposed.denominator - point.denominator)[1:]
+    held = radii_held(point.denominator, change, radius)
+    if held.size:
+        at = descent.place.denominator
+        rows = np.zeros((len(held), step.size))
+        rows[:, at] = held @ difference_basis(change.size) * scale[at]
+        free = null_space(rows)
+        along = _solve(free.T @ matrix @ free, free.T @ vector, damping)
+        step = step if along is None else free @ along
+        proposed = moved(point, scale * step, descent.place)
+    inside = drawn_back(proposed.denominator, radius)
+    return step, replace(proposed, denominator=inside)
 
 
 def _solve(matrix: np.ndarray, vector: np.ndarray, damping: float) -> np.ndarray | None:

@@ -2,6 +2,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.optimize import least_squares
+from scipy.signal import lfilter
 
 from hwid_cli.maths.model.beginnings import block_starts
 from hwid_cli.maths.model.candidates import Experiment
@@ -10,6 +12,7 @@ from hwid_cli.maths.model.simulate import simulate
 from hwid_cli.maths.scores import fit_percent
 from hwid_cli.records.linear_block import LinearBlock
 from hwid_cli.records.model import FitOptions, Orders
+from hwid_cli.records.recordings import Recording
 from tests.maths.model.plants import ORDERS, level_input, measured, options, plant
 
 PAIRS = [
@@ -208,6 +211,43 @@ def test_no_pole_lies_beyond_the_bound(radius, output_map):
         assert np.max(np.abs(result.poles)) < radius
         assert np.max(np.abs(result.poles)) > radius - 0.1
         assert result.fit_percent > 40.0
+
+
+TRUE_BLOCK = ([0.0, 0.0, 0.0, 0.05, 0.03], [1.0, -1.6, 0.68])
+
+
+def gun_like(u, block, edges, limits):
+    """Dead zone, block, saturation, from rest."""
+    return np.clip(lfilter(*block, u - np.clip(u, *edges)), *limits)
+
+
+def rmsd_on_the_bound(recording, radius):
+    """Second way: the pair of poles lies on the bound, its angle and the rest are free."""
+
+    def residuals(p):
+        f = [1.0, -2.0 * radius * np.cos(p[0]), radius**2]
+        block = ([0.0, 0.0, 0.0, *p[1:3]], f)
+        return gun_like(recording.input, block, p[3:5], p[5:7]) - recording.output
+
+    angle = float(np.angle(np.roots(TRUE_BLOCK[1])[0]))
+    begin = (angle, 0.05, 0.03, -0.4, 0.4, -1.2, 1.2)
+    return float(np.sqrt(np.mean(least_squares(residuals, begin).fun ** 2)))
+
+
+@pytest.mark.parametrize("radius", [0.7, 0.8, 0.82])
+@pytest.mark.parametrize("seed", [10, 11, 12, 13])
+def test_the_best_model_that_lies_on_the_bound_is_found(radius, seed):
+    # A search that only refuses to cross the bound stops 2 to 15 times as far off.
+    rng = np.random.default_rng(seed)
+    u = np.repeat(rng.uniform(-2.5, 2.5, 60), rng.integers(3, 30, 60))
+    y = gun_like(u, TRUE_BLOCK, (-0.4, 0.4), (-1.2, 1.2))
+    noisy = y + 0.01 * rng.standard_normal(u.size)
+    recording = Recording("r", u, noisy, 1e-3)
+    bound = FitOptions(
+        input_map="dead_zone", output_map="saturation", largest_pole_radius=radius
+    )
+    result = fit([recording], Orders(2, 2, 3), bound)
+    assert result.rmsd < 1.01 * rmsd_on_the_bound(recording, radius)
 
 
 def test_the_bound_holds_for_models_of_other_fits_too():
