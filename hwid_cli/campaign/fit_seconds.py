@@ -80,7 +80,7 @@ def time_one_fit(
     middle = middle_orders(orders)
     short = replace(options, starts=1, max_iterations=1, join=FitOptions().join)
     # The first call loads the compiled loops, which no later fit does.
-    fit([cut], Orders(1, 1, 1), short)
+    fit([cut], middle, short)
     start = time.perf_counter()
     fit([cut], middle, replace(options, join=FitOptions().join))
     return FitCost(

@@ -1,7 +1,6 @@
 """Which candidate orders to try."""
 
 from hwid_cli.errors import ConfigError
-from hwid_cli.maths.model.contained import contains
 from hwid_cli.records.experiment import OrdersOptions
 from hwid_cli.records.model import Fit, Orders
 
@@ -68,7 +67,7 @@ def growth(
     """
     grid = [orders for _, _, orders in candidate_orders(options)]
     smaller = [
-        [j for j, other in enumerate(grid) if i != j and contains(orders, other)]
+        [j for j, other in enumerate(grid) if i != j and orders.contains(other)]
         for i, orders in enumerate(grid)
     ]
     rounds: dict[int, list[tuple[int, tuple[int, ...]]]] = {}

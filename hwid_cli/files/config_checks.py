@@ -3,6 +3,7 @@
 import math
 
 from hwid_cli.errors import ConfigError
+from hwid_cli.files.block_checks import check_block
 from hwid_cli.files.config_bounds import check_bounds
 from hwid_cli.files.config_requirements import (
     require,
@@ -55,7 +56,7 @@ def check_experiment(experiment: Experiment) -> None:
     if experiment.calibrate is not None:
         _check_calibrate(experiment.calibrate, file)
     _check_orders(experiment.orders, file)
-    _check_block(experiment, file)
+    check_block(experiment, file)
     if experiment.fit.delays and experiment.orders.nk_role == "delay":
         raise ConfigError(
             f"{file}: fit.delays: found {list(experiment.fit.delays)}; expected none with "
@@ -82,30 +83,6 @@ def check_experiment(experiment: Experiment) -> None:
     check_simulation(experiment)
     _check_name_lists(experiment, file)
     _check_test(experiment, file)
-
-
-def _check_block(experiment: Experiment, file: str) -> None:
-    """A given linear block must have a place in the grid; a frozen one fills it."""
-    block, grid = experiment.fit.linear_block, experiment.orders
-    if block is None:
-        return
-    own, at = block.orders, f"{file}: fit.linear_block"
-    counts_poles = grid.nk_role == "poles"
-    second = own.nf if counts_poles else own.nk
-    other = ("delay", own.nk, 1) if counts_poles else ("poles", own.nf, grid.nf)
-    word, found, wanted = other
-    if block.frozen and (grid.nb, grid.nk) != ((own.nb,), (second,)):
-        raise ConfigError(
-            f"{at}: found a frozen block of {own.nb} numerator coefficients, {own.nf} "
-            f"poles and delay {own.nk}; expected the orders of the grid; set orders: "
-            f"{{nb: {own.nb}, nk: {second}}}"
-        )
-    if block.frozen and found != wanted:
-        raise ConfigError(
-            f"{at}: found {word} {found}; expected {wanted} as in the grid of "
-            f"orders.nk_role: {grid.nk_role}; set orders: {{nb: {own.nb}, nf: {own.nf}, "
-            f"nk: {own.nk}, nk_role: delay}}"
-        )
 
 
 def _check_name(name: str, file: str) -> None:

@@ -3,6 +3,8 @@
 import math
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 
 @dataclass(frozen=True, order=True)
 class Orders:
@@ -38,6 +40,30 @@ class Orders:
     def n_state(self) -> int:
         """Number of past values that the linear block remembers."""
         return max(self.nf, self.nb + self.nk - 1)
+
+    def contains(self, smaller: "Orders") -> bool:
+        """Tell whether every model of some orders is also one of these.
+
+        Parameters
+        ----------
+        smaller : Orders
+
+        Returns
+        -------
+        bool
+
+        Examples
+        --------
+        >>> Orders(3, 2, 1).contains(Orders(2, 2, 2))
+        True
+        >>> Orders(2, 2, 2).contains(Orders(2, 2, 1))
+        False
+        """
+        return (
+            smaller.nf <= self.nf
+            and self.nk <= smaller.nk
+            and smaller.nk + smaller.nb <= self.nk + self.nb
+        )
 
 
 @dataclass(frozen=True)
@@ -90,6 +116,11 @@ class LinearBlock:
     def orders(self) -> Orders:
         """Orders ``[nb nf nk]``."""
         return Orders(len(self.numerator), len(self.denominator) - 1, self.delay)
+
+    @property
+    def pole_radius(self) -> float:
+        """Distance of the outermost pole from zero; 0 without poles."""
+        return float(np.max(np.abs(np.roots(self.denominator)), initial=0.0))
 
     def in_units(self, input_unit: float, output_unit: float) -> "LinearBlock":
         """Give the same block for signals that are divided by these units.

@@ -53,6 +53,21 @@ def test_every_number_of_a_block_is_part_of_the_key(tmp_path):
             "found poles 2; expected 3",
         ),
         ("{nb: 2, nk: 2}", BLOCK.replace("[1,", "[2,"), "denominator: must start with"),
+        (
+            "{nb: 2, nk: 2}",
+            BLOCK.replace("0.65", "1.65"),
+            r"found a pole at radius 1.285; expected all poles .* inside radius 1;",
+        ),
+        (
+            "{nb: 2, nk: 2}",
+            BLOCK + ", largest_pole_radius: 0.7",
+            r"denominator: found a pole at radius 0.8062; expected .* inside radius 0.7",
+        ),
+        (
+            "{nb: 1, nk: [1, 3]}",
+            BLOCK.replace("true", "false"),
+            "found 2 numerator coefficients, 2 poles and delay 1, which no orders",
+        ),
         ("{nb: 2, nk: 2}", "{numerator: [1]}", "linear_block.denominator: missing"),
         ("{nb: 2, nk: 2}", BLOCK + ", largest_pole_radius: 2", "largest_pole_radius"),
     ],

@@ -14,7 +14,7 @@ import numpy as np
 
 from hwid_cli.maths.model.beyond import for_search
 from hwid_cli.maths.model.candidates import Candidate, Experiment, limits_of
-from hwid_cli.maths.model.contained import contains, enlarged
+from hwid_cli.maths.model.contained import enlarged
 from hwid_cli.maths.model.delays import starts_of_delays
 from hwid_cli.maths.model.levenberg_marquardt import Search
 from hwid_cli.maths.model.linear_block import filtered, is_stable, reflected
@@ -128,7 +128,7 @@ def contained_candidates(
     for model in models:
         # With several delays a smaller model may have found another one than this one.
         tried = [replace(orders, nk=nk) for nk in (orders.nk, model.delay)]
-        at = next((one for one in tried if contains(one, model.orders)), None)
+        at = next((one for one in tried if one.contains(model.orders)), None)
         if at is None:
             continue
         # The gain that the blocks share is fixed anew: in the units of the recordings it
@@ -200,7 +200,7 @@ def _given_start(
 ) -> tuple[Start, ...]:
     """Start from the block that the user gives, where the orders contain it."""
     block = options.linear_block
-    if block is None or not contains(orders, block.orders):
+    if block is None or not orders.contains(block.orders):
         return ()
     first = block.delay - orders.nk
     numerator = np.zeros(orders.nb)

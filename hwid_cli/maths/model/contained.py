@@ -10,29 +10,6 @@ import numpy as np
 from hwid_cli.records.model import HammersteinWiener, Orders
 
 
-def contains(orders: Orders, smaller: Orders) -> bool:
-    """Tell whether every model of some orders is also one of others.
-
-    Parameters
-    ----------
-    orders, smaller : Orders
-
-    Returns
-    -------
-    bool
-
-    Examples
-    --------
-    >>> contains(Orders(3, 2, 1), Orders(2, 2, 2)), contains(Orders(2, 2, 2), Orders(2, 2, 1))
-    (True, False)
-    """
-    return (
-        smaller.nf <= orders.nf
-        and orders.nk <= smaller.nk
-        and smaller.nk + smaller.nb <= orders.nk + orders.nb
-    )
-
-
 def enlarged(model: HammersteinWiener, orders: Orders) -> HammersteinWiener:
     """Same model written with larger orders.
 

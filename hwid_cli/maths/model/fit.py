@@ -166,7 +166,7 @@ def _fitted(
             starts_found, linear = linear_beginnings(
                 problem, orders, options, sees_input_map=anew
             )
-            linear_rmsd = rmsd(linear, problem)
+            linear_rmsd = rmsd(_yardstick(linear, problem, orders, options), problem)
             problem = _with_threshold(problem, linear)
             orders = replace(orders, nk=starts_found[0].delay)
             known = contained_candidates(problem, orders, options, given.contained)
@@ -190,6 +190,16 @@ def _fitted(
         replace(problem, experiments=tuple(experiments)),
         standard_errors=standard_errors,
     )
+
+
+def _yardstick(
+    linear: Search, problem: Problem, orders: Orders, options: FitOptions
+) -> Search:
+    """Linear model to compare with; a frozen block does not hold it."""
+    if not options.keeps_block:
+        return linear
+    free = replace(options, linear_block=None)
+    return linear_beginnings(problem, orders, free, sees_input_map=False)[1]
 
 
 def _warm_search(

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from hwid_cli.maths.model.contained import contains, enlarged
+from hwid_cli.maths.model.contained import enlarged
 from hwid_cli.maths.model.fit import fit
 from hwid_cli.maths.model.simulate import simulate
 from hwid_cli.records.model import Orders
@@ -20,7 +20,7 @@ from tests.maths.model.plants import level_input, measured, options, plant
     ],
 )
 def test_orders_contain_those_whose_coefficients_they_have(orders, smaller, expected):
-    assert contains(orders, smaller) is expected
+    assert orders.contains(smaller) is expected
 
 
 @pytest.mark.parametrize("initial_state", ["zero", "steady", "estimated"])

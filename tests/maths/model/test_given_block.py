@@ -268,6 +268,18 @@ def test_a_bound_far_out_changes_nothing():
     assert bound.rmsd == pytest.approx(free.rmsd, rel=1e-3)
 
 
+def test_a_frozen_block_is_compared_with_the_free_linear_model():
+    # With maps of free gains a block of any unit will do; the linear model has none.
+    true = plant("dead_zone", "polynomial")
+    recording = measured(true, noise=0.01)
+    large = replace(true, numerator=100.0 * true.numerator)
+    frozen = FitOptions(linear_block=block_of(large, frozen=True))
+    result = fit([recording], ORDERS, frozen)
+    linear = fit([recording], ORDERS, FitOptions(input_map="none", output_map="none"))
+    assert result.linear_rmsd == pytest.approx(linear.rmsd, rel=1e-2)
+    assert result.rmsd < 0.5 * linear.rmsd
+
+
 @pytest.mark.parametrize("radius", [0.0, 1.1, float("nan")])
 def test_a_radius_that_is_none_is_refused(radius):
     with pytest.raises(ValueError, match="largest_pole_radius must be"):
