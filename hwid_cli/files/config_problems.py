@@ -40,28 +40,41 @@ def config_problems(path: Path) -> tuple[tuple[str, ...], Experiment | None]:
         return (str(error),), None
     whole = {name: repr(content.get(name)) for name in _DECIDE_READING}
     problems: list[str] = []
-    while len(problems) < _MOST:
+    removed: list[list[str]] = []
+    while len(removed) < _MOST:
         try:
             rest = experiment_of(content, str(path))
         except ConfigError as error:
             said = str(error)
-            if said in problems or not _take_out(content, said, str(path)):
-                return tuple(dict.fromkeys([*problems, said])), None
-            problems.append(said)
+            keys = _place(said, str(path))
+            # What is said of a key that is out already is no fault of the file: then the
+            # section cannot do without that key.
+            follows = bool(keys) and keys in removed
+            if not follows:
+                problems = list(dict.fromkeys([*problems, said]))
+            out = keys[:-1] if follows or _is_missing(said) else keys
+            if not _take_out(content, said, out):
+                return tuple(problems), None
+            removed += [keys, out]
         else:
             is_same = all(repr(content.get(name)) == old for name, old in whole.items())
             return tuple(problems), rest if is_same else None
     return tuple(problems), None
 
 
-def _take_out(content: dict[Any, Any], said: str, source: str) -> bool:
-    """Remove the key that a message names; whether there was one."""
+def _place(said: str, source: str) -> list[str]:
+    """Keys that a message names, the outermost first."""
     place = re.match(r"[\w.+-]+", said.removeprefix(f"{source}: "))
-    keys = place[0].rstrip(".").split(".") if place else []
-    # A key that is missing goes with its section, unless that is the file itself.
-    is_missing = "missing" in said.split(";")[0]
-    if is_missing:
-        keys = keys[:-1]
+    return place[0].rstrip(".").split(".") if place else []
+
+
+def _is_missing(said: str) -> bool:
+    """Tell whether a key is missing: it goes with its section."""
+    return "missing" in said.split(";")[0]
+
+
+def _take_out(content: dict[Any, Any], said: str, keys: list[str]) -> bool:
+    """Remove the key that a message names; whether there was one."""
     if not keys:
         # A section that is missing is only needed by another one, which is named.
         needed_by = re.search(r"or remove (\w+)", said)

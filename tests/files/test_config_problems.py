@@ -44,3 +44,22 @@ def test_what_is_no_yaml_is_one_problem(tmp_path):
 
     assert len(problems) == 1
     assert experiment is None
+
+
+def test_what_only_follows_from_a_problem_is_not_told(tmp_path):
+    path = tmp_path / "a.yaml"
+    path.write_text(
+        GOOD
+        + "orders: {nb: 2, nk: 2}\nfit:\n  linear_block: {numerator: [1, 2], "
+        + "denominator: [2, -1, 0.1]}\n  input_map: {file: none.py, name: f}\n"
+        + "crossval: {treshold: 1}\n"
+    )
+    problems, experiment = config_problems(path)
+
+    places = [problem.split(": ")[1] for problem in problems]
+    assert sorted(places) == [
+        "crossval.treshold",
+        "fit.input_map.file",
+        "fit.linear_block.denominator",
+    ]
+    assert experiment.fit.linear_block is None
