@@ -17,7 +17,7 @@ from hwid_cli.maths.model.levenberg_marquardt import (
     Search,
     minimise,
 )
-from hwid_cli.maths.model.placing import coarser, cut, finer, with_maps
+from hwid_cli.maths.model.placing import PLACED, coarser, cut, finer, with_maps
 from hwid_cli.records.model import FitOptions, StaticMap
 
 # Iterations at most with fixed break-points, and the share of the cost that a step must
@@ -54,7 +54,7 @@ def place(
     settled = distinct(
         [_settled(one, few, options) for one in screened], few, WHILE_FIXED
     )
-    if not (options.free_break_points and _has_break_points(settled[0].candidate)):
+    if not (options.free_break_points and _is_placed(settled[0].candidate)):
         return settled
     return [_placed(one, experiments, options, finer, _PLACING_GAIN) for one in settled]
 
@@ -107,7 +107,7 @@ def refine(
     Search
         To the end too; the better of both where break-points may move.
     """
-    if not (options.free_break_points and _has_break_points(found.candidate)):
+    if not (options.free_break_points and _is_placed(found.candidate)):
         return found
     placed = _placed(found, experiments, options, cut, _REFINING_GAIN)
     again = finish(placed, experiments, options)
@@ -196,6 +196,6 @@ def standing(candidate: Candidate, experiments: Sequence[Experiment]) -> Search:
     return Search(candidate, cost, 0, "converged", "taken over as it is")
 
 
-def _has_break_points(candidate: Candidate) -> bool:
+def _is_placed(candidate: Candidate) -> bool:
     maps = (candidate.model.input_map, candidate.model.output_map)
-    return any(one.kind == "piecewise_linear" for one in maps)
+    return any(one.kind in PLACED for one in maps)

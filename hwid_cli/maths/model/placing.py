@@ -11,6 +11,11 @@ import numpy as np
 from hwid_cli.maths.model import static_map
 from hwid_cli.maths.model.candidates import Candidate, Experiment
 from hwid_cli.maths.model.maps.break_points.kernels import thinned_break_points
+from hwid_cli.maths.model.maps.piecewise_constant import (
+    edges_and_levels,
+    with_edges,
+    with_fewer_levels,
+)
 from hwid_cli.maths.model.maps.piecewise_linear import (
     N_ENDS,
     break_points_and_values,
@@ -18,6 +23,8 @@ from hwid_cli.maths.model.maps.piecewise_linear import (
 from hwid_cli.maths.model.points import block_signals, point_of
 from hwid_cli.records.model import FitOptions, StaticMap
 
+# Kinds whose break-points or edges are put where they matter.
+PLACED = ("piecewise_linear", "piecewise_constant")
 # Break-points of the fine maps from which the final ones are chosen, for each final one.
 _FINE_FACTOR = 3
 # Least distance of fine break-points, as a share of the range.
@@ -112,16 +119,16 @@ def finer(one: StaticMap, argument: np.ndarray) -> StaticMap:
     Parameters
     ----------
     one : StaticMap
-        Kinds other than piecewise linear come back as they are.
+        Kinds that are not placed come back as they are.
     argument : ndarray, shape (n,)
 
     Returns
     -------
     StaticMap
     """
-    if one.kind != "piecewise_linear" or not argument.min() < argument.max():
+    if one.kind not in PLACED or not argument.min() < argument.max():
         return one
-    old, _ = break_points_and_values(one)
+    old = _corners(one)
     points = np.union1d(old, _spread(argument, (_FINE_FACTOR - 1) * old.size))
     return _at(one, old, points, _LEAST_GAP * np.ptp(points), argument)
 
@@ -132,7 +139,7 @@ def cut(one: StaticMap, argument: np.ndarray) -> StaticMap:
     Parameters
     ----------
     one : StaticMap
-        Kinds other than piecewise linear come back as they are.
+        Kinds that are not placed come back as they are.
     argument : ndarray, shape (n,)
 
     Returns
@@ -140,9 +147,9 @@ def cut(one: StaticMap, argument: np.ndarray) -> StaticMap:
     StaticMap
         Segments of few samples stay whole.
     """
-    if one.kind != "piecewise_linear" or not argument.min() < argument.max():
+    if one.kind not in PLACED or not argument.min() < argument.max():
         return one
-    old, _ = break_points_and_values(one)
+    old = _corners(one)
     ordered = np.sort(argument)
     pieces = np.split(ordered, np.searchsorted(ordered, old))[1:-1]
     inner = [
@@ -154,6 +161,13 @@ def cut(one: StaticMap, argument: np.ndarray) -> StaticMap:
     return _at(one, old, points, _LEAST_CUT * np.ptp(argument), argument)
 
 
+def _corners(one: StaticMap) -> np.ndarray:
+    """Break-points or edges."""
+    if one.kind == "piecewise_constant":
+        return edges_and_levels(one)[0]
+    return break_points_and_values(one)[0]
+
+
 def _at(
     one: StaticMap,
     old: np.ndarray,
@@ -163,10 +177,24 @@ def _at(
 ) -> StaticMap:
     """Same map with more break-points; new ones that make segments of no samples fall."""
     apart = np.diff(points, prepend=-np.inf) > least_gap
+    domain = (float(argument.min()), float(argument.max()))
+    if one.kind == "piecewise_constant":
+        return with_edges(one, _between_samples(points[apart], argument, old), domain)
     points = np.union1d(old, points[apart])
     values = static_map.evaluate(one, points)
-    domain = (float(argument.min()), float(argument.max()))
     return StaticMap(one.kind, np.concatenate([points, values]), domain)
+
+
+def _between_samples(
+    edges: np.ndarray, argument: np.ndarray, old: np.ndarray
+) -> np.ndarray:
+    """Edges half way between neighbouring samples, and the old ones.
+
+    On a sample, rounding would decide on which side of the edge it lies.
+    """
+    known = np.unique(argument)
+    place = np.clip(np.searchsorted(known, edges), 1, known.size - 1)
+    return np.union1d(old, 0.5 * (known[place - 1] + known[place]))
 
 
 def _spread(argument: np.ndarray, count: int) -> np.ndarray:
@@ -187,7 +215,7 @@ def thinner(one: StaticMap, argument: np.ndarray, units: int) -> StaticMap:
     Parameters
     ----------
     one : StaticMap
-        Kinds other than piecewise linear come back as they are.
+        Kinds that are not placed come back as they are.
     argument : ndarray, shape (n,)
         What reaches the map; break-points near many samples weigh more.
     units : int
@@ -197,6 +225,11 @@ def thinner(one: StaticMap, argument: np.ndarray, units: int) -> StaticMap:
     -------
     StaticMap
     """
+    if one.kind == "piecewise_constant" and one.parameters.size > 2 * units:
+        cells = np.searchsorted(np.sort(argument), _corners(one))
+        weights = np.diff(cells, prepend=0, append=argument.size)
+        weights = weights + _WEIGHT_OF_SHAPE * argument.size
+        return with_fewer_levels(one, weights, units)
     count = units + N_ENDS
     if one.kind != "piecewise_linear" or one.parameters.size <= 2 * count:
         return one

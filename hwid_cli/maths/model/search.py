@@ -29,9 +29,11 @@ from hwid_cli.maths.model.race import LONG, SHORT, Rounds, race
 from hwid_cli.maths.model.relaxing import relaxed_search
 from hwid_cli.maths.model.robust import rejudged, renewed
 from hwid_cli.maths.model.second_search import (
+    FINE_MAP_POINTS,
     doubted_input_maps,
     leaves_structure,
     maps_anew,
+    with_break_points,
 )
 from hwid_cli.maths.model.starts import Start
 from hwid_cli.records.model import FitOptions
@@ -119,6 +121,7 @@ def nonlinear_search(
     if relaxed.cost < _WORTH_GOING_ON * best.cost:
         best = _best([best, finish(relaxed, experiments, options)])
     best = _doubted(best, experiments, options, starts)
+    best = _from_break_points(best, experiments, options, starts, linear)
     return _not_worse_than(linear, best, experiments, options)
 
 
@@ -143,6 +146,30 @@ def _doubted(
         if not gained:
             break
     return _refined(best, experiments, options)
+
+
+def _from_break_points(
+    best: Search,
+    experiments: Sequence[Experiment],
+    options: FitOptions,
+    starts: Sequence[Start],
+    linear: Search,
+) -> Search:
+    """The best so far, or what comes of piecewise linear maps where it is not noise.
+
+    Those are placed where maps bend, which other kinds cannot find by themselves.
+    """
+    bent = with_break_points(options)
+    if bent == options or not leaves_structure(best.candidate, experiments):
+        return best
+    found = nonlinear_search(experiments, bent, starts, linear)
+    if found.cost > _WORTH_DOUBTING * best.cost:
+        return best
+    entered = maps_anew(found.candidate, experiments, FINE_MAP_POINTS)
+    placed = place(
+        race(experiments, entered, options, rounds=LONG), experiments, options
+    )
+    return _best([best, finish(_best(placed), experiments, options)])
 
 
 def _refined(

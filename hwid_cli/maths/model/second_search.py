@@ -19,6 +19,7 @@ from hwid_cli.maths.model import static_map
 from hwid_cli.maths.model.candidates import Candidate, Experiment
 from hwid_cli.maths.model.distinct import borne_residuals
 from hwid_cli.maths.model.starts import Start
+from hwid_cli.records.model import FitOptions
 
 # Correlation of neighbouring residuals, and mean fourth power over squared mean square
 # (3 for normal noise), from which on residuals are not taken for noise.
@@ -28,8 +29,11 @@ _COLOURED, _PEAKED = 0.5, 4.0
 _CLOSE = 0.005
 # The same share from which on next to nothing has been found, whatever the error's shape.
 _FAR = 0.5
-# Values by which a start takes over an input map.
-_MAP_POINTS = 12
+# Break-points of maps whose shape other kinds take over.
+_BREAK_POINTS = 15
+_NOT_REPLACED = ("none", "piecewise_linear")
+# Values by which a start takes over an input map, and an input map of another kind.
+_MAP_POINTS, FINE_MAP_POINTS = 12, 200
 
 
 def leaves_structure(candidate: Candidate, experiments: Sequence[Experiment]) -> bool:
@@ -78,13 +82,19 @@ def doubted_input_maps(
     return [_straight(one, experiments) for one in starts if one.is_expanded]
 
 
-def maps_anew(candidate: Candidate, experiments: Sequence[Experiment]) -> list[Start]:
+def maps_anew(
+    candidate: Candidate,
+    experiments: Sequence[Experiment],
+    n_points: int = _MAP_POINTS,
+) -> list[Start]:
     """The block that a search found, to find maps around it again.
 
     Parameters
     ----------
     candidate : Candidate
     experiments : sequence of Experiment
+    n_points : int, [-]
+        Values by which a start takes over the input map.
 
     Returns
     -------
@@ -92,7 +102,7 @@ def maps_anew(candidate: Candidate, experiments: Sequence[Experiment]) -> list[S
         With its input map at equal distances, and without.
     """
     model = candidate.model
-    points = np.linspace(*_range(experiments), _MAP_POINTS)
+    points = np.linspace(*_range(experiments), n_points)
     found = Start(
         model.numerator,
         model.denominator,
@@ -104,6 +114,29 @@ def maps_anew(candidate: Candidate, experiments: Sequence[Experiment]) -> list[S
         delay=model.delay,
     )
     return [found, _straight(found, experiments)]
+
+
+def with_break_points(options: FitOptions) -> FitOptions:
+    """Options of a model with piecewise linear maps in the place of others.
+
+    Parameters
+    ----------
+    options : FitOptions
+
+    Returns
+    -------
+    FitOptions
+        The same where no map is of another kind.
+    """
+    if options.input_map not in _NOT_REPLACED:
+        options = replace(
+            options, input_map="piecewise_linear", input_units=_BREAK_POINTS
+        )
+    if options.output_map not in _NOT_REPLACED:
+        options = replace(
+            options, output_map="piecewise_linear", output_units=_BREAK_POINTS
+        )
+    return options
 
 
 def _straight(start: Start, experiments: Sequence[Experiment]) -> Start:

@@ -2,6 +2,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from hwid_cli.maths.model.candidates import Candidate, Experiment
 from hwid_cli.maths.model.fit import fit
@@ -10,9 +11,16 @@ from hwid_cli.maths.model.second_search import (
     doubted_input_maps,
     leaves_structure,
     maps_anew,
+    with_break_points,
 )
 from hwid_cli.maths.model.starts import Start
-from hwid_cli.records.model import HammersteinWiener, StaticMap
+from hwid_cli.records.model import (
+    FitOptions,
+    HammersteinWiener,
+    Orders,
+    StaticMap,
+)
+from hwid_cli.records.recordings import Recording
 from tests.benchmarks.bench_wide import true_model, wide_plant
 
 NONE = StaticMap("none", np.zeros(0))
@@ -143,3 +151,26 @@ def test_the_shape_of_a_map_is_not_lost_beside_its_offset(seed):
     _, values = break_points_and_values(found)
 
     assert abs(np.mean(values)) < 2.0 * np.ptp(values)
+
+
+@pytest.mark.parametrize("seed", [2, 4])
+def test_maps_of_other_kinds_begin_with_those_that_break_points_found(seed):
+    # Without that these end at ten times the noise: the output folds.
+    rng = np.random.default_rng(seed)
+    u = np.repeat(rng.uniform(-3.0, 3.0, 80), rng.integers(3, 25, 80))[:1000]
+    w = u - np.clip(u, -0.4, 0.4)
+    y = np.abs(lfilter([0.0, 0.05, 0.03], [1.0, -1.6, 0.68], w))
+    noise = 0.01 * np.std(y)
+    recording = Recording("r", u, y + noise * rng.standard_normal(u.size), 1e-3)
+    kinds = FitOptions(input_map="dead_zone", output_map="cubic_spline", output_units=7)
+    result = fit([recording], Orders(2, 2, 1), kinds)
+    assert result.model.output_map.kind == "cubic_spline"
+    assert result.rmsd < 1.1 * noise
+
+
+def test_break_points_stand_for_all_other_kinds_of_maps():
+    asked = FitOptions(input_map="saturation", output_map="none", units=5)
+    bent = with_break_points(asked)
+    assert (bent.input_map, bent.output_map) == ("piecewise_linear", "none")
+    assert bent.of_input.units > 10
+    assert with_break_points(FitOptions(units=5)) == FitOptions(units=5)

@@ -28,6 +28,10 @@ from hwid_cli.records.maps import MapOptions, StaticMap
 # Half width of a ramp as a share of the narrower cell beside it. Wide ramps blur where an
 # edge is, narrow ones do not feel an edge that is far off; measured between 0.1 and 0.5.
 _RAMP_SHARE = 0.15
+# Places for an edge of a start, for each level.
+_PIECES = 12
+# Slope, as a share of a curve's range, that is added where pieces are chosen.
+_TILT = 1e-3
 
 
 def edges_and_levels(one: StaticMap) -> tuple[np.ndarray, np.ndarray]:
@@ -96,10 +100,105 @@ def _differentiate(
 def _starts(
     options: MapOptions, lowest: float, highest: float, shape: Shape
 ) -> tuple[StaticMap, ...]:
-    ends = np.linspace(lowest, highest, options.units + 1)
-    levels = shape(0.5 * (ends[1:] + ends[:-1]))
-    parameters = np.concatenate([ends[1:-1], levels])
+    ends = np.linspace(lowest, highest, _PIECES * options.units + 1)
+    values = shape(0.5 * (ends[1:] + ends[:-1]))
+    cuts = nearest_steps(values, options.units)
+    levels = [np.mean(piece) for piece in np.split(values, cuts)]
+    parameters = np.concatenate([ends[cuts], levels])
     return (StaticMap("piecewise_constant", parameters, (lowest, highest)),)
+
+
+def nearest_steps(
+    values: np.ndarray, count: int, weights: np.ndarray | None = None
+) -> np.ndarray:
+    """Cut a curve so that its pieces' means come closest to it.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+    count : int
+        Pieces, at most n.
+    weights : ndarray, shape (n,), optional
+        Positive; of the squared distances.
+
+    Returns
+    -------
+    ndarray of int, shape (count - 1,)
+        First value of each piece but the first; equal pieces for a straight line.
+
+    References
+    ----------
+    Bellman (1961), On the approximation of curves by line segments using dynamic
+    programming.
+    """
+    n = values.size
+    # Where a curve asks for fewer pieces, a slight slope spreads the others.
+    values = values + _TILT * (np.ptp(values) or 1.0) * np.linspace(0.0, 1.0, n)
+    weights = np.ones(n) if weights is None else weights
+    weight, sums, squares = (
+        np.concatenate([[0.0], np.cumsum(weights * values**power)])
+        for power in (0, 1, 2)
+    )
+    # Of a piece from one place (row) up to another (column).
+    inside = np.tri(n + 1, k=-1).T > 0
+    size = np.where(inside, weight - weight[:, None], 1.0)
+    error = squares - squares[:, None] - (sums - sums[:, None]) ** 2 / size
+    error[~inside] = np.inf
+    least, best = error[0], []
+    for _ in range(count - 1):
+        through = least[:, None] + error
+        best.append(np.argmin(through, axis=0))
+        least = np.min(through, axis=0)
+    cuts, end = [], n
+    for step in reversed(best):
+        end = int(step[end])
+        cuts.append(end)
+    return np.array(cuts[::-1], dtype=int)
+
+
+def with_edges(
+    one: StaticMap, edges: np.ndarray, domain: tuple[float, float]
+) -> StaticMap:
+    """Same map with more edges.
+
+    Parameters
+    ----------
+    one : StaticMap
+    edges : ndarray, shape (n,)
+        Rising; those of the map among them.
+    domain : tuple of float
+
+    Returns
+    -------
+    StaticMap
+    """
+    levels = _evaluate(one, np.concatenate([edges[:1] - 1.0, edges]))
+    return StaticMap(one.kind, np.concatenate([edges, levels]), domain)
+
+
+def with_fewer_levels(one: StaticMap, weights: np.ndarray, count: int) -> StaticMap:
+    """Map with so many levels, the nearest to those that it has.
+
+    Parameters
+    ----------
+    one : StaticMap
+    weights : ndarray, shape (units,)
+        Of its levels; positive.
+    count : int
+
+    Returns
+    -------
+    StaticMap
+    """
+    edges, levels = edges_and_levels(one)
+    cuts = nearest_steps(levels, count, weights)
+    means = [
+        np.average(piece, weights=weight)
+        for piece, weight in zip(
+            np.split(levels, cuts), np.split(weights, cuts), strict=True
+        )
+    ]
+    return replace(one, parameters=np.concatenate([edges[cuts - 1], means]))
 
 
 def _names(one: StaticMap) -> tuple[str, ...]:
