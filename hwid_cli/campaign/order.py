@@ -80,6 +80,7 @@ def recommend_orders(
         nk_role=crossval.nk_role,
         nf=orders.nf,
         unit=crossval.unit,
+        tried_delays=fits[0].options.delays,
     )
 
 

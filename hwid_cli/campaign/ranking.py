@@ -75,7 +75,7 @@ def score_models(
         for nk in crossval.nk
     ]
     scores = [
-        ModelScore(name, nb, nk, rmsd=fit.rmsd, coverage=int(count))
+        ModelScore(name, nb, nk, fit.rmsd, int(count), fit.orders)
         for (name, nb, nk), fit, count in zip(places, fits, covered, strict=True)
     ]
     return tuple(sorted(scores, key=_widest_first))

@@ -121,8 +121,8 @@ def show_coverage(
 
     scores = score_models(identified.fits, crossval)
     best = best_of_each(scores, crossval.identified_on)
-    rule, nf = session.experiment.fit.initial_state, session.experiment.orders.nf
-    wide = coverage_table(scores, crossval, initial_state=rule, nf=nf)
+    rule = session.experiment.fit.initial_state
+    wide = coverage_table(scores, crossval, initial_state=rule)
     say(session, f"\n{wide}")
     each = cross_table(best, crossval, initial_state=rule, width=screen_width())
     say(session, f"\n{each}")

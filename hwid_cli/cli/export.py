@@ -69,17 +69,15 @@ def chosen_model(session: "Session", asked: str) -> "Exported":
     """
     from hwid_cli.campaign.export import SIMULATION, export_model, find_fit
     from hwid_cli.files.recording_paths import recordings_options
-    from hwid_cli.report.tables import thesis_name
+    from hwid_cli.report.tables import thesis_name_of
 
     if asked == SIMULATION:
         return _simulation(session)
     named, stage = _named_fits(session, asked)
-    nk_role = session.experiment.orders.nk_role
-    titles = {}
-    for name, fit in named.items():
-        on, nb, nk = name.rsplit("/", 2)
-        nf = None if nk_role == "poles" else fit.orders.nf
-        titles[thesis_name(on, int(nb), int(nk), nf=nf)] = name
+    titles = {
+        thesis_name_of(name.rsplit("/", 2)[0], fit.orders): name
+        for name, fit in named.items()
+    }
     name, fit = find_fit(asked, named, titles)
     return export_model(
         fit,

@@ -183,7 +183,11 @@ def show_final_test(session: "Session", final: "FinalTest") -> None:
                 final, trend, initial_state=rule, width=width
             ),
             final_test_tables.chain_coverage_table(
-                final, trend, initial_state=rule, nf=session.experiment.orders.nf
+                final,
+                trend,
+                initial_state=rule,
+                nf=session.experiment.orders.nf,
+                has_names=not session.experiment.fit.delays,
             ),
             final_test_tables.chain_tables(
                 final, trend, kinds, initial_state=rule, width=width

@@ -109,6 +109,8 @@ class OrderAdvice:
         Number of poles where ``nk`` is the delay.
     unit : str
         Of the output.
+    tried_delays : tuple of int, [samples]
+        Delays of which every fit takes the best; empty where the grid says the delay.
     """
 
     overall: OrderChoice
@@ -122,6 +124,7 @@ class OrderAdvice:
     nk_role: str
     nf: int | None
     unit: str
+    tried_delays: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)

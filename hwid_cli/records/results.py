@@ -4,6 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hwid_cli.records.linear_block import Orders
+
 
 @dataclass(frozen=True, eq=False)
 class CrossValidation:
@@ -64,6 +66,8 @@ class ModelScore:
         On its own recording.
     coverage : int, [-]
         Recordings on which its RMSD lies below the threshold.
+    orders : Orders
+        Those of the model; its delay may be another one than the grid's.
     """
 
     identified_on: str
@@ -71,3 +75,4 @@ class ModelScore:
     nk: int
     rmsd: float
     coverage: int
+    orders: Orders

@@ -95,6 +95,7 @@ def chain_coverage_table(
     *,
     initial_state: str,
     nf: int | None = None,
+    has_names: bool = True,
 ) -> str:
     """Show how many recordings the chain covers, level by level (as T3.4.1-1).
 
@@ -106,13 +107,15 @@ def chain_coverage_table(
         Rule of the fits.
     nf : int or None, [-]
         As for ``tables.thesis_name``.
+    has_names : bool
+        Whether the thesis's names, which hold a delay, can be told from the grid.
 
     Returns
     -------
     str
     """
     rows = [
-        (model, *map(str, counts), str(total), _thesis_name(model, nf))
+        (model, *map(str, counts), str(total), *_names(model, nf, has_names=has_names))
         for model, counts, total in zip(
             trend.models, trend.coverage, trend.total, strict=True
         )
@@ -122,13 +125,15 @@ def chain_coverage_table(
         "\n(form of T3.4.1-1 and T3.4.2-1)\n"
         f"{simulation_words(initial_state, is_validation=True)}"
     )
-    heads = ("model", *trend.kinds, "all", "thesis's name")
-    return text_table(title, heads, rows, text_columns=(0, len(heads) - 1))
+    names = ("thesis's name",) if has_names else ()
+    heads = ("model", *trend.kinds, "all", *names)
+    last = (len(heads) - 1,) if has_names else ()
+    return text_table(title, heads, rows, text_columns=(0, *last))
 
 
-def _thesis_name(model: str, nf: int | None) -> str:
+def _names(model: str, nf: int | None, *, has_names: bool) -> tuple[str, ...]:
     identified_on, nb, nk = model.rsplit("/", 2)
-    return thesis_name(identified_on, int(nb), int(nk), nf)
+    return (thesis_name(identified_on, int(nb), int(nk), nf),) if has_names else ()
 
 
 def chain_tables(

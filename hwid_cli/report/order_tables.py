@@ -95,6 +95,8 @@ def _pair(nb: int, nk: int) -> str:
 
 def _orders(nb: int, nk: int, advice: OrderAdvice) -> str:
     """Orders in the form of the toolboxes."""
+    if advice.tried_delays:
+        return f"[{nb} {nk} nk], nk of fit.delays"
     if advice.nk_role == "poles":
         return f"[{nb} {nk} {_GRID_DELAY}]"
     return f"[{nb} {advice.nf} {nk}]"
@@ -156,6 +158,8 @@ def _delays(advice: OrderAdvice) -> str:
     )
     if advice.nk_role == "delay":
         return f"{text} The recommended delay is {advice.overall.nk}."
+    if advice.tried_delays:
+        return f"{text} {_tried(advice)}"
     if advice.delay > _GRID_DELAY:
         text += (
             f" The grid takes {_GRID_DELAY}; leading coefficients of B make up for more, "
@@ -163,6 +167,15 @@ def _delays(advice: OrderAdvice) -> str:
         )
     if advice.delay < _GRID_DELAY:
         text += f" The grid takes {_GRID_DELAY}: set orders.nk_role: delay to try 0."
+    return text
+
+
+def _tried(advice: OrderAdvice) -> str:
+    """What fits have tried already, and whether the data allow more."""
+    longest = max(advice.tried_delays)
+    text = f"Every fit tries {', '.join(map(str, advice.tried_delays))} (fit.delays)."
+    if advice.delay > longest:
+        text += f" The data allow longer ones than {longest}."
     return text
 
 

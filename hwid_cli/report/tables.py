@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from hwid_cli.records.linear_block import Orders
 from hwid_cli.records.model import Fit
 from hwid_cli.records.recordings import CalibrationLog
 from hwid_cli.records.results import CrossValidation, ModelScore
@@ -66,6 +67,22 @@ def thesis_name(identified_on: str, nb: int, nk: int, nf: int | None = None) -> 
         )
     orders = f"{nb}-{nk}-1" if nf is None else f"{nb}-{nf}-{nk}"
     return f"NLHW-{who}-{orders}"
+
+
+def thesis_name_of(identified_on: str, orders: Orders) -> str:
+    """Name of a model in the form of the published tables, by its orders.
+
+    Parameters
+    ----------
+    identified_on : str
+    orders : Orders
+        With the delay that was found.
+
+    Returns
+    -------
+    str
+    """
+    return thesis_name(identified_on, orders.nb, orders.nk, orders.nf)
 
 
 def calibration_table(logs: Sequence[CalibrationLog]) -> str:
@@ -154,7 +171,7 @@ def best_models_table(
             rows.append(
                 (
                     f"{fit.name}/{fit.orders.nb}/{nk}",
-                    thesis_name(fit.name, fit.orders.nb, fit.orders.nk, fit.orders.nf),
+                    thesis_name_of(fit.name, fit.orders),
                     number(fit.rmsd),
                     _percent(fit.fit_percent),
                     number(fit.linear_rmsd),
@@ -189,7 +206,6 @@ def coverage_table(
     crossval: CrossValidation,
     *,
     initial_state: str,
-    nf: int | None = None,
     count: int = 15,
 ) -> str:
     """Show the models that cover the most recordings (as T3.2.2.2-2).
@@ -201,8 +217,6 @@ def coverage_table(
     crossval : CrossValidation
     initial_state : str
         Rule of the fits.
-    nf : int or None, [-]
-        As for ``thesis_name``.
     count : int, [-]
         How many models to show.
 
@@ -217,7 +231,7 @@ def coverage_table(
             str(score.nk),
             f"{score.coverage} of {len(crossval.validated_on)}",
             number(score.rmsd),
-            thesis_name(score.identified_on, score.nb, score.nk, nf),
+            thesis_name_of(score.identified_on, score.orders),
         )
         for score in scores[:count]
     ]

@@ -8,6 +8,7 @@ from hwid_cli.files.result_tables import (
     write_crossval_csv,
     write_table_csv,
 )
+from hwid_cli.records.model import Orders
 from hwid_cli.records.results import CrossValidation, ModelScore
 
 
@@ -34,7 +35,10 @@ def test_crossval_table_has_a_row_for_each_model_and_judge(tmp_path):
 
 
 def test_coverage_table_keeps_the_order_of_the_scores(tmp_path):
-    scores = [ModelScore("b", 2, 3, 0.1, coverage=9), ModelScore("a", 1, 1, 0.2, 4)]
+    scores = [
+        ModelScore("b", 2, 3, 0.1, 9, Orders(2, 3, 1)),
+        ModelScore("a", 1, 1, 0.2, 4, Orders(1, 1, 1)),
+    ]
     write_coverage_csv(tmp_path / "coverage.csv", scores, of=15)
     assert rows_of(tmp_path / "coverage.csv") == [
         ["identified_on", "nb", "nk", "coverage", "of"],

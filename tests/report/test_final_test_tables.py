@@ -68,6 +68,11 @@ def test_the_chain_covers_kind_by_kind():
     assert widest_line(text) <= 80
     delay = chain_coverage_table(FINAL, TREND, nf=2, initial_state="estimated")
     assert delay.endswith("NLHW-Step-6-9-1-8-7-2-7")
+    bare = chain_coverage_table(
+        FINAL, TREND, has_names=False, initial_state="estimated"
+    )
+    assert "NLHW" not in bare
+    assert bare.splitlines()[-1].split()[0] == WINNER
 
 
 def test_the_chain_is_shown_on_every_recording_once():

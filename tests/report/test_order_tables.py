@@ -115,3 +115,12 @@ def test_what_the_data_do_not_show_is_said():
     assert "no output answers its input" in text
     assert "no hint of their number" in text
     assert "BIC" not in text
+
+
+def test_delays_that_every_fit_tries_are_not_asked_for_again():
+    tried = said(tried_delays=(1, 2, 3), delay=2)
+    assert "orders [2 3 nk], nk of fit.delays" in tried
+    assert "Every fit tries 1, 2, 3 (fit.delays)." in tried
+    assert "The grid takes" not in tried
+    assert "allow longer ones than 3" in said(tried_delays=(1, 3), delay=5)
+    assert "allow longer" not in tried

@@ -40,7 +40,9 @@ CROSSVAL = CrossValidation(
     unit="m",
     threshold=0.01,
 )
-SCORES = tuple(ModelScore(name, 10, 10, 1.234e-4, 7) for name in NAMES)
+SCORES = tuple(
+    ModelScore(name, 10, 10, 1.234e-4, 7, Orders(10, 10, 1)) for name in NAMES
+)
 
 
 def assert_fits_the_screen(text):
@@ -102,6 +104,12 @@ def test_no_dash_of_a_dimensionless_output_stands_behind_a_number():
     assert re.search(r"-0\.288 to 0\.129  +0 to 2 V", recordings_table([facts]))
 
 
+def test_the_delay_that_was_found_stands_in_the_name():
+    found = [replace(SCORES[0], orders=Orders(10, 10, 3))]
+    text = coverage_table(found, CROSSVAL, initial_state="estimated")
+    assert text.splitlines()[-1].endswith("-10-10-3")
+
+
 def test_the_coverage_table_shows_the_first_models_only():
     text = coverage_table(SCORES, CROSSVAL, count=4, initial_state="estimated")
 
@@ -152,7 +160,7 @@ def test_long_names_take_more_blocks_and_are_never_cut():
         unit="rad",
         threshold=0.1,
     )
-    scores = [ModelScore(name, 1, 1, 1.0, 0) for name in names]
+    scores = [ModelScore(name, 1, 1, 1.0, 0, Orders(1, 1, 1)) for name in names]
     text = cross_table(scores, crossval, initial_state="estimated")
 
     assert all(f" {name}" in text for name in names)
