@@ -19,7 +19,7 @@ from hwid_cli.records.experiment import RECIPE_STEPS, CalibrateOptions
 from hwid_cli.records.recordings import CalibrationLog, RawRecording, Recording
 
 STAGE = "calibrate"
-STAGE_VERSION = 1
+STAGE_VERSION = 2
 
 # Two passes settle nearly every recording (the second one changes nothing); noise at a
 # threshold may take one or two more.

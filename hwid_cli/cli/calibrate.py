@@ -98,12 +98,19 @@ def _check_names(session: "Session", raws: "list[RawRecording]") -> None:
 
 
 def _what_changed(session: "Session", calibrated: "Calibrated") -> str:
-    if session.experiment.calibrate is None:
+    options = session.experiment.calibrate
+    if options is None:
         return "left as they are (no calibrate: section)"
+    kinds = {recording.kind for recording in calibrated.recordings}
+    bare = sorted(kind for kind in kinds if not getattr(options, kind))
+    left = f"calibrate: has no recipe for {' and '.join(bare)}"
+    if len(bare) == len(kinds):
+        return f"left as they are, not repaired either ({left})"
     n_repaired = sum(
         len(log.repaired_input) + len(log.repaired_output) for log in calibrated.logs
     )
-    return f"{n_repaired} damaged samples replaced"
+    changed = f"{n_repaired} damaged samples replaced"
+    return f"{changed}, some left as they are ({left})" if bare else changed
 
 
 def find_measurements(session: "Session") -> None:

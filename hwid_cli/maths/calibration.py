@@ -94,7 +94,12 @@ def find_damaged(values: np.ndarray) -> np.ndarray:
     agree = disagreement < np.maximum(
         NEIGHBOURS_AGREE * beyond, USUAL_DISAGREEMENT * _local_median(disagreement)
     )
-    return np.flatnonzero((error > limit) & (beyond > limit) & agree)
+    # Two equal samples side by side are no single one: a short level between others.
+    steps = np.abs(np.diff(values))
+    alone = np.zeros(values.size)
+    alone[1:-1] = np.minimum(steps[:-1], steps[1:])
+    stands_alone = alone > NEIGHBOURS_AGREE * beyond
+    return np.flatnonzero((error > limit) & (beyond > limit) & agree & stands_alone)
 
 
 def _local_median(values: np.ndarray) -> np.ndarray:

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from hwid_cli.campaign import calibrate
 from hwid_cli.campaign.calibrate import calibrate_all, calibration_key
 from hwid_cli.records.experiment import CalibrateOptions
 from hwid_cli.records.recordings import RawRecording
@@ -69,7 +70,8 @@ def test_recordings_without_a_reference_stay_without():
     assert cut.reference is None
 
 
-def test_the_key_of_recordings_without_a_reference_is_that_of_earlier_versions():
+def test_a_reference_that_is_not_there_is_no_part_of_the_key(monkeypatch):
+    monkeypatch.setattr(calibrate, "STAGE_VERSION", 1)
     raws = [
         RawRecording(
             "r1",

@@ -61,6 +61,10 @@ def test_without_a_recipe_recordings_are_left_as_they_are_and_not_drawn(
     assert "1 recordings done, left as they are" in result.stdout
     assert not (out / "figures").exists()
 
+    path.write_text(f"{path.read_text()}calibrate: {{repair: true, step: [cut]}}\n")
+    result = hwid("calibrate", path=path)
+    assert "not repaired either (calibrate: has no recipe for other)" in result.stdout
+
 
 def test_a_step_that_cannot_work_names_the_recording(hwid, edit):
     edit("step: [cut, output_offset]", "step: [cut, output_offset]\n  rest_samples: 5")

@@ -73,6 +73,15 @@ def test_held_random_levels_are_not_damage():
         assert find_damaged(held_levels(2000 // hold, hold, seed=hold)).size == 0
 
 
+@pytest.mark.parametrize("length", [2, 3, 4, 8])
+def test_a_short_level_between_others_is_not_damage(length):
+    rng = np.random.default_rng(6)
+    levels = np.tile([-2.6, -1.7, -2.5, 2.4], 40) + 0.01 * rng.standard_normal(160)
+    lengths = np.full(160, 25)
+    lengths[1::4] = length
+    assert find_damaged(np.repeat(levels, lengths)).size == 0
+
+
 def test_a_binary_signal_that_may_switch_at_every_sample_is_not_damage():
     values = np.where(np.random.default_rng(2).random(3000) < 0.5, -1.0, 1.0)
 
