@@ -106,8 +106,12 @@ def show_fits(session: "Session", identified: Identified) -> None:
     from hwid_cli.campaign.ranking import best_fits, count_statuses
     from hwid_cli.campaign.residuals import own_residuals
     from hwid_cli.cli.session import say
+    from hwid_cli.report.fit_tables import (
+        best_models_table,
+        failure_lines,
+        status_line,
+    )
     from hwid_cli.report.residual_tables import residual_table
-    from hwid_cli.report.tables import best_models_table, status_line
 
     if session.is_quiet:
         return
@@ -123,3 +127,6 @@ def show_fits(session: "Session", identified: Identified) -> None:
         rule = session.experiment.fit.initial_state
         say(session, f"\n{residual_table(left, rule)}")
     say(session, f"\n{status_line(count_statuses(identified.fits))}")
+    reasons = failure_lines(identified.fits)
+    if reasons:
+        say(session, reasons)

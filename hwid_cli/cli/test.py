@@ -169,7 +169,7 @@ def show_final_test(session: "Session", final: "FinalTest") -> None:
     from hwid_cli.campaign.test import chain_trend
     from hwid_cli.cli.session import say, screen_width
     from hwid_cli.files.results import read_calibrated
-    from hwid_cli.report import assignment_tables, final_test_tables
+    from hwid_cli.report import assignment_tables, coverage_tables, final_test_tables
 
     width = screen_width()
     rule = session.experiment.fit.initial_state
@@ -194,8 +194,8 @@ def show_final_test(session: "Session", final: "FinalTest") -> None:
             ),
         ]
     parts += [
-        final_test_tables.coverage_matrix_table(final, initial_state=rule, width=width),
-        final_test_tables.gaps_text(final, width=width),
+        coverage_tables.coverage_matrix_table(final, initial_state=rule, width=width),
+        coverage_tables.gaps_text(final, width=width),
         assignment_tables.smallest_set_table(final, initial_state=rule, width=width),
         assignment_tables.prediction_table(final, initial_state=rule),
     ]

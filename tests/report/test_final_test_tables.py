@@ -6,12 +6,11 @@ import pytest
 
 from hwid_cli.campaign.test import chain_trend
 from hwid_cli.records.groups import ChainTrend
+from hwid_cli.report.coverage_tables import coverage_matrix_table, gaps_text
 from hwid_cli.report.final_test_tables import (
     chain_coverage_table,
     chain_on_tests_table,
     chain_tables,
-    coverage_matrix_table,
-    gaps_text,
     trend_line,
 )
 from tests.campaign.final_test_examples import KINDS, example_final_test

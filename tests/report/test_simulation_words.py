@@ -5,12 +5,13 @@ from dataclasses import replace
 import pytest
 
 from hwid_cli.report.assignment_tables import prediction_table, smallest_set_table
+from hwid_cli.report.coverage_tables import coverage_matrix_table
 from hwid_cli.report.final_test_tables import (
     chain_coverage_table,
     chain_on_tests_table,
     chain_tables,
-    coverage_matrix_table,
 )
+from hwid_cli.report.fit_tables import best_models_table
 from hwid_cli.report.group_tables import chain_table, join_table, levels_table
 from hwid_cli.report.page import Text
 from hwid_cli.report.sections.final_test import (
@@ -28,7 +29,7 @@ from hwid_cli.report.sections.recordings import (
 from hwid_cli.report.sections.residuals import residuals_section
 from hwid_cli.report.sections.summary import summary_section
 from hwid_cli.report.simulation_words import simulation_words
-from hwid_cli.report.tables import best_models_table, coverage_table, cross_table
+from hwid_cli.report.tables import coverage_table, cross_table
 from tests.report.report_examples import fit, group_search
 from tests.report.test_assignment_tables import FINAL as ASSIGNED
 from tests.report.test_final_test_tables import FINAL, KINDS, TREND

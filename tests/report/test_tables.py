@@ -16,12 +16,15 @@ from hwid_cli.records.model import (
 from hwid_cli.records.recordings import CalibrationLog
 from hwid_cli.records.results import CrossValidation, ModelScore
 from hwid_cli.report.check_tables import recordings_table
-from hwid_cli.report.tables import (
+from hwid_cli.report.fit_tables import (
     best_models_table,
+    failure_lines,
+    status_line,
+)
+from hwid_cli.report.tables import (
     calibration_table,
     coverage_table,
     cross_table,
-    status_line,
     thesis_name,
 )
 
@@ -205,3 +208,18 @@ def test_the_status_line_counts_in_words():
 )
 def test_models_are_named_as_in_the_published_tables(name, expected):
     assert thesis_name(name, 3, 7) == expected
+
+
+def test_failed_fits_say_why_each_reason_once():
+    failed = Fit(("a",), Orders(1, 1, 1), FitOptions(), None, "failed", "too short")
+    other = replace(failed, message="the input is constant at 3")
+    done = Fit(("a",), Orders(1, 1, 1), FitOptions(), MODEL, "converged", "")
+
+    assert failure_lines([failed, done, other, failed]).splitlines() == [
+        "Failed, 2 fits: too short",
+        "Failed, 1 fit: the input is constant at 3",
+    ]
+    assert failure_lines([done]) == ""
+    many = [replace(failed, message=str(number)) for number in range(5)]
+    assert failure_lines(many).splitlines()[-1].startswith("More reasons: results.h5")
+    assert best_models_table([], "m") == "No fit gave a model."

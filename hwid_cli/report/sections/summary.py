@@ -1,6 +1,7 @@
 """What was run on what, and what came out, in a few sentences."""
 
 from hwid_cli.records.report import ChainOnTests, ReportContents
+from hwid_cli.report.fit_tables import status_line
 from hwid_cli.report.page import Block, Cell, Code, Folded, Section, Table, Text
 from hwid_cli.report.sections.words import (
     NOTHING_COVERED,
@@ -9,7 +10,6 @@ from hwid_cli.report.sections.words import (
     simulation_note,
     with_unit,
 )
-from hwid_cli.report.tables import status_line
 from hwid_cli.report.text_table import MISSING
 
 # Characters of a hash that tell files and runs apart for the eye.

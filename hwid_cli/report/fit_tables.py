@@ -1,0 +1,130 @@
+"""The fits of single recordings as text: the best ones, and how all ended."""
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from hwid_cli.records.model import Fit
+from hwid_cli.report.fold_words import folds_note
+from hwid_cli.report.simulation_words import simulation_words
+from hwid_cli.report.tables import thesis_name_of
+from hwid_cli.report.text_table import MISSING, number, text_table
+
+# Words for the statuses of fits.
+_STATUS_WORDS = {
+    "converged": "converged",
+    "iteration_limit": "stopped at the iteration limit",
+    "stalled": "stalled",
+    "failed": "failed",
+}
+# Reasons of failed fits that are shown, the most frequent ones.
+_SHOWN_REASONS = 3
+
+
+def best_models_table(
+    best: Sequence[Sequence[Fit]], unit: str, *, nk_is_delay: bool = False
+) -> str:
+    """Show the best models of each recording on that recording (as T3.2.2-1).
+
+    Parameters
+    ----------
+    best : sequence of sequence of Fit
+        As ``ranking.best_fits`` gives them.
+    unit : str
+        Of the output.
+    nk_is_delay : bool
+        Whether the grid's second axis is the delay.
+
+    Returns
+    -------
+    str
+    """
+    rows = []
+    for group in best:
+        for fit in group:
+            nk = fit.orders.nk if nk_is_delay else fit.orders.nf
+            rows.append(
+                (
+                    f"{fit.name}/{fit.orders.nb}/{nk}",
+                    thesis_name_of(fit.name, fit.orders),
+                    number(fit.rmsd),
+                    _percent(fit.fit_percent),
+                    number(fit.linear_rmsd),
+                    str(fit.information.n_parameters or MISSING),
+                    _criterion(fit.information.bic),
+                )
+            )
+    if not rows:
+        return "No fit gave a model."
+    heads = (
+        "model",
+        "thesis's name",
+        "RMSD",
+        "fit %",
+        "linear RMSD",
+        "par.",
+        "BIC",
+    )
+    started = sorted({fit.options.initial_state for group in best for fit in group})
+    title = (
+        f"Best models of each recording, RMSD [{unit}] on that recording; beside it the "
+        "best\nlinear output-error model of the same orders, the parameters that the "
+        "data\ndetermine, and BIC (form of T3.2.2-1)"
+    )
+    for one in started:
+        title += f"\n{simulation_words(one, is_validation=False)}"
+    table = text_table(title, heads, rows, text_columns=(0, 1))
+    note = folds_note([fit for group in best for fit in group], nk_is_delay=nk_is_delay)
+    return f"{table}\n{note}" if note else table
+
+
+def status_line(counts: Mapping[str, int]) -> str:
+    """Say how the fits ended.
+
+    Parameters
+    ----------
+    counts : mapping of str to int
+        As ``ranking.count_statuses`` gives them.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> status_line({"converged": 98, "failed": 2})
+    'Fits: 98 converged, 2 failed'
+    """
+    parts = [f"{n} {_STATUS_WORDS.get(status, status)}" for status, n in counts.items()]
+    return f"Fits: {', '.join(parts) or 'none'}"
+
+
+def failure_lines(fits: Sequence[Fit]) -> str:
+    """Say why fits failed, each reason once.
+
+    Parameters
+    ----------
+    fits : sequence of Fit
+
+    Returns
+    -------
+    str
+        A line for each of the most frequent reasons; empty where none failed.
+    """
+    counts = Counter(fit.message for fit in fits if fit.status == "failed")
+    lines = [
+        f"Failed, {count} fit{'s' * (count != 1)}: {reason}"
+        for reason, count in counts.most_common(_SHOWN_REASONS)
+    ]
+    if len(counts) > _SHOWN_REASONS:
+        lines.append("More reasons: results.h5:/identify/fit/message")
+    return "\n".join(lines)
+
+
+def _criterion(value: float) -> str:
+    return f"{value:.0f}" if np.isfinite(value) else MISSING
+
+
+def _percent(value: float) -> str:
+    return f"{value:.2f}" if np.isfinite(value) else "-"
