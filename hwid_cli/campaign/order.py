@@ -81,6 +81,7 @@ def recommend_orders(
         nf=orders.nf,
         unit=crossval.unit,
         tried_delays=fits[0].options.delays,
+        loss=fits[0].options.loss,
     )
 
 

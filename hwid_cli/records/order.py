@@ -111,6 +111,8 @@ class OrderAdvice:
         Of the output.
     tried_delays : tuple of int, [samples]
         Delays of which every fit takes the best; empty where the grid says the delay.
+    loss : str
+        Of the fits; RMSDs that judge are of all residuals.
     """
 
     overall: OrderChoice
@@ -125,6 +127,7 @@ class OrderAdvice:
     nf: int | None
     unit: str
     tried_delays: tuple[int, ...] = ()
+    loss: str = "squared"
 
 
 @dataclass(frozen=True)

@@ -72,6 +72,10 @@ def best_models_table(
         "best\nlinear output-error model of the same orders, the parameters that the "
         "data\ndetermine, and BIC (form of T3.2.2-1)"
     )
+    if any(fit.options.loss == "huber" for group in best for fit in group):
+        title += (
+            "\nFitted with Huber's loss; RMSD, fit % and BIC count outliers in full."
+        )
     for one in started:
         title += f"\n{simulation_words(one, is_validation=False)}"
     table = text_table(title, heads, rows, text_columns=(0, 1))

@@ -124,3 +124,8 @@ def test_delays_that_every_fit_tries_are_not_asked_for_again():
     assert "The grid takes" not in tried
     assert "allow longer ones than 3" in said(tried_delays=(1, 3), delay=5)
     assert "allow longer" not in tried
+
+
+def test_outliers_that_fits_bear_but_judges_do_not_are_told():
+    assert "too small ones are taken" in said(loss="huber")
+    assert "outliers" not in said()

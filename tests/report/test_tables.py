@@ -223,3 +223,10 @@ def test_failed_fits_say_why_each_reason_once():
     many = [replace(failed, message=str(number)) for number in range(5)]
     assert failure_lines(many).splitlines()[-1].startswith("More reasons: results.h5")
     assert best_models_table([], "m") == "No fit gave a model."
+
+
+def test_a_robust_loss_is_told_beside_the_numbers_that_it_does_not_change():
+    fit = Fit(("a",), Orders(1, 1, 1), FitOptions(loss="huber"), MODEL, "converged", "")
+    assert "Huber's loss" in best_models_table([(fit,)], "m")
+    plain = replace(fit, options=FitOptions())
+    assert "Huber" not in best_models_table([(plain,)], "m")
