@@ -18,11 +18,11 @@ from hwid_cli.maths.model.contained import enlarged
 from hwid_cli.maths.model.delays import starts_of_delays
 from hwid_cli.maths.model.levenberg_marquardt import Search
 from hwid_cli.maths.model.linear_block import filtered, is_stable, reflected
+from hwid_cli.maths.model.linear_search import linear_search
 from hwid_cli.maths.model.normalise import normalise, rescaled
 from hwid_cli.maths.model.problem import Problem
 from hwid_cli.maths.model.regression.least_squares import LARGEST_RADIUS
 from hwid_cli.maths.model.robust import rejudged, renewed, winsorised
-from hwid_cli.maths.model.search import linear_search
 from hwid_cli.maths.model.starts import Start
 from hwid_cli.maths.model.static_map import has_free_shape
 from hwid_cli.records.model import FitOptions, HammersteinWiener, Orders

@@ -24,6 +24,7 @@ from hwid_cli.maths.model.candidates import Candidate
 from hwid_cli.maths.model.description import described
 from hwid_cli.maths.model.levenberg_marquardt import Search
 from hwid_cli.maths.model.linear_block import is_stable
+from hwid_cli.maths.model.linear_search import linear_beyond
 from hwid_cli.maths.model.prerequisites import (
     check_arguments,
     reason_not_to_fit,
@@ -32,7 +33,6 @@ from hwid_cli.maths.model.problem import Problem, rmsd, scaled
 from hwid_cli.maths.model.robust import rejudged, renewed, settled, winsorised
 from hwid_cli.maths.model.search import (
     grown,
-    linear_beyond,
     nonlinear_search,
     search_beyond,
 )

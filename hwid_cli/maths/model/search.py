@@ -14,9 +14,9 @@ The best candidate seen wins. docs/method.md, section "The search".
 from collections.abc import Sequence
 from dataclasses import replace
 
-from hwid_cli.maths.model import sensitivities, static_map
-from hwid_cli.maths.model.candidates import Candidate, Experiment, thinned
-from hwid_cli.maths.model.levenberg_marquardt import Search, minimise
+from hwid_cli.maths.model import static_map
+from hwid_cli.maths.model.candidates import Candidate, Experiment
+from hwid_cli.maths.model.levenberg_marquardt import Search
 from hwid_cli.maths.model.phases import (
     converge,
     finish,
@@ -25,7 +25,7 @@ from hwid_cli.maths.model.phases import (
     standing,
 )
 from hwid_cli.maths.model.placing import reaching
-from hwid_cli.maths.model.race import LONG, SHORT, Rounds, race
+from hwid_cli.maths.model.race import LONG, SHORT, race
 from hwid_cli.maths.model.relaxing import relaxed_search
 from hwid_cli.maths.model.robust import rejudged, renewed
 from hwid_cli.maths.model.second_search import (
@@ -46,47 +46,6 @@ _WORTH_GOING_ON = 0.995
 _MOST_DOUBTS, _WORTH_DOUBTING = 3, 0.9
 # Share of the cost that a step must gain where larger models go on from the result.
 _SMALL_GAIN = 1e-3
-# Samples that count for the linear model, and the share of the cost that a step must gain:
-# it is a yardstick and one more start.
-_LINEAR_ROWS, _LINEAR_GAIN = 2500, 1e-3
-# A race that ends at its first comparison: linear starts hardly change places in one.
-_ENTERED: Rounds = ((0, 1),)
-
-
-def linear_search(
-    experiments: Sequence[Experiment],
-    options: FitOptions,
-    starts: Sequence[Start],
-) -> Search:
-    """Linear output-error model, nearly converged: both maps are left out.
-
-    Parameters
-    ----------
-    experiments : sequence of Experiment
-        Scaled to about one.
-    options : FitOptions
-        Its maps are ignored.
-    starts : sequence of Start
-        Best first; only those of the input as it is are used.
-
-    Returns
-    -------
-    Search
-    """
-    linear = replace(options, input_map="none", output_map="none")
-    plain = [one for one in starts if not one.is_expanded]
-    (leader,) = race(experiments, plain, linear, rounds=_ENTERED)
-    few = thinned(experiments, _LINEAR_ROWS)
-    found = minimise(
-        leader.candidate,
-        few,
-        with_positions=False,
-        max_iterations=options.max_iterations,
-        least_gain=_LINEAR_GAIN,
-    )
-    iterations = leader.iterations + found.iterations
-    cost = sensitivities.cost(found.candidate, experiments)
-    return replace(found, cost=cost, iterations=iterations)
 
 
 def nonlinear_search(
@@ -115,14 +74,21 @@ def nonlinear_search(
     finalists = race(experiments, starts, options)
     experiments = renewed(experiments, [one.candidate for one in finalists])
     best = finish(_best(place(finalists, experiments, options)), experiments, options)
-    relaxed = best
     if not options.keeps_block:
-        relaxed = relaxed_search(best, experiments, options)
-    if relaxed.cost < _WORTH_GOING_ON * best.cost:
-        best = _best([best, finish(relaxed, experiments, options)])
+        best = _relaxed(best, experiments, options)
     best = _doubted(best, experiments, options, starts)
     best = _from_break_points(best, experiments, options, starts, linear)
     return _not_worse_than(linear, best, experiments, options)
+
+
+def _relaxed(
+    best: Search, experiments: Sequence[Experiment], options: FitOptions
+) -> Search:
+    """The best so far, or what comes of another block between its maps."""
+    relaxed = relaxed_search(best, experiments, options)
+    if relaxed.cost >= _WORTH_GOING_ON * best.cost:
+        return best
+    return _best([best, finish(relaxed, experiments, options)])
 
 
 def _doubted(
@@ -237,36 +203,9 @@ def search_beyond(
     leaders = race(experiments, starts, options, rounds=SHORT)
     (placed,) = place(leaders, experiments, options)
     anew = finish(placed, experiments, options, least_gain=_SMALL_GAIN)
-    return _best([near, anew])
-
-
-def linear_beyond(
-    contained: Sequence[Candidate],
-    experiments: Sequence[Experiment],
-    options: FitOptions,
-    linear: Search,
-) -> Search:
-    """Linear model that is never worse than those of smaller orders that it contains.
-
-    Parameters
-    ----------
-    contained : sequence of Candidate
-        Of the orders asked for, without maps; may be empty.
-    experiments : sequence of Experiment
-    options : FitOptions
-    linear : Search
-        What `linear_search` found.
-
-    Returns
-    -------
-    Search
-    """
-    known = [standing(one, experiments) for one in contained]
-    found = [finish(rejudged(linear, experiments), experiments, options)]
-    if known:
-        best = _best(known)
-        found += [best, converge(best, experiments, options)]
-    return _best(found)
+    best = _best([near, anew])
+    # Only between known maps are delays told apart safely.
+    return _relaxed(best, experiments, options) if len(options.delays) > 1 else best
 
 
 def _not_worse_than(

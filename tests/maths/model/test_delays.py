@@ -2,14 +2,20 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
+from hwid_cli.campaign.cache import MemoryStore
+from hwid_cli.campaign.identify import identify_all
+from hwid_cli.campaign.runner import RunSettings, Workers
 from hwid_cli.maths.model.beginnings import contained_candidates
 from hwid_cli.maths.model.fit import fit
 from hwid_cli.maths.model.problem import scaled
 from hwid_cli.maths.model.simulate import simulate
 from hwid_cli.maths.scores import fit_percent
+from hwid_cli.records.experiment import OrdersOptions
 from hwid_cli.records.linear_block import LinearBlock
 from hwid_cli.records.model import FitOptions, Orders
+from hwid_cli.records.recordings import Recording
 from tests.maths.model.plants import measured, plant
 
 ANY = FitOptions(delays=(1, 2, 3, 4), units=6)
@@ -108,3 +114,26 @@ def test_a_smaller_model_keeps_its_own_delay_where_that_is_needed():
     (one,) = contained_candidates(problem, Orders(2, 2, 3), options, [small])
     assert one.model.orders == Orders(2, 2, 1)
     assert one.free_responses.shape == (1, 2)
+
+
+@pytest.mark.parametrize("delays", [(1, 2, 3, 4, 5), (2, 3, 4), (2, 3)])
+def test_the_cells_of_a_grid_find_the_delays_of_fits_alone(delays):
+    # A short race alone takes another delay in some of them.
+    options = FitOptions(input_map="dead_zone", output_map="saturation", delays=delays)
+    settings = RunSettings(store=MemoryStore(), workers=Workers(jobs=1))
+    recordings = [late_plant(seed) for seed in (10, 11, 12, 13)]
+    grid = OrdersOptions(nb=(1, 2), nk=(1, 2))
+    for found in identify_all(recordings, grid, options, settings):
+        (recording,) = (one for one in recordings if one.name == found.name)
+        alone = fit([recording], replace(found.orders, nk=1), options)
+        assert found.rmsd < 1.1 * alone.rmsd
+
+
+def late_plant(seed):
+    """Dead zone, block with three samples of delay, saturation; levels held."""
+    rng = np.random.default_rng(seed)
+    u = np.repeat(rng.uniform(-2.5, 2.5, 60), rng.integers(3, 30, 60))
+    block = ([0.0, 0.0, 0.0, 0.05, 0.03], [1.0, -1.6, 0.68])
+    y = np.clip(lfilter(*block, u - np.clip(u, -0.4, 0.4)), -1.2, 1.2)
+    noise = 0.01 * np.std(y) * rng.standard_normal(u.size)
+    return Recording(f"r{seed}", u, y + noise, 1e-3)
