@@ -1,13 +1,22 @@
 from dataclasses import replace
 
+import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from hwid_cli.campaign.check import group_bound
-from hwid_cli.campaign.fit_seconds import MEASURED, fit_seconds, share_of_round
+from hwid_cli.campaign.fit_seconds import (
+    MEASURED,
+    fit_seconds,
+    share_of_round,
+    time_one_fit,
+)
 from hwid_cli.campaign.group_rules import search_groups
-from hwid_cli.records.experiment import GroupOptions
+from hwid_cli.records.experiment import GroupOptions, OrdersOptions
 from hwid_cli.records.groups import Group
-from hwid_cli.records.model import Orders
+from hwid_cli.records.linear_block import LinearBlock
+from hwid_cli.records.model import FitOptions, Orders
+from hwid_cli.records.recordings import Recording
 
 NAMES = tuple("abcdefg")
 
@@ -81,3 +90,15 @@ def test_the_grid_of_a_group_is_searched_in_fewer_rounds():
     assert share_of_round(fourth) == share_of_round(1)
     assert share_of_round(fourth, of_group=True) == share_of_round(9)
     assert share_of_round(fourth - 1, of_group=True) == share_of_round(1)
+
+
+def test_a_fit_that_keeps_a_block_is_timed_with_the_orders_of_that_block():
+    rng = np.random.default_rng(1)
+    u = np.repeat(rng.uniform(-1.0, 1.0, 30), 10)
+    recording = Recording("r", u, lfilter([0.0, 0.1, 0.05], [1.0, -1.5, 0.6], u), 1e-3)
+    block = LinearBlock((0.1, 0.05), (1.0, -1.5, 0.6), frozen=True)
+    cost = time_one_fit(
+        [recording], OrdersOptions(nb=(2,), nk=(2,)), FitOptions(linear_block=block)
+    )
+    assert cost.seconds > 0.0
+    assert "orders 2 2 1" in cost.source
