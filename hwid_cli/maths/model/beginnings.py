@@ -17,9 +17,10 @@ from hwid_cli.maths.model.candidates import Candidate, Experiment, limits_of
 from hwid_cli.maths.model.contained import enlarged
 from hwid_cli.maths.model.delays import starts_of_delays
 from hwid_cli.maths.model.levenberg_marquardt import Search
-from hwid_cli.maths.model.linear_block import filtered, is_stable, reflected
+from hwid_cli.maths.model.linear_block import filtered, is_stable
 from hwid_cli.maths.model.linear_search import linear_search
 from hwid_cli.maths.model.normalise import normalise, rescaled
+from hwid_cli.maths.model.pole_bound import drawn_in
 from hwid_cli.maths.model.problem import Problem
 from hwid_cli.maths.model.regression.least_squares import LARGEST_RADIUS
 from hwid_cli.maths.model.robust import rejudged, renewed, winsorised
@@ -148,7 +149,9 @@ def contained_candidates(
         states[0] = larger.free_response[:n_state] if n_state else 0.0
         bare = replace(
             larger,
-            denominator=_drawn_in(larger.denominator, options.largest_pole_radius),
+            denominator=drawn_in(
+                larger.denominator, options.largest_pole_radius, LARGEST_RADIUS
+            ),
             free_response=np.zeros(0),
         )
         candidates.append(Candidate(bare, states, limits_of(options)))
@@ -189,7 +192,9 @@ def member_models(
             replace(
                 one,
                 numerator=numerator,
-                denominator=_drawn_in(denominator, options.largest_pole_radius),
+                denominator=drawn_in(
+                    denominator, options.largest_pole_radius, LARGEST_RADIUS
+                ),
             )
         )
     return found
@@ -207,7 +212,7 @@ def _given_start(
     numerator[first : first + block.orders.nb] = block.numerator
     denominator = np.zeros(orders.nf + 1)
     denominator[: block.orders.nf + 1] = block.denominator
-    denominator = _drawn_in(denominator, options.largest_pole_radius)
+    denominator = drawn_in(denominator, options.largest_pole_radius, LARGEST_RADIUS)
     gain, offset, cost = _gain(experiments, numerator, denominator, orders.nk)
     inputs = np.concatenate([one.input for one in experiments])
     points = np.array([inputs.min(), inputs.max()])
@@ -246,10 +251,3 @@ def _gain(
     residual = y - gain * x - offset
     cost = float(residual @ residual)
     return (float(gain) if gain != 0.0 else 1.0), float(offset), cost
-
-
-def _drawn_in(denominator: np.ndarray, largest_radius: float) -> np.ndarray:
-    """Denominator with its poles inside the circle that they may fill."""
-    if is_stable(denominator, largest_radius):
-        return denominator
-    return reflected(denominator, LARGEST_RADIUS * largest_radius)

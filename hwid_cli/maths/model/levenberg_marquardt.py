@@ -30,7 +30,7 @@ from hwid_cli.maths.model.maps.break_points.kernels import (
 )
 from hwid_cli.maths.model.maps.piecewise_linear import break_points_and_values
 from hwid_cli.maths.model.points import Point, candidate_at, moved, point_of
-from hwid_cli.maths.model.pole_bound import drawn_back, radii_held
+from hwid_cli.maths.model.pole_bound import drawn_in, radii_held
 from hwid_cli.maths.model.sensitivities import (
     Equations,
     Simulated,
@@ -230,7 +230,7 @@ def _within_bound(
         along = _solve(free.T @ matrix @ free, free.T @ vector, damping)
         step = step if along is None else free @ along
         proposed = moved(point, scale * step, descent.place)
-    inside = drawn_back(proposed.denominator, radius)
+    inside = drawn_in(proposed.denominator, radius)
     return step, replace(proposed, denominator=inside)
 
 

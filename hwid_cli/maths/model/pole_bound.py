@@ -49,13 +49,17 @@ def radii_held(
     return np.asarray(rows[rows @ change > 0.0])
 
 
-def drawn_back(denominator: np.ndarray, largest_radius: float) -> np.ndarray:
-    """Denominator whose poles beyond the bound lie on it.
+def drawn_in(
+    denominator: np.ndarray, largest_radius: float, share: float = _DRAWN_BACK
+) -> np.ndarray:
+    """Denominator with its poles inside the circle that they may fill.
 
     Parameters
     ----------
     denominator : ndarray, shape (nf + 1,)
     largest_radius : float, [-]
+    share : float, [-]
+        Of that radius, to which poles beyond it come back.
 
     Returns
     -------
@@ -63,4 +67,4 @@ def drawn_back(denominator: np.ndarray, largest_radius: float) -> np.ndarray:
     """
     if is_stable(denominator, largest_radius):
         return denominator
-    return reflected(denominator, _DRAWN_BACK * largest_radius)
+    return reflected(denominator, share * largest_radius)

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from hwid_cli.maths.model.pole_bound import drawn_back, radii_held
+from hwid_cli.maths.model.pole_bound import drawn_in, radii_held
 
 RADIUS = 0.8
 PAIR = RADIUS * np.exp(0.4j * np.array([1, -1]))
@@ -41,6 +41,6 @@ def test_what_moves_inwards_or_stands_further_in_is_free():
 
 def test_poles_beyond_the_bound_come_back_to_it():
     denominator = np.real(np.poly([*(1.1 * PAIR), 0.3]))
-    found = np.sort(np.abs(np.roots(drawn_back(denominator, RADIUS))))
+    found = np.sort(np.abs(np.roots(drawn_in(denominator, RADIUS))))
     np.testing.assert_allclose(found, [0.3, RADIUS, RADIUS], rtol=1e-5)
     assert found[-1] < RADIUS
