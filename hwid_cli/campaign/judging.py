@@ -37,12 +37,15 @@ class Judged:
         Number of the judging recording; -1 where a recording judges its own models.
     n_beyond : int, [-]
         Pairs that do not judge, because the input goes beyond what the model has seen.
+    n_outliers : int, [samples]
+        Of the judges, that do not count.
     """
 
     factors: np.ndarray
     rmsd: np.ndarray
     judges: np.ndarray
     n_beyond: int
+    n_outliers: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,6 +75,7 @@ def judged(
     identified_on: Sequence[str],
     validated_on: Sequence[str],
     recordings: Sequence[Recording],
+    n_outliers: Sequence[int] = (),
 ) -> Judged | None:
     """What others say of some recordings' models, or they themselves where alone.
 
@@ -82,6 +86,8 @@ def judged(
     identified_on, validated_on : sequence of str
     recordings : sequence of Recording
         Among them all of these.
+    n_outliers : sequence of int, [samples]
+        Of each of ``validated_on``; empty where all samples count.
 
     Returns
     -------
@@ -107,7 +113,9 @@ def judged(
     factors = logs - np.nanmin(logs, axis=1, keepdims=True)
     factors = np.minimum(np.nan_to_num(factors, nan=np.inf), np.log(_MOST_FACTOR))
     judges = np.array([-1 if is_alone else judge for _, judge in pairs])
-    return Judged(factors, values, judges, max(len(others) - len(pairs), 0))
+    n_beyond = max(len(others) - len(pairs), 0)
+    counts = [n_outliers[one] for one in {judge for _, judge in pairs} if n_outliers]
+    return Judged(factors, values, judges, n_beyond, sum(counts))
 
 
 def smallest_good(found: Judged, sizes: np.ndarray, tolerance: float) -> Verdict:
@@ -151,6 +159,7 @@ def smallest_good(found: Judged, sizes: np.ndarray, tolerance: float) -> Verdict
         standard_error=float(error[chosen]),
         n_judges=int(np.sum(names >= 0)),
         n_beyond=found.n_beyond,
+        n_outliers=found.n_outliers,
     )
     return Verdict(chosen, best, judgement, factors, rmsd)
 

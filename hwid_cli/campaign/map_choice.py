@@ -15,6 +15,7 @@ from hwid_cli.campaign.content_keys import recording_key
 from hwid_cli.campaign.crossval import deviation_tasks
 from hwid_cli.campaign.identify import fit_task
 from hwid_cli.campaign.judging import judged, smallest_good
+from hwid_cli.campaign.outliers import without_outliers
 from hwid_cli.campaign.runner import RunSettings, run_tasks
 from hwid_cli.records.experiment import OrderOptions
 from hwid_cli.records.maps import KINDS_WITH_UNITS
@@ -130,11 +131,13 @@ def recommend_maps(
     ----------
     docs/method.md, section "Which maps".
     """
+    rmsd, n_outliers = _judging(fits, recordings, judges, settings)
     found = judged(
-        _deviations(fits, recordings, judges, settings),
+        rmsd,
         [one.name for one in recordings],
         [one.name for one in judges],
         (*recordings, *judges),
+        n_outliers,
     )
     if found is None:
         return None
@@ -163,6 +166,27 @@ def recommend_maps(
         tolerance=tolerance,
         unit=judges[0].output_unit,
     )
+
+
+def _judging(
+    fits: Sequence[Sequence[Fit]],
+    recordings: Sequence[Recording],
+    judges: Sequence[Recording],
+    settings: RunSettings,
+) -> tuple[np.ndarray, tuple[int, ...]]:
+    """RMSDs, shape (n_recordings, n_candidates, n_judges), and the outliers left out."""
+    rmsd = _deviations(fits, recordings, judges, settings)
+    if fits[0][0].options.loss == "squared":
+        return rmsd, ()
+    models = [one.model for each in fits for one in each]
+    shape = (len(models), len(judges))
+    table, n_outliers = without_outliers(
+        models,
+        rmsd.reshape(shape),
+        judges,
+        lambda some: _deviations(fits, recordings, some, settings).reshape(shape),
+    )
+    return table.reshape(rmsd.shape), n_outliers
 
 
 def _deviations(

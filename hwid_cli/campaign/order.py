@@ -25,6 +25,7 @@ def recommend_orders(
     recordings: Sequence[Recording],
     orders: OrdersOptions,
     options: OrderOptions,
+    n_outliers: Sequence[int] = (),
 ) -> OrderAdvice | None:
     """Recommend orders for all recordings together and for each.
 
@@ -37,6 +38,8 @@ def recommend_orders(
         Among them those of the fits and those that judge.
     orders : OrdersOptions
     options : OrderOptions
+    n_outliers : sequence of int, [samples]
+        Of each judging recording, that its RMSDs leave out; empty where all count.
 
     Returns
     -------
@@ -49,8 +52,8 @@ def recommend_orders(
     """
     criteria = {name: _criterion(fits, crossval, name) for name in ("aic", "bic")}
     places = range(len(crossval.identified_on))
-    single = [_judged_by(crossval, [place], recordings) for place in places]
-    total = _judged_by(crossval, places, recordings)
+    single = [_judged_by(crossval, [place], recordings, n_outliers) for place in places]
+    total = _judged_by(crossval, places, recordings, n_outliers)
     if total is None:
         return None
     responses = tuple(
@@ -81,7 +84,6 @@ def recommend_orders(
         nf=orders.nf,
         unit=crossval.unit,
         tried_delays=fits[0].options.delays,
-        loss=fits[0].options.loss,
     )
 
 
@@ -93,13 +95,16 @@ def _quantile(values: list[int], share: float, missing: int) -> int:
 
 
 def _judged_by(
-    crossval: CrossValidation, places: Sequence[int], recordings: Sequence[Recording]
+    crossval: CrossValidation,
+    places: Sequence[int],
+    recordings: Sequence[Recording],
+    n_outliers: Sequence[int],
 ) -> Judged | None:
     """What recordings say of the models of some, the grid in one row."""
     names = [crossval.identified_on[place] for place in places]
     shape = (len(names), -1, len(crossval.validated_on))
     rmsd = crossval.rmsd[list(places)].reshape(shape)
-    return judged(rmsd, names, crossval.validated_on, recordings)
+    return judged(rmsd, names, crossval.validated_on, recordings, n_outliers)
 
 
 def _choice(

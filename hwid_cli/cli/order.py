@@ -9,9 +9,11 @@ from hwid_cli.cli.options import Choices, stage_options
 from hwid_cli.cli.stages import once
 
 if TYPE_CHECKING:
+    from hwid_cli.cli.identify import Identified
     from hwid_cli.cli.session import Session
     from hwid_cli.records.model import Orders
     from hwid_cli.records.order import MapAdvice, OrderAdvice
+    from hwid_cli.records.results import CrossValidation
 
 
 @click.command("order")
@@ -61,12 +63,14 @@ def order_stage(session: "Session") -> "OrderAdvice":
 
     identified, crossval = crossval_stage(session)
     experiment, timer = session.experiment, start_timer()
+    crossval, n_outliers = _judging(session, identified, crossval)
     advice = recommend_orders(
         identified.fits,
         crossval,
         identified.recordings,
         experiment.orders,
         experiment.order or OrderOptions(),
+        n_outliers,
     )
     if advice is None:
         raise ConfigError(
@@ -114,6 +118,7 @@ def map_stage(session: "Session") -> "MapAdvice | None":
         If no model could be judged.
     """
     from hwid_cli.campaign.map_choice import candidate_maps, fit_maps, recommend_maps
+    from hwid_cli.campaign.outliers import ROUNDS
     from hwid_cli.cli.session import stage_tasks
     from hwid_cli.errors import ConfigError
     from hwid_cli.files.order_results import write_maps_csv
@@ -131,7 +136,8 @@ def map_stage(session: "Session") -> "MapAdvice | None":
     orders, n_fits = _recommended(session), len(chosen) * len(candidates)
     with stage_tasks(session, "order", n_fits, "fits", part="maps") as settings:
         fits = fit_maps(chosen, orders, candidates, settings)
-    n_pairs = len(chosen) * len(judges)
+    rounds = 1 if experiment.fit.loss == "squared" else 1 + ROUNDS
+    n_pairs = rounds * len(chosen) * len(judges)
     with stage_tasks(session, "order", n_pairs, "pairs", part="maps") as settings:
         advice = recommend_maps(fits, chosen, judges, options.tolerance, settings)
     if advice is None:
@@ -159,6 +165,25 @@ def show_maps(session: "Session", advice: "MapAdvice | None") -> None:
     rule = session.experiment.fit.initial_state
     say(session, f"\n{map_table(advice, initial_state=rule)}")
     say(session, f"\n{map_sentences(advice)}")
+
+
+def _judging(
+    session: "Session", identified: "Identified", crossval: "CrossValidation"
+) -> "tuple[CrossValidation, tuple[int, ...]]":
+    """The RMSDs that judge, and the outliers in each recording that they leave out."""
+    from hwid_cli.campaign.outliers import ROUNDS, cross_validate_without_outliers
+    from hwid_cli.cli.session import stage_tasks
+
+    experiment, fits = session.experiment, identified.fits
+    if experiment.fit.loss == "squared":
+        return crossval, ()
+    by_name = {one.name: one for one in identified.recordings}
+    judges = [by_name[name] for name in crossval.validated_on]
+    n_pairs = ROUNDS * len(crossval.identified_on) * len(judges)
+    with stage_tasks(session, "order", n_pairs, "pairs", part="outliers") as settings:
+        return cross_validate_without_outliers(
+            fits, crossval, judges, experiment.orders, settings
+        )
 
 
 def _recommended(session: "Session") -> "Orders":

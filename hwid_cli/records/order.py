@@ -45,6 +45,8 @@ class Judgement:
     n_beyond : int, [-]
         Pairs of model and recording that do not judge, because the recording's input goes
         beyond what the model has seen.
+    n_outliers : int, [samples]
+        Of the judging recordings, that do not count because the fits bear outliers too.
     """
 
     rmsd: float
@@ -53,6 +55,7 @@ class Judgement:
     standard_error: float
     n_judges: int
     n_beyond: int = 0
+    n_outliers: int = 0
 
 
 @dataclass(frozen=True)
@@ -111,8 +114,6 @@ class OrderAdvice:
         Of the output.
     tried_delays : tuple of int, [samples]
         Delays of which every fit takes the best; empty where the grid says the delay.
-    loss : str
-        Of the fits; RMSDs that judge are of all residuals.
     """
 
     overall: OrderChoice
@@ -127,7 +128,6 @@ class OrderAdvice:
     nf: int | None
     unit: str
     tried_delays: tuple[int, ...] = ()
-    loss: str = "squared"
 
 
 @dataclass(frozen=True)

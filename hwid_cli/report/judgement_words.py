@@ -41,8 +41,8 @@ def reason_to_take(
             f"one standard error ({judgement.standard_error:.2g}) of the difference"
         )
     return (
-        f"on {on} they are on average {judgement.factor:.3g} times as far off as the best "
-        f"{best}; that is within {within}, and no smaller {things} are."
+        f"on {on} they are on average {100 * (judgement.factor - 1):.3g} % further off than "
+        f"the best {best}; that is within {within}, and no smaller {things} are."
     )
 
 
@@ -65,6 +65,29 @@ def beyond_sentence(judgement: Judgement) -> str:
         f"{count} pair{'s' * (count != 1)} of model and recording {'do' if count != 1 else 'does'} "
         "not judge: there the input goes beyond what the model has seen, and a map is only "
         "a continuation."
+    )
+
+
+def outlier_sentence(judgement: Judgement) -> str:
+    """Say how many samples of the judging recordings do not count.
+
+    Parameters
+    ----------
+    judgement : Judgement
+
+    Returns
+    -------
+    str
+        Empty where all do.
+    """
+    count = judgement.n_outliers
+    if not count:
+        return ""
+    return (
+        f"{count} sample{'s' * (count != 1)} of the judging recordings "
+        f"{'are outliers' if count != 1 else 'is an outlier'} and "
+        f"{'do' if count != 1 else 'does'} not count here, as in the fits (fit.loss); AIC "
+        "and BIC count all."
     )
 
 

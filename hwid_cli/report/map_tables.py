@@ -3,6 +3,7 @@
 from hwid_cli.records.order import MapAdvice, MapCandidate
 from hwid_cli.report.judgement_words import (
     beyond_sentence,
+    outlier_sentence,
     paragraphs,
     reason_to_take,
 )
@@ -65,7 +66,11 @@ def map_sentences(advice: MapAdvice, *, width: int = WIDTH) -> str:
     str
         A paragraph for each reason.
     """
-    sentences = (_recommendation(advice), beyond_sentence(advice.judgement))
+    sentences = (
+        _recommendation(advice),
+        beyond_sentence(advice.judgement),
+        outlier_sentence(advice.judgement),
+    )
     return paragraphs(sentences, width)
 
 

@@ -3,6 +3,7 @@
 from hwid_cli.records.order import OrderAdvice, OrderChoice
 from hwid_cli.report.judgement_words import (
     beyond_sentence,
+    outlier_sentence,
     paragraphs,
     reason_to_take,
 )
@@ -82,7 +83,7 @@ def order_sentences(advice: OrderAdvice, *, width: int = WIDTH) -> str:
         _recommendation(advice),
         _criteria(advice.overall),
         beyond_sentence(advice.overall.judgement),
-        _outliers(advice),
+        outlier_sentence(advice.overall.judgement),
         _edges(advice),
         _delays(advice),
         _poles(advice),
@@ -125,17 +126,6 @@ def _criteria(one: OrderChoice) -> str:
         f"BIC of the fits chooses {_pair(one.bic_nb, one.bic_nk)}, AIC "
         f"{_pair(one.aic_nb, one.aic_nk)}. Both see the recording of the fit only and take "
         "residuals for white: where these are not, both ask for too much."
-    )
-
-
-def _outliers(advice: OrderAdvice) -> str:
-    """RMSDs that outliers fill are nearly the same for all orders."""
-    if advice.loss == "squared":
-        return ""
-    return (
-        "The fits bear outliers (fit.loss), the RMSDs that judge here count them in full: "
-        "where there are many, all orders look alike and too small ones are taken. Judge "
-        "by recordings without outliers, or trust the poles below more."
     )
 
 

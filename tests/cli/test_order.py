@@ -1,4 +1,5 @@
 import csv
+import re
 
 import pytest
 
@@ -38,6 +39,22 @@ def test_the_tolerance_is_a_key_of_the_configuration(after_run, hwid, edit, out)
     hwid("order")
 
     assert {row["nk"] for row in rows_of(out / "order.csv")} == {"1"}
+
+
+def test_outliers_of_the_judges_do_not_count_where_fits_bear_them(
+    after_run, hwid, edit, out
+):
+    edit("fit: {", "order: {units: [4]}\nfit: {loss: huber, ")
+    result = hwid("order")
+
+    assert result.exit_code == 0, result.output
+    # Three recordings' models on three, twice; the maps once more, with the outliers.
+    for part, total in (("outliers", 18), ("maps", 27)):
+        found = re.search(
+            rf"order {part}: (\d+) pairs from the cache, (\d+) computed", result.stdout
+        )
+        assert sum(map(int, found.groups())) == total
+    assert int(rows_of(out / "order.csv")[0]["outliers"]) < 5
 
 
 def test_a_tolerance_below_zero_is_refused(after_run, hwid, edit):

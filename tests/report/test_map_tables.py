@@ -54,9 +54,7 @@ def test_the_recommendation_can_be_pasted_and_says_why():
     assert text.startswith(
         "Take fit: {input_map: piecewise_linear, input_units: 3, output_map: none}: on "
     )
-    assert (
-        "1.03 times as far off as the best maps, piecewise linear, 5 and none" in text
-    )
+    assert "3 % further off than the best maps, piecewise linear, 5 and none" in text
     assert "Those of the configuration are 1.62 times as far off as the best." in text
     assert "6 pairs of model and recording do not judge" in text
     assert max(map(len, map_sentences(ADVICE).splitlines())) <= 80

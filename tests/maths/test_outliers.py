@@ -1,0 +1,66 @@
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from hwid_cli.maths.outliers import find_outliers, replace_outliers
+
+
+def noise(count, seed=0):
+    return np.random.default_rng(seed).standard_normal(count)
+
+
+@pytest.mark.parametrize("length", [1, 5])
+def test_spikes_and_short_bursts_stand_out_and_nothing_else(length):
+    residual = noise(4000)
+    firsts = np.arange(50, 3900, 200)
+    places = (firsts[:, np.newaxis] + np.arange(length)).ravel()
+    residual[places] += 20.0 * np.repeat(np.where(firsts % 400 < 200, 1, -1), length)
+
+    assert np.flatnonzero(find_outliers(residual)).tolist() == places.tolist()
+
+
+def test_a_fifth_of_all_samples_may_stand_out():
+    residual = noise(3000)
+    is_bad = np.random.default_rng(1).random(3000) < 0.2
+    residual[is_bad] += 100.0 * np.sign(residual[is_bad])
+    found = find_outliers(residual)
+
+    # Here and there half of the samples nearby are bad, and then nobody can tell.
+    assert np.mean(found[is_bad]) > 0.9
+    assert np.mean(found[~is_bad]) < 0.01
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_what_a_model_leaves_of_a_response_is_no_outlier(seed):
+    """Rests of nothing but noise, and transients a thousand times as large."""
+    u = np.repeat([0.0, 1.0, 0.0, -0.5, 0.0], 400)
+    pair = 0.95 * np.exp(1j * np.array([0.2, -0.2]))
+    misfit = lfilter([0.05], np.real(np.poly(pair)), np.diff(u, prepend=0.0))
+    residual = misfit + 1e-3 * np.max(np.abs(misfit)) * noise(u.size, seed)
+
+    assert not find_outliers(residual).any()
+
+
+@pytest.mark.parametrize("count", [1, 2, 15, 100])
+def test_short_and_empty_residuals_hold_no_outlier(count):
+    assert not find_outliers(np.zeros(count)).any()
+
+
+def test_outliers_are_replaced_by_the_model_and_what_it_leaves_nearby():
+    simulated = np.sin(0.01 * np.arange(2000))
+    clean = simulated + 0.3 + 0.01 * noise(2000)
+    output = clean.copy()
+    output[[7, 700, 1999]] += [5.0, -5.0, 5.0]
+    repaired, count = replace_outliers(output, simulated)
+
+    assert count == 3
+    assert np.max(np.abs(repaired - clean)) < 0.05
+    assert np.sum(repaired != output) == 3
+
+
+def test_a_simulation_that_is_not_finite_tells_nothing():
+    output = noise(100)
+    repaired, count = replace_outliers(output, np.full(100, np.nan))
+
+    assert count == 0
+    assert repaired is output
