@@ -115,4 +115,5 @@ def _view(shown: _Shown, recordings: Sequence[Recording]) -> ModelView:
         covers_of=shown.of,
         input_unit=model.input_unit,
         output_unit=model.output_unit,
+        information=shown.fit.information,
     )

@@ -75,10 +75,12 @@ def show_groups(session: "Session", search: "GroupSearch") -> None:
     from hwid_cli.cli.session import say, screen_width
     from hwid_cli.report.group_tables import chain_table, join_table, levels_table
 
+    rule = session.experiment.fit.initial_state
     for level in search.levels[1:]:
-        say(session, f"\n{join_table(search, level, width=screen_width())}")
-    say(session, f"\n{levels_table(search)}")
-    say(session, f"\n{chain_table(search)}")
+        table = join_table(search, level, initial_state=rule, width=screen_width())
+        say(session, f"\n{table}")
+    say(session, f"\n{levels_table(search, initial_state=rule)}")
+    say(session, f"\n{chain_table(search, initial_state=rule)}")
 
 
 def _plan(session: "Session") -> "GroupPlan":

@@ -57,6 +57,7 @@ def command(
     )
     from hwid_cli.maths.input_range import outside_share
     from hwid_cli.records.units import behind
+    from hwid_cli.report.simulation_words import prediction_words
 
     exported = read_exported(model)
     check_trust(exported, model, is_trusted=run_own_functions)
@@ -77,5 +78,5 @@ def command(
     write_prediction(out, exported, time, values, predicted)
     click.echo(
         f"{out}: {predicted.size} samples of {card.name}; time in s, predicted in "
-        f"{card.output_unit}"
+        f"{card.output_unit}\n{prediction_words(initial_state, exported.initial_state)}"
     )

@@ -86,9 +86,10 @@ def read_own_function(path: Path, name: str, *, place: str = "") -> OwnFunction:
         ) from error
     defined = sorted(_names(tree))
     if name not in defined:
+        wanted = f"expected {name} = MapFunction(...) in it"
         raise ConfigError(
             f"{at.removesuffix('.file')}: {str(path)!r} defines no {name!r}; "
-            f"{did_you_mean(name, defined)}"
+            f"{did_you_mean(name, defined) if defined else wanted}"
         )
     return OwnFunction(name, source)
 

@@ -76,6 +76,11 @@ class ExportedModel:
         """Of the model, in seconds."""
         return self.model.sample_time_s
 
+    @property
+    def initial_state(self) -> str | None:
+        """Rule of the model's fit; one of ``model.INITIAL_STATES``."""
+        return self.model.initial_state
+
 
 @dataclass(frozen=True, eq=False)
 class ExportedSimulation:
@@ -98,6 +103,11 @@ class ExportedSimulation:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "slots", frozen_vector(self.slots, "slots"))
+
+    @property
+    def initial_state(self) -> str | None:
+        """None: a drive starts at rest, not by the rule of a fit."""
+        return None
 
 
 Exported = ExportedModel | ExportedSimulation

@@ -8,6 +8,7 @@ import numpy as np
 
 from hwid_cli.records.diagnosis import Diagnosis
 from hwid_cli.records.groups import FinalTest, GroupSearch
+from hwid_cli.records.information import Information
 from hwid_cli.records.model import Fit
 from hwid_cli.records.recordings import CalibrationLog, Recording
 from hwid_cli.records.residuals import ResidualTests
@@ -225,6 +226,7 @@ class ModelView:
         Recordings that it covers, of ``covers_of``.
     covers_of : int, [-]
     input_unit, output_unit : str
+    information : Information
     """
 
     model: str
@@ -240,6 +242,7 @@ class ModelView:
     covers_of: int
     input_unit: str
     output_unit: str
+    information: Information
 
 
 @dataclass(frozen=True, eq=False)

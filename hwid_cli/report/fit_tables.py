@@ -7,7 +7,7 @@ import numpy as np
 
 from hwid_cli.records.model import Fit
 from hwid_cli.report.fold_words import folds_note
-from hwid_cli.report.simulation_words import simulation_words
+from hwid_cli.report.simulation_words import HUBER_WORDS, simulation_words
 from hwid_cli.report.tables import thesis_name_of
 from hwid_cli.report.text_table import MISSING, number, text_table
 
@@ -73,9 +73,7 @@ def best_models_table(
         "data\ndetermine, and BIC (form of T3.2.2-1)"
     )
     if any(fit.options.loss == "huber" for group in best for fit in group):
-        title += (
-            "\nFitted with Huber's loss; RMSD, fit % and BIC count outliers in full."
-        )
+        title += f"\n{HUBER_WORDS}"
     for one in started:
         title += f"\n{simulation_words(one, is_validation=False)}"
     table = text_table(title, heads, rows, text_columns=(0, 1))

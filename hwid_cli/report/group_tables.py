@@ -9,12 +9,14 @@ from hwid_cli.report.text_table import WIDTH, number, split_table, text_table
 _PUBLISHED = {2: "T3.3.3.1-2", 3: "T3.3.3.2-2", 4: "T3.3.3.3-2"}
 
 
-def levels_table(search: GroupSearch) -> str:
+def levels_table(search: GroupSearch, *, initial_state: str) -> str:
     """Show what each level tried, filtered and kept.
 
     Parameters
     ----------
     search : GroupSearch
+    initial_state : str
+        Rule of the fits.
 
     Returns
     -------
@@ -51,12 +53,15 @@ def levels_table(search: GroupSearch) -> str:
     title = (
         f"Search for groups: models above {search.threshold:g}{behind(search.unit)} on their "
         "own recordings\n(not self), models below it on no recording (not cross), "
-        f"and the widest coverage{_started(search)}"
+        "and the widest coverage\n"
+        f"{simulation_words(initial_state, is_validation=True)}"
     )
     return text_table(title, heads, rows, text_columns=())
 
 
-def join_table(search: GroupSearch, level: int, *, width: int = WIDTH) -> str:
+def join_table(
+    search: GroupSearch, level: int, *, initial_state: str, width: int = WIDTH
+) -> str:
     """Show the coverage of every join of a level, base by add-on.
 
     Parameters
@@ -64,6 +69,8 @@ def join_table(search: GroupSearch, level: int, *, width: int = WIDTH) -> str:
     search : GroupSearch
     level : int, [-]
         Recordings in the groups, at least 2.
+    initial_state : str
+        Rule of the fits.
     width : int, [characters]
         Of the screen; more add-ons than fit go into further blocks.
 
@@ -87,7 +94,8 @@ def join_table(search: GroupSearch, level: int, *, width: int = WIDTH) -> str:
     form = f" (form of {_PUBLISHED[level]})" if level in _PUBLISHED else ""
     title = (
         f"Groups of {level}: recordings covered of {len(search.validated_on)}, base by "
-        f"add-on,\n* goes on{form}{_started(search)}"
+        f"add-on,\n* goes on{form}\n"
+        f"{simulation_words(initial_state, is_validation=True)}"
     )
     return split_table(title, ("base", *heads, "widest"), rows, width=width)
 
@@ -111,12 +119,14 @@ def add_ons_of(search: GroupSearch, level: int) -> list[str]:
     return [name for name in dict.fromkeys([*singles, *later]) if name in tried]
 
 
-def chain_table(search: GroupSearch) -> str:
+def chain_table(search: GroupSearch, *, initial_state: str) -> str:
     """Show the winner and what it grew from.
 
     Parameters
     ----------
     search : GroupSearch
+    initial_state : str
+        Rule of the fits.
 
     Returns
     -------
@@ -134,26 +144,17 @@ def chain_table(search: GroupSearch) -> str:
         for one in search.chain_groups
     ]
     heads = ("model", "covers", "own RMSD", "validation RMSD")
-    title = f"The chain of groups, RMSD [{search.unit}]{_started(search)}"
-    for rule in _rules(search):
-        title += f"\n{joined_words(rule, search.join)}"
+    title = (
+        f"The chain of groups, RMSD [{search.unit}]\n"
+        f"{simulation_words(initial_state, is_validation=True)}\n"
+        f"{joined_words(initial_state, search.join)}"
+    )
     table = text_table(title, heads, rows, text_columns=(0,))
     return (
         f"{table}\nWhat a model covers, and its validation RMSD, which pools all "
         "samples, include the\nrecordings of its own fit. The search stopped: "
         f"{search.reason}."
     )
-
-
-def _started(search: GroupSearch) -> str:
-    """A line that says how the models were simulated; none without models."""
-    lines = [simulation_words(rule, is_validation=True) for rule in _rules(search)]
-    return "".join(f"\n{line}" for line in lines)
-
-
-def _rules(search: GroupSearch) -> list[str]:
-    """How the models start; one rule, unless nothing was fitted."""
-    return sorted({one.options.initial_state for one in search.fits if one is not None})
 
 
 def _cell(group: Group | None) -> str:

@@ -4,6 +4,9 @@ Prediction or simulation, and from which state, decides what an RMSD means; ever
 and figure of fits says it in these words.
 """
 
+# What numbers of fits that bear outliers still count.
+HUBER_WORDS = "Fitted with Huber's loss; RMSD, fit % and BIC count outliers in full."
+
 _OWN = {
     "zero": "initial state zero",
     "steady": "initial state steady at the first input",
@@ -14,6 +17,13 @@ _VALIDATED = {
     "steady": "initial state steady at the first input",
     "estimated": "initial state estimated on each recording",
 }
+
+# Of an exported model, which has no recording beside it.
+_PREDICTED = _OWN | {
+    "estimated": "initial state that of the first recording of its fit"
+}
+# Rules that ``hwid predict`` puts in the place of the model's own.
+_ASKED = {"steady": "steady", "empty": "zero"}
 
 
 def simulation_words(initial_state: str, *, is_validation: bool) -> str:
@@ -72,3 +82,30 @@ def joined_words(initial_state: str, join: str) -> str:
     if join == "concatenate":
         return f"In a fit, joined recordings start once, with {state}."
     return f"In a fit, each joined recording starts by itself, with {state}."
+
+
+def prediction_words(start: str, model_rule: str | None) -> str:
+    """Say from which initial state an exported model predicts.
+
+    Parameters
+    ----------
+    start : str
+        One of ``STARTS_OF_PREDICTIONS``.
+    model_rule : str or None
+        Rule of the model's fit; None for a physics simulation.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> prediction_words("fitted", "steady")
+    'Free-run simulation; initial state steady at the first input.'
+    >>> prediction_words("steady", None)
+    'Free-run simulation; it starts at rest.'
+    """
+    if model_rule is None:
+        return "Free-run simulation; it starts at rest."
+    start_words = _PREDICTED[_ASKED.get(start, model_rule)]
+    return f"Free-run simulation; {start_words}."

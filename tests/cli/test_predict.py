@@ -47,8 +47,14 @@ def test_a_prediction_is_what_simulate_gives(start, model, tmp_path):
 
     assert result.exit_code == 0, result.output
     assert result.stderr == ""
+    words = {
+        "fitted": "that of the first recording of its fit",
+        "steady": "steady at the first input",
+        "empty": "zero",
+    }[start]
     assert result.stdout == (
         f"{out}: 400 samples of step_06/3/7; time in s, predicted in m\n"
+        f"Free-run simulation; initial state {words}.\n"
     )
     expected = simulate(load_model(model), u, initial_state=state)
     assert np.array_equal(predicted(out), expected)

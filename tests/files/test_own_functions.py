@@ -71,6 +71,7 @@ def test_section_that_cannot_be_used_is_one_line(write_config, section, message)
         ),
         ("curve = '\u00fc'\n", "latin-1", "is no Python text: .*invalid start byte"),
         ("curv = 1\n", "utf-8", r"fit.input_map: .* defines no 'curve'; did you mean"),
+        ("import maps\n", "utf-8", r"defines no .curve.; expected curve = MapFunction"),
     ],
 )
 def test_file_that_cannot_be_used_is_one_line(

@@ -9,6 +9,7 @@ import pytest
 
 from hwid_cli.campaign.report import report_contents
 from hwid_cli.records.groups import Group, GroupSearch, Join
+from hwid_cli.records.information import Information
 from hwid_cli.records.report import ReportContents
 from hwid_cli.report.page import Figures, Folded, Heading, Table, Text, images_of
 from hwid_cli.report.sections.final_test import (
@@ -203,6 +204,20 @@ def test_a_peak_at_the_lowest_frequency_drawn_has_no_place(contents):
 
     assert "and passes low frequencies most." in text
     assert "passes most at" not in text
+
+
+@blank
+def test_a_chosen_model_says_what_weighs_its_fit_against_its_parameters(contents):
+    known = Information(n_samples=100, n_parameters=7, aic=-12.4, bic=5.6, fpe=4e-4)
+    view = replace(contents.models[0], information=known)
+    text = said(models_section(replace(contents, models=(view,))))
+
+    assert (
+        "The data determine 7 parameters: AIC -12, BIC 6, root of the final prediction "
+        "error (FPE) 0.02 m."
+    ) in text
+    unknown = replace(view, information=Information())
+    assert "AIC" not in said(models_section(replace(contents, models=(unknown,))))
 
 
 @blank

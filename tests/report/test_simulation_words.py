@@ -28,7 +28,7 @@ from hwid_cli.report.sections.recordings import (
 )
 from hwid_cli.report.sections.residuals import residuals_section
 from hwid_cli.report.sections.summary import summary_section
-from hwid_cli.report.simulation_words import simulation_words
+from hwid_cli.report.simulation_words import HUBER_WORDS, simulation_words
 from hwid_cli.report.tables import coverage_table, cross_table
 from tests.report.report_examples import fit, group_search
 from tests.report.test_assignment_tables import FINAL as ASSIGNED
@@ -44,16 +44,12 @@ def started(rule):
     return replace(one, options=replace(one.options, initial_state=rule))
 
 
-def searched(rule):
-    return replace(SEARCH, fits=tuple(started(rule) for _ in SEARCH.fits))
-
-
 VALIDATED = {
     "coverage": lambda rule: coverage_table(SCORES, CROSSVAL, initial_state=rule),
     "cross": lambda rule: cross_table(SCORES, CROSSVAL, initial_state=rule),
-    "levels": lambda rule: levels_table(searched(rule)),
-    "joins": lambda rule: join_table(searched(rule), 2),
-    "chain": lambda rule: chain_table(searched(rule)),
+    "levels": lambda rule: levels_table(SEARCH, initial_state=rule),
+    "joins": lambda rule: join_table(SEARCH, 2, initial_state=rule),
+    "chain": lambda rule: chain_table(SEARCH, initial_state=rule),
     "on tests": lambda rule: chain_on_tests_table(FINAL, TREND, initial_state=rule),
     "kinds": lambda rule: chain_coverage_table(FINAL, TREND, initial_state=rule),
     "on all": lambda rule: chain_tables(FINAL, TREND, KINDS, initial_state=rule),
@@ -110,4 +106,20 @@ def test_the_table_of_the_best_models_says_how_their_fits_start(rule):
     [("concatenate", "start once"), ("experiments", "starts by itself")],
 )
 def test_the_chain_of_groups_says_how_joined_recordings_start(join, words):
-    assert words in chain_table(replace(searched("estimated"), join=join))
+    search = replace(SEARCH, join=join)
+
+    assert words in chain_table(search, initial_state="estimated")
+
+
+def test_a_section_of_fits_that_bear_outliers_says_so(contents):
+    robust = tuple(
+        replace(one, options=replace(one.options, loss="huber"))
+        for one in contents.stored.fits
+    )
+    stored = replace(contents.stored, fits=robust)
+
+    for found, is_said in ((contents, False), (replace(contents, stored=stored), True)):
+        notes = [
+            one.text for one in crossval_section(found).blocks if isinstance(one, Text)
+        ]
+        assert (HUBER_WORDS in notes) == is_said

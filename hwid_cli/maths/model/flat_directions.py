@@ -33,6 +33,7 @@ _FEW = 5
 # Levels of a signal nearer than this share of its range are one.
 _SAME_LEVEL = 1e-9
 _NO_MAP = StaticMap("none", np.zeros(0))
+_SAME_OUTPUT = "that hardly changes the simulated output"
 
 
 def flat_sentences(
@@ -143,7 +144,7 @@ def _why(
             if reason:
                 return reason.format(what=what)
     if not _moves_listed(parts, place):
-        return "nothing that was recorded shows more"
+        return _SAME_OUTPUT
     in_block = [
         np.abs(parts[part]).max(initial=0.0) >= largest
         for part in (place.numerator, place.denominator)
@@ -152,7 +153,7 @@ def _why(
         at = _cancellation(model)
         if at:
             return f"a pole and a zero nearly cancel at {at}"
-    return "nothing that was recorded tells more"
+    return f"{_SAME_OUTPUT}; an input of more levels or frequencies would tell"
 
 
 def _why_of_map(

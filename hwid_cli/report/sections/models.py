@@ -1,5 +1,7 @@
 """Section about the chosen models: maps, frequency response, poles and zeros."""
 
+from math import isfinite, sqrt
+
 from hwid_cli.records.report import ModelView, ReportContents
 from hwid_cli.report.figures.models import bode_figure, maps_figure, poles_figure
 from hwid_cli.report.page import Block, Figures, Heading, Section, Text
@@ -91,5 +93,17 @@ def _sentence(view: ModelView) -> str:
         f"{corners[0]} corners in the input map and {corners[1]} in the output map; the "
         f"linear block is {stable}, has {counted(len(view.poles), 'pole')}, "
         f"{counted(len(view.zeros), 'zero')} and a delay of "
-        f"{counted(view.delay, 'sample')}, and passes {most}."
+        f"{counted(view.delay, 'sample')}, and passes {most}.{_criteria(view)}"
+    )
+
+
+def _criteria(view: ModelView) -> str:
+    """What weighs the fit against its parameters; nothing where it was not worked out."""
+    known = view.information
+    if not isfinite(known.aic):
+        return ""
+    return (
+        f" The data determine {counted(known.n_parameters, 'parameter')}: AIC "
+        f"{known.aic:.0f}, BIC {known.bic:.0f}, root of the final prediction error (FPE) "
+        f"{with_unit(sqrt(known.fpe), view.output_unit)}."
     )

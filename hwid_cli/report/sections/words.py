@@ -11,7 +11,7 @@ from hwid_cli.records.report import ReportContents
 from hwid_cli.records.units import behind
 from hwid_cli.report.figures.style import DOTS, as_png
 from hwid_cli.report.page import Image, Text
-from hwid_cli.report.simulation_words import simulation_words
+from hwid_cli.report.simulation_words import HUBER_WORDS, simulation_words
 from hwid_cli.report.text_table import MISSING
 
 NOTHING_COVERED = "no group covers any recording."
@@ -178,7 +178,7 @@ def file_names(names: Iterable[str], endings: Sequence[str] = ("",)) -> dict[str
 
 
 def simulation_note(contents: ReportContents, *, is_validation: bool) -> list[Text]:
-    """Say how the models of a section were simulated.
+    """Say how the models of a section were fitted and simulated.
 
     Parameters
     ----------
@@ -189,13 +189,13 @@ def simulation_note(contents: ReportContents, *, is_validation: bool) -> list[Te
     Returns
     -------
     list of Text
-        One note; none where there are no models.
+        Notes; none where there are no models.
     """
     fits = list(contents.stored.fits)
     if contents.stored.search is not None:
         fits += [one for one in contents.stored.search.fits if one is not None]
     rules = dict.fromkeys(one.options.initial_state for one in fits)
-    return [
-        Text(simulation_words(rule, is_validation=is_validation), is_note=True)
-        for rule in rules
-    ]
+    words = [simulation_words(rule, is_validation=is_validation) for rule in rules]
+    if any(one.options.loss == "huber" for one in fits):
+        words.append(HUBER_WORDS)
+    return [Text(one, is_note=True) for one in words]

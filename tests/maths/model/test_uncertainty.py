@@ -150,6 +150,21 @@ def test_a_segment_with_one_sample_is_named_as_the_reason():
         assert is_nan == any(name in one for one in sentences)
 
 
+def test_coefficients_that_a_single_frequency_does_not_tell_apart_are_named():
+    u = np.sin(0.2 * np.arange(800))
+    y = noisy(signal.lfilter([0.0, 0.5, 0.1, 0.05, 0.02], [1.0, -0.5], u), 0, 1e-3)
+    asked = FitOptions("none", "none", initial_state="estimated")
+    result = fit([Recording("r", u, y, 1.0)], Orders(4, 1, 1), asked)
+
+    *states, block = result.uncertainty.flat
+    assert all("initial state" in one for one in states)
+    assert "b[0]" in block
+    assert block.endswith(
+        "can move together, because that hardly changes the simulated output; an input "
+        "of more levels or frequencies would tell"
+    )
+
+
 def test_a_limit_that_is_never_reached_is_named_as_the_reason():
     u = np.random.default_rng(2).uniform(-1, 1, 500)
     y = noisy(signal.lfilter([0.0, 0.5], [1.0, -0.5], np.minimum(u, 0.4)), 1, 1e-3)
