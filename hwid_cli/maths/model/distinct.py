@@ -78,6 +78,5 @@ def distinct(
 
 def _deviates(residual: np.ndarray, better: np.ndarray, share: float) -> bool:
     # A simulation that is not finite is no other model's.
-    with np.errstate(over="ignore", invalid="ignore"):
-        deviation = residual - better
-        return not deviation @ deviation < share**2 * (better @ better)
+    deviation = residual - better
+    return not deviation @ deviation < share**2 * (better @ better)

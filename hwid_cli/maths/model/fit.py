@@ -141,6 +141,8 @@ def fit_without_standard_errors(
     return _fitted(recordings, orders, options, given, standard_errors=False)
 
 
+# A step to a model that overflows is refused by its cost.
+@np.errstate(over="ignore", invalid="ignore")
 def _fitted(
     recordings: Sequence[Recording],
     orders: Orders,

@@ -24,9 +24,7 @@ from hwid_cli.maths.model.equations.kernels import scaled_equations
 from hwid_cli.maths.model.linear_block import difference_basis, is_stable
 from hwid_cli.maths.model.maps.break_points.kernels import (
     add_bends,
-    growth,
-    mean_slope,
-    squared_bends,
+    squared_bends_after,
 )
 from hwid_cli.maths.model.maps.piecewise_linear import break_points_and_values
 from hwid_cli.maths.model.points import Point, candidate_at, moved, point_of
@@ -244,18 +242,16 @@ def _solve(matrix: np.ndarray, vector: np.ndarray, damping: float) -> np.ndarray
 
 
 def _squared_bends(point: Point, before: Point) -> float:
-    """Sum of the squared bends of both maps after a step, as the step saw them.
-
-    The unit is the mean slope before the step, times the growth of the map in it.
-    """
+    """Sum of the squared bends of both maps after a step, as the step saw them."""
     total = 0.0
     for one, other in (
         (point.output_map, before.output_map),
         (point.input_map, before.input_map),
     ):
         if _bends(one):
-            now, old = break_points_and_values(one), break_points_and_values(other)
-            total += squared_bends(*now, mean_slope(*old) * growth(*now, *old))
+            total += squared_bends_after(
+                *break_points_and_values(one), *break_points_and_values(other)
+            )
     return total
 
 

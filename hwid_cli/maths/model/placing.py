@@ -20,7 +20,7 @@ from hwid_cli.maths.model.maps.piecewise_linear import (
     N_ENDS,
     break_points_and_values,
 )
-from hwid_cli.maths.model.points import block_signals, point_of
+from hwid_cli.maths.model.points import before_output_map, point_of
 from hwid_cli.records.model import FitOptions, StaticMap
 
 # Kinds whose break-points or edges are put where they matter.
@@ -53,11 +53,7 @@ def reaching(
         Of all experiments, one after the other.
     """
     u = np.concatenate([one.input for one in experiments])
-    point = point_of(candidate)
-    x = np.concatenate(
-        [block_signals(point, i, one)[1] for i, one in enumerate(experiments)]
-    )
-    return u, x
+    return u, before_output_map(point_of(candidate), experiments)
 
 
 def with_maps(

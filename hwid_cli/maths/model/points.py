@@ -4,6 +4,7 @@ A search takes hundreds of steps and a record checks itself whenever it is built
 steps are taken on bare arrays and a candidate is built where a search ends.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -146,3 +147,21 @@ def block_signals(
         point.is_steady,
     )
     return w, x
+
+
+def before_output_map(point: Point, experiments: Sequence[Experiment]) -> np.ndarray:
+    """Signal that reaches the output map.
+
+    Parameters
+    ----------
+    point : Point
+    experiments : sequence of Experiment
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Of all experiments, one after the other.
+    """
+    return np.concatenate(
+        [block_signals(point, i, one)[1] for i, one in enumerate(experiments)]
+    )

@@ -18,13 +18,13 @@ from hwid_cli.maths.model import static_map
 from hwid_cli.maths.model.candidates import Candidate, Experiment, limits_of, thinned
 from hwid_cli.maths.model.distinct import WHILE_FIXED, distinct
 from hwid_cli.maths.model.levenberg_marquardt import Search, minimise
+from hwid_cli.maths.model.linear_block import as_loops_take_it
 from hwid_cli.maths.model.maps.kernels import piecewise_linear_shares
-from hwid_cli.maths.model.placing import reaching
-from hwid_cli.maths.model.points import point_of
+from hwid_cli.maths.model.points import Point, before_output_map, point_of
 from hwid_cli.maths.model.rows.kernels import local_sums
 from hwid_cli.maths.model.sensitivities import simulated
 from hwid_cli.maths.model.starts import Start
-from hwid_cli.records.model import FitOptions, HammersteinWiener
+from hwid_cli.records.model import FitOptions, HammersteinWiener, StaticMap
 
 # Iterations of each round, and how many candidates go on after it.
 Rounds = tuple[tuple[int, int], ...]
@@ -40,8 +40,7 @@ RACE_ROWS = 1000
 _CURVE_POINTS, _STIFFNESS = 12, 1e-2
 _SECOND = np.diff(np.eye(_CURVE_POINTS), 2, axis=0)
 _BENDING = _SECOND.T @ _SECOND
-
-
+_NO_MAP = StaticMap("none", np.zeros(0))
 # Cost from which on a candidate drops out, as a multiple of the best's.
 _HOPELESS = 3.0
 
@@ -126,31 +125,33 @@ def starting_candidates(
         inputs.max(),
         shape=lambda u: np.interp(u, start.input_points, start.input_values),
     ):
-        model = HammersteinWiener(
+        point = Point(
             input_map,
-            start.numerator,
-            start.denominator,
+            as_loops_take_it(start.numerator),
+            as_loops_take_it(start.denominator),
             start.delay,
-            static_map.identity("none", options.of_output, np.ones(1)),
-            sample_time_s=1.0,
-            initial_state=options.initial_state,
+            _NO_MAP,
+            as_loops_take_it(states),
+            options.initial_state == "steady",
         )
-        _, x = reaching(Candidate(model, states), experiments)
-        candidates += [
-            (
-                Candidate(
-                    replace(model, output_map=output_map), states, limits_of(options)
-                ),
-                x,
+        x = before_output_map(point, experiments)
+        for output_map in static_map.starting_maps(
+            options.output_map,
+            options.of_output,
+            x.min(),
+            x.max(),
+            shape=lambda x: x + start.offset,
+        ):
+            model = HammersteinWiener(
+                input_map,
+                start.numerator,
+                start.denominator,
+                start.delay,
+                output_map,
+                sample_time_s=1.0,
+                initial_state=options.initial_state,
             )
-            for output_map in static_map.starting_maps(
-                options.output_map,
-                options.of_output,
-                x.min(),
-                x.max(),
-                shape=lambda x: x + start.offset,
-            )
-        ]
+            candidates.append((Candidate(model, states, limits_of(options)), x))
     return candidates
 
 

@@ -201,8 +201,7 @@ def _scale(candidate: Candidate, experiments: Sequence[Experiment]) -> float:
 
 
 def _residual(candidate: Candidate, experiments: Sequence[Experiment]) -> np.ndarray:
-    with np.errstate(over="ignore", invalid="ignore"):
-        simulated = sensitivities.simulated_outputs(candidate, experiments)
-        return np.concatenate(
-            [one.output - y for one, y in zip(experiments, simulated, strict=True)]
-        )
+    simulated = sensitivities.simulated_outputs(candidate, experiments)
+    return np.concatenate(
+        [one.output - y for one, y in zip(experiments, simulated, strict=True)]
+    )

@@ -132,16 +132,15 @@ def simulated(point: Point, experiments: Sequence[Experiment]) -> Simulated:
     Simulated
     """
     signals, residuals, total = [], [], 0.0
-    with np.errstate(over="ignore", invalid="ignore"):
-        for index, one in enumerate(experiments):
-            w, x = block_signals(point, index, one)
-            seen = static_map.evaluate(point.output_map, one.at_counted(x))
-            residual, loss = residuals_and_loss(
-                one.output, seen, one.counted, one.threshold
-            )
-            signals.append((w, x))
-            residuals.append(residual)
-            total += one.output.size / residual.size * loss
+    for index, one in enumerate(experiments):
+        w, x = block_signals(point, index, one)
+        seen = static_map.evaluate(point.output_map, one.at_counted(x))
+        residual, loss = residuals_and_loss(
+            one.output, seen, one.counted, one.threshold
+        )
+        signals.append((w, x))
+        residuals.append(residual)
+        total += one.output.size / residual.size * loss
     if not np.isfinite(total):
         total = float("inf")
     return Simulated(tuple(signals), tuple(residuals), total)

@@ -82,13 +82,13 @@ def test_the_prior_and_its_gradient_are_of_one_function(with_positions):
     total = map_kernels.add_bends(
         POINTS, VALUES, with_positions, 0.7, matrix, vector, 1
     )
-    size = map_kernels.mean_slope(POINTS, VALUES)
-    assert total == pytest.approx(map_kernels.squared_bends(POINTS, VALUES, size))
 
     def judged(moved):
-        now, before = np.split(moved, 2), (POINTS, VALUES)
-        grown = size * map_kernels.growth(*now, *before)
-        return map_kernels.squared_bends(*now, grown)
+        return map_kernels.squared_bends_after(*np.split(moved, 2), POINTS, VALUES)
+
+    bend, _ = map_kernels.bends(POINTS, VALUES, with_positions)
+    assert total == pytest.approx(bend @ bend)
+    assert total == pytest.approx(judged(parameters))
 
     for k in range(first, 10):
         step = 1e-6 * np.eye(10)[k]

@@ -193,26 +193,36 @@ def growth(
 
 
 @njit(cache=True)
-def squared_bends(break_points: np.ndarray, values: np.ndarray, size: float) -> float:
-    """Sum of the squared changes of slope.
+def squared_bends_after(
+    break_points: np.ndarray,
+    values: np.ndarray,
+    before: np.ndarray,
+    values_before: np.ndarray,
+) -> float:
+    """Sum of the squared changes of slope after a step, as the step saw them.
+
+    The slope that counts as one is the mean slope before the step, times the growth of
+    the map in it.
 
     Parameters
     ----------
     break_points, values : ndarray, shape (units,)
-    size : float
-        The slope that counts as one.
+    before, values_before : ndarray, shape (units,)
+        Of the map before the step.
 
     Returns
     -------
     float
     """
+    size = mean_slope(before, values_before)
+    size *= growth(break_points, values, before, values_before)
     total = 0.0
-    before = 0.0
+    last = 0.0
     for i in range(values.size - 1):
         slope = (values[i + 1] - values[i]) / (break_points[i + 1] - break_points[i])
         if i > 0:
-            total += ((slope - before) / size) ** 2
-        before = slope
+            total += ((slope - last) / size) ** 2
+        last = slope
     return total
 
 
