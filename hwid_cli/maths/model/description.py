@@ -18,7 +18,8 @@ from hwid_cli.maths.model.folding import folds
 from hwid_cli.maths.model.levenberg_marquardt import Search
 from hwid_cli.maths.model.linear_block import poles
 from hwid_cli.maths.model.normalise import normalise, rescaled
-from hwid_cli.maths.model.placing import reaching, with_maps
+from hwid_cli.maths.model.placing import with_maps
+from hwid_cli.maths.model.points import before_output_map, point_of
 from hwid_cli.maths.model.problem import Problem, joined
 from hwid_cli.maths.model.uncertainty import NOT_WORKED_OUT, judged_parameters
 from hwid_cli.maths.model.unvisited import straightened
@@ -72,10 +73,9 @@ def described(
             free_break_points=blank.options.free_break_points,
         )
     deviation = scores.rmsd(measured, simulated)
-    _, x = reaching(candidate, experiments)
-    low, high = np.quantile(x, [_RARE, 1.0 - _RARE])
+    x = before_output_map(point_of(candidate), experiments)
     turns = folds(
-        candidate.model.output_map, least=_TOLD * deviation, between=(low, high)
+        candidate.model.output_map, least=_TOLD * deviation, between=_usual_range(x)
     )
     return replace(
         blank,
@@ -92,6 +92,13 @@ def described(
         information=information,
         output_folds=tuple(float(x) for x in turns),
     )
+
+
+def _usual_range(signal: np.ndarray) -> tuple[float, float]:
+    """Range of a signal without its rarest samples."""
+    rare = int(_RARE * signal.size)
+    ordered = np.partition(signal, [rare, signal.size - 1 - rare])
+    return float(ordered[rare]), float(ordered[-1 - rare])
 
 
 def _in_units(

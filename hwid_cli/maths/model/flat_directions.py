@@ -89,6 +89,9 @@ def _weak_parts(found: Directions, variance: float) -> list[tuple[np.ndarray, fl
     covariance = covariance / found.size[chosen] / found.size[chosen][:, None]
     if not np.isfinite(covariance).all():
         return []
+    # No direction spreads wider than all parameters together.
+    if np.trace(covariance) <= _WEAK**2:
+        return []
     spread, parts = np.linalg.eigh(covariance)
     weak = []
     for number in np.flatnonzero(spread > _WEAK**2)[::-1]:

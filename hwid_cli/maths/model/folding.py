@@ -48,10 +48,15 @@ def folds(
     low, high = one.domain if between is None else between
     inside = (curve.argument >= low) & (curve.argument <= high)
     argument, value = curve.argument[inside], curve.value[inside]
-    if value.size < 3 or not np.isfinite(value).all():
+    if value.size < 3 or not np.isfinite(value).all() or _is_monotonic(value):
         return np.zeros(0)
     depth = max(_LEAST_DEPTH * float(np.ptp(value)), least)
     return argument[_turns(value, depth)]
+
+
+def _is_monotonic(value: np.ndarray) -> bool:
+    steps = np.diff(value)
+    return bool((steps >= 0.0).all() or (steps <= 0.0).all())
 
 
 def _turns(value: np.ndarray, depth: float) -> list[int]:

@@ -15,6 +15,9 @@ from hwid_cli.maths.model.kernels import block_output
 from hwid_cli.maths.model.linear_block import as_loops_take_it, difference_basis
 from hwid_cli.records.model import StaticMap
 
+# Before and after the linear block, for each experiment.
+Signals = tuple[tuple[np.ndarray, np.ndarray], ...]
+
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Point:
@@ -149,6 +152,21 @@ def block_signals(
     return w, x
 
 
+def all_signals(point: Point, experiments: Sequence[Experiment]) -> Signals:
+    """Signals before and after the linear block, for each experiment.
+
+    Parameters
+    ----------
+    point : Point
+    experiments : sequence of Experiment
+
+    Returns
+    -------
+    tuple of (w, x), each of shape (n,)
+    """
+    return tuple(block_signals(point, i, one) for i, one in enumerate(experiments))
+
+
 def before_output_map(point: Point, experiments: Sequence[Experiment]) -> np.ndarray:
     """Signal that reaches the output map.
 
@@ -162,6 +180,4 @@ def before_output_map(point: Point, experiments: Sequence[Experiment]) -> np.nda
     ndarray, shape (n,)
         Of all experiments, one after the other.
     """
-    return np.concatenate(
-        [block_signals(point, i, one)[1] for i, one in enumerate(experiments)]
-    )
+    return np.concatenate([x for _, x in all_signals(point, experiments)])

@@ -20,9 +20,9 @@ from hwid_cli.maths.model.distinct import WHILE_FIXED, distinct
 from hwid_cli.maths.model.levenberg_marquardt import Search, minimise
 from hwid_cli.maths.model.linear_block import as_loops_take_it
 from hwid_cli.maths.model.maps.kernels import piecewise_linear_shares
-from hwid_cli.maths.model.points import Point, before_output_map, point_of
+from hwid_cli.maths.model.points import Point, Signals, all_signals
 from hwid_cli.maths.model.rows.kernels import local_sums
-from hwid_cli.maths.model.sensitivities import simulated
+from hwid_cli.maths.model.sensitivities import compared
 from hwid_cli.maths.model.starts import Start
 from hwid_cli.records.model import FitOptions, HammersteinWiener, StaticMap
 
@@ -80,11 +80,11 @@ def race(
     racing = []
     for start in starts:
         kind = (start.is_given, start.is_expanded)
-        for candidate, x in starting_candidates(experiments, start, options):
-            racing.append(_entered((*kind, False), candidate, experiments))
+        for candidate, signals in starting_candidates(experiments, start, options):
+            racing.append(_entered((*kind, False), candidate, signals, experiments))
             if static_map.has_free_shape(options.output_map):
-                curved = _with_output_curve(candidate, x, experiments, options)
-                racing.append(_entered((*kind, True), curved, experiments))
+                curved = _with_output_curve(candidate, signals, experiments, options)
+                racing.append(_entered((*kind, True), curved, signals, experiments))
     if rounds != LONG:
         racing = _leaders(racing, options.starts)
     for iterations, count in rounds:
@@ -100,7 +100,7 @@ def starting_candidates(
     experiments: Sequence[Experiment],
     start: Start,
     options: FitOptions,
-) -> list[tuple[Candidate, np.ndarray]]:
+) -> list[tuple[Candidate, Signals]]:
     """Models that begin with one linear block, one for each pair of starting maps.
 
     Parameters
@@ -111,8 +111,8 @@ def starting_candidates(
 
     Returns
     -------
-    list of (Candidate, ndarray)
-        Each with what reaches its output map, all experiments one after the other.
+    list of (Candidate, Signals)
+        Each with its signals before and after the linear block.
     """
     inputs = np.concatenate([one.input for one in experiments])
     is_estimated = options.initial_state == "estimated"
@@ -134,7 +134,8 @@ def starting_candidates(
             as_loops_take_it(states),
             options.initial_state == "steady",
         )
-        x = before_output_map(point, experiments)
+        signals = all_signals(point, experiments)
+        x = np.concatenate([x for _, x in signals])
         for output_map in static_map.starting_maps(
             options.output_map,
             options.of_output,
@@ -151,17 +152,18 @@ def starting_candidates(
                 sample_time_s=1.0,
                 initial_state=options.initial_state,
             )
-            candidates.append((Candidate(model, states, limits_of(options)), x))
+            candidates.append((Candidate(model, states, limits_of(options)), signals))
     return candidates
 
 
 def _with_output_curve(
     candidate: Candidate,
-    x: np.ndarray,
+    signals: Signals,
     experiments: Sequence[Experiment],
     options: FitOptions,
 ) -> Candidate:
     """Candidate with the output map that comes closest for what reaches it."""
+    x = np.concatenate([x for _, x in signals])
     measured = np.concatenate([one.output for one in experiments])
     points = np.linspace(x.min(), x.max(), _CURVE_POINTS)
     if not points[0] < points[-1]:
@@ -181,9 +183,12 @@ def _with_output_curve(
 
 
 def _entered(
-    family: tuple[bool, ...], candidate: Candidate, experiments: Sequence[Experiment]
+    family: tuple[bool, ...],
+    candidate: Candidate,
+    signals: Signals,
+    experiments: Sequence[Experiment],
 ) -> _Runner:
-    cost = simulated(point_of(candidate), experiments).cost
+    cost = compared(candidate.model.output_map, signals, experiments).cost
     return _Runner(family, Search(candidate, cost, 0, "iteration_limit", ""))
 
 

@@ -22,8 +22,9 @@ from hwid_cli.maths.model.equations.kernels import combined
 from hwid_cli.maths.model.kernels import residuals_and_loss
 from hwid_cli.maths.model.loss import root_weights
 from hwid_cli.maths.model.maps.rule import Derivatives
-from hwid_cli.maths.model.points import Point, block_signals, point_of
+from hwid_cli.maths.model.points import Point, Signals, all_signals, point_of
 from hwid_cli.maths.model.rows.kernels import derivative_rows, local_sums
+from hwid_cli.records.model import StaticMap
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +50,6 @@ class Simulated:
     Parameters
     ----------
     signals : tuple of (w, x)
-        Before and after the linear block, for each experiment.
     residuals : tuple of ndarray, shape (n_rows,)
         Measured minus simulated, at the samples that count.
     cost : float
@@ -57,7 +57,7 @@ class Simulated:
         where the simulation is not finite.
     """
 
-    signals: tuple[tuple[np.ndarray, np.ndarray], ...]
+    signals: Signals
     residuals: tuple[np.ndarray, ...]
     cost: float
 
@@ -78,8 +78,8 @@ def simulated_outputs(
     """
     point = point_of(candidate)
     return [
-        static_map.evaluate(point.output_map, block_signals(point, index, one)[1])
-        for index, one in enumerate(experiments)
+        static_map.evaluate(point.output_map, x)
+        for _, x in all_signals(point, experiments)
     ]
 
 
@@ -131,19 +131,37 @@ def simulated(point: Point, experiments: Sequence[Experiment]) -> Simulated:
     -------
     Simulated
     """
-    signals, residuals, total = [], [], 0.0
-    for index, one in enumerate(experiments):
-        w, x = block_signals(point, index, one)
-        seen = static_map.evaluate(point.output_map, one.at_counted(x))
+    return compared(point.output_map, all_signals(point, experiments), experiments)
+
+
+def compared(
+    output_map: StaticMap,
+    signals: Signals,
+    experiments: Sequence[Experiment],
+) -> Simulated:
+    """Compare what an output map makes of signals with what was measured.
+
+    Parameters
+    ----------
+    output_map : StaticMap
+    signals : tuple of (w, x)
+    experiments : sequence of Experiment
+
+    Returns
+    -------
+    Simulated
+    """
+    residuals, total = [], 0.0
+    for (_, x), one in zip(signals, experiments, strict=True):
+        seen = static_map.evaluate(output_map, one.at_counted(x))
         residual, loss = residuals_and_loss(
             one.output, seen, one.counted, one.threshold
         )
-        signals.append((w, x))
         residuals.append(residual)
         total += one.output.size / residual.size * loss
     if not np.isfinite(total):
         total = float("inf")
-    return Simulated(tuple(signals), tuple(residuals), total)
+    return Simulated(signals, tuple(residuals), total)
 
 
 def normal_equations(
