@@ -78,5 +78,6 @@ def distinct(
 
 def _deviates(residual: np.ndarray, better: np.ndarray, share: float) -> bool:
     # A simulation that is not finite is no other model's.
-    deviation = residual - better
-    return not deviation @ deviation < share**2 * (better @ better)
+    with np.errstate(over="ignore", invalid="ignore"):
+        deviation = residual - better
+        return not deviation @ deviation < share**2 * (better @ better)
