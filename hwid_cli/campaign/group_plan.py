@@ -10,7 +10,7 @@ from hwid_cli.records.model import FitOptions
 from hwid_cli.records.recordings import Recording
 
 STAGE = "group"
-STAGE_VERSION = 9
+STAGE_VERSION = 10
 
 # Does the work of a level with what runs its tasks. The text says what they are, "fits",
 # "pairs" or "models", the second number how many there will be.

@@ -13,7 +13,7 @@ from hwid_cli.records.model import Fit, FitOptions, HammersteinWiener, Orders
 from hwid_cli.records.recordings import Recording
 
 STAGE = "identify"
-STAGE_VERSION = 9
+STAGE_VERSION = 10
 
 # Runs tasks and returns them with their results, in their order.
 Run = Callable[[Sequence[Task]], Sequence[TaskDone]]

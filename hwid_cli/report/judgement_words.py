@@ -86,8 +86,7 @@ def outlier_sentence(judgement: Judgement) -> str:
     return (
         f"{count} sample{'s' * (count != 1)} of the judging recordings "
         f"{'are outliers' if count != 1 else 'is an outlier'} and "
-        f"{'do' if count != 1 else 'does'} not count here, as in the fits (fit.loss); AIC "
-        "and BIC count all."
+        f"{'do' if count != 1 else 'does'} not count here, as in the fits (fit.loss)."
     )
 
 

@@ -163,36 +163,32 @@ def plain(experiments: Sequence[Experiment]) -> tuple[Experiment, ...]:
     return tuple(replace(one, threshold=np.inf) for one in experiments)
 
 
-def residual_variance(
-    candidate: Candidate, experiments: Sequence[Experiment], n_parameters: int
-) -> float:
-    """Variance by which the inverse of ``J'J`` becomes a covariance.
+def squared_error(candidate: Candidate, experiments: Sequence[Experiment]) -> float:
+    """Sum of the squared residuals, outliers aside.
 
     Parameters
     ----------
     candidate : Candidate
     experiments : sequence of Experiment
-    n_parameters : int
-        That the data determine.
 
     Returns
     -------
     float, [output unit squared]
-        The mean square of the residuals; with a threshold h that of the residuals cut to
-        it, over the squared share of those that are not cut.
+        With a threshold h that of the residuals cut to it, over the squared share of
+        those that are not cut: over the degrees of freedom it is the variance by which
+        the inverse of ``J'J`` becomes a covariance.
 
     References
     ----------
-    docs/method.md, eqs. (16), (16a).
+    docs/method.md, eqs. (16), (16a), (24).
     """
-    freedom = sum(one.output.size for one in experiments) - n_parameters
     threshold = experiments[0].threshold
     if threshold == np.inf:
-        return sensitivities.cost(candidate, experiments) / freedom
+        return sensitivities.cost(candidate, experiments)
     residual = _residual(candidate, experiments)
     cut = np.clip(residual, -threshold, threshold)
     uncut = float(np.mean(np.abs(residual) <= threshold))
-    return float(cut @ cut) / freedom / uncut**2
+    return float(cut @ cut) / uncut**2
 
 
 def _scale(candidate: Candidate, experiments: Sequence[Experiment]) -> float:

@@ -17,7 +17,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from hwid_cli.maths.model import sensitivities
 from hwid_cli.maths.model.beyond import for_search
 from hwid_cli.maths.model.candidates import Candidate, Experiment, limits_of
 from hwid_cli.maths.model.flat_directions import flat_sentences
@@ -29,7 +28,7 @@ from hwid_cli.maths.model.identifiability import (
     parameter_names,
 )
 from hwid_cli.maths.model.information import information
-from hwid_cli.maths.model.robust import plain, renewed, residual_variance
+from hwid_cli.maths.model.robust import plain, renewed, squared_error
 from hwid_cli.maths.model.simulate import estimated_state
 from hwid_cli.maths.model.static_map import RULES
 from hwid_cli.records.information import Information
@@ -67,17 +66,16 @@ def judged_parameters(
     kind = candidate.model.output_map.kind
     if not RULES[kind].has_slope:
         count = n_free(candidate, free_break_points=free_break_points)
-        squared_error = sensitivities.cost(candidate, plain(experiments))
         return (
             Uncertainty(reason=f"a {kind} output map has no slope to tell by"),
-            information(squared_error, n_samples, count),
+            information(squared_error(candidate, experiments), n_samples, count),
         )
     squared = plain(experiments)
     found = directions(candidate, squared, free_break_points=free_break_points)
     if found is None or found.n_effective >= n_samples:
         return Uncertainty(reason="the data are too few to tell"), Information()
-    squared_error = sensitivities.cost(candidate, squared)
-    variance = residual_variance(candidate, experiments, found.n_effective)
+    error = squared_error(candidate, experiments)
+    variance = error / (n_samples - found.n_effective)
     covariance = _covariance(found, variance)
     order = listed(found.place)
     every = parameter_names(candidate, found.place)
@@ -90,7 +88,7 @@ def judged_parameters(
             _reason(names, errors),
             flat_sentences(candidate, squared, found, variance),
         ),
-        information(squared_error, n_samples, found.n_effective),
+        information(error, n_samples, found.n_effective),
     )
 
 
@@ -153,10 +151,11 @@ def parameter_covariance(
     found = directions(
         candidate, plain(experiments), free_break_points=fit.options.free_break_points
     )
-    freedom = sum(one.output.size for one in experiments)
-    if found is None or found.n_effective >= freedom:
+    n_samples = sum(one.output.size for one in experiments)
+    if found is None or found.n_effective >= n_samples:
         raise ValueError(f"the recordings of {fit.name} are too few to tell")
-    variance = residual_variance(candidate, experiments, found.n_effective)
+    freedom = n_samples - found.n_effective
+    variance = squared_error(candidate, experiments) / freedom
     order = listed(found.place)
     every = parameter_names(candidate, found.place)
     return ParameterCovariance(

@@ -17,23 +17,23 @@ from tests.maths.model.plants import MAPS, ORDERS, level_input, measured, plant
 B, F = np.array([0.2, 0.1]), np.array([1.0, -1.2, 0.5])
 
 
-def with_outliers(recording, share=0.05, seed=7):
+def with_outliers(recording, share=0.05, seed=7, times=1.0):
     """Recording with gross errors of two to ten standard deviations, all upwards."""
     rng = np.random.default_rng(seed)
     y = recording.output.copy()
     bad = np.flatnonzero(rng.random(y.size) < share)
     # An initial state is known by the first few samples only: those stay good.
     bad = bad[bad > 20]
-    y[bad] += np.std(y) * rng.uniform(2.0, 10.0, bad.size)
+    y[bad] += np.std(y) * rng.uniform(2.0, 10.0, bad.size) * times
     return replace(recording, output=y)
 
 
-def linear_recording(seed=5):
+def linear_recording(seed=5, share=0.05, times=1.0):
     rng = np.random.default_rng(seed)
     u = rng.standard_normal(1000)
     y = signal.lfilter(np.r_[0.0, B], F, u)
     y += 0.02 * np.std(y) * rng.standard_normal(y.size)
-    return with_outliers(Recording("r", u, y, 1e-3))
+    return with_outliers(Recording("r", u, y, 1e-3), share, times=times)
 
 
 def linear_options(loss):
@@ -144,6 +144,34 @@ def test_standard_errors_with_outliers_are_those_of_the_estimates():
     # 48 numbers tell a standard deviation to 10 %; outliers to one side only leave a
     # small bias. With the plain variance this would be 0.03.
     assert 0.6 < np.sqrt(np.mean(np.square(deviations))) < 1.5
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_criteria_find_the_true_orders_behind_outliers(seed):
+    recording = linear_recording(seed, times=8.0)
+    fits = [
+        fit([recording], Orders(n, n, 1), linear_options("huber")) for n in (1, 2, 3)
+    ]
+    n = recording.n_samples
+    plain = [
+        n * np.log(one.rmsd**2) + one.information.n_parameters * np.log(n)
+        for one in fits
+    ]
+
+    assert np.argmin([one.information.bic for one in fits]) == 1
+    # RMSDs count outliers in full, which drown the better model.
+    assert np.argmin(plain) == 0
+
+
+def test_criteria_without_outliers_are_nearly_those_of_squares():
+    recording = linear_recording(share=0.0)
+    squared, huber = (
+        fit([recording], Orders(2, 2, 1), linear_options(loss)).information
+        for loss in ("squared", "huber")
+    )
+
+    # 95 % efficient: the variance is twentieth larger, give or take.
+    assert huber.fpe == pytest.approx(1.05 * squared.fpe, rel=0.05)
 
 
 def test_threshold_is_that_of_normal_residuals():
