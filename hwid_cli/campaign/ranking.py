@@ -11,7 +11,7 @@ from hwid_cli.records.results import CrossValidation, ModelScore
 
 
 def best_fits(fits: Sequence[Fit], count: int = 3) -> tuple[tuple[Fit, ...], ...]:
-    """Choose the fits with the lowest RMSD on their own recording.
+    """Choose the fits that come closest to their own recording.
 
     Parameters
     ----------
@@ -22,7 +22,8 @@ def best_fits(fits: Sequence[Fit], count: int = 3) -> tuple[tuple[Fit, ...], ...
     Returns
     -------
     tuple of tuple of Fit
-        One tuple for each recording, best first; without fits that have no RMSD.
+        One tuple for each recording, best first: by RMSD, or by FPE where the fits bear
+        outliers, which fill an RMSD. Without fits that have no RMSD.
     """
     by_recording: dict[str, list[Fit]] = {}
     for fit in fits:
@@ -30,8 +31,7 @@ def best_fits(fits: Sequence[Fit], count: int = 3) -> tuple[tuple[Fit, ...], ...
         if np.isfinite(fit.rmsd):
             by_recording[fit.name].append(fit)
     return tuple(
-        tuple(sorted(group, key=lambda fit: fit.rmsd)[:count])
-        for group in by_recording.values()
+        tuple(sorted(group, key=_own_error)[:count]) for group in by_recording.values()
     )
 
 
@@ -101,6 +101,14 @@ def best_of_each(
     for score in scores:
         best.setdefault(score.identified_on, score)
     return tuple(best[name] for name in identified_on if name in best)
+
+
+def _own_error(fit: Fit) -> float:
+    """What tells fits of one recording apart."""
+    variance = fit.information.fpe
+    if fit.options.loss == "squared" or not np.isfinite(variance):
+        return fit.rmsd
+    return float(np.sqrt(variance))
 
 
 def _widest_first(score: ModelScore) -> tuple[int, bool, float]:

@@ -73,7 +73,9 @@ def best_models_table(
         "data\ndetermine, and BIC (form of T3.2.2-1)"
     )
     if any(fit.options.loss == "huber" for group in best for fit in group):
-        title += f"\n{HUBER_WORDS}"
+        title += (
+            f"\n{HUBER_WORDS}\nThe best have the lowest FPE, which leaves outliers out."
+        )
     for one in started:
         title += f"\n{simulation_words(one, is_validation=False)}"
     table = text_table(title, heads, rows, text_columns=(0, 1))

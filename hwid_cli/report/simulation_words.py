@@ -5,7 +5,9 @@ and figure of fits says it in these words.
 """
 
 # What numbers of fits that bear outliers still count.
-HUBER_WORDS = "Fitted with Huber's loss; RMSD and fit % count outliers in full."
+HUBER_WORDS = (
+    "Fitted with Huber's loss; RMSD and fit % count outliers in full, criteria do not."
+)
 
 _OWN = {
     "zero": "initial state zero",

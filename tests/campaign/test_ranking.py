@@ -1,4 +1,7 @@
+from dataclasses import replace
+
 import numpy as np
+import pytest
 
 from hwid_cli.campaign.ranking import (
     best_fits,
@@ -6,6 +9,7 @@ from hwid_cli.campaign.ranking import (
     count_statuses,
     score_models,
 )
+from hwid_cli.records.information import Information
 from hwid_cli.records.model import (
     Fit,
     FitOptions,
@@ -49,6 +53,20 @@ def test_the_best_fits_of_each_recording_come_first_and_failed_ones_never():
     best = best_fits(FITS, count=3)
 
     assert [[fit.rmsd for fit in group] for group in best] == [[0.2, 0.3], [0.1]]
+
+
+@pytest.mark.parametrize(("loss", "first"), [("squared", 0.2), ("huber", 0.3)])
+def test_fits_that_bear_outliers_are_ranked_without_them(loss, first):
+    known = [
+        replace(
+            fit,
+            options=FitOptions(loss=loss),
+            information=Information(fpe=0.01 / fit.rmsd),
+        )
+        for fit in FITS[:2]
+    ]
+
+    assert best_fits(known, count=1)[0][0].rmsd == first
 
 
 def test_statuses_are_counted():
