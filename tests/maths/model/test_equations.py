@@ -49,3 +49,11 @@ def test_columns_of_segments_give_the_derivatives_of_the_map():
     local[at, first], local[at, first + 1] = shares.T
     found = local @ columns_of_segments(points, values).T
     np.testing.assert_allclose(found, expected, atol=1e-12)
+
+
+def test_equations_that_nothing_moves_are_no_division_by_zero():
+    matrix, vector, scale = scaled_equations(np.zeros((3, 3)), np.zeros(3), 1e-12)
+
+    assert not matrix.any()
+    assert not vector.any()
+    assert np.isfinite(scale).all()

@@ -248,3 +248,18 @@ def test_random_plants_reach_their_noise_floor():
     # The noise floor is 99.00 % on each.
     assert np.median(percent) > 98.9
     assert np.min(percent) > 98.0
+
+
+@pytest.mark.parametrize("seed", [0, 7, 9])
+def test_dead_zones_that_swallow_a_start_cost_no_fit(seed):
+    rng = np.random.default_rng(seed)
+    u = np.repeat(rng.uniform(-1.0, 1.0, 60), rng.integers(5, 40, 60))[:300]
+    f = np.poly([0.92 + 0.1j, 0.92 - 0.1j]).real
+    b = np.array([0.0, 1.0, 0.6]) / 1.6 * f.sum()
+    x = signal.lfilter(b, f, u - np.clip(u, -0.1, 0.2))
+    y = x - np.clip(x, -0.1, 0.1) + 0.003 * rng.standard_normal(u.size)
+    # Far from zero: starts whose output never leaves the zone.
+    recording = Recording("r", u + 30.0, y, 1e-3)
+    result = fit([recording], Orders(2, 2, 1), FitOptions("dead_zone", "dead_zone"))
+
+    assert result.rmsd < 1.2 * 0.003

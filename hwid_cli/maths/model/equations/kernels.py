@@ -15,7 +15,8 @@ def scaled_equations(
     matrix : ndarray, shape (n, n)
     vector : ndarray, shape (n,)
     least : float, [-]
-        Diagonal elements below this share of the largest count as much as that.
+        Diagonal elements below this share of the largest count as much as that; where
+        all are zero they stay so.
 
     Returns
     -------
@@ -29,9 +30,11 @@ def scaled_equations(
     largest = 0.0
     for i in range(n):
         largest = max(largest, matrix[i, i])
+    # A dead zone may swallow its whole signal: then no parameter moves the output.
+    lowest = least * largest if largest > 0.0 else 1.0
     scale = np.empty(n)
     for i in range(n):
-        scale[i] = 1.0 / np.sqrt(max(matrix[i, i], least * largest))
+        scale[i] = 1.0 / np.sqrt(max(matrix[i, i], lowest))
     scaled, right = np.empty((n, n)), np.empty(n)
     for i in range(n):
         right[i] = vector[i] * scale[i]
