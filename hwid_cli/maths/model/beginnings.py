@@ -28,6 +28,11 @@ from hwid_cli.maths.model.starts import Start
 from hwid_cli.maths.model.static_map import has_free_shape
 from hwid_cli.records.model import FitOptions, HammersteinWiener, Orders
 
+# What is left of the threshold for outliers from one linear model to the next: where a
+# machine mostly rests, the one asked for is that of the rest, and takes all movement for
+# outliers while the model is still poor.
+_FALL = 0.25
+
 
 def linear_beginnings(
     problem: Problem,
@@ -60,11 +65,15 @@ def linear_beginnings(
     linear = linear_search(experiments, options, starts)
     if options.loss == "squared":
         return starts, linear
-    starts = block_starts(winsorised(linear, experiments), orders, kinds)
-    experiments = renewed(experiments, [linear.candidate])
-    again = linear_search(experiments, options, starts)
-    linear = rejudged(linear, experiments)
-    return starts, min(linear, again, key=lambda one: one.cost)
+    asked = 0.0
+    while asked < experiments[0].threshold:
+        asked = renewed(experiments, [linear.candidate])[0].threshold
+        slowly = max(asked, _FALL * experiments[0].threshold)
+        experiments = [replace(one, threshold=slowly) for one in experiments]
+        starts = block_starts(winsorised(linear, experiments), orders, kinds)
+        again = linear_search(experiments, options, starts)
+        linear = min(rejudged(linear, experiments), again, key=lambda one: one.cost)
+    return starts, linear
 
 
 def block_starts(

@@ -114,7 +114,6 @@ def winsorised(
     """
     if experiments[0].threshold == np.inf:
         return experiments
-    experiments = renewed(experiments, [search.candidate])
     simulated = sensitivities.simulated_outputs(search.candidate, experiments)
     return tuple(
         replace(one, output=y + np.clip(one.output - y, -one.threshold, one.threshold))
@@ -192,8 +191,15 @@ def squared_error(candidate: Candidate, experiments: Sequence[Experiment]) -> fl
 
 
 def _scale(candidate: Candidate, experiments: Sequence[Experiment]) -> float:
-    """Standard deviation of normal residuals of the same median size."""
-    return _NORMAL * float(np.median(np.abs(_residual(candidate, experiments))))
+    """Standard deviation of normal residuals of the same median size.
+
+    Only of samples that do not repeat the one before: a sensor with steps repeats itself
+    as long as a machine rests, and that says nothing of the size of errors.
+    """
+    tells = np.concatenate(
+        [np.diff(one.output, prepend=np.nan) != 0.0 for one in experiments]
+    )
+    return _NORMAL * float(np.median(np.abs(_residual(candidate, experiments)[tells])))
 
 
 def _residual(candidate: Candidate, experiments: Sequence[Experiment]) -> np.ndarray:

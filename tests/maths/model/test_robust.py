@@ -195,3 +195,46 @@ def test_an_unknown_loss_is_refused():
         ValueError, match="loss must be one of squared, huber, got 'l1'"
     ):
         FitOptions(loss="l1")
+
+
+SLOW_F = np.poly([0.92 + 0.1j, 0.92 - 0.1j]).real
+SLOW_B = np.array([1.0, 0.6]) / 1.6 * SLOW_F.sum()
+
+
+def resting(seed, rest):
+    """Two slow poles, moved by levels after a share of rest; input and output."""
+    rng = np.random.default_rng(seed)
+    n = 1000
+    u = np.zeros(n)
+    moving = n - int(rest * n)
+    held = np.repeat(rng.uniform(-1.0, 1.0, moving), rng.integers(10, 40, moving))
+    u[n - moving :] = held[:moving]
+    return u, signal.lfilter(np.r_[0.0, SLOW_B], SLOW_F, u), rng
+
+
+@pytest.mark.parametrize("seed", [5, 6, 7])
+def test_movement_after_a_long_rest_is_not_taken_for_outliers(seed):
+    u, y, rng = resting(seed, 0.8)
+    bad = rng.random(y.size) < 0.1
+    y = y + 0.003 * rng.standard_normal(y.size)
+    y[bad] += rng.choice([-1.0, 1.0], bad.sum()) * rng.uniform(1.0, 3.0, bad.sum())
+    asked = replace(linear_options("huber"), initial_state="zero")
+    result = fit([Recording("r", u, y, 1e-3)], Orders(2, 2, 1), asked)
+
+    found = np.r_[result.model.numerator, result.model.denominator[1:]]
+    np.testing.assert_allclose(found, np.r_[SLOW_B, SLOW_F[1:]], atol=0.01)
+
+
+def test_a_sensor_that_repeats_itself_at_rest_hides_no_errors():
+    """As long as a stepped sensor rests its residuals are zero: not the errors' size."""
+    deviations = []
+    for seed in range(8):
+        u, y, rng = resting(seed, 0.6)
+        y = np.round((y + 0.001 * rng.standard_normal(y.size)) / 0.01) * 0.01
+        asked = replace(linear_options("huber"), initial_state="zero")
+        result = fit([Recording("r", u, y, 1e-3)], Orders(2, 2, 1), asked)
+        found = np.r_[result.model.numerator, result.model.denominator[1:]]
+        errors = found - np.r_[SLOW_B, SLOW_F[1:]]
+        deviations.append(errors / result.uncertainty.standard_errors)
+    # Errors of rounding are not white, so they are somewhat larger than foretold.
+    assert np.sqrt(np.mean(np.square(deviations))) < 3.0
