@@ -5,13 +5,18 @@ from collections.abc import Sequence
 import numpy as np
 
 from hwid_cli.campaign.order_grid import grid_place
+from hwid_cli.campaign.outliers import robust_validation
 from hwid_cli.campaign.ranking import best_fits
 from hwid_cli.maths.model.leverage import pull
 from hwid_cli.maths.model.residual_tests import n_tested_lags, residual_tests
 from hwid_cli.maths.model.simulate import validation_output
+from hwid_cli.maths.outliers import usual_error
 from hwid_cli.records.model import Fit
 from hwid_cli.records.recordings import Recording
 from hwid_cli.records.residuals import ModelResiduals, ResidualTests
+
+# Robust standard deviations that residuals of fits that bear outliers are cut to.
+_CUT = 3.0
 
 
 def own_residuals(
@@ -64,10 +69,17 @@ def judge_residual(
     Returns
     -------
     ResidualTests or None
-        None where the model's output is not finite.
+        None where the model's output is not finite. Of a fit that bears outliers these are
+        of the residual cut to three robust standard deviations: what is white stays so,
+        and a few large numbers do not make up all of a product.
     """
     if fit.model is None or not np.isfinite(residual).all():
         return None
+    if fit.options.loss != "squared":
+        simulated = robust_validation(fit.model, recording)
+        residual = recording.output - simulated
+        most = _CUT * usual_error(recording.output, residual)
+        residual = np.clip(residual, -most, most)
     pulled = None
     # Only a fit to this very recording has taken a part of its noise.
     if fit.identified_on == (recording.name,):

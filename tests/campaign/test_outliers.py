@@ -76,6 +76,25 @@ def test_judges_without_their_outliers_choose_the_true_poles(robust):
     assert {one.judgement.n_outliers for one in advice.choices} == {3 * N_OUTLIERS}
 
 
+def test_an_outlier_among_the_first_samples_does_not_hide_in_the_initial_state():
+    estimated = replace(ROBUST, initial_state="estimated")
+    clean = recordings(outliers=0)
+    bad = []
+    for one in clean:
+        y = one.output.copy()
+        y[3] += 10.0 * np.std(y)
+        bad.append(replace(one, output=y))
+    fits = identify_all(bad, GRID, estimated, SETTINGS)
+    crossval = cross_validate(fits, bad, GRID, CrossvalOptions(), SETTINGS)
+    judging, n_outliers = cross_validate_without_outliers(
+        fits, crossval, bad, GRID, SETTINGS
+    )
+    truth = cross_validate(fits, clean, GRID, CrossvalOptions(), SETTINGS)
+
+    assert n_outliers == (1,) * 4
+    assert judging.rmsd == pytest.approx(truth.rmsd, rel=0.02)
+
+
 def test_maps_are_judged_without_outliers_too():
     chosen = recordings(outliers=N_OUTLIERS, gain=lambda u: u - np.clip(u, -0.1, 0.1))
     options = replace(ROBUST, input_map="piecewise_linear", units=6)

@@ -4,26 +4,37 @@ from scipy.signal import lfilter
 
 from hwid_cli.maths.outliers import find_outliers, replace_outliers
 
+PAIR = 0.95 * np.exp(1j * np.array([0.2, -0.2]))
+
 
 def noise(count, seed=0):
     return np.random.default_rng(seed).standard_normal(count)
 
 
+def moving(count, seed=0, poles=PAIR, hold=50):
+    """Output of a block at levels that it is held at."""
+    rng = np.random.default_rng(seed)
+    u = np.repeat(rng.uniform(-1.0, 1.0, count // hold + 1), hold)[:count]
+    f = np.real(np.poly(poles))
+    return 100.0 * lfilter([0.0, f.sum()], f, u)
+
+
 @pytest.mark.parametrize("length", [1, 5])
 def test_spikes_and_short_bursts_stand_out_and_nothing_else(length):
-    residual = noise(4000)
+    simulated, residual = 0.3 * moving(4000), noise(4000)
     firsts = np.arange(50, 3900, 200)
     places = (firsts[:, np.newaxis] + np.arange(length)).ravel()
     residual[places] += 20.0 * np.repeat(np.where(firsts % 400 < 200, 1, -1), length)
 
-    assert np.flatnonzero(find_outliers(residual)).tolist() == places.tolist()
+    found = find_outliers(simulated + residual, simulated)
+    assert np.flatnonzero(found).tolist() == places.tolist()
 
 
 def test_a_fifth_of_all_samples_may_stand_out():
-    residual = noise(3000)
+    simulated, residual = moving(3000), noise(3000)
     is_bad = np.random.default_rng(1).random(3000) < 0.2
     residual[is_bad] += 100.0 * np.sign(residual[is_bad])
-    found = find_outliers(residual)
+    found = find_outliers(simulated + residual, simulated)
 
     # Here and there half of the samples nearby are bad, and then nobody can tell.
     assert np.mean(found[is_bad]) > 0.9
@@ -31,19 +42,32 @@ def test_a_fifth_of_all_samples_may_stand_out():
 
 
 @pytest.mark.parametrize("seed", range(10))
-def test_what_a_model_leaves_of_a_response_is_no_outlier(seed):
+@pytest.mark.parametrize("radius", [0.95, 0.6, 0.3])
+def test_what_a_model_leaves_of_a_response_is_no_outlier(radius, seed):
     """Rests of nothing but noise, and transients a thousand times as large."""
-    u = np.repeat([0.0, 1.0, 0.0, -0.5, 0.0], 400)
-    pair = 0.95 * np.exp(1j * np.array([0.2, -0.2]))
-    misfit = lfilter([0.05], np.real(np.poly(pair)), np.diff(u, prepend=0.0))
-    residual = misfit + 1e-3 * np.max(np.abs(misfit)) * noise(u.size, seed)
+    poles = radius / 0.95 * PAIR
+    simulated = moving(2000, seed, poles, hold=80)
+    misfit = 0.2 * (moving(2000, seed, 0.9 * poles, hold=80) - simulated)
+    misfit += 1e-3 * np.max(np.abs(misfit)) * noise(2000, seed)
 
-    assert not find_outliers(residual).any()
+    assert np.sum(find_outliers(simulated + misfit, simulated)) <= 2
+
+
+def test_a_stepped_sensor_flickers_without_being_an_outlier():
+    exact = moving(3000, poles=[0.5])
+    output = np.round(exact + 0.3 * noise(3000))
+
+    assert not find_outliers(output, exact).any()
+    output[1234] += 8.0
+    assert np.flatnonzero(find_outliers(output, exact)).tolist() == [1234]
 
 
 @pytest.mark.parametrize("count", [1, 2, 15, 100])
-def test_short_and_empty_residuals_hold_no_outlier(count):
-    assert not find_outliers(np.zeros(count)).any()
+def test_short_records_and_perfect_models_have_no_outlier(count):
+    output = noise(count)
+
+    assert not find_outliers(output, output).any()
+    assert not find_outliers(np.zeros(count), np.zeros(count)).any()
 
 
 def test_outliers_are_replaced_by_the_model_and_what_it_leaves_nearby():
