@@ -16,6 +16,9 @@ _HOLDS = 0.5
 _LIMIT_RUN = 5
 # Share of a recording that a stretch without change must take to be named, [-].
 _DEAD_SHARE = 0.05
+# Standard deviations from zero beyond which a fit without maps that shift ends in poor
+# minima.
+_FAR = 50.0
 
 
 def signal_oddities(values: np.ndarray, *, may_hold: bool = False) -> tuple[str, ...]:
@@ -52,6 +55,12 @@ def signal_oddities(values: np.ndarray, *, may_hold: bool = False) -> tuple[str,
         run = longest_run((np.diff(values) == 0) & inside[1:])
         if not may_hold and run >= _DEAD_SHARE * values.size:
             notes.append(f"does not change for {run + 1} samples in a row")
+    spread, middle = float(np.std(values)), abs(float(np.mean(values)))
+    if middle > _FAR * spread > 0.0:
+        notes.append(
+            f"{middle / spread:.3g} standard deviations from zero: take the offset off, "
+            "fits with few kinds of maps may miss it"
+        )
     damaged = find_damaged(values).size
     if damaged:
         what = "single sample looks" if damaged == 1 else "single samples look"

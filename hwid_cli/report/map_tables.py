@@ -44,8 +44,9 @@ def map_table(advice: MapAdvice, *, initial_state: str) -> str:
     nb, nf, nk = advice.orders
     title = (
         f"Maps at the orders [{nb} {nf} {nk}], with p parameters: cross-validated RMSD "
-        f"[{advice.unit}]\n(geometric mean), factor above the best, BIC above the "
-        f"lowest; {len(rows)} of {len(advice.candidates)} pairs\n"
+        f"[{advice.unit}]\n(geometric mean), factor above the best (ten at most on one "
+        "recording),\nBIC above the lowest; "
+        f"{len(rows)} of {len(advice.candidates)} pairs\n"
         f"{simulation_words(initial_state, is_validation=True)}"
     )
     heads = ("", "input map", "output map", "p", "RMSD", "factor", "BIC")
@@ -90,6 +91,8 @@ def _recommendation(advice: MapAdvice) -> str:
     )
     if one == advice.given:
         return f"{take}{reason} They are those of the configuration."
+    if advice.given == best:
+        return f"{take}{reason} Those of the configuration are the best."
     return (
         f"{take}{reason} Those of the configuration are {advice.given.factor:.3g} times as "
         "far off as the best."

@@ -59,8 +59,9 @@ def order_table(advice: OrderAdvice, *, initial_state: str) -> str:
     )
     title = (
         f"Orders nb/nk to take, cross-validated RMSD [{advice.unit}] (geometric mean), the "
-        "factor\nabove the best orders, what AIC and BIC choose, delay and poles that "
-        f"data show\n{simulation_words(initial_state, is_validation=True)}"
+        "factor\nabove the best orders (ten at most on one recording), what AIC and BIC\n"
+        "choose, delay and poles that data show\n"
+        f"{simulation_words(initial_state, is_validation=True)}"
     )
     return text_table(title, heads, rows, text_columns=(0,))
 

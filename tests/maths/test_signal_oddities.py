@@ -32,3 +32,9 @@ def test_damaged_samples_are_counted():
     damaged = WAVE.copy()
     damaged[300] += 5.0
     assert signal_oddities(damaged) == ("1 single sample looks damaged",)
+
+
+def test_a_signal_far_from_zero_is_named():
+    (note,) = signal_oddities(293.0 + 0.5 * WAVE)
+    assert "standard deviations from zero: take the offset off" in note
+    assert signal_oddities(3.0 + WAVE) == ()

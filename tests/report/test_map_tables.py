@@ -44,7 +44,7 @@ def test_the_best_come_first_and_those_of_the_configuration_are_there(rule):
     assert rows[1].split()[-1] == "20"
     assert rows[-1].split()[0] == "yours"
     assert (len(rows), rows[-1].split()[-1]) == (13, "-")
-    assert "13 of 23 pairs" in lines[1]
+    assert "13 of 23 pairs" in lines[2]
     assert max(map(len, lines)) <= 80
 
 
@@ -65,6 +65,7 @@ def test_the_recommendation_can_be_pasted_and_says_why():
     [
         ({"chosen": BEST}, "they have the lowest RMSD on recordings that"),
         ({"given": SMALL}, "They are those of the configuration."),
+        ({"given": BEST}, "Those of the configuration are the best."),
         (
             {"judgement": replace(ADVICE.judgement, n_judges=0)},
             "they have the lowest BIC. No other recording judges",

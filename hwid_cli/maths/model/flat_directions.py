@@ -156,7 +156,9 @@ def _why(
         at = _cancellation(model)
         if at:
             return f"a pole and a zero nearly cancel at {at}"
-    return f"{_SAME_OUTPUT}; an input of more levels or frequencies would tell"
+    if all(in_block):
+        return f"{_SAME_OUTPUT}: orders may be too high, or the input too simple"
+    return _SAME_OUTPUT
 
 
 def _why_of_map(

@@ -76,9 +76,15 @@ def reason_not_to_fit(
         if not is_stable(np.array(block.denominator), radius):
             return f"the frozen linear block has a pole at or beyond radius {radius:g}"
     total = sum(one.n_samples for one in recordings)
-    needed = _least_parameters(orders, options) + orders.n_state
+    delay = min(options.delays, default=orders.nk)
+    needed = _least_parameters(orders, options) + replace(orders, nk=delay).n_state
     if total <= needed:
         return f"{total} samples cannot determine a model that needs more than {needed}"
+    longest = total
+    if options.join == "experiments":
+        longest = max(one.n_samples for one in recordings)
+    if delay >= longest:
+        return f"a delay of {delay} samples leaves nothing of a record of {longest}"
     for side in ("input", "output"):
         signal = np.concatenate([getattr(one, side) for one in recordings])
         largest = float(np.max(np.abs(signal)))

@@ -193,6 +193,17 @@ def test_data_that_cannot_determine_a_model_give_a_failed_fit(u, y, reason):
     assert reason in result.message
 
 
+def test_delays_that_leave_nothing_give_a_failed_fit():
+    rng = np.random.default_rng(0)
+    pair = [Recording(name, *rng.standard_normal((2, 300)), 1.0) for name in "ab"]
+    asked = FitOptions("none", "none", delays=(350, 900), join="experiments")
+    alone = fit(pair[:1], Orders(1, 1, 1), asked)
+    joined = fit(pair, Orders(1, 1, 1), asked)
+
+    assert "300 samples cannot determine a model that needs more than" in alone.message
+    assert "a delay of 350 samples leaves nothing of a record of 300" in joined.message
+
+
 def test_fit_of_pure_noise_is_a_value_and_stable():
     rng = np.random.default_rng(0)
     recording = Recording("r", *rng.standard_normal((2, 300)), 1.0)

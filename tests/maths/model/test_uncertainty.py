@@ -160,9 +160,18 @@ def test_coefficients_that_a_single_frequency_does_not_tell_apart_are_named():
     assert all("initial state" in one for one in states)
     assert "b[0]" in block
     assert block.endswith(
-        "can move together, because that hardly changes the simulated output; an input "
-        "of more levels or frequencies would tell"
+        "can move together, because that hardly changes the simulated output"
     )
+
+
+def test_a_pole_too_many_is_not_blamed_on_the_input_alone():
+    u = np.random.default_rng(4).standard_normal(600)
+    y = noisy(signal.lfilter([0.0, 0.5, 0.2], [1.0, -0.9, 0.3], u), 5, 0.03)
+    asked = FitOptions("none", "none", initial_state="zero")
+    result = fit([Recording("r", u, y, 1.0)], Orders(3, 3, 1), asked)
+
+    (sentence,) = result.uncertainty.flat
+    assert sentence.endswith("orders may be too high, or the input too simple")
 
 
 def test_a_limit_that_is_never_reached_is_named_as_the_reason():

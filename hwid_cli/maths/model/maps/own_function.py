@@ -23,6 +23,8 @@ _CHECKED, _OFF = 41, 0.137
 # Step of the central differences as a share of what is varied, and the share of the
 # largest derivative by which they may differ: rounding leaves 1e-9, curvature 1e-10.
 _STEP, _TOLERANCE = 1e-6, 1e-4
+# Share of the largest value that may be rounding in a difference of two.
+_ROUNDING = 1e-13
 
 
 @lru_cache(maxsize=16)
@@ -114,16 +116,17 @@ def _check_at(function: MapFunction, start: np.ndarray) -> None:
         _called(function, "value", (at + sign * step, start), value.shape)
         for sign in (1.0, -1.0)
     )
-    _compare("by_argument", slope, (above - below) / (2.0 * step), at)
+    _compare("by_argument", slope, (above, below, step), at)
+    usual = float(np.max(np.abs(start))) or 1.0
     for k in range(start.size):
         change = np.zeros(start.size)
-        change[k] = _STEP * max(abs(start[k]), 1e-3)
+        change[k] = _STEP * (abs(start[k]) or usual)
         above, below = (
             _called(function, "value", (at, start + sign * change), value.shape)
             for sign in (1.0, -1.0)
         )
-        difference = (above - below) / (2.0 * change[k])
-        _compare(f"by_parameters, column {k}", columns[:, k], difference, at)
+        sides = (above, below, change[k])
+        _compare(f"by_parameters, column {k}", columns[:, k], sides, at)
 
 
 def _called(
@@ -136,7 +139,7 @@ def _called(
     try:
         with np.errstate(all="ignore"):
             given = np.asarray(getattr(function, part)(*arguments), dtype=float)
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise ValueError(f"{part} does not run: {_said(error)}") from error
     if given.shape != shape:
         raise ValueError(f"{part}: found shape {given.shape}; expected {shape}")
@@ -150,13 +153,18 @@ def _called(
 
 
 def _compare(
-    part: str, stated: np.ndarray, difference: np.ndarray, at: np.ndarray
+    part: str,
+    stated: np.ndarray,
+    sides: tuple[np.ndarray, np.ndarray, float],
+    at: np.ndarray,
 ) -> None:
-    """Refuse a derivative that central differences contradict."""
+    """Refuse a derivative that the values a step above and below contradict."""
+    above, below, step = sides
+    difference = (above - below) / (2.0 * step)
     gap = np.abs(stated - difference)
     worst = int(np.argmax(gap))
-    # The tiny floor lets rounding pass where the derivative is zero everywhere.
-    if gap[worst] > _TOLERANCE * np.max(np.abs(difference)) + 1e-7:
+    rounding = _ROUNDING * float(np.max(np.abs([above, below]))) / step
+    if gap[worst] > _TOLERANCE * np.max(np.abs(difference)) + rounding:
         raise ValueError(
             f"{part}: found {stated[worst]:.6g} at v = {at[worst]:.4g}; expected "
             f"{difference[worst]:.6g}, the central difference of value; correct it, or "
@@ -164,7 +172,7 @@ def _compare(
         )
 
 
-def _said(error: Exception) -> str:
+def _said(error: BaseException) -> str:
     """An exception in one line."""
     line = " ".join(str(error).split())
     return f"{type(error).__name__}: {line}" if line else type(error).__name__

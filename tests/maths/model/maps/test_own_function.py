@@ -103,3 +103,38 @@ def test_a_kink_inside_the_range_is_no_contradiction():
     source = CUBIC.replace("v + p[0] * v**3", "np.abs(v) + p[0] * v**3")
     source = source.replace("1 + 3", "np.sign(v) + 3")
     assert own_function.load("cubic", source).start == [0.1]
+
+
+TANH = """
+import numpy as np
+from hwid_cli import MapFunction
+
+UNIT = 1.0
+
+def by_parameters(v, p):
+    t = np.tanh(v / p[1])
+    return np.stack([-t, p[0] * v / p[1]**2 * (1 - t**2)], axis=1)
+
+lossy = MapFunction(
+    value=lambda v, p: v - p[0] * np.tanh(v / p[1]),
+    by_argument=lambda v, p: 1 - p[0] / p[1] * (1 - np.tanh(v / p[1])**2),
+    by_parameters=by_parameters,
+    start=[[0.05 * UNIT, 0.3 * UNIT], [0.0, 0.05 * UNIT]],
+    check_range=(-UNIT, UNIT),
+)
+"""
+
+
+@pytest.mark.parametrize("unit", [1e-12, 1e-6, 1e6])
+def test_a_function_in_any_unit_is_checked_as_closely(unit):
+    source = TANH.replace("UNIT = 1.0", f"UNIT = {unit}")
+    assert len(own_function.load("lossy", source).start) == 2
+    wrong = source.replace("p[1]**2 *", "p[1]**2 * 1.01 *")
+    with pytest.raises(ValueError, match="by_parameters, column 1"):
+        own_function.load("lossy", wrong)
+
+
+def test_a_function_that_ends_the_program_is_refused():
+    source = CUBIC.replace("return v +", "raise SystemExit(3)\n    return v +")
+    with pytest.raises(ValueError, match="value does not run: SystemExit: 3"):
+        own_function.load("cubic", source)
