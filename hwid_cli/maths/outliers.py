@@ -82,11 +82,26 @@ def replace_outliers(
     return repaired, int(is_outlier.sum())
 
 
-def usual_error(output: np.ndarray, residual: np.ndarray) -> float:
-    """Robust standard deviation of a residual.
+def tells_errors(output: np.ndarray) -> np.ndarray:
+    """Which samples say how large errors are: those that do not repeat the one before.
 
-    Only of samples whose output is not that of the one before: a sensor with steps repeats
-    itself as long as a machine rests, and that says nothing of the size of errors.
+    A sensor with steps repeats itself as long as a machine rests, and a model soon leaves
+    nothing there.
+
+    Parameters
+    ----------
+    output : ndarray, shape (n_samples,), [output unit]
+        As it was measured.
+
+    Returns
+    -------
+    ndarray of bool, shape (n_samples,)
+    """
+    return np.diff(output, prepend=np.nan) != 0.0
+
+
+def usual_error(output: np.ndarray, residual: np.ndarray) -> float:
+    """Robust standard deviation of the residual where it tells errors.
 
     Parameters
     ----------
@@ -98,9 +113,8 @@ def usual_error(output: np.ndarray, residual: np.ndarray) -> float:
     -------
     float, [output unit]
     """
-    tells = np.diff(output, prepend=np.nan) != 0.0
     deviation = np.abs(residual - np.median(residual))
-    return _NORMAL * float(np.median(deviation[tells]))
+    return _NORMAL * float(np.median(deviation[tells_errors(output)]))
 
 
 def _sides(residual: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -19,6 +19,7 @@ from hwid_cli.maths.model import sensitivities
 from hwid_cli.maths.model.candidates import Candidate, Experiment
 from hwid_cli.maths.model.levenberg_marquardt import Search
 from hwid_cli.maths.model.phases import finish
+from hwid_cli.maths.outliers import tells_errors
 from hwid_cli.records.model import FitOptions
 
 # Threshold in standard deviations: 95 % efficient for normal residuals.
@@ -191,14 +192,8 @@ def squared_error(candidate: Candidate, experiments: Sequence[Experiment]) -> fl
 
 
 def _scale(candidate: Candidate, experiments: Sequence[Experiment]) -> float:
-    """Standard deviation of normal residuals of the same median size.
-
-    Only of samples that do not repeat the one before: a sensor with steps repeats itself
-    as long as a machine rests, and that says nothing of the size of errors.
-    """
-    tells = np.concatenate(
-        [np.diff(one.output, prepend=np.nan) != 0.0 for one in experiments]
-    )
+    """Standard deviation of normal residuals of the same median size."""
+    tells = np.concatenate([tells_errors(one.output) for one in experiments])
     return _NORMAL * float(np.median(np.abs(_residual(candidate, experiments)[tells])))
 
 
