@@ -215,7 +215,7 @@ def _simulate(
         detail=detail_window(
             recording.input, recording.output, is_periodic=recording.kind == "sine"
         ),
-        tests=judge_residual(recording.output - output, recording, fit),
+        tests=judge_residual(recording, fit),
     )
 
 

@@ -11,7 +11,7 @@ from hwid_cli.maths.model.leverage import pull
 from hwid_cli.maths.model.residual_tests import n_tested_lags, residual_tests
 from hwid_cli.maths.model.simulate import validation_output
 from hwid_cli.maths.outliers import usual_error
-from hwid_cli.records.model import Fit
+from hwid_cli.records.model import Fit, HammersteinWiener
 from hwid_cli.records.recordings import Recording
 from hwid_cli.records.residuals import ModelResiduals, ResidualTests
 
@@ -42,11 +42,7 @@ def own_residuals(
     found = []
     for best in best_fits(fits, 1):
         for fit in best:
-            recording = by_name[fit.name]
-            residual = recording.output
-            if fit.model is not None:
-                residual = residual - validation_output(fit.model, recording)
-            tests = judge_residual(residual, recording, fit)
+            tests = judge_residual(by_name[fit.name], fit)
             if tests is not None:
                 nb, nk = grid_place(fit, nk_role)
                 name = f"{fit.name}/{nb}/{nk}"
@@ -54,14 +50,11 @@ def own_residuals(
     return tuple(found)
 
 
-def judge_residual(
-    residual: np.ndarray, recording: Recording, fit: Fit
-) -> ResidualTests | None:
+def judge_residual(recording: Recording, fit: Fit) -> ResidualTests | None:
     """Test the residual of a model on one recording.
 
     Parameters
     ----------
-    residual : ndarray, shape (n_samples,), [output unit]
     recording : Recording
     fit : Fit
         That gave the model; of this recording or of others.
@@ -69,17 +62,13 @@ def judge_residual(
     Returns
     -------
     ResidualTests or None
-        None where the model's output is not finite. Of a fit that bears outliers these are
-        of the residual cut to three robust standard deviations: what is white stays so,
-        and a few large numbers do not make up all of a product.
+        None where there is no model or its output is not finite.
     """
-    if fit.model is None or not np.isfinite(residual).all():
+    if fit.model is None:
         return None
-    if fit.options.loss != "squared":
-        simulated = robust_validation(fit.model, recording)
-        residual = recording.output - simulated
-        most = _CUT * usual_error(recording.output, residual)
-        residual = np.clip(residual, -most, most)
+    residual = _residual(fit.model, recording, fit.options.loss)
+    if not np.isfinite(residual).all():
+        return None
     pulled = None
     # Only a fit to this very recording has taken a part of its noise.
     if fit.identified_on == (recording.name,):
@@ -90,3 +79,15 @@ def judge_residual(
             free_break_points=fit.options.free_break_points,
         )
     return residual_tests(residual, recording.input, pull=pulled)
+
+
+def _residual(model: HammersteinWiener, recording: Recording, loss: str) -> np.ndarray:
+    """What a model leaves; of fits that bear outliers cut to where these begin.
+
+    What is white stays so, and a few large numbers do not make up all of a product.
+    """
+    if loss == "squared":
+        return recording.output - validation_output(model, recording)
+    residual = recording.output - robust_validation(model, recording)
+    most = _CUT * usual_error(recording.output, residual)
+    return np.clip(residual, -most, most)

@@ -30,7 +30,7 @@ def alarms(loss):
         bad = rng.random(u.size) < 0.01
         y[bad] += rng.standard_normal(bad.sum())
         y[2] += 3.0
-        tests = judge_residual(y, Recording("r", u, y, 1.0), fit)
+        tests = judge_residual(Recording("r", u, y, 1.0), fit)
         count += tests.follows_input or tests.follows_square or not tests.is_white
     return count
 
