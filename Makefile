@@ -101,7 +101,7 @@ bench-wide: $(DEV)  ## many kinds of plants against fits that begin at the truth
 
 scale: $(DEV)  ## what a cluster costs, and docs/scale.md
 	@$(BENCH).bench_dask --json docs/scale.json
-	$(BIN)/python docs/scale.py docs/scale.json > docs/scale.tmp && mv docs/scale.tmp docs/scale.md
+	$(BIN)/python tools/scale.py docs/scale.json > docs/scale.tmp && mv docs/scale.tmp docs/scale.md
 
 bench-real: $(DEV)  ## public benchmarks beside the published errors (data in HWID_REALDATA)
 	@$(BENCH).bench_real
@@ -134,7 +134,7 @@ model2: $(RUN)  ## section 3.4.2: groups of steps and sines, on all 38 recording
 	$(HWID) run configs/model2.yaml $(THESIS)
 
 reproduction: $(RUN)  ## docs/reproduction.md from what steps, model1 and model2 have left
-	$(BIN)/python docs/reproduction.py results/thesis_steps/results.h5 results/model1/results.h5 \
+	$(BIN)/python tools/reproduction.py results/thesis_steps/results.h5 results/model1/results.h5 \
 	  results/model2/results.h5 > docs/reproduction.tmp && mv docs/reproduction.tmp docs/reproduction.md
 
 thesis: chapter2 steps model1 model2  ## everything of the thesis at full size, and all 43 recordings
@@ -149,18 +149,18 @@ diagnose: $(RUN)  ## what a mass-spring-damper lacks to be the virtual gun
 
 gun: $(RUN)  ## the same at full size, and docs/gun_diagnosis.md
 	$(HWID) diagnose configs/diagnose_gun.yaml
-	$(BIN)/python docs/gun_diagnosis.py results/diagnose_gun > docs/gun_diagnosis.tmp && mv docs/gun_diagnosis.tmp docs/gun_diagnosis.md
+	$(BIN)/python tools/gun_diagnosis.py results/diagnose_gun > docs/gun_diagnosis.tmp && mv docs/gun_diagnosis.tmp docs/gun_diagnosis.md
 
 REAL := emps silverbox hsm150 ffwheel
 real: $(RUN)  ## diagnose real machines (data in HWID_REALDATA), and docs/real_diagnosis.md
 	@for name in $(REAL); do $(HWID) diagnose configs/diagnose_$$name.yaml || exit 1; done
-	$(BIN)/python docs/real_diagnosis.py results > docs/real_diagnosis.tmp && mv docs/real_diagnosis.tmp docs/real_diagnosis.md
+	$(BIN)/python tools/real_diagnosis.py results > docs/real_diagnosis.tmp && mv docs/real_diagnosis.tmp docs/real_diagnosis.md
 
 effects: $(RUN)  ## docs/effects.md from the catalogue
-	$(BIN)/python docs/effects_document.py
+	$(BIN)/python tools/effects_document.py
 
 drive-source: $(RUN)  ## the C form of the drive's compiled loops, for hwid export
-	$(BIN)/python docs/drive_source.py
+	$(BIN)/python tools/drive_source.py
 
 export-check: $(DEV)  ## every format of hwid export against hwid predict: the table of docs/export.md
 	$(BIN)/python -m tests.benchmarks.export_check

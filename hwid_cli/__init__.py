@@ -2,11 +2,13 @@
 
 The rooms, and the only direction in which they import each other::
 
-    cli -> campaign | files | report -> maths -> records -> errors
+    cli -> stages -> export | simulations | report | tasks -> config | store -> data
+        -> files -> diagnosis -> drive | model -> records -> errors
 
-``records`` holds the data handed between rooms, ``maths`` is pure functions on it,
-``files`` reads and writes, ``campaign`` runs whole experiments, ``report`` makes
-tables and figures, ``cli`` joins them behind the ``hwid`` command.
+``records`` holds the data handed between rooms; ``model``, ``drive`` and ``diagnosis``
+are pure functions on it; ``files`` to ``export`` turn bytes into records and back;
+``tasks`` runs and memoises work; ``stages`` say what is needed, computed, stored and
+shown; ``report`` makes tables, figures and the page; ``cli`` joins them behind ``hwid``.
 
 From Python, the names below do on records in memory what the commands do on files.
 
@@ -47,14 +49,14 @@ _PUBLIC = {
     "OwnFunction": "hwid_cli.records.maps",
     "Recording": "hwid_cli.records.recordings",
     "SimulationOptions": "hwid_cli.records.experiment",
-    "diagnose": "hwid_cli.campaign.diagnose_recordings",
-    "fit": "hwid_cli.maths.model.fit",
-    "fit_percent": "hwid_cli.maths.scores",
-    "load_recording": "hwid_cli.files.single_recording",
-    "load_model": "hwid_cli.files.exported.loading",
-    "parameter_covariance": "hwid_cli.maths.model.uncertainty",
-    "rmsd": "hwid_cli.maths.scores",
-    "simulate": "hwid_cli.maths.model.simulate",
+    "diagnose": "hwid_cli.stages.diagnose",
+    "fit": "hwid_cli.model.fit",
+    "fit_percent": "hwid_cli.model.scores",
+    "load_recording": "hwid_cli.stages.single_recording",
+    "load_model": "hwid_cli.export.loading",
+    "parameter_covariance": "hwid_cli.model.uncertainty",
+    "rmsd": "hwid_cli.model.scores",
+    "simulate": "hwid_cli.model.simulate",
 }
 
 __all__ = [

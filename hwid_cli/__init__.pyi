@@ -1,16 +1,14 @@
 """What ``from hwid_cli import ...`` gives, for type checkers: the same as ``_PUBLIC``."""
 
-from hwid_cli.campaign.diagnose_recordings import diagnose as diagnose
 from hwid_cli.errors import HwidError as HwidError
-from hwid_cli.files.exported.loading import load_model as load_model
-from hwid_cli.files.single_recording import load_recording as load_recording
-from hwid_cli.maths.model.fit import fit as fit
-from hwid_cli.maths.model.simulate import simulate as simulate
-from hwid_cli.maths.model.uncertainty import (
+from hwid_cli.export.loading import load_model as load_model
+from hwid_cli.model.fit import fit as fit
+from hwid_cli.model.scores import fit_percent as fit_percent
+from hwid_cli.model.scores import rmsd as rmsd
+from hwid_cli.model.simulate import simulate as simulate
+from hwid_cli.model.uncertainty import (
     parameter_covariance as parameter_covariance,
 )
-from hwid_cli.maths.scores import fit_percent as fit_percent
-from hwid_cli.maths.scores import rmsd as rmsd
 from hwid_cli.records.diagnosis import Diagnosis as Diagnosis
 from hwid_cli.records.experiment import (
     Columns as Columns,
@@ -36,6 +34,8 @@ from hwid_cli.records.model import (
     Orders as Orders,
 )
 from hwid_cli.records.recordings import Recording as Recording
+from hwid_cli.stages.diagnose import diagnose as diagnose
+from hwid_cli.stages.single_recording import load_recording as load_recording
 
 __version__: str
 __all__: list[str]

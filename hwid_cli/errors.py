@@ -1,7 +1,7 @@
 """Errors that a user can act on; the command line shows them as one line.
 
 A message names the place, the value found, what was expected, and the next step.
-Wrong shapes inside ``maths`` stay ``ValueError``: they are our bugs, not the user's.
+Wrong shapes inside the pure rooms stay ``ValueError``: they are our bugs, not the user's.
 """
 
 

@@ -23,7 +23,7 @@ from hwid_cli import (
     simulate,
 )
 from hwid_cli.errors import ConfigError, MeasurementError
-from tests.maths.diagnosis.small_drive import recordings, simulation
+from tests.diagnosis.small_drive import recordings, simulation
 
 PACKAGE = Path(hwid_cli.__file__).parent
 
@@ -141,10 +141,10 @@ def test_a_missing_file_is_named(tmp_path):
 
 
 def test_a_diagnosis_in_memory_is_what_the_command_writes(tmp_path):
-    from hwid_cli.campaign.diagnose import diagnose_all
-    from hwid_cli.files.diagnosis_json import write_diagnosis_json
-    from hwid_cli.files.result_files import Provenance
-    from tests.campaign.diagnosed_drive import settings
+    from hwid_cli.stages.diagnose import diagnose_all
+    from hwid_cli.store.diagnosis_results import write_diagnosis_json
+    from hwid_cli.store.result_files import Provenance
+    from tests.stages.diagnosed_drive import settings
 
     measured = recordings()
     options = DiagnoseOptions(effects=("coulomb_friction",), max_effects=1)

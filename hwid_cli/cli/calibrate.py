@@ -9,8 +9,8 @@ from hwid_cli.cli.stages import once
 
 if TYPE_CHECKING:
     from hwid_cli.cli.session import Session
-    from hwid_cli.files.results import Calibrated
     from hwid_cli.records.recordings import RawRecording
+    from hwid_cli.store.results import Calibrated
 
 
 # Keys of the configuration that name recordings.
@@ -42,20 +42,11 @@ def command(choices: Choices) -> None:
 
 @once
 def calibrate_stage(session: "Session") -> "Calibrated":
-    """Bring ``calibrated.h5`` up to date.
-
-    Parameters
-    ----------
-    session : Session
-
-    Returns
-    -------
-    Calibrated
-    """
-    from hwid_cli.campaign.calibrate import calibrate_all, calibration_key
+    """Bring ``calibrated.h5`` up to date."""
     from hwid_cli.cli.session import provenance, read_unchanged, say, start_timer
-    from hwid_cli.files.recordings import read_recordings
-    from hwid_cli.files.results import Calibrated, read_calibrated, write_calibrated
+    from hwid_cli.data.recordings import read_recordings
+    from hwid_cli.stages.calibrate import calibrate_all, calibration_key
+    from hwid_cli.store.results import Calibrated, read_calibrated, write_calibrated
 
     find_measurements(session)
     timer = start_timer()
@@ -84,7 +75,7 @@ def calibrate_stage(session: "Session") -> "Calibrated":
 
 def _check_names(session: "Session", raws: "list[RawRecording]") -> None:
     """Refuse a misspelt recording in any section before anything is computed."""
-    from hwid_cli.campaign.selection import select_recordings
+    from hwid_cli.stages.selection import select_recordings
 
     experiment = session.experiment
     for section, keys in NAME_LISTS.items():
@@ -116,21 +107,13 @@ def _what_changed(session: "Session", calibrated: "Calibrated") -> str:
 def find_measurements(session: "Session") -> None:
     """Make virtual measurements up to date, or end the program if optional ones lack.
 
-    Parameters
-    ----------
-    session : Session
-
     Raises
     ------
     click.exceptions.Exit
         With code 0 and one line that says where to put the data.
     """
     from hwid_cli.cli.simulate import simulate_stage
-    from hwid_cli.files.recording_paths import (
-        find_files,
-        missing_files_message,
-        recordings_base,
-    )
+    from hwid_cli.data.paths import find_files, missing_files_message, recordings_base
 
     if session.experiment.simulate is not None:
         simulate_stage(session)
@@ -151,8 +134,6 @@ def draw_figures(
 
     Parameters
     ----------
-    session : Session
-    raws : list of RawRecording
     calibrated : Calibrated
         In the same order.
     only_missing : bool
@@ -162,7 +143,7 @@ def draw_figures(
     paths = [folder / f"{raw.name}.png" for raw in raws]
     if only_missing and all(path.is_file() for path in paths):
         return
-    from hwid_cli.files.replaced_files import replace_file
+    from hwid_cli.files.atomic import replace_file
     from hwid_cli.report.plots import as_png, calibration_figure
 
     for path, raw, recording, log in zip(

@@ -8,9 +8,9 @@ import click
 from hwid_cli.cli.calibrate import NAME_LISTS
 
 if TYPE_CHECKING:
-    from hwid_cli.campaign.recording_facts import Checked
     from hwid_cli.records.check import FitCost
     from hwid_cli.records.experiment import Experiment
+    from hwid_cli.stages.recording_facts import Checked
 
 _EXIT_PROBLEMS = 1
 
@@ -49,7 +49,7 @@ def command(
     the cache already, and an estimate of time and disk. Computes no result and writes
     nothing. Every problem is one line; the exit code is 1 if there is any.
     """
-    from hwid_cli.files.config_problems import config_problems
+    from hwid_cli.config.problems import config_problems
 
     problems, experiment = config_problems(config)
     if experiment is None:
@@ -66,12 +66,8 @@ def command(
 
 def _is_waiting(experiment: "Experiment", folder: Path) -> bool:
     """Whether there are no data to check yet, which is no fault."""
+    from hwid_cli.data.paths import find_files, missing_files_message, recordings_base
     from hwid_cli.errors import MeasurementError
-    from hwid_cli.files.recording_paths import (
-        find_files,
-        missing_files_message,
-        recordings_base,
-    )
 
     if experiment.recordings is None and experiment.simulate is not None:
         click.echo(f"{experiment.source} is sound; it simulates and does nothing else.")
@@ -97,11 +93,11 @@ def _is_waiting(experiment: "Experiment", folder: Path) -> bool:
 
 def _data(experiment: "Experiment", folder: Path) -> "tuple[Checked, tuple[str, ...]]":
     """Show the recordings, and collect what is wrong with them or their names."""
-    from hwid_cli.campaign.own_functions import check_own_functions
-    from hwid_cli.campaign.recording_facts import check_recordings
+    from hwid_cli.data.survey import survey_recordings
     from hwid_cli.errors import HwidError
-    from hwid_cli.files.recording_survey import survey_recordings
     from hwid_cli.report.check_tables import recordings_table
+    from hwid_cli.stages.own_functions import check_own_functions
+    from hwid_cli.stages.recording_facts import check_recordings
 
     problems: list[str] = []
     try:
@@ -121,7 +117,7 @@ def _data(experiment: "Experiment", folder: Path) -> "tuple[Checked, tuple[str, 
 
 def _names(experiment: "Experiment", known: set[str]) -> list[str]:
     """Names of recordings that there are not, in any section."""
-    from hwid_cli.files.suggestions import did_you_mean
+    from hwid_cli.files.messages import did_you_mean
 
     problems = []
     for section, keys in NAME_LISTS.items():
@@ -139,8 +135,8 @@ def _names(experiment: "Experiment", known: set[str]) -> list[str]:
 
 def _show_starts(experiment: "Experiment", checked: "Checked") -> None:
     """Warn of recordings that a diagnosis would start wrongly."""
-    from hwid_cli.campaign.selection import select_recordings
     from hwid_cli.cli.diagnose import ToDiagnose, start_warning
+    from hwid_cli.stages.selection import select_recordings
 
     simulation, options = experiment.simulation, experiment.diagnose
     if simulation is None or options is None:
@@ -158,11 +154,11 @@ def _show_plan(
     checked: "Checked",
     how: tuple[Path, int | None, bool],
 ) -> None:
-    from hwid_cli.campaign.check import plan_stages
-    from hwid_cli.campaign.tasks import one_thread
-    from hwid_cli.campaign.workers import Workers
-    from hwid_cli.files.hdf5_store import Hdf5Store
     from hwid_cli.report.check_tables import stages_table
+    from hwid_cli.stages.check import plan_stages
+    from hwid_cli.store.cache import Hdf5Store
+    from hwid_cli.tasks.task import one_thread
+    from hwid_cli.tasks.workers import Workers
 
     cache, jobs, timing = how
     with one_thread():
@@ -176,15 +172,13 @@ def _show_plan(
 
 
 def _cost(experiment: "Experiment", checked: "Checked", *, timing: bool) -> "FitCost":
-    from hwid_cli.campaign.fit_seconds import (
-        MEASURED,
-        compiled_loops_place,
-        time_one_fit,
-    )
+    from hwid_cli.stages.fit_seconds import MEASURED, compiled_loops_place, time_one_fit
 
     if not timing:
         return MEASURED
-    if not any(Path(compiled_loops_place()).glob("kernels.derivative_rows*.nbi")):
+    if not any(
+        Path(compiled_loops_place()).glob("derivative_rows.derivative_rows*.nbi")
+    ):
         click.echo("\nThe first run compiles its loops: about 20 s more, once.")
         return MEASURED
     return time_one_fit(checked.recordings, experiment.orders, experiment.fit)

@@ -84,8 +84,8 @@ def command(
 def _compared(
     session: "Session", models: tuple[str, ...], names: tuple[str, ...]
 ) -> "Comparison":
-    from hwid_cli.campaign.compare import compare_models
-    from hwid_cli.campaign.selection import select_recordings
+    from hwid_cli.stages.compare import compare_models
+    from hwid_cli.stages.selection import select_recordings
 
     calibrated = calibrate_stage(session).recordings
     judges = select_recordings(calibrated, names or None, key="--recording")
@@ -96,7 +96,7 @@ def _compared(
 def _model(session: "Session", text: str) -> "NamedModel":
     """Model that a word of the command line names."""
     from hwid_cli.errors import ConfigError
-    from hwid_cli.files.stored_models import (
+    from hwid_cli.export.stored_models import (
         chosen_model,
         read_exported_model,
         read_stored_model,
@@ -122,7 +122,7 @@ def _own_fits(session: "Session", name: str) -> "dict[str, Fit]":
     """Fits of the configuration's own stages by name, as far as they are needed."""
     from hwid_cli.cli.group import group_stage
     from hwid_cli.cli.identify import identify_stage
-    from hwid_cli.files.stored_models import fit_name
+    from hwid_cli.export.stored_models import fit_name
 
     nk_role = session.experiment.orders.nk_role
     if "+" in name and session.experiment.group is not None:
@@ -134,10 +134,10 @@ def _own_fits(session: "Session", name: str) -> "dict[str, Fit]":
 
 def _linear(session: "Session", text: str) -> "NamedModel":
     """Linear model of one or several recordings of the configuration, fitted now."""
-    from hwid_cli.campaign.compare import fit_linear
-    from hwid_cli.campaign.selection import select_recordings
     from hwid_cli.cli.session import stage_tasks
-    from hwid_cli.files.stored_models import chosen_model
+    from hwid_cli.export.stored_models import chosen_model
+    from hwid_cli.stages.compare import fit_linear
+    from hwid_cli.stages.selection import select_recordings
 
     name, orders = _split(session, text)
     chosen = select_recordings(
@@ -165,8 +165,8 @@ def _split(session: "Session", text: str) -> "tuple[str, Orders]":
 
 
 def _write(session: "Session", comparison: "Comparison") -> None:
-    from hwid_cli.files.replaced_files import replace_file
-    from hwid_cli.files.result_tables import write_compare_csv
+    from hwid_cli.files.atomic import replace_file
+    from hwid_cli.files.csv_tables import write_compare_csv
     from hwid_cli.report.figures.comparison import comparison_figure
     from hwid_cli.report.figures.style import as_png
 

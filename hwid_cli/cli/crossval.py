@@ -32,18 +32,7 @@ def command(choices: Choices) -> None:
 
 @once
 def crossval_stage(session: "Session") -> "tuple[Identified, CrossValidation]":
-    """Bring ``results.h5:/crossval`` and its CSV files up to date.
-
-    Parameters
-    ----------
-    session : Session
-
-    Returns
-    -------
-    Identified, CrossValidation
-    """
-    from hwid_cli.campaign.crossval import cross_validate, crossval_key
-    from hwid_cli.campaign.selection import select_recordings
+    """Bring ``results.h5:/crossval`` and its CSV files up to date."""
     from hwid_cli.cli.session import (
         provenance,
         read_unchanged,
@@ -51,8 +40,10 @@ def crossval_stage(session: "Session") -> "tuple[Identified, CrossValidation]":
         stage_tasks,
         start_timer,
     )
-    from hwid_cli.files.results import read_crossval, write_crossval
     from hwid_cli.records.experiment import CrossvalOptions
+    from hwid_cli.stages.crossval import cross_validate, crossval_key
+    from hwid_cli.stages.selection import select_recordings
+    from hwid_cli.store.results import read_crossval, write_crossval
 
     experiment, path = session.experiment, session.results_path
     identified = identify_stage(session)
@@ -88,16 +79,9 @@ def crossval_stage(session: "Session") -> "tuple[Identified, CrossValidation]":
 def write_tables(
     session: "Session", identified: Identified, crossval: "CrossValidation"
 ) -> None:
-    """Write ``crossval.csv`` and ``coverage.csv``.
-
-    Parameters
-    ----------
-    session : Session
-    identified : Identified
-    crossval : CrossValidation
-    """
-    from hwid_cli.campaign.ranking import score_models
-    from hwid_cli.files.result_tables import write_coverage_csv, write_crossval_csv
+    """Write ``crossval.csv`` and ``coverage.csv``."""
+    from hwid_cli.files.csv_tables import write_coverage_csv, write_crossval_csv
+    from hwid_cli.stages.ranking import score_models
 
     scores = score_models(identified.fits, crossval)
     write_crossval_csv(session.out / "crossval.csv", crossval)
@@ -107,17 +91,10 @@ def write_tables(
 def show_coverage(
     session: "Session", identified: Identified, crossval: "CrossValidation"
 ) -> None:
-    """Show the models that cover the most recordings.
-
-    Parameters
-    ----------
-    session : Session
-    identified : Identified
-    crossval : CrossValidation
-    """
-    from hwid_cli.campaign.ranking import best_of_each, score_models
+    """Show the models that cover the most recordings."""
     from hwid_cli.cli.session import say, screen_width
     from hwid_cli.report.tables import coverage_table, cross_table
+    from hwid_cli.stages.ranking import best_of_each, score_models
 
     scores = score_models(identified.fits, crossval)
     best = best_of_each(scores, crossval.identified_on)

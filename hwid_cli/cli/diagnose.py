@@ -13,7 +13,6 @@ from hwid_cli.cli.stages import once
 
 if TYPE_CHECKING:
     from hwid_cli.cli.session import Session
-    from hwid_cli.files.result_files import Provenance
     from hwid_cli.records.diagnosis import Diagnosis
     from hwid_cli.records.experiment import (
         DiagnoseOptions,
@@ -21,6 +20,7 @@ if TYPE_CHECKING:
         SimulationOptions,
     )
     from hwid_cli.records.recordings import Recording
+    from hwid_cli.store.result_files import Provenance
 
 _FIGURES = "figures"
 _log = logging.getLogger(__name__)
@@ -28,14 +28,7 @@ _log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, eq=False)
 class ToDiagnose:
-    """What a diagnosis works on.
-
-    Parameters
-    ----------
-    recordings : tuple of Recording
-    simulation : SimulationOptions
-    options : DiagnoseOptions
-    """
+    """What a diagnosis works on."""
 
     recordings: "tuple[Recording, ...]"
     simulation: "SimulationOptions"
@@ -67,20 +60,11 @@ def command(choices: Choices) -> None:
 def diagnose_stage(session: "Session") -> "Diagnosis":
     """Bring ``results.h5:/diagnose`` and the files of the diagnosis up to date.
 
-    Parameters
-    ----------
-    session : Session
-
-    Returns
-    -------
-    Diagnosis
-
     Raises
     ------
     ConfigError
         If the configuration has no simulation to diagnose, or names unknown recordings.
     """
-    from hwid_cli.campaign.diagnose import diagnose_all, diagnosis_key
     from hwid_cli.cli.session import (
         provenance,
         read_unchanged,
@@ -88,8 +72,9 @@ def diagnose_stage(session: "Session") -> "Diagnosis":
         stage_rounds,
         start_timer,
     )
-    from hwid_cli.files.diagnosis_results import read_diagnosis_record, write_diagnosis
-    from hwid_cli.files.result_files import read_provenance
+    from hwid_cli.stages.diagnose import diagnose_all, diagnosis_key
+    from hwid_cli.store.diagnosis_results import read_diagnosis_record, write_diagnosis
+    from hwid_cli.store.result_files import read_provenance
 
     given, path = what_to_diagnose(session), session.results_path
     warning = start_warning(session.experiment, given)
@@ -116,17 +101,12 @@ def diagnose_stage(session: "Session") -> "Diagnosis":
 def start_warning(experiment: "Experiment", given: ToDiagnose) -> str:
     """Say which recordings cannot start in equilibrium, as the diagnosis takes them to.
 
-    Parameters
-    ----------
-    experiment : Experiment
-    given : ToDiagnose
-
     Returns
     -------
     str
         One line; empty if there is none.
     """
-    from hwid_cli.campaign.diagnosis_starts import doubtful_starts, starts_sentence
+    from hwid_cli.stages.diagnosis_starts import doubtful_starts, starts_sentence
 
     names = doubtful_starts(given.recordings, given.simulation, given.options)
     sentence = starts_sentence(names, given.recordings, experiment.calibrate)
@@ -136,23 +116,15 @@ def start_warning(experiment: "Experiment", given: ToDiagnose) -> str:
 def what_to_diagnose(session: "Session") -> ToDiagnose:
     """Run the stages before this one, and choose the recordings.
 
-    Parameters
-    ----------
-    session : Session
-
-    Returns
-    -------
-    ToDiagnose
-
     Raises
     ------
     ConfigError
         If the configuration has no simulation, names unknown recordings, or leaves none
         to train on.
     """
-    from hwid_cli.campaign.selection import select_recordings
     from hwid_cli.errors import ConfigError
     from hwid_cli.records.experiment import DiagnoseOptions
+    from hwid_cli.stages.selection import select_recordings
 
     experiment = session.experiment
     if experiment.simulation is None:
@@ -190,17 +162,17 @@ def write_files(
 
     Parameters
     ----------
-    session : Session
-    diagnosis : Diagnosis
     simulation : SimulationOptions
         As it was given.
     origin : Provenance
         Of the run that gave the diagnosis.
     """
-    from hwid_cli.campaign.diagnose import extended_options
-    from hwid_cli.files.diagnosis_json import write_diagnosis_json
-    from hwid_cli.files.diagnosis_results import write_diagnosis_tables
-    from hwid_cli.files.extended_simulation import write_extended_simulation
+    from hwid_cli.config.extended_simulation import write_extended_simulation
+    from hwid_cli.stages.diagnose import extended_options
+    from hwid_cli.store.diagnosis_results import (
+        write_diagnosis_json,
+        write_diagnosis_tables,
+    )
 
     figures = _drawn_before(session.out, origin)
     if figures is None:
@@ -223,7 +195,7 @@ def write_files(
 def _drawn_before(out: Path, origin: "Provenance") -> list[str] | None:
     """Names of the figures of this very run, if all of them are still there."""
     from hwid_cli.errors import CacheError
-    from hwid_cli.files.diagnosis_json import read_diagnosis
+    from hwid_cli.store.diagnosis_results import read_diagnosis
 
     try:
         found = read_diagnosis(out / "diagnosis.json") or {}
@@ -237,7 +209,7 @@ def _drawn_before(out: Path, origin: "Provenance") -> list[str] | None:
 
 
 def _draw(out: Path, diagnosis: "Diagnosis") -> list[str]:
-    from hwid_cli.files.replaced_files import replace_file
+    from hwid_cli.files.atomic import replace_file
     from hwid_cli.report.figures.diagnosis import diagnosis_figures
     from hwid_cli.report.plots import as_png
 
@@ -254,13 +226,7 @@ def _draw(out: Path, diagnosis: "Diagnosis") -> list[str]:
 
 
 def show_diagnosis(session: "Session", diagnosis: "Diagnosis") -> None:
-    """Show the verdict, what it rests on, and what to do next.
-
-    Parameters
-    ----------
-    session : Session
-    diagnosis : Diagnosis
-    """
+    """Show the verdict, what it rests on, and what to do next."""
     from hwid_cli.cli.session import say, screen_width
     from hwid_cli.report.diagnosis_tables import diagnosis_text
 

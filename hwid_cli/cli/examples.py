@@ -39,10 +39,6 @@ EXAMPLES: Mapping[str, tuple[str, ...]] = {
 def add_examples(command: click.Command) -> click.Command:
     """Give a command's help its examples.
 
-    Parameters
-    ----------
-    command : click.Command
-
     Returns
     -------
     click.Command

@@ -42,7 +42,7 @@ def command(choices: Choices, model: str, file_format: str) -> None:
     and prints the path; docs/export.md describes the formats.
     """
     from hwid_cli.cli.session import open_session
-    from hwid_cli.files.exported.formats import write_exported
+    from hwid_cli.export.formats import write_exported
 
     session = open_session(choices, "export")
     exported = chosen_model(session, model)
@@ -53,22 +53,13 @@ def command(choices: Choices, model: str, file_format: str) -> None:
 def chosen_model(session: "Session", asked: str) -> "Exported":
     """The model of a name; stages that it needs run first.
 
-    Parameters
-    ----------
-    session : Session
-    asked : str
-
-    Returns
-    -------
-    ExportedModel or ExportedSimulation
-
     Raises
     ------
     ConfigError
         If there is no such model.
     """
-    from hwid_cli.campaign.export import SIMULATION, export_model, find_fit
-    from hwid_cli.files.recording_paths import recordings_options
+    from hwid_cli.data.paths import recordings_options
+    from hwid_cli.export.contents import SIMULATION, export_model, find_fit
     from hwid_cli.report.tables import thesis_name_of
 
     if asked == SIMULATION:
@@ -91,10 +82,10 @@ def chosen_model(session: "Session", asked: str) -> "Exported":
 
 def _named_fits(session: "Session", asked: str) -> "tuple[dict[str, Fit], str]":
     """All models by name, those of groups only where the name may be one of them."""
-    from hwid_cli.campaign.model_views import named_fits
     from hwid_cli.cli.group import group_stage
-    from hwid_cli.files.stored_stages import has_left_results
     from hwid_cli.records.report import StoredResults
+    from hwid_cli.stages.model_views import named_fits
+    from hwid_cli.store.result_files import has_left_results
 
     experiment = session.experiment
     identified = identify_stage(session)
@@ -118,10 +109,10 @@ def _named_fits(session: "Session", asked: str) -> "tuple[dict[str, Fit], str]":
 
 def _simulation(session: "Session") -> "Exported":
     """The physics simulation with what a diagnosis added."""
-    from hwid_cli.campaign.diagnose import extended_options
-    from hwid_cli.campaign.export import export_simulation
     from hwid_cli.cli.diagnose import diagnose_stage, what_to_diagnose
-    from hwid_cli.files.recording_paths import recordings_options
+    from hwid_cli.data.paths import recordings_options
+    from hwid_cli.export.contents import export_simulation
+    from hwid_cli.stages.diagnose import extended_options
 
     given = what_to_diagnose(session)
     diagnosis = diagnose_stage(session)
@@ -136,7 +127,7 @@ def _simulation(session: "Session") -> "Exported":
 
 def _origin(session: "Session", stage: str) -> dict[str, object]:
     """Where the results of a stage came from, as plain data."""
-    from hwid_cli.files.result_files import read_provenance
+    from hwid_cli.store.result_files import read_provenance
 
     found = read_provenance(session.results_path, stage)
     return {

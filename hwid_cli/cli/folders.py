@@ -5,7 +5,7 @@ from pathlib import Path
 import click
 
 from hwid_cli.cli.stopping import KEPT_IN
-from hwid_cli.files.folder_locks import claim_folder, share_folder
+from hwid_cli.files.locks import claim_folder, share_folder
 
 
 def enter_folders(out: Path, cache: Path, *, is_alone: bool) -> None:

@@ -12,10 +12,10 @@ from hwid_cli.cli.options import Choices, stage_options
 from hwid_cli.cli.stages import once
 
 if TYPE_CHECKING:
-    from hwid_cli.campaign.group_plan import GroupPlan, RunLevel
-    from hwid_cli.campaign.identify import Run
     from hwid_cli.cli.session import Session
     from hwid_cli.records.groups import GroupSearch
+    from hwid_cli.stages.group import GroupPlan, RunLevel
+    from hwid_cli.stages.identify import Run
 
 
 @click.command("group")
@@ -35,19 +35,10 @@ def command(choices: Choices) -> None:
 
 @once
 def group_stage(session: "Session") -> "GroupSearch":
-    """Bring ``results.h5:/group`` and ``groups.csv`` up to date.
-
-    Parameters
-    ----------
-    session : Session
-
-    Returns
-    -------
-    GroupSearch
-    """
-    from hwid_cli.campaign.group import group_key, search_all
+    """Bring ``results.h5:/group`` and ``groups.csv`` up to date."""
     from hwid_cli.cli.session import provenance, read_unchanged, say, start_timer
-    from hwid_cli.files.group_results import read_group, write_group, write_groups_csv
+    from hwid_cli.stages.group import group_key, search_all
+    from hwid_cli.store.group_results import read_group, write_group, write_groups_csv
 
     plan, path = _plan(session), session.results_path
     timer = start_timer()
@@ -65,13 +56,7 @@ def group_stage(session: "Session") -> "GroupSearch":
 
 
 def show_groups(session: "Session", search: "GroupSearch") -> None:
-    """Show the coverage of every group, what the levels filtered, and the chain.
-
-    Parameters
-    ----------
-    session : Session
-    search : GroupSearch
-    """
+    """Show the coverage of every group, what the levels filtered, and the chain."""
     from hwid_cli.cli.session import say, screen_width
     from hwid_cli.report.group_tables import chain_table, join_table, levels_table
 
@@ -85,9 +70,9 @@ def show_groups(session: "Session", search: "GroupSearch") -> None:
 
 def _plan(session: "Session") -> "GroupPlan":
     """Everything that the search depends on, from the configuration."""
-    from hwid_cli.campaign.group_plan import GroupPlan
-    from hwid_cli.campaign.selection import select_recordings
     from hwid_cli.records.experiment import CrossvalOptions, GroupOptions
+    from hwid_cli.stages.group import GroupPlan
+    from hwid_cli.stages.selection import select_recordings
 
     experiment = session.experiment
     identify_stage(session)
@@ -118,8 +103,8 @@ def _plan(session: "Session") -> "GroupPlan":
 
 def _runner(session: "Session") -> "RunLevel":
     """Do the work of a level under a progress bar."""
-    from hwid_cli.campaign.runner import run_tasks
     from hwid_cli.cli.session import stage_tasks
+    from hwid_cli.tasks.runner import run_tasks
 
     def run(level: int, unit: str, total: int, work: "Callable[[Run], Any]") -> Any:
         part = f"level {level}"

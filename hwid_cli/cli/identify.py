@@ -48,19 +48,7 @@ def command(choices: Choices) -> None:
 
 @once
 def identify_stage(session: "Session") -> Identified:
-    """Bring ``results.h5:/identify`` up to date.
-
-    Parameters
-    ----------
-    session : Session
-
-    Returns
-    -------
-    Identified
-    """
-    from hwid_cli.campaign.identify import identify_all, identify_key
-    from hwid_cli.campaign.order_grid import candidate_orders
-    from hwid_cli.campaign.selection import select_recordings
+    """Bring ``results.h5:/identify`` up to date."""
     from hwid_cli.cli.session import (
         provenance,
         read_unchanged,
@@ -68,7 +56,10 @@ def identify_stage(session: "Session") -> Identified:
         stage_tasks,
         start_timer,
     )
-    from hwid_cli.files.results import read_fits, write_fits
+    from hwid_cli.stages.identify import identify_all, identify_key
+    from hwid_cli.stages.order_grid import candidate_orders
+    from hwid_cli.stages.selection import select_recordings
+    from hwid_cli.store.results import read_fits, write_fits
 
     experiment, path = session.experiment, session.results_path
     recordings = calibrate_stage(session).recordings
@@ -96,22 +87,12 @@ def identify_stage(session: "Session") -> Identified:
 
 
 def show_fits(session: "Session", identified: Identified) -> None:
-    """Show the best models of each recording, what they leave, and how the fits ended.
-
-    Parameters
-    ----------
-    session : Session
-    identified : Identified
-    """
-    from hwid_cli.campaign.ranking import best_fits, count_statuses
-    from hwid_cli.campaign.residuals import own_residuals
+    """Show the best models of each recording, what they leave, and how the fits ended."""
     from hwid_cli.cli.session import say
-    from hwid_cli.report.fit_tables import (
-        best_models_table,
-        failure_lines,
-        status_line,
-    )
+    from hwid_cli.report.fit_tables import best_models_table, failure_lines, status_line
     from hwid_cli.report.residual_tables import residual_table
+    from hwid_cli.stages.ranking import best_fits, count_statuses
+    from hwid_cli.stages.residuals import own_residuals
 
     if session.is_quiet:
         return

@@ -28,18 +28,18 @@ def command(folder: Path, out: Path, force: bool, quiet: bool) -> None:
     says why, and asks nothing: the file runs at once, and every line of it is yours to
     correct.
     """
-    from hwid_cli.campaign.init import guess_layout
-    from hwid_cli.campaign.init_proposal import propose
-    from hwid_cli.errors import MeasurementError
-    from hwid_cli.files.config import load_experiment
-    from hwid_cli.files.measurement_folder import list_measurements
-    from hwid_cli.files.recording_survey import survey_recordings
-    from hwid_cli.files.starter_config import (
+    from hwid_cli.config.load import load_experiment
+    from hwid_cli.config.starter import (
         draft_experiment,
         refuse_existing,
         starter_text,
         write_starter,
     )
+    from hwid_cli.data.folder import list_measurements
+    from hwid_cli.data.layout import guess_layout
+    from hwid_cli.data.survey import survey_recordings
+    from hwid_cli.errors import MeasurementError
+    from hwid_cli.stages.proposal import propose
 
     refuse_existing(out, force=force)
     layout = guess_layout(list_measurements(folder))

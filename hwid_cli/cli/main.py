@@ -26,7 +26,7 @@ from hwid_cli.cli import (
 from hwid_cli.cli.examples import add_examples
 from hwid_cli.cli.stopping import Stopped, stop_signals
 from hwid_cli.errors import HwidError
-from hwid_cli.files.plain_text import escaped
+from hwid_cli.files.messages import escaped
 
 # What a disk or a folder may refuse, which is no fault of the program.
 _MENDABLE = (
@@ -51,10 +51,6 @@ class _Commands(click.Group):
     def invoke(self, ctx: click.Context) -> object:
         """Run the chosen command.
 
-        Parameters
-        ----------
-        ctx : click.Context
-
         Returns
         -------
         object
@@ -77,16 +73,7 @@ class _Commands(click.Group):
             ctx.exit(stopped.exit_code)
 
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002
-        """Name the commands in the order in which they work.
-
-        Parameters
-        ----------
-        ctx : click.Context
-
-        Returns
-        -------
-        list of str
-        """
+        """Name the commands in the order in which they work."""
         return list(self.commands)
 
 

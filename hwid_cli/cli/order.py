@@ -42,24 +42,16 @@ def command(choices: Choices) -> None:
 def order_stage(session: "Session") -> "OrderAdvice":
     """Bring ``order.csv`` up to date.
 
-    Parameters
-    ----------
-    session : Session
-
-    Returns
-    -------
-    OrderAdvice
-
     Raises
     ------
     ConfigError
         If no model could be judged.
     """
-    from hwid_cli.campaign.order import recommend_orders
     from hwid_cli.cli.session import say, start_timer
     from hwid_cli.errors import ConfigError
-    from hwid_cli.files.order_results import write_order_csv
     from hwid_cli.records.experiment import OrderOptions
+    from hwid_cli.stages.order import recommend_orders
+    from hwid_cli.store.order_results import write_order_csv
 
     identified, crossval = crossval_stage(session)
     experiment, timer = session.experiment, start_timer()
@@ -84,13 +76,7 @@ def order_stage(session: "Session") -> "OrderAdvice":
 
 
 def show_advice(session: "Session", advice: "OrderAdvice") -> None:
-    """Show the recommended orders and the reasons.
-
-    Parameters
-    ----------
-    session : Session
-    advice : OrderAdvice
-    """
+    """Show the recommended orders and the reasons."""
     from hwid_cli.cli.session import say
     from hwid_cli.report.order_tables import order_sentences, order_table
 
@@ -103,10 +89,6 @@ def show_advice(session: "Session", advice: "OrderAdvice") -> None:
 def map_stage(session: "Session") -> "MapAdvice | None":
     """Bring ``maps.csv`` up to date, for the recommended orders.
 
-    Parameters
-    ----------
-    session : Session
-
     Returns
     -------
     MapAdvice or None
@@ -117,12 +99,12 @@ def map_stage(session: "Session") -> "MapAdvice | None":
     ConfigError
         If no model could be judged.
     """
-    from hwid_cli.campaign.map_choice import candidate_maps, fit_maps, recommend_maps
-    from hwid_cli.campaign.outliers import ROUNDS
     from hwid_cli.cli.session import stage_tasks
     from hwid_cli.errors import ConfigError
-    from hwid_cli.files.order_results import write_maps_csv
     from hwid_cli.records.experiment import OrderOptions
+    from hwid_cli.stages.map_choice import candidate_maps, fit_maps, recommend_maps
+    from hwid_cli.stages.outliers import ROUNDS
+    from hwid_cli.store.order_results import write_maps_csv
 
     experiment = session.experiment
     options = experiment.order or OrderOptions()
@@ -150,15 +132,9 @@ def map_stage(session: "Session") -> "MapAdvice | None":
 
 
 def show_maps(session: "Session", advice: "MapAdvice | None") -> None:
-    """Show the recommended maps and the reasons.
-
-    Parameters
-    ----------
-    session : Session
-    advice : MapAdvice or None
-    """
+    """Show the recommended maps and the reasons."""
     from hwid_cli.cli.session import say
-    from hwid_cli.report.map_tables import map_sentences, map_table
+    from hwid_cli.report.order_tables import map_sentences, map_table
 
     if advice is None:
         return
@@ -171,8 +147,8 @@ def _judging(
     session: "Session", identified: "Identified", crossval: "CrossValidation"
 ) -> "tuple[CrossValidation, tuple[int, ...]]":
     """The RMSDs that judge, and the outliers in each recording that they leave out."""
-    from hwid_cli.campaign.outliers import ROUNDS, cross_validate_without_outliers
     from hwid_cli.cli.session import stage_tasks
+    from hwid_cli.stages.outliers import ROUNDS, cross_validate_without_outliers
 
     experiment, fits = session.experiment, identified.fits
     if experiment.fit.loss == "squared":
@@ -188,7 +164,7 @@ def _judging(
 
 def _recommended(session: "Session") -> "Orders":
     """The recommended orders, of the candidates of the grid."""
-    from hwid_cli.campaign.order_grid import candidate_orders
+    from hwid_cli.stages.order_grid import candidate_orders
 
     one = order_stage(session).overall
     grid = candidate_orders(session.experiment.orders)

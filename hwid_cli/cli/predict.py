@@ -47,15 +47,11 @@ def command(
     Reads the columns that the model's file names, and writes time, the input and the
     predicted output.
     """
-    from hwid_cli.campaign.predict import predict
-    from hwid_cli.files.exported.json_reader import read_exported
-    from hwid_cli.files.exported.loading import check_trust
-    from hwid_cli.files.exported.prediction import (
-        check_target,
-        read_input,
-        write_prediction,
-    )
-    from hwid_cli.maths.input_range import outside_share
+    from hwid_cli.export.json_reader import read_exported
+    from hwid_cli.export.loading import check_trust
+    from hwid_cli.export.predict import predict
+    from hwid_cli.export.prediction import check_target, read_input, write_prediction
+    from hwid_cli.model.input_range import outside_share
     from hwid_cli.records.units import behind
     from hwid_cli.report.simulation_words import prediction_words
 

@@ -35,10 +35,6 @@ def command(choices: Choices) -> None:
 def report_stage(session: "Session") -> Path:
     """Write ``report.html`` and its figures from the stored results.
 
-    Parameters
-    ----------
-    session : Session
-
     Returns
     -------
     Path
@@ -51,11 +47,11 @@ def report_stage(session: "Session") -> Path:
     CacheError
         If results are there but cannot be read; nothing is written then.
     """
-    from hwid_cli.campaign.report import report_contents, report_key
     from hwid_cli.cli.session import say, start_timer
     from hwid_cli.errors import ConfigError
-    from hwid_cli.files.replaced_files import replace_file
+    from hwid_cli.files.atomic import replace_file
     from hwid_cli.report.html import report_page
+    from hwid_cli.stages.report import report_contents, report_key
 
     timer = start_timer()
     stored = read_stored(session)
@@ -108,14 +104,6 @@ def _is_complete(out: Path, path: Path, key: str) -> bool:
 def read_stored(session: "Session") -> "StoredResults":
     """Read the results of all stages that have run.
 
-    Parameters
-    ----------
-    session : Session
-
-    Returns
-    -------
-    StoredResults
-
     Raises
     ------
     CacheError
@@ -123,13 +111,12 @@ def read_stored(session: "Session") -> "StoredResults":
     """
     import json
 
-    from hwid_cli.files.config import describe_experiment
-    from hwid_cli.files.diagnosis_json import read_diagnosis
-    from hwid_cli.files.diagnosis_results import read_diagnosis_record
-    from hwid_cli.files.final_test_results import read_final_test
-    from hwid_cli.files.group_results import read_group
-    from hwid_cli.files.results import read_calibrated, read_crossval, read_fits
+    from hwid_cli.config.load import describe_experiment
     from hwid_cli.records.report import StoredResults
+    from hwid_cli.store.diagnosis_results import read_diagnosis, read_diagnosis_record
+    from hwid_cli.store.final_test_results import read_final_test
+    from hwid_cli.store.group_results import read_group
+    from hwid_cli.store.results import read_calibrated, read_crossval, read_fits
 
     described = describe_experiment(session.experiment)
     runs = _stage_runs(session, described)
@@ -160,10 +147,9 @@ def _stage_runs(
     session: "Session", described: dict[str, Any]
 ) -> "tuple[StageRun, ...]":
     """Stages that have left results, and how each was run."""
-    from hwid_cli.campaign.report import STAGES, changed_sections
-    from hwid_cli.files.result_files import read_provenance
-    from hwid_cli.files.stored_stages import has_left_results
     from hwid_cli.records.report import StageRun
+    from hwid_cli.stages.report import STAGES, changed_sections
+    from hwid_cli.store.result_files import has_left_results, read_provenance
 
     runs = []
     for stage in STAGES:

@@ -36,10 +36,6 @@ def command(choices: Choices) -> None:
 def run_stages(session: "Session") -> None:
     """Run all stages that the configuration names, and so those that they need.
 
-    Parameters
-    ----------
-    session : Session
-
     Raises
     ------
     ConfigError

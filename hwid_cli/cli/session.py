@@ -13,23 +13,19 @@ from typing import Any, TypeVar
 
 import click
 
-from hwid_cli.campaign.own_functions import check_own_functions
-from hwid_cli.campaign.runner import RunSettings, TaskDone, Workers
 from hwid_cli.cli.folders import enter_folders
 from hwid_cli.cli.options import Choices
 from hwid_cli.cli.timing import start_timer
+from hwid_cli.config.load import describe_experiment, load_experiment
+from hwid_cli.data.recordings import check_unchanged
 from hwid_cli.errors import CacheError, ConfigError
-from hwid_cli.files.config import describe_experiment, load_experiment
-from hwid_cli.files.hdf5_store import Hdf5Store
-from hwid_cli.files.recordings import check_unchanged
-from hwid_cli.files.result_files import (
-    Provenance,
-    current_versions,
-    read_stage_key,
-)
 from hwid_cli.records.experiment import Experiment
 from hwid_cli.records.recordings import Recording
 from hwid_cli.report.progress import StageProgress
+from hwid_cli.stages.own_functions import check_own_functions
+from hwid_cli.store.cache import Hdf5Store
+from hwid_cli.store.result_files import Provenance, current_versions, read_stage_key
+from hwid_cli.tasks.runner import RunSettings, TaskDone, Workers
 
 Result = TypeVar("Result")
 
@@ -44,15 +40,12 @@ class Session:
 
     Parameters
     ----------
-    experiment : Experiment
     out : Path
         Folder of the results; exists.
     cache : Path
         Folder of what was computed before.
-    workers : Workers
     forced : tuple of str
         Stages that ignore their cached results.
-    is_quiet : bool
     finished : dict
         Results of the stages that ran in this session, see ``stages.once``.
     read : dict of str to str
@@ -84,15 +77,10 @@ def open_session(choices: Choices, *stages: str, is_alone: bool = True) -> Sessi
 
     Parameters
     ----------
-    choices : Choices
     *stages : str
         What ``--force`` computes again.
     is_alone : bool
         Whether no other run may work in the folder meanwhile.
-
-    Returns
-    -------
-    Session
 
     Raises
     ------
@@ -124,13 +112,7 @@ def open_session(choices: Choices, *stages: str, is_alone: bool = True) -> Sessi
 
 
 def say(session: Session, text: str) -> None:
-    """Show text to people, unless they asked for quiet.
-
-    Parameters
-    ----------
-    session : Session
-    text : str
-    """
+    """Show text to people, unless they asked for quiet."""
     if not session.is_quiet:
         click.echo(text)
 
@@ -150,14 +132,8 @@ def is_unchanged(session: Session, stage: str, key: str) -> bool:
 
     Parameters
     ----------
-    session : Session
-    stage : str
     key : str
         Of everything that the stage depends on.
-
-    Returns
-    -------
-    bool
     """
     if stage in session.forced:
         return False
@@ -173,8 +149,6 @@ def read_unchanged(
 
     Parameters
     ----------
-    session : Session
-    stage : str
     key : str
         Of everything that the stage depends on.
     read : callable
@@ -207,17 +181,12 @@ def provenance(
 
     Parameters
     ----------
-    session : Session
     key : str
         Of everything that the stage depends on.
     recordings : tuple of Recording
         That it used.
     seconds : float, [s]
         What the run took that gave the results; NaN unknown.
-
-    Returns
-    -------
-    Provenance
 
     Raises
     ------
@@ -242,18 +211,12 @@ def stage_tasks(
 
     Parameters
     ----------
-    session : Session
-    stage : str
     total : int, [-]
         Tasks.
     unit : str
         What one task is, in the plural.
     part : str
         Which part of the stage, where it has several.
-
-    Yields
-    ------
-    RunSettings
     """
     with _progress(session, stage, total, unit, part=part) as (settings, _):
         yield settings
@@ -267,14 +230,11 @@ def stage_rounds(
 
     Parameters
     ----------
-    session : Session
-    stage : str
     unit : str
         What one task is, in the plural.
 
     Yields
     ------
-    RunSettings
     callable
         Takes what the next round does and how many tasks it has.
     """

@@ -39,20 +39,19 @@ def command(choices: Choices) -> None:
 def simulate_stage(session: "Session") -> None:
     """Bring the virtual measurements up to date.
 
-    Parameters
-    ----------
-    session : Session
-
     Raises
     ------
     ConfigError
         If the configuration has no machine to simulate.
     """
-    from hwid_cli.campaign.cache import task_key
-    from hwid_cli.campaign.simulate import STAGE_VERSION, simulate_machine
     from hwid_cli.cli.session import say, start_timer
+    from hwid_cli.data.virtual_measurements import (
+        read_virtual_key,
+        write_virtual_measurements,
+    )
     from hwid_cli.errors import ConfigError
-    from hwid_cli.files.raw import read_virtual_key, write_virtual_measurements
+    from hwid_cli.stages.simulate import STAGE_VERSION, simulate_machine
+    from hwid_cli.tasks.cache import task_key
 
     machine = session.experiment.simulate
     if machine is None:
@@ -74,20 +73,16 @@ def simulate_stage(session: "Session") -> None:
 def simulate_drive(session: "Session") -> None:
     """Simulate the recordings by the physics model and show how far off it is.
 
-    Parameters
-    ----------
-    session : Session
-
     Raises
     ------
     ConfigError
         If the configuration has no such model, or names unknown recordings.
     """
-    from hwid_cli.campaign.simulate_drive import simulate_recordings
     from hwid_cli.cli.diagnose import what_to_diagnose
     from hwid_cli.cli.session import say, start_timer
-    from hwid_cli.files.diagnosis_results import write_simulated_csv
     from hwid_cli.report.text_table import number, text_table
+    from hwid_cli.stages.simulate_drive import simulate_recordings
+    from hwid_cli.store.diagnosis_results import write_simulated_csv
 
     given = what_to_diagnose(session)
     timer = start_timer()

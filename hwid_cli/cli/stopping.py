@@ -153,6 +153,6 @@ def _sentence(context: click.Context, number: int) -> str:
 
 
 def _kept(folder: Path) -> str:
-    from hwid_cli.files.hdf5_store import count_entries
+    from hwid_cli.store.cache import count_entries
 
     return f"{count_entries(folder)} finished results are kept in {folder}"

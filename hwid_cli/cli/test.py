@@ -10,10 +10,10 @@ from hwid_cli.cli.options import Choices, stage_options
 from hwid_cli.cli.stages import once
 
 if TYPE_CHECKING:
-    from hwid_cli.campaign.test import FinalModels
     from hwid_cli.cli.session import Session
     from hwid_cli.records.groups import FinalTest
     from hwid_cli.records.recordings import Recording
+    from hwid_cli.stages.test import FinalModels
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,20 +50,11 @@ def command(choices: Choices) -> None:
 def final_test_stage(session: "Session") -> "FinalTest":
     """Bring ``results.h5:/test`` and its CSV files up to date.
 
-    Parameters
-    ----------
-    session : Session
-
-    Returns
-    -------
-    FinalTest
-
     Raises
     ------
     ConfigError
         If the configuration names no test recordings, or no model could be fitted.
     """
-    from hwid_cli.campaign.test import final_test_key, judge_models
     from hwid_cli.cli.session import (
         provenance,
         read_unchanged,
@@ -71,7 +62,8 @@ def final_test_stage(session: "Session") -> "FinalTest":
         stage_tasks,
         start_timer,
     )
-    from hwid_cli.files.final_test_results import read_final_test, write_final_test
+    from hwid_cli.stages.test import final_test_key, judge_models
+    from hwid_cli.store.final_test_results import read_final_test, write_final_test
 
     given, path = _to_judge(session), session.results_path
     timer = start_timer()
@@ -100,10 +92,10 @@ def final_test_stage(session: "Session") -> "FinalTest":
 
 def _to_judge(session: "Session") -> _ToJudge:
     """Run the stages before this one, and choose the models that it judges."""
-    from hwid_cli.campaign.selection import select_recordings
-    from hwid_cli.campaign.test import final_models
     from hwid_cli.cli.session import say
     from hwid_cli.errors import ConfigError
+    from hwid_cli.stages.selection import select_recordings
+    from hwid_cli.stages.test import final_models
 
     experiment = session.experiment
     if experiment.test is None:
@@ -140,14 +132,8 @@ def _to_judge(session: "Session") -> _ToJudge:
 
 
 def write_tables(session: "Session", final: "FinalTest") -> None:
-    """Write ``test.csv``, ``assignment.csv`` and ``coverage_matrix.csv``.
-
-    Parameters
-    ----------
-    session : Session
-    final : FinalTest
-    """
-    from hwid_cli.files.final_test_results import (
+    """Write ``test.csv``, ``assignment.csv`` and ``coverage_matrix.csv``."""
+    from hwid_cli.store.final_test_results import (
         write_assignment_csv,
         write_coverage_matrix_csv,
         write_test_csv,
@@ -159,17 +145,11 @@ def write_tables(session: "Session", final: "FinalTest") -> None:
 
 
 def show_final_test(session: "Session", final: "FinalTest") -> None:
-    """Show the chain, the coverage matrix, the smallest set and the predictions.
-
-    Parameters
-    ----------
-    session : Session
-    final : FinalTest
-    """
-    from hwid_cli.campaign.test import chain_trend
+    """Show the chain, the coverage matrix, the smallest set and the predictions."""
     from hwid_cli.cli.session import say, screen_width
-    from hwid_cli.files.results import read_calibrated
-    from hwid_cli.report import assignment_tables, coverage_tables, final_test_tables
+    from hwid_cli.report import final_test_tables
+    from hwid_cli.stages.test import chain_trend
+    from hwid_cli.store.results import read_calibrated
 
     width = screen_width()
     rule = session.experiment.fit.initial_state
@@ -194,10 +174,10 @@ def show_final_test(session: "Session", final: "FinalTest") -> None:
             ),
         ]
     parts += [
-        coverage_tables.coverage_matrix_table(final, initial_state=rule, width=width),
-        coverage_tables.gaps_text(final, width=width),
-        assignment_tables.smallest_set_table(final, initial_state=rule, width=width),
-        assignment_tables.prediction_table(final, initial_state=rule),
+        final_test_tables.coverage_matrix_table(final, initial_state=rule, width=width),
+        final_test_tables.gaps_text(final, width=width),
+        final_test_tables.smallest_set_table(final, initial_state=rule, width=width),
+        final_test_tables.prediction_table(final, initial_state=rule),
     ]
     for part in parts:
         say(session, f"\n{part}")

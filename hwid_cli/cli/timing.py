@@ -27,10 +27,5 @@ class Timer:
 
 
 def start_timer() -> Timer:
-    """Start a clock.
-
-    Returns
-    -------
-    Timer
-    """
+    """Start a clock."""
     return Timer(time.perf_counter())

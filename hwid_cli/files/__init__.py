@@ -1,1 +1,1 @@
-"""The only room that reads or writes data."""
+"""Bytes on disk, safely: whole files or none, checksums, locks, limits, plain messages."""

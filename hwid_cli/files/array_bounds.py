@@ -53,10 +53,6 @@ def check_dataset(dataset: h5py.Dataset) -> None:
 def check_archive(archive: ZipFile) -> None:
     """Refuse an archive whose members are too many, too large or of one name.
 
-    Parameters
-    ----------
-    archive : ZipFile
-
     Raises
     ------
     ValueError

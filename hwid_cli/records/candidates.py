@@ -26,7 +26,6 @@ class RankedCandidate:
         Of the held-out recordings.
     whiteness : float, [-]
         Statistic of what it leaves, over its limit: above 1 something remains.
-    note : str
     """
 
     effects: tuple[str, ...]
@@ -62,8 +61,6 @@ class CandidateFit:
         Of all residuals, see ``RankedCandidate``.
     neighbour : float, [-]
         Correlation of neighbouring residuals.
-    iterations : int
-    has_converged : bool
     """
 
     effects: tuple[str, ...]

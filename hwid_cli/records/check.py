@@ -9,7 +9,6 @@ class RecordingFacts:
 
     Parameters
     ----------
-    name, kind : str
     n_input, n_output : int, [samples]
         Lengths of the raw columns.
     n_used : int, [samples]
@@ -17,7 +16,6 @@ class RecordingFacts:
     sample_time_s : float, [s]
     input_range, output_range : tuple of float
         Smallest and largest value.
-    input_unit, output_unit : str
     notes : tuple of str
         What looks odd, in words.
     """
@@ -41,7 +39,6 @@ class StagePlan:
 
     Parameters
     ----------
-    stage : str
     what : str
         Its tasks in words, with their number.
     tasks : int, [-]
@@ -52,7 +49,6 @@ class StagePlan:
         For what is not cached; NaN where there is no estimate.
     size_bytes : float, [bytes]
         What it adds to the disk.
-    is_bound : bool
     """
 
     stage: str

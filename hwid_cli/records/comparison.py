@@ -15,7 +15,6 @@ class NamedModel:
     ----------
     name : str
         As the user named it.
-    model : HammersteinWiener
     identified_on : tuple of str
         Names of the recordings of its fit; empty unknown.
     """
@@ -31,7 +30,6 @@ class ShownRecording:
 
     Parameters
     ----------
-    name : str
     time_s, input, measured : ndarray, shape (n_samples,)
     simulated : ndarray, shape (n_models, n_samples), [output unit]
     """
@@ -49,14 +47,11 @@ class Comparison:
 
     Parameters
     ----------
-    models : tuple of NamedModel
-    recordings : tuple of str
     is_own : ndarray of bool, shape (n_models, n_recordings)
         Whether the recording, by its name, took part in the model's fit.
     rmsd : ndarray, shape (n_models, n_recordings), [output unit]
         NaN where the model diverges.
     fit_percent : ndarray, shape (n_models, n_recordings), [%]
-    input_unit, output_unit : str
     shown : ShownRecording
         Where the models differ most.
     """

@@ -17,7 +17,6 @@ class FittedParameter:
     ----------
     name : str
         Ends in its unit.
-    value : float
     low, high : float
         Bounds of the interval; NaN where there is none.
     text : str
@@ -37,11 +36,8 @@ class FittedEffect:
 
     Parameters
     ----------
-    id : str
     sentence : str
         In plain words.
-    equation : str
-    parameters : tuple of FittedParameter
     """
 
     id: str
@@ -65,7 +61,6 @@ class NoiseFloor:
         Whether neighbouring samples of the noise go together.
     whitening : tuple of float
         Coefficients of the autoregressive filter that makes it white; (1,) if it is.
-    sentence : str
     """
 
     rms: float
@@ -98,7 +93,6 @@ class BaseParameter:
 
     Parameters
     ----------
-    name : str
     before, refitted, after : float
         As given; fitted without an effect; fitted together with the effects.
     """
@@ -115,9 +109,6 @@ class RecordingGap:
 
     Parameters
     ----------
-    name : str
-    kind : str
-    is_held_out : bool
     rms_given, rms_before, rms_after : float, [output unit]
         Simulation as given, base re-fitted, with the effects.
     """
@@ -144,7 +135,6 @@ class Place:
         Of the excess error (of the variance of the missing force, for a variable).
     rms : float, [output unit]
         NaN where it has no meaning.
-    sentence : str
     """
 
     about: str
@@ -160,9 +150,7 @@ class Overlay:
 
     Parameters
     ----------
-    name : str
     time_s, input, measured, before, after : ndarray, shape (n_samples,)
-    noise_rms : float
     """
 
     name: str
@@ -180,8 +168,6 @@ class LatentForce:
 
     Parameters
     ----------
-    variable : str
-    unit : str
     at : ndarray, shape (n_bins,), [unit]
     mean, spread : ndarray, shape (n_bins,), [N]
         Of the force estimated from the measurements.
@@ -205,7 +191,6 @@ class NextExperiment:
     ----------
     input : str
         Empty where none is needed.
-    reason : str
     """
 
     input: str
@@ -224,22 +209,15 @@ class Diagnosis:
         Whether nothing remains beyond the noise.
     summary : str
         The verdict in one or two sentences.
-    effects : tuple of FittedEffect
     ambiguous_with : tuple of str
         Effects that fit as well; the ids of a set are joined by ``+``.
-    noise : NoiseFloor
     given, before, after : Gap
         Simulation as given, base re-fitted, with the effects.
     explained_share : float, [-]
-    base : tuple of BaseParameter
     places : tuple of Place
         Where the error sits, the largest first.
-    not_observable : tuple of str
-    next_experiment : NextExperiment
-    train, held_out : tuple of str
     candidates : tuple of RankedCandidate
         The best first.
-    gaps : tuple of RecordingGap
     overlays : tuple of Overlay
         The worst held-out recordings first.
     latent_force : tuple of LatentForce

@@ -107,7 +107,6 @@ class SimulatedRecording:
 
     Parameters
     ----------
-    name : str
     time_s, input, measured, simulated : ndarray, shape (n_samples,)
         Under a controller input, measured and simulated are the reference, the measured
         command and the simulated one.

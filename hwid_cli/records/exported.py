@@ -29,7 +29,6 @@ class ModelCard:
         Where time, input and output stand in measurement files.
     input_range : tuple of float, [input unit]
         Lowest and highest input of the recordings that the model was made of.
-    input_unit, output_unit : str
     input_scale, output_scale : float
         What the columns of a file are multiplied by to be in these units.
     origin : mapping
@@ -53,8 +52,6 @@ class ExportedModel:
 
     Parameters
     ----------
-    card : ModelCard
-    model : HammersteinWiener
     static_gain : float, [-]
         Of the linear block at zero frequency; infinite with a pole at 1.
     input_bends, output_bends : ndarray, shape (n_knots,) or (0,)
@@ -88,8 +85,6 @@ class ExportedSimulation:
 
     Parameters
     ----------
-    card : ModelCard
-    drive : Drive
     sample_time_s : float, [s]
         Of the recordings that it was compared with.
     slots : ndarray, shape (n_slots,)

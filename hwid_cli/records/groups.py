@@ -96,7 +96,6 @@ class GroupSearch:
         In the order in which they were tried.
     fits : tuple of Fit or None
         The best model's fit of each group, in the order of ``groups``.
-    validated_on : tuple of str, length m
     rmsd : ndarray, shape (n_groups, m), [unit]
         Of the best models on the validation recordings; NaN where no model is left.
     chain : tuple of str
@@ -146,7 +145,6 @@ class Prediction:
 
     Parameters
     ----------
-    recording : str
     nearest : str
         The other recording whose input is most like its own.
     distance : float, [-]

@@ -251,12 +251,8 @@ class GunMachine:
     ----------
     kind : str
         ``gun``.
-    mechanics : Mechanics
     current_limit_A : float, [A]
         The drive cuts its command to plus and minus this.
-    change : ParameterChange
-    sensors : Sensors
-    plan : GunPlan
     seed : int, [-]
     """
 
@@ -280,7 +276,6 @@ class VirtualMeasurement:
 
     Parameters
     ----------
-    name : str
     kind : str
         One of ``recordings.KINDS``.
     time_s : ndarray, shape (n_time,), [s]

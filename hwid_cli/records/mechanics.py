@@ -63,8 +63,6 @@ class Mechanics:
     stiffness_N_per_m : float, [N/m]
         0 for a free axis.
     force_constant_N_per_A : float, [N/A]
-    friction : Friction
-    contact : Contact
     """
 
     mass_kg: float = 2.0

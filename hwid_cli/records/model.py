@@ -1,16 +1,222 @@
-"""The Hammerstein-Wiener model, the options of a fit and its result."""
+"""The Hammerstein-Wiener model, the options of a fit and its result.
 
+The linear block: its orders, and one that the user gives.
+
+How well a fit's parameters are known.
+
+Information criteria of a fit: how its error weighs against its parameters.
+"""
+
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from hwid_cli.records.information import Information
-from hwid_cli.records.linear_block import LinearBlock, Orders
 from hwid_cli.records.maps import MAP_KINDS, MapOptions, OwnFunction, StaticMap
 from hwid_cli.records.recordings import frozen_vector
 from hwid_cli.records.stored import ADDED_LATER
-from hwid_cli.records.uncertainty import Uncertainty
+
+
+@dataclass(frozen=True, order=True)
+class Orders:
+    """Orders of the linear block B(q)/F(q), as in MATLAB's ``[nb nf nk]``.
+
+    Parameters
+    ----------
+    nb : int, [-]
+        Number of numerator coefficients, at least 1.
+    nf : int, [-]
+        Number of poles, at least 0.
+    nk : int, [samples]
+        Delay from input to output, at least 0.
+
+    Raises
+    ------
+    ValueError
+        If an order is out of its range.
+    """
+
+    nb: int
+    nf: int
+    nk: int
+
+    def __post_init__(self) -> None:
+        for name, least in (("nb", 1), ("nf", 0), ("nk", 0)):
+            value = getattr(self, name)
+            if value != int(value) or value < least:
+                raise ValueError(f"{name} must be an integer >= {least}, got {value!r}")
+            object.__setattr__(self, name, int(value))
+
+    @property
+    def n_state(self) -> int:
+        """Number of past values that the linear block remembers."""
+        return max(self.nf, self.nb + self.nk - 1)
+
+    def contains(self, smaller: "Orders") -> bool:
+        """Tell whether every model of some orders is also one of these.
+
+        Examples
+        --------
+        >>> Orders(3, 2, 1).contains(Orders(2, 2, 2))
+        True
+        >>> Orders(2, 2, 2).contains(Orders(2, 2, 1))
+        False
+        """
+        return (
+            smaller.nf <= self.nf
+            and self.nk <= smaller.nk
+            and smaller.nk + smaller.nb <= self.nk + self.nb
+        )
+
+
+@dataclass(frozen=True)
+class LinearBlock:
+    """A linear block B/F that the user gives, in the units of the data.
+
+    Parameters
+    ----------
+    numerator : tuple of float, length nb, [output unit / input unit]
+        Coefficients of ``q^-delay ... q^-(delay + nb - 1)``. With an output map of a
+        free gain any unit does.
+    denominator : tuple of float, length nf + 1, [-]
+        Coefficients of ``q^0 ... q^-nf``; the first is 1.
+    delay : int, [samples]
+        nk.
+    frozen : bool
+        Whether the fit keeps the block as it is; else it is one more start.
+
+    Raises
+    ------
+    ValueError
+        If the numbers are no linear block.
+    """
+
+    numerator: tuple[float, ...]
+    denominator: tuple[float, ...]
+    delay: int = 1
+    frozen: bool = False
+
+    def __post_init__(self) -> None:
+        for name in ("numerator", "denominator"):
+            values = tuple(float(value) for value in getattr(self, name))
+            if not all(math.isfinite(value) for value in values):
+                raise ValueError(f"{name} must be finite numbers, got {list(values)}")
+            object.__setattr__(self, name, values)
+        if not any(self.numerator):
+            raise ValueError(
+                f"numerator must have a coefficient other than 0, got "
+                f"{list(self.numerator)}"
+            )
+        if not self.denominator or self.denominator[0] != 1.0:
+            raise ValueError(
+                f"denominator must start with 1, got {list(self.denominator)}; divide "
+                "both by its first coefficient"
+            )
+        if self.delay != int(self.delay) or self.delay < 0:
+            raise ValueError(f"delay must be an integer >= 0, got {self.delay!r}")
+
+    @property
+    def orders(self) -> Orders:
+        """Orders ``[nb nf nk]``."""
+        return Orders(len(self.numerator), len(self.denominator) - 1, self.delay)
+
+    @property
+    def pole_radius(self) -> float:
+        """Distance of the outermost pole from zero; 0 without poles."""
+        return float(np.max(np.abs(np.roots(self.denominator)), initial=0.0))
+
+    def in_units(self, input_unit: float, output_unit: float) -> "LinearBlock":
+        """Give the same block for signals that are divided by these units.
+
+        Parameters
+        ----------
+        input_unit, output_unit : float
+            Positive.
+        """
+        factor = input_unit / output_unit
+        return replace(self, numerator=tuple(b * factor for b in self.numerator))
+
+
+@dataclass(frozen=True, eq=False)
+class Uncertainty:
+    """Standard errors of a model's parameters, or the reason why there are none.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Parameter names, such as ``b[0]``, ``f[1]``, ``input_map.value[3]``.
+    standard_errors : ndarray, shape (n_parameters,)
+        In the units of the parameters; NaN where the data do not determine one.
+    reason : str
+        Why some or all are missing; empty if all exist.
+    flat : tuple of str
+        What the data do not tell, or hardly: one sentence for each direction in which
+        parameters can move together, with the reason where there is one to tell.
+    """
+
+    names: tuple[str, ...] = ()
+    standard_errors: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    reason: str = ""
+    flat: tuple[str, ...] = field(default=(), metadata=ADDED_LATER)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(
+            self,
+            "standard_errors",
+            frozen_vector(self.standard_errors, "standard_errors"),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class ParameterCovariance:
+    """Covariance of a model's parameters.
+
+    Parameters
+    ----------
+    names : tuple of str
+        As in ``Uncertainty``.
+    matrix : ndarray, shape (n_parameters, n_parameters)
+        In the units of the parameters; rows and columns of NaN where the data do not
+        determine one.
+    """
+
+    names: tuple[str, ...]
+    matrix: np.ndarray
+
+
+_NAN = float("nan")
+
+
+@dataclass(frozen=True)
+class Information:
+    """Criteria that weigh a fit's error against the number of its parameters.
+
+    Only differences between models of the same recordings mean anything. They take the
+    residuals for white; where these are not, they choose too many parameters.
+
+    Parameters
+    ----------
+    n_samples : int, [samples]
+        Of all recordings of the fit.
+    n_parameters : int, [-]
+        That the data determine: shared gains, a shared offset, outermost break-points and
+        flat directions do not count, initial states do.
+    aic, aicc, bic : float, [-]
+        Criteria of Akaike, the same corrected for few samples, and of Schwarz. The lowest
+        is the best; minus infinity where nothing is left of the residuals.
+    fpe : float, [output unit squared]
+        Variance of the error on new data of the same kind (Akaike's final prediction
+        error), here of the free-run simulation.
+    """
+
+    n_samples: int = 0
+    n_parameters: int = 0
+    aic: float = _NAN
+    aicc: float = _NAN
+    bic: float = _NAN
+    fpe: float = _NAN
+
 
 INITIAL_STATES = ("zero", "steady", "estimated")
 JOINS = ("concatenate", "experiments")
@@ -119,10 +325,6 @@ class FitOptions:
     def delays_for(self, orders: Orders) -> tuple[int, ...]:
         """Delays that a fit of some orders tries, that of the orders first if it may.
 
-        Parameters
-        ----------
-        orders : Orders
-
         Returns
         -------
         tuple of int, [samples]
@@ -201,7 +403,6 @@ class HammersteinWiener:
     free_response : ndarray, shape (n_state,) or (0,), [x]
         With ``estimated``: x gains ``C(q)/F(q)`` times a unit pulse at the first
         sample; these are C's coefficients for the first recording of the fit.
-    input_unit, output_unit : str
     """
 
     input_map: StaticMap
@@ -237,7 +438,6 @@ class Fit:
         Names of the recordings, in the order in which they were joined.
     orders : Orders
         With the delay that was found, where several were tried.
-    options : FitOptions
     model : HammersteinWiener or None
         None where no usable model was found.
     status : str
@@ -256,7 +456,6 @@ class Fit:
     poles : ndarray of complex, shape (nf,), [-]
     is_stable : bool
         Whether every pole lies inside the unit circle.
-    uncertainty : Uncertainty
     information : Information
         AIC, BIC and FPE; NaN if failed.
     output_folds : tuple of float, [x]

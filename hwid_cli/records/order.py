@@ -11,7 +11,6 @@ class ResponseEstimate:
 
     Parameters
     ----------
-    recording : str
     delay : int, [samples]
         Largest delay that the recording does not contradict; -1 where the output does not
         answer the input at all.
@@ -70,7 +69,6 @@ class OrderChoice:
         The recommended place in the grid.
     best_nb, best_nk : int, [-]
         The place of the lowest cross-validated RMSD.
-    judgement : Judgement
     aic_nb, aic_nk, bic_nb, bic_nk : int, [-]
         What AIC and BIC of the fits choose; 0 where no fit has them.
     """
@@ -93,7 +91,6 @@ class OrderAdvice:
 
     Parameters
     ----------
-    overall : OrderChoice
     choices : tuple of OrderChoice
         One for each recording that has models.
     responses : tuple of ResponseEstimate

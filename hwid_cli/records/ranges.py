@@ -8,7 +8,6 @@ def require_positive(record: object, *names: str) -> None:
 
     Parameters
     ----------
-    record : object
     *names : str
         Fields to check.
 
@@ -28,7 +27,6 @@ def require_not_negative(record: object, *names: str) -> None:
 
     Parameters
     ----------
-    record : object
     *names : str
         Fields to check.
 
@@ -48,7 +46,6 @@ def require_share(record: object, *names: str) -> None:
 
     Parameters
     ----------
-    record : object
     *names : str
         Fields to check.
 

@@ -50,7 +50,6 @@ class RawRecording:
         The file it came from, for messages.
     sha256 : str
         Hash of the file's bytes, hexadecimal.
-    input_unit, output_unit : str
     reference : ndarray or None, [output_unit]
         What a controller was told to follow; as long as the input.
     """
@@ -88,7 +87,6 @@ class Recording:
         One of ``KINDS``.
     sha256 : str
         Hash of the bytes of the file that it was read from; empty if from memory.
-    input_unit, output_unit : str
     reference : ndarray or None, shape (n_samples,), [output_unit]
         What a controller was told to follow; None for a drive without one.
 
@@ -141,7 +139,6 @@ class CalibrationLog:
 
     Parameters
     ----------
-    name : str
     steps : tuple of str
         The recipe's steps in the order in which they ran.
     first_sample : int, [samples]

@@ -8,8 +8,7 @@ import numpy as np
 
 from hwid_cli.records.diagnosis import Diagnosis
 from hwid_cli.records.groups import FinalTest, GroupSearch
-from hwid_cli.records.information import Information
-from hwid_cli.records.model import Fit
+from hwid_cli.records.model import Fit, Information
 from hwid_cli.records.recordings import CalibrationLog, Recording
 from hwid_cli.records.residuals import ResidualTests
 from hwid_cli.records.results import CrossValidation
@@ -25,7 +24,6 @@ class StageRun:
 
     Parameters
     ----------
-    stage : str
     key : str
         Hash of everything that the results depend on.
     seconds : float, [s]
@@ -63,9 +61,6 @@ class StoredResults:
         In the order of the recordings.
     fits : tuple of Fit
         Of single recordings.
-    crossval : CrossValidation or None
-    search : GroupSearch or None
-    final_test : FinalTest or None
     diagnosis : mapping or None
         Content of ``diagnosis.json``.
     diagnosis_record : Diagnosis or None
@@ -92,7 +87,6 @@ class SimulatedRecording:
 
     Parameters
     ----------
-    recording : Recording
     model : str
         ``step_06/3/7``.
     choice : str
@@ -126,9 +120,6 @@ class OrderGrid:
 
     Parameters
     ----------
-    recordings : tuple of str, length n
-    nb, nk : tuple of int
-    nk_role : str
     rmsd : ndarray, shape (n, nb, nk), [unit]
         NaN where a fit failed.
     unit : str
@@ -149,8 +140,6 @@ class RmsdMatrix:
 
     Parameters
     ----------
-    models : tuple of str, length n
-    recordings : tuple of str, length m
     rmsd : ndarray, shape (n, m), [unit]
     is_own : ndarray of bool, shape (n, m)
         Whether the model was fitted to the recording.
@@ -158,7 +147,6 @@ class RmsdMatrix:
         Recordings that each model covers, a model's own counted or not as the stage does.
     covered_by : ndarray of int, shape (m,), [-]
         Models that cover each recording.
-    unit : str
     threshold : float, [unit]
     """
 
@@ -215,18 +203,13 @@ class ModelView:
     ----------
     model : str
         Its name.
-    input_curve, output_curve : MapCurve
-    response : FrequencyResponse
     poles, zeros : ndarray of complex, [-]
     delay : int, [samples]
-    is_stable : bool
     rmsd : float, [output unit]
         On the recordings of its fit.
     coverage : int, [-]
         Recordings that it covers, of ``covers_of``.
     covers_of : int, [-]
-    input_unit, output_unit : str
-    information : Information
     """
 
     model: str
@@ -253,12 +236,10 @@ class ChainOnTests:
     ----------
     models : tuple of str, length n
         Level by level.
-    recordings : tuple of str, length m
     rmsd : ndarray, shape (n, m), [unit]
     mean : ndarray, shape (n,), [unit]
         Over the recordings; NaN where one is missing.
     covers : ndarray of int, shape (n,), [-]
-    unit : str
     threshold : float, [unit]
     """
 
@@ -295,22 +276,18 @@ class ReportContents:
 
     Parameters
     ----------
-    stored : StoredResults
     statuses : mapping of str to int
         How the fits ended.
     simulated : tuple of SimulatedRecording
         In the order of the recordings, without those that no model is there for.
     without_model : tuple of str
         Those recordings.
-    grid : OrderGrid or None
     cross : RmsdMatrix or None
         The widest model of each recording on all that judge.
     models : tuple of ModelView
         The chain of groups, or the widest models.
-    trend : ChainOnTests or None
     chain_matrix, full_matrix : RmsdMatrix or None
         The chain, and all models of the final test, on all recordings.
-    predictions : PredictionCounts or None
     outdated : tuple of str
         Stages whose stored results do not belong to the models that are stored now.
     """

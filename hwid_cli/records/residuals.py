@@ -75,7 +75,6 @@ class ModelResiduals:
     ----------
     model : str
         ``step_06/3/7``.
-    tests : ResidualTests
     flat : tuple of str
         As in ``Uncertainty``.
     """

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hwid_cli.records.linear_block import Orders
+from hwid_cli.records.model import Orders
 
 
 @dataclass(frozen=True, eq=False)
@@ -13,12 +13,10 @@ class CrossValidation:
 
     Parameters
     ----------
-    identified_on : tuple of str, length n
     nb, nk : tuple of int
         The two axes of the order grid, as the configuration names them.
     nk_role : str
         ``poles``: orders are ``[nb, nk, 1]``; ``delay``: ``[nb, nf, nk]``.
-    validated_on : tuple of str, length m
     rmsd : ndarray, shape (n, nb, nk, m), [unit]
         NaN where there is no usable model or its output is not finite.
     status : ndarray of str, shape (n, nb, nk, m)
@@ -59,7 +57,6 @@ class ModelScore:
 
     Parameters
     ----------
-    identified_on : str
     nb, nk : int
         Its place in the order grid.
     rmsd : float, [output unit]

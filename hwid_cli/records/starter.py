@@ -57,8 +57,6 @@ class Role:
 
     Parameters
     ----------
-    key : str or int
-    title : str
     unit : str
         Empty where the name says none.
     reason : str
@@ -79,15 +77,10 @@ class Layout:
     ----------
     patterns : tuple of str
         Below the folder.
-    input, output : Role
-    time : Role or None
-    reference : Role or None
-    variable : str or None
     sample_time_s : float or None, [s]
         Only where there is no usable time column.
     clock_reason : str
         Where the sample time comes from.
-    resample : bool
     notes : tuple of str
         What else a reader of the configuration must know.
     """
@@ -112,17 +105,11 @@ class Proposal:
     ----------
     kinds : dict of str to tuple of str
         Patterns of each kind.
-    kind_reason : str
     recipes : dict of str to tuple of str
         Steps of calibration of each kind.
-    recipe_reason : str
-    exclude : tuple of str
-    parts : dict of str to tuple of int
     nb, nk : tuple of int
         First and last order.
-    order_reason : str
     threshold : float, [output unit]
-    threshold_reason : str
     identify : tuple of str
         Empty for all.
     held_out : tuple of str
@@ -132,7 +119,6 @@ class Proposal:
     initial_state : str
         How a diagnosis takes the recordings to start.
     sample_time_s : float, [s]
-    notes : tuple of str
     """
 
     kinds: dict[str, tuple[str, ...]]

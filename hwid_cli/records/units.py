@@ -4,14 +4,6 @@
 def behind(unit: str) -> str:
     """Write a unit behind a number; the dash of a dimensionless one would be a minus.
 
-    Parameters
-    ----------
-    unit : str
-
-    Returns
-    -------
-    str
-
     Examples
     --------
     >>> f"0.4{behind('m')} and 0.4{behind('-')}"

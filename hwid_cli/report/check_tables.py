@@ -11,16 +11,7 @@ _KILO = 1000.0
 
 
 def recordings_table(facts: Sequence[RecordingFacts]) -> str:
-    """Show the recordings as they are read, and beneath what looks odd.
-
-    Parameters
-    ----------
-    facts : sequence of RecordingFacts
-
-    Returns
-    -------
-    str
-    """
+    """Show the recordings as they are read, and beneath what looks odd."""
     rows = [
         (
             one.name,
@@ -51,14 +42,8 @@ def stages_table(plans: Sequence[StagePlan], cost: FitCost, workers: int) -> str
 
     Parameters
     ----------
-    plans : sequence of StagePlan
-    cost : FitCost
     workers : int, [-]
         Processes that share the work.
-
-    Returns
-    -------
-    str
     """
     rows = [
         (
@@ -105,10 +90,6 @@ def duration(seconds: float) -> str:
     ----------
     seconds : float, [s]
 
-    Returns
-    -------
-    str
-
     Examples
     --------
     >>> [duration(value) for value in (0.02, 7.3, 300.0, 9000.0, float("nan"))]
@@ -134,10 +115,6 @@ def size(n_bytes: float) -> str:
     Parameters
     ----------
     n_bytes : float, [bytes]
-
-    Returns
-    -------
-    str
 
     Examples
     --------

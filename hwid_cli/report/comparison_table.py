@@ -16,10 +16,6 @@ _TIE = "="
 def model_letters(comparison: Comparison) -> list[str]:
     """Short names of the models, in their order.
 
-    Parameters
-    ----------
-    comparison : Comparison
-
     Returns
     -------
     list of str
@@ -37,7 +33,6 @@ def comparison_table(comparison: Comparison, *, width: int = WIDTH) -> str:
 
     Parameters
     ----------
-    comparison : Comparison
     width : int, [characters]
         Of the screen.
 
@@ -86,10 +81,6 @@ def comparison_table(comparison: Comparison, *, width: int = WIDTH) -> str:
 
 def start_words(comparison: Comparison) -> str:
     """Say how the simulations start.
-
-    Parameters
-    ----------
-    comparison : Comparison
 
     Returns
     -------

@@ -1,19 +1,255 @@
-"""The final test as text: the chain of groups on all recordings."""
+"""The final test as text: the chain of groups on all recordings.
+
+What covers what in the final test, as text: the matrix, and what is not covered.
+
+Which model serves which recording, as text.
+"""
 
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import pairwise
 
 import numpy as np
 
-from hwid_cli.records.groups import ChainTrend, FinalTest
+from hwid_cli.records.groups import ChainTrend, FinalTest, Prediction
+from hwid_cli.records.units import behind
+from hwid_cli.report.sections.words import counted
 from hwid_cli.report.simulation_words import simulation_words
 from hwid_cli.report.tables import thesis_name
 from hwid_cli.report.text_table import (
+    GAP,
+    MISSING,
     WIDTH,
+    joined_names,
     number,
     split_table,
     text_table,
 )
+
+# Columns of the matrix that stand together, so that the eye can count.
+_TOGETHER = 5
+
+
+def coverage_matrix_table(
+    final: FinalTest, *, initial_state: str, width: int = WIDTH
+) -> str:
+    """Show which model covers which recording (as T3.4.3-1).
+
+    Parameters
+    ----------
+    initial_state : str
+        Rule of the fits.
+    width : int, [characters]
+        Of the screen; more recordings than fit go into further blocks.
+
+    Returns
+    -------
+    str
+        One character for each pair, recordings' names from top to bottom.
+    """
+    labels = ["model", *_short_names(final), "covered by"]
+    label = max(map(len, labels))
+    room = width - label - len(GAP) - len("  covers")
+    # Each group of columns takes one more character for the gap behind it.
+    per_block = max(1, room * _TOGETHER // (_TOGETHER + 1))
+    title = (
+        f"Coverage of all models on all recordings: 1 RMSD below {final.threshold:g}"
+        f"{behind(final.unit)}, . not,\nblank its own; a + adds to the model above it "
+        "(form of T3.4.3-1)\n"
+        f"{simulation_words(initial_state, is_validation=True)}"
+    )
+    blocks = [
+        _matrix_block(final, slice(first, first + per_block), labels[1:-1], label)
+        for first in range(0, len(final.recordings), per_block)
+    ]
+    return "\n\n".join([f"{title}\n{blocks[0]}", *blocks[1:]])
+
+
+def _matrix_block(
+    final: FinalTest, part: slice, labels: Sequence[str], label: int
+) -> str:
+    """Some columns of the matrix, with heads, rows and sums."""
+
+    def line(start: str, cells: str, end: str = "") -> str:
+        return f"{start:{label}}{GAP}{_grouped(cells)}{GAP}{end:>6}".rstrip()
+
+    heads = _downwards(final.recordings[part])
+    lines = [line("", cells) for cells in heads[:-1]]
+    lines.append(line("model", heads[-1], "covers"))
+    covered = final.rmsd[:, part] < final.threshold
+    for row, name in enumerate(labels):
+        cells = np.where(covered[row], "1", ".")
+        cells[final.is_own[row, part]] = " "
+        lines.append(line(name, "".join(cells), str(final.covers[row])))
+    counts = _downwards([str(n) for n in final.covered_by[part]])
+    lines.append(line("covered by", counts[0]))
+    lines += [line("", cells) for cells in counts[1:]]
+    return "\n".join(lines)
+
+
+def _short_names(final: FinalTest) -> list[str]:
+    """Names of models; what a chain's model adds to the one above it follows a ``+``."""
+    short = []
+    before = ""
+    for model in final.models:
+        who = model.rsplit("/", 2)[0]
+        is_longer = model in final.chain and before and who.startswith(f"{before}+")
+        short.append(model[len(before) :] if is_longer else model)
+        before = who if model in final.chain else ""
+    return short
+
+
+def _downwards(names: Sequence[str]) -> list[str]:
+    """Lines that hold the names from top to bottom, one name in each column."""
+    height = max(map(len, names))
+    placed = [name.rjust(height) for name in names]
+    return ["".join(letters) for letters in zip(*placed, strict=True)]
+
+
+def _grouped(cells: str) -> str:
+    starts = range(0, len(cells), _TOGETHER)
+    return " ".join(cells[first : first + _TOGETHER] for first in starts)
+
+
+def gaps_text(final: FinalTest, *, width: int = WIDTH) -> str:
+    """Name the recordings that nothing covers, or hardly anything.
+
+    Parameters
+    ----------
+    width : int, [characters]
+        Of the screen.
+    """
+    parts = [
+        ("Covered by no model at all, not even their own", final.uncovered),
+        ("Covered by fewer than a tenth of the other models", final.hard_to_cover),
+    ]
+    lines = []
+    for what, names in parts:
+        every = counted(len(final.recordings), "recording")
+        lines.append(f"{what}: {len(names)} of {every}")
+        lines += [f"  {line}" for line in joined_names(names, width=width - 2) if line]
+    return "\n".join(lines)
+
+
+# Room for names of recordings, however long the names of models are, [characters].
+_LEAST_ROOM = 24
+
+
+def smallest_set_table(
+    final: FinalTest, *, initial_state: str, width: int = WIDTH
+) -> str:
+    """Show the smallest set of models and what each serves (as T3.4.3-2).
+
+    Parameters
+    ----------
+    initial_state : str
+        Rule of the fits.
+    width : int, [characters]
+        Of the screen.
+
+    Returns
+    -------
+    str
+        Models are numbered M1, M2, ... for the table of predictions.
+    """
+    if not final.smallest_set:
+        return "No model covers any recording, so no set of models is of use."
+    short = _short_labels(final)
+    taken = [max(map(len, (*final.smallest_set, "model"))), len("M99"), len("serves")]
+    room = max(_LEAST_ROOM, width - sum(taken) - 3 * len(GAP))
+    rows = []
+    for model in final.smallest_set:
+        served = _served_by(model, final)
+        first, *others = joined_names(served, width=room)
+        rows.append((short[model], model, str(len(served)), first))
+        rows += [("", "", "", line) for line in others]
+    n_covered = len(final.recordings) - len(final.uncovered)
+    title = (
+        f"Fewest models that cover all that any model covers: {len(final.smallest_set)} of "
+        f"{len(final.models)} models\nfor {n_covered} of {len(final.recordings)} "
+        "recordings; each served by the lowest RMSD, * covered\n(form of T3.4.3-2)\n"
+        f"{simulation_words(initial_state, is_validation=True)}"
+    )
+    heads = ("", "model", "serves", "recordings")
+    return text_table(title, heads, rows, text_columns=(0, 1, 3))
+
+
+def _served_by(model: str, final: FinalTest) -> list[str]:
+    """Recordings that a model of the smallest set serves, marked where covered."""
+    values = final.rmsd[final.models.index(model)]
+    return [
+        name + ("*" if value < final.threshold else "")
+        for name, value, chosen in zip(
+            final.recordings, values, final.assigned_in_set, strict=True
+        )
+        if chosen == model
+    ]
+
+
+def _short_labels(final: FinalTest) -> dict[str, str]:
+    labels = {model: f"M{n}" for n, model in enumerate(final.smallest_set, 1)}
+    return labels | {"": MISSING}
+
+
+def prediction_table(final: FinalTest, *, initial_state: str) -> str:
+    """Show which model the input alone tells to use, and how that went.
+
+    Parameters
+    ----------
+    initial_state : str
+        Rule of the fits.
+
+    Returns
+    -------
+    str
+        Beneath the table stands how often the choice was right.
+    """
+    short = _short_labels(final)
+    rows = [
+        (
+            told.recording,
+            "test" if told.recording in final.tested_on else "",
+            told.nearest or MISSING,
+            f"{told.distance:.3f}" if told.nearest else MISSING,
+            short[told.model],
+            number(told.rmsd) + ("*" if told.is_right else " "),
+            short[told.best_model],
+            number(told.best_rmsd) + ("*" if told.is_possible else " "),
+        )
+        for told in final.predictions
+    ]
+    heads = (
+        "recording",
+        "",
+        "nearest",
+        "distance",
+        "model",
+        "RMSD ",
+        "best",
+        "its RMSD ",
+    )
+    title = (
+        "Model for a recording told from its input: that of the recording of nearest input,"
+        f"\nRMSD [{final.unit}], * covered; models fitted to the recording itself are "
+        f"left out\n{simulation_words(initial_state, is_validation=True)}"
+    )
+    table = text_table(title, heads, rows, text_columns=(0, 1, 2))
+    return f"{table}\n{prediction_line(final)}"
+
+
+def prediction_line(final: FinalTest) -> str:
+    """Say how often the model that the input told was right."""
+    tests = [told for told in final.predictions if told.recording in final.tested_on]
+    return (
+        f"Right for {_rights(final.predictions)} recordings ({_rights(tests)} test "
+        f"recordings);\nsome model that could have been chosen covers "
+        f"{sum(told.is_possible for told in final.predictions)} "
+        f"({sum(told.is_possible for told in tests)}) of them."
+    )
+
+
+def _rights(predictions: Sequence[Prediction]) -> str:
+    return f"{sum(told.is_right for told in predictions)} of {len(predictions)}"
+
 
 # Published tables of the chain on all recordings of a kind.
 _FORMS = {"step": "T3.4.1-2", "sine": "T3.4.1-3"}
@@ -28,8 +264,6 @@ def chain_on_tests_table(
 
     Parameters
     ----------
-    final : FinalTest
-    trend : ChainTrend
     initial_state : str
         Rule of the fits.
     width : int, [characters]
@@ -54,14 +288,6 @@ def chain_on_tests_table(
 
 def trend_line(trend: ChainTrend) -> str:
     """Say whether the RMSD on the test recordings falls along the chain.
-
-    Parameters
-    ----------
-    trend : ChainTrend
-
-    Returns
-    -------
-    str
 
     Examples
     --------
@@ -95,18 +321,12 @@ def chain_coverage_table(
 
     Parameters
     ----------
-    final : FinalTest
-    trend : ChainTrend
     initial_state : str
         Rule of the fits.
     nf : int or None, [-]
         As for ``tables.thesis_name``.
     has_names : bool
         Whether the thesis's names, which hold a delay, can be told from the grid.
-
-    Returns
-    -------
-    str
     """
     rows = [
         (model, *map(str, counts), str(total), *_names(model, nf, has_names=has_names))
@@ -142,18 +362,12 @@ def chain_tables(
 
     Parameters
     ----------
-    final : FinalTest
-    trend : ChainTrend
     kinds : mapping of str to str
         Kind of each recording by its name.
     initial_state : str
         Rule of the fits.
     width : int, [characters]
         Of the screen.
-
-    Returns
-    -------
-    str
     """
     tables = []
     for place, kind in enumerate(trend.kinds):

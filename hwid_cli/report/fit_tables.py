@@ -1,15 +1,52 @@
-"""The fits of single recordings as text: the best ones, and how all ended."""
+"""The fits of single recordings as text: the best ones, and how all ended.
 
+Output maps that turn back, in words.
+"""
+
+import textwrap
 from collections import Counter
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from hwid_cli.records.model import Fit
-from hwid_cli.report.fold_words import folds_note
+from hwid_cli.records.units import behind
 from hwid_cli.report.simulation_words import HUBER_WORDS, simulation_words
 from hwid_cli.report.tables import thesis_name_of
-from hwid_cli.report.text_table import MISSING, number, text_table
+from hwid_cli.report.text_table import MISSING, WIDTH, number, text_table
+
+# Models that are named, and places of each.
+_MOST_MODELS, _MOST_PLACES = 4, 2
+
+
+def folds_note(fits: Sequence[Fit], *, nk_is_delay: bool = False) -> str:
+    """Name the models whose output map turns back, and where.
+
+    Parameters
+    ----------
+    nk_is_delay : bool
+        Whether the grid's second axis is the delay.
+
+    Returns
+    -------
+    str
+        Lines that fit the screen; empty if there are none.
+    """
+    folded = []
+    for fit in fits:
+        if fit.output_folds and fit.model is not None:
+            nk = fit.orders.nk if nk_is_delay else fit.orders.nf
+            places = ", ".join(f"{x:.3g}" for x in fit.output_folds[:_MOST_PLACES])
+            more = ", ..." if len(fit.output_folds) > _MOST_PLACES else ""
+            where = f"x = {places}{more}{behind(fit.model.input_unit)}"
+            folded.append(f"{fit.name}/{fit.orders.nb}/{nk} ({where})")
+    if not folded:
+        return ""
+    rest = len(folded) - _MOST_MODELS
+    shown = "; ".join(folded[:_MOST_MODELS]) + (f"; {rest} more" if rest > 0 else "")
+    text = f"Output maps that fold, so that two positions give one output: {shown}"
+    return textwrap.fill(text, WIDTH, break_long_words=False, break_on_hyphens=False)
+
 
 # Words for the statuses of fits.
 _STATUS_WORDS = {
@@ -35,10 +72,6 @@ def best_models_table(
         Of the output.
     nk_is_delay : bool
         Whether the grid's second axis is the delay.
-
-    Returns
-    -------
-    str
     """
     rows = []
     for group in best:
@@ -91,10 +124,6 @@ def status_line(counts: Mapping[str, int]) -> str:
     counts : mapping of str to int
         As ``ranking.count_statuses`` gives them.
 
-    Returns
-    -------
-    str
-
     Examples
     --------
     >>> status_line({"converged": 98, "failed": 2})
@@ -106,10 +135,6 @@ def status_line(counts: Mapping[str, int]) -> str:
 
 def failure_lines(fits: Sequence[Fit]) -> str:
     """Say why fits failed, each reason once.
-
-    Parameters
-    ----------
-    fits : sequence of Fit
 
     Returns
     -------

@@ -14,13 +14,8 @@ def levels_table(search: GroupSearch, *, initial_state: str) -> str:
 
     Parameters
     ----------
-    search : GroupSearch
     initial_state : str
         Rule of the fits.
-
-    Returns
-    -------
-    str
     """
     rows = []
     for level in search.levels:
@@ -66,7 +61,6 @@ def join_table(
 
     Parameters
     ----------
-    search : GroupSearch
     level : int, [-]
         Recordings in the groups, at least 2.
     initial_state : str
@@ -105,12 +99,7 @@ def add_ons_of(search: GroupSearch, level: int) -> list[str]:
 
     Parameters
     ----------
-    search : GroupSearch
     level : int, [-]
-
-    Returns
-    -------
-    list of str
     """
     tried = {join.add_on for join in search.joins if join.level == level}
     # Single recordings come in the order of the experiment, others as they join.
@@ -124,13 +113,8 @@ def chain_table(search: GroupSearch, *, initial_state: str) -> str:
 
     Parameters
     ----------
-    search : GroupSearch
     initial_state : str
         Rule of the fits.
-
-    Returns
-    -------
-    str
     """
     if not search.chain:
         return f"No group covers anything: {search.reason}."

@@ -34,7 +34,6 @@ class Page:
 
     Parameters
     ----------
-    html : str
     figures : mapping of str to bytes
         PNG files by their place below ``figures/``, without those that were given.
     """
@@ -50,7 +49,6 @@ def report_page(
 
     Parameters
     ----------
-    contents : ReportContents
     calibration_figures : mapping of str to bytes
         PNG files of ``hwid calibrate`` by the names of the recordings.
 

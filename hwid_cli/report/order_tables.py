@@ -1,14 +1,217 @@
-"""Recommended orders as a table, and the reasons as sentences."""
+"""Recommended orders as a table, and the reasons as sentences.
 
-from hwid_cli.records.order import OrderAdvice, OrderChoice
-from hwid_cli.report.judgement_words import (
-    beyond_sentence,
-    outlier_sentence,
-    paragraphs,
-    reason_to_take,
+Why the smallest good one of some candidates is to be taken, in words.
+
+Recommended maps as a table, and the reasons as sentences.
+"""
+
+import textwrap
+from collections.abc import Sequence
+
+from hwid_cli.records.order import (
+    Judgement,
+    MapAdvice,
+    MapCandidate,
+    OrderAdvice,
+    OrderChoice,
 )
 from hwid_cli.report.simulation_words import simulation_words
 from hwid_cli.report.text_table import MISSING, WIDTH, number, text_table
+
+
+def reason_to_take(
+    judgement: Judgement, tolerance: float, things: str, best: str | None
+) -> str:
+    """Say why candidates are taken that other recordings have judged.
+
+    Parameters
+    ----------
+    tolerance : float, [-]
+    things : str
+        What the candidates are, in the plural.
+    best : str or None
+        The best ones; None where these are taken.
+
+    Returns
+    -------
+    str
+        Goes on behind a colon.
+    """
+    on = (
+        "recordings that the models were not fitted to"
+        if judgement.n_judges > 1
+        else "the one recording that it was not fitted to"
+    )
+    if best is None:
+        return (
+            f"they have the lowest RMSD on {on}, and no smaller ones come within "
+            f"{100 * tolerance:g} % or one standard error of it."
+        )
+    within = f"the tolerance of {100 * tolerance:g} %"
+    if judgement.factor > 1.0 + tolerance:
+        within = (
+            f"one standard error ({judgement.standard_error:.2g}) of the difference"
+        )
+    return (
+        f"on {on} they are on average {100 * (judgement.factor - 1):.3g} % further off than "
+        f"the best {best}; that is within {within}, and no smaller {things} are."
+    )
+
+
+def beyond_sentence(judgement: Judgement) -> str:
+    """Say which pairs of model and recording do not judge.
+
+    Returns
+    -------
+    str
+        Empty where all do.
+    """
+    count = judgement.n_beyond
+    if not count:
+        return ""
+    return (
+        f"{count} pair{'s' * (count != 1)} of model and recording {'do' if count != 1 else 'does'} "
+        "not judge: there the input goes beyond what the model has seen, and a map is only "
+        "a continuation."
+    )
+
+
+def outlier_sentence(judgement: Judgement) -> str:
+    """Say how many samples of the judging recordings do not count.
+
+    Returns
+    -------
+    str
+        Empty where all do.
+    """
+    count = judgement.n_outliers
+    if not count:
+        return ""
+    return (
+        f"{count} sample{'s' * (count != 1)} of the judging recordings "
+        f"{'are outliers' if count != 1 else 'is an outlier'} and "
+        f"{'do' if count != 1 else 'does'} not count here, as in the fits (fit.loss)."
+    )
+
+
+def paragraphs(sentences: Sequence[str], width: int) -> str:
+    """Give each reason a paragraph of its own.
+
+    Parameters
+    ----------
+    sentences : sequence of str
+        Empty ones are left out.
+    width : int, [characters]
+        Of a line.
+    """
+    return "\n".join(
+        textwrap.fill(one, width, subsequent_indent="  ") for one in sentences if one
+    )
+
+
+# Rows on the screen; maps.csv has all.
+_SHOWN = 12
+
+
+def map_table(advice: MapAdvice, *, initial_state: str) -> str:
+    """Show the pairs of maps that predict best, that to take and that of the configuration.
+
+    Parameters
+    ----------
+    initial_state : str
+        Rule of the fits.
+    """
+    lowest = min(one.bic for one in advice.candidates)
+    rows = [
+        (
+            _mark(one, advice),
+            _map(one.input_map, one.input_units),
+            _map(one.output_map, one.output_units),
+            str(one.n_parameters or MISSING),
+            number(one.rmsd),
+            f"{one.factor:.2f}",
+            f"{one.bic - lowest:.0f}" if lowest < one.bic < float("inf") else MISSING,
+        )
+        for place, one in enumerate(advice.candidates)
+        if place < _SHOWN or one in (advice.chosen, advice.given)
+    ]
+    nb, nf, nk = advice.orders
+    title = (
+        f"Maps at the orders [{nb} {nf} {nk}], with p parameters: cross-validated RMSD "
+        f"[{advice.unit}]\n(geometric mean), factor above the best (ten at most on one "
+        "recording),\nBIC above the lowest; "
+        f"{len(rows)} of {len(advice.candidates)} pairs\n"
+        f"{simulation_words(initial_state, is_validation=True)}"
+    )
+    heads = ("", "input map", "output map", "p", "RMSD", "factor", "BIC")
+    return text_table(title, heads, rows, text_columns=(0, 1, 2))
+
+
+def map_sentences(advice: MapAdvice, *, width: int = WIDTH) -> str:
+    """Say which maps to take, and why.
+
+    Parameters
+    ----------
+    width : int, [characters]
+        Of a line.
+
+    Returns
+    -------
+    str
+        A paragraph for each reason.
+    """
+    sentences = (
+        _map_recommendation(advice),
+        beyond_sentence(advice.judgement),
+        outlier_sentence(advice.judgement),
+    )
+    return paragraphs(sentences, width)
+
+
+def _map_recommendation(advice: MapAdvice) -> str:
+    one, best = advice.chosen, advice.candidates[0]
+    take = f"Take fit: {{{_keys(one)}}}: "
+    if not advice.judgement.n_judges:
+        return (
+            f"{take}they have the lowest BIC. No other recording judges, and BIC takes "
+            "residuals for white; cut the recording into several (recordings.parts) to let "
+            "data judge that were not fitted."
+        )
+    words = f"maps, {_map(best.input_map, best.input_units)} and "
+    words += _map(best.output_map, best.output_units)
+    reason = reason_to_take(
+        advice.judgement, advice.tolerance, "maps", None if one == best else words
+    )
+    if one == advice.given:
+        return f"{take}{reason} They are those of the configuration."
+    if advice.given == best:
+        return f"{take}{reason} Those of the configuration are the best."
+    return (
+        f"{take}{reason} Those of the configuration are {advice.given.factor:.3g} times as "
+        "far off as the best."
+    )
+
+
+def _keys(one: MapCandidate) -> str:
+    """The keys of the configuration that ask for these maps."""
+    keys = []
+    for side in ("input", "output"):
+        keys.append(f"{side}_map: {getattr(one, f'{side}_map')}")
+        if units := getattr(one, f"{side}_units"):
+            keys.append(f"{side}_units: {units}")
+    return ", ".join(keys)
+
+
+def _mark(one: MapCandidate, advice: MapAdvice) -> str:
+    if one == advice.chosen:
+        return "take"
+    return "yours" if one == advice.given else ""
+
+
+def _map(kind: str, units: int) -> str:
+    words = kind.replace("_", " ")
+    return f"{words}, {units}" if units else words
+
 
 # Delay of a grid whose second axis counts poles, [samples].
 _GRID_DELAY = 1
@@ -20,13 +223,8 @@ def order_table(advice: OrderAdvice, *, initial_state: str) -> str:
 
     Parameters
     ----------
-    advice : OrderAdvice
     initial_state : str
         Rule of the fits.
-
-    Returns
-    -------
-    str
     """
     seen = {one.recording: (one.delay, one.n_poles) for one in advice.responses}
     seen[""] = (advice.delay, advice.n_poles)
@@ -71,7 +269,6 @@ def order_sentences(advice: OrderAdvice, *, width: int = WIDTH) -> str:
 
     Parameters
     ----------
-    advice : OrderAdvice
     width : int, [characters]
         Of a line.
 

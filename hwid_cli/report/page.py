@@ -10,7 +10,6 @@ class Text:
 
     Parameters
     ----------
-    text : str
     is_note : bool
         Whether it stands back, as remarks and missing stages do.
     """
@@ -22,12 +21,7 @@ class Text:
 
 @dataclass(frozen=True)
 class Code:
-    """Text in a type of fixed width, line by line.
-
-    Parameters
-    ----------
-    text : str
-    """
+    """Text in a type of fixed width, line by line."""
 
     kind: ClassVar[str] = "code"
     text: str
@@ -41,7 +35,6 @@ class Image:
     ----------
     file : str
         Where it lies below ``figures/``.
-    png : bytes
     alt : str
         What a reader who does not see it should know.
     width_px, height_px : int, [pixels]
@@ -70,7 +63,6 @@ class Figures:
     ----------
     images : tuple of Image
         Side by side where there is room.
-    sentence : str
     """
 
     kind: ClassVar[str] = "figures"
@@ -84,7 +76,6 @@ class Cell:
 
     Parameters
     ----------
-    text : str
     title : str
         Shown when the pointer rests on it; empty for nothing.
     share : float or None, [-]
@@ -105,8 +96,6 @@ class Table:
 
     Parameters
     ----------
-    caption : str
-    heads : tuple of str
     rows : tuple of tuple of Cell or str
         The first cell of each is its head.
     text_columns : tuple of int, [-]
@@ -122,12 +111,7 @@ class Table:
 
 @dataclass(frozen=True)
 class Heading:
-    """A heading inside a section.
-
-    Parameters
-    ----------
-    text : str
-    """
+    """A heading inside a section."""
 
     kind: ClassVar[str] = "heading"
     text: str
@@ -141,7 +125,6 @@ class Folded:
     ----------
     summary : str
         What is inside.
-    blocks : tuple of blocks
     is_printed : bool
         Whether they are opened on paper.
     """
@@ -154,12 +137,7 @@ class Folded:
 
 @dataclass(frozen=True)
 class Pairs:
-    """Small figures, two in a row where there is room.
-
-    Parameters
-    ----------
-    figures : tuple of Figures
-    """
+    """Small figures, two in a row where there is room."""
 
     kind: ClassVar[str] = "pairs"
     figures: tuple[Figures, ...]
@@ -176,10 +154,8 @@ class Section:
     ----------
     id : str
         Where links lead.
-    title : str
     short : str
         Its name in the navigation.
-    blocks : tuple of blocks
     """
 
     id: str
@@ -190,10 +166,6 @@ class Section:
 
 def images_of(blocks: tuple[Block, ...]) -> tuple[Image, ...]:
     """Collect the figures of some blocks, folded ones too.
-
-    Parameters
-    ----------
-    blocks : tuple of blocks
 
     Returns
     -------

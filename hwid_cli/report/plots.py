@@ -17,12 +17,6 @@ def calibration_figure(
 ) -> Figure:
     """Draw a recording before and after calibration.
 
-    Parameters
-    ----------
-    raw : RawRecording
-    recording : Recording
-    log : CalibrationLog
-
     Returns
     -------
     Figure
@@ -81,10 +75,6 @@ def _draw_column(
 
 def as_png(figure: Figure) -> bytes:
     """Render a figure.
-
-    Parameters
-    ----------
-    figure : Figure
 
     Returns
     -------

@@ -22,7 +22,6 @@ class StageProgress:
 
     Parameters
     ----------
-    stage : str
     total : int, [-]
         Tasks that are to come.
     unit : str
@@ -78,7 +77,6 @@ class StageProgress:
 
         Parameters
         ----------
-        stage : str
         total : int, [-]
             Tasks of this round.
         """

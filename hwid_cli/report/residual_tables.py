@@ -15,10 +15,6 @@ _LEAST_P, _MOST_SHOWN = 1e-3, 5
 def residual_verdict(tests: ResidualTests) -> str:
     """Say in a few words what residuals show.
 
-    Parameters
-    ----------
-    tests : ResidualTests
-
     Returns
     -------
     str
@@ -45,10 +41,6 @@ def p_words(p_value: float) -> str:
     ----------
     p_value : float, [-]
 
-    Returns
-    -------
-    str
-
     Examples
     --------
     >>> p_words(0.0002), p_words(0.043), p_words(float("nan"))
@@ -64,7 +56,6 @@ def residual_table(found: Sequence[ModelResiduals], initial_state: str) -> str:
 
     Parameters
     ----------
-    found : sequence of ModelResiduals
     initial_state : str
         Rule of the fits.
 
@@ -85,10 +76,6 @@ def residual_table(found: Sequence[ModelResiduals], initial_state: str) -> str:
 
 def flat_lines(found: Sequence[ModelResiduals]) -> list[str]:
     """Say what the recordings do not tell about the parameters of models.
-
-    Parameters
-    ----------
-    found : sequence of ModelResiduals
 
     Returns
     -------

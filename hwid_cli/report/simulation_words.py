@@ -40,10 +40,6 @@ def simulation_words(initial_state: str, *, is_validation: bool) -> str:
         estimated initial state, and nothing else, is fitted to each of them. Else the
         numbers are those of the fit itself.
 
-    Returns
-    -------
-    str
-
     Examples
     --------
     >>> simulation_words("zero", is_validation=True)
@@ -64,10 +60,6 @@ def joined_words(initial_state: str, join: str) -> str:
         Rule of the fit; one of ``model.INITIAL_STATES``.
     join : str
         One of ``model.JOINS``.
-
-    Returns
-    -------
-    str
 
     Examples
     --------
@@ -95,10 +87,6 @@ def prediction_words(start: str, model_rule: str | None) -> str:
         One of ``STARTS_OF_PREDICTIONS``.
     model_rule : str or None
         Rule of the model's fit; None for a physics simulation.
-
-    Returns
-    -------
-    str
 
     Examples
     --------

@@ -14,14 +14,8 @@ def starter_words(
     ----------
     path : str
         Of the configuration that was written.
-    layout : Layout
-    proposal : Proposal
     problems : sequence of str
         About files that are left out.
-
-    Returns
-    -------
-    str
     """
     lines = [
         f"files: {', '.join(layout.patterns)}",

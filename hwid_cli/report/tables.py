@@ -3,7 +3,7 @@
 import re
 from collections.abc import Sequence
 
-from hwid_cli.records.linear_block import Orders
+from hwid_cli.records.model import Orders
 from hwid_cli.records.recordings import CalibrationLog
 from hwid_cli.records.results import CrossValidation, ModelScore
 from hwid_cli.records.units import behind
@@ -61,28 +61,14 @@ def thesis_name_of(identified_on: str, orders: Orders) -> str:
 
     Parameters
     ----------
-    identified_on : str
     orders : Orders
         With the delay that was found.
-
-    Returns
-    -------
-    str
     """
     return thesis_name(identified_on, orders.nb, orders.nk, orders.nf)
 
 
 def calibration_table(logs: Sequence[CalibrationLog]) -> str:
-    """Show what calibration did, one line for each recording.
-
-    Parameters
-    ----------
-    logs : sequence of CalibrationLog
-
-    Returns
-    -------
-    str
-    """
+    """Show what calibration did, one line for each recording."""
     heads, rows = calibration_cells(logs)
     return text_table(
         "Calibration: samples, what was subtracted, samples repaired (in/out)",
@@ -97,13 +83,8 @@ def calibration_cells(
 ) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     """Write what calibration did, for a table on the screen or on a page.
 
-    Parameters
-    ----------
-    logs : sequence of CalibrationLog
-
     Returns
     -------
-    heads : tuple of str
     rows : list of tuple of str
         One for each recording, its name first.
     """
@@ -146,15 +127,10 @@ def coverage_table(
     ----------
     scores : sequence of ModelScore
         As ``ranking.score_models`` gives them.
-    crossval : CrossValidation
     initial_state : str
         Rule of the fits.
     count : int, [-]
         How many models to show.
-
-    Returns
-    -------
-    str
     """
     rows = [
         (
@@ -189,7 +165,6 @@ def cross_table(
     ----------
     best : sequence of ModelScore
         As ``ranking.best_of_each`` gives them.
-    crossval : CrossValidation
     initial_state : str
         Rule of the fits.
     width : int, [characters]

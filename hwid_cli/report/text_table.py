@@ -30,10 +30,6 @@ def text_table(
     text_columns : sequence of int, [-]
         Columns that hold text and stand left; the others hold numbers and stand right.
 
-    Returns
-    -------
-    str
-
     Examples
     --------
     >>> print(text_table("Counts", ("kind", "n"), [("step", "15")], text_columns=(0,)))
@@ -73,10 +69,6 @@ def split_table(
         stands in every block; those between are divided.
     width : int, [characters]
         Of the screen; a block of one column may be wider.
-
-    Returns
-    -------
-    str
     """
     sizes = [max(map(len, column)) for column in zip(heads, *rows, strict=True)]
     middle = range(1, len(heads) - 1)
@@ -102,13 +94,8 @@ def joined_names(names: Sequence[str], *, width: int = WIDTH) -> list[str]:
 
     Parameters
     ----------
-    names : sequence of str
     width : int, [characters]
         Of a line; a single longer name is a line of its own.
-
-    Returns
-    -------
-    list of str
 
     Examples
     --------

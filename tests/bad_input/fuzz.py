@@ -18,9 +18,9 @@ import h5py
 import numpy as np
 import scipy.io
 
+from hwid_cli.config.load import load_experiment
+from hwid_cli.data.formats import read_columns
 from hwid_cli.errors import HwidError
-from hwid_cli.files.config import load_experiment
-from hwid_cli.files.recording_formats import read_columns
 from hwid_cli.records.experiment import Columns
 from tests.bad_input.trial import csv_text, signals
 

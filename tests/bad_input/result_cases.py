@@ -4,7 +4,7 @@ import os
 
 import h5py
 
-from hwid_cli.files.seals import sealed
+from hwid_cli.files.checksums import sealed
 from tests.bad_input.trial import Case
 
 

@@ -14,10 +14,10 @@ from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
+from hwid_cli.config.load import load_experiment
+from hwid_cli.data.formats import read_columns
+from hwid_cli.data.recordings import read_recordings
 from hwid_cli.errors import ConfigError, MeasurementError
-from hwid_cli.files.config import load_experiment
-from hwid_cli.files.recording_formats import read_columns
-from hwid_cli.files.recordings import read_recordings
 from hwid_cli.records.experiment import Columns, Experiment
 from hwid_cli.records.recordings import Recording
 

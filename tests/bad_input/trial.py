@@ -16,7 +16,7 @@ import numpy as np
 from click.testing import CliRunner
 
 from hwid_cli.cli.main import main
-from hwid_cli.files.folder_locks import RUN_LOCK, USERS_LOCK
+from hwid_cli.files.locks import RUN_LOCK, USERS_LOCK
 
 CONFIG = """\
 name: tiny

@@ -12,10 +12,10 @@ from collections.abc import Callable
 import numpy as np
 from scipy.signal import lfilter
 
-from hwid_cli.maths.model.beyond import continued, for_search
-from hwid_cli.maths.model.fit import fit
-from hwid_cli.maths.model.simulate import validation_output
-from hwid_cli.maths.scores import rmsd
+from hwid_cli.model.extrapolation import continued, for_search
+from hwid_cli.model.fit import fit
+from hwid_cli.model.scores import rmsd
+from hwid_cli.model.simulate import validation_output
 from hwid_cli.records.model import HammersteinWiener, Orders
 from hwid_cli.records.recordings import Recording
 from tests.benchmarks.bench_warm_start import measured_steps

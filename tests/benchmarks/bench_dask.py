@@ -2,7 +2,7 @@
 
 Scheduler and two workers run on this machine and talk over loopback. Results are those
 of a fit, in size and in form, and the parent keeps each in a cache on disk as in a run.
-``--json`` writes what ``docs/scale.py`` needs.
+``--json`` writes what ``tools/scale.py`` needs.
 """
 
 import argparse
@@ -15,16 +15,16 @@ from pathlib import Path
 
 import numpy as np
 
-from hwid_cli.campaign import chunks
-from hwid_cli.campaign.identify import identify_all
-from hwid_cli.campaign.runner import RunSettings, run_tasks
-from hwid_cli.campaign.tasks import Task
-from hwid_cli.campaign.workers import Workers
-from hwid_cli.files.hdf5_store import Hdf5Store, pack_entry
-from hwid_cli.maths.model.fit import fit
+from hwid_cli.model.fit import fit
 from hwid_cli.records.experiment import OrdersOptions
 from hwid_cli.records.model import Fit, FitOptions, Orders
 from hwid_cli.records.recordings import Recording
+from hwid_cli.stages.identify import identify_all
+from hwid_cli.store.cache import Hdf5Store, pack_entry
+from hwid_cli.tasks import cluster
+from hwid_cli.tasks.runner import RunSettings, run_tasks
+from hwid_cli.tasks.task import Task
+from hwid_cli.tasks.workers import Workers
 from tests import dask_processes
 from tests.benchmarks.plants import random_plant
 
@@ -54,7 +54,7 @@ def way(address: str, process: int, model: Fit) -> dict[str, float]:
     """Seconds per chunk and per result: of the wall, the parent, the scheduler."""
     rows = []
     for size in SIZES:
-        chunks.MOST_IN_CHUNK = size
+        cluster.MOST_IN_CHUNK = size
         for repeat in range(REPEATS):
             tasks = [
                 Task(f"{size} {repeat} {n}", str(n), echoed, (model, n), Fit)
@@ -122,7 +122,7 @@ def main() -> None:
         dask_processes.workers(address, Path(name)),
     ):
         found = way(address, process, model)
-        chunks.MOST_IN_CHUNK = 64
+        cluster.MOST_IN_CHUNK = 64
         found["dask_s"] = campaign(Workers(2, "dask", address))
     found["local_s"] = campaign(Workers(2))
     found["fits"] = RECORDINGS * GRID**2

@@ -10,9 +10,9 @@ from importlib.util import find_spec
 
 import numpy as np
 
-from hwid_cli.maths import scores
-from hwid_cli.maths.model.fit import fit
-from hwid_cli.maths.model.simulate import simulate
+from hwid_cli.model import scores
+from hwid_cli.model.fit import fit
+from hwid_cli.model.simulate import simulate
 from hwid_cli.records.model import FitOptions
 from hwid_cli.records.recordings import Recording
 from tests.benchmarks.by_hand import fit_by_hand

@@ -10,15 +10,15 @@ import time
 
 import numpy as np
 
-from hwid_cli.campaign.cache import MemoryStore
-from hwid_cli.campaign.identify import identify_all
-from hwid_cli.campaign.order_grid import candidate_orders
-from hwid_cli.campaign.runner import RunSettings, Workers
-from hwid_cli.maths import scores
-from hwid_cli.maths.model.simulate import simulate
+from hwid_cli.model import scores
+from hwid_cli.model.simulate import simulate
 from hwid_cli.records.experiment import OrdersOptions
 from hwid_cli.records.model import FitOptions
 from hwid_cli.records.recordings import Recording
+from hwid_cli.stages.identify import identify_all
+from hwid_cli.stages.order_grid import candidate_orders
+from hwid_cli.tasks.cache import MemoryStore
+from hwid_cli.tasks.runner import RunSettings, Workers
 from tests.benchmarks.by_hand import MOST_IN_GRID, fit_by_hand
 from tests.benchmarks.grid_scores import Scored, n_not_monotone, n_worse_than
 from tests.benchmarks.plants import grid_plant

@@ -10,10 +10,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from hwid_cli.campaign.tasks import one_thread
-from hwid_cli.maths.model.fit import fit
+from hwid_cli.model.fit import fit
 from hwid_cli.records.model import FitOptions, Orders
 from hwid_cli.records.recordings import Recording
+from hwid_cli.tasks.task import one_thread
 from tests.benchmarks.plants import random_plant
 
 PLANTS = (0, 1, 2, 3, 4)

@@ -12,16 +12,16 @@ import time
 import numpy as np
 from scipy.linalg.blas import dsyrk
 
-from hwid_cli.campaign.tasks import one_thread
-from hwid_cli.maths.model import static_map
-from hwid_cli.maths.model.candidates import Candidate, Experiment, columns
-from hwid_cli.maths.model.fit import fit
-from hwid_cli.maths.model.levenberg_marquardt import minimise
-from hwid_cli.maths.model.points import point_of
-from hwid_cli.maths.model.rows.kernels import derivative_rows
-from hwid_cli.maths.model.sensitivities import simulated
+from hwid_cli.model import static_map
+from hwid_cli.model.candidates import Candidate, Experiment, columns
+from hwid_cli.model.derivative_rows import derivative_rows
+from hwid_cli.model.fit import fit
+from hwid_cli.model.levenberg_marquardt import minimise
+from hwid_cli.model.points import point_of
+from hwid_cli.model.sensitivities import simulated
 from hwid_cli.records.model import FitOptions, HammersteinWiener, Orders
 from hwid_cli.records.recordings import Recording
+from hwid_cli.tasks.task import one_thread
 from tests.benchmarks.plants import random_plant
 
 N_SAMPLES = 7500

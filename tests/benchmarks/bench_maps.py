@@ -12,13 +12,13 @@ from dataclasses import dataclass
 import numpy as np
 from joblib import Parallel, delayed
 
-from hwid_cli.campaign.map_choice import candidate_maps
-from hwid_cli.maths import scores
-from hwid_cli.maths.model.fit import fit
-from hwid_cli.maths.model.simulate import simulate
+from hwid_cli.model import scores
+from hwid_cli.model.fit import fit
+from hwid_cli.model.simulate import simulate
 from hwid_cli.records.experiment import OrderOptions
 from hwid_cli.records.model import FitOptions, Orders
 from hwid_cli.records.recordings import Recording
+from hwid_cli.stages.map_choice import candidate_maps
 from tests.benchmarks.plants import random_plant, true_random_plant
 
 CANDIDATES = candidate_maps(

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from itertools import product
 
-from hwid_cli.maths.model.fit import fit
+from hwid_cli.model.fit import fit
 from hwid_cli.records.model import FitOptions, Orders
 from tests.benchmarks.real_data import (
     METHODS,

@@ -9,13 +9,13 @@ import time
 
 import numpy as np
 
-from hwid_cli.campaign import identify
-from hwid_cli.campaign.cache import MemoryStore
-from hwid_cli.campaign.order_grid import SEARCHED_ROUNDS
-from hwid_cli.campaign.runner import RunSettings, Workers
-from hwid_cli.maths.model.fit import fit
+from hwid_cli.model.fit import fit
 from hwid_cli.records.experiment import OrdersOptions
 from hwid_cli.records.model import FitOptions, Orders
+from hwid_cli.stages import identify
+from hwid_cli.stages.order_grid import SEARCHED_ROUNDS
+from hwid_cli.tasks.cache import MemoryStore
+from hwid_cli.tasks.runner import RunSettings, Workers
 from tests.benchmarks.bench_warm_start import measured_steps
 
 STEPS = ("step_01", "step_02", "step_06", "step_12", "step_14")

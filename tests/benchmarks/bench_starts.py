@@ -12,10 +12,9 @@ from unittest.mock import patch
 
 import numpy as np
 
-from hwid_cli.maths import scores
-from hwid_cli.maths.model import beginnings, phases, race, search, starts
-from hwid_cli.maths.model.fit import fit
-from hwid_cli.maths.model.simulate import simulate
+from hwid_cli.model import initial_candidates, phases, scores, screening, search, starts
+from hwid_cli.model.fit import fit
+from hwid_cli.model.simulate import simulate
 from hwid_cli.records.model import FitOptions
 from hwid_cli.records.recordings import Recording
 from tests.benchmarks.bench_wide import true_model, wide_plant
@@ -54,12 +53,12 @@ def all_poles(orders):
 VARIANTS = {
     "everything": nothing,
     "- input expanded into hats": lambda: patch.object(
-        beginnings, "has_free_shape", lambda _: False
+        initial_candidates, "has_free_shape", lambda _: False
     ),
     "- iterations: ARX only": lambda: patch.object(starts, "_ITERATIONS", 1),
     "- starts of fewer poles": lambda: patch.object(starts, "_prefilters", all_poles),
     "- output curve of a start": lambda: patch.object(
-        race, "_with_output_curve", lambda candidate, *_: candidate
+        screening, "_with_output_curve", lambda candidate, *_: candidate
     ),
     "- placing break-points": lambda: patch.object(
         phases, "_has_break_points", lambda _: False

@@ -12,19 +12,18 @@ from dataclasses import replace
 
 import numpy as np
 
-from hwid_cli.campaign.cache import MemoryStore
-from hwid_cli.campaign.calibrate import calibrate_all
-from hwid_cli.campaign.group_fits import fit_level
-from hwid_cli.campaign.group_plan import GroupPlan
-from hwid_cli.campaign.identify import identify_all
-from hwid_cli.campaign.runner import RunSettings, Workers, run_tasks
-from hwid_cli.campaign.simulate import simulate_machine
-from hwid_cli.maths.model.simulate import validation_output
-from hwid_cli.maths.scores import rmsd
+from hwid_cli.model.scores import rmsd
+from hwid_cli.model.simulate import validation_output
 from hwid_cli.records.experiment import CalibrateOptions, GroupOptions, OrdersOptions
 from hwid_cli.records.machines import GunMachine, GunPlan
 from hwid_cli.records.model import FitOptions
 from hwid_cli.records.recordings import RawRecording
+from hwid_cli.stages.calibrate import calibrate_all
+from hwid_cli.stages.group import GroupPlan, fit_level
+from hwid_cli.stages.identify import identify_all
+from hwid_cli.stages.simulate import simulate_machine
+from hwid_cli.tasks.cache import MemoryStore
+from hwid_cli.tasks.runner import RunSettings, Workers, run_tasks
 
 GROUPS = (
     ("step_03", "step_13"),

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import lfilter
 
-from hwid_cli.maths.model.fit import fit
+from hwid_cli.model.fit import fit
 from hwid_cli.records.model import HammersteinWiener, Orders
 from hwid_cli.records.recordings import Recording
 from tests.benchmarks.plants import cut_model, linear_block

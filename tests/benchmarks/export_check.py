@@ -16,13 +16,13 @@ from scipy.io import loadmat
 from scipy.signal import lfilter
 
 from hwid_cli import FitOptions, HammersteinWiener, Orders, Recording, fit
-from hwid_cli.campaign.predict import predict
-from hwid_cli.files.exported.c_drive import drive_source
-from hwid_cli.files.exported.formats import write_exported
-from hwid_cli.files.exported.json_reader import read_exported
-from tests.files.exported import test_c_drive as drives
-from tests.files.exported.fmu_runs import answered
-from tests.files.exported.model_examples import (
+from hwid_cli.export.c_drive import drive_source
+from hwid_cli.export.formats import write_exported
+from hwid_cli.export.json_reader import read_exported
+from hwid_cli.export.predict import predict
+from tests.export import test_c_drive as drives
+from tests.export.fmu_runs import answered
+from tests.export.model_examples import (
     KINDS,
     STARTS,
     c_output,
@@ -33,7 +33,7 @@ from tests.files.exported.model_examples import (
     example_model,
     exported_of,
 )
-from tests.files.exported.test_mat import RUN, interp1
+from tests.export.test_mat import RUN, interp1
 
 RULES = ("zero", "steady", "estimated")
 OCTAVE = shutil.which("octave-cli")

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.linalg import hankel
 from scipy.signal import lfilter
 
-from hwid_cli.maths.model.linear_block import is_stable, reflected
+from hwid_cli.model.linear_block import is_stable, reflected
 
 # Rounds of instruments, and taps of the long impulse response at most.
 _ROUNDS, _TAPS = 3, 150

@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 from scipy.io import loadmat
 
-from hwid_cli.maths import scores
-from hwid_cli.maths.model.simulate import estimated_state, simulate
+from hwid_cli.model import scores
+from hwid_cli.model.simulate import estimated_state, simulate
 from hwid_cli.records.model import HammersteinWiener
 from hwid_cli.records.recordings import Recording
 

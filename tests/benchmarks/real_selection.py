@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hwid_cli.maths.model.fit import fit
+from hwid_cli.model.fit import fit
 from hwid_cli.records.experiment import OrderOptions
 from hwid_cli.records.model import FitOptions, Orders
 from hwid_cli.records.recordings import Recording

@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hwid_cli.maths.model.fit import fit
-from hwid_cli.maths.model.simulate import simulate
+from hwid_cli.model.fit import fit
+from hwid_cli.model.simulate import simulate
 from hwid_cli.records.model import FitOptions, Orders
 from hwid_cli.records.recordings import Recording
 from tests.benchmarks.real_data import Exam, ced, error, folder, part, tanks

@@ -1,6 +1,6 @@
 import pytest
 
-from hwid_cli.files.results import read_calibrated
+from hwid_cli.store.results import read_calibrated
 
 
 def test_calibrated_recordings_and_a_figure_of_each_are_written(hwid, out):

@@ -5,9 +5,9 @@ import pytest
 from click.testing import CliRunner
 
 from hwid_cli.cli.main import main
-from hwid_cli.files.results import read_calibrated, read_crossval, read_fits
-from hwid_cli.maths.model.simulate import validation_output
-from hwid_cli.maths.scores import fit_percent
+from hwid_cli.model.scores import fit_percent
+from hwid_cli.model.simulate import validation_output
+from hwid_cli.store.results import read_calibrated, read_crossval, read_fits
 
 
 @pytest.fixture

@@ -3,7 +3,7 @@ import csv
 import h5py
 import numpy as np
 
-from hwid_cli.files.result_files import read_provenance
+from hwid_cli.store.result_files import read_provenance
 
 
 def rows_of(path):

@@ -6,8 +6,8 @@ import pytest
 from click.testing import CliRunner
 
 from hwid_cli.cli.main import main
-from hwid_cli.files.config import load_experiment
-from hwid_cli.files.diagnosis_results import read_diagnosis_record
+from hwid_cli.config.load import load_experiment
+from hwid_cli.store.diagnosis_results import read_diagnosis_record
 from tests.cli.drive_examples import CONFIG, FRICTION, write_measurements
 
 FILES = (

@@ -5,8 +5,8 @@ import pytest
 import yaml
 
 from hwid_cli import load_model
-from hwid_cli.files.exported.json_reader import read_exported
-from hwid_cli.files.results import read_fits
+from hwid_cli.export.json_reader import read_exported
+from hwid_cli.store.results import read_fits
 
 
 @pytest.mark.parametrize("file_format", ["json", "mat", "c", "fmu"])

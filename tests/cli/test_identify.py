@@ -2,7 +2,7 @@ from pathlib import Path
 
 import pytest
 
-from hwid_cli.files.results import read_fits
+from hwid_cli.store.results import read_fits
 
 
 def test_models_are_written_and_the_best_are_shown(hwid, out):

@@ -6,8 +6,8 @@ import pytest
 from click.testing import CliRunner
 
 from hwid_cli.cli.main import main
-from hwid_cli.files.config import load_experiment
-from hwid_cli.files.recordings import read_recordings
+from hwid_cli.config.load import load_experiment
+from hwid_cli.data.recordings import read_recordings
 from tests.cli.measured_folders import (
     EXPECTED,
     LAYOUTS,

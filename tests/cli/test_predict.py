@@ -6,13 +6,13 @@ from click.testing import CliRunner
 
 from hwid_cli import load_model, simulate
 from hwid_cli.cli.main import main
-from hwid_cli.files.exported.json_writer import write_json
-from tests.files.exported.model_examples import (
+from hwid_cli.export.json_writer import write_json
+from tests.export.model_examples import (
     example_input,
     example_model,
     exported_of,
 )
-from tests.files.exported.test_json import exported_drive
+from tests.export.test_json import exported_drive
 
 
 @pytest.fixture

@@ -3,13 +3,13 @@
 import numpy as np
 from scipy.signal import lfilter
 
-from hwid_cli.campaign.cache import MemoryStore
-from hwid_cli.campaign.crossval import cross_validate
-from hwid_cli.campaign.identify import identify_all
-from hwid_cli.campaign.runner import RunSettings, Workers
 from hwid_cli.records.experiment import CrossvalOptions, OrdersOptions
 from hwid_cli.records.model import FitOptions
 from hwid_cli.records.recordings import Recording
+from hwid_cli.stages.crossval import cross_validate
+from hwid_cli.stages.identify import identify_all
+from hwid_cli.tasks.cache import MemoryStore
+from hwid_cli.tasks.runner import RunSettings, Workers
 
 GRID = OrdersOptions(nb=(1,), nk=(1, 2))
 FEW = FitOptions(units=4, starts=1, max_iterations=8, initial_state="zero")

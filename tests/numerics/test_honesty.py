@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from hwid_cli.campaign import crossval
 from hwid_cli.records.recordings import Recording
-from tests.campaign.diagnosed_drive import FRICTION, diagnosed, parameters
-from tests.maths.diagnosis import small_drive
+from hwid_cli.stages import crossval
+from tests.diagnosis import small_drive
 from tests.numerics.plants import GRID, identified, measured, validated
+from tests.stages.diagnosed_drive import FRICTION, diagnosed, parameters
 
 NAMES = ("a", "b", "c")
 

@@ -14,8 +14,8 @@ SAMPLES = 1_000_000
 READ = """
 import sys
 from pathlib import Path
-from hwid_cli.files.config import load_experiment
-from hwid_cli.files.recordings import read_recordings
+from hwid_cli.config.load import load_experiment
+from hwid_cli.data.recordings import read_recordings
 (raw,) = read_recordings(load_experiment(Path(sys.argv[1])), Path("."))
 print(raw.input.size, *(
     line.split()[1]

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from hwid_cli.files.hdf5_store import Hdf5Store
-from hwid_cli.files.results import read_crossval, read_fits
+from hwid_cli.store.cache import Hdf5Store
+from hwid_cli.store.results import read_crossval, read_fits
 from tests.bad_input import trial
-from tests.campaign.diagnosed_drive import FRICTION, diagnosed, parameters
-from tests.maths.diagnosis import small_drive
+from tests.diagnosis import small_drive
 from tests.numerics.plants import identified, measured, settings, validated
+from tests.stages.diagnosed_drive import FRICTION, diagnosed, parameters
 
 CONFIG = """\
 name: tiny

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from hwid_cli import FitOptions, Orders, Recording, fit
-from hwid_cli.campaign.calibrate import calibrate_all
-from hwid_cli.maths.model.simulate import simulate
+from hwid_cli.model.simulate import simulate
 from hwid_cli.records.experiment import CalibrateOptions
 from hwid_cli.records.recordings import RawRecording
-from tests.campaign.diagnosed_drive import FRICTION, diagnosed, parameters
-from tests.maths.diagnosis.small_drive import recordings, simulation
+from hwid_cli.stages.calibrate import calibrate_all
+from tests.diagnosis.small_drive import recordings, simulation
 from tests.numerics.plants import FEW, identified, measured, validated
+from tests.stages.diagnosed_drive import FRICTION, diagnosed, parameters
 
 # Current in mA and uA; displacement in mm, counts of a micrometre, nm, and far beyond.
 UNITS = [

@@ -14,8 +14,8 @@ import numpy as np
 from click.testing import CliRunner
 
 from hwid_cli.cli.main import main
-from hwid_cli.files.folder_locks import RUN_LOCK, USERS_LOCK
-from hwid_cli.files.seals import unsealed
+from hwid_cli.files.checksums import unsealed
+from hwid_cli.files.locks import RUN_LOCK, USERS_LOCK
 
 CONFIG = """
 name: tiny

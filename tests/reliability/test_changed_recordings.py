@@ -4,8 +4,8 @@ import shutil
 
 import pytest
 
-from hwid_cli.campaign import identify
-from hwid_cli.files import recordings
+from hwid_cli.data import recordings
+from hwid_cli.stages import identify
 from tests.reliability import harness
 
 

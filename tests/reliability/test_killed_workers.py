@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from hwid_cli.campaign import workers
-from hwid_cli.campaign.cache import MemoryStore
-from hwid_cli.campaign.runner import RunSettings, Task, Workers, run_tasks
 from hwid_cli.errors import WorkerError
 from hwid_cli.records.model import Orders
+from hwid_cli.tasks import workers
+from hwid_cli.tasks.cache import MemoryStore
+from hwid_cli.tasks.runner import RunSettings, Task, Workers, run_tasks
 
 
 def orders_after_deaths(number, deaths, folder, by=signal.SIGKILL):

@@ -7,7 +7,7 @@ import shutil
 
 import pytest
 
-from hwid_cli.files.folder_locks import RUN_LOCK, claim_folder, share_folder
+from hwid_cli.files.locks import RUN_LOCK, claim_folder, share_folder
 from tests.reliability import harness
 
 JOBS = ("--jobs", "1")

@@ -2,8 +2,8 @@
 
 import pytest
 
-from hwid_cli.campaign.report import report_contents
 from hwid_cli.report.html import report_page
+from hwid_cli.stages.report import report_contents
 from tests.report.report_examples import everything
 
 

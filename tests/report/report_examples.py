@@ -11,13 +11,7 @@ from hwid_cli.records.groups import (
     Join,
     Prediction,
 )
-from hwid_cli.records.model import (
-    Fit,
-    FitOptions,
-    HammersteinWiener,
-    Orders,
-    StaticMap,
-)
+from hwid_cli.records.model import Fit, FitOptions, HammersteinWiener, Orders, StaticMap
 from hwid_cli.records.recordings import CalibrationLog, Recording
 from hwid_cli.records.report import StageRun, StoredResults
 from hwid_cli.records.results import CrossValidation

@@ -3,12 +3,12 @@ from dataclasses import replace
 import numpy as np
 
 from hwid_cli.records.groups import Prediction
-from hwid_cli.report.assignment_tables import (
+from hwid_cli.report.final_test_tables import (
     prediction_line,
     prediction_table,
     smallest_set_table,
 )
-from tests.campaign.final_test_examples import example_final_test
+from tests.stages.final_test_examples import example_final_test
 
 FINAL = example_final_test()
 

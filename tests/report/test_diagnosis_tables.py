@@ -4,16 +4,16 @@ from dataclasses import replace
 import pytest
 
 from hwid_cli.records.diagnosis import FittedEffect, FittedParameter, NextExperiment
-from hwid_cli.report.diagnosis_cells import (
+from hwid_cli.report.diagnosis_tables import (
     base_table,
     closing_sentences,
+    diagnosis_text,
     effects_table,
     gap_table,
+    quantity_and_unit,
     ranking_table,
     recordings_table,
 )
-from hwid_cli.report.diagnosis_tables import diagnosis_text
-from hwid_cli.report.parameter_names import quantity_and_unit
 from tests.report.diagnosis_examples import (
     DRAG,
     FRICTION,

@@ -4,16 +4,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hwid_cli.campaign.test import chain_trend
 from hwid_cli.records.groups import ChainTrend
-from hwid_cli.report.coverage_tables import coverage_matrix_table, gaps_text
 from hwid_cli.report.final_test_tables import (
     chain_coverage_table,
     chain_on_tests_table,
     chain_tables,
+    coverage_matrix_table,
+    gaps_text,
     trend_line,
 )
-from tests.campaign.final_test_examples import KINDS, example_final_test
+from hwid_cli.stages.test import chain_trend
+from tests.stages.final_test_examples import KINDS, example_final_test
 
 FINAL = example_final_test()
 TREND = chain_trend(FINAL, KINDS)

@@ -5,9 +5,9 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from hwid_cli.campaign.report import report_contents
 from hwid_cli.records.report import ReportContents, StoredResults
 from hwid_cli.report.html import report_page
+from hwid_cli.stages.report import report_contents
 from tests.report.report_examples import (
     calibrated_only,
     recording,

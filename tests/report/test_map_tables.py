@@ -3,7 +3,7 @@ from dataclasses import replace
 import pytest
 
 from hwid_cli.records.order import Judgement, MapAdvice, MapCandidate
-from hwid_cli.report.map_tables import map_sentences, map_table
+from hwid_cli.report.order_tables import map_sentences, map_table
 from hwid_cli.report.simulation_words import simulation_words
 
 PIECEWISE = "piecewise_linear"

@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hwid_cli.maths.model.residual_tests import residual_tests
+from hwid_cli.model.residual_tests import residual_tests
 from hwid_cli.records.residuals import ModelResiduals
 from hwid_cli.report.figures.residuals import residuals_figure
 from hwid_cli.report.page import Table

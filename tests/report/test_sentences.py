@@ -7,9 +7,8 @@ from html import unescape
 import numpy as np
 import pytest
 
-from hwid_cli.campaign.report import report_contents
 from hwid_cli.records.groups import Group, GroupSearch, Join
-from hwid_cli.records.information import Information
+from hwid_cli.records.model import Information
 from hwid_cli.records.report import ReportContents
 from hwid_cli.report.page import Figures, Folded, Heading, Table, Text, images_of
 from hwid_cli.report.sections.final_test import (
@@ -25,6 +24,7 @@ from hwid_cli.report.sections.recordings import (
     recordings_section,
 )
 from hwid_cli.report.sections.summary import summary_section
+from hwid_cli.stages.report import report_contents
 from tests.report.report_examples import calibrated_only, log, names
 
 # Figures of rare shapes are rendered in the tests without this mark.

@@ -4,12 +4,13 @@ from dataclasses import replace
 
 import pytest
 
-from hwid_cli.report.assignment_tables import prediction_table, smallest_set_table
-from hwid_cli.report.coverage_tables import coverage_matrix_table
 from hwid_cli.report.final_test_tables import (
     chain_coverage_table,
     chain_on_tests_table,
     chain_tables,
+    coverage_matrix_table,
+    prediction_table,
+    smallest_set_table,
 )
 from hwid_cli.report.fit_tables import best_models_table
 from hwid_cli.report.group_tables import chain_table, join_table, levels_table

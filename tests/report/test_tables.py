@@ -5,22 +5,18 @@ import numpy as np
 import pytest
 
 from hwid_cli.records.check import RecordingFacts
-from hwid_cli.records.information import Information
 from hwid_cli.records.model import (
     Fit,
     FitOptions,
     HammersteinWiener,
+    Information,
     Orders,
     StaticMap,
 )
 from hwid_cli.records.recordings import CalibrationLog
 from hwid_cli.records.results import CrossValidation, ModelScore
 from hwid_cli.report.check_tables import recordings_table
-from hwid_cli.report.fit_tables import (
-    best_models_table,
-    failure_lines,
-    status_line,
-)
+from hwid_cli.report.fit_tables import best_models_table, failure_lines, status_line
 from hwid_cli.report.tables import (
     calibration_table,
     coverage_table,

@@ -11,7 +11,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hwid_cli.files.raw import read_virtual_key, write_virtual_measurements
+from hwid_cli.data.virtual_measurements import (
+    read_virtual_key,
+    write_virtual_measurements,
+)
 from hwid_cli.records.machines import VirtualMeasurement
 from tests.bad_input import trial
 
@@ -196,7 +199,7 @@ def test_only_the_function_that_a_configuration_names_runs(tmp_path):
 def test_a_crash_of_a_reader_is_a_message():
     import signal
 
-    from hwid_cli.files.rehearsed_reading import rehearse
+    from hwid_cli.data.isolated_reading import rehearse
 
     rehearse(lambda: None)
     rehearse(lambda: 1 / 0)
@@ -207,8 +210,8 @@ def test_a_crash_of_a_reader_is_a_message():
 
 
 def test_an_entry_of_the_cache_answers_under_its_own_name_only(tmp_path):
-    from hwid_cli.files.hdf5_store import Hdf5Store
     from hwid_cli.records.recordings import CalibrationLog
+    from hwid_cli.store.cache import Hdf5Store
 
     store = Hdf5Store(tmp_path)
     log = CalibrationLog("a", (), 0, 1, 1, 1)

@@ -24,14 +24,14 @@ FORBIDDEN_CALLS = {
     *("joblib.load", "joblib.dump", "np.loadtxt", "np.genfromtxt", "np.fromfile"),
 }
 # A function of the user's own runs; nothing else that is read does.
-_OWN_FUNCTION = "hwid_cli/maths/model/maps/own_function.py"
+_OWN_FUNCTION = "hwid_cli/model/maps/own_function.py"
 # Tasks go through pickle on their way to a worker, here and on a cluster; an FMU is
 # compiled by the system's compiler, without a shell, and its text escaped for XML.
 ALLOWED_MODULES = {
-    ("hwid_cli/campaign/workers.py", "pickle"),
-    ("hwid_cli/campaign/dask_cluster.py", "pickle"),
-    ("hwid_cli/files/exported/fmu.py", "subprocess"),
-    ("hwid_cli/files/exported/fmu.py", "xml.sax.saxutils"),
+    ("hwid_cli/tasks/workers.py", "pickle"),
+    ("hwid_cli/tasks/cluster.py", "pickle"),
+    ("hwid_cli/export/fmu.py", "subprocess"),
+    ("hwid_cli/export/fmu.py", "xml.sax.saxutils"),
 }
 ALLOWED_CALLS = {(_OWN_FUNCTION, "exec"), (_OWN_FUNCTION, "compile")}
 
@@ -101,7 +101,7 @@ def test_the_rules_see_what_they_forbid(text):
 def test_the_yaml_loader_is_the_safe_one_and_builds_nothing_more():
     import yaml
 
-    from hwid_cli.files import yaml_text
+    from hwid_cli.config import yaml_text
 
     loader = yaml_text._StrictLoader
 

@@ -32,10 +32,6 @@ _LONGEST = 60
 def comparison_figure(comparison: Comparison) -> Figure:
     """Draw the RMSD of each model on each recording, and one recording in full.
 
-    Parameters
-    ----------
-    comparison : Comparison
-
     Returns
     -------
     Figure

@@ -25,10 +25,6 @@ _WIDTH, _LEFT, _ROW = 7.2, 0.75, 0.19
 def trend_figure(trend: ChainOnTests) -> Figure:
     """Draw the RMSD on the test recordings along the chain of groups.
 
-    Parameters
-    ----------
-    trend : ChainOnTests
-
     Returns
     -------
     Figure

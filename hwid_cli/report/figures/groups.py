@@ -29,10 +29,6 @@ _MOST_CHARACTERS = 24
 def tree_figure(search: GroupSearch) -> Figure:
     """Draw the search from left to right, level by level.
 
-    Parameters
-    ----------
-    search : GroupSearch
-
     Returns
     -------
     Figure
@@ -202,10 +198,6 @@ _LAST: dict[str, Any] = {
 @styled
 def coverage_histogram_figure(search: GroupSearch) -> Figure:
     """Draw how many groups of each level cover how many recordings.
-
-    Parameters
-    ----------
-    search : GroupSearch
 
     Returns
     -------

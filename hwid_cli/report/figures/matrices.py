@@ -57,10 +57,6 @@ def _ends(values: np.ndarray, scale: LogNorm) -> Literal["max", "neither"]:
 def order_grid_figure(grid: OrderGrid) -> Figure:
     """Draw a heat map of RMSD over the orders for each recording.
 
-    Parameters
-    ----------
-    grid : OrderGrid
-
     Returns
     -------
     Figure
@@ -135,7 +131,6 @@ def rmsd_matrix_figure(matrix: RmsdMatrix, *, with_margins: bool = True) -> Figu
 
     Parameters
     ----------
-    matrix : RmsdMatrix
     with_margins : bool
         Whether the numbers of what is covered stand at the right and on top.
 

@@ -26,10 +26,6 @@ _WIDTH = 0.66 * HALF_WIDTH
 def maps_figure(view: ModelView) -> Figure:
     """Draw the two static maps with their corners: break-points, knots or edges.
 
-    Parameters
-    ----------
-    view : ModelView
-
     Returns
     -------
     Figure
@@ -59,16 +55,7 @@ def _draw_map(axes: Axes, curve: MapCurve) -> None:
 
 @styled
 def bode_figure(view: ModelView) -> Figure:
-    """Draw magnitude and phase of the linear block up to half the sampling frequency.
-
-    Parameters
-    ----------
-    view : ModelView
-
-    Returns
-    -------
-    Figure
-    """
+    """Draw magnitude and phase of the linear block up to half the sampling frequency."""
     response = view.response
     figure = new_figure(_WIDTH, _HEIGHT)
     figure.subplots_adjust(left=0.19, right=0.96, top=0.9, bottom=0.13, hspace=0.14)
@@ -94,10 +81,6 @@ def bode_figure(view: ModelView) -> Figure:
 @styled
 def poles_figure(view: ModelView) -> Figure:
     """Draw poles and zeros of the linear block and the unit circle.
-
-    Parameters
-    ----------
-    view : ModelView
 
     Returns
     -------

@@ -25,7 +25,6 @@ def simulation_figure(simulated: SimulatedRecording, *, is_detail: bool) -> Figu
 
     Parameters
     ----------
-    simulated : SimulatedRecording
     is_detail : bool
         Whether only the stretch of ``simulated.detail`` is shown.
 

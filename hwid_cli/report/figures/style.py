@@ -72,16 +72,7 @@ _SETTINGS: Any = {
 def styled(
     draw: Callable[Arguments, Drawn],
 ) -> Callable[Arguments, Drawn]:
-    """Let a function draw in the report's style, whatever the user's settings are.
-
-    Parameters
-    ----------
-    draw : callable
-
-    Returns
-    -------
-    callable
-    """
+    """Let a function draw in the report's style, whatever the user's settings are."""
 
     @wraps(draw)
     def with_style(*args: Arguments.args, **kwargs: Arguments.kwargs) -> Drawn:
@@ -99,10 +90,6 @@ def new_figure(width: float, height: float) -> Figure:
     Parameters
     ----------
     width, height : float, [inch]
-
-    Returns
-    -------
-    Figure
     """
     return Figure(figsize=(width, height), dpi=DOTS)
 
@@ -110,10 +97,6 @@ def new_figure(width: float, height: float) -> Figure:
 @styled
 def as_png(figure: Figure) -> bytes:
     """Render a figure, with the same bytes for the same figure.
-
-    Parameters
-    ----------
-    figure : Figure
 
     Returns
     -------
@@ -128,7 +111,6 @@ def number_decades(axis: Axis, low: float, high: float) -> None:
 
     Parameters
     ----------
-    axis : Axis
     low, high : float
         Ends of what is shown; positive.
     """
@@ -161,12 +143,7 @@ def label_with_factor(axes: Axes) -> None:
 
 
 def mark_missing(axes: Axes) -> None:
-    """Hatch whatever a heat map leaves blank.
-
-    Parameters
-    ----------
-    axes : Axes
-    """
+    """Hatch whatever a heat map leaves blank."""
     axes.patch.set_facecolor(MISSING_COLOUR)
     axes.patch.set_hatch(MISSING_HATCH)
     axes.patch.set_edgecolor("#a0a0a0")

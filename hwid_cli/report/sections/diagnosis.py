@@ -8,7 +8,7 @@ import numpy as np
 
 from hwid_cli.records.diagnosis import Diagnosis, RecordingGap
 from hwid_cli.records.report import ReportContents
-from hwid_cli.report.diagnosis_cells import (
+from hwid_cli.report.diagnosis_tables import (
     INTERVALS_OF_A_PART,
     base_table,
     closing_sentences,
@@ -42,16 +42,7 @@ _VERDICTS = {
 
 
 def diagnosis_section(contents: ReportContents) -> Section:
-    """Show the verdict, the effects with their parameters, and the gap.
-
-    Parameters
-    ----------
-    contents : ReportContents
-
-    Returns
-    -------
-    Section
-    """
+    """Show the verdict, the effects with their parameters, and the gap."""
     found, record = contents.stored.diagnosis, contents.stored.diagnosis_record
     blocks: list[Block] = []
     if record is not None:

@@ -16,16 +16,7 @@ _MOST_OPEN = 15
 
 
 def final_test_section(contents: ReportContents) -> Section:
-    """Show the chain of groups on the test recordings and on all recordings.
-
-    Parameters
-    ----------
-    contents : ReportContents
-
-    Returns
-    -------
-    Section
-    """
+    """Show the chain of groups on the test recordings and on all recordings."""
     trend, matrix = contents.trend, contents.chain_matrix
     blocks: list[Block] = []
     if trend is None or matrix is None:
@@ -65,16 +56,7 @@ def _trend_sentence(trend: ChainOnTests) -> str:
 
 
 def coverage_section(contents: ReportContents) -> Section:
-    """Show all models of the final test on all recordings.
-
-    Parameters
-    ----------
-    contents : ReportContents
-
-    Returns
-    -------
-    Section
-    """
+    """Show all models of the final test on all recordings."""
     final, matrix = contents.stored.final_test, contents.full_matrix
     blocks: list[Block] = []
     if final is None or matrix is None:
@@ -114,16 +96,7 @@ def _matrix_sentence(matrix: RmsdMatrix) -> str:
 
 
 def assignment_section(contents: ReportContents) -> Section:
-    """Show which model serves which recording, and how well inputs tell it.
-
-    Parameters
-    ----------
-    contents : ReportContents
-
-    Returns
-    -------
-    Section
-    """
+    """Show which model serves which recording, and how well inputs tell it."""
     final = contents.stored.final_test
     blocks: list[Block] = []
     if final is None:

@@ -20,16 +20,7 @@ _JOINS = {
 
 
 def groups_section(contents: ReportContents) -> Section:
-    """Show the search as a tree, as tables, and why it stopped.
-
-    Parameters
-    ----------
-    contents : ReportContents
-
-    Returns
-    -------
-    Section
-    """
+    """Show the search as a tree, as tables, and why it stopped."""
     search = contents.stored.search
     blocks: list[Block] = []
     if search is None or not search.groups:

@@ -19,16 +19,7 @@ _FIGURES = ("_maps", "_bode", "_poles")
 
 
 def models_section(contents: ReportContents) -> Section:
-    """Show the chain of groups, or else the widest models, from all sides.
-
-    Parameters
-    ----------
-    contents : ReportContents
-
-    Returns
-    -------
-    Section
-    """
+    """Show the chain of groups, or else the widest models, from all sides."""
     blocks: list[Block] = []
     if not contents.models:
         blocks.append(Text(_why_none(contents), is_note=True))

@@ -55,13 +55,8 @@ def calibration_section(
 
     Parameters
     ----------
-    contents : ReportContents
     figures : mapping of str to bytes
         PNG files by the names of the recordings.
-
-    Returns
-    -------
-    Section
     """
     logs = contents.stored.logs
     blocks: list[Block] = []
@@ -110,16 +105,7 @@ def _folded(figures: list[Figures], what: str) -> Folded:
 
 
 def recordings_section(contents: ReportContents) -> Section:
-    """Show the best model of each recording over the measurement.
-
-    Parameters
-    ----------
-    contents : ReportContents
-
-    Returns
-    -------
-    Section
-    """
+    """Show the best model of each recording over the measurement."""
     blocks: list[Block] = []
     if not contents.simulated:
         blocks.append(Text("No models yet: run 'hwid identify CONFIG'.", is_note=True))
@@ -171,16 +157,7 @@ def _is_finite(one: SimulatedRecording) -> bool:
 
 
 def orders_section(contents: ReportContents) -> Section:
-    """Show the RMSD of every model on its own recording over the orders.
-
-    Parameters
-    ----------
-    contents : ReportContents
-
-    Returns
-    -------
-    Section
-    """
+    """Show the RMSD of every model on its own recording over the orders."""
     grid = contents.grid
     blocks: list[Block] = []
     if grid is None:
@@ -216,16 +193,7 @@ def _grid_name(grid: OrderGrid, place: int) -> str:
 
 
 def crossval_section(contents: ReportContents) -> Section:
-    """Show the widest model of each recording on all recordings.
-
-    Parameters
-    ----------
-    contents : ReportContents
-
-    Returns
-    -------
-    Section
-    """
+    """Show the widest model of each recording on all recordings."""
     matrix = contents.cross
     blocks: list[Block] = []
     if "crossval" in contents.outdated:

@@ -25,16 +25,7 @@ _HOW = (
 
 
 def residuals_section(contents: ReportContents) -> Section:
-    """Show the tests of the residuals of each recording's best model.
-
-    Parameters
-    ----------
-    contents : ReportContents
-
-    Returns
-    -------
-    Section
-    """
+    """Show the tests of the residuals of each recording's best model."""
     tested = [one for one in contents.simulated if one.tests is not None]
     blocks: list[Block] = []
     if not tested:

@@ -19,16 +19,7 @@ _MOST_OPEN = 12
 
 
 def summary_section(contents: ReportContents) -> Section:
-    """Write the first section.
-
-    Parameters
-    ----------
-    contents : ReportContents
-
-    Returns
-    -------
-    Section
-    """
+    """Write the first section."""
     stored = contents.stored
     recordings = _recordings_table(contents)
     many = len(stored.recordings) > _MOST_OPEN

@@ -27,11 +27,6 @@ def with_unit(value: float, unit: str) -> str:
     Parameters
     ----------
     value : float, [unit]
-    unit : str
-
-    Returns
-    -------
-    str
 
     Examples
     --------
@@ -50,10 +45,6 @@ def percent(value: float) -> str:
     Parameters
     ----------
     value : float, [%]
-
-    Returns
-    -------
-    str
     """
     return f"{value:.2f}{_GLUE}%" if np.isfinite(value) else MISSING
 
@@ -69,10 +60,6 @@ def counted(count: int, one: str, many: str = "") -> str:
     many : str
         Its plural; an s is added unless given.
 
-    Returns
-    -------
-    str
-
     Examples
     --------
     >>> counted(1, "fit"), counted(2, "fit"), counted(0, "entry", "entries")
@@ -86,13 +73,8 @@ def listed(names: Sequence[str], most: int = _MOST_NAMED) -> str:
 
     Parameters
     ----------
-    names : sequence of str
     most : int, [-]
         More are counted only.
-
-    Returns
-    -------
-    str
 
     Examples
     --------
@@ -113,12 +95,6 @@ def drawn(file: str, figure: Figure, alt: str) -> Image:
     ----------
     file : str
         Where it lies below ``figures/``; without ending.
-    figure : Figure
-    alt : str
-
-    Returns
-    -------
-    Image
     """
     return image(f"{file}.png", as_png(figure), alt, dots_per_inch=DOTS)
 
@@ -130,13 +106,7 @@ def image(file: str, png: bytes, alt: str, *, dots_per_inch: int) -> Image:
     ----------
     file : str
         Where it lies below ``figures/``.
-    png : bytes
-    alt : str
     dots_per_inch : int, [pixels/inch]
-
-    Returns
-    -------
-    Image
     """
     # Width and height stand at a fixed place in every PNG file, behind its signature
     # and the head of its first part.
@@ -149,7 +119,6 @@ def file_names(names: Iterable[str], endings: Sequence[str] = ("",)) -> dict[str
 
     Parameters
     ----------
-    names : iterable of str
     endings : sequence of str
         What follows a name in the files that belong to it.
 
@@ -182,7 +151,6 @@ def simulation_note(contents: ReportContents, *, is_validation: bool) -> list[Te
 
     Parameters
     ----------
-    contents : ReportContents
     is_validation : bool
         As for ``simulation_words``.
 

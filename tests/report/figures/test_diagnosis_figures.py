@@ -5,9 +5,10 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from hwid_cli.records.diagnosis import LatentForce
-from hwid_cli.report.figures.diagnosis import diagnosis_figures, gap_figure
-from hwid_cli.report.figures.diagnosis_curves import (
+from hwid_cli.report.figures.diagnosis import (
+    diagnosis_figures,
     force_figure,
+    gap_figure,
     overlay_figure,
     telling_stretch,
 )

@@ -1,1 +1,0 @@
-"""The experiment as a whole: one module for each stage, and the pool they run on."""

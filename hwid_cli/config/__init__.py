@@ -1,0 +1,1 @@
+"""Configuration files as records, every key checked."""

@@ -1,0 +1,307 @@
+"""A starter configuration as text with comments, and as an experiment to try it."""
+
+import glob
+import os
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from hwid_cli.config.load import experiment_of
+from hwid_cli.errors import ConfigError
+from hwid_cli.records.experiment import Experiment
+from hwid_cli.records.starter import Layout, Proposal, Role
+
+# Stands for a unit that no name says.
+_UNKNOWN_UNIT = "-"
+# Diagnose section by how recordings start, and why so.
+_STARTS = {
+    "rest": ("# diagnose: {max_effects: 2}",),
+    "held": (
+        "# 'cut' takes away the rest before sines and random signals: the drive still "
+        "holds its level.",
+        "# diagnose: {max_effects: 2, initial_state: held}",
+    ),
+    "estimated": (
+        "# Recordings do not all begin with a rest: how they start is fitted too.",
+        "# diagnose: {max_effects: 2, initial_state: estimated}",
+    ),
+}
+
+
+def draft_experiment(layout: Layout, folder: Path) -> Experiment:
+    """Experiment that reads all recordings as guessed, for trying it.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the measurements.
+    """
+    source = folder.resolve() / "the proposed configuration"
+    content: dict[str, Any] = {
+        "name": "draft",
+        "recordings": _recordings(layout, ""),
+        # The smallest orders and a recipe that allows columns of different length.
+        "orders": {"nb": [1], "nk": [1]},
+        "calibrate": {"other": ["cut"]},
+    }
+    return experiment_of(content, str(source))
+
+
+def starter_name(folder: Path) -> str:
+    """Name of an experiment after the folder of its measurements."""
+    name = folder.resolve().name
+    kept = "".join(c if c.isalnum() or c in "-_" else "_" for c in name).strip("_")
+    return kept or "measurements"
+
+
+def starter_text(layout: Layout, proposal: Proposal, folder: Path, path: Path) -> str:
+    """Text of a starter configuration.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the measurements.
+    path : Path
+        Where the text will stand: paths in it are relative to that.
+    """
+    own = _relative(folder, path)
+    blocks = [
+        [
+            f"# Written by 'hwid init {folder}': every line is a guess to be checked.",
+            f"# 'hwid check {path.name}' says what would run; configs/README.md of the",
+            "# project explains every key.",
+            f"name: {_flow(starter_name(folder))}",
+        ],
+        _recordings_lines(layout, proposal, own),
+        _calibrate_lines(proposal),
+        _fit_lines(proposal),
+        _judging_lines(layout, proposal),
+        _group_lines(proposal),
+        _diagnose_lines(layout, proposal),
+    ]
+    return "\n\n".join("\n".join(lines) for lines in blocks if lines) + "\n"
+
+
+def refuse_existing(path: Path, *, force: bool) -> None:
+    """Refuse a file that is there, before any work is done.
+
+    Parameters
+    ----------
+    force : bool
+        Whether it may be replaced.
+
+    Raises
+    ------
+    ConfigError
+    """
+    if path.exists() and not force:
+        raise ConfigError(
+            f"{path}: exists already; expected a new file; choose another one with "
+            "--out, or replace it with --force"
+        )
+
+
+def write_starter(path: Path, text: str, *, force: bool) -> None:
+    """Write a new configuration; one that is there stays unless it may go.
+
+    Parameters
+    ----------
+    force : bool
+        Whether an existing file may be replaced.
+
+    Raises
+    ------
+    ConfigError
+        If the file exists, or cannot be written.
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        # "x" refuses a file that came into being a moment ago, too.
+        with path.open("w" if force else "x", encoding="utf-8") as file:
+            file.write(text)
+    except FileExistsError:
+        refuse_existing(path, force=force)
+    except OSError as error:
+        raise ConfigError(
+            f"{path}: cannot be written ({error.strerror}); expected a folder that may "
+            "be written; choose another one with --out"
+        ) from error
+
+
+def _relative(folder: Path, path: Path) -> str:
+    """Folder as seen from the configuration, ready for a pattern; empty if its own."""
+    try:
+        relative = os.path.relpath(folder, path.parent)
+    except ValueError:
+        # Another drive of Windows.
+        relative = str(folder.resolve())
+    return "" if relative == "." else glob.escape(relative.replace(os.sep, "/")) + "/"
+
+
+def _recordings(layout: Layout, own: str) -> dict[str, Any]:
+    section: dict[str, Any] = {
+        "files": [own + pattern for pattern in layout.patterns],
+        "columns": _columns(layout),
+        "input_unit": layout.input.unit or _UNKNOWN_UNIT,
+        "output_unit": layout.output.unit or _UNKNOWN_UNIT,
+    }
+    if layout.sample_time_s is not None:
+        section["sample_time_s"] = layout.sample_time_s
+    if layout.resample:
+        section["resample"] = True
+    return section
+
+
+def _columns(layout: Layout) -> dict[str, str | int]:
+    columns: dict[str, str | int] = {}
+    if layout.variable is not None:
+        columns["variable"] = layout.variable
+    if layout.time is not None:
+        columns["time"] = layout.time.key
+    columns |= {"input": layout.input.key, "output": layout.output.key}
+    return columns
+
+
+def _recordings_lines(layout: Layout, proposal: Proposal, own: str) -> list[str]:
+    section = _recordings(layout, own)
+    lines = ["recordings:", f"  files: {_flow(section['files'])}"]
+    if proposal.exclude:
+        lines += ["  # These cannot be used, see 'hwid check' without this line."]
+        lines += [f"  exclude: {_flow(list(proposal.exclude))}"]
+    lines += _role_lines("time", layout.time)
+    lines += _role_lines("input", layout.input) + _role_lines("output", layout.output)
+    lines += [f"  columns: {_flow(section['columns'])}"]
+    if layout.reference is not None:
+        lines += [
+            f"  # {layout.reference.title!r} looks like what a controller follows; with "
+            "simulation.controller",
+            f"  # add it to columns: reference: {_flow(layout.reference.key)}",
+        ]
+    lines += [f"  # {line}" for note in layout.notes for line in _wrapped(note)]
+    if layout.sample_time_s is not None:
+        lines += [
+            f"  sample_time_s: {layout.sample_time_s!r}   # {layout.clock_reason}"
+        ]
+    else:
+        lines += [
+            f"  # The time column ticks every {proposal.sample_time_s:g} s; resample: "
+            "true would allow one that jitters."
+        ]
+    if layout.resample:
+        lines += ["  resample: true   # the time column jitters"]
+    lines += _unit_lines(layout)
+    if proposal.parts:
+        lines += ["  # One file only: its first two thirds identify, the rest judges."]
+        lines += [f"  parts: {_flow({k: list(v) for k, v in proposal.parts.items()})}"]
+    if proposal.average > 1:
+        lines += [
+            f"  # average: {proposal.average}   # the output changes slowly: means of "
+            f"{proposal.average} samples would do"
+        ]
+    if proposal.kinds and not proposal.parts:
+        lines += [f"  # Kinds have recipes of their own; {proposal.kind_reason}."]
+        lines += ["  kind:"]
+        lines += [f"    {k}: {_flow(list(v))}" for k, v in proposal.kinds.items()]
+    return lines
+
+
+def _role_lines(name: str, role: Role | None) -> list[str]:
+    if role is None:
+        return []
+    called = repr(role.title) if role.title else f"column {role.key}"
+    return [f"  # {name}: {called}, {role.reason}."]
+
+
+def _unit_lines(layout: Layout) -> list[str]:
+    lines = []
+    for name, role in (("input", layout.input), ("output", layout.output)):
+        why = "from the name" if role.unit else "no name says it; put yours"
+        lines += [f"  {name}_unit: {_flow(role.unit or _UNKNOWN_UNIT)}   # {why}"]
+    return lines
+
+
+def _calibrate_lines(proposal: Proposal) -> list[str]:
+    if proposal.parts:
+        return []
+    lines = [
+        "# What is cut and subtracted before anything is fitted; "
+        f"{proposal.recipe_reason}.",
+        "# Look at figures/calibrate in the results.",
+        "calibrate:",
+    ]
+    return lines + [f"  {k}: {_flow(list(v))}" for k, v in proposal.recipes.items()]
+
+
+def _fit_lines(proposal: Proposal) -> list[str]:
+    return [
+        "# nb numerator coefficients and nk poles, [first, last]; "
+        f"{proposal.order_reason}.",
+        f"orders: {{nb: {list(proposal.nb)}, nk: {list(proposal.nk)}}}",
+        "fit: {units: 10, initial_state: estimated, join: experiments}",
+    ]
+
+
+def _judging_lines(layout: Layout, proposal: Proposal) -> list[str]:
+    unit = layout.output.unit or "the output's unit"
+    lines = ["# Models of these recordings, judged on all of them."]
+    chosen = _flow(list(proposal.identify)) if proposal.identify else "all"
+    lines += [f"identify: {{recordings: {chosen}}}"]
+    lines += [
+        f"# A model covers a recording when its RMSD lies below, in {unit}:",
+        f"# {proposal.threshold_reason}. Put the deviation that you can live with.",
+        f"crossval: {{threshold: {proposal.threshold!r}}}",
+        "# Which orders to take, which maps and how many break-points, and why.",
+        "order: {maps: [none], units: [3, 5]}",
+    ]
+    if proposal.held_out:
+        lines += ["# Kept away from everything else: they judge the final models."]
+        lines += [f"test: {{recordings: {_flow(list(proposal.held_out))}}}"]
+    return lines
+
+
+def _group_lines(proposal: Proposal) -> list[str]:
+    if len(proposal.identify) < 3:
+        return []
+    return [
+        "# Models of several recordings together: takes longer, covers more.",
+        "# group: {keep: {top: 2}, max_level: 3}",
+    ]
+
+
+def _diagnose_lines(layout: Layout, proposal: Proposal) -> list[str]:
+    lines = [
+        "# What does a physics simulation of the drive lack? Put the values that you "
+        "simulate with,",
+        "# in SI units, and remove the marks.",
+    ]
+    if layout.output.unit not in ("m", "rad"):
+        lines += [
+            "# (The output must be in metre then: recordings.output_scale and output_unit.)"
+        ]
+    return [
+        *lines,
+        "# simulation:",
+        "#   mass_kg: 1.0",
+        "#   damping_N_s_per_m: 10.0",
+        "#   stiffness_N_per_m: 0.0   # 0: no spring",
+        "#   force_constant_N_per_A: 10.0",
+        *_STARTS[proposal.initial_state],
+    ]
+
+
+def _wrapped(text: str) -> list[str]:
+    lines = [""]
+    for word in text.split():
+        if len(lines[-1]) + len(word) > 84:
+            lines.append("")
+        lines[-1] = f"{lines[-1]} {word}".strip()
+    return lines
+
+
+def _flow(value: Any) -> str:
+    """Value as YAML on one line, quoted where it must be."""
+    text = yaml.safe_dump(
+        value, default_flow_style=True, allow_unicode=True, width=10**6, sort_keys=False
+    )
+    return text.removesuffix("\n").removesuffix("\n...").strip()

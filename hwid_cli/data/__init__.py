@@ -1,0 +1,1 @@
+"""Measurement files as recordings: formats, columns, clocks, calibration."""

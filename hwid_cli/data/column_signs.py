@@ -1,0 +1,234 @@
+"""What the numbers of a column say about it: a clock, an input, an answer to one.
+
+Signs, no proofs: they order the columns of a file that nobody has described, for a
+person to check. All are free of units.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+# Time stamps carry rounding errors and jitter; beyond this share of the step a column
+# that only grows is no clock, [-].
+MOST_JITTER = 0.5
+# Share of the steps that may lie beyond that: gaps, [-].
+MOST_GAPS = 0.02
+# Two columns are multiples of each other beyond this correlation, [-].
+SAME = 0.99999
+# Samples looked at: more tell nothing new.
+_LONGEST = 20_000
+# Share of the largest that a spectral line must hold to be alone, [-].
+_LINE_SHARE = 0.85
+# A step's levels hold for this share of all samples at least, [-].
+_HELD_SHARE = 0.8
+_FEWEST = 20
+
+
+@dataclass(frozen=True)
+class Clock:
+    """How a column ticks.
+
+    Parameters
+    ----------
+    step : float, [as the column]
+        Median difference.
+    jitter : float, [-]
+        Largest deviation of a difference from it, as a share of it.
+    """
+
+    step: float
+    jitter: float
+
+
+def clock_of(values: np.ndarray) -> Clock | None:
+    """Clock that a column may be.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+
+    Returns
+    -------
+    Clock or None
+        None for a column that does not grow throughout, or not evenly.
+
+    Examples
+    --------
+    >>> clock_of(0.5 * np.arange(100))
+    Clock(step=0.5, jitter=0.0)
+    >>> clock_of(np.arange(100.0) ** 2) is None
+    True
+    """
+    if values.size < _FEWEST or not np.isfinite(values).all():
+        return None
+    steps = np.diff(values)
+    median = float(np.median(steps))
+    if median <= 0 or not (steps > 0).all():
+        return None
+    off = np.abs(steps - median) / median
+    if np.mean(off > MOST_JITTER) > MOST_GAPS:
+        return None
+    return Clock(median, float(off.max()))
+
+
+def changes(values: np.ndarray) -> bool:
+    """Whether a column holds numbers that are not all the same.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+    """
+    known = values[np.isfinite(values)]
+    return known.size >= _FEWEST and bool(np.ptp(known) > 0)
+
+
+def held_share(values: np.ndarray) -> float:
+    """Share of samples that repeat the one before.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+
+    Returns
+    -------
+    float, [-]
+    """
+    return float(np.mean(np.diff(values) == 0)) if values.size > 1 else 0.0
+
+
+def roughness(values: np.ndarray) -> float:
+    """How much of a column's spread happens from sample to sample.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+
+    Returns
+    -------
+    float, [-]
+        0 for a slow signal, 1.4 for white noise.
+    """
+    spread = float(np.std(values))
+    return float(np.std(np.diff(values))) / spread if spread > 0 else 0.0
+
+
+def are_same(one: np.ndarray, other: np.ndarray, *, least: float = SAME) -> bool:
+    """Whether a column is a multiple of another one, apart from an offset.
+
+    Parameters
+    ----------
+    one, other : ndarray, shape (n,)
+    least : float, [-]
+        Correlation beyond which it is one.
+    """
+    return one.size == other.size and abs(_correlation(one, other)) > least
+
+
+def answers(first: np.ndarray, second: np.ndarray) -> float:
+    """How much better the first column's past explains the second than the reverse.
+
+    Each column is predicted from two of its own past values and the other's value one
+    sample before; the gain is the logarithm of the error's fall by the other column.
+
+    Parameters
+    ----------
+    first, second : ndarray, shape (n,)
+
+    Returns
+    -------
+    float, [-]
+        Positive where the second column answers to the first.
+    """
+    n = min(first.size, second.size, _LONGEST)
+    one, other = _standard(first[:n]), _standard(second[:n])
+    return _gain(other, one) - _gain(one, other)
+
+
+def is_stepwise(values: np.ndarray) -> bool:
+    """Whether a signal holds few levels for most of the time.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+        May carry noise.
+    """
+    low, high = np.percentile(values, [1.0, 99.0])
+    if high <= low:
+        return False
+    rounded = np.round(12.0 * (values - low) / (high - low))
+    counts = np.sort(np.unique(rounded, return_counts=True)[1])[::-1]
+    jumps = int(np.sum(np.abs(np.diff(rounded)) > 1))
+    return bool(counts[:3].sum() >= _HELD_SHARE * values.size and jumps <= 6)
+
+
+def is_sine(values: np.ndarray) -> bool:
+    """Whether one frequency holds nearly all of a signal's variance.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+    """
+    window = np.hanning(values.size)
+    power = np.abs(np.fft.rfft(window * (values - np.mean(values)))) ** 2
+    top = int(np.argmax(power))
+    # A window spreads a line over its neighbours.
+    line = power[max(0, top - 2) : top + 3].sum()
+    return bool(top > 2 and line > _LINE_SHARE * power.sum())
+
+
+def memory_samples(values: np.ndarray) -> int:
+    """Samples after which a signal has forgotten most of its value.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+
+    Returns
+    -------
+    int, [samples]
+        First lag at which its autocorrelation lies below 1/e; its length if none does.
+    """
+    centred = values - np.mean(values)
+    size = 1 << int(2 * centred.size - 1).bit_length()
+    spectrum = np.abs(np.fft.rfft(centred, size)) ** 2
+    correlation = np.fft.irfft(spectrum, size)[: centred.size]
+    if correlation[0] <= 0:
+        return int(centred.size)
+    below = np.flatnonzero(correlation < correlation[0] / np.e)
+    return int(below[0]) if below.size else int(centred.size)
+
+
+def runs_away(values: np.ndarray) -> bool:
+    """Whether a signal mostly moves in one direction, as an integrator does.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+    """
+    n = values.size
+    return abs(_correlation(values, np.arange(n, dtype=float))) > 0.95
+
+
+def _standard(values: np.ndarray) -> np.ndarray:
+    spread = np.std(values)
+    return (values - np.mean(values)) / (spread if spread > 0 else 1.0)
+
+
+def _gain(target: np.ndarray, other: np.ndarray) -> float:
+    """Fall of the error's logarithm when the other column's past is known too."""
+    own = np.column_stack([target[1:-1], target[:-2], np.ones(target.size - 2)])
+    both = np.column_stack([own, other[1:-1], other[:-2]])
+    alone, together = (_misfit(columns, target[2:]) for columns in (own, both))
+    return float(np.log(alone) - np.log(together))
+
+
+def _misfit(columns: np.ndarray, target: np.ndarray) -> float:
+    found = np.linalg.lstsq(columns, target, rcond=None)[0]
+    # The least that rounding leaves keeps the logarithm finite.
+    return float(np.mean((target - columns @ found) ** 2)) + 1e-12
+
+
+def _correlation(one: np.ndarray, other: np.ndarray) -> float:
+    a, b = one - np.mean(one), other - np.mean(other)
+    norm = float(np.sqrt(np.sum(a**2) * np.sum(b**2)))
+    return float(np.sum(a * b)) / norm if norm > 0 else 0.0

@@ -1,0 +1,85 @@
+"""What looks odd in a recording though it can be used: limits, dead stretches, damage.
+
+A sensor that runs into its limit repeats its largest value, one that fails repeats any
+value; an input that holds levels repeats them on purpose. So only signals that otherwise
+change from sample to sample are suspected.
+"""
+
+import numpy as np
+
+from hwid_cli.data.calibration import find_damaged
+from hwid_cli.data.column_signs import held_share
+
+# Signals that hold their value for more of the time do so on purpose, [-].
+_HOLDS = 0.5
+# Fewest samples in a row at the largest or smallest value that are no coincidence, [-].
+_LIMIT_RUN = 5
+# Share of a recording that a stretch without change must take to be named, [-].
+_DEAD_SHARE = 0.05
+# Standard deviations from zero beyond which a fit without maps that shift ends in poor
+# minima.
+_FAR = 50.0
+
+
+def signal_oddities(values: np.ndarray, *, may_hold: bool = False) -> tuple[str, ...]:
+    """Say what looks odd in a signal.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+        Finite.
+    may_hold : bool
+        Whether long stretches without change are nothing odd, as in an input.
+
+    Examples
+    --------
+    >>> t = np.arange(400) / 400
+    >>> signal_oddities(np.minimum(np.sin(20 * t), 0.8))
+    ('at its largest value 0.8 for 20 % of the time: clipped?',)
+    """
+    notes = []
+    if held_share(values) < _HOLDS:
+        for word, limit in (("largest", values.max()), ("smallest", values.min())):
+            at_limit = values == limit
+            if longest_run(at_limit) >= _LIMIT_RUN:
+                share = 100.0 * float(np.mean(at_limit))
+                notes.append(
+                    f"at its {word} value {limit:.4g} for {share:.2g} % of the time: "
+                    "clipped?"
+                )
+        inside = (values != values.max()) & (values != values.min())
+        run = longest_run((np.diff(values) == 0) & inside[1:])
+        if not may_hold and run >= _DEAD_SHARE * values.size:
+            notes.append(f"does not change for {run + 1} samples in a row")
+    spread, middle = float(np.std(values)), abs(float(np.mean(values)))
+    if middle > _FAR * spread > 0.0:
+        notes.append(
+            f"{middle / spread:.3g} standard deviations from zero: take the offset off, "
+            "fits with few kinds of maps may miss it"
+        )
+    damaged = find_damaged(values).size
+    if damaged:
+        what = "single sample looks" if damaged == 1 else "single samples look"
+        notes.append(f"{damaged} {what} damaged")
+    return tuple(notes)
+
+
+def longest_run(flags: np.ndarray) -> int:
+    """Count the most flags in a row.
+
+    Parameters
+    ----------
+    flags : ndarray of bool, shape (n,)
+
+    Returns
+    -------
+    int, [samples]
+
+    Examples
+    --------
+    >>> longest_run(np.array([True, False, True, True]))
+    2
+    """
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(int), [0]])))
+    lengths = edges[1::2] - edges[::2]
+    return int(lengths.max(initial=0))

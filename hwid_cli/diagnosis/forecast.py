@@ -1,0 +1,174 @@
+"""Ranking of candidates before any of them is fitted.
+
+Every candidate is simulated from the re-fitted base at a few values of its parameters.
+What the simulation changes is regressed on the base's error, together with the
+derivatives by the base's parameters, which absorb part of every effect. That gives the
+share of the error that the candidate should explain, and where to start its fit; pairs
+of candidates follow from the same columns. docs/method_diagnosis.md, eq. (D19).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from hwid_cli.diagnosis.candidate import Start
+from hwid_cli.diagnosis.comparing import residuals
+from hwid_cli.diagnosis.own_parameters import with_own_trials
+from hwid_cli.diagnosis.problem import Problem
+from hwid_cli.diagnosis.search import derivatives
+from hwid_cli.diagnosis.unknowns import first_point, layout
+from hwid_cli.drive.catalogue import CATALOGUE
+from hwid_cli.drive.effect import Scales
+from hwid_cli.records.drive import Drive
+
+# A column may be taken between these multiples of what was simulated; beyond, the
+# effect is not proportional to it any more.
+_LEAST_MULTIPLE, _MOST_MULTIPLE = 0.0, 4.0
+# What is left of a column must exceed this share of it, or it is rounding.
+_VISIBLE = 1e-9
+# Starts that are kept for the fit of one candidate.
+KEPT_STARTS = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Forecast:
+    """What is expected of one candidate.
+
+    Parameters
+    ----------
+    share : float, [-]
+        Of the sum of squares that the base leaves, that it should explain.
+    starts : tuple of mapping
+        Parameter values to start from, the best first.
+    column : ndarray, shape (n_samples,)
+        What the best start changes, without what the base can absorb, of unit length.
+    """
+
+    effect: str
+    share: float
+    starts: tuple[dict[str, float], ...]
+    column: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Ground:
+    """The base, from which candidates are tried.
+
+    Parameters
+    ----------
+    problem : Problem
+        Training recordings, or some of them.
+    drive : Drive
+        With the re-fitted base.
+    present : mapping
+        Effects that the base has already, as fitted.
+    parts : list of ndarray
+        Error of the base in each recording.
+    absorbed : ndarray, shape (n_samples, n_shared)
+        Orthonormal directions that the base's parameters can absorb.
+    error : ndarray, shape (n_samples,)
+        Error of the base without what they absorb.
+    """
+
+    problem: Problem
+    drive: Drive
+    present: Start
+    scales: Scales
+    parts: list[np.ndarray]
+    absorbed: np.ndarray
+    error: np.ndarray
+
+
+def ground(problem: Problem, drive: Drive, present: Start, scales: Scales) -> Ground:
+    """Simulate the base and its derivatives."""
+    fit_layout = layout(problem, tuple(present), present, scales)
+    point = first_point(problem, fit_layout, drive, present)
+    point = with_own_trials(problem, fit_layout, point)
+    parts = residuals(problem, fit_layout, point)
+    jacobians = derivatives(problem, fit_layout, point, parts)
+    shared = len(fit_layout.shared)
+    absorbed = _orthonormal(np.vstack([one[:, :shared] for one in jacobians]))
+    error = np.concatenate(parts)
+    error = error - absorbed @ (absorbed.T @ error)
+    return Ground(problem, drive, present, scales, parts, absorbed, error)
+
+
+def forecast(base: Ground, identifier: str) -> Forecast:
+    """Try the start values of one candidate.
+
+    Parameters
+    ----------
+    identifier : str
+        Id in the catalogue.
+    """
+    effect, error = CATALOGUE[identifier], base.error
+    size = float(error @ error)
+    tried: list[tuple[float, dict[str, float], np.ndarray]] = []
+    for start in effect.starts(base.scales):
+        changed = _changed(base, identifier, start)
+        if changed is None:
+            continue
+        column = changed - base.absorbed @ (base.absorbed.T @ changed)
+        length = float(np.sqrt(column @ column))
+        if length <= _VISIBLE * np.sqrt(float(changed @ changed)) or size == 0:
+            continue
+        along = float(column @ error) / length
+        multiple = min(max(along / length, _LEAST_MULTIPLE), _MOST_MULTIPLE) * length
+        gain = 2 * multiple * along - multiple**2
+        tried.append((gain / size, start, column / length))
+    if not tried:
+        starts = tuple(effect.starts(base.scales)[:1])
+        return Forecast(identifier, 0.0, starts, np.zeros_like(error))
+    tried.sort(key=lambda one: -one[0])
+    starts = tuple(start for _, start, _ in tried[:KEPT_STARTS])
+    return Forecast(identifier, tried[0][0], starts, tried[0][2])
+
+
+def _changed(
+    base: Ground, identifier: str, start: dict[str, float]
+) -> np.ndarray | None:
+    """What a candidate adds to the simulation; None where it ran away."""
+    full = {**base.present, identifier: start}
+    fit_layout = layout(base.problem, tuple(full), full, base.scales)
+    point = first_point(base.problem, fit_layout, base.drive, full)
+    point = with_own_trials(base.problem, fit_layout, point)
+    with_effect = residuals(base.problem, fit_layout, point)
+    changed = np.concatenate(base.parts) - np.concatenate(with_effect)
+    return changed if np.isfinite(changed).all() else None
+
+
+def _orthonormal(columns: np.ndarray) -> np.ndarray:
+    if columns.shape[1] == 0:
+        return columns
+    lengths = np.sqrt(np.sum(columns**2, axis=0))
+    usable = columns[:, lengths > 0] / lengths[lengths > 0]
+    return np.linalg.qr(usable)[0]
+
+
+def pair_shares(
+    forecasts: Sequence[Forecast], error: np.ndarray
+) -> list[tuple[float, str, str]]:
+    """Rank pairs of candidates by the columns of their best starts.
+
+    Parameters
+    ----------
+    error : ndarray, shape (n_samples,)
+        Of the base, without what its parameters absorb.
+
+    Returns
+    -------
+    list of (share, effect, effect)
+        The best first.
+    """
+    size = float(error @ error) or 1.0
+    columns = np.column_stack([one.column for one in forecasts])
+    gram, along = columns.T @ columns, columns.T @ error
+    ranked = []
+    for i, j in combinations(range(len(forecasts)), 2):
+        common = gram[i, j]
+        left = max(1 - common**2, 1e-6)
+        gain = (along[i] ** 2 + along[j] ** 2 - 2 * common * along[i] * along[j]) / left
+        ranked.append((gain / size, forecasts[i].effect, forecasts[j].effect))
+    return sorted(ranked, key=lambda one: -one[0])

@@ -1,0 +1,233 @@
+"""How strong the evidence for a candidate is, and whether it may be named.
+
+An information criterion alone names something even where nothing is missing: input
+noise or a coarse sensor is enough. Naming therefore also asks for held-out recordings:
+most of their error beyond the noise must be explained, in most of them.
+docs/method_diagnosis.md, eq. (D21) and (D24).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from hwid_cli.diagnosis.problem import Problem
+from hwid_cli.records.candidates import CandidateFit, RankedCandidate
+from hwid_cli.records.diagnosis import NoiseFloor
+
+# A set of effects must lower the criterion by this much against the smaller one.
+LEAST_GAIN = 10.0
+# Share of the held-out excess over the noise that a single effect must explain ...
+LEAST_EXPLAINED = 0.5
+# ... and a set of several, which imitates more ...
+LEAST_EXPLAINED_SET = 0.8
+# ... in this share of the held-out recordings.
+LEAST_IMPROVED = 0.65
+# A recording counts where its sum of squares changes by this share of the mean change.
+LEAST_CHANGE = 0.1
+# Changes of a parameter between recordings below this are scatter, [-].
+LEAST_SPREAD = 0.01
+# Residuals that go together all along still count as so many pieces of each recording:
+# it rises, holds and falls, fast and slowly.
+LEAST_PIECES = 10
+# Ratio to the noise up to which what remains is of no account.
+CLOSE_TO_NOISE = 1.03
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """How one candidate does against another one.
+
+    Parameters
+    ----------
+    gain : float, [-]
+        How much lower its criterion is.
+    explained : float, [-]
+        Share of the other's held-out excess over the noise.
+    improved : float, [-]
+        Share of the held-out recordings that it changes in which it is better.
+    """
+
+    gain: float
+    explained: float
+    improved: float
+
+
+@dataclass(frozen=True, eq=False)
+class Judge:
+    """What judging needs beside the fits.
+
+    Parameters
+    ----------
+    n_samples : ndarray, shape (n_recordings,)
+    is_held_out : ndarray of bool, shape (n_recordings,)
+    """
+
+    n_samples: np.ndarray
+    is_held_out: np.ndarray
+    noise: NoiseFloor
+
+    @classmethod
+    def of(cls, problem: Problem, noise: NoiseFloor) -> "Judge":
+        """Judge of a problem."""
+        held = np.array([one.is_held_out for one in problem.signals])
+        # A single recording judges itself; the report says so.
+        held = held if held.any() else ~held
+        counts = np.array([one.n_judged for one in problem.signals])
+        return cls(counts, held, noise)
+
+    def rms(self, found: CandidateFit, *, held_out: bool) -> float:
+        """RMS over the held-out recordings, or the others.
+
+        Returns
+        -------
+        float, [output unit]
+        """
+        rows = self.is_held_out if held_out else ~self.is_held_out
+        rows = rows if rows.any() else ~rows
+        return float(np.sqrt(found.sse[rows].sum() / self.n_samples[rows].sum()))
+
+    def ratio(self, found: CandidateFit) -> float:
+        """RMS of the held-out recordings over that of the noise.
+
+        Returns
+        -------
+        float, [-]
+        """
+        rms = self.rms(found, held_out=True)
+        return rms / self.noise.rms if self.noise.rms > 0 else float("inf")
+
+    def evidence(self, found: CandidateFit, other: CandidateFit) -> Evidence:
+        """How a candidate does against another one."""
+        held = self.is_held_out
+        floor = self.n_samples[held].sum() * self.noise.rms**2
+        before, after = other.sse[held].sum(), found.sse[held].sum()
+        excess = before - floor
+        explained = (before - after) / excess if excess > 0 else 0.0
+        change = other.sse[held] - found.sse[held]
+        # A stop that a recording never reaches says nothing there, for or against.
+        affected = np.abs(change) > LEAST_CHANGE * np.mean(np.abs(change))
+        improved = float(np.mean(change[affected] > 0)) if affected.any() else 0.0
+        return Evidence(self.gain(found, other), float(explained), improved)
+
+    def gain(self, found: CandidateFit, other: CandidateFit) -> float:
+        """How much lower the criterion of a candidate is than another's.
+
+        Residuals that go together count as fewer samples.
+
+        Returns
+        -------
+        float, [-]
+            Infinite where only one of them could be simulated.
+
+        References
+        ----------
+        docs/method_diagnosis.md, eq. (D21).
+        """
+        if not found.is_usable:
+            return -float("inf")
+        if not other.is_usable:
+            return float("inf")
+        both = min(max(found.neighbour, 0.0), max(other.neighbour, 0.0))
+        n = float(self.n_samples.sum()) * (1 - both) / (1 + both)
+        n = max(n, LEAST_PIECES * self.n_samples.size)
+        least = 1e-24 * max(float(other.sse.sum()), 1e-300)
+        fits = np.log((other.sse.sum() + least) / (found.sse.sum() + least))
+        more = count(found) - count(other)
+        return float(n * fits - more * np.log(max(n, 2.0)))
+
+    def is_complete(self, found: CandidateFit) -> bool:
+        """Whether nothing but noise remains."""
+        return found.is_usable and found.whiteness <= 1.0
+
+    def may_be_named(self, found: CandidateFit, base: CandidateFit) -> bool:
+        """Whether the evidence for a set of effects suffices.
+
+        Parameters
+        ----------
+        base : CandidateFit
+            Re-fitted, without further effects.
+
+        References
+        ----------
+        docs/method_diagnosis.md, eq. (D24).
+        """
+        against = self.evidence(found, base)
+        least = LEAST_EXPLAINED if len(found.effects) == 1 else LEAST_EXPLAINED_SET
+        return (
+            against.gain >= LEAST_GAIN
+            and (against.explained >= least or self.is_complete(found))
+            and against.improved >= LEAST_IMPROVED
+            and has_size(found)
+        )
+
+
+def count(found: CandidateFit) -> int:
+    """Number of parameters of a candidate."""
+    return int(found.values.size + found.own.size)
+
+
+def has_size(found: CandidateFit) -> bool:
+    """Whether changes between recordings are more than scatter."""
+    for column, name in enumerate(found.own_names):
+        if "/log_" in name and float(np.std(found.own[:, column])) < LEAST_SPREAD:
+            return False
+    return True
+
+
+def ranked(
+    judge: Judge,
+    found: Sequence[CandidateFit],
+    base: CandidateFit,
+    shares: dict[tuple[str, ...], float],
+) -> tuple[RankedCandidate, ...]:
+    """Table of all candidates, the best first.
+
+    Parameters
+    ----------
+    shares : dict of tuple of str to float
+        Forecasts, of candidates that were not fitted as well.
+    """
+    rows = [_row(judge, one, base, shares) for one in found]
+    rows.sort(key=lambda row: -row.bic_gain if np.isfinite(row.bic_gain) else np.inf)
+    fitted = {one.effects for one in found}
+    nan = float("nan")
+    waiting = sorted(
+        (item for item in shares.items() if item[0] not in fitted),
+        key=lambda item: -item[1],
+    )
+    rows += [
+        RankedCandidate(
+            ids, share, False, nan, nan, nan, nan, nan, nan, "not fitted: far behind"
+        )
+        for ids, share in waiting
+    ]
+    return tuple(rows)
+
+
+def _row(
+    judge: Judge,
+    found: CandidateFit,
+    base: CandidateFit,
+    shares: dict[tuple[str, ...], float],
+) -> RankedCandidate:
+    share = shares.get(found.effects, float("nan"))
+    nan = float("nan")
+    if not found.is_usable:
+        text = "could not be simulated"
+        return RankedCandidate(
+            found.effects, share, True, nan, nan, nan, nan, nan, nan, text
+        )
+    against = judge.evidence(found, base)
+    return RankedCandidate(
+        effects=found.effects,
+        forecast_share=share,
+        is_fitted=True,
+        train_rms=judge.rms(found, held_out=False),
+        held_out_rms=judge.rms(found, held_out=True),
+        bic_gain=against.gain,
+        explained_share=against.explained,
+        improved_share=against.improved,
+        whiteness=found.whiteness,
+        note="" if found.has_converged else "stopped at the iteration limit",
+    )

@@ -1,0 +1,162 @@
+"""Lines of an error: frequencies in time, periods along the way.
+
+docs/method_diagnosis.md, eq. (D15).
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.signal import lfilter
+
+from hwid_cli.diagnosis.covariates import judged_force, judged_position
+from hwid_cli.diagnosis.latent_force import Smoothed, finite
+from hwid_cli.diagnosis.problem import Compared
+from hwid_cli.diagnosis.segments import parabolic_peak
+from hwid_cli.drive.effect import Wave
+from hwid_cli.records.diagnosis import NoiseFloor
+
+_MOST_LINES = 3
+_FINER = 8
+# Places along the stroke at which a force is averaged, and what bends slowly along it.
+_PLACES = 2048
+_SLOW_BENDS = 5
+# Periods of a line along the stroke: fewer imitate a spring, more are not resolved.
+_FEWEST_PERIODS, _MOST_PERIODS = 3.0, 200.0
+
+
+def line_frequencies(
+    compared: Sequence[Compared], noise: NoiseFloor
+) -> tuple[float, ...]:
+    """Frequencies at which nearly all residuals have a line in common.
+
+    Parameters
+    ----------
+    noise : NoiseFloor
+        Its whitening takes the colour of the noise off.
+
+    Returns
+    -------
+    tuple of float, [Hz]
+        The highest line first, at most three, at least one.
+    """
+    pairs = [
+        (
+            lfilter(noise.whitening, [1.0], finite(one.residual)),
+            one.signals.sample_time_s,
+        )
+        for one in compared
+    ]
+    pairs = [(residual, time) for residual, time in pairs if residual.size >= 8]
+    if not pairs:
+        return (1.0,)
+    duration = max(residual.size * time for residual, time in pairs)
+    highest = min(0.5 / time for _, time in pairs)
+    frequencies = np.arange(1.5 / duration, highest, 1 / (_FINER * duration))
+    rows = [_spectrum(*pair, frequencies) for pair in pairs]
+    used = [row for row in rows if row.any()]
+    if frequencies.size < 3 or not used:
+        return (float(1.5 / duration),)
+    # The logarithm over its own median: a few recordings that are driven there, or that
+    # hold most of the error, do not count for more than the others.
+    middle = np.median(used, axis=0)
+    return tuple(
+        float(frequencies[0] + (frequencies[1] - frequencies[0]) * peak)
+        for peak in _highest_peaks(middle)
+    )
+
+
+def line_share(compared: Sequence[Compared], frequency_Hz: float) -> float:
+    """Share of all residuals that one line takes, with its own phase in each.
+
+    Parameters
+    ----------
+    frequency_Hz : float, [Hz]
+
+    Returns
+    -------
+    float, [-]
+    """
+    before = after = 0.0
+    for one in compared:
+        residual = finite(one.residual)
+        residual = residual - residual.mean()
+        times = one.signals.sample_time_s * np.arange(residual.size)
+        angles = 2 * np.pi * frequency_Hz * times
+        columns = np.column_stack([np.sin(angles), np.cos(angles)])
+        found = np.linalg.lstsq(columns, residual, rcond=None)[0]
+        left = residual - columns @ found
+        before += float(residual @ residual)
+        after += float(left @ left)
+    return 1 - after / before if before > 0 else 0.0
+
+
+def _spectrum(
+    residual: np.ndarray, sample_time_s: float, frequencies: np.ndarray
+) -> np.ndarray:
+    """Share of the residual's power at each frequency, on a common grid."""
+    n_points = 1 << int(np.ceil(np.log2(_FINER * residual.size)))
+    windowed = (residual - residual.mean()) * np.hanning(residual.size)
+    power = np.abs(np.fft.rfft(windowed, n_points)) ** 2
+    own = np.fft.rfftfreq(n_points, sample_time_s)
+    # What varies once or less in the recording is no line.
+    power[own < 1.5 / (residual.size * sample_time_s)] = 0.0
+    whole = float(power.sum())
+    return np.interp(frequencies, own, power / whole if whole > 0 else power)
+
+
+def waves_along(
+    compared: Sequence[Compared], smoothed: Sequence[Smoothed]
+) -> tuple[Wave, ...]:
+    """Waves with which the missing force repeats along the way.
+
+    Returns
+    -------
+    tuple of Wave
+        The strongest first, at most three; none where nothing moves.
+    """
+    force = judged_force(compared, smoothed)
+    position = judged_position(compared, smoothed)
+    stroke = float(np.ptp(position)) if position.size else 0.0
+    if stroke <= 0:
+        return ()
+    at = np.linspace(position.min(), position.max(), _PLACES)
+    place = np.rint((position - at[0]) / stroke * (_PLACES - 1)).astype(int)
+    counts = np.bincount(place, minlength=_PLACES)
+    used = counts > 0
+    # A mean at each place: a long hold counts for no more than a passage.
+    means = np.bincount(place, force, _PLACES) / np.maximum(counts, 1)
+    columns = np.vander(np.linspace(-1.0, 1.0, _PLACES), _SLOW_BENDS + 1)
+    slow = columns @ np.linalg.lstsq(columns[used], means[used], rcond=None)[0]
+    rest = np.where(used, means - slow, 0.0)
+    power = np.abs(np.fft.rfft(rest, _FINER * _PLACES)) ** 2
+    first = int(_FINER * _FEWEST_PERIODS)
+    peaks = _highest_peaks(power[first : int(_FINER * _MOST_PERIODS)])
+    length = stroke * _PLACES / (_PLACES - 1)
+    periods = [length * _FINER / (first + peak) for peak in peaks]
+    return tuple(_wave(one, at[used], means[used], columns[used]) for one in periods)
+
+
+def _wave(period: float, at: np.ndarray, force: np.ndarray, slow: np.ndarray) -> Wave:
+    """Size and phase of a wave beside what bends slowly."""
+    angles = 2 * np.pi * at / period
+    columns = np.column_stack([np.sin(angles), np.cos(angles), slow])
+    sine, cosine = np.linalg.lstsq(columns, force, rcond=None)[0][:2]
+    return Wave(
+        float(period), float(np.hypot(sine, cosine)), float(np.arctan2(cosine, sine))
+    )
+
+
+def _highest_peaks(values: np.ndarray) -> list[float]:
+    """Highest maxima that are no side of a higher one, between grid points."""
+    inner = np.flatnonzero((values[1:-1] >= values[:-2]) & (values[1:-1] > values[2:]))
+    peaks = inner + 1
+    if not peaks.size:
+        return [float(np.argmax(values))]
+    chosen: list[int] = []
+    for peak in peaks[np.argsort(-values[peaks])]:
+        # The window's main lobe is two lines wide to either side.
+        if all(abs(peak - other) > 2 * _FINER for other in chosen):
+            chosen.append(int(peak))
+        if len(chosen) == _MOST_LINES:
+            break
+    return [float(parabolic_peak(values, peak)) for peak in chosen]

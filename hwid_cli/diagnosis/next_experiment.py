@@ -1,0 +1,148 @@
+"""Which input would separate two candidates, by simulation of both.
+
+The rival may adapt its parameters: what its derivatives can absorb of the difference
+does not count. The input of the menu that leaves most is proposed.
+docs/method_diagnosis.md, eq. (D26).
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from hwid_cli.diagnosis.comparing import residuals, simulate
+from hwid_cli.diagnosis.problem import Problem, Signals
+from hwid_cli.diagnosis.search import derivatives
+from hwid_cli.diagnosis.unknowns import Layout, Point
+from hwid_cli.drive.effect import Scales
+
+# Samples of a proposed recording.
+_MOST_SAMPLES = 6000
+_PERIODS = 12
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """A fitted candidate, ready to be simulated on other inputs.
+
+    Parameters
+    ----------
+    point : Point
+        Own values of one recording.
+    """
+
+    layout: Layout
+    point: Point
+
+
+@dataclass(frozen=True)
+class Separation:
+    """How well an input separates two candidates.
+
+    Parameters
+    ----------
+    input : str
+        In words.
+    rms : float, [output unit]
+        Difference that the rival cannot absorb.
+    """
+
+    input: str
+    rms: float
+
+
+def best_separation(
+    problem: Problem, favourite: Model, rival: Model, scales: Scales
+) -> Separation:
+    """Input of the menu that separates two candidates best.
+
+    Parameters
+    ----------
+    problem : Problem
+        For the drive.
+    """
+    found = []
+    for name, command in menu(scales).items():
+        signals = Signals(
+            name, "other", command, 0 * command, command, 0 * command,
+            scales.sample_time_s,
+        )  # fmt: skip
+        one = replace(problem, signals=(signals,))
+        (truth,) = simulate(one, favourite.layout, _single(favourite.point))
+        seen = Signals(
+            name, "other", command, truth.output, command, truth.output,
+            scales.sample_time_s,
+        )  # fmt: skip
+        asked = replace(problem, signals=(seen,))
+        found.append(Separation(name, _left_over(asked, rival)))
+    return max(found, key=lambda item: item.rms)
+
+
+def _single(point: Point) -> Point:
+    return Point(point.shared, point.own[:1])
+
+
+def _left_over(asked: Problem, rival: Model) -> float:
+    """RMS of what the rival's parameters cannot absorb."""
+    point = _single(rival.point)
+    parts = residuals(asked, rival.layout, point)
+    if not np.isfinite(parts[0]).all():
+        return 0.0
+    (slopes,) = derivatives(asked, rival.layout, point, parts)
+    lengths = np.sqrt(np.sum(slopes**2, axis=0))
+    usable = slopes[:, np.isfinite(lengths) & (lengths > 0)]
+    left = parts[0]
+    if usable.shape[1]:
+        left = left - usable @ np.linalg.lstsq(usable, left, rcond=1e-10)[0]
+    return float(np.sqrt(np.mean(left**2)))
+
+
+def menu(scales: Scales) -> dict[str, np.ndarray]:
+    """Inputs that could be measured next.
+
+    Returns
+    -------
+    dict of str to ndarray, shape (n_samples,), [A]
+        By their description.
+    """
+    step, size, natural = scales.sample_time_s, scales.current_A, scales.natural_Hz
+    n = int(min(_MOST_SAMPLES, max(_PERIODS / natural / step, 200)))
+    time = step * np.arange(n)
+    rest = int(0.05 * n)
+    inputs: dict[str, np.ndarray] = {}
+    for sign, word in ((1, "positive"), (-1, "negative")):
+        for share in (1.0, 0.15):
+            value = sign * share * size
+            inputs[f"a {word} step of {abs(value):.3g} A, held and taken back"] = _step(
+                n, rest, value
+            )
+    inputs[f"a slow triangle of {0.3 * size:.3g} A, once to each side"] = (
+        0.3 * size * _triangle(n, rest)
+    )
+    for factor in (0.15, 0.7, 1.0, 2.5, 6.0):
+        frequency = factor * natural
+        if frequency < 0.3 / step:
+            inputs[f"a sine of {size:.3g} A at {frequency:.3g} Hz"] = size * np.sin(
+                2 * np.pi * frequency * time
+            )
+    inputs[f"a small sine of {0.1 * size:.3g} A at {natural:.3g} Hz"] = (
+        0.1 * size * np.sin(2 * np.pi * natural * time)
+    )
+    biased = 0.6 * size + 0.3 * size * np.sin(2 * np.pi * 0.7 * natural * time)
+    inputs[
+        f"a sine of {0.3 * size:.3g} A at {0.7 * natural:.3g} Hz around {0.6 * size:.3g} A"
+    ] = biased * np.minimum(1.0, np.arange(n) / max(rest, 1))
+    return inputs
+
+
+def _step(n: int, rest: int, value: float) -> np.ndarray:
+    command = np.zeros(n)
+    ramp = max(2, n // 300)
+    command[rest:] = value * np.minimum(1.0, np.arange(n - rest) / ramp)
+    back = int(0.6 * n)
+    command[back:] = value * np.maximum(0.0, 1 - np.arange(n - back) / ramp)
+    return command
+
+
+def _triangle(n: int, rest: int) -> np.ndarray:
+    corners = np.array([0, rest, rest + (n - rest) / 4, rest + 3 * (n - rest) / 4, n])
+    return np.interp(np.arange(n), corners, [0.0, 0.0, 1.0, -1.0, 0.0])

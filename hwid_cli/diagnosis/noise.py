@@ -1,0 +1,505 @@
+"""Noise floor of the measurements, without any model.
+
+From repeats where there are some; else from differences of high order, which remove any
+smooth motion; from the rest before the input moves where the noise there is coloured,
+because differences see only its fast part. docs/method_diagnosis.md.
+
+Colour of noise: correlation between neighbouring samples, and what removes it.
+
+Everything is pooled over pieces of different length. docs/method_diagnosis.md.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import comb
+
+import numpy as np
+from scipy.optimize import least_squares
+from scipy.signal import lfilter
+from scipy.stats import chi2
+
+from hwid_cli.diagnosis.problem import Problem, Signals, rest_length
+from hwid_cli.records.diagnosis import NoiseFloor
+from hwid_cli.records.units import behind
+
+# Chance of calling white noise coloured, and what remains of it something missing.
+FALSE_ALARM = 1e-3
+_LAGS_OF_COLOUR = 10
+_HIGHEST_ORDER = 20
+# Fewest samples for each coefficient of a filter.
+_SAMPLES_PER_COEFFICIENT = 20
+
+
+def autocovariances(
+    pieces: Sequence[np.ndarray], n_lags: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Pooled sums of products at each lag, and how many products each has.
+
+    Parameters
+    ----------
+    pieces : sequence of ndarray, shape (n_samples,)
+        Used as they are: no mean is taken off.
+
+    Returns
+    -------
+    sums : ndarray, shape (n_lags + 1,)
+    counts : ndarray, shape (n_lags + 1,)
+    """
+    sums, counts = np.zeros(n_lags + 1), np.zeros(n_lags + 1)
+    for piece in pieces:
+        for lag in range(min(n_lags + 1, piece.size)):
+            sums[lag] += piece[: piece.size - lag] @ piece[lag:]
+            counts[lag] += piece.size - lag
+    return sums, counts
+
+
+def is_white(pieces: Sequence[np.ndarray], *, n_removed: int = 1) -> bool:
+    """Whether neighbouring samples do not go together.
+
+    Parameters
+    ----------
+    pieces : sequence of ndarray, shape (n_samples,)
+    n_removed : int
+        Number of regressors, the mean among them, that were taken off each piece.
+
+    Returns
+    -------
+    bool
+        By the pooled portmanteau statistic of the first ten lags.
+    """
+    sums, counts = autocovariances(pieces, _LAGS_OF_COLOUR)
+    if sums[0] <= 0 or counts[-1] == 0:
+        return True
+    # Taking off one regressor pulls every correlation down by one over the length.
+    pulled = n_removed * sum(piece.size > _LAGS_OF_COLOUR for piece in pieces)
+    correlations = sums[1:] / counts[1:] * counts[0] / sums[0] + pulled / counts[1:]
+    statistic = float(np.sum(counts[1:] * np.square(correlations)))
+    return statistic < chi2.ppf(1 - FALSE_ALARM, _LAGS_OF_COLOUR)
+
+
+def whitening_filter(pieces: Sequence[np.ndarray]) -> np.ndarray:
+    """Autoregressive filter that makes coloured noise white.
+
+    Either of an order up to 20, or the long one of slow noise beside white noise,
+    ``(1 - phi/z) / (1 - theta/z)``, whichever has the lowest information criterion.
+
+    Parameters
+    ----------
+    pieces : sequence of ndarray, shape (n_samples,)
+        Noise around zero.
+
+    Returns
+    -------
+    ndarray, shape (order + 1,), [-]
+        The first is 1.
+
+    References
+    ----------
+    Least squares on earlier samples; criterion of Schwarz.
+    """
+    total = sum(piece.size for piece in pieces)
+    shortest = min(piece.size for piece in pieces)
+    highest = min(_HIGHEST_ORDER, shortest // 2, total // _SAMPLES_PER_COEFFICIENT)
+    # All orders predict the same samples, or their criteria could not be compared.
+    windows = [np.lib.stride_tricks.sliding_window_view(one, highest + 1)[:, ::-1]
+               for one in pieces]  # fmt: skip
+    table = np.concatenate(windows)
+    gram = table.T @ table
+    count = table.shape[0]
+    best, lowest = np.ones(1), count * np.log(gram[0, 0] / count)
+    for order in range(1, highest + 1):
+        past = slice(1, order + 1)
+        taps = np.linalg.lstsq(gram[past, past], gram[past, 0], rcond=None)[0]
+        remaining = (gram[0, 0] - taps @ gram[past, 0]) / count
+        if remaining <= 0:
+            break
+        criterion = count * np.log(remaining) + order * np.log(count)
+        if criterion < lowest:
+            best, lowest = np.concatenate([[1.0], -taps]), criterion
+    long, remaining = _long_filter(pieces, highest)
+    if remaining > 0 and count * np.log(remaining) + 2 * np.log(count) < lowest:
+        return long
+    return best
+
+
+def _long_filter(pieces: Sequence[np.ndarray], first: int) -> tuple[np.ndarray, float]:
+    """Filter of slow noise beside white noise, and the variance that it leaves."""
+    longest = max(piece.size for piece in pieces)
+    block = np.zeros((len(pieces), longest))
+    weight = np.zeros((len(pieces), longest), dtype=bool)
+    for row, piece in enumerate(pieces):
+        block[row, : piece.size] = piece
+        weight[row, first : piece.size] = True
+
+    def remaining(point: np.ndarray) -> np.ndarray:
+        # The hyperbolic tangent keeps both roots inside the unit circle.
+        phi, theta = np.tanh(point)
+        return lfilter([1.0, -phi], [1.0, -theta], block, axis=1)[weight]
+
+    fit = least_squares(remaining, np.arctanh([0.9, 0.5]), method="lm", max_nfev=100)
+    phi, theta = np.tanh(fit.x)
+    size = max(abs(theta), 1e-3)
+    # Long enough that what is cut off is nothing beside the errors of estimation.
+    length = int(np.clip(np.log(1e-4) / np.log(size), _HIGHEST_ORDER + 1, 200))
+    taps = np.concatenate([[1.0], (theta - phi) * theta ** np.arange(length)])
+    return taps, float(np.mean(np.square(remaining(fit.x))))
+
+
+def portmanteau(
+    pieces: Sequence[np.ndarray],
+    whitening: Sequence[float],
+    *,
+    n_lags: int,
+    least_variance: float = 0.0,
+) -> float:
+    """Pooled portmanteau statistic over its limit; above 1 something remains.
+
+    The coefficients of the filter are estimates. To first order an error of theirs adds
+    the columns ``h(k - j)`` to the correlations, h the answer of the filter's inverse
+    to an impulse; these directions are left out, which costs a degree of freedom each.
+
+    Parameters
+    ----------
+    pieces : sequence of ndarray, shape (n_samples,)
+    least_variance : float
+        The variance is taken as at least this.
+
+    Returns
+    -------
+    float, [-]
+        0 where the pieces are zero throughout.
+
+    References
+    ----------
+    Box and Pierce (1970), with its correction for estimated coefficients.
+    """
+    taps = np.asarray(whitening, dtype=np.float64)
+    white = []
+    for piece in pieces:
+        # The filter does not know what came before the first samples.
+        unknown = min(taps.size - 1, piece.size // 4)
+        white.append(lfilter(taps, [1.0], piece)[unknown:])
+    sums, counts = autocovariances(white, n_lags)
+    if counts[0] == 0:
+        return 0.0
+    variance = max(sums[0] / counts[0], least_variance)
+    used = counts[1:] > 0
+    if variance == 0 or not used.any():
+        return 0.0
+    scores = sums[1:][used] / (variance * np.sqrt(counts[1:][used]))
+    basis = np.linalg.qr(_errors_of(taps, scores.size))[0]
+    scores = scores - basis @ (basis.T @ scores)
+    free = max(scores.size - basis.shape[1], 1)
+    return float(scores @ scores / chi2.ppf(1 - FALSE_ALARM, free))
+
+
+def _errors_of(taps: np.ndarray, n_lags: int) -> np.ndarray:
+    """What errors of a filter's estimated coefficients add to the correlations."""
+    impulse = np.zeros(n_lags)
+    impulse[0] = 1.0
+    order = taps.size - 1
+    if order > _HIGHEST_ORDER and taps[1] != 0:
+        theta = taps[2] / taps[1]
+        phi = theta - taps[1]
+        return np.column_stack(
+            [lfilter([1.0], [1.0, -root], impulse) for root in (phi, theta)]
+        )
+    answer = lfilter([1.0], taps, impulse)
+    columns = [np.concatenate([np.zeros(j), answer[: n_lags - j]])
+               for j in range(min(order, n_lags - 1))]  # fmt: skip
+    return np.array(columns).reshape(-1, n_lags).T
+
+
+# Inputs that differ by less than this share of their largest value are repeats.
+_SAME_INPUT = 0.02
+_SAME_LENGTH = 2
+_FEWEST_AT_REST = 30
+_FEWEST_RESTS = 3
+# Orders of differences: the second where the first still sees motion or colour.
+_ORDER, _HIGHER_ORDER = 6, 16
+_SEES_MOTION = 0.7
+# A difference that is larger than this many standard deviations is a jump.
+_JUMP = 5.0
+# The grid of a sensor limits it while it makes this share of the noise or more: below,
+# the other noise moves the reading over several steps, and the error of rounding is
+# noise like any other.
+_GRID_SHARE = 0.5
+# Repeats that differ this much more in motion than at rest differ by more than noise.
+# Slow noise reads a little less in a short rest.
+_MORE_IN_MOTION = 2.0
+
+
+@dataclass(frozen=True, eq=False)
+class _Stretch:
+    """Noise that was set free from the signal: pieces around zero, and its colour."""
+
+    rms: float
+    is_coloured: bool
+    whitening: tuple[float, ...]
+
+
+def noise_floor(problem: Problem, *, rests: bool = True) -> NoiseFloor:
+    """How much of what is compared is noise.
+
+    Parameters
+    ----------
+    rests : bool
+        Whether what is read before the input moves is noise.
+
+    Returns
+    -------
+    NoiseFloor
+        Never NaN; next to 0 where the recordings hold none.
+    """
+    pieces = [one.compared[one.judged] for one in problem.signals if one.n_judged > 0]
+    grid = _grid(pieces)
+    step = grid / np.sqrt(12)
+    differences = _from_differences(pieces, step)
+    is_limited = grid > 0 and step >= _GRID_SHARE * max(differences, step)
+    repeats = _from_repeats(problem.signals, differences)
+    rest = None if is_limited or not rests else _from_rest(problem.signals)
+    if repeats is not None and not (is_limited and repeats.rms < step):
+        found, method = repeats, "repeats"
+    elif rest is not None and rest.is_coloured:
+        found, method = rest, "rest"
+    else:
+        rms = differences
+        if rest is not None and 0 < rest.rms < _SEES_MOTION * differences:
+            rms, method = rest.rms, "rest"
+        else:
+            method = "differences"
+        if is_limited:
+            rms = max(step, _upper_quartile(pieces, step))
+        found = _Stretch(rms, False, (1.0,))
+    unit = problem.unit
+    resolution = float(grid) if is_limited else 0.0
+    sentence = _sentence(found, method, resolution, unit)
+    return NoiseFloor(
+        float(found.rms), method, resolution, found.is_coloured, found.whitening,
+        sentence,
+    )  # fmt: skip
+
+
+def whiteness(
+    residuals: Sequence[np.ndarray], noise: NoiseFloor, lags: int = 30
+) -> float:
+    """Whether residuals hold more than noise.
+
+    Where the grid of the sensor is the limit, what lies within half a step counts as
+    zero: the reading stands still there although the motion goes on.
+
+    Parameters
+    ----------
+    residuals : sequence of ndarray, shape (n_samples,), [output unit]
+
+    Returns
+    -------
+    float, [-]
+        Portmanteau statistic over its 99.9 % limit: about 0.5 for noise, above 1
+        something remains; infinite where a residual is not finite.
+    """
+    pieces = [np.asarray(one, dtype=np.float64) for one in residuals]
+    if not all(np.isfinite(piece).all() for piece in pieces):
+        return float("inf")
+    largest = max((float(np.max(np.abs(one))) for one in pieces if one.size), default=0)
+    if largest == 0:
+        return 0.0
+    # Scaled, because the statistic goes with the fourth power.
+    pieces = [piece / largest for piece in pieces]
+    least = 0.0
+    if noise.resolution > 0:
+        half = noise.resolution / (2 * largest)
+        pieces = [np.sign(one) * np.maximum(np.abs(one) - half, 0.0) for one in pieces]
+        least = (noise.rms / largest) ** 2
+    return portmanteau(pieces, noise.whitening, n_lags=lags, least_variance=least)
+
+
+def _from_differences(pieces: Sequence[np.ndarray], step: float) -> float:
+    """RMS of white noise from the higher order where the lower one sees motion."""
+    low = _difference_rms(pieces, _ORDER, step)
+    high = _difference_rms(pieces, _HIGHER_ORDER, step)
+    return high if 0 < high < _SEES_MOTION * low else low
+
+
+def _difference_rms(pieces: Sequence[np.ndarray], order: int, step: float) -> float:
+    """RMS of white noise from pooled differences of one order, without jumps."""
+    longer = [piece for piece in pieces if piece.size > order]
+    if not longer:
+        return 0.0
+    scale = np.sqrt(comb(2 * order, order))
+    found = np.concatenate([np.diff(piece, order) for piece in longer]) / scale
+    size = np.abs(found)
+    # 1.4826: from the median of the magnitudes to a standard deviation.
+    limit = _JUMP * max(1.4826 * float(np.median(size)), step)
+    kept = found[size <= limit] if limit > 0 else found
+    return float(np.sqrt(np.mean(np.square(kept)))) if kept.size else 0.0
+
+
+def _upper_quartile(pieces: Sequence[np.ndarray], step: float) -> float:
+    """RMS of noise on a grid: only fast recordings step through it and show it."""
+    found = [_difference_rms([piece], _ORDER, step) for piece in pieces]
+    return float(np.quantile(found, 0.75))
+
+
+def _grid(pieces: Sequence[np.ndarray]) -> float:
+    """Step of a sensor that reads on a grid; 0 if it does not."""
+    steps = [_grid_of(piece) for piece in pieces]
+    found = [step for step in steps if step > 0]
+    return float(np.median(found)) if 2 * len(found) > len(steps) else 0.0
+
+
+def _grid_of(piece: np.ndarray) -> float:
+    """Step of the grid of one recording; 0 if there is none."""
+    levels = np.unique(piece)
+    steps = np.diff(levels)
+    # What is left over from rounding is no step.
+    steps = steps[steps > 1e-9 * max(float(np.ptp(levels)), 1e-300)]
+    if steps.size < 1 or 4 * (steps.size + 1) > 3 * piece.size:
+        return 0.0
+    smallest = float(np.min(steps))
+    ratios = steps / smallest
+    # Wide gaps are left out, over which the rounding of the file adds up.
+    ratios = ratios[ratios <= 20]
+    is_multiple = np.abs(ratios - np.round(ratios)) < 0.05
+    return smallest if ratios.size * 2 > steps.size and is_multiple.all() else 0.0
+
+
+def _from_repeats(all_signals: Sequence[Signals], white_rms: float) -> _Stretch | None:
+    """Noise by which recordings of the same input differ; None if there are none."""
+    deviations, at_rest = [], []
+    for group in _groups(all_signals):
+        length = min(one.compared.size for one in group)
+        start = max(one.skip for one in group)
+        stack = np.array([one.compared[start:length] for one in group])
+        if stack.shape[1] < _FEWEST_AT_REST:
+            continue
+        # One degree of freedom of the group goes into its mean.
+        gain = np.sqrt(len(group) / (len(group) - 1))
+        rows = gain * (stack - stack.mean(axis=0))
+        still = min(rest_length(one.driven_by) for one in group) - start
+        deviations += [_detrended(row, 1) for row in rows]
+        if still >= _FEWEST_AT_REST:
+            at_rest += [_detrended(row[:still], 0) for row in rows]
+    if not deviations:
+        return None
+    rms = _rms(deviations)
+    if rms > 1.1 * white_rms and at_rest and rms > _MORE_IN_MOTION * _rms(at_rest):
+        return None
+    return _stretch(deviations, deviations)
+
+
+def _groups(all_signals: Sequence[Signals]) -> list[list[Signals]]:
+    """Recordings of the same input, which is not zero throughout."""
+    groups: list[list[Signals]] = []
+    for one in all_signals:
+        if not np.any(one.driven_by):
+            continue
+        for group in groups:
+            if _is_same_input(group[0], one):
+                group.append(one)
+                break
+        else:
+            groups.append([one])
+    return [group for group in groups if len(group) > 1]
+
+
+def _is_same_input(one: Signals, other: Signals) -> bool:
+    """Whether two recordings are repeats of each other."""
+    if abs(one.driven_by.size - other.driven_by.size) > _SAME_LENGTH:
+        return False
+    if not np.isclose(one.sample_time_s, other.sample_time_s, rtol=1e-3):
+        return False
+    length = min(one.driven_by.size, other.driven_by.size)
+    a, b = one.driven_by[:length], other.driven_by[:length]
+    return float(np.max(np.abs(a - b))) < _SAME_INPUT * float(np.max(np.abs(a)))
+
+
+def _from_rest(all_signals: Sequence[Signals]) -> _Stretch | None:
+    """Noise before the input first moves; None where too little is seen of it."""
+    pieces = [
+        one.compared[one.skip : rest_length(one.driven_by)]
+        for one in all_signals
+        if rest_length(one.driven_by) < one.driven_by.size
+    ]
+    pieces = [piece for piece in pieces if piece.size >= _FEWEST_AT_REST]
+    if len(pieces) < _FEWEST_RESTS:
+        return None
+    own = [piece - piece.mean() for piece in pieces]
+    if _rms(own) <= 1e-12 * max(float(np.max(np.abs(one.compared)))
+                                for one in all_signals):  # fmt: skip
+        return None
+    # A short piece's own mean takes slow noise away. The common mean keeps it, if all
+    # start from one place: their means differ by less than the noise.
+    means = np.array([piece.mean() for piece in pieces])
+    is_common = float(np.std(means)) < _rms(own)
+    around = [piece - np.mean(np.concatenate(pieces)) for piece in pieces]
+    return _stretch(own, around if is_common else own)
+
+
+def _stretch(own: list[np.ndarray], around: list[np.ndarray]) -> _Stretch:
+    """Colour of noise; a drift or a common sine is no noise and is taken off."""
+    # The degree of freedom of each piece's mean is given back to the variance.
+    for free, n_removed in (
+        (own, 1),
+        ([_detrended(one, 1) for one in own], 2),
+        (_without_sine(own), 3),
+    ):
+        if is_white(free, n_removed=n_removed):
+            total = sum(one.size for one in free)
+            share = total / max(total - n_removed * len(free), 1)
+            return _Stretch(_rms(free) * float(np.sqrt(share)), False, (1.0,))
+    taps = tuple(float(tap) for tap in whitening_filter(around))
+    return _Stretch(_rms(around), len(taps) > 1, taps)
+
+
+def _detrended(piece: np.ndarray, degree: int) -> np.ndarray:
+    """A piece without its polynomial in time."""
+    times = np.linspace(-1.0, 1.0, piece.size)
+    columns = np.vander(times, degree + 1)
+    return piece - columns @ np.linalg.lstsq(columns, piece, rcond=None)[0]
+
+
+def _without_sine(pieces: list[np.ndarray]) -> list[np.ndarray]:
+    """Pieces without the sine of one frequency that takes most of all of them."""
+    length = min(4096, max(piece.size for piece in pieces))
+    cut = [piece[:length] for piece in pieces]
+    power = sum(np.abs(np.fft.rfft(piece, 8 * length)) ** 2 for piece in cut)
+    peak = int(np.argmax(power))
+    # In a short rest, of a period or two, its mean moves the peak.
+    near = (peak + np.linspace(-4.0, 4.0, 65)) / (8 * length)
+    tried = [_without_line(pieces, line) for line in near if line > 0]
+    return min(tried, key=_rms)
+
+
+def _without_line(pieces: list[np.ndarray], line: float) -> list[np.ndarray]:
+    """Pieces without their sine of a frequency in periods per sample."""
+    free = []
+    for piece in pieces:
+        angles = 2 * np.pi * line * np.arange(piece.size)
+        columns = np.column_stack([np.ones(piece.size), np.cos(angles), np.sin(angles)])
+        free.append(piece - columns @ np.linalg.lstsq(columns, piece, rcond=None)[0])
+    return free
+
+
+def _rms(pieces: Sequence[np.ndarray]) -> float:
+    """RMS of all samples."""
+    total = sum(piece.size for piece in pieces)
+    return float(np.sqrt(sum(piece @ piece for piece in pieces) / max(total, 1)))
+
+
+def _sentence(found: _Stretch, method: str, resolution: float, unit: str) -> str:
+    """What was found, in words."""
+    if resolution > 0 and not found.is_coloured:
+        return (
+            f"the sensor shows steps of {resolution:.2g}{behind(unit)}, which is a noise of "
+            f"{found.rms:.2g}{behind(unit)}"
+        )
+    source = {
+        "repeats": "from what repeats differ by",
+        "rest": "from the rest before the input moves",
+        "differences": "from sixth differences",
+    }[method]
+    if found.rms == 0:
+        return f"no noise, {source}"
+    colour = "coloured" if found.is_coloured else "white"
+    return f"{colour} noise of {found.rms:.2g}{behind(unit)}, {source}"

@@ -1,0 +1,241 @@
+"""Fit of a drive's base and effects to recordings by its simulation error.
+
+Levenberg-Marquardt on the residuals of all recordings together. Parameters that belong
+to one recording only (a phase, a start) change that recording alone, so one simulation
+of all recordings gives the derivatives by all of them.
+
+References
+----------
+Marquardt (1963); damping rule of Nielsen (1999), IMM-REP-1999-05.
+docs/method_diagnosis.md, eq. (D16) to (D18).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hwid_cli.diagnosis.comparing import residuals, total
+from hwid_cli.diagnosis.problem import Problem
+from hwid_cli.diagnosis.unknowns import Layout, Point, Unknown
+
+# Difference for derivatives, in coordinates; large enough to look across the corners of
+# thresholds, small enough for a straight line.
+_DIFFERENCE = 3e-4
+LEAST_GAIN = 1e-5
+_FIRST_DAMPING = 1e-3
+_LARGEST_DAMPING = 1e8
+_LARGEST_STEP = 1.5
+_LEAST_DIAGONAL = 1e-14
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """Where a search ended.
+
+    Parameters
+    ----------
+    sse : float
+        Sum of squared residuals; infinite where nothing could be simulated.
+    """
+
+    layout: Layout
+    point: Point
+    sse: float
+    iterations: int
+    has_converged: bool
+
+
+@dataclass(frozen=True, eq=False)
+class _Place:
+    """Where a search is."""
+
+    point: Point
+    parts: list[np.ndarray]
+    sse: float
+
+
+def fit(
+    problem: Problem,
+    fit_layout: Layout,
+    point: Point,
+    *,
+    max_iterations: int,
+    only_own: bool = False,
+) -> Fitted:
+    """Lower the sum of squared residuals until it stands still.
+
+    Parameters
+    ----------
+    point : Point
+        Where to start.
+    max_iterations : int
+        Limit on accepted steps.
+    only_own : bool
+        Hold what is shared, find each recording's own values.
+    """
+    parts = residuals(problem, fit_layout, point)
+    place = _Place(point, parts, total(parts))
+    free = _free(fit_layout, len(problem.signals), only_own=only_own)
+    if not np.isfinite(place.sse) or not free.any():
+        return Fitted(fit_layout, point, place.sse, 0, False)
+    damping, small = _FIRST_DAMPING, 0
+    for iteration in range(max_iterations):
+        better, damping = _one_step(problem, fit_layout, place, free, damping)
+        if better is None:
+            return Fitted(fit_layout, place.point, place.sse, iteration, True)
+        gain = (place.sse - better.sse) / max(place.sse, 1e-300)
+        place = better
+        small = small + 1 if gain < LEAST_GAIN else 0
+        if small == 2 or place.sse == 0.0:
+            return Fitted(fit_layout, place.point, place.sse, iteration + 1, True)
+    return Fitted(fit_layout, place.point, place.sse, max_iterations, False)
+
+
+def _one_step(
+    problem: Problem,
+    fit_layout: Layout,
+    place: _Place,
+    free: np.ndarray,
+    damping: float,
+) -> tuple[_Place | None, float]:
+    """Take a step, shorter and shorter until it lowers the sum of squares."""
+    matrix, vector = _normal_equations(
+        problem, fit_layout, place.point, place.parts, free
+    )
+    growth = 2.0
+    while damping < _LARGEST_DAMPING:
+        step, predicted = _step(matrix, vector, damping, free)
+        proposed = moved(fit_layout, place.point, step)
+        parts = residuals(problem, fit_layout, proposed)
+        sse = total(parts)
+        if sse < place.sse:
+            ratio = (place.sse - sse) / max(predicted, 1e-300)
+            damping *= max(1 / 3, 1 - (2 * min(ratio, 1.0) - 1) ** 3)
+            return _Place(proposed, parts, sse), damping
+        if predicted < 1e-3 * LEAST_GAIN * place.sse:
+            break
+        damping, growth = damping * growth, growth * 2
+    return None, damping
+
+
+def derivatives(
+    problem: Problem, fit_layout: Layout, point: Point, parts: list[np.ndarray]
+) -> list[np.ndarray]:
+    """Derivatives of each recording's simulation by all coordinates that touch it.
+
+    Parameters
+    ----------
+    parts : list of ndarray
+        Residuals at the point.
+
+    Returns
+    -------
+    list of ndarray, shape (n_samples, n_shared + n_own)
+    """
+    columns: list[list[np.ndarray]] = [[] for _ in problem.signals]
+    unknowns: list[tuple[Unknown, int, bool]] = [
+        *((one, j, False) for j, one in enumerate(fit_layout.shared)),
+        *((one, j, True) for j, one in enumerate(fit_layout.own)),
+    ]
+    for unknown, column, is_own in unknowns:
+        shared, own = point.shared.copy(), point.own.copy()
+        # Look inwards at a bound.
+        width = _DIFFERENCE
+        at = own[0, column] if is_own else shared[column]
+        if unknown.value(at + width) > unknown.high:
+            width = -width
+        if is_own:
+            own[:, column] += width
+        else:
+            shared[column] += width
+        shifted = residuals(problem, fit_layout, Point(shared, own))
+        for row, (before, after) in enumerate(zip(parts, shifted, strict=True)):
+            columns[row].append((before - after) / width)
+    return [np.column_stack(one) for one in columns]
+
+
+def local_matrix(problem: Problem, fit_layout: Layout, point: Point) -> np.ndarray:
+    """Normal equations of a search at a point.
+
+    Returns
+    -------
+    ndarray, shape (n_unknowns, n_unknowns)
+    """
+    parts = residuals(problem, fit_layout, point)
+    free = _free(fit_layout, len(problem.signals), only_own=False)
+    return _normal_equations(problem, fit_layout, point, parts, free)[0]
+
+
+def _normal_equations(
+    problem: Problem,
+    fit_layout: Layout,
+    point: Point,
+    parts: list[np.ndarray],
+    free: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:
+    jacobians = derivatives(problem, fit_layout, point, parts)
+    size = free.size
+    n_shared, n_own = len(fit_layout.shared), len(fit_layout.own)
+    matrix, vector = np.zeros((size, size)), np.zeros(size)
+    for row, (jacobian, part) in enumerate(zip(jacobians, parts, strict=True)):
+        first = n_shared + row * n_own
+        at = np.r_[0:n_shared, first : first + n_own]
+        clean = np.nan_to_num(jacobian)
+        matrix[np.ix_(at, at)] += clean.T @ clean
+        vector[at] += clean.T @ part
+    return matrix, vector
+
+
+def _free(fit_layout: Layout, recordings: int, *, only_own: bool) -> np.ndarray:
+    free = np.ones(fit_layout.size(recordings), dtype=bool)
+    if only_own:
+        free[: len(fit_layout.shared)] = False
+    return free
+
+
+def _step(
+    matrix: np.ndarray, vector: np.ndarray, damping: float, free: np.ndarray
+) -> tuple[np.ndarray, float]:
+    """Damped step and the gain that the straight line promises."""
+    diagonal = np.diag(matrix)
+    usable = free & (diagonal > _LEAST_DIAGONAL * max(diagonal[free].max(), 1e-300))
+    step = np.zeros(vector.size)
+    if not usable.any():
+        return step, 0.0
+    scale = 1 / np.sqrt(diagonal[usable])
+    scaled = matrix[np.ix_(usable, usable)] * scale[:, None] * scale
+    scaled[np.diag_indices_from(scaled)] += damping
+    right = vector[usable] * scale
+    inner = np.linalg.lstsq(scaled, right, rcond=None)[0]
+    step[usable] = scale * inner
+    # No coordinate leaps: far away the straight line says nothing.
+    longest = float(np.max(np.abs(step)))
+    if longest > _LARGEST_STEP:
+        step *= _LARGEST_STEP / longest
+    gain = float(step @ (2 * vector - matrix @ step))
+    return step, gain
+
+
+def moved(fit_layout: Layout, point: Point, step: np.ndarray) -> Point:
+    """Point that a step leads to, kept inside the bounds.
+
+    Parameters
+    ----------
+    step : ndarray, shape (n_unknowns,)
+        In coordinates; shared ones first, then recording by recording.
+    """
+    n_shared = len(fit_layout.shared)
+    shared = point.shared + step[:n_shared]
+    own = point.own + step[n_shared:].reshape(point.own.shape)
+    for column, one in enumerate(fit_layout.shared):
+        shared[column] = _inside(one, shared[column])
+    for column, one in enumerate(fit_layout.own):
+        own[:, column] = [_inside(one, q) for q in own[:, column]]
+    return Point(shared, own)
+
+
+def _inside(unknown: Unknown, coordinate: float) -> float:
+    value = unknown.value(coordinate)
+    if unknown.low <= value <= unknown.high:
+        return float(coordinate)
+    return unknown.coordinate(value)

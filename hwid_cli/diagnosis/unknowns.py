@@ -1,0 +1,283 @@
+"""What a fit may change: parameters of the base, of effects, and of each recording.
+
+A fit works on coordinates without units: logarithms of what is positive, multiples of a
+typical size of what may have either sign. docs/method_diagnosis.md, eq. (D17).
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from hwid_cli.diagnosis.problem import Problem
+from hwid_cli.drive import slots
+from hwid_cli.drive.catalogue import CATALOGUE
+from hwid_cli.drive.effect import Parameter, Scales
+from hwid_cli.drive.simulation import parameter_vector, set_start
+from hwid_cli.records.drive import BASE_PARAMETERS, Drive
+
+START = "start"
+# A damping of zero is searched from this share of what halves an oscillation.
+_SMALL_DAMPING = 0.02
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """One coordinate of a fit.
+
+    Parameters
+    ----------
+    owner : str
+        Id of the effect; ``base`` or ``start``.
+    scale : float
+        Sign and size: the value is ``scale * exp(q)`` or ``scale * q``.
+    low, high : float
+        Bounds of the value.
+    """
+
+    owner: str
+    name: str
+    is_log: bool
+    scale: float
+    low: float
+    high: float
+
+    def value(self, coordinate: float) -> float:
+        """Value at a coordinate.
+
+        Parameters
+        ----------
+        coordinate : float, [-]
+
+        Returns
+        -------
+        float, [unit of the parameter]
+        """
+        if self.is_log:
+            return float(self.scale * np.exp(coordinate))
+        return self.scale * coordinate
+
+    def coordinate(self, value: float) -> float:
+        """Coordinate of a value, moved into the bounds.
+
+        Parameters
+        ----------
+        value : float, [unit of the parameter]
+
+        Returns
+        -------
+        float, [-]
+        """
+        inside = min(max(value, self.low), self.high)
+        return (
+            float(np.log(inside / self.scale)) if self.is_log else inside / self.scale
+        )
+
+
+@dataclass(frozen=True)
+class Layout:
+    """All coordinates of a fit.
+
+    Parameters
+    ----------
+    shared : tuple of Unknown
+        One value for all recordings.
+    own : tuple of Unknown
+        One value for each recording.
+    effects : tuple of str
+        Ids in the catalogue, those of the simulation first.
+    """
+
+    shared: tuple[Unknown, ...]
+    own: tuple[Unknown, ...]
+    effects: tuple[str, ...]
+
+    def size(self, recordings: int) -> int:
+        """Number of coordinates.
+
+        Parameters
+        ----------
+        recordings : int
+            Number of recordings.
+        """
+        return len(self.shared) + recordings * len(self.own)
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """Values of all coordinates.
+
+    Parameters
+    ----------
+    shared : ndarray, shape (n_shared,)
+    own : ndarray, shape (n_recordings, n_own)
+    """
+
+    shared: np.ndarray
+    own: np.ndarray
+
+
+def layout(
+    problem: Problem,
+    effects: Sequence[str],
+    start: Mapping[str, Mapping[str, float]],
+    scales: Scales,
+) -> Layout:
+    """Coordinates of a fit of the base and effects.
+
+    Parameters
+    ----------
+    effects : sequence of str
+        Ids in the catalogue, those of the simulation included.
+    start : mapping of str to mapping of str to float
+        Values that the search starts from, which set the sizes.
+    """
+    shared = _base_unknowns(problem.drive)
+    own: list[Unknown] = []
+    for identifier in effects:
+        for parameter in CATALOGUE[identifier].parameters:
+            value = start[identifier].get(parameter.name, 0.0)
+            unknown = _unknown(identifier, parameter, value, scales)
+            (own if parameter.is_own else shared).append(unknown)
+    far = float("inf")
+    if problem.start != "rest":
+        reach = scales.displacement_m
+        own.append(Unknown(START, "position", False, reach, -far, far))
+    if problem.start == "estimated":
+        speed = scales.velocity_m_per_s
+        own.append(Unknown(START, "velocity", False, speed, -far, far))
+    return Layout(tuple(shared), tuple(own), tuple(effects))
+
+
+def _base_unknowns(drive: Drive) -> list[Unknown]:
+    """Coordinates of the base; a spring that is not there stays away."""
+    unknowns = []
+    for name in BASE_PARAMETERS:
+        value = getattr(drive, name)
+        if name == "stiffness_N_per_m" and value == 0:
+            continue
+        if value == 0:
+            rate = np.sqrt(drive.stiffness_N_per_m * drive.mass_kg) or drive.mass_kg
+            value = _SMALL_DAMPING * rate
+        size = abs(value)
+        low, high = (
+            (1e-4 * size, 1e4 * size) if value > 0 else (-1e4 * size, -1e-4 * size)
+        )
+        unknowns.append(Unknown("base", name, True, value, low, high))
+    return unknowns
+
+
+def _unknown(owner: str, parameter: Parameter, value: float, scales: Scales) -> Unknown:
+    low, high = parameter.bounds(scales)
+    if parameter.is_positive:
+        size = value if value > 0 else max(parameter.starts(scales))
+        return Unknown(owner, parameter.name, True, size, max(low, 1e-9 * size), high)
+    sizes = [abs(one) for one in (value, *parameter.starts(scales))]
+    return Unknown(owner, parameter.name, False, max(sizes) or 1.0, low, high)
+
+
+def first_point(
+    problem: Problem,
+    fit_layout: Layout,
+    drive: Drive,
+    start: Mapping[str, Mapping[str, float]],
+) -> Point:
+    """Point that a search starts from.
+
+    Parameters
+    ----------
+    drive : Drive
+        With the base to start from.
+    start : mapping of str to mapping of str to float
+        Values of the effects.
+    """
+    shared = []
+    for one in fit_layout.shared:
+        if one.owner == "base":
+            value = getattr(drive, one.name) or one.scale
+        else:
+            value = start[one.owner][one.name]
+        shared.append(one.coordinate(value))
+    each = np.zeros((len(problem.signals), len(fit_layout.own)))
+    for column, one in enumerate(fit_layout.own):
+        for row, signals in enumerate(problem.signals):
+            if one.owner != START:
+                value = start[one.owner].get(one.name, 0.0)
+                each[row, column] = one.coordinate(value)
+            elif one.name == "position" and problem.start == "estimated":
+                each[row, column] = one.coordinate(float(signals.output[0]))
+    return Point(np.array(shared), each)
+
+
+def drive_at(problem: Problem, fit_layout: Layout, point: Point) -> Drive:
+    """Drive with the base of a point."""
+    base: dict[str, Any] = {
+        one.name: one.value(q)
+        for one, q in zip(fit_layout.shared, point.shared, strict=True)
+        if one.owner == "base"
+    }
+    return replace(problem.drive, **base)
+
+
+def effects_at(
+    fit_layout: Layout, point: Point, row: int | None = None
+) -> dict[str, dict[str, float]]:
+    """Effects with the values of a point.
+
+    Parameters
+    ----------
+    row : int or None
+        Number of the recording whose own values are included; None leaves them out.
+    """
+    values: dict[str, dict[str, float]] = {one: {} for one in fit_layout.effects}
+    for unknown, q in zip(fit_layout.shared, point.shared, strict=True):
+        if unknown.owner in values:
+            values[unknown.owner][unknown.name] = unknown.value(q)
+    if row is not None:
+        for unknown, q in zip(fit_layout.own, point.own[row], strict=True):
+            if unknown.owner in values:
+                values[unknown.owner][unknown.name] = unknown.value(q)
+    return values
+
+
+def vectors_at(problem: Problem, fit_layout: Layout, point: Point) -> list[np.ndarray]:
+    """Vector of parameters for each recording.
+
+    Returns
+    -------
+    list of ndarray, shape (N_SLOTS,)
+    """
+    drive = drive_at(problem, fit_layout, point)
+    common = None
+    vectors = []
+    for row, signals in enumerate(problem.signals):
+        if common is None or fit_layout.own:
+            common = parameter_vector(drive, effects_at(fit_layout, point, row))
+        vector = common.copy()
+        _place_start(
+            vector, problem, signals.rest_position_m, fit_layout, point.own[row]
+        )
+        vectors.append(vector)
+    return vectors
+
+
+def _place_start(
+    vector: np.ndarray,
+    problem: Problem,
+    rest_position: float,
+    fit_layout: Layout,
+    own: np.ndarray,
+) -> None:
+    if problem.start != "rest":
+        found = {
+            one.name: one.value(q)
+            for one, q in zip(fit_layout.own, own, strict=True)
+            if one.owner == START
+        }
+        set_start(vector, found["position"], found.get("velocity", 0.0))
+        if problem.start == "held":
+            # The recording starts at its measured level, wherever the sensor's zero is.
+            vector[slots.OUTPUT_ZERO] = found["position"] - rest_position
+    elif problem.drive.stiffness_N_per_m == 0:
+        set_start(vector, rest_position, 0.0)

@@ -1,0 +1,395 @@
+"""Where the error sits: recordings, parts of them, and what the missing force goes with.
+
+docs/method_diagnosis.md.
+
+How the error goes with the size of an input, and with reversals of motion.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from hwid_cli.diagnosis.covariates import (
+    Variable,
+    binned,
+    judged_force,
+    quantile_edges,
+    shares,
+    variables,
+)
+from hwid_cli.diagnosis.latent_force import Smoothed, finite, latent_force
+from hwid_cli.diagnosis.noise import whiteness
+from hwid_cli.diagnosis.problem import Compared
+from hwid_cli.diagnosis.segments import amplitude
+from hwid_cli.diagnosis.sharing import (
+    excess_of,
+    harmonic_places,
+    percent,
+    portions,
+    recording_places,
+    segment_places,
+)
+from hwid_cli.records.diagnosis import LatentForce, NoiseFloor, Place
+from hwid_cli.records.drive import Drive
+
+# Inputs are of one shape where they differ by less than this, over their size.
+_SAME_SHAPE = 0.02
+_LEAST_RATIO = 1.4
+# A recording is affected where its error beyond the noise is this share of the worst.
+_AFFECTED = 0.15
+_NEARLY_ALL = 0.75
+# Around a reversal of velocity, in shares of the time between two of them.
+_NEAR = 0.1
+_REVERSAL_SHARE, _REVERSAL_GAIN = 0.3, 2.0
+_STANDING = 0.02
+
+
+def amplitude_places(
+    compared: Sequence[Compared], noise: NoiseFloor, excess: np.ndarray, drive: Drive
+) -> list[Place]:
+    """How the error grows with the size of the input, for each kind of recording.
+
+    Parameters
+    ----------
+    excess : ndarray, shape (n_recordings,)
+
+    Returns
+    -------
+    list of Place
+        Empty where no two recordings have inputs of one shape and different size.
+    """
+    share_of = portions(excess)
+    found = []
+    for kind in dict.fromkeys(one.signals.kind for one in compared):
+        inside = [j for j, one in enumerate(compared) if one.signals.kind == kind]
+        exponent = _exponent([compared[j] for j in inside], excess[inside])
+        if exponent is None:
+            continue
+        if exponent < 0.4:
+            said = "hardly grows with the amplitude"
+        elif exponent < 1.4:
+            said = "grows about in proportion to the amplitude"
+        else:
+            said = "grows faster than the amplitude"
+        size = sum(compared[j].residual.size for j in inside)
+        rms = float(np.sqrt(excess[inside].sum() / size + noise.rms**2))
+        where = _affected(compared, excess, drive, kind)
+        sentence = f"in {_plural(kind)} the error {said} (exponent {exponent:.1f})" + (
+            f"; it sits in {where}" if where else ""
+        )
+        share = float(share_of[inside].sum())
+        found.append(Place("amplitude", kind, share, rms, sentence))
+    return sorted(found, key=lambda one: -one.share)
+
+
+def is_at_reversals(compared: Sequence[Compared], smoothed: Sequence[Smoothed]) -> bool:
+    """Whether the missing force changes most where the velocity reverses.
+
+    Returns
+    -------
+    bool
+        Lags behind the input do it as well, so that it says nothing on its own.
+    """
+    inside = outside = 0.0
+    n_inside = n_outside = 0
+    for one, two in zip(compared, smoothed, strict=True):
+        if two.force.size < 2:
+            continue
+        near = near_reversals(finite(one.velocity))[one.signals.judged]
+        change = np.square(np.gradient(two.force))[one.signals.judged]
+        inside, outside = inside + change[near].sum(), outside + change[~near].sum()
+        n_inside, n_outside = n_inside + near.sum(), n_outside + (~near).sum()
+    if inside <= 0:
+        return False
+    share, time = inside / (inside + outside), n_inside / (n_inside + n_outside)
+    return bool(share > _REVERSAL_SHARE and share > _REVERSAL_GAIN * time)
+
+
+def affected_sentence(
+    compared: Sequence[Compared],
+    noise: NoiseFloor,
+    drive: Drive,
+    at_reversals: bool,
+) -> str:
+    """Which recordings hold the error, and whether it sits at reversals of velocity.
+
+    Returns
+    -------
+    str
+        To be added to a sentence; empty where there is nothing to say.
+    """
+    where = _affected(compared, excess_of(compared, noise), drive)
+    if at_reversals:
+        said = "; the error sits at reversals of velocity"
+        return f"{said}, in {where}" if where else said
+    return f"; the error sits in {where}" if where else ""
+
+
+def near_reversals(velocity: np.ndarray) -> np.ndarray:
+    """Samples close to a change of sign of the velocity.
+
+    Parameters
+    ----------
+    velocity : ndarray, shape (n_samples,), [m/s]
+
+    Returns
+    -------
+    ndarray of bool, shape (n_samples,)
+    """
+    near = np.zeros(velocity.size, dtype=bool)
+    size = float(np.max(np.abs(velocity), initial=0.0))
+    moving = np.flatnonzero(np.abs(velocity) > _STANDING * size)
+    if size == 0 or moving.size < 2:
+        return near
+    signs = np.sign(velocity[moving])
+    turned = np.flatnonzero(signs[1:] != signs[:-1])
+    # Between the last sample one way and the first the other way.
+    first, last = moving[turned], moving[turned + 1]
+    if not first.size:
+        return near
+    between = velocity.size / (first.size + 1)
+    reach = max(2, int(_NEAR * between / 2))
+    for start, stop in zip(first, last, strict=True):
+        # A long stand between two strokes is near at its ends only.
+        near[max(start - reach, 0) : min(start + reach, stop) + 1] = True
+        near[max(stop - reach, start) : stop + reach + 1] = True
+    return near
+
+
+def _affected(
+    compared: Sequence[Compared], excess: np.ndarray, drive: Drive, kind: str = ""
+) -> str:
+    """Recordings of one kind, or of all, that hold the error, as their sizes tell."""
+    chosen = [j for j, one in enumerate(compared) if kind in ("", one.signals.kind)]
+    sizes = np.array([compared[j].residual.size for j in chosen])
+    rms = np.sqrt(excess[chosen] / np.maximum(sizes, 1))
+    if rms.size < 2 or np.max(rms) <= 0:
+        return ""
+    is_affected = rms > _AFFECTED * np.max(rms)
+    kinds = [compared[j].signals.kind for j in chosen]
+    amplitudes = np.array([amplitude(compared[j].signals) for j in chosen])
+    said, has_threshold = [], False
+    for name in dict.fromkeys(kinds):
+        inside = np.array([other == name for other in kinds])
+        sizes, hit = amplitudes[inside], is_affected[inside]
+        if hit.all():
+            said.append(f"all {_plural(name)}")
+        elif hit.any() and np.min(sizes[hit]) > np.max(sizes[~hit]):
+            below = f"{np.max(sizes[~hit]):.3g} {_input_unit(drive)}"
+            said.append(f"all {_plural(name)} above {below}")
+            has_threshold = True
+        elif hit.any():
+            said.append(f"{hit.sum()} of {hit.size} {_plural(name)}")
+    if not has_threshold and np.mean(is_affected) > _NEARLY_ALL:
+        if kind:
+            return ""
+        return "all recordings" if is_affected.all() else "nearly all recordings"
+    return " and ".join([", ".join(said[:-1]), said[-1]] if said[1:] else said)
+
+
+def _exponent(compared: Sequence[Compared], excess: np.ndarray) -> float | None:
+    """Power of the amplitude with which the error grows, over inputs of one shape."""
+    groups: list[tuple[np.ndarray, list[tuple[float, float]]]] = []
+    for one, square in zip(compared, excess, strict=True):
+        size = amplitude(one.signals)
+        if size == 0 or square <= 0:
+            continue
+        shape = (one.signals.driven_by - one.signals.driven_by[0]) / size
+        point = (np.log(size), 0.5 * np.log(square / one.residual.size))
+        for known, points in groups:
+            if known.size == shape.size and np.max(np.abs(known - shape)) < _SAME_SHAPE:
+                points.append(point)
+                break
+        else:
+            groups.append((shape, [point]))
+    centred = [np.array(points) - np.mean(points, axis=0) for _, points in groups]
+    together = np.concatenate(centred) if centred else np.zeros((0, 2))
+    if not len(together) or np.ptp(together[:, 0]) < np.log(_LEAST_RATIO):
+        return None
+    sizes, errors = together.T
+    return float(sizes @ errors / (sizes @ sizes))
+
+
+def _input_unit(drive: Drive) -> str:
+    """Unit of what drives a recording."""
+    if drive.controller is not None:
+        return "m"
+    return "A" if drive.resistance_ohm is None else "V"
+
+
+def _plural(kind: str) -> str:
+    """Several recordings of a kind."""
+    return f"recordings of kind {kind}" if not kind.isalpha() else f"{kind}s"
+
+
+_CURVE_BINS = 30
+# Below this share no variable is worth a sentence of its own.
+_LEAST_SHARE = 0.02
+# A constant above this share comes first whatever goes with the small rest.
+_ALL_CONSTANT = 0.9
+_FINER_SAYS_MORE = 1.1
+_CLEAR_SHARE = 0.2
+# Variables that say what another one says, in less detail or with more.
+_PART_OF = {"size of the displacement": "displacement", "speed": "velocity"}
+_WORDS = {
+    "displacement": "the displacement",
+    "size of the displacement": "the size of the displacement",
+    "velocity": "the velocity",
+    "speed": "the speed, whatever its direction",
+    "direction": "the direction of motion",
+    "time": "the time since the start of a recording",
+}
+
+
+def places(
+    compared: Sequence[Compared],
+    noise: NoiseFloor,
+    drive: Drive,
+    smoothed: Sequence[Smoothed],
+) -> tuple[Place, ...]:
+    """Places where the error sits.
+
+    Parameters
+    ----------
+    drive : Drive
+        That made the simulations.
+    smoothed : sequence of Smoothed
+        As ``latent_force`` returns it.
+
+    Returns
+    -------
+    tuple of Place
+        The variable with the largest share first, then segments, harmonics, amplitudes,
+        recordings and the other variables, each sort the largest first. A single one
+        where nothing but noise is left.
+    """
+    if not compared:
+        return ()
+    if whiteness([one.residual for one in compared], noise) < 1:
+        sentence = "what the simulation leaves of the measurements looks like noise"
+        return (Place("variable", "noise", 0.0, float("nan"), sentence),)
+    excess = excess_of(compared, noise)
+    found = _variable_places(compared, noise, drive, smoothed)
+    return (
+        *found[:1],
+        *segment_places(compared, noise, drive),
+        *harmonic_places(compared, noise),
+        *amplitude_places(compared, noise, excess, drive),
+        *found[1:],
+        *recording_places(compared, excess),
+    )
+
+
+def latent_force_curves(
+    compared_before: Sequence[Compared],
+    compared_after: Sequence[Compared] | None,
+    smoothed_before: Sequence[Smoothed],
+    drive: Drive,
+    noise: NoiseFloor,
+    top: int = 2,
+) -> tuple[LatentForce, ...]:
+    """Missing force against the variables that it goes with most.
+
+    Parameters
+    ----------
+    compared_before : sequence of Compared
+        Measurements beside the base's simulation.
+    compared_after : sequence of Compared or None
+        Beside the simulation with the effects; None without any.
+    drive : Drive
+        The base.
+    top : int
+        Number of variables.
+    """
+    if not compared_before:
+        return ()
+    before = variables(compared_before, smoothed_before, drive)
+    force = judged_force(compared_before, smoothed_before)
+    found, _ = shares(force, before)
+    drawn = [place for place, one in enumerate(before) if one.unit]
+    order = sorted(drawn, key=lambda place: -_whole_share(found, before, place))[:top]
+    law_variables: Sequence[Variable] = ()
+    law_force = np.zeros(0)
+    if compared_after is not None:
+        pairs = zip(compared_before, compared_after, strict=True)
+        instead = [
+            replace(old, signals=replace(old.signals, compared=new.simulated))
+            for old, new in pairs
+        ]
+        law_smoothed = latent_force(instead, drive, noise)
+        law_variables = variables(instead, law_smoothed, drive)
+        law_force = judged_force(instead, law_smoothed)
+    curves = []
+    for place in order:
+        one = before[place]
+        edges = quantile_edges(one.values, _CURVE_BINS)
+        at, mean, spread, counts = binned(one.values, force, edges)
+        law = np.zeros(0)
+        used = counts > 0
+        if law_variables:
+            law = binned(law_variables[place].values, law_force, edges)[1][used]
+        curves.append(
+            LatentForce(one.name, one.unit, at[used], mean[used], spread[used], law)
+        )
+    return tuple(curves)
+
+
+def _variable_places(
+    compared: Sequence[Compared],
+    noise: NoiseFloor,
+    drive: Drive,
+    smoothed: Sequence[Smoothed],
+) -> list[Place]:
+    """Variables that the missing force goes with, the largest share first."""
+    all_variables = variables(compared, smoothed, drive)
+    found, constant = shares(judged_force(compared, smoothed), all_variables)
+    ranked = [
+        (one.name, _whole_share(found, all_variables, place))
+        for place, one in enumerate(all_variables)
+        if one.name not in _PART_OF
+    ]
+    ranked.sort(key=lambda pair: -pair[1])
+    best = ranked[0][1]
+    is_constant = constant > _ALL_CONSTANT or (constant > 0.5 and best < 0.5)
+    ranked.insert(0 if is_constant else len(ranked), ("constant", constant))
+    fine = {one.name: float(x) for one, x in zip(all_variables, found, strict=True)}
+    finished = []
+    for number, (name, share) in enumerate(ranked):
+        sentence = _variable_sentence(name, share, fine)
+        if number == 0:
+            at_reversals = name == "velocity" and is_at_reversals(compared, smoothed)
+            sentence += affected_sentence(compared, noise, drive, at_reversals)
+        elif share < _LEAST_SHARE:
+            continue
+        finished.append(Place("variable", name, share, float("nan"), sentence))
+    return finished
+
+
+def _whole_share(
+    found: np.ndarray, all_variables: Sequence[Variable], place: int
+) -> float:
+    """Share of a variable, or of its magnitude where that says more."""
+    name = all_variables[place].name
+    same = [
+        float(share)
+        for one, share in zip(all_variables, found, strict=True)
+        if name in (one.name, _PART_OF.get(one.name))
+    ]
+    return max(same)
+
+
+def _variable_sentence(name: str, share: float, fine: dict[str, float]) -> str:
+    """What the share of a variable says."""
+    if name == "constant":
+        return f"the missing force has a constant part ({percent(share)} of its square)"
+    if share < _LEAST_SHARE:
+        return "the missing force goes with no variable that was looked at"
+    said, part = _WORDS.get(name, f"the {name}"), percent(share)
+    for finer, coarse in _PART_OF.items():
+        # Both tell the same where all motion is to one side.
+        if coarse == name and fine[finer] > _FINER_SAYS_MORE * fine[coarse]:
+            said = _WORDS[finer]
+    if share < _CLEAR_SHARE:
+        return f"the missing force hardly goes with {said} ({part} of its variance)"
+    return f"the missing force goes with {said} ({part} of its variance)"

@@ -1,0 +1,217 @@
+"""Entries of the catalogue: what happens to the command and to the force it makes.
+
+docs/method_diagnosis.md, eq. (D4) to (D7).
+"""
+
+from hwid_cli.drive import slots
+from hwid_cli.drive.effect import Effect, Parameter, Rule, Scales
+
+
+def _current(*shares: float) -> Rule:
+    return lambda scales: tuple(share * scales.current_A for share in shares)
+
+
+def _rate(*shares: float) -> Rule:
+    return lambda scales: tuple(share * scales.current_rate_A_per_s for share in shares)
+
+
+def _times(scales: Scales) -> tuple[float, ...]:
+    period = 1.0 / scales.natural_Hz
+    return tuple(share * period for share in (0.01, 0.03, 0.1))
+
+
+def _time_bounds(scales: Scales) -> tuple[float, float]:
+    return 0.01 * scales.sample_time_s, 0.5 / scales.natural_Hz
+
+
+DEAD_ZONE = Effect(
+    id="input_dead_zone",
+    sentence="small currents make no force",
+    equation="i -> i - d sgn(i) beyond |i| = d, 0 within",
+    enters="command",
+    parameters=(
+        Parameter(
+            "threshold_A",
+            _current(0.02, 0.06, 0.15),
+            lambda scales: (1e-4 * scales.current_A, 0.8 * scales.current_A),
+        ),
+    ),
+    slots=lambda value: {slots.DEAD_ZONE: value["threshold_A"]},
+    confused_with={
+        "coulomb_friction": "reversals while a load holds the current away from zero",
+        "supply_sag": "small steps",
+    },
+)
+
+SATURATION = Effect(
+    id="input_saturation",
+    sentence="the current is cut at a limit",
+    equation="i -> max(-I, min(i, I))",
+    enters="command",
+    parameters=(
+        Parameter(
+            "limit_A",
+            _current(0.5, 0.7, 0.88),
+            lambda scales: (0.05 * scales.current_A, scales.current_A),
+        ),
+    ),
+    slots=lambda value: {slots.SATURATION: value["limit_A"]},
+    confused_with={
+        "end_stop": "a sine near resonance at full amplitude",
+        "force_constant_saturation": "steps of several sizes below the limit",
+    },
+)
+
+RATE_LIMIT = Effect(
+    id="rate_limit",
+    sentence="the current changes no faster than a limit",
+    equation="|di/dt| <= r",
+    enters="command",
+    parameters=(
+        Parameter(
+            "rate_A_per_s",
+            _rate(0.01, 0.03, 0.08, 0.2, 0.4, 0.7),
+            lambda scales: (
+                1e-4 * scales.current_rate_A_per_s,
+                scales.current_rate_A_per_s,
+            ),
+        ),
+    ),
+    slots=lambda value: {slots.RATE: value["rate_A_per_s"]},
+    confused_with={"actuator_lag": "fast changes of several sizes"},
+)
+
+DELAY = Effect(
+    id="input_delay",
+    sentence="the current acts later than it was commanded",
+    equation="i -> i(t - td)",
+    enters="command",
+    parameters=(Parameter("delay_s", _times, _time_bounds),),
+    slots=lambda value: {slots.DELAY: value["delay_s"]},
+    confused_with={"actuator_lag": "a sine far above the natural frequency"},
+)
+
+LAG = Effect(
+    id="actuator_lag",
+    sentence="the current follows the command with a first-order lag",
+    equation="tau di/dt + i = command",
+    enters="command",
+    parameters=(Parameter("time_constant_s", _times, _time_bounds),),
+    slots=lambda value: {slots.LAG: value["time_constant_s"]},
+    confused_with={"input_delay": "a sine far above the natural frequency"},
+)
+
+CONSTANT_SATURATION = Effect(
+    id="force_constant_saturation",
+    sentence="the force constant falls with the square of the current",
+    equation="kt -> kt (1 - a (i / Iref)^2)",
+    enters="force",
+    parameters=(
+        Parameter(
+            "loss_at_reference",
+            lambda scales: (0.08, 0.25),
+            lambda scales: (-0.9, 0.9),
+            is_positive=False,
+        ),
+    ),
+    slots=lambda value: {slots.SATURATION_LOSS: value["loss_at_reference"]},
+    confused_with={
+        "supply_sag": "steps of many sizes and little noise",
+        "sensor_cubic": "a sine near resonance",
+    },
+)
+
+SAG = Effect(
+    id="supply_sag",
+    sentence="the force constant falls in proportion to the current",
+    equation="kt -> kt (1 - a |i| / Iref)",
+    enters="force",
+    parameters=(
+        Parameter(
+            "loss_at_reference",
+            lambda scales: (0.08, 0.25),
+            lambda scales: (-0.9, 0.9),
+            is_positive=False,
+        ),
+    ),
+    slots=lambda value: {slots.SAG_LOSS: value["loss_at_reference"]},
+    confused_with={
+        "force_constant_saturation": "steps of many sizes and little noise",
+        "sensor_quadratic": "a step of the other sign",
+        "input_dead_zone": "small steps",
+    },
+)
+
+THERMAL = Effect(
+    id="thermal_gain_loss",
+    sentence="the force constant falls as the motor heats up",
+    equation="kt -> kt (1 - a w), tau dw/dt = (i / Iref)^2 - w, w = 0 at the start",
+    enters="force",
+    parameters=(
+        Parameter(
+            "loss_at_reference",
+            lambda scales: (0.15,),
+            lambda scales: (-0.95, 0.95),
+            is_positive=False,
+        ),
+        Parameter(
+            "time_constant_s",
+            lambda scales: (0.3, 1.0, 3.0),
+            # Faster heating is the force constant's saturation.
+            lambda scales: (0.2, max(1.0, 10 * scales.duration_s)),
+        ),
+    ),
+    slots=lambda value: {
+        slots.THERMAL_LOSS: value["loss_at_reference"],
+        slots.THERMAL_TIME: value["time_constant_s"],
+    },
+    confused_with={
+        "force_constant_saturation": "a long hold, and repeats after a rest"
+    },
+)
+
+VOLTAGE_LIMIT = Effect(
+    id="voltage_limit",
+    sentence="at speed the back-EMF leaves less current than commanded",
+    equation="|i + s v| <= I",
+    enters="force",
+    parameters=(
+        Parameter(
+            "limit_A",
+            _current(0.7, 0.9, 1.2),
+            lambda scales: (0.05 * scales.current_A, 5 * scales.current_A),
+        ),
+        Parameter(
+            "slope_A_s_per_m",
+            lambda scales: tuple(
+                share * scales.current_A / scales.velocity_m_per_s
+                for share in (0.2, 0.6, 1.5)
+            ),
+            lambda scales: (
+                1e-3 * scales.current_A / scales.velocity_m_per_s,
+                30 * scales.current_A / scales.velocity_m_per_s,
+            ),
+        ),
+    ),
+    slots=lambda value: {
+        slots.CLIP_LIMIT: value["limit_A"],
+        slots.CLIP_SLOPE: value["slope_A_s_per_m"],
+    },
+    confused_with={
+        "input_saturation": "full current at rest and at speed",
+        "quadratic_drag": "the same speed at small current, such as after a release",
+    },
+    contains=("input_saturation",),
+)
+
+EFFECTS = (
+    DEAD_ZONE,
+    SATURATION,
+    RATE_LIMIT,
+    DELAY,
+    LAG,
+    CONSTANT_SATURATION,
+    SAG,
+    THERMAL,
+    VOLTAGE_LIMIT,
+)

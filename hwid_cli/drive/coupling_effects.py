@@ -1,0 +1,134 @@
+"""Entries of the catalogue: what adds a motion or a force of its own.
+
+docs/method_diagnosis.md, eq. (D11) to (D13).
+"""
+
+from math import pi
+
+from hwid_cli.drive import slots
+from hwid_cli.drive.effect import Effect, Parameter, Rule, Scales, Values
+
+
+def _displacement(*shares: float) -> Rule:
+    return lambda scales: tuple(share * scales.displacement_m for share in shares)
+
+
+def _force(*shares: float) -> Rule:
+    return lambda scales: tuple(share * scales.force_N for share in shares)
+
+
+def _gap(scales: Scales) -> tuple[float, float]:
+    return 1e-5 * scales.displacement_m, 0.5 * scales.displacement_m
+
+
+def _frequencies(scales: Scales) -> tuple[float, ...]:
+    return tuple(
+        min(factor * scales.natural_Hz, 0.4 / scales.sample_time_s)
+        for factor in (1.4, 2.0, 2.6, 3.4, 4.5, 6.0, 9.0)
+    )
+
+
+def _mode_slots(value: Values) -> dict[int, float]:
+    mass, turn = value["mass_kg"], 2 * pi * value["frequency_Hz"]
+    return {
+        slots.MODE_MASS: mass,
+        slots.MODE_STIFFNESS: mass * turn**2,
+        slots.MODE_DAMPING: 2 * value["damping_ratio"] * mass * turn,
+    }
+
+
+GEAR = Effect(
+    id="gear_backlash",
+    sentence="play between motor and load: teeth that let go and hit again",
+    equation="m1 xm'' = kt i - T, m2 x'' = T - c x' - k x; "
+    "T = kg (xm - x -+ g) + cg (xm' - x') while it pushes, else 0",
+    enters="motion",
+    parameters=(
+        Parameter("half_gap_m", _displacement(0.003, 0.012, 0.04), _gap),
+        Parameter(
+            "stiffness_N_per_m",
+            lambda scales: (50 * scales.stiffness_N_per_m,),
+            lambda scales: (
+                3 * scales.stiffness_N_per_m,
+                2000 * scales.stiffness_N_per_m,
+            ),
+        ),
+        Parameter(
+            "motor_share",
+            lambda scales: (0.2, 0.45),
+            lambda scales: (0.05, 0.95),
+            is_reported=False,
+        ),
+        # Without any, the teeth rattle chaotically.
+        Parameter(
+            "contact_damping_ratio",
+            lambda scales: (0.15,),
+            lambda scales: (1e-3, 1.0),
+            is_reported=False,
+        ),
+    ),
+    slots=lambda value: {
+        slots.GEAR_GAP: value["half_gap_m"],
+        slots.GEAR_STIFFNESS: value["stiffness_N_per_m"],
+        slots.MOTOR_SHARE: value.get("motor_share", 0.5),
+        slots.GEAR_DAMPING_RATIO: value.get("contact_damping_ratio", 0.0),
+    },
+    confused_with={
+        "output_backlash": "reversals with the spring unloaded",
+        "input_delay": "large and small reversals",
+    },
+)
+
+MODE = Effect(
+    id="second_mode",
+    sentence="a flexible part that swings along",
+    equation="m2 r'' = k2 (x - r) + c2 (x' - r'), the reaction acts on the mass",
+    enters="motion",
+    parameters=(
+        Parameter(
+            "mass_kg",
+            lambda scales: (0.15 * scales.mass_kg,),
+            lambda scales: (1e-3 * scales.mass_kg, 3 * scales.mass_kg),
+        ),
+        Parameter(
+            "frequency_Hz",
+            _frequencies,
+            lambda scales: (0.2 * scales.natural_Hz, 0.45 / scales.sample_time_s),
+        ),
+        Parameter("damping_ratio", lambda scales: (0.05,), lambda scales: (1e-4, 2.0)),
+    ),
+    slots=_mode_slots,
+    confused_with={"input_delay": "a multisine over the whole band"},
+)
+
+PERIODIC = Effect(
+    id="periodic_force",
+    sentence="an unmeasured force that swings at a fixed frequency all the time",
+    equation="F = A sin(2 pi f t + p), p free in every recording",
+    enters="motion",
+    parameters=(
+        Parameter("amplitude_N", _force(0.03)),
+        Parameter(
+            "frequency_Hz",
+            lambda scales: scales.frequencies_Hz,
+            lambda scales: (0.5 / scales.duration_s, 0.5 / scales.sample_time_s),
+        ),
+        Parameter(
+            "phase_rad",
+            lambda scales: (0.0,),
+            is_positive=False,
+            is_reported=False,
+            is_own=True,
+        ),
+    ),
+    slots=lambda value: {
+        slots.PERIODIC_FORCE: value["amplitude_N"],
+        slots.PERIODIC_FREQUENCY: value["frequency_Hz"],
+        slots.PERIODIC_PHASE: value.get("phase_rad", 0.0),
+    },
+    confused_with={"cogging": "recordings at rest, where only a force in time goes on"},
+    # A free axis drifts off with the phase at the start: that imitates anything.
+    needs_spring=True,
+)
+
+EFFECTS = (GEAR, MODE, PERIODIC)

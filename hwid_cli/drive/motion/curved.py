@@ -1,0 +1,229 @@
+"""Compiled motion between two events where a force is curved: Runge-Kutta steps.
+
+docs/method_diagnosis.md, eq. (D2), (D8) to (D10).
+"""
+
+import numpy as np
+from numba import njit
+
+from hwid_cli.drive import slots
+from hwid_cli.drive.compiled import INNER
+from hwid_cli.drive.motion.forces import (
+    MOTOR_V,
+    N_STATE,
+    PART_V,
+    TURNED_AT,
+    WAY,
+    V,
+    X,
+    acceleration,
+    resisting,
+)
+from hwid_cli.drive.motion.push import (
+    DRIVE,
+    OTHER,
+    TURN,
+    depends_on_motion,
+    has_losses,
+    shift,
+)
+
+# Beyond this many Stribeck velocities the excess is below rounding, exp(-6.1^2); and
+# beyond this many yield lengths the hysteresis has yielded, exp(-37).
+FAST, FAR = 6.1, 37.0
+# A step is so short that no smooth force turns by more than this, [rad].
+LONGEST_PHASE = 0.3
+
+
+@njit(**INNER)
+def is_always_curved(p: np.ndarray) -> bool:
+    """Return whether no stretch of the motion is linear.
+
+    Parameters
+    ----------
+    p : ndarray, shape (N_SLOTS,)
+    """
+    return (
+        p[slots.CUBIC] != 0.0
+        or p[slots.QUADRATIC] != 0.0
+        or p[slots.COGGING_FORCE] != 0.0
+        or p[slots.DRAG] != 0.0
+        or (depends_on_motion(p) and has_losses(p))
+    )
+
+
+@njit(**INNER)
+def is_curved_here(state: np.ndarray, memory: np.ndarray, p: np.ndarray) -> bool:
+    """Return whether friction is curved at this velocity and after this way.
+
+    Parameters
+    ----------
+    state : ndarray, shape (N_STATE,)
+    memory : ndarray, shape (N_MEMORY,)
+    p : ndarray, shape (N_SLOTS,)
+    """
+    if p[slots.STATIC_EXCESS] != 0.0:
+        speed = memory[WAY] * state[V]
+        if memory[WAY] != 0.0 and speed < FAST * p[slots.STRIBECK_VELOCITY]:
+            return True
+    if p[slots.HYSTERESIS_FORCE] != 0.0 and memory[WAY] != 0.0:
+        gone = abs(state[X] - memory[TURNED_AT])
+        return gone < FAR * p[slots.HYSTERESIS_YIELD]
+    return False
+
+
+@njit(**INNER)
+def step_limit(
+    state: np.ndarray, memory: np.ndarray, push: np.ndarray, done: float, p: np.ndarray
+) -> float:
+    """Return the longest step in which no curved force turns too far.
+
+    Parameters
+    ----------
+    state : ndarray, shape (N_STATE,)
+    memory : ndarray, shape (N_MEMORY,)
+    push : ndarray, shape (N_PUSH,)
+    done : float, [s]
+        Since the start of the piece.
+    p : ndarray, shape (N_SLOTS,)
+    """
+    mass = p[slots.MASS]
+    has_motor = p[slots.GEAR_STIFFNESS] > 0.0
+    if has_motor:
+        mass *= min(p[slots.MOTOR_SHARE], 1.0 - p[slots.MOTOR_SHARE])
+    x, v = state[X], state[V]
+    speed = abs(v)
+    stiffness = p[slots.STIFFNESS]
+    if p[slots.CUBIC] != 0.0 or p[slots.QUADRATIC] != 0.0:
+        bend = 3.0 * p[slots.CUBIC] * x + 2.0 * p[slots.QUADRATIC]
+        stiffness += abs(bend * x)
+    if p[slots.STOP_STIFFNESS] > 0.0 and abs(x) > p[slots.STOP_POSITION]:
+        stiffness += p[slots.STOP_STIFFNESS]
+    edge = p[slots.SIDE_POSITION]
+    if p[slots.SIDE_STIFFNESS] > 0.0 and (x - edge) * edge > 0.0:
+        stiffness += p[slots.SIDE_STIFFNESS]
+    damping = p[slots.DAMPING] + 2.0 * abs(p[slots.DRAG]) * speed
+    if has_motor and abs(state[2] - x) > p[slots.GEAR_GAP]:
+        stiffness += p[slots.GEAR_STIFFNESS]
+        damping += p[slots.GEAR_DAMPING]
+    if p[slots.CLIP_LIMIT] < np.inf:
+        damping += p[slots.FORCE_CONSTANT] * p[slots.CLIP_SLOPE]
+    if p[slots.RESISTANCE] > 0.0:
+        damping += p[slots.FORCE_CONSTANT] * p[slots.BACK_EMF] / p[slots.RESISTANCE]
+    if p[slots.COGGING_FORCE] != 0.0:
+        turn = TURN / p[slots.COGGING_PERIOD]
+        stiffness += abs(p[slots.COGGING_FORCE]) * turn
+        # A forcing, not a motion of its own: it may turn further.
+        damping += 0.12 * mass * turn * speed
+    rate = np.sqrt(stiffness / mass) + damping / mass
+    if p[slots.MODE_MASS] > 0.0:
+        both = 1.0 / p[slots.MODE_MASS] + 1.0 / mass
+        rate += np.sqrt(p[slots.MODE_STIFFNESS] * both) + p[slots.MODE_DAMPING] * both
+    if p[slots.INDUCTANCE] > 0.0:
+        rate += p[slots.RESISTANCE] / p[slots.INDUCTANCE]
+    if p[slots.HYSTERESIS_FORCE] != 0.0:
+        rate += _rate_of_yielding(state, memory, mass, p)
+    slow = p[slots.STRIBECK_VELOCITY]
+    if p[slots.STATIC_EXCESS] != 0.0 and memory[WAY] != 0.0 and speed < FAST * slow:
+        pull = abs(acceleration(state, memory, push, done, p)[0])
+        rate += abs(p[slots.STATIC_EXCESS]) / (mass * slow) + 0.5 * pull / slow
+    return LONGEST_PHASE / max(rate, 1e-9)
+
+
+@njit(**INNER)
+def _rate_of_yielding(
+    state: np.ndarray, memory: np.ndarray, mass: float, p: np.ndarray
+) -> float:
+    """Return how fast the hysteresis changes, as long as it has not yielded."""
+    gone = abs(state[X] - memory[TURNED_AT]) / p[slots.HYSTERESIS_YIELD]
+    if gone >= FAR:
+        return 0.0
+    fading = np.exp(-gone)
+    stiffness = 2.0 * abs(p[slots.HYSTERESIS_FORCE]) / p[slots.HYSTERESIS_YIELD]
+    # How much of it is left decides how exactly it has to be followed.
+    speed = abs(state[V]) / p[slots.HYSTERESIS_YIELD]
+    return np.sqrt(stiffness * fading / mass) + 0.6 * speed * np.sqrt(np.sqrt(fading))
+
+
+@njit(**INNER)
+def step_plain(
+    x: float,
+    v: float,
+    memory: np.ndarray,
+    push: np.ndarray,
+    done: float,
+    h: float,
+    p: np.ndarray,
+) -> tuple[float, float]:
+    """Return position and velocity one Runge-Kutta step on, without inner states.
+
+    Parameters
+    ----------
+    x, v : float, [m], [m/s]
+    memory : ndarray, shape (N_MEMORY,)
+    push : ndarray, shape (N_PUSH,)
+    done, h : float, [s]
+        Since the start of the piece, and length of the step.
+    p : ndarray, shape (N_SLOTS,)
+    """
+    half, inverse = 0.5 * h, 1.0 / p[slots.MASS]
+    a0, b0, c0, d0 = shift(push, DRIVE, done)
+    a1, b1, c1, d1 = shift(push, OTHER, done)
+    first, b, c, d = a0 + a1, b0 + b1, c0 + c1, d0 + d1
+    middle = first + half * (b + half * (c + half * d))
+    last = first + h * (b + h * (c + h * d))
+    k1 = (first - resisting(x, v, memory, p)) * inverse
+    v2 = v + half * k1
+    k2 = (middle - resisting(x + half * v, v2, memory, p)) * inverse
+    v3 = v + half * k2
+    k3 = (middle - resisting(x + half * v2, v3, memory, p)) * inverse
+    v4 = v + h * k3
+    k4 = (last - resisting(x + h * v3, v4, memory, p)) * inverse
+    sixth = h / 6.0
+    return x + sixth * (v + 2.0 * (v2 + v3) + v4), v + sixth * (
+        k1 + 2.0 * (k2 + k3) + k4
+    )
+
+
+@njit(**INNER)
+def step_all(
+    state: np.ndarray,
+    trial: np.ndarray,
+    memory: np.ndarray,
+    push: np.ndarray,
+    done: float,
+    h: float,
+    is_held: bool,
+    p: np.ndarray,
+) -> None:
+    """Set ``trial`` to the state one Runge-Kutta step on.
+
+    Parameters
+    ----------
+    state, trial : ndarray, shape (N_STATE,)
+    memory : ndarray, shape (N_MEMORY,)
+    push : ndarray, shape (N_PUSH,)
+    done, h : float, [s]
+        Since the start of the piece, and length of the step.
+    is_held : bool
+        Whether position and velocity of the mass stay as they are.
+    p : ndarray, shape (N_SLOTS,)
+    """
+    total, slope = np.zeros(N_STATE), np.empty(N_STATE)
+    for n in range(N_STATE):
+        trial[n] = state[n]
+    for stage in range(4):
+        at = 0.0 if stage == 0 else (h if stage == 3 else 0.5 * h)
+        a, motor, part, circuit = acceleration(trial, memory, push, done + at, p)
+        slope[0], slope[1] = trial[V], a
+        if is_held:
+            slope[0], slope[1] = 0.0, 0.0
+        slope[2], slope[3] = trial[MOTOR_V], motor
+        slope[4], slope[5], slope[6] = trial[PART_V], part, circuit
+        weight = 1.0 if stage in (0, 3) else 2.0
+        way = h if stage == 2 else 0.5 * h
+        for n in range(N_STATE):
+            total[n] += weight * slope[n]
+            trial[n] = state[n] + way * slope[n]
+    for n in range(N_STATE):
+        trial[n] = state[n] + h / 6.0 * total[n]

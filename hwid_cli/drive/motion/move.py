@@ -1,0 +1,306 @@
+"""Compiled motion of a drive with every effect, events located inside the step.
+
+Between events the motion is summed exactly where all forces are linear, and follows
+Runge-Kutta steps where one is curved. Events are stops and reversals, break-aways, and
+the edges of stops, gaps and limits; a step never straddles one. Friction at rest is
+exact: position and velocity stay as they are to the last digit.
+docs/method_diagnosis.md, eq. (D1) to (D3).
+"""
+
+import numpy as np
+from numba import njit
+
+from hwid_cli.drive import slots
+from hwid_cli.drive.command import MOST_PIECES, static_command
+from hwid_cli.drive.compiled import INNER
+from hwid_cli.drive.motion.corners import corner_of, count_edges
+from hwid_cli.drive.motion.curved import is_always_curved, step_limit
+from hwid_cli.drive.motion.events import (
+    EDGE,
+    LEAVING,
+    REVERSAL,
+    advance,
+    excess,
+    stop,
+    time_of,
+)
+from hwid_cli.drive.motion.forces import (
+    CIRCUIT,
+    LAGGED,
+    MOTOR_V,
+    MOTOR_X,
+    N_MEMORY,
+    N_STATE,
+    PART_V,
+    PART_X,
+    TURNED_AT,
+    WAY,
+    V,
+    X,
+    force_of,
+    has_dry_friction,
+    resting_point,
+    wanted_current,
+)
+from hwid_cli.drive.motion.linear import N_COLUMNS, N_INPUT, active_states, fastest
+from hwid_cli.drive.motion.pieces import LENGTH, N_PIECE, SAMPLE, list_pieces
+from hwid_cli.drive.motion.push import (
+    DRIVE,
+    N_PUSH,
+    N_ROOM,
+    depends_on_motion,
+    value_of,
+)
+from hwid_cli.drive.motion.quiet import MOST_STEPS, glide_inner, glide_plain
+
+# Where events are watched, a step turns nothing by more than this, [rad]: a longer one
+# could go there and back.
+LONGEST_PHASE = 0.5
+# Pieces that are listed at once.
+MANY_PIECES = 1000
+# Most events in one piece; what rattles more often is followed less exactly.
+MOST_EVENTS = 100
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def move(
+    command: np.ndarray, sample_time: float, given_p: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return position, velocity and command at every sample.
+
+    Parameters
+    ----------
+    command : ndarray, shape (n,), [A] or [V]; the reference [m] under a controller
+    sample_time : float, [s]
+    given_p : ndarray, shape (N_SLOTS,)
+    """
+    n = command.size
+    p = given_p.copy()
+    positions, velocities, given = np.empty(n), np.empty(n), command.copy()
+    is_closed = p[slots.VELOCITY_GAIN] > 0.0
+    before = 0.0 if is_closed else command[0]
+    state, memory = np.zeros(N_STATE), np.zeros(N_MEMORY)
+    followed = _start(state, memory, before, p)
+    trial, inputs, active = state.copy(), np.zeros(N_INPUT), active_states(p)
+    kind, step, matrices, lengths = _prepare(sample_time, p)
+    # Pieces are listed for many samples at once, or for one after the other where the
+    # command or the temperature depends on the motion.
+    is_single = is_closed or (depends_on_motion(p) and p[slots.THERMAL_LOSS] != 0.0)
+    pieces = np.empty((MOST_PIECES + (0 if is_single else MANY_PIECES), N_PIECE))
+    pushes, ends = np.zeros((pieces.shape[0], N_PUSH)), np.empty((2, n))
+    room = np.zeros(N_ROOM)
+    positions[0], velocities[0] = state[X], state[V]
+    # Not plain 0: numba would compile what it is handed to twice.
+    sample = np.int64(0)
+    while sample < n and np.isfinite(positions[sample]):
+        if is_closed:
+            given[sample] = _controlled(
+                command[sample], positions[sample], velocities[sample], p
+            )
+        now = _current_now(given[sample], state, p) if is_single else 0.0
+        count, followed, sample = list_pieces(
+            sample, sample_time, given, ends, before, followed, now, pieces, pushes,
+            room, memory, p,
+        )  # fmt: skip
+        j = np.int64(0)
+        while j < count:
+            push, length, done = pushes[j], pieces[j, LENGTH], 0.0
+            if kind[0]:
+                done = glide_inner(
+                    state, trial, memory, push, length, step, kind, matrices,
+                    lengths, inputs, active, p,
+                )  # fmt: skip
+            else:
+                j, done = glide_plain(
+                    j, count, pieces, pushes, positions, velocities, state, memory,
+                    step, kind, matrices, lengths, p,
+                )  # fmt: skip
+                if j == count:
+                    break
+                push, length = pushes[j], pieces[j, LENGTH]
+            if done < length:
+                _move_piece(
+                    state, trial, memory, push, done, length, step, kind, inputs, p
+                )
+            at = int(pieces[j, SAMPLE])
+            if at >= 0:
+                positions[at], velocities[at] = state[X], state[V]
+            j += 1
+        if count == 0:
+            break
+    _blank(positions, velocities, given)
+    return positions, velocities, given
+
+
+@njit(**INNER)
+def _blank(positions: np.ndarray, velocities: np.ndarray, given: np.ndarray) -> None:
+    """Set everything to NaN from where the simulation has run away."""
+    is_away = False
+    for i in range(positions.size):
+        is_away = is_away or not np.isfinite(positions[i])
+        if is_away:
+            positions[i] = velocities[i] = given[i] = np.nan
+
+
+@njit(**INNER)
+def _prepare(
+    sample_time: float, p: np.ndarray
+) -> tuple[tuple[bool, bool, bool, bool, bool, float], float, np.ndarray, np.ndarray]:
+    """Return what kind of drive it is, its longest linear step, and room for matrices."""
+    rate = fastest(p)
+    n_edges = count_edges(p)
+    is_watched = has_dry_friction(p) or p[slots.HYSTERESIS_FORCE] != 0.0
+    has_inner = (
+        p[slots.GEAR_STIFFNESS] > 0.0
+        or p[slots.MODE_MASS] > 0.0
+        or depends_on_motion(p)
+    )
+    at_times = p[slots.STATIC_EXCESS] != 0.0 or p[slots.HYSTERESIS_FORCE] != 0.0
+    kind = (has_inner, n_edges > 0, is_always_curved(p), is_watched, at_times, rate)
+    count = 1
+    if n_edges > 0 or is_watched:
+        count = int(
+            min(max(np.ceil(sample_time * rate / LONGEST_PHASE), 1), MOST_STEPS)
+        )
+    # Lengths that come back in every sample: whole steps, and both parts that a delay
+    # makes of a sample.
+    whole = np.floor(p[slots.DELAY] / sample_time) * sample_time
+    part = p[slots.DELAY] - whole
+    lengths = np.array([sample_time / count, part, sample_time - part])
+    matrices = np.zeros((lengths.size * 2 * 3**n_edges, N_STATE, N_COLUMNS))
+    return kind, sample_time / count, matrices, lengths
+
+
+@njit(**INNER)
+def _controlled(reference: float, x: float, v: float, p: np.ndarray) -> float:
+    wanted = p[slots.VELOCITY_GAIN] * (p[slots.POSITION_GAIN] * (reference - x) - v)
+    limit = p[slots.COMMAND_LIMIT]
+    return min(max(wanted, -limit), limit)
+
+
+@njit(**INNER)
+def _start(
+    state: np.ndarray, memory: np.ndarray, command: float, p: np.ndarray
+) -> float:
+    """Set the drive to rest in equilibrium, or to the given start."""
+    command = static_command(command, p)
+    memory[LAGGED] = command
+    current = command
+    if p[slots.RESISTANCE] > 0.0:
+        current = command / p[slots.RESISTANCE]
+        state[CIRCUIT] = current
+    p[slots.COGGING_REST] = np.sin(p[slots.COGGING_PHASE])
+    if p[slots.STIFFNESS] > 0.0:
+        p[slots.COGGING_ORIGIN] = resting_point(0.0, False, p)
+    if p[slots.IS_START_GIVEN] > 0.0:
+        state[X] = p[slots.START_POSITION]
+        state[V] = p[slots.START_VELOCITY]
+    else:
+        state[X] = resting_point(current, True, p)
+    if p[slots.GEAR_STIFFNESS] > 0.0:
+        # Of both masses that swing against each other on the teeth.
+        swinging = p[slots.MASS] * p[slots.MOTOR_SHARE] * (1.0 - p[slots.MOTOR_SHARE])
+        p[slots.GEAR_DAMPING] = 2.0 * p[slots.GEAR_DAMPING_RATIO]
+        p[slots.GEAR_DAMPING] *= np.sqrt(p[slots.GEAR_STIFFNESS] * swinging)
+    limit = p[slots.CLIP_LIMIT]
+    force = force_of(min(max(current, -limit), limit), 0.0, p)
+    state[MOTOR_X] = state[X]
+    if p[slots.GEAR_STIFFNESS] > 0.0 and force != 0.0:
+        state[MOTOR_X] += np.sign(force) * p[slots.GEAR_GAP]
+        state[MOTOR_X] += force / p[slots.GEAR_STIFFNESS]
+    state[MOTOR_V] = state[V]
+    state[PART_X], state[PART_V] = state[X], state[V]
+    memory[WAY] = np.sign(state[V])
+    memory[TURNED_AT] = state[X]
+    return command
+
+
+@njit(**INNER)
+def _current_now(command: float, state: np.ndarray, p: np.ndarray) -> float:
+    speed = state[MOTOR_V] if p[slots.GEAR_STIFFNESS] > 0.0 else state[V]
+    middle, limit = -p[slots.CLIP_SLOPE] * speed, p[slots.CLIP_LIMIT]
+    current = wanted_current(command, state, p)
+    return min(max(current, middle - limit), middle + limit)
+
+
+@njit(**INNER)
+def _move_piece(
+    state: np.ndarray,
+    trial: np.ndarray,
+    memory: np.ndarray,
+    push: np.ndarray,
+    done: float,
+    length: float,
+    step: float,
+    kind: tuple[bool, bool, bool, bool, bool, float],
+    inputs: np.ndarray,
+    p: np.ndarray,
+) -> None:
+    """Move through what is left of one straight piece of the command."""
+    _, has_edges, is_curved, is_watched, is_curved_at_times, _ = kind
+    corner = corner_of(state, value_of(push, DRIVE, done), p)
+    events, is_stuck = 0, False
+    while done < length:
+        left = length - done
+        h = left if left <= step else left / np.ceil(left / step)
+        is_held = is_watched and memory[WAY] == 0.0
+        is_wild = events > MOST_EVENTS
+        if is_held and not is_wild and not is_stuck:
+            net, more = excess(state, memory, push, done, p)
+            if more > 0.0:
+                memory[WAY] = np.sign(net)
+                is_held = False
+                events += 1
+        if is_curved or is_curved_at_times:
+            limit = step_limit(state, memory, push, done, p)
+            limit = max(limit, length / MOST_STEPS)
+            if limit < h:
+                h = left / np.ceil(left / limit)
+        advance(state, trial, memory, push, done, h, corner, is_held, kind, inputs, p)
+        is_turned = is_watched and not is_held and memory[WAY] * trial[V] < 0.0
+        event = -1
+        if is_turned:
+            event = REVERSAL
+        elif is_held and not is_stuck:
+            more = excess(trial, memory, push, done + h, p)[1]
+            event = LEAVING if more > 0.0 else -1
+        is_stuck = False
+        is_leaving = event == LEAVING and not is_wild
+        for stage in range(2):
+            if stage == 1:
+                event = -1
+                if has_edges:
+                    there = corner_of(trial, value_of(push, DRIVE, done + h), p)
+                    event = EDGE if there[0] != corner[0] else -1
+            if event < 0 or is_wild:
+                continue
+            events += 1
+            when = time_of(
+                event, state, trial, memory, push, done, h, corner, is_held, kind,
+                inputs, p,
+            )  # fmt: skip
+            if when == 0.0 and event == REVERSAL:
+                is_stuck = True
+                break
+            if event == EDGE:
+                # The other event only counts if the edge is not before it.
+                is_leaving = is_leaving and when == h
+                is_turned = is_turned and when == h
+                trial[V] = 0.0 if is_turned else trial[V]
+            h = when
+        if is_stuck:
+            # It left on rounding only: rest for one step.
+            state[V], memory[WAY] = 0.0, 0.0
+            continue
+        for n in range(N_STATE):
+            state[n] = trial[n]
+        done = length if h >= left * (1.0 - 1e-12) else done + h
+        if has_edges:
+            corner = corner_of(state, value_of(push, DRIVE, done), p)
+        if is_leaving:
+            # Whether the force here is a last bit above or below, it is growing.
+            memory[WAY] = np.sign(excess(state, memory, push, done, p)[0])
+        if is_turned and is_wild:
+            memory[WAY] = np.sign(state[V])
+        elif is_turned:
+            stop(state, memory, push, done, p)

@@ -1,0 +1,244 @@
+"""Compiled push of the drive within one straight piece of the command.
+
+Lag, losses of the force constant, heating and a periodic force make a curve of time
+out of the straight piece. A cubic stands for it, the projection on polynomials (five
+Gauss points): it has the same mean and moments, so that even a lag much faster than
+the piece gives the right motion. docs/method_diagnosis.md, eq. (D5), (D6), (D12).
+"""
+
+import numpy as np
+from numba import njit
+
+from hwid_cli.drive import slots
+from hwid_cli.drive.compiled import INNER
+
+TURN = 2.0 * np.pi
+# Places in the push: cubic of the drive's force (or command, where the current depends
+# on the motion), cubic of the other forces, temperature in the middle.
+DRIVE, OTHER, WARMTH, N_PUSH = 0, 4, 8, 9
+# Numbers that depend on the length of a piece alone.
+N_ROOM = 17
+# Gauss-Legendre points and weights on -1 to 1.
+_POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(5)
+# Rows: what each point adds to the coefficients of 1, s, s^2, s^3, with s from 0 to 1.
+_P1, _P2 = _POINTS, 1.5 * _POINTS**2 - 0.5
+_P3 = 2.5 * _POINTS**3 - 1.5 * _POINTS
+_C0, _C1, _C2, _C3 = (
+    (n + 0.5) * _WEIGHTS * legendre
+    for n, legendre in enumerate((np.ones(5), _P1, _P2, _P3))
+)
+_PROJECT = np.column_stack(
+    [
+        _C0 - _C1 + _C2 - _C3,
+        2.0 * _C1 - 6.0 * _C2 + 12.0 * _C3,
+        6.0 * _C2 - 30.0 * _C3,
+        20.0 * _C3,
+    ]
+)
+_SHARES = 0.5 * (_POINTS + 1.0)
+_HALF_WEIGHTS = 0.5 * _WEIGHTS
+
+
+@njit(**INNER)
+def depends_on_motion(p: np.ndarray) -> bool:
+    """Return whether the current depends on the motion.
+
+    Parameters
+    ----------
+    p : ndarray, shape (N_SLOTS,)
+    """
+    return p[slots.RESISTANCE] > 0.0 or p[slots.CLIP_LIMIT] < np.inf
+
+
+@njit(**INNER)
+def has_losses(p: np.ndarray) -> bool:
+    """Return whether the force is no constant times the current.
+
+    Parameters
+    ----------
+    p : ndarray, shape (N_SLOTS,)
+    """
+    return (
+        p[slots.SATURATION_LOSS] != 0.0
+        or p[slots.SAG_LOSS] != 0.0
+        or p[slots.THERMAL_LOSS] != 0.0
+    )
+
+
+@njit(**INNER)
+def is_straight(p: np.ndarray) -> bool:
+    """Return whether straight pieces of the command give straight pieces of force.
+
+    Parameters
+    ----------
+    p : ndarray, shape (N_SLOTS,)
+    """
+    is_bent = not depends_on_motion(p) and has_losses(p)
+    is_bent = is_bent or p[slots.LAG] > 0.0 or p[slots.PERIODIC_FORCE] != 0.0
+    return not is_bent
+
+
+@njit(**INNER)
+def force_of(current: float, warmth: float, p: np.ndarray) -> float:
+    """Return the force that a current makes.
+
+    Parameters
+    ----------
+    current : float, [A]
+    warmth : float, [-]
+    p : ndarray, shape (N_SLOTS,)
+    """
+    share = abs(current) / p[slots.REFERENCE_CURRENT]
+    loss = (p[slots.SATURATION_LOSS] * share + p[slots.SAG_LOSS]) * share
+    loss += p[slots.THERMAL_LOSS] * warmth
+    return p[slots.FORCE_CONSTANT] * (1.0 - loss) * current
+
+
+@njit(**INNER)
+def prepare_push(room: np.ndarray, length: float, p: np.ndarray) -> None:
+    """Prepare what depends on the length of a piece alone.
+
+    Parameters
+    ----------
+    room : ndarray, shape (N_ROOM,)
+        Length; fading of the lag at the Gauss points and at the end; fading of the
+        temperature; cubics of sine and cosine of the periodic force.
+    length : float, [s]
+    p : ndarray, shape (N_SLOTS,)
+    """
+    room[0] = length
+    if p[slots.LAG] > 0.0:
+        for j in range(5):
+            room[1 + j] = np.exp(-_SHARES[j] * length / p[slots.LAG])
+        room[6] = np.exp(-length / p[slots.LAG])
+    if p[slots.THERMAL_LOSS] != 0.0:
+        room[7] = np.exp(-length / p[slots.THERMAL_TIME])
+        room[8] = np.sqrt(room[7])
+    if p[slots.PERIODIC_FORCE] != 0.0:
+        for n in range(9, N_ROOM):
+            room[n] = 0.0
+        for j in range(5):
+            angle = TURN * p[slots.PERIODIC_FREQUENCY] * _SHARES[j] * length
+            for n in range(4):
+                room[9 + n] += _PROJECT[j, n] * np.cos(angle)
+                room[13 + n] += _PROJECT[j, n] * np.sin(angle)
+
+
+@njit(**INNER)
+def set_push(
+    push: np.ndarray,
+    room: np.ndarray,
+    memory: np.ndarray,
+    piece: tuple[float, float, float, float],
+    current_now: float,
+    p: np.ndarray,
+) -> None:
+    """Set the cubics of one piece; move lag and temperature to its end.
+
+    Parameters
+    ----------
+    push : ndarray, shape (N_PUSH,)
+    room : ndarray, shape (N_ROOM,)
+        From ``prepare_push``; prepared again where the length is another one.
+    memory : ndarray, shape (N_MEMORY,)
+        The fourth is the current after the lag, the fifth the temperature.
+    piece : tuple
+        Time at its start [s], length [s], command at both ends.
+    current_now : float, [A]
+        What flows at its start; read where the current depends on the motion.
+    p : ndarray, shape (N_SLOTS,)
+    """
+    time, length, first, last = piece
+    if room[0] != length:
+        prepare_push(room, length, p)
+    lag, swing = p[slots.LAG], p[slots.PERIODIC_FORCE]
+    depends, is_hot = depends_on_motion(p), p[slots.THERMAL_LOSS] != 0.0
+    is_force = has_losses(p) and not depends
+    rise = last - first
+    steady, fading = first, 0.0
+    if lag > 0.0:
+        steady = first - rise * lag / length
+        fading = memory[3] - steady
+    for n in range(4):
+        push[DRIVE + n], push[OTHER + n] = 0.0, 0.0
+    push[OTHER] = p[slots.LOAD]
+    cold = memory[4]
+    if is_hot:
+        square = current_now / p[slots.REFERENCE_CURRENT]
+        square *= square
+        if not depends:
+            square = 0.0
+            for j in range(5):
+                share = steady + rise * _SHARES[j] + fading * room[1 + j]
+                share /= p[slots.REFERENCE_CURRENT]
+                square += _HALF_WEIGHTS[j] * share * share
+        push[WARMTH] = square + (cold - square) * room[8]
+        memory[4] = square + (cold - square) * room[7]
+    if lag > 0.0 or is_force:
+        for j in range(5):
+            value = steady + rise * _SHARES[j] + fading * room[1 + j]
+            if is_force:
+                value = force_of(value, cold + (memory[4] - cold) * _SHARES[j], p)
+            elif not depends:
+                value *= p[slots.FORCE_CONSTANT]
+            for n in range(4):
+                push[DRIVE + n] += _PROJECT[j, n] * value
+    else:
+        gain = 1.0 if depends else p[slots.FORCE_CONSTANT]
+        push[DRIVE] = gain * first
+        push[DRIVE + 1] = gain * rise
+    if swing != 0.0:
+        angle = TURN * p[slots.PERIODIC_FREQUENCY] * time + p[slots.PERIODIC_PHASE]
+        sine, cosine = swing * np.sin(angle), swing * np.cos(angle)
+        for n in range(4):
+            push[OTHER + n] += sine * room[9 + n] + cosine * room[13 + n]
+    memory[3] = last
+    if lag > 0.0:
+        memory[3] = steady + rise + fading * room[6]
+    # From shares of the piece to seconds.
+    scale = 1.0
+    for n in range(1, 4):
+        scale /= length
+        push[DRIVE + n] *= scale
+        push[OTHER + n] *= scale
+
+
+@njit(**INNER)
+def value_of(push: np.ndarray, which: int, done: float) -> float:
+    """Return the value of a cubic.
+
+    Parameters
+    ----------
+    push : ndarray, shape (N_PUSH,)
+    which : int
+        DRIVE or OTHER.
+    done : float, [s]
+        Since the start of the piece.
+    """
+    rest = push[which + 2] + done * push[which + 3]
+    return push[which] + done * (push[which + 1] + done * rest)
+
+
+@njit(**INNER)
+def shift(
+    push: np.ndarray, which: int, done: float
+) -> tuple[float, float, float, float]:
+    """Return the cubic's coefficients counted from a later time.
+
+    Parameters
+    ----------
+    push : ndarray, shape (N_PUSH,)
+    which : int
+        DRIVE or OTHER.
+    done : float, [s]
+        Since the start of the piece.
+    """
+    a, b, c, d = push[which], push[which + 1], push[which + 2], push[which + 3]
+    if done == 0.0:
+        return a, b, c, d
+    return (
+        a + done * (b + done * (c + done * d)),
+        b + done * (2.0 * c + 3.0 * done * d),
+        c + 3.0 * done * d,
+        d,
+    )

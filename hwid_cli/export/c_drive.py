@@ -1,0 +1,62 @@
+"""A physics simulation as one self-contained C99 file."""
+
+import math
+import textwrap
+
+from hwid_cli.errors import ConfigError
+from hwid_cli.export.c_source import card_words, filled, numbers
+from hwid_cli.export.names import in_comment
+from hwid_cli.records.exported import ExportedSimulation
+
+_WIDTH = 84
+_HOLDS = {"linear": "a straight line", "zero": "held"}
+# A longer delay would make the state of the model unbearably large, [samples].
+_LONGEST_DELAY = 100_000
+
+
+def drive_source(exported: ExportedSimulation) -> str:
+    """Text of a C file that computes what ``hwid predict`` does.
+
+    Parameters
+    ----------
+    exported : ExportedSimulation
+        With its slots.
+
+    Returns
+    -------
+    str
+        ASCII.
+
+    Raises
+    ------
+    ConfigError
+        If it holds something that no program can do sample by sample.
+    """
+    drive, step = exported.drive, exported.sample_time_s
+    if drive.hold not in _HOLDS:
+        raise ConfigError(
+            f"--format c: simulation.hold {drive.hold}: follows a smooth curve through "
+            "inputs that are yet to come; expected linear or zero; use --format json"
+        )
+    delay = max(
+        float(values.get("delay_s", 0.0)) for values in ({}, *drive.effects.values())
+    )
+    n_history = math.floor(delay / step) + 2
+    if n_history > _LONGEST_DELAY:
+        raise ConfigError(
+            f"--format c: simulation.effects.input_delay.delay_s {delay:g}: expected at "
+            f"most {_LONGEST_DELAY} samples of {step:g} s; use --format json"
+        )
+    effects = ", ".join(drive.effects) or "mass, spring and damper"
+    return filled(
+        "drive.c",
+        {
+            **card_words(exported.card, step),
+            "effects": "\n * ".join(textwrap.wrap(in_comment(effects), _WIDTH)),
+            "hold": _HOLDS[drive.hold],
+            "n_slots": exported.slots.size,
+            "n_history": n_history,
+            "kernels": filled("drive_kernels.c", {}),
+            "parameters": numbers(exported.slots),
+        },
+    )

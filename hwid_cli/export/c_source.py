@@ -1,0 +1,156 @@
+"""A Hammerstein-Wiener model as one self-contained C99 file."""
+
+import re
+import textwrap
+from collections.abc import Iterable, Mapping
+from importlib.resources import files
+
+import numpy as np
+
+from hwid_cli import __version__
+from hwid_cli.errors import ConfigError
+from hwid_cli.export.map_parts import parts_of
+from hwid_cli.export.names import in_comment
+from hwid_cli.records.exported import ExportedModel, ModelCard
+from hwid_cli.records.maps import StaticMap
+from hwid_cli.records.units import behind
+
+_SOURCES = files("hwid_cli.export") / "sources"
+_WIDTH = 84
+# A handle of MATLAB has a parenthesis after the sign.
+_BLANK = re.compile("@([A-Za-z_]+)@")
+_RULES = {
+    "zero": "an empty linear block",
+    "steady": "equilibrium with the first input",
+    "estimated": "the state of the first recording of the fit",
+}
+
+
+def c_source(exported: ExportedModel) -> str:
+    """Text of a C file that computes what ``hwid predict`` does.
+
+    Returns
+    -------
+    str
+        ASCII.
+
+    Raises
+    ------
+    ConfigError
+        If a map is a Python function, of which C knows nothing.
+    """
+    model = exported.model
+    orders, free = model.orders, model.free_response
+    # The recursion takes four coefficients at a time.
+    size_f = 4 * max(1, -(-orders.nf // 4))
+    missing = np.zeros(size_f - orders.nf)
+    return filled(
+        "model.c",
+        {
+            **card_words(exported.card, model.sample_time_s),
+            "rule": _RULES[model.initial_state],
+            "input_map": _map("input", model.input_map, exported.input_bends),
+            "output_map": _map("output", model.output_map, exported.output_bends),
+            "nb": orders.nb,
+            "nk": orders.nk,
+            "size_w": orders.nb + orders.nk,
+            "size_f": size_f,
+            "size_c": max(free.size, 1),
+            "n_free": free.size,
+            "numerator": numbers(model.numerator),
+            "denominator": numbers(np.append(model.denominator[1:], missing)),
+            "free_response": numbers(free if free.size else np.zeros(1)),
+            "static_gain": number(exported.static_gain),
+            "is_steady": int(model.initial_state == "steady"),
+            "has_free": int(free.size > 0),
+        },
+    )
+
+
+def card_words(card: ModelCard, sample_time_s: float) -> dict[str, str]:
+    """What the comment at the top of a source says.
+
+    Parameters
+    ----------
+    sample_time_s : float, [s]
+
+    Returns
+    -------
+    dict of str to str
+        Safe inside a comment.
+    """
+    low, high = card.input_range
+    # The dash of a dimensionless input would be a minus behind a number.
+    ends = f"{low:.6g} to {high:.6g}{behind(card.input_unit)}"
+    about = (
+        f"Model {card.name}, written by hwid {__version__}. Its data have inputs from "
+        f"{ends}."
+    )
+    lines = textwrap.wrap(in_comment(about), _WIDTH)
+    return {
+        "title": in_comment(card.title),
+        "about": "\n * ".join(lines),
+        "sample_time": repr(sample_time_s),
+        "input_unit": in_comment(card.input_unit),
+        "output_unit": in_comment(card.output_unit),
+    }
+
+
+def filled(name: str, words: Mapping[str, object]) -> str:
+    """A source file with its blanks filled in.
+
+    Parameters
+    ----------
+    name : str
+        Path below ``sources``.
+    words : mapping of str to object
+        By the names that stand between ``@`` signs.
+    """
+    text = (_SOURCES / name).read_text(encoding="ascii")
+    return _BLANK.sub(lambda found: str(words[found[1]]), text)
+
+
+def number(value: float) -> str:
+    """A number as C reads it, bit by bit the same.
+
+    Examples
+    --------
+    >>> number(0.1), number(float("-inf"))
+    ('0.1', '-HUGE_VAL')
+    """
+    if np.isinf(value):
+        return "HUGE_VAL" if value > 0 else "-HUGE_VAL"
+    # The shortest decimal that is read back as the same number.
+    return repr(float(value))
+
+
+def numbers(values: Iterable[float]) -> str:
+    """Numbers as C reads them, in lines of bearable length."""
+    line = ", ".join(number(value) for value in values)
+    if len(line) < _WIDTH // 2:
+        return line
+    return "\n" + textwrap.indent(textwrap.fill(line, _WIDTH - 4), " " * 4)
+
+
+def _map(side: str, one: StaticMap, bends: np.ndarray) -> str:
+    if one.function is not None:
+        raise ConfigError(
+            f"--format: the {side} map is the Python function {one.function.name!r}, "
+            "which C does not know; expected another kind of map; use --format json"
+        )
+    parts = parts_of(one)
+    count = len(next(iter(parts.values()))) if parts else 0
+    if one.kind == "cubic_spline":
+        count = bends.size
+    words = {name: numbers(values) for name, values in parts.items()}
+    return filled(
+        f"maps/{one.kind}.c",
+        {
+            **words,
+            "side": side,
+            "count": count,
+            "count_less_one": count - 1,
+            "bends": numbers(bends),
+            "domain": numbers(one.domain),
+        },
+    )

@@ -1,0 +1,101 @@
+"""A Hammerstein-Wiener model for MATLAB and Octave: numbers, and a function beside them."""
+
+import io
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.io import savemat
+
+from hwid_cli.errors import ConfigError
+from hwid_cli.export.c_source import card_words, filled
+from hwid_cli.export.json_writer import described
+from hwid_cli.export.map_parts import parts_of
+from hwid_cli.export.names import identifier
+from hwid_cli.files.atomic import replace_file
+from hwid_cli.records.exported import ExportedModel
+from hwid_cli.records.maps import StaticMap
+
+
+def write_mat(path: Path, exported: ExportedModel) -> Path:
+    """Write a MAT file and a function that computes with it.
+
+    Parameters
+    ----------
+    path : Path
+        Of the MAT file.
+
+    Returns
+    -------
+    Path
+        Of the function.
+
+    Raises
+    ------
+    ConfigError
+        If a map is a Python function.
+    CacheError
+        If a file cannot be written.
+    """
+    name = identifier(exported.card.name)
+    content = io.BytesIO()
+    savemat(content, _variables(exported), long_field_names=True, oned_as="row")
+    words = card_words(exported.card, exported.sample_time_s)
+    script = filled(
+        "model.m",
+        {
+            **words,
+            "about": words["about"].replace("\n *", "\n%  "),
+            "identifier": name,
+            "IDENTIFIER": name.upper(),
+            "mat_file": path.name.replace("'", "''"),
+        },
+    )
+    replace_file(path, content.getvalue())
+    beside = path.with_name(f"{name}.m")
+    replace_file(beside, script.encode("utf-8"))
+    return beside
+
+
+def _variables(exported: ExportedModel) -> dict[str, Any]:
+    model = exported.model
+    content = described(exported)
+    units, columns = content["units"], content["columns"]
+    return {
+        "name": content["name"],
+        "title": content["title"],
+        "created_by": content["created_by"],
+        "schema_version": float(content["schema_version"]),
+        "sample_time_s": model.sample_time_s,
+        "nb": float(model.orders.nb),
+        "nf": float(model.orders.nf),
+        "nk": float(model.orders.nk),
+        # As `filter` takes them: the delay is leading zeros.
+        "B": np.concatenate([np.zeros(model.delay), model.numerator]),
+        "F": model.denominator,
+        "C": model.free_response,
+        "static_gain": exported.static_gain,
+        "input_map": _map("input", model.input_map, exported.input_bends),
+        "output_map": _map("output", model.output_map, exported.output_bends),
+        "initial_state": model.initial_state,
+        "units": units,
+        "columns": {key: "" if one is None else one for key, one in columns.items()},
+        "scales": content["scales"],
+        "input_range": np.array(content["input_range"]),
+        # Nested configurations have keys that MATLAB refuses: jsondecode reads them.
+        "provenance": json.dumps(content["provenance"]),
+    }
+
+
+def _map(side: str, one: StaticMap, bends: np.ndarray) -> dict[str, Any]:
+    if one.function is not None:
+        raise ConfigError(
+            f"--format: the {side} map is the Python function {one.function.name!r}, "
+            "which MATLAB does not know; expected another kind of map; use --format json"
+        )
+    content: dict[str, Any] = {"kind": one.kind, **parts_of(one)}
+    if one.kind == "cubic_spline":
+        content["bends"] = bends
+    content["domain"] = np.array(one.domain)
+    return content

@@ -1,0 +1,59 @@
+"""What an exported model makes of an input."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from hwid_cli.drive.simulation import simulate_drive
+from hwid_cli.errors import ModelFileError
+from hwid_cli.export.contents import check_stability
+from hwid_cli.model.simulate import simulate
+from hwid_cli.records.exported import Exported, ExportedSimulation
+from hwid_cli.records.model import HammersteinWiener
+
+
+def predict(
+    exported: Exported,
+    signal: np.ndarray,
+    *,
+    initial_state: str = "fitted",
+    place: str = "model",
+) -> np.ndarray:
+    """Output of an exported model for an input.
+
+    Parameters
+    ----------
+    signal : ndarray, shape (n_samples,), [input unit]
+    initial_state : str
+        One of ``STARTS_OF_PREDICTIONS``. ``fitted``: by the model's own rule, as
+        ``simulate`` does. A physics simulation starts at rest in equilibrium.
+    place : str
+        File that holds the model, for messages.
+
+    Returns
+    -------
+    ndarray, shape (n_samples,), [output unit]
+
+    Raises
+    ------
+    ModelFileError
+        If the model is not stable, or a simulation is asked to start otherwise.
+    """
+    if isinstance(exported, ExportedSimulation):
+        if initial_state == "empty":
+            raise ModelFileError(
+                f"--initial-state {initial_state}: {place} is a physics simulation, "
+                "which starts at rest; expected steady; leave the option out"
+            )
+        step = exported.sample_time_s
+        return simulate_drive(signal, exported.drive, sample_time_s=step).output
+    check_stability(exported.model, place)
+    if initial_state == "fitted":
+        return simulate(exported.model, signal)
+    if initial_state == "steady":
+        return simulate(exported.model, signal, initial_state="steady")
+    return simulate(_emptied(exported.model), signal)
+
+
+def _emptied(model: HammersteinWiener) -> HammersteinWiener:
+    return replace(model, initial_state="zero", free_response=np.zeros(0))

@@ -1,0 +1,190 @@
+"""The input that a prediction reads, and the file that it writes."""
+
+import csv
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from hwid_cli.data.columns import Column, keep_rows, place_of
+from hwid_cli.data.formats import read_columns
+from hwid_cli.errors import ConfigError, MeasurementError
+from hwid_cli.files.csv_tables import write_table_csv
+from hwid_cli.records.experiment import Columns
+from hwid_cli.records.exported import Exported
+
+# A time column may jitter by this share of a step, and differ so much in its mean step.
+_TOLERANCE = 0.01
+# So much of a file's first line tells whether it is a prediction, [characters].
+_LONGEST_HEADER = 10_000
+
+
+def read_input(path: Path, exported: Exported) -> tuple[np.ndarray, np.ndarray]:
+    """Read time and input as a model's file names them.
+
+    Parameters
+    ----------
+    path : Path
+        CSV, MAT, NPZ or H5.
+
+    Returns
+    -------
+    time : ndarray, shape (n_samples,), [s]
+        Counted from zero where the model names no column of time.
+    values : ndarray, shape (n_samples,)
+        As they stand in the file.
+
+    Raises
+    ------
+    MeasurementError
+        If the file or a column is missing, a value no finite number, or the sample time
+        another one than the model's.
+    """
+    if not path.is_file():
+        raise MeasurementError(
+            f"{path}: no such file; expected measurements of the input; correct the path"
+        )
+    columns, step = exported.card.columns, exported.sample_time_s
+    # Nobody knows the output yet: the input's column stands in for it.
+    wanted = Columns(
+        input=columns.input,
+        output=columns.input,
+        time=columns.time,
+        variable=columns.variable,
+    )
+    found = read_columns(path, wanted)
+    _check_numbers(path, found.input)
+    if found.time is None:
+        return step * np.arange(found.input.values.size), found.input.values
+    n, time = found.input.values.size, found.time
+    if time.values.size < n:
+        raise MeasurementError(
+            f"{path}: {found.input.title} has {n} values and {time.title} "
+            f"{time.values.size}; expected a time for each; fill or cut the columns"
+        )
+    # Raw measurements may go on with the output for a while.
+    time = keep_rows(time, slice(n))
+    _check_numbers(path, time)
+    _check_steps(path, time, step)
+    return time.values, found.input.values
+
+
+def _check_numbers(path: Path, column: Column) -> None:
+    if column.values.size == 0:
+        raise MeasurementError(
+            f"{path}: {column.title} holds no numbers; expected at least one; export "
+            "the file again"
+        )
+    wrong = np.flatnonzero(~np.isfinite(column.values))
+    if wrong.size:
+        at = int(wrong[0])
+        stands = column.texts.get(int(column.rows[at]), str(column.values[at]))
+        raise MeasurementError(
+            f"{place_of(path, column, at)}: {column.title} is {stands!r}; expected a "
+            "finite number; correct the row"
+        )
+
+
+def _check_steps(path: Path, time: Column, step: float) -> None:
+    """Refuse a file that is sampled otherwise than the model."""
+    if time.values.size == 1:
+        return
+    steps = np.diff(time.values)
+    median = float(np.median(steps))
+    if abs(median - step) > _TOLERANCE * step:
+        raise MeasurementError(
+            f"{path}: {time.title} steps by {median:.6g} s; expected {step:.6g} s, the "
+            "sample time of the model; resample the file"
+        )
+    off = np.abs(steps - step)
+    if off.max() > _TOLERANCE * step:
+        at = int(np.argmax(off))
+        raise MeasurementError(
+            f"{place_of(path, time, at + 1)}: {time.title} steps by {steps[at]:.6g} s; "
+            f"expected {step:.6g} s throughout; cut the file there or resample it"
+        )
+
+
+def check_target(path: Path, read: Sequence[Path], *, is_forced: bool) -> None:
+    """Refuse to write a prediction over a file that is none.
+
+    Parameters
+    ----------
+    path : Path
+        Of the prediction.
+    read : sequence of Path
+        Files that were read; they are never written.
+    is_forced : bool
+        Whether any other file may be replaced.
+
+    Raises
+    ------
+    ConfigError
+        If the folder is missing, or another file would be lost.
+    """
+    if not path.parent.is_dir():
+        raise ConfigError(
+            f"--out: found {path}, and there is no folder {path.parent}; expected a file "
+            "in a folder that exists; make the folder or correct the path"
+        )
+    if not path.is_file():
+        return
+    if any(path.samefile(one) for one in read):
+        raise ConfigError(
+            f"--out: found {path}, which is read for the prediction; expected another "
+            "file; choose one"
+        )
+    if not (is_forced or _is_prediction(path)):
+        raise ConfigError(
+            f"--out: found {path}, an existing file that is no prediction; expected a "
+            "new file or an old prediction; choose another one, or replace it with --force"
+        )
+
+
+def _is_prediction(path: Path) -> bool:
+    """Whether the first line is the header that ``write_prediction`` writes."""
+    try:
+        with path.open(encoding="utf-8", newline="") as file:
+            names = next(csv.reader([file.readline(_LONGEST_HEADER)]), [])
+    except (OSError, UnicodeDecodeError, csv.Error):
+        return False
+    return len(names) == 3 and (names[0], names[2]) == ("time", "predicted")
+
+
+def write_prediction(
+    path: Path,
+    exported: Exported,
+    time: np.ndarray,
+    values: np.ndarray,
+    predicted: np.ndarray,
+) -> None:
+    """Write ``prediction.csv``.
+
+    Parameters
+    ----------
+    exported : ExportedModel or ExportedSimulation
+        Its file names the column of the input.
+    time, values, predicted : ndarray, shape (n_samples,)
+        Time [s], input as it was read, output [output unit].
+
+    Raises
+    ------
+    CacheError
+        If it cannot be written.
+    """
+    header = ("time", prediction_column(exported), "predicted")
+    columns = (column.tolist() for column in (time, values, predicted))
+    write_table_csv(path, header, zip(*columns, strict=True))
+
+
+def prediction_column(exported: Exported) -> str:
+    """Name of the input's column in ``prediction.csv``.
+
+    Returns
+    -------
+    str
+        ``input`` where the model's data have numbers for names.
+    """
+    name = exported.card.columns.input
+    is_taken = name in ("time", "predicted")
+    return name if isinstance(name, str) and not is_taken else "input"

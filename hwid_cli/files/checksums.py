@@ -1,0 +1,35 @@
+"""A checksum behind the content of a file; readers of HDF5 do not look there.
+
+HDF5 itself does not notice a changed number, and some damaged files crash its library.
+"""
+
+import hashlib
+
+MARK = b"hwid-sha256:"
+_LENGTH = len(MARK) + hashlib.sha256().digest_size
+
+
+def sealed(content: bytes) -> bytes:
+    """Add the checksum."""
+    return content + MARK + hashlib.sha256(content).digest()
+
+
+def has_seal(content: bytes) -> bool:
+    """Whether there is a checksum, right or wrong."""
+    return content[-_LENGTH:].startswith(MARK)
+
+
+def unsealed(content: bytes) -> bytes:
+    """Check and take off the checksum where there is one.
+
+    Raises
+    ------
+    ValueError
+        If content and checksum do not match.
+    """
+    if not has_seal(content):
+        return content
+    inner, seal = content[:-_LENGTH], content[-_LENGTH:]
+    if MARK + hashlib.sha256(inner).digest() != seal:
+        raise ValueError("content and checksum do not match")
+    return inner

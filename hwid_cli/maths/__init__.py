@@ -1,1 +1,0 @@
-"""Pure functions on arrays and records: no files, no clock, no global random state."""

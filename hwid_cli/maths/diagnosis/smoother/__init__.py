@@ -1,1 +1,0 @@
-"""Compiled smoother of the force that a simulation lacks."""

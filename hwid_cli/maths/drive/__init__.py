@@ -1,1 +1,0 @@
-"""Physics simulation of servo drives: circuit, mechanics, friction."""

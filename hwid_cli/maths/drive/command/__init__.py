@@ -1,1 +1,0 @@
-"""What becomes of the command before it drives the motion."""

@@ -1,1 +1,0 @@
-"""Corners of the forces on a drive."""

@@ -1,1 +1,0 @@
-"""Motion between two events where a force is curved."""

@@ -1,1 +1,0 @@
-"""Events: reversals, break-aways, corners of forces."""

@@ -1,1 +1,0 @@
-"""Forces on a drive."""

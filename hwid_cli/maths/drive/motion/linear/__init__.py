@@ -1,1 +1,0 @@
-"""Motion between two events where all forces are linear."""

@@ -1,1 +1,0 @@
-"""Pieces of the command with the push of the drive."""

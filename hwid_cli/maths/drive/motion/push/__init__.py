@@ -1,1 +1,0 @@
-"""Push of the drive."""

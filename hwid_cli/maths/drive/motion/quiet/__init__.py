@@ -1,1 +1,0 @@
-"""Stretches of motion without events."""

@@ -1,1 +1,0 @@
-"""What the sensor of the output makes of the displacement."""

@@ -1,1 +1,0 @@
-"""Normal equations of a step."""

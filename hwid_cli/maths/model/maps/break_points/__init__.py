@@ -1,1 +1,0 @@
-"""Where a piecewise linear map bends, and by how much."""

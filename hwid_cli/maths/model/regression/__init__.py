@@ -1,1 +1,0 @@
-"""Least squares that find linear blocks without a model to begin with."""

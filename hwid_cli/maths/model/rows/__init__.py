@@ -1,1 +1,0 @@
-"""Rows of the derivatives of a model's output."""

@@ -1,0 +1,322 @@
+"""Directions of a fit's parameters, and how firmly the data hold each.
+
+``J'J`` at the optimum is singular in the directions of the shared gains (see
+`normalise`): they are held by one equation each, the same that `normalise` fulfils.
+Positions that a kind takes as known are held too, such as the outermost break-points of a
+map that goes on straight beyond them: they may slide along that line. What is singular
+beyond that is flat: the data do not tell it.
+
+Everything is worked out for the coefficients of ``(1 - q^-1)^j``, whose signals are not
+nearly equal, and turned into those of B and F at the end.
+
+References
+----------
+Ljung, System Identification (1999), section 9.2. docs/method.md, eqs. (16), (28).
+
+What is held while standard errors are worked out: shared gains, a shared offset, ends.
+
+One equation for each, the same that `normalise` fulfils, and one for each position that
+a kind of map takes as known.
+
+References
+----------
+docs/method.md, eqs. (15)-(16).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import qr
+
+from hwid_cli.model import sensitivities, static_map
+from hwid_cli.model.candidates import Candidate, Columns, Experiment, columns
+from hwid_cli.model.linear_block import difference_basis
+from hwid_cli.model.normalise import uses_static_gain
+from hwid_cli.model.static_map import RULES
+from hwid_cli.records.model import StaticMap
+
+
+def held_gradients(candidate: Candidate, place: Columns) -> list[np.ndarray]:
+    """Gradients of what is held while standard errors are worked out.
+
+    Parameters
+    ----------
+    candidate : Candidate
+        Normalised.
+
+    Returns
+    -------
+    list of ndarray, shape (n_parameters,)
+        B and F as coefficients.
+    """
+    model = candidate.model
+    held = []
+    input_rule, output_rule = RULES[model.input_map.kind], RULES[model.output_map.kind]
+    frozen = candidate.limits.is_block_frozen
+    # Around a frozen block there is a gain to share only where both maps have one.
+    if input_rule.size is not None and not (frozen and output_rule.compress is None):
+        _, gradient = input_rule.size(model.input_map)
+        held.append(_row(place, place.input_map, gradient))
+    if output_rule.compress is not None and not frozen:
+        row = np.zeros(place.total)
+        if uses_static_gain(model):
+            row[place.numerator], row[place.denominator] = 1.0, -1.0
+        else:
+            row[place.numerator] = model.numerator
+        held.append(row)
+    if _offset_is_shared(candidate, place):
+        gradient = _value_gradient(model.input_map)
+        held.append(_row(place, place.input_map, gradient))
+    if place.with_positions:
+        held += _held_positions(model.input_map, place, place.input_map)
+        held += _held_positions(model.output_map, place, place.output_map)
+    return held
+
+
+def _held_positions(one: StaticMap, place: Columns, part: slice) -> list[np.ndarray]:
+    """Hold the positions that a kind takes as known."""
+    indices = RULES[one.kind].held(one)
+    rows = np.zeros((len(indices), place.total))
+    rows[np.arange(len(indices)), part.start + np.array(indices, dtype=int)] = 1.0
+    return list(rows)
+
+
+def _offset_is_shared(candidate: Candidate, place: Columns) -> bool:
+    """Tell whether a constant can move from one map to the other unnoticed.
+
+    A block that starts empty answers a constant with a transient, so there it cannot;
+    nor can break-points that are fixed take up the shift.
+    """
+    model = candidate.model
+    both_free = all(
+        RULES[one.kind].size is not None for one in (model.input_map, model.output_map)
+    )
+    rule = RULES[model.output_map.kind]
+    has_positions = rule.n_positions(model.output_map) > 0
+    can_shift = rule.shifts or (place.with_positions and has_positions)
+    return both_free and can_shift and model.initial_state != "zero"
+
+
+def _value_gradient(one: StaticMap) -> np.ndarray:
+    """Derivative of a map's value at zero, or at its domain's nearest end."""
+    at = np.clip(np.zeros(1), *one.domain)
+    row = np.zeros((1, one.parameters.size))
+    static_map.differentiate(one, at, row, 0, with_positions=True)
+    return row[0]
+
+
+def _row(place: Columns, part: slice, gradient: np.ndarray) -> np.ndarray:
+    row = np.zeros(place.total)
+    row[part] = gradient[gradient.size - (part.stop - part.start) :]
+    return row
+
+
+# Eigenvalues of the scaled equations below this share of the largest are zero within
+# rounding.
+_SINGULAR = 1e-11
+# A parameter with this share of a flat direction's largest part is not determined.
+_LEAST_SHARE = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Directions:
+    """Directions that keep what is held, from the weakest to the strongest.
+
+    Parameters
+    ----------
+    place : Columns
+        Where each group of parameters stands.
+    steps : ndarray, shape (n_parameters, n_directions)
+        Step of the parameters in each direction, B and F as coefficients.
+    strength : ndarray, shape (n_directions,), [output unit squared]
+        By how much a unit step raises the sum of squares.
+    size : ndarray, shape (n_parameters,)
+        Size of what each parameter belongs to: of B, F, an initial state, the range of a
+        map or of its break-points. Never zero.
+    """
+
+    place: Columns
+    steps: np.ndarray
+    strength: np.ndarray
+    size: np.ndarray
+
+    @property
+    def is_flat(self) -> np.ndarray:
+        """Which directions the data do not tell at all, shape (n_directions,)."""
+        return self.strength <= _SINGULAR * self.strength[-1]
+
+    @property
+    def n_effective(self) -> int:
+        """Parameters that the data determine, initial states included."""
+        return int(np.sum(~self.is_flat))
+
+    @property
+    def flat_parts(self) -> np.ndarray:
+        """Flat directions in shares of the sizes, shape (n_parameters, n_flat).
+
+        Eigenvectors of equal eigenvalues are any mixture; one parameter each parts them.
+        """
+        flat = self.steps[:, self.is_flat] / self.size[:, None]
+        count = flat.shape[1]
+        if count == 0:
+            return flat
+        _, _, order = qr(flat.T, mode="economic", pivoting=True)
+        return flat @ np.linalg.pinv(flat[order[:count]])
+
+    @property
+    def is_moved_by_flat(self) -> np.ndarray:
+        """Which parameters a flat direction moves, shape (n_parameters,).
+
+        Measured by their size: one that stays while another grows a thousandfold is
+        known for all purposes.
+        """
+        parts = np.abs(self.flat_parts)
+        return (parts > _LEAST_SHARE * parts.max(axis=0, initial=0.0)).any(axis=1)
+
+    def covariance(self, variance: float) -> np.ndarray:
+        """Covariance of all parameters, flat directions left out.
+
+        Parameters
+        ----------
+        variance : float, [output unit squared]
+            Of the residuals.
+
+        Returns
+        -------
+        ndarray, shape (n_parameters, n_parameters)
+        """
+        firm = ~self.is_flat
+        scaled = self.steps[:, firm] * np.sqrt(variance / self.strength[firm])
+        return scaled @ scaled.T
+
+
+def directions(
+    candidate: Candidate, experiments: Sequence[Experiment], *, free_break_points: bool
+) -> Directions | None:
+    """Directions of the parameters of a normalised model at its optimum.
+
+    Parameters
+    ----------
+    candidate : Candidate
+        Normalised, in the units of the experiments.
+    free_break_points : bool
+        Whether break-points were fitted; fixed ones are left out.
+
+    Returns
+    -------
+    Directions or None
+        None where the equations are not finite, or nothing is free.
+    """
+    system = sensitivities.equations(
+        candidate, experiments, with_positions=free_break_points
+    )
+    place = columns(candidate, with_positions=free_break_points)
+    change = _coefficients(place)
+    diagonal = np.diag(system.matrix)
+    # A parameter without any effect keeps its own scale.
+    scale = np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
+    held = held_gradients(candidate, place)
+    if not np.isfinite(system.matrix).all() or len(held) >= place.total:
+        return None
+    free = np.eye(place.total)
+    if held:
+        # A basis of all steps that keep what is held.
+        _, _, basis = np.linalg.svd(np.array(held) @ change / scale)
+        free = basis[len(held) :].T
+    strength, parts = np.linalg.eigh(
+        free.T @ (system.matrix / scale / scale[:, None]) @ free
+    )
+    return Directions(
+        place,
+        change @ ((free @ parts) / scale[:, None]),
+        strength,
+        _sizes(candidate, place),
+    )
+
+
+def n_free(candidate: Candidate, *, free_break_points: bool) -> int:
+    """Parameters less what is held, whatever the data tell of them."""
+    place = columns(candidate, with_positions=free_break_points)
+    return place.total - len(held_gradients(candidate, place))
+
+
+def parameter_names(candidate: Candidate, place: Columns) -> tuple[str, ...]:
+    """Names of all parameters, initial states included.
+
+    Returns
+    -------
+    tuple of str
+        In the order of the columns; those of an initial state are named after it.
+    """
+    model = candidate.model
+    names = [""] * place.total
+    for label, one, part in (
+        ("input_map", model.input_map, place.input_map),
+        ("output_map", model.output_map, place.output_map),
+    ):
+        labels = static_map.parameter_names(one)
+        active = labels[len(labels) - (part.stop - part.start) :]
+        names[part] = [f"{label}.{name}" for name in active]
+    if not candidate.limits.is_block_frozen:
+        names[place.numerator] = [f"b[{i}]" for i in range(model.numerator.size)]
+        names[place.denominator] = [f"f[{i}]" for i in range(1, model.denominator.size)]
+    n_experiments = len(candidate.free_responses)
+    names[place.free_responses] = [
+        f"initial state {i}" + (f" of record {k + 1}" if n_experiments > 1 else "")
+        for k in range(n_experiments)
+        for i in range(place.n_state)
+    ]
+    return tuple(names)
+
+
+def listed(place: Columns) -> np.ndarray:
+    """Places of the parameters that a fit lists: all but the initial states.
+
+    Returns
+    -------
+    ndarray of int, shape (n_listed,)
+        Input map, output map, B, F.
+    """
+    parts = (place.input_map, place.output_map, place.numerator, place.denominator)
+    return np.concatenate([np.arange(part.start, part.stop) for part in parts])
+
+
+def _coefficients(place: Columns) -> np.ndarray:
+    """Matrix from the parameters of a step to the coefficients of B and F."""
+    change = np.eye(place.total)
+    for part in (place.numerator, place.denominator, *_initial_states(place)):
+        change[part, part] = difference_basis(part.stop - part.start)
+    return change
+
+
+def _sizes(candidate: Candidate, place: Columns) -> np.ndarray:
+    """Size of what each parameter belongs to; one where that is zero."""
+    model = candidate.model
+    size = np.zeros(place.total)
+    size[place.numerator] = np.linalg.norm(model.numerator)
+    size[place.denominator] = np.linalg.norm(model.denominator[1:])
+    size[place.free_responses] = np.linalg.norm(candidate.free_responses)
+    for one, part in (
+        (model.input_map, place.input_map),
+        (model.output_map, place.output_map),
+    ):
+        if part.stop > part.start:
+            count = RULES[one.kind].n_positions(one)
+            positions, values = one.parameters[:count], one.parameters[count:]
+            of_values = np.ptp(values) or np.max(np.abs(values))
+            sizes = np.full(one.parameters.size, of_values)
+            sizes[:count] = np.ptp(positions) if count else 0.0
+            if one.kind == "own_function":
+                # Parameters of any kind and unit: each has its own size.
+                sizes = np.abs(one.parameters)
+            size[part] = sizes[sizes.size - (part.stop - part.start) :]
+    return np.where(size > 0.0, size, 1.0)
+
+
+def _initial_states(place: Columns) -> list[slice]:
+    """Columns of each experiment's initial state."""
+    part, size = place.free_responses, place.n_state
+    if size == 0:
+        return []
+    return [slice(at, at + size) for at in range(part.start, part.stop, size)]

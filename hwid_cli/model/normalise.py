@@ -1,0 +1,137 @@
+"""The one place where the gain shared by the three blocks is fixed.
+
+``f -> a f, B -> B / a`` and ``B -> b B, g(x) -> g(x / b)`` leave the output as it is.
+Here the input map gets the mean slope one and does not fall from one end of its domain
+to the other, so that w is in the input's unit; the linear block gets the static gain one
+where the output map can take up its gain. Maps without a free gain leave theirs in B.
+
+References
+----------
+docs/method.md, eq. (15).
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from hwid_cli.model import static_map
+from hwid_cli.model.linear_block import static_gain
+from hwid_cli.model.static_map import RULES
+from hwid_cli.records.model import HammersteinWiener
+
+# A block whose static gain is below this share of its largest gain is a differentiator;
+# its numerator's norm is fixed instead.
+_LEAST_STATIC_SHARE = 1e-3
+_FREQUENCIES = np.linspace(0.0, np.pi, 128)
+
+
+def normalise(
+    model: HammersteinWiener, *, keeps_block: bool = False
+) -> HammersteinWiener:
+    """Same model with its shared gain in a fixed place.
+
+    Parameters
+    ----------
+    keeps_block : bool
+        Whether B and F stay as they are; the gain that the two maps share is fixed then.
+
+    Returns
+    -------
+    HammersteinWiener
+        Gives the same output for every input.
+    """
+    if keeps_block:
+        return _around_block(model)
+    model = _with_unit_input_map(model)
+    rule = RULES[model.output_map.kind]
+    gain = block_gain(model)
+    if rule.compress is None or not np.isfinite(gain) or gain == 0.0:
+        return model
+    return replace(
+        model,
+        numerator=model.numerator / gain,
+        free_response=model.free_response / gain,
+        output_map=rule.compress(model.output_map, gain),
+    )
+
+
+def block_gain(model: HammersteinWiener) -> float:
+    """Gain by which the linear block is measured.
+
+    Returns
+    -------
+    float, [-]
+        The static gain, or the norm of B for a block that hardly passes constants.
+    """
+    if uses_static_gain(model):
+        return static_gain(model.numerator, model.denominator)
+    return float(np.linalg.norm(model.numerator))
+
+
+def uses_static_gain(model: HammersteinWiener) -> bool:
+    """Tell whether the block passes constants well enough to be measured by them."""
+    delay_b = np.exp(-1j * np.outer(_FREQUENCIES, np.arange(model.numerator.size)))
+    delay_f = np.exp(-1j * np.outer(_FREQUENCIES, np.arange(model.denominator.size)))
+    below = delay_f @ model.denominator
+    if below[0] == 0.0:
+        return False
+    response = np.abs((delay_b @ model.numerator) / below)
+    return bool(response[0] >= _LEAST_STATIC_SHARE * np.max(response))
+
+
+def rescaled(
+    model: HammersteinWiener, input_scale: float, output_scale: float
+) -> HammersteinWiener:
+    """Model for signals in other units.
+
+    Parameters
+    ----------
+    model : HammersteinWiener
+        For scaled signals.
+    input_scale, output_scale : float
+        Positive; one unit of the scaled signal in the new unit.
+    """
+    return replace(
+        model,
+        input_map=static_map.stretch(model.input_map, input_scale),
+        numerator=model.numerator * (output_scale / input_scale),
+        free_response=model.free_response * output_scale,
+        output_map=static_map.stretch(model.output_map, output_scale),
+    )
+
+
+def _around_block(model: HammersteinWiener) -> HammersteinWiener:
+    """Input map of mean slope one where the output map can take up its gain."""
+    rule, factor = RULES[model.output_map.kind], _unit_factor(model)
+    amplify = RULES[model.input_map.kind].amplify
+    if factor is None or amplify is None or rule.compress is None:
+        return model
+    return replace(
+        model,
+        input_map=amplify(model.input_map, factor),
+        free_response=model.free_response * factor,
+        output_map=rule.compress(model.output_map, 1.0 / factor),
+    )
+
+
+def _unit_factor(model: HammersteinWiener) -> float | None:
+    """Factor that gives the input map the mean slope one; None where there is none."""
+    rule = RULES[model.input_map.kind]
+    if rule.amplify is None or rule.size is None:
+        return None
+    size, _ = rule.size(model.input_map)
+    if not np.isfinite(size) or size == 0.0:
+        return None
+    ends = static_map.evaluate(model.input_map, np.array(model.input_map.domain))
+    return 1.0 / size if ends[1] >= ends[0] else -1.0 / size
+
+
+def _with_unit_input_map(model: HammersteinWiener) -> HammersteinWiener:
+    rule, factor = RULES[model.input_map.kind], _unit_factor(model)
+    if factor is None or rule.amplify is None:
+        return model
+    return replace(
+        model,
+        input_map=rule.amplify(model.input_map, factor),
+        numerator=model.numerator / factor,
+    )

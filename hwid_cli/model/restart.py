@@ -1,0 +1,221 @@
+"""A new linear block between the maps of the best model: leaves minima of the block.
+
+References
+----------
+docs/method.md, section "The search", step 4.
+
+Where a search may have ended in a poor minimum, and from where to begin again.
+
+The error of a poor minimum is of another shape than noise: it follows itself from sample
+to sample, or it is large at few moments. Then what the first search took for granted is
+doubted: the input maps that came with the linear starts (where an output folds, least
+squares on the output see a wrong one), and the maps that it found around its own block.
+
+References
+----------
+docs/method.md, section "The search".
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from hwid_cli.model import static_map
+from hwid_cli.model.candidates import Candidate, Experiment
+from hwid_cli.model.delays import relaxed_starts
+from hwid_cli.model.distinct import WHEN_FREE, borne_residuals, distinct
+from hwid_cli.model.levenberg_marquardt import Search, minimise
+from hwid_cli.model.phases import standing
+from hwid_cli.model.points import block_signals, point_of
+from hwid_cli.model.starts import Start
+from hwid_cli.records.model import FitOptions
+
+# Correlation of neighbouring residuals, and mean fourth power over squared mean square
+# (3 for normal noise), from which on residuals are not taken for noise.
+_COLOURED, _PEAKED = 0.5, 4.0
+# Deviation, as a share of the output's own, below which peaks are let be. Models of too
+# few poles can come closer still, by maps that bend for this one record.
+_CLOSE = 0.005
+# The same share from which on next to nothing has been found, whatever the error's shape.
+_FAR = 0.5
+# Break-points of maps whose shape other kinds take over.
+_BREAK_POINTS = 15
+_NOT_REPLACED = ("none", "piecewise_linear")
+# Values by which a start takes over an input map, and an input map of another kind.
+_MAP_POINTS, FINE_MAP_POINTS = 12, 200
+
+
+def leaves_structure(candidate: Candidate, experiments: Sequence[Experiment]) -> bool:
+    """Tell whether residuals look like the error of a poor minimum.
+
+    Returns
+    -------
+    bool
+        Whether they follow their neighbours, are half as large as the output, or are not
+        small and large at few moments.
+    """
+    # Outliers, where they are to be borne, are no error of the model.
+    residuals = borne_residuals(candidate, experiments)
+    following = sum(float(one[1:] @ one[:-1]) for one in residuals)
+    joined = np.concatenate(residuals)
+    power = float(joined @ joined)
+    spread = sum(
+        float(np.sum((one.output - np.mean(one.output)) ** 2)) for one in experiments
+    )
+    if following > _COLOURED * power or power > _FAR**2 * spread:
+        return True
+    squares = joined * joined
+    peaks = joined.size * float(squares @ squares)
+    return power > _CLOSE**2 * spread and peaks > _PEAKED * power**2
+
+
+def doubted_input_maps(
+    starts: Sequence[Start], experiments: Sequence[Experiment]
+) -> list[Start]:
+    """Blocks that came with an input map of their own, without it."""
+    return [_straight(one, experiments) for one in starts if one.is_expanded]
+
+
+def maps_anew(
+    candidate: Candidate,
+    experiments: Sequence[Experiment],
+    n_points: int = _MAP_POINTS,
+) -> list[Start]:
+    """The block that a search found, to find maps around it again.
+
+    Parameters
+    ----------
+    n_points : int, [-]
+        Values by which a start takes over the input map.
+
+    Returns
+    -------
+    list of Start
+        With its input map at equal distances, and without.
+    """
+    model = candidate.model
+    points = np.linspace(*_range(experiments), n_points)
+    found = Start(
+        model.numerator,
+        model.denominator,
+        np.inf,
+        points,
+        static_map.evaluate(model.input_map, points),
+        0.0,
+        candidate.free_responses,
+        delay=model.delay,
+    )
+    return [found, _straight(found, experiments)]
+
+
+def with_break_points(options: FitOptions) -> FitOptions:
+    """Options of a model with piecewise linear maps in the place of others.
+
+    Returns
+    -------
+    FitOptions
+        The same where no map is of another kind.
+    """
+    if options.input_map not in _NOT_REPLACED:
+        options = replace(
+            options, input_map="piecewise_linear", input_units=_BREAK_POINTS
+        )
+    if options.output_map not in _NOT_REPLACED:
+        options = replace(
+            options, output_map="piecewise_linear", output_units=_BREAK_POINTS
+        )
+    return options
+
+
+def _straight(start: Start, experiments: Sequence[Experiment]) -> Start:
+    ends = np.array(_range(experiments))
+    return replace(start, input_points=ends, input_values=ends)
+
+
+def _range(experiments: Sequence[Experiment]) -> tuple[float, float]:
+    lowest = min(float(one.input.min()) for one in experiments)
+    return lowest, max(float(one.input.max()) for one in experiments)
+
+
+_RELAXING_ITERATIONS = 8
+_RELAXED_BLOCKS = 2
+# Slopes of the output map below this share of their mean square say too little about x.
+_FLAT = 0.1
+
+
+def relaxed_search(
+    best: Search,
+    experiments: Sequence[Experiment],
+    options: FitOptions,
+) -> Search:
+    """Find the linear block anew between the maps of the best model.
+
+    Returns
+    -------
+    Search
+        With fixed break-points; not to the end, and not always better. The best itself
+        where the new blocks come to the same model.
+    """
+    between = _between_maps(best.candidate, experiments)
+    model, no_states = best.candidate.model, best.candidate.free_responses[:, :0]
+    has_states = options.initial_state == "estimated"
+    starts = relaxed_starts(
+        between,
+        model.orders,
+        options,
+        count=_RELAXED_BLOCKS,
+        denominator=model.denominator,
+    )
+    entered = [
+        standing(
+            Candidate(
+                replace(
+                    model,
+                    numerator=one.numerator,
+                    denominator=one.denominator,
+                    delay=one.delay,
+                ),
+                one.free_responses if has_states else no_states,
+                best.candidate.limits,
+            ),
+            experiments,
+        )
+        for one in starts
+    ]
+    found = [
+        minimise(
+            one.candidate,
+            experiments,
+            with_positions=False,
+            max_iterations=min(_RELAXING_ITERATIONS, options.max_iterations),
+        )
+        for one in distinct([best, *entered], experiments, WHEN_FREE)
+        if one is not best
+    ]
+    if not found:
+        return best
+    leader = min(found, key=lambda one: one.cost)
+    return replace(leader, iterations=best.iterations + leader.iterations)
+
+
+def _between_maps(
+    candidate: Candidate, experiments: Sequence[Experiment]
+) -> list[Experiment]:
+    """Signals before and after the linear block; the latter corrected by the output.
+
+    The correction is a Gauss-Newton step of x towards the measured output, held back
+    where the output map is flat.
+    """
+    result = []
+    point, output_map = point_of(candidate), candidate.model.output_map
+    for index, one in enumerate(experiments):
+        w, x = block_signals(point, index, one)
+        scratch = np.empty((x.size, output_map.parameters.size))
+        y, slope = static_map.differentiate(
+            output_map, x, scratch, 0, with_positions=True
+        )
+        held_back = slope**2 + _FLAT * float(np.mean(slope**2)) + 1e-300
+        error = np.clip(one.output - y, -one.threshold, one.threshold)
+        result.append(Experiment(w, x + error * slope / held_back))
+    return result

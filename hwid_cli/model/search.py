@@ -1,0 +1,227 @@
+"""The phases of a fit, from linear starts to free break-points.
+
+1. *Screen*: every start runs a few iterations with fixed break-points.
+2. *Place*: the best of each family goes on, its maps get many equally spaced
+   break-points, and those that matter most stay. Break-points moved from an equally
+   spaced coarse grid stop in poor minima far more often.
+3. *Free*: break-points move.
+4. *Relax*: with the maps of the best model taken as known, new linear blocks are found by
+   least squares and continue from there; this leaves minima of the linear block.
+
+The best candidate seen wins. docs/method.md, section "The search".
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from hwid_cli.model import static_map
+from hwid_cli.model.candidates import Candidate, Experiment
+from hwid_cli.model.levenberg_marquardt import Search
+from hwid_cli.model.phases import converge, finish, place, refine, standing
+from hwid_cli.model.placing import reaching
+from hwid_cli.model.restart import (
+    FINE_MAP_POINTS,
+    doubted_input_maps,
+    leaves_structure,
+    maps_anew,
+    relaxed_search,
+    with_break_points,
+)
+from hwid_cli.model.robust import rejudged, renewed
+from hwid_cli.model.screening import LONG, SHORT, race
+from hwid_cli.model.starts import Start
+from hwid_cli.records.model import FitOptions
+
+# Cost that a relaxed block must reach, as a share of the best so far, to be finished;
+# nearer to it the search has only come back to where it was.
+_WORTH_GOING_ON = 0.995
+# Searches that follow one whose residuals are not noise, and the share of the cost that
+# one must reach for another to follow it.
+_MOST_DOUBTS, _WORTH_DOUBTING = 3, 0.9
+# Share of the cost that a step must gain where larger models go on from the result.
+_SMALL_GAIN = 1e-3
+
+
+def nonlinear_search(
+    experiments: Sequence[Experiment],
+    options: FitOptions,
+    starts: Sequence[Start],
+    linear: Search,
+) -> Search:
+    """Hammerstein-Wiener model of given orders and kinds of maps.
+
+    Parameters
+    ----------
+    experiments : sequence of Experiment
+        Scaled to about one.
+    linear : Search
+        What `linear_search` found: with maps that pass everything on it is a model of
+        every kind, and the result is never worse.
+
+    Returns
+    -------
+    Search
+        Its iterations are those of the winning chain.
+    """
+    finalists = race(experiments, starts, options)
+    experiments = renewed(experiments, [one.candidate for one in finalists])
+    best = finish(_best(place(finalists, experiments, options)), experiments, options)
+    if not options.keeps_block:
+        best = _relaxed(best, experiments, options)
+    best = _doubted(best, experiments, options, starts)
+    best = _from_break_points(best, experiments, options, starts, linear)
+    return _not_worse_than(linear, best, experiments, options)
+
+
+def _relaxed(
+    best: Search, experiments: Sequence[Experiment], options: FitOptions
+) -> Search:
+    """The best so far, or what comes of another block between its maps."""
+    relaxed = relaxed_search(best, experiments, options)
+    if relaxed.cost >= _WORTH_GOING_ON * best.cost:
+        return best
+    return _best([best, finish(relaxed, experiments, options)])
+
+
+def _doubted(
+    best: Search,
+    experiments: Sequence[Experiment],
+    options: FitOptions,
+    starts: Sequence[Start],
+) -> Search:
+    """The best so far, or what long races find where its residuals are not noise."""
+    best = _refined(best, experiments, options)
+    entered = [*starts, *doubted_input_maps(starts, experiments)]
+    for _ in range(_MOST_DOUBTS):
+        if not leaves_structure(best.candidate, experiments):
+            break
+        entered += maps_anew(best.candidate, experiments)
+        found = race(experiments, entered, options, rounds=LONG)
+        placed = place(found, experiments, options)
+        again = finish(_best(placed), experiments, options)
+        gained = again.cost < _WORTH_DOUBTING * best.cost
+        best, entered = _best([best, again]), []
+        if not gained:
+            break
+    return _refined(best, experiments, options)
+
+
+def _from_break_points(
+    best: Search,
+    experiments: Sequence[Experiment],
+    options: FitOptions,
+    starts: Sequence[Start],
+    linear: Search,
+) -> Search:
+    """The best so far, or what comes of piecewise linear maps where it is not noise.
+
+    Those are placed where maps bend, which other kinds cannot find by themselves.
+    """
+    bent = with_break_points(options)
+    if bent == options or not leaves_structure(best.candidate, experiments):
+        return best
+    found = nonlinear_search(experiments, bent, starts, linear)
+    if found.cost > _WORTH_DOUBTING * best.cost:
+        return best
+    entered = maps_anew(found.candidate, experiments, FINE_MAP_POINTS)
+    placed = place(
+        race(experiments, entered, options, rounds=LONG), experiments, options
+    )
+    return _best([best, finish(_best(placed), experiments, options)])
+
+
+def _refined(
+    best: Search, experiments: Sequence[Experiment], options: FitOptions
+) -> Search:
+    """The same with break-points nearer to where maps bend, if residuals are not noise."""
+    if not leaves_structure(best.candidate, experiments):
+        return best
+    return refine(best, experiments, options)
+
+
+def grown(
+    contained: Sequence[Candidate],
+    experiments: Sequence[Experiment],
+    options: FitOptions,
+    linear: Search,
+) -> Search:
+    """Model that goes on from the best of those of smaller orders that it contains.
+
+    Parameters
+    ----------
+    contained : sequence of Candidate
+        Of the orders and kinds of maps asked for.
+
+    Returns
+    -------
+    Search
+        Never worse than any of the contained models, nor than the linear one.
+    """
+    experiments = renewed(experiments, contained)
+    known = _best([standing(one, experiments) for one in contained])
+    near = converge(known, experiments, options, least_gain=_SMALL_GAIN)
+    return _not_worse_than(linear, _best([known, near]), experiments, options)
+
+
+def search_beyond(
+    contained: Sequence[Candidate],
+    experiments: Sequence[Experiment],
+    options: FitOptions,
+    starts: Sequence[Start],
+    linear: Search,
+) -> Search:
+    """The better of a model that goes on from smaller orders and one found anew.
+
+    Parameters
+    ----------
+    contained : sequence of Candidate
+        Of the orders and kinds of maps asked for.
+
+    Returns
+    -------
+    Search
+        Never worse than any of the contained models, nor than the linear one. The search
+        anew is a shorter one than `nonlinear_search`.
+    """
+    near = grown(contained, experiments, options, linear)
+    experiments = renewed(experiments, contained)
+    leaders = race(experiments, starts, options, rounds=SHORT)
+    (placed,) = place(leaders, experiments, options)
+    anew = finish(placed, experiments, options, least_gain=_SMALL_GAIN)
+    best = _best([near, anew])
+    # Only between known maps are delays told apart safely.
+    return _relaxed(best, experiments, options) if len(options.delays) > 1 else best
+
+
+def _not_worse_than(
+    linear: Search,
+    best: Search,
+    experiments: Sequence[Experiment],
+    options: FitOptions,
+) -> Search:
+    """The best so far, or what comes of the linear model where that is better."""
+    linear = rejudged(linear, experiments)
+    if linear.cost >= best.cost:
+        return best
+    linear = finish(linear, experiments, options)
+    passing = standing(_passing(linear, experiments, options), experiments)
+    passing = replace(passing, iterations=linear.iterations)
+    return _best([best, passing, finish(passing, experiments, options)])
+
+
+def _passing(
+    linear: Search, experiments: Sequence[Experiment], options: FitOptions
+) -> Candidate:
+    """Linear model with maps of the kinds asked for that pass everything on."""
+    candidate = linear.candidate
+    u, x = reaching(candidate, experiments)
+    model = replace(
+        candidate.model,
+        input_map=static_map.identity(options.input_map, options.of_input, u),
+        output_map=static_map.identity(options.output_map, options.of_output, x),
+    )
+    return replace(candidate, model=model)
+
+
+def _best(searches: Sequence[Search]) -> Search:
+    return min(searches, key=lambda one: one.cost)

@@ -1,0 +1,238 @@
+"""Static nonlinearities: one table from name to functions, and what fits do with them.
+
+Another nonlinearity is one more entry in `RULES` (and its name in `records.maps`).
+
+References
+----------
+docs/method.md, eqs. (2)-(4f).
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from hwid_cli.model.maps import (
+    cubic_spline,
+    limits,
+    own_function,
+    piecewise_constant,
+    piecewise_linear,
+    polynomial,
+    sigmoid_network,
+    wavelet_network,
+)
+from hwid_cli.model.maps.rule import Derivatives, MapRule, Shape
+from hwid_cli.records.maps import MapOptions, StaticMap
+
+RULES: dict[str, MapRule] = {
+    "piecewise_linear": piecewise_linear.RULE,
+    "saturation": limits.SATURATION,
+    "dead_zone": limits.DEAD_ZONE,
+    "polynomial": polynomial.RULE,
+    "none": limits.NONE,
+    "sigmoid_network": sigmoid_network.RULE,
+    "wavelet_network": wavelet_network.RULE,
+    "cubic_spline": cubic_spline.RULE,
+    "piecewise_constant": piecewise_constant.RULE,
+    "own_function": own_function.RULE,
+}
+
+
+def evaluate(static_map: StaticMap, argument: np.ndarray) -> np.ndarray:
+    """Value of a static map.
+
+    Parameters
+    ----------
+    argument : ndarray, shape (n,)
+
+    Returns
+    -------
+    ndarray, shape (n,)
+
+    References
+    ----------
+    docs/method.md, eqs. (2)-(4f).
+
+    Examples
+    --------
+    >>> evaluate(StaticMap("dead_zone", np.array([-1.0, 2.0])), np.array([-3.0, 0, 5]))
+    array([-2.,  0.,  3.])
+    """
+    return RULES[static_map.kind].evaluate(static_map, argument)
+
+
+def differentiate(
+    static_map: StaticMap,
+    argument: np.ndarray,
+    out: np.ndarray,
+    first: int,
+    *,
+    with_positions: bool,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Value and slope of a static map; its derivatives by its parameters into `out`.
+
+    Parameters
+    ----------
+    argument : ndarray, shape (n,)
+    out : ndarray, shape (n, at least first + n_active)
+        Receives one column for each active parameter. Written in place, because fresh
+        memory for every call would cost more than the arithmetic.
+    first : int
+        First column to write.
+    with_positions : bool
+        Whether positions, such as break-points, count as parameters.
+
+    Returns
+    -------
+    value, slope : ndarray, shape (n,)
+    """
+    rule = RULES[static_map.kind]
+    return rule.differentiate(static_map, argument, with_positions, out, first)
+
+
+def derivatives(
+    static_map: StaticMap, argument: np.ndarray, *, with_positions: bool
+) -> Derivatives:
+    """Value, slope and derivatives of a static map by its active parameters.
+
+    Parameters
+    ----------
+    argument : ndarray, shape (n,)
+    with_positions : bool
+        Whether the break-points of a piecewise linear map count as parameters.
+    """
+    rule = RULES[static_map.kind]
+    if rule.derivatives is not None:
+        return rule.derivatives(static_map, argument, with_positions)
+    active = active_parameters(static_map, with_positions=with_positions)
+    count = active.stop - active.start
+    shares = np.empty((argument.size, count))
+    value, slope = rule.differentiate(static_map, argument, with_positions, shares, 0)
+    first = np.zeros(argument.size, dtype=np.int64)
+    return Derivatives(value, slope, first, shares, count)
+
+
+def starting_maps(
+    kind: str,
+    options: MapOptions,
+    lowest: float,
+    highest: float,
+    *,
+    shape: Shape = lambda argument: argument,
+) -> tuple[StaticMap, ...]:
+    """Maps from which a fit can start.
+
+    Parameters
+    ----------
+    lowest, highest : float
+        Range of the argument; widened where it is empty.
+    shape : callable (ndarray) -> ndarray
+        What kinds with a free shape should look like; the identity unless given.
+    """
+    lowest, highest = _widened(float(lowest), float(highest))
+    return RULES[kind].starts(options, lowest, highest, shape)
+
+
+def identity(kind: str, options: MapOptions, argument: np.ndarray) -> StaticMap:
+    """Map that passes an argument on unchanged.
+
+    Parameters
+    ----------
+    argument : ndarray, shape (n,)
+    """
+    lowest, highest = _widened(float(np.min(argument)), float(np.max(argument)))
+    return RULES[kind].identity(options, lowest, highest)
+
+
+def _widened(lowest: float, highest: float) -> tuple[float, float]:
+    """A range that is not empty."""
+    if lowest < highest:
+        return lowest, highest
+    half = 0.5 * max(abs(lowest), 1.0)
+    return lowest - half, highest + half
+
+
+def active_parameters(static_map: StaticMap, *, with_positions: bool) -> slice:
+    """Which parameters a fit may move."""
+    first = 0 if with_positions else RULES[static_map.kind].n_positions(static_map)
+    return slice(first, static_map.parameters.size)
+
+
+def move(static_map: StaticMap, step: np.ndarray) -> StaticMap:
+    """Map after a step of its active parameters, put into a legal order.
+
+    Parameters
+    ----------
+    step : ndarray, shape (n_active,)
+        Of its last parameters: positions, which may stay, come first.
+    """
+    if step.size == 0:
+        return static_map
+    parameters = static_map.parameters.copy()
+    parameters[parameters.size - step.size :] += step
+    RULES[static_map.kind].settle(static_map, parameters)
+    return StaticMap(
+        static_map.kind, parameters, static_map.domain, static_map.function
+    )
+
+
+def with_domain(static_map: StaticMap, argument: np.ndarray) -> StaticMap:
+    """Same map, with the range of an argument as its domain.
+
+    Parameters
+    ----------
+    argument : ndarray, shape (n,)
+        A constant one leaves the map as it is.
+
+    Returns
+    -------
+    StaticMap
+        Gives the same values.
+    """
+    lowest, highest = float(np.min(argument)), float(np.max(argument))
+    if not lowest < highest:
+        return static_map
+    return RULES[static_map.kind].with_domain(static_map, (lowest, highest))
+
+
+def stretch(static_map: StaticMap, factor: float) -> StaticMap:
+    """The map ``v -> factor * map(v / factor)``: another unit for argument and value.
+
+    Parameters
+    ----------
+    factor : float
+        Positive.
+    """
+    low, high = static_map.domain
+    domain = (low * factor, high * factor)
+    function = static_map.function
+    if function is not None:
+        # Nobody knows the units of its parameters: the function keeps its own.
+        kept = replace(function, unit=function.unit * factor)
+        return replace(static_map, function=kept, domain=domain)
+    # Every other parameter has the unit of argument or value, whatever the kind.
+    return replace(static_map, parameters=static_map.parameters * factor, domain=domain)
+
+
+def outlined(static_map: StaticMap) -> StaticMap:
+    """Same map, its parameters alone giving its values everywhere.
+
+    Returns
+    -------
+    StaticMap
+        A piecewise linear map that goes on beyond its domain with slopes of its own has
+        them as segments.
+    """
+    if static_map.slopes_beyond is None:
+        return static_map
+    return piecewise_linear.outlined(static_map)
+
+
+def has_free_shape(kind: str) -> bool:
+    """Tell whether maps of a kind have a gain and an offset of their own."""
+    return RULES[kind].size is not None
+
+
+def parameter_names(static_map: StaticMap) -> tuple[str, ...]:
+    """Names of a map's parameters, in their order."""
+    return RULES[static_map.kind].names(static_map)

@@ -1,0 +1,1 @@
+"""Simulations that a diagnosis can judge, whatever their kind."""

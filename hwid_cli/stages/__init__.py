@@ -1,0 +1,1 @@
+"""The stages of an experiment: what each needs, computes, stores and shows."""

@@ -1,0 +1,168 @@
+"""Stage ``calibrate``: raw measurements in, recordings of equal length out.
+
+Each kind of recording has a recipe of steps (``campaign/recipe.py``). Single damaged
+samples are replaced before the first step and listed in the log. A recipe is repeated
+until it changes nothing, so that calibrating a calibrated recording gives the same
+recording.
+"""
+
+from collections.abc import Sequence
+from dataclasses import fields, replace
+
+import numpy as np
+
+from hwid_cli.data.calibration import LEAST_QUIET, OFFSETS, Draft, run_recipe
+from hwid_cli.errors import ConfigError, MeasurementError
+from hwid_cli.records.experiment import RECIPE_STEPS, CalibrateOptions
+from hwid_cli.records.recordings import CalibrationLog, RawRecording, Recording
+from hwid_cli.tasks.cache import task_key
+
+STAGE = "calibrate"
+STAGE_VERSION = 2
+
+# Two passes settle nearly every recording (the second one changes nothing); noise at a
+# threshold may take one or two more.
+MOST_PASSES = 8
+# An offset below this share of the signal's size is rounding, [-].
+ROUNDING = 1e-12
+
+
+def calibrate_all(
+    raws: Sequence[RawRecording], options: CalibrateOptions | None
+) -> tuple[tuple[Recording, ...], tuple[CalibrationLog, ...]]:
+    """Calibrate measurements by the recipe of their kind.
+
+    Parameters
+    ----------
+    options : CalibrateOptions or None
+        None leaves every measurement as it is.
+
+    Returns
+    -------
+    tuple of Recording, tuple of CalibrationLog
+        In the order of the measurements.
+
+    Raises
+    ------
+    ConfigError
+        If a recipe names an unknown step or a length makes no sense.
+    MeasurementError
+        If a step cannot work on a measurement, or input and output differ in length
+        where no step cuts them.
+    """
+    chosen = CalibrateOptions() if options is None else options
+    _check_options(chosen)
+    pairs = [_calibrate(raw, chosen) for raw in raws]
+    return tuple(pair[0] for pair in pairs), tuple(pair[1] for pair in pairs)
+
+
+def calibration_key(
+    raws: Sequence[RawRecording], options: CalibrateOptions | None
+) -> str:
+    """Content key of a calibration: everything that its result depends on."""
+    # Moving a file changes nothing; its bytes are in sha256.
+    about = [
+        {
+            item.name: getattr(raw, item.name)
+            for item in fields(raw)
+            if item.name != "source"
+        }
+        for raw in raws
+    ]
+    arrays = [one.pop(side) for one in about for side in ("input", "output")]
+    for one in about:
+        reference = one.pop("reference")
+        # Said only where there is one: keys of recordings without one stay as they were.
+        if reference is not None:
+            one["has_reference"] = True
+            arrays.append(reference)
+    settings = {"recordings": about, "options": options}
+    return task_key(STAGE, STAGE_VERSION, settings, arrays)
+
+
+def _check_options(options: CalibrateOptions) -> None:
+    for kind in ("step", "sine", "random", "other"):
+        for step in getattr(options, kind):
+            if step not in RECIPE_STEPS:
+                raise ConfigError(
+                    f"calibrate.{kind}: unknown step {step!r}; "
+                    f"expected some of {', '.join(RECIPE_STEPS)}"
+                )
+            if step == "recut" and kind != "sine":
+                raise ConfigError(
+                    f"calibrate.{kind}: 'recut' keeps whole periods of a sine; "
+                    "remove it, 'cut' alone gives equal lengths"
+                )
+    if options.samples is not None and options.samples < LEAST_QUIET:
+        raise ConfigError(
+            f"calibrate.samples: {options.samples}; expected at least {LEAST_QUIET}"
+        )
+    if options.rest_samples < LEAST_QUIET and any(
+        "cut" in recipe and set(recipe) & set(OFFSETS)
+        for recipe in (options.step, options.random, options.other)
+    ):
+        raise ConfigError(
+            f"calibrate.rest_samples: {options.rest_samples}; expected at least "
+            f"{LEAST_QUIET} where a recipe subtracts the mean over the rest"
+        )
+
+
+def _calibrate(
+    raw: RawRecording, options: CalibrateOptions
+) -> tuple[Recording, CalibrationLog]:
+    """One measurement through its recipe until nothing changes any more."""
+    draft = Draft(
+        raw=raw,
+        options=options,
+        input=raw.input,
+        output=raw.output,
+        reference=raw.reference,
+        log=CalibrationLog(
+            name=raw.name,
+            steps=getattr(options, raw.kind),
+            first_sample=0,
+            n_samples=raw.input.size,
+            n_raw_input=raw.input.size,
+            n_raw_output=raw.output.size,
+        ),
+    )
+    if draft.recipe:
+        for _ in range(MOST_PASSES):
+            before, draft = draft, run_recipe(draft)
+            if _is_same(before, draft):
+                break
+    return _finish(draft)
+
+
+def _is_same(before: Draft, after: Draft) -> bool:
+    if before.log.repaired_input != after.log.repaired_input:
+        return False
+    if before.log.repaired_output != after.log.repaired_output:
+        return False
+    return all(
+        old.size == new.size
+        and np.max(np.abs(old - new)) <= ROUNDING * max(np.max(np.abs(old)), 1e-300)
+        for old, new in ((before.input, after.input), (before.output, after.output))
+    )
+
+
+def _finish(draft: Draft) -> tuple[Recording, CalibrationLog]:
+    raw = draft.raw
+    if draft.input.size != draft.output.size:
+        raise MeasurementError(
+            f"{draft.place}: input has {draft.input.size} samples, output "
+            f"{draft.output.size}; expected equal lengths, or 'cut' in "
+            f"calibrate.{raw.kind}"
+        )
+    recording = Recording(
+        name=raw.name,
+        input=draft.input,
+        output=draft.output,
+        sample_time_s=raw.sample_time_s,
+        kind=raw.kind,
+        sha256=raw.sha256,
+        input_unit=raw.input_unit,
+        output_unit=raw.output_unit,
+        reference=draft.reference,
+    )
+    return recording, replace(draft.log, n_samples=recording.n_samples)

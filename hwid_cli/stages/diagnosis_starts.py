@@ -1,0 +1,117 @@
+"""Whether recordings can start as a diagnosis takes them to: at rest, in equilibrium.
+
+A recording that was cut at the onset of its excitation begins with an input to which the
+drive has not answered yet; a simulation that starts in equilibrium with that input is off
+from its first sample, and no missing effect explains that.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from hwid_cli.data.calibration import LEAST_QUIET, find_onset
+from hwid_cli.diagnosis.noise import noise_floor
+from hwid_cli.diagnosis.preparing import prepare
+from hwid_cli.records.experiment import (
+    CalibrateOptions,
+    DiagnoseOptions,
+    SimulationOptions,
+)
+from hwid_cli.records.recordings import Recording
+
+# A first sample is away from the equilibrium beyond this many times the noise, [-] ...
+_AWAY = 5.0
+# ... and this share of what the first input asks for: parameters from data sheets are
+# not off by so much, [-].
+_AWAY_SHARE = 0.5
+_MOST_NAMED = 4
+
+
+def doubtful_starts(
+    recordings: Sequence[Recording],
+    simulation: SimulationOptions,
+    options: DiagnoseOptions,
+) -> tuple[str, ...]:
+    """Find recordings that do not begin in equilibrium, where they are taken to.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+        At least one, as the diagnosis gets them.
+
+    Returns
+    -------
+    tuple of str
+        Names of those without a rest before the excitation whose first output is far
+        from the equilibrium of the linear drive with the first input. None where a
+        diagnosis fits how recordings start, under a controller and without a spring.
+    """
+    if options.initial_state != "rest" or simulation.controller is not None:
+        return ()
+    if not simulation.stiffness_N_per_m > 0:
+        return ()
+    noise = noise_floor(prepare(recordings, simulation, options, ())).rms
+    gain = simulation.force_constant_N_per_A / (
+        simulation.stiffness_N_per_m * (simulation.resistance_ohm or 1.0)
+    )
+    rests = [_rest(one) for one in recordings]
+    zeros = [
+        float(np.mean(one.output[:rest] - gain * one.input[:rest]))
+        for one, rest in zip(recordings, rests, strict=True)
+        if rest
+    ]
+    # A load, or the zero of the sensor.
+    zero = float(np.median(zeros)) if zeros else 0.0
+    found = []
+    for one, rest in zip(recordings, rests, strict=True):
+        asked = abs(gain * float(one.input[0]))
+        away = abs(float(one.output[0]) - zero - gain * float(one.input[0]))
+        is_known = bool(zeros) or asked > _AWAY * noise
+        if not rest and is_known and away > max(_AWAY * noise, _AWAY_SHARE * asked):
+            found.append(one.name)
+    return tuple(found)
+
+
+def starts_sentence(
+    names: Sequence[str],
+    recordings: Sequence[Recording],
+    calibrate: CalibrateOptions | None,
+) -> str:
+    """Say which recordings do not begin in equilibrium, and what to do.
+
+    Parameters
+    ----------
+    names : sequence of str
+        From ``doubtful_starts``.
+
+    Returns
+    -------
+    str
+        One line; empty without names.
+    """
+    if not names:
+        return ""
+    kinds = dict.fromkeys(one.kind for one in recordings if one.name in names)
+    cut = [kind for kind in kinds if calibrate and "cut" in getattr(calibrate, kind)]
+    advice = "'held' keeps the level before the excitation, 'estimated' fits the start"
+    if cut:
+        where = " and ".join(f"calibrate.{kind}" for kind in cut)
+        advice += f"; or leave 'cut' out of {where}, which takes the rest away"
+    return (
+        "diagnose.initial_state: 'rest' starts each recording in equilibrium with its "
+        f"first input, but {_shown(names)} begin{'s' * (len(names) == 1)} within the "
+        f"excitation, away from it; {advice}"
+    )
+
+
+def _rest(recording: Recording) -> int:
+    """Samples before the excitation; 0 where there are too few to be a rest."""
+    onset = find_onset(recording.input, quiet_is_rest=True)
+    onset = recording.n_samples if onset is None else onset
+    return onset if onset >= LEAST_QUIET else 0
+
+
+def _shown(names: Sequence[str]) -> str:
+    more = len(names) - _MOST_NAMED
+    shown = ", ".join(names[:_MOST_NAMED])
+    return f"{shown} and {more} more" if more > 0 else shown

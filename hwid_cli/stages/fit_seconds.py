@@ -1,0 +1,253 @@
+"""How long fits will take: one is timed, the others are scaled from it.
+
+The exponents are those that docs/benchmarks.md measures ("How times grow"), for sizes of
+the larger half. An estimate to a factor of two: the number of iterations depends on the
+data.
+"""
+
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+
+from hwid_cli.model.derivative_rows import derivative_rows
+from hwid_cli.model.fit import fit
+from hwid_cli.records.check import FitCost
+from hwid_cli.records.experiment import Experiment, GroupOptions, OrdersOptions
+from hwid_cli.records.model import FitOptions, Orders
+from hwid_cli.records.recordings import Recording
+from hwid_cli.stages.group import SEARCHED_ROUNDS_OF_GROUPS
+from hwid_cli.stages.order_grid import SEARCHED_ROUNDS, candidate_orders, growth
+
+# Growth with samples, units, orders and recordings (docs/benchmarks.md), [-].
+_P_SAMPLES, _P_UNITS, _P_ORDERS, _P_RECORDINGS = 0.56, 0.44, 0.54, 0.85
+# Beyond this many the last phase, which sees all of them, decides, [samples].
+_LONG_SAMPLES = 20_000
+# Below this many samples the fixed work of the search decides, [samples].
+_LEAST_SAMPLES = 1000
+# What docs/benchmarks.md measured: [3 3 1], 2000 samples, 10 units.
+MEASURED = FitCost(0.055, 2000, 3.0, 10, "the table in docs/benchmarks.md")
+# A fit of so many samples stays below two seconds on a slow machine, [samples].
+_MOST_TIMED = 10_000
+# Time of a grid's fit against that of one alone from nothing: in the rounds in which fits
+# are searched for too, in the later ones, and both for groups that begin with the models
+# of their members (docs/benchmarks.md, "A campaign" and "Groups of recordings"), [-].
+_SEARCHED, _GROWN, _WARM_SEARCHED, _WARM_GROWN = 0.5, 0.2, 0.25, 0.1
+# Simulating one model on one sample, its initial state included (docs/benchmarks.md: 1 ms
+# for 7500 samples on two cores), [s].
+SECONDS_PER_SIMULATED_SAMPLE = 2.7e-7
+
+
+def compiled_loops_place() -> str:
+    """Folder in which the compiled loops of a fit are kept.
+
+    Returns
+    -------
+    str
+        Where files ``derivative_rows.derivative_rows*.nbi`` are missing, the first fit compiles.
+    """
+    return str(derivative_rows.stats.cache_path)
+
+
+def time_one_fit(
+    recordings: Sequence[Recording], orders: OrdersOptions, options: FitOptions
+) -> FitCost:
+    """Time a fit of middle orders on the recording of middle length.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+        At least one.
+    """
+    by_length = sorted(recordings, key=lambda one: one.n_samples)
+    whole = by_length[len(by_length) // 2]
+    n = min(whole.n_samples, _MOST_TIMED)
+    cut = replace(
+        whole,
+        input=whole.input[:n],
+        output=whole.output[:n],
+        reference=None if whole.reference is None else whole.reference[:n],
+    )
+    middle = middle_orders(orders)
+    short = replace(options, starts=1, max_iterations=1, join=FitOptions().join)
+    # The first call loads the compiled loops, which no later fit does.
+    fit([cut], middle, short)
+    start = time.perf_counter()
+    fit([cut], middle, replace(options, join=FitOptions().join))
+    return FitCost(
+        seconds=time.perf_counter() - start,
+        n_samples=n,
+        order=(middle.nb + middle.nf) / 2,
+        units=options.units,
+        source=f"one fit of {whole.name} with orders {middle.nb} {middle.nf} "
+        f"{middle.nk}",
+    )
+
+
+def fit_seconds(
+    cost: FitCost,
+    orders: Orders,
+    n_samples: int,
+    *,
+    units: float,
+    n_recordings: int = 1,
+) -> float:
+    """Estimate the time of a fit on one core.
+
+    Parameters
+    ----------
+    n_samples : int, [samples]
+        Of each recording.
+    units : float, [-]
+        Mean of both maps.
+    n_recordings : int, [-]
+        That are joined.
+
+    Returns
+    -------
+    float, [s]
+
+    Examples
+    --------
+    >>> round(fit_seconds(MEASURED, Orders(3, 3, 1), 2000, units=10), 3)
+    0.055
+    """
+    samples = _work(n_samples) / _work(cost.n_samples)
+    order = max((orders.nb + orders.nf) / 2, 1.0) / max(cost.order, 1.0)
+    return (
+        cost.seconds
+        * samples
+        * order**_P_ORDERS
+        * (units / cost.units) ** _P_UNITS
+        * n_recordings**_P_RECORDINGS
+    )
+
+
+def share_of_round(
+    number: int, *, of_group: bool = False, is_warm: bool = False
+) -> float:
+    """Time of a fit in a round of a grid's growth, against one alone from nothing.
+
+    Parameters
+    ----------
+    number : int
+        From zero.
+    of_group : bool
+        Whether it is a group's grid, of which fewer rounds are searched.
+    is_warm : bool
+        Whether it begins with the models of a group's members.
+
+    Returns
+    -------
+    float, [-]
+
+    Examples
+    --------
+    >>> share_of_round(0), share_of_round(0) > share_of_round(1) > share_of_round(9)
+    (1.0, True)
+    """
+    searched = SEARCHED_ROUNDS_OF_GROUPS if of_group else SEARCHED_ROUNDS
+    if is_warm:
+        return _WARM_SEARCHED if number < searched else _WARM_GROWN
+    if number == 0:
+        return 1.0
+    return _SEARCHED if number < searched else _GROWN
+
+
+def grid_seconds(
+    experiment: Experiment,
+    recordings: Sequence[Recording],
+    speed: tuple[FitCost, int],
+) -> float:
+    """Time of grids: their rounds wait for each other, so few fits leave workers idle.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+        Each with a grid of its own.
+    speed : tuple of (FitCost, int)
+        What a fit costs, and the workers.
+
+    Returns
+    -------
+    float, [s]
+    """
+    cost, workers = speed
+    grid = [orders for _, _, orders in candidate_orders(experiment.orders)]
+    total = 0.0
+    for number, places in enumerate(growth(experiment.orders)):
+        share = share_of_round(number)
+        each = [
+            share
+            * fit_seconds(cost, grid[place], one.n_samples, units=experiment.fit.units)
+            for one in recordings
+            for place, _ in places
+        ]
+        total += max(sum(each) / workers, sum(each) / len(each))
+    return total
+
+
+def group_grid_seconds(
+    cost: FitCost, n_samples: int, experiment: Experiment, level: int
+) -> float:
+    """Time of all fits of one group on one core.
+
+    Parameters
+    ----------
+    n_samples : int, [samples]
+        Of each recording.
+    level : int, [-]
+        Recordings in the group.
+
+    Returns
+    -------
+    float, [s]
+    """
+    grid = [orders for _, _, orders in candidate_orders(experiment.orders)]
+    is_warm = (experiment.group or GroupOptions()).warm_start
+    units = experiment.fit.units
+    return sum(
+        share_of_round(number, of_group=True, is_warm=is_warm)
+        * fit_seconds(cost, grid[place], n_samples, units=units, n_recordings=level)
+        for number, places in enumerate(growth(experiment.orders))
+        for place, _ in places
+    )
+
+
+def map_seconds(
+    cost: FitCost,
+    orders: OrdersOptions,
+    recordings: Sequence[Recording],
+    maps: Sequence[FitOptions],
+) -> float:
+    """Time of fits with several pairs of maps on one core; their orders are not known yet.
+
+    Returns
+    -------
+    float, [s]
+    """
+    middle = middle_orders(orders)
+    return sum(
+        fit_seconds(
+            cost,
+            middle,
+            one.n_samples,
+            units=(options.of_input.units + options.of_output.units) / 2,
+        )
+        for one in recordings
+        for options in maps
+    )
+
+
+def middle_orders(orders: OrdersOptions) -> Orders:
+    """Orders that stand for a whole grid."""
+    nb = sorted(orders.nb)[len(orders.nb) // 2]
+    nk = sorted(orders.nk)[len(orders.nk) // 2]
+    if orders.nk_role == "delay":
+        return Orders(nb, orders.nf or 0, nk)
+    return Orders(nb, nk, 1)
+
+
+def _work(n_samples: int) -> float:
+    """Time against the number of samples, up to a factor."""
+    short = min(max(n_samples, _LEAST_SAMPLES), _LONG_SAMPLES)
+    return float(short**_P_SAMPLES * max(n_samples / _LONG_SAMPLES, 1.0))

@@ -1,0 +1,137 @@
+"""Judging without outliers, where fits bear outliers too.
+
+References
+----------
+docs/method.md, section "Which orders".
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from hwid_cli.model.outliers import replace_outliers, usual_error
+from hwid_cli.model.simulate import validation_output
+from hwid_cli.records.experiment import CrossvalOptions, OrdersOptions
+from hwid_cli.records.model import Fit, HammersteinWiener
+from hwid_cli.records.recordings import Recording
+from hwid_cli.records.results import CrossValidation
+from hwid_cli.stages.crossval import cross_validate
+from hwid_cli.tasks.runner import RunSettings
+
+# Where outliers fill the RMSDs, the first one may find another model closest than
+# those who know the outliers; these agree.
+ROUNDS = 2
+# Robust standard deviations that outputs are cut to where an initial state is estimated,
+# how fast they come down to that, and the share of them that a run may still move.
+_CUT, _NEARER, _STILL = 1.345, 0.5, 0.02
+_MOST_RUNS = 50
+
+
+def cross_validate_without_outliers(
+    fits: Sequence[Fit],
+    crossval: CrossValidation,
+    judges: Sequence[Recording],
+    orders: OrdersOptions,
+    settings: RunSettings,
+) -> tuple[CrossValidation, tuple[int, ...]]:
+    """Validate every model on every recording without its outliers.
+
+    Parameters
+    ----------
+    fits : sequence of Fit
+        Of which the cross-validation was made.
+    crossval : CrossValidation
+        With the outliers.
+    judges : sequence of Recording
+        Those that judge there.
+
+    Returns
+    -------
+    n_outliers : tuple of int, [samples]
+        In each judging recording.
+    """
+    options = CrossvalOptions(threshold=crossval.threshold)
+
+    def score(some: Sequence[Recording]) -> np.ndarray:
+        scored = cross_validate(fits, some, orders, options, settings)
+        return scored.rmsd.reshape(len(fits), -1)
+
+    table = crossval.rmsd.reshape(len(fits), -1)
+    models = [fit.model for fit in fits]
+    table, n_outliers = without_outliers(models, table, judges, score)
+    return replace(crossval, rmsd=table.reshape(crossval.rmsd.shape)), n_outliers
+
+
+def without_outliers(
+    models: Sequence[HammersteinWiener | None],
+    rmsd: np.ndarray,
+    judges: Sequence[Recording],
+    score: Callable[[Sequence[Recording]], np.ndarray],
+) -> tuple[np.ndarray, tuple[int, ...]]:
+    """RMSDs on recordings whose outliers the model that comes closest has replaced.
+
+    Parameters
+    ----------
+    rmsd : ndarray, shape (n_models, n_judges), [output unit]
+        On the recordings as they are; NaN where there is none.
+    score : callable
+        From recordings to RMSDs like these.
+
+    Returns
+    -------
+    rmsd : ndarray, shape (n_models, n_judges), [output unit]
+    n_outliers : tuple of int, [samples]
+        In each recording; none where no model has an RMSD.
+    """
+    for _ in range(ROUNDS):
+        repaired = [
+            _repaired(one, models, column)
+            for one, column in zip(judges, rmsd.T, strict=True)
+        ]
+        rmsd = score([one for one, _ in repaired])
+    return rmsd, tuple(count for _, count in repaired)
+
+
+def _repaired(
+    recording: Recording,
+    models: Sequence[HammersteinWiener | None],
+    rmsd: np.ndarray,
+) -> tuple[Recording, int]:
+    if not np.isfinite(rmsd).any():
+        return recording, 0
+    closest = models[int(np.nanargmin(rmsd))]
+    if closest is None:
+        raise ValueError("a model with an RMSD is missing")
+    simulated = robust_validation(closest, recording)
+    output, count = replace_outliers(recording.output, simulated)
+    return replace(recording, output=output), count
+
+
+def robust_validation(model: HammersteinWiener, recording: Recording) -> np.ndarray:
+    """Output of a model for a recording, from an initial state that outliers hardly move.
+
+    The state is estimated from outputs cut to near the last run, nearer each time.
+
+    Returns
+    -------
+    ndarray, shape (n_samples,), [output unit]
+        Not finite where the model diverges.
+    """
+    simulated = validation_output(model, recording)
+    residual = recording.output - simulated
+    if model.initial_state != "estimated" or not np.isfinite(residual).all():
+        return simulated
+    near = float(np.max(np.abs(residual)))
+    for _ in range(_MOST_RUNS):
+        asked = _CUT * usual_error(recording.output, residual)
+        near = max(asked, _NEARER * near)
+        cut = simulated + np.clip(residual, -near, near)
+        last, simulated = (
+            simulated,
+            validation_output(model, replace(recording, output=cut)),
+        )
+        residual = recording.output - simulated
+        if near == asked and np.max(np.abs(simulated - last)) < _STILL * asked:
+            break
+    return simulated

@@ -1,0 +1,241 @@
+"""``init``: what to do with the recordings of a folder, proposed from their content."""
+
+import glob
+import re
+from collections.abc import Sequence
+
+import numpy as np
+
+from hwid_cli.data import column_signs as signs
+from hwid_cli.data.calibration import LEAST_QUIET, find_onset
+from hwid_cli.errors import HwidError
+from hwid_cli.records.experiment import CalibrateOptions
+from hwid_cli.records.recordings import KINDS, RawRecording
+from hwid_cli.records.starter import Proposal
+from hwid_cli.stages.calibrate import calibrate_all
+
+# Words in file names, German and English; the first kind that has one of them is it.
+_KIND_WORDS = {
+    "random": (
+        *("random", "rand", "noise", "rausch", "prbs", "aprbs", "multisin", "zufall"),
+        *("chirp", "sweep"),
+    ),
+    "sine": ("sine", "sin", "sinus"),
+    "step": ("step", "sprung", "jump", "schritt", "stufe", "ramp", "rampe"),
+}
+# Recipes of calibration, the best one first; each is tried on the data.
+_RECIPES: dict[str, tuple[tuple[str, ...], ...]] = {
+    "step": (("cut", "output_offset"), ("cut",)),
+    "sine": (("cut",),),
+    "random": (("cut",),),
+    "other": (),
+}
+# A recipe that keeps less than this share of a recording has misjudged it, [-].
+_LEAST_KEPT = 0.5
+# Fits that a first run may take without asking, [-].
+_MOST_FITS = 600
+# A model counts as good within this share of the output's swing, [-].
+_GOOD_SHARE = 0.05
+# Samples in the time in which the output forgets, beyond which a model of few orders
+# sees nothing change from one to the next, [samples].
+_ENOUGH_SAMPLES = 50
+# One file is cut where each part is still a measurement, [samples].
+_LEAST_TO_CUT = 600
+
+
+def propose(raws: Sequence[RawRecording], excluded: Sequence[str] = ()) -> Proposal:
+    """Propose what to do with recordings.
+
+    Parameters
+    ----------
+    raws : sequence of RawRecording
+        At least one.
+    excluded : sequence of str
+        Names of files that cannot be used.
+    """
+    kinds, kind_reason = _kinds(raws)
+    recipes, recipe_reason = _recipes(raws, kinds)
+    names = [raw.name for raw in raws]
+    parts = _parts(raws)
+    held_out = ("last",) if parts else _held_out(names, kinds)
+    identify = ("first",) if parts else tuple(n for n in names if n not in held_out)
+    is_large = len(identify) * 12 > _MOST_FITS
+    swing = float(
+        np.median([np.ptp(raw.output[np.isfinite(raw.output)]) for raw in raws])
+    )
+    memory = int(np.median([signs.memory_samples(raw.output) for raw in raws]))
+    threshold = float(f"{_GOOD_SHARE * swing:.1g}")
+    return Proposal(
+        kinds=_patterns(kinds, names),
+        kind_reason=kind_reason,
+        recipes=recipes,
+        recipe_reason=recipe_reason,
+        nb=(1, 2) if is_large else (1, 3),
+        nk=(1, 3) if is_large else (1, 4),
+        order_reason=(
+            f"{len(identify)} recordings: a small grid first"
+            if is_large
+            else "enough for a drive with a spring; raise them after a look"
+        ),
+        threshold=threshold,
+        threshold_reason=f"5 % of the usual swing of the output, {swing:.3g}",
+        sample_time_s=raws[0].sample_time_s,
+        exclude=tuple(glob.escape(name) for name in excluded),
+        parts=parts,
+        identify=identify if held_out else (),
+        held_out=held_out,
+        average=max(1, memory // _ENOUGH_SAMPLES),
+        initial_state=_initial_state(raws, kinds, recipes, is_cut=bool(parts)),
+    )
+
+
+def kind_named(name: str) -> str:
+    """Kind that the name of a file says.
+
+    Returns
+    -------
+    str
+        Empty where it says none.
+
+    Examples
+    --------
+    >>> kind_named("Sprung_03"), kind_named("multisine2"), kind_named("run7")
+    ('step', 'random', '')
+    """
+    words = re.findall(r"[a-zäöü]+", name.lower())
+    for kind, known in _KIND_WORDS.items():
+        for word in words:
+            # Short words are no part of longer ones: "sin" is not in "using".
+            if any(word == one or (len(one) > 3 and one in word) for one in known):
+                return kind
+    return ""
+
+
+def _kinds(raws: Sequence[RawRecording]) -> tuple[dict[str, str], str]:
+    """Kind of each recording, and what it was told from."""
+    by_name = {raw.name: kind_named(raw.name) for raw in raws}
+    if all(by_name.values()):
+        return by_name, "told from the names of the files"
+    found = {raw.name: by_name[raw.name] or _kind_of_signal(raw.input) for raw in raws}
+    if any(by_name.values()):
+        return found, "told from the names of the files, else from the inputs"
+    return found, "told from the inputs"
+
+
+def _kind_of_signal(values: np.ndarray) -> str:
+    if signs.is_stepwise(values):
+        return "step"
+    return "sine" if signs.is_sine(values) else "other"
+
+
+def _patterns(
+    kinds: dict[str, str], names: Sequence[str]
+) -> dict[str, tuple[str, ...]]:
+    """Patterns that give every recording its kind and no other one."""
+    found: dict[str, tuple[str, ...]] = {}
+    for kind in KINDS[:-1]:
+        own = [name for name in names if kinds[name] == kind]
+        if not own:
+            continue
+        start = _common_letters(own)
+        others = [name for name in names if kinds[name] != kind]
+        is_clear = len(start) > 1 and not any(n.startswith(start) for n in others)
+        found[kind] = (f"{start}*",) if is_clear else tuple(glob.escape(n) for n in own)
+    return found
+
+
+def _common_letters(names: Sequence[str]) -> str:
+    """Letters with which all names begin."""
+    start = ""
+    for letters in zip(*names, strict=False):
+        if len(set(letters)) > 1 or not letters[0].isalpha():
+            break
+        start += letters[0]
+    return start
+
+
+def _recipes(
+    raws: Sequence[RawRecording], kinds: dict[str, str]
+) -> tuple[dict[str, tuple[str, ...]], str]:
+    """For each kind the first recipe that works on all of its recordings."""
+    recipes: dict[str, tuple[str, ...]] = {}
+    for kind in KINDS:
+        own = [raw for raw in raws if kinds[raw.name] == kind]
+        if not own:
+            continue
+        needs_cut = any(raw.input.size != raw.output.size for raw in own)
+        candidates = (*_RECIPES[kind], ("cut",)) if needs_cut else _RECIPES[kind]
+        fitting = [one for one in candidates if _works(one, kind, own)]
+        recipes[kind] = fitting[0] if fitting else ()
+    some = [kind for kind, recipe in recipes.items() if recipe]
+    if not some:
+        return recipes, "nothing is cut: the recordings do not begin with a rest"
+    return recipes, f"tried: {' and '.join(some)} recordings begin with a rest"
+
+
+def _works(recipe: tuple[str, ...], kind: str, raws: Sequence[RawRecording]) -> bool:
+    """Whether a recipe finds a rest in every recording and keeps most of it."""
+    options = CalibrateOptions(**{kind: recipe})  # type: ignore[arg-type]
+    as_kind = [_of_kind(raw, kind) for raw in raws]
+    try:
+        logs = calibrate_all(as_kind, options)[1]
+    except HwidError:
+        return False
+    is_long = all(
+        log.n_samples >= _LEAST_KEPT * min(log.n_raw_input, log.n_raw_output)
+        for log in logs
+    )
+    differ = any(log.n_raw_input != log.n_raw_output for log in logs)
+    is_random = kind == "random"
+    onsets = [find_onset(raw.input, quiet_is_rest=not is_random) for raw in raws]
+    rests = all((onset or 0) >= LEAST_QUIET for onset in onsets)
+    return is_long and (rests or differ)
+
+
+def _of_kind(raw: RawRecording, kind: str) -> RawRecording:
+    about = {name: getattr(raw, name) for name in RawRecording.__dataclass_fields__}
+    return RawRecording(**{**about, "kind": kind})
+
+
+def _initial_state(
+    raws: Sequence[RawRecording],
+    kinds: dict[str, str],
+    recipes: dict[str, tuple[str, ...]],
+    *,
+    is_cut: bool,
+) -> str:
+    """How a diagnosis must take the recordings to start, rests cut as proposed."""
+    if is_cut or any(not _begins_at_rest(raw, kinds[raw.name]) for raw in raws):
+        return "estimated"
+    # Of these kinds 'cut' keeps no rest: the drive is still where it was before.
+    if any("cut" in recipes.get(kind, ()) for kind in ("sine", "random")):
+        return "held"
+    return "rest"
+
+
+def _begins_at_rest(raw: RawRecording, kind: str) -> bool:
+    onset = find_onset(raw.input, quiet_is_rest=kind != "random")
+    return onset is None or onset >= LEAST_QUIET
+
+
+def _held_out(names: Sequence[str], kinds: dict[str, str]) -> tuple[str, ...]:
+    """About a quarter of each kind, neither the first nor the last: often extremes."""
+    if len(names) < 2:
+        return ()
+    chosen = [
+        name
+        for kind in KINDS
+        for number, name in enumerate([n for n in names if kinds[n] == kind])
+        if number % 4 == 2
+    ]
+    return tuple(chosen) or (names[-1],)
+
+
+def _parts(raws: Sequence[RawRecording]) -> dict[str, tuple[int, ...]]:
+    """A single long file identifies with its first two thirds."""
+    if len(raws) != 1 or raws[0].input.size != raws[0].output.size:
+        return {}
+    n = raws[0].input.size
+    return (
+        {} if n < _LEAST_TO_CUT else {"first": (0, 2 * n // 3), "last": (2 * n // 3, n)}
+    )

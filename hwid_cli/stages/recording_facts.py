@@ -1,0 +1,79 @@
+"""``check``: what each recording is like, and whether it can be calibrated."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from hwid_cli.data.quality import signal_oddities
+from hwid_cli.errors import HwidError
+from hwid_cli.records.check import RecordingFacts
+from hwid_cli.records.experiment import Experiment
+from hwid_cli.records.recordings import RawRecording, Recording
+from hwid_cli.stages.calibrate import calibrate_all
+
+# Clocks that deviate by a larger share of the sample time are worth a note, [-].
+_NOTED_JITTER = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Checked:
+    """What calibration makes of the recordings.
+
+    Parameters
+    ----------
+    recordings : tuple of Recording
+        Those that can be calibrated.
+    """
+
+    facts: tuple[RecordingFacts, ...]
+    recordings: tuple[Recording, ...]
+    problems: tuple[str, ...]
+
+
+def check_recordings(
+    raws: Sequence[RawRecording], experiment: Experiment, jitter: dict[str, float]
+) -> Checked:
+    """Calibrate in memory, and say what each recording is like.
+
+    Parameters
+    ----------
+    jitter : dict of str to float, [-]
+        Largest deviation of a step of the time column by name, as a share of the step.
+    """
+    facts, recordings, problems = [], [], []
+    for raw in raws:
+        n_used, notes = 0, _notes(raw, jitter.get(raw.name, 0.0))
+        try:
+            (recording,), _ = calibrate_all([raw], experiment.calibrate)
+        except HwidError as error:
+            if str(error) not in problems:
+                problems.append(str(error))
+        else:
+            recordings.append(recording)
+            n_used = recording.n_samples
+        facts.append(
+            RecordingFacts(
+                name=raw.name,
+                kind=raw.kind,
+                n_input=raw.input.size,
+                n_output=raw.output.size,
+                n_used=n_used,
+                sample_time_s=raw.sample_time_s,
+                input_range=(float(raw.input.min()), float(raw.input.max())),
+                output_range=(float(raw.output.min()), float(raw.output.max())),
+                input_unit=raw.input_unit,
+                output_unit=raw.output_unit,
+                notes=notes,
+            )
+        )
+    return Checked(tuple(facts), tuple(recordings), tuple(problems))
+
+
+def _notes(raw: RawRecording, jitter: float) -> tuple[str, ...]:
+    notes = [
+        f"{side} {note}"
+        for side, values in (("input", raw.input), ("output", raw.output))
+        for note in signal_oddities(values, may_hold=side == "input")
+    ]
+    if jitter > _NOTED_JITTER:
+        notes.append(f"the clock jitters by up to {100 * jitter:.2g} % of a step")
+    return tuple(notes)

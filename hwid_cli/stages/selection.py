@@ -1,0 +1,52 @@
+"""Which recordings take part in a stage."""
+
+from collections.abc import Sequence
+from difflib import get_close_matches
+from typing import TypeVar
+
+from hwid_cli.errors import ConfigError
+from hwid_cli.records.recordings import RawRecording, Recording
+
+Chosen = TypeVar("Chosen", Recording, RawRecording)
+
+
+def select_recordings(
+    recordings: Sequence[Chosen],
+    names: Sequence[str] | None,
+    *,
+    key: str,
+    held_out: Sequence[str] = (),
+) -> tuple[Chosen, ...]:
+    """Choose recordings by name, in their own order.
+
+    Parameters
+    ----------
+    names : sequence of str or None
+        None means all that are not held out.
+    key : str
+        Key of the configuration that holds the names, for messages.
+    held_out : sequence of str
+        Recordings that only the final test may see.
+
+    Raises
+    ------
+    ConfigError
+        If a name is unknown, or nothing is left.
+    """
+    known = [recording.name for recording in recordings]
+    for name in (*(names or ()), *held_out):
+        if name not in known:
+            place = key if name in (names or ()) else "test.recordings"
+            close = get_close_matches(name, known, n=1)
+            expected = f"did you mean {close[0]!r}?" if close else _list(known)
+            raise ConfigError(f"{place}: no recording {name!r}; {expected}")
+    wanted = set(known) - set(held_out) if names is None else set(names)
+    chosen = tuple(recording for recording in recordings if recording.name in wanted)
+    if not chosen:
+        raise ConfigError(f"{key}: no recording is left; {_list(known)}")
+    return chosen
+
+
+def _list(known: Sequence[str]) -> str:
+    shown = ", ".join(known[:6]) + (", ..." if len(known) > 6 else "")
+    return f"expected some of {shown}"

@@ -1,0 +1,44 @@
+"""Simulation of a drive on measured inputs, beside what was measured."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from hwid_cli.diagnosis.preparing import prepare
+from hwid_cli.records.drive import SimulatedRecording
+from hwid_cli.records.experiment import DiagnoseOptions, SimulationOptions
+from hwid_cli.records.recordings import Recording
+from hwid_cli.stages.diagnose import compared_as_given
+
+
+def simulate_recordings(
+    recordings: Sequence[Recording],
+    simulation: SimulationOptions,
+    options: DiagnoseOptions,
+) -> tuple[SimulatedRecording, ...]:
+    """Simulate a drive on the inputs of recordings, with the given parameters.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+        At least one.
+    options : DiagnoseOptions
+        How recordings start and from which sample they are judged.
+
+    Returns
+    -------
+    tuple of SimulatedRecording
+        In the order of the recordings. NaN where the simulation runs away.
+    """
+    problem = prepare(recordings, simulation, options, ())
+    return tuple(
+        SimulatedRecording(
+            one.signals.name,
+            one.signals.sample_time_s * np.arange(one.signals.compared.size),
+            one.signals.driven_by,
+            one.signals.compared,
+            one.simulated,
+            one.rms,
+        )
+        for one in compared_as_given(problem)
+    )

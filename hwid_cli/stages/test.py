@@ -1,0 +1,458 @@
+"""Stage ``test``: the final models on all recordings, those never used before included.
+
+Judged are the widest model of each single recording and the best model of each group in
+the chain that the search for groups followed.
+
+Which model to use for a recording, told from its input alone.
+
+A new recording has an input and no measured output yet. The known recording with the
+most similar input is looked up, and the model that serves that one best is used. How
+often that works is found out on recordings whose output is known.
+
+How alike two inputs are: their mean and their amplitudes in octave bands.
+
+An input is told by twelve numbers: its mean, which keeps its sign, and the amplitude
+that it has around Nyquist's frequency, half of it, a quarter and so on; the last of the
+eleven bands holds all that is slower. The bands overlap: a frequency between two
+centres gives its power to both, so that two sines at nearly one frequency never fall
+apart at the edge of a band.
+
+Powers are per sample, so records of different length compare. What happens when is not
+seen: two inputs whose parts stand in another order are alike. Frequencies are counted
+in cycles per sample; the inputs must share their sample time.
+
+References
+----------
+docs/method.md, eqs. (18)-(20).
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from hwid_cli.records.groups import ChainTrend, FinalTest, GroupSearch, Prediction
+from hwid_cli.records.model import Fit
+from hwid_cli.records.recordings import Recording
+from hwid_cli.records.results import CrossValidation
+from hwid_cli.stages.coverage_matrix import (
+    JudgedModels,
+    are_hard_to_cover,
+    assign,
+    count_covered_by,
+    count_covers,
+    smallest_set,
+)
+from hwid_cli.stages.crossval import deviation_tasks
+from hwid_cli.stages.identify import recording_key
+from hwid_cli.stages.ranking import best_of_each, score_models
+from hwid_cli.tasks.cache import task_key
+from hwid_cli.tasks.runner import RunSettings, Task, run_tasks
+
+
+def predict_all(
+    judged: JudgedModels, distances: np.ndarray, is_known: np.ndarray
+) -> tuple[Prediction, ...]:
+    """Predict the model for each recording as if it were new.
+
+    Models that were fitted to the recording itself are left out of the choice. They would
+    cover it whatever its input is like, and for a recording that is really new there is
+    no such model: with them the choice would look right far more often than it is. For the
+    same reason a recording is never its own neighbour.
+
+    The models to choose from were themselves chosen with all recordings in view. So
+    ``is_possible`` may be too favourable to a new recording; the choice among them is
+    not, it sees nothing but the input.
+
+    Parameters
+    ----------
+    judged : JudgedModels
+        The models to choose from, on all recordings.
+    distances : ndarray, shape (n_recordings, n_recordings), [-]
+        Between the inputs of the recordings.
+    is_known : ndarray of bool, shape (n_recordings,)
+        Recordings that may be neighbours: all but the test recordings, which stand for
+        those yet to come.
+
+    Returns
+    -------
+    tuple of Prediction
+        In the order of the recordings. Where there is no neighbour or no model to choose
+        from, its name is empty and its number NaN.
+    """
+    return tuple(
+        _predict(judged, number, _nearest(distances[number], is_known, number))
+        for number in range(len(judged.recordings))
+    )
+
+
+def _nearest(
+    distances: np.ndarray, is_known: np.ndarray, number: int
+) -> tuple[int, float]:
+    """Find the nearest known recording other than that of the number."""
+    may_be = is_known.copy()
+    may_be[number] = False
+    if not may_be.any():
+        return -1, float("nan")
+    nearest = int(np.argmin(np.where(may_be, distances, np.inf)))
+    return nearest, float(distances[nearest])
+
+
+def _predict(
+    judged: JudgedModels, number: int, neighbour: tuple[int, float]
+) -> Prediction:
+    nearest, distance = neighbour
+    # Models that are fitted to the recording are blanked, not dropped: places stay.
+    eligible = np.where(judged.is_own[:, number, np.newaxis], np.nan, judged.rmsd)
+    serving = assign(eligible)
+    chosen = -1 if nearest < 0 else int(serving[nearest])
+    best = int(serving[number])
+    own_rmsd = eligible[:, number]
+    rmsd, best_rmsd = (
+        float("nan") if model < 0 else float(own_rmsd[model])
+        for model in (chosen, best)
+    )
+    return Prediction(
+        recording=judged.recordings[number],
+        nearest="" if nearest < 0 else judged.recordings[nearest],
+        distance=distance,
+        model="" if chosen < 0 else judged.models[chosen],
+        rmsd=rmsd,
+        best_model="" if best < 0 else judged.models[best],
+        best_rmsd=best_rmsd,
+        is_right=rmsd < judged.threshold,
+        is_possible=best_rmsd < judged.threshold,
+    )
+
+
+# Octaves below Nyquist's frequency that are told apart, [-]: at 1 kHz down to 0.5 Hz,
+# below the slowest excitation of a servo drive.
+N_OCTAVES = 10
+
+
+def input_signature(values: np.ndarray) -> np.ndarray:
+    """Mean and band amplitudes of an input.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n_samples,), [input unit]
+
+    Returns
+    -------
+    ndarray, shape (N_OCTAVES + 2,), [input unit]
+        The mean, then the bands from Nyquist's frequency down. Its norm is the root
+        mean square of the input.
+
+    Raises
+    ------
+    ValueError
+        If there are no samples, or they are not 1-D.
+
+    References
+    ----------
+    docs/method.md, eqs. (18) and (19).
+
+    Examples
+    --------
+    >>> signature = input_signature(np.array([4.0, 2.0, 4.0, 2.0]))
+    >>> signature[:4].tolist()
+    [3.0, 1.0, 0.0, 0.0]
+    """
+    signal = np.asarray(values, dtype=float)
+    if signal.ndim != 1 or signal.size == 0:
+        raise ValueError(f"input must be a 1-D array with samples, got {signal.shape}")
+    mean = float(np.mean(signal))
+    half = np.abs(np.fft.rfft(signal - mean)[1:] / signal.size) ** 2
+    cycles = np.arange(1, half.size + 1)
+    # All frequencies but Nyquist's stand for their negative twin too.
+    power = np.where(2 * cycles == signal.size, half, 2.0 * half)
+    octaves_down = np.clip(np.log2(0.5 * signal.size / cycles), 0.0, N_OCTAVES)
+    upper = np.minimum(octaves_down.astype(int), N_OCTAVES - 1)
+    to_lower = octaves_down - upper
+    bands = np.zeros(N_OCTAVES + 1)
+    np.add.at(bands, upper, (1.0 - to_lower) * power)
+    np.add.at(bands, upper + 1, to_lower * power)
+    return np.append(mean, np.sqrt(bands))
+
+
+def input_distance(one: np.ndarray, other: np.ndarray) -> float:
+    """Distance between two inputs, relative to the larger one.
+
+    Parameters
+    ----------
+    one, other : ndarray, shape (N_OCTAVES + 2,), [input unit]
+        As ``input_signature`` gives them.
+
+    Returns
+    -------
+    float, [-]
+        0 for equal ones, between 1 and 1.4 for inputs that have nothing in common, 2
+        for a constant and its opposite.
+
+    References
+    ----------
+    docs/method.md, eq. (20).
+
+    Examples
+    --------
+    >>> step = input_signature(np.full(100, 2.0))
+    >>> input_distance(step, input_signature(np.full(50, 1.5)))
+    0.25
+    """
+    larger = max(float(np.linalg.norm(one)), float(np.linalg.norm(other)))
+    if larger == 0.0:
+        return 0.0
+    return float(np.linalg.norm(one - other)) / larger
+
+
+def input_distances(inputs: list[np.ndarray]) -> np.ndarray:
+    """Distance between any two of several inputs.
+
+    Parameters
+    ----------
+    inputs : list of ndarray, shape (n_samples,), [input unit]
+        Lengths may differ.
+
+    Returns
+    -------
+    ndarray, shape (n_inputs, n_inputs), [-]
+    """
+    signatures = [input_signature(values) for values in inputs]
+    return np.array(
+        [[input_distance(one, other) for other in signatures] for one in signatures]
+    ).reshape(len(inputs), len(inputs))
+
+
+STAGE = "test"
+STAGE_VERSION = 2
+
+
+@dataclass(frozen=True, eq=False)
+class FinalModels:
+    """The models that the final test judges.
+
+    Parameters
+    ----------
+    names : tuple of str
+        ``step_06/3/7``; those of single recordings, then the chain.
+    fits : tuple of Fit
+        In the order of the names; each has a model.
+    n_chain : int, [-]
+        How many of them, the last ones, are the chain.
+    """
+
+    names: tuple[str, ...]
+    fits: tuple[Fit, ...]
+    n_chain: int
+
+    @property
+    def chain(self) -> tuple[str, ...]:
+        """Names of the chain's models, level by level."""
+        return self.names[len(self.names) - self.n_chain :]
+
+
+def final_models(
+    fits: Sequence[Fit], crossval: CrossValidation, search: GroupSearch | None
+) -> FinalModels:
+    """Choose the models to judge.
+
+    Parameters
+    ----------
+    fits : sequence of Fit
+        Of single recordings, of which the tensor was made, in the same order.
+    crossval : CrossValidation
+        Says which model of each recording is its widest.
+    search : GroupSearch or None
+        None if there was no search for groups; there is no chain then.
+
+    Returns
+    -------
+    FinalModels
+        The recording that the chain starts from is there with the chain's first model
+        only: two of its models would count as two that cover. Recordings without any
+        usable model are left out.
+    """
+    places = [
+        (name, nb, nk)
+        for name in crossval.identified_on
+        for nb in crossval.nb
+        for nk in crossval.nk
+    ]
+    by_place = dict(zip(places, fits, strict=True))
+    singles = {
+        f"{best.identified_on}/{best.nb}/{best.nk}": by_place[
+            best.identified_on, best.nb, best.nk
+        ]
+        for best in best_of_each(score_models(fits, crossval), crossval.identified_on)
+    }
+    chain: dict[str, Fit] = {}
+    if search is not None:
+        found = {
+            group.name: (group.model_name, fit)
+            for group, fit in zip(search.groups, search.fits, strict=True)
+            if fit is not None
+        }
+        chain = dict(found[name] for name in search.chain if name in found)
+    grouped = {fit.identified_on for fit in chain.values()}
+    alone = {k: fit for k, fit in singles.items() if fit.identified_on not in grouped}
+    usable = {k: fit for k, fit in (alone | chain).items() if fit.model is not None}
+    return FinalModels(
+        tuple(usable), tuple(usable.values()), sum(name in chain for name in usable)
+    )
+
+
+def judge_models(
+    models: FinalModels,
+    recordings: Sequence[Recording],
+    tested_on: Sequence[str],
+    threshold: float,
+    settings: RunSettings,
+) -> FinalTest:
+    """Judge the final models on every recording.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+        All of them.
+    tested_on : sequence of str
+        Those that nothing else has used.
+    threshold : float, [output unit]
+    """
+    done = run_tasks(final_test_tasks(models, recordings), settings)
+    # Tasks run over recordings, each with all models.
+    rmsd = np.array([item.result.rmsd for item in done]).T.copy()
+    names = tuple(recording.name for recording in recordings)
+    is_own = np.array(
+        [[name in fit.identified_on for name in names] for fit in models.fits],
+        dtype=bool,
+    ).reshape(rmsd.shape)
+    return judge_table(
+        JudgedModels(models.names, names, rmsd, is_own, threshold),
+        chain=models.chain,
+        tested_on=tested_on,
+        distances=input_distances([recording.input for recording in recordings]),
+        unit=recordings[0].output_unit,
+    )
+
+
+def judge_table(
+    judged: JudgedModels,
+    *,
+    chain: Sequence[str],
+    tested_on: Sequence[str],
+    distances: np.ndarray,
+    unit: str,
+) -> FinalTest:
+    """Read the final test's result off a table of RMSDs.
+
+    Parameters
+    ----------
+    chain : sequence of str
+        The last of the models: those of the chain, level by level.
+    tested_on : sequence of str
+        Recordings that nothing else has used.
+    distances : ndarray, shape (n_recordings, n_recordings), [-]
+        Between the inputs of the recordings.
+    unit : str
+        Of the output.
+    """
+    names, covered = judged.recordings, judged.covered
+    chosen = smallest_set(judged.rmsd, judged.threshold)
+    in_set = replace(
+        judged,
+        models=tuple(judged.models[n] for n in chosen),
+        rmsd=judged.rmsd[chosen],
+        is_own=judged.is_own[chosen],
+    )
+    is_known = ~np.isin(names, tested_on)
+    return FinalTest(
+        models=judged.models,
+        chain=tuple(chain),
+        recordings=names,
+        tested_on=_named(names, ~is_known),
+        rmsd=judged.rmsd,
+        is_own=judged.is_own,
+        covers=count_covers(covered, judged.is_own),
+        covered_by=count_covered_by(covered, judged.is_own),
+        uncovered=_named(names, np.sum(covered, axis=0) == 0),
+        hard_to_cover=_named(names, are_hard_to_cover(covered, judged.is_own)),
+        assigned=_assigned(judged),
+        smallest_set=in_set.models,
+        assigned_in_set=_assigned(in_set),
+        predictions=predict_all(in_set, distances, is_known),
+        unit=unit,
+        threshold=judged.threshold,
+    )
+
+
+def final_test_tasks(
+    models: FinalModels, recordings: Sequence[Recording]
+) -> tuple[Task, ...]:
+    """List the tasks: all models on one recording each."""
+    contents = [recording_key(recording) for recording in recordings]
+    return deviation_tasks(
+        [fit.model for fit in models.fits], recordings, contents, "final models"
+    )
+
+
+def final_test_key(
+    models: FinalModels,
+    recordings: Sequence[Recording],
+    tested_on: Sequence[str],
+    threshold: float,
+) -> str:
+    """Content key of the whole stage: its RMSDs and all that is read off them.
+
+    Parameters
+    ----------
+    threshold : float, [output unit]
+    """
+    settings = {
+        "rmsds": [task.key for task in final_test_tasks(models, recordings)],
+        "models": models.names,
+        "identified_on": [fit.identified_on for fit in models.fits],
+        "chain": models.chain,
+        "recordings": [recording.name for recording in recordings],
+        "tested_on": sorted(tested_on),
+        "threshold": threshold,
+    }
+    return task_key(STAGE, STAGE_VERSION, settings, [])
+
+
+def chain_trend(final: FinalTest, kinds: Mapping[str, str]) -> ChainTrend:
+    """Follow the chain: its RMSD on the test recordings and what it covers.
+
+    Parameters
+    ----------
+    kinds : mapping of str to str
+        Kind of each recording by its name.
+
+    Returns
+    -------
+    ChainTrend
+        Own recordings count in the coverage, as in the published chain tables: a longer
+        chain has more of them, and what it has learnt is covered, too.
+    """
+    rows = [final.models.index(name) for name in final.chain]
+    rmsd = final.rmsd[rows]
+    is_tested = np.isin(final.recordings, final.tested_on)
+    of_recording = np.array([kinds[name] for name in final.recordings])
+    present = tuple(dict.fromkeys(of_recording.tolist()))
+    covered = rmsd < final.threshold
+    return ChainTrend(
+        models=final.chain,
+        tested_rmsd=tuple(np.mean(rmsd[:, is_tested], axis=1).tolist()),
+        kinds=present,
+        coverage=np.array(
+            [np.sum(covered[:, of_recording == kind], axis=1) for kind in present]
+        ).T,
+    )
+
+
+def _named(names: Sequence[str], chosen: np.ndarray) -> tuple[str, ...]:
+    return tuple(name for name, is_it in zip(names, chosen, strict=True) if is_it)
+
+
+def _assigned(judged: JudgedModels) -> tuple[str, ...]:
+    """Name the best model for each recording; empty where there is none."""
+    return tuple("" if n < 0 else judged.models[n] for n in assign(judged.rmsd))

@@ -1,0 +1,1 @@
+"""Results and cache on disk."""

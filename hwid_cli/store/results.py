@@ -1,0 +1,201 @@
+"""Results of stages in and out of ``calibrated.h5`` and ``results.h5``.
+
+Both are written as a whole or not at all; rewriting one stage of ``results.h5`` keeps
+the groups of the others. docs/storage.md draws the trees.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+from hwid_cli.files.atomic import replaced_hdf5
+from hwid_cli.files.checksums import sealed
+from hwid_cli.records.experiment import OrdersOptions
+from hwid_cli.records.model import Fit
+from hwid_cli.records.recordings import CalibrationLog, Recording
+from hwid_cli.records.results import CrossValidation
+from hwid_cli.store.hdf5_records import (
+    read_array,
+    read_record,
+    write_array,
+    write_record,
+    write_small,
+)
+from hwid_cli.store.hdf5_tables import read_table, write_table
+from hwid_cli.store.result_files import (
+    CALIBRATED_FORMAT,
+    SCHEMA_VERSION,
+    SEALED,
+    Provenance,
+    read_results,
+    replaced_stage,
+    write_provenance,
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Calibrated:
+    """What ``calibrated.h5`` holds.
+
+    Parameters
+    ----------
+    logs : tuple of CalibrationLog
+        In the order of the recordings.
+    key : str
+        Key of the calibration that made them.
+    """
+
+    recordings: tuple[Recording, ...]
+    logs: tuple[CalibrationLog, ...]
+    key: str
+
+
+def write_calibrated(
+    path: Path,
+    recordings: Sequence[Recording],
+    logs: Sequence[CalibrationLog],
+    provenance: Provenance,
+) -> None:
+    """Write ``calibrated.h5``.
+
+    Parameters
+    ----------
+    logs : sequence of CalibrationLog
+        In the order of the recordings.
+
+    Raises
+    ------
+    CacheError
+        If it cannot be written; an old file is untouched then.
+    """
+    with replaced_hdf5(
+        path,
+        format_name=CALIBRATED_FORMAT,
+        version=SCHEMA_VERSION,
+        seal=sealed,
+        is_lasting=True,
+    ) as file:
+        file.attrs[SEALED] = True
+        write_provenance(file, provenance)
+        names = [recording.name for recording in recordings]
+        write_array(file, "names", np.array(names, dtype=object))
+        for recording, log in zip(recordings, logs, strict=True):
+            group = file.create_group(f"recordings/{recording.name}")
+            write_record(group, recording)
+            group["input"].attrs["unit"] = recording.input_unit
+            group["output"].attrs["unit"] = recording.output_unit
+            write_record(file.create_group(f"logs/{recording.name}"), log)
+
+
+def read_calibrated(path: Path) -> Calibrated:
+    """Read ``calibrated.h5``.
+
+    Raises
+    ------
+    CacheError
+        If it is missing or cannot be read.
+    """
+
+    def read(file: h5py.File) -> Calibrated:
+        names = read_array(file, "names").tolist()
+        return Calibrated(
+            tuple(read_record(file[f"recordings/{n}"], Recording) for n in names),
+            tuple(read_record(file[f"logs/{n}"], CalibrationLog) for n in names),
+            str(file.attrs["key"]),
+        )
+
+    return read_results(path, "calibrate", read)
+
+
+def write_fits(
+    path: Path, fits: Sequence[Fit], orders: OrdersOptions, provenance: Provenance
+) -> None:
+    """Write ``results.h5:/identify``, one row for each fit.
+
+    Parameters
+    ----------
+    orders : OrdersOptions
+        Says which two of a fit's orders are its place ``nb``, ``nk`` in the grid.
+
+    Raises
+    ------
+    CacheError
+        If it cannot be written; an old file is untouched then.
+    """
+    of_poles = orders.nk_role == "poles"
+    nb = np.array([fit.orders.nb for fit in fits], dtype=np.int64)
+    nk = np.array(
+        [fit.orders.nf if of_poles else fit.orders.nk for fit in fits], dtype=np.int64
+    )
+    names = [f"{fit.name}/{b}/{k}" for fit, b, k in zip(fits, nb, nk, strict=True)]
+    with replaced_stage(path, "identify", provenance) as group:
+        group.attrs["nk_role"] = orders.nk_role
+        write_array(group, "name", np.array(names, dtype=object))
+        write_array(group, "nb", nb)
+        write_array(group, "nk", nk)
+        write_table(group.create_group("fit"), fits, Fit)
+
+
+def read_fits(path: Path) -> tuple[Fit, ...]:
+    """Read all fits of ``results.h5:/identify``.
+
+    Returns
+    -------
+    tuple of Fit
+        In the order in which they were written.
+
+    Raises
+    ------
+    CacheError
+        If they are missing or cannot be read.
+    """
+
+    def read(file: h5py.File) -> tuple[Fit, ...]:
+        fits = read_table(file["identify/fit"], Fit)
+        return tuple(fit for fit in fits if fit is not None)
+
+    return read_results(path, "identify", read)
+
+
+def write_crossval(
+    path: Path, crossval: CrossValidation, provenance: Provenance
+) -> None:
+    """Write ``results.h5:/crossval``.
+
+    Raises
+    ------
+    CacheError
+        If it cannot be written; an old file is untouched then.
+    """
+    with replaced_stage(path, "crossval", provenance) as group:
+        write_small(group, "nk_role", crossval.nk_role, str)
+        write_small(group, "unit", crossval.unit, str)
+        write_small(group, "threshold", crossval.threshold, float)
+        write_array(group, "rmsd", crossval.rmsd)
+        write_array(group, "status", crossval.status)
+        axes = ("identified_on", "nb", "nk", "validated_on")
+        for axis in axes:
+            write_array(group, axis, np.array(getattr(crossval, axis)))
+            group[axis].make_scale(axis)
+        for name in ("rmsd", "status"):
+            for number, axis in enumerate(axes):
+                group[name].dims[number].label = axis
+                group[name].dims[number].attach_scale(group[axis])
+        group["rmsd"].attrs["unit"] = crossval.unit
+        group["rmsd"].attrs["nk_role"] = crossval.nk_role
+
+
+def read_crossval(path: Path) -> CrossValidation:
+    """Read ``results.h5:/crossval``.
+
+    Raises
+    ------
+    CacheError
+        If it is missing or cannot be read.
+    """
+    return read_results(
+        path, "crossval", lambda file: read_record(file["crossval"], CrossValidation)
+    )

@@ -1,0 +1,1 @@
+"""How work is done: tasks, their cache, the runner, workers of this machine and clusters."""

@@ -1,0 +1,394 @@
+"""Tasks on a dask cluster: data sent once, results back to this process, which writes.
+
+Workers need this package in the same version and nothing else: no shared disk and no
+configuration. Large arguments, such as recordings, are tasks of their own: the scheduler
+hands them to another worker when one has died, with what that one was computing. Tasks
+go out in chunks that last long enough for the way there and back not to matter; what a
+chunk holds changes no number.
+
+Which tasks go out together, and which are tried again after workers have died.
+
+A chunk lasts long enough for its way there and back not to matter. One over which workers
+died is taken apart; a task whose workers die again although it is alone is given up.
+"""
+
+import atexit
+import logging
+import math
+import pickle
+import queue
+import statistics
+import time
+from collections import Counter, deque
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from hashlib import sha256
+from typing import Any
+from uuid import uuid4
+
+from threadpoolctl import threadpool_limits
+
+from hwid_cli import __version__
+from hwid_cli.errors import ConfigError, WorkerError
+from hwid_cli.tasks.task import Computed, Task, computed
+
+# How long a chunk shall last, [s], and how many tasks it holds at most. Near the end
+# chunks get shorter, so that none is waited for long, down to a length, [s], at which the
+# way to a worker and back (docs/scale.md) is still a small share of it.
+CHUNK_S, LEAST_CHUNK_S, MOST_IN_CHUNK = 1.0, 0.2, 64
+# Chunks handed out ahead for each thread of a worker.
+CHUNKS_AHEAD = 3
+# Chunks from whose duration that of the next ones is taken.
+RECENT = 30
+# Names of tasks in a message.
+_MOST_NAMES = 4
+
+
+class Chunks:
+    """Tasks that wait for a worker.
+
+    Parameters
+    ----------
+    tasks : sequence of Task
+        Of one kind.
+    recent : deque of float, optional, [s]
+        How long tasks of that kind took last; goes on with these.
+    """
+
+    def __init__(
+        self, tasks: Sequence[Task], recent: deque[float] | None = None
+    ) -> None:
+        self._waiting = deque(tasks)
+        self._alone: deque[Task] = deque()
+        self._deaths: Counter[str] = Counter()
+        self._given_up: list[Task] = []
+        self._seconds = deque(maxlen=RECENT) if recent is None else recent
+
+    def __bool__(self) -> bool:
+        """Whether a task waits."""
+        return bool(self._waiting or self._alone)
+
+    def take(self, threads: int) -> tuple[Task, ...]:
+        """Take the next chunk.
+
+        Parameters
+        ----------
+        threads : int, [-]
+            That compute; the last tasks are divided among them.
+
+        Returns
+        -------
+        tuple of Task
+            At least one.
+        """
+        if self._alone:
+            return (self._alone.popleft(),)
+        count = 1
+        if self._seconds:
+            typical = max(statistics.median(self._seconds), 1e-6)
+            left = len(self._waiting)
+            longest = min(int(CHUNK_S / typical), MOST_IN_CHUNK)
+            shortest = min(math.ceil(LEAST_CHUNK_S / typical), -(-left // threads))
+            fair = left // (CHUNKS_AHEAD * threads)
+            count = max(1, min(longest, max(shortest, fair)))
+        return tuple(self._waiting.popleft() for _ in range(count))
+
+    def is_done(self, chunk: Sequence[Task], seconds: float) -> None:
+        """Note how long a chunk took.
+
+        Parameters
+        ----------
+        seconds : float, [s]
+        """
+        self._seconds.append(seconds / len(chunk))
+
+    def has_died(self, chunk: Sequence[Task]) -> str:
+        """Try the tasks of a chunk again, each alone, unless they were already.
+
+        Returns
+        -------
+        str
+            Their names.
+        """
+        for task in chunk:
+            self._deaths[task.key] += 1
+            is_first = self._deaths[task.key] == 1
+            (self._alone if is_first else self._given_up).append(task)
+        return _names(chunk)
+
+    def check(self) -> None:
+        """Refuse to end well where tasks were given up.
+
+        Raises
+        ------
+        WorkerError
+            Naming them.
+        """
+        if self._given_up:
+            raise WorkerError(
+                f"{_names(self._given_up)}: workers died over it again and again; "
+                "expected a task that fits into their memory and that they finish; what "
+                "was finished is kept: look into their logs and run the same command "
+                "again"
+            )
+
+
+def _names(tasks: Sequence[Task]) -> str:
+    named = ", ".join(task.name for task in tasks[:_MOST_NAMES])
+    more = len(tasks) - _MOST_NAMES
+    return f"{named} and {more} more" if more > 0 else named
+
+
+# A scheduler that does not answer within this time is not there, [s].
+CONNECT_TIMEOUT_S = 10
+# Arguments with a longer pickle are sent once, [bytes].
+LARGE = 8192
+# Time between two looks at the workers, and after which a message says there are none.
+_LOOK_S, _PATIENCE_S = 2.0, 15.0
+
+_log = logging.getLogger(__name__)
+
+# Key, function, arguments, and what packs the result.
+Call = tuple[str, Callable[..., Any], Sequence[Any], Callable[[str, Any], Any] | None]
+
+
+@dataclass(frozen=True)
+class ChunkDone:
+    """What a worker sends back.
+
+    Parameters
+    ----------
+    results : tuple of (str, Computed)
+        Keys and results.
+    seconds : float, [s]
+        That the worker took.
+    """
+
+    results: tuple[tuple[str, Computed], ...]
+    seconds: float
+
+
+def cluster_results(
+    tasks: Sequence[Task], scheduler: str | None, count: int
+) -> Iterator[tuple[str, Computed]]:
+    """Results of tasks as they come from a cluster, each with its key.
+
+    Parameters
+    ----------
+    scheduler : str or None
+        Address; None starts a cluster on this machine.
+    count : int
+        Processes of that.
+
+    Raises
+    ------
+    ConfigError
+        If dask is not installed, the scheduler does not answer or goes away, or a worker
+        has no package of this version.
+    WorkerError
+        If workers died over the same tasks again and again.
+    """
+    cluster = _cluster(scheduler, count)
+    chunks = Chunks(tasks, cluster.recent(tasks))
+    on_way: dict[Any, tuple[Task, ...]] = {}
+    arrived: queue.Queue[Any] = queue.Queue()
+    try:
+        while chunks or on_way:
+            threads = max(1, cluster.threads())
+            while chunks and len(on_way) < CHUNKS_AHEAD * threads:
+                chunk = chunks.take(threads)
+                future = cluster.submit(chunk)
+                on_way[future] = chunk
+                future.add_done_callback(arrived.put)
+            for future, done in cluster.results(_arrived(arrived, cluster)):
+                chunk = on_way.pop(future)
+                if done is None:
+                    names = chunks.has_died(chunk)
+                    _log.warning("workers died over %s; tried once more", names)
+                    continue
+                chunks.is_done(chunk, done.seconds)
+                yield from done.results
+    finally:
+        cluster.forget(list(on_way))
+    chunks.check()
+
+
+def run_chunk(version: str, calls: Sequence[Call]) -> ChunkDone:
+    """Run calls on a worker, one after the other.
+
+    Parameters
+    ----------
+    version : str
+        Of the package in the process that asks.
+
+    Raises
+    ------
+    ConfigError
+        If this worker has another version.
+    """
+    if version != __version__:
+        raise ConfigError(
+            f"a worker has hwid {__version__}; expected {version}, as here; install the "
+            "same version on all workers"
+        )
+    _one_thread_for_good()
+    begin = time.perf_counter()
+    results = tuple((call[0], computed(*call)) for call in calls)
+    return ChunkDone(results, time.perf_counter() - begin)
+
+
+@lru_cache(maxsize=1)
+def _one_thread_for_good() -> None:
+    """Keep linear algebra to one thread, also where a worker runs several tasks at once."""
+    threadpool_limits(limits=1)
+
+
+class _Cluster:
+    """A connection to a scheduler, and what has been sent to it."""
+
+    def __init__(self, client: Any, address: str) -> None:
+        self.client, self.address = client, address
+        self._sent: dict[int, tuple[Any, Any]] = {}
+        self._threads, self._looked_at = 0, -_LOOK_S
+        self._recent: dict[Callable[..., Any], deque[float]] = {}
+
+    def recent(self, tasks: Sequence[Task]) -> deque[float]:
+        """How long tasks of this kind took last, in the rounds before."""
+        return self._recent.setdefault(tasks[0].function, deque(maxlen=RECENT))
+
+    def threads(self) -> int:
+        """Threads of all workers; looked up every few seconds."""
+        if time.monotonic() - self._looked_at >= _LOOK_S:
+            before = self._threads
+            self._threads = sum(self.client.nthreads().values())
+            self._looked_at = time.monotonic()
+            if self._threads < before:
+                _log.warning(
+                    "a worker of %s is gone; what it was computing is computed again",
+                    self.address,
+                )
+        return self._threads
+
+    def submit(self, chunk: Sequence[Task]) -> Any:
+        """Hand a chunk to the scheduler; gives dask's future."""
+        calls = [
+            (
+                task.key,
+                task.function,
+                [self._reference(one) for one in task.arguments],
+                task.pack,
+            )
+            for task in chunk
+        ]
+        name = f"hwid-tasks-{uuid4().hex}"
+        return self.client.submit(run_chunk, __version__, calls, key=name)
+
+    def results(self, futures: Sequence[Any]) -> list[tuple[Any, ChunkDone | None]]:
+        """What came of chunks; None where workers died over one."""
+        from distributed.scheduler import KilledWorker
+
+        finished = [one for one in futures if one.status == "finished"]
+        try:
+            # All in one message: each alone would cost milliseconds.
+            found = dict(zip(finished, self.client.gather(finished), strict=True))
+        except KilledWorker:
+            # What had finished was lost with its worker, and killed those after it.
+            found = {}
+        return [
+            (one, found[one] if one in found else self._result(one)) for one in futures
+        ]
+
+    def _result(self, future: Any) -> ChunkDone | None:
+        from distributed.scheduler import KilledWorker
+
+        if future.status == "cancelled":
+            raise ConfigError(
+                f"--scheduler {self.address}: went away while computing; expected a "
+                "running dask scheduler; start it and give the same command again"
+            )
+        try:
+            return future.result()
+        except KilledWorker:
+            return None
+        except ImportError as error:
+            raise ConfigError(
+                f"--scheduler {self.address}: a worker cannot run tasks ({error}); "
+                f"expected hwid {__version__} there too; install it on all workers"
+            ) from error
+
+    def forget(self, futures: Sequence[Any]) -> None:
+        """Give up what is still on its way."""
+        if futures and self.client.status == "running":
+            self.client.cancel(futures)
+
+    def _reference(self, argument: Any) -> Any:
+        """Argument, or what stands for it where it is large."""
+        known = self._sent.get(id(argument))
+        if known is not None:
+            return known[1]
+        if isinstance(argument, list | tuple):
+            members = [self._reference(one) for one in argument]
+            if any(
+                one is not other for one, other in zip(members, argument, strict=True)
+            ):
+                return type(argument)(members)
+        content = pickle.dumps(argument, protocol=pickle.HIGHEST_PROTOCOL)
+        if len(content) <= LARGE:
+            return argument
+        name = f"hwid-data-{sha256(content).hexdigest()}"
+        future = self.client.submit(pickle.loads, content, key=name)
+        # The argument stays with it: its id is its name here.
+        self._sent[id(argument)] = (argument, future)
+        return future
+
+
+def _arrived(arrived: queue.Queue[Any], cluster: _Cluster) -> list[Any]:
+    """Futures that are done: at least one, and all others that have come meanwhile."""
+    futures: list[Any] = []
+    since, told = time.monotonic(), False
+    while not futures:
+        try:
+            futures.append(arrived.get(timeout=_LOOK_S))
+        except queue.Empty:
+            is_late = time.monotonic() - since > _PATIENCE_S
+            if is_late and not told and cluster.threads() == 0:
+                _log.warning("%s has no workers; waiting for one", cluster.address)
+                told = True
+    while not arrived.empty():
+        futures.append(arrived.get_nowait())
+    return futures
+
+
+def _quieten(package: str) -> None:
+    """Keep dask from telling of lost workers: what matters is told here."""
+    for name in logging.root.manager.loggerDict:
+        if name.partition(".")[0] == package:
+            logging.getLogger(name).setLevel(logging.CRITICAL)
+
+
+@lru_cache(maxsize=4)
+def _cluster(scheduler: str | None, count: int) -> _Cluster:
+    """Connection that lasts as long as the program."""
+    try:
+        from distributed import Client
+    except ImportError as error:
+        raise ConfigError(
+            f"--backend dask: {error}; expected dask[distributed] in this environment; "
+            "run: pip install 'hwid[dask]', or leave --backend out"
+        ) from error
+    _quieten("distributed")
+    try:
+        if scheduler is None:
+            client = Client(
+                n_workers=count, threads_per_worker=1, dashboard_address=None
+            )
+        else:
+            client = Client(scheduler, timeout=CONNECT_TIMEOUT_S)
+    except (OSError, ValueError) as error:
+        raise ConfigError(
+            f"--scheduler {scheduler}: {error}; expected the address of a "
+            "running dask scheduler, such as tcp://127.0.0.1:8786"
+        ) from error
+    atexit.register(client.close)
+    return _Cluster(client, scheduler or "the cluster on this machine")

@@ -1,0 +1,50 @@
+import pytest
+
+from hwid_cli.data.column_roles import meaning_of, sample_time_named
+
+
+@pytest.mark.parametrize(
+    ("title", "role", "unit"),
+    [
+        ("current_A", "input", "A"),
+        ("Strom [mA]", "input", "mA"),
+        ("i_motor", "input", ""),
+        ("u", "input", ""),
+        ("Spannung (V)", "input", "V"),
+        ("Drehmoment [Nm]", "input", "Nm"),
+        ("y", "output", ""),
+        ("position_mm", "output", "mm"),
+        ("Weg/mm", "output", "mm"),
+        ("Istposition [m]", "output", "m"),
+        ("Drehzahl [1/min]", "output", "1/min"),
+        ("displacement_m", "output", "m"),
+        ("winkel_rad", "output", "rad"),
+        ("speed_m_per_s", "output", "m/s"),
+        ("t", "time", ""),
+        ("time_ms", "time", "ms"),
+        ("Zeit [s]", "time", "s"),
+        ("pos_ref", "reference", ""),
+        ("Sollposition [m]", "reference", "m"),
+        ("Sollstrom [A]", "input", "A"),
+        ("Kanal 3 [A]", "input", "A"),
+        ("Nr", "counter", ""),
+        ("data.input", "input", ""),
+        ("Temperatur [K]", "output", "K"),
+        ("foo", "", ""),
+    ],
+)
+def test_names_in_two_languages_say_role_and_unit(title, role, unit):
+    found = meaning_of(title)
+    assert (found.role, found.unit) == (role, unit)
+
+
+def test_a_measured_current_comes_before_a_wanted_one():
+    assert meaning_of("Iststrom [A]").rank < meaning_of("Sollstrom [A]").rank
+
+
+@pytest.mark.parametrize(
+    ("title", "value", "step"),
+    [("Ts", 0.01, 0.01), ("fs", 500.0, 0.002), ("dt", 0.0, None), ("kp", 2.0, None)],
+)
+def test_settings_may_state_the_sample_time(title, value, step):
+    assert sample_time_named(title, value) == step

@@ -1,0 +1,146 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hwid_cli.data.csv_files import read_csv_columns
+from hwid_cli.errors import MeasurementError
+from hwid_cli.records.experiment import Columns
+
+BY_NAME = Columns(time="t", input="u", output="y")
+BY_NUMBER = Columns(time=0, input=1, output=2)
+
+
+@pytest.fixture
+def read(tmp_path):
+    def read_text(text, columns=BY_NAME, encoding="utf-8"):
+        path = tmp_path / "run.csv"
+        path.write_bytes(text.encode(encoding))
+        found = read_csv_columns(path, columns)
+        return found.time.values, found.input.values, found.output.values
+
+    return read_text
+
+
+EXPECTED = ([0, 0.5], [1.5, 2], [-3, 1e-4])
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "t,u,y\n0,1.5,-3\n0.5,2,1e-4\n",
+        "t;u;y\n0;1.5;-3\n0.5;2;1e-4\n",
+        "t;u;y\n0;1,5;-3\n0,5;2;1e-4\n",
+        "t\tu\ty\n0\t1,5\t-3\n0,5\t2\t1E-4\n",
+        "\ufefft,u,y\r\n0,1.5,-3\r\n0.5,2,1e-4\r\n",
+        "t,u,y\r0,1.5,-3\r0.5,2,1e-4\r",
+        '"t","u","y"\n"0","1.5","-3"\n"0.5","2","1e-4"\n',
+        '"t", "u", "y"\n 0 , 1.5, -3\n 0.5 , 2 , 1e-4',
+        "# made by hand\n\nt,u,y\n# units s,A,m\n0,1.5,-3\n\n0.5,2,1e-4\n\n",
+        "t,u,y,\n0,1.5,-3,\n0.5,2,1e-4,\n",
+        "note,y,u,t\na,-3,1.5,0\nb;c,1e-4,2,0.5\n",
+        "# t,u,y\n0,1.5,-3\n0.5,2,1e-4\n",
+        "# t u\n# t;u;y\n0;1,5;-3\n0,5;2;1e-4\n",
+        "t,u,y\n0,1.5,-3\n0.5,2,1e-4\n,,\n,,\n",
+    ],
+)
+def test_columns_are_found_by_header_name(read, text):
+    for found, expected in zip(read(text), EXPECTED, strict=True):
+        np.testing.assert_array_equal(found, expected)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "0,1.5,-3\n0.5,2,1e-4\n",
+        "time,current,travel\n0,1.5,-3\n0.5,2,1e-4\n",
+        "0;1,5;-3\n0,5;2;1e-4\n",
+    ],
+)
+def test_columns_are_found_by_number_with_or_without_header(read, text):
+    for found, expected in zip(read(text, BY_NUMBER), EXPECTED, strict=True):
+        np.testing.assert_array_equal(found, expected)
+
+
+def test_other_encodings_of_header_and_numbers_are_read(read):
+    columns = Columns(time="t", input="u", output="Weg [µm]")
+    for encoding in ("latin-1", "utf-8-sig", "utf-16"):
+        time, _, output = read("t,u,Weg [µm]\n0,1,2\n1,2,3\n", columns, encoding)
+        assert (time.tolist(), output.tolist()) == ([0, 1], [2, 3])
+
+
+def test_columns_that_end_in_blank_cells_are_shorter(tmp_path):
+    path = tmp_path / "run.csv"
+    path.write_text("t,u,y\n0,1,5\n1,2,\n2,,\n")
+    found = read_csv_columns(path, BY_NAME)
+    assert found.time.values.tolist() == [0, 1, 2]
+    assert found.input.values.tolist() == [1, 2]
+    assert found.output.values.tolist() == [5]
+
+
+def test_rows_are_lines_of_the_file_counted_from_one(tmp_path):
+    path = tmp_path / "run.csv"
+    path.write_text('# note\n"t\nx",u,y\n\n0,1,5\n# pause\n1,2,6\n')
+    found = read_csv_columns(path, Columns(input="u", output="y"))
+    assert found.input.rows.tolist() == [5, 7]
+    assert not found.input.rows_from_zero
+
+
+def test_cell_without_a_number_is_kept_as_text_of_its_row(tmp_path):
+    path = tmp_path / "run.csv"
+    path.write_text("t,u,y\n0,1,5\n1,off,6\n2,1_0,7\n3,,8\n4,nan,9\n")
+    column = read_csv_columns(path, BY_NAME).input
+    assert column.texts == {3: "off", 4: "1_0", 5: ""}
+    assert np.isnan(column.values[1:]).all()
+
+
+@pytest.mark.parametrize(
+    ("text", "columns", "message"),
+    [
+        ("T,u,y\n0,1,2\n", BY_NAME, r"run.csv, row 1: has no column 't' .*mean 'T'\?"),
+        ("t,cur,y\n0,1,2\n", BY_NAME, r"'u' for the input; expected one of t, cur, y"),
+        ("t,u,u,y\n0,1,2,3\n", BY_NAME, r"row 1: column 'u' occurs 2 times"),
+        ("0,1\n1,2\n", BY_NUMBER, r"no column 2 for the output; .*from 0 to 1;"),
+        ("t,u,y\n", BY_NAME, r"run.csv: holds a header and no rows; .*export the"),
+        ("t,u,y\n# 0,1,2\n", BY_NAME, r"run.csv: holds a header and no rows"),
+        ("\n\n", BY_NAME, r"run.csv: holds no rows; expected rows of numbers"),
+        ("# t,u,y\n", BY_NAME, r"run.csv: holds no rows; expected rows of numbers"),
+        (
+            "t,u,y\n0,0,1,5,2\n",
+            BY_NAME,
+            r"run.csv, row 2: has 5 cells; expected 3 as in row 1; if commas are",
+        ),
+        (
+            "t;u;y\n0;1,5;2\n1;1.5;2\n",
+            BY_NAME,
+            r"run.csv, row 3: input 'u' is '1.5', while other rows use the other",
+        ),
+        (
+            "t;u;y\n0;1.234,5;2\n",
+            BY_NAME,
+            r"run.csv, row 2: input 'u' is '1.234,5'",
+        ),
+        ('t,u,y\n0,"1' + "2" * 200_000, BY_NAME, r"row 2: field larger .*a quote"),
+    ],
+)
+def test_file_that_cannot_be_understood_is_refused(read, text, columns, message):
+    with pytest.raises(MeasurementError, match=message) as caught:
+        read(text, columns)
+    assert "\n" not in str(caught.value)
+
+
+@given(
+    st.lists(st.floats(allow_nan=False, allow_infinity=False), min_size=1, max_size=20),
+    st.sampled_from([",", ";", "\t"]),
+    st.booleans(),
+)
+def test_every_float_is_read_back_bit_by_bit(tmp_path_factory, values, mark, decimal):
+    cells = [repr(value) for value in values]
+    if decimal and mark != ",":
+        cells = [cell.replace(".", ",") for cell in cells]
+    path = tmp_path_factory.mktemp("csv") / "run.csv"
+    lines = [mark.join(["u", "y"])] + [mark.join([cell, cell]) for cell in cells]
+    path.write_text("\n".join(lines))
+    found = read_csv_columns(path, Columns(input="u", output="y"))
+    assert found.input.values.tobytes() == np.array(values).tobytes()
+    assert found.output.values.tobytes() == np.array(values).tobytes()

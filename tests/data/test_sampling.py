@@ -1,0 +1,166 @@
+import logging
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hwid_cli.data.columns import FileColumns, array_column
+from hwid_cli.data.recordings import sample_uniformly
+from hwid_cli.errors import MeasurementError
+from hwid_cli.records.experiment import Columns, RecordingsOptions
+
+PATH = Path("data/run07.csv")
+
+
+def options(**changes):
+    columns = Columns(time="t", input="u", output="y")
+    return RecordingsOptions(files=("a",), columns=columns, **changes)
+
+
+def columns(time, n_input=None, n_output=None):
+    time = np.asarray(time, float)
+    return FileColumns(
+        array_column("input 'u'", 2 * time[:n_input]),
+        array_column("output 'y'", -time[:n_output]),
+        array_column("time 't'", time),
+    )
+
+
+def test_uniform_columns_are_left_alone():
+    given_columns = columns(0.001 * np.arange(100))
+    found, step = sample_uniformly(PATH, given_columns, options())
+    assert found is given_columns
+    assert step == 0.001
+
+
+def test_without_a_time_column_the_stated_sample_time_holds():
+    bare = FileColumns(*[array_column("x", np.ones(3))] * 2)
+    assert sample_uniformly(PATH, bare, options(sample_time_s=0.25)) == (bare, 0.25)
+
+
+def test_without_any_clock_the_call_is_wrong():
+    bare = FileColumns(*[array_column("x", np.ones(3))] * 2)
+    with pytest.raises(ValueError, match="neither a time column nor sample_time_s"):
+        sample_uniformly(PATH, bare, options())
+
+
+def test_stated_sample_time_wins_over_stamps_within_the_tolerance():
+    time = 0.001004 * np.arange(100)
+    assert sample_uniformly(PATH, columns(time), options(sample_time_s=1e-3))[1] == 1e-3
+
+
+@given(
+    st.sampled_from([1e-4, 2e-4, 0.001, 0.005, 0.0125, 0.02, 0.1, 0.25, 1.0, 4.0]),
+    st.integers(60, 3000),
+    st.floats(-1000, 1000),
+)
+def test_sample_time_is_the_short_number_behind_the_stamps(step, n, start):
+    time = start + step * np.arange(n)
+    assert sample_uniformly(PATH, columns(time), options())[1] == step
+
+
+def test_rounded_stamps_give_their_mean_step():
+    time = np.round(np.arange(3001) / 3000, 6)
+    step = sample_uniformly(PATH, columns(time), options())[1]
+    # The last stamp is exact to 5e-7 s, so the mean of 3000 steps to 2e-10 s.
+    assert step == pytest.approx(1 / 3000, abs=2e-10)
+
+
+@pytest.mark.parametrize(
+    ("time", "message"),
+    [
+        (
+            [0, 1.2, 1.204, 1.198, 1.3],
+            r"^data/run07.csv, row 3 \(counted from 0\): time goes back from 1.204 s to "
+            r"1.198 s; expected time to go on; sort or cut the file$",
+        ),
+        ([0, 1, 1, 2], r"row 2 \(counted from 0\): time 1 s is repeated; .*remove rep"),
+        (
+            [0, 1, 2, 3.5, 4.5],
+            r"row 3 \(counted from 0\): time steps by 1.5 s, from 2 s to 3.5 s; expected "
+            r"1 s within 0.01 of it; set recordings.resample: true, or raise",
+        ),
+        ([0], r"has 1 rows; expected a whole measurement"),
+    ],
+)
+def test_time_that_is_no_clock_is_refused(time, message):
+    with pytest.raises(MeasurementError, match=message):
+        sample_uniformly(PATH, columns(time), options())
+
+
+def test_rows_of_text_are_named_as_lines():
+    time = np.array([0.0, 1.0, 0.5])
+    stamps = array_column("time 't'", time)
+    lines = type(stamps)(stamps.title, time, np.array([2, 3, 5]), rows_from_zero=False)
+    data = FileColumns(array_column("u", time), array_column("y", time), lines)
+    with pytest.raises(
+        MeasurementError, match=r"^data/run07.csv, row 5: time goes back"
+    ):
+        sample_uniformly(PATH, data, options())
+
+
+def test_jitter_within_the_tolerance_passes():
+    time = np.arange(100) + 0.04 * np.random.default_rng(1).uniform(-1, 1, 100)
+    with pytest.raises(MeasurementError, match="time steps by"):
+        sample_uniformly(PATH, columns(time), options())
+    wide = options(sampling_tolerance=0.1)
+    found, step = sample_uniformly(PATH, columns(time), wide)
+    assert found.input.values.size == 100
+    # Both ends may be off by 0.04 s, so the mean of 99 steps by 0.08 / 99 s.
+    assert step == pytest.approx(1, abs=1e-3)
+
+
+def test_stated_sample_time_that_contradicts_the_stamps_is_refused():
+    time = 0.002 * np.arange(100)
+    with pytest.raises(
+        MeasurementError, match=r"steps by 0.002 s; expected 0.001 s as .*sample_time_s"
+    ):
+        sample_uniformly(PATH, columns(time), options(sample_time_s=0.001))
+
+
+def test_time_that_ends_before_the_signals_is_refused():
+    data = columns(np.arange(10.0))
+    short = FileColumns(data.input, data.output, array_column("time 't'", np.arange(8)))
+    with pytest.raises(
+        MeasurementError, match=r"time 't' has 8 values for 10 rows; exp"
+    ):
+        sample_uniformly(PATH, short, options())
+
+
+def test_resampling_interpolates_linearly_and_is_logged(caplog):
+    time = np.array([0, 1, 2, 2.5, 4, 5, 6, 7.0])
+    with caplog.at_level(logging.INFO):
+        found, step = sample_uniformly(PATH, columns(time), options(resample=True))
+    assert step == 1.0
+    # The columns are linear in time, so interpolation gives them exactly.
+    np.testing.assert_allclose(found.input.values, 2 * np.arange(8), rtol=1e-15)
+    np.testing.assert_allclose(found.output.values, -np.arange(8.0), rtol=1e-15)
+    assert "data/run07.csv: resampled to 1 s, because 2 of 7 steps" in caplog.text
+
+
+def test_resampling_keeps_each_column_to_its_own_end():
+    time = np.array([0, 1, 2, 2.5, 4, 5, 6, 7.0])
+    data = columns(time, n_input=8, n_output=5)
+    found, _ = sample_uniformly(PATH, data, options(resample=True))
+    assert (found.input.values.size, found.output.values.size) == (8, 5)
+
+
+def test_resampling_uses_the_stated_sample_time():
+    time = np.array([0, 1, 2, 2.5, 4, 5, 6, 7.0])
+    stated = options(resample=True, sample_time_s=1.005)
+    found, step = sample_uniformly(PATH, columns(time), stated)
+    assert step == 1.005
+    np.testing.assert_allclose(found.input.values, 2.01 * np.arange(7), rtol=1e-14)
+
+
+def test_resampling_does_not_fill_a_gap_longer_than_the_recording():
+    time = np.append(np.arange(100.0), [1e5])
+    with pytest.raises(MeasurementError, match=r"row 100 .*time jumps by 99901 s"):
+        sample_uniformly(PATH, columns(time), options(resample=True))
+
+
+def test_resampling_does_not_forgive_time_that_goes_back():
+    with pytest.raises(MeasurementError, match="goes back"):
+        sample_uniformly(PATH, columns([0, 1, 2, 1.5, 3]), options(resample=True))

@@ -1,0 +1,113 @@
+"""The ranking beforehand: what each candidate should explain."""
+
+import numpy as np
+import pytest
+
+from hwid_cli.diagnosis.candidate import Footing, fit_candidate
+from hwid_cli.diagnosis.forecast import Forecast, forecast, ground, pair_shares
+from hwid_cli.diagnosis.stored_fit import fitted_drive
+from hwid_cli.drive.catalogue import CATALOGUE
+from tests.diagnosis.small_drive import problem, recordings, sizes, white
+
+HIDDEN = {
+    "coulomb_friction": {"force_N": 0.8},
+    "quadratic_drag": {"drag_N_s2_per_m2": 9.0},
+    "cubic_stiffness": {"stiffness_N_per_m3": 8e5},
+    "end_stop": {"position_m": 0.012, "stiffness_N_per_m": 4000.0},
+    "input_dead_zone": {"threshold_A": 0.2},
+    "input_saturation": {"limit_A": 2.8},
+    "actuator_lag": {"time_constant_s": 3e-3},
+    "sensor_drift": {"drift_m_per_s": 0.01},
+}
+
+
+def ground_of(effects, **changes):
+    of = problem(recordings(effects), **changes)
+    footing = Footing(of.drive, sizes(of), white())
+    base = fit_candidate(of, (), ({},), footing)
+    return ground(of, fitted_drive(of.drive, base), {}, footing.scales)
+
+
+@pytest.mark.parametrize("hidden", HIDDEN)
+def test_the_hidden_effect_is_among_the_first_three_of_all(hidden):
+    level = ground_of({hidden: HIDDEN[hidden]})
+    found = [forecast(level, one) for one in CATALOGUE if "parameter" not in one]
+    found.sort(key=lambda one: -one.share)
+    assert hidden in [one.effect for one in found[:3]]
+
+
+def test_shares_lie_between_nothing_and_all():
+    level = ground_of({"coulomb_friction": {"force_N": 0.8}})
+    shares = [forecast(level, one).share for one in HIDDEN]
+    assert all(-1e-12 <= one <= 1 for one in shares)
+    assert max(shares) > 0.8
+
+
+def test_starts_are_ordered_by_how_near_they_come():
+    # A twelfth, a twenty-fifth and a hundredth of the largest force, 20 N, are tried.
+    level = ground_of({"coulomb_friction": {"force_N": 0.8}})
+    starts = forecast(level, "coulomb_friction").starts
+    assert starts[0]["force_N"] == pytest.approx(0.8)
+    assert len(starts) == 3
+
+
+def test_the_base_absorbs_its_own_directions():
+    level = ground_of({"coulomb_friction": {"force_N": 0.8}})
+    np.testing.assert_allclose(level.absorbed.T @ level.absorbed, np.eye(3), atol=1e-12)
+    assert np.abs(level.absorbed.T @ level.error).max() < 1e-12
+    column = forecast(level, "coulomb_friction").column
+    assert column @ column == pytest.approx(1.0)
+    assert np.abs(level.absorbed.T @ column).max() < 1e-9
+
+
+def test_an_effect_of_the_wrong_sign_explains_nothing():
+    # Friction only resists: what drags along looks like its opposite.
+    level = ground_of({"coulomb_friction": {"force_N": 0.8}})
+    turned = type(level)(
+        level.problem, level.drive, level.present, level.scales,
+        [-one for one in level.parts], level.absorbed, -level.error,
+    )  # fmt: skip
+    assert forecast(level, "coulomb_friction").share > 0.8
+    changed = forecast(turned, "quadratic_drag")
+    assert changed.share >= 0.0
+
+
+def test_an_effect_that_changes_nothing_gets_no_share():
+    # No current is cut at a limit that it never reaches.
+    level = ground_of({"coulomb_friction": {"force_N": 0.8}})
+    far = type(level)(
+        level.problem, level.drive, level.present,
+        type(level.scales)(**{**vars(level.scales), "current_A": 100.0}),
+        level.parts, level.absorbed, level.error,
+    )  # fmt: skip
+    found = forecast(far, "input_saturation")
+    assert found.share == 0.0
+    assert not found.column.any()
+    assert found.starts
+
+
+def test_pairs_are_ranked_by_what_two_columns_explain_together():
+    rng = np.random.default_rng(1)
+    columns = rng.standard_normal((40, 4))
+    columns /= np.linalg.norm(columns, axis=0)
+    error = 2 * columns[:, 1] - columns[:, 3] + 0.01 * rng.standard_normal(40)
+    forecasts = [
+        Forecast(name, 0.0, ({},), column)
+        for name, column in zip("abcd", columns.T, strict=True)
+    ]
+    ranked = pair_shares(forecasts, error)
+
+    assert len(ranked) == 6
+    assert ranked[0][1:] == ("b", "d")
+    for share, one, other in ranked:
+        pair = columns[:, ["abcd".index(one), "abcd".index(other)]]
+        fit = pair @ np.linalg.lstsq(pair, error, rcond=None)[0]
+        # Two ways to the same projection.
+        assert share == pytest.approx(fit @ fit / (error @ error), rel=1e-9)
+
+
+def test_two_columns_of_one_direction_explain_no_more_than_one():
+    column = np.array([0.6, 0.8])
+    same = [Forecast(name, 0.0, ({},), column) for name in "ab"]
+    ((share, _, _),) = pair_shares(same, np.array([0.6, 0.8]))
+    assert share == pytest.approx(0.0, abs=1e-9) or share == pytest.approx(1.0)

@@ -1,0 +1,102 @@
+"""The input that would separate two candidates."""
+
+import numpy as np
+import pytest
+
+from hwid_cli.diagnosis.candidate import Footing, fit_candidate
+from hwid_cli.diagnosis.next_experiment import Model, Separation, best_separation, menu
+from hwid_cli.diagnosis.stored_fit import rebuilt
+from hwid_cli.diagnosis.unknowns import first_point, layout
+from hwid_cli.drive.simulation import simulate_drive
+from hwid_cli.records.recordings import Recording
+from tests.diagnosis.small_drive import (
+    DRIVE,
+    NOISE,
+    STEP_S,
+    problem,
+    replace,
+    sizes,
+    white,
+)
+
+FRICTION = {"coulomb_friction": {"force_N": 0.8}}
+
+
+@pytest.fixture(scope="module")
+def rivals():
+    """Coulomb friction and output backlash, fitted to one-way ramps."""
+    time = STEP_S * np.arange(400)
+    rng = np.random.default_rng(2)
+    given = []
+    for size in (1.0, 2.0, 3.0, 4.0):
+        current = size * np.interp(time, [0.04, 0.1], [0, 1])
+        motion = simulate_drive(
+            current, replace(DRIVE, effects=FRICTION), sample_time_s=STEP_S
+        )
+        read = motion.output + NOISE * rng.standard_normal(400)
+        given.append(Recording(f"step_{size}", current, read, STEP_S, kind="step"))
+    of = problem(given)
+    footing = Footing(of.drive, sizes(of), white())
+    models = []
+    for effect, start in (
+        ("coulomb_friction", {"force_N": 0.4}),
+        ("output_backlash", {"half_gap_m": 2e-4}),
+    ):
+        found = fit_candidate(of, (effect,), ({effect: start},), footing)
+        models.append(Model(*rebuilt(of, found, footing.scales)))
+    return of, models, footing.scales
+
+
+def test_friction_and_backlash_are_separated_by_reversals(rivals):
+    of, (coulomb, backlash), scales = rivals
+    found = best_separation(of, coulomb, backlash, scales)
+    # Ramps to one side say little about either; anything that reverses does.
+    assert "sine" in found.input or "triangle" in found.input
+    assert found.rms > 5 * NOISE
+
+
+def test_a_candidate_is_not_separated_from_itself(rivals):
+    of, (coulomb, _), scales = rivals
+    # What is simulated is compared with itself.
+    assert best_separation(of, coulomb, coulomb, scales).rms < 1e-12
+
+
+def test_what_the_rival_can_absorb_does_not_count(rivals):
+    of, (coulomb, _), scales = rivals
+    point = coulomb.point
+    # Another force of friction: a new measurement would only correct it.
+    moved = point.shared + np.array([0.0, 0.0, 0.0, 1e-3])
+    other = Model(coulomb.layout, type(point)(moved, point.own))
+    found = best_separation(of, coulomb, other, scales)
+    unabsorbed = 1e-3 * 0.8 / DRIVE.stiffness_N_per_m
+    assert found.rms < 0.05 * unabsorbed
+
+
+def test_a_rival_that_runs_away_separates_nothing(rivals):
+    of, (coulomb, _), scales = rivals
+    start = {"cubic_stiffness": {"stiffness_N_per_m3": -1e9}}
+    lost = layout(of, ("cubic_stiffness",), start, scales)
+    model = Model(lost, first_point(of, lost, of.drive, start))
+    assert best_separation(of, coulomb, model, scales) == Separation(
+        next(iter(menu(scales))), 0.0
+    )
+
+
+def test_the_menu_stays_within_the_current_that_was_used(rivals):
+    _, _, scales = rivals
+    inputs = menu(scales)
+    assert len(inputs) == len(set(inputs)) >= 10
+    for name, command in inputs.items():
+        assert np.abs(command).max() <= scales.current_A * (1 + 1e-12), name
+        assert np.isfinite(command).all(), name
+        assert np.ptp(command) > 0, name
+        # A drive starts at rest.
+        assert command[0] == pytest.approx(0.0, abs=1e-12), name
+
+
+def test_the_menu_has_no_frequency_that_the_samples_cannot_follow(rivals):
+    _, _, scales = rivals
+    slow = replace(scales, sample_time_s=0.02)
+    fast = [name for name in menu(slow) if "at 60.7 Hz" in name]
+    assert fast == []
+    assert len(menu(slow)) < len(menu(scales))

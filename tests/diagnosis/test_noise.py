@@ -1,0 +1,265 @@
+"""Noise floor and whiteness without a model, against noise that is known."""
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from hwid_cli.diagnosis.noise import noise_floor, whiteness
+from hwid_cli.drive.simulation import simulate_drive
+from tests.diagnosis.diagnosed import (
+    DRIVE,
+    FULL_SCALE,
+    SAMPLE_TIME_S,
+    inputs,
+    problem_of,
+    white,
+)
+
+# Correlation over 20 samples.
+PHI = float(np.exp(-1 / 20))
+
+
+@pytest.fixture(scope="module")
+def driven_by():
+    return list(inputs().values())
+
+
+@pytest.fixture(scope="module")
+def motions(driven_by):
+    return [
+        simulate_drive(u, DRIVE, sample_time_s=SAMPLE_TIME_S).output for u in driven_by
+    ]
+
+
+def slow_noise(rng, size, rms):
+    waves = rng.normal(0, np.sqrt(1 - PHI**2), size + 500)
+    return rms * lfilter([1.0], [1.0, -PHI], waves)[500:]
+
+
+def mixed_noise(rng, size, rms):
+    """Half of the power slow, half white."""
+    half = rms * np.sqrt(0.5)
+    return slow_noise(rng, size, half) + rng.normal(0, half, size)
+
+
+@pytest.mark.parametrize("share", [0.001, 0.01, 0.03])
+def test_white_noise_is_read_within_two_percent(motions, driven_by, share):
+    rng = np.random.default_rng(0)
+    sigma = share * FULL_SCALE
+    measured = [y + rng.normal(0, sigma, y.size) for y in motions]
+
+    noise = noise_floor(problem_of(measured, driven_by))
+
+    # 39 000 sixth differences: one standard error is 0.64 %.
+    assert noise.rms == pytest.approx(sigma, rel=0.02)
+    assert noise.method == "differences"
+    assert noise.whitening == (1.0,)
+    assert "white noise" in noise.sentence
+
+
+def test_single_jumps_are_no_noise(motions, driven_by):
+    rng = np.random.default_rng(1)
+    measured = [y + rng.normal(0, 1e-5, y.size) for y in motions]
+    measured = [np.where(np.arange(y.size) == 700, y + 1e-2, y) for y in measured]
+
+    # Without the rest, which would tell as well.
+    moving = slice(101, None)
+    noise = noise_floor(
+        problem_of([y[moving] for y in measured], [u[moving] for u in driven_by])
+    )
+
+    # As above, and the 13 samples around a jump that are lost are 1 % of all.
+    assert noise.rms == pytest.approx(1e-5, rel=0.02)
+
+
+def test_without_noise_there_is_next_to_none_and_no_nan(motions, driven_by):
+    noise = noise_floor(problem_of(motions, driven_by))
+
+    # Far below what a double resolves of 28 mm.
+    assert 0 <= noise.rms < 1e-15
+    assert not noise.is_coloured
+
+
+def test_constant_recordings_have_no_noise():
+    noise = noise_floor(problem_of([np.ones(50)] * 4, [np.zeros(50)] * 4))
+
+    assert noise.rms == 0
+    assert noise.resolution == 0
+    assert noise.sentence.startswith("no noise")
+
+
+def test_slow_noise_is_read_from_the_rest(motions, driven_by):
+    found = []
+    for seed in range(10):
+        rng = np.random.default_rng(seed)
+        measured = [y + mixed_noise(rng, y.size, 2.8e-4) for y in motions]
+        noise = noise_floor(problem_of(measured, driven_by))
+        assert noise.method == "rest"
+        assert noise.is_coloured
+        found.append(noise.rms / 2.8e-4)
+
+    # 27 rests of 100 samples hold 70 independent values of the slow half: one standard
+    # error is 4 %, and the common mean costs 1 %. Differences alone read 0.71.
+    assert np.max(np.abs(np.array(found) - 1)) < 0.15
+    assert np.mean(found) == pytest.approx(1, abs=0.05)
+
+
+@pytest.mark.parametrize("step_share", [0.003, 0.01, 0.03])
+@pytest.mark.parametrize("noise_share", [0.0, 0.2, 0.4])
+def test_a_coarse_sensor_is_recognised(motions, driven_by, step_share, noise_share):
+    rng = np.random.default_rng(2)
+    step = step_share * FULL_SCALE
+    measured = [
+        step * np.round((y + rng.normal(0, noise_share * step, y.size)) / step)
+        for y in motions
+    ]
+
+    noise = noise_floor(problem_of(measured, driven_by))
+
+    assert noise.resolution == pytest.approx(step, rel=1e-6)
+    # Rounding and the noise before it add up; slow recordings rest on one level and
+    # show less of the noise, by up to 5 %.
+    expected = step * np.sqrt(1 / 12 + noise_share**2)
+    assert noise.rms == pytest.approx(expected, rel=0.06)
+    assert "steps of" in noise.sentence
+
+
+def test_noise_above_the_grid_is_noise(motions, driven_by):
+    rng = np.random.default_rng(3)
+    step = 1e-5
+    measured = [
+        step * np.round((y + rng.normal(0, 2 * step, y.size)) / step) for y in motions
+    ]
+
+    noise = noise_floor(problem_of(measured, driven_by))
+
+    assert noise.resolution == 0
+    assert noise.rms == pytest.approx(step * np.sqrt(4 + 1 / 12), rel=0.02)
+
+
+def test_repeats_that_drift_show_their_noise_alone(motions, driven_by):
+    rng = np.random.default_rng(4)
+    ramp = np.linspace(-1, 1, motions[0].size)
+    measured, repeated = [], []
+    for u, y in list(zip(driven_by, motions, strict=True))[:6]:
+        for _ in range(3):
+            drift = rng.normal(0, 1e-3) + rng.normal(0, 1e-3) * ramp
+            measured.append(y + drift + rng.normal(0, 1e-5, y.size))
+            repeated.append(u)
+
+    noise = noise_floor(problem_of(measured, repeated))
+
+    # 6 groups x 2 degrees of freedom x 1450 samples: one standard error is 0.5 %.
+    assert noise.method == "repeats"
+    assert noise.rms == pytest.approx(1e-5, rel=0.02)
+    assert not noise.is_coloured
+
+
+def test_repeats_show_slow_noise(motions, driven_by):
+    rng = np.random.default_rng(5)
+    pairs = [(u, y) for u, y in zip(driven_by, motions, strict=True) for _ in range(2)]
+    measured = [y + mixed_noise(rng, y.size, 1e-4) for _, y in pairs]
+
+    noise = noise_floor(problem_of(measured, [u for u, _ in pairs]))
+
+    assert noise.method == "repeats"
+    assert noise.is_coloured
+    # A line taken off 1450 samples takes 5 % of the slow half.
+    assert noise.rms == pytest.approx(1e-4, rel=0.06)
+
+
+def test_repeats_that_move_differently_are_no_noise(motions, driven_by):
+    rng = np.random.default_rng(6)
+    measured, repeated = [], []
+    for u, y in zip(driven_by, motions, strict=True):
+        for gain in (0.97, 1.03):
+            measured.append(gain * y + rng.normal(0, 1e-5, y.size))
+            repeated.append(u)
+
+    noise = noise_floor(problem_of(measured, repeated))
+
+    assert noise.method == "differences"
+    assert noise.rms == pytest.approx(1e-5, rel=0.02)
+
+
+def test_a_periodic_force_at_rest_is_no_noise(motions, driven_by):
+    rng = np.random.default_rng(7)
+    t = SAMPLE_TIME_S * np.arange(motions[0].size)
+    measured = [
+        y
+        + 3e-4 * np.sin(2 * np.pi * 17.3 * t + rng.uniform(0, 2 * np.pi))
+        + rng.normal(0, 1e-4, y.size)
+        for y in motions
+    ]
+
+    noise = noise_floor(problem_of(measured, driven_by))
+
+    assert not noise.is_coloured
+    assert noise.rms == pytest.approx(1e-4, rel=0.02)
+
+
+def test_white_residuals_raise_a_false_alarm_in_less_than_one_percent(driven_by):
+    noise, found = white(1.0), []
+    for seed in range(300):
+        rng = np.random.default_rng(seed)
+        found.append(whiteness([rng.normal(size=u.size) for u in driven_by], noise))
+
+    # 0.1 % by design: more than 3 of 300 has a chance of 3e-4.
+    assert np.mean(np.array(found) > 1) <= 0.01
+    # The middle of chi squared of 30 over its 99.9 % quantile is 29.3 / 59.7.
+    assert np.median(found) == pytest.approx(0.491, abs=0.03)
+
+
+@pytest.mark.parametrize(
+    ("seeds", "most"),
+    # Over 120 seeds 0 and 1 were above 1; two of 60 are more than chance at 1 %.
+    [(range(12), 0), pytest.param(range(60), 2, marks=pytest.mark.slow)],
+    ids=["few", "many"],
+)
+@pytest.mark.parametrize("make", [slow_noise, mixed_noise])
+def test_residuals_of_slow_noise_pass_after_the_estimated_whitening(
+    motions, driven_by, make, seeds, most
+):
+    found = []
+    for seed in seeds:
+        rng = np.random.default_rng(seed)
+        parts = [make(rng, y.size, 3e-4) for y in motions]
+        measured = [y + part for y, part in zip(motions, parts, strict=True)]
+        noise = noise_floor(problem_of(measured, driven_by))
+        found.append(whiteness(parts, noise))
+
+    assert np.sum(np.array(found) > 1) <= most
+    assert np.median(found) == pytest.approx(0.5, abs=0.1)
+
+
+def test_a_coarse_sensor_leaves_nothing_where_the_motion_is_right(motions, driven_by):
+    step = 0.01 * FULL_SCALE
+    measured = [step * np.round(y / step) for y in motions]
+    noise = noise_floor(problem_of(measured, driven_by))
+    right = [a - b for a, b in zip(measured, motions, strict=True)]
+    wrong = [a - 1.03 * b for a, b in zip(measured, motions, strict=True)]
+
+    assert whiteness(right, noise) < 1
+    assert whiteness(right, white(noise.rms)) > 1
+    # The error of 3 % is at most 3 steps.
+    assert whiteness(wrong, noise) > 1
+
+
+def test_what_is_missing_is_seen_far_below_the_noise(motions, driven_by):
+    rng = np.random.default_rng(8)
+    parts = [rng.normal(0, 1e-3, y.size) + 0.02 * y for y in motions]
+
+    # The RMS is up by less than 3 %.
+    rms = np.sqrt(np.mean(np.concatenate(parts) ** 2))
+    assert rms < 1.03e-3
+    assert whiteness(parts, white(1e-3)) > 1
+
+
+def test_whiteness_of_what_is_not_finite_is_infinite():
+    assert whiteness([np.array([1.0, np.nan])], white(1.0)) == np.inf
+    assert whiteness([np.array([1.0, np.inf])], white(1.0)) == np.inf
+
+
+def test_whiteness_of_nothing_is_zero():
+    assert whiteness([np.zeros(100)], white(0.0)) == 0
+    assert whiteness([], white(1.0)) == 0

@@ -1,0 +1,219 @@
+"""Fits by simulation error: derivatives, and known drives found again."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hwid_cli.diagnosis.comparing import residuals, total
+from hwid_cli.diagnosis.search import derivatives, fit, local_matrix
+from hwid_cli.diagnosis.unknowns import Point, drive_at, effects_at, first_point, layout
+from hwid_cli.records.experiment import DiagnoseOptions
+from tests.diagnosis.small_drive import DRIVE, NOISE, problem, recordings, sizes
+
+OFF = replace(
+    DRIVE,
+    damping_N_s_per_m=19.0,
+    stiffness_N_per_m=1000.0,
+    force_constant_N_per_A=4.3,
+)
+
+
+def begun(of, start=None, drive=None):
+    start = start or {}
+    found = layout(of, tuple(start), start, sizes(of))
+    return found, first_point(of, found, drive or of.drive, start)
+
+
+def fitted(of, start=None, drive=None, **options):
+    found, point = begun(of, start, drive)
+    return fit(of, found, point, **{"max_iterations": 40, **options})
+
+
+@pytest.mark.parametrize(
+    ("start", "initial_state"),
+    [
+        ({}, "rest"),
+        ({"cubic_stiffness": {"stiffness_N_per_m3": 8e5}}, "rest"),
+        ({"actuator_lag": {"time_constant_s": 2e-3}}, "estimated"),
+        (
+            {"periodic_force": {"amplitude_N": 0.5, "frequency_Hz": 3.0}},
+            "estimated",
+        ),
+        ({"parameter_change:damping": {"log_damping": 0.1}}, "rest"),
+    ],
+)
+def test_derivatives_agree_with_central_differences(start, initial_state):
+    of = problem(
+        recordings()[3:7], options=DiagnoseOptions(initial_state=initial_state)
+    )
+    found, point = begun(of, start)
+    columns = derivatives(of, found, point, residuals(of, found, point))
+
+    shared, width = len(found.shared), 1e-4
+    for column in range(shared + len(found.own)):
+        shifted = []
+        for sign in (1, -1):
+            moved = Point(point.shared.copy(), point.own.copy())
+            if column < shared:
+                moved.shared[column] += sign * width
+            else:
+                moved.own[:, column - shared] += sign * width
+            shifted.append(residuals(of, found, moved))
+        for row, (more, less) in enumerate(zip(*shifted, strict=True)):
+            central = (less - more) / (2 * width)
+            # One-sided differences of 3e-4 miss 1.5e-4 of the curvature, which is up
+            # to ten times the slope for the frequency of a force over 7.5 rad.
+            apart = np.linalg.norm(columns[row][:, column] - central)
+            assert apart <= 2e-3 * np.linalg.norm(central) + 1e-12
+
+
+def test_a_derivative_at_an_upper_bound_looks_inwards():
+    of = problem(recordings()[1:2])
+    limit = sizes(of).current_A
+    # At its bound, the largest current, the limit cuts nothing; beyond it neither.
+    found, point = begun(of, {"input_saturation": {"limit_A": limit}})
+    (columns,) = derivatives(of, found, point, residuals(of, found, point))
+    assert np.linalg.norm(columns[:, -1]) > 0
+
+
+def test_the_base_is_found_again_without_noise():
+    of = problem(recordings(noise=0.0))
+    found = fitted(of, drive=OFF)
+    drive = drive_at(of, found.layout, found.point)
+
+    assert found.has_converged
+    for name in ("damping_N_s_per_m", "stiffness_N_per_m", "force_constant_N_per_A"):
+        # Ten digits of a simulation that is exact to rounding; 1e-6 leaves room for
+        # one-sided derivatives, which stop the search a little early.
+        assert getattr(drive, name) == pytest.approx(getattr(DRIVE, name), rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("effect", "true", "start"),
+    [
+        (
+            "stribeck_friction",
+            {"force_N": 0.5, "static_excess_N": 0.4, "velocity_m_per_s": 0.02},
+            {"force_N": 0.6, "static_excess_N": 0.3, "velocity_m_per_s": 0.03},
+        ),
+        (
+            "cubic_stiffness",
+            {"stiffness_N_per_m3": 8e5},
+            {"stiffness_N_per_m3": 3e5},
+        ),
+        ("quadratic_drag", {"drag_N_s2_per_m2": 9.0}, {"drag_N_s2_per_m2": 4.0}),
+        ("input_dead_zone", {"threshold_A": 0.2}, {"threshold_A": 0.1}),
+        ("actuator_lag", {"time_constant_s": 2e-3}, {"time_constant_s": 5e-3}),
+        ("sensor_cubic", {"coefficient": 0.06}, {"coefficient": 0.02}),
+        ("constant_load", {"force_N": 0.7}, {"force_N": -0.2}),
+    ],
+)
+def test_an_effect_and_the_base_are_found_again_without_noise(effect, true, start):
+    of = problem(recordings({effect: true}, noise=0.0))
+    found = fitted(of, {effect: start})
+    values = effects_at(found.layout, found.point)[effect]
+    # See above.
+    assert values == pytest.approx(true, rel=1e-6)
+    assert drive_at(of, found.layout, found.point).stiffness_N_per_m == pytest.approx(
+        DRIVE.stiffness_N_per_m, rel=1e-6
+    )
+
+
+def test_friction_is_found_again_as_closely_as_its_corners_let_it():
+    of = problem(recordings({"coulomb_friction": {"force_N": 0.8}}, noise=0.0))
+    found = fitted(of, {"coulomb_friction": {"force_N": 0.5}})
+    force = effects_at(found.layout, found.point)["coulomb_friction"]["force_N"]
+    # Where a mass comes to rest jumps with the force: nothing finer than a difference
+    # for derivatives, 3e-4, is seen. Noise of 0.1 % hides three times as much.
+    assert force == pytest.approx(0.8, rel=3e-4)
+
+
+def test_with_noise_everything_is_within_four_standard_errors():
+    true = {"coulomb_friction": {"force_N": 0.8}}
+    of = problem(recordings(true, noise=5 * NOISE, seed=4))
+    found = fitted(of, {"coulomb_friction": {"force_N": 0.5}}, OFF)
+
+    aim, wanted = begun(of, true)
+    matrix = local_matrix(of, found.layout, found.point)
+    errors = np.sqrt(np.diag(np.linalg.inv(matrix))) * 5 * NOISE
+    apart = np.array(
+        [
+            one.value(q) / other.value(r) - 1
+            for one, q, other, r in zip(
+                found.layout.shared,
+                found.point.shared,
+                aim.shared,
+                wanted.shared,
+                strict=True,
+            )
+        ]
+    )
+    # Logarithms, so relative. Four: one of 16 000 draws is beyond.
+    assert (np.abs(apart) < 4 * errors).all()
+    assert (errors < 0.02).all()
+
+
+def test_a_start_that_is_not_at_rest_is_estimated():
+    cut = [
+        replace(one, input=one.input[130:], output=one.output[130:])
+        for one in recordings(noise=0.0)[5:]
+    ]
+    of = problem(cut, options=DiagnoseOptions(initial_state="estimated"))
+    found = fitted(of, drive=OFF)
+    assert drive_at(of, found.layout, found.point).stiffness_N_per_m == pytest.approx(
+        DRIVE.stiffness_N_per_m, rel=1e-6
+    )
+    # At rest instead, the same recordings leave much.
+    assert fitted(problem(cut), drive=OFF).sse > 1e6 * found.sse
+
+
+def test_only_own_parameters_move_where_the_shared_ones_are_held():
+    of = problem(recordings(), options=DiagnoseOptions(initial_state="estimated"))
+    found, point = begun(of, drive=OFF)
+    ended = fit(of, found, point, max_iterations=5, only_own=True)
+    np.testing.assert_array_equal(ended.point.shared, point.shared)
+    assert not np.array_equal(ended.point.own, point.own)
+
+
+def test_a_search_never_ends_above_its_start():
+    of = problem(recordings({"cogging": {"amplitude_N": 0.6, "period_m": 0.004}}))
+    for period in (2e-3, 3e-3, 6e-3):
+        start = {"cogging": {"amplitude_N": 0.3, "period_m": period, "phase_rad": 0.0}}
+        found, point = begun(of, start)
+        before = total(residuals(of, found, point))
+        assert fit(of, found, point, max_iterations=3).sse <= before
+
+
+def test_a_search_says_that_it_was_stopped():
+    ended = fitted(problem(recordings()), drive=OFF, max_iterations=1)
+    assert ended.iterations == 1
+    assert not ended.has_converged
+
+
+def test_a_simulation_that_runs_away_is_an_infinite_sum():
+    # A spring that pushes away beyond a small displacement.
+    of = problem(recordings()[:3])
+    ended = fitted(of, {"cubic_stiffness": {"stiffness_N_per_m3": -1e9}})
+    assert ended.sse == float("inf")
+    assert not ended.has_converged
+
+
+def test_parameters_stay_within_their_bounds():
+    # A lag that the recordings do not have goes to its lowest value and no further.
+    of = problem(recordings())
+    ended = fitted(of, {"actuator_lag": {"time_constant_s": 2e-3}})
+    lag = ended.layout.shared[-1]
+    value = lag.value(ended.point.shared[-1])
+    assert lag.low * (1 - 1e-12) <= value <= lag.high
+
+
+def test_what_is_skipped_has_no_influence():
+    given = recordings(noise=0.0)
+    spoilt = [
+        replace(one, output=np.r_[one.output[:30] + 1.0, one.output[30:]])
+        for one in given
+    ]
+    options = DiagnoseOptions(skip_samples=30)
+    found = [fitted(problem(one, options=options)).sse for one in (given, spoilt)]
+    assert found[0] == pytest.approx(found[1], abs=1e-20)

@@ -1,0 +1,175 @@
+"""Coordinates of a fit: what is searched, and within which bounds."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hwid_cli.diagnosis.unknowns import (
+    START,
+    Point,
+    Unknown,
+    drive_at,
+    effects_at,
+    first_point,
+    layout,
+    vectors_at,
+)
+from hwid_cli.drive import slots
+from hwid_cli.drive.simulation import drive_effects
+from hwid_cli.records.experiment import DiagnoseOptions
+from tests.diagnosis.small_drive import DRIVE, problem, recordings, sizes
+
+LOG = Unknown("effect", "force_N", True, 2.0, 0.1, 50.0)
+NEGATIVE = Unknown("base", "force_constant_N_per_A", True, -5.0, -5e4, -5e-4)
+LINEAR = Unknown("effect", "coefficient", False, 0.05, -0.4, 0.4)
+
+
+def laid_out(effects=(), start=None, *, of=None, **changes):
+    of = problem(recordings()[:3], **changes) if of is None else of
+    start = start or {}
+    found = layout(of, effects, start, sizes(of))
+    return of, found, first_point(of, found, of.drive, start)
+
+
+@given(st.floats(0.1, 50.0))
+def test_a_logarithmic_coordinate_gives_its_value_back(value):
+    # A logarithm and its exponential lose a few roundings.
+    assert LOG.value(LOG.coordinate(value)) == pytest.approx(value, rel=1e-13)
+    assert NEGATIVE.value(NEGATIVE.coordinate(-value)) == pytest.approx(
+        -value, rel=1e-13
+    )
+
+
+@given(st.floats(-0.4, 0.4))
+def test_a_linear_coordinate_gives_its_value_back(value):
+    assert LINEAR.value(LINEAR.coordinate(value)) == pytest.approx(value, rel=1e-13)
+
+
+def test_coordinates_have_no_unit():
+    assert LOG.coordinate(2.0) == 0.0
+    assert NEGATIVE.coordinate(-5.0) == 0.0
+    assert LINEAR.coordinate(0.05) == 1.0
+
+
+@pytest.mark.parametrize(
+    ("unknown", "value", "moved"),
+    [
+        (LOG, 0.0, 0.1),
+        (LOG, -3.0, 0.1),
+        (LOG, 99.0, 50.0),
+        (NEGATIVE, 3.0, -5e-4),
+        (LINEAR, 0.9, 0.4),
+        (LINEAR, -0.9, -0.4),
+    ],
+)
+def test_a_value_outside_the_bounds_is_moved_onto_them(unknown, value, moved):
+    assert unknown.value(unknown.coordinate(value)) == pytest.approx(moved, rel=1e-12)
+
+
+def test_the_base_has_damping_stiffness_and_force_constant():
+    _, found, _ = laid_out()
+    assert [one.name for one in found.shared] == [
+        "damping_N_s_per_m",
+        "stiffness_N_per_m",
+        "force_constant_N_per_A",
+    ]
+    assert found.own == ()
+    assert found.size(3) == 3
+
+
+def test_a_free_axis_gets_no_spring():
+    _, found, _ = laid_out(stiffness_N_per_m=0.0)
+    assert "stiffness_N_per_m" not in [one.name for one in found.shared]
+
+
+def test_a_damping_of_zero_may_grow():
+    of, found, point = laid_out(damping_N_s_per_m=0.0)
+    damping = drive_at(of, found, point).damping_N_s_per_m
+    # A fiftieth of sqrt(k m).
+    assert damping == pytest.approx(0.02 * np.sqrt(1184.0 * 0.3))
+
+
+def test_a_negative_force_constant_stays_negative():
+    of, found, point = laid_out(force_constant_N_per_A=-5.0)
+    assert drive_at(of, found, point).force_constant_N_per_A == pytest.approx(-5.0)
+    assert found.shared[2].high < 0
+
+
+def test_effects_share_one_value_over_all_recordings():
+    start = {"hysteresis": {"force_N": 0.3, "yield_m": 1e-4}}
+    _, found, point = laid_out(("hysteresis",), start)
+
+    assert [one.owner for one in found.shared] == ["base"] * 3 + ["hysteresis"] * 2
+    values = effects_at(found, point)["hysteresis"]
+    assert values == pytest.approx({"force_N": 0.3, "yield_m": 1e-4})
+
+
+def test_a_phase_belongs_to_each_recording():
+    start = {"periodic_force": {"amplitude_N": 0.3, "frequency_Hz": 30.0}}
+    of, found, point = laid_out(("periodic_force",), start)
+    assert [one.name for one in found.own] == ["phase_rad"]
+    assert found.size(3) == 3 + 2 + 3
+
+    own = Point(point.shared, np.array([[0.1], [0.2], [0.3]]) / found.own[0].scale)
+    vectors = vectors_at(of, found, own)
+    phases = [vector[slots.PERIODIC_PHASE] for vector in vectors]
+    assert phases == pytest.approx([0.1, 0.2, 0.3])
+    assert effects_at(found, own, 1)["periodic_force"]["phase_rad"] == pytest.approx(
+        0.2
+    )
+    assert "phase_rad" not in effects_at(found, own)["periodic_force"]
+
+
+def test_a_factor_between_recordings_acts_on_the_base():
+    start = {"parameter_change:damping": {"log_damping": 0.0}}
+    of, found, point = laid_out(("parameter_change:damping",), start)
+    own = np.log([[0.5], [1.0], [2.0]]) / found.own[0].scale
+    vectors = vectors_at(of, found, Point(point.shared, own))
+    assert [vector[slots.DAMPING] for vector in vectors] == pytest.approx(
+        [7.5, 15.0, 30.0]
+    )
+
+
+def test_effects_of_the_simulation_start_from_its_values():
+    of = problem(recordings()[:3], effects={"sensor_drift": {"drift_m_per_s": 0.004}})
+    present = drive_effects(of.drive)
+    _, found, point = laid_out(tuple(present), present, of=of)
+    assert effects_at(found, point) == {
+        "sensor_drift": pytest.approx({"drift_m_per_s": 0.004})
+    }
+
+
+def test_an_estimated_start_begins_at_the_first_output_at_rest():
+    of = problem(recordings()[:3], options=DiagnoseOptions(initial_state="estimated"))
+    _, found, point = laid_out(of=of)
+    assert [(one.owner, one.name) for one in found.own] == [
+        (START, "position"),
+        (START, "velocity"),
+    ]
+    for signals, vector in zip(of.signals, vectors_at(of, found, point), strict=True):
+        assert vector[slots.IS_START_GIVEN] == 1.0
+        assert vector[slots.START_POSITION] == pytest.approx(signals.output[0])
+        assert vector[slots.START_VELOCITY] == 0.0
+
+
+def test_a_free_axis_starts_where_it_rested():
+    of, found, point = laid_out(stiffness_N_per_m=0.0)
+    for signals, vector in zip(of.signals, vectors_at(of, found, point), strict=True):
+        assert vector[slots.IS_START_GIVEN] == 1.0
+        assert vector[slots.START_POSITION] == signals.rest_position_m
+
+
+def test_a_spring_starts_in_equilibrium():
+    of, found, point = laid_out()
+    assert vectors_at(of, found, point)[0][slots.IS_START_GIVEN] == 0.0
+
+
+def test_the_base_of_a_point_is_that_of_its_drive():
+    of, found, _ = laid_out()
+    point = Point(np.log([2.0, 0.5, 3.0]), np.zeros((3, 0)))
+    drive = drive_at(of, found, point)
+    assert drive.damping_N_s_per_m == pytest.approx(2 * DRIVE.damping_N_s_per_m)
+    assert drive.stiffness_N_per_m == pytest.approx(0.5 * DRIVE.stiffness_N_per_m)
+    assert drive.force_constant_N_per_A == pytest.approx(15.0)
+    assert drive.mass_kg == DRIVE.mass_kg

@@ -1,0 +1,116 @@
+"""Cases for the drive's simulation: effects alone and together, and one varied input."""
+
+import numpy as np
+
+from hwid_cli.drive.simulation import simulate_drive
+from hwid_cli.records.drive import Drive
+
+SAMPLE_TIME_S = 1e-3
+# Ramps of both signs, reversals, holds; starts at rest.
+CORNER_TIMES_S = np.array([0, 0.02, 0.05, 0.09, 0.13, 0.18, 0.2, 0.24, 0.3, 0.36, 0.4])
+CORNERS = np.array([0, 0, 3.0, -4.0, 4.5, 4.5, -1.0, 0.6, 0.6, -0.3, -5.0])
+TIMES_S = SAMPLE_TIME_S * np.arange(401)
+
+COULOMB = {"coulomb_friction": {"force_N": 0.8}}
+STRIBECK = {
+    "stribeck_friction": {
+        "force_N": 0.6,
+        "static_excess_N": 0.5,
+        "velocity_m_per_s": 0.01,
+    }
+}
+HYSTERESIS = {"hysteresis": {"force_N": 0.8, "yield_m": 2e-4}}
+CUBIC = {"cubic_stiffness": {"stiffness_N_per_m3": 5e5}}
+END_STOP = {"end_stop": {"position_m": 0.012, "stiffness_N_per_m": 2e4}}
+GAP = {"spring_gap": {"half_gap_m": 1e-3}}
+GEAR = {
+    "gear_backlash": {
+        "half_gap_m": 2e-4,
+        "stiffness_N_per_m": 5e4,
+        "motor_share": 0.3,
+    }
+}
+MODE = {"second_mode": {"mass_kg": 0.05, "frequency_Hz": 40.0, "damping_ratio": 0.05}}
+COGGING = {"cogging": {"amplitude_N": 0.5, "period_m": 5e-3, "phase_rad": 0.3}}
+LOAD = {"constant_load": {"force_N": 2.0}}
+DEAD_ZONE = {"input_dead_zone": {"threshold_A": 0.3}}
+SATURATION = {"input_saturation": {"limit_A": 3.3}}
+RATE = {"rate_limit": {"rate_A_per_s": 80.0}}
+DELAY = {"input_delay": {"delay_s": 0.0034}}
+LAG = {"actuator_lag": {"time_constant_s": 0.005}}
+LOSS = {"force_constant_saturation": {"loss_at_reference": 0.25}}
+HEAT = {"thermal_gain_loss": {"loss_at_reference": 0.3, "time_constant_s": 0.2}}
+CLIP = {"voltage_limit": {"limit_A": 4.0, "slope_A_s_per_m": 3.0}}
+PERIODIC = {
+    "periodic_force": {"amplitude_N": 0.5, "frequency_Hz": 25.0, "phase_rad": 0.4}
+}
+
+SINGLE = {
+    **COULOMB,
+    "asymmetric_friction": {"force_forward_N": 0.8, "force_backward_N": 0.4},
+    **STRIBECK,
+    **HYSTERESIS,
+    "quadratic_drag": {"drag_N_s2_per_m2": 10.0},
+    **CUBIC,
+    "quadratic_stiffness": {"stiffness_N_per_m2": 1e4},
+    **END_STOP,
+    "one_sided_stop": {"position_m": -0.008, "stiffness_N_per_m": 1e4},
+    **GAP,
+    **GEAR,
+    **MODE,
+    **COGGING,
+    **LOAD,
+    **DEAD_ZONE,
+    **SATURATION,
+    **RATE,
+    **DELAY,
+    **LAG,
+    **LOSS,
+    "supply_sag": {"loss_at_reference": 0.25},
+    **HEAT,
+    **CLIP,
+    **PERIODIC,
+}
+TOGETHER = (
+    COULOMB | LOAD,
+    COULOMB | CUBIC,
+    COULOMB | MODE,
+    COULOMB | END_STOP,
+    COULOMB | PERIODIC,
+    COULOMB | CLIP,
+    HYSTERESIS | COULOMB,
+    LAG | HEAT,
+    LAG | CLIP,
+    LAG | LOSS,
+    COGGING | LOAD,
+    DEAD_ZONE | SATURATION | RATE | DELAY,
+)
+# The oracle stops at many events here, or follows a stiff pair of masses.
+TOGETHER_SLOW = (
+    COULOMB | GEAR,
+    COULOMB | STRIBECK,
+    HYSTERESIS | MODE,
+    GAP | COGGING,
+    END_STOP | GAP,
+)
+
+
+def tool(effects, command=None, *, sample_time=SAMPLE_TIME_S, start=None, **drive):
+    """Motion of the default drive of these tests with some effects."""
+    if command is None:
+        count = round(CORNER_TIMES_S[-1] / sample_time) + 1
+        command = np.interp(sample_time * np.arange(count), CORNER_TIMES_S, CORNERS)
+    values = {
+        "mass_kg": 0.3,
+        "damping_N_s_per_m": 15.1,
+        "stiffness_N_per_m": 1184.0,
+        "force_constant_N_per_A": 5.0,
+        "reference_current_A": 5.0,
+        "reference_displacement_m": 0.02,
+    }
+    made = Drive(**(values | drive), effects=effects)
+    return simulate_drive(command, made, sample_time_s=sample_time, start=start)
+
+
+def rms(values):
+    return float(np.sqrt(np.mean(np.square(values))))

@@ -1,0 +1,138 @@
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hwid_cli.drive.simulation import drive_effects, parameter_vector
+from hwid_cli.errors import ConfigError
+from hwid_cli.export.c_drive import drive_source
+from hwid_cli.export.formats import write_exported
+from hwid_cli.export.predict import predict
+from hwid_cli.records.drive import Controller, Drive
+from hwid_cli.records.experiment import Columns
+from hwid_cli.records.exported import ExportedSimulation, ModelCard
+from tests.drive import drive_cases as cases
+from tests.export.fmu_runs import answered
+from tests.export.model_examples import (
+    MAIN,
+    c_output,
+    compiled,
+    deviation,
+)
+
+STEP = 1e-3
+# Steps without tables of matrices round otherwise; friction does not enlarge that.
+PROMISED = 1e-12
+# A simulation starts in one way only.
+ONE_START = MAIN.replace("init_empty", "init").replace("init_steady", "init")
+BACKLASH = {"output_backlash": {"half_gap_m": 1e-3}}
+SENSORS = {
+    "sensor_quadratic": {"coefficient": 0.1},
+    "sensor_cubic": {"coefficient": 0.05},
+    "sensor_drift": {"drift_m_per_s": 0.01},
+}
+MACHINES = (
+    ({}, {}),
+    (BACKLASH, {}),
+    (SENSORS, {}),
+    (cases.COULOMB, {"stiffness_N_per_m": 0.0}),
+    (cases.COULOMB, {"hold": "zero"}),
+    (cases.COULOMB, {"resistance_ohm": 2.0}),
+    (cases.COULOMB | cases.HEAT, {"resistance_ohm": 2.0, "inductance_H": 1e-3}),
+    (cases.STRIBECK, {"controller": Controller(20.0, 30.0, 4.0)}),
+)
+ALONE = tuple(({name: values}, {}) for name, values in cases.SINGLE.items())
+TOGETHER = tuple((both, {}) for both in cases.TOGETHER + cases.TOGETHER_SLOW)
+
+
+def exported_drive(effects, **values):
+    base = {
+        "mass_kg": 0.3,
+        "damping_N_s_per_m": 15.1,
+        "stiffness_N_per_m": 1184.0,
+        "force_constant_N_per_A": 5.0,
+        "reference_current_A": 5.0,
+        "reference_displacement_m": 0.02,
+    }
+    drive = Drive(**(base | values), effects=effects)
+    card = ModelCard("simulation", "simulation", Columns("u", "y"), (-6.0, 6.0))
+    vector = parameter_vector(drive, drive_effects(drive))
+    return ExportedSimulation(card, drive, STEP, vector)
+
+
+def example_command(n, scale=1.0):
+    """A rest, ramps with corners and a sine: reversals, stops and limits."""
+    rng = np.random.default_rng(1)
+    times = STEP * np.arange(n)
+    corners = np.sort(rng.uniform(0.0, times[-1], n // 60))
+    ramps = np.interp(times, corners, rng.uniform(-3.0, 3.0, corners.size))
+    command = 3.5 * np.sin(2 * np.pi * 3.0 * times) + ramps
+    command[:50] = command[50]
+    return scale * command
+
+
+def check(folder, effects, values, n):
+    exported = exported_drive(effects, **values)
+    source = drive_source(exported)
+    folder.mkdir(exist_ok=True)
+    u = example_command(n, 0.004 if "controller" in values else 1.0)
+    found = c_output(compiled(folder, source, ONE_START), u)
+    assert deviation(found, predict(exported, u)) <= PROMISED
+
+
+@pytest.mark.parametrize(
+    "effects",
+    [
+        cases.COULOMB | cases.END_STOP | cases.DELAY,
+        cases.GEAR | cases.HYSTERESIS,
+        {"quadratic_drag": {"drag_N_s2_per_m2": 200.0}} | cases.CUBIC,
+    ],
+    ids=["friction, stop, delay", "gear, hysteresis", "curved"],
+)
+def test_the_program_simulates_as_hwid_does(effects, tmp_path):
+    check(tmp_path, effects, {}, 1500)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("place", range(len(ALONE + TOGETHER + MACHINES)))
+def test_all_effects_alone_and_together(place, tmp_path):
+    check(tmp_path, *(ALONE + TOGETHER + MACHINES)[place], 4000)
+
+
+def test_a_simulation_that_runs_away_is_nan_from_there(tmp_path):
+    exported = exported_drive({"cubic_stiffness": {"stiffness_N_per_m3": -1e7}})
+    u = example_command(1000)
+    found = c_output(compiled(tmp_path, drive_source(exported), ONE_START), u)
+    expected = predict(exported, u)
+
+    assert np.isnan(expected).any()
+    assert np.array_equal(np.isnan(found), np.isnan(expected))
+
+
+def test_a_smooth_input_is_refused():
+    with pytest.raises(
+        ConfigError, match=r"simulation.hold smooth: .*use --format json"
+    ):
+        drive_source(exported_drive({}, hold="smooth"))
+
+
+def test_matlab_is_refused(tmp_path):
+    with pytest.raises(ConfigError, match="expected json, c or fmu"):
+        write_exported(tmp_path, exported_drive({}), "mat")
+
+
+def test_the_unit_of_a_simulation_answers_like_hwid(tmp_path):
+    exported = exported_drive(cases.COULOMB)
+    u = example_command(300)
+    unit = write_exported(tmp_path, exported, "fmu")[0]
+
+    assert deviation(answered(unit, u, STEP), predict(exported, u)) <= PROMISED
+
+
+def test_the_source_is_the_translation_of_todays_loops():
+    script = Path(__file__).parents[2] / "tools" / "drive_source.py"
+    done = subprocess.run([sys.executable, str(script), "--check"], check=False)
+
+    assert done.returncode == 0, "run 'make drive-source'"

@@ -1,0 +1,225 @@
+import json
+from importlib.resources import files
+from pathlib import Path
+
+import jsonschema
+import numpy as np
+import pytest
+
+from hwid_cli import load_model, simulate
+from hwid_cli.errors import HwidError, ModelFileError
+from hwid_cli.export.json_reader import read_exported
+from hwid_cli.export.json_writer import described, write_json
+from hwid_cli.export.predict import predict
+from hwid_cli.records.drive import Controller, Drive
+from hwid_cli.records.experiment import Columns
+from hwid_cli.records.exported import ExportedSimulation, ModelCard
+from hwid_cli.records.maps import OwnFunction, StaticMap
+from tests.export.model_examples import (
+    KINDS,
+    example_input,
+    example_model,
+    exported_of,
+)
+from tests.store.record_examples import assert_same
+
+_TEXT = (files("hwid_cli.export") / "model.schema.json").read_text()
+SCHEMA = jsonschema.Draft202012Validator(json.loads(_TEXT))
+OWN = """
+from hwid_cli import MapFunction
+square = MapFunction(
+    value=lambda v, p: v + p[0] * v**2,
+    by_argument=lambda v, p: 1.0 + 2.0 * p[0] * v,
+    by_parameters=lambda v, p: v[:, None] ** 2,
+    start=[0.1],
+)
+"""
+
+
+def written(path, exported):
+    write_json(path, exported)
+    return read_exported(path)
+
+
+def exported_drive(**values):
+    drive = Drive(mass_kg=0.3, stiffness_N_per_m=1e3, **values)
+    card = ModelCard("simulation", "simulation", Columns("u", "y", "t"), (-5.0, 5.0))
+    return ExportedSimulation(card, drive, 1e-3)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_model_comes_back_bit_by_bit_and_predicts_the_same(kind, tmp_path):
+    rule = ("zero", "steady", "estimated")[KINDS.index(kind) % 3]
+    given = exported_of(example_model(1, kinds=(kind, kind), nf=3, nk=2, rule=rule))
+    found = written(tmp_path / "m.json", given)
+    u = example_input(2)
+
+    assert_same(found, given)
+    assert np.array_equal(predict(found, u), simulate(given.model, u))
+    assert np.array_equal(
+        simulate(load_model(tmp_path / "m.json"), u), simulate(given.model, u)
+    )
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_schema_describes_what_is_written(kind):
+    content = described(exported_of(example_model(1, kinds=("none", kind))))
+
+    SCHEMA.validate(content)
+    content["output_map"]["surprise"] = 1
+    with pytest.raises(jsonschema.ValidationError):
+        SCHEMA.validate(content)
+
+
+def test_a_simulation_comes_back_and_fits_the_schema(tmp_path):
+    given = exported_drive(
+        effects={"coulomb_friction": {"force_N": 0.7}},
+        controller=Controller(20.0, 3.0, 4.0),
+    )
+    found = written(tmp_path / "s.json", given)
+
+    assert found.drive == given.drive
+    SCHEMA.validate(described(given))
+    with pytest.raises(ModelFileError, match="physics simulation"):
+        load_model(tmp_path / "s.json")
+
+
+def test_a_start_is_chosen(tmp_path):
+    model = example_model(3, rule="estimated")
+    exported, u = exported_of(model), example_input(1)
+    steady = predict(exported, u, initial_state="steady")
+    empty = predict(exported, u, initial_state="empty")
+
+    assert np.array_equal(steady, simulate(model, u, initial_state="steady"))
+    assert np.array_equal(empty, simulate(model, u, initial_state=np.zeros(2)))
+    assert not np.array_equal(empty, steady)
+
+
+def test_a_python_function_runs_only_where_it_is_trusted(tmp_path):
+    own = StaticMap(
+        "own_function", np.array([0.3]), function=OwnFunction("square", OWN)
+    )
+    model = example_model(1, kinds=("none", "none"))
+    model = type(model)(**{**vars(model), "input_map": own})
+    path = tmp_path / "m.json"
+    write_json(path, exported_of(model))
+    SCHEMA.validate(json.loads(path.read_text()))
+
+    with pytest.raises(ModelFileError, match="carries the Python function 'square'"):
+        load_model(path)
+    trusted = load_model(path, run_own_functions=True)
+    u = example_input(1)
+    assert np.array_equal(simulate(trusted, u), simulate(model, u))
+
+
+def change(key, value):
+    """A fault: sets the value below a key with dots; drops the key for None."""
+
+    def made(content):
+        *way, last = key.split(".")
+        inner = content
+        for one in way:
+            inner = inner[one]
+        if value is None:
+            del inner[last]
+        else:
+            inner[last] = value
+
+    return made
+
+
+FAULTS = {
+    "other version": (change("schema_version", 2), "schema_version 2; expected"),
+    "other format": (change("format", "x"), "format x"),
+    "no kind": (change("kind", "neural"), "kind: found neural; expected one of"),
+    "missing key": (change("input_map", None), "input_map: found nothing"),
+    "unknown key": (change("inputmap", 1), "inputmap: unknown key; did you mean"),
+    "no sample time": (change("sample_time_s", 0), "sample_time_s: found 0; expected"),
+    "text": (change("linear_block.delay", "1"), "delay: found 1; expected an integer"),
+    "negative delay": (change("linear_block.delay", -1), "delay: found -1"),
+    "huge delay": (change("linear_block.delay", 10**12), "expected an integer from 0"),
+    "infinite": (
+        change("linear_block.numerator", [10**400]),
+        "numerator[0]: found 1000",
+    ),
+    "true": (change("linear_block.numerator", [True]), "numerator[0]: found True"),
+    "no numerator": (
+        change("linear_block.numerator", []),
+        "numerator: found no numbers",
+    ),
+    "not monic": (change("linear_block.denominator", [2.0, 1.0]), "starts with 1"),
+    "many poles": (
+        change("linear_block.denominator", [1.0] * 5000),
+        "denominator: found 5000 numbers; expected at most 1001",
+    ),
+    "orders": (change("orders.nf", 3), "orders.nf: found 3; expected 2"),
+    "rule": (change("initial_state.rule", "warm"), "rule: found warm"),
+    "state": (change("initial_state.free_response", [1.0]), "1 numbers; expected 2"),
+    "map": (change("input_map.kind", "spline"), "input_map.kind: found spline"),
+    "falling": (
+        change("input_map.break_points", [1.0, 0.0]),
+        "break_points: found [1.0, 0.0]; expected numbers that rise",
+    ),
+    "lengths": (change("input_map.values", [1.0]), "expected as many values"),
+    "domain": (change("input_map.domain", [1.0, 1.0]), "domain: found [1.0, 1.0]"),
+    "widths": (change("output_map.widths", [0.0]), "numbers above 0"),
+    "range": (change("input_range", [1.0]), "input_range: found [1.0]"),
+    "column": (change("columns.input", -1), "columns.input: found -1"),
+    "unit": (change("units.input", 3), "units.input: found 3; expected text"),
+    "scale": (change("scales.input", 0.0), "scales.input: found 0.0"),
+    "section": (change("provenance", "me"), "provenance: found text"),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_fault_in_a_model_is_one_line(fault, tmp_path):
+    alter, said = FAULTS[fault]
+    path = tmp_path / "m.json"
+    content = described(exported_of(example_model(1)))
+    alter(content)
+    path.write_text(json.dumps(content))
+
+    with pytest.raises(ModelFileError) as error:
+        read_exported(path)
+    assert said in str(error.value)
+    assert str(path) in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", "is no JSON"),
+        ("{", "is no JSON"),
+        ("[]", "holds a list"),
+        ('{"a": NaN}', "NaN is no number"),
+        ('{"a": 1, "a": 2}', "key 'a' occurs twice"),
+        ("[" * 100_000, "is no JSON"),
+        ("{}", "format None"),
+    ],
+)
+def test_what_is_no_model_is_refused(text, said, tmp_path):
+    path = tmp_path / "m.json"
+    path.write_text(text)
+    with pytest.raises(ModelFileError, match=said):
+        read_exported(path)
+    with pytest.raises(ModelFileError, match="no such file"):
+        read_exported(Path("nowhere.json"))
+
+
+def test_effects_of_a_simulation_are_checked_as_in_a_configuration(tmp_path):
+    path = tmp_path / "s.json"
+    content = described(exported_drive())
+    content["simulation"]["effects"] = {"coulomb_friction": {"force": 1.0}}
+    path.write_text(json.dumps(content))
+
+    with pytest.raises(HwidError, match=r"effects.coulomb_friction.force: unknown key"):
+        read_exported(path)
+
+
+def test_an_unstable_model_does_not_predict():
+    model = example_model(1)
+    model = type(model)(**{**vars(model), "denominator": np.array([1.0, -2.0, 0.5])})
+
+    with pytest.raises(ModelFileError, match=r"m.json: .*pole of magnitude 1.7071"):
+        predict(exported_of(model), np.ones(3), place="m.json")

@@ -1,0 +1,103 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from hwid_cli.records.experiment import GroupOptions, OrdersOptions
+from hwid_cli.records.groups import Group
+from hwid_cli.records.model import FitOptions, LinearBlock, Orders
+from hwid_cli.records.recordings import Recording
+from hwid_cli.stages.check import group_bound
+from hwid_cli.stages.fit_seconds import (
+    MEASURED,
+    fit_seconds,
+    share_of_round,
+    time_one_fit,
+)
+from hwid_cli.stages.group import search_groups
+
+NAMES = tuple("abcdefg")
+
+
+def widest_search(start, options, *, is_ordered):
+    """Number of groups on each level if all of a level are equally good."""
+    counts = {}
+
+    def score(tried):
+        counts[len(tried[0])] = len(tried)
+        return [
+            Group(
+                recordings=one,
+                coverage=len(one),
+                nb=1,
+                nk=1,
+                rmsd=0.1,
+                validation_rmsd=0.1,
+                n_models=1,
+                n_self_passed=1,
+                n_cross_passed=1,
+                is_kept=False,
+            )
+            for one in tried
+        ]
+
+    search_groups(start, NAMES, options, score, n_validate=99, is_ordered=is_ordered)
+    return tuple(counts.get(level, 0) for level in range(2, options.max_level + 1))
+
+
+@pytest.mark.parametrize("is_ordered", [True, False])
+@pytest.mark.parametrize("start", [None, ("a", "b", "c")])
+@pytest.mark.parametrize(
+    "keep",
+    [{"top": 2}, {"best": True}, {"top": (3, 1)}, {"coverage_at_least": 1}],
+    ids=str,
+)
+def test_no_search_tries_more_groups_than_the_bound(start, keep, is_ordered):
+    options = GroupOptions(start=start, keep=keep, max_level=4)
+    tried = widest_search(start, options, is_ordered=is_ordered)
+    n_start = len(start or NAMES)
+    bounds = group_bound(n_start, len(NAMES), options, is_ordered=is_ordered)
+
+    assert all(most >= one for most, one in zip(bounds, tried, strict=True))
+    # Of groups that are told apart by their order, the bound is what a search does.
+    if is_ordered and keep != {"best": True}:
+        assert bounds == tried
+
+
+def test_time_grows_with_every_size():
+    orders = Orders(3, 3, 1)
+    usual = fit_seconds(MEASURED, orders, 4000, units=10)
+
+    assert usual > fit_seconds(MEASURED, orders, 2000, units=10)
+    assert usual > fit_seconds(MEASURED, orders, 4000, units=5)
+    assert usual > fit_seconds(MEASURED, Orders(1, 2, 1), 4000, units=10)
+    assert usual < fit_seconds(MEASURED, orders, 4000, units=10, n_recordings=2)
+
+
+def test_a_fit_of_the_timed_size_takes_the_timed_seconds():
+    cost = replace(MEASURED, seconds=0.3, n_samples=50_000)
+
+    assert fit_seconds(cost, Orders(3, 3, 1), 50_000, units=10) == pytest.approx(0.3)
+    # Beyond 20 000 samples the time grows with their number.
+    assert fit_seconds(cost, Orders(3, 3, 1), 100_000, units=10) == pytest.approx(0.6)
+
+
+def test_the_grid_of_a_group_is_searched_in_fewer_rounds():
+    fourth = 3
+
+    assert share_of_round(fourth) == share_of_round(1)
+    assert share_of_round(fourth, of_group=True) == share_of_round(9)
+    assert share_of_round(fourth - 1, of_group=True) == share_of_round(1)
+
+
+def test_a_fit_that_keeps_a_block_is_timed_with_the_orders_of_that_block():
+    rng = np.random.default_rng(1)
+    u = np.repeat(rng.uniform(-1.0, 1.0, 30), 10)
+    recording = Recording("r", u, lfilter([0.0, 0.1, 0.05], [1.0, -1.5, 0.6], u), 1e-3)
+    block = LinearBlock((0.1, 0.05), (1.0, -1.5, 0.6), frozen=True)
+    cost = time_one_fit(
+        [recording], OrdersOptions(nb=(2,), nk=(2,)), FitOptions(linear_block=block)
+    )
+    assert cost.seconds > 0.0
+    assert "orders 2 2 1" in cost.source

@@ -1,0 +1,124 @@
+"""What a diagnosis says in words."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hwid_cli.records.drive import Controller
+from hwid_cli.stages.diagnosis_sentences import hidden_from_view
+from tests.diagnosis.small_drive import problem, recordings, simulation
+from tests.stages.diagnosed_drive import FRICTION, breathing, diagnosed
+
+
+def said(of):
+    return " | ".join(hidden_from_view(of))
+
+
+def test_the_five_words_are_said_differently():
+    right, wrong = simulation(), simulation(force_constant_N_per_A=5.3)
+    summaries = [
+        diagnosed(recordings(), right).summary,
+        diagnosed(recordings(), wrong).summary,
+        diagnosed(recordings(FRICTION), right).summary,
+        diagnosed(breathing(), right).summary,
+    ]
+    starts = ("Nothing is missing", "No effect is missing", "The simulation lacks")
+    for summary, start in zip(summaries, starts, strict=False):
+        assert summary.startswith(start)
+    assert "no effect of the catalogue explains" in summaries[3]
+
+
+def shifted(names):
+    """Recordings of the right drive; some begin within their excitation."""
+    return [
+        replace(one, input=one.input[44:], output=one.output[44:])
+        if one.name in names
+        else one
+        for one in recordings()
+    ]
+
+
+SINES = ("sine_0", "sine_1", "sine_2", "sine_3")
+
+
+@pytest.mark.parametrize("names", [SINES, ("sine_1",)])
+def test_an_unknown_gap_in_some_recordings_names_them(names):
+    found = diagnosed(shifted(names), effects=("quadratic_drag",))
+    assert found.verdict == "unknown", found.summary
+    assert f"gap sits in {', '.join(names)}: check how they start" in found.summary
+
+
+def test_an_unknown_gap_in_all_recordings_names_none():
+    found = diagnosed(breathing(), effects=("coulomb_friction",))
+    assert found.verdict == "unknown"
+    assert "gap sits in" not in found.summary
+
+
+def test_a_named_effect_is_explained_with_its_numbers():
+    found = diagnosed(recordings(FRICTION))
+    assert "coulomb_friction (dry friction" in found.summary
+    assert f"{found.before.ratio_to_noise:.3g}" in found.summary
+    assert f"{found.after.ratio_to_noise:.3g}" in found.summary
+    assert "remains" not in found.summary
+    assert found.next_experiment.input == ""
+
+
+def test_an_unknown_gap_comes_with_the_input_that_separates_the_nearest():
+    found = diagnosed(breathing())
+    first, second = (one.effects[0] for one in found.candidates[:2])
+    assert first in found.next_experiment.reason
+    assert second in found.next_experiment.reason
+    assert "A" in found.next_experiment.input
+
+
+def test_with_a_single_candidate_there_is_nothing_to_separate():
+    found = diagnosed(breathing(), effects=("coulomb_friction",))
+    assert found.verdict == "unknown"
+    assert found.next_experiment.input == ""
+
+
+def test_a_measured_current_hides_what_comes_before_it():
+    of = problem(recordings()[:2])
+    assert "resistance" in said(of)
+    volts = problem(recordings()[:2], resistance_ohm=2.0)
+    assert "resistance" not in said(volts)
+
+
+def test_the_mass_is_always_hidden():
+    assert "mass" in said(problem(recordings()))
+
+
+@pytest.mark.parametrize(
+    ("rows", "side"), [((0, 1, 3), "negative"), ((2, 4), "positive")]
+)
+def test_a_side_where_the_drive_never_is_stays_hidden(rows, side):
+    # Steps to one side; without the millimetre that comes from swinging back.
+    given = [recordings()[row] for row in rows]
+    sign = 1 if side == "negative" else -1
+    clipped = [
+        replace(one, output=sign * np.maximum(sign * one.output, 0.0)) for one in given
+    ]
+    text = said(problem(clipped))
+    assert f"on the {side} side" in text
+    other = "positive" if side == "negative" else "negative"
+    assert f"on the {other} side" not in text
+
+
+def test_motion_to_both_sides_hides_neither():
+    assert " side" not in said(problem(recordings()))
+
+
+def test_a_free_axis_hides_an_offset_unless_a_controller_holds_it():
+    free = problem(recordings()[:2], stiffness_N_per_m=0.0)
+    assert "offset" in said(free)
+    held = problem(
+        recordings()[:2], stiffness_N_per_m=0.0, controller=Controller(20.0, 30.0)
+    )
+    assert "offset" not in said(held)
+    assert "offset" not in said(problem(recordings()[:2]))
+
+
+def test_without_held_out_recordings_it_says_so():
+    assert "only one" in said(problem(recordings()[:1]))
+    assert "only one" not in said(problem(recordings(), held_out=("step_0",)))

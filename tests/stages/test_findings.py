@@ -1,0 +1,125 @@
+"""What a diagnosis reports: gaps, parameters, curves, the table of candidates."""
+
+import numpy as np
+import pytest
+
+from hwid_cli.stages.findings import MOST_OVERLAYS
+from tests.diagnosis.small_drive import N, recordings, simulation
+from tests.stages.diagnosed_drive import FRICTION, breathing, diagnosed
+
+WRONG = {"force_constant_N_per_A": 5.2}
+
+
+@pytest.fixture(scope="module")
+def given():
+    return recordings(FRICTION)
+
+
+@pytest.fixture(scope="module")
+def found(given):
+    return diagnosed(given, simulation(**WRONG))
+
+
+def test_the_gap_falls_from_given_to_refitted_to_extended(found):
+    for rms in ("train_rms", "held_out_rms", "ratio_to_noise"):
+        given, before, after = (
+            getattr(one, rms) for one in (found.given, found.before, found.after)
+        )
+        assert given > before > 5 * after > 0
+
+
+def test_ratios_are_those_of_held_out_rms_to_noise(found):
+    for gap in (found.given, found.before, found.after):
+        assert gap.ratio_to_noise == pytest.approx(gap.held_out_rms / found.noise.rms)
+
+
+def test_the_explained_share_is_of_the_excess_over_the_noise(found):
+    floor = found.noise.rms**2
+    before, after = found.before.held_out_rms**2, found.after.held_out_rms**2
+    share = min((before - after) / (before - floor), 1.0)
+    assert found.explained_share == pytest.approx(share)
+
+
+def test_gaps_of_recordings_add_up_to_the_gap(found):
+    for side, rms in ((True, "held_out_rms"), (False, "train_rms")):
+        rows = [one for one in found.gaps if one.is_held_out is side]
+        # All are as long.
+        together = np.sqrt(np.mean([one.rms_after**2 for one in rows]))
+        assert together == pytest.approx(getattr(found.after, rms))
+        together = np.sqrt(np.mean([one.rms_given**2 for one in rows]))
+        assert together == pytest.approx(getattr(found.given, rms))
+
+
+def test_every_recording_is_on_one_side_and_in_the_table(given, found):
+    names = [one.name for one in given]
+    assert [one.name for one in found.gaps] == names
+    assert sorted((*found.train, *found.held_out)) == sorted(names)
+    assert [one.kind for one in found.gaps] == [one.kind for one in given]
+
+
+def test_the_base_is_told_as_given_refitted_and_with_the_effect(found):
+    constant = {one.name: one for one in found.base}["force_constant_N_per_A"]
+    assert constant.before == 5.2
+    # With friction in the model it is right; without, it makes up for it.
+    assert constant.after == pytest.approx(5.0, rel=2e-3)
+    assert abs(constant.refitted - 5.0) > 10 * abs(constant.after - 5.0)
+
+
+def test_overlays_show_the_worst_held_out_recordings(found):
+    assert 0 < len(found.overlays) <= MOST_OVERLAYS
+    assert {one.name for one in found.overlays} <= set(found.held_out)
+    before = {one.name: one.rms_before for one in found.gaps}
+    sizes = [before[one.name] for one in found.overlays]
+    assert sizes == sorted(sizes, reverse=True)
+    for one in found.overlays:
+        assert one.time_s[-1] == pytest.approx((N - 1) * 1e-3)
+        rms = np.sqrt(np.mean((one.measured - one.before) ** 2))
+        assert rms == pytest.approx(before[one.name])
+        left = one.measured - one.after
+        assert np.sqrt(np.mean(left**2)) < 1.2 * found.noise.rms
+
+
+def test_the_table_has_the_winner_first(found):
+    assert found.candidates[0].effects == ("coulomb_friction",)
+    assert found.candidates[0].explained_share > 0.99
+    assert found.candidates[0].whiteness <= 1
+
+
+def test_the_missing_force_is_drawn_with_its_law(found):
+    first = found.latent_force[0]
+    assert first.variable == "velocity"
+    assert first.law.size == first.at.size
+    # Friction of 0.8 N against the motion. At rest any force below it may act, and
+    # where it is fast the base's damping has made up for it.
+    moves = np.abs(first.at) > 0.01
+    slow = moves & (np.abs(first.at) < 0.3)
+    assert slow.sum() > 4
+    assert (np.sign(first.law[slow]) == -np.sign(first.at[slow])).all()
+    apart = (first.law - first.mean)[moves]
+    assert np.abs(apart).max() < 0.1 * np.abs(first.mean).max()
+
+
+def test_where_begins_with_the_velocity(found):
+    assert found.places[0].variable in {"velocity", "direction"}
+
+
+def test_without_effects_the_gap_is_that_of_the_refit():
+    found = diagnosed(recordings(), simulation(**WRONG))
+    assert found.verdict == "parameters"
+    assert found.before == found.given
+    assert found.explained_share > 0.99
+    assert all(one.after == one.refitted for one in found.base)
+    assert all(one.rms_before == one.rms_after for one in found.gaps)
+
+
+def test_an_unknown_gap_stays_as_it_is():
+    found = diagnosed(breathing())
+    assert found.after == found.before
+    assert found.explained_share == 0.0
+    assert found.effects == ()
+    assert all(one.law.size == 0 for one in found.latent_force)
+
+
+def test_references_are_those_that_the_laws_count_from(found):
+    assert found.reference_current_A == 4.0
+    assert found.reference_displacement_m == 0.02

@@ -1,0 +1,189 @@
+from dataclasses import dataclass, replace
+from uuid import uuid4
+
+import h5py
+import numpy as np
+import pytest
+from hypothesis import given
+
+from hwid_cli.records.model import LinearBlock
+from hwid_cli.store.hdf5_records import LONGEST_ATTRIBUTE, read_record, write_record
+from hwid_cli.store.hdf5_tables import read_table, write_table
+from tests.store.record_examples import (
+    WITH_MORE,
+    Everything,
+    Inner,
+    WithMore,
+    assert_same,
+    example_fit,
+    failed_fit,
+    fit_with_own_function,
+)
+
+
+def in_memory():
+    return h5py.File(uuid4().hex, "w", driver="core", backing_store=False)
+
+
+def round_trip(record):
+    with in_memory() as file:
+        write_record(file.create_group("record"), record)
+        file.flush()
+        image = file.id.get_file_image()
+    with h5py.File(h5py.h5f.open_file_image(image), "r") as file:
+        return read_record(file["record"], type(record))
+
+
+@given(WITH_MORE)
+def test_every_record_comes_back_bit_by_bit(record):
+    assert_same(round_trip(record), record)
+
+
+@pytest.mark.parametrize(
+    "fit",
+    [example_fit(), failed_fit(), fit_with_own_function()],
+    ids=["fit", "failure", "own_function"],
+)
+def test_fit_comes_back_bit_by_bit(fit):
+    assert_same(round_trip(fit), fit)
+
+
+@pytest.mark.parametrize("form", ["word", "words", "counts"])
+def test_values_too_long_for_an_attribute_come_back(form):
+    example = Everything(
+        word="a", count=1, size=1.0, is_true=True, words=(), counts=(), sizes=(),
+        truths=(), vector=np.zeros(0), inner=Inner("", np.zeros(0)), perhaps_inner=None,
+    )  # fmt: skip
+    long = {
+        "word": "µ" * LONGEST_ATTRIBUTE,
+        "words": tuple(f"recording µ {number}" for number in range(9000)),
+        "counts": tuple(range(9000)),
+    }
+    record = replace(example, **{form: long[form]})
+    assert_same(round_trip(record), record)
+
+
+def test_array_of_text_comes_back():
+    @dataclass(frozen=True, eq=False)
+    class Statuses:
+        status: np.ndarray
+
+    for status in (
+        np.array([["ok", "no model"], ["", "nicht endlich: µ"]]),
+        np.array([], dtype="U5"),
+        np.array("alone"),
+    ):
+        found = round_trip(Statuses(status)).status
+        assert found.shape == status.shape
+        assert found.dtype.kind == "U"
+        assert found.tolist() == status.tolist()
+
+
+def test_text_is_readable_by_other_programs():
+    with in_memory() as file:
+        write_record(file, example_fit())
+        assert file.attrs["status"] == "converged"
+        assert file["uncertainty"].attrs["names"].tolist() == ["b[0]", "µ"]
+        assert file["options"].attrs["units"] == 3
+        assert file.attrs["is_stable"]
+
+
+def test_missing_field_is_an_error():
+    with in_memory() as file:
+        write_record(file, example_fit())
+        del file.attrs["status"]
+        with pytest.raises(KeyError):
+            read_record(file, type(example_fit()))
+
+
+def test_fields_that_earlier_versions_did_not_write_hold_their_defaults():
+    fit = example_fit()
+    with in_memory() as file:
+        write_record(file, fit)
+        del file["information"], file["uncertainty"].attrs["flat"]
+        del file.attrs["output_folds"], file["options"].attrs["loss"]
+        del file["options"].attrs["largest_pole_radius"]
+        del file["options"].attrs["delays"]
+        found = read_record(file, type(fit))
+    assert found.output_folds == ()
+    assert found.options == fit.options
+    assert found.information.n_parameters == 0
+    assert found.uncertainty.flat == ()
+    assert_same(found.model, fit.model)
+
+
+def test_value_of_another_shape_is_an_error():
+    @dataclass(frozen=True)
+    class One:
+        value: int
+
+    @dataclass(frozen=True)
+    class Many:
+        value: tuple[int, ...]
+
+    with in_memory() as file:
+        write_record(file, One(3))
+        with pytest.raises(TypeError, match="value has the wrong shape"):
+            read_record(file, Many)
+
+
+def test_value_of_another_type_is_an_error():
+    @dataclass(frozen=True)
+    class Word:
+        value: str
+
+    @dataclass(frozen=True)
+    class Size:
+        value: float
+
+    for written, wanted in ((Word("a"), Size), (Size(1.0), Word)):
+        with in_memory() as file:
+            write_record(file, written)
+            with pytest.raises((TypeError, OSError)):
+                read_record(file, wanted)
+
+
+def test_field_without_a_place_in_hdf5_is_an_error():
+    @dataclass(frozen=True)
+    class Odd:
+        mapping: dict[str, int]
+
+    with (
+        in_memory() as file,
+        pytest.raises(TypeError, match=r"Odd.mapping: .*no place"),
+    ):
+        write_record(file, Odd({}))
+
+
+@pytest.mark.parametrize("word", ["a\0b", "a\0"])
+def test_text_with_a_null_character_is_an_error(word):
+    @dataclass(frozen=True)
+    class Word:
+        value: str
+
+    with in_memory() as file, pytest.raises(ValueError, match="null character"):
+        write_record(file, Word(word))
+
+
+def test_record_type_has_every_form_that_is_stored():
+    forms = {"scalar", "tuple", "array", "record", "records"}
+    from hwid_cli.store.hdf5_records import schema  # noqa: PLC0415, RUF100
+
+    assert {field.form for field in schema(WithMore)} == forms
+
+
+def test_a_given_linear_block_comes_back():
+    block = LinearBlock((0.1, 1 / 3), (1.0, -0.9), 2, frozen=True)
+    fit = example_fit()
+    frozen = replace(fit, options=replace(fit.options, linear_block=block))
+    other = replace(fit, options=replace(fit.options, delays=(1, 3), loss="huber"))
+    with in_memory() as file:
+        write_record(file.create_group("one"), frozen)
+        write_table(file.create_group("many"), [frozen, fit, other], type(fit))
+        assert read_record(file["one"], type(fit)).options == frozen.options
+        found = read_table(file["many"], type(fit))
+    assert [one.options for one in found] == [
+        frozen.options,
+        fit.options,
+        other.options,
+    ]

@@ -1,0 +1,208 @@
+"""Write ``docs/effects.md`` and its figures from the catalogue of effects.
+
+``python tools/effects_document.py`` writes them, with ``--check`` it only says whether
+the text is out of date (exit code 1).
+"""
+
+import argparse
+import math
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import fields, replace
+from pathlib import Path
+
+# Run as a file, Python looks for modules beside it and not in the project.
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from hwid_cli.drive.catalogue import CATALOGUE
+from hwid_cli.drive.effect import Effect, Parameter, Scales
+from hwid_cli.report.diagnosis_tables import quantity_and_unit
+from tools.effects_figures import EXAMPLES, draw
+
+DOCS = Path(__file__).parents[1] / "docs"
+DOCUMENT, FIGURES = DOCS / "effects.md", DOCS / "figures" / "effects"
+ENTERS = {
+    "command": "the command, before it becomes a current",
+    "force": "the force that the current makes",
+    "motion": "the forces on the mass",
+    "output": "the sensor",
+}
+# Symbols of the scales, and a drive on which the rules are read off.
+SYMBOLS = {
+    "displacement_m": "X",
+    "velocity_m_per_s": "V",
+    "current_A": "I",
+    "current_rate_A_per_s": "R",
+    "stroke_m": "S",
+    "force_N": "F",
+    "mass_kg": "M",
+    "natural_Hz": "fn",
+    "sample_time_s": "Ts",
+    "duration_s": "T",
+}
+DRIVE = Scales(
+    displacement_m=0.02,
+    velocity_m_per_s=1.0,
+    current_A=5.0,
+    current_rate_A_per_s=1000.0,
+    stroke_m=0.04,
+    force_N=25.0,
+    mass_kg=0.3,
+    natural_Hz=10.0,
+    sample_time_s=1e-5,
+    duration_s=1.5,
+    frequencies_Hz=(17.0,),
+)
+HEAD = """# Effects
+
+Every effect that `hwid diagnose` knows, made from the catalogue by `tools/effects_document.py`. Equations are in SI units; x displacement,
+v velocity, i current. The method is in [method_diagnosis.md](method_diagnosis.md).
+
+Each figure shows the drive without and with the effect (left; two steps, then a sine) and what a simulation without it would
+lack along that motion (right): a force, or an error of the sensor.
+
+Start values and bounds of the search scale with the recordings: X largest displacement, V largest velocity, I largest current,
+R largest rate of the current, S stroke, F = kt I, M mass, fn natural frequency, Ts sample time, T longest recording.
+"""
+CHANGE_SENTENCE = (
+    "The stiffness, the force constant or the damping differs from recording to recording by more than chance. "
+    "Each recording gets its own value; the report gives which parameter and the relative standard deviation (`spread`)."
+)
+
+
+def document() -> str:
+    """Text of the document.
+
+    Returns
+    -------
+    str
+    """
+    plain = [one for one in CATALOGUE.values() if ":" not in one.id]
+    rows = [f"| [{one.id}](#{one.id}) | {one.sentence} |" for one in plain]
+    rows.append(
+        "| [parameter_change](#parameter_change) | a parameter differs between recordings |"
+    )
+    parts = [HEAD, "\n".join(["| id | what it is |", "|---|---|", *rows])]
+    parts += [_section(one) for one in plain]
+    parts.append(_change())
+    return "\n\n".join(part.strip("\n") for part in parts) + "\n"
+
+
+def _section(effect: Effect) -> str:
+    lines = [
+        f"## {effect.id}",
+        "",
+        f"{effect.sentence[0].upper()}{effect.sentence[1:]}.",
+        "",
+        f"    {effect.equation}",
+        "",
+        "| parameter | unit | starts | bounds |",
+        "|---|---|---|---|",
+        *(_row(one) for one in effect.parameters),
+        "",
+        f"Enters {ENTERS[effect.enters]}.",
+    ]
+    if effect.contains:
+        names = ", ".join(f"`{one}`" for one in effect.contains)
+        lines[-1] += f" Contains {names} as a limit."
+    if effect.needs_spring:
+        lines[-1] += " Means nothing on a free axis."
+    if effect.confused_with:
+        lines += ["", "Looks like:", ""]
+        lines += [
+            f"- `{other}`; told apart by {what}."
+            for other, what in effect.confused_with.items()
+        ]
+    lines += ["", f"![{effect.id}](figures/effects/{effect.id}.png)"]
+    return "\n".join(lines)
+
+
+def _change() -> str:
+    changes = [one for one in CATALOGUE.values() if ":" in one.id]
+    lines = ["## parameter_change", "", CHANGE_SENTENCE, ""]
+    lines += [f"    {one.equation}" for one in changes]
+    lines += ["", "Looks like:", ""]
+    others = {
+        other: what for one in changes for other, what in one.confused_with.items()
+    }
+    lines += [f"- `{other}`; told apart by {what}." for other, what in others.items()]
+    return "\n".join(lines)
+
+
+def _row(parameter: Parameter) -> str:
+    name, unit = parameter.name, quantity_and_unit(parameter.name)[1]
+    notes = [] if parameter.is_reported else ["not reported"]
+    notes += ["own value in every recording"] if parameter.is_own else []
+    shown = f"{name} ({'; '.join(notes)})" if notes else name
+    return f"| {shown} | {unit} | {_starts(parameter)} | {_bounds(parameter)} |"
+
+
+def _starts(parameter: Parameter) -> str:
+    if parameter.starts(DRIVE) == DRIVE.frequencies_Hz:
+        return "highest lines in the spectrum of the error"
+    return _law(parameter.starts)
+
+
+def _bounds(parameter: Parameter) -> str:
+    low, high = parameter.bounds(DRIVE)
+    if math.isinf(low) and math.isinf(high):
+        return "above 0" if parameter.is_positive else "none"
+    ends = [_law(lambda scales, n=n: (parameter.bounds(scales)[n],)) for n in (0, 1)]
+    return " to ".join(ends)
+
+
+def _law(rule: Callable[[Scales], Sequence[float]]) -> str:
+    """A rule as numbers times scales, found by doubling one scale after the other."""
+    here = rule(DRIVE)
+    above, below, value = [], [], 1.0
+    for field in fields(Scales):
+        if field.name not in SYMBOLS:
+            continue
+        size = getattr(DRIVE, field.name)
+        doubled = rule(replace(DRIVE, **{field.name: 2 * size}))
+        pairs = zip(here, doubled, strict=True)
+        powers = [math.log2(new / old) for old, new in pairs if old != 0]
+        power = round(powers[0]) if powers else 0
+        value *= size**power
+        symbol = SYMBOLS[field.name] + (f"^{abs(power)}" if abs(power) > 1 else "")
+        if power:
+            (above if power > 0 else below).append(symbol)
+    numbers = ", ".join(f"{one / value:.3g}" for one in here)
+    product = " ".join(above) + (f" / ({' '.join(below)})" if below else "")
+    if below and not above:
+        product = f"1{product}"
+    product = product.replace("(", "").replace(")", "") if len(below) == 1 else product
+    return f"{numbers} x {product.strip()}" if above or below else numbers
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Write or check the document.
+
+    Parameters
+    ----------
+    arguments : sequence of str or None
+        None takes those of the command line.
+
+    Returns
+    -------
+    int
+        Exit code: 0 done, 1 out of date.
+    """
+    parser = argparse.ArgumentParser(description="Write docs/effects.md.")
+    parser.add_argument("--check", action="store_true", help="write nothing")
+    chosen = parser.parse_args(arguments)
+    text = document()
+    if chosen.check:
+        is_current = DOCUMENT.exists() and DOCUMENT.read_text() == text
+        if not is_current:
+            sys.stderr.write(f"{DOCUMENT} is out of date; run this without --check\n")
+        return 0 if is_current else 1
+    DOCUMENT.write_text(text)
+    FIGURES.mkdir(parents=True, exist_ok=True)
+    for identifier in EXAMPLES:
+        draw(identifier, FIGURES / f"{identifier}.png")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
