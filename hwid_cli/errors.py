@@ -27,3 +27,7 @@ class WorkerError(HwidError):
 
 class ModelFileError(HwidError):
     """An exported model cannot be used as it is."""
+
+
+class NothingToDo(HwidError):
+    """What was asked for cannot be done yet, and that is no fault: measurements lack."""

@@ -1,56 +1,36 @@
 """``hwid check``: is a configuration sound, what would it run, and for how long."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, NoReturn
+from typing import NoReturn
 
 import click
 
-from hwid_cli.cli.calibrate import NAME_LISTS
-
-if TYPE_CHECKING:
-    from hwid_cli.records.check import FitCost
-    from hwid_cli.records.experiment import Experiment
-    from hwid_cli.stages.recording_facts import Checked
+from hwid_cli.config.problems import config_problems
+from hwid_cli.data.paths import find_files, missing_files_message, recordings_base
+from hwid_cli.data.survey import survey_recordings
+from hwid_cli.errors import HwidError, MeasurementError
+from hwid_cli.files.messages import did_you_mean
+from hwid_cli.records.check import FitCost
+from hwid_cli.records.experiment import Experiment
+from hwid_cli.records.recordings import Calibrated
+from hwid_cli.report.check_tables import recordings_table, stages_table
+from hwid_cli.stages.fit_seconds import MEASURED, compiled_loops_place, time_one_fit
+from hwid_cli.stages.own_functions import check_own_functions
+from hwid_cli.stages.recording_facts import Checked, check_recordings
+from hwid_cli.stages.selection import named_recordings
+from hwid_cli.stages.stage import Context, Planning
+from hwid_cli.stages.table import named, stage_named, to_run
+from hwid_cli.store.cache import Hdf5Store
+from hwid_cli.tasks.task import one_thread
+from hwid_cli.tasks.workers import Workers
 
 _EXIT_PROBLEMS = 1
 
 
-@click.command("check")
-@click.argument("config", type=click.Path(path_type=Path))
-@click.option(
-    "--out",
-    type=click.Path(path_type=Path),
-    metavar="DIR",
-    help="Folder of the results.  [default: results/<name>]",
-)
-@click.option(
-    "--cache",
-    type=click.Path(path_type=Path),
-    metavar="DIR",
-    help="Folder of what was computed before.  [default: cache in that folder]",
-)
-@click.option(
-    "--jobs",
-    type=click.IntRange(min=1),
-    metavar="N",
-    help="Processes to estimate for.  [default: one for each core]",
-)
-@click.option(
-    "--timing/--no-timing",
-    default=True,
-    help="Time one fit on these data for the estimate (about two seconds).",
-)
-def command(
+def check(
     config: Path, out: Path | None, cache: Path | None, jobs: int | None, timing: bool
 ) -> None:
-    """Check a configuration and its data, and say what would run.
-
-    Lists the recordings with what looks odd in them, the tasks of every stage, what is in
-    the cache already, and an estimate of time and disk. Computes no result and writes
-    nothing. Every problem is one line; the exit code is 1 if there is any.
-    """
-    from hwid_cli.config.problems import config_problems
-
+    """Check a configuration and its data, and say what would run."""
     problems, experiment = config_problems(config)
     if experiment is None:
         _end_with(problems)
@@ -60,15 +40,12 @@ def command(
     checked, more = _data(experiment, folder)
     if problems or more:
         _end_with((*problems, *more))
-    _show_starts(experiment, checked)
+    _show_warnings(experiment, checked, folder)
     _show_plan(experiment, checked, (cache or folder / "cache", jobs, timing))
 
 
-def _is_waiting(experiment: "Experiment", folder: Path) -> bool:
+def _is_waiting(experiment: Experiment, folder: Path) -> bool:
     """Whether there are no data to check yet, which is no fault."""
-    from hwid_cli.data.paths import find_files, missing_files_message, recordings_base
-    from hwid_cli.errors import MeasurementError
-
     if experiment.recordings is None and experiment.simulate is not None:
         click.echo(f"{experiment.source} is sound; it simulates and does nothing else.")
         return True
@@ -91,14 +68,8 @@ def _is_waiting(experiment: "Experiment", folder: Path) -> bool:
     return True
 
 
-def _data(experiment: "Experiment", folder: Path) -> "tuple[Checked, tuple[str, ...]]":
+def _data(experiment: Experiment, folder: Path) -> tuple[Checked, tuple[str, ...]]:
     """Show the recordings, and collect what is wrong with them or their names."""
-    from hwid_cli.data.survey import survey_recordings
-    from hwid_cli.errors import HwidError
-    from hwid_cli.report.check_tables import recordings_table
-    from hwid_cli.stages.own_functions import check_own_functions
-    from hwid_cli.stages.recording_facts import check_recordings
-
     problems: list[str] = []
     try:
         check_own_functions(experiment)
@@ -115,64 +86,48 @@ def _data(experiment: "Experiment", folder: Path) -> "tuple[Checked, tuple[str, 
     return checked, tuple(dict.fromkeys(problems))
 
 
-def _names(experiment: "Experiment", known: set[str]) -> list[str]:
+def _names(experiment: Experiment, known: set[str]) -> list[str]:
     """Names of recordings that there are not, in any section."""
-    from hwid_cli.files.messages import did_you_mean
-
-    problems = []
-    for section, keys in NAME_LISTS.items():
-        options = getattr(experiment, section)
-        for key in keys if options is not None else ():
-            names = getattr(options, key)
-            for name in () if names in (None, "auto") else names:
-                if name not in known:
-                    place = f"{experiment.source}: {section}.{key}"
-                    problems.append(
-                        f"{place}: no recording {name!r}; {did_you_mean(name, known)}"
-                    )
-    return problems
+    return [
+        f"{experiment.source}: {key}: no recording {name!r}; {did_you_mean(name, known)}"
+        for key, names in named_recordings(experiment)
+        for name in names
+        if name not in known
+    ]
 
 
-def _show_starts(experiment: "Experiment", checked: "Checked") -> None:
-    """Warn of recordings that a diagnosis would start wrongly."""
-    from hwid_cli.cli.diagnose import ToDiagnose, start_warning
-    from hwid_cli.stages.selection import select_recordings
-
-    simulation, options = experiment.simulation, experiment.diagnose
-    if simulation is None or options is None:
-        return
-    recordings = select_recordings(
-        checked.recordings, options.recordings, key="diagnose.recordings"
-    )
-    warning = start_warning(experiment, ToDiagnose(recordings, simulation, options))
-    if warning:
-        click.echo(f"hwid: {warning}", err=True)
+def _show_warnings(experiment: Experiment, checked: Checked, out: Path) -> None:
+    """Say what stages would warn of that work on calibrated recordings alone."""
+    calibrated = Calibrated(checked.recordings, (), "")
+    context = Context(experiment, out, {"calibrate": calibrated}, click.echo)
+    for name in named(experiment):
+        stage = stage_named(name)
+        if stage.needs == ("calibrate",):
+            for warning in stage.warnings(context, stage.choose(context)):
+                click.echo(f"hwid: {warning}", err=True)
 
 
 def _show_plan(
-    experiment: "Experiment",
-    checked: "Checked",
+    experiment: Experiment,
+    checked: Checked,
     how: tuple[Path, int | None, bool],
 ) -> None:
-    from hwid_cli.report.check_tables import stages_table
-    from hwid_cli.stages.check import plan_stages
-    from hwid_cli.store.cache import Hdf5Store
-    from hwid_cli.tasks.task import one_thread
-    from hwid_cli.tasks.workers import Workers
 
     cache, jobs, timing = how
     with one_thread():
         cost = _cost(experiment, checked, timing=timing)
         store = Hdf5Store(cache, sets_aside=False)
         workers = Workers(jobs).count
-        plans = plan_stages(
-            experiment, checked.recordings, cost, store, workers=workers
-        )
+        planning = Planning(experiment, checked.recordings, cost, store, workers)
+        plans = [
+            plan
+            for name in to_run(experiment)
+            for plan in stage_named(name).plan(planning)
+        ]
     click.echo(f"\n{stages_table(plans, cost, workers)}")
 
 
-def _cost(experiment: "Experiment", checked: "Checked", *, timing: bool) -> "FitCost":
-    from hwid_cli.stages.fit_seconds import MEASURED, compiled_loops_place, time_one_fit
+def _cost(experiment: Experiment, checked: Checked, *, timing: bool) -> FitCost:
 
     if not timing:
         return MEASURED

@@ -6,26 +6,10 @@ import logging
 import click
 
 from hwid_cli import __version__
-from hwid_cli.cli import (
-    calibrate,
-    check,
-    compare,
-    crossval,
-    diagnose,
-    export,
-    group,
-    identify,
-    init,
-    order,
-    predict,
-    report,
-    run,
-    simulate,
-    test,
-)
+from hwid_cli.cli.commands import COMMANDS
 from hwid_cli.cli.examples import add_examples
 from hwid_cli.cli.stopping import Stopped, stop_signals
-from hwid_cli.errors import HwidError
+from hwid_cli.errors import HwidError, NothingToDo
 from hwid_cli.files.messages import escaped
 
 # What a disk or a folder may refuse, which is no fault of the program.
@@ -59,6 +43,9 @@ class _Commands(click.Group):
         try:
             with stop_signals(ctx):
                 return super().invoke(ctx)
+        except NothingToDo as reason:
+            click.echo(f"skipped: {reason}")
+            ctx.exit(0)
         except HwidError as error:
             _complain(str(error))
             ctx.exit(EXIT_ERROR)
@@ -120,22 +107,5 @@ def main(ctx: click.Context) -> None:
     ctx.obj = set_log_levels
 
 
-_MODULES = (
-    init,
-    check,
-    run,
-    simulate,
-    calibrate,
-    identify,
-    crossval,
-    order,
-    group,
-    test,
-    diagnose,
-    report,
-    compare,
-    export,
-    predict,
-)
-for _module in _MODULES:
-    main.add_command(add_examples(_module.command))
+for _command in COMMANDS.values():
+    main.add_command(add_examples(_command))

@@ -4,37 +4,16 @@ from pathlib import Path
 
 import click
 
-_STARTS = ("fitted", "steady", "empty")
+from hwid_cli.export.json_reader import read_exported
+from hwid_cli.export.loading import check_trust
+from hwid_cli.export.predict import predict
+from hwid_cli.export.prediction import check_target, read_input, write_prediction
+from hwid_cli.model.input_range import outside_share
+from hwid_cli.records.units import behind
+from hwid_cli.report.simulation_words import prediction_words
 
 
-@click.command("predict")
-@click.argument("model", type=click.Path(path_type=Path), metavar="MODEL.json")
-@click.argument("input_file", type=click.Path(path_type=Path), metavar="INPUT.csv")
-@click.option(
-    "--out",
-    type=click.Path(path_type=Path),
-    default=Path("prediction.csv"),
-    show_default=True,
-    metavar="FILE",
-    help="File of the prediction.",
-)
-@click.option(
-    "--initial-state",
-    type=click.Choice(_STARTS),
-    default="fitted",
-    show_default=True,
-    help="How it starts: by the model's own rule (a model with an estimated state like "
-    "the first recording of its fit), in equilibrium with the first input, or empty.",
-)
-@click.option(
-    "--force", is_flag=True, help="Replace a file that is no prediction, too."
-)
-@click.option(
-    "--run-own-functions",
-    is_flag=True,
-    help="Run Python that the model's file carries; only for files that you trust.",
-)
-def command(
+def predict_file(
     model: Path,
     input_file: Path,
     out: Path,
@@ -42,19 +21,7 @@ def command(
     force: bool,
     run_own_functions: bool,
 ) -> None:
-    """Predict the output for an input, with a model that 'hwid export' wrote.
-
-    Reads the columns that the model's file names, and writes time, the input and the
-    predicted output.
-    """
-    from hwid_cli.export.json_reader import read_exported
-    from hwid_cli.export.loading import check_trust
-    from hwid_cli.export.predict import predict
-    from hwid_cli.export.prediction import check_target, read_input, write_prediction
-    from hwid_cli.model.input_range import outside_share
-    from hwid_cli.records.units import behind
-    from hwid_cli.report.simulation_words import prediction_words
-
+    """Predict the output for an input, with an exported model."""
     exported = read_exported(model)
     check_trust(exported, model, is_trusted=run_own_functions)
     time, values = read_input(input_file, exported)

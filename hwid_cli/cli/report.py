@@ -1,38 +1,33 @@
 """``hwid report``: one page that shows whatever stages have run."""
 
+import json
+from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
-import click
-
-from hwid_cli.cli.options import Choices, stage_options
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from hwid_cli.cli.session import Session
-    from hwid_cli.records.report import StageRun, StoredResults
+from hwid_cli.cli.options import Choices
+from hwid_cli.cli.session import Session, Timer, open_session
+from hwid_cli.config.load import describe_experiment
+from hwid_cli.errors import ConfigError
+from hwid_cli.files.atomic import replace_file
+from hwid_cli.records.report import StageRun, StoredResults
+from hwid_cli.report.html import report_page
+from hwid_cli.stages.report import changed_sections, report_contents, report_key
+from hwid_cli.stages.table import STAGES, stage_named
+from hwid_cli.store.diagnosis_results import read_diagnosis
+from hwid_cli.store.result_files import has_left_results, read_provenance
 
 FILE = "report.html"
 FIGURES = "figures"
 _KEY_MARK, _KEY_END = "<!-- drawn from ", " -->\n"
 
 
-@click.command("report")
-@stage_options
-def command(choices: Choices) -> None:
-    """Show whatever stages have run on one page.
-
-    Runs no stage. Writes report.html, which needs nothing else to be looked at, and its
-    figures as figures/*.png.
-    """
-    from hwid_cli.cli.session import open_session
-
+def report(choices: Choices) -> None:
+    """Show whatever stages have run on one page."""
     session = open_session(choices, "report", is_alone=False)
-    report_stage(session)
+    write_report(session)
 
 
-def report_stage(session: "Session") -> Path:
+def write_report(session: Session) -> Path:
     """Write ``report.html`` and its figures from the stored results.
 
     Returns
@@ -47,13 +42,7 @@ def report_stage(session: "Session") -> Path:
     CacheError
         If results are there but cannot be read; nothing is written then.
     """
-    from hwid_cli.cli.session import say, start_timer
-    from hwid_cli.errors import ConfigError
-    from hwid_cli.files.atomic import replace_file
-    from hwid_cli.report.html import report_page
-    from hwid_cli.stages.report import report_contents, report_key
-
-    timer = start_timer()
+    timer = Timer()
     stored = read_stored(session)
     if not stored.stages and stored.diagnosis is None:
         source = session.experiment.source
@@ -66,7 +55,7 @@ def report_stage(session: "Session") -> Path:
     path = session.out / FILE
     stages = ", ".join(run.stage for run in stored.stages) or "the diagnosis"
     if "report" not in session.forced and _is_complete(session.out, path, key):
-        say(session, f"report: {path} shows {stages} already, {timer()}")
+        session.say(f"report: {path} shows {stages} already, {timer}")
         return path
     page = report_page(report_contents(stored), figures)
     for name, png in page.figures.items():
@@ -74,14 +63,12 @@ def report_stage(session: "Session") -> Path:
         if not (place.is_file() and place.read_bytes() == png):
             replace_file(place, png)
     replace_file(path, (page.html + _last_line(key, page.figures)).encode())
-    say(session, f"report: {path} shows {stages}, {timer()}")
+    session.say(f"report: {path} shows {stages}, {timer}")
     return path
 
 
-def _last_line(key: str, figures: "Iterable[str]") -> str:
+def _last_line(key: str, figures: Iterable[str]) -> str:
     """Comment that says what a page was drawn from, and which figures belong to it."""
-    import json
-
     # The sign that ends a comment may be part of a name.
     names = json.dumps(sorted(figures)).replace(">", "\\u003e")
     return f"{_KEY_MARK}{key} {names}{_KEY_END}"
@@ -89,8 +76,6 @@ def _last_line(key: str, figures: "Iterable[str]") -> str:
 
 def _is_complete(out: Path, path: Path, key: str) -> bool:
     """Whether a page was drawn from the same, and all of its figures are still there."""
-    import json
-
     if not path.is_file():
         return False
     page = path.read_text(encoding="utf-8", errors="replace")
@@ -101,7 +86,7 @@ def _is_complete(out: Path, path: Path, key: str) -> bool:
     return all((out / FIGURES / name).is_file() for name in figures)
 
 
-def read_stored(session: "Session") -> "StoredResults":
+def read_stored(session: Session) -> StoredResults:
     """Read the results of all stages that have run.
 
     Raises
@@ -109,65 +94,35 @@ def read_stored(session: "Session") -> "StoredResults":
     CacheError
         If results are there but cannot be read.
     """
-    import json
-
-    from hwid_cli.config.load import describe_experiment
-    from hwid_cli.records.report import StoredResults
-    from hwid_cli.store.diagnosis_results import read_diagnosis, read_diagnosis_record
-    from hwid_cli.store.final_test_results import read_final_test
-    from hwid_cli.store.group_results import read_group
-    from hwid_cli.store.results import read_calibrated, read_crossval, read_fits
-
-    described = describe_experiment(session.experiment)
-    runs = _stage_runs(session, described)
-    done = {run.stage for run in runs}
-    calibrated = (
-        read_calibrated(session.calibrated_path) if "calibrate" in done else None
-    )
-    path = session.results_path
-    crossval = read_crossval(path) if "crossval" in done else None
-    orders = session.experiment.orders
-    return StoredResults(
-        name=session.experiment.name,
-        config=json.dumps(described, indent=2, ensure_ascii=False),
-        nk_role=orders.nk_role if crossval is None else crossval.nk_role,
-        stages=runs,
-        recordings=() if calibrated is None else calibrated.recordings,
-        logs=() if calibrated is None else calibrated.logs,
-        fits=read_fits(path) if "identify" in done else (),
-        crossval=crossval,
-        search=read_group(path) if "group" in done else None,
-        final_test=read_final_test(path) if "test" in done else None,
-        diagnosis=read_diagnosis(session.out / "diagnosis.json"),
-        diagnosis_record=read_diagnosis_record(path) if "diagnose" in done else None,
-    )
-
-
-def _stage_runs(
-    session: "Session", described: dict[str, Any]
-) -> "tuple[StageRun, ...]":
-    """Stages that have left results, and how each was run."""
-    from hwid_cli.records.report import StageRun
-    from hwid_cli.stages.report import STAGES, changed_sections
-    from hwid_cli.store.result_files import has_left_results, read_provenance
-
-    runs = []
-    for stage in STAGES:
-        is_first = stage == "calibrate"
-        path = session.calibrated_path if is_first else session.results_path
-        if not has_left_results(path, stage):
+    experiment = session.experiment
+    described = describe_experiment(experiment)
+    runs, results = [], {}
+    for name in STAGES:
+        storage = stage_named(name).storage
+        if storage is None or not storage.is_hdf5:
             continue
-        origin = read_provenance(path, stage)
-        changed = changed_sections(stage, described, origin.config)
+        path = session.out / storage.file
+        if not has_left_results(path, name):
+            continue
+        origin = read_provenance(path, name)
+        changed = changed_sections(name, described, origin.config)
         runs.append(
-            StageRun(stage, origin.key, origin.seconds, origin.versions, changed)
+            StageRun(name, origin.key, origin.seconds, origin.versions, changed)
         )
-    return tuple(runs)
+        results[name] = storage.read(path)
+    crossval = results.get("crossval")
+    nk_role = experiment.orders.nk_role if crossval is None else crossval.nk_role
+    return StoredResults(
+        name=experiment.name,
+        config=json.dumps(described, indent=2, ensure_ascii=False),
+        nk_role=nk_role,
+        stages=tuple(runs),
+        results=results,
+        diagnosis=read_diagnosis(session.out / "diagnosis.json"),
+    )
 
 
-def _calibration_figures(
-    session: "Session", stored: "StoredResults"
-) -> dict[str, bytes]:
+def _calibration_figures(session: Session, stored: StoredResults) -> dict[str, bytes]:
     """Figures that calibration left, by the names of the recordings."""
     folder = session.out / FIGURES / "calibrate"
     paths = {log.name: folder / f"{log.name}.png" for log in stored.logs}

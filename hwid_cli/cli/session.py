@@ -1,37 +1,21 @@
-"""One run of the program: its experiment, its folder, and who computes.
+"""One run of the program: its experiment, its folders, and who computes."""
 
-Imported by commands when they run, so that ``hwid --help`` stays fast.
-"""
-
-import logging
 import shutil
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+import time
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import click
 
-from hwid_cli.cli.folders import enter_folders
 from hwid_cli.cli.options import Choices
-from hwid_cli.cli.timing import start_timer
-from hwid_cli.config.load import describe_experiment, load_experiment
-from hwid_cli.data.recordings import check_unchanged
-from hwid_cli.errors import CacheError, ConfigError
+from hwid_cli.cli.stopping import KEPT_IN
+from hwid_cli.config.load import load_experiment
+from hwid_cli.errors import ConfigError
+from hwid_cli.files.locks import claim_folder, share_folder
 from hwid_cli.records.experiment import Experiment
-from hwid_cli.records.recordings import Recording
-from hwid_cli.report.progress import StageProgress
 from hwid_cli.stages.own_functions import check_own_functions
-from hwid_cli.store.cache import Hdf5Store
-from hwid_cli.store.result_files import Provenance, current_versions, read_stage_key
-from hwid_cli.tasks.runner import RunSettings, TaskDone, Workers
-
-Result = TypeVar("Result")
-
-_log = logging.getLogger(__name__)
-
-STAGES = ("simulate", "calibrate", "identify", "crossval", "group", "test", "diagnose")
+from hwid_cli.tasks.workers import Workers
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,10 +30,8 @@ class Session:
         Folder of what was computed before.
     forced : tuple of str
         Stages that ignore their cached results.
-    finished : dict
-        Results of the stages that ran in this session, see ``stages.once``.
-    read : dict of str to str
-        SHA-256 of the recordings' files that were read, by file.
+    given, results : dict
+        What each stage that ran worked on, and what it gave.
     """
 
     experiment: Experiment
@@ -58,18 +40,34 @@ class Session:
     workers: Workers
     forced: tuple[str, ...]
     is_quiet: bool
-    finished: dict[str, Any] = field(default_factory=dict)
-    read: dict[str, str] = field(default_factory=dict)
+    given: dict[str, Any] = field(default_factory=dict)
+    results: dict[str, Any] = field(default_factory=dict)
+
+    def say(self, text: str) -> None:
+        """Show text to people, unless they asked for quiet."""
+        if not self.is_quiet:
+            click.echo(text)
+
+
+@dataclass(frozen=True)
+class Timer:
+    """A running clock; as text it is the time since its start, with its unit.
+
+    Parameters
+    ----------
+    start_s : float, [s]
+        Reading of the system's steady clock at the start.
+    """
+
+    start_s: float = field(default_factory=time.perf_counter)
 
     @property
-    def calibrated_path(self) -> Path:
-        """File of calibrated recordings."""
-        return self.out / "calibrated.h5"
+    def seconds(self) -> float:
+        """Time since the start, in seconds."""
+        return time.perf_counter() - self.start_s
 
-    @property
-    def results_path(self) -> Path:
-        """File of models and scores."""
-        return self.out / "results.h5"
+    def __str__(self) -> str:
+        return f"{self.seconds:.1f} s"
 
 
 def open_session(choices: Choices, *stages: str, is_alone: bool = True) -> Session:
@@ -100,7 +98,7 @@ def open_session(choices: Choices, *stages: str, is_alone: bool = True) -> Sessi
             "written; choose another one"
         ) from error
     cache = choices.cache or out / "cache"
-    enter_folders(out, cache, is_alone=is_alone)
+    _lock(out, cache, is_alone=is_alone)
     return Session(
         experiment=experiment,
         out=out,
@@ -111,10 +109,19 @@ def open_session(choices: Choices, *stages: str, is_alone: bool = True) -> Sessi
     )
 
 
-def say(session: Session, text: str) -> None:
-    """Show text to people, unless they asked for quiet."""
-    if not session.is_quiet:
-        click.echo(text)
+def _lock(out: Path, cache: Path, *, is_alone: bool) -> None:
+    """Lock the folders until the command ends, and note where its results are kept."""
+    context = click.get_current_context(silent=True)
+    locks = [claim_folder(out)] if is_alone else []
+    locks += [lock for lock in map(share_folder, (out, cache)) if lock is not None]
+    if context is None:
+        # A session outside of a command, whose end nobody tells.
+        for lock in locks:
+            lock.close()
+        return
+    for lock in locks:
+        context.call_on_close(lock.close)
+    context.find_root().meta[KEPT_IN] = cache
 
 
 def screen_width() -> int:
@@ -125,153 +132,3 @@ def screen_width() -> int:
     int, [characters]
     """
     return shutil.get_terminal_size((80, 24)).columns
-
-
-def is_unchanged(session: Session, stage: str, key: str) -> bool:
-    """Whether the stored results of a stage are those that it would give now.
-
-    Parameters
-    ----------
-    key : str
-        Of everything that the stage depends on.
-    """
-    if stage in session.forced:
-        return False
-    is_calibrate = stage == "calibrate"
-    path = session.calibrated_path if is_calibrate else session.results_path
-    return read_stage_key(path, stage) == key
-
-
-def read_unchanged(
-    session: Session, stage: str, key: str, read: Callable[[Path], Result]
-) -> Result | None:
-    """Read the stored results of a stage if they are those that it would give now.
-
-    Parameters
-    ----------
-    key : str
-        Of everything that the stage depends on.
-    read : callable
-        From the path of the results to the result.
-
-    Returns
-    -------
-    Result or None
-        None where the stage has to run; results that cannot be read are named in the
-        log, and the cache has what they were made of.
-    """
-    if not is_unchanged(session, stage, key):
-        return None
-    path = session.calibrated_path if stage == "calibrate" else session.results_path
-    try:
-        return read(path)
-    except CacheError as error:
-        _log.warning("%s (%s comes back from the cache now)", error, stage)
-        return None
-
-
-def provenance(
-    session: Session,
-    key: str,
-    recordings: tuple[Recording, ...],
-    *,
-    seconds: float = float("nan"),
-) -> Provenance:
-    """Say where results come from, right before they are stored.
-
-    Parameters
-    ----------
-    key : str
-        Of everything that the stage depends on.
-    recordings : tuple of Recording
-        That it used.
-    seconds : float, [s]
-        What the run took that gave the results; NaN unknown.
-
-    Raises
-    ------
-    MeasurementError
-        If the file of a recording has changed since it was read.
-    """
-    check_unchanged(session.read)
-    return Provenance(
-        key,
-        describe_experiment(session.experiment),
-        {recording.name: recording.sha256 for recording in recordings},
-        seconds,
-        current_versions(),
-    )
-
-
-@contextmanager
-def stage_tasks(
-    session: Session, stage: str, total: int, unit: str, *, part: str = ""
-) -> Iterator[RunSettings]:
-    """Run the tasks of a stage under a progress bar, and sum up at the end.
-
-    Parameters
-    ----------
-    total : int, [-]
-        Tasks.
-    unit : str
-        What one task is, in the plural.
-    part : str
-        Which part of the stage, where it has several.
-    """
-    with _progress(session, stage, total, unit, part=part) as (settings, _):
-        yield settings
-
-
-@contextmanager
-def stage_rounds(
-    session: Session, stage: str, unit: str
-) -> Iterator[tuple[RunSettings, Callable[[str, int], None]]]:
-    """Run the tasks of a stage that come in rounds, each with a progress bar.
-
-    Parameters
-    ----------
-    unit : str
-        What one task is, in the plural.
-
-    Yields
-    ------
-    callable
-        Takes what the next round does and how many tasks it has.
-    """
-    with _progress(session, stage, 0, unit) as (settings, progress):
-        yield (
-            settings,
-            lambda text, total: progress.begin_round(f"{stage}: {text}", total),
-        )
-
-
-@contextmanager
-def _progress(
-    session: Session, stage: str, total: int, unit: str, *, part: str = ""
-) -> Iterator[tuple[RunSettings, StageProgress]]:
-    timer, label = start_timer(), f"{stage} {part}".rstrip()
-    with StageProgress(label, total, unit, is_silent=session.is_quiet) as progress:
-
-        def on_done(item: TaskDone) -> None:
-            progress.advance(from_cache=item.from_cache)
-
-        store = Hdf5Store(session.cache)
-        settings = RunSettings(
-            store=store,
-            workers=session.workers,
-            force=stage in session.forced,
-            on_done=on_done,
-        )
-        yield settings, progress
-    if store.unusable:
-        _log.warning(
-            "%s: %d damaged entries of the cache set aside, computed again (such as %s)",
-            label,
-            len(store.unusable),
-            store.unusable[0],
-        )
-    say(
-        session,
-        f"{label}: {progress.from_cache} {unit} from the cache, "
-        f"{progress.computed} computed, {timer()}",
-    )

@@ -4,6 +4,7 @@ Every key of a configuration file is a field here. ``configs/README.md`` explain
 """
 
 from dataclasses import dataclass, field
+from typing import Annotated
 
 from hwid_cli.records.drive import Controller
 from hwid_cli.records.machines import GunMachine, ServoMachine
@@ -11,6 +12,9 @@ from hwid_cli.records.model import FitOptions
 
 RECIPE_STEPS = ("cut", "input_offset", "output_offset", "recut")
 NK_ROLES = ("poles", "delay")
+# Marks the keys that name recordings, so that a misspelt one is told at once.
+OF_RECORDINGS = "of recordings"
+RecordingNames = Annotated[tuple[str, ...], OF_RECORDINGS]
 
 
 @dataclass(frozen=True)
@@ -77,7 +81,7 @@ class OrdersOptions:
 class IdentifyOptions:
     """Which recordings get models; None means all."""
 
-    recordings: tuple[str, ...] | None = None
+    recordings: RecordingNames | None = None
 
 
 @dataclass(frozen=True)
@@ -85,7 +89,7 @@ class CrossvalOptions:
     """Which recordings judge the models, and where a model counts as good."""
 
     threshold: float = 0.01
-    recordings: tuple[str, ...] | None = None
+    recordings: RecordingNames | None = None
 
 
 @dataclass(frozen=True)
@@ -101,9 +105,9 @@ class OrderOptions:
 class GroupOptions:
     """The greedy search for groups of recordings."""
 
-    start: tuple[str, ...] | None = None
-    candidates: tuple[str, ...] | None = None
-    validate: tuple[str, ...] | None = None
+    start: RecordingNames | None = None
+    candidates: RecordingNames | None = None
+    validate: RecordingNames | None = None
     keep: dict[str, int | bool | tuple[int, ...]] = field(
         default_factory=lambda: {"top": 3}
     )
@@ -115,7 +119,7 @@ class GroupOptions:
 class FinalTestOptions:
     """Recordings that judge the final models and are used nowhere else."""
 
-    recordings: tuple[str, ...]
+    recordings: RecordingNames
 
 
 @dataclass(frozen=True)
@@ -141,8 +145,8 @@ class SimulationOptions:
 class DiagnoseOptions:
     """What diagnosis may use."""
 
-    recordings: tuple[str, ...] | None = None
-    hold_out: str | tuple[str, ...] = "auto"
+    recordings: RecordingNames | None = None
+    hold_out: str | RecordingNames = "auto"
     effects: tuple[str, ...] | None = None
     max_effects: int = 3
     initial_state: str = "rest"

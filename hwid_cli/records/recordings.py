@@ -185,3 +185,20 @@ def _check_common(kind: str, sample_time_s: float) -> None:
         raise ValueError(f"kind {kind!r} is none of {', '.join(KINDS)}")
     if not (np.isfinite(sample_time_s) and sample_time_s > 0):
         raise ValueError(f"sample_time_s must be positive, got {sample_time_s!r}")
+
+
+@dataclass(frozen=True, eq=False)
+class Calibrated:
+    """Calibrated recordings, and what was done to each.
+
+    Parameters
+    ----------
+    logs : tuple of CalibrationLog
+        In the order of the recordings.
+    key : str
+        Key of the calibration that made them.
+    """
+
+    recordings: tuple[Recording, ...]
+    logs: tuple[CalibrationLog, ...]
+    key: str

@@ -9,7 +9,7 @@ import numpy as np
 from hwid_cli.records.diagnosis import Diagnosis
 from hwid_cli.records.groups import FinalTest, GroupSearch
 from hwid_cli.records.model import Fit, Information
-from hwid_cli.records.recordings import CalibrationLog, Recording
+from hwid_cli.records.recordings import Calibrated, CalibrationLog, Recording
 from hwid_cli.records.residuals import ResidualTests
 from hwid_cli.records.results import CrossValidation
 
@@ -55,30 +55,56 @@ class StoredResults:
         What the second axis of the order grid counts; one of ``experiment.NK_ROLES``.
     stages : tuple of StageRun
         Those that have run, in their order.
-    recordings : tuple of Recording
-        Calibrated ones.
-    logs : tuple of CalibrationLog
-        In the order of the recordings.
-    fits : tuple of Fit
-        Of single recordings.
+    results : mapping of str to object
+        What each of them gave, by its name.
     diagnosis : mapping or None
         Content of ``diagnosis.json``.
-    diagnosis_record : Diagnosis or None
-        What that file was written from, with its curves.
     """
 
     name: str
     config: str
     nk_role: str
     stages: tuple[StageRun, ...] = ()
-    recordings: tuple[Recording, ...] = ()
-    logs: tuple[CalibrationLog, ...] = ()
-    fits: tuple[Fit, ...] = ()
-    crossval: CrossValidation | None = None
-    search: GroupSearch | None = None
-    final_test: FinalTest | None = None
+    results: Mapping[str, Any] = field(default_factory=dict)
     diagnosis: Mapping[str, Any] | None = None
-    diagnosis_record: Diagnosis | None = None
+
+    @property
+    def recordings(self) -> tuple[Recording, ...]:
+        """Calibrated ones."""
+        found: Calibrated | None = self.results.get("calibrate")
+        return () if found is None else found.recordings
+
+    @property
+    def logs(self) -> tuple[CalibrationLog, ...]:
+        """What was done to the recordings, in their order."""
+        found: Calibrated | None = self.results.get("calibrate")
+        return () if found is None else found.logs
+
+    @property
+    def fits(self) -> tuple[Fit, ...]:
+        """Fits of single recordings."""
+        found: tuple[Fit, ...] = self.results.get("identify", ())
+        return found
+
+    @property
+    def crossval(self) -> CrossValidation | None:
+        """RMSD of every model on every recording."""
+        return self.results.get("crossval")
+
+    @property
+    def search(self) -> GroupSearch | None:
+        """The search for groups."""
+        return self.results.get("group")
+
+    @property
+    def final_test(self) -> FinalTest | None:
+        """The final models on all recordings."""
+        return self.results.get("test")
+
+    @property
+    def diagnosis_record(self) -> Diagnosis | None:
+        """What ``diagnosis.json`` was written from, with its curves."""
+        return self.results.get("diagnose")
 
 
 @dataclass(frozen=True, eq=False)

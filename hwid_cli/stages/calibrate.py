@@ -1,23 +1,40 @@
 """Stage ``calibrate``: raw measurements in, recordings of equal length out.
 
-Each kind of recording has a recipe of steps (``campaign/recipe.py``). Single damaged
+Each kind of recording has a recipe of steps (``data/calibration.py``). Single damaged
 samples are replaced before the first step and listed in the log. A recipe is repeated
 until it changes nothing, so that calibrating a calibrated recording gives the same
 recording.
 """
 
 from collections.abc import Sequence
-from dataclasses import fields, replace
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
 
 import numpy as np
 
 from hwid_cli.data.calibration import LEAST_QUIET, OFFSETS, Draft, run_recipe
-from hwid_cli.errors import ConfigError, MeasurementError
+from hwid_cli.data.paths import find_files, missing_files_message, recordings_base
+from hwid_cli.data.recordings import read_recordings
+from hwid_cli.errors import ConfigError, MeasurementError, NothingToDo
+from hwid_cli.files.atomic import replace_file
+from hwid_cli.records.check import StagePlan
 from hwid_cli.records.experiment import RECIPE_STEPS, CalibrateOptions
-from hwid_cli.records.recordings import CalibrationLog, RawRecording, Recording
+from hwid_cli.records.recordings import (
+    Calibrated,
+    CalibrationLog,
+    RawRecording,
+    Recording,
+)
+from hwid_cli.report.plots import as_png, calibration_figure
+from hwid_cli.report.tables import calibration_table
+from hwid_cli.stages.fit_seconds import counted
+from hwid_cli.stages.selection import named_recordings, select_recordings
+from hwid_cli.stages.stage import Context, Planning, Runner, Stage, in_results
+from hwid_cli.store.result_files import Provenance
+from hwid_cli.store.results import read_calibrated, write_calibrated
 from hwid_cli.tasks.cache import task_key
 
-STAGE = "calibrate"
+NAME = "calibrate"
 STAGE_VERSION = 2
 
 # Two passes settle nearly every recording (the second one changes nothing); noise at a
@@ -77,7 +94,7 @@ def calibration_key(
             one["has_reference"] = True
             arrays.append(reference)
     settings = {"recordings": about, "options": options}
-    return task_key(STAGE, STAGE_VERSION, settings, arrays)
+    return task_key(NAME, STAGE_VERSION, settings, arrays)
 
 
 def _check_options(options: CalibrateOptions) -> None:
@@ -166,3 +183,98 @@ def _finish(draft: Draft) -> tuple[Recording, CalibrationLog]:
         reference=draft.reference,
     )
     return recording, replace(draft.log, n_samples=recording.n_samples)
+
+
+# Measured on the demo: a sample, the figures of a recording, the page, [bytes].
+_SAMPLE_BYTES, _FIGURE_BYTES, _PAGE_BYTES = 16, 80e3, 4e6
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """Measurements as they were read, and what calibration shall do with them."""
+
+    recordings: tuple[RawRecording, ...]
+    options: CalibrateOptions | None
+
+
+def _choose(context: Context) -> Measured:
+    experiment = context.experiment
+    base = recordings_base(experiment, context.out)
+    if not find_files(experiment, base):
+        raise NothingToDo(missing_files_message(experiment, base))
+    raws = read_recordings(experiment, context.out)
+    # A misspelt name in any section is refused before anything is computed.
+    for key, names in named_recordings(experiment):
+        select_recordings(raws, names or None, key=f"{experiment.source}: {key}")
+    return Measured(tuple(raws), experiment.calibrate)
+
+
+def _compute(given: Measured, _: Runner) -> Calibrated:
+    recordings, logs = calibrate_all(given.recordings, given.options)
+    return Calibrated(
+        recordings, logs, calibration_key(given.recordings, given.options)
+    )
+
+
+def _write(path: Path, _: Measured, result: Calibrated, origin: Provenance) -> None:
+    write_calibrated(path, result.recordings, result.logs, origin)
+
+
+def _draw(
+    out: Path, given: Measured, result: Calibrated, _: Provenance | None, is_new: bool
+) -> None:
+    """Draw each recording before and after; old figures of old results may stay."""
+    if given.options is None:
+        return
+    for raw, recording, log in zip(
+        given.recordings, result.recordings, result.logs, strict=True
+    ):
+        path = out / "figures" / NAME / f"{raw.name}.png"
+        if is_new or not path.is_file():
+            replace_file(path, as_png(calibration_figure(raw, recording, log)))
+
+
+def _summary(given: Measured, result: Calibrated, is_stored: bool) -> str:
+    state = "from the cache" if is_stored else "done"
+    return f"{len(given.recordings)} recordings {state}, {_changed(given, result)}"
+
+
+def _changed(given: Measured, result: Calibrated) -> str:
+    options = given.options
+    if options is None:
+        return "left as they are (no calibrate: section)"
+    kinds = {recording.kind for recording in result.recordings}
+    bare = sorted(kind for kind in kinds if not getattr(options, kind))
+    left = f"calibrate: has no recipe for {' and '.join(bare)}"
+    if len(bare) == len(kinds):
+        return f"left as they are, not repaired either ({left})"
+    n_repaired = sum(
+        len(log.repaired_input) + len(log.repaired_output) for log in result.logs
+    )
+    changed = f"{n_repaired} damaged samples replaced"
+    return f"{changed}, some left as they are ({left})" if bare else changed
+
+
+def _plan(planning: Planning) -> tuple[StagePlan, ...]:
+    n = len(planning.recordings)
+    samples = sum(one.n_samples for one in planning.recordings)
+    what = f"{counted(n, 'recording')}, {counted(samples, 'sample')}"
+    size = _SAMPLE_BYTES * samples + _FIGURE_BYTES * n + _PAGE_BYTES
+    return (StagePlan(NAME, what, n, None, 0.0, size),)
+
+
+STAGE = Stage(
+    name=NAME,
+    needs_where_named=("simulate",),
+    sections=("recordings", "calibrate"),
+    choose=_choose,
+    key=lambda given: calibration_key(given.recordings, given.options),
+    compute=_compute,
+    storage=in_results(NAME, read_calibrated, _write),
+    summary=_summary,
+    write_files=_draw,
+    tables=lambda context, result: [calibration_table(result.logs)],
+    is_shown_in_run=False,
+    files=("calibrated.h5", "figures"),
+    plan=_plan,
+)

@@ -6,19 +6,35 @@ keeps the RMSDs only: simulated signals are never held for more than one model.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
+from hwid_cli.files.csv_tables import write_coverage_csv, write_crossval_csv
 from hwid_cli.model.scores import rmsd
 from hwid_cli.model.simulate import validation_output
-from hwid_cli.records.experiment import CrossvalOptions, OrdersOptions
+from hwid_cli.records.check import StagePlan
+from hwid_cli.records.experiment import CrossvalOptions, Experiment, OrdersOptions
 from hwid_cli.records.model import Fit, HammersteinWiener
 from hwid_cli.records.recordings import Recording
 from hwid_cli.records.results import CrossValidation
+from hwid_cli.report.tables import coverage_table, cross_table
+from hwid_cli.stages.fit_seconds import (
+    PAIR_BYTES,
+    SECONDS_PER_SIMULATED_SAMPLE,
+    counted,
+)
+from hwid_cli.stages.identify import recordings_with_models, stored_fits
+from hwid_cli.stages.order_grid import candidate_orders
+from hwid_cli.stages.ranking import best_of_each, score_models
+from hwid_cli.stages.selection import select_recordings
+from hwid_cli.stages.stage import Context, Planning, Runner, Stage, in_results
+from hwid_cli.store.result_files import Provenance
+from hwid_cli.store.results import read_crossval, write_crossval
 from hwid_cli.tasks.cache import model_key, recording_key, task_key
 from hwid_cli.tasks.runner import RunSettings, Task, run_tasks
 
-STAGE = "crossval"
+NAME = "crossval"
 STAGE_VERSION = 2
 
 # Why an RMSD is there or missing.
@@ -125,7 +141,7 @@ def deviation_tasks(
     return tuple(
         Task(
             key=task_key(
-                STAGE,
+                NAME,
                 STAGE_VERSION,
                 {"models": model_keys, "recording": content},
                 [],
@@ -153,7 +169,7 @@ def crossval_key(
         "orders": orders,
         "threshold": options.threshold,
     }
-    return task_key(STAGE, STAGE_VERSION, settings, [])
+    return task_key(NAME, STAGE_VERSION, settings, [])
 
 
 def _deviations(
@@ -169,3 +185,110 @@ def _deviations(
         for model, value in zip(models, values, strict=True)
     ]
     return Deviations(values, np.array(status))
+
+
+@dataclass(frozen=True, eq=False)
+class _Given:
+    """Models, and the recordings that validate them."""
+
+    fits: tuple[Fit, ...]
+    recordings: tuple[Recording, ...]
+    orders: OrdersOptions
+    options: CrossvalOptions
+
+
+def _choose(context: Context) -> _Given:
+    experiment = context.experiment
+    return _Given(
+        context.results["identify"],
+        _validation(context.results["calibrate"].recordings, experiment),
+        experiment.orders,
+        experiment.crossval or CrossvalOptions(),
+    )
+
+
+def _validation(
+    recordings: Sequence[Recording], experiment: Experiment
+) -> tuple[Recording, ...]:
+    options = experiment.crossval or CrossvalOptions()
+    return select_recordings(
+        recordings,
+        options.recordings,
+        key=f"{experiment.source}: crossval.recordings",
+        held_out=() if experiment.test is None else experiment.test.recordings,
+    )
+
+
+def _compute(given: _Given, runner: Runner) -> CrossValidation:
+    n_grid = len(given.orders.nb) * len(given.orders.nk)
+    total = len(given.fits) // n_grid * len(given.recordings)
+    with runner.tasks(total, "pairs") as settings:
+        return cross_validate(
+            given.fits, given.recordings, given.orders, given.options, settings
+        )
+
+
+def _summary(_: _Given, result: CrossValidation, is_stored: bool) -> str:
+    pairs = len(result.identified_on) * len(result.validated_on)
+    return f"{pairs} pairs from the cache, 0 computed" if is_stored else ""
+
+
+def _write_csv(
+    out: Path, given: _Given, result: CrossValidation, _: Provenance | None, __: bool
+) -> None:
+    scores = score_models(given.fits, result)
+    write_crossval_csv(out / "crossval.csv", result)
+    write_coverage_csv(out / "coverage.csv", scores, len(result.validated_on))
+
+
+def _tables(context: Context, result: CrossValidation) -> list[str]:
+    """The models that cover the most recordings."""
+    scores = score_models(context.results["identify"], result)
+    best = best_of_each(scores, result.identified_on)
+    rule = context.experiment.fit.initial_state
+    return [
+        coverage_table(scores, result, initial_state=rule),
+        cross_table(best, result, initial_state=rule, width=context.width),
+    ]
+
+
+def _plan(planning: Planning) -> tuple[StagePlan, ...]:
+    experiment = planning.experiment
+    chosen = recordings_with_models(planning.recordings, experiment)
+    judges = _validation(planning.recordings, experiment)
+    fits, n_stored = stored_fits(experiment, chosen, planning.store)
+    n_models = len(chosen) * len(candidate_orders(experiment.orders))
+    pairs, done = len(chosen) * len(judges), 0
+    if n_stored == n_models:
+        tasks = crossval_tasks(fits, judges, experiment.orders)
+        done = sum(planning.store.get(one.key, Deviations) is not None for one in tasks)
+    samples = n_models * sum(one.n_samples for one in judges) * (1 - done / pairs)
+    what = (
+        f"{counted(n_models, 'model')} on {counted(len(judges), 'recording')} = "
+        f"{counted(n_models * len(judges), 'validation')} in {counted(pairs, 'task')}"
+    )
+    seconds = SECONDS_PER_SIMULATED_SAMPLE * samples / min(planning.workers, pairs)
+    return (StagePlan(NAME, what, pairs, done, seconds, PAIR_BYTES * pairs),)
+
+
+STAGE = Stage(
+    name=NAME,
+    needs=("calibrate", "identify"),
+    sections=("crossval",),
+    choose=_choose,
+    key=lambda given: crossval_key(
+        given.fits, given.recordings, given.orders, given.options
+    ),
+    compute=_compute,
+    storage=in_results(
+        NAME,
+        read_crossval,
+        lambda path, given, result, origin: write_crossval(path, result, origin),
+    ),
+    summary=_summary,
+    write_files=_write_csv,
+    tables=_tables,
+    shows_before=("identify",),
+    files=("results.h5", "crossval.csv", "coverage.csv"),
+    plan=_plan,
+)

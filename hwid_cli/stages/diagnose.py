@@ -8,11 +8,14 @@ A diagnosis in memory, for programs that hold recordings and write no results.
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from math import nan
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from hwid_cli.config.extended_simulation import write_extended_simulation
 from hwid_cli.diagnosis.candidate import Footing, fit_candidate
 from hwid_cli.diagnosis.comparing import compare
 from hwid_cli.diagnosis.judge import Judge
@@ -28,15 +31,32 @@ from hwid_cli.diagnosis.unknowns import first_point, layout
 from hwid_cli.drive.catalogue import CATALOGUE, public_id
 from hwid_cli.drive.effect import Scales
 from hwid_cli.drive.simulation import drive_effects
-from hwid_cli.errors import ConfigError
+from hwid_cli.errors import CacheError, ConfigError
+from hwid_cli.files.atomic import replace_file
 from hwid_cli.records.candidates import CandidateFit
+from hwid_cli.records.check import StagePlan
 from hwid_cli.records.diagnosis import Diagnosis, NoiseFloor
-from hwid_cli.records.experiment import DiagnoseOptions, SimulationOptions
+from hwid_cli.records.experiment import DiagnoseOptions, Experiment, SimulationOptions
 from hwid_cli.records.recordings import Recording
+from hwid_cli.report.diagnosis_tables import diagnosis_text
+from hwid_cli.report.figures.diagnosis import diagnosis_figures
+from hwid_cli.report.plots import as_png
 from hwid_cli.stages.candidate_rounds import Found, run_rounds
-from hwid_cli.stages.candidate_tasks import STAGE, STAGE_VERSION, Announce, Rounds
+from hwid_cli.stages.candidate_tasks import STAGE as NAME
+from hwid_cli.stages.candidate_tasks import STAGE_VERSION, Announce, Rounds
+from hwid_cli.stages.diagnosis_starts import doubtful_starts, starts_sentence
 from hwid_cli.stages.findings import Findings, describe
+from hwid_cli.stages.fit_seconds import counted
 from hwid_cli.stages.selection import select_recordings
+from hwid_cli.stages.stage import Context, Planning, Runner, Stage, in_results
+from hwid_cli.store.diagnosis_results import (
+    read_diagnosis,
+    read_diagnosis_record,
+    write_diagnosis,
+    write_diagnosis_json,
+    write_diagnosis_tables,
+)
+from hwid_cli.store.result_files import Provenance
 from hwid_cli.tasks.cache import MemoryStore, task_key
 from hwid_cli.tasks.runner import RunSettings, Workers
 from hwid_cli.tasks.task import one_thread
@@ -58,7 +78,7 @@ def diagnosis_key(
     arrays = [array for one in recordings for array in (one.input, one.output)]
     arrays += [one.reference for one in recordings if one.reference is not None]
     settings = {"recordings": about, "simulation": simulation, "options": options}
-    return task_key(STAGE, STAGE_VERSION, settings, arrays)
+    return task_key(NAME, STAGE_VERSION, settings, arrays)
 
 
 def diagnose_all(
@@ -277,3 +297,152 @@ def diagnose(
             )
     settings = RunSettings(MemoryStore(), Workers(jobs))
     return diagnose_all(chosen, simulation, options, settings, lambda what, total: None)
+
+
+@dataclass(frozen=True, eq=False)
+class ToDiagnose:
+    """A simulation, and the recordings that it is compared with."""
+
+    experiment: Experiment
+    recordings: tuple[Recording, ...]
+    simulation: SimulationOptions
+    options: DiagnoseOptions
+
+
+def choose(context: Context) -> ToDiagnose:
+    """Choose the recordings that a simulation is compared with.
+
+    Raises
+    ------
+    ConfigError
+        If the configuration has no simulation, names unknown recordings, or leaves none
+        to train on.
+    """
+    experiment = context.experiment
+    simulation = _simulation(experiment)
+    options = experiment.diagnose or DiagnoseOptions()
+    place = f"{experiment.source}: diagnose"
+    recordings = select_recordings(
+        context.results["calibrate"].recordings,
+        options.recordings,
+        key=f"{place}.recordings",
+    )
+    if not isinstance(options.hold_out, str):
+        held_out = select_recordings(
+            recordings, options.hold_out, key=f"{place}.hold_out"
+        )
+        if len(held_out) == len(recordings):
+            raise ConfigError(
+                f"{place}.hold_out: names all {len(recordings)} recordings; expected "
+                "at least one left to train on; take one out, or write 'auto'"
+            )
+    return ToDiagnose(experiment, recordings, simulation, options)
+
+
+def _simulation(experiment: Experiment) -> SimulationOptions:
+    if experiment.simulation is None:
+        raise ConfigError(
+            f"{experiment.source}: simulation: missing; expected the physics model that "
+            "is compared with the recordings; add the section (configs/README.md "
+            "explains it)"
+        )
+    return experiment.simulation
+
+
+def _warnings(context: Context, given: ToDiagnose) -> list[str]:
+    """Which recordings cannot start in equilibrium, as the diagnosis takes them to."""
+    names = doubtful_starts(given.recordings, given.simulation, given.options)
+    said = starts_sentence(names, given.recordings, given.experiment.calibrate)
+    return [f"{context.experiment.source}: {said}"] if said else []
+
+
+def _compute(given: ToDiagnose, runner: Runner) -> Diagnosis:
+    with runner.rounds("tasks") as (settings, begin_round):
+        return diagnose_all(
+            given.recordings, given.simulation, given.options, settings, begin_round
+        )
+
+
+def _write_files(
+    out: Path,
+    given: ToDiagnose,
+    diagnosis: Diagnosis,
+    origin: Provenance | None,
+    is_new: bool,
+) -> None:
+    """Write the JSON file, the tables, the extended simulation and the figures."""
+    if origin is None:
+        raise ValueError("a diagnosis is always stored")
+    path = out / "diagnosis.json"
+    figures = None if is_new else _drawn_before(out, origin)
+    if figures is None:
+        figures = _draw(out / "figures", diagnosis)
+    write_diagnosis_json(path, diagnosis, origin.seconds, origin, figures=figures)
+    write_diagnosis_tables(out, diagnosis)
+    write_extended_simulation(
+        out / "extended_simulation.yaml",
+        given.experiment,
+        extended_options(diagnosis, given.simulation),
+    )
+
+
+def _drawn_before(out: Path, origin: Provenance) -> list[str] | None:
+    """Names of the figures of this very run, if all of them are still there."""
+    try:
+        found = read_diagnosis(out / "diagnosis.json") or {}
+    except CacheError:
+        return None
+    about, names = found.get("provenance") or {}, found.get("figures") or []
+    # Seconds tell one run from another one with the same key (--force).
+    is_same = about.get("key") == origin.key and found.get("seconds") == origin.seconds
+    is_there = all((out / "figures" / name).is_file() for name in names)
+    return names if is_same and names and is_there else None
+
+
+def _draw(folder: Path, diagnosis: Diagnosis) -> list[str]:
+    figures = diagnosis_figures(diagnosis)
+    drawn = {f"{name}.png": as_png(figure) for name, figure in figures.items()}
+    for path in folder.glob("diagnosis_*.png"):
+        # Another verdict may have fewer figures.
+        if path.name not in drawn:
+            path.unlink()
+    for name, png in drawn.items():
+        replace_file(folder / name, png)
+    return sorted(drawn)
+
+
+def _plan(planning: Planning) -> tuple[StagePlan, ...]:
+    n = len(planning.recordings)
+    what = f"up to {counted(n, 'recording')}; time depends on what is missing"
+    return (StagePlan("diagnose", what, n, None, nan, 1e6),)
+
+
+STAGE = Stage(
+    name="diagnose",
+    needs=("calibrate",),
+    sections=("simulation", "diagnose"),
+    require=_simulation,
+    choose=choose,
+    key=lambda given: diagnosis_key(given.recordings, given.simulation, given.options),
+    compute=_compute,
+    storage=in_results(
+        "diagnose",
+        read_diagnosis_record,
+        lambda path, given, result, origin: write_diagnosis(path, result, origin),
+    ),
+    summary=lambda given, result, is_stored: (
+        f"{len(given.recordings)} recordings from the cache" if is_stored else ""
+    ),
+    write_files=_write_files,
+    tables=lambda context, result: [diagnosis_text(result, width=context.width)],
+    files=(
+        "diagnosis.json",
+        "ranking.csv",
+        "where.csv",
+        "gaps.csv",
+        "extended_simulation.yaml",
+        "figures",
+    ),
+    warnings=_warnings,
+    plan=_plan,
+)

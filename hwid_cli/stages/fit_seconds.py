@@ -15,8 +15,12 @@ from hwid_cli.records.check import FitCost
 from hwid_cli.records.experiment import Experiment, GroupOptions, OrdersOptions
 from hwid_cli.records.model import FitOptions, Orders
 from hwid_cli.records.recordings import Recording
-from hwid_cli.stages.group import SEARCHED_ROUNDS_OF_GROUPS
-from hwid_cli.stages.order_grid import SEARCHED_ROUNDS, candidate_orders, growth
+from hwid_cli.stages.order_grid import (
+    SEARCHED_ROUNDS,
+    SEARCHED_ROUNDS_OF_GROUPS,
+    candidate_orders,
+    growth,
+)
 
 # Growth with samples, units, orders and recordings (docs/benchmarks.md), [-].
 _P_SAMPLES, _P_UNITS, _P_ORDERS, _P_RECORDINGS = 0.56, 0.44, 0.54, 0.85
@@ -35,6 +39,24 @@ _SEARCHED, _GROWN, _WARM_SEARCHED, _WARM_GROWN = 0.5, 0.2, 0.25, 0.1
 # Simulating one model on one sample, its initial state included (docs/benchmarks.md: 1 ms
 # for 7500 samples on two cores), [s].
 SECONDS_PER_SIMULATED_SAMPLE = 2.7e-7
+# Measured on the demo: a stored fit and a stored list of RMSDs, in the cache and again in
+# the results, [bytes].
+FIT_BYTES, PAIR_BYTES = 22e3, 9e3
+
+
+def counted(count: int, thing: str) -> str:
+    """Say how many there are of something.
+
+    Parameters
+    ----------
+    count : int, [-]
+
+    Examples
+    --------
+    >>> counted(1, "fit"), counted(2, "fit")
+    ('1 fit', '2 fits')
+    """
+    return f"{count} {thing}{'s' * (count != 1)}"
 
 
 def compiled_loops_place() -> str:

@@ -30,6 +30,7 @@ gets them.
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from math import comb
 from typing import Any
 
 import numpy as np
@@ -37,17 +38,32 @@ import numpy as np
 from hwid_cli.model.fit import fit_without_standard_errors
 from hwid_cli.model.scores import coverage
 from hwid_cli.model.uncertainty import with_standard_errors
-from hwid_cli.records.experiment import GroupOptions, OrdersOptions
+from hwid_cli.records.check import StagePlan
+from hwid_cli.records.experiment import CrossvalOptions, GroupOptions, OrdersOptions
 from hwid_cli.records.groups import Group, GroupSearch, Join
 from hwid_cli.records.model import Fit, FitOptions, HammersteinWiener, Orders
 from hwid_cli.records.recordings import Recording
+from hwid_cli.report.group_tables import chain_table, join_table, levels_table
 from hwid_cli.stages.crossval import deviation_tasks
+from hwid_cli.stages.fit_seconds import (
+    FIT_BYTES,
+    PAIR_BYTES,
+    SECONDS_PER_SIMULATED_SAMPLE,
+    group_grid_seconds,
+)
 from hwid_cli.stages.identify import Run, fit_grid
-from hwid_cli.stages.order_grid import candidate_orders, growth
+from hwid_cli.stages.order_grid import (
+    SEARCHED_ROUNDS_OF_GROUPS,
+    candidate_orders,
+    growth,
+)
+from hwid_cli.stages.selection import select_recordings
+from hwid_cli.stages.stage import Context, Planning, Runner, Stage, in_results
+from hwid_cli.store.group_results import read_group, write_group, write_groups_csv
 from hwid_cli.tasks.cache import model_key, recording_key, task_key
-from hwid_cli.tasks.runner import Task, TaskDone
+from hwid_cli.tasks.runner import Task, TaskDone, run_tasks
 
-STAGE = "group"
+NAME = "group"
 STAGE_VERSION = 10
 
 # Does the work of a level with what runs its tasks. The text says what they are, "fits",
@@ -292,11 +308,6 @@ def _widest_first(one: Group) -> tuple[int, float]:
     return -one.coverage, rmsd if np.isfinite(rmsd) else np.inf
 
 
-# As for single recordings, but one round less: a fit from the members' models takes many
-# times as long as going on from smaller orders, and groups are told apart by a threshold.
-SEARCHED_ROUNDS_OF_GROUPS = 3
-
-
 def fit_singles(
     plan: GroupPlan, names: Collection[str], run: RunLevel
 ) -> dict[str, list[Fit]]:
@@ -388,7 +399,7 @@ def judging_task(plan: GroupPlan, fit: Fit) -> Task:
         "standard_errors_of": None if fit.model is None else model_key(fit.model),
     }
     return Task(
-        key=task_key(STAGE, STAGE_VERSION, matters, []),
+        key=task_key(NAME, STAGE_VERSION, matters, []),
         name=f"{fit.name}/standard errors",
         function=with_standard_errors,
         arguments=(fit, recordings),
@@ -430,7 +441,7 @@ def _fit_task(
         "search_anew": anew,
     }
     return Task(
-        key=task_key(STAGE, STAGE_VERSION, matters, []),
+        key=task_key(NAME, STAGE_VERSION, matters, []),
         name=f"{'+'.join(group)}/{nb}/{nk}",
         function=_fit_group,
         arguments=(recordings, orders, plan.fit_options, starts, contained, anew),
@@ -539,7 +550,7 @@ def group_key(plan: GroupPlan) -> str:
         "warm_start": plan.options.warm_start,
         "threshold": plan.threshold,
     }
-    return task_key(STAGE, STAGE_VERSION, settings, [])
+    return task_key(NAME, STAGE_VERSION, settings, [])
 
 
 def _validate_level(
@@ -634,3 +645,150 @@ def _score_group(
         validation_rmsd=float(pooled[best]),
     )
     return _Scored(chosen, fits[best], deviations[best])
+
+
+def _choose(context: Context) -> GroupPlan:
+    """Everything that the search depends on, from the configuration."""
+    experiment = context.experiment
+    recordings = context.results["calibrate"].recordings
+    options = experiment.group or GroupOptions()
+    held_out = () if experiment.test is None else experiment.test.recordings
+
+    def chosen(key: str) -> tuple[str, ...]:
+        place = f"{experiment.source}: group.{key}"
+        names = getattr(options, key)
+        found = select_recordings(recordings, names, key=place, held_out=held_out)
+        return tuple(one.name for one in found)
+
+    start = None if options.start is None else chosen("start")
+    candidates, validate = chosen("candidates"), chosen("validate")
+    used = {*(start or ()), *candidates, *validate}
+    return GroupPlan(
+        recordings=tuple(one for one in recordings if one.name in used),
+        start=start,
+        candidates=candidates,
+        validate=validate,
+        orders=experiment.orders,
+        fit_options=experiment.fit,
+        options=options,
+        threshold=(experiment.crossval or CrossvalOptions()).threshold,
+    )
+
+
+def _compute(plan: GroupPlan, runner: Runner) -> GroupSearch:
+    def run(level: int, unit: str, total: int, work: Callable[[Run], Any]) -> Any:
+        with runner.tasks(total, unit, part=f"level {level}") as settings:
+            # Fits of single recordings are those of another stage: --force spares them.
+            is_forced = settings.force and not (level == 1 and unit == "fits")
+            own = replace(settings, force=is_forced)
+            return work(lambda tasks: run_tasks(tasks, own))
+
+    return search_all(plan, run)
+
+
+def _tables(context: Context, search: GroupSearch) -> list[str]:
+    """The coverage of every group, what the levels filtered, and the chain."""
+    rule = context.experiment.fit.initial_state
+    return [
+        *(
+            join_table(search, level, initial_state=rule, width=context.width)
+            for level in search.levels[1:]
+        ),
+        levels_table(search, initial_state=rule),
+        chain_table(search, initial_state=rule),
+    ]
+
+
+def group_bound(
+    n_start: int, n_candidates: int, options: GroupOptions, *, is_ordered: bool
+) -> tuple[int, ...]:
+    """Count the groups that a search may try, level by level from the second one.
+
+    Parameters
+    ----------
+    n_start, n_candidates : int, [-]
+    is_ordered : bool
+        Whether the order of recordings makes another group.
+
+    Examples
+    --------
+    >>> group_bound(5, 5, GroupOptions(keep={"top": 2}, max_level=3), is_ordered=False)
+    (8, 6)
+    >>> group_bound(5, 5, GroupOptions(keep={"best": True}), is_ordered=False)
+    (10, 10, 5)
+    """
+    counts: list[int] = []
+    going_on = n_start
+    for level in range(2, options.max_level + 1):
+        # All explicit starts go on; the rule of keeping holds from the next level.
+        if counts or options.start is None:
+            rule = options.keep.get("top")
+            values = rule if isinstance(rule, tuple) else (rule,)
+            turn = len(counts) - (options.start is not None)
+            most = values[min(turn, len(values) - 1)]
+            if most is not None:
+                going_on = min(going_on, int(most))
+        tried = going_on * max(n_candidates - level + 1, 0)
+        if not is_ordered and n_start <= n_candidates:
+            tried = min(tried, comb(n_candidates, level))
+        counts.append(tried)
+        going_on = tried
+    return tuple(counts)
+
+
+def _plan(planning: Planning) -> tuple[StagePlan, ...]:
+    experiment = planning.experiment
+    options = experiment.group or GroupOptions()
+    held_out = () if experiment.test is None else experiment.test.recordings
+    usable = [one for one in planning.recordings if one.name not in held_out]
+    n_candidates = len(options.candidates or usable)
+    n_validate = len(options.validate or usable)
+    bounds = group_bound(
+        len(options.start) if options.start is not None else n_candidates,
+        n_candidates,
+        options,
+        is_ordered=experiment.fit.join == "concatenate",
+    )
+    n = int(np.median([one.n_samples for one in usable] or [0]))
+    fits = sum(bounds) * len(candidate_orders(experiment.orders))
+    seconds = (
+        sum(
+            count * group_grid_seconds(planning.cost, n, experiment, level)
+            for level, count in enumerate(bounds, start=2)
+        )
+        + SECONDS_PER_SIMULATED_SAMPLE * n * n_validate * fits
+    )
+    plan = StagePlan(
+        NAME,
+        f"at most {sum(bounds)} groups ({' + '.join(map(str, bounds))}), {fits} fits",
+        fits,
+        None,
+        seconds / planning.workers,
+        FIT_BYTES * fits + PAIR_BYTES * sum(bounds) * n_validate,
+        is_bound=True,
+    )
+    return (plan,)
+
+
+STAGE = Stage(
+    name=NAME,
+    needs=("calibrate", "identify"),
+    sections=("crossval", "group"),
+    choose=_choose,
+    key=group_key,
+    compute=_compute,
+    storage=in_results(
+        NAME,
+        read_group,
+        lambda path, plan, result, origin: write_group(path, result, origin),
+    ),
+    summary=lambda plan, result, is_stored: (
+        f"{len(result.groups)} groups from the cache, 0 computed" if is_stored else ""
+    ),
+    write_files=lambda out, plan, result, origin, is_new: write_groups_csv(
+        out / "groups.csv", result
+    ),
+    tables=_tables,
+    files=("results.h5", "groups.csv"),
+    plan=_plan,
+)

@@ -1,17 +1,32 @@
 """Stage ``identify``: one model for every recording and every pair of orders."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from math import nan
+from pathlib import Path
+
+import numpy as np
 
 from hwid_cli.model.fit import fit
-from hwid_cli.records.experiment import OrdersOptions
+from hwid_cli.records.check import StagePlan
+from hwid_cli.records.experiment import Experiment, OrdersOptions
+from hwid_cli.records.maps import StaticMap
 from hwid_cli.records.model import Fit, FitOptions, HammersteinWiener, Orders
 from hwid_cli.records.recordings import Recording
+from hwid_cli.report.fit_tables import best_models_table, failure_lines, status_line
+from hwid_cli.report.residual_tables import residual_table
+from hwid_cli.stages.fit_seconds import FIT_BYTES, counted, grid_seconds
 from hwid_cli.stages.order_grid import SEARCHED_ROUNDS, candidate_orders, growth
-from hwid_cli.tasks.cache import model_key, recording_key, task_key
+from hwid_cli.stages.ranking import best_fits, count_statuses
+from hwid_cli.stages.residuals import own_residuals
+from hwid_cli.stages.selection import select_recordings
+from hwid_cli.stages.stage import Context, Planning, Runner, Stage, in_results
+from hwid_cli.store.result_files import Provenance
+from hwid_cli.store.results import read_fits, write_fits
+from hwid_cli.tasks.cache import Store, model_key, recording_key, task_key
 from hwid_cli.tasks.runner import RunSettings, Task, TaskDone, run_tasks
 
-STAGE = "identify"
+NAME = "identify"
 STAGE_VERSION = 10
 
 # Runs tasks and returns them with their results, in their order.
@@ -101,7 +116,7 @@ def identify_key(
         "orders": orders,
         "options": options,
     }
-    return task_key(STAGE, STAGE_VERSION, settings, [])
+    return task_key(NAME, STAGE_VERSION, settings, [])
 
 
 def fit_task(
@@ -139,7 +154,7 @@ def fit_task(
         "search_anew": search_anew,
     }
     return Task(
-        key=task_key(STAGE, STAGE_VERSION, matters, []),
+        key=task_key(NAME, STAGE_VERSION, matters, []),
         name=name,
         function=_fit_one,
         arguments=(recording, orders, options, known, search_anew),
@@ -162,3 +177,129 @@ def _fit_one(
     anew: bool,
 ) -> Fit:
     return fit([recording], orders, options, contained=contained, search_anew=anew)
+
+
+@dataclass(frozen=True, eq=False)
+class _Given:
+    """Recordings that get models, and of which orders."""
+
+    recordings: tuple[Recording, ...]
+    orders: OrdersOptions
+    options: FitOptions
+
+
+def _choose(context: Context) -> _Given:
+    experiment = context.experiment
+    recordings = context.results["calibrate"].recordings
+    chosen = recordings_with_models(recordings, experiment)
+    return _Given(chosen, experiment.orders, experiment.fit)
+
+
+def recordings_with_models(
+    recordings: Sequence[Recording], experiment: Experiment
+) -> tuple[Recording, ...]:
+    """Choose the recordings that get models.
+
+    Raises
+    ------
+    ConfigError
+        If a name is unknown, or none is left.
+    """
+    return select_recordings(
+        recordings,
+        None if experiment.identify is None else experiment.identify.recordings,
+        key=f"{experiment.source}: identify.recordings",
+        held_out=() if experiment.test is None else experiment.test.recordings,
+    )
+
+
+def _compute(given: _Given, runner: Runner) -> tuple[Fit, ...]:
+    total = len(given.recordings) * len(candidate_orders(given.orders))
+    with runner.tasks(total, "fits") as settings:
+        return identify_all(given.recordings, given.orders, given.options, settings)
+
+
+def _write(
+    path: Path, given: _Given, result: tuple[Fit, ...], origin: Provenance
+) -> None:
+    write_fits(path, result, given.orders, origin)
+
+
+def _tables(context: Context, fits: tuple[Fit, ...]) -> list[str]:
+    """The best models of each recording, what they leave, and how the fits ended."""
+    experiment, recordings = context.experiment, context.results["calibrate"].recordings
+    nk_role = experiment.orders.nk_role
+    unit = recordings[0].output_unit
+    texts = [best_models_table(best_fits(fits), unit, nk_is_delay=nk_role == "delay")]
+    left = own_residuals(fits, recordings, nk_role)
+    if left:
+        texts.append(residual_table(left, experiment.fit.initial_state))
+    reasons = failure_lines(fits)
+    status = status_line(count_statuses(fits))
+    return [*texts, f"{status}\n{reasons}" if reasons else status]
+
+
+def _plan(planning: Planning) -> tuple[StagePlan, ...]:
+    experiment = planning.experiment
+    chosen = recordings_with_models(planning.recordings, experiment)
+    n_grid = len(candidate_orders(experiment.orders))
+    _, n_cached = stored_fits(experiment, chosen, planning.store)
+    total = len(chosen) * n_grid
+    seconds = grid_seconds(experiment, chosen, (planning.cost, planning.workers))
+    what = (
+        f"{counted(len(chosen), 'recording')} x {counted(n_grid, 'order')} = "
+        f"{counted(total, 'fit')}"
+    )
+    size = FIT_BYTES * (2 * total - n_cached)
+    left = seconds * (1 - n_cached / total)
+    return (StagePlan(NAME, what, total, n_cached, left, size),)
+
+
+def stored_fits(
+    experiment: Experiment, recordings: Sequence[Recording], store: Store
+) -> tuple[tuple[Fit, ...], int]:
+    """Fits as far as they are stored, and their number.
+
+    The key of a fit holds the models that it begins with. Where one of those is missing,
+    a model that nobody can have stored stands for it, and what follows is missing too.
+    """
+    found = 0
+
+    def look_up(tasks: Sequence[Task]) -> list[TaskDone]:
+        nonlocal found
+        done = []
+        for task in tasks:
+            stored = store.get(task.key, Fit)
+            found += stored is not None
+            result = _absent(task) if stored is None else stored
+            done.append(TaskDone(task, result, stored is not None))
+        return done
+
+    fits = fit_grid(recordings, experiment.orders, experiment.fit, look_up)
+    return fits, found
+
+
+def _absent(task: Task) -> Fit:
+    recording, orders, options, *_ = task.arguments
+    none = StaticMap("none", np.zeros(0))
+    nobody = HammersteinWiener(
+        none, np.array([nan]), np.array([1.0]), 0, none, recording.sample_time_s
+    )
+    return Fit((recording.name,), orders, options, nobody, "stalled", "not stored")
+
+
+STAGE = Stage(
+    name=NAME,
+    needs=("calibrate",),
+    sections=("orders", "fit", "identify"),
+    choose=_choose,
+    key=lambda given: identify_key(given.recordings, given.orders, given.options),
+    compute=_compute,
+    storage=in_results(NAME, read_fits, _write),
+    summary=lambda given, fits, is_stored: (
+        f"{len(fits)} fits from the cache, 0 computed" if is_stored else ""
+    ),
+    tables=_tables,
+    files=("results.h5",),
+    plan=_plan,
+)

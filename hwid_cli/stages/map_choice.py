@@ -16,9 +16,9 @@ from hwid_cli.records.maps import KINDS_WITH_UNITS
 from hwid_cli.records.model import Fit, FitOptions, Orders
 from hwid_cli.records.order import MapAdvice, MapCandidate
 from hwid_cli.records.recordings import Recording
+from hwid_cli.stages.candidate_selection import scored, smallest_good
 from hwid_cli.stages.crossval import deviation_tasks
 from hwid_cli.stages.identify import fit_task
-from hwid_cli.stages.order import judged, smallest_good
 from hwid_cli.stages.outliers import without_outliers
 from hwid_cli.tasks.cache import recording_key
 from hwid_cli.tasks.runner import RunSettings, run_tasks
@@ -122,7 +122,7 @@ def recommend_maps(
     docs/method.md, section "Which maps".
     """
     rmsd, n_outliers = _judging(fits, recordings, judges, settings)
-    found = judged(
+    found = scored(
         rmsd,
         [one.name for one in recordings],
         [one.name for one in judges],

@@ -3,199 +3,37 @@
 References
 ----------
 docs/method.md, eqs. (33)-(36).
-
-The smallest of some candidates that predicts other recordings as well as the best.
-
-Candidates are orders or maps: whatever gave every recording one model each.
-
-References
-----------
-docs/method.md, eqs. (33), (34).
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
-from hwid_cli.model.input_range import outside_share
+from hwid_cli.errors import ConfigError
 from hwid_cli.model.response_estimate import estimate_response
-from hwid_cli.records.experiment import OrderOptions, OrdersOptions
+from hwid_cli.records.check import StagePlan
+from hwid_cli.records.experiment import Experiment, OrderOptions, OrdersOptions
 from hwid_cli.records.model import Fit
-from hwid_cli.records.order import Judgement, OrderAdvice, OrderChoice
+from hwid_cli.records.order import MapAdvice, OrderAdvice, OrderChoice
 from hwid_cli.records.recordings import Recording
 from hwid_cli.records.results import CrossValidation
-from hwid_cli.stages.order_grid import grid_place
-
-# A model that is this many times worse than the best, or missing, is just bad: how bad
-# must not decide between the others.
-_MOST_FACTOR = 10.0
-# Share of a recording's input that may lie beyond what a model has seen for the recording
-# to judge it: beyond, a map is a continuation, however it was fitted.
-_MOST_BEYOND = 0.1
-
-
-@dataclass(frozen=True, eq=False)
-class Judged:
-    """What recordings say of candidates, a row for each pair of model and judge.
-
-    Parameters
-    ----------
-    factors : ndarray, shape (n_pairs, n_candidates), [-]
-        Logarithms of the RMSDs over the pair's lowest.
-    rmsd : ndarray, shape (n_pairs, n_candidates), [output unit]
-    judges : ndarray of int, shape (n_pairs,)
-        Number of the judging recording; -1 where a recording judges its own models.
-    n_beyond : int, [-]
-        Pairs that do not judge, because the input goes beyond what the model has seen.
-    n_outliers : int, [samples]
-        Of the judges, that do not count.
-    """
-
-    factors: np.ndarray
-    rmsd: np.ndarray
-    judges: np.ndarray
-    n_beyond: int
-    n_outliers: int
-
-
-@dataclass(frozen=True, eq=False)
-class Verdict:
-    """Which candidates are chosen and best, and what is known of all.
-
-    Parameters
-    ----------
-    chosen, best : int, [-]
-        Numbers of candidates.
-    factors : ndarray, shape (n_candidates,), [-]
-        By how much each is worse than the best one, on average.
-    rmsd : ndarray, shape (n_candidates,), [output unit]
-        Geometric mean over the pairs.
-    """
-
-    chosen: int
-    best: int
-    judgement: Judgement
-    factors: np.ndarray
-    rmsd: np.ndarray
-
-
-def judged(
-    rmsd: np.ndarray,
-    identified_on: Sequence[str],
-    validated_on: Sequence[str],
-    recordings: Sequence[Recording],
-    n_outliers: Sequence[int] = (),
-) -> Judged | None:
-    """What others say of some recordings' models, or they themselves where alone.
-
-    Parameters
-    ----------
-    rmsd : ndarray, shape (n_identified, n_candidates, n_validated), [output unit]
-        NaN where there is none.
-    recordings : sequence of Recording
-        Among them all of these.
-    n_outliers : sequence of int, [samples]
-        Of each of ``validated_on``; empty where all samples count.
-
-    Returns
-    -------
-    Judged or None
-        None where there is no RMSD at all. Where every recording's input goes beyond what
-        the models have seen, all judge.
-    """
-    inputs = {one.name: one.input for one in recordings}
-    others = _known_pairs(rmsd, identified_on, validated_on, is_own=False)
-    pairs = [
-        (place, judge)
-        for place, judge in others
-        if _is_within(inputs[identified_on[place]], inputs[validated_on[judge]])
-    ] or others
-    is_alone = not pairs
-    if is_alone:
-        pairs = _known_pairs(rmsd, identified_on, validated_on, is_own=True)
-    if not pairs:
-        return None
-    values = np.array([rmsd[place, :, judge] for place, judge in pairs])
-    with np.errstate(divide="ignore"):
-        logs = np.log(np.maximum(values, 1e-300))
-    factors = logs - np.nanmin(logs, axis=1, keepdims=True)
-    factors = np.minimum(np.nan_to_num(factors, nan=np.inf), np.log(_MOST_FACTOR))
-    judges = np.array([-1 if is_alone else judge for _, judge in pairs])
-    n_beyond = max(len(others) - len(pairs), 0)
-    counts = [n_outliers[one] for one in {judge for _, judge in pairs} if n_outliers]
-    return Judged(factors, values, judges, n_beyond, sum(counts))
-
-
-def smallest_good(found: Judged, sizes: np.ndarray, tolerance: float) -> Verdict:
-    """Choose the smallest candidate that is as good as the best.
-
-    Parameters
-    ----------
-    sizes : ndarray, shape (n_candidates,)
-        What small means; of equally small ones the best is chosen.
-    tolerance : float, [-]
-        Share by which it may be worse than the best; one standard error is allowed too.
-
-    References
-    ----------
-    docs/method.md, eq. (34).
-    """
-    names = np.unique(found.judges)
-    by_judge = np.array(
-        [found.factors[found.judges == one].mean(axis=0) for one in names]
-    )
-    mean = by_judge.mean(axis=0)
-    best = int(np.argmin(mean))
-    error = np.full(mean.shape, np.nan)
-    if len(by_judge) > 1:
-        worse = by_judge - by_judge[:, [best]]
-        error = worse.std(axis=0, ddof=1) / np.sqrt(len(by_judge))
-    is_good = mean - mean[best] <= np.maximum(np.log1p(tolerance), np.nan_to_num(error))
-    smallest = is_good & (sizes == sizes[is_good].min())
-    chosen = int(np.argmin(np.where(smallest, mean, np.inf)))
-    factors = np.exp(mean - mean[best])
-    rmsd = np.array([_typical(column) for column in found.rmsd.T])
-    judgement = Judgement(
-        rmsd=float(rmsd[chosen]),
-        best_rmsd=float(rmsd[best]),
-        factor=float(factors[chosen]),
-        standard_error=float(error[chosen]),
-        n_judges=int(np.sum(names >= 0)),
-        n_beyond=found.n_beyond,
-        n_outliers=found.n_outliers,
-    )
-    return Verdict(chosen, best, judgement, factors, rmsd)
-
-
-def _known_pairs(
-    rmsd: np.ndarray,
-    identified_on: Sequence[str],
-    validated_on: Sequence[str],
-    *,
-    is_own: bool,
-) -> list[tuple[int, int]]:
-    """Places of models and judges with an RMSD, of the same recording or of two."""
-    return [
-        (place, judge)
-        for place, model in enumerate(identified_on)
-        for judge, name in enumerate(validated_on)
-        if (model == name) == is_own and np.isfinite(rmsd[place, :, judge]).any()
-    ]
-
-
-def _is_within(seen: np.ndarray, judging: np.ndarray) -> bool:
-    """Whether a judging recording's input stays in what a model has seen."""
-    share, *_ = outside_share(judging, (float(seen.min()), float(seen.max())))
-    return share <= _MOST_BEYOND
-
-
-def _typical(rmsd: np.ndarray) -> float:
-    """Geometric mean of what is known."""
-    known = rmsd[np.isfinite(rmsd) & (rmsd > 0.0)]
-    if known.size == 0:
-        return float("nan") if not (rmsd == 0.0).any() else 0.0
-    return float(np.exp(np.mean(np.log(known))))
+from hwid_cli.report.order_tables import (
+    map_sentences,
+    map_table,
+    order_sentences,
+    order_table,
+)
+from hwid_cli.stages.candidate_selection import ScoredCandidates, scored, smallest_good
+from hwid_cli.stages.fit_seconds import FIT_BYTES, counted, map_seconds
+from hwid_cli.stages.identify import recordings_with_models
+from hwid_cli.stages.map_choice import candidate_maps, fit_maps, recommend_maps
+from hwid_cli.stages.order_grid import candidate_orders, grid_place
+from hwid_cli.stages.outliers import ROUNDS, cross_validate_without_outliers
+from hwid_cli.stages.stage import Context, Planning, Runner, Stage
+from hwid_cli.store.order_results import write_maps_csv, write_order_csv
+from hwid_cli.store.result_files import Provenance
 
 
 def recommend_orders(
@@ -275,17 +113,17 @@ def _judged_by(
     places: Sequence[int],
     recordings: Sequence[Recording],
     n_outliers: Sequence[int],
-) -> Judged | None:
+) -> ScoredCandidates | None:
     """What recordings say of the models of some, the grid in one row."""
     names = [crossval.identified_on[place] for place in places]
     shape = (len(names), -1, len(crossval.validated_on))
     rmsd = crossval.rmsd[list(places)].reshape(shape)
-    return judged(rmsd, names, crossval.validated_on, recordings, n_outliers)
+    return scored(rmsd, names, crossval.validated_on, recordings, n_outliers)
 
 
 def _choice(
     recording: str,
-    found: Judged,
+    found: ScoredCandidates,
     criteria: dict[str, np.ndarray],
     crossval: CrossValidation,
     options: OrderOptions,
@@ -341,3 +179,162 @@ def _named(place: int, crossval: CrossValidation) -> tuple[int, int]:
     """Orders at a place of the grid, counted row by row."""
     row, column = divmod(place, len(crossval.nk))
     return crossval.nb[row], crossval.nk[column]
+
+
+@dataclass(frozen=True, eq=False)
+class _Given:
+    """Models with their RMSDs, and what may be recommended."""
+
+    experiment: Experiment
+    recordings: tuple[Recording, ...]
+    fits: tuple[Fit, ...]
+    crossval: CrossValidation
+
+    @property
+    def options(self) -> OrderOptions:
+        """What the section says, or its defaults."""
+        return self.experiment.order or OrderOptions()
+
+    def named(self, names: Sequence[str]) -> list[Recording]:
+        """Recordings of these names, in their order."""
+        by_name = {one.name: one for one in self.recordings}
+        return [by_name[name] for name in names]
+
+
+@dataclass(frozen=True, eq=False)
+class Advice:
+    """Recommended orders, and recommended maps where some were to be compared."""
+
+    orders: OrderAdvice
+    maps: MapAdvice | None
+
+
+def _choose(context: Context) -> _Given:
+    results = context.results
+    return _Given(
+        context.experiment,
+        results["calibrate"].recordings,
+        results["identify"],
+        results["crossval"],
+    )
+
+
+def _compute(given: _Given, runner: Runner) -> Advice:
+    experiment = given.experiment
+    crossval, n_outliers = _without_outliers(given, runner)
+    orders = recommend_orders(
+        given.fits,
+        crossval,
+        given.recordings,
+        experiment.orders,
+        given.options,
+        n_outliers,
+    )
+    if orders is None:
+        raise ConfigError(
+            f"{experiment.source}: orders: no recording judges a usable model; expected "
+            "at least one RMSD; widen the orders or change fit"
+        )
+    return Advice(orders, _recommend_maps(given, orders, runner))
+
+
+def _without_outliers(
+    given: _Given, runner: Runner
+) -> tuple[CrossValidation, tuple[int, ...]]:
+    """The RMSDs that select, and the outliers in each recording that they leave out."""
+    crossval = given.crossval
+    if given.experiment.fit.loss == "squared":
+        return crossval, ()
+    validation = given.named(crossval.validated_on)
+    n_pairs = ROUNDS * len(crossval.identified_on) * len(validation)
+    with runner.tasks(n_pairs, "pairs", part="outliers") as settings:
+        return cross_validate_without_outliers(
+            given.fits, crossval, validation, given.experiment.orders, settings
+        )
+
+
+def _recommend_maps(
+    given: _Given, advice: OrderAdvice, runner: Runner
+) -> MapAdvice | None:
+    """Compare maps at the recommended orders; None where there is no choice."""
+    experiment, crossval = given.experiment, given.crossval
+    candidates = candidate_maps(experiment.fit, given.options)
+    if len(candidates) == 1:
+        return None
+    chosen = given.named(crossval.identified_on)
+    validation = given.named(crossval.validated_on)
+    place = advice.overall.nb, advice.overall.nk
+    grid = candidate_orders(experiment.orders)
+    orders = next(one for nb, nk, one in grid if (nb, nk) == place)
+    with runner.tasks(len(chosen) * len(candidates), "fits", part="maps") as settings:
+        fits = fit_maps(chosen, orders, candidates, settings)
+    rounds = 1 if experiment.fit.loss == "squared" else 1 + ROUNDS
+    n_pairs = rounds * len(chosen) * len(validation)
+    with runner.tasks(n_pairs, "pairs", part="maps") as settings:
+        maps = recommend_maps(
+            fits, chosen, validation, given.options.tolerance, settings
+        )
+    if maps is None:
+        raise ConfigError(
+            f"{experiment.source}: order.maps: no recording judges a usable model; "
+            "expected at least one RMSD; change order.maps or order.units"
+        )
+    return maps
+
+
+def _summary(given: _Given, _: Advice, __: bool) -> str:
+    n_grid = len(given.crossval.nb) * len(given.crossval.nk)
+    return f"{n_grid} pairs of orders compared"
+
+
+def _write_csv(
+    out: Path, _: _Given, result: Advice, __: Provenance | None, ___: bool
+) -> None:
+    write_order_csv(out / "order.csv", result.orders)
+    if result.maps is not None:
+        write_maps_csv(out / "maps.csv", result.maps)
+
+
+def _tables(context: Context, result: Advice) -> list[str]:
+    rule = context.experiment.fit.initial_state
+    texts = [
+        order_table(result.orders, initial_state=rule),
+        order_sentences(result.orders),
+    ]
+    if result.maps is not None:
+        texts += [
+            map_table(result.maps, initial_state=rule),
+            map_sentences(result.maps),
+        ]
+    return texts
+
+
+def _plan(planning: Planning) -> tuple[StagePlan, ...]:
+    """Only the comparison of maps takes time; the orders are not known yet."""
+    experiment = planning.experiment
+    maps = candidate_maps(experiment.fit, experiment.order or OrderOptions())
+    if len(maps) == 1:
+        return ()
+    chosen = recordings_with_models(planning.recordings, experiment)
+    total = len(chosen) * len(maps)
+    seconds = map_seconds(planning.cost, experiment.orders, chosen, maps)
+    what = (
+        f"{counted(len(chosen), 'recording')} x {len(maps)} pairs of maps = "
+        f"{counted(total, 'fit')}"
+    )
+    per_process = seconds / planning.workers
+    return (StagePlan("order", what, total, None, per_process, FIT_BYTES * total),)
+
+
+STAGE = Stage(
+    name="order",
+    needs=("calibrate", "identify", "crossval"),
+    sections=("order",),
+    choose=_choose,
+    compute=_compute,
+    summary=_summary,
+    write_files=_write_csv,
+    tables=_tables,
+    files=("order.csv", "maps.csv"),
+    plan=_plan,
+)

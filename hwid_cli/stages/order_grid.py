@@ -9,6 +9,9 @@ DELAY_OF_POLE_GRID = 1
 # Rounds of a grid's growth in which fits are also searched for anew: what is found there
 # all later models contain, and beyond it a search anew hardly ever finds better.
 SEARCHED_ROUNDS = 4
+# As for single recordings, but one round less: a fit from the members' models takes many
+# times as long as going on from smaller orders, and groups are told apart by a threshold.
+SEARCHED_ROUNDS_OF_GROUPS = 3
 
 
 def candidate_orders(options: OrdersOptions) -> tuple[tuple[int, int, Orders], ...]:

@@ -36,6 +36,7 @@ from hwid_cli.stages.ranking import (
     score_models,
 )
 from hwid_cli.stages.residuals import judge_residual
+from hwid_cli.stages.table import needed, stage_named
 from hwid_cli.tasks.cache import task_key
 
 # The output has begun to move, and has moved most of its way, at these shares of its
@@ -195,19 +196,6 @@ def chain_on_tests(final: FinalTest) -> ChainOnTests:
     )
 
 
-# Sections of the configuration that each stage depends on, besides those of the stage
-# before it.
-_SECTIONS = {
-    "calibrate": ("simulate", "recordings", "calibrate"),
-    "identify": ("orders", "fit", "identify"),
-    "crossval": ("crossval",),
-    "group": ("group",),
-    "test": ("test",),
-    "diagnose": ("simulation", "diagnose"),
-}
-# Stages that a stage does not build on although they run before it.
-_BESIDE = {"diagnose": ("identify", "crossval", "group", "test")}
-STAGES = tuple(_SECTIONS)
 # Raised when the page or a figure changes, so that pages are drawn again.
 REPORT_VERSION = 3
 
@@ -246,13 +234,9 @@ def changed_sections(
     tuple of str
         Empty where the results are those of today's configuration.
     """
-    before = STAGES[: STAGES.index(stage) + 1]
-    matter = [
-        section
-        for name in before
-        if name not in _BESIDE.get(stage, ())
-        for section in _SECTIONS[name]
-    ]
+    # A configuration that names no groups now may have had some.
+    before = (*needed(stage), stage)
+    matter = [section for name in before for section in stage_named(name).sections]
     # Only what is in JSON can be compared with what was stored as JSON.
     today = json.loads(json.dumps(now))
     return tuple(

@@ -6,12 +6,12 @@ import numpy as np
 
 from hwid_cli.model.outliers import usual_error
 from hwid_cli.model.residual_tests import n_tested_lags, pull, residual_tests
+from hwid_cli.model.robust_validation import robust_validation
 from hwid_cli.model.simulate import validation_output
 from hwid_cli.records.model import Fit, HammersteinWiener
 from hwid_cli.records.recordings import Recording
 from hwid_cli.records.residuals import ModelResiduals, ResidualTests
 from hwid_cli.stages.order_grid import grid_place
-from hwid_cli.stages.outliers import robust_validation
 from hwid_cli.stages.ranking import best_fits
 
 # Robust standard deviations that residuals of fits that bear outliers are cut to.

@@ -1,10 +1,12 @@
 """Which recordings take part in a stage."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import fields, is_dataclass
 from difflib import get_close_matches
-from typing import TypeVar
+from typing import Any, TypeVar, get_args, get_type_hints
 
 from hwid_cli.errors import ConfigError
+from hwid_cli.records.experiment import OF_RECORDINGS, Experiment
 from hwid_cli.records.recordings import RawRecording, Recording
 
 Chosen = TypeVar("Chosen", Recording, RawRecording)
@@ -50,3 +52,31 @@ def select_recordings(
 def _list(known: Sequence[str]) -> str:
     shown = ", ".join(known[:6]) + (", ..." if len(known) > 6 else "")
     return f"expected some of {shown}"
+
+
+def named_recordings(experiment: Experiment) -> Iterator[tuple[str, tuple[str, ...]]]:
+    """Give every list of names of recordings in a configuration.
+
+    Yields
+    ------
+    str
+        Its key.
+    tuple of str
+        The names.
+    """
+    for section in fields(experiment):
+        options = getattr(experiment, section.name)
+        if not is_dataclass(options):
+            continue
+        hints = get_type_hints(type(options), include_extras=True)
+        for one in fields(options):
+            names = getattr(options, one.name)
+            # "auto" stands for a choice that the program makes.
+            if _names_recordings(hints[one.name]) and not isinstance(names, str):
+                yield f"{section.name}.{one.name}", names or ()
+
+
+def _names_recordings(hint: Any) -> bool:
+    """Whether an annotation, or a member of its union, is ``RecordingNames``."""
+    marks = getattr(hint, "__metadata__", ())
+    return OF_RECORDINGS in marks or any(map(_names_recordings, get_args(hint)))

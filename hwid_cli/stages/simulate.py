@@ -9,11 +9,18 @@ Which recordings of the virtual gun are planned: the thesis's three tables.
 
 import difflib
 from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from hwid_cli.data.virtual_measurements import (
+    read_virtual_key,
+    write_virtual_measurements,
+)
 from hwid_cli.drive import circuit, excitation, mechanics, sensors
 from hwid_cli.errors import ConfigError
+from hwid_cli.records.experiment import Experiment
 from hwid_cli.records.machines import (
     GunMachine,
     GunPlan,
@@ -21,6 +28,9 @@ from hwid_cli.records.machines import (
     VirtualMeasurement,
 )
 from hwid_cli.records.mechanics import Mechanics
+from hwid_cli.stages.stage import Context, Runner, Stage, Storage
+from hwid_cli.store.result_files import Provenance
+from hwid_cli.tasks.cache import task_key
 
 GUN_KINDS = ("step", "sine", "random")
 
@@ -125,7 +135,7 @@ def select_recordings(
     return tuple(recording for recording in planned if recording.name in only)
 
 
-STAGE = "simulate"
+NAME = "simulate"
 STAGE_VERSION = 1
 
 # The gun rests within this share of its stiction band, so that no reading of the lead-in
@@ -356,3 +366,58 @@ def _measure_servo(
             "switched_on_s": servo.rest_s,
         },
     )
+
+
+@dataclass(frozen=True, eq=False)
+class _Given:
+    """A machine to simulate; no recording goes in."""
+
+    machine: GunMachine | ServoMachine
+    recordings: tuple[()] = ()
+
+
+def _choose(context: Context) -> _Given:
+    return _Given(_machine(context.experiment))
+
+
+def _machine(experiment: Experiment) -> GunMachine | ServoMachine:
+    if experiment.simulate is None:
+        raise ConfigError(
+            f"{experiment.source}: simulate: missing; expected a machine to "
+            "simulate; add the section (configs/README.md explains it), or simulation: "
+            "where measurements exist"
+        )
+    return experiment.simulate
+
+
+def _key(given: _Given) -> str:
+    return task_key("simulate", STAGE_VERSION, given.machine, [])
+
+
+def _compute(given: _Given, _: Runner) -> tuple[VirtualMeasurement, ...]:
+    return simulate_machine(given.machine)
+
+
+def _write(
+    path: Path, _: _Given, result: tuple[VirtualMeasurement, ...], origin: Provenance
+) -> None:
+    write_virtual_measurements(path.parent, result, key=origin.key)
+
+
+def _summary(_: _Given, result: Any, is_stored: bool) -> str:
+    if is_stored:
+        return "measurements from the cache"
+    return f"{len(result)} measurements computed"
+
+
+STAGE = Stage(
+    name="simulate",
+    choose=_choose,
+    key=_key,
+    compute=_compute,
+    storage=Storage("raw", read_virtual_key, lambda path: None, _write, is_hdf5=False),
+    require=_machine,
+    sections=("simulate",),
+    summary=_summary,
+    files=("raw",),
+)

@@ -28,13 +28,18 @@ docs/method.md, eqs. (18)-(20).
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
+from hwid_cli.errors import ConfigError
+from hwid_cli.records.check import StagePlan
+from hwid_cli.records.experiment import Experiment, FinalTestOptions
 from hwid_cli.records.groups import ChainTrend, FinalTest, GroupSearch, Prediction
 from hwid_cli.records.model import Fit
 from hwid_cli.records.recordings import Recording
 from hwid_cli.records.results import CrossValidation
+from hwid_cli.report import final_test_tables
 from hwid_cli.stages.coverage_matrix import (
     JudgedModels,
     are_hard_to_cover,
@@ -44,8 +49,19 @@ from hwid_cli.stages.coverage_matrix import (
     smallest_set,
 )
 from hwid_cli.stages.crossval import deviation_tasks
+from hwid_cli.stages.fit_seconds import PAIR_BYTES, counted
 from hwid_cli.stages.identify import recording_key
 from hwid_cli.stages.ranking import best_of_each, score_models
+from hwid_cli.stages.selection import select_recordings
+from hwid_cli.stages.stage import Context, Planning, Runner, Stage, in_results
+from hwid_cli.store.final_test_results import (
+    read_final_test,
+    write_assignment_csv,
+    write_coverage_matrix_csv,
+    write_final_test,
+    write_test_csv,
+)
+from hwid_cli.store.result_files import Provenance
 from hwid_cli.tasks.cache import task_key
 from hwid_cli.tasks.runner import RunSettings, Task, run_tasks
 
@@ -223,7 +239,7 @@ def input_distances(inputs: list[np.ndarray]) -> np.ndarray:
     ).reshape(len(inputs), len(inputs))
 
 
-STAGE = "test"
+NAME = "test"
 STAGE_VERSION = 2
 
 
@@ -416,7 +432,7 @@ def final_test_key(
         "tested_on": sorted(tested_on),
         "threshold": threshold,
     }
-    return task_key(STAGE, STAGE_VERSION, settings, [])
+    return task_key(NAME, STAGE_VERSION, settings, [])
 
 
 def chain_trend(final: FinalTest, kinds: Mapping[str, str]) -> ChainTrend:
@@ -456,3 +472,128 @@ def _named(names: Sequence[str], chosen: np.ndarray) -> tuple[str, ...]:
 def _assigned(judged: JudgedModels) -> tuple[str, ...]:
     """Name the best model for each recording; empty where there is none."""
     return tuple("" if n < 0 else judged.models[n] for n in assign(judged.rmsd))
+
+
+@dataclass(frozen=True, eq=False)
+class _Given:
+    """Models, all recordings, those that nothing else has used, and the threshold."""
+
+    models: FinalModels
+    recordings: tuple[Recording, ...]
+    tested_on: tuple[str, ...]
+    threshold: float
+
+
+def _choose(context: Context) -> _Given:
+    experiment, results = context.experiment, context.results
+    options = _options(experiment)
+    if experiment.group is None:
+        context.say(
+            f"test: {experiment.source} has no group: section, so there is no chain of "
+            "groups to test; models of single recordings only"
+        )
+    recordings, crossval = results["calibrate"].recordings, results["crossval"]
+    tested = select_recordings(
+        recordings,
+        options.recordings,
+        key=f"{experiment.source}: test.recordings",
+    )
+    models = final_models(results["identify"], crossval, results.get("group"))
+    if not models.names:
+        raise ConfigError(
+            f"{experiment.source}: orders: no recording has a usable model; expected at "
+            "least one to test; widen the orders or change fit"
+        )
+    names = tuple(recording.name for recording in tested)
+    return _Given(models, recordings, names, crossval.threshold)
+
+
+def _options(experiment: Experiment) -> FinalTestOptions:
+    if experiment.test is None:
+        raise ConfigError(
+            f"{experiment.source}: test: the section is missing; expected the recordings "
+            "that nothing else uses; add it, such as 'test: {recordings: [step_05, "
+            "step_10]}'"
+        )
+    return experiment.test
+
+
+def _compute(given: _Given, runner: Runner) -> FinalTest:
+    with runner.tasks(len(given.recordings), "recordings") as settings:
+        return judge_models(
+            given.models, given.recordings, given.tested_on, given.threshold, settings
+        )
+
+
+def _write_csv(
+    out: Path, _: _Given, final: FinalTest, __: Provenance | None, ___: bool
+) -> None:
+    write_test_csv(out / "test.csv", final)
+    write_assignment_csv(out / "assignment.csv", final)
+    write_coverage_matrix_csv(out / "coverage_matrix.csv", final)
+
+
+def _tables(context: Context, final: FinalTest) -> list[str]:
+    """The chain, the coverage matrix, the smallest set and the predictions."""
+    experiment, width = context.experiment, context.width
+    rule = experiment.fit.initial_state
+    parts = []
+    if final.chain:
+        recordings = context.results["calibrate"].recordings
+        kinds = {recording.name: recording.kind for recording in recordings}
+        trend = chain_trend(final, kinds)
+        parts += [
+            final_test_tables.chain_on_tests_table(
+                final, trend, initial_state=rule, width=width
+            ),
+            final_test_tables.chain_coverage_table(
+                final,
+                trend,
+                initial_state=rule,
+                nf=experiment.orders.nf,
+                has_names=not experiment.fit.delays,
+            ),
+            final_test_tables.chain_tables(
+                final, trend, kinds, initial_state=rule, width=width
+            ),
+        ]
+    return [
+        *parts,
+        final_test_tables.coverage_matrix_table(final, initial_state=rule, width=width),
+        final_test_tables.gaps_text(final, width=width),
+        final_test_tables.smallest_set_table(final, initial_state=rule, width=width),
+        final_test_tables.prediction_table(final, initial_state=rule),
+    ]
+
+
+def _plan(planning: Planning) -> tuple[StagePlan, ...]:
+    n = len(planning.recordings)
+    return (StagePlan(NAME, counted(n, "recording"), n, None, 0.0, n * PAIR_BYTES),)
+
+
+STAGE = Stage(
+    name=NAME,
+    needs=("calibrate", "identify", "crossval"),
+    needs_where_named=("group",),
+    sections=("test",),
+    require=_options,
+    choose=_choose,
+    key=lambda given: final_test_key(
+        given.models, given.recordings, given.tested_on, given.threshold
+    ),
+    compute=_compute,
+    storage=in_results(
+        NAME,
+        read_final_test,
+        lambda path, given, result, origin: write_final_test(path, result, origin),
+    ),
+    summary=lambda given, final, is_stored: (
+        f"{len(final.recordings)} recordings from the cache, 0 computed"
+        if is_stored
+        else ""
+    ),
+    write_files=_write_csv,
+    tables=_tables,
+    files=("results.h5", "test.csv", "assignment.csv", "coverage_matrix.csv"),
+    plan=_plan,
+)

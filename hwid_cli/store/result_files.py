@@ -25,8 +25,11 @@ from hwid_cli.store.hdf5_records import read_array, write_array
 
 Result = TypeVar("Result")
 
-CALIBRATED_FORMAT = "hwid-calibrated"
 RESULTS_FORMAT = "hwid-results"
+CALIBRATED_FORMAT = "hwid-calibrated"
+RESULTS = "results.h5"
+# Stages whose results are a file of their own; every other has a group in RESULTS.
+_OWN_FILES = {"calibrate": ("calibrated.h5", CALIBRATED_FORMAT)}
 SCHEMA_VERSION = 1
 # Root attribute of files with a checksum behind them; earlier versions had none.
 SEALED = "sealed"
@@ -62,6 +65,15 @@ class Provenance:
     versions: Mapping[str, str] = field(default_factory=dict)
 
 
+def results_file(stage: str) -> str:
+    """Name of the file, below the folder of the results, that holds those of a stage."""
+    return _OWN_FILES.get(stage, (RESULTS, RESULTS_FORMAT))[0]
+
+
+def _group_of(file: h5py.File, stage: str) -> h5py.Group:
+    return file if stage in _OWN_FILES else file[stage]
+
+
 def current_versions() -> dict[str, str]:
     """Versions of the program, of Python and of what computes and stores.
 
@@ -83,7 +95,7 @@ def read_stage_key(path: Path, stage: str) -> str | None:
     Parameters
     ----------
     path : Path
-        ``calibrated.h5`` for ``calibrate``, else ``results.h5``.
+        The stage's ``results_file``.
 
     Returns
     -------
@@ -92,8 +104,7 @@ def read_stage_key(path: Path, stage: str) -> str | None:
     """
     try:
         with _opened(path, stage) as file:
-            group = file if stage == "calibrate" else file[stage]
-            return str(group.attrs["key"])
+            return str(_group_of(file, stage).attrs["key"])
     except (CacheError, KeyError, OSError):
         return None
 
@@ -126,7 +137,7 @@ def read_provenance(path: Path, stage: str) -> Provenance:
     Parameters
     ----------
     path : Path
-        ``calibrated.h5`` for ``calibrate``, else ``results.h5``.
+        The stage's ``results_file``.
 
     Returns
     -------
@@ -140,7 +151,7 @@ def read_provenance(path: Path, stage: str) -> Provenance:
     """
 
     def read(file: h5py.File) -> Provenance:
-        group = file if stage == "calibrate" else file[stage]
+        group = _group_of(file, stage)
         inner = group["provenance"]
         names = read_array(inner, "input_names").tolist()
         hashes = read_array(inner, "input_sha256").tolist()
@@ -235,7 +246,7 @@ def read_results(path: Path, stage: str, read: Callable[[h5py.File], Result]) ->
     Parameters
     ----------
     path : Path
-        ``calibrated.h5`` for ``calibrate``, else ``results.h5``.
+        The stage's ``results_file``.
     read : callable
         From the open file to the results.
 
@@ -249,7 +260,7 @@ def read_results(path: Path, stage: str, read: Callable[[h5py.File], Result]) ->
             f"{path}: no such file; expected the results of {stage}; run 'hwid {stage}'"
         )
     with _opened(path, stage) as file:
-        if stage != "calibrate" and stage not in file:
+        if stage not in _OWN_FILES and stage not in file:
             raise CacheError(
                 f"{path}: holds {', '.join(file) or 'nothing'}; expected the results "
                 f"of {stage}; run 'hwid {stage}'"
@@ -260,8 +271,7 @@ def read_results(path: Path, stage: str, read: Callable[[h5py.File], Result]) ->
 @contextmanager
 def _opened(path: Path, stage: str) -> Iterator[h5py.File]:
     """Give an open results file; faults in it become errors that a user can act on."""
-    is_calibrated = stage == "calibrate"
-    format_name = CALIBRATED_FORMAT if is_calibrated else RESULTS_FORMAT
+    _, format_name = _OWN_FILES.get(stage, (RESULTS, RESULTS_FORMAT))
     try:
         if not path.is_file():
             raise ValueError("it is no plain file")
@@ -287,7 +297,7 @@ def has_left_results(path: Path, stage: str) -> bool:
     Parameters
     ----------
     path : Path
-        ``calibrated.h5`` for ``calibrate``, else ``results.h5``.
+        The stage's ``results_file``.
 
     Returns
     -------
@@ -302,6 +312,7 @@ def has_left_results(path: Path, stage: str) -> bool:
     try:
         unsealed(path.read_bytes())
         with h5py.File(path, "r") as file:
-            return stage == "calibrate" or "format" not in file.attrs or stage in file
+            is_whole = stage in _OWN_FILES or "format" not in file.attrs
+            return is_whole or stage in file
     except (KeyError, OSError, RuntimeError, ValueError):
         return True

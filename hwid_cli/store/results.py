@@ -5,7 +5,6 @@ the groups of the others. docs/storage.md draws the trees.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import h5py
@@ -15,7 +14,7 @@ from hwid_cli.files.atomic import replaced_hdf5
 from hwid_cli.files.checksums import sealed
 from hwid_cli.records.experiment import OrdersOptions
 from hwid_cli.records.model import Fit
-from hwid_cli.records.recordings import CalibrationLog, Recording
+from hwid_cli.records.recordings import Calibrated, CalibrationLog, Recording
 from hwid_cli.records.results import CrossValidation
 from hwid_cli.store.hdf5_records import (
     read_array,
@@ -34,23 +33,6 @@ from hwid_cli.store.result_files import (
     replaced_stage,
     write_provenance,
 )
-
-
-@dataclass(frozen=True, eq=False)
-class Calibrated:
-    """What ``calibrated.h5`` holds.
-
-    Parameters
-    ----------
-    logs : tuple of CalibrationLog
-        In the order of the recordings.
-    key : str
-        Key of the calibration that made them.
-    """
-
-    recordings: tuple[Recording, ...]
-    logs: tuple[CalibrationLog, ...]
-    key: str
 
 
 def write_calibrated(

@@ -7,19 +7,19 @@ import pytest
 from click.testing import CliRunner
 
 from hwid_cli.cli.examples import EXAMPLES
-from hwid_cli.cli.main import main
+from hwid_cli.cli.main import COMMANDS, main
 
 LINES = [line for lines in EXAMPLES.values() for line in lines]
 
 
 def test_every_command_has_examples_and_no_other_has():
-    assert set(EXAMPLES) == set(main.commands)
+    assert set(EXAMPLES) == set(COMMANDS)
 
 
 @pytest.mark.parametrize("line", LINES)
 def test_every_example_parses(line):
     program, name, *arguments = shlex.split(line)
-    command = main.commands[name]
+    command = main.get_command(None, name)
 
     assert program == "hwid"
     # Parses the words and calls nothing; wrong usage raises.
@@ -37,7 +37,7 @@ def test_the_help_shows_each_example_on_a_line_of_its_own(name):
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
 def test_shells_get_a_script_and_names_to_complete(shell):
     def hwid(**environment):
-        code = "from hwid_cli.cli.main import main; main(prog_name='hwid')"
+        code = "from hwid_cli.cli.main import COMMANDS, main; main(prog_name='hwid')"
         done = subprocess.run(
             [sys.executable, "-c", code],
             env={**os.environ, **environment},

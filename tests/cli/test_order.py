@@ -131,6 +131,15 @@ def test_run_recommends_maps_too(after_run, hwid, edit, out):
     assert "Take fit: {input_map: " in result.stdout
 
 
+def test_run_with_force_fits_maps_anew(after_run, hwid, edit):
+    # All stages that the table lists are forced, not only some of them.
+    edit("identify: {}", MAPS)
+    hwid("run")
+    result = hwid("run", "--force")
+
+    assert "order maps: 0 fits from the cache, 27 computed" in result.stdout
+
+
 def test_check_counts_the_fits_of_maps(after_run, hwid, edit):
     edit("identify: {}", MAPS)
     result = hwid("check")

@@ -1,6 +1,7 @@
 """Results of all stages as records, made up but of the shape that real ones have."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from hwid_cli.records.groups import (
     Prediction,
 )
 from hwid_cli.records.model import Fit, FitOptions, HammersteinWiener, Orders, StaticMap
-from hwid_cli.records.recordings import CalibrationLog, Recording
+from hwid_cli.records.recordings import Calibrated, CalibrationLog, Recording
 from hwid_cli.records.report import StageRun, StoredResults
 from hwid_cli.records.results import CrossValidation
 from tests.report.diagnosis_examples import named
@@ -236,6 +237,16 @@ def stages(*which):
     return tuple(StageRun(one, 64 * "a", 1.25, versions) for one in which)
 
 
+def calibrated(who):
+    recordings = tuple(recording(name, n) for n, name in enumerate(who))
+    return Calibrated(recordings, tuple(log(name) for name in who), "")
+
+
+def with_results(stored, **changed):
+    """Stored results with those of some stages replaced."""
+    return replace(stored, results={**stored.results, **changed})
+
+
 def everything(count=15, levels=4):
     """Results of every stage; a fifth of the recordings only test."""
     who = names(count)
@@ -244,14 +255,15 @@ def everything(count=15, levels=4):
         config=json.dumps({"name": "example"}, indent=2),
         nk_role="poles",
         stages=stages("calibrate", "identify", "crossval", "group", "test"),
-        recordings=tuple(recording(name, n) for n, name in enumerate(who)),
-        logs=tuple(log(name) for name in who),
-        fits=fits(count - n_tested(count)),
-        crossval=crossval(count - n_tested(count)),
-        search=group_search(count - n_tested(count), levels=levels),
-        final_test=final_test(count, levels),
+        results={
+            "calibrate": calibrated(who),
+            "identify": fits(count - n_tested(count)),
+            "crossval": crossval(count - n_tested(count)),
+            "group": group_search(count - n_tested(count), levels=levels),
+            "test": final_test(count, levels),
+            "diagnose": named(),
+        },
         diagnosis=DIAGNOSIS,
-        diagnosis_record=named(),
     )
 
 
@@ -262,6 +274,5 @@ def calibrated_only():
         config="{}",
         nk_role="poles",
         stages=stages("calibrate"),
-        recordings=tuple(recording(name, n) for n, name in enumerate(who)),
-        logs=tuple(log(name) for name in who),
+        results={"calibrate": calibrated(who)},
     )

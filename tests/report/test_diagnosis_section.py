@@ -13,9 +13,8 @@ blank = pytest.mark.usefixtures("blank_figures")
 
 
 def section_of(record=None, diagnosis=None):
-    stored = StoredResults(
-        "a", "{}", "poles", diagnosis=diagnosis, diagnosis_record=record
-    )
+    results = {"diagnose": record}
+    stored = StoredResults("a", "{}", "poles", results=results, diagnosis=diagnosis)
     return diagnosis_section(ReportContents(stored))
 
 

@@ -9,9 +9,10 @@ from hwid_cli.records.report import ReportContents, StoredResults
 from hwid_cli.report.html import report_page
 from hwid_cli.stages.report import report_contents
 from tests.report.report_examples import (
+    calibrated,
     calibrated_only,
-    recording,
     stages,
+    with_results,
 )
 
 SECTIONS = [
@@ -174,18 +175,16 @@ def small(contents):
         trend=None,
         chain_matrix=None,
         full_matrix=None,
-        stored=replace(contents.stored, search=None, final_test=None),
+        stored=with_results(contents.stored, group=None, test=None),
     )
 
 
 def test_names_cannot_become_elements_of_the_page(page):
     name = 'a<script>alert("x")</script>&$\\alpha'
     stored = replace(
-        calibrated_only(),
+        with_results(calibrated_only(), calibrate=calibrated((name,))),
         name=name,
         config='{"name": "<b>"}',
-        recordings=(recording(name),),
-        logs=(replace(calibrated_only().logs[0], name=name),),
         diagnosis={"verdict": "<i>none</i>"},
     )
     hostile = report_page(

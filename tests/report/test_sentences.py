@@ -25,7 +25,12 @@ from hwid_cli.report.sections.recordings import (
 )
 from hwid_cli.report.sections.summary import summary_section
 from hwid_cli.stages.report import report_contents
-from tests.report.report_examples import calibrated_only, log, names
+from tests.report.report_examples import (
+    calibrated,
+    calibrated_only,
+    names,
+    with_results,
+)
 
 # Figures of rare shapes are rendered in the tests without this mark.
 blank = pytest.mark.usefixtures("blank_figures")
@@ -88,7 +93,7 @@ def nothing_covered(contents):
     crossval = replace(crossval, rmsd=np.full(crossval.rmsd.shape, 0.5))
     search = one_level(0)
     return report_contents(
-        replace(stored, final_test=final, search=search, crossval=crossval)
+        with_results(stored, test=final, group=search, crossval=crossval)
     )
 
 
@@ -130,7 +135,7 @@ def test_where_nothing_is_covered_there_is_no_set_of_models(nothing_covered):
 @blank
 def test_a_smallest_set_of_one_is_a_model(contents):
     final = replace(contents.stored.final_test, smallest_set=("step_01/2/2",))
-    one = replace(contents, stored=replace(contents.stored, final_test=final))
+    one = replace(contents, stored=with_results(contents.stored, test=final))
 
     assert "One model, step_01/2/2, covers the 5 of 6" in said(assignment_section(one))
 
@@ -153,7 +158,7 @@ def test_a_chain_of_one_neither_raises_nor_goes_anywhere(contents):
             is_own=contents.chain_matrix.is_own[:1],
             covers=contents.chain_matrix.covers[:1],
         ),
-        stored=replace(contents.stored, search=one_level(2)),
+        stored=with_results(contents.stored, group=one_level(2)),
     )
 
     groups = said(groups_section(short))
@@ -181,7 +186,7 @@ def test_the_chain_says_how_its_coverage_goes(contents, covers, expected):
     groups = tuple(
         replace(one, coverage=of.get(one.name, one.coverage)) for one in search.groups
     )
-    stored = replace(contents.stored, search=replace(search, groups=groups))
+    stored = with_results(contents.stored, group=replace(search, groups=groups))
 
     assert expected in said(groups_section(replace(contents, stored=stored)))
 
@@ -245,7 +250,7 @@ def test_add_ons_stand_in_the_order_of_the_experiment(contents):
         rmsd=np.full((len(members), len(contents.stored.search.validated_on)), 1e-3),
         chain=("step_10",),
     )
-    stored = replace(contents.stored, search=search)
+    stored = with_results(contents.stored, group=search)
     joined = tables(groups_section(replace(contents, stored=stored)))[1]
 
     assert joined.heads == ("base", *who)
@@ -281,7 +286,7 @@ def test_figures_of_models_that_look_alike_are_files_of_their_own(contents):
 
 @pytest.mark.parametrize(("count", "is_folded"), [(12, False), (13, True)])
 def test_a_long_calibration_table_is_folded(count, is_folded):
-    stored = replace(calibrated_only(), logs=tuple(log(name) for name in names(count)))
+    stored = with_results(calibrated_only(), calibrate=calibrated(names(count)))
     first = calibration_section(ReportContents(stored), {}).blocks[0]
 
     assert isinstance(first, Folded) == is_folded

@@ -31,7 +31,7 @@ from hwid_cli.report.sections.residuals import residuals_section
 from hwid_cli.report.sections.summary import summary_section
 from hwid_cli.report.simulation_words import HUBER_WORDS, simulation_words
 from hwid_cli.report.tables import coverage_table, cross_table
-from tests.report.report_examples import fit, group_search
+from tests.report.report_examples import fit, group_search, with_results
 from tests.report.test_assignment_tables import FINAL as ASSIGNED
 from tests.report.test_final_test_tables import FINAL, KINDS, TREND
 from tests.report.test_tables import CROSSVAL, SCORES
@@ -117,7 +117,7 @@ def test_a_section_of_fits_that_bear_outliers_says_so(contents):
         replace(one, options=replace(one.options, loss="huber"))
         for one in contents.stored.fits
     )
-    stored = replace(contents.stored, fits=robust)
+    stored = with_results(contents.stored, identify=robust)
 
     for found, is_said in ((contents, False), (replace(contents, stored=stored), True)):
         notes = [

@@ -8,14 +8,13 @@ from hwid_cli.records.experiment import GroupOptions, OrdersOptions
 from hwid_cli.records.groups import Group
 from hwid_cli.records.model import FitOptions, LinearBlock, Orders
 from hwid_cli.records.recordings import Recording
-from hwid_cli.stages.check import group_bound
 from hwid_cli.stages.fit_seconds import (
     MEASURED,
     fit_seconds,
     share_of_round,
     time_one_fit,
 )
-from hwid_cli.stages.group import search_groups
+from hwid_cli.stages.group import group_bound, search_groups
 
 NAMES = tuple("abcdefg")
 

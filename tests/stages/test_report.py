@@ -11,6 +11,7 @@ from tests.report.report_examples import (
     calibrated_only,
     everything,
     fit,
+    with_results,
 )
 
 
@@ -75,7 +76,7 @@ def test_a_recording_that_only_judges_is_shown_with_the_best_of_the_tensor(store
         status=tensor.status[:4],
     )
     contents = report_contents(
-        replace(stored, fits=without, crossval=smaller, final_test=None)
+        with_results(stored, identify=without, crossval=smaller, test=None)
     )
     shown = contents.simulated[4]
 
@@ -87,7 +88,9 @@ def test_a_recording_that_only_judges_is_shown_with_the_best_of_the_tensor(store
 
 
 def test_a_tensor_of_other_models_is_not_mixed_with_these(stored):
-    contents = report_contents(replace(stored, fits=(*stored.fits, fit(("late",)))))
+    contents = report_contents(
+        with_results(stored, identify=(*stored.fits, fit(("late",))))
+    )
 
     assert contents.outdated == ("crossval",)
     assert contents.cross is None
@@ -95,14 +98,18 @@ def test_a_tensor_of_other_models_is_not_mixed_with_these(stored):
 
 def test_a_failed_fit_is_missing_in_the_grid(stored):
     failed = replace(stored.fits[0], model=None, status="failed", rmsd=float("nan"))
-    contents = report_contents(replace(stored, fits=(failed, *stored.fits[1:])))
+    contents = report_contents(
+        with_results(stored, identify=(failed, *stored.fits[1:]))
+    )
 
     assert np.isnan(contents.grid.rmsd[0, 0, 0])
     assert np.isfinite(contents.grid.rmsd[1:]).all()
 
 
 def test_the_grid_takes_the_delay_where_it_is_the_second_axis(stored):
-    contents = report_contents(replace(stored, fits=stored.fits[:1], nk_role="delay"))
+    contents = report_contents(
+        replace(with_results(stored, identify=stored.fits[:1]), nk_role="delay")
+    )
 
     assert contents.grid.nk == (1,)
 
@@ -127,7 +134,7 @@ def test_the_chain_of_groups_is_shown_from_all_sides(contents, stored):
 
 
 def test_without_groups_the_three_widest_models_are_shown(stored):
-    contents = report_contents(replace(stored, search=None))
+    contents = report_contents(with_results(stored, group=None))
 
     widest = sorted(contents.cross.covers)[-3:]
     assert sorted(view.coverage for view in contents.models) == widest

@@ -36,7 +36,7 @@ def test_only_commands_that_exist_are_shown():
         for line in body.splitlines() if words == ["sh"] and not skipped else ():
             program, name, *arguments = shlex.split(line)
             if program == "hwid":
-                assert main.commands[name].make_context(name, arguments)
+                assert main.get_command(None, name).make_context(name, arguments)
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from hwid_cli.records.recordings import Recording
-from hwid_cli.stages.order import judged, smallest_good
+from hwid_cli.stages.candidate_selection import scored, smallest_good
 
 
 def recording(name, *levels):
@@ -24,7 +24,7 @@ def tensor(values):
 def test_inputs_beyond_what_a_model_has_seen_do_not_judge():
     # The second candidate goes astray on "large" only, where the others never were.
     rmsd = tensor([[0.1, 0.5, 8.0], [0.5, 0.1, 8.0]])
-    found = judged(rmsd, NAMES[:2], NAMES, (SMALL, ALIKE, LARGE))
+    found = scored(rmsd, NAMES[:2], NAMES, (SMALL, ALIKE, LARGE))
 
     # "alike" has not seen the level 0, at which "small" stands half of the time.
     assert found.n_beyond == 3
@@ -34,7 +34,7 @@ def test_inputs_beyond_what_a_model_has_seen_do_not_judge():
 
 def test_a_few_samples_beyond_do_not_matter():
     nearly = Recording("nearly", np.r_[SMALL.input, 1.5], np.r_[SMALL.output, 1.5], 1.0)
-    found = judged(
+    found = scored(
         tensor([[0.1, 0.5]]), ("small",), ("small", "nearly"), (SMALL, nearly)
     )
 
@@ -42,7 +42,7 @@ def test_a_few_samples_beyond_do_not_matter():
 
 
 def test_where_all_inputs_go_beyond_all_judge():
-    found = judged(tensor([[0.1, 8.0]]), ("small",), ("small", "large"), (SMALL, LARGE))
+    found = scored(tensor([[0.1, 8.0]]), ("small",), ("small", "large"), (SMALL, LARGE))
 
     assert found.judges.tolist() == [1]
     assert found.n_beyond == 0
@@ -51,13 +51,13 @@ def test_where_all_inputs_go_beyond_all_judge():
 def test_where_those_within_have_no_number_the_others_judge():
     rmsd = tensor([[0.1, 0.5, 8.0]])
     rmsd[0, :, 1] = np.nan
-    found = judged(rmsd, ("small",), NAMES, (SMALL, ALIKE, LARGE))
+    found = scored(rmsd, ("small",), NAMES, (SMALL, ALIKE, LARGE))
 
     assert found.judges.tolist() == [2]
 
 
 def test_a_lone_recording_judges_itself():
-    found = judged(tensor([[0.1]]), ("small",), ("small",), (SMALL,))
+    found = scored(tensor([[0.1]]), ("small",), ("small",), (SMALL,))
     verdict = smallest_good(found, np.array([1, 2]), 0.05)
 
     assert found.judges.tolist() == [-1]
@@ -65,12 +65,12 @@ def test_a_lone_recording_judges_itself():
 
 
 def test_without_a_number_nobody_judges():
-    assert judged(tensor([[np.nan]]) * np.nan, ("small",), ("small",), (SMALL,)) is None
+    assert scored(tensor([[np.nan]]) * np.nan, ("small",), ("small",), (SMALL,)) is None
 
 
 def test_all_candidates_have_a_factor_and_a_typical_rmsd():
     rmsd = tensor([[0.1, 0.5, 2.0]])
-    found = judged(
+    found = scored(
         rmsd, ("small",), ("small", "alike", "large"), (SMALL, ALIKE, ALIKE_2)
     )
     verdict = smallest_good(found, np.array([1, 2]), 0.05)

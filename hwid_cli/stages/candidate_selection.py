@@ -1,0 +1,190 @@
+"""The smallest of some candidates that predicts other recordings as well as the best.
+
+Candidates are orders or maps: whatever gave every recording one model each. The
+recordings that score them are validation recordings: no model was fitted to them.
+
+References
+----------
+docs/method.md, eqs. (33), (34).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from hwid_cli.model.input_range import outside_share
+from hwid_cli.records.order import Judgement
+from hwid_cli.records.recordings import Recording
+
+# A model that is this many times worse than the best, or missing, is just bad: how bad
+# must not decide between the others.
+_MOST_FACTOR = 10.0
+# Share of a recording's input that may lie beyond what a model has seen for the recording
+# to judge it: beyond, a map is a continuation, however it was fitted.
+_MOST_UNEXCITED = 0.1
+
+
+@dataclass(frozen=True, eq=False)
+class ScoredCandidates:
+    """What recordings say of candidates, a row for each pair of model and judge.
+
+    Parameters
+    ----------
+    factors : ndarray, shape (n_pairs, n_candidates), [-]
+        Logarithms of the RMSDs over the pair's lowest.
+    rmsd : ndarray, shape (n_pairs, n_candidates), [output unit]
+    judges : ndarray of int, shape (n_pairs,)
+        Number of the judging recording; -1 where a recording judges its own models.
+    n_beyond : int, [-]
+        Pairs that do not judge, because the input goes beyond what the model has seen.
+    n_outliers : int, [samples]
+        Of the judges, that do not count.
+    """
+
+    factors: np.ndarray
+    rmsd: np.ndarray
+    judges: np.ndarray
+    n_beyond: int
+    n_outliers: int
+
+
+@dataclass(frozen=True, eq=False)
+class Selected:
+    """Which candidates are chosen and best, and what is known of all.
+
+    Parameters
+    ----------
+    chosen, best : int, [-]
+        Numbers of candidates.
+    factors : ndarray, shape (n_candidates,), [-]
+        By how much each is worse than the best one, on average.
+    rmsd : ndarray, shape (n_candidates,), [output unit]
+        Geometric mean over the pairs.
+    """
+
+    chosen: int
+    best: int
+    judgement: Judgement
+    factors: np.ndarray
+    rmsd: np.ndarray
+
+
+def scored(
+    rmsd: np.ndarray,
+    identified_on: Sequence[str],
+    validated_on: Sequence[str],
+    recordings: Sequence[Recording],
+    n_outliers: Sequence[int] = (),
+) -> ScoredCandidates | None:
+    """What others say of some recordings' models, or they themselves where alone.
+
+    Parameters
+    ----------
+    rmsd : ndarray, shape (n_identified, n_candidates, n_validated), [output unit]
+        NaN where there is none.
+    recordings : sequence of Recording
+        Among them all of these.
+    n_outliers : sequence of int, [samples]
+        Of each of ``validated_on``; empty where all samples count.
+
+    Returns
+    -------
+    ScoredCandidates or None
+        None where there is no RMSD at all. Where every recording's input goes beyond what
+        the models have seen, all judge.
+    """
+    inputs = {one.name: one.input for one in recordings}
+    others = _known_pairs(rmsd, identified_on, validated_on, is_own=False)
+    pairs = [
+        (place, judge)
+        for place, judge in others
+        if _is_within(inputs[identified_on[place]], inputs[validated_on[judge]])
+    ] or others
+    is_alone = not pairs
+    if is_alone:
+        pairs = _known_pairs(rmsd, identified_on, validated_on, is_own=True)
+    if not pairs:
+        return None
+    values = np.array([rmsd[place, :, judge] for place, judge in pairs])
+    with np.errstate(divide="ignore"):
+        logs = np.log(np.maximum(values, 1e-300))
+    factors = logs - np.nanmin(logs, axis=1, keepdims=True)
+    factors = np.minimum(np.nan_to_num(factors, nan=np.inf), np.log(_MOST_FACTOR))
+    judges = np.array([-1 if is_alone else judge for _, judge in pairs])
+    n_beyond = max(len(others) - len(pairs), 0)
+    counts = [n_outliers[one] for one in {judge for _, judge in pairs} if n_outliers]
+    return ScoredCandidates(factors, values, judges, n_beyond, sum(counts))
+
+
+def smallest_good(
+    found: ScoredCandidates, sizes: np.ndarray, tolerance: float
+) -> Selected:
+    """Choose the smallest candidate that is as good as the best.
+
+    Parameters
+    ----------
+    sizes : ndarray, shape (n_candidates,)
+        What small means; of equally small ones the best is chosen.
+    tolerance : float, [-]
+        Share by which it may be worse than the best; one standard error is allowed too.
+
+    References
+    ----------
+    docs/method.md, eq. (34).
+    """
+    names = np.unique(found.judges)
+    by_judge = np.array(
+        [found.factors[found.judges == one].mean(axis=0) for one in names]
+    )
+    mean = by_judge.mean(axis=0)
+    best = int(np.argmin(mean))
+    error = np.full(mean.shape, np.nan)
+    if len(by_judge) > 1:
+        worse = by_judge - by_judge[:, [best]]
+        error = worse.std(axis=0, ddof=1) / np.sqrt(len(by_judge))
+    is_good = mean - mean[best] <= np.maximum(np.log1p(tolerance), np.nan_to_num(error))
+    smallest = is_good & (sizes == sizes[is_good].min())
+    chosen = int(np.argmin(np.where(smallest, mean, np.inf)))
+    factors = np.exp(mean - mean[best])
+    rmsd = np.array([_typical(column) for column in found.rmsd.T])
+    judgement = Judgement(
+        rmsd=float(rmsd[chosen]),
+        best_rmsd=float(rmsd[best]),
+        factor=float(factors[chosen]),
+        standard_error=float(error[chosen]),
+        n_judges=int(np.sum(names >= 0)),
+        n_beyond=found.n_beyond,
+        n_outliers=found.n_outliers,
+    )
+    return Selected(chosen, best, judgement, factors, rmsd)
+
+
+def _known_pairs(
+    rmsd: np.ndarray,
+    identified_on: Sequence[str],
+    validated_on: Sequence[str],
+    *,
+    is_own: bool,
+) -> list[tuple[int, int]]:
+    """Places of models and judges with an RMSD, of the same recording or of two."""
+    return [
+        (place, judge)
+        for place, model in enumerate(identified_on)
+        for judge, name in enumerate(validated_on)
+        if (model == name) == is_own and np.isfinite(rmsd[place, :, judge]).any()
+    ]
+
+
+def _is_within(seen: np.ndarray, judging: np.ndarray) -> bool:
+    """Whether a judging recording's input stays in what a model has seen."""
+    share, *_ = outside_share(judging, (float(seen.min()), float(seen.max())))
+    return share <= _MOST_UNEXCITED
+
+
+def _typical(rmsd: np.ndarray) -> float:
+    """Geometric mean of what is known."""
+    known = rmsd[np.isfinite(rmsd) & (rmsd > 0.0)]
+    if known.size == 0:
+        return float("nan") if not (rmsd == 0.0).any() else 0.0
+    return float(np.exp(np.mean(np.log(known))))
