@@ -22,7 +22,7 @@ def test_a_stage_has_one_name_and_needs_what_stands_before_it(name):
     assert stage.name == name
     assert name in SECTIONS
     assert set(stage.sections) <= SECTIONS
-    assert set((*stage.needs, *stage.needs_where_named)) <= set(before)
+    assert {*stage.needs, *stage.needs_where_named} <= set(before)
     assert (stage.key is None) == (stage.storage is None)
 
 
