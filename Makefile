@@ -14,7 +14,7 @@ DEV := $(VENV)/installed-dev
         bench bench-campaign bench-growth bench-maps bench-rounds bench-search bench-starts bench-wide \
         bench-real scale \
         simulate calibrate identify crossval group test-stage steps model1 model2 \
-        reproduction thesis chapter2 hsm150 diagnose gun real effects drive-source export-check blind
+        reproduction thesis chapter2 hsm150 diagnose gun real effects drive-source golden export-check blind
 
 help:  ## show these targets
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / {printf "  make %-14s %s\n", $$1, $$2}' Makefile
@@ -161,6 +161,16 @@ effects: $(RUN)  ## docs/effects.md from the catalogue
 
 drive-source: $(RUN)  ## the C form of the drive's compiled loops, for hwid export
 	$(BIN)/python tools/drive_source.py
+
+# Real recordings are read from HWID_REALDATA where it is set.
+BASE ?= HEAD
+PARTS ?= smoke demo diagnose_demo
+golden: $(DEV)  ## the same numbers as at a commit, bit by bit? make golden BASE=HEAD~3
+	rm -rf results/golden && git worktree prune && git worktree add --quiet --detach results/golden/base $(BASE)
+	$(BIN)/python tools/golden.py record results/golden/base results/golden/old.json $(PARTS)
+	$(BIN)/python tools/golden.py record . results/golden/new.json $(PARTS)
+	git worktree remove --force results/golden/base
+	$(BIN)/python tools/golden.py compare results/golden/old.json results/golden/new.json
 
 export-check: $(DEV)  ## every format of hwid export against hwid predict: the table of docs/export.md
 	$(BIN)/python -m tests.benchmarks.export_check

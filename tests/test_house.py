@@ -4,6 +4,7 @@ import ast
 import re
 import subprocess
 import sys
+from collections import Counter
 from pathlib import Path
 
 import pytest
@@ -187,6 +188,30 @@ def test_no_function_is_too_long():
         if body_lines(function) > MOST_LINES_OF_FUNCTION
     ]
     assert long == []
+
+
+def names_bound_at_the_top(tree):
+    """Functions, classes and constants of a module, once for each time they are made."""
+    for node in tree.body:
+        if isinstance(node, ast.FunctionDef | ast.ClassDef):
+            yield node.name
+        elif isinstance(node, ast.Assign):
+            for part in (inner for one in node.targets for inner in ast.walk(one)):
+                if isinstance(part, ast.Name) and isinstance(part.ctx, ast.Store):
+                    yield part.id
+
+
+def test_no_name_is_made_twice_in_a_module():
+    # The later one would silently serve the functions above, too.
+    twice = [
+        f"{short(path)}: {name}"
+        for path in SOURCES
+        for name, count in Counter(
+            names_bound_at_the_top(ast.parse(path.read_text()))
+        ).items()
+        if count > 1
+    ]
+    assert twice == []
 
 
 def test_no_module_is_named_after_nothing():

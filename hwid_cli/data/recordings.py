@@ -90,7 +90,7 @@ def sample_uniformly(
             f"expected {median:.6g} s within {options.sampling_tolerance:.3g} of it; "
             "set recordings.resample: true, or raise recordings.sampling_tolerance"
         )
-    step = options.sample_time_s or float(f"{median:.{_STEP_DIGITS}g}")
+    step = options.sample_time_s or float(f"{median:.{_CLOCK_STEP_DIGITS}g}")
     _check_gaps(path, time, steps, step)
     _log.info(
         "%s: resampled to %.9g s, because %d of %d steps lie beyond the tolerance",

@@ -515,9 +515,9 @@ def _force_limits(shown: Sequence[LatentForce]) -> tuple[float, float]:
 
 
 # Width, a row, the room above a panel for its title and below all, [inch].
-_WIDTH, _ROW, _TITLE, _BELOW = 7.2, 0.19, 0.34, 0.48
+_WIDTH, _GAP_ROW, _TITLE, _BELOW_GAPS = 7.2, 0.19, 0.34, 0.48
 # The legend above all, [inch].
-_LEGEND = 0.28
+_GAP_LEGEND = 0.28
 
 
 def diagnosis_figures(diagnosis: Diagnosis) -> dict[str, Figure]:
@@ -565,10 +565,10 @@ def gap_figure(diagnosis: Diagnosis) -> Figure:
     groups = [group for group in groups if group[1]]
     names = [shortened(one.name, 30) for one in diagnosis.gaps]
     left = label_room(names)
-    tall = [_ROW * len(gaps) + 0.1 for _, gaps in groups]
-    height = _LEGEND + sum(tall) + _TITLE * len(groups) + _BELOW
+    tall = [_GAP_ROW * len(gaps) + 0.1 for _, gaps in groups]
+    height = _GAP_LEGEND + sum(tall) + _TITLE * len(groups) + _BELOW_GAPS
     figure = new_figure(_WIDTH, height)
-    top = height - _LEGEND
+    top = height - _GAP_LEGEND
     # Panels share their axis by its limits: only the lowest shows numbers.
     for number, (title, gaps) in enumerate(groups):
         bottom = top - _TITLE - tall[number]
