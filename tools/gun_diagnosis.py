@@ -93,7 +93,7 @@ def candidates(folder: Path) -> list[str]:
         "",
         "Each row is a set of effects that was added to the simulation and fitted. *Explained* is the share of the excess over the noise, on",
         "held-out recordings, that the set removes. A larger set is named only if it also explains 80 % of what the smaller set leaves",
-        "([method_diagnosis.md](method_diagnosis.md), \"Which candidate\").",
+        '([method_diagnosis.md](method_diagnosis.md), "Which candidate").',
         "",
         "| effects added | explained |",
         "|---|---|",
