@@ -5,13 +5,13 @@ BIN := $(VENV)/bin
 HWID := $(BIN)/hwid
 # The experiments of the thesis share what they have computed.
 THESIS := --cache results/cache
-# Each stamp is as old as the installation that it stands for.
+# Each file marks when an installation was made.
 RUN := $(VENV)/installed-run
 DEV := $(VENV)/installed-dev
 
 .DEFAULT_GOAL := help
 .PHONY: help install run test test-all check audit format smoke clean reliability \
-        bench bench-campaign bench-growth bench-maps bench-rounds bench-search bench-starts bench-wide \
+        bench bench-beyond bench-campaign bench-growth bench-maps bench-rounds bench-search bench-starts bench-wide \
         bench-real scale \
         simulate calibrate identify crossval group test-stage steps model1 model2 \
         reproduction thesis chapter2 hsm150 diagnose gun real effects drive-source golden export-check blind
@@ -63,7 +63,7 @@ audit: $(DEV)  ## known faults of installed packages and of the lowest allowed v
 	  > $(VENV)/lowest.txt
 	$(BIN)/pip-audit --no-deps --disable-pip --requirement $(VENV)/lowest.txt
 
-format: $(DEV)  ## put the code into form
+format: $(DEV)  ## format the code
 	$(BIN)/ruff check --fix
 	$(BIN)/ruff format
 
@@ -81,22 +81,22 @@ bench-campaign: $(DEV)  ## 15 recordings with 100 orders each from an empty cach
 bench-growth: $(DEV)  ## how a fit's time grows, up to 100 000 samples
 	@$(BENCH).bench_growth --full
 
-bench-rounds: $(DEV)  ## where in a grid a search anew is worth its time: three minutes
+bench-rounds: $(DEV)  ## in which rounds of a grid a search anew pays: three minutes
 	@$(BENCH).bench_rounds
 
-bench-starts: $(DEV)  ## what each part of the search is worth: two minutes
+bench-starts: $(DEV)  ## the search without each of its parts in turn: two minutes
 	@$(BENCH).bench_starts
 
 bench-search: $(DEV)  ## the whole search for groups of the thesis: half an hour
 	@$(BENCH).bench_search
 
-bench-beyond: $(DEV)  ## how maps go on beyond the data of their fit: two minutes
+bench-beyond: $(DEV)  ## extrapolation of maps beyond the data of their fit: two minutes
 	@$(BENCH).bench_beyond
 
-bench-maps: $(DEV)  ## maps of the default size against maps that the data choose: seven minutes
+bench-maps: $(DEV)  ## maps of the default size against maps chosen by the data: seven minutes
 	@$(BENCH).bench_maps
 
-bench-wide: $(DEV)  ## many kinds of plants against fits that begin at the truth
+bench-wide: $(DEV)  ## many kinds of plants against fits that start at the true parameters
 	@$(BENCH).bench_wide
 
 scale: $(DEV)  ## what a cluster costs, and docs/scale.md
@@ -121,7 +121,7 @@ crossval: $(RUN)  ## stage: every model on every recording
 group: $(RUN)  ## stage: the search for groups of steps
 	$(HWID) group configs/model1.yaml $(THESIS)
 
-test-stage: $(RUN)  ## stage: the groups on recordings that were never used (make test is the tests)
+test-stage: $(RUN)  ## stage: final test of the groups on recordings that nothing else used (make test runs the tests)
 	$(HWID) test configs/model1.yaml $(THESIS)
 
 steps: $(RUN)  ## section 3.2 of the thesis: models of the 15 steps on the 15 steps
@@ -133,7 +133,7 @@ model1: $(RUN)  ## sections 3.3 and 3.4.1: groups of steps, on all 38 recordings
 model2: $(RUN)  ## section 3.4.2: groups of steps and sines, on all 38 recordings
 	$(HWID) run configs/model2.yaml $(THESIS)
 
-reproduction: $(RUN)  ## docs/reproduction.md from what steps, model1 and model2 have left
+reproduction: $(RUN)  ## docs/reproduction.md from the results of steps, model1 and model2
 	$(BIN)/python tools/reproduction.py results/thesis_steps/results.h5 results/model1/results.h5 \
 	  results/model2/results.h5 > docs/reproduction.tmp && mv docs/reproduction.tmp docs/reproduction.md
 
@@ -175,10 +175,10 @@ golden: $(DEV)  ## the same numbers as at a commit, bit by bit? make golden BASE
 export-check: $(DEV)  ## every format of hwid export against hwid predict: the table of docs/export.md
 	$(BIN)/python -m tests.benchmarks.export_check
 
-# Seconds are only true on a machine that does nothing else.
+# The seconds in the document are valid only on a machine that does nothing else.
 BLIND ?= results/blind
 BLIND_NUMBER ?= 1
-blind: $(DEV)  ## effects hidden by a generator of its own, and docs/blind_test.md: an hour and more
+blind: $(DEV)  ## blind test with effects hidden by a separate generator, and docs/blind_test.md: an hour and more
 	$(BIN)/python tests/blind/run_blind.py --suite full --suite poor --suite clean --suite nuisance \
 	  --suite outside --suite near --suite pairs --suite small --seeds reporting \
 	  --number $(BLIND_NUMBER) --jobs 2 --work $(BLIND) --write docs/blind_test.md

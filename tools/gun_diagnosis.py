@@ -1,4 +1,4 @@
-"""Write docs/gun_diagnosis.md: what is found in the virtual gun, beside what is inside.
+"""Write docs/gun_diagnosis.md: what is found in the virtual gun, and what it contains.
 
     python tools/gun_diagnosis.py results/diagnose_gun > docs/gun_diagnosis.md
 
@@ -19,7 +19,7 @@ INSIDE = (
     ("dry friction", "4.8 N sliding, 7.2 N to break away"),
     ("contact on one side", "1000 N/m beyond 0.33 m"),
     ("limit of the current", "9.5 A"),
-    ("stiffness between recordings", "up to 10 % off in 7 of 10"),
+    ("stiffness differs between recordings", "by up to 10 % in 7 of 10"),
     ("mass", "2.0 kg (given)"),
     ("damping", "15 N s/m (given as 20)"),
     ("stiffness", "968 N/m (given as 1100)"),
@@ -31,7 +31,7 @@ def main() -> None:
     """Print the document."""
     folder = Path(sys.argv[1])
     found = json.loads((folder / "diagnosis.json").read_text())
-    parts = [head(), inside(), verdict(found), candidates(folder), gaps(folder)]
+    parts = [head(), verdict(found), inside(), candidates(folder), gaps(folder)]
     sys.stdout.write("\n".join(line for part in parts for line in part))
 
 
@@ -40,8 +40,8 @@ def head() -> list[str]:
     return [
         "# The virtual gun, diagnosed with a plain mass-spring-damper",
         "",
-        "Written by `make gun`: the 38 steps and sines of chapter 3 at full size (7500 samples each), beside a simulation with wrong",
-        "parameters and no effects (`configs/diagnose_gun.yaml`).",
+        "`make gun` writes this page. `hwid diagnose` compares the 38 steps and sines of chapter 3 at full size (7500 samples each) with a",
+        "simulation that has wrong parameters and no effects (`configs/diagnose_gun.yaml`).",
         "",
     ]
 
@@ -49,7 +49,16 @@ def head() -> list[str]:
 def inside() -> list[str]:
     """What is really there."""
     rows = [f"| {name} | {value} |" for name, value in INSIDE]
-    return ["| inside the gun | |", "|---|---|", *rows, ""]
+    return [
+        "## What the gun contains",
+        "",
+        "The diagnosis knows only the recordings. *Given* is the value that its simulation starts from.",
+        "",
+        "| effect or parameter | value |",
+        "|---|---|",
+        *rows,
+        "",
+    ]
 
 
 def verdict(found: dict) -> list[str]:
@@ -62,11 +71,12 @@ def verdict(found: dict) -> list[str]:
     ratios = [gap[side]["held_out_rms"] / noise for side in ("before", "after")]
     return [
         *lines,
-        f"- base: {values}",
-        f"- held-out recordings: {ratios[0]:.1f} times the noise before, {ratios[1]:.1f} after; "
-        f"{gap['explained_share']:.0%} of the excess explained; {found['seconds']:.0f} s",
+        f"- parameters of the simulation after the fit: {values}",
+        f"- RMS error on held-out recordings: {ratios[0]:.1f} times the noise before, {ratios[1]:.1f} after; "
+        f"the effects explain {gap['explained_share']:.0%} of the excess over the noise",
+        f"- computing time: {found['seconds']:.0f} s",
         "",
-        "Where, before anything was added:",
+        "Where the error is before any effect is added (all parameters fitted):",
         "",
         *(f"- {one['sentence']}" for one in found["where"][:6]),
         "",
@@ -78,7 +88,16 @@ def candidates(folder: Path) -> list[str]:
     with (folder / "ranking.csv").open(encoding="utf-8") as stream:
         rows = [row for row in csv.DictReader(stream) if row["is_fitted"] == "1"]
     rows.sort(key=lambda row: -float(row["explained_share"]))
-    lines = ["## What explains most", "", "| added | explained |", "|---|---|"]
+    lines = [
+        "## Candidates that explain most",
+        "",
+        "Each row is a set of effects that was added to the simulation and fitted. *Explained* is the share of the excess over the noise, on",
+        "held-out recordings, that the set removes. A larger set is named only if it also explains 80 % of what the smaller set leaves",
+        '([method_diagnosis.md](method_diagnosis.md), "Which candidate").',
+        "",
+        "| effects added | explained |",
+        "|---|---|",
+    ]
     lines += [
         f"| {row['effects']} | {float(row['explained_share']):.1%} |"
         for row in rows[:8]
@@ -91,6 +110,8 @@ def gaps(folder: Path) -> list[str]:
     rows = sorted(rows_of(folder), key=lambda row: -float(row["rms_after"]))
     lines = [
         "## Recordings, the worst first",
+        "",
+        "RMS error of each recording. The re-fitted base is the simulation without effects, with its own parameters fitted.",
         "",
         "| recording | held out | re-fitted base, m | with the effects, m |",
         "|---|---|---|---|",

@@ -25,8 +25,8 @@ PUBLISHED_MV = {
 HEAD = """# Diagnoses of real measurements
 
 Written by `make real` (needs the data, see [configs/README.md](../configs/README.md)); the configurations are
-`configs/diagnose_*.yaml`. Each simulation is deliberately poor: inertia and viscous friction, or a linear oscillator. What
-is named, with which parameters, and how far the gap closes on recordings that were held out:
+`configs/diagnose_*.yaml`. Each simulation is deliberately poor: inertia and viscous friction, or a linear oscillator. The table says
+which effects are named, with which parameters, and how far the error falls on held-out recordings:
 """
 
 
@@ -107,7 +107,7 @@ def emps(found: dict) -> str:
     lines = [
         "## EMPS: force level",
         "",
-        "Force from the measured drive signal beside the force that mass, damping and friction need along the measured path",
+        "Force from the measured drive signal, compared with the force that mass, damping and friction need along the measured path",
         "(position filtered by a zero-phase Butterworth filter of order 4 at 100 Hz, central differences). The parameters are",
         "those of the diagnosis, fitted in closed loop to the first half of `DATA_EMPS`; published ones were fitted on force",
         "level to all of it (Janot, Gautier, Brunot 2019).",
@@ -156,7 +156,7 @@ def emps(found: dict) -> str:
             *lines,
             "",
             f"Mean dry friction {friction:.2f} N (published 20.39 N); half the difference of the two directions {offset:.2f} N "
-            "(published as an offset of -3.165 N, which no sliding motion can tell from it); viscous friction "
+            "(published as an offset of -3.165 N; in sliding motion the two cannot be distinguished); viscous friction "
             f"{after['damping_N_s_per_m']:.1f} N s/m (published 203.5).",
             "",
         ]

@@ -5,27 +5,26 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from tools.reproduction_evidence import Evidence
-from tools.reproduction_judges_groups import (
+from tools.reproduction_verdicts import (
+    Verdict,
     judge_accuracy_grows,
     judge_accuracy_is_traded,
-    judge_grouping_raises,
-    judge_reaches_share,
-    judge_saturates,
-    judge_test_coverage_rises,
-    judge_test_rmsd_falls,
-    judge_uncovered_gain,
-)
-from tools.reproduction_judges_models import (
     judge_best_covers_half,
+    judge_grouping_raises,
     judge_groups_beat_singles,
     judge_hard_ones_cover_little,
     judge_none_covers_all,
     judge_one_stands_alone,
+    judge_reaches_share,
+    judge_saturates,
     judge_self_rmsd,
     judge_several_models_needed,
     judge_some_covered_by_nobody,
+    judge_test_coverage_rises,
+    judge_test_rmsd_falls,
+    judge_uncovered_gain,
+    not_judged,
 )
-from tools.reproduction_verdict import Verdict, not_judged
 
 
 @dataclass(frozen=True)

@@ -13,14 +13,12 @@ from hwid_cli.store.group_results import write_group
 from hwid_cli.store.result_files import Provenance
 from hwid_cli.store.results import write_crossval, write_fits
 from tests.tools.reproduction_examples import full_results
-from tools.reproduction import main
+from tools.reproduction import document, main
 from tools.reproduction_claims import CLAIMS
-from tools.reproduction_document import document
-from tools.reproduction_here import Results
+from tools.reproduction_here import Results, Run
 from tools.reproduction_markdown import WIDTH, table, wide_table
-from tools.reproduction_results import Run
 
-DOCS = Path(__file__).parents[2] / "docs"
+TOOLS = Path(__file__).parents[2] / "tools"
 NOT_RUN = (Run({}),) * 3
 TABLES = (
     "T3.2.2-1",
@@ -43,9 +41,9 @@ def full():
     return full_results()
 
 
-@pytest.mark.parametrize("module", sorted(path.stem for path in DOCS.glob("*.py")))
+@pytest.mark.parametrize("module", sorted(path.stem for path in TOOLS.glob("*.py")))
 def test_the_examples_in_the_docstrings_are_true(module):
-    done = doctest.testmod(importlib.import_module(f"docs.{module}"))
+    done = doctest.testmod(importlib.import_module(f"tools.{module}"))
     assert done.failed == 0
 
 

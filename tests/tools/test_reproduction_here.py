@@ -5,13 +5,9 @@ from dataclasses import replace
 import numpy as np
 
 from tests.store.record_examples import example_fit, failed_fit
-from tests.tools.reproduction_examples import (
-    crossval_of,
-    final_of,
-    search_of,
-)
+from tests.tools.reproduction_examples import crossval_of, final_of, search_of
 from tools.reproduction_here import Results, evidence_of, matrix_of
-from tools.reproduction_tables_groups import iterations_of
+from tools.reproduction_tables import iterations_of
 
 GOOD, BAD = 0.001, 0.05
 NAMES = ("a", "b", "c")

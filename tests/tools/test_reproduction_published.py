@@ -11,7 +11,7 @@ from tools.reproduction_published import (
     published_evidence,
     published_iterations,
 )
-from tools.reproduction_verdict import FAILS, HOLDS, IN_PART, NOT_JUDGED
+from tools.reproduction_verdicts import FAILS, HOLDS, IN_PART, NOT_JUDGED
 
 
 @pytest.fixture(scope="module")

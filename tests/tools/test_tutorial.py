@@ -40,7 +40,8 @@ def test_only_commands_that_exist_are_shown():
 
 
 @pytest.mark.parametrize(
-    "page", ["tutorial.md", "coming_from_matlab.md", "glossary.md"]
+    "page",
+    ["tutorial.md", "coming_from_matlab.md", "glossary.md", "architecture.md"],
 )
 def test_every_link_leads_somewhere(page):
     text = (DOCS / page).read_text()

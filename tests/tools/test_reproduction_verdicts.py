@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from tools import reproduction_judges_groups as groups
-from tools import reproduction_judges_models as models
+from tools import reproduction_verdicts as verdicts
 from tools.reproduction_evidence import Counts, Matrix, SelfRmsd, own_cells
-from tools.reproduction_verdict import FAILS, HOLDS, IN_PART, NOT_JUDGED
+from tools.reproduction_verdicts import FAILS, HOLDS, IN_PART, NOT_JUDGED
 
 GOOD, BAD = 0.001, 0.05
 
@@ -42,12 +41,12 @@ def test_self_rmsd_holds_between_a_hundredth_and_a_tenth_of_the_threshold(
     lowest, answer
 ):
     found = SelfRmsd(("a",) * 10, np.array(lowest)[:, None], 0.01)
-    assert models.judge_self_rmsd(found).answer == answer
+    assert verdicts.judge_self_rmsd(found).answer == answer
 
 
 @pytest.mark.parametrize(("widest", "answer"), [(7, HOLDS), (14, HOLDS), (15, FAILS)])
 def test_no_model_covers_all_fails_as_soon_as_one_does(widest, answer):
-    verdict = models.judge_none_covers_all(Counts((3, widest, 1), 15))
+    verdict = verdicts.judge_none_covers_all(Counts((3, widest, 1), 15))
     assert verdict.answer == answer
     assert verdict.numbers == {"widest": widest, "of": 15}
 
@@ -57,12 +56,12 @@ def test_no_model_covers_all_fails_as_soon_as_one_does(widest, answer):
     [(2, FAILS), (3, IN_PART), (4, HOLDS), (6, HOLDS), (7, IN_PART), (8, FAILS)],
 )
 def test_about_half_is_four_to_six_tenths(widest, answer):
-    assert models.judge_best_covers_half(Counts((1, widest), 10)).answer == answer
+    assert verdicts.judge_best_covers_half(Counts((1, widest), 10)).answer == answer
 
 
 def test_one_recording_stands_alone_only_if_it_is_the_only_one():
     def verdict(rmsd):
-        return models.judge_one_stands_alone(matrix("abc", rmsd))
+        return verdicts.judge_one_stands_alone(matrix("abc", rmsd))
 
     friends = [[GOOD, GOOD, BAD], [GOOD, GOOD, BAD], [GOOD, BAD, GOOD]]
     loners = [[GOOD, BAD, BAD], [BAD, GOOD, BAD], [GOOD, BAD, GOOD]]
@@ -74,11 +73,11 @@ def test_one_recording_stands_alone_only_if_it_is_the_only_one():
 
 def test_nobody_covers_a_recording_that_only_its_own_models_cover():
     rmsd = [[GOOD, BAD], [BAD, GOOD], [GOOD, GOOD]]
-    own_only = models.judge_some_covered_by_nobody(matrix(("a", "b", "a+b"), rmsd))
+    own_only = verdicts.judge_some_covered_by_nobody(matrix(("a", "b", "a+b"), rmsd))
     assert own_only.answer == HOLDS
     assert own_only.numbers["uncovered"] == 2
     others = [[GOOD, GOOD], [GOOD, GOOD]]
-    assert models.judge_some_covered_by_nobody(matrix("ab", others)).answer == FAILS
+    assert verdicts.judge_some_covered_by_nobody(matrix("ab", others)).answer == FAILS
 
 
 def hard_ones(n_poor):
@@ -96,7 +95,7 @@ def hard_ones(n_poor):
 def test_hard_recordings_give_narrow_models_if_most_of_theirs_cover_little(
     n_poor, answer
 ):
-    verdict = models.judge_hard_ones_cover_little(hard_ones(n_poor))
+    verdict = verdicts.judge_hard_ones_cover_little(hard_ones(n_poor))
     assert verdict.answer == answer
     assert verdict.numbers["hard"] == 4
     assert verdict.numbers["poor"] == n_poor
@@ -104,7 +103,7 @@ def test_hard_recordings_give_narrow_models_if_most_of_theirs_cover_little(
 
 def test_hard_recordings_are_not_judged_where_there_are_none():
     found = matrix("abc", np.full((3, 3), GOOD))
-    assert models.judge_hard_ones_cover_little(found).answer == NOT_JUDGED
+    assert verdicts.judge_hard_ones_cover_little(found).answer == NOT_JUDGED
 
 
 @pytest.mark.parametrize(
@@ -114,7 +113,7 @@ def test_hard_recordings_are_not_judged_where_there_are_none():
 def test_groups_beat_singles_only_with_a_higher_count(group, answer):
     names = ("a", "b", "c", "a+b")
     rmsd = [[GOOD, GOOD, BAD], [BAD, GOOD, BAD], [BAD, BAD, GOOD], group]
-    assert models.judge_groups_beat_singles(matrix(names, rmsd)).answer == answer
+    assert verdicts.judge_groups_beat_singles(matrix(names, rmsd)).answer == answer
 
 
 def test_several_models_are_needed_where_one_alone_does_not_do():
@@ -123,7 +122,7 @@ def test_several_models_are_needed_where_one_alone_does_not_do():
     everything = apart.part((0, 1, 2), apart.recordings)
     most = apart.part((0, 1), apart.recordings)
     single = apart.part((0,), apart.recordings)
-    judge = models.judge_several_models_needed
+    judge = verdicts.judge_several_models_needed
     assert judge(apart, everything).answer == HOLDS
     assert judge(apart, most).answer == IN_PART
     assert judge(apart, single).answer == FAILS
@@ -142,7 +141,7 @@ def test_several_models_are_needed_where_one_alone_does_not_do():
     ],
 )
 def test_grouping_raises_the_coverage_if_a_later_level_covers_more(values, answer):
-    assert groups.judge_grouping_raises(Counts(values, 12)).answer == answer
+    assert verdicts.judge_grouping_raises(Counts(values, 12)).answer == answer
 
 
 @pytest.mark.parametrize(
@@ -156,7 +155,7 @@ def test_grouping_raises_the_coverage_if_a_later_level_covers_more(values, answe
     ],
 )
 def test_coverage_saturates_if_the_last_level_gains_nothing(values, answer):
-    assert groups.judge_saturates(Counts(values, 12)).answer == answer
+    assert verdicts.judge_saturates(Counts(values, 12)).answer == answer
 
 
 @pytest.mark.parametrize(
@@ -164,7 +163,7 @@ def test_coverage_saturates_if_the_last_level_gains_nothing(values, answer):
     [(23, HOLDS), (26, HOLDS), (27, IN_PART), (30, IN_PART), (31, FAILS), (15, FAILS)],
 )
 def test_about_23_of_38_is_within_a_tenth_of_all(last, answer):
-    assert groups.judge_reaches_share(Counts((14, last), 38)).answer == answer
+    assert verdicts.judge_reaches_share(Counts((14, last), 38)).answer == answer
 
 
 @pytest.mark.parametrize(
@@ -178,7 +177,7 @@ def test_about_23_of_38_is_within_a_tenth_of_all(last, answer):
     ],
 )
 def test_rmsd_falls_along_the_chain_only_if_it_does_at_every_level(rmsd, answer):
-    assert groups.judge_test_rmsd_falls(chain(rmsd)).answer == answer
+    assert verdicts.judge_test_rmsd_falls(chain(rmsd)).answer == answer
 
 
 @pytest.mark.parametrize(
@@ -191,7 +190,7 @@ def test_rmsd_falls_along_the_chain_only_if_it_does_at_every_level(rmsd, answer)
     ],
 )
 def test_the_test_shows_wider_coverage_only_with_more_recordings(first, last, answer):
-    verdict = groups.judge_test_coverage_rises(chain([first, last]))
+    verdict = verdicts.judge_test_coverage_rises(chain([first, last]))
     assert verdict.answer == answer
 
 
@@ -206,12 +205,12 @@ def test_the_test_shows_wider_coverage_only_with_more_recordings(first, last, an
 )
 def test_accuracy_is_traded_if_the_covered_pay_and_more_are_covered(last, answer):
     found = chain([[GOOD, GOOD, BAD, BAD], last])
-    assert groups.judge_accuracy_is_traded(found).answer == answer
+    assert verdicts.judge_accuracy_is_traded(found).answer == answer
 
 
 def test_accuracy_cannot_be_traded_where_there_was_none():
     found = chain([[BAD, BAD], [GOOD, GOOD]])
-    assert groups.judge_accuracy_is_traded(found).answer == NOT_JUDGED
+    assert verdicts.judge_accuracy_is_traded(found).answer == NOT_JUDGED
 
 
 @pytest.mark.parametrize(
@@ -222,7 +221,7 @@ def test_the_uncovered_gain_if_three_quarters_do(n_better, answer):
     last[1 : 1 + n_better] = BAD / 2
     # The first recording is covered and does not count.
     found = chain([[GOOD, *[BAD] * 4], last])
-    verdict = groups.judge_uncovered_gain(found)
+    verdict = verdicts.judge_uncovered_gain(found)
     assert verdict.answer == answer
     assert verdict.numbers == {"better": n_better, "uncovered_first": 4}
 
@@ -238,11 +237,11 @@ def test_the_uncovered_gain_if_three_quarters_do(n_better, answer):
 def test_accuracy_grows_only_if_the_median_falls_at_every_level(medians, answer):
     # The outer two of three recordings move against it and do not matter.
     found = chain([[0.01, value, 9.0 + n] for n, value in enumerate(medians)])
-    assert groups.judge_accuracy_grows(found).answer == answer
+    assert verdicts.judge_accuracy_grows(found).answer == answer
 
 
 def test_a_lost_number_takes_its_recording_out_of_the_comparison():
     found = chain([[0.3, 0.1], [0.2, np.nan], [0.1, 0.3]])
-    assert groups.judge_accuracy_grows(found).answer == HOLDS
+    assert verdicts.judge_accuracy_grows(found).answer == HOLDS
     nothing = chain([[np.nan], [0.2]])
-    assert groups.judge_accuracy_grows(nothing).answer == NOT_JUDGED
+    assert verdicts.judge_accuracy_grows(nothing).answer == NOT_JUDGED
