@@ -37,20 +37,21 @@ MODULES = (
     f"{_DRIVE}.motion.events",
     f"{_DRIVE}.motion.quiet",
     f"{_DRIVE}.motion.move",
-    f"{_DRIVE}.output_play",
+    f"{_DRIVE}.output",
 )
 # Whole recordings, tables of matrices for speed, and what only these need: the source
 # around the loops goes sample by sample.
 LEFT_OUT = {
     "move",
-    "play",
+    "read",
+    "_play",
     "glide_plain",
     "glide_inner",
     "which_matrix",
     "fill",
     "apply",
     "active_states",
-    "_prepare",
+    "_make_room",
     "_blank",
 }
 HEAD = """/* Forces and steps of the drive: the loops of hwid's own simulation, translated. */

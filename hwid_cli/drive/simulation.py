@@ -15,7 +15,7 @@ from hwid_cli.drive import slots
 from hwid_cli.drive.catalogue import CATALOGUE
 from hwid_cli.drive.effect import Effect, Values
 from hwid_cli.drive.motion.move import move
-from hwid_cli.drive.output_play import play
+from hwid_cli.drive.output import read
 from hwid_cli.records.drive import Drive
 
 # A smooth input is followed in straight lines of a quarter of a sample: at a fifth of the
@@ -155,18 +155,7 @@ def run(
     """
     columns = move(driven_by, sample_time_s / refinement, vector)
     position, velocity, command = (column[::refinement] for column in columns)
-    output = position
-    if vector[slots.OUTPUT_GAP] > 0:
-        output = play(position, velocity, sample_time_s, vector[slots.OUTPUT_GAP])
-    if vector[slots.OUTPUT_ZERO] != 0:
-        output = output - vector[slots.OUTPUT_ZERO]
-    quadratic, cubic = vector[slots.SENSOR_QUADRATIC], vector[slots.SENSOR_CUBIC]
-    if quadratic != 0 or cubic != 0:
-        share = output / vector[slots.REFERENCE_DISPLACEMENT]
-        output = output * (1 + (quadratic + cubic * share) * share)
-    if vector[slots.SENSOR_DRIFT] != 0:
-        times = sample_time_s * np.arange(output.size)
-        output = output + vector[slots.SENSOR_DRIFT] * times
+    output = read(position, velocity, sample_time_s, vector)
     return Motion(output, position, velocity, command)
 
 
@@ -246,15 +235,19 @@ def drive_effects(drive: Drive) -> dict[str, dict[str, float]]:
     Returns
     -------
     dict of str to dict of str to float
-        A change between recordings becomes none, a phase that is free becomes 0.
+        With the defaults of what is not stated, except where each recording has its own
+        value. A change between recordings becomes none.
     """
     effects: dict[str, dict[str, float]] = {}
     for identifier, values in drive.effects.items():
         if identifier == "parameter_change":
             which = str(values["which"])
             effects[f"{identifier}:{which}"] = {f"log_{which}": 0.0}
-        else:
-            effects[identifier] = {name: float(one) for name, one in values.items()}
+            continue
+        effects[identifier] = {name: float(one) for name, one in values.items()}
+        for one in CATALOGUE[identifier].parameters if identifier in CATALOGUE else ():
+            if one.default is not None and not one.is_own:
+                effects[identifier].setdefault(one.name, one.default)
     return effects
 
 
