@@ -146,9 +146,8 @@ def _known(functions: list[Function]) -> Known:
             plain = f"{plain}_{one.module.__name__.split('.')[-2]}"
         names[one.place] = plain
     known = Known(names, {one.place: one for one in functions})
-    for name in vars(slots):
-        if name.isupper():
-            known.integers[name] = getattr(slots, name)
+    places = {name: place for name, place in vars(slots).items() if name.isupper()}
+    known.integers.update(sorted(places.items(), key=lambda item: item[1]))
     for path in MODULES:
         _add_constants(known, importlib.import_module(path))
     return known

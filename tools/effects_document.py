@@ -21,8 +21,9 @@ from tools.effects_figures import SCALES, draw
 
 DOCS = Path(__file__).parents[1] / "docs"
 README = Path(__file__).parents[1] / "configs" / "README.md"
-TABLE_HEAD = "| id | what it is | law | parameters |\n|---|---|---|---|\n"
-CHANGE = "a parameter differs between recordings"
+TABLE_HEAD = "| id | law | parameters |\n|---|---|---|\n"
+# Of a table in which it is no end of a cell.
+BAR = r"\|"
 DOCUMENT, FIGURES = DOCS / "effects.md", DOCS / "figures" / "effects"
 ENTERS = {
     "command": "the command, before it becomes a current",
@@ -80,7 +81,9 @@ def document() -> str:
     """
     plain = plain_effects()
     rows = [f"| [{one.id}](#{one.id}) | {one.sentence} |" for one in plain]
-    rows.append(f"| [parameter_change](#parameter_change) | {CHANGE} |")
+    rows.append(
+        "| [parameter_change](#parameter_change) | a parameter differs between recordings |"
+    )
     parts = [HEAD, "\n".join(["| id | what it is |", "|---|---|", *rows])]
     parts += [_section(one) for one in plain]
     parts.append(_change())
@@ -91,7 +94,7 @@ def _section(effect: Effect) -> str:
     lines = [
         f"## {effect.id}",
         "",
-        f"{effect.sentence[0].upper()}{effect.sentence[1:]}.",
+        _claim(effect),
         "",
         f"    {effect.equation}",
         "",
@@ -114,6 +117,10 @@ def _section(effect: Effect) -> str:
         ]
     lines += ["", f"![{effect.id}](figures/effects/{effect.id}.png)"]
     return "\n".join(lines)
+
+
+def _claim(effect: Effect) -> str:
+    return f"{effect.sentence[0].upper()}{effect.sentence[1:]}."
 
 
 def _change() -> str:
@@ -150,12 +157,12 @@ def readme(text: str) -> str:
     """
     before, _, rest = text.partition(TABLE_HEAD)
     after = rest[rest.index("\n\n") :]
-    texts = {one.id: (one.sentence, one.equation) for one in plain_effects()}
-    texts["parameter_change"] = (CHANGE, "p -> p (1 + s_r) in recording r")
-    rows = []
-    for name, keys in configured_effects().items():
-        sentence, law = (one.replace("|", r"\|") for one in texts[name])
-        rows.append(f"| `{name}` | {sentence} | {law} | {_keys(keys)} |")
+    laws = {one.id: f"{_claim(one)} {one.equation}" for one in plain_effects()}
+    laws["parameter_change"] = "A parameter differs between recordings."
+    rows = [
+        f"| `{name}` | {laws[name].replace('|', BAR)} | {_keys(keys)} |"
+        for name, keys in configured_effects().items()
+    ]
     return before + TABLE_HEAD + "\n".join(rows) + after
 
 

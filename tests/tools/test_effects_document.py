@@ -66,7 +66,7 @@ def test_figures_are_small():
 def test_a_check_tells_that_the_document_is_out_of_date(tmp_path, monkeypatch, capsys):
     old = tmp_path / "effects.md"
     table = tmp_path / "README.md"
-    table.write_text(README.read_text().replace("| F = F0 |", "| F = F1 |"))
+    table.write_text(README.read_text().replace(" F = F0 |", " F = F1 |"))
     monkeypatch.setattr(effects_document, "README", table)
     monkeypatch.setattr(effects_document, "DOCUMENT", old)
     assert main(["--check"]) == 1
