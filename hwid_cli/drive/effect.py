@@ -89,6 +89,20 @@ def shares_of(quantity: str, *shares: float) -> Rule:
     return lambda scales: tuple(share * getattr(scales, quantity) for share in shares)
 
 
+def span_of(quantity: str, low: float, high: float) -> Bounds:
+    """Bounds that are shares of one of the scales.
+
+    Parameters
+    ----------
+    quantity : str
+        Attribute of ``Scales``.
+    """
+    return lambda scales: (
+        low * getattr(scales, quantity),
+        high * getattr(scales, quantity),
+    )
+
+
 @dataclass(frozen=True)
 class Limit:
     """What a configuration must keep to.

@@ -12,6 +12,7 @@ from hwid_cli.drive.effect import (
     Parameter,
     Scales,
     shares_of,
+    span_of,
 )
 
 
@@ -33,7 +34,7 @@ DEAD_ZONE = Effect(
         Parameter(
             "threshold_A",
             shares_of("current_A", 0.02, 0.06, 0.15),
-            lambda scales: (1e-4 * scales.current_A, 0.8 * scales.current_A),
+            span_of("current_A", 1e-4, 0.8),
             places=("DEAD_ZONE",),
             limits=(POSITIVE,),
         ),
@@ -53,7 +54,7 @@ SATURATION = Effect(
         Parameter(
             "limit_A",
             shares_of("current_A", 0.5, 0.7, 0.88),
-            lambda scales: (0.05 * scales.current_A, scales.current_A),
+            span_of("current_A", 0.05, 1.0),
             places=("SATURATION",),
             limits=(POSITIVE,),
             off=inf,
@@ -74,10 +75,7 @@ RATE_LIMIT = Effect(
         Parameter(
             "rate_A_per_s",
             shares_of("current_rate_A_per_s", 0.01, 0.03, 0.08, 0.2, 0.4, 0.7),
-            lambda scales: (
-                1e-4 * scales.current_rate_A_per_s,
-                scales.current_rate_A_per_s,
-            ),
+            span_of("current_rate_A_per_s", 1e-4, 1.0),
             places=("RATE",),
             limits=(POSITIVE,),
             off=inf,
@@ -189,7 +187,7 @@ VOLTAGE_LIMIT = Effect(
         Parameter(
             "limit_A",
             shares_of("current_A", 0.7, 0.9, 1.2),
-            lambda scales: (0.05 * scales.current_A, 5 * scales.current_A),
+            span_of("current_A", 0.05, 5),
             places=("CLIP_LIMIT",),
             limits=(POSITIVE,),
             off=inf,

@@ -14,11 +14,8 @@ from hwid_cli.drive.effect import (
     Scales,
     Values,
     shares_of,
+    span_of,
 )
-
-
-def _gap(scales: Scales) -> tuple[float, float]:
-    return 1e-5 * scales.displacement_m, 0.5 * scales.displacement_m
 
 
 def _frequencies(scales: Scales) -> tuple[float, ...]:
@@ -53,17 +50,14 @@ GEAR = Effect(
         Parameter(
             "half_gap_m",
             shares_of("displacement_m", 0.003, 0.012, 0.04),
-            _gap,
+            span_of("displacement_m", 1e-5, 0.5),
             places=("GEAR_GAP",),
             limits=(POSITIVE,),
         ),
         Parameter(
             "stiffness_N_per_m",
-            lambda scales: (50 * scales.stiffness_N_per_m,),
-            lambda scales: (
-                3 * scales.stiffness_N_per_m,
-                2000 * scales.stiffness_N_per_m,
-            ),
+            shares_of("stiffness_N_per_m", 50),
+            span_of("stiffness_N_per_m", 3, 2000),
             places=("GEAR_STIFFNESS",),
             limits=(POSITIVE,),
         ),
@@ -99,8 +93,8 @@ MODE = Effect(
     parameters=(
         Parameter(
             "mass_kg",
-            lambda scales: (0.15 * scales.mass_kg,),
-            lambda scales: (1e-3 * scales.mass_kg, 3 * scales.mass_kg),
+            shares_of("mass_kg", 0.15),
+            span_of("mass_kg", 1e-3, 3),
             places=("MODE_MASS",),
             limits=(POSITIVE,),
         ),

@@ -5,20 +5,9 @@ from hwid_cli.drive.effect import (
     POSITIVE,
     Effect,
     Parameter,
-    Scales,
     shares_of,
+    span_of,
 )
-
-
-def _slow(scales: Scales) -> tuple[float, float]:
-    # Slower than this is not resolved, faster is viscous damping.
-    return 1e-4 * scales.velocity_m_per_s, 0.3 * scales.velocity_m_per_s
-
-
-def _short(scales: Scales) -> tuple[float, float]:
-    # Shorter is Coulomb friction, longer is a spring.
-    return 1e-4 * scales.displacement_m, 0.3 * scales.displacement_m
-
 
 COULOMB = Effect(
     id="coulomb_friction",
@@ -86,7 +75,8 @@ STRIBECK = Effect(
         Parameter(
             "velocity_m_per_s",
             shares_of("velocity_m_per_s", 0.003, 0.01, 0.04, 0.12),
-            _slow,
+            # Slower than this is not resolved, faster is viscous damping.
+            span_of("velocity_m_per_s", 1e-4, 0.3),
             places=("STRIBECK_VELOCITY",),
             limits=(POSITIVE,),
         ),
@@ -110,7 +100,8 @@ HYSTERESIS = Effect(
         Parameter(
             "yield_m",
             shares_of("displacement_m", 0.003, 0.012, 0.05),
-            _short,
+            # Shorter is Coulomb friction, longer is a spring.
+            span_of("displacement_m", 1e-4, 0.3),
             places=("HYSTERESIS_YIELD",),
             limits=(POSITIVE,),
         ),

@@ -3,7 +3,7 @@
 docs/method_diagnosis.md, eq. (D14).
 """
 
-from hwid_cli.drive.effect import POSITIVE, Effect, Parameter, shares_of
+from hwid_cli.drive.effect import POSITIVE, Effect, Parameter, shares_of, span_of
 
 BACKLASH = Effect(
     id="output_backlash",
@@ -14,7 +14,7 @@ BACKLASH = Effect(
         Parameter(
             "half_gap_m",
             shares_of("displacement_m", 0.003, 0.012, 0.05),
-            lambda scales: (1e-5 * scales.displacement_m, 0.4 * scales.displacement_m),
+            span_of("displacement_m", 1e-5, 0.4),
             places=("OUTPUT_GAP",),
             limits=(POSITIVE,),
         ),

@@ -9,24 +9,8 @@ from hwid_cli.drive.effect import (
     Parameter,
     Scales,
     shares_of,
+    span_of,
 )
-
-
-def _inside(scales: Scales) -> tuple[float, float]:
-    # A stop that nothing reaches explains nothing.
-    return 0.02 * scales.displacement_m, scales.displacement_m
-
-
-def _inside_signed(scales: Scales) -> tuple[float, float]:
-    return -scales.displacement_m, scales.displacement_m
-
-
-def _stiff(scales: Scales) -> tuple[float, float]:
-    return 0.05 * scales.stiffness_N_per_m, 1e4 * scales.stiffness_N_per_m
-
-
-def _gap(scales: Scales) -> tuple[float, float]:
-    return 1e-5 * scales.displacement_m, 0.5 * scales.displacement_m
 
 
 def _periods(scales: Scales) -> tuple[float, ...]:
@@ -100,14 +84,15 @@ END_STOP = Effect(
         Parameter(
             "position_m",
             shares_of("displacement_m", 0.4, 0.65, 0.85, 0.95),
-            _inside,
+            # A stop that nothing reaches explains nothing.
+            span_of("displacement_m", 0.02, 1.0),
             places=("STOP_POSITION",),
             limits=(POSITIVE,),
         ),
         Parameter(
             "stiffness_N_per_m",
             shares_of("stiffness_N_per_m", 2.0, 15.0, 100.0),
-            _stiff,
+            span_of("stiffness_N_per_m", 0.05, 1e4),
             places=("STOP_STIFFNESS",),
             limits=(NOT_NEGATIVE,),
         ),
@@ -130,14 +115,14 @@ ONE_SIDED = Effect(
         Parameter(
             "position_m",
             shares_of("displacement_m", -0.9, -0.7, -0.4, 0.4, 0.7, 0.9),
-            _inside_signed,
+            span_of("displacement_m", -1.0, 1.0),
             is_positive=False,
             places=("SIDE_POSITION",),
         ),
         Parameter(
             "stiffness_N_per_m",
             shares_of("stiffness_N_per_m", 2.0, 15.0, 100.0),
-            _stiff,
+            span_of("stiffness_N_per_m", 0.05, 1e4),
             places=("SIDE_STIFFNESS",),
             limits=(NOT_NEGATIVE,),
         ),
@@ -157,7 +142,7 @@ SPRING_GAP = Effect(
         Parameter(
             "half_gap_m",
             shares_of("displacement_m", 0.01, 0.05, 0.15, 0.3),
-            _gap,
+            span_of("displacement_m", 1e-5, 0.5),
             places=("SPRING_GAP",),
             limits=(POSITIVE,),
         ),
