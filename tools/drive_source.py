@@ -2,7 +2,9 @@
 
 ``python tools/drive_source.py`` writes ``drive_kernels.c`` among the sources of exported
 models, with ``--check`` it only says whether that is out of date (exit code 1). One text
-of the equations serves both: what changes in the loops changes in the C source.
+of the equations serves both: what changes in the loops changes in the C source. Before
+that, places of the vector that declarations of effects name and ``slots.py`` lacks are
+put at its end.
 
 The loops use little of Python: numbers, arrays of numbers, tuples, branches and loops.
 Annotations give the types of arguments and results; the others follow from them.
@@ -13,6 +15,7 @@ import ast
 import importlib
 import inspect
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from types import ModuleType
 
@@ -22,10 +25,13 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from hwid_cli.drive import slots
+from hwid_cli.drive.catalogue import CATALOGUE
 from tools.c_translation import Function, Known, translated
 
 ROOT = Path(__file__).parents[1]
 TARGET = ROOT / "hwid_cli" / "export" / "sources" / "drive_kernels.c"
+SLOTS = ROOT / "hwid_cli" / "drive" / "slots.py"
+_END = "    N_SLOTS,\n) = range({})\n"
 _DRIVE = "hwid_cli.drive"
 MODULES = (
     f"{_DRIVE}.command",
@@ -37,20 +43,21 @@ MODULES = (
     f"{_DRIVE}.motion.events",
     f"{_DRIVE}.motion.quiet",
     f"{_DRIVE}.motion.move",
-    f"{_DRIVE}.output_play",
+    f"{_DRIVE}.output",
 )
 # Whole recordings, tables of matrices for speed, and what only these need: the source
 # around the loops goes sample by sample.
 LEFT_OUT = {
     "move",
-    "play",
+    "read",
+    "_play",
     "glide_plain",
     "glide_inner",
     "which_matrix",
     "fill",
     "apply",
     "active_states",
-    "_prepare",
+    "_make_room",
     "_blank",
 }
 HEAD = """/* Forces and steps of the drive: the loops of hwid's own simulation, translated. */
@@ -139,9 +146,8 @@ def _known(functions: list[Function]) -> Known:
             plain = f"{plain}_{one.module.__name__.split('.')[-2]}"
         names[one.place] = plain
     known = Known(names, {one.place: one for one in functions})
-    for name in vars(slots):
-        if name.isupper():
-            known.integers[name] = getattr(slots, name)
+    places = {name: place for name, place in vars(slots).items() if name.isupper()}
+    known.integers.update(sorted(places.items(), key=lambda item: item[1]))
     for path in MODULES:
         _add_constants(known, importlib.import_module(path))
     return known
@@ -179,6 +185,44 @@ def _tables(known: Known) -> list[str]:
     return parts
 
 
+def missing_places() -> list[str]:
+    """Places that declarations of effects name and ``slots.py`` lacks, in their order.
+
+    Returns
+    -------
+    list of str
+    """
+    named = [place for effect in CATALOGUE.values() for place in effect.places()]
+    return [place for place in dict.fromkeys(named) if not hasattr(slots, place)]
+
+
+def with_places(text: str, places: Sequence[str]) -> str:
+    """Text of ``slots.py`` with further places behind those that it has.
+
+    Parameters
+    ----------
+    places : sequence of str
+        Names.
+
+    Returns
+    -------
+    str
+    """
+    count = int(text.rsplit("range(", 1)[1].split(")")[0])
+    added = "".join(f"    {place},\n" for place in places)
+    return text.replace(_END.format(count), added + _END.format(count + len(places)))
+
+
+def forget_compiled() -> None:
+    """Remove what numba keeps of the loops.
+
+    It compiles a function again where its own file changed, but not where only a function
+    that it calls did.
+    """
+    for path in (ROOT / "hwid_cli" / "drive").rglob("*.nb[ic]"):
+        path.unlink()
+
+
 def main() -> int:
     """Write the source, or compare it.
 
@@ -189,10 +233,14 @@ def main() -> int:
     """
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--check", action="store_true")
-    text = source()
-    if parser.parse_args().check:
-        return int(TARGET.read_text() != text)
-    TARGET.write_text(text)
+    is_check, missing = parser.parse_args().check, missing_places()
+    if is_check:
+        return int(bool(missing) or TARGET.read_text() != source())
+    if missing:
+        SLOTS.write_text(with_places(SLOTS.read_text(), missing))
+        importlib.reload(slots)
+    forget_compiled()
+    TARGET.write_text(source())
     return 0
 
 

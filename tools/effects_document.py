@@ -1,7 +1,7 @@
-"""Write ``docs/effects.md`` and its figures from the catalogue of effects.
+"""Write ``docs/effects.md``, its figures and the table of effects in ``configs/README.md``.
 
-``python tools/effects_document.py`` writes them, with ``--check`` it only says whether
-the text is out of date (exit code 1).
+All from the catalogue. ``python tools/effects_document.py`` writes them, with ``--check``
+it only says whether the text is out of date (exit code 1).
 """
 
 import argparse
@@ -14,12 +14,16 @@ from pathlib import Path
 # Run as a file, Python looks for modules beside it and not in the project.
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from hwid_cli.drive.catalogue import CATALOGUE
-from hwid_cli.drive.effect import Effect, Parameter, Scales
+from hwid_cli.drive.catalogue import CATALOGUE, configured_effects
+from hwid_cli.drive.effect import Effect, Parameter, Scales, Stated
 from hwid_cli.report.diagnosis_tables import quantity_and_unit
-from tools.effects_figures import EXAMPLES, draw
+from tools.effects_figures import SCALES, draw
 
 DOCS = Path(__file__).parents[1] / "docs"
+README = Path(__file__).parents[1] / "configs" / "README.md"
+TABLE_HEAD = "| id | law | parameters |\n|---|---|---|\n"
+# Of a table in which it is no end of a cell.
+BAR = r"\|"
 DOCUMENT, FIGURES = DOCS / "effects.md", DOCS / "figures" / "effects"
 ENTERS = {
     "command": "the command, before it becomes a current",
@@ -27,7 +31,7 @@ ENTERS = {
     "motion": "the forces on the mass",
     "output": "the sensor",
 }
-# Symbols of the scales, and a drive on which the rules are read off.
+# Symbols of the scales.
 SYMBOLS = {
     "displacement_m": "X",
     "velocity_m_per_s": "V",
@@ -40,19 +44,6 @@ SYMBOLS = {
     "sample_time_s": "Ts",
     "duration_s": "T",
 }
-DRIVE = Scales(
-    displacement_m=0.02,
-    velocity_m_per_s=1.0,
-    current_A=5.0,
-    current_rate_A_per_s=1000.0,
-    stroke_m=0.04,
-    force_N=25.0,
-    mass_kg=0.3,
-    natural_Hz=10.0,
-    sample_time_s=1e-5,
-    duration_s=1.5,
-    frequencies_Hz=(17.0,),
-)
 HEAD = """# Effects
 
 Every effect that `hwid diagnose` knows, made from the catalogue by `tools/effects_document.py`. Equations are in SI units; x displacement,
@@ -70,6 +61,17 @@ CHANGE_SENTENCE = (
 )
 
 
+def plain_effects() -> list[Effect]:
+    """Effects that are one entry of the catalogue each.
+
+    Returns
+    -------
+    list of Effect
+        All but ``parameter_change``, of which there is one for each parameter.
+    """
+    return [one for one in CATALOGUE.values() if ":" not in one.id]
+
+
 def document() -> str:
     """Text of the document.
 
@@ -77,7 +79,7 @@ def document() -> str:
     -------
     str
     """
-    plain = [one for one in CATALOGUE.values() if ":" not in one.id]
+    plain = plain_effects()
     rows = [f"| [{one.id}](#{one.id}) | {one.sentence} |" for one in plain]
     rows.append(
         "| [parameter_change](#parameter_change) | a parameter differs between recordings |"
@@ -92,7 +94,7 @@ def _section(effect: Effect) -> str:
     lines = [
         f"## {effect.id}",
         "",
-        f"{effect.sentence[0].upper()}{effect.sentence[1:]}.",
+        _claim(effect),
         "",
         f"    {effect.equation}",
         "",
@@ -117,6 +119,10 @@ def _section(effect: Effect) -> str:
     return "\n".join(lines)
 
 
+def _claim(effect: Effect) -> str:
+    return f"{effect.sentence[0].upper()}{effect.sentence[1:]}."
+
+
 def _change() -> str:
     changes = [one for one in CATALOGUE.values() if ":" in one.id]
     lines = ["## parameter_change", "", CHANGE_SENTENCE, ""]
@@ -131,20 +137,55 @@ def _change() -> str:
 
 def _row(parameter: Parameter) -> str:
     name, unit = parameter.name, quantity_and_unit(parameter.name)[1]
-    notes = [] if parameter.is_reported else ["not reported"]
+    notes = [] if parameter.default is None else [f"{parameter.default:g} if left out"]
     notes += ["own value in every recording"] if parameter.is_own else []
     shown = f"{name} ({'; '.join(notes)})" if notes else name
     return f"| {shown} | {unit} | {_starts(parameter)} | {_bounds(parameter)} |"
 
 
+def readme(text: str) -> str:
+    """Text of ``configs/README.md`` with today's table of effects.
+
+    Parameters
+    ----------
+    text : str
+        With any table.
+
+    Returns
+    -------
+    str
+    """
+    before, _, rest = text.partition(TABLE_HEAD)
+    after = rest[rest.index("\n\n") :]
+    laws = {one.id: f"{_claim(one)} {one.equation}" for one in plain_effects()}
+    laws["parameter_change"] = "A parameter differs between recordings."
+    rows = [
+        f"| `{name}` | {laws[name].replace('|', BAR)} | {_keys(keys)} |"
+        for name, keys in configured_effects().items()
+    ]
+    return before + TABLE_HEAD + "\n".join(rows) + after
+
+
+def _keys(keys: Sequence[Stated]) -> str:
+    """What has to be stated, then what may be left out, in brackets."""
+    needed = [_key(one) for one in keys if one.is_needed]
+    others = [_key(one) for one in keys if not one.is_needed]
+    return ", ".join(needed) + (f" ({', '.join(others)})" if others else "")
+
+
+def _key(one: Stated) -> str:
+    words = ", ".join(f"`{word}`" for word in one.words)
+    return f"`{one.name}`" + (f" ({words})" if words else "")
+
+
 def _starts(parameter: Parameter) -> str:
-    if parameter.starts(DRIVE) == DRIVE.frequencies_Hz:
+    if parameter.starts(SCALES) == SCALES.frequencies_Hz:
         return "highest lines in the spectrum of the error"
     return _law(parameter.starts)
 
 
 def _bounds(parameter: Parameter) -> str:
-    low, high = parameter.bounds(DRIVE)
+    low, high = parameter.bounds(SCALES)
     if math.isinf(low) and math.isinf(high):
         return "above 0" if parameter.is_positive else "none"
     ends = [_law(lambda scales, n=n: (parameter.bounds(scales)[n],)) for n in (0, 1)]
@@ -153,13 +194,13 @@ def _bounds(parameter: Parameter) -> str:
 
 def _law(rule: Callable[[Scales], Sequence[float]]) -> str:
     """A rule as numbers times scales, found by doubling one scale after the other."""
-    here = rule(DRIVE)
+    here = rule(SCALES)
     above, below, value = [], [], 1.0
     for field in fields(Scales):
         if field.name not in SYMBOLS:
             continue
-        size = getattr(DRIVE, field.name)
-        doubled = rule(replace(DRIVE, **{field.name: 2 * size}))
+        size = getattr(SCALES, field.name)
+        doubled = rule(replace(SCALES, **{field.name: 2 * size}))
         pairs = zip(here, doubled, strict=True)
         powers = [math.log2(new / old) for old, new in pairs if old != 0]
         power = round(powers[0]) if powers else 0
@@ -191,16 +232,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description="Write docs/effects.md.")
     parser.add_argument("--check", action="store_true", help="write nothing")
     chosen = parser.parse_args(arguments)
-    text = document()
+    texts = {DOCUMENT: document(), README: readme(README.read_text())}
     if chosen.check:
-        is_current = DOCUMENT.exists() and DOCUMENT.read_text() == text
-        if not is_current:
-            sys.stderr.write(f"{DOCUMENT} is out of date; run this without --check\n")
-        return 0 if is_current else 1
-    DOCUMENT.write_text(text)
+        old = [
+            path
+            for path, text in texts.items()
+            if not path.exists() or path.read_text() != text
+        ]
+        for path in old:
+            sys.stderr.write(f"{path} is out of date; run this without --check\n")
+        return int(bool(old))
+    for path, text in texts.items():
+        path.write_text(text)
     FIGURES.mkdir(parents=True, exist_ok=True)
-    for identifier in EXAMPLES:
-        draw(identifier, FIGURES / f"{identifier}.png")
+    for effect in plain_effects():
+        draw(effect, FIGURES / f"{effect.id}.png")
     return 0
 
 

@@ -6,12 +6,28 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
+from hwid_cli.drive.effect import Effect, Scales
 from hwid_cli.drive.simulation import Motion, simulate_drive
 from hwid_cli.records.drive import Drive
 
 SAMPLE_TIME_S = 1e-3
 MASS, DAMPING, STIFFNESS, CONSTANT = 0.3, 15.1, 1184.0, 5.0
-# Sizes that are easy to see on a motion of 20 mm.
+# Sizes of recordings of that drive; rules for starts and bounds are read off on them.
+SCALES = Scales(
+    displacement_m=0.02,
+    velocity_m_per_s=1.0,
+    current_A=5.0,
+    current_rate_A_per_s=1000.0,
+    stroke_m=0.04,
+    force_N=25.0,
+    mass_kg=0.3,
+    natural_Hz=10.0,
+    sample_time_s=1e-5,
+    duration_s=1.5,
+    frequencies_Hz=(17.0,),
+)
+# Sizes that are easier to see on a motion of 20 mm than the last values that a search
+# would start from.
 EXAMPLES: dict[str, dict[str, float]] = {
     "coulomb_friction": {"force_N": 2.0},
     "asymmetric_friction": {"force_forward_N": 3.0, "force_backward_N": 1.0},
@@ -50,7 +66,7 @@ EXAMPLES: dict[str, dict[str, float]] = {
     "sensor_drift": {"drift_m_per_s": 2e-3},
     "periodic_force": {"amplitude_N": 2.0, "frequency_Hz": 12.0},
 }
-# What the missing force is best drawn over; the rest over time.
+# What the missing force is best drawn over, where that is not time.
 OVER = {
     **dict.fromkeys(
         ("coulomb_friction", "asymmetric_friction", "stribeck_friction"), "velocity"
@@ -71,7 +87,6 @@ LABELS = {
     "current": "current [A]",
     "time": "time [s]",
 }
-ON_SENSOR = ("output_backlash", "sensor_quadratic", "sensor_cubic", "sensor_drift")
 STYLE = {"font.size": 8, "axes.spines.top": False, "axes.spines.right": False}
 
 
@@ -90,18 +105,28 @@ def command() -> np.ndarray:
     return np.concatenate([steps, 5.0 * np.sin(2 * np.pi * 3.0 * times)])
 
 
-def draw(identifier: str, path: Path) -> None:
+def example(effect: Effect) -> dict[str, float]:
+    """Values of an effect that show what it does.
+
+    Returns
+    -------
+    dict of str to float
+        By the names of the parameters.
+    """
+    return EXAMPLES.get(effect.id) or effect.starts(SCALES)[-1]
+
+
+def draw(effect: Effect, path: Path) -> None:
     """Draw one effect.
 
     Parameters
     ----------
-    identifier : str
     path : Path
         Where to write the figure.
     """
     current = command()
     plain = _simulate({}, current)
-    motion = _simulate({identifier: EXAMPLES[identifier]}, current)
+    motion = _simulate({effect.id: example(effect)}, current)
     times = SAMPLE_TIME_S * np.arange(current.size)
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(7.2, 2.2), layout="constrained")
@@ -110,7 +135,7 @@ def draw(identifier: str, path: Path) -> None:
         left.plot(times, 1e3 * motion.output, color="C0", label="with")
         left.set(xlabel=LABELS["time"], ylabel="output [mm]")
         left.legend(frameon=False, loc="lower left")
-        variable = OVER.get(identifier, "time")
+        variable = OVER.get(effect.id, "time")
         axis = {
             "velocity": motion.velocity,
             "position": 1e3 * motion.position,
@@ -120,8 +145,8 @@ def draw(identifier: str, path: Path) -> None:
         style = (
             {"lw": 0.8} if variable == "time" else {"marker": ".", "ms": 2, "ls": ""}
         )
-        right.plot(axis, _missing(identifier, motion, current), color="C3", **style)
-        quantity = "sensor error [mm]" if identifier in ON_SENSOR else "force [N]"
+        right.plot(axis, _missing(effect, motion, current), color="C3", **style)
+        quantity = "sensor error [mm]" if effect.enters == "output" else "force [N]"
         right.set(xlabel=LABELS[variable], ylabel=f"what is missing:\n{quantity}")
         figure.savefig(path, dpi=80, metadata={"Software": None})
 
@@ -139,9 +164,9 @@ def _simulate(effects: dict[str, dict[str, float]], current: np.ndarray) -> Moti
     return simulate_drive(current, drive, sample_time_s=SAMPLE_TIME_S)
 
 
-def _missing(identifier: str, motion: Motion, current: np.ndarray) -> np.ndarray:
+def _missing(effect: Effect, motion: Motion, current: np.ndarray) -> np.ndarray:
     """Force that the plain drive lacks along this motion, or error of the sensor."""
-    if identifier in ON_SENSOR:
+    if effect.enters == "output":
         return 1e3 * (motion.output - motion.position)
     inertia = MASS * np.gradient(motion.velocity, SAMPLE_TIME_S)
     known = CONSTANT * current - DAMPING * motion.velocity - STIFFNESS * motion.position

@@ -1,88 +1,17 @@
 """What the sections ``simulation`` and ``diagnose`` must agree on.
 
-Names of the effects that a drive's simulation may hold, and of their parameters.
+Which effects a drive's simulation may hold, and with which parameters, says the catalogue.
 """
 
 from collections.abc import Mapping
 
 from hwid_cli.config.requirements import require, require_distinct, require_known
+from hwid_cli.drive.catalogue import configured_effects
+from hwid_cli.drive.effect import Stated
 from hwid_cli.errors import ConfigError
 from hwid_cli.files.messages import did_you_mean
-from hwid_cli.records.drive import CHANGING, HOLDS, STARTS
+from hwid_cli.records.drive import HOLDS, STARTS
 from hwid_cli.records.experiment import DiagnoseOptions, Experiment, SimulationOptions
-
-# Every parameter that an effect has to state; the law of each is in docs/effects.md.
-EFFECT_PARAMETERS: dict[str, tuple[str, ...]] = {
-    "coulomb_friction": ("force_N",),
-    "asymmetric_friction": ("force_forward_N", "force_backward_N"),
-    "stribeck_friction": ("force_N", "static_excess_N", "velocity_m_per_s"),
-    "hysteresis": ("force_N", "yield_m"),
-    "quadratic_drag": ("drag_N_s2_per_m2",),
-    "cubic_stiffness": ("stiffness_N_per_m3",),
-    "quadratic_stiffness": ("stiffness_N_per_m2",),
-    "end_stop": ("position_m", "stiffness_N_per_m"),
-    "one_sided_stop": ("position_m", "stiffness_N_per_m"),
-    "spring_gap": ("half_gap_m",),
-    "gear_backlash": ("half_gap_m", "stiffness_N_per_m"),
-    "output_backlash": ("half_gap_m",),
-    "second_mode": ("mass_kg", "frequency_Hz", "damping_ratio"),
-    "cogging": ("amplitude_N", "period_m"),
-    "constant_load": ("force_N",),
-    "input_dead_zone": ("threshold_A",),
-    "input_saturation": ("limit_A",),
-    "rate_limit": ("rate_A_per_s",),
-    "input_delay": ("delay_s",),
-    "actuator_lag": ("time_constant_s",),
-    "force_constant_saturation": ("loss_at_reference",),
-    "supply_sag": ("loss_at_reference",),
-    "thermal_gain_loss": ("loss_at_reference", "time_constant_s"),
-    "voltage_limit": ("limit_A", "slope_A_s_per_m"),
-    "sensor_quadratic": ("coefficient",),
-    "sensor_cubic": ("coefficient",),
-    "sensor_drift": ("drift_m_per_s",),
-    "periodic_force": ("amplitude_N", "frequency_Hz"),
-    "parameter_change": ("which", "spread"),
-}
-# What an effect may state beyond that; 0, or half of the mass, where it does not.
-OPTIONAL_PARAMETERS: dict[str, tuple[str, ...]] = {
-    "cogging": ("phase_rad",),
-    "periodic_force": ("phase_rad",),
-    "gear_backlash": ("motor_share",),
-}
-# Parameters that a law divides by, or that have no meaning at 0 or below.
-POSITIVE_PARAMETERS: dict[str, tuple[str, ...]] = {
-    "stribeck_friction": ("velocity_m_per_s",),
-    "hysteresis": ("yield_m",),
-    "end_stop": ("position_m",),
-    "spring_gap": ("half_gap_m",),
-    "gear_backlash": ("half_gap_m", "stiffness_N_per_m", "motor_share"),
-    "output_backlash": ("half_gap_m",),
-    "second_mode": ("mass_kg", "frequency_Hz"),
-    "cogging": ("period_m",),
-    "input_dead_zone": ("threshold_A",),
-    "input_saturation": ("limit_A",),
-    "rate_limit": ("rate_A_per_s",),
-    "input_delay": ("delay_s",),
-    "actuator_lag": ("time_constant_s",),
-    "thermal_gain_loss": ("time_constant_s",),
-    "voltage_limit": ("limit_A",),
-    "periodic_force": ("frequency_Hz",),
-}
-# Parameters that only switch their law off at 0.
-NOT_NEGATIVE_PARAMETERS: dict[str, tuple[str, ...]] = {
-    "coulomb_friction": ("force_N",),
-    "asymmetric_friction": ("force_forward_N", "force_backward_N"),
-    "stribeck_friction": ("force_N",),
-    "hysteresis": ("force_N",),
-    "end_stop": ("stiffness_N_per_m",),
-    "one_sided_stop": ("stiffness_N_per_m",),
-    "second_mode": ("damping_ratio",),
-    "voltage_limit": ("slope_A_s_per_m",),
-    "parameter_change": ("spread",),
-}
-# Parameters that are a word and no number.
-WORD_PARAMETERS: dict[str, tuple[str, ...]] = {"parameter_change": ("which",)}
-
 
 _KIND = "drive"
 _POSITIVE = (
@@ -165,34 +94,36 @@ def _check_controller(experiment: Experiment) -> None:
 
 
 def _check_effect(name: str, found: Mapping[str, float | str], at: str) -> None:
-    require_known((name,), EFFECT_PARAMETERS, at)
+    effects = configured_effects()
+    require_known((name,), effects, at)
     at = f"{at}.{name}"
-    needed = EFFECT_PARAMETERS[name]
-    known = (*needed, *OPTIONAL_PARAMETERS.get(name, ()))
+    known = {one.name: one for one in effects[name]}
     for key in found:
         if key not in known:
             raise ConfigError(f"{at}.{key}: unknown key; {did_you_mean(key, known)}")
-    for key in needed:
-        is_word = key in WORD_PARAMETERS.get(name, ())
-        expected = f"one of {', '.join(CHANGING)}" if is_word else "a finite number"
-        if key not in found:
-            raise ConfigError(f"{at}.{key}: missing; expected {expected}; add the key")
+    for one in known.values():
+        if one.is_needed and one.name not in found:
+            expected = (
+                f"one of {', '.join(one.words)}" if one.words else "a finite number"
+            )
+            raise ConfigError(
+                f"{at}.{one.name}: missing; expected {expected}; add the key"
+            )
     for key, value in found.items():
-        _check_parameter(name, key, value, f"{at}.{key}")
+        _check_stated(known[key], value, f"{at}.{key}")
 
 
-def _check_parameter(effect: str, key: str, value: float | str, at: str) -> None:
-    if key in WORD_PARAMETERS.get(effect, ()):
-        if value not in CHANGING:
-            raise ConfigError(f"{at}: found {value!r}; {did_you_mean(value, CHANGING)}")
+def _check_stated(one: Stated, value: float | str, at: str) -> None:
+    if one.words:
+        if value not in one.words:
+            raise ConfigError(
+                f"{at}: found {value!r}; {did_you_mean(value, one.words)}"
+            )
     elif isinstance(value, str):
         require(False, at, value, "a finite number")
-    elif key in POSITIVE_PARAMETERS.get(effect, ()):
-        require(value > 0, at, value, "a number > 0")
-    elif key in NOT_NEGATIVE_PARAMETERS.get(effect, ()):
-        require(value >= 0, at, value, "a number >= 0")
-    if key == "motor_share" and not isinstance(value, str):
-        require(value < 1, at, value, "a share of the mass below 1")
+    else:
+        for limit in one.limits:
+            require(limit.holds(value), at, value, limit.expected)
 
 
 def _check_diagnose(options: DiagnoseOptions, at: str) -> None:
@@ -201,7 +132,7 @@ def _check_diagnose(options: DiagnoseOptions, at: str) -> None:
         require(value >= 0, f"{at}.{name}", value, "an integer >= 0")
     require_known((options.initial_state,), STARTS, f"{at}.initial_state")
     if options.effects is not None:
-        require_known(options.effects, EFFECT_PARAMETERS, f"{at}.effects")
+        require_known(options.effects, configured_effects(), f"{at}.effects")
         require_distinct(options.effects, f"{at}.effects")
     names = options.recordings
     if names is not None:

@@ -1,8 +1,13 @@
-"""What an entry of the catalogue of effects is made of."""
+"""What the declaration of an effect is made of.
+
+Declarations are data: what a configuration accepts, the vector that the compiled loops
+read, the search of a diagnosis and the documents follow from them.
+"""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from itertools import product
+from math import inf
 
 Values = Mapping[str, float]
 
@@ -70,7 +75,70 @@ Bounds = Callable[[Scales], tuple[float, float]]
 
 
 def _unbounded(_: Scales) -> tuple[float, float]:
-    return -float("inf"), float("inf")
+    return -inf, inf
+
+
+def shares_of(quantity: str, *shares: float) -> Rule:
+    """Start values that are shares of one of the scales.
+
+    Parameters
+    ----------
+    quantity : str
+        Attribute of ``Scales``.
+    """
+    return lambda scales: tuple(share * getattr(scales, quantity) for share in shares)
+
+
+def span_of(quantity: str, low: float, high: float) -> Bounds:
+    """Bounds that are shares of one of the scales.
+
+    Parameters
+    ----------
+    quantity : str
+        Attribute of ``Scales``.
+    """
+    return lambda scales: (
+        low * getattr(scales, quantity),
+        high * getattr(scales, quantity),
+    )
+
+
+@dataclass(frozen=True)
+class Limit:
+    """What a configuration must keep to.
+
+    Parameters
+    ----------
+    expected : str
+        In words, for the message that refuses a value.
+    holds : callable
+        Whether a value keeps to it.
+    """
+
+    expected: str
+    holds: Callable[[float], bool]
+
+
+# Of parameters that a law divides by, or that have no meaning at 0 or below.
+POSITIVE = Limit("a number > 0", lambda value: value > 0)
+# Of parameters that only switch their law off at 0.
+NOT_NEGATIVE = Limit("a number >= 0", lambda value: value >= 0)
+
+
+@dataclass(frozen=True)
+class Stated:
+    """What a configuration states for an effect under one key.
+
+    Parameters
+    ----------
+    words : tuple of str
+        One of these; empty where it is a number.
+    """
+
+    name: str
+    limits: tuple[Limit, ...] = ()
+    words: tuple[str, ...] = ()
+    is_needed: bool = True
 
 
 @dataclass(frozen=True)
@@ -84,26 +152,39 @@ class Parameter:
     starts : callable
         Values to start a search from, from the scales.
     bounds : callable
-        Lowest and highest value, from the scales.
+        Lowest and highest value of the search, from the scales.
     is_positive : bool
         Searched by its logarithm.
-    is_reported : bool
-        Whether it belongs to the result; others only make the law complete.
     is_own : bool
         Whether each recording has its own value.
+    places : tuple of str
+        Names in ``slots`` of the places in the vector that hold it. What several effects
+        hold there adds up.
+    is_factor : bool
+        Whether the places are multiplied by its exponential instead.
+    off : float, [unit of the parameter]
+        What the places hold without the effect: 0, or infinite for a limit.
+    default : float or None, [unit of the parameter]
+        What it is where nothing states it; None where it has to be stated.
+    limits : tuple of Limit
+        Of the value that a configuration states.
     """
 
     name: str
     starts: Rule
     bounds: Bounds = _unbounded
     is_positive: bool = True
-    is_reported: bool = True
     is_own: bool = False
+    places: tuple[str, ...] = ()
+    is_factor: bool = False
+    off: float = 0.0
+    default: float | None = None
+    limits: tuple[Limit, ...] = ()
 
 
 @dataclass(frozen=True)
 class Effect:
-    """One entry of the catalogue.
+    """The declaration of one effect.
 
     Parameters
     ----------
@@ -113,8 +194,8 @@ class Effect:
         The law, in ASCII.
     enters : str
         ``command``, ``force``, ``motion`` or ``output``.
-    slots : callable
-        From parameter values to values of places in the vector of ``slots``.
+    derived : mapping of str to callable
+        What further places of the vector hold, from the values of all parameters.
     confused_with : mapping of str to str
         Other effects that look alike, and what would separate them.
     contains : tuple of str
@@ -124,6 +205,8 @@ class Effect:
     seen : callable or None
         Values to start from that the recordings show, from the scales; where there are
         some they stand in for the parameters' own.
+    stated : tuple of Stated
+        What a configuration states where that is not the parameters.
     """
 
     id: str
@@ -131,11 +214,12 @@ class Effect:
     equation: str
     enters: str
     parameters: tuple[Parameter, ...]
-    slots: Callable[[Values], dict[int, float]]
+    derived: Mapping[str, Callable[[Values], float]] = field(default_factory=dict)
     confused_with: Mapping[str, str] = field(default_factory=dict)
     contains: tuple[str, ...] = ()
     needs_spring: bool = False
     seen: Callable[[Scales], tuple[dict[str, float], ...]] | None = None
+    stated: tuple[Stated, ...] = ()
 
     def starts(self, scales: Scales) -> list[dict[str, float]]:
         """List what the recordings show, or all combinations of start values."""
@@ -144,3 +228,15 @@ class Effect:
         names = [one.name for one in self.parameters]
         grids = [one.starts(scales) for one in self.parameters]
         return [dict(zip(names, values, strict=True)) for values in product(*grids)]
+
+    def keys(self) -> tuple[Stated, ...]:
+        """What a configuration states, key by key."""
+        return self.stated or tuple(
+            Stated(one.name, one.limits, is_needed=one.default is None)
+            for one in self.parameters
+        )
+
+    def places(self) -> tuple[str, ...]:
+        """Names of the places in the vector that it fills."""
+        own = [place for one in self.parameters for place in one.places]
+        return (*own, *self.derived)

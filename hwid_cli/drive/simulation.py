@@ -13,23 +13,24 @@ from scipy.interpolate import make_interp_spline
 
 from hwid_cli.drive import slots
 from hwid_cli.drive.catalogue import CATALOGUE
-from hwid_cli.drive.effect import Values
+from hwid_cli.drive.effect import Effect, Values
 from hwid_cli.drive.motion.move import move
-from hwid_cli.drive.output_play import play
+from hwid_cli.drive.output import read
 from hwid_cli.records.drive import Drive
 
-_CHANGED_SLOTS = {
-    "log_stiffness": slots.STIFFNESS,
-    "log_force_constant": slots.FORCE_CONSTANT,
-    "log_damping": slots.DAMPING,
-}
 # A smooth input is followed in straight lines of a quarter of a sample: at a fifth of the
 # sampling frequency a straight line over a whole sample loses 12 % of the amplitude, one
 # over a quarter of it 0.8 %.
 REFINEMENT = 4
 _SPLINE_DEGREE = 5
-# Limits that are off where they are infinite.
-_INFINITE = (slots.SATURATION, slots.RATE, slots.CLIP_LIMIT, slots.COMMAND_LIMIT)
+# Places that are not 0 where their effect is switched off.
+_OFF = {
+    getattr(slots, place): one.off
+    for effect in CATALOGUE.values()
+    for one in effect.parameters
+    for place in one.places
+    if one.off != 0
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,18 +155,7 @@ def run(
     """
     columns = move(driven_by, sample_time_s / refinement, vector)
     position, velocity, command = (column[::refinement] for column in columns)
-    output = position
-    if vector[slots.OUTPUT_GAP] > 0:
-        output = play(position, velocity, sample_time_s, vector[slots.OUTPUT_GAP])
-    if vector[slots.OUTPUT_ZERO] != 0:
-        output = output - vector[slots.OUTPUT_ZERO]
-    quadratic, cubic = vector[slots.SENSOR_QUADRATIC], vector[slots.SENSOR_CUBIC]
-    if quadratic != 0 or cubic != 0:
-        share = output / vector[slots.REFERENCE_DISPLACEMENT]
-        output = output * (1 + (quadratic + cubic * share) * share)
-    if vector[slots.SENSOR_DRIFT] != 0:
-        times = sample_time_s * np.arange(output.size)
-        output = output + vector[slots.SENSOR_DRIFT] * times
+    output = read(position, velocity, sample_time_s, vector)
     return Motion(output, position, velocity, command)
 
 
@@ -189,7 +179,8 @@ def parameter_vector(drive: Drive, effects: Mapping[str, Values]) -> np.ndarray:
         If the catalogue has no such effect.
     """
     vector = np.zeros(slots.N_SLOTS)
-    vector[list(_INFINITE)] = np.inf
+    vector[list(_OFF)] = list(_OFF.values())
+    vector[slots.COMMAND_LIMIT] = np.inf
     vector[slots.MASS] = drive.mass_kg
     vector[slots.DAMPING] = drive.damping_N_s_per_m
     vector[slots.STIFFNESS] = drive.stiffness_N_per_m
@@ -212,14 +203,30 @@ def parameter_vector(drive: Drive, effects: Mapping[str, Values]) -> np.ndarray:
     for identifier, values in effects.items():
         if identifier not in CATALOGUE:
             raise ValueError(f"effect {identifier!r} is not in the catalogue")
-        for slot, value in CATALOGUE[identifier].slots(values).items():
-            # Both kinds of friction push at once; nothing else shares a place.
-            is_shared = slot in (slots.FRICTION_FORWARD, slots.FRICTION_BACKWARD)
-            vector[slot] = vector[slot] + value if is_shared else value
-        for name, slot in _CHANGED_SLOTS.items():
-            if name in values:
-                vector[slot] *= np.exp(values[name])
+        _fill(vector, CATALOGUE[identifier], values)
     return vector
+
+
+def _fill(vector: np.ndarray, effect: Effect, given: Values) -> None:
+    """Put an effect into the vector; what acts in the same place adds up."""
+    values = {
+        one.name: given[one.name]
+        if one.default is None
+        else given.get(one.name, one.default)
+        for one in effect.parameters
+    }
+    for one in effect.parameters:
+        value = values[one.name]
+        for place in one.places:
+            slot = getattr(slots, place)
+            if one.is_factor:
+                vector[slot] *= np.exp(value)
+            elif one.off == 0:
+                vector[slot] += value
+            else:
+                vector[slot] = min(vector[slot], value)
+    for place, law in effect.derived.items():
+        vector[getattr(slots, place)] += law(values)
 
 
 def drive_effects(drive: Drive) -> dict[str, dict[str, float]]:
@@ -228,15 +235,19 @@ def drive_effects(drive: Drive) -> dict[str, dict[str, float]]:
     Returns
     -------
     dict of str to dict of str to float
-        A change between recordings becomes none, a phase that is free becomes 0.
+        With the defaults of what is not stated, except where each recording has its own
+        value. A change between recordings becomes none.
     """
     effects: dict[str, dict[str, float]] = {}
     for identifier, values in drive.effects.items():
         if identifier == "parameter_change":
             which = str(values["which"])
             effects[f"{identifier}:{which}"] = {f"log_{which}": 0.0}
-        else:
-            effects[identifier] = {name: float(one) for name, one in values.items()}
+            continue
+        effects[identifier] = {name: float(one) for name, one in values.items()}
+        for one in CATALOGUE[identifier].parameters if identifier in CATALOGUE else ():
+            if one.default is not None and not one.is_own:
+                effects[identifier].setdefault(one.name, one.default)
     return effects
 
 

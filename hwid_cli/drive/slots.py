@@ -1,6 +1,8 @@
 """Places of the parameters in the vector that the compiled loops read.
 
-A parameter that is switched off is 0, except where the comment says infinite.
+Effects name the places that they fill in their declarations; ``make drive-source`` puts
+those that are not here yet at the end, so that the others keep their numbers. A parameter
+that is switched off is 0, except where the comment says infinite.
 """
 
 (

@@ -3,6 +3,7 @@
 import math
 import textwrap
 
+from hwid_cli.drive import slots
 from hwid_cli.errors import ConfigError
 from hwid_cli.export.c_source import card_words, filled, numbers
 from hwid_cli.export.names import in_comment
@@ -38,9 +39,7 @@ def drive_source(exported: ExportedSimulation) -> str:
             f"--format c: simulation.hold {drive.hold}: follows a smooth curve through "
             "inputs that are yet to come; expected linear or zero; use --format json"
         )
-    delay = max(
-        float(values.get("delay_s", 0.0)) for values in ({}, *drive.effects.values())
-    )
+    delay = float(exported.slots[slots.DELAY])
     n_history = math.floor(delay / step) + 2
     if n_history > _LONGEST_DELAY:
         raise ConfigError(

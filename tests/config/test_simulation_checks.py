@@ -1,16 +1,13 @@
 """The sections ``simulation`` and ``diagnose``: what is accepted and what is refused."""
 
-import re
-from pathlib import Path
-
 import pytest
 
 from hwid_cli.config.load import load_experiment
-from hwid_cli.config.simulation_checks import EFFECT_PARAMETERS, OPTIONAL_PARAMETERS
+from hwid_cli.drive.catalogue import configured_effects
 from hwid_cli.errors import ConfigError
 from hwid_cli.records.drive import Controller
 
-README = Path(__file__).parents[2] / "configs" / "README.md"
+EFFECTS = configured_effects()
 RECORDINGS = "recordings: {files: a.csv, columns: {time: t, input: u, output: y%s}}\n"
 
 
@@ -27,25 +24,30 @@ def load_effect(load):
     return load_one
 
 
-def some_value(name):
-    return "stiffness" if name == "which" else 0.25
+def some_value(one):
+    return one.words[0] if one.words else 0.25
 
 
-def test_every_effect_is_accepted_with_all_of_its_parameters(load_effect):
-    for identifier, names in EFFECT_PARAMETERS.items():
-        values = {name: some_value(name) for name in names}
-        text = ", ".join(f"{name}: {value}" for name, value in values.items())
-        assert load_effect(f"{identifier}: {{{text}}}") == {identifier: values}
+def written(values):
+    return ", ".join(f"{name}: {value}" for name, value in values.items())
 
 
-def test_every_parameter_of_every_effect_is_required(load_effect):
-    for identifier, names in EFFECT_PARAMETERS.items():
-        for left_out in names:
-            text = ", ".join(f"{n}: {some_value(n)}" for n in names if n != left_out)
-            with pytest.raises(
-                ConfigError, match=rf"effects\.{identifier}\.{left_out}: missing; exp"
-            ):
-                load_effect(f"{identifier}: {{{text}}}")
+@pytest.mark.parametrize("identifier", EFFECTS)
+def test_every_effect_is_accepted_with_all_of_its_parameters(load_effect, identifier):
+    values = {one.name: some_value(one) for one in EFFECTS[identifier]}
+    assert load_effect(f"{identifier}: {{{written(values)}}}") == {identifier: values}
+
+
+@pytest.mark.parametrize("identifier", EFFECTS)
+def test_what_an_effect_needs_is_required_and_the_rest_is_not(load_effect, identifier):
+    needed = {one.name: some_value(one) for one in EFFECTS[identifier] if one.is_needed}
+    assert load_effect(f"{identifier}: {{{written(needed)}}}") == {identifier: needed}
+    for left_out in needed:
+        others = {name: one for name, one in needed.items() if name != left_out}
+        with pytest.raises(
+            ConfigError, match=rf"effects\.{identifier}\.{left_out}: missing; exp"
+        ):
+            load_effect(f"{identifier}: {{{written(others)}}}")
 
 
 def test_what_completes_a_law_may_be_given(load_effect):
@@ -113,6 +115,11 @@ def test_what_completes_a_law_may_be_given(load_effect):
         (
             "gear_backlash: {half_gap_m: 1, stiffness_N_per_m: 9, motor_share: 1}",
             r"motor_share: found 1.0; expected a share of the mass below 1",
+        ),
+        (
+            "gear_backlash: {half_gap_m: 1, stiffness_N_per_m: 9, "
+            "contact_damping_ratio: -1}",
+            r"contact_damping_ratio: found -1.0; expected a number >= 0",
         ),
         ("coulomb_friction: 1", r"coulomb_friction: found 1; expected a section"),
     ],
@@ -219,18 +226,3 @@ def test_diagnosis_options_are_read(load):
     assert options.effects == ("cogging",)
     assert options.hold_out == ("a",)
     assert (options.initial_state, options.skip_samples) == ("estimated", 50)
-
-
-def test_readme_lists_every_effect_with_its_parameters():
-    text = README.read_text(encoding="utf-8")
-    section = text.split("### Effects")[1].split("\n## ")[0]
-    rows = re.findall(r"^\| `(\w+)` \| [^|]+ \| (.+) \|$", section, re.M)
-    needed, optional = {}, {}
-    for identifier, cell in rows:
-        needed[identifier] = tuple(
-            re.findall(r"`(\w+)`", re.sub(r"\([^)]*\)", "", cell))
-        )
-        optional[identifier] = " ".join(re.findall(r"\(([^)]*)\)", cell))
-    assert needed == EFFECT_PARAMETERS
-    for identifier, names in OPTIONAL_PARAMETERS.items():
-        assert all(f"`{name}`" in optional[identifier] for name in names)

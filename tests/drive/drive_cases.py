@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from hwid_cli.drive.catalogue import CATALOGUE
+from hwid_cli.drive.effect import Scales
 from hwid_cli.drive.simulation import simulate_drive
 from hwid_cli.records.drive import Drive
 
@@ -45,6 +47,7 @@ PERIODIC = {
     "periodic_force": {"amplitude_N": 0.5, "frequency_Hz": 25.0, "phase_rad": 0.4}
 }
 
+# Effects that ``drive_oracle`` has too.
 SINGLE = {
     **COULOMB,
     "asymmetric_friction": {"force_forward_N": 0.8, "force_backward_N": 0.4},
@@ -70,6 +73,26 @@ SINGLE = {
     **HEAT,
     **CLIP,
     **PERIODIC,
+}
+# What the corners do to the drive of these tests.
+SCALES = Scales(
+    displacement_m=0.02,
+    velocity_m_per_s=0.6,
+    current_A=5.0,
+    current_rate_A_per_s=175.0,
+    stroke_m=0.04,
+    force_N=25.0,
+    mass_kg=0.3,
+    natural_Hz=10.0,
+    sample_time_s=SAMPLE_TIME_S,
+    duration_s=0.4,
+    frequencies_Hz=(17.0,),
+)
+# All that can be simulated alone: where no size is chosen, the last that is searched from.
+EVERY = {
+    effect.id: SINGLE.get(effect.id) or effect.starts(SCALES)[-1]
+    for effect in CATALOGUE.values()
+    if not effect.id.startswith("parameter_change")
 }
 TOGETHER = (
     COULOMB | LOAD,

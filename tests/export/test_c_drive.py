@@ -43,7 +43,7 @@ MACHINES = (
     (cases.COULOMB | cases.HEAT, {"resistance_ohm": 2.0, "inductance_H": 1e-3}),
     (cases.STRIBECK, {"controller": Controller(20.0, 30.0, 4.0)}),
 )
-ALONE = tuple(({name: values}, {}) for name, values in cases.SINGLE.items())
+ALONE = tuple(({name: values}, {}) for name, values in cases.EVERY.items())
 TOGETHER = tuple((both, {}) for both in cases.TOGETHER + cases.TOGETHER_SLOW)
 
 

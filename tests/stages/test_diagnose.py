@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hwid_cli.drive import slots
 from hwid_cli.drive.catalogue import CATALOGUE
 from hwid_cli.drive.simulation import simulate_drive
 from hwid_cli.records.experiment import DiagnoseOptions
@@ -260,8 +259,34 @@ def test_with_a_wrong_law_in_the_catalogue_the_right_name_is_not_found(monkeypat
     assert [one.id for one in right.effects] == ["input_dead_zone"]
 
     entry = CATALOGUE["input_dead_zone"]
-    wrong = replace(entry, slots=lambda value: {slots.SATURATION: value["threshold_A"]})
+    elsewhere = replace(entry.parameters[0], places=("SATURATION",), off=np.inf)
+    wrong = replace(entry, parameters=(elsewhere,))
     monkeypatch.setitem(CATALOGUE, "input_dead_zone", wrong)
     mistaken = diagnosed(given)
     assert "input_dead_zone" not in [one.id for one in mistaken.effects]
     assert not mistaken.complete
+
+
+@pytest.mark.parametrize(
+    ("effects", "names"),
+    [
+        (
+            {"cogging": {"amplitude_N": 0.5, "period_m": 5e-3}},
+            ["amplitude_N", "period_m", "phase_rad"],
+        ),
+        (
+            {"gear_backlash": {"half_gap_m": 1e-4, "stiffness_N_per_m": 5e4}},
+            [
+                "half_gap_m",
+                "stiffness_N_per_m",
+                "motor_share",
+                "contact_damping_ratio",
+            ],
+        ),
+    ],
+    ids=["cogging", "gear_backlash"],
+)
+def test_a_simulation_may_leave_out_what_completes_a_law(effects, names):
+    found = diagnosed(recordings(effects), simulation(effects=effects))
+    assert [one.id for one in found.present] == list(effects)
+    assert list(parameters(found.present[0])) == names

@@ -1,23 +1,62 @@
 """docs/effects.md says what the catalogue says."""
 
+from dataclasses import replace
+
 import pytest
 
-from hwid_cli.config.simulation_checks import EFFECT_PARAMETERS
-from hwid_cli.drive.catalogue import CATALOGUE, public_id
+from hwid_cli.drive.catalogue import CATALOGUE, configured_effects
 from tools import effects_document
-from tools.effects_document import DOCUMENT, FIGURES, document, main
-from tools.effects_figures import EXAMPLES
+from tools.effects_document import (
+    DOCUMENT,
+    FIGURES,
+    README,
+    document,
+    main,
+    plain_effects,
+    readme,
+)
+from tools.effects_figures import EXAMPLES, OVER, draw, example
 
 
-def test_the_document_is_up_to_date():
-    assert DOCUMENT.read_text() == document()
+def test_the_documents_are_up_to_date():
+    assert DOCUMENT.read_text() == document(), "run 'make effects'"
+    assert README.read_text() == readme(README.read_text()), "run 'make effects'"
 
 
 def test_every_effect_has_a_section_and_a_figure():
     sections = {line[3:] for line in document().splitlines() if line.startswith("## ")}
-    assert sections == set(EFFECT_PARAMETERS) == {public_id(one) for one in CATALOGUE}
-    assert {path.stem for path in FIGURES.glob("*.png")} == set(EXAMPLES)
-    assert set(EXAMPLES) == sections - {"parameter_change"}
+    assert sections == set(configured_effects())
+    assert {path.stem for path in FIGURES.glob("*.png")} == {
+        one.id for one in plain_effects()
+    }
+
+
+def test_what_figures_choose_by_hand_is_of_the_catalogue():
+    for identifier, values in EXAMPLES.items():
+        names = {one.name for one in CATALOGUE[identifier].parameters}
+        assert set(values) <= names
+    assert set(OVER) <= set(CATALOGUE)
+
+
+def test_an_effect_without_an_entry_of_its_own_is_drawn_at_its_last_start(tmp_path):
+    new = replace(CATALOGUE["quadratic_drag"], id="new")
+    # A fifth of 25 N at 1 m/s.
+    assert example(new) == {"drag_N_s2_per_m2": pytest.approx(5.0)}
+    assert example(CATALOGUE["quadratic_drag"]) == EXAMPLES["quadratic_drag"]
+
+    target = tmp_path / "new.png"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setitem(CATALOGUE, "new", new)
+        draw(new, target)
+    assert target.stat().st_size > 5000
+
+
+def test_the_table_of_the_configuration_names_every_key():
+    text = readme(README.read_text())
+    rows = [line for line in text.splitlines() if line.startswith("| `cogging` |")]
+    assert len(rows) == 1
+    assert rows[0].endswith("| `amplitude_N`, `period_m` (`phase_rad`) |")
+    assert r"F = -d v \|v\| |" in text
 
 
 def test_figures_are_small():
@@ -26,10 +65,15 @@ def test_figures_are_small():
 
 def test_a_check_tells_that_the_document_is_out_of_date(tmp_path, monkeypatch, capsys):
     old = tmp_path / "effects.md"
+    table = tmp_path / "README.md"
+    table.write_text(README.read_text().replace(" F = F0 |", " F = F1 |"))
+    monkeypatch.setattr(effects_document, "README", table)
     monkeypatch.setattr(effects_document, "DOCUMENT", old)
     assert main(["--check"]) == 1
-    assert "out of date" in capsys.readouterr().err
+    assert capsys.readouterr().err.count("out of date") == 2
     old.write_text(document())
+    assert main(["--check"]) == 1
+    table.write_text(README.read_text())
     assert main(["--check"]) == 0
 
 

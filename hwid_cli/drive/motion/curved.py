@@ -17,7 +17,9 @@ from hwid_cli.drive.motion.forces import (
     V,
     X,
     acceleration,
+    is_force_curved,
     resisting,
+    spring_rate,
 )
 from hwid_cli.drive.motion.push import (
     DRIVE,
@@ -43,13 +45,7 @@ def is_always_curved(p: np.ndarray) -> bool:
     ----------
     p : ndarray, shape (N_SLOTS,)
     """
-    return (
-        p[slots.CUBIC] != 0.0
-        or p[slots.QUADRATIC] != 0.0
-        or p[slots.COGGING_FORCE] != 0.0
-        or p[slots.DRAG] != 0.0
-        or (depends_on_motion(p) and has_losses(p))
-    )
+    return is_force_curved(p) or (depends_on_motion(p) and has_losses(p))
 
 
 @njit(**INNER)
@@ -93,15 +89,7 @@ def step_limit(
         mass *= min(p[slots.MOTOR_SHARE], 1.0 - p[slots.MOTOR_SHARE])
     x, v = state[X], state[V]
     speed = abs(v)
-    stiffness = p[slots.STIFFNESS]
-    if p[slots.CUBIC] != 0.0 or p[slots.QUADRATIC] != 0.0:
-        bend = 3.0 * p[slots.CUBIC] * x + 2.0 * p[slots.QUADRATIC]
-        stiffness += abs(bend * x)
-    if p[slots.STOP_STIFFNESS] > 0.0 and abs(x) > p[slots.STOP_POSITION]:
-        stiffness += p[slots.STOP_STIFFNESS]
-    edge = p[slots.SIDE_POSITION]
-    if p[slots.SIDE_STIFFNESS] > 0.0 and (x - edge) * edge > 0.0:
-        stiffness += p[slots.SIDE_STIFFNESS]
+    stiffness = spring_rate(x, p)
     damping = p[slots.DAMPING] + 2.0 * abs(p[slots.DRAG]) * speed
     if has_motor and abs(state[2] - x) > p[slots.GEAR_GAP]:
         stiffness += p[slots.GEAR_STIFFNESS]

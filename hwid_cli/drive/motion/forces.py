@@ -151,6 +151,43 @@ def spring_force(x: float, p: np.ndarray) -> float:
 
 
 @njit(**INNER)
+def spring_rate(x: float, p: np.ndarray) -> float:
+    """Return how stiff the springs are here at most, [N/m].
+
+    Parameters
+    ----------
+    x : float, [m]
+    p : ndarray, shape (N_SLOTS,)
+    """
+    stiffness = p[slots.STIFFNESS]
+    if p[slots.CUBIC] != 0.0 or p[slots.QUADRATIC] != 0.0:
+        bend = 3.0 * p[slots.CUBIC] * x + 2.0 * p[slots.QUADRATIC]
+        stiffness += abs(bend * x)
+    if p[slots.STOP_STIFFNESS] > 0.0 and abs(x) > p[slots.STOP_POSITION]:
+        stiffness += p[slots.STOP_STIFFNESS]
+    edge = p[slots.SIDE_POSITION]
+    if p[slots.SIDE_STIFFNESS] > 0.0 and (x - edge) * edge > 0.0:
+        stiffness += p[slots.SIDE_STIFFNESS]
+    return stiffness
+
+
+@njit(**INNER)
+def is_force_curved(p: np.ndarray) -> bool:
+    """Return whether a force on the mass is curved everywhere.
+
+    Parameters
+    ----------
+    p : ndarray, shape (N_SLOTS,)
+    """
+    return (
+        p[slots.CUBIC] != 0.0
+        or p[slots.QUADRATIC] != 0.0
+        or p[slots.COGGING_FORCE] != 0.0
+        or p[slots.DRAG] != 0.0
+    )
+
+
+@njit(**INNER)
 def cogging(x: float, p: np.ndarray) -> float:
     """Return the force that repeats along the way.
 

@@ -82,7 +82,9 @@ def move(
     state, memory = np.zeros(N_STATE), np.zeros(N_MEMORY)
     followed = _start(state, memory, before, p)
     trial, inputs, active = state.copy(), np.zeros(N_INPUT), active_states(p)
-    kind, step, matrices, lengths = _prepare(sample_time, p)
+    kind = _kind_of(p)
+    step = _longest_step(sample_time, kind)
+    matrices, lengths = _make_room(sample_time, step, p)
     # Pieces are listed for many samples at once, or for one after the other where the
     # command or the temperature depends on the motion.
     is_single = is_closed or (depends_on_motion(p) and p[slots.THERMAL_LOSS] != 0.0)
@@ -143,32 +145,50 @@ def _blank(positions: np.ndarray, velocities: np.ndarray, given: np.ndarray) -> 
 
 
 @njit(**INNER)
-def _prepare(
-    sample_time: float, p: np.ndarray
-) -> tuple[tuple[bool, bool, bool, bool, bool, float], float, np.ndarray, np.ndarray]:
-    """Return what kind of drive it is, its longest linear step, and room for matrices."""
-    rate = fastest(p)
-    n_edges = count_edges(p)
-    is_watched = has_dry_friction(p) or p[slots.HYSTERESIS_FORCE] != 0.0
+def _kind_of(p: np.ndarray) -> tuple[bool, bool, bool, bool, bool, float]:
+    """Return what kind of drive it is, as in ``events.advance``."""
     has_inner = (
         p[slots.GEAR_STIFFNESS] > 0.0
         or p[slots.MODE_MASS] > 0.0
         or depends_on_motion(p)
     )
+    is_watched = has_dry_friction(p) or p[slots.HYSTERESIS_FORCE] != 0.0
     at_times = p[slots.STATIC_EXCESS] != 0.0 or p[slots.HYSTERESIS_FORCE] != 0.0
-    kind = (has_inner, n_edges > 0, is_always_curved(p), is_watched, at_times, rate)
-    count = 1
-    if n_edges > 0 or is_watched:
-        count = int(
-            min(max(np.ceil(sample_time * rate / LONGEST_PHASE), 1), MOST_STEPS)
-        )
+    return (
+        has_inner,
+        count_edges(p) > 0,
+        is_always_curved(p),
+        is_watched,
+        at_times,
+        fastest(p),
+    )
+
+
+@njit(**INNER)
+def _longest_step(
+    sample_time: float, kind: tuple[bool, bool, bool, bool, bool, float]
+) -> float:
+    """Return the longest step of linear motion, a whole part of a sample."""
+    _, has_edges, _, is_watched, _, rate = kind
+    count = 1.0
+    if has_edges or is_watched:
+        count = np.ceil(sample_time * rate / LONGEST_PHASE)
+        count = min(max(count, 1.0), MOST_STEPS)
+    return sample_time / count
+
+
+@njit(**INNER)
+def _make_room(
+    sample_time: float, step: float, p: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return room for matrices, and the lengths that they are for."""
     # Lengths that come back in every sample: whole steps, and both parts that a delay
     # makes of a sample.
     whole = np.floor(p[slots.DELAY] / sample_time) * sample_time
     part = p[slots.DELAY] - whole
-    lengths = np.array([sample_time / count, part, sample_time - part])
-    matrices = np.zeros((lengths.size * 2 * 3**n_edges, N_STATE, N_COLUMNS))
-    return kind, sample_time / count, matrices, lengths
+    lengths = np.array([step, part, sample_time - part])
+    n_matrices = lengths.size * 2 * 3 ** count_edges(p)
+    return np.zeros((n_matrices, N_STATE, N_COLUMNS)), lengths
 
 
 @njit(**INNER)

@@ -55,25 +55,6 @@ static const double parameters[N_SLOTS] = {@parameters@};
 
 typedef tuple_iiiiid drive_kind;
 
-static double step_and_kind(double *p, drive_kind *kind)
-{
-    const double rate = drive_fastest(p);
-    const int n_edges = drive_count_edges(p);
-    const int is_watched = drive_has_dry_friction(p) || p[HYSTERESIS_FORCE] != 0.0;
-    double count = 1.0;
-    kind->m0 = p[GEAR_STIFFNESS] > 0.0 || p[MODE_MASS] > 0.0
-        || drive_depends_on_motion(p);
-    kind->m1 = n_edges > 0;
-    kind->m2 = drive_is_always_curved(p);
-    kind->m3 = is_watched;
-    kind->m4 = p[STATIC_EXCESS] != 0.0 || p[HYSTERESIS_FORCE] != 0.0;
-    kind->m5 = rate;
-    if (n_edges > 0 || is_watched) {
-        count = least(most(ceil(sample_time * rate / 0.5), 1.0), MOST_STEPS);
-    }
-    return sample_time / count;
-}
-
 /* As far into a piece as nothing happens, without inner states. */
 static double glide_plain(HWID_NAME(state) *s, double *push, double length, double step,
                           drive_kind kind)
@@ -229,8 +210,8 @@ static void interval(HWID_NAME(state) *s, double first, double last)
     const double now = is_single ? drive_current_now(first, s->motion, p) : 0.0;
     double rows[MOST_PIECES][3], push[N_PUSH];
     double time = (double)(s->sample - 1) * sample_time;
-    drive_kind kind = {0, 0, 0, 0, 0, 0.0};
-    const double step = step_and_kind(p, &kind);
+    const drive_kind kind = drive_kind_of(p);
+    const double step = drive_longest_step(sample_time, kind);
     int n, count = 1;
     for (n = 0; n + 1 < N_HISTORY; ++n) {
         s->starts[n] = s->starts[n + 1];
@@ -287,23 +268,6 @@ static double played(HWID_NAME(state) *s, double x0, double v0)
     return least(most(y, x1 - gap), x1 + gap);
 }
 
-static double sensed(HWID_NAME(state) *s)
-{
-    double *p = s->p;
-    double y = p[OUTPUT_GAP] > 0.0 ? s->played : s->position;
-    if (p[OUTPUT_ZERO] != 0.0) {
-        y -= p[OUTPUT_ZERO];
-    }
-    if (p[SENSOR_QUADRATIC] != 0.0 || p[SENSOR_CUBIC] != 0.0) {
-        const double share = y / p[REFERENCE_DISPLACEMENT];
-        y *= 1.0 + (p[SENSOR_QUADRATIC] + p[SENSOR_CUBIC] * share) * share;
-    }
-    if (p[SENSOR_DRIFT] != 0.0) {
-        y += p[SENSOR_DRIFT] * (sample_time * (double)s->sample);
-    }
-    return y;
-}
-
 void HWID_NAME(init)(HWID_NAME(state) *state)
 {
     int n;
@@ -356,7 +320,8 @@ double HWID_NAME(step)(HWID_NAME(state) *state, double u)
     if (is_closed) {
         state->previous = drive_controlled(u, state->position, state->velocity, p);
     }
-    u = sensed(state);
+    u = drive_sensed(p[OUTPUT_GAP] > 0.0 ? state->played : state->position,
+                     sample_time * (double)state->sample, p);
     state->sample += 1;
     return u;
 }

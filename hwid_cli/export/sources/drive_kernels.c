@@ -712,6 +712,31 @@ static double drive_moved_mass(double *p)
     return p[MASS];
 }
 
+static double drive_spring_rate(double x, double *p)
+{
+    double stiffness = 0.0;
+    double bend = 0.0;
+    double edge = 0.0;
+    stiffness = p[STIFFNESS];
+    if ((p[CUBIC] != 0.0) || (p[QUADRATIC] != 0.0)) {
+        bend = ((3.0 * p[CUBIC]) * x) + (2.0 * p[QUADRATIC]);
+        stiffness += fabs(bend * x);
+    }
+    if ((p[STOP_STIFFNESS] > 0.0) && (fabs(x) > p[STOP_POSITION])) {
+        stiffness += p[STOP_STIFFNESS];
+    }
+    edge = p[SIDE_POSITION];
+    if ((p[SIDE_STIFFNESS] > 0.0) && (((x - edge) * edge) > 0.0)) {
+        stiffness += p[SIDE_STIFFNESS];
+    }
+    return stiffness;
+}
+
+static int drive_is_force_curved(double *p)
+{
+    return (p[CUBIC] != 0.0) || (p[QUADRATIC] != 0.0) || (p[COGGING_FORCE] != 0.0) || (p[DRAG] != 0.0);
+}
+
 static int drive_has_dry_friction(double *p)
 {
     double level = 0.0;
@@ -933,7 +958,7 @@ static double drive_margin(double *state, double command, int corner, double *p)
 
 static int drive_is_always_curved(double *p)
 {
-    return (p[CUBIC] != 0.0) || (p[QUADRATIC] != 0.0) || (p[COGGING_FORCE] != 0.0) || (p[DRAG] != 0.0) || (drive_depends_on_motion(p) && drive_has_losses(p));
+    return drive_is_force_curved(p) || (drive_depends_on_motion(p) && drive_has_losses(p));
 }
 
 static int drive_is_curved_here(double *state, double *memory, double *p)
@@ -977,8 +1002,6 @@ static double drive_step_limit(double *state, double *memory, double *push, doub
     double v = 0.0;
     double speed = 0.0;
     double stiffness = 0.0;
-    double bend = 0.0;
-    double edge = 0.0;
     double damping = 0.0;
     double turn = 0.0;
     double rate = 0.0;
@@ -993,18 +1016,7 @@ static double drive_step_limit(double *state, double *memory, double *push, doub
     x = state[X];
     v = state[V];
     speed = fabs(v);
-    stiffness = p[STIFFNESS];
-    if ((p[CUBIC] != 0.0) || (p[QUADRATIC] != 0.0)) {
-        bend = ((3.0 * p[CUBIC]) * x) + (2.0 * p[QUADRATIC]);
-        stiffness += fabs(bend * x);
-    }
-    if ((p[STOP_STIFFNESS] > 0.0) && (fabs(x) > p[STOP_POSITION])) {
-        stiffness += p[STOP_STIFFNESS];
-    }
-    edge = p[SIDE_POSITION];
-    if ((p[SIDE_STIFFNESS] > 0.0) && (((x - edge) * edge) > 0.0)) {
-        stiffness += p[SIDE_STIFFNESS];
-    }
+    stiffness = drive_spring_rate(x, p);
     damping = p[DAMPING] + ((2.0 * fabs(p[DRAG])) * speed);
     if (has_motor && (fabs(state[2] - x) > p[GEAR_GAP])) {
         stiffness += p[GEAR_STIFFNESS];
@@ -1683,6 +1695,36 @@ static tuple_dd drive_bounds(double x, double *p)
     return (tuple_dd){low, high};
 }
 
+static tuple_iiiiid drive_kind_of(double *p)
+{
+    int has_inner = 0;
+    int is_watched = 0;
+    int at_times = 0;
+    has_inner = (p[GEAR_STIFFNESS] > 0.0) || (p[MODE_MASS] > 0.0) || drive_depends_on_motion(p);
+    is_watched = drive_has_dry_friction(p) || (p[HYSTERESIS_FORCE] != 0.0);
+    at_times = (p[STATIC_EXCESS] != 0.0) || (p[HYSTERESIS_FORCE] != 0.0);
+    return (tuple_iiiiid){has_inner, drive_count_edges(p) > 0, drive_is_always_curved(p), is_watched, at_times, drive_fastest(p)};
+}
+
+static double drive_longest_step(double sample_time, tuple_iiiiid kind)
+{
+    tuple_iiiiid t1 = {0};
+    int has_edges = 0;
+    int is_watched = 0;
+    double rate = 0.0;
+    double count = 0.0;
+    t1 = kind;
+    has_edges = t1.m1;
+    is_watched = t1.m3;
+    rate = t1.m5;
+    count = 1.0;
+    if (has_edges || is_watched) {
+        count = ceil((sample_time * rate) / 0.5);
+        count = least(most(count, 1.0), MOST_STEPS);
+    }
+    return sample_time / count;
+}
+
 static double drive_controlled(double reference, double x, double v, double *p)
 {
     double wanted = 0.0;
@@ -1863,6 +1905,22 @@ static void drive_move_piece(double *state, double *trial, double *memory, doubl
             }
         }
     }
+}
+
+static double drive_sensed(double y, double time, double *p)
+{
+    double share = 0.0;
+    if (p[OUTPUT_ZERO] != 0.0) {
+        y -= p[OUTPUT_ZERO];
+    }
+    if ((p[SENSOR_QUADRATIC] != 0.0) || (p[SENSOR_CUBIC] != 0.0)) {
+        share = y / p[REFERENCE_DISPLACEMENT];
+        y *= 1.0 + ((p[SENSOR_QUADRATIC] + (p[SENSOR_CUBIC] * share)) * share);
+    }
+    if (p[SENSOR_DRIFT] != 0.0) {
+        y += p[SENSOR_DRIFT] * time;
+    }
+    return y;
 }
 
 static double drive_extreme(double x0, double v0, double x1, double v1)

@@ -1,38 +1,16 @@
-"""Entries of the catalogue: what depends on position. docs/method_diagnosis.md, (D10)."""
+"""Declarations of effects: what depends on position. docs/method_diagnosis.md, (D10)."""
 
 from math import pi
 
-from hwid_cli.drive import slots
-from hwid_cli.drive.effect import Effect, Parameter, Rule, Scales
-
-
-def _displacement(*shares: float) -> Rule:
-    return lambda scales: tuple(share * scales.displacement_m for share in shares)
-
-
-def _stiffness(*shares: float) -> Rule:
-    return lambda scales: tuple(share * scales.stiffness_N_per_m for share in shares)
-
-
-def _force(*shares: float) -> Rule:
-    return lambda scales: tuple(share * scales.force_N for share in shares)
-
-
-def _inside(scales: Scales) -> tuple[float, float]:
-    # A stop that nothing reaches explains nothing.
-    return 0.02 * scales.displacement_m, scales.displacement_m
-
-
-def _inside_signed(scales: Scales) -> tuple[float, float]:
-    return -scales.displacement_m, scales.displacement_m
-
-
-def _stiff(scales: Scales) -> tuple[float, float]:
-    return 0.05 * scales.stiffness_N_per_m, 1e4 * scales.stiffness_N_per_m
-
-
-def _gap(scales: Scales) -> tuple[float, float]:
-    return 1e-5 * scales.displacement_m, 0.5 * scales.displacement_m
+from hwid_cli.drive.effect import (
+    NOT_NEGATIVE,
+    POSITIVE,
+    Effect,
+    Parameter,
+    Scales,
+    shares_of,
+    span_of,
+)
 
 
 def _periods(scales: Scales) -> tuple[float, ...]:
@@ -65,9 +43,9 @@ CUBIC = Effect(
                 for share in (-0.1, 0.1, 0.4)
             ),
             is_positive=False,
+            places=("CUBIC",),
         ),
     ),
-    slots=lambda value: {slots.CUBIC: value["stiffness_N_per_m3"]},
     confused_with={
         "quadratic_stiffness": "a step of the other sign",
         "end_stop": "small and full amplitude",
@@ -88,9 +66,9 @@ QUADRATIC = Effect(
                 for share in (-0.15, 0.15)
             ),
             is_positive=False,
+            places=("QUADRATIC",),
         ),
     ),
-    slots=lambda value: {slots.QUADRATIC: value["stiffness_N_per_m2"]},
     confused_with={
         "cubic_stiffness": "a step of the other sign",
         "sensor_quadratic": "a sine near resonance",
@@ -103,13 +81,22 @@ END_STOP = Effect(
     equation="F = -ks (|x| - xs) sgn(x) beyond |x| = xs",
     enters="motion",
     parameters=(
-        Parameter("position_m", _displacement(0.4, 0.65, 0.85, 0.95), _inside),
-        Parameter("stiffness_N_per_m", _stiffness(2.0, 15.0, 100.0), _stiff),
+        Parameter(
+            "position_m",
+            shares_of("displacement_m", 0.4, 0.65, 0.85, 0.95),
+            # A stop that nothing reaches explains nothing.
+            span_of("displacement_m", 0.02, 1.0),
+            places=("STOP_POSITION",),
+            limits=(POSITIVE,),
+        ),
+        Parameter(
+            "stiffness_N_per_m",
+            shares_of("stiffness_N_per_m", 2.0, 15.0, 100.0),
+            span_of("stiffness_N_per_m", 0.05, 1e4),
+            places=("STOP_STIFFNESS",),
+            limits=(NOT_NEGATIVE,),
+        ),
     ),
-    slots=lambda value: {
-        slots.STOP_POSITION: value["position_m"],
-        slots.STOP_STIFFNESS: value["stiffness_N_per_m"],
-    },
     confused_with={
         "cubic_stiffness": "small and full amplitude",
         "input_saturation": "a sine near resonance at full amplitude",
@@ -127,16 +114,19 @@ ONE_SIDED = Effect(
     parameters=(
         Parameter(
             "position_m",
-            _displacement(-0.9, -0.7, -0.4, 0.4, 0.7, 0.9),
-            _inside_signed,
+            shares_of("displacement_m", -0.9, -0.7, -0.4, 0.4, 0.7, 0.9),
+            span_of("displacement_m", -1.0, 1.0),
             is_positive=False,
+            places=("SIDE_POSITION",),
         ),
-        Parameter("stiffness_N_per_m", _stiffness(2.0, 15.0, 100.0), _stiff),
+        Parameter(
+            "stiffness_N_per_m",
+            shares_of("stiffness_N_per_m", 2.0, 15.0, 100.0),
+            span_of("stiffness_N_per_m", 0.05, 1e4),
+            places=("SIDE_STIFFNESS",),
+            limits=(NOT_NEGATIVE,),
+        ),
     ),
-    slots=lambda value: {
-        slots.SIDE_POSITION: value["position_m"],
-        slots.SIDE_STIFFNESS: value["stiffness_N_per_m"],
-    },
     confused_with={
         "end_stop": "a step of the other sign",
         "quadratic_stiffness": "small and full amplitude",
@@ -148,8 +138,15 @@ SPRING_GAP = Effect(
     sentence="a spring that acts only beyond a clearance",
     equation="F = -k (x - g sgn(x)) beyond |x| = g, 0 within",
     enters="motion",
-    parameters=(Parameter("half_gap_m", _displacement(0.01, 0.05, 0.15, 0.3), _gap),),
-    slots=lambda value: {slots.SPRING_GAP: value["half_gap_m"]},
+    parameters=(
+        Parameter(
+            "half_gap_m",
+            shares_of("displacement_m", 0.01, 0.05, 0.15, 0.3),
+            span_of("displacement_m", 1e-5, 0.5),
+            places=("SPRING_GAP",),
+            limits=(POSITIVE,),
+        ),
+    ),
     confused_with={"end_stop": "small steps"},
     needs_spring=True,
 )
@@ -160,25 +157,23 @@ COGGING = Effect(
     equation="F = A (sin(2 pi x / l + q) - sin(q))",
     enters="motion",
     parameters=(
-        Parameter("amplitude_N", _force(0.05)),
+        Parameter("amplitude_N", shares_of("force_N", 0.05), places=("COGGING_FORCE",)),
         Parameter(
             "period_m",
             _periods,
             # Longer periods imitate any spring.
             lambda scales: (scales.stroke_m / 200, scales.stroke_m / 3),
+            places=("COGGING_PERIOD",),
+            limits=(POSITIVE,),
         ),
         Parameter(
             "phase_rad",
             lambda scales: (-0.75 * pi, -0.25 * pi, 0.25 * pi, 0.75 * pi),
             is_positive=False,
-            is_reported=False,
+            places=("COGGING_PHASE",),
+            default=0.0,
         ),
     ),
-    slots=lambda value: {
-        slots.COGGING_FORCE: value["amplitude_N"],
-        slots.COGGING_PERIOD: value["period_m"],
-        slots.COGGING_PHASE: value.get("phase_rad", 0.0),
-    },
     confused_with={"cubic_stiffness": "slow motion over the whole stroke"},
     seen=_waves,
 )
@@ -188,8 +183,14 @@ LOAD = Effect(
     sentence="a constant force, such as weight; or a zero offset of the sensor",
     equation="F = F0",
     enters="motion",
-    parameters=(Parameter("force_N", _force(-0.06, 0.06), is_positive=False),),
-    slots=lambda value: {slots.LOAD: value["force_N"]},
+    parameters=(
+        Parameter(
+            "force_N",
+            shares_of("force_N", -0.06, 0.06),
+            is_positive=False,
+            places=("LOAD",),
+        ),
+    ),
     confused_with={"sensor_drift": "long rests at the start and at the end"},
 )
 

@@ -1,18 +1,19 @@
-"""Entries of the catalogue: what happens to the command and to the force it makes.
+"""Declarations of effects: what happens to the command and to the force it makes.
 
 docs/method_diagnosis.md, eq. (D4) to (D7).
 """
 
-from hwid_cli.drive import slots
-from hwid_cli.drive.effect import Effect, Parameter, Rule, Scales
+from math import inf
 
-
-def _current(*shares: float) -> Rule:
-    return lambda scales: tuple(share * scales.current_A for share in shares)
-
-
-def _rate(*shares: float) -> Rule:
-    return lambda scales: tuple(share * scales.current_rate_A_per_s for share in shares)
+from hwid_cli.drive.effect import (
+    NOT_NEGATIVE,
+    POSITIVE,
+    Effect,
+    Parameter,
+    Scales,
+    shares_of,
+    span_of,
+)
 
 
 def _times(scales: Scales) -> tuple[float, ...]:
@@ -32,11 +33,12 @@ DEAD_ZONE = Effect(
     parameters=(
         Parameter(
             "threshold_A",
-            _current(0.02, 0.06, 0.15),
-            lambda scales: (1e-4 * scales.current_A, 0.8 * scales.current_A),
+            shares_of("current_A", 0.02, 0.06, 0.15),
+            span_of("current_A", 1e-4, 0.8),
+            places=("DEAD_ZONE",),
+            limits=(POSITIVE,),
         ),
     ),
-    slots=lambda value: {slots.DEAD_ZONE: value["threshold_A"]},
     confused_with={
         "coulomb_friction": "reversals while a load holds the current away from zero",
         "supply_sag": "small steps",
@@ -51,11 +53,13 @@ SATURATION = Effect(
     parameters=(
         Parameter(
             "limit_A",
-            _current(0.5, 0.7, 0.88),
-            lambda scales: (0.05 * scales.current_A, scales.current_A),
+            shares_of("current_A", 0.5, 0.7, 0.88),
+            span_of("current_A", 0.05, 1.0),
+            places=("SATURATION",),
+            limits=(POSITIVE,),
+            off=inf,
         ),
     ),
-    slots=lambda value: {slots.SATURATION: value["limit_A"]},
     confused_with={
         "end_stop": "a sine near resonance at full amplitude",
         "force_constant_saturation": "steps of several sizes below the limit",
@@ -70,14 +74,13 @@ RATE_LIMIT = Effect(
     parameters=(
         Parameter(
             "rate_A_per_s",
-            _rate(0.01, 0.03, 0.08, 0.2, 0.4, 0.7),
-            lambda scales: (
-                1e-4 * scales.current_rate_A_per_s,
-                scales.current_rate_A_per_s,
-            ),
+            shares_of("current_rate_A_per_s", 0.01, 0.03, 0.08, 0.2, 0.4, 0.7),
+            span_of("current_rate_A_per_s", 1e-4, 1.0),
+            places=("RATE",),
+            limits=(POSITIVE,),
+            off=inf,
         ),
     ),
-    slots=lambda value: {slots.RATE: value["rate_A_per_s"]},
     confused_with={"actuator_lag": "fast changes of several sizes"},
 )
 
@@ -86,8 +89,11 @@ DELAY = Effect(
     sentence="the current acts later than it was commanded",
     equation="i -> i(t - td)",
     enters="command",
-    parameters=(Parameter("delay_s", _times, _time_bounds),),
-    slots=lambda value: {slots.DELAY: value["delay_s"]},
+    parameters=(
+        Parameter(
+            "delay_s", _times, _time_bounds, places=("DELAY",), limits=(POSITIVE,)
+        ),
+    ),
     confused_with={"actuator_lag": "a sine far above the natural frequency"},
 )
 
@@ -96,8 +102,11 @@ LAG = Effect(
     sentence="the current follows the command with a first-order lag",
     equation="tau di/dt + i = command",
     enters="command",
-    parameters=(Parameter("time_constant_s", _times, _time_bounds),),
-    slots=lambda value: {slots.LAG: value["time_constant_s"]},
+    parameters=(
+        Parameter(
+            "time_constant_s", _times, _time_bounds, places=("LAG",), limits=(POSITIVE,)
+        ),
+    ),
     confused_with={"input_delay": "a sine far above the natural frequency"},
 )
 
@@ -112,9 +121,9 @@ CONSTANT_SATURATION = Effect(
             lambda scales: (0.08, 0.25),
             lambda scales: (-0.9, 0.9),
             is_positive=False,
+            places=("SATURATION_LOSS",),
         ),
     ),
-    slots=lambda value: {slots.SATURATION_LOSS: value["loss_at_reference"]},
     confused_with={
         "supply_sag": "steps of many sizes and little noise",
         "sensor_cubic": "a sine near resonance",
@@ -132,9 +141,9 @@ SAG = Effect(
             lambda scales: (0.08, 0.25),
             lambda scales: (-0.9, 0.9),
             is_positive=False,
+            places=("SAG_LOSS",),
         ),
     ),
-    slots=lambda value: {slots.SAG_LOSS: value["loss_at_reference"]},
     confused_with={
         "force_constant_saturation": "steps of many sizes and little noise",
         "sensor_quadratic": "a step of the other sign",
@@ -153,18 +162,17 @@ THERMAL = Effect(
             lambda scales: (0.15,),
             lambda scales: (-0.95, 0.95),
             is_positive=False,
+            places=("THERMAL_LOSS",),
         ),
         Parameter(
             "time_constant_s",
             lambda scales: (0.3, 1.0, 3.0),
             # Faster heating is the force constant's saturation.
             lambda scales: (0.2, max(1.0, 10 * scales.duration_s)),
+            places=("THERMAL_TIME",),
+            limits=(POSITIVE,),
         ),
     ),
-    slots=lambda value: {
-        slots.THERMAL_LOSS: value["loss_at_reference"],
-        slots.THERMAL_TIME: value["time_constant_s"],
-    },
     confused_with={
         "force_constant_saturation": "a long hold, and repeats after a rest"
     },
@@ -178,8 +186,11 @@ VOLTAGE_LIMIT = Effect(
     parameters=(
         Parameter(
             "limit_A",
-            _current(0.7, 0.9, 1.2),
-            lambda scales: (0.05 * scales.current_A, 5 * scales.current_A),
+            shares_of("current_A", 0.7, 0.9, 1.2),
+            span_of("current_A", 0.05, 5),
+            places=("CLIP_LIMIT",),
+            limits=(POSITIVE,),
+            off=inf,
         ),
         Parameter(
             "slope_A_s_per_m",
@@ -191,12 +202,10 @@ VOLTAGE_LIMIT = Effect(
                 1e-3 * scales.current_A / scales.velocity_m_per_s,
                 30 * scales.current_A / scales.velocity_m_per_s,
             ),
+            places=("CLIP_SLOPE",),
+            limits=(NOT_NEGATIVE,),
         ),
     ),
-    slots=lambda value: {
-        slots.CLIP_LIMIT: value["limit_A"],
-        slots.CLIP_SLOPE: value["slope_A_s_per_m"],
-    },
     confused_with={
         "input_saturation": "full current at rest and at speed",
         "quadratic_drag": "the same speed at small current, such as after a release",

@@ -1,11 +1,57 @@
-"""Compiled play at the output. docs/method_diagnosis.md, eq. (D14)."""
+"""Compiled output: one term for each effect of the sensor.
+
+docs/method_diagnosis.md, eq. (D14).
+"""
 
 import numpy as np
 from numba import njit
 
+from hwid_cli.drive import slots
+from hwid_cli.drive.compiled import INNER
+
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def play(
+def read(
+    positions: np.ndarray, velocities: np.ndarray, sample_time: float, p: np.ndarray
+) -> np.ndarray:
+    """Return what the sensor reads at every sample.
+
+    Parameters
+    ----------
+    positions, velocities : ndarray, shape (n,), [m], [m/s]
+    sample_time : float, [s]
+    p : ndarray, shape (N_SLOTS,)
+    """
+    output = positions.copy()
+    if p[slots.OUTPUT_GAP] > 0.0:
+        output = _play(positions, velocities, sample_time, p[slots.OUTPUT_GAP])
+    for i in range(output.size):
+        output[i] = sensed(output[i], sample_time * i, p)
+    return output
+
+
+@njit(**INNER)
+def sensed(y: float, time: float, p: np.ndarray) -> float:
+    """Return what the sensor makes of the place that it measures.
+
+    Parameters
+    ----------
+    y : float, [m]
+    time : float, [s]
+    p : ndarray, shape (N_SLOTS,)
+    """
+    if p[slots.OUTPUT_ZERO] != 0.0:
+        y -= p[slots.OUTPUT_ZERO]
+    if p[slots.SENSOR_QUADRATIC] != 0.0 or p[slots.SENSOR_CUBIC] != 0.0:
+        share = y / p[slots.REFERENCE_DISPLACEMENT]
+        y *= 1.0 + (p[slots.SENSOR_QUADRATIC] + p[slots.SENSOR_CUBIC] * share) * share
+    if p[slots.SENSOR_DRIFT] != 0.0:
+        y += p[slots.SENSOR_DRIFT] * time
+    return y
+
+
+@njit(**INNER)
+def _play(
     positions: np.ndarray,
     velocities: np.ndarray,
     sample_time: float,
@@ -15,12 +61,6 @@ def play(
 
     A turning point between two samples pushes further than both of them: it is found on
     the cubic through positions and velocities.
-
-    Parameters
-    ----------
-    positions, velocities : ndarray, shape (n,), [m], [m/s]
-    sample_time : float, [s]
-    half_gap : float, [m]
     """
     followed = np.empty(positions.size)
     y = positions[0]
@@ -36,7 +76,7 @@ def play(
     return followed
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(**INNER)
 def _extreme(x0: float, v0: float, x1: float, v1: float) -> float:
     """Return the turning point of the cubic with these ends and slopes."""
     # Slope of the cubic: a t^2 + b t + v0 for t from 0 to 1.

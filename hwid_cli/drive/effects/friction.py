@@ -1,41 +1,27 @@
-"""Entries of the catalogue: what resists motion. docs/method_diagnosis.md, (D8), (D9)."""
+"""Declarations of effects: what resists motion. docs/method_diagnosis.md, (D8), (D9)."""
 
-from hwid_cli.drive import slots
-from hwid_cli.drive.effect import Effect, Parameter, Rule, Scales
-
-
-def _force(*shares: float) -> Rule:
-    return lambda scales: tuple(share * scales.force_N for share in shares)
-
-
-def _velocity(*shares: float) -> Rule:
-    return lambda scales: tuple(share * scales.velocity_m_per_s for share in shares)
-
-
-def _displacement(*shares: float) -> Rule:
-    return lambda scales: tuple(share * scales.displacement_m for share in shares)
-
-
-def _slow(scales: Scales) -> tuple[float, float]:
-    # Slower than this is not resolved, faster is viscous damping.
-    return 1e-4 * scales.velocity_m_per_s, 0.3 * scales.velocity_m_per_s
-
-
-def _short(scales: Scales) -> tuple[float, float]:
-    # Shorter is Coulomb friction, longer is a spring.
-    return 1e-4 * scales.displacement_m, 0.3 * scales.displacement_m
-
+from hwid_cli.drive.effect import (
+    NOT_NEGATIVE,
+    POSITIVE,
+    Effect,
+    Parameter,
+    shares_of,
+    span_of,
+)
 
 COULOMB = Effect(
     id="coulomb_friction",
     sentence="dry friction of constant size against the motion; holds the drive at rest",
     equation="F = -Fc sgn(v); at rest F balances up to Fc",
     enters="motion",
-    parameters=(Parameter("force_N", _force(0.01, 0.04, 0.12)),),
-    slots=lambda value: {
-        slots.FRICTION_FORWARD: value["force_N"],
-        slots.FRICTION_BACKWARD: value["force_N"],
-    },
+    parameters=(
+        Parameter(
+            "force_N",
+            shares_of("force_N", 0.01, 0.04, 0.12),
+            places=("FRICTION_FORWARD", "FRICTION_BACKWARD"),
+            limits=(NOT_NEGATIVE,),
+        ),
+    ),
     confused_with={
         "output_backlash": "sines of medium frequency, which reverse at speed",
         "hysteresis": "very slow small triangles, which show the way before sliding",
@@ -49,13 +35,19 @@ ASYMMETRIC = Effect(
     equation="F = -Fc+ for v > 0, +Fc- for v < 0",
     enters="motion",
     parameters=(
-        Parameter("force_forward_N", _force(0.02, 0.08)),
-        Parameter("force_backward_N", _force(0.02, 0.08)),
+        Parameter(
+            "force_forward_N",
+            shares_of("force_N", 0.02, 0.08),
+            places=("FRICTION_FORWARD",),
+            limits=(NOT_NEGATIVE,),
+        ),
+        Parameter(
+            "force_backward_N",
+            shares_of("force_N", 0.02, 0.08),
+            places=("FRICTION_BACKWARD",),
+            limits=(NOT_NEGATIVE,),
+        ),
     ),
-    slots=lambda value: {
-        slots.FRICTION_FORWARD: value["force_forward_N"],
-        slots.FRICTION_BACKWARD: value["force_backward_N"],
-    },
     confused_with={
         "coulomb_friction": "the same motion in both directions",
         "constant_load": "long rests in several positions",
@@ -69,16 +61,26 @@ STRIBECK = Effect(
     equation="F = -(Fc + dFs exp(-(v/vs)^2)) sgn(v)",
     enters="motion",
     parameters=(
-        Parameter("force_N", _force(0.02, 0.08)),
-        Parameter("static_excess_N", _force(0.02, 0.08)),
-        Parameter("velocity_m_per_s", _velocity(0.003, 0.01, 0.04, 0.12), _slow),
+        Parameter(
+            "force_N",
+            shares_of("force_N", 0.02, 0.08),
+            places=("FRICTION_FORWARD", "FRICTION_BACKWARD"),
+            limits=(NOT_NEGATIVE,),
+        ),
+        Parameter(
+            "static_excess_N",
+            shares_of("force_N", 0.02, 0.08),
+            places=("STATIC_EXCESS",),
+        ),
+        Parameter(
+            "velocity_m_per_s",
+            shares_of("velocity_m_per_s", 0.003, 0.01, 0.04, 0.12),
+            # Slower than this is not resolved, faster is viscous damping.
+            span_of("velocity_m_per_s", 1e-4, 0.3),
+            places=("STRIBECK_VELOCITY",),
+            limits=(POSITIVE,),
+        ),
     ),
-    slots=lambda value: {
-        slots.FRICTION_FORWARD: value["force_N"],
-        slots.FRICTION_BACKWARD: value["force_N"],
-        slots.STATIC_EXCESS: value["static_excess_N"],
-        slots.STRIBECK_VELOCITY: value["velocity_m_per_s"],
-    },
     confused_with={"coulomb_friction": "slow small triangles, which stick and slip"},
     contains=("coulomb_friction",),
 )
@@ -89,13 +91,21 @@ HYSTERESIS = Effect(
     equation="F = -Fh z, dz/dx = (1 - z sgn(dx)) / zy",
     enters="motion",
     parameters=(
-        Parameter("force_N", _force(0.03, 0.1)),
-        Parameter("yield_m", _displacement(0.003, 0.012, 0.05), _short),
+        Parameter(
+            "force_N",
+            shares_of("force_N", 0.03, 0.1),
+            places=("HYSTERESIS_FORCE",),
+            limits=(NOT_NEGATIVE,),
+        ),
+        Parameter(
+            "yield_m",
+            shares_of("displacement_m", 0.003, 0.012, 0.05),
+            # Shorter is Coulomb friction, longer is a spring.
+            span_of("displacement_m", 1e-4, 0.3),
+            places=("HYSTERESIS_YIELD",),
+            limits=(POSITIVE,),
+        ),
     ),
-    slots=lambda value: {
-        slots.HYSTERESIS_FORCE: value["force_N"],
-        slots.HYSTERESIS_YIELD: value["yield_m"],
-    },
     confused_with={
         "coulomb_friction": "very slow small triangles, which show the way before sliding"
     },
@@ -114,9 +124,9 @@ DRAG = Effect(
                 share * scales.force_N / scales.velocity_m_per_s**2
                 for share in (0.05, 0.2)
             ),
+            places=("DRAG",),
         ),
     ),
-    slots=lambda value: {slots.DRAG: value["drag_N_s2_per_m2"]},
     confused_with={
         "voltage_limit": "the same speed at small current, such as after a release"
     },

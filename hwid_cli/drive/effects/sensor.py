@@ -1,10 +1,9 @@
-"""Entries of the catalogue: what the sensor of the output does.
+"""Declarations of effects: what the sensor of the output does.
 
 docs/method_diagnosis.md, eq. (D14).
 """
 
-from hwid_cli.drive import slots
-from hwid_cli.drive.effect import Effect, Parameter
+from hwid_cli.drive.effect import POSITIVE, Effect, Parameter, shares_of, span_of
 
 BACKLASH = Effect(
     id="output_backlash",
@@ -14,13 +13,12 @@ BACKLASH = Effect(
     parameters=(
         Parameter(
             "half_gap_m",
-            lambda scales: tuple(
-                share * scales.displacement_m for share in (0.003, 0.012, 0.05)
-            ),
-            lambda scales: (1e-5 * scales.displacement_m, 0.4 * scales.displacement_m),
+            shares_of("displacement_m", 0.003, 0.012, 0.05),
+            span_of("displacement_m", 1e-5, 0.4),
+            places=("OUTPUT_GAP",),
+            limits=(POSITIVE,),
         ),
     ),
-    slots=lambda value: {slots.OUTPUT_GAP: value["half_gap_m"]},
     confused_with={
         "coulomb_friction": "sines of medium frequency, which reverse at speed",
         "gear_backlash": "reversals with the spring unloaded",
@@ -38,9 +36,9 @@ QUADRATIC = Effect(
             lambda scales: (-0.05, 0.05),
             lambda scales: (-0.45, 0.45),
             is_positive=False,
+            places=("SENSOR_QUADRATIC",),
         ),
     ),
-    slots=lambda value: {slots.SENSOR_QUADRATIC: value["coefficient"]},
     confused_with={
         "supply_sag": "a step of the other sign",
         "quadratic_stiffness": "a sine near resonance",
@@ -58,9 +56,9 @@ CUBIC = Effect(
             lambda scales: (-0.06, 0.06),
             lambda scales: (-0.3, 2.0),
             is_positive=False,
+            places=("SENSOR_CUBIC",),
         ),
     ),
-    slots=lambda value: {slots.SENSOR_CUBIC: value["coefficient"]},
     confused_with={
         "force_constant_saturation": "a sine near resonance",
         "cubic_stiffness": "a sine near resonance",
@@ -80,9 +78,9 @@ DRIFT = Effect(
                 for share in (-0.05, 0.05)
             ),
             is_positive=False,
+            places=("SENSOR_DRIFT",),
         ),
     ),
-    slots=lambda value: {slots.SENSOR_DRIFT: value["drift_m_per_s"]},
     confused_with={"constant_load": "long rests at the start and at the end"},
 )
 

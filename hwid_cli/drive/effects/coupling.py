@@ -1,24 +1,21 @@
-"""Entries of the catalogue: what adds a motion or a force of its own.
+"""Declarations of effects: what adds a motion or a force of its own.
 
 docs/method_diagnosis.md, eq. (D11) to (D13).
 """
 
 from math import pi
 
-from hwid_cli.drive import slots
-from hwid_cli.drive.effect import Effect, Parameter, Rule, Scales, Values
-
-
-def _displacement(*shares: float) -> Rule:
-    return lambda scales: tuple(share * scales.displacement_m for share in shares)
-
-
-def _force(*shares: float) -> Rule:
-    return lambda scales: tuple(share * scales.force_N for share in shares)
-
-
-def _gap(scales: Scales) -> tuple[float, float]:
-    return 1e-5 * scales.displacement_m, 0.5 * scales.displacement_m
+from hwid_cli.drive.effect import (
+    NOT_NEGATIVE,
+    POSITIVE,
+    Effect,
+    Limit,
+    Parameter,
+    Scales,
+    Values,
+    shares_of,
+    span_of,
+)
 
 
 def _frequencies(scales: Scales) -> tuple[float, ...]:
@@ -28,14 +25,20 @@ def _frequencies(scales: Scales) -> tuple[float, ...]:
     )
 
 
-def _mode_slots(value: Values) -> dict[int, float]:
-    mass, turn = value["mass_kg"], 2 * pi * value["frequency_Hz"]
-    return {
-        slots.MODE_MASS: mass,
-        slots.MODE_STIFFNESS: mass * turn**2,
-        slots.MODE_DAMPING: 2 * value["damping_ratio"] * mass * turn,
-    }
+def _mode_stiffness(value: Values) -> float:
+    return value["mass_kg"] * _turn(value) ** 2
 
+
+def _mode_damping(value: Values) -> float:
+    return 2 * value["damping_ratio"] * value["mass_kg"] * _turn(value)
+
+
+def _turn(value: Values) -> float:
+    return 2 * pi * value["frequency_Hz"]
+
+
+# The load has the rest.
+_BELOW_WHOLE = Limit("a share of the mass below 1", lambda value: value < 1)
 
 GEAR = Effect(
     id="gear_backlash",
@@ -44,35 +47,38 @@ GEAR = Effect(
     "T = kg (xm - x -+ g) + cg (xm' - x') while it pushes, else 0",
     enters="motion",
     parameters=(
-        Parameter("half_gap_m", _displacement(0.003, 0.012, 0.04), _gap),
+        Parameter(
+            "half_gap_m",
+            shares_of("displacement_m", 0.003, 0.012, 0.04),
+            span_of("displacement_m", 1e-5, 0.5),
+            places=("GEAR_GAP",),
+            limits=(POSITIVE,),
+        ),
         Parameter(
             "stiffness_N_per_m",
-            lambda scales: (50 * scales.stiffness_N_per_m,),
-            lambda scales: (
-                3 * scales.stiffness_N_per_m,
-                2000 * scales.stiffness_N_per_m,
-            ),
+            shares_of("stiffness_N_per_m", 50),
+            span_of("stiffness_N_per_m", 3, 2000),
+            places=("GEAR_STIFFNESS",),
+            limits=(POSITIVE,),
         ),
         Parameter(
             "motor_share",
             lambda scales: (0.2, 0.45),
             lambda scales: (0.05, 0.95),
-            is_reported=False,
+            places=("MOTOR_SHARE",),
+            default=0.5,
+            limits=(POSITIVE, _BELOW_WHOLE),
         ),
         # Without any, the teeth rattle chaotically.
         Parameter(
             "contact_damping_ratio",
             lambda scales: (0.15,),
             lambda scales: (1e-3, 1.0),
-            is_reported=False,
+            places=("GEAR_DAMPING_RATIO",),
+            default=0.0,
+            limits=(NOT_NEGATIVE,),
         ),
     ),
-    slots=lambda value: {
-        slots.GEAR_GAP: value["half_gap_m"],
-        slots.GEAR_STIFFNESS: value["stiffness_N_per_m"],
-        slots.MOTOR_SHARE: value.get("motor_share", 0.5),
-        slots.GEAR_DAMPING_RATIO: value.get("contact_damping_ratio", 0.0),
-    },
     confused_with={
         "output_backlash": "reversals with the spring unloaded",
         "input_delay": "large and small reversals",
@@ -87,17 +93,25 @@ MODE = Effect(
     parameters=(
         Parameter(
             "mass_kg",
-            lambda scales: (0.15 * scales.mass_kg,),
-            lambda scales: (1e-3 * scales.mass_kg, 3 * scales.mass_kg),
+            shares_of("mass_kg", 0.15),
+            span_of("mass_kg", 1e-3, 3),
+            places=("MODE_MASS",),
+            limits=(POSITIVE,),
         ),
         Parameter(
             "frequency_Hz",
             _frequencies,
             lambda scales: (0.2 * scales.natural_Hz, 0.45 / scales.sample_time_s),
+            limits=(POSITIVE,),
         ),
-        Parameter("damping_ratio", lambda scales: (0.05,), lambda scales: (1e-4, 2.0)),
+        Parameter(
+            "damping_ratio",
+            lambda scales: (0.05,),
+            lambda scales: (1e-4, 2.0),
+            limits=(NOT_NEGATIVE,),
+        ),
     ),
-    slots=_mode_slots,
+    derived={"MODE_STIFFNESS": _mode_stiffness, "MODE_DAMPING": _mode_damping},
     confused_with={"input_delay": "a multisine over the whole band"},
 )
 
@@ -107,25 +121,25 @@ PERIODIC = Effect(
     equation="F = A sin(2 pi f t + p), p free in every recording",
     enters="motion",
     parameters=(
-        Parameter("amplitude_N", _force(0.03)),
+        Parameter(
+            "amplitude_N", shares_of("force_N", 0.03), places=("PERIODIC_FORCE",)
+        ),
         Parameter(
             "frequency_Hz",
             lambda scales: scales.frequencies_Hz,
             lambda scales: (0.5 / scales.duration_s, 0.5 / scales.sample_time_s),
+            places=("PERIODIC_FREQUENCY",),
+            limits=(POSITIVE,),
         ),
         Parameter(
             "phase_rad",
             lambda scales: (0.0,),
             is_positive=False,
-            is_reported=False,
             is_own=True,
+            places=("PERIODIC_PHASE",),
+            default=0.0,
         ),
     ),
-    slots=lambda value: {
-        slots.PERIODIC_FORCE: value["amplitude_N"],
-        slots.PERIODIC_FREQUENCY: value["frequency_Hz"],
-        slots.PERIODIC_PHASE: value.get("phase_rad", 0.0),
-    },
     confused_with={"cogging": "recordings at rest, where only a force in time goes on"},
     # A free axis drifts off with the phase at the start: that imitates anything.
     needs_spring=True,

@@ -1,0 +1,1 @@
+"""Declarations of effects, one module for each family."""

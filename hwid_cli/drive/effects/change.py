@@ -1,0 +1,37 @@
+"""Declarations of effects: what differs between recordings. docs/method_diagnosis.md.
+
+A configuration states the public effect ``parameter_change``; a diagnosis tries one
+entry for each parameter of the base that may change.
+"""
+
+from hwid_cli.drive.effect import NOT_NEGATIVE, Effect, Parameter, Stated
+from hwid_cli.records.drive import CHANGING
+
+EFFECTS = tuple(
+    Effect(
+        id=f"parameter_change:{which}",
+        sentence=f"the {which.replace('_', ' ')} differs between recordings",
+        equation=f"{which} -> {which} (1 + s_r) in recording r",
+        enters="motion",
+        parameters=(
+            # Relative to the parameter's own value; a logarithm, so that no change is 0.
+            Parameter(
+                f"log_{which}",
+                lambda scales: (0.0,),
+                lambda scales: (-1.5, 1.5),
+                is_positive=False,
+                is_own=True,
+                places=(which.upper(),),
+                is_factor=True,
+                default=0.0,
+            ),
+        ),
+        stated=(
+            Stated("which", words=CHANGING),
+            Stated("spread", limits=(NOT_NEGATIVE,)),
+        ),
+        confused_with={"force_constant_saturation": "repeats of the same recording"},
+        needs_spring=which == "stiffness",
+    )
+    for which in CHANGING
+)
