@@ -1,6 +1,6 @@
 """Which models cover which recordings, read off a table of RMSDs.
 
-All functions take plain tables, so that published ones can be judged by the same rules.
+All functions take plain tables, so that published ones can be scored by the same rules.
 A model's own recordings are those that it was fitted to. They are left out of the
 counts, as in the published matrix: that a model fits what it has seen says little.
 
@@ -122,7 +122,7 @@ HARD_BELOW_SHARE = 0.1
 
 
 @dataclass(frozen=True, eq=False)
-class JudgedModels:
+class ScoredModels:
     """Models, recordings, and how each model did on each recording.
 
     Parameters

@@ -71,7 +71,7 @@ def cross_validate(
     fits : sequence of Fit
         As ``identify_all`` gives them: recording by recording, orders within.
     recordings : sequence of Recording
-        Those that judge.
+        Those that validate.
     """
     tasks = crossval_tasks(fits, recordings, orders)
     done = run_tasks(tasks, settings)
@@ -97,7 +97,7 @@ def cross_validate(
 def crossval_tasks(
     fits: Sequence[Fit], recordings: Sequence[Recording], orders: OrdersOptions
 ) -> tuple[Task, ...]:
-    """List the tasks: for each recording's models, one for each judging recording.
+    """List the tasks: for each recording's models, one for each validation recording.
 
     Parameters
     ----------
@@ -124,7 +124,7 @@ def deviation_tasks(
     Parameters
     ----------
     models : sequence of HammersteinWiener or None
-        All judged in one task; None stands for a failed fit.
+        All scored in one task; None stands for a failed fit.
     recordings : sequence of Recording
         One task for each.
     contents : sequence of str
@@ -255,17 +255,17 @@ def _tables(context: Context, result: CrossValidation) -> list[str]:
 def _plan(planning: Planning) -> tuple[StagePlan, ...]:
     experiment = planning.experiment
     chosen = recordings_with_models(planning.recordings, experiment)
-    judges = _validation(planning.recordings, experiment)
+    validation = _validation(planning.recordings, experiment)
     fits, n_stored = stored_fits(experiment, chosen, planning.store)
     n_models = len(chosen) * len(candidate_orders(experiment.orders))
-    pairs, done = len(chosen) * len(judges), 0
+    pairs, done = len(chosen) * len(validation), 0
     if n_stored == n_models:
-        tasks = crossval_tasks(fits, judges, experiment.orders)
+        tasks = crossval_tasks(fits, validation, experiment.orders)
         done = sum(planning.store.get(one.key, Deviations) is not None for one in tasks)
-    samples = n_models * sum(one.n_samples for one in judges) * (1 - done / pairs)
+    samples = n_models * sum(one.n_samples for one in validation) * (1 - done / pairs)
     what = (
-        f"{counted(n_models, 'model')} on {counted(len(judges), 'recording')} = "
-        f"{counted(n_models * len(judges), 'validation')} in {counted(pairs, 'task')}"
+        f"{counted(n_models, 'model')} on {counted(len(validation), 'recording')} = "
+        f"{counted(n_models * len(validation), 'validation')} in {counted(pairs, 'task')}"
     )
     seconds = SECONDS_PER_SIMULATED_SAMPLE * samples / min(planning.workers, pairs)
     return (StagePlan(NAME, what, pairs, done, seconds, PAIR_BYTES * pairs),)

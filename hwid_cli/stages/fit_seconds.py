@@ -35,7 +35,7 @@ _MOST_TIMED = 10_000
 # Time of a grid's fit against that of one alone from nothing: in the rounds in which fits
 # are searched for too, in the later ones, and both for groups that begin with the models
 # of their members (docs/benchmarks.md, "A campaign" and "Groups of recordings"), [-].
-_SEARCHED, _GROWN, _WARM_SEARCHED, _WARM_GROWN = 0.5, 0.2, 0.25, 0.1
+_SEARCHED, _CONTINUED, _WARM_SEARCHED, _WARM_CONTINUED = 0.5, 0.2, 0.25, 0.1
 # Simulating one model on one sample, its initial state included (docs/benchmarks.md: 1 ms
 # for 7500 samples on two cores), [s].
 SECONDS_PER_SIMULATED_SAMPLE = 2.7e-7
@@ -169,10 +169,10 @@ def share_of_round(
     """
     searched = SEARCHED_ROUNDS_OF_GROUPS if of_group else SEARCHED_ROUNDS
     if is_warm:
-        return _WARM_SEARCHED if number < searched else _WARM_GROWN
+        return _WARM_SEARCHED if number < searched else _WARM_CONTINUED
     if number == 0:
         return 1.0
-    return _SEARCHED if number < searched else _GROWN
+    return _SEARCHED if number < searched else _CONTINUED
 
 
 def grid_seconds(

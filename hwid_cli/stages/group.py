@@ -160,7 +160,7 @@ def search_groups(
     score : callable
         Called once for each level.
     n_validate : int, [-]
-        Recordings that judge.
+        Validation recordings.
     is_ordered : bool
         Whether 6-8 and 8-6 are two groups.
     """
@@ -179,7 +179,11 @@ def search_groups(
         levels.append(Level(best, sum(one.coverage == best for one in level)))
         flags = kept(level, options.keep, turn) if turn >= 0 else [True] * len(level)
         reason = reason_to_stop(levels, options.max_level, n_validate)
-        new = [] if reason else _grown(level, flags, candidates, is_ordered=is_ordered)
+        new = (
+            []
+            if reason
+            else _joined_groups(level, flags, candidates, is_ordered=is_ordered)
+        )
         if not reason and not new:
             reason = "no group that goes on can grow" if any(flags) else _none(best)
         groups += [
@@ -236,7 +240,7 @@ def reason_to_stop(levels: Sequence[Level], max_level: int, n_validate: int) -> 
     max_level : int, [-]
         Largest number of recordings in a group.
     n_validate : int, [-]
-        Recordings that judge; a group that covers all of them cannot be surpassed.
+        Validation recordings; a group that covers all of them cannot be surpassed.
 
     Returns
     -------
@@ -263,7 +267,7 @@ def reason_to_stop(levels: Sequence[Level], max_level: int, n_validate: int) -> 
     return ""
 
 
-def _grown(
+def _joined_groups(
     level: Sequence[Group],
     flags: Sequence[bool],
     candidates: Sequence[str],
@@ -378,7 +382,7 @@ def fit_level(
     return [[fits[place] for place in range(len(grid))] for fits in found]
 
 
-def judging_task(plan: GroupPlan, fit: Fit) -> Task:
+def scoring_task(plan: GroupPlan, fit: Fit) -> Task:
     """Task that works out the standard errors of a group's best model.
 
     Parameters
@@ -407,7 +411,7 @@ def judging_task(plan: GroupPlan, fit: Fit) -> Task:
     )
 
 
-def judged(fit: Fit, found: Fit) -> Fit:
+def scored(fit: Fit, found: Fit) -> Fit:
     """Fit with the standard errors that its task found.
 
     Parameters
@@ -563,18 +567,18 @@ def _validate_level(
 
     NaN for models above the threshold on their own recordings: they are not simulated.
     """
-    judges = [one for one in plan.recordings if one.name in plan.validate]
-    contents = [recording_key(one) for one in judges]
+    validation = [one for one in plan.recordings if one.name in plan.validate]
+    contents = [recording_key(one) for one in validation]
     passing = [_self_passed(plan, of_group) for of_group in fits]
     tasks: list[Task] = []
     for group, models in zip(tried, passing, strict=True):
         if any(model is not None for model in models):
-            tasks += deviation_tasks(models, judges, contents, "+".join(group))
+            tasks += deviation_tasks(models, validation, contents, "+".join(group))
     done = iter(_run_all(run, len(tried[0]), "pairs", tasks))
     return [
-        np.transpose([next(done).result.rmsd for _ in judges])
+        np.transpose([next(done).result.rmsd for _ in validation])
         if any(model is not None for model in models)
-        else np.full((len(models), len(judges)), np.nan)
+        else np.full((len(models), len(validation)), np.nan)
         for models in passing
     ]
 
@@ -584,11 +588,11 @@ def _with_standard_errors(
 ) -> list[_Scored]:
     """The same, with the standard errors of every group's best model."""
     best = [one.fit for one in level if one.fit is not None]
-    tasks = [judging_task(plan, one) for one in best]
+    tasks = [scoring_task(plan, one) for one in best]
     size = len(level[0].group.recordings)
     done = iter(_run_all(run, size, "models", tasks) if tasks else ())
     return [
-        one if one.fit is None else replace(one, fit=judged(one.fit, next(done).result))
+        one if one.fit is None else replace(one, fit=scored(one.fit, next(done).result))
         for one in level
     ]
 

@@ -1,4 +1,4 @@
-"""Judging without outliers, where fits bear outliers too.
+"""Validation without outliers, where fits bear outliers too.
 
 References
 ----------
@@ -27,7 +27,7 @@ ROUNDS = 2
 def cross_validate_without_outliers(
     fits: Sequence[Fit],
     crossval: CrossValidation,
-    judges: Sequence[Recording],
+    validation: Sequence[Recording],
     orders: OrdersOptions,
     settings: RunSettings,
 ) -> tuple[CrossValidation, tuple[int, ...]]:
@@ -39,13 +39,13 @@ def cross_validate_without_outliers(
         Of which the cross-validation was made.
     crossval : CrossValidation
         With the outliers.
-    judges : sequence of Recording
-        Those that judge there.
+    validation : sequence of Recording
+        The validation recordings there.
 
     Returns
     -------
     n_outliers : tuple of int, [samples]
-        In each judging recording.
+        In each validation recording.
     """
     options = CrossvalOptions(threshold=crossval.threshold)
 
@@ -55,35 +55,35 @@ def cross_validate_without_outliers(
 
     table = crossval.rmsd.reshape(len(fits), -1)
     models = [fit.model for fit in fits]
-    table, n_outliers = without_outliers(models, table, judges, score)
+    table, n_outliers = without_outliers(models, table, validation, score)
     return replace(crossval, rmsd=table.reshape(crossval.rmsd.shape)), n_outliers
 
 
 def without_outliers(
     models: Sequence[HammersteinWiener | None],
     rmsd: np.ndarray,
-    judges: Sequence[Recording],
+    validation: Sequence[Recording],
     score: Callable[[Sequence[Recording]], np.ndarray],
 ) -> tuple[np.ndarray, tuple[int, ...]]:
     """RMSDs on recordings whose outliers the model that comes closest has replaced.
 
     Parameters
     ----------
-    rmsd : ndarray, shape (n_models, n_judges), [output unit]
+    rmsd : ndarray, shape (n_models, n_validation), [output unit]
         On the recordings as they are; NaN where there is none.
     score : callable
         From recordings to RMSDs like these.
 
     Returns
     -------
-    rmsd : ndarray, shape (n_models, n_judges), [output unit]
+    rmsd : ndarray, shape (n_models, n_validation), [output unit]
     n_outliers : tuple of int, [samples]
         In each recording; none where no model has an RMSD.
     """
     for _ in range(ROUNDS):
         repaired = [
             _repaired(one, models, column)
-            for one, column in zip(judges, rmsd.T, strict=True)
+            for one, column in zip(validation, rmsd.T, strict=True)
         ]
         rmsd = score([one for one, _ in repaired])
     return rmsd, tuple(count for _, count in repaired)

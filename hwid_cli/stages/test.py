@@ -41,7 +41,7 @@ from hwid_cli.records.recordings import Recording
 from hwid_cli.records.results import CrossValidation
 from hwid_cli.report import final_test_tables
 from hwid_cli.stages.coverage_matrix import (
-    JudgedModels,
+    ScoredModels,
     are_hard_to_cover,
     assign,
     count_covered_by,
@@ -67,7 +67,7 @@ from hwid_cli.tasks.runner import RunSettings, Task, run_tasks
 
 
 def predict_all(
-    judged: JudgedModels, distances: np.ndarray, is_known: np.ndarray
+    scored: ScoredModels, distances: np.ndarray, is_known: np.ndarray
 ) -> tuple[Prediction, ...]:
     """Predict the model for each recording as if it were new.
 
@@ -82,7 +82,7 @@ def predict_all(
 
     Parameters
     ----------
-    judged : JudgedModels
+    scored : ScoredModels
         The models to choose from, on all recordings.
     distances : ndarray, shape (n_recordings, n_recordings), [-]
         Between the inputs of the recordings.
@@ -97,8 +97,8 @@ def predict_all(
         from, its name is empty and its number NaN.
     """
     return tuple(
-        _predict(judged, number, _nearest(distances[number], is_known, number))
-        for number in range(len(judged.recordings))
+        _predict(scored, number, _nearest(distances[number], is_known, number))
+        for number in range(len(scored.recordings))
     )
 
 
@@ -115,11 +115,11 @@ def _nearest(
 
 
 def _predict(
-    judged: JudgedModels, number: int, neighbour: tuple[int, float]
+    scored: ScoredModels, number: int, neighbour: tuple[int, float]
 ) -> Prediction:
     nearest, distance = neighbour
     # Models that are fitted to the recording are blanked, not dropped: places stay.
-    eligible = np.where(judged.is_own[:, number, np.newaxis], np.nan, judged.rmsd)
+    eligible = np.where(scored.is_own[:, number, np.newaxis], np.nan, scored.rmsd)
     serving = assign(eligible)
     chosen = -1 if nearest < 0 else int(serving[nearest])
     best = int(serving[number])
@@ -129,15 +129,15 @@ def _predict(
         for model in (chosen, best)
     )
     return Prediction(
-        recording=judged.recordings[number],
-        nearest="" if nearest < 0 else judged.recordings[nearest],
+        recording=scored.recordings[number],
+        nearest="" if nearest < 0 else scored.recordings[nearest],
         distance=distance,
-        model="" if chosen < 0 else judged.models[chosen],
+        model="" if chosen < 0 else scored.models[chosen],
         rmsd=rmsd,
-        best_model="" if best < 0 else judged.models[best],
+        best_model="" if best < 0 else scored.models[best],
         best_rmsd=best_rmsd,
-        is_right=rmsd < judged.threshold,
-        is_possible=best_rmsd < judged.threshold,
+        is_right=rmsd < scored.threshold,
+        is_possible=best_rmsd < scored.threshold,
     )
 
 
@@ -245,7 +245,7 @@ STAGE_VERSION = 2
 
 @dataclass(frozen=True, eq=False)
 class FinalModels:
-    """The models that the final test judges.
+    """The models that the final test scores.
 
     Parameters
     ----------
@@ -270,7 +270,7 @@ class FinalModels:
 def final_models(
     fits: Sequence[Fit], crossval: CrossValidation, search: GroupSearch | None
 ) -> FinalModels:
-    """Choose the models to judge.
+    """Choose the models to score.
 
     Parameters
     ----------
@@ -317,7 +317,7 @@ def final_models(
     )
 
 
-def judge_models(
+def score_final_models(
     models: FinalModels,
     recordings: Sequence[Recording],
     tested_on: Sequence[str],
@@ -342,8 +342,8 @@ def judge_models(
         [[name in fit.identified_on for name in names] for fit in models.fits],
         dtype=bool,
     ).reshape(rmsd.shape)
-    return judge_table(
-        JudgedModels(models.names, names, rmsd, is_own, threshold),
+    return score_table(
+        ScoredModels(models.names, names, rmsd, is_own, threshold),
         chain=models.chain,
         tested_on=tested_on,
         distances=input_distances([recording.input for recording in recordings]),
@@ -351,8 +351,8 @@ def judge_models(
     )
 
 
-def judge_table(
-    judged: JudgedModels,
+def score_table(
+    scored: ScoredModels,
     *,
     chain: Sequence[str],
     tested_on: Sequence[str],
@@ -372,32 +372,32 @@ def judge_table(
     unit : str
         Of the output.
     """
-    names, covered = judged.recordings, judged.covered
-    chosen = smallest_set(judged.rmsd, judged.threshold)
+    names, covered = scored.recordings, scored.covered
+    chosen = smallest_set(scored.rmsd, scored.threshold)
     in_set = replace(
-        judged,
-        models=tuple(judged.models[n] for n in chosen),
-        rmsd=judged.rmsd[chosen],
-        is_own=judged.is_own[chosen],
+        scored,
+        models=tuple(scored.models[n] for n in chosen),
+        rmsd=scored.rmsd[chosen],
+        is_own=scored.is_own[chosen],
     )
     is_known = ~np.isin(names, tested_on)
     return FinalTest(
-        models=judged.models,
+        models=scored.models,
         chain=tuple(chain),
         recordings=names,
         tested_on=_named(names, ~is_known),
-        rmsd=judged.rmsd,
-        is_own=judged.is_own,
-        covers=count_covers(covered, judged.is_own),
-        covered_by=count_covered_by(covered, judged.is_own),
+        rmsd=scored.rmsd,
+        is_own=scored.is_own,
+        covers=count_covers(covered, scored.is_own),
+        covered_by=count_covered_by(covered, scored.is_own),
         uncovered=_named(names, np.sum(covered, axis=0) == 0),
-        hard_to_cover=_named(names, are_hard_to_cover(covered, judged.is_own)),
-        assigned=_assigned(judged),
+        hard_to_cover=_named(names, are_hard_to_cover(covered, scored.is_own)),
+        assigned=_assigned(scored),
         smallest_set=in_set.models,
         assigned_in_set=_assigned(in_set),
         predictions=predict_all(in_set, distances, is_known),
         unit=unit,
-        threshold=judged.threshold,
+        threshold=scored.threshold,
     )
 
 
@@ -469,9 +469,9 @@ def _named(names: Sequence[str], chosen: np.ndarray) -> tuple[str, ...]:
     return tuple(name for name, is_it in zip(names, chosen, strict=True) if is_it)
 
 
-def _assigned(judged: JudgedModels) -> tuple[str, ...]:
+def _assigned(scored: ScoredModels) -> tuple[str, ...]:
     """Name the best model for each recording; empty where there is none."""
-    return tuple("" if n < 0 else judged.models[n] for n in assign(judged.rmsd))
+    return tuple("" if n < 0 else scored.models[n] for n in assign(scored.rmsd))
 
 
 @dataclass(frozen=True, eq=False)
@@ -520,7 +520,7 @@ def _options(experiment: Experiment) -> FinalTestOptions:
 
 def _compute(given: _Given, runner: Runner) -> FinalTest:
     with runner.tasks(len(given.recordings), "recordings") as settings:
-        return judge_models(
+        return score_final_models(
             given.models, given.recordings, given.tested_on, given.threshold, settings
         )
 

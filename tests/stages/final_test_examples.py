@@ -4,8 +4,8 @@ from functools import cache
 
 import numpy as np
 
-from hwid_cli.stages.coverage_matrix import JudgedModels
-from hwid_cli.stages.test import judge_table
+from hwid_cli.stages.coverage_matrix import ScoredModels
+from hwid_cli.stages.test import score_table
 
 STEPS = tuple(f"step_{n:02d}" for n in range(1, 16))
 SINES = tuple(f"sine_{n:02d}" for n in range(1, 24))
@@ -30,8 +30,8 @@ def example_final_test(seed=1, n_chain=4):
         rng.lognormal(np.log(0.03), 0.7, is_own.shape),
     )
     rmsd[1, 20] = np.nan
-    return judge_table(
-        JudgedModels(models, recordings, rmsd, is_own, 0.01),
+    return score_table(
+        ScoredModels(models, recordings, rmsd, is_own, 0.01),
         chain=models[len(models) - n_chain :],
         tested_on=TESTED_ON,
         distances=rng.uniform(0, 1, (38, 38)),

@@ -4,7 +4,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from hwid_cli.stages.coverage_matrix import (
-    JudgedModels,
+    ScoredModels,
     are_hard_to_cover,
     assign,
     count_covered_by,
@@ -48,7 +48,7 @@ def test_without_another_model_nothing_is_called_hard():
 
 def test_covered_is_strictly_below_the_threshold_and_never_missing():
     rmsd = np.array([[0.0099, 0.01, np.nan]])
-    judged = JudgedModels(("a/1/1",), ("a", "b", "c"), rmsd, rmsd < 0, 0.01)
+    judged = ScoredModels(("a/1/1",), ("a", "b", "c"), rmsd, rmsd < 0, 0.01)
 
     assert judged.covered.tolist() == [[True, False, False]]
 

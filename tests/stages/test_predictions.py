@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from hwid_cli.stages.coverage_matrix import JudgedModels
+from hwid_cli.stages.coverage_matrix import ScoredModels
 from hwid_cli.stages.test import predict_all
 
 RECORDINGS = ("a", "b", "c", "t")
@@ -21,7 +21,7 @@ IS_OWN = np.eye(3, 4, dtype=bool)
 
 
 def predict(rmsd=RMSD, is_own=IS_OWN, distances=DISTANCES, is_known=IS_KNOWN):
-    judged = JudgedModels(MODELS[: len(rmsd)], RECORDINGS, rmsd, is_own, 0.01)
+    judged = ScoredModels(MODELS[: len(rmsd)], RECORDINGS, rmsd, is_own, 0.01)
     told = predict_all(judged, distances, is_known)
     return {prediction.recording: prediction for prediction in told}
 

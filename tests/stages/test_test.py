@@ -8,14 +8,14 @@ from hwid_cli.records.experiment import CrossvalOptions, OrdersOptions
 from hwid_cli.records.groups import Group, GroupSearch
 from hwid_cli.records.model import Fit, FitOptions, HammersteinWiener, Orders, StaticMap
 from hwid_cli.records.recordings import Recording
-from hwid_cli.stages.coverage_matrix import JudgedModels
+from hwid_cli.stages.coverage_matrix import ScoredModels
 from hwid_cli.stages.crossval import cross_validate
 from hwid_cli.stages.test import (
     chain_trend,
     final_models,
     final_test_key,
-    judge_models,
-    judge_table,
+    score_final_models,
+    score_table,
 )
 from hwid_cli.tasks.cache import MemoryStore
 from hwid_cli.tasks.runner import RunSettings, Workers
@@ -122,7 +122,7 @@ def test_a_level_without_a_model_is_left_out():
 def judged(store=None, jobs=1, on_done=None, search=None):
     models = final_models(FITS, crossval_of(), search or search_of(PAIR))
     settings = settings_of(store, jobs, on_done)
-    return judge_models(models, RECORDINGS, ["t"], THRESHOLD, settings)
+    return score_final_models(models, RECORDINGS, ["t"], THRESHOLD, settings)
 
 
 def test_every_model_is_judged_on_every_recording():
@@ -210,8 +210,8 @@ def test_all_that_the_result_depends_on_alters_the_key(changes):
 def test_a_table_where_nothing_is_covered_gives_an_empty_set():
     rmsd = np.ones((2, 3))
     rmsd[:, 2] = np.nan
-    final = judge_table(
-        JudgedModels(("a/1/1", "b/1/1"), ("a", "b", "c"), rmsd, rmsd < 0, 0.01),
+    final = score_table(
+        ScoredModels(("a/1/1", "b/1/1"), ("a", "b", "c"), rmsd, rmsd < 0, 0.01),
         chain=(),
         tested_on=(),
         distances=np.zeros((3, 3)),
