@@ -14,7 +14,7 @@ DEV := $(VENV)/installed-dev
         bench bench-campaign bench-growth bench-maps bench-rounds bench-search bench-starts bench-wide \
         bench-real scale \
         simulate calibrate identify crossval group test-stage steps model1 model2 \
-        reproduction thesis chapter2 hsm150 diagnose gun real effects drive-source export-check blind
+        reproduction thesis chapter2 hsm150 diagnose gun real effects drive-source model-schema export-check blind
 
 help:  ## show these targets
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / {printf "  make %-14s %s\n", $$1, $$2}' Makefile
@@ -161,6 +161,9 @@ effects: $(RUN)  ## docs/effects.md from the catalogue
 
 drive-source: $(RUN)  ## the C form of the drive's compiled loops, for hwid export
 	$(BIN)/python tools/drive_source.py
+
+model-schema: $(RUN)  ## what the kinds of static map say, in the JSON Schema of exported models
+	$(BIN)/python tools/model_schema.py
 
 export-check: $(DEV)  ## every format of hwid export against hwid predict: the table of docs/export.md
 	$(BIN)/python -m tests.benchmarks.export_check

@@ -4,16 +4,6 @@ References
 ----------
 docs/method.md, section "What a fit reports".
 
-Piecewise linear maps where no sample has been: as straight as the data allow.
-
-What a search leaves there depends on where it began: data without noise stop it before
-the prior has any say. Of all values that agree with the map wherever a sample has been,
-those with the smallest bends are taken. Positions stay.
-
-References
-----------
-docs/method.md, section "Where no sample has been".
-
 Where a static map folds: turns back, so that two arguments give one value.
 
 A map that folds is legitimate, such as that of a sensor that rectifies, but the position
@@ -35,8 +25,6 @@ from hwid_cli.model.extrapolation import continued
 from hwid_cli.model.levenberg_marquardt import Search
 from hwid_cli.model.linear_block import poles
 from hwid_cli.model.map_curve import map_curve
-from hwid_cli.model.maps.break_points import bends
-from hwid_cli.model.maps.piecewise_linear import break_points_and_values
 from hwid_cli.model.normalise import normalise, rescaled
 from hwid_cli.model.placing import with_maps
 from hwid_cli.model.points import before_output_map, point_of
@@ -44,73 +32,6 @@ from hwid_cli.model.problem import Problem, joined
 from hwid_cli.model.uncertainty import NOT_WORKED_OUT, judged_parameters
 from hwid_cli.records.model import Fit, FitOptions, StaticMap
 from hwid_cli.records.recordings import Recording
-
-# Share of a segment over which its samples must spread to tell its slope, and strength
-# of a direction, as a share of the strongest, below which the samples do not see it.
-_LEAST_SPREAD, _UNSEEN = 1e-3, 1e-6
-
-
-def straightened(one: StaticMap, argument: np.ndarray) -> StaticMap:
-    """Same map where samples have been, with the smallest bends elsewhere.
-
-    Parameters
-    ----------
-    one : StaticMap
-        Kinds other than piecewise linear come back as they are.
-    argument : ndarray, shape (n,)
-        What reaches the map.
-
-    Returns
-    -------
-    StaticMap
-        The same one where samples tell the slope of every segment.
-
-    Examples
-    --------
-    >>> bent = StaticMap("piecewise_linear", np.array([0.0, 1, 2, 3, 0, 1, 9, 3]))
-    >>> straightened(bent, np.array([0.0, 0.5, 1.0, 3.0])).parameters[4:].round(6)
-    array([0., 1., 2., 3.])
-    """
-    if one.kind != "piecewise_linear" or one.parameters.size < 6:
-        return one
-    points, values = break_points_and_values(one)
-    if not np.isfinite(argument).all():
-        return one
-    levels = np.sort(argument)
-    if _is_told(points, levels):
-        return one
-    seen = _shares(points, np.unique(levels))
-    _, strength, directions = np.linalg.svd(np.linalg.qr(seen, mode="r"))
-    rank = int(np.sum(strength > _UNSEEN * strength[0]))
-    unseen = directions[rank:].T
-    if unseen.shape[1] == 0:
-        return one
-    bend, jacobian = bends(points, values, False)
-    steps = np.linalg.lstsq(jacobian @ unseen, -bend, rcond=None)[0]
-    return replace(one, parameters=np.concatenate([points, values + unseen @ steps]))
-
-
-def _is_told(points: np.ndarray, levels: np.ndarray) -> bool:
-    """Tell whether the samples in every segment spread enough to know its line."""
-    inner = np.searchsorted(levels, points[1:-1], side="left")
-    first, end = np.append(0, inner), np.append(inner, levels.size)
-    if np.any(first == end):
-        return False
-    spread = levels[end - 1] - levels[first]
-    return bool(np.all(spread > _LEAST_SPREAD * np.diff(points)))
-
-
-def _shares(points: np.ndarray, argument: np.ndarray) -> np.ndarray:
-    """How much the value at each break-point counts for a map's values."""
-    segment = np.clip(
-        np.searchsorted(points, argument, side="right") - 1, 0, points.size - 2
-    )
-    share = (argument - points[segment]) / (points[segment + 1] - points[segment])
-    rows = np.zeros((argument.size, points.size))
-    at = np.arange(argument.size)
-    rows[at, segment], rows[at, segment + 1] = 1.0 - share, share
-    return rows
-
 
 # Share of a map's range by which it must turn back; less is the shape of a flat part.
 _LEAST_DEPTH = 0.02
@@ -203,7 +124,9 @@ def described(
     standard_errors : bool
         Whether they are worked out, and the criteria too.
     """
-    candidate = with_maps(search.candidate, problem.experiments, straightened)
+    candidate = with_maps(
+        search.candidate, problem.experiments, static_map.straightened
+    )
     candidate = with_maps(candidate, problem.experiments, static_map.with_domain)
     candidate = _in_units(candidate, problem, recordings[0], blank.options)
     experiments = joined(recordings, blank.options)

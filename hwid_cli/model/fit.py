@@ -466,4 +466,5 @@ def _with_threshold(problem: Problem, search: Search) -> Problem:
 
 
 def _is_linear(options: FitOptions) -> bool:
-    return options.input_map == "none" and options.output_map == "none"
+    kinds = (options.input_map, options.output_map)
+    return all(static_map.RULES[kind].is_identity for kind in kinds)

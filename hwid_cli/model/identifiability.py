@@ -307,8 +307,7 @@ def _sizes(candidate: Candidate, place: Columns) -> np.ndarray:
             of_values = np.ptp(values) or np.max(np.abs(values))
             sizes = np.full(one.parameters.size, of_values)
             sizes[:count] = np.ptp(positions) if count else 0.0
-            if one.kind == "own_function":
-                # Parameters of any kind and unit: each has its own size.
+            if not RULES[one.kind].has_common_sizes:
                 sizes = np.abs(one.parameters)
             size[part] = sizes[sizes.size - (part.stop - part.start) :]
     return np.where(size > 0.0, size, 1.0)

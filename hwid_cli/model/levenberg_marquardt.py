@@ -21,8 +21,7 @@ from scipy.linalg.lapack import dposv
 
 from hwid_cli.model.candidates import Candidate, Columns, Experiment, columns
 from hwid_cli.model.linear_block import difference_basis, is_stable
-from hwid_cli.model.maps.break_points import add_bends, squared_bends_after
-from hwid_cli.model.maps.piecewise_linear import break_points_and_values
+from hwid_cli.model.maps.rule import Prior
 from hwid_cli.model.normal_equations import scaled_equations
 from hwid_cli.model.points import Point, candidate_at, moved, point_of
 from hwid_cli.model.pole_bound import drawn_in, radii_held
@@ -32,6 +31,7 @@ from hwid_cli.model.sensitivities import (
     normal_equations,
     simulated,
 )
+from hwid_cli.model.static_map import RULES
 from hwid_cli.records.model import StaticMap
 
 # Share of the cost that a step must gain, and how many smaller gains in a row end the
@@ -238,10 +238,9 @@ def _squared_bends(point: Point, before: Point) -> float:
         (point.output_map, before.output_map),
         (point.input_map, before.input_map),
     ):
-        if _bends(one):
-            total += squared_bends_after(
-                *break_points_and_values(one), *break_points_and_values(other)
-            )
+        prior = _prior(one)
+        if prior is not None:
+            total += prior.after(one, other)
     return total
 
 
@@ -252,9 +251,10 @@ def _add_prior(system: Equations, point: Point, weight: float, place: Columns) -
         (point.output_map, place.output_map),
         (point.input_map, place.input_map),
     ):
-        if _bends(one):
-            total += add_bends(
-                *break_points_and_values(one),
+        prior = _prior(one)
+        if prior is not None:
+            total += prior.add(
+                one,
                 place.with_positions,
                 weight,
                 system.matrix,
@@ -264,5 +264,7 @@ def _add_prior(system: Equations, point: Point, weight: float, place: Columns) -
     return weight * total
 
 
-def _bends(one: StaticMap) -> bool:
-    return one.kind == "piecewise_linear" and one.parameters.size > 4
+def _prior(one: StaticMap) -> Prior | None:
+    """What holds a map's shape; None where nothing does."""
+    prior = RULES[one.kind].prior
+    return prior if prior is not None and prior.applies(one) else None

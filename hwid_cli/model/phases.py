@@ -12,7 +12,8 @@ from hwid_cli.model import sensitivities
 from hwid_cli.model.candidates import Candidate, Experiment, thinned
 from hwid_cli.model.distinct import WHILE_FIXED, distinct
 from hwid_cli.model.levenberg_marquardt import LEAST_GAIN, PATIENCE, Search, minimise
-from hwid_cli.model.placing import PLACED, coarser, cut, finer, with_maps
+from hwid_cli.model.placing import coarser, cut, finer, with_maps
+from hwid_cli.model.static_map import RULES
 from hwid_cli.records.model import FitOptions, StaticMap
 
 # Iterations at most with fixed break-points, and the share of the cost that a step must
@@ -161,4 +162,4 @@ def standing(candidate: Candidate, experiments: Sequence[Experiment]) -> Search:
 
 def _is_placed(candidate: Candidate) -> bool:
     maps = (candidate.model.input_map, candidate.model.output_map)
-    return any(one.kind in PLACED for one in maps)
+    return any(RULES[one.kind].placing is not None for one in maps)

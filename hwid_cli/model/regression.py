@@ -26,7 +26,7 @@ from hwid_cli.model.linear_block import (
     is_stable,
     reflected,
 )
-from hwid_cli.model.maps.segments import piecewise_linear_shares
+from hwid_cli.model.maps.piecewise_linear import piecewise_linear_shares
 from hwid_cli.records.model import Orders
 
 

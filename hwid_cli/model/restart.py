@@ -41,7 +41,7 @@ _CLOSE = 0.005
 _FAR = 0.5
 # Break-points of maps whose shape other kinds take over.
 _BREAK_POINTS = 15
-_NOT_REPLACED = ("none", "piecewise_linear")
+_STAND_IN = "piecewise_linear"
 # Values by which a start takes over an input map, and an input map of another kind.
 _MAP_POINTS, FINE_MAP_POINTS = 12, 200
 
@@ -117,15 +117,16 @@ def with_break_points(options: FitOptions) -> FitOptions:
     FitOptions
         The same where no map is of another kind.
     """
-    if options.input_map not in _NOT_REPLACED:
-        options = replace(
-            options, input_map="piecewise_linear", input_units=_BREAK_POINTS
-        )
-    if options.output_map not in _NOT_REPLACED:
-        options = replace(
-            options, output_map="piecewise_linear", output_units=_BREAK_POINTS
-        )
+    if _is_replaced(options.input_map):
+        options = replace(options, input_map=_STAND_IN, input_units=_BREAK_POINTS)
+    if _is_replaced(options.output_map):
+        options = replace(options, output_map=_STAND_IN, output_units=_BREAK_POINTS)
     return options
+
+
+def _is_replaced(kind: str) -> bool:
+    # Maps that stand in for others already have as many break-points as were asked for.
+    return kind != _STAND_IN and not static_map.RULES[kind].is_identity
 
 
 def _straight(start: Start, experiments: Sequence[Experiment]) -> Start:

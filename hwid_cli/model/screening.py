@@ -20,7 +20,7 @@ from hwid_cli.model.derivative_rows import local_sums
 from hwid_cli.model.distinct import WHILE_FIXED, distinct
 from hwid_cli.model.levenberg_marquardt import Search, minimise
 from hwid_cli.model.linear_block import as_loops_take_it
-from hwid_cli.model.maps.segments import piecewise_linear_shares
+from hwid_cli.model.maps.piecewise_linear import piecewise_linear_shares
 from hwid_cli.model.points import Point, Signals, all_signals
 from hwid_cli.model.sensitivities import compared
 from hwid_cli.model.starts import Start

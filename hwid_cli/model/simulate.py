@@ -10,7 +10,7 @@ from typing import Literal
 
 import numpy as np
 
-from hwid_cli.model import repeatable, static_map
+from hwid_cli.model import static_map
 from hwid_cli.model.extrapolation import outlined_model
 from hwid_cli.model.linear_block import (
     difference_basis,
@@ -93,7 +93,7 @@ def simulate(
             coefficients = model.free_response
         else:
             coefficients = initial_state
-        return repeatable.evaluate(
+        return static_map.evaluate_repeatably(
             model.output_map,
             _forced(model, signal) + _free(model, coefficients, signal),
         )
@@ -241,7 +241,7 @@ def _state_step(
 
 def _forced(model: HammersteinWiener, signal: np.ndarray) -> np.ndarray:
     return filtered(
-        repeatable.evaluate(model.input_map, signal),
+        static_map.evaluate_repeatably(model.input_map, signal),
         model.numerator,
         model.denominator,
         model.delay,

@@ -1,6 +1,6 @@
 """What one kind of static map must offer."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -42,6 +42,30 @@ def no_corners(static_map: StaticMap) -> np.ndarray:  # noqa: ARG001
     return np.zeros(0)
 
 
+def no_reason(
+    static_map: StaticMap,  # noqa: ARG001 - a rule's signature
+    moved: np.ndarray,  # noqa: ARG001
+    argument: np.ndarray,  # noqa: ARG001
+) -> str:
+    """Tell that a kind knows no reason of its own."""
+    return ""
+
+
+def nothing_derived(static_map: StaticMap) -> dict[str, np.ndarray]:  # noqa: ARG001
+    """Tell that a map's parameters are all that its value needs."""
+    return {}
+
+
+def unchanged(static_map: StaticMap) -> StaticMap:
+    """The map as it is."""
+    return static_map
+
+
+def unchanged_over(static_map: StaticMap, argument: np.ndarray) -> StaticMap:  # noqa: ARG001
+    """The map as it is, whatever reaches it."""
+    return static_map
+
+
 @dataclass(frozen=True, eq=False)
 class Derivatives:
     """Value, slope and derivatives of a static map along a signal.
@@ -71,6 +95,108 @@ class Derivatives:
     def is_local(self) -> bool:
         """Whether some columns are zero at every sample."""
         return self.shares.shape[1] < self.count
+
+
+@dataclass(frozen=True)
+class Placing:
+    """How the corners of a kind are put where they matter.
+
+    Parameters
+    ----------
+    corners : callable (StaticMap) -> ndarray
+        Those that it has.
+    finer : callable (StaticMap, corners, argument) -> StaticMap
+        The same map with these corners beside its own, over the range of the argument.
+    coarser : callable (StaticMap, argument, units) -> StaticMap
+        The map with so many corners, those that it needs most for what reaches it.
+    """
+
+    corners: Callable[[StaticMap], np.ndarray]
+    finer: Callable[[StaticMap, np.ndarray, np.ndarray], StaticMap]
+    coarser: Callable[[StaticMap, np.ndarray, int], StaticMap]
+
+
+@dataclass(frozen=True)
+class Prior:
+    """What a search holds a map's shape with where no data ask for it.
+
+    Parameters
+    ----------
+    applies : callable (StaticMap) -> bool
+    add : callable (StaticMap, with_positions, weight, matrix, vector, first) -> float
+        Adds the rows of the prior to normal equations, the map's parameters beginning
+        at `first`; its unweighted share of the total.
+    after : callable (StaticMap, StaticMap before a step) -> float
+        The unweighted share of the total after the step, as the step saw it.
+    """
+
+    applies: Callable[[StaticMap], bool]
+    add: Callable[[StaticMap, bool, float, np.ndarray, np.ndarray, int], float]
+    after: Callable[[StaticMap, StaticMap], float]
+
+
+@dataclass(frozen=True)
+class Part:
+    """One named part of a map's parameters in a file.
+
+    Parameters
+    ----------
+    size : callable (int) -> int
+        Its length, from the number of all parameters.
+    about : str
+        What its numbers are.
+    least : int
+        Fewest numbers.
+    most : int or None
+    is_rising, is_positive : bool
+        Whether its numbers must rise, and be above zero.
+    """
+
+    name: str
+    size: Callable[[int], int]
+    about: str
+    least: int = 0
+    most: int | None = None
+    is_rising: bool = False
+    is_positive: bool = False
+
+
+@dataclass(frozen=True)
+class Portable:
+    """How maps of a kind leave the program.
+
+    Texts may say ``@side@`` (input or output), ``@domain@``, and of every part and
+    derived part ``@name@`` for its numbers and ``@size_name@`` for their count.
+
+    Parameters
+    ----------
+    parts : tuple of Part
+        One after the other they are the parameters.
+    lengths : str
+        How many numbers the parts must have, for a message.
+    are_limits : bool
+        Whether the one part is a pair, the lower one first.
+    derived : callable (StaticMap) -> mapping of str to ndarray
+        What a program elsewhere should not have to compute.
+    derived_parts : tuple of Part
+        What these are.
+    c : str or None
+        ``static double @side@_map(double v)`` in C99; None where C cannot compute it.
+    matlab : str or None
+        Statements that turn the column ``v`` into values, the parts being fields of
+        ``map``.
+    matlab_function : str
+        A function that these statements call; several kinds may name the same one.
+    """
+
+    parts: tuple[Part, ...] = ()
+    lengths: str = ""
+    are_limits: bool = False
+    derived: Callable[[StaticMap], Mapping[str, np.ndarray]] = nothing_derived
+    derived_parts: tuple[Part, ...] = ()
+    c: str | None = None
+    matlab: str | None = None
+    matlab_function: str = ""
 
 
 @dataclass(frozen=True)
@@ -113,6 +239,26 @@ class MapRule:
     has_slope : bool
         Whether the slope in `differentiate` is that of the map, not a stand-in that
         serves the search only.
+    portable : Portable
+        How maps of the kind leave the program.
+    repeatable : callable (StaticMap, v) -> ndarray, or None
+        The value by the arithmetic that a program elsewhere repeats to the last bit;
+        None where `evaluate` does that.
+    outlined : callable (StaticMap) -> StaticMap
+        The same map, its parameters alone giving its values everywhere.
+    straightened : callable (StaticMap, v) -> StaticMap
+        The map where samples have been, as straight as they allow elsewhere.
+    placing : Placing or None
+        None where a fit leaves corners where a start put them, or there are none.
+    prior : Prior or None
+    why_flat : callable (StaticMap, moved, v) -> str
+        Why the data do not tell the parameters of the indices `moved`, with ``{what}``
+        for the name of v; empty where the kind knows no reason of its own.
+    is_identity : bool
+        Whether the kind is no map at all.
+    has_common_sizes : bool
+        Whether positions have one size and values another; else each parameter has its
+        own.
     """
 
     evaluate: Callable[[StaticMap, np.ndarray], np.ndarray]
@@ -131,3 +277,12 @@ class MapRule:
     held: Callable[[StaticMap], tuple[int, ...]] = none_held
     shifts: bool = False
     has_slope: bool = True
+    portable: Portable = Portable()
+    repeatable: Callable[[StaticMap, np.ndarray], np.ndarray] | None = None
+    outlined: Callable[[StaticMap], StaticMap] = unchanged
+    straightened: Callable[[StaticMap, np.ndarray], StaticMap] = unchanged_over
+    placing: Placing | None = None
+    prior: Prior | None = None
+    why_flat: Callable[[StaticMap, np.ndarray, np.ndarray], str] = no_reason
+    is_identity: bool = False
+    has_common_sizes: bool = True
