@@ -4,9 +4,9 @@ References
 ----------
 docs/method.md, section "What a fit reports".
 
-Where a static map folds: turns back, so that two arguments give one value.
+Where a static map is not monotonic: turns back, so that two arguments give one value.
 
-A map that folds is legitimate, such as that of a sensor that rectifies, but the position
+Such a map is legitimate, such as that of a sensor that rectifies, but the position
 can no longer be told from the output, and no controller can invert it.
 
 References
@@ -28,8 +28,8 @@ from hwid_cli.model.map_curve import map_curve
 from hwid_cli.model.normalise import normalise, rescaled
 from hwid_cli.model.placing import with_maps
 from hwid_cli.model.points import before_output_map, point_of
-from hwid_cli.model.problem import Problem, joined
-from hwid_cli.model.uncertainty import NOT_WORKED_OUT, judged_parameters
+from hwid_cli.model.problem import FitProblem, joined
+from hwid_cli.model.uncertainty import NOT_WORKED_OUT, parameter_statistics
 from hwid_cli.records.model import Fit, FitOptions, StaticMap
 from hwid_cli.records.recordings import Recording
 
@@ -37,7 +37,7 @@ from hwid_cli.records.recordings import Recording
 _LEAST_DEPTH = 0.02
 
 
-def folds(
+def turning_points(
     one: StaticMap,
     *,
     least: float = 0.0,
@@ -55,12 +55,12 @@ def folds(
 
     Returns
     -------
-    ndarray, shape (n_folds,)
+    ndarray, shape (n_turns,)
         Rising; empty for a map that is monotonic.
 
     Examples
     --------
-    >>> folds(StaticMap("polynomial", np.array([0.5, 0.0, 0.5]), (-1.0, 1.0)))
+    >>> turning_points(StaticMap("polynomial", np.array([0.5, 0.0, 0.5]), (-1.0, 1.0)))
     array([0.])
     """
     curve = map_curve(one)
@@ -99,7 +99,7 @@ def _turns(value: np.ndarray, depth: float) -> list[int]:
     return turns
 
 
-# RMSDs by which an output map must turn back to be called folded: less may be noise.
+# RMSDs by which an output map must turn back to be called non-monotonic: less may be noise.
 _TOLD = 2.0
 # Share of the samples at either end of a map that says too little about its shape.
 _RARE = 0.005
@@ -109,7 +109,7 @@ def described(
     blank: Fit,
     search: Search,
     recordings: Sequence[Recording],
-    problem: Problem,
+    problem: FitProblem,
     *,
     standard_errors: bool = True,
 ) -> Fit:
@@ -119,7 +119,7 @@ def described(
     ----------
     blank : Fit
         With the options in the units of the data.
-    problem : Problem
+    problem : FitProblem
         With the last threshold of the search.
     standard_errors : bool
         Whether they are worked out, and the criteria too.
@@ -136,14 +136,14 @@ def described(
     uncertainty, information = NOT_WORKED_OUT
     if standard_errors:
         threshold = problem.experiments[0].threshold * problem.output_scale
-        uncertainty, information = judged_parameters(
+        uncertainty, information = parameter_statistics(
             candidate,
             [replace(one, threshold=threshold) for one in experiments],
             free_break_points=blank.options.free_break_points,
         )
     deviation = scores.rmsd(measured, simulated)
     x = before_output_map(point_of(candidate), experiments)
-    turns = folds(
+    turns = turning_points(
         candidate.model.output_map, least=_TOLD * deviation, between=_usual_range(x)
     )
     return replace(
@@ -171,7 +171,7 @@ def _usual_range(signal: np.ndarray) -> tuple[float, float]:
 
 
 def _in_units(
-    candidate: Candidate, problem: Problem, like: Recording, options: FitOptions
+    candidate: Candidate, problem: FitProblem, like: Recording, options: FitOptions
 ) -> Candidate:
     """Normalised candidate for the data as they are."""
     states = candidate.free_responses

@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from hwid_cli.model import sensitivities
-from hwid_cli.model.candidates import Candidate, Columns, Experiment
+from hwid_cli.model.candidates import Candidate, FitData, JacobianColumns
 from hwid_cli.model.identifiability import Directions, listed, parameter_names
 from hwid_cli.model.static_map import RULES
 from hwid_cli.records.model import HammersteinWiener, StaticMap
@@ -35,7 +35,7 @@ _SAME_OUTPUT = "that hardly changes the simulated output"
 
 def flat_sentences(
     candidate: Candidate,
-    experiments: Sequence[Experiment],
+    experiments: Sequence[FitData],
     found: Directions,
     variance: float,
 ) -> tuple[str, ...]:
@@ -68,7 +68,7 @@ def flat_sentences(
     )
 
 
-def _moves_listed(parts: np.ndarray, place: Columns) -> bool:
+def _moves_listed(parts: np.ndarray, place: JacobianColumns) -> bool:
     """Whether a direction moves more than initial states."""
     return bool(np.abs(parts[listed(place)]).max() >= _NAMED_PART * np.abs(parts).max())
 
@@ -96,7 +96,7 @@ def _weak_parts(found: Directions, variance: float) -> list[tuple[np.ndarray, fl
 
 
 def _map_arguments(
-    candidate: Candidate, experiments: Sequence[Experiment]
+    candidate: Candidate, experiments: Sequence[FitData]
 ) -> dict[str, np.ndarray]:
     """What goes into the two maps, all experiments together."""
     before = replace(candidate, model=replace(candidate.model, output_map=_NO_MAP))
@@ -125,7 +125,7 @@ def _sentence(parts: np.ndarray, spread: str, names: Sequence[str], why: str) ->
 def _why(
     parts: np.ndarray,
     candidate: Candidate,
-    place: Columns,
+    place: JacobianColumns,
     signals: dict[str, np.ndarray],
 ) -> str:
     """Say why a direction is flat, where the reason can be told."""

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from hwid_cli.model import sensitivities
-from hwid_cli.model.candidates import Candidate, Experiment, thinned
+from hwid_cli.model.candidates import Candidate, FitData, thinned
 from hwid_cli.model.distinct import WHILE_FIXED, distinct
 from hwid_cli.model.levenberg_marquardt import LEAST_GAIN, PATIENCE, Search, minimise
 from hwid_cli.model.placing import coarser, cut, finer, with_maps
@@ -28,7 +28,7 @@ _ROWS, _COARSE_GAIN = 2500, 1e-3
 
 def place(
     screened: Sequence[Search],
-    experiments: Sequence[Experiment],
+    experiments: Sequence[FitData],
     options: FitOptions,
 ) -> list[Search]:
     """Go on with fixed break-points, then put them where the maps bend.
@@ -51,7 +51,7 @@ def place(
 
 def _settled(
     found: Search,
-    experiments: Sequence[Experiment],
+    experiments: Sequence[FitData],
     options: FitOptions,
     least_gain: float = _PLACING_GAIN,
 ) -> Search:
@@ -68,7 +68,7 @@ def _settled(
 
 def _placed(
     found: Search,
-    experiments: Sequence[Experiment],
+    experiments: Sequence[FitData],
     options: FitOptions,
     more: Callable[[StaticMap, np.ndarray], StaticMap],
     least_gain: float,
@@ -81,7 +81,7 @@ def _placed(
 
 
 def refine(
-    found: Search, experiments: Sequence[Experiment], options: FitOptions
+    found: Search, experiments: Sequence[FitData], options: FitOptions
 ) -> Search:
     """Cut the segments of maps that were found, and keep what matters most.
 
@@ -104,7 +104,7 @@ def refine(
 
 def finish(
     placed: Search,
-    experiments: Sequence[Experiment],
+    experiments: Sequence[FitData],
     options: FitOptions,
     *,
     least_gain: float = LEAST_GAIN,
@@ -125,7 +125,7 @@ def finish(
 
 def converge(
     near: Search,
-    experiments: Sequence[Experiment],
+    experiments: Sequence[FitData],
     options: FitOptions,
     *,
     least_gain: float = LEAST_GAIN,
@@ -154,7 +154,7 @@ def converge(
     return replace(found, iterations=near.iterations + found.iterations)
 
 
-def standing(candidate: Candidate, experiments: Sequence[Experiment]) -> Search:
+def standing(candidate: Candidate, experiments: Sequence[FitData]) -> Search:
     """Take a candidate for a search that ends where it begins."""
     cost = sensitivities.cost(candidate, experiments)
     return Search(candidate, cost, 0, "converged", "taken over as it is")

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from hwid_cli.model.candidates import Candidate, Experiment
+from hwid_cli.model.candidates import Candidate, FitData
 from hwid_cli.model.points import before_output_map, point_of
 from hwid_cli.model.static_map import RULES
 from hwid_cli.records.model import FitOptions, StaticMap
@@ -23,7 +23,7 @@ _PIECES, _LEAST_CUT = 3, 1e-4
 
 
 def reaching(
-    candidate: Candidate, experiments: Sequence[Experiment]
+    candidate: Candidate, experiments: Sequence[FitData]
 ) -> tuple[np.ndarray, np.ndarray]:
     """Signals that reach the input map and the output map.
 
@@ -38,7 +38,7 @@ def reaching(
 
 def with_maps(
     candidate: Candidate,
-    experiments: Sequence[Experiment],
+    experiments: Sequence[FitData],
     change: Callable[[StaticMap, np.ndarray], StaticMap],
     change_output: Callable[[StaticMap, np.ndarray], StaticMap] | None = None,
 ) -> Candidate:
@@ -61,7 +61,7 @@ def with_maps(
 
 
 def coarser(
-    candidate: Candidate, experiments: Sequence[Experiment], options: FitOptions
+    candidate: Candidate, experiments: Sequence[FitData], options: FitOptions
 ) -> Candidate:
     """Candidate whose maps have as many break-points as asked for."""
     return with_maps(

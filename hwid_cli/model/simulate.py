@@ -177,12 +177,12 @@ def _state_from(
     responses = _free_responses(model, forced.size)
     # Where the free responses have died away, the initial state changes nothing.
     n = responses.shape[0]
-    beginning, measured = forced[:n], output[:n]
+    forced_head, measured = forced[:n], output[:n]
     basis = difference_basis(best.size)
 
     def deviation(coefficients: np.ndarray) -> float:
         # The basis is its own inverse.
-        x = beginning + responses @ (basis @ coefficients)
+        x = forced_head + responses @ (basis @ coefficients)
         residual = measured - static_map.evaluate(model.output_map, x)
         return float(residual @ residual)
 
@@ -192,7 +192,7 @@ def _state_from(
         if of_fit < cost:
             best, cost = model.free_response, of_fit
     for _ in range(_ESTIMATE_ITERATIONS):
-        x = beginning + responses @ (basis @ best)
+        x = forced_head + responses @ (basis @ best)
         step, promised = _state_step(model, x, measured, responses)
         if promised < _LEAST_GAIN * cost:
             break

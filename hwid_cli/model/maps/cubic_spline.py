@@ -69,7 +69,7 @@ def _basis(place: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
     share = place - left
     # Beyond the ends only the slope at the end goes on.
     inside = np.clip(share, 0.0, 1.0)
-    rest, beyond = 1.0 - inside, share - inside
+    rest, outside = 1.0 - inside, share - inside
     rows, bends = np.arange(place.size), _bends(count)
     value, slope = np.zeros((2, place.size, count))
     slope[rows, left], slope[rows, left + 1] = -1.0, 1.0
@@ -78,7 +78,7 @@ def _basis(place: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
     value[rows, left], value[rows, left + 1] = rest, inside
     value += ((rest**3 - rest) / 6.0)[:, None] * bends[left]
     value += ((inside**3 - inside) / 6.0)[:, None] * bends[left + 1]
-    return value + beyond[:, None] * slope, slope
+    return value + outside[:, None] * slope, slope
 
 
 def _evaluate(one: StaticMap, argument: np.ndarray) -> np.ndarray:

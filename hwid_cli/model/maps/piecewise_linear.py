@@ -269,11 +269,11 @@ def piecewise_linear_shares(
             k += 1
         while k > 0 and v < break_points[k]:
             k -= 1
-        beyond = v - break_points[k]
+        past = v - break_points[k]
         first[t] = spacing * k
         slope[t] = slopes[k]
-        value[t] = values[k] + slopes[k] * beyond
-        shares[t, 1] = beyond * widths[k]
+        value[t] = values[k] + slopes[k] * past
+        shares[t, 1] = past * widths[k]
         shares[t, 0] = 1.0 - shares[t, 1]
     return value, slope, first, shares
 
