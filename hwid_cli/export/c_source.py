@@ -8,7 +8,7 @@ from importlib.resources import files
 import numpy as np
 
 from hwid_cli import __version__
-from hwid_cli.export.map_parts import check_language, numbers_of, portable
+from hwid_cli.export.map_parts import language_text, numbers_of, portable
 from hwid_cli.export.names import in_comment
 from hwid_cli.records.exported import ExportedModel, ModelCard
 from hwid_cli.records.maps import StaticMap
@@ -135,7 +135,7 @@ def numbers(values: Iterable[float]) -> str:
 
 
 def _map(side: str, one: StaticMap) -> str:
-    text = check_language(side, one, "C", portable(one.kind).c)
+    text = language_text(side, one, "C", portable(one.kind).c)
     parts = numbers_of(one)
     return _filled(
         text,

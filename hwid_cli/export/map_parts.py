@@ -37,7 +37,7 @@ def numbers_of(one: StaticMap) -> dict[str, np.ndarray]:
     return {**parts_of(one), **portable(one.kind).derived(one)}
 
 
-def check_language(side: str, one: StaticMap, language: str, text: str | None) -> str:
+def language_text(side: str, one: StaticMap, language: str, text: str | None) -> str:
     """Text of a map in a language, refused where there is none.
 
     Parameters

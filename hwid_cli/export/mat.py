@@ -11,7 +11,7 @@ from scipy.io import savemat
 
 from hwid_cli.export.c_source import card_words, filled
 from hwid_cli.export.json_writer import described
-from hwid_cli.export.map_parts import check_language, numbers_of
+from hwid_cli.export.map_parts import language_text, numbers_of
 from hwid_cli.export.names import identifier
 from hwid_cli.files.atomic import replace_file
 from hwid_cli.model.static_map import RULES
@@ -91,7 +91,7 @@ def _variables(exported: ExportedModel) -> dict[str, Any]:
 
 
 def _map(side: str, one: StaticMap) -> dict[str, Any]:
-    check_language(side, one, "MATLAB", RULES[one.kind].portable.matlab)
+    language_text(side, one, "MATLAB", RULES[one.kind].portable.matlab)
     return {"kind": one.kind, **numbers_of(one), "domain": np.array(one.domain)}
 
 

@@ -37,7 +37,19 @@ def differentiate_clip(
     out: np.ndarray,
     first: int,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Value and slope of `clip`, and its derivatives, as a rule gives them."""
+    """Value and slope of `clip`; its derivatives by both limits into two columns.
+
+    Parameters
+    ----------
+    argument : ndarray, shape (n,)
+    out : ndarray, shape (n, at least first + 2)
+    first : int
+        First column to write.
+
+    Returns
+    -------
+    value, slope : ndarray, shape (n,)
+    """
     lower, upper = static_map.parameters
     out[:, first] = argument < lower
     out[:, first + 1] = argument > upper
@@ -67,5 +79,11 @@ def starts_at(
 
 
 def settle(old: StaticMap, parameters: np.ndarray) -> None:  # noqa: ARG001
-    """Keep the lower limit below the upper one."""
+    """Keep the lower limit below the upper one.
+
+    Parameters
+    ----------
+    parameters : ndarray, shape (2,)
+        Put into order in place.
+    """
     parameters.sort()

@@ -13,59 +13,6 @@ Differentiate = Callable[
 ]
 
 
-def no_positions(static_map: StaticMap) -> int:  # noqa: ARG001 - a rule's signature
-    """Tell that all parameters move from the first phase on."""
-    return 0
-
-
-def none_held(static_map: StaticMap) -> tuple[int, ...]:  # noqa: ARG001
-    """Tell that data may determine every parameter."""
-    return ()
-
-
-def keep_proposed(old: StaticMap, parameters: np.ndarray) -> None:
-    """Accept all proposed parameters.
-
-    Parameters
-    ----------
-    parameters : ndarray, shape (n_parameters,)
-    """
-
-
-def no_corners(static_map: StaticMap) -> np.ndarray:  # noqa: ARG001
-    """Tell that a map is smooth.
-
-    Returns
-    -------
-    ndarray, shape (0,)
-    """
-    return np.zeros(0)
-
-
-def no_reason(
-    static_map: StaticMap,  # noqa: ARG001 - a rule's signature
-    moved: np.ndarray,  # noqa: ARG001
-    argument: np.ndarray,  # noqa: ARG001
-) -> str:
-    """Tell that a kind knows no reason of its own."""
-    return ""
-
-
-def nothing_derived(static_map: StaticMap) -> dict[str, np.ndarray]:  # noqa: ARG001
-    """Tell that a map's parameters are all that its value needs."""
-    return {}
-
-
-def unchanged(static_map: StaticMap) -> StaticMap:
-    """The map as it is."""
-    return static_map
-
-
-def unchanged_over(static_map: StaticMap, argument: np.ndarray) -> StaticMap:  # noqa: ARG001
-    """The map as it is, whatever reaches it."""
-    return static_map
-
-
 @dataclass(frozen=True, eq=False)
 class Derivatives:
     """Value, slope and derivatives of a static map along a signal.
@@ -192,7 +139,7 @@ class Portable:
     parts: tuple[Part, ...] = ()
     lengths: str = ""
     are_limits: bool = False
-    derived: Callable[[StaticMap], Mapping[str, np.ndarray]] = nothing_derived
+    derived: Callable[[StaticMap], Mapping[str, np.ndarray]] = lambda one: {}
     derived_parts: tuple[Part, ...] = ()
     c: str | None = None
     matlab: str | None = None
@@ -270,19 +217,21 @@ class MapRule:
     amplify: Callable[[StaticMap, float], StaticMap] | None = None
     compress: Callable[[StaticMap, float], StaticMap] | None = None
     size: Callable[[StaticMap], tuple[float, np.ndarray]] | None = None
-    n_positions: Callable[[StaticMap], int] = no_positions
-    settle: Callable[[StaticMap, np.ndarray], None] = keep_proposed
-    corners: Callable[[StaticMap], np.ndarray] = no_corners
+    n_positions: Callable[[StaticMap], int] = lambda one: 0
+    settle: Callable[[StaticMap, np.ndarray], None] = lambda old, parameters: None
+    corners: Callable[[StaticMap], np.ndarray] = lambda one: np.zeros(0)
     derivatives: Callable[[StaticMap, np.ndarray, bool], Derivatives] | None = None
-    held: Callable[[StaticMap], tuple[int, ...]] = none_held
+    held: Callable[[StaticMap], tuple[int, ...]] = lambda one: ()
     shifts: bool = False
     has_slope: bool = True
     portable: Portable = Portable()
     repeatable: Callable[[StaticMap, np.ndarray], np.ndarray] | None = None
-    outlined: Callable[[StaticMap], StaticMap] = unchanged
-    straightened: Callable[[StaticMap, np.ndarray], StaticMap] = unchanged_over
+    outlined: Callable[[StaticMap], StaticMap] = lambda one: one
+    straightened: Callable[[StaticMap, np.ndarray], StaticMap] = lambda one, v: one
     placing: Placing | None = None
     prior: Prior | None = None
-    why_flat: Callable[[StaticMap, np.ndarray, np.ndarray], str] = no_reason
+    why_flat: Callable[[StaticMap, np.ndarray, np.ndarray], str] = (
+        lambda one, moved, v: ""
+    )
     is_identity: bool = False
     has_common_sizes: bool = True
