@@ -149,7 +149,10 @@ def identity(kind: str, options: MapOptions, argument: np.ndarray) -> StaticMap:
     argument : ndarray, shape (n,)
     """
     lowest, highest = _widened(float(np.min(argument)), float(np.max(argument)))
-    return RULES[kind].identity(options, lowest, highest)
+    rule = RULES[kind]
+    if rule.identity is None:
+        return rule.starts(options, lowest, highest, np.asarray)[0]
+    return rule.identity(options, lowest, highest)
 
 
 def _widened(lowest: float, highest: float) -> tuple[float, float]:

@@ -9,7 +9,6 @@ docs/method.md, eq. (4d). de Boor, A Practical Guide to Splines (2001), chapter 
 """
 
 import math
-from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -232,8 +231,6 @@ RULE = MapRule(
     evaluate=_evaluate,
     differentiate=_differentiate,
     starts=_starts,
-    identity=lambda options, low, high: _starts(options, low, high, np.asarray)[0],
-    with_domain=lambda one, domain: replace(one, domain=domain),
     names=_names,
     amplify=lambda one, factor: amplified(one, 2, factor),
     compress=lambda one, factor: compressed(one, 2, factor),

@@ -1,7 +1,5 @@
 """No map: everything passes on unchanged."""
 
-from dataclasses import replace
-
 import numpy as np
 
 from hwid_cli.model.maps.rule import MapRule, Portable
@@ -31,8 +29,6 @@ RULE = MapRule(
     starts=lambda options, low, high, shape: (
         StaticMap("none", np.zeros(0), (low, high)),
     ),
-    identity=lambda options, low, high: StaticMap("none", np.zeros(0), (low, high)),
-    with_domain=lambda one, domain: replace(one, domain=domain),
     names=lambda one: (),
     is_identity=True,
     portable=Portable(c=_C, matlab=""),

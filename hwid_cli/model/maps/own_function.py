@@ -9,7 +9,6 @@ References
 docs/method.md, eq. (4f).
 """
 
-from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -228,8 +227,6 @@ RULE = MapRule(
     evaluate=_evaluate,
     differentiate=_differentiate,
     starts=_starts,
-    identity=lambda options, low, high: _starts(options, low, high, np.asarray)[0],
-    with_domain=lambda one, domain: replace(one, domain=domain),
     names=_names,
     # Parameters of any kind and unit.
     has_common_sizes=False,

@@ -234,8 +234,6 @@ RULE = MapRule(
     evaluate=_evaluate,
     differentiate=_differentiate,
     starts=_starts,
-    identity=lambda options, low, high: _starts(options, low, high, np.asarray)[0],
-    with_domain=lambda one, domain: replace(one, domain=domain),
     names=_names,
     amplify=lambda one, factor: amplified(one, one.parameters.size // 2, factor),
     compress=lambda one, factor: compressed(one, one.parameters.size // 2, factor),

@@ -801,7 +801,6 @@ RULE = MapRule(
     evaluate=_evaluate,
     differentiate=_differentiate,
     starts=_starts,
-    identity=lambda options, low, high: _starts(options, low, high, np.asarray)[0],
     with_domain=_with_domain,
     names=_names,
     amplify=lambda one, factor: amplified(one, one.parameters.size // 2, factor),

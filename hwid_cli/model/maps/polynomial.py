@@ -131,7 +131,6 @@ RULE = MapRule(
     evaluate=_evaluate,
     differentiate=_differentiate,
     starts=_starts,
-    identity=lambda options, low, high: _starts(options, low, high, np.asarray)[0],
     with_domain=_with_domain,
     names=_names,
     amplify=_amplify,

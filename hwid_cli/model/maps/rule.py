@@ -1,7 +1,7 @@
 """What one kind of static map must offer."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,6 +11,10 @@ Shape = Callable[[np.ndarray], np.ndarray]
 Differentiate = Callable[
     [StaticMap, np.ndarray, bool, np.ndarray, int], tuple[np.ndarray, np.ndarray]
 ]
+
+
+def _over(one: StaticMap, domain: tuple[float, float]) -> StaticMap:
+    return replace(one, domain=domain)
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,13 +161,13 @@ class MapRule:
         Writes a column for each active parameter into `out`, from column `first` on.
     starts : callable (MapOptions, lowest, highest, shape) -> tuple of StaticMap
         Maps over the given range that follow the function `shape` where the kind can.
-    identity : callable (MapOptions, lowest, highest) -> StaticMap
-        A map that passes on what lies in the range unchanged; kinds that cannot give
-        one that comes near.
-    with_domain : callable (StaticMap, (lowest, highest)) -> StaticMap
-        The same map with another domain.
     names : callable (StaticMap) -> tuple of str
         Names of the parameters.
+    identity : callable (MapOptions, lowest, highest) -> StaticMap, or None
+        A map that passes on what lies in the range unchanged, or comes near; None where
+        the first start that follows the identity does.
+    with_domain : callable (StaticMap, (lowest, highest)) -> StaticMap
+        The same map with another domain.
     amplify : callable (StaticMap, factor) -> StaticMap, or None
         The map v -> factor * map(v); None where the kind has no free gain.
     compress : callable (StaticMap, factor) -> StaticMap, or None
@@ -211,9 +215,9 @@ class MapRule:
     evaluate: Callable[[StaticMap, np.ndarray], np.ndarray]
     differentiate: Differentiate
     starts: Callable[[MapOptions, float, float, Shape], tuple[StaticMap, ...]]
-    identity: Callable[[MapOptions, float, float], StaticMap]
-    with_domain: Callable[[StaticMap, tuple[float, float]], StaticMap]
     names: Callable[[StaticMap], tuple[str, ...]]
+    identity: Callable[[MapOptions, float, float], StaticMap] | None = None
+    with_domain: Callable[[StaticMap, tuple[float, float]], StaticMap] = _over
     amplify: Callable[[StaticMap, float], StaticMap] | None = None
     compress: Callable[[StaticMap, float], StaticMap] | None = None
     size: Callable[[StaticMap], tuple[float, np.ndarray]] | None = None

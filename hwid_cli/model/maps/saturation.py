@@ -5,8 +5,6 @@ References
 docs/method.md, eq. (4).
 """
 
-from dataclasses import replace
-
 import numpy as np
 
 from hwid_cli.model.maps import limits
@@ -45,7 +43,6 @@ RULE = MapRule(
     identity=lambda options, low, high: StaticMap(
         "saturation", np.array([low, high]), (low, high)
     ),
-    with_domain=lambda one, domain: replace(one, domain=domain),
     names=lambda one: limits.NAMES,
     settle=limits.settle,
     corners=lambda one: one.parameters,
