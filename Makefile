@@ -14,7 +14,7 @@ DEV := $(VENV)/installed-dev
         bench bench-beyond bench-campaign bench-growth bench-maps bench-rounds bench-search bench-starts bench-wide \
         bench-real scale \
         simulate calibrate identify crossval group test-stage steps model1 model2 \
-        reproduction thesis chapter2 hsm150 diagnose gun real effects drive-source golden export-check blind
+        reproduction thesis chapter2 hsm150 diagnose gun real effects drive-source model-schema golden export-check blind
 
 help:  ## show these targets
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / {printf "  make %-14s %s\n", $$1, $$2}' Makefile
@@ -171,6 +171,9 @@ golden: $(DEV)  ## the same numbers as at a commit, bit by bit? make golden BASE
 	$(BIN)/python tools/golden.py record . results/golden/new.json $(PARTS)
 	git worktree remove --force results/golden/base
 	$(BIN)/python tools/golden.py compare results/golden/old.json results/golden/new.json
+
+model-schema: $(RUN)  ## what the kinds of static map say, in the JSON Schema of exported models
+	$(BIN)/python tools/model_schema.py
 
 export-check: $(DEV)  ## every format of hwid export against hwid predict: the table of docs/export.md
 	$(BIN)/python -m tests.benchmarks.export_check

@@ -139,7 +139,7 @@ def _word_of(known: tuple[str, ...]) -> Reader:
 
 def _read_maps(value: Any, place: Place) -> tuple[str, ...]:
     """Kinds of maps that need no file beside them."""
-    known = tuple(kind for kind in MAP_KINDS if kind != "own_function")
+    known = tuple(kind for kind, one in MAP_KINDS.items() if not one.has_function)
     words = convert(value, tuple[str, ...], place, readers={})
     require_known(words, known, str(place))
     return words
@@ -184,8 +184,8 @@ _READERS: dict[tuple[type, str], Reader] = {
     (OrderOptions, "maps"): _read_maps,
     (OrdersOptions, "nb"): _read_orders_axis,
     (OrdersOptions, "nk"): _read_orders_axis,
-    (FitOptions, "input_map"): _word_of(MAP_KINDS),
-    (FitOptions, "output_map"): _word_of(MAP_KINDS),
+    (FitOptions, "input_map"): _word_of(tuple(MAP_KINDS)),
+    (FitOptions, "output_map"): _word_of(tuple(MAP_KINDS)),
     (FitOptions, "initial_state"): _word_of(INITIAL_STATES),
     (FitOptions, "join"): _word_of(JOINS),
     (FitOptions, "loss"): _word_of(LOSSES),

@@ -8,8 +8,7 @@ from importlib.resources import files
 import numpy as np
 
 from hwid_cli import __version__
-from hwid_cli.errors import ConfigError
-from hwid_cli.export.map_parts import parts_of
+from hwid_cli.export.map_parts import language_text, numbers_of, portable
 from hwid_cli.export.names import in_comment
 from hwid_cli.records.exported import ExportedModel, ModelCard
 from hwid_cli.records.maps import StaticMap
@@ -37,7 +36,7 @@ def c_source(exported: ExportedModel) -> str:
     Raises
     ------
     ConfigError
-        If a map is a Python function, of which C knows nothing.
+        If C does not know a map.
     """
     model = exported.model
     orders, free = model.orders, model.free_response
@@ -49,8 +48,8 @@ def c_source(exported: ExportedModel) -> str:
         {
             **card_words(exported.card, model.sample_time_s),
             "rule": _RULES[model.initial_state],
-            "input_map": _map("input", model.input_map, exported.input_bends),
-            "output_map": _map("output", model.output_map, exported.output_bends),
+            "input_map": _map("input", model.input_map),
+            "output_map": _map("output", model.output_map),
             "nb": orders.nb,
             "nk": orders.nk,
             "size_w": orders.nb + orders.nk,
@@ -106,7 +105,10 @@ def filled(name: str, words: Mapping[str, object]) -> str:
     words : mapping of str to object
         By the names that stand between ``@`` signs.
     """
-    text = (_SOURCES / name).read_text(encoding="ascii")
+    return _filled((_SOURCES / name).read_text(encoding="ascii"), words)
+
+
+def _filled(text: str, words: Mapping[str, object]) -> str:
     return _BLANK.sub(lambda found: str(words[found[1]]), text)
 
 
@@ -132,25 +134,15 @@ def numbers(values: Iterable[float]) -> str:
     return "\n" + textwrap.indent(textwrap.fill(line, _WIDTH - 4), " " * 4)
 
 
-def _map(side: str, one: StaticMap, bends: np.ndarray) -> str:
-    if one.function is not None:
-        raise ConfigError(
-            f"--format: the {side} map is the Python function {one.function.name!r}, "
-            "which C does not know; expected another kind of map; use --format json"
-        )
-    parts = parts_of(one)
-    count = len(next(iter(parts.values()))) if parts else 0
-    if one.kind == "cubic_spline":
-        count = bends.size
-    words = {name: numbers(values) for name, values in parts.items()}
-    return filled(
-        f"maps/{one.kind}.c",
+def _map(side: str, one: StaticMap) -> str:
+    text = language_text(side, one, "C", portable(one.kind).c)
+    parts = numbers_of(one)
+    return _filled(
+        text,
         {
-            **words,
             "side": side,
-            "count": count,
-            "count_less_one": count - 1,
-            "bends": numbers(bends),
             "domain": numbers(one.domain),
+            **{name: numbers(values) for name, values in parts.items()},
+            **{f"size_{name}": values.size for name, values in parts.items()},
         },
     )

@@ -12,14 +12,12 @@ from hwid_cli.drive.simulation import drive_effects, parameter_vector
 from hwid_cli.errors import ConfigError, ModelFileError
 from hwid_cli.model.extrapolation import outlined_model
 from hwid_cli.model.linear_block import poles, static_gain
-from hwid_cli.model.maps.cubic_spline import bends
 from hwid_cli.records.experiment import (
     DiagnoseOptions,
     RecordingsOptions,
     SimulationOptions,
 )
 from hwid_cli.records.exported import ExportedModel, ExportedSimulation, ModelCard
-from hwid_cli.records.maps import StaticMap
 from hwid_cli.records.model import Fit, HammersteinWiener
 from hwid_cli.records.recordings import Recording
 
@@ -128,13 +126,7 @@ def completed(card: ModelCard, model: HammersteinWiener) -> ExportedModel:
         card,
         outlined_model(model),
         static_gain(model.numerator, model.denominator),
-        _bends(model.input_map),
-        _bends(model.output_map),
     )
-
-
-def _bends(one: StaticMap) -> np.ndarray:
-    return bends(one) if one.kind == "cubic_spline" else np.zeros(0)
 
 
 def export_simulation(

@@ -11,7 +11,8 @@ from hwid_cli.errors import ModelFileError
 from hwid_cli.export import json_fields as read
 from hwid_cli.export.json_fields import Fields
 from hwid_cli.export.json_writer import FORMAT, MODEL, SCHEMA_VERSION, SIMULATION
-from hwid_cli.export.map_parts import MAP_PARTS, Part, parts_of
+from hwid_cli.export.map_parts import parts_of, portable
+from hwid_cli.model.maps.rule import Part
 from hwid_cli.records.drive import HOLDS, Controller, Drive
 from hwid_cli.records.experiment import Columns, Experiment, SimulationOptions
 from hwid_cli.records.exported import (
@@ -96,8 +97,7 @@ def _model(fields: Fields, card: ModelCard, sample_time_s: float) -> ExportedMod
     )
     gain = block.values.get("static_gain")
     gain = math.inf if gain is None else read.number(block, "static_gain")
-    bends = [_bends(fields, key) for key in ("input_map", "output_map")]
-    return ExportedModel(card, model, gain, *bends)
+    return ExportedModel(card, model, gain)
 
 
 def _check_orders(fields: Fields, nb: int, nf: int, nk: int) -> None:
@@ -116,11 +116,11 @@ def _check_orders(fields: Fields, nb: int, nf: int, nk: int) -> None:
 
 def _map(fields: Fields, key: str) -> StaticMap:
     given = read.section(fields, key)
-    kind = read.choice(given, "kind", MAP_KINDS)
-    parts = MAP_PARTS[kind]
-    further = {"cubic_spline": ("bends",), "own_function": ("function",)}
-    required = ("kind", *(part.name for part in parts), "domain")
-    read.check_keys(given, (*required, *further.get(kind, ())))
+    kind = read.choice(given, "kind", tuple(MAP_KINDS))
+    form, is_function = portable(kind), MAP_KINDS[kind].has_function
+    parts = form.parts
+    names = (part.name for part in (*parts, *form.derived_parts))
+    read.check_keys(given, ("kind", *names, "domain", *("function",) * is_function))
     numbers = [_part(given, part) for part in parts]
     domain = read.vector(given, "domain", most=2)
     if domain.size != 2 or not domain[0] < domain[1]:
@@ -131,9 +131,13 @@ def _map(fields: Fields, key: str) -> StaticMap:
         kind,
         np.concatenate(numbers) if numbers else np.zeros(0),
         (float(domain[0]), float(domain[1])),
-        _function(given) if kind == "own_function" else None,
+        _function(given) if is_function else None,
     )
     _check_sizes(given, one, numbers)
+    for part in form.derived_parts:
+        found, size = _part(given, part).size, part.size(one.parameters.size)
+        if found != size:
+            read.refuse(given, part.name, f"{found} numbers", f"{size}, one a value")
     return one
 
 
@@ -146,43 +150,22 @@ def _part(given: Fields, part: Part) -> np.ndarray:
     return values
 
 
-# Fewest numbers of a map, and what the numbers of all its parts must be.
-_LEAST = {
-    "piecewise_linear": (4, "as many values as break_points, at least two"),
-    "saturation": (2, "two, the lower one first"),
-    "dead_zone": (2, "two, the lower one first"),
-    "polynomial": (1, "at least one"),
-    "sigmoid_network": (5, "as many widths and heights as centres, and two ends"),
-    "wavelet_network": (5, "as many widths and heights as centres, and two ends"),
-    "cubic_spline": (4, "two ends and at least two values"),
-    "piecewise_constant": (3, "one level more than edges, at least two"),
-}
-
-
 def _check_sizes(given: Fields, one: StaticMap, numbers: list[np.ndarray]) -> None:
     """Refuse parts whose lengths do not fit together."""
-    least, expected = _LEAST.get(one.kind, (0, ""))
+    form = portable(one.kind)
+    expected = form.lengths
     sizes = [values.size for values in numbers]
     fitting = [values.size for values in parts_of(one).values()]
-    total = sum(sizes)
-    names = [part.name for part in MAP_PARTS[one.kind]]
-    is_pair = one.kind in ("saturation", "dead_zone")
-    if sizes != fitting or total < least or (is_pair and total != least):
+    names = [part.name for part in form.parts]
+    is_allowed = all(
+        part.least <= size and (part.most is None or size <= part.most)
+        for part, size in zip(form.parts, sizes, strict=True)
+    )
+    if sizes != fitting or not is_allowed:
         found = ", ".join(f"{n} {name}" for n, name in zip(sizes, names, strict=True))
         read.refuse(given, names[0], found, expected)
-    if is_pair and numbers[0][0] > numbers[0][1]:
+    if form.are_limits and numbers[0][0] > numbers[0][1]:
         read.refuse(given, names[0], numbers[0].tolist(), expected)
-
-
-def _bends(fields: Fields, key: str) -> np.ndarray:
-    given = read.section(fields, key)
-    if given.values["kind"] != "cubic_spline":
-        return np.zeros(0)
-    bends = read.vector(given, "bends", most=_MOST_NUMBERS)
-    count = len(given.values["values"])
-    if bends.size != count:
-        read.refuse(given, "bends", f"{bends.size} numbers", f"{count}, one a value")
-    return bends
 
 
 def _function(given: Fields) -> OwnFunction:

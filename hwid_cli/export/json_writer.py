@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from hwid_cli import __version__
-from hwid_cli.export.map_parts import parts_of
+from hwid_cli.export.map_parts import numbers_of
 from hwid_cli.files.atomic import replace_file
 from hwid_cli.records.drive import Drive
 from hwid_cli.records.exported import (
@@ -67,14 +67,14 @@ def _model(exported: ExportedModel) -> dict[str, Any]:
     gain = exported.static_gain
     return {
         "orders": {"nb": orders.nb, "nf": orders.nf, "nk": orders.nk},
-        "input_map": _map(model.input_map, exported.input_bends.tolist()),
+        "input_map": _map(model.input_map),
         "linear_block": {
             "numerator": model.numerator.tolist(),
             "denominator": model.denominator.tolist(),
             "delay": model.delay,
             "static_gain": gain if math.isfinite(gain) else None,
         },
-        "output_map": _map(model.output_map, exported.output_bends.tolist()),
+        "output_map": _map(model.output_map),
         "initial_state": {
             "rule": model.initial_state,
             "free_response": model.free_response.tolist(),
@@ -82,11 +82,9 @@ def _model(exported: ExportedModel) -> dict[str, Any]:
     }
 
 
-def _map(one: StaticMap, bends: list[float]) -> dict[str, Any]:
+def _map(one: StaticMap) -> dict[str, Any]:
     content: dict[str, Any] = {"kind": one.kind}
-    content |= {name: part.tolist() for name, part in parts_of(one).items()}
-    if one.kind == "cubic_spline":
-        content["bends"] = bends
+    content |= {name: part.tolist() for name, part in numbers_of(one).items()}
     content["domain"] = [float(edge) for edge in one.domain]
     if one.function is not None:
         content["function"] = asdict(one.function)

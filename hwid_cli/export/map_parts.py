@@ -1,68 +1,18 @@
-"""The named parts of each kind of map: how a file shows the numbers of a ``StaticMap``.
+"""How a file shows the numbers of a static map: by the names that its kind gives them."""
 
-The parts of a map, one after the other, are its parameters.
-"""
-
-from collections.abc import Callable
-from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from hwid_cli.records.maps import StaticMap
+from hwid_cli.errors import ConfigError
+from hwid_cli.model.maps.rule import Portable
+from hwid_cli.model.static_map import RULES
+from hwid_cli.records.maps import MAP_KINDS, StaticMap
 
 
-@dataclass(frozen=True)
-class Part:
-    """One part of a map's parameters.
-
-    Parameters
-    ----------
-    size : callable (int) -> int
-        Its length, from the number of all parameters.
-    is_rising : bool
-        Whether its numbers must rise.
-    is_positive : bool
-        Whether they must be above zero.
-    """
-
-    name: str
-    size: Callable[[int], int]
-    is_rising: bool = False
-    is_positive: bool = False
-
-
-def _network_units(total: int) -> int:
-    return (total - 2) // 3
-
-
-_NETWORK = (
-    Part("centres", _network_units),
-    Part("widths", _network_units, is_positive=True),
-    Part("heights", _network_units),
-    Part("line", lambda total: 2),
-)
-
-MAP_PARTS: dict[str, tuple[Part, ...]] = {
-    "none": (),
-    "piecewise_linear": (
-        Part("break_points", lambda total: total // 2, is_rising=True),
-        Part("values", lambda total: total // 2),
-    ),
-    "saturation": (Part("limits", lambda total: total),),
-    "dead_zone": (Part("edges", lambda total: total),),
-    "polynomial": (Part("chebyshev", lambda total: total),),
-    "sigmoid_network": _NETWORK,
-    "wavelet_network": _NETWORK,
-    "cubic_spline": (
-        Part("ends", lambda total: 2, is_rising=True),
-        Part("values", lambda total: total - 2),
-    ),
-    "piecewise_constant": (
-        Part("edges", lambda total: total // 2, is_rising=True),
-        Part("levels", lambda total: total - total // 2),
-    ),
-    "own_function": (Part("parameters", lambda total: total),),
-}
+def portable(kind: str) -> Portable:
+    """How maps of a kind leave the program."""
+    return RULES[kind].portable
 
 
 def parts_of(one: StaticMap) -> dict[str, np.ndarray]:
@@ -75,8 +25,85 @@ def parts_of(one: StaticMap) -> dict[str, np.ndarray]:
     """
     total, first = one.parameters.size, 0
     parts = {}
-    for part in MAP_PARTS[one.kind]:
+    for part in portable(one.kind).parts:
         size = part.size(total)
         parts[part.name] = one.parameters[first : first + size]
         first += size
     return parts
+
+
+def numbers_of(one: StaticMap) -> dict[str, np.ndarray]:
+    """Named parts of a map, and what is derived from them."""
+    return {**parts_of(one), **portable(one.kind).derived(one)}
+
+
+def language_text(side: str, one: StaticMap, language: str, text: str | None) -> str:
+    """Text of a map in a language, refused where there is none.
+
+    Parameters
+    ----------
+    side : str
+        ``input`` or ``output``.
+
+    Raises
+    ------
+    ConfigError
+        With the map.
+    """
+    if text is not None:
+        return text
+    what = f"of the kind {one.kind}"
+    if one.function is not None:
+        what = f"the Python function {one.function.name!r}"
+    raise ConfigError(
+        f"--format: the {side} map is {what}, which {language} does not know; expected "
+        "another kind of map; use --format json"
+    )
+
+
+def map_schema() -> dict[str, Any]:
+    """What a file's maps must look like, as JSON Schema."""
+    return {
+        "type": "object",
+        "description": "A static map; its kind says which parts it has.",
+        "oneOf": [_schema_of(kind) for kind in RULES],
+    }
+
+
+_FUNCTION = {
+    "type": "object",
+    "description": "A Python function of the user's own; runs only where that is allowed.",
+    "properties": {
+        "name": {"type": "string"},
+        "source": {"type": "string"},
+        "unit": {"type": "number", "exclusiveMinimum": 0},
+    },
+    "required": ["name", "source", "unit"],
+    "additionalProperties": False,
+}
+
+
+def _schema_of(kind: str) -> dict[str, Any]:
+    form = portable(kind)
+    properties: dict[str, Any] = {"kind": {"const": kind}}
+    for part in (*form.parts, *form.derived_parts):
+        properties[part.name] = _array(part.about, part.least, part.most)
+    if MAP_KINDS[kind].has_function:
+        properties["function"] = _FUNCTION
+    properties["domain"] = _array(
+        "Range of the argument in the fit; outside it the map extrapolates.", 2, 2
+    )
+    return {
+        "properties": properties,
+        "required": list(properties),
+        "additionalProperties": False,
+    }
+
+
+def _array(about: str, least: int = 0, most: int | None = None) -> dict[str, Any]:
+    found: dict[str, Any] = {"type": "array", "items": {"type": "number"}}
+    if least:
+        found["minItems"] = least
+    if most is not None:
+        found["maxItems"] = most
+    return {**found, "description": about}

@@ -3,17 +3,18 @@
 import io
 import json
 from pathlib import Path
+from textwrap import indent
 from typing import Any
 
 import numpy as np
 from scipy.io import savemat
 
-from hwid_cli.errors import ConfigError
 from hwid_cli.export.c_source import card_words, filled
 from hwid_cli.export.json_writer import described
-from hwid_cli.export.map_parts import parts_of
+from hwid_cli.export.map_parts import language_text, numbers_of
 from hwid_cli.export.names import identifier
 from hwid_cli.files.atomic import replace_file
+from hwid_cli.model.static_map import RULES
 from hwid_cli.records.exported import ExportedModel
 from hwid_cli.records.maps import StaticMap
 
@@ -34,7 +35,7 @@ def write_mat(path: Path, exported: ExportedModel) -> Path:
     Raises
     ------
     ConfigError
-        If a map is a Python function.
+        If MATLAB does not know a map.
     CacheError
         If a file cannot be written.
     """
@@ -46,6 +47,7 @@ def write_mat(path: Path, exported: ExportedModel) -> Path:
         "model.m",
         {
             **words,
+            **_map_words(),
             "about": words["about"].replace("\n *", "\n%  "),
             "identifier": name,
             "IDENTIFIER": name.upper(),
@@ -76,8 +78,8 @@ def _variables(exported: ExportedModel) -> dict[str, Any]:
         "F": model.denominator,
         "C": model.free_response,
         "static_gain": exported.static_gain,
-        "input_map": _map("input", model.input_map, exported.input_bends),
-        "output_map": _map("output", model.output_map, exported.output_bends),
+        "input_map": _map("input", model.input_map),
+        "output_map": _map("output", model.output_map),
         "initial_state": model.initial_state,
         "units": units,
         "columns": {key: "" if one is None else one for key, one in columns.items()},
@@ -88,14 +90,19 @@ def _variables(exported: ExportedModel) -> dict[str, Any]:
     }
 
 
-def _map(side: str, one: StaticMap, bends: np.ndarray) -> dict[str, Any]:
-    if one.function is not None:
-        raise ConfigError(
-            f"--format: the {side} map is the Python function {one.function.name!r}, "
-            "which MATLAB does not know; expected another kind of map; use --format json"
-        )
-    content: dict[str, Any] = {"kind": one.kind, **parts_of(one)}
-    if one.kind == "cubic_spline":
-        content["bends"] = bends
-    content["domain"] = np.array(one.domain)
-    return content
+def _map(side: str, one: StaticMap) -> dict[str, Any]:
+    language_text(side, one, "MATLAB", RULES[one.kind].portable.matlab)
+    return {"kind": one.kind, **numbers_of(one), "domain": np.array(one.domain)}
+
+
+def _map_words() -> dict[str, str]:
+    """Every kind of map that MATLAB knows, and the functions that they call."""
+    forms = {kind: rule.portable for kind, rule in RULES.items()}
+    cases, functions = [], []
+    for kind, form in forms.items():
+        if form.matlab is not None:
+            cases.append(f"    case '{kind}'\n{indent(form.matlab, ' ' * 8)}".rstrip())
+            functions.append(form.matlab_function.strip())
+    # Several kinds may call the same one.
+    called = [text for text in dict.fromkeys(functions) if text]
+    return {"cases": "\n".join(cases), "functions": "\n\n\n".join(called)}

@@ -14,12 +14,12 @@ from hwid_cli.model import static_map
 from hwid_cli.model.linear_block import as_loops_take_it
 from hwid_cli.records.model import FitOptions, HammersteinWiener, StaticMap
 
-# Samples at the beginning that always count.
-_BEGINNING = 50
+# First samples, which always count.
+_ALWAYS_COUNTED = 50
 
 
 @dataclass(frozen=True, eq=False)
-class Experiment:
+class FitData:
     """Input and measured output that start with one initial state.
 
     Parameters
@@ -60,7 +60,7 @@ class Experiment:
         return signal[self.counted]
 
 
-def thinned(experiments: Sequence[Experiment], rows: int) -> tuple[Experiment, ...]:
+def thinned(experiments: Sequence[FitData], rows: int) -> tuple[FitData, ...]:
     """Experiments of which about so many samples count.
 
     The first ones all do: they alone tell the initial state.
@@ -73,8 +73,8 @@ def thinned(experiments: Sequence[Experiment], rows: int) -> tuple[Experiment, .
             one,
             counted=np.concatenate(
                 [
-                    np.arange(min(_BEGINNING, one.output.size)),
-                    np.arange(_BEGINNING, one.output.size, stride),
+                    np.arange(min(_ALWAYS_COUNTED, one.output.size)),
+                    np.arange(_ALWAYS_COUNTED, one.output.size, stride),
                 ]
             ),
         )
@@ -121,7 +121,7 @@ class Candidate:
 
 
 @dataclass(frozen=True)
-class Columns:
+class JacobianColumns:
     """Where each group of parameters stands; those of the maps come first."""
 
     output_map: slice
@@ -138,7 +138,7 @@ class Columns:
         return int(self.denominator.stop)
 
 
-def columns(candidate: Candidate, *, with_positions: bool) -> Columns:
+def columns(candidate: Candidate, *, with_positions: bool) -> JacobianColumns:
     """Places of a candidate's parameters in a step.
 
     Parameters
@@ -157,7 +157,7 @@ def columns(candidate: Candidate, *, with_positions: bool) -> Columns:
     stops = list(accumulate(sizes))
     slices = [slice(stop - size, stop) for stop, size in zip(stops, sizes, strict=True)]
     output_map, input_map, free_responses, numerator, denominator = slices
-    return Columns(
+    return JacobianColumns(
         output_map,
         input_map,
         free_responses,

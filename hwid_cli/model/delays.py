@@ -15,7 +15,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from hwid_cli.model.candidates import Experiment
+from hwid_cli.model.candidates import FitData
 from hwid_cli.model.starts import Known, Start, linear_starts
 from hwid_cli.records.model import FitOptions, Orders
 
@@ -26,7 +26,7 @@ _MOST, _CLOSE = 2, 1.2
 
 
 def starts_of_delays(
-    experiments: Sequence[Experiment],
+    experiments: Sequence[FitData],
     orders: Orders,
     *,
     options: FitOptions,
@@ -73,8 +73,8 @@ def starts_of_delays(
     return tuple(found[number] for number in order[:_MOST] if costs[number] <= limit)
 
 
-def relaxed_starts(
-    experiments: Sequence[Experiment],
+def reestimated_blocks(
+    experiments: Sequence[FitData],
     found: Orders,
     options: FitOptions,
     *,
@@ -85,7 +85,7 @@ def relaxed_starts(
 
     Parameters
     ----------
-    experiments : sequence of Experiment
+    experiments : sequence of FitData
         Signals before and after the linear block.
     found : Orders
         Of the best model so far.

@@ -4,19 +4,9 @@ References
 ----------
 docs/method.md, section "What a fit reports".
 
-Piecewise linear maps where no sample has been: as straight as the data allow.
+Where a static map is not monotonic: turns back, so that two arguments give one value.
 
-What a search leaves there depends on where it began: data without noise stop it before
-the prior has any say. Of all values that agree with the map wherever a sample has been,
-those with the smallest bends are taken. Positions stay.
-
-References
-----------
-docs/method.md, section "Where no sample has been".
-
-Where a static map folds: turns back, so that two arguments give one value.
-
-A map that folds is legitimate, such as that of a sensor that rectifies, but the position
+Such a map is legitimate, such as that of a sensor that rectifies, but the position
 can no longer be told from the output, and no controller can invert it.
 
 References
@@ -35,88 +25,19 @@ from hwid_cli.model.extrapolation import continued
 from hwid_cli.model.levenberg_marquardt import Search
 from hwid_cli.model.linear_block import poles
 from hwid_cli.model.map_curve import map_curve
-from hwid_cli.model.maps.break_points import bends
-from hwid_cli.model.maps.piecewise_linear import break_points_and_values
 from hwid_cli.model.normalise import normalise, rescaled
 from hwid_cli.model.placing import with_maps
 from hwid_cli.model.points import before_output_map, point_of
-from hwid_cli.model.problem import Problem, joined
-from hwid_cli.model.uncertainty import NOT_WORKED_OUT, judged_parameters
+from hwid_cli.model.problem import FitProblem, joined
+from hwid_cli.model.uncertainty import NOT_WORKED_OUT, parameter_statistics
 from hwid_cli.records.model import Fit, FitOptions, StaticMap
 from hwid_cli.records.recordings import Recording
-
-# Share of a segment over which its samples must spread to tell its slope, and strength
-# of a direction, as a share of the strongest, below which the samples do not see it.
-_LEAST_SPREAD, _UNSEEN = 1e-3, 1e-6
-
-
-def straightened(one: StaticMap, argument: np.ndarray) -> StaticMap:
-    """Same map where samples have been, with the smallest bends elsewhere.
-
-    Parameters
-    ----------
-    one : StaticMap
-        Kinds other than piecewise linear come back as they are.
-    argument : ndarray, shape (n,)
-        What reaches the map.
-
-    Returns
-    -------
-    StaticMap
-        The same one where samples tell the slope of every segment.
-
-    Examples
-    --------
-    >>> bent = StaticMap("piecewise_linear", np.array([0.0, 1, 2, 3, 0, 1, 9, 3]))
-    >>> straightened(bent, np.array([0.0, 0.5, 1.0, 3.0])).parameters[4:].round(6)
-    array([0., 1., 2., 3.])
-    """
-    if one.kind != "piecewise_linear" or one.parameters.size < 6:
-        return one
-    points, values = break_points_and_values(one)
-    if not np.isfinite(argument).all():
-        return one
-    levels = np.sort(argument)
-    if _is_told(points, levels):
-        return one
-    seen = _shares(points, np.unique(levels))
-    _, strength, directions = np.linalg.svd(np.linalg.qr(seen, mode="r"))
-    rank = int(np.sum(strength > _UNSEEN * strength[0]))
-    unseen = directions[rank:].T
-    if unseen.shape[1] == 0:
-        return one
-    bend, jacobian = bends(points, values, False)
-    steps = np.linalg.lstsq(jacobian @ unseen, -bend, rcond=None)[0]
-    return replace(one, parameters=np.concatenate([points, values + unseen @ steps]))
-
-
-def _is_told(points: np.ndarray, levels: np.ndarray) -> bool:
-    """Tell whether the samples in every segment spread enough to know its line."""
-    inner = np.searchsorted(levels, points[1:-1], side="left")
-    first, end = np.append(0, inner), np.append(inner, levels.size)
-    if np.any(first == end):
-        return False
-    spread = levels[end - 1] - levels[first]
-    return bool(np.all(spread > _LEAST_SPREAD * np.diff(points)))
-
-
-def _shares(points: np.ndarray, argument: np.ndarray) -> np.ndarray:
-    """How much the value at each break-point counts for a map's values."""
-    segment = np.clip(
-        np.searchsorted(points, argument, side="right") - 1, 0, points.size - 2
-    )
-    share = (argument - points[segment]) / (points[segment + 1] - points[segment])
-    rows = np.zeros((argument.size, points.size))
-    at = np.arange(argument.size)
-    rows[at, segment], rows[at, segment + 1] = 1.0 - share, share
-    return rows
-
 
 # Share of a map's range by which it must turn back; less is the shape of a flat part.
 _LEAST_DEPTH = 0.02
 
 
-def folds(
+def turning_points(
     one: StaticMap,
     *,
     least: float = 0.0,
@@ -134,12 +55,12 @@ def folds(
 
     Returns
     -------
-    ndarray, shape (n_folds,)
+    ndarray, shape (n_turns,)
         Rising; empty for a map that is monotonic.
 
     Examples
     --------
-    >>> folds(StaticMap("polynomial", np.array([0.5, 0.0, 0.5]), (-1.0, 1.0)))
+    >>> turning_points(StaticMap("polynomial", np.array([0.5, 0.0, 0.5]), (-1.0, 1.0)))
     array([0.])
     """
     curve = map_curve(one)
@@ -178,7 +99,7 @@ def _turns(value: np.ndarray, depth: float) -> list[int]:
     return turns
 
 
-# RMSDs by which an output map must turn back to be called folded: less may be noise.
+# RMSDs by which an output map must turn back to be called non-monotonic: less may be noise.
 _TOLD = 2.0
 # Share of the samples at either end of a map that says too little about its shape.
 _RARE = 0.005
@@ -188,7 +109,7 @@ def described(
     blank: Fit,
     search: Search,
     recordings: Sequence[Recording],
-    problem: Problem,
+    problem: FitProblem,
     *,
     standard_errors: bool = True,
 ) -> Fit:
@@ -198,12 +119,14 @@ def described(
     ----------
     blank : Fit
         With the options in the units of the data.
-    problem : Problem
+    problem : FitProblem
         With the last threshold of the search.
     standard_errors : bool
         Whether they are worked out, and the criteria too.
     """
-    candidate = with_maps(search.candidate, problem.experiments, straightened)
+    candidate = with_maps(
+        search.candidate, problem.experiments, static_map.straightened
+    )
     candidate = with_maps(candidate, problem.experiments, static_map.with_domain)
     candidate = _in_units(candidate, problem, recordings[0], blank.options)
     experiments = joined(recordings, blank.options)
@@ -213,14 +136,14 @@ def described(
     uncertainty, information = NOT_WORKED_OUT
     if standard_errors:
         threshold = problem.experiments[0].threshold * problem.output_scale
-        uncertainty, information = judged_parameters(
+        uncertainty, information = parameter_statistics(
             candidate,
             [replace(one, threshold=threshold) for one in experiments],
             free_break_points=blank.options.free_break_points,
         )
     deviation = scores.rmsd(measured, simulated)
     x = before_output_map(point_of(candidate), experiments)
-    turns = folds(
+    turns = turning_points(
         candidate.model.output_map, least=_TOLD * deviation, between=_usual_range(x)
     )
     return replace(
@@ -248,7 +171,7 @@ def _usual_range(signal: np.ndarray) -> tuple[float, float]:
 
 
 def _in_units(
-    candidate: Candidate, problem: Problem, like: Recording, options: FitOptions
+    candidate: Candidate, problem: FitProblem, like: Recording, options: FitOptions
 ) -> Candidate:
     """Normalised candidate for the data as they are."""
     states = candidate.free_responses

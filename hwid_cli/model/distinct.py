@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from hwid_cli.model.candidates import Candidate, Experiment
+from hwid_cli.model.candidates import Candidate, FitData
 from hwid_cli.model.levenberg_marquardt import Search
 from hwid_cli.model.points import point_of
 from hwid_cli.model.sensitivities import simulated
@@ -24,7 +24,7 @@ WHILE_FIXED, WHEN_FREE = 0.3, 0.1
 
 
 def borne_residuals(
-    candidate: Candidate, experiments: Sequence[Experiment]
+    candidate: Candidate, experiments: Sequence[FitData]
 ) -> list[np.ndarray]:
     """Residuals at the samples that count, large ones cut to where they are outliers.
 
@@ -41,7 +41,7 @@ def borne_residuals(
 
 
 def distinct(
-    searches: Sequence[Search], experiments: Sequence[Experiment], apart: float
+    searches: Sequence[Search], experiments: Sequence[FitData], apart: float
 ) -> list[Search]:
     """Searches less those that have come to the same model as a better one.
 

@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from hwid_cli.model.static_map import evaluate, outlined
-from hwid_cli.records.maps import StaticMap
+from hwid_cli.records.maps import MAP_KINDS, StaticMap
 from hwid_cli.records.model import HammersteinWiener
 
 # Share of the domain over which the mean slope is taken.
@@ -69,7 +69,7 @@ def outlined_model(model: HammersteinWiener) -> HammersteinWiener:
 
 
 def _continued(one: StaticMap, share: float) -> StaticMap:
-    if one.kind != "piecewise_linear":
+    if not MAP_KINDS[one.kind].goes_on:
         return one
     plain = replace(one, slopes_beyond=None)
     low, high = one.domain

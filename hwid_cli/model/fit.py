@@ -13,8 +13,8 @@ What a fit needs: arguments that make sense, and data that can determine a model
 Search that begins with models of the same orders instead of from nothing.
 
 A group's recordings each have a model already. Its linear block and maps are where the
-group's model is looked for: the screening of linear starts and the relaxing, which make
-up most of a fit, are left out.
+group's model is looked for: the screening of linear starts and the re-estimation of the
+block, which make up most of a fit, are left out.
 
 References
 ----------
@@ -27,22 +27,26 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hwid_cli.model import static_map
-from hwid_cli.model.candidates import Candidate, Experiment, limits_of, thinned
+from hwid_cli.model.candidates import Candidate, FitData, limits_of, thinned
 from hwid_cli.model.description import described
 from hwid_cli.model.initial_candidates import (
     block_starts,
-    contained_candidates,
-    linear_beginnings,
+    linear_initial_candidates,
     member_models,
+    nested_candidates,
 )
 from hwid_cli.model.levenberg_marquardt import Search, minimise
 from hwid_cli.model.linear_block import is_stable
-from hwid_cli.model.linear_search import linear_beyond
+from hwid_cli.model.linear_search import linear_from_nested
 from hwid_cli.model.phases import converge, finish, place, standing
 from hwid_cli.model.placing import coarser, finer, with_maps
-from hwid_cli.model.problem import Problem, rmsd, scaled
-from hwid_cli.model.robust import rejudged, renewed, settled, winsorised
-from hwid_cli.model.search import grown, nonlinear_search, search_beyond
+from hwid_cli.model.problem import FitProblem, rmsd, scaled
+from hwid_cli.model.robust import renewed, rescored, settled, winsorised
+from hwid_cli.model.search import (
+    continue_nested,
+    nonlinear_search,
+    search_beside_nested,
+)
 from hwid_cli.model.starts import Start
 from hwid_cli.records.model import Fit, FitOptions, HammersteinWiener, Orders
 from hwid_cli.records.recordings import Recording
@@ -152,16 +156,16 @@ _ROWS, _SCREENING_ITERATIONS = 1000, 3
 # Groups are told apart by a threshold: the last tenth of a percent of the deviation is
 # not worth half of the time.
 _LEAST_GAIN = 1e-3
-# Smaller gains in a row that end the going on from a contained model: the next orders go
+# Smaller gains in a row that end the continuation of a nested model: the next orders go
 # on from here again.
 _PATIENCE = 1
 
 
 def warm_search(
-    experiments: Sequence[Experiment],
+    experiments: Sequence[FitData],
     options: FitOptions,
     starts: Sequence[HammersteinWiener],
-    contained: Sequence[Candidate] = (),
+    nested: Sequence[Candidate] = (),
     *,
     search_anew: bool = True,
 ) -> Search:
@@ -169,16 +173,16 @@ def warm_search(
 
     Parameters
     ----------
-    experiments : sequence of Experiment
+    experiments : sequence of FitData
         Scaled to about one.
     starts : sequence of HammersteinWiener
         At least one; in the units of the experiments, with the orders and the kinds of
         maps that the result has.
-    contained : sequence of Candidate
+    nested : sequence of Candidate
         Models of smaller orders, written with those of the result, which is not worse
         than any of them.
     search_anew : bool
-        Whether the starts are tried beside contained models.
+        Whether the starts are tried beside nested models.
 
     Returns
     -------
@@ -186,9 +190,9 @@ def warm_search(
         From the start that is best for these experiments; of equal ones the first.
     """
     found = []
-    if contained:
+    if nested:
         known = min(
-            (standing(one, experiments) for one in contained), key=lambda one: one.cost
+            (standing(one, experiments) for one in nested), key=lambda one: one.cost
         )
         near = converge(
             known,
@@ -198,7 +202,7 @@ def warm_search(
             patience=_PATIENCE,
         )
         found = [known, near]
-    if search_anew or not contained:
+    if search_anew or not nested:
         screened = _screened(experiments, options, starts)
         (placed,) = place([screened], experiments, options)
         found.append(finish(placed, experiments, options, least_gain=_LEAST_GAIN))
@@ -206,7 +210,7 @@ def warm_search(
 
 
 def _screened(
-    experiments: Sequence[Experiment],
+    experiments: Sequence[FitData],
     options: FitOptions,
     starts: Sequence[HammersteinWiener],
 ) -> Search:
@@ -225,7 +229,7 @@ def _screened(
 
 
 def _starting(
-    model: HammersteinWiener, experiments: Sequence[Experiment], options: FitOptions
+    model: HammersteinWiener, experiments: Sequence[FitData], options: FitOptions
 ) -> Candidate:
     """A model with empty initial states for every experiment."""
     is_estimated = options.initial_state == "estimated"
@@ -238,7 +242,7 @@ def _starting(
 
 
 def _spread(
-    candidate: Candidate, experiments: Sequence[Experiment], options: FitOptions
+    candidate: Candidate, experiments: Sequence[FitData], options: FitOptions
 ) -> Candidate:
     """Maps whose break-points cover what the experiments reach, not the start's data."""
     fine = with_maps(candidate, experiments, finer)
@@ -355,23 +359,23 @@ def _fitted(
     options = options.in_units(problem.input_scale, problem.output_scale)
     linear_rmsd = float("nan")
     try:
-        known = contained_candidates(problem, orders, options, given.contained)
+        known = nested_candidates(problem, orders, options, given.contained)
         anew = given.search_anew or not known
         search = _warm_search(problem, options, given.starts, known, anew)
         if search is None:
-            starts_found, linear = linear_beginnings(
+            starts_found, linear = linear_initial_candidates(
                 problem, orders, options, sees_input_map=anew
             )
             linear_rmsd = rmsd(_yardstick(linear, problem, orders, options), problem)
             problem = _with_threshold(problem, linear)
             orders = replace(orders, nk=starts_found[0].delay)
-            known = contained_candidates(problem, orders, options, given.contained)
+            known = nested_candidates(problem, orders, options, given.contained)
             found = (starts_found, linear, known)
             if anew or _is_linear(options):
                 search = _search(problem, options, found)
                 search = _again(search, problem, orders, options, found)
             else:
-                search = grown(known, problem.experiments, options, linear)
+                search = continue_nested(known, problem.experiments, options, linear)
         search, experiments = settled(search, problem.experiments, options)
     except np.linalg.LinAlgError as error:
         return replace(blank, message=f"linear algebra failed: {error}")
@@ -389,17 +393,17 @@ def _fitted(
 
 
 def _yardstick(
-    linear: Search, problem: Problem, orders: Orders, options: FitOptions
+    linear: Search, problem: FitProblem, orders: Orders, options: FitOptions
 ) -> Search:
     """Linear model to compare with; a frozen block does not hold it."""
     if not options.keeps_block:
         return linear
     free = replace(options, linear_block=None)
-    return linear_beginnings(problem, orders, free, sees_input_map=False)[1]
+    return linear_initial_candidates(problem, orders, free, sees_input_map=False)[1]
 
 
 def _warm_search(
-    problem: Problem,
+    problem: FitProblem,
     options: FitOptions,
     starts: Sequence[HammersteinWiener],
     known: Sequence[Candidate],
@@ -428,22 +432,22 @@ def _is_usable(search: Search) -> bool:
 
 
 def _search(
-    problem: Problem,
+    problem: FitProblem,
     options: FitOptions,
     found: tuple[tuple[Start, ...], Search, list[Candidate]],
 ) -> Search:
     """Search from nothing but linear models and models of smaller orders."""
     starts, linear, known = found
     if _is_linear(options):
-        return linear_beyond(known, problem.experiments, options, linear)
+        return linear_from_nested(known, problem.experiments, options, linear)
     if known:
-        return search_beyond(known, problem.experiments, options, starts, linear)
+        return search_beside_nested(known, problem.experiments, options, starts, linear)
     return nonlinear_search(problem.experiments, options, starts, linear)
 
 
 def _again(
     first: Search,
-    problem: Problem,
+    problem: FitProblem,
     orders: Orders,
     options: FitOptions,
     found: tuple[tuple[Start, ...], Search, list[Candidate]],
@@ -455,15 +459,16 @@ def _again(
     starts = block_starts(winsorised(first, experiments), orders, options)
     second = _search(problem, options, (starts, *found[1:]))
     second, experiments = settled(second, problem.experiments, options)
-    first = rejudged(first, experiments)
-    return min(first, rejudged(second, experiments), key=lambda one: one.cost)
+    first = rescored(first, experiments)
+    return min(first, rescored(second, experiments), key=lambda one: one.cost)
 
 
-def _with_threshold(problem: Problem, search: Search) -> Problem:
+def _with_threshold(problem: FitProblem, search: Search) -> FitProblem:
     """Problem with the threshold that a search's residuals ask for."""
     experiments = renewed(problem.experiments, [search.candidate])
     return replace(problem, experiments=tuple(experiments))
 
 
 def _is_linear(options: FitOptions) -> bool:
-    return options.input_map == "none" and options.output_map == "none"
+    kinds = (options.input_map, options.output_map)
+    return all(static_map.RULES[kind].is_identity for kind in kinds)

@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from hwid_cli.model import sensitivities
-from hwid_cli.model.candidates import Candidate, Columns, Experiment
+from hwid_cli.model.candidates import Candidate, FitData, JacobianColumns
 from hwid_cli.model.identifiability import Directions, listed, parameter_names
 from hwid_cli.model.static_map import RULES
 from hwid_cli.records.model import HammersteinWiener, StaticMap
@@ -25,11 +25,8 @@ _WEAK = 0.5
 # Parameters with less than this share of a direction's largest part are not named.
 _NAMED_PART = 0.2
 _MOST_NAMES, _MOST_SENTENCES = 4, 3
-# Distance of a pole and a zero that counts as a cancellation, and the share of a map's
-# mean slope by which it must bend to have a break-point there.
-_CANCELS, _BENDS = 0.05, 1e-3
-# Fewer samples than this in a segment leave its line open.
-_FEW = 5
+# Distance of a pole and a zero that counts as a cancellation.
+_CANCELS = 0.05
 # Levels of a signal nearer than this share of its range are one.
 _SAME_LEVEL = 1e-9
 _NO_MAP = StaticMap("none", np.zeros(0))
@@ -38,7 +35,7 @@ _SAME_OUTPUT = "that hardly changes the simulated output"
 
 def flat_sentences(
     candidate: Candidate,
-    experiments: Sequence[Experiment],
+    experiments: Sequence[FitData],
     found: Directions,
     variance: float,
 ) -> tuple[str, ...]:
@@ -71,7 +68,7 @@ def flat_sentences(
     )
 
 
-def _moves_listed(parts: np.ndarray, place: Columns) -> bool:
+def _moves_listed(parts: np.ndarray, place: JacobianColumns) -> bool:
     """Whether a direction moves more than initial states."""
     return bool(np.abs(parts[listed(place)]).max() >= _NAMED_PART * np.abs(parts).max())
 
@@ -99,7 +96,7 @@ def _weak_parts(found: Directions, variance: float) -> list[tuple[np.ndarray, fl
 
 
 def _map_arguments(
-    candidate: Candidate, experiments: Sequence[Experiment]
+    candidate: Candidate, experiments: Sequence[FitData]
 ) -> dict[str, np.ndarray]:
     """What goes into the two maps, all experiments together."""
     before = replace(candidate, model=replace(candidate.model, output_map=_NO_MAP))
@@ -128,7 +125,7 @@ def _sentence(parts: np.ndarray, spread: str, names: Sequence[str], why: str) ->
 def _why(
     parts: np.ndarray,
     candidate: Candidate,
-    place: Columns,
+    place: JacobianColumns,
     signals: dict[str, np.ndarray],
 ) -> str:
     """Say why a direction is flat, where the reason can be told."""
@@ -163,54 +160,12 @@ def _why_of_map(
 ) -> str:
     """Reason that lies in what a map gets to see; ``{what}`` stands for its name."""
     n_levels = _count_levels(signal)
-    count = one.parameters.size - RULES[one.kind].n_positions(one)
+    rule = RULES[one.kind]
+    count = one.parameters.size - rule.n_positions(one)
     if n_levels < max(count, 2):
         return f"{{what}} visits only {n_levels} level{'s' * (n_levels > 1)}"
-    if one.kind == "saturation":
-        return _limit_not_reached(one, moved, signal)
-    if one.kind != "piecewise_linear":
-        return ""
-    units = one.parameters.size // 2
-    points, values = one.parameters[:units], one.parameters[units:]
     first = one.parameters.size - (part.stop - part.start)
-    slopes = np.diff(values) / np.diff(points)
-    scale = np.ptp(values) / np.ptp(points)
-    for number in (moved + first) % units:
-        gap = _gap_beside(points, int(number), signal)
-        if gap:
-            return gap
-    for place in moved + first:
-        inner = 0 < place < units - 1
-        if inner and abs(slopes[place] - slopes[place - 1]) < _BENDS * scale:
-            return f"the map does not bend at {points[place]:.3g}"
-    return ""
-
-
-def _limit_not_reached(one: StaticMap, moved: np.ndarray, signal: np.ndarray) -> str:
-    """Which of the limits that move no sample reaches; empty where all are reached."""
-    low, high = one.parameters
-    if 0 in moved and not (signal < low).any():
-        return f"no sample of {{what}} lies below {low:.3g}"
-    if 1 in moved and not (signal > high).any():
-        return f"no sample of {{what}} lies above {high:.3g}"
-    return ""
-
-
-def _gap_beside(points: np.ndarray, number: int, signal: np.ndarray) -> str:
-    """Segments beside a break-point with hardly any sample; empty where there are many."""
-    before, after = max(number - 1, 0), min(number + 1, points.size - 1)
-    found = []
-    for low, high in ((before, after), (before, number), (number, after)):
-        between = (signal > points[low]) & (signal < points[high])
-        if low < high:
-            found.append((int(between.sum()), points[low], points[high]))
-    # The emptiest of them; of equally empty ones the longest, which comes first.
-    count, left, right = min(found, key=lambda one: one[0])
-    if count >= _FEW:
-        return ""
-    many = f"only {count} sample{'s' * (count > 1)}" if count else "no sample"
-    verb = "lie" if count > 1 else "lies"
-    return f"{many} of {{what}} {verb} between {left:.3g} and {right:.3g}"
+    return rule.why_flat(one, moved + first, signal)
 
 
 def _count_levels(signal: np.ndarray) -> int:

@@ -30,14 +30,14 @@ import numpy as np
 from scipy.linalg import qr
 
 from hwid_cli.model import sensitivities, static_map
-from hwid_cli.model.candidates import Candidate, Columns, Experiment, columns
+from hwid_cli.model.candidates import Candidate, FitData, JacobianColumns, columns
 from hwid_cli.model.linear_block import difference_basis
 from hwid_cli.model.normalise import uses_static_gain
 from hwid_cli.model.static_map import RULES
 from hwid_cli.records.model import StaticMap
 
 
-def held_gradients(candidate: Candidate, place: Columns) -> list[np.ndarray]:
+def held_gradients(candidate: Candidate, place: JacobianColumns) -> list[np.ndarray]:
     """Gradients of what is held while standard errors are worked out.
 
     Parameters
@@ -74,7 +74,9 @@ def held_gradients(candidate: Candidate, place: Columns) -> list[np.ndarray]:
     return held
 
 
-def _held_positions(one: StaticMap, place: Columns, part: slice) -> list[np.ndarray]:
+def _held_positions(
+    one: StaticMap, place: JacobianColumns, part: slice
+) -> list[np.ndarray]:
     """Hold the positions that a kind takes as known."""
     indices = RULES[one.kind].held(one)
     rows = np.zeros((len(indices), place.total))
@@ -82,7 +84,7 @@ def _held_positions(one: StaticMap, place: Columns, part: slice) -> list[np.ndar
     return list(rows)
 
 
-def _offset_is_shared(candidate: Candidate, place: Columns) -> bool:
+def _offset_is_shared(candidate: Candidate, place: JacobianColumns) -> bool:
     """Tell whether a constant can move from one map to the other unnoticed.
 
     A block that starts empty answers a constant with a transient, so there it cannot;
@@ -106,7 +108,7 @@ def _value_gradient(one: StaticMap) -> np.ndarray:
     return row[0]
 
 
-def _row(place: Columns, part: slice, gradient: np.ndarray) -> np.ndarray:
+def _row(place: JacobianColumns, part: slice, gradient: np.ndarray) -> np.ndarray:
     row = np.zeros(place.total)
     row[part] = gradient[gradient.size - (part.stop - part.start) :]
     return row
@@ -125,7 +127,7 @@ class Directions:
 
     Parameters
     ----------
-    place : Columns
+    place : JacobianColumns
         Where each group of parameters stands.
     steps : ndarray, shape (n_parameters, n_directions)
         Step of the parameters in each direction, B and F as coefficients.
@@ -136,7 +138,7 @@ class Directions:
         map or of its break-points. Never zero.
     """
 
-    place: Columns
+    place: JacobianColumns
     steps: np.ndarray
     strength: np.ndarray
     size: np.ndarray
@@ -192,7 +194,7 @@ class Directions:
 
 
 def directions(
-    candidate: Candidate, experiments: Sequence[Experiment], *, free_break_points: bool
+    candidate: Candidate, experiments: Sequence[FitData], *, free_break_points: bool
 ) -> Directions | None:
     """Directions of the parameters of a normalised model at its optimum.
 
@@ -241,7 +243,7 @@ def n_free(candidate: Candidate, *, free_break_points: bool) -> int:
     return place.total - len(held_gradients(candidate, place))
 
 
-def parameter_names(candidate: Candidate, place: Columns) -> tuple[str, ...]:
+def parameter_names(candidate: Candidate, place: JacobianColumns) -> tuple[str, ...]:
     """Names of all parameters, initial states included.
 
     Returns
@@ -270,7 +272,7 @@ def parameter_names(candidate: Candidate, place: Columns) -> tuple[str, ...]:
     return tuple(names)
 
 
-def listed(place: Columns) -> np.ndarray:
+def listed(place: JacobianColumns) -> np.ndarray:
     """Places of the parameters that a fit lists: all but the initial states.
 
     Returns
@@ -282,7 +284,7 @@ def listed(place: Columns) -> np.ndarray:
     return np.concatenate([np.arange(part.start, part.stop) for part in parts])
 
 
-def _coefficients(place: Columns) -> np.ndarray:
+def _coefficients(place: JacobianColumns) -> np.ndarray:
     """Matrix from the parameters of a step to the coefficients of B and F."""
     change = np.eye(place.total)
     for part in (place.numerator, place.denominator, *_initial_states(place)):
@@ -290,7 +292,7 @@ def _coefficients(place: Columns) -> np.ndarray:
     return change
 
 
-def _sizes(candidate: Candidate, place: Columns) -> np.ndarray:
+def _sizes(candidate: Candidate, place: JacobianColumns) -> np.ndarray:
     """Size of what each parameter belongs to; one where that is zero."""
     model = candidate.model
     size = np.zeros(place.total)
@@ -307,14 +309,13 @@ def _sizes(candidate: Candidate, place: Columns) -> np.ndarray:
             of_values = np.ptp(values) or np.max(np.abs(values))
             sizes = np.full(one.parameters.size, of_values)
             sizes[:count] = np.ptp(positions) if count else 0.0
-            if one.kind == "own_function":
-                # Parameters of any kind and unit: each has its own size.
+            if not RULES[one.kind].has_common_sizes:
                 sizes = np.abs(one.parameters)
             size[part] = sizes[sizes.size - (part.stop - part.start) :]
     return np.where(size > 0.0, size, 1.0)
 
 
-def _initial_states(place: Columns) -> list[slice]:
+def _initial_states(place: JacobianColumns) -> list[slice]:
     """Columns of each experiment's initial state."""
     part, size = place.free_responses, place.n_state
     if size == 0:

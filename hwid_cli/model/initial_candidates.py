@@ -16,7 +16,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from hwid_cli.model.candidates import Candidate, Experiment, limits_of
+from hwid_cli.model.candidates import Candidate, FitData, limits_of
 from hwid_cli.model.delays import starts_of_delays
 from hwid_cli.model.extrapolation import for_search
 from hwid_cli.model.levenberg_marquardt import Search
@@ -24,9 +24,9 @@ from hwid_cli.model.linear_block import filtered, is_stable
 from hwid_cli.model.linear_search import linear_search
 from hwid_cli.model.normalise import normalise, rescaled
 from hwid_cli.model.pole_bound import drawn_in
-from hwid_cli.model.problem import Problem
+from hwid_cli.model.problem import FitProblem
 from hwid_cli.model.regression import LARGEST_RADIUS
-from hwid_cli.model.robust import rejudged, renewed, winsorised
+from hwid_cli.model.robust import renewed, rescored, winsorised
 from hwid_cli.model.starts import Start
 from hwid_cli.model.static_map import has_free_shape
 from hwid_cli.records.model import FitOptions, HammersteinWiener, Orders
@@ -68,8 +68,8 @@ def enlarged(model: HammersteinWiener, orders: Orders) -> HammersteinWiener:
 _FALL = 0.25
 
 
-def linear_beginnings(
-    problem: Problem,
+def linear_initial_candidates(
+    problem: FitProblem,
     orders: Orders,
     options: FitOptions,
     *,
@@ -90,7 +90,7 @@ def linear_beginnings(
     starts : tuple of Start
         At least one.
     """
-    experiments: Sequence[Experiment] = problem.experiments
+    experiments: Sequence[FitData] = problem.experiments
     kinds = options if sees_input_map else replace(options, input_map="none")
     starts = block_starts(experiments, orders, kinds)
     linear = linear_search(experiments, options, starts)
@@ -103,12 +103,12 @@ def linear_beginnings(
         experiments = [replace(one, threshold=slowly) for one in experiments]
         starts = block_starts(winsorised(linear, experiments), orders, kinds)
         again = linear_search(experiments, options, starts)
-        linear = min(rejudged(linear, experiments), again, key=lambda one: one.cost)
+        linear = min(rescored(linear, experiments), again, key=lambda one: one.cost)
     return starts, linear
 
 
 def block_starts(
-    experiments: Sequence[Experiment], orders: Orders, options: FitOptions
+    experiments: Sequence[FitData], orders: Orders, options: FitOptions
 ) -> tuple[Start, ...]:
     """Linear blocks from the data, and the one that is given.
 
@@ -139,8 +139,8 @@ def block_starts(
     return found
 
 
-def contained_candidates(
-    problem: Problem,
+def nested_candidates(
+    problem: FitProblem,
     orders: Orders,
     options: FitOptions,
     models: Sequence[HammersteinWiener],
@@ -194,7 +194,7 @@ def contained_candidates(
 
 
 def member_models(
-    problem: Problem, options: FitOptions, models: Sequence[HammersteinWiener]
+    problem: FitProblem, options: FitOptions, models: Sequence[HammersteinWiener]
 ) -> list[HammersteinWiener]:
     """Stable models in the units of a problem, their poles where they may be.
 
@@ -231,7 +231,7 @@ def member_models(
 
 
 def _given_start(
-    experiments: Sequence[Experiment], orders: Orders, options: FitOptions
+    experiments: Sequence[FitData], orders: Orders, options: FitOptions
 ) -> tuple[Start, ...]:
     """Start from the block that the user gives, where the orders contain it."""
     block = options.linear_block
@@ -264,7 +264,7 @@ def _given_start(
 
 
 def _gain(
-    experiments: Sequence[Experiment],
+    experiments: Sequence[FitData],
     numerator: np.ndarray,
     denominator: np.ndarray,
     delay: int,

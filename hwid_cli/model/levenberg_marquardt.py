@@ -19,12 +19,11 @@ import numpy as np
 from scipy.linalg import null_space
 from scipy.linalg.lapack import dposv
 
-from hwid_cli.model.candidates import Candidate, Columns, Experiment, columns
+from hwid_cli.model.candidates import Candidate, FitData, JacobianColumns, columns
 from hwid_cli.model.linear_block import difference_basis, is_stable
-from hwid_cli.model.maps.break_points import add_bends, squared_bends_after
-from hwid_cli.model.maps.piecewise_linear import break_points_and_values
+from hwid_cli.model.maps.rule import Prior
 from hwid_cli.model.normal_equations import scaled_equations
-from hwid_cli.model.points import Point, candidate_at, moved, point_of
+from hwid_cli.model.points import ParameterPoint, candidate_at, moved, point_of
 from hwid_cli.model.pole_bound import drawn_in, radii_held
 from hwid_cli.model.sensitivities import (
     Equations,
@@ -32,6 +31,7 @@ from hwid_cli.model.sensitivities import (
     normal_equations,
     simulated,
 )
+from hwid_cli.model.static_map import RULES
 from hwid_cli.records.model import StaticMap
 
 # Share of the cost that a step must gain, and how many smaller gains in a row end the
@@ -78,7 +78,7 @@ class _Step:
     Without a point no step did; the gain is then what the first one promised.
     """
 
-    point: Point | None
+    point: ParameterPoint | None
     found: Simulated
     gain: float
     damping: float
@@ -88,8 +88,8 @@ class _Step:
 class _Descent:
     """What stays the same along a search."""
 
-    experiments: Sequence[Experiment]
-    place: Columns
+    experiments: Sequence[FitData]
+    place: JacobianColumns
     largest_pole_radius: float
 
     @property
@@ -104,7 +104,7 @@ class _Descent:
 
 def minimise(
     candidate: Candidate,
-    experiments: Sequence[Experiment],
+    experiments: Sequence[FitData],
     *,
     with_positions: bool,
     max_iterations: int,
@@ -161,7 +161,7 @@ def minimise(
 
 
 def _accepted_step(
-    point: Point, found: Simulated, damping: float, descent: _Descent
+    point: ParameterPoint, found: Simulated, damping: float, descent: _Descent
 ) -> _Step:
     """Raise the damping until a step lowers the total and stays stable."""
     place = descent.place
@@ -197,12 +197,12 @@ def _accepted_step(
 
 
 def _within_bound(
-    point: Point,
+    point: ParameterPoint,
     step: np.ndarray,
-    proposed: Point,
+    proposed: ParameterPoint,
     equations: tuple[np.ndarray, np.ndarray, np.ndarray, float],
     descent: _Descent,
-) -> tuple[np.ndarray, Point]:
+) -> tuple[np.ndarray, ParameterPoint]:
     """The same step, or one along the bound on the poles where it would cross it."""
     radius = descent.largest_pole_radius
     if is_stable(proposed.denominator, radius):
@@ -231,30 +231,32 @@ def _solve(matrix: np.ndarray, vector: np.ndarray, damping: float) -> np.ndarray
     return step if info == 0 and np.isfinite(step @ step) else None
 
 
-def _squared_bends(point: Point, before: Point) -> float:
+def _squared_bends(point: ParameterPoint, before: ParameterPoint) -> float:
     """Sum of the squared bends of both maps after a step, as the step saw them."""
     total = 0.0
     for one, other in (
         (point.output_map, before.output_map),
         (point.input_map, before.input_map),
     ):
-        if _bends(one):
-            total += squared_bends_after(
-                *break_points_and_values(one), *break_points_and_values(other)
-            )
+        prior = _prior(one)
+        if prior is not None:
+            total += prior.after(one, other)
     return total
 
 
-def _add_prior(system: Equations, point: Point, weight: float, place: Columns) -> float:
+def _add_prior(
+    system: Equations, point: ParameterPoint, weight: float, place: JacobianColumns
+) -> float:
     """Add the bends' rows to the normal equations; their share of the total."""
     total = 0.0
     for one, part in (
         (point.output_map, place.output_map),
         (point.input_map, place.input_map),
     ):
-        if _bends(one):
-            total += add_bends(
-                *break_points_and_values(one),
+        prior = _prior(one)
+        if prior is not None:
+            total += prior.add(
+                one,
                 place.with_positions,
                 weight,
                 system.matrix,
@@ -264,5 +266,7 @@ def _add_prior(system: Equations, point: Point, weight: float, place: Columns) -
     return weight * total
 
 
-def _bends(one: StaticMap) -> bool:
-    return one.kind == "piecewise_linear" and one.parameters.size > 4
+def _prior(one: StaticMap) -> Prior | None:
+    """What holds a map's shape; None where nothing does."""
+    prior = RULES[one.kind].prior
+    return prior if prior is not None and prior.applies(one) else None

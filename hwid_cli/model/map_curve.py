@@ -8,7 +8,7 @@ from hwid_cli.records.report import MapCurve
 
 # Points of a curve, and how far it goes on beyond the fit's range on each side, as a
 # share of it, [-].
-_COUNT, _BEYOND = 201, 0.05
+_COUNT, _MARGIN = 201, 0.05
 
 
 def map_curve(static_map: StaticMap) -> MapCurve:
@@ -26,10 +26,10 @@ def map_curve(static_map: StaticMap) -> MapCurve:
     array([-1.,  2.])
     """
     low, high = static_map.domain
-    beyond = _BEYOND * (high - low)
+    margin = _MARGIN * (high - low)
     corners = RULES[static_map.kind].corners(static_map)
-    corners = corners[(corners >= low - beyond) & (corners <= high + beyond)]
-    argument = np.union1d(np.linspace(low - beyond, high + beyond, _COUNT), corners)
+    corners = corners[(corners >= low - margin) & (corners <= high + margin)]
+    argument = np.union1d(np.linspace(low - margin, high + margin, _COUNT), corners)
     return MapCurve(
         argument,
         evaluate(static_map, argument),

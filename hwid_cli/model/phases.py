@@ -9,10 +9,11 @@ from dataclasses import replace
 import numpy as np
 
 from hwid_cli.model import sensitivities
-from hwid_cli.model.candidates import Candidate, Experiment, thinned
+from hwid_cli.model.candidates import Candidate, FitData, thinned
 from hwid_cli.model.distinct import WHILE_FIXED, distinct
 from hwid_cli.model.levenberg_marquardt import LEAST_GAIN, PATIENCE, Search, minimise
-from hwid_cli.model.placing import PLACED, coarser, cut, finer, with_maps
+from hwid_cli.model.placing import coarser, cut, finer, with_maps
+from hwid_cli.model.static_map import RULES
 from hwid_cli.records.model import FitOptions, StaticMap
 
 # Iterations at most with fixed break-points, and the share of the cost that a step must
@@ -27,7 +28,7 @@ _ROWS, _COARSE_GAIN = 2500, 1e-3
 
 def place(
     screened: Sequence[Search],
-    experiments: Sequence[Experiment],
+    experiments: Sequence[FitData],
     options: FitOptions,
 ) -> list[Search]:
     """Go on with fixed break-points, then put them where the maps bend.
@@ -50,7 +51,7 @@ def place(
 
 def _settled(
     found: Search,
-    experiments: Sequence[Experiment],
+    experiments: Sequence[FitData],
     options: FitOptions,
     least_gain: float = _PLACING_GAIN,
 ) -> Search:
@@ -67,7 +68,7 @@ def _settled(
 
 def _placed(
     found: Search,
-    experiments: Sequence[Experiment],
+    experiments: Sequence[FitData],
     options: FitOptions,
     more: Callable[[StaticMap, np.ndarray], StaticMap],
     least_gain: float,
@@ -80,7 +81,7 @@ def _placed(
 
 
 def refine(
-    found: Search, experiments: Sequence[Experiment], options: FitOptions
+    found: Search, experiments: Sequence[FitData], options: FitOptions
 ) -> Search:
     """Cut the segments of maps that were found, and keep what matters most.
 
@@ -103,7 +104,7 @@ def refine(
 
 def finish(
     placed: Search,
-    experiments: Sequence[Experiment],
+    experiments: Sequence[FitData],
     options: FitOptions,
     *,
     least_gain: float = LEAST_GAIN,
@@ -124,7 +125,7 @@ def finish(
 
 def converge(
     near: Search,
-    experiments: Sequence[Experiment],
+    experiments: Sequence[FitData],
     options: FitOptions,
     *,
     least_gain: float = LEAST_GAIN,
@@ -153,7 +154,7 @@ def converge(
     return replace(found, iterations=near.iterations + found.iterations)
 
 
-def standing(candidate: Candidate, experiments: Sequence[Experiment]) -> Search:
+def standing(candidate: Candidate, experiments: Sequence[FitData]) -> Search:
     """Take a candidate for a search that ends where it begins."""
     cost = sensitivities.cost(candidate, experiments)
     return Search(candidate, cost, 0, "converged", "taken over as it is")
@@ -161,4 +162,4 @@ def standing(candidate: Candidate, experiments: Sequence[Experiment]) -> Search:
 
 def _is_placed(candidate: Candidate) -> bool:
     maps = (candidate.model.input_map, candidate.model.output_map)
-    return any(one.kind in PLACED for one in maps)
+    return any(RULES[one.kind].placing is not None for one in maps)

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hwid_cli.model import static_map
-from hwid_cli.model.candidates import Candidate, Columns, Experiment
+from hwid_cli.model.candidates import Candidate, FitData, JacobianColumns
 from hwid_cli.model.linear_block import as_loops_take_it, block_output, difference_basis
 from hwid_cli.records.model import StaticMap
 
@@ -19,7 +19,7 @@ Signals = tuple[tuple[np.ndarray, np.ndarray], ...]
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Point:
+class ParameterPoint:
     """Parameters of a candidate.
 
     Parameters
@@ -39,10 +39,10 @@ class Point:
     is_steady: bool
 
 
-def point_of(candidate: Candidate) -> Point:
+def point_of(candidate: Candidate) -> ParameterPoint:
     """Where a candidate stands."""
     model = candidate.model
-    return Point(
+    return ParameterPoint(
         model.input_map,
         as_loops_take_it(model.numerator),
         as_loops_take_it(model.denominator),
@@ -53,7 +53,7 @@ def point_of(candidate: Candidate) -> Point:
     )
 
 
-def candidate_at(point: Point, like: Candidate) -> Candidate:
+def candidate_at(point: ParameterPoint, like: Candidate) -> Candidate:
     """Candidate that stands at a point.
 
     Parameters
@@ -71,13 +71,15 @@ def candidate_at(point: Point, like: Candidate) -> Candidate:
     return replace(like, model=model, free_responses=point.states)
 
 
-def moved(point: Point, step: np.ndarray, place: Columns) -> Point:
+def moved(
+    point: ParameterPoint, step: np.ndarray, place: JacobianColumns
+) -> ParameterPoint:
     """Point after a step.
 
     Parameters
     ----------
     step : ndarray, shape (n_parameters,)
-    place : Columns
+    place : JacobianColumns
         What stands where in it.
     """
     numerator, denominator, states = point.numerator, point.denominator, point.states
@@ -90,7 +92,7 @@ def moved(point: Point, step: np.ndarray, place: Columns) -> Point:
     if states.size:
         c_step = step[place.free_responses].reshape(states.shape)
         states = states + c_step @ difference_basis(place.n_state).T
-    return Point(
+    return ParameterPoint(
         static_map.move(point.input_map, step[place.input_map]),
         numerator,
         denominator,
@@ -102,7 +104,7 @@ def moved(point: Point, step: np.ndarray, place: Columns) -> Point:
 
 
 def block_signals(
-    point: Point, index: int, experiment: Experiment
+    point: ParameterPoint, index: int, experiment: FitData
 ) -> tuple[np.ndarray, np.ndarray]:
     """Signals before and after the linear block.
 
@@ -127,7 +129,7 @@ def block_signals(
     return w, x
 
 
-def all_signals(point: Point, experiments: Sequence[Experiment]) -> Signals:
+def all_signals(point: ParameterPoint, experiments: Sequence[FitData]) -> Signals:
     """Signals before and after the linear block, for each experiment.
 
     Returns
@@ -137,7 +139,9 @@ def all_signals(point: Point, experiments: Sequence[Experiment]) -> Signals:
     return tuple(block_signals(point, i, one) for i, one in enumerate(experiments))
 
 
-def before_output_map(point: Point, experiments: Sequence[Experiment]) -> np.ndarray:
+def before_output_map(
+    point: ParameterPoint, experiments: Sequence[FitData]
+) -> np.ndarray:
     """Signal that reaches the output map.
 
     Returns

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hwid_cli.model import sensitivities
-from hwid_cli.model.candidates import Experiment
+from hwid_cli.model.candidates import FitData
 from hwid_cli.model.levenberg_marquardt import Search
 from hwid_cli.model.robust import plain, with_loss
 from hwid_cli.records.model import FitOptions
@@ -19,55 +19,53 @@ from hwid_cli.records.recordings import Recording
 
 
 @dataclass(frozen=True, eq=False)
-class Problem:
+class FitProblem:
     """Scaled experiments and what they were divided by.
 
     Parameters
     ----------
-    experiments : tuple of Experiment
+    experiments : tuple of FitData
         Of size about one.
     input_scale : float, [input unit]
     output_scale : float, [output unit]
     """
 
-    experiments: tuple[Experiment, ...]
+    experiments: tuple[FitData, ...]
     input_scale: float
     output_scale: float
 
 
-def joined(
-    recordings: Sequence[Recording], options: FitOptions
-) -> tuple[Experiment, ...]:
+def joined(recordings: Sequence[Recording], options: FitOptions) -> tuple[FitData, ...]:
     """Recordings joined as the options say.
 
     Returns
     -------
-    tuple of Experiment
+    tuple of FitData
         In the units of the recordings.
     """
     if options.join == "experiments":
-        return tuple(Experiment(one.input, one.output) for one in recordings)
+        return tuple(FitData(one.input, one.output) for one in recordings)
     return (
-        Experiment(
+        FitData(
             np.concatenate([one.input for one in recordings]),
             np.concatenate([one.output for one in recordings]),
         ),
     )
 
 
-def scaled(recordings: Sequence[Recording], options: FitOptions) -> Problem:
+def scaled(recordings: Sequence[Recording], options: FitOptions) -> FitProblem:
     """Experiments divided by their size, so that one damping suits all."""
     experiments = joined(recordings, options)
     input_scale = max(float(np.max(np.abs(one.input))) for one in experiments)
     output_scale = float(np.std(np.concatenate([one.output for one in experiments])))
     divided = [
-        Experiment(one.input / input_scale, one.output / output_scale)
+        FitData(one.input / input_scale, one.output / output_scale)
         for one in experiments
     ]
-    return Problem(with_loss(divided, options), input_scale, output_scale)
+    return FitProblem(with_loss(divided, options), input_scale, output_scale)
 
 
-def rmsd(search: Search, problem: Problem) -> float:
+def rmsd(search: Search, problem: FitProblem) -> float:
     """RMSD of a search's model, whatever loss it was found with.
 
     Returns

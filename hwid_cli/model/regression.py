@@ -18,7 +18,7 @@ import numpy as np
 from numba import njit
 from scipy.linalg.lapack import dposv
 
-from hwid_cli.model.candidates import Experiment
+from hwid_cli.model.candidates import FitData
 from hwid_cli.model.derivative_rows import all_pole, differences
 from hwid_cli.model.linear_block import (
     as_loops_take_it,
@@ -26,7 +26,7 @@ from hwid_cli.model.linear_block import (
     is_stable,
     reflected,
 )
-from hwid_cli.model.maps.segments import piecewise_linear_shares
+from hwid_cli.model.maps.piecewise_linear import piecewise_linear_shares
 from hwid_cli.records.model import Orders
 
 
@@ -135,7 +135,7 @@ class Regression:
         Poles further out are drawn in.
     """
 
-    experiments: tuple[Experiment, ...]
+    experiments: tuple[FitData, ...]
     bases: tuple[tuple[np.ndarray, np.ndarray], ...]
     points: np.ndarray
     orders: Orders
@@ -184,7 +184,7 @@ class Solution:
 
 
 def regression(
-    experiments: Sequence[Experiment],
+    experiments: Sequence[FitData],
     orders: Orders,
     points: np.ndarray,
     *,

@@ -252,7 +252,7 @@ def _with_itself(residual: np.ndarray, pull: np.ndarray) -> tuple[Correlation, f
     deviation = np.sqrt(np.maximum(free - lags, 1.0) / (free * (free + 2.0)))
     statistic = float(np.sum((values / deviation) ** 2))
     p_value = float(chi2.sf(statistic, n_lags))
-    return _judged(lags, values, deviation, p_value), statistic
+    return _banded(lags, values, deviation, p_value), statistic
 
 
 def _with_signal(
@@ -278,7 +278,7 @@ def _with_signal(
     causal = lags >= 0
     size = np.abs(values) / np.maximum(deviation, 1e-300)
     size[share < 1.0 / e.size] = 0.0
-    correlation = _judged(
+    correlation = _banded(
         lags, values, deviation, _p_of_largest(size[causal]), counted=causal
     )
     return correlation, _p_of_largest(size[~causal]) < LEVEL
@@ -334,7 +334,7 @@ def _p_of_largest(sizes: np.ndarray) -> float:
     return float(-np.expm1(sizes.size * np.log1p(-min(single, 1.0 - 1e-16))))
 
 
-def _judged(
+def _banded(
     lags: np.ndarray,
     values: np.ndarray,
     deviation: np.ndarray,
@@ -346,14 +346,14 @@ def _judged(
     counted = np.ones(lags.size, dtype=bool) if counted is None else counted
     each = 1.0 - (1.0 - LEVEL) ** (1.0 / max(int(counted.sum()), 1))
     common = norm.isf(each / 2.0) * deviation
-    beyond = lags[counted & (np.abs(values) > common) & (common > 0.0)]
+    outside = lags[counted & (np.abs(values) > common) & (common > 0.0)]
     return Correlation(
         lags,
         values,
         norm.isf(LEVEL / 2.0) * deviation,
         common,
         p_value,
-        int(beyond.max(initial=-1)),
+        int(outside.max(initial=-1)),
     )
 
 

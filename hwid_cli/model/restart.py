@@ -1,4 +1,4 @@
-"""A new linear block between the maps of the best model: leaves minima of the block.
+"""Re-estimation of the block between the maps of the best model: leaves its minima.
 
 References
 ----------
@@ -7,9 +7,10 @@ docs/method.md, section "The search", step 4.
 Where a search may have ended in a poor minimum, and from where to begin again.
 
 The error of a poor minimum is of another shape than noise: it follows itself from sample
-to sample, or it is large at few moments. Then what the first search took for granted is
-doubted: the input maps that came with the linear starts (where an output folds, least
-squares on the output see a wrong one), and the maps that it found around its own block.
+to sample, or it is large at few moments. Then a search is restarted without what the
+first one took for granted: the input maps that came with the linear starts (where the
+output map is not monotonic, least squares on the output see a wrong one), and the maps
+that it found around its own block.
 
 References
 ----------
@@ -22,8 +23,8 @@ from dataclasses import replace
 import numpy as np
 
 from hwid_cli.model import static_map
-from hwid_cli.model.candidates import Candidate, Experiment
-from hwid_cli.model.delays import relaxed_starts
+from hwid_cli.model.candidates import Candidate, FitData
+from hwid_cli.model.delays import reestimated_blocks
 from hwid_cli.model.distinct import WHEN_FREE, borne_residuals, distinct
 from hwid_cli.model.levenberg_marquardt import Search, minimise
 from hwid_cli.model.phases import standing
@@ -41,12 +42,12 @@ _CLOSE = 0.005
 _FAR = 0.5
 # Break-points of maps whose shape other kinds take over.
 _BREAK_POINTS = 15
-_NOT_REPLACED = ("none", "piecewise_linear")
+_STAND_IN = "piecewise_linear"
 # Values by which a start takes over an input map, and an input map of another kind.
 _MAP_POINTS, FINE_MAP_POINTS = 12, 200
 
 
-def leaves_structure(candidate: Candidate, experiments: Sequence[Experiment]) -> bool:
+def leaves_structure(candidate: Candidate, experiments: Sequence[FitData]) -> bool:
     """Tell whether residuals look like the error of a poor minimum.
 
     Returns
@@ -70,16 +71,16 @@ def leaves_structure(candidate: Candidate, experiments: Sequence[Experiment]) ->
     return power > _CLOSE**2 * spread and peaks > _PEAKED * power**2
 
 
-def doubted_input_maps(
-    starts: Sequence[Start], experiments: Sequence[Experiment]
+def starts_without_input_maps(
+    starts: Sequence[Start], experiments: Sequence[FitData]
 ) -> list[Start]:
     """Blocks that came with an input map of their own, without it."""
     return [_straight(one, experiments) for one in starts if one.is_expanded]
 
 
-def maps_anew(
+def starts_with_new_maps(
     candidate: Candidate,
-    experiments: Sequence[Experiment],
+    experiments: Sequence[FitData],
     n_points: int = _MAP_POINTS,
 ) -> list[Start]:
     """The block that a search found, to find maps around it again.
@@ -117,36 +118,37 @@ def with_break_points(options: FitOptions) -> FitOptions:
     FitOptions
         The same where no map is of another kind.
     """
-    if options.input_map not in _NOT_REPLACED:
-        options = replace(
-            options, input_map="piecewise_linear", input_units=_BREAK_POINTS
-        )
-    if options.output_map not in _NOT_REPLACED:
-        options = replace(
-            options, output_map="piecewise_linear", output_units=_BREAK_POINTS
-        )
+    if _is_replaced(options.input_map):
+        options = replace(options, input_map=_STAND_IN, input_units=_BREAK_POINTS)
+    if _is_replaced(options.output_map):
+        options = replace(options, output_map=_STAND_IN, output_units=_BREAK_POINTS)
     return options
 
 
-def _straight(start: Start, experiments: Sequence[Experiment]) -> Start:
+def _is_replaced(kind: str) -> bool:
+    # Maps that stand in for others already have as many break-points as were asked for.
+    return kind != _STAND_IN and not static_map.RULES[kind].is_identity
+
+
+def _straight(start: Start, experiments: Sequence[FitData]) -> Start:
     ends = np.array(_range(experiments))
     return replace(start, input_points=ends, input_values=ends)
 
 
-def _range(experiments: Sequence[Experiment]) -> tuple[float, float]:
+def _range(experiments: Sequence[FitData]) -> tuple[float, float]:
     lowest = min(float(one.input.min()) for one in experiments)
     return lowest, max(float(one.input.max()) for one in experiments)
 
 
-_RELAXING_ITERATIONS = 8
-_RELAXED_BLOCKS = 2
+_REESTIMATION_ITERATIONS = 8
+_REESTIMATED_BLOCKS = 2
 # Slopes of the output map below this share of their mean square say too little about x.
 _FLAT = 0.1
 
 
-def relaxed_search(
+def reestimate_block(
     best: Search,
-    experiments: Sequence[Experiment],
+    experiments: Sequence[FitData],
     options: FitOptions,
 ) -> Search:
     """Find the linear block anew between the maps of the best model.
@@ -160,11 +162,11 @@ def relaxed_search(
     between = _between_maps(best.candidate, experiments)
     model, no_states = best.candidate.model, best.candidate.free_responses[:, :0]
     has_states = options.initial_state == "estimated"
-    starts = relaxed_starts(
+    starts = reestimated_blocks(
         between,
         model.orders,
         options,
-        count=_RELAXED_BLOCKS,
+        count=_REESTIMATED_BLOCKS,
         denominator=model.denominator,
     )
     entered = [
@@ -188,7 +190,7 @@ def relaxed_search(
             one.candidate,
             experiments,
             with_positions=False,
-            max_iterations=min(_RELAXING_ITERATIONS, options.max_iterations),
+            max_iterations=min(_REESTIMATION_ITERATIONS, options.max_iterations),
         )
         for one in distinct([best, *entered], experiments, WHEN_FREE)
         if one is not best
@@ -200,8 +202,8 @@ def relaxed_search(
 
 
 def _between_maps(
-    candidate: Candidate, experiments: Sequence[Experiment]
-) -> list[Experiment]:
+    candidate: Candidate, experiments: Sequence[FitData]
+) -> list[FitData]:
     """Signals before and after the linear block; the latter corrected by the output.
 
     The correction is a Gauss-Newton step of x towards the measured output, held back
@@ -217,5 +219,5 @@ def _between_maps(
         )
         held_back = slope**2 + _FLAT * float(np.mean(slope**2)) + 1e-300
         error = np.clip(one.output - y, -one.threshold, one.threshold)
-        result.append(Experiment(w, x + error * slope / held_back))
+        result.append(FitData(w, x + error * slope / held_back))
     return result

@@ -16,7 +16,7 @@ from dataclasses import replace
 import numpy as np
 
 from hwid_cli.model import sensitivities
-from hwid_cli.model.candidates import Candidate, Experiment
+from hwid_cli.model.candidates import Candidate, FitData
 from hwid_cli.model.levenberg_marquardt import Search
 from hwid_cli.model.outliers import tells_errors
 from hwid_cli.model.phases import finish
@@ -33,18 +33,18 @@ _MOST_RENEWALS, _SAME = 5, 0.02
 
 
 def with_loss(
-    experiments: Sequence[Experiment], options: FitOptions
-) -> tuple[Experiment, ...]:
+    experiments: Sequence[FitData], options: FitOptions
+) -> tuple[FitData, ...]:
     """Experiments whose residuals count as the options say.
 
     Parameters
     ----------
-    experiments : sequence of Experiment
+    experiments : sequence of FitData
         Divided by the standard deviation of their output.
 
     Returns
     -------
-    tuple of Experiment
+    tuple of FitData
         With a first threshold, as if no model explained anything.
     """
     if options.loss == "squared":
@@ -53,8 +53,8 @@ def with_loss(
 
 
 def renewed(
-    experiments: Sequence[Experiment], candidates: Sequence[Candidate]
-) -> Sequence[Experiment]:
+    experiments: Sequence[FitData], candidates: Sequence[Candidate]
+) -> Sequence[FitData]:
     """Experiments with the threshold that the best of some candidates asks for.
 
     Parameters
@@ -64,7 +64,7 @@ def renewed(
 
     Returns
     -------
-    sequence of Experiment
+    sequence of FitData
         The same where all residuals count squared.
     """
     if experiments[0].threshold == np.inf:
@@ -78,16 +78,14 @@ def renewed(
     return tuple(replace(one, threshold=threshold) for one in experiments)
 
 
-def rejudged(search: Search, experiments: Sequence[Experiment]) -> Search:
+def rescored(search: Search, experiments: Sequence[FitData]) -> Search:
     """Same search with the cost that a renewed threshold gives it."""
     if experiments[0].threshold == np.inf:
         return search
     return replace(search, cost=sensitivities.cost(search.candidate, experiments))
 
 
-def winsorised(
-    search: Search, experiments: Sequence[Experiment]
-) -> Sequence[Experiment]:
+def winsorised(search: Search, experiments: Sequence[FitData]) -> Sequence[FitData]:
     """Experiments whose outputs are nowhere further from a model than the threshold.
 
     Parameters
@@ -97,7 +95,7 @@ def winsorised(
 
     Returns
     -------
-    sequence of Experiment
+    sequence of FitData
         For least squares that know no loss; the same where all residuals count squared.
     """
     if experiments[0].threshold == np.inf:
@@ -110,15 +108,15 @@ def winsorised(
 
 
 def settled(
-    search: Search, experiments: Sequence[Experiment], options: FitOptions
-) -> tuple[Search, Sequence[Experiment]]:
+    search: Search, experiments: Sequence[FitData], options: FitOptions
+) -> tuple[Search, Sequence[FitData]]:
     """Go on until the threshold is that of the residuals that it leads to.
 
     Returns
     -------
     search : Search
         As it was where all residuals count squared.
-    experiments : sequence of Experiment
+    experiments : sequence of FitData
         With the last threshold.
     """
     for _ in range(_MOST_RENEWALS):
@@ -130,12 +128,12 @@ def settled(
     return search, experiments
 
 
-def plain(experiments: Sequence[Experiment]) -> tuple[Experiment, ...]:
+def plain(experiments: Sequence[FitData]) -> tuple[FitData, ...]:
     """Experiments whose residuals all count squared."""
     return tuple(replace(one, threshold=np.inf) for one in experiments)
 
 
-def squared_error(candidate: Candidate, experiments: Sequence[Experiment]) -> float:
+def squared_error(candidate: Candidate, experiments: Sequence[FitData]) -> float:
     """Sum of the squared residuals, outliers aside.
 
     Returns
@@ -158,13 +156,13 @@ def squared_error(candidate: Candidate, experiments: Sequence[Experiment]) -> fl
     return float(cut @ cut) / uncut**2
 
 
-def _scale(candidate: Candidate, experiments: Sequence[Experiment]) -> float:
+def _scale(candidate: Candidate, experiments: Sequence[FitData]) -> float:
     """Standard deviation of normal residuals of the same median size."""
     tells = np.concatenate([tells_errors(one.output) for one in experiments])
     return _NORMAL * float(np.median(np.abs(_residual(candidate, experiments)[tells])))
 
 
-def _residual(candidate: Candidate, experiments: Sequence[Experiment]) -> np.ndarray:
+def _residual(candidate: Candidate, experiments: Sequence[FitData]) -> np.ndarray:
     simulated = sensitivities.simulated_outputs(candidate, experiments)
     return np.concatenate(
         [one.output - y for one, y in zip(experiments, simulated, strict=True)]

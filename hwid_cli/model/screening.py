@@ -1,4 +1,4 @@
-"""The first phase of a search: many starts, a few iterations each, the best go on.
+"""Multistart screening: many starts, a few iterations each, the best go on.
 
 A linear block alone does not tell on which side of it a nonlinearity lies, so every block
 starts twice: with what it says of the input map, and with the output map that its own
@@ -15,13 +15,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hwid_cli.model import static_map
-from hwid_cli.model.candidates import Candidate, Experiment, limits_of, thinned
+from hwid_cli.model.candidates import Candidate, FitData, limits_of, thinned
 from hwid_cli.model.derivative_rows import local_sums
 from hwid_cli.model.distinct import WHILE_FIXED, distinct
 from hwid_cli.model.levenberg_marquardt import Search, minimise
 from hwid_cli.model.linear_block import as_loops_take_it
-from hwid_cli.model.maps.segments import piecewise_linear_shares
-from hwid_cli.model.points import Point, Signals, all_signals
+from hwid_cli.model.maps.piecewise_linear import piecewise_linear_shares
+from hwid_cli.model.points import ParameterPoint, Signals, all_signals
 from hwid_cli.model.sensitivities import compared
 from hwid_cli.model.starts import Start
 from hwid_cli.records.model import FitOptions, HammersteinWiener, StaticMap
@@ -29,42 +29,42 @@ from hwid_cli.records.model import FitOptions, HammersteinWiener, StaticMap
 # Iterations of each round, and how many candidates go on after it.
 Rounds = tuple[tuple[int, int], ...]
 THOROUGH: Rounds = ((2, 3), (4, 2))
-# For where that has found no good minimum: everything that entered.
+# For a restart, where that has found no good minimum: every start is kept.
 LONG: Rounds = ((6, 5), (15, 2))
 # For one of many fits that help each other.
 SHORT: Rounds = ((0, 4), (2, 1), (3, 1))
 # Samples that count in a round; enough to tell candidates apart.
-RACE_ROWS = 1000
+SCREENING_ROWS = 1000
 # Knots of the output map that a block's output asks for, and how stiff it is: the
 # weight of its second differences as a share of the mean number of samples at a knot.
 _CURVE_POINTS, _STIFFNESS = 12, 1e-2
 _SECOND = np.diff(np.eye(_CURVE_POINTS), 2, axis=0)
 _BENDING = _SECOND.T @ _SECOND
 _NO_MAP = StaticMap("none", np.zeros(0))
-# Cost from which on a candidate drops out, as a multiple of the best's.
-_HOPELESS = 3.0
+# Cost from which on a candidate is pruned, as a multiple of the best's.
+_PRUNING_LIMIT = 3.0
 
 
 @dataclass(frozen=True, eq=False)
-class _Runner:
-    """A candidate in the race and the kind of start that it came from."""
+class _Screened:
+    """A candidate of the screening and the kind of start that it came from."""
 
     family: tuple[bool, ...]
     search: Search
 
 
-def race(
-    experiments: Sequence[Experiment],
+def screen(
+    experiments: Sequence[FitData],
     starts: Sequence[Start],
     options: FitOptions,
     *,
     rounds: Rounds = THOROUGH,
 ) -> list[Search]:
-    """Let all starts run a few iterations; the slower ones drop out.
+    """Let all starts run a few iterations; those far behind are pruned.
 
     Parameters
     ----------
-    experiments : sequence of Experiment
+    experiments : sequence of FitData
         Scaled to about one.
     rounds : tuple of (int, int)
         Iterations of each round, and how many candidates go on after it.
@@ -74,28 +74,28 @@ def race(
     list of Search
         The best, those of different kinds of starts first.
     """
-    experiments = thinned(experiments, RACE_ROWS)
-    racing = []
+    experiments = thinned(experiments, SCREENING_ROWS)
+    running = []
     for start in starts:
         kind = (start.is_given, start.is_expanded)
         for candidate, signals in starting_candidates(experiments, start, options):
-            racing.append(_entered((*kind, False), candidate, signals, experiments))
+            running.append(_unscreened((*kind, False), candidate, signals, experiments))
             if static_map.has_free_shape(options.output_map):
                 curved = _with_output_curve(candidate, signals, experiments, options)
-                racing.append(_entered((*kind, True), curved, signals, experiments))
+                running.append(_unscreened((*kind, True), curved, signals, experiments))
     if rounds != LONG:
-        racing = _leaders(racing, options.starts)
+        running = _leaders(running, options.starts)
     for iterations, count in rounds:
         if iterations:
-            racing = [_going_on(one, experiments, iterations) for one in racing]
-        racing = _leaders(racing, count, _HOPELESS)
-        kept = distinct([one.search for one in racing], experiments, WHILE_FIXED)
-        racing = [one for one in racing if one.search in kept]
-    return [one.search for one in racing]
+            running = [_iterated(one, experiments, iterations) for one in running]
+        running = _leaders(running, count, _PRUNING_LIMIT)
+        kept = distinct([one.search for one in running], experiments, WHILE_FIXED)
+        running = [one for one in running if one.search in kept]
+    return [one.search for one in running]
 
 
 def starting_candidates(
-    experiments: Sequence[Experiment],
+    experiments: Sequence[FitData],
     start: Start,
     options: FitOptions,
 ) -> list[tuple[Candidate, Signals]]:
@@ -117,7 +117,7 @@ def starting_candidates(
         inputs.max(),
         shape=lambda u: np.interp(u, start.input_points, start.input_values),
     ):
-        point = Point(
+        point = ParameterPoint(
             input_map,
             as_loops_take_it(start.numerator),
             as_loops_take_it(start.denominator),
@@ -151,7 +151,7 @@ def starting_candidates(
 def _with_output_curve(
     candidate: Candidate,
     signals: Signals,
-    experiments: Sequence[Experiment],
+    experiments: Sequence[FitData],
     options: FitOptions,
 ) -> Candidate:
     """Candidate with the output map that comes closest for what reaches it."""
@@ -174,19 +174,19 @@ def _with_output_curve(
     return replace(candidate, model=replace(candidate.model, output_map=maps[0]))
 
 
-def _entered(
+def _unscreened(
     family: tuple[bool, ...],
     candidate: Candidate,
     signals: Signals,
-    experiments: Sequence[Experiment],
-) -> _Runner:
+    experiments: Sequence[FitData],
+) -> _Screened:
     cost = compared(candidate.model.output_map, signals, experiments).cost
-    return _Runner(family, Search(candidate, cost, 0, "iteration_limit", ""))
+    return _Screened(family, Search(candidate, cost, 0, "iteration_limit", ""))
 
 
-def _going_on(
-    one: _Runner, experiments: Sequence[Experiment], iterations: int
-) -> _Runner:
+def _iterated(
+    one: _Screened, experiments: Sequence[FitData], iterations: int
+) -> _Screened:
     found = minimise(
         one.search.candidate,
         experiments,
@@ -198,11 +198,11 @@ def _going_on(
 
 
 def _leaders(
-    racing: Sequence[_Runner], count: int, hopeless: float = np.inf
-) -> list[_Runner]:
-    """Best of each family unless it is hopeless, then the best of the rest."""
-    ordered = sorted(racing, key=lambda one: one.search.cost)
-    limit = hopeless * ordered[0].search.cost
+    running: Sequence[_Screened], count: int, pruning_limit: float = np.inf
+) -> list[_Screened]:
+    """Best of each family that is not pruned, then the best of the rest."""
+    ordered = sorted(running, key=lambda one: one.search.cost)
+    limit = pruning_limit * ordered[0].search.cost
     ordered = [one for one in ordered if one.search.cost <= limit] or ordered
     families = [one.family for one in ordered]
     firsts = sorted({families.index(family) for family in set(families)})

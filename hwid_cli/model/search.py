@@ -5,7 +5,7 @@
    break-points, and those that matter most stay. Break-points moved from an equally
    spaced coarse grid stop in poor minima far more often.
 3. *Free*: break-points move.
-4. *Relax*: with the maps of the best model taken as known, new linear blocks are found by
+4. *Re-estimate*: with the maps of the best model taken as known, new linear blocks are found by
    least squares and continue from there; this leaves minima of the linear block.
 
 The best candidate seen wins. docs/method.md, section "The search".
@@ -15,35 +15,35 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from hwid_cli.model import static_map
-from hwid_cli.model.candidates import Candidate, Experiment
+from hwid_cli.model.candidates import Candidate, FitData
 from hwid_cli.model.levenberg_marquardt import Search
 from hwid_cli.model.phases import converge, finish, place, refine, standing
 from hwid_cli.model.placing import reaching
 from hwid_cli.model.restart import (
     FINE_MAP_POINTS,
-    doubted_input_maps,
     leaves_structure,
-    maps_anew,
-    relaxed_search,
+    reestimate_block,
+    starts_with_new_maps,
+    starts_without_input_maps,
     with_break_points,
 )
-from hwid_cli.model.robust import rejudged, renewed
-from hwid_cli.model.screening import LONG, SHORT, race
+from hwid_cli.model.robust import renewed, rescored
+from hwid_cli.model.screening import LONG, SHORT, screen
 from hwid_cli.model.starts import Start
 from hwid_cli.records.model import FitOptions
 
-# Cost that a relaxed block must reach, as a share of the best so far, to be finished;
+# Cost that a re-estimated block must reach, as a share of the best so far, to be finished;
 # nearer to it the search has only come back to where it was.
 _WORTH_GOING_ON = 0.995
-# Searches that follow one whose residuals are not noise, and the share of the cost that
+# Restarts that follow a search whose residuals are not noise, and the share of the cost that
 # one must reach for another to follow it.
-_MOST_DOUBTS, _WORTH_DOUBTING = 3, 0.9
+_MOST_RESTARTS, _WORTH_RESTARTING = 3, 0.9
 # Share of the cost that a step must gain where larger models go on from the result.
 _SMALL_GAIN = 1e-3
 
 
 def nonlinear_search(
-    experiments: Sequence[Experiment],
+    experiments: Sequence[FitData],
     options: FitOptions,
     starts: Sequence[Start],
     linear: Search,
@@ -52,7 +52,7 @@ def nonlinear_search(
 
     Parameters
     ----------
-    experiments : sequence of Experiment
+    experiments : sequence of FitData
         Scaled to about one.
     linear : Search
         What `linear_search` found: with maps that pass everything on it is a model of
@@ -63,43 +63,43 @@ def nonlinear_search(
     Search
         Its iterations are those of the winning chain.
     """
-    finalists = race(experiments, starts, options)
+    finalists = screen(experiments, starts, options)
     experiments = renewed(experiments, [one.candidate for one in finalists])
     best = finish(_best(place(finalists, experiments, options)), experiments, options)
     if not options.keeps_block:
-        best = _relaxed(best, experiments, options)
-    best = _doubted(best, experiments, options, starts)
+        best = _with_reestimated_block(best, experiments, options)
+    best = _restarted(best, experiments, options, starts)
     best = _from_break_points(best, experiments, options, starts, linear)
     return _not_worse_than(linear, best, experiments, options)
 
 
-def _relaxed(
-    best: Search, experiments: Sequence[Experiment], options: FitOptions
+def _with_reestimated_block(
+    best: Search, experiments: Sequence[FitData], options: FitOptions
 ) -> Search:
     """The best so far, or what comes of another block between its maps."""
-    relaxed = relaxed_search(best, experiments, options)
-    if relaxed.cost >= _WORTH_GOING_ON * best.cost:
+    reestimated = reestimate_block(best, experiments, options)
+    if reestimated.cost >= _WORTH_GOING_ON * best.cost:
         return best
-    return _best([best, finish(relaxed, experiments, options)])
+    return _best([best, finish(reestimated, experiments, options)])
 
 
-def _doubted(
+def _restarted(
     best: Search,
-    experiments: Sequence[Experiment],
+    experiments: Sequence[FitData],
     options: FitOptions,
     starts: Sequence[Start],
 ) -> Search:
-    """The best so far, or what long races find where its residuals are not noise."""
+    """The best so far, or what longer screenings find where its residuals are not noise."""
     best = _refined(best, experiments, options)
-    entered = [*starts, *doubted_input_maps(starts, experiments)]
-    for _ in range(_MOST_DOUBTS):
+    entered = [*starts, *starts_without_input_maps(starts, experiments)]
+    for _ in range(_MOST_RESTARTS):
         if not leaves_structure(best.candidate, experiments):
             break
-        entered += maps_anew(best.candidate, experiments)
-        found = race(experiments, entered, options, rounds=LONG)
+        entered += starts_with_new_maps(best.candidate, experiments)
+        found = screen(experiments, entered, options, rounds=LONG)
         placed = place(found, experiments, options)
         again = finish(_best(placed), experiments, options)
-        gained = again.cost < _WORTH_DOUBTING * best.cost
+        gained = again.cost < _WORTH_RESTARTING * best.cost
         best, entered = _best([best, again]), []
         if not gained:
             break
@@ -108,7 +108,7 @@ def _doubted(
 
 def _from_break_points(
     best: Search,
-    experiments: Sequence[Experiment],
+    experiments: Sequence[FitData],
     options: FitOptions,
     starts: Sequence[Start],
     linear: Search,
@@ -121,17 +121,17 @@ def _from_break_points(
     if bent == options or not leaves_structure(best.candidate, experiments):
         return best
     found = nonlinear_search(experiments, bent, starts, linear)
-    if found.cost > _WORTH_DOUBTING * best.cost:
+    if found.cost > _WORTH_RESTARTING * best.cost:
         return best
-    entered = maps_anew(found.candidate, experiments, FINE_MAP_POINTS)
+    entered = starts_with_new_maps(found.candidate, experiments, FINE_MAP_POINTS)
     placed = place(
-        race(experiments, entered, options, rounds=LONG), experiments, options
+        screen(experiments, entered, options, rounds=LONG), experiments, options
     )
     return _best([best, finish(_best(placed), experiments, options)])
 
 
 def _refined(
-    best: Search, experiments: Sequence[Experiment], options: FitOptions
+    best: Search, experiments: Sequence[FitData], options: FitOptions
 ) -> Search:
     """The same with break-points nearer to where maps bend, if residuals are not noise."""
     if not leaves_structure(best.candidate, experiments):
@@ -139,33 +139,33 @@ def _refined(
     return refine(best, experiments, options)
 
 
-def grown(
-    contained: Sequence[Candidate],
-    experiments: Sequence[Experiment],
+def continue_nested(
+    nested: Sequence[Candidate],
+    experiments: Sequence[FitData],
     options: FitOptions,
     linear: Search,
 ) -> Search:
-    """Model that goes on from the best of those of smaller orders that it contains.
+    """Continue from the best of the nested models of smaller orders.
 
     Parameters
     ----------
-    contained : sequence of Candidate
+    nested : sequence of Candidate
         Of the orders and kinds of maps asked for.
 
     Returns
     -------
     Search
-        Never worse than any of the contained models, nor than the linear one.
+        Never worse than any of the nested models, nor than the linear one.
     """
-    experiments = renewed(experiments, contained)
-    known = _best([standing(one, experiments) for one in contained])
+    experiments = renewed(experiments, nested)
+    known = _best([standing(one, experiments) for one in nested])
     near = converge(known, experiments, options, least_gain=_SMALL_GAIN)
     return _not_worse_than(linear, _best([known, near]), experiments, options)
 
 
-def search_beyond(
-    contained: Sequence[Candidate],
-    experiments: Sequence[Experiment],
+def search_beside_nested(
+    nested: Sequence[Candidate],
+    experiments: Sequence[FitData],
     options: FitOptions,
     starts: Sequence[Start],
     linear: Search,
@@ -174,33 +174,37 @@ def search_beyond(
 
     Parameters
     ----------
-    contained : sequence of Candidate
+    nested : sequence of Candidate
         Of the orders and kinds of maps asked for.
 
     Returns
     -------
     Search
-        Never worse than any of the contained models, nor than the linear one. The search
+        Never worse than any of the nested models, nor than the linear one. The search
         anew is a shorter one than `nonlinear_search`.
     """
-    near = grown(contained, experiments, options, linear)
-    experiments = renewed(experiments, contained)
-    leaders = race(experiments, starts, options, rounds=SHORT)
+    near = continue_nested(nested, experiments, options, linear)
+    experiments = renewed(experiments, nested)
+    leaders = screen(experiments, starts, options, rounds=SHORT)
     (placed,) = place(leaders, experiments, options)
     anew = finish(placed, experiments, options, least_gain=_SMALL_GAIN)
     best = _best([near, anew])
     # Only between known maps are delays told apart safely.
-    return _relaxed(best, experiments, options) if len(options.delays) > 1 else best
+    return (
+        _with_reestimated_block(best, experiments, options)
+        if len(options.delays) > 1
+        else best
+    )
 
 
 def _not_worse_than(
     linear: Search,
     best: Search,
-    experiments: Sequence[Experiment],
+    experiments: Sequence[FitData],
     options: FitOptions,
 ) -> Search:
     """The best so far, or what comes of the linear model where that is better."""
-    linear = rejudged(linear, experiments)
+    linear = rescored(linear, experiments)
     if linear.cost >= best.cost:
         return best
     linear = finish(linear, experiments, options)
@@ -210,7 +214,7 @@ def _not_worse_than(
 
 
 def _passing(
-    linear: Search, experiments: Sequence[Experiment], options: FitOptions
+    linear: Search, experiments: Sequence[FitData], options: FitOptions
 ) -> Candidate:
     """Linear model with maps of the kinds asked for that pass everything on."""
     candidate = linear.candidate

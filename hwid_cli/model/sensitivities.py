@@ -27,12 +27,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hwid_cli.model import static_map
-from hwid_cli.model.candidates import Candidate, Columns, Experiment, columns
+from hwid_cli.model.candidates import Candidate, FitData, JacobianColumns, columns
 from hwid_cli.model.derivative_rows import derivative_rows, local_sums
 from hwid_cli.model.linear_block import residuals_and_loss
 from hwid_cli.model.maps.rule import Derivatives
 from hwid_cli.model.normal_equations import combined
-from hwid_cli.model.points import Point, Signals, all_signals, point_of
+from hwid_cli.model.points import ParameterPoint, Signals, all_signals, point_of
 from hwid_cli.records.model import StaticMap
 
 
@@ -97,7 +97,7 @@ class Simulated:
 
 
 def simulated_outputs(
-    candidate: Candidate, experiments: Sequence[Experiment]
+    candidate: Candidate, experiments: Sequence[FitData]
 ) -> list[np.ndarray]:
     """Simulate every experiment."""
     point = point_of(candidate)
@@ -107,7 +107,7 @@ def simulated_outputs(
     ]
 
 
-def cost(candidate: Candidate, experiments: Sequence[Experiment]) -> float:
+def cost(candidate: Candidate, experiments: Sequence[FitData]) -> float:
     """Sum of squares, or of losses; infinite where the simulation is not finite.
 
     Returns
@@ -118,7 +118,7 @@ def cost(candidate: Candidate, experiments: Sequence[Experiment]) -> float:
 
 
 def equations(
-    candidate: Candidate, experiments: Sequence[Experiment], *, with_positions: bool
+    candidate: Candidate, experiments: Sequence[FitData], *, with_positions: bool
 ) -> Equations:
     """Normal equations of all experiments together.
 
@@ -132,7 +132,7 @@ def equations(
     return normal_equations(point, place, experiments, simulated(point, experiments))
 
 
-def simulated(point: Point, experiments: Sequence[Experiment]) -> Simulated:
+def simulated(point: ParameterPoint, experiments: Sequence[FitData]) -> Simulated:
     """Simulate every experiment and compare it with what was measured."""
     return compared(point.output_map, all_signals(point, experiments), experiments)
 
@@ -140,7 +140,7 @@ def simulated(point: Point, experiments: Sequence[Experiment]) -> Simulated:
 def compared(
     output_map: StaticMap,
     signals: Signals,
-    experiments: Sequence[Experiment],
+    experiments: Sequence[FitData],
 ) -> Simulated:
     """Compare what an output map makes of signals with what was measured."""
     residuals, total = [], 0.0
@@ -157,16 +157,16 @@ def compared(
 
 
 def normal_equations(
-    point: Point,
-    place: Columns,
-    experiments: Sequence[Experiment],
+    point: ParameterPoint,
+    place: JacobianColumns,
+    experiments: Sequence[FitData],
     found: Simulated,
 ) -> Equations:
     """Normal equations at a point.
 
     Parameters
     ----------
-    place : Columns
+    place : JacobianColumns
         Which parameters move and where they stand.
     found : Simulated
         What the point makes of the experiments.
@@ -203,8 +203,8 @@ def normal_equations(
 
 
 def _rows(
-    point: Point,
-    place: Columns,
+    point: ParameterPoint,
+    place: JacobianColumns,
     maps: tuple[Derivatives, Derivatives],
     where: tuple[int, Simulated, np.ndarray],
 ) -> np.ndarray:
@@ -248,7 +248,7 @@ def _joined(own: np.ndarray, cross: np.ndarray, rows: np.ndarray) -> np.ndarray:
 
 
 def _by_parameters(
-    total: np.ndarray, place: Columns, before: Derivatives, after: Derivatives
+    total: np.ndarray, place: JacobianColumns, before: Derivatives, after: Derivatives
 ) -> Equations:
     """Turn the products of columns into those of the parameters' derivatives."""
     for derivatives, first in ((before, after.count), (after, 0)):

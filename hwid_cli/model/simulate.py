@@ -10,7 +10,7 @@ from typing import Literal
 
 import numpy as np
 
-from hwid_cli.model import repeatable, static_map
+from hwid_cli.model import static_map
 from hwid_cli.model.extrapolation import outlined_model
 from hwid_cli.model.linear_block import (
     difference_basis,
@@ -93,7 +93,7 @@ def simulate(
             coefficients = model.free_response
         else:
             coefficients = initial_state
-        return repeatable.evaluate(
+        return static_map.evaluate_repeatably(
             model.output_map,
             _forced(model, signal) + _free(model, coefficients, signal),
         )
@@ -177,12 +177,12 @@ def _state_from(
     responses = _free_responses(model, forced.size)
     # Where the free responses have died away, the initial state changes nothing.
     n = responses.shape[0]
-    beginning, measured = forced[:n], output[:n]
+    forced_head, measured = forced[:n], output[:n]
     basis = difference_basis(best.size)
 
     def deviation(coefficients: np.ndarray) -> float:
         # The basis is its own inverse.
-        x = beginning + responses @ (basis @ coefficients)
+        x = forced_head + responses @ (basis @ coefficients)
         residual = measured - static_map.evaluate(model.output_map, x)
         return float(residual @ residual)
 
@@ -192,7 +192,7 @@ def _state_from(
         if of_fit < cost:
             best, cost = model.free_response, of_fit
     for _ in range(_ESTIMATE_ITERATIONS):
-        x = beginning + responses @ (basis @ best)
+        x = forced_head + responses @ (basis @ best)
         step, promised = _state_step(model, x, measured, responses)
         if promised < _LEAST_GAIN * cost:
             break
@@ -241,7 +241,7 @@ def _state_step(
 
 def _forced(model: HammersteinWiener, signal: np.ndarray) -> np.ndarray:
     return filtered(
-        repeatable.evaluate(model.input_map, signal),
+        static_map.evaluate_repeatably(model.input_map, signal),
         model.numerator,
         model.denominator,
         model.delay,

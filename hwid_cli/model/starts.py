@@ -17,7 +17,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from hwid_cli.model.candidates import Experiment, thinned
+from hwid_cli.model.candidates import FitData, thinned
 from hwid_cli.model.linear_block import difference_basis
 from hwid_cli.model.regression import (
     LARGEST_RADIUS,
@@ -95,7 +95,7 @@ class Known:
 
 
 def linear_starts(
-    experiments: Sequence[Experiment],
+    experiments: Sequence[FitData],
     orders: Orders,
     *,
     options: FitOptions,
@@ -107,7 +107,7 @@ def linear_starts(
 
     Parameters
     ----------
-    experiments : sequence of Experiment
+    experiments : sequence of FitData
         Scaled to about one.
     options : FitOptions
         Its output map says whether the output may have an offset, its initial state

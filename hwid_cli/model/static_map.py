@@ -1,6 +1,7 @@
 """Static nonlinearities: one table from name to functions, and what fits do with them.
 
-Another nonlinearity is one more entry in `RULES` (and its name in `records.maps`).
+Another nonlinearity is a module of its name in `maps` that gives a ``RULE``, and a line
+in the table ``MAP_KINDS`` of `records.maps`.
 
 References
 ----------
@@ -8,33 +9,15 @@ docs/method.md, eqs. (2)-(4f).
 """
 
 from dataclasses import replace
+from importlib import import_module
 
 import numpy as np
 
-from hwid_cli.model.maps import (
-    cubic_spline,
-    limits,
-    own_function,
-    piecewise_constant,
-    piecewise_linear,
-    polynomial,
-    sigmoid_network,
-    wavelet_network,
-)
 from hwid_cli.model.maps.rule import Derivatives, MapRule, Shape
-from hwid_cli.records.maps import MapOptions, StaticMap
+from hwid_cli.records.maps import MAP_KINDS, MapOptions, StaticMap
 
 RULES: dict[str, MapRule] = {
-    "piecewise_linear": piecewise_linear.RULE,
-    "saturation": limits.SATURATION,
-    "dead_zone": limits.DEAD_ZONE,
-    "polynomial": polynomial.RULE,
-    "none": limits.NONE,
-    "sigmoid_network": sigmoid_network.RULE,
-    "wavelet_network": wavelet_network.RULE,
-    "cubic_spline": cubic_spline.RULE,
-    "piecewise_constant": piecewise_constant.RULE,
-    "own_function": own_function.RULE,
+    kind: import_module(f"hwid_cli.model.maps.{kind}").RULE for kind in MAP_KINDS
 }
 
 
@@ -59,6 +42,31 @@ def evaluate(static_map: StaticMap, argument: np.ndarray) -> np.ndarray:
     array([-2.,  0.,  3.])
     """
     return RULES[static_map.kind].evaluate(static_map, argument)
+
+
+def evaluate_repeatably(static_map: StaticMap, argument: np.ndarray) -> np.ndarray:
+    """Value that a program elsewhere can repeat to the last bit.
+
+    A search needs values and derivatives of whole arrays fast; a simulation is what a
+    model that leaves the program is compared with, so its arithmetic has one order.
+
+    Parameters
+    ----------
+    argument : ndarray, shape (n,)
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        That of `evaluate` but for rounding.
+
+    Examples
+    --------
+    >>> line = StaticMap("cubic_spline", np.array([0.0, 1.0, 0.0, 2.0]), (0.0, 1.0))
+    >>> evaluate_repeatably(line, np.array([-1.0, 0.25]))
+    array([-2. ,  0.5])
+    """
+    rule = RULES[static_map.kind]
+    return (rule.repeatable or rule.evaluate)(static_map, argument)
 
 
 def differentiate(
@@ -141,7 +149,10 @@ def identity(kind: str, options: MapOptions, argument: np.ndarray) -> StaticMap:
     argument : ndarray, shape (n,)
     """
     lowest, highest = _widened(float(np.min(argument)), float(np.max(argument)))
-    return RULES[kind].identity(options, lowest, highest)
+    rule = RULES[kind]
+    if rule.identity is None:
+        return rule.starts(options, lowest, highest, np.asarray)[0]
+    return rule.identity(options, lowest, highest)
 
 
 def _widened(lowest: float, highest: float) -> tuple[float, float]:
@@ -223,9 +234,22 @@ def outlined(static_map: StaticMap) -> StaticMap:
         A piecewise linear map that goes on beyond its domain with slopes of its own has
         them as segments.
     """
-    if static_map.slopes_beyond is None:
-        return static_map
-    return piecewise_linear.outlined(static_map)
+    return RULES[static_map.kind].outlined(static_map)
+
+
+def straightened(static_map: StaticMap, argument: np.ndarray) -> StaticMap:
+    """Same map where samples have been, as straight elsewhere as they allow.
+
+    Parameters
+    ----------
+    argument : ndarray, shape (n,)
+        What reaches the map.
+
+    References
+    ----------
+    docs/method.md, section "Where no sample has been".
+    """
+    return RULES[static_map.kind].straightened(static_map, argument)
 
 
 def has_free_shape(kind: str) -> bool:

@@ -17,7 +17,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from hwid_cli.model.candidates import Candidate, Experiment, limits_of
+from hwid_cli.model.candidates import Candidate, FitData, limits_of
 from hwid_cli.model.extrapolation import for_search
 from hwid_cli.model.flat_directions import flat_sentences
 from hwid_cli.model.identifiability import (
@@ -39,8 +39,8 @@ _MOST_NAMES = 4
 NOT_WORKED_OUT = (Uncertainty(reason="not worked out for this fit"), Information())
 
 
-def judged_parameters(
-    candidate: Candidate, experiments: Sequence[Experiment], *, free_break_points: bool
+def parameter_statistics(
+    candidate: Candidate, experiments: Sequence[FitData], *, free_break_points: bool
 ) -> tuple[Uncertainty, Information]:
     """What the data say about the parameters of a normalised model at its optimum.
 
@@ -48,7 +48,7 @@ def judged_parameters(
     ----------
     candidate : Candidate
         Normalised, in the units of the experiments.
-    experiments : sequence of Experiment
+    experiments : sequence of FitData
         With the threshold of the fit.
     free_break_points : bool
         Whether break-points were fitted; fixed ones are left out.
@@ -105,7 +105,7 @@ def with_standard_errors(fit: Fit, recordings: Sequence[Recording]) -> Fit:
         If the fit failed or the recordings are others.
     """
     candidate, experiments = _as_fitted(fit, recordings)
-    uncertainty, information = judged_parameters(
+    uncertainty, information = parameter_statistics(
         candidate, experiments, free_break_points=fit.options.free_break_points
     )
     return replace(fit, uncertainty=uncertainty, information=information)
@@ -155,7 +155,7 @@ def parameter_covariance(
 
 def _as_fitted(
     fit: Fit, recordings: Sequence[Recording]
-) -> tuple[Candidate, tuple[Experiment, ...]]:
+) -> tuple[Candidate, tuple[FitData, ...]]:
     """A fit's model with its experiments, their initial states and their threshold."""
     names = tuple(one.name for one in recordings)
     if names != fit.identified_on:
@@ -164,13 +164,13 @@ def _as_fitted(
     if model is None:
         raise ValueError(f"the fit of {fit.name} failed: there is no model")
     if fit.options.join == "experiments":
-        experiments = tuple(Experiment(one.input, one.output) for one in recordings)
+        experiments = tuple(FitData(one.input, one.output) for one in recordings)
         others = recordings[1:]
     else:
         inputs, outputs = (
             [getattr(one, side) for one in recordings] for side in ("input", "output")
         )
-        experiments = (Experiment(np.concatenate(inputs), np.concatenate(outputs)),)
+        experiments = (FitData(np.concatenate(inputs), np.concatenate(outputs)),)
         others = ()
     states = [model.free_response]
     if model.initial_state == "estimated":

@@ -54,19 +54,11 @@ class ExportedModel:
     ----------
     static_gain : float, [-]
         Of the linear block at zero frequency; infinite with a pole at 1.
-    input_bends, output_bends : ndarray, shape (n_knots,) or (0,)
-        Second derivatives of cubic spline maps at their knots, which are one apart.
     """
 
     card: ModelCard
     model: HammersteinWiener
     static_gain: float
-    input_bends: np.ndarray = field(default_factory=lambda: np.zeros(0))
-    output_bends: np.ndarray = field(default_factory=lambda: np.zeros(0))
-
-    def __post_init__(self) -> None:
-        for name in ("input_bends", "output_bends"):
-            object.__setattr__(self, name, frozen_vector(getattr(self, name), name))
 
     @property
     def sample_time_s(self) -> float:

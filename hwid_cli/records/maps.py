@@ -7,28 +7,40 @@ import numpy as np
 
 from hwid_cli.records.recordings import frozen_vector
 
-MAP_KINDS = (
-    "piecewise_linear",
-    "saturation",
-    "dead_zone",
-    "polynomial",
-    "none",
-    "sigmoid_network",
-    "wavelet_network",
-    "cubic_spline",
-    "piecewise_constant",
-    "own_function",
-)
-# Those whose size the number of units sets.
-KINDS_WITH_UNITS = (
-    "piecewise_linear",
-    "sigmoid_network",
-    "wavelet_network",
-    "cubic_spline",
-    "piecewise_constant",
-)
-# Networks have a linear part beside their units; other kinds need two to have a slope.
-_LEAST_UNITS = {"piecewise_linear": 2, "cubic_spline": 2, "piecewise_constant": 2}
+
+@dataclass(frozen=True)
+class MapKind:
+    """What records of a kind of static map may hold.
+
+    Parameters
+    ----------
+    least_units : int or None, [-]
+        Fewest units; None where their number does not set the size of the map.
+    has_function : bool
+        Whether the map is a function of the user's own.
+    goes_on : bool
+        Whether it may have slopes of its own beyond its domain.
+    """
+
+    least_units: int | None = None
+    has_function: bool = False
+    goes_on: bool = False
+
+
+# The table of kinds, by name: each is the module of this name in ``model.maps``. Networks
+# have a linear part beside their units; other kinds need two to have a slope.
+MAP_KINDS = {
+    "piecewise_linear": MapKind(least_units=2, goes_on=True),
+    "saturation": MapKind(),
+    "dead_zone": MapKind(),
+    "polynomial": MapKind(),
+    "none": MapKind(),
+    "sigmoid_network": MapKind(least_units=1),
+    "wavelet_network": MapKind(least_units=1),
+    "cubic_spline": MapKind(least_units=2),
+    "piecewise_constant": MapKind(least_units=2),
+    "own_function": MapKind(has_function=True),
+}
 
 
 @dataclass(frozen=True)
@@ -125,15 +137,16 @@ class MapOptions:
             raise ValueError(
                 f"map must be one of {', '.join(MAP_KINDS)}, got {self.kind!r}"
             )
-        least = _LEAST_UNITS.get(self.kind, 1)
+        kind = MAP_KINDS[self.kind]
+        least = kind.least_units or 1
         if self.units != int(self.units) or self.units < least:
             raise ValueError(
                 f"units must be an integer >= {least} for {self.kind}, "
                 f"got {self.units!r}"
             )
-        if self.kind == "own_function" and self.function is None:
+        if kind.has_function and self.function is None:
             raise ValueError(
-                "map own_function needs a function; name its file: "
+                f"map {self.kind} needs a function; name its file: "
                 "{file: my_map.py, name: my_function}"
             )
 
@@ -176,9 +189,10 @@ class StaticMap:
             raise ValueError(
                 f"map kind {self.kind!r} is none of {', '.join(MAP_KINDS)}"
             )
-        if (self.kind == "own_function") != (self.function is not None):
+        kind = MAP_KINDS[self.kind]
+        if kind.has_function != (self.function is not None):
             raise ValueError("a map has a function exactly with kind own_function")
-        if self.slopes_beyond is not None and self.kind != "piecewise_linear":
+        if self.slopes_beyond is not None and not kind.goes_on:
             raise ValueError(f"a {self.kind} map has no slopes beyond its domain")
         object.__setattr__(
             self, "parameters", frozen_vector(self.parameters, "parameters")

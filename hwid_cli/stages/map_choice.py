@@ -12,7 +12,7 @@ from itertools import product
 import numpy as np
 
 from hwid_cli.records.experiment import OrderOptions
-from hwid_cli.records.maps import KINDS_WITH_UNITS
+from hwid_cli.records.maps import MAP_KINDS
 from hwid_cli.records.model import Fit, FitOptions, Orders
 from hwid_cli.records.order import MapAdvice, MapCandidate
 from hwid_cli.records.recordings import Recording
@@ -43,7 +43,7 @@ def candidate_maps(fit: FitOptions, options: OrderOptions) -> tuple[FitOptions, 
             (kind, units)
             for kind in dict.fromkeys((own.kind, *options.maps))
             for units in dict.fromkeys((own.units, *options.units))
-            if kind in KINDS_WITH_UNITS or units == own.units
+            if _has_units(kind) or units == own.units
         ]
         for own in (fit.of_input, fit.of_output)
     ]
@@ -201,10 +201,14 @@ def _deviations(
 def _named(options: FitOptions) -> tuple[str, int, str, int]:
     """Both maps, each with its size; 0 where its kind has none."""
     first, second = (
-        (one.kind, one.units * (one.kind in KINDS_WITH_UNITS))
+        (one.kind, one.units * _has_units(one.kind))
         for one in (options.of_input, options.of_output)
     )
     return (*first, *second)
+
+
+def _has_units(kind: str) -> bool:
+    return MAP_KINDS[kind].least_units is not None
 
 
 def _known(criterion: float) -> float:

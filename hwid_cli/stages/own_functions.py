@@ -3,6 +3,7 @@
 from hwid_cli.errors import ConfigError
 from hwid_cli.model.maps.own_function import load
 from hwid_cli.records.experiment import Experiment
+from hwid_cli.records.maps import MAP_KINDS
 
 
 def check_own_functions(experiment: Experiment) -> None:
@@ -18,7 +19,7 @@ def check_own_functions(experiment: Experiment) -> None:
         ("input_map", options.of_input),
         ("output_map", options.of_output),
     ):
-        if one.kind != "own_function" or one.function is None:
+        if not MAP_KINDS[one.kind].has_function or one.function is None:
             continue
         try:
             load(one.function.name, one.function.source)

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.linalg.blas import dsyrk
 
 from hwid_cli.model import static_map
-from hwid_cli.model.candidates import Candidate, Experiment, columns
+from hwid_cli.model.candidates import Candidate, FitData, columns
 from hwid_cli.model.derivative_rows import derivative_rows
 from hwid_cli.model.fit import fit
 from hwid_cli.model.levenberg_marquardt import minimise
@@ -61,7 +61,7 @@ def start(orders: Orders, u, y) -> Candidate:
     return Candidate(full, model.free_response[None, :])
 
 
-def recursions(candidate: Candidate, one: Experiment, *, free: bool):
+def recursions(candidate: Candidate, one: FitData, *, free: bool):
     """Pass of the recursions that writes a single row."""
     point = point_of(candidate)
     place = columns(candidate, with_positions=free)
@@ -86,7 +86,7 @@ def recursions(candidate: Candidate, one: Experiment, *, free: bool):
 
 def measure(orders: Orders, u, y, *, free: bool) -> None:
     """Print one row."""
-    candidate, one = start(orders, u, y), Experiment(u, y)
+    candidate, one = start(orders, u, y), FitData(u, y)
     done = []
 
     def search() -> None:

@@ -61,18 +61,18 @@ VARIANTS = {
         screening, "_with_output_curve", lambda candidate, *_: candidate
     ),
     "- placing break-points": lambda: patch.object(
-        phases, "_has_break_points", lambda _: False
+        phases, "_is_placed", lambda _: False
     ),
-    "- relaxed linear blocks": lambda: patch.object(
-        search, "relaxed_search", lambda best, *_: best
+    "- re-estimated linear blocks": lambda: patch.object(
+        search, "reestimate_block", lambda best, *_: best
     ),
-    "- doubt": lambda: patch.object(search, "leaves_structure", lambda *_: False),
-    "- doubted input maps": lambda: patch.object(
-        search, "doubted_input_maps", lambda *_: []
+    "- restarts": lambda: patch.object(search, "leaves_structure", lambda *_: False),
+    "- restarts without input maps": lambda: patch.object(
+        search, "starts_without_input_maps", lambda *_: []
     ),
-    # Further doubts have nothing but the found block to begin with.
+    # Further restarts have nothing but the found block to begin with.
     "- maps anew": lambda: patch.multiple(
-        search, maps_anew=lambda *_: [], _MOST_DOUBTS=1
+        search, starts_with_new_maps=lambda *_: [], _MOST_RESTARTS=1
     ),
     "- cutting found maps": lambda: patch.object(
         search, "refine", lambda found, *_: found

@@ -7,10 +7,13 @@ import pytest
 
 from hwid_cli.export.c_source import c_source
 from hwid_cli.export.contents import completed
+from hwid_cli.model import static_map
+from hwid_cli.model.static_map import RULES
 from hwid_cli.records.experiment import Columns
 from hwid_cli.records.exported import ModelCard
 from hwid_cli.records.maps import StaticMap
 from hwid_cli.records.model import HammersteinWiener
+from tests.model.plants import MAPS
 
 # Prints the output for each input that it reads; 1 empty, 2 steady, else by the rule.
 MAIN = """
@@ -38,17 +41,8 @@ int main(int argc, char **argv)
 }
 """
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-Wconversion")
-KINDS = (
-    "none",
-    "piecewise_linear",
-    "saturation",
-    "dead_zone",
-    "polynomial",
-    "sigmoid_network",
-    "wavelet_network",
-    "cubic_spline",
-    "piecewise_constant",
-)
+# Those that leave the program for C.
+KINDS = tuple(kind for kind, rule in RULES.items() if rule.portable.c is not None)
 STARTS = {"fitted": 0, "empty": 1, "steady": 2}
 
 
@@ -63,16 +57,16 @@ def example_map(kind, rng, scale=1.0):
         rng.normal(0, 1, 2),
     )
     parameters = {
-        "none": np.zeros(0),
         "piecewise_linear": np.concatenate([rising, rng.normal(0, 1, count)]),
-        "saturation": np.array([-0.7, 0.5]),
-        "dead_zone": np.array([-0.2, 0.1]),
         "polynomial": rng.normal(0, 0.5, count),
         "sigmoid_network": np.concatenate(network),
         "wavelet_network": np.concatenate(network),
         "cubic_spline": np.concatenate([[-0.8, 0.9], rng.normal(0, 1, count)]),
         "piecewise_constant": np.concatenate([rising, rng.normal(0, 1, count + 1)]),
-    }[kind]
+    }.get(kind)
+    if parameters is None:
+        # Kinds whose parameters are always as many: the example of all other tests.
+        return static_map.stretch(MAPS[kind], scale / MAPS[kind].domain[1])
     if kind != "polynomial":
         parameters = parameters * scale
     return StaticMap(kind, parameters, (-scale, scale))

@@ -8,6 +8,7 @@ import pytest
 
 from hwid_cli.errors import ConfigError
 from hwid_cli.export.c_source import c_source
+from hwid_cli.export.map_parts import language_text
 from hwid_cli.export.predict import predict
 from hwid_cli.records.maps import OwnFunction, StaticMap
 from tests.export.model_examples import (
@@ -20,6 +21,7 @@ from tests.export.model_examples import (
     example_model,
     exported_of,
 )
+from tests.model.plants import MAPS
 
 # What the C source promises over a whole recording, of the largest output.
 PROMISED = 1e-12
@@ -101,6 +103,15 @@ def test_names_cannot_break_the_source(tmp_path):
 
     assert c_source(exported).isascii()
     assert c_output(c_program(tmp_path, exported), [1.0]).size == 1
+
+
+def test_a_kind_without_text_in_a_language_is_refused():
+    with pytest.raises(ConfigError) as error:
+        language_text("input", MAPS["dead_zone"], "C", None)
+    assert str(error.value) == (
+        "--format: the input map is of the kind dead_zone, which C does not know; "
+        "expected another kind of map; use --format json"
+    )
 
 
 def test_a_python_function_is_refused():

@@ -10,6 +10,7 @@ from hwid_cli import load_model, simulate
 from hwid_cli.errors import HwidError, ModelFileError
 from hwid_cli.export.json_reader import read_exported
 from hwid_cli.export.json_writer import described, write_json
+from hwid_cli.export.map_parts import map_schema
 from hwid_cli.export.predict import predict
 from hwid_cli.records.drive import Controller, Drive
 from hwid_cli.records.experiment import Columns
@@ -223,3 +224,8 @@ def test_an_unstable_model_does_not_predict():
 
     with pytest.raises(ModelFileError, match=r"m.json: .*pole of magnitude 1.7071"):
         predict(exported_of(model), np.ones(3), place="m.json")
+
+
+def test_the_schema_says_of_maps_what_their_kinds_say():
+    # Written by tools/model_schema.py.
+    assert json.loads(_TEXT)["$defs"]["map"] == map_schema()

@@ -3,6 +3,7 @@
 import numpy as np
 
 from hwid_cli.model.simulate import simulate
+from hwid_cli.model.static_map import RULES
 from hwid_cli.records.maps import OwnFunction
 from hwid_cli.records.model import FitOptions, HammersteinWiener, Orders, StaticMap
 from hwid_cli.records.recordings import Recording
@@ -32,6 +33,7 @@ soft_limit = MapFunction(
 """,
 )
 
+# One for every kind: the laws of all maps, of exports and of fits are tested on them.
 MAPS = {
     "none": StaticMap("none", np.zeros(0), (-3.0, 3.0)),
     "saturation": StaticMap("saturation", np.array([-1.4, 1.1]), (-3.0, 3.0)),
@@ -65,7 +67,7 @@ MAPS = {
     ),
 }
 # What has no slope is searched by a stand-in, which is no derivative of its values.
-WITHOUT_SLOPE = ("piecewise_constant",)
+WITHOUT_SLOPE = tuple(kind for kind, rule in RULES.items() if not rule.has_slope)
 # Kinds that cannot pass a signal on unchanged.
 NO_IDENTITY = ("piecewise_constant", "own_function")
 

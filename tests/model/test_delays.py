@@ -5,7 +5,7 @@ import pytest
 from scipy.signal import lfilter
 
 from hwid_cli.model.fit import fit
-from hwid_cli.model.initial_candidates import contained_candidates
+from hwid_cli.model.initial_candidates import nested_candidates
 from hwid_cli.model.problem import scaled
 from hwid_cli.model.scores import fit_percent
 from hwid_cli.model.simulate import simulate
@@ -110,14 +110,14 @@ def test_a_smaller_model_keeps_its_own_delay_where_that_is_needed():
     options = FitOptions(units=4, delays=(1, 2, 3))
     small = fit([recording], Orders(1, 2, 1), FitOptions(units=4)).model
     problem = scaled([recording], options)
-    (one,) = contained_candidates(problem, Orders(2, 2, 3), options, [small])
+    (one,) = nested_candidates(problem, Orders(2, 2, 3), options, [small])
     assert one.model.orders == Orders(2, 2, 1)
     assert one.free_responses.shape == (1, 2)
 
 
 @pytest.mark.parametrize("delays", [(1, 2, 3, 4, 5), (2, 3, 4), (2, 3)])
 def test_the_cells_of_a_grid_find_the_delays_of_fits_alone(delays):
-    # A short race alone takes another delay in some of them.
+    # A short screening alone takes another delay in some of them.
     options = FitOptions(input_map="dead_zone", output_map="saturation", delays=delays)
     settings = RunSettings(store=MemoryStore(), workers=Workers(jobs=1))
     recordings = [late_plant(seed) for seed in (10, 11, 12, 13)]

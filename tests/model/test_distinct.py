@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hwid_cli.model.candidates import Candidate, Experiment
+from hwid_cli.model.candidates import Candidate, FitData
 from hwid_cli.model.distinct import WHEN_FREE, WHILE_FIXED, distinct
 from hwid_cli.model.phases import place, standing
 from hwid_cli.records.model import FitOptions, HammersteinWiener, StaticMap
@@ -21,7 +21,7 @@ def search(gain, experiment):
 
 
 # A gain that is off by d leaves noise and d times the input, both of size one.
-PLAIN = Experiment(INPUT, 2.0 * INPUT + NOISE)
+PLAIN = FitData(INPUT, 2.0 * INPUT + NOISE)
 
 
 def test_of_two_that_give_the_same_output_the_better_one_stays():
@@ -48,7 +48,7 @@ def test_the_residuals_tell_how_far_outputs_may_differ(off, apart, count):
 def test_outliers_do_not_make_two_models_the_same():
     spoilt = NOISE.copy()
     spoilt[::100] += 1e4
-    torn = Experiment(INPUT, 2.0 * INPUT + spoilt)
+    torn = FitData(INPUT, 2.0 * INPUT + spoilt)
     borne = replace(torn, threshold=3.0)
     for experiment, count in ((torn, 1), (borne, 2)):
         both = [search(2.0, experiment), search(2.5, experiment)]

@@ -1,6 +1,6 @@
 import numpy as np
 
-from hwid_cli.model.maps.segments import (
+from hwid_cli.model.maps.piecewise_linear import (
     columns_of_segments,
     piecewise_linear,
     piecewise_linear_jacobian,

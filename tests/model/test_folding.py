@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hwid_cli.model.description import folds
+from hwid_cli.model.description import turning_points
 from hwid_cli.model.fit import fit
 from hwid_cli.model.simulate import simulate
 from hwid_cli.records.model import FitOptions, StaticMap
@@ -31,20 +31,20 @@ def piecewise(points, values):
     ],
 )
 def test_folds_are_the_extremes_between_which_a_map_turns_back(values, expected):
-    found = folds(piecewise([-3, -1, 1, 3], values))
+    found = turning_points(piecewise([-3, -1, 1, 3], values))
     np.testing.assert_allclose(found, expected)
 
 
 def test_folds_of_a_polynomial_are_the_roots_of_its_derivative():
     # T3 turns back at +-1/2; the curve has 221 points over 2.2.
     cubic = StaticMap("polynomial", np.array([0.0, 0, 0, 1]), (-1.0, 1.0))
-    np.testing.assert_allclose(folds(cubic), [-0.5, 0.5], atol=0.01)
-    assert folds(cubic, least=2.1).size == 0
+    np.testing.assert_allclose(turning_points(cubic), [-0.5, 0.5], atol=0.01)
+    assert turning_points(cubic, least=2.1).size == 0
 
 
 @pytest.mark.parametrize("kind", ["none", "saturation", "dead_zone"])
 def test_limits_and_nothing_at_all_never_fold(kind):
-    assert folds(MAPS[kind]).size == 0
+    assert turning_points(MAPS[kind]).size == 0
 
 
 def test_a_rectifying_sensor_is_said_to_fold():

@@ -5,7 +5,7 @@ import pytest
 from scipy.optimize import least_squares
 from scipy.signal import lfilter
 
-from hwid_cli.model.candidates import Experiment
+from hwid_cli.model.candidates import FitData
 from hwid_cli.model.fit import fit
 from hwid_cli.model.initial_candidates import block_starts
 from hwid_cli.model.scores import fit_percent
@@ -140,7 +140,7 @@ def test_a_given_block_is_one_more_start():
 def test_the_start_of_a_given_block_has_the_gain_and_offset_of_the_data(frozen):
     true = plant()
     u = level_input(400, 1)
-    one = Experiment(u, 3.0 * simulate(true, u) + 2.0)
+    one = FitData(u, 3.0 * simulate(true, u) + 2.0)
     given = FitOptions(linear_block=block_of(true, frozen=frozen))
     larger = Orders(3, 3, 1)
     start = block_starts([one], ORDERS if frozen else larger, given)[-1]

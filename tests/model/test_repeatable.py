@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from hwid_cli.model import repeatable, static_map
+from hwid_cli.model import static_map
 from tests.export.model_examples import KINDS, example_map
 
 
@@ -11,7 +11,7 @@ def test_values_are_those_of_the_map_but_for_rounding(kind):
     # Knots and ends themselves, inside and far outside.
     at = np.concatenate([one.parameters[:2], np.linspace(-5.0, 5.0, 1001)])
     expected = static_map.evaluate(one, at)
-    found = repeatable.evaluate(one, at)
+    found = static_map.evaluate_repeatably(one, at)
 
     assert np.max(np.abs(found - expected)) <= 1e-13 * np.max(np.abs(expected))
 
@@ -20,7 +20,9 @@ def test_values_are_those_of_the_map_but_for_rounding(kind):
 def test_a_value_does_not_depend_on_its_neighbours(kind):
     one = example_map(kind, np.random.default_rng(3))
     at = np.linspace(-1.5, 1.5, 37)
-    together = repeatable.evaluate(one, at)
+    together = static_map.evaluate_repeatably(one, at)
 
-    alone = [repeatable.evaluate(one, at[n : n + 1])[0] for n in range(at.size)]
+    alone = [
+        static_map.evaluate_repeatably(one, at[n : n + 1])[0] for n in range(at.size)
+    ]
     assert np.array_equal(together, alone)

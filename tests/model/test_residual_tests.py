@@ -4,7 +4,7 @@ from scipy import signal
 from scipy.stats import chi2
 
 from hwid_cli.model import sensitivities
-from hwid_cli.model.candidates import Candidate, Experiment, columns
+from hwid_cli.model.candidates import Candidate, FitData, columns
 from hwid_cli.model.fit import fit
 from hwid_cli.model.residual_tests import (
     n_tested_lags,
@@ -33,7 +33,7 @@ def judged(result, recording):
         recording.output
         - sensitivities.simulated_outputs(
             Candidate(result.model, result.model.free_response[None]),
-            [Experiment(recording.input, recording.output)],
+            [FitData(recording.input, recording.output)],
         )[0]
     )
     pulled = pull(
@@ -110,7 +110,7 @@ def test_derivatives_are_those_of_the_search(initial_state):
     candidate = Candidate(true, true.free_response[None])
     expected = sensitivities.equations(
         candidate,
-        [Experiment(recording.input, recording.output)],
+        [FitData(recording.input, recording.output)],
         with_positions=True,
     ).matrix
     place = columns(candidate, with_positions=True)

@@ -60,7 +60,7 @@ def test_gradient_of_the_loss_agrees_with_central_differences(output_map, rows):
     candidate = candidates.Candidate(model, np.zeros((1, 3)))
     rng = np.random.default_rng(2)
     u = level_input(300, 1)
-    every = candidates.Experiment(u, 4.0 * rng.standard_normal(300), threshold=1.5)
+    every = candidates.FitData(u, 4.0 * rng.standard_normal(300), threshold=1.5)
     (one,) = candidates.thinned([every], rows)
     place = candidates.columns(candidate, with_positions=True)
     point = points.point_of(candidate)
@@ -179,14 +179,14 @@ def test_threshold_is_that_of_normal_residuals():
     y = 0.3 * rng.standard_normal(20001)
     model = HammersteinWiener(MAPS["none"], [0.0], [1.0], 0, MAPS["none"], 1.0)
     candidate = candidates.Candidate(model, np.zeros((1, 0)))
-    one = candidates.Experiment(np.ones(y.size), y, threshold=1.0)
+    one = candidates.FitData(np.ones(y.size), y, threshold=1.0)
     (found,) = robust.renewed([one], [candidate])
     # The median of 20001 samples is known to 1 %.
     assert found.threshold == pytest.approx(1.345 * 0.3, rel=0.03)
 
 
 def test_squared_loss_has_no_threshold():
-    one = candidates.Experiment(np.ones(3), np.ones(3))
+    one = candidates.FitData(np.ones(3), np.ones(3))
     assert robust.with_loss([one], FitOptions())[0].threshold == np.inf
 
 

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from hwid_cli.model.candidates import Candidate, Experiment
+from hwid_cli.model.candidates import Candidate, FitData
 from hwid_cli.model.fit import fit
 from hwid_cli.model.maps.piecewise_linear import break_points_and_values
 from hwid_cli.model.restart import (
-    doubted_input_maps,
     leaves_structure,
-    maps_anew,
+    starts_with_new_maps,
+    starts_without_input_maps,
     with_break_points,
 )
 from hwid_cli.model.starts import Start
@@ -26,7 +26,7 @@ def leaving(residuals):
     """Candidate that gives a large wave, and what it leaves."""
     wave = 10.0 * np.std(residuals) * np.sin(np.arange(N) / 50.0)
     model = HammersteinWiener(NONE, np.ones(1), np.ones(1), 0, NONE, 1.0, "rest")
-    return Candidate(model, np.zeros((1, 0))), [Experiment(wave, wave + residuals)]
+    return Candidate(model, np.zeros((1, 0))), [FitData(wave, wave + residuals)]
 
 
 @pytest.mark.parametrize(
@@ -61,7 +61,7 @@ def test_peaks_of_a_model_that_is_close_are_no_sign():
     candidate = Candidate(gain, np.zeros((1, 0)))
 
     def said(share):
-        return leaves_structure(candidate, [Experiment(wave, wave + share * large)])
+        return leaves_structure(candidate, [FitData(wave, wave + share * large)])
 
     # The deviation of the peaks is 1.34, of the wave 212: 0.5 % is a share of 0.79.
     assert not said(0.7)
@@ -76,7 +76,7 @@ def test_half_of_the_output_is_no_noise():
 
     def said(share):
         output = wave + share / np.sqrt(1.0 - share**2) * np.sqrt(0.5) * noise
-        return leaves_structure(candidate, [Experiment(wave, output)])
+        return leaves_structure(candidate, [FitData(wave, output)])
 
     assert not said(0.45)
     assert said(0.55)
@@ -92,8 +92,8 @@ def test_outliers_that_the_loss_bears_are_no_sign():
     assert not leaves_structure(candidate, bearing)
 
 
-def test_only_blocks_with_an_input_map_are_doubted():
-    experiments = [Experiment(np.array([-2.0, 5.0]), np.zeros(2))]
+def test_only_blocks_with_an_input_map_are_restarted_without_it():
+    experiments = [FitData(np.array([-2.0, 5.0]), np.zeros(2))]
     one = Start(
         np.ones(1),
         np.array([1.0, -0.5]),
@@ -103,11 +103,11 @@ def test_only_blocks_with_an_input_map_are_doubted():
         0.0,
         np.zeros((1, 1)),
     )
-    straight = doubted_input_maps([one], experiments)
+    straight = starts_without_input_maps([one], experiments)
 
     assert [start.is_expanded for start in straight] == [False]
     assert straight[0].input_values.tolist() == [-2.0, 5.0]
-    assert doubted_input_maps(straight, experiments) == []
+    assert starts_without_input_maps(straight, experiments) == []
 
 
 def test_maps_are_sought_anew_around_the_block_that_was_found():
@@ -115,8 +115,10 @@ def test_maps_are_sought_anew_around_the_block_that_was_found():
     model = HammersteinWiener(
         rising, np.array([0.3]), np.array([1.0, -0.7]), 2, NONE, 1.0, "rest"
     )
-    experiments = [Experiment(np.linspace(0.0, 4.0, 9), np.zeros(9))]
-    with_map, without = maps_anew(Candidate(model, np.zeros((1, 0))), experiments)
+    experiments = [FitData(np.linspace(0.0, 4.0, 9), np.zeros(9))]
+    with_map, without = starts_with_new_maps(
+        Candidate(model, np.zeros((1, 0))), experiments
+    )
 
     for start in (with_map, without):
         assert (start.numerator[0], start.denominator[1], start.delay) == (0.3, -0.7, 2)

@@ -29,7 +29,7 @@ def make_candidate(input_map, output_map, initial_state, n_experiments=2):
 
 def make_experiments():
     return [
-        candidates.Experiment(level_input(200, seed), np.zeros(200)) for seed in (1, 2)
+        candidates.FitData(level_input(200, seed), np.zeros(200)) for seed in (1, 2)
     ]
 
 
@@ -98,7 +98,7 @@ def test_rows_of_few_samples_are_those_rows_of_all(stride):
     point = points.point_of(candidate)
     place = candidates.columns(candidate, with_positions=True)
     # Three chunks of the recursions, the last one short.
-    whole = candidates.Experiment(level_input(600, 1), np.zeros(600))
+    whole = candidates.FitData(level_input(600, 1), np.zeros(600))
     found = sensitivities.simulated(point, [whole])
     before = static_map.derivatives(point.input_map, whole.input, with_positions=True)
 
@@ -127,7 +127,7 @@ def test_cost_of_a_diverging_candidate_is_infinite():
     model = HammersteinWiener(
         MAPS["none"], np.ones(1), np.array([1.0, -1e9]), 1, MAPS["none"], 1.0
     )
-    experiment = candidates.Experiment(np.ones(200), np.zeros(200))
+    experiment = candidates.FitData(np.ones(200), np.zeros(200))
     candidate = candidates.Candidate(model, np.zeros((1, 0)))
     assert sensitivities.cost(candidate, [experiment]) == np.inf
 

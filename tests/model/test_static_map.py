@@ -1,9 +1,12 @@
+import importlib
+import pkgutil
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hwid_cli.model import static_map
+from hwid_cli.model import maps, static_map
 from hwid_cli.records.maps import MAP_KINDS, MapOptions, StaticMap
 from tests.model.plants import MAPS, NO_IDENTITY, SOFT_LIMIT, WITHOUT_SLOPE
 
@@ -25,8 +28,14 @@ def derivatives(one, argument, with_positions=True):
     return value, slope, out[:, 1:]
 
 
-def test_every_kind_that_options_allow_has_a_rule():
-    assert set(static_map.RULES) == set(MAP_KINDS)
+def test_every_module_that_gives_a_rule_is_a_kind_that_options_allow():
+    modules = [one.name for one in pkgutil.iter_modules(maps.__path__)]
+    giving = {
+        name
+        for name in modules
+        if hasattr(importlib.import_module(f"{maps.__name__}.{name}"), "RULE")
+    }
+    assert giving == set(MAP_KINDS) == set(MAPS)
 
 
 def test_dead_zone_is_zero_inside_its_band_and_has_slope_one_outside():

@@ -5,7 +5,6 @@ import pytest
 from scipy import signal
 
 from hwid_cli.model import static_map
-from hwid_cli.model.description import straightened
 from hwid_cli.model.fit import fit
 from hwid_cli.model.maps.piecewise_linear import break_points_and_values
 from hwid_cli.records.model import FitOptions, Orders, StaticMap
@@ -56,7 +55,7 @@ def test_a_map_stays_where_samples_are():
         "piecewise_linear", np.r_[np.linspace(-3, 3, 12), rng.normal(size=12)]
     )
     argument = np.r_[rng.choice(LEVELS, 50), rng.uniform(1.0, 2.9, 50)]
-    found = straightened(one, argument)
+    found = static_map.straightened(one, argument)
     np.testing.assert_allclose(
         static_map.evaluate(found, argument),
         static_map.evaluate(one, argument),
@@ -70,7 +69,7 @@ def test_of_all_maps_through_the_levels_the_least_bent_one_is_taken():
     rng = np.random.default_rng(2)
     points = np.linspace(-3.0, 3.0, 8)
     one = StaticMap("piecewise_linear", np.r_[points, rng.normal(size=8)])
-    found = straightened(one, LEVELS)
+    found = static_map.straightened(one, LEVELS)
 
     def bending(values):
         return float(np.sum(np.diff(np.diff(values) / np.diff(points)) ** 2))
@@ -85,9 +84,9 @@ def test_of_all_maps_through_the_levels_the_least_bent_one_is_taken():
 
 @pytest.mark.parametrize("kind", [kind for kind in MAPS if kind != "piecewise_linear"])
 def test_other_kinds_stay_as_they_are(kind):
-    assert straightened(MAPS[kind], LEVELS) is MAPS[kind]
+    assert static_map.straightened(MAPS[kind], LEVELS) is MAPS[kind]
 
 
 def test_a_map_with_samples_everywhere_is_the_same_object():
     one = MAPS["piecewise_linear"]
-    assert straightened(one, np.linspace(-3.0, 3.0, 50)) is one
+    assert static_map.straightened(one, np.linspace(-3.0, 3.0, 50)) is one

@@ -1,1 +1,1 @@
-"""The kinds of static map, one module each; `static_map.RULES` lists them."""
+"""The kinds of static map: one module each, of the name in `records.maps.MAP_KINDS`."""

@@ -6,13 +6,7 @@ domain. All have the unit of argument or value, so that scaling data scales them
 
 References
 ----------
-docs/method.md, eqs. (4a)-(4c).
-
-Mean slope of a map over its domain, for kinds whose values are no parameters.
-
-References
-----------
-docs/method.md, eq. (15).
+docs/method.md, eqs. (4a)-(4c), (15).
 """
 
 from collections.abc import Callable
@@ -20,37 +14,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hwid_cli.model.maps.rule import Differentiate, MapRule, Shape
+from hwid_cli.model.maps.rule import Differentiate, MapRule, Part, Portable, Shape
 from hwid_cli.records.maps import MapOptions, StaticMap
 
-# Points over the domain, [-]; units narrower than their distance hardly count.
+# Points over the domain at which the mean slope is taken, [-]; units narrower than their
+# distance hardly count.
 _COUNT = 65
-
-
-def mean_slope(
-    static_map: StaticMap, differentiate: Differentiate
-) -> tuple[float, np.ndarray]:
-    """Standard deviation of a map's values, as a share of that of a line of slope one.
-
-    Parameters
-    ----------
-    differentiate : callable
-        That of the map's rule.
-
-    Returns
-    -------
-    ndarray, shape (n_parameters,)
-        Gradient by the parameters.
-    """
-    at = np.linspace(*static_map.domain, _COUNT)
-    columns = np.empty((_COUNT, static_map.parameters.size))
-    values, _ = differentiate(static_map, at, True, columns, 0)
-    centred = values - values.mean()
-    deviation, of_line = float(np.std(values)), float(np.std(at))
-    gradient = centred @ columns / (_COUNT * of_line * (deviation or 1.0))
-    return deviation / of_line, gradient
-
-
 # A step of the fit may change a width by this factor at most, so that it stays positive.
 _MOST_CHANGE = 5.0
 # Widths as shares of the range: narrower units are jumps between samples, wider ones
@@ -75,12 +44,25 @@ class Unit:
         1 for an even function, -1 for an odd one.
     layout : callable (int) -> (ndarray, ndarray)
         Centres and widths from which a fit starts, for a range from 0 to 1.
+    total : callable (v, centres, widths, heights) -> ndarray, shape (n,)
+        Compiled sum of the units, sample by sample and unit by unit, as the C source
+        has it: sums of whole arrays add up in an order of their own, and their tanh and
+        exp are not those of the mathematical library.
+    title : str
+        What a network of such units is.
+    formula, c, matlab : str
+        The unit as a function of ``s``, as people, C and MATLAB write it.
     """
 
     value: Callable[[np.ndarray], np.ndarray]
     slope: Callable[[np.ndarray], np.ndarray]
     parity: float
     layout: Callable[[int], tuple[np.ndarray, np.ndarray]]
+    total: Callable[..., np.ndarray]
+    title: str
+    formula: str
+    c: str
+    matlab: str
 
 
 def network_rule(kind: str, unit: Unit) -> MapRule:
@@ -106,10 +88,28 @@ def network_rule(kind: str, unit: Unit) -> MapRule:
         names=_names,
         amplify=_amplify,
         compress=lambda one, factor: _compress(unit, one, factor),
-        size=lambda one: mean_slope(one, differentiate),
+        size=lambda one: _mean_slope(one, differentiate),
         n_positions=lambda one: 2 * _count(one),
         settle=_settle,
+        repeatable=lambda one, argument: _repeatable(unit, one, argument),
+        portable=_portable(unit),
     )
+
+
+def _mean_slope(
+    one: StaticMap, differentiate: Differentiate
+) -> tuple[float, np.ndarray]:
+    """Standard deviation of the values, as a share of that of a line of slope one.
+
+    The values are no parameters, so their range would have no gradient to speak of.
+    """
+    at = np.linspace(*one.domain, _COUNT)
+    columns = np.empty((_COUNT, one.parameters.size))
+    values, _ = differentiate(one, at, True, columns, 0)
+    centred = values - values.mean()
+    deviation, of_line = float(np.std(values)), float(np.std(at))
+    gradient = centred @ columns / (_COUNT * of_line * (deviation or 1.0))
+    return deviation / of_line, gradient
 
 
 def _count(one: StaticMap) -> int:
@@ -141,6 +141,11 @@ def _evaluate(unit: Unit, one: StaticMap, argument: np.ndarray) -> np.ndarray:
     argument = np.asarray(argument, dtype=float)
     scaled = (argument[:, None] - centres) / widths
     return _line(one, argument) + unit.value(scaled) @ heights
+
+
+def _repeatable(unit: Unit, one: StaticMap, argument: np.ndarray) -> np.ndarray:
+    centres, widths, heights, _ = _parts(one)
+    return _line(one, argument) + unit.total(argument, centres, widths, heights)
 
 
 def _differentiate(
@@ -259,3 +264,76 @@ def _settle(old: StaticMap, parameters: np.ndarray) -> None:
         old_widths * _MOST_CHANGE, np.maximum(old_widths, _MOST_WIDTH * reach)
     )
     np.clip(widths, least, most, out=widths)
+
+
+_C = """\
+/* @title@ */
+static const double @side@_centres[@size_centres@] = {@centres@};
+static const double @side@_widths[@size_centres@] = {@widths@};
+static const double @side@_heights[@size_centres@] = {@heights@};
+static const double @side@_line[2] = {@line@};
+static const double @side@_domain[2] = {@domain@};
+
+static double @side@_map(double v)
+{
+    const double low = @side@_domain[0], high = @side@_domain[1];
+    double value = 0.0;
+    int i;
+    for (i = 0; i < @size_centres@; ++i) {
+        const double s = (v - @side@_centres[i]) / @side@_widths[i];
+        value += @side@_heights[i] * @unit@;
+    }
+    return @side@_line[0]
+        + (@side@_line[1] - @side@_line[0]) / (high - low) * (v - low) + value;
+}
+"""
+
+_MATLAB = """\
+function y = network(map, v, unit)
+y = map.line(1) + diff(map.line) / diff(map.domain) * (v - map.domain(1));
+for i = 1:numel(map.centres)
+    y = y + map.heights(i) * unit((v - map.centres(i)) / map.widths(i));
+end
+end
+"""
+
+
+def _portable(unit: Unit) -> Portable:
+    def count(total: int) -> int:
+        return (total - 2) // 3
+
+    return Portable(
+        (
+            Part(
+                "centres",
+                count,
+                "Where each unit stands, in the unit of the argument.",
+                least=1,
+            ),
+            Part(
+                "widths",
+                count,
+                "How wide each unit is; above 0.",
+                least=1,
+                is_positive=True,
+            ),
+            Part(
+                "heights",
+                count,
+                f"What each unit is multiplied by: {unit.formula} with "
+                "s = (v - centre) / width.",
+                least=1,
+            ),
+            Part(
+                "line",
+                lambda total: 2,
+                "Values of the straight line at the two ends of domain.",
+                least=2,
+                most=2,
+            ),
+        ),
+        "as many widths and heights as centres, and two ends",
+        c=_C.replace("@title@", unit.title).replace("@unit@", unit.c),
+        matlab=f"v = network(map, v, @(s) {unit.matlab});",
+        matlab_function=_MATLAB,
+    )

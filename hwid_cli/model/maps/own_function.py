@@ -9,12 +9,11 @@ References
 docs/method.md, eq. (4f).
 """
 
-from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
 
-from hwid_cli.model.maps.rule import MapRule, Shape
+from hwid_cli.model.maps.rule import MapRule, Part, Portable, Shape
 from hwid_cli.records.maps import MapFunction, MapOptions, OwnFunction, StaticMap
 
 # Arguments at which a function is checked, and by how much they lie off round numbers,
@@ -228,7 +227,11 @@ RULE = MapRule(
     evaluate=_evaluate,
     differentiate=_differentiate,
     starts=_starts,
-    identity=lambda options, low, high: _starts(options, low, high, np.asarray)[0],
-    with_domain=lambda one, domain: replace(one, domain=domain),
     names=_names,
+    # Parameters of any kind and unit.
+    has_common_sizes=False,
+    # Only Python can run it.
+    portable=Portable(
+        (Part("parameters", lambda total: total, "As the function says."),)
+    ),
 )

@@ -16,9 +16,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from hwid_cli.model.maps.piecewise_linear import put_in_order
+from hwid_cli.model.maps.piecewise_linear import WEIGHT_OF_SHAPE, put_in_order
 from hwid_cli.model.maps.positions_and_values import amplified, compressed, mean_slope
-from hwid_cli.model.maps.rule import MapRule, Shape
+from hwid_cli.model.maps.rule import MapRule, Part, Placing, Portable, Shape
 from hwid_cli.records.maps import MapOptions, StaticMap
 
 # Half width of a ramp as a share of the narrower cell beside it. Wide ramps blur where an
@@ -144,18 +144,29 @@ def nearest_steps(
     return np.array(cuts[::-1], dtype=int)
 
 
-def with_edges(
-    one: StaticMap, edges: np.ndarray, domain: tuple[float, float]
-) -> StaticMap:
-    """Same map with more edges.
+def _finer(one: StaticMap, corners: np.ndarray, argument: np.ndarray) -> StaticMap:
+    """Same map with more edges, each half way between neighbouring samples.
 
-    Parameters
-    ----------
-    edges : ndarray, shape (n,)
-        Rising; those of the map among them.
+    On a sample, rounding would decide on which side of the edge it lies.
     """
+    old, _ = edges_and_levels(one)
+    known = np.unique(argument)
+    place = np.clip(np.searchsorted(known, corners), 1, known.size - 1)
+    edges = np.union1d(old, 0.5 * (known[place - 1] + known[place]))
     levels = _evaluate(one, np.concatenate([edges[:1] - 1.0, edges]))
+    domain = (float(argument.min()), float(argument.max()))
     return StaticMap(one.kind, np.concatenate([edges, levels]), domain)
+
+
+def _coarser(one: StaticMap, argument: np.ndarray, units: int) -> StaticMap:
+    """Map with so many levels; those that many samples reach weigh more."""
+    if one.parameters.size <= 2 * units:
+        return one
+    edges, _ = edges_and_levels(one)
+    cells = np.searchsorted(np.sort(argument), edges)
+    weights = np.diff(cells, prepend=0, append=argument.size)
+    weights = weights + WEIGHT_OF_SHAPE * argument.size
+    return with_fewer_levels(one, weights, units)
 
 
 def with_fewer_levels(one: StaticMap, weights: np.ndarray, count: int) -> StaticMap:
@@ -191,12 +202,38 @@ def _settle(old: StaticMap, parameters: np.ndarray) -> None:
     put_in_order(edges, parameters[: edges.size])
 
 
+_C = """\
+/* Piecewise constant: levels between edges and beyond them. */
+static const double @side@_edges[@size_edges@] = {@edges@};
+static const double @side@_levels[@size_edges@ + 1] = {@levels@};
+
+static double @side@_map(double v)
+{
+    int low = 0, high = @size_edges@;
+    while (low < high) {
+        const int middle = (low + high) / 2;
+        if (v >= @side@_edges[middle]) {
+            low = middle + 1;
+        } else {
+            high = middle;
+        }
+    }
+    return @side@_levels[low];
+}
+"""
+
+_MATLAB = """\
+place = ones(size(v));
+for edge = map.edges(:)'
+    place = place + (v >= edge);
+end
+v = reshape(map.levels(place), size(v));
+"""
+
 RULE = MapRule(
     evaluate=_evaluate,
     differentiate=_differentiate,
     starts=_starts,
-    identity=lambda options, low, high: _starts(options, low, high, np.asarray)[0],
-    with_domain=lambda one, domain: replace(one, domain=domain),
     names=_names,
     amplify=lambda one, factor: amplified(one, one.parameters.size // 2, factor),
     compress=lambda one, factor: compressed(one, one.parameters.size // 2, factor),
@@ -206,4 +243,26 @@ RULE = MapRule(
     corners=lambda one: edges_and_levels(one)[0],
     held=lambda one: tuple(range(one.parameters.size // 2)),
     has_slope=False,
+    placing=Placing(lambda one: edges_and_levels(one)[0], _finer, _coarser),
+    portable=Portable(
+        (
+            Part(
+                "edges",
+                lambda total: total // 2,
+                "Rising arguments at which the value jumps; an edge belongs to the level "
+                "above it.",
+                least=1,
+                is_rising=True,
+            ),
+            Part(
+                "levels",
+                lambda total: total - total // 2,
+                "Values, one more than edges.",
+                least=2,
+            ),
+        ),
+        "one level more than edges, at least two",
+        c=_C,
+        matlab=_MATLAB,
+    ),
 )

@@ -11,19 +11,25 @@ docs/method.md, eq. (2).
 from dataclasses import replace
 
 import numpy as np
+from numba import njit
 
-from hwid_cli.model.maps.break_points import settled_break_points
 from hwid_cli.model.maps.positions_and_values import amplified, compressed, mean_slope
-from hwid_cli.model.maps.rule import Derivatives, MapRule, Shape
-from hwid_cli.model.maps.segments import (
-    columns_of_segments,
-    piecewise_linear,
-    piecewise_linear_jacobian,
-    piecewise_linear_shares,
-    piecewise_linear_value,
+from hwid_cli.model.maps.rule import (
+    Derivatives,
+    MapRule,
+    Part,
+    Placing,
+    Portable,
+    Prior,
+    Shape,
 )
 from hwid_cli.records.maps import MapOptions, StaticMap
 
+# Sweeps that put break-points into order.
+_SWEEPS = 4
+# Share of the samples that every break-point counts for beyond those near it when the
+# needless ones go, so that the ends of a map, which few samples reach, keep theirs.
+WEIGHT_OF_SHAPE = 1e-3
 # Ends of a map, stored beside the break-points between them.
 N_ENDS = 2
 # A step of the fit may shrink a segment to this share of its width at most, so that
@@ -123,6 +129,181 @@ def _derivatives(
     )
 
 
+@njit(cache=True)
+def piecewise_linear(
+    argument: np.ndarray, break_points: np.ndarray, values: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Evaluate a piecewise linear map.
+
+    Parameters
+    ----------
+    argument : ndarray, shape (n,)
+    break_points, values : ndarray, shape (units,)
+
+    Returns
+    -------
+    result, slope : ndarray, shape (n,)
+    segment : ndarray of int, shape (n,)
+        Left break-point of the segment that is used; the outer segments extrapolate.
+    """
+    n = argument.size
+    last = break_points.size - 2
+    result = np.empty(n)
+    slope = np.empty(n)
+    segment = np.empty(n, dtype=np.int64)
+    slopes = (values[1:] - values[:-1]) / (break_points[1:] - break_points[:-1])
+    k = 0
+    for t in range(n):
+        v = argument[t]
+        # Signals move little from sample to sample: walk from the last segment.
+        while k < last and v >= break_points[k + 1]:
+            k += 1
+        while k > 0 and v < break_points[k]:
+            k -= 1
+        segment[t] = k
+        slope[t] = slopes[k]
+        result[t] = values[k] + slopes[k] * (v - break_points[k])
+    return result, slope, segment
+
+
+@njit(cache=True)
+def piecewise_linear_jacobian(
+    argument: np.ndarray,
+    break_points: np.ndarray,
+    lines: tuple[np.ndarray, np.ndarray],
+    with_positions: bool,
+    out: np.ndarray,
+    first: int,
+) -> None:
+    """Derivatives of a piecewise linear map by its break-points and values.
+
+    Parameters
+    ----------
+    argument : ndarray, shape (n,)
+    break_points : ndarray, shape (units,)
+    lines : tuple of ndarray, shape (n,)
+        Slope and segment as `piecewise_linear` returns them.
+    with_positions : bool
+        Whether the break-points have columns, before those of the values.
+    out : ndarray, shape (n, at least first + units or first + 2 units)
+    first : int
+        First column to write.
+    """
+    slope, segment = lines
+    units = break_points.size
+    values_at = first + units if with_positions else first
+    for t in range(argument.size):
+        k = segment[t]
+        width = break_points[k + 1] - break_points[k]
+        share = (argument[t] - break_points[k]) / width
+        for column in range(first, values_at + units):
+            out[t, column] = 0.0
+        out[t, values_at + k] = 1.0 - share
+        out[t, values_at + k + 1] = share
+        if with_positions:
+            out[t, first + k] = -slope[t] * (1.0 - share)
+            out[t, first + k + 1] = -slope[t] * share
+
+
+@njit(cache=True)
+def piecewise_linear_value(
+    argument: np.ndarray, break_points: np.ndarray, values: np.ndarray
+) -> np.ndarray:
+    """Evaluate a piecewise linear map.
+
+    Parameters
+    ----------
+    argument : ndarray, shape (n,)
+    break_points, values : ndarray, shape (units,)
+
+    Returns
+    -------
+    ndarray, shape (n,)
+    """
+    last = break_points.size - 2
+    result = np.empty(argument.size)
+    slopes = (values[1:] - values[:-1]) / (break_points[1:] - break_points[:-1])
+    k = 0
+    for t in range(argument.size):
+        v = argument[t]
+        # Signals move little from sample to sample: walk from the last segment.
+        while k < last and v >= break_points[k + 1]:
+            k += 1
+        while k > 0 and v < break_points[k]:
+            k -= 1
+        result[t] = values[k] + slopes[k] * (v - break_points[k])
+    return result
+
+
+@njit(cache=True)
+def piecewise_linear_shares(
+    argument: np.ndarray, break_points: np.ndarray, values: np.ndarray, spacing: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Value and slope of a piecewise linear map, and its derivatives, which are local.
+
+    Parameters
+    ----------
+    argument : ndarray, shape (n,)
+    break_points, values : ndarray, shape (units,)
+    spacing : int
+        1: columns are those of the values. 2: every segment has two columns, those of
+        its own left and right value.
+
+    Returns
+    -------
+    value, slope : ndarray, shape (n,)
+    first : ndarray of int, shape (n,)
+        First of the two columns that are not zero.
+    shares : ndarray, shape (n, 2)
+        What stands in them.
+    """
+    n, last = argument.size, break_points.size - 2
+    value, slope = np.empty(n), np.empty(n)
+    first, shares = np.empty(n, dtype=np.int64), np.empty((n, 2))
+    widths = 1.0 / (break_points[1:] - break_points[:-1])
+    slopes = (values[1:] - values[:-1]) * widths
+    k = 0
+    for t in range(n):
+        v = argument[t]
+        while k < last and v >= break_points[k + 1]:
+            k += 1
+        while k > 0 and v < break_points[k]:
+            k -= 1
+        past = v - break_points[k]
+        first[t] = spacing * k
+        slope[t] = slopes[k]
+        value[t] = values[k] + slopes[k] * past
+        shares[t, 1] = past * widths[k]
+        shares[t, 0] = 1.0 - shares[t, 1]
+    return value, slope, first, shares
+
+
+@njit(cache=True)
+def columns_of_segments(break_points: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Parameters' columns out of those of each segment's own end values.
+
+    A break-point that moves to the right lowers the line through it by its slope: on
+    either side by another one.
+
+    Parameters
+    ----------
+    break_points, values : ndarray, shape (units,)
+
+    Returns
+    -------
+    ndarray, shape (2 units, 2 (units - 1))
+    """
+    units = values.size
+    change = np.zeros((2 * units, 2 * (units - 1)))
+    for i in range(units - 1):
+        slope = (values[i + 1] - values[i]) / (break_points[i + 1] - break_points[i])
+        change[i, 2 * i] = -slope
+        change[i + 1, 2 * i + 1] = -slope
+        change[units + i, 2 * i] = 1.0
+        change[units + i + 1, 2 * i + 1] = 1.0
+    return change
+
+
 def _starts(
     options: MapOptions, lowest: float, highest: float, shape: Shape
 ) -> tuple[StaticMap, ...]:
@@ -171,11 +352,455 @@ def _with_domain(one: StaticMap, domain: tuple[float, float]) -> StaticMap:
     return replace(one, parameters=np.concatenate([ends, values]), domain=domain)
 
 
+@njit(cache=True)
+def settled_break_points(
+    old: np.ndarray, proposed: np.ndarray, least_shrink: float, least_width: float
+) -> None:
+    """Put break-points into order again, in place.
+
+    Parameters
+    ----------
+    old, proposed : ndarray, shape (units,)
+    least_shrink : float, [-]
+        Share of its old width that a segment keeps at least.
+    least_width : float, [-]
+        Share of the whole that it keeps at least.
+    """
+    whole = old[-1] - old[0]
+    least = np.empty(old.size - 1)
+    for i in range(least.size):
+        width = old[i + 1] - old[i]
+        least[i] = min(max(least_shrink * width, least_width * whole), width)
+    # Neighbours that came too close part to both sides alike; what that does to the
+    # next ones is mended in further sweeps, and the last one is one-sided.
+    for sweep in range(_SWEEPS):
+        is_legal = True
+        for i in range(least.size):
+            lack = least[i] - (proposed[i + 1] - proposed[i])
+            if lack > 0.0:
+                is_legal = False
+                share = 0.5 if sweep < _SWEEPS - 1 else 0.0
+                proposed[i] -= share * lack
+                proposed[i + 1] += (1.0 - share) * lack
+        if is_legal:
+            return
+
+
+def _finer(one: StaticMap, corners: np.ndarray, argument: np.ndarray) -> StaticMap:
+    """Same map with more break-points."""
+    points = np.union1d(break_points_and_values(one)[0], corners)
+    domain = (float(argument.min()), float(argument.max()))
+    values = _evaluate(one, points)
+    return StaticMap(one.kind, np.concatenate([points, values]), domain)
+
+
+def _coarser(one: StaticMap, argument: np.ndarray, units: int) -> StaticMap:
+    """Map with so many break-points between its ends; those near many samples weigh more."""
+    count = units + N_ENDS
+    if one.parameters.size <= 2 * count:
+        return one
+    points, values = break_points_and_values(one)
+    below = np.searchsorted(np.sort(argument), 0.5 * (points[1:] + points[:-1]))
+    near = np.diff(below, prepend=0, append=argument.size)
+    weights = near + WEIGHT_OF_SHAPE * argument.size
+    kept = thinned_break_points(points, values, weights, count)
+    return replace(one, parameters=np.concatenate([points[kept], values[kept]]))
+
+
+@njit(cache=True)
+def thinned_break_points(
+    break_points: np.ndarray, values: np.ndarray, weights: np.ndarray, count: int
+) -> np.ndarray:
+    """Choose the break-points that a coarser map needs most.
+
+    One after the other, the inner break-point goes whose absence adds least to the
+    weighted squared error at all given break-points.
+
+    Parameters
+    ----------
+    break_points, values, weights : ndarray, shape (n,)
+    count : int
+        How many stay.
+
+    Returns
+    -------
+    ndarray of int, shape (count,)
+        Their indices.
+    """
+    kept = np.arange(break_points.size)
+    while kept.size > count:
+        cheapest, least = 1, np.inf
+        for j in range(1, kept.size - 1):
+            first, middle, last = kept[j - 1], kept[j], kept[j + 1]
+            added = 0.0
+            for i in range(first + 1, last):
+                near, far = (first, middle) if i <= middle else (middle, last)
+                with_it = _between(break_points, values, near, far, i)
+                without = _between(break_points, values, first, last, i)
+                added += weights[i] * (
+                    (without - values[i]) ** 2 - (with_it - values[i]) ** 2
+                )
+            if added < least:
+                cheapest, least = j, added
+        for j in range(cheapest, kept.size - 1):
+            kept[j] = kept[j + 1]
+        kept = kept[: kept.size - 1]
+    return kept
+
+
+@njit(cache=True)
+def _between(
+    points: np.ndarray, values: np.ndarray, first: int, last: int, at: int
+) -> float:
+    """Straight line through two break-points, read at a third."""
+    share = (points[at] - points[first]) / (points[last] - points[first])
+    return values[first] + share * (values[last] - values[first])
+
+
+# Share of a segment over which its samples must spread to tell its slope, and strength
+# of a direction, as a share of the strongest, below which the samples do not see it.
+_LEAST_SPREAD, _UNSEEN = 1e-3, 1e-6
+
+
+def straightened(one: StaticMap, argument: np.ndarray) -> StaticMap:
+    """Same map where samples have been, with the smallest bends elsewhere.
+
+    What a search leaves there depends on where it began: data without noise stop it
+    before the prior has any say. Positions stay.
+
+    Parameters
+    ----------
+    argument : ndarray, shape (n,)
+        What reaches the map.
+
+    Returns
+    -------
+    StaticMap
+        The same one where samples tell the slope of every segment.
+
+    Examples
+    --------
+    >>> bent = StaticMap("piecewise_linear", np.array([0.0, 1, 2, 3, 0, 1, 9, 3]))
+    >>> straightened(bent, np.array([0.0, 0.5, 1.0, 3.0])).parameters[4:].round(6)
+    array([0., 1., 2., 3.])
+    """
+    if one.parameters.size < 6:
+        return one
+    points, values = break_points_and_values(one)
+    if not np.isfinite(argument).all():
+        return one
+    levels = np.sort(argument)
+    if _is_told(points, levels):
+        return one
+    seen = _shares(points, np.unique(levels))
+    _, strength, directions = np.linalg.svd(np.linalg.qr(seen, mode="r"))
+    rank = int(np.sum(strength > _UNSEEN * strength[0]))
+    unseen = directions[rank:].T
+    if unseen.shape[1] == 0:
+        return one
+    bend, jacobian = bends(points, values, False)
+    steps = np.linalg.lstsq(jacobian @ unseen, -bend, rcond=None)[0]
+    return replace(one, parameters=np.concatenate([points, values + unseen @ steps]))
+
+
+def _is_told(points: np.ndarray, levels: np.ndarray) -> bool:
+    """Tell whether the samples in every segment spread enough to know its line."""
+    inner = np.searchsorted(levels, points[1:-1], side="left")
+    first, end = np.append(0, inner), np.append(inner, levels.size)
+    if np.any(first == end):
+        return False
+    spread = levels[end - 1] - levels[first]
+    return bool(np.all(spread > _LEAST_SPREAD * np.diff(points)))
+
+
+def _shares(points: np.ndarray, argument: np.ndarray) -> np.ndarray:
+    """How much the value at each break-point counts for a map's values."""
+    segment = np.clip(
+        np.searchsorted(points, argument, side="right") - 1, 0, points.size - 2
+    )
+    share = (argument - points[segment]) / (points[segment + 1] - points[segment])
+    rows = np.zeros((argument.size, points.size))
+    at = np.arange(argument.size)
+    rows[at, segment], rows[at, segment + 1] = 1.0 - share, share
+    return rows
+
+
+@njit(cache=True)
+def _mean_slope(break_points: np.ndarray, values: np.ndarray) -> float:
+    """Range of the values over that of the break-points; 1 for a constant map.
+
+    Parameters
+    ----------
+    break_points, values : ndarray, shape (units,)
+    """
+    low = high = values[0]
+    for value in values:
+        low, high = min(low, value), max(high, value)
+    size = (high - low) / (break_points[-1] - break_points[0])
+    return size if size != 0.0 else 1.0
+
+
+@njit(cache=True)
+def bends(
+    break_points: np.ndarray, values: np.ndarray, with_positions: bool
+) -> tuple[np.ndarray, np.ndarray]:
+    """Changes of slope of a piecewise linear map, in units of its mean slope.
+
+    Parameters
+    ----------
+    break_points, values : ndarray, shape (units,)
+    with_positions : bool
+        Whether the break-points have columns in the jacobian.
+
+    Returns
+    -------
+    bend : ndarray, shape (units - 2,)
+    jacobian : ndarray, shape (units - 2, 2 units) or (units - 2, units)
+        By the break-points (if asked for) and the values, at a fixed mean slope.
+    """
+    units = break_points.size
+    offset = units if with_positions else 0
+    bend = np.zeros(units - 2)
+    jacobian = np.zeros((units - 2, offset + units))
+    size = _mean_slope(break_points, values)
+    for i in range(units - 2):
+        left = 1.0 / ((break_points[i + 1] - break_points[i]) * size)
+        right = 1.0 / ((break_points[i + 2] - break_points[i + 1]) * size)
+        rise_left = (values[i + 1] - values[i]) * left
+        rise_right = (values[i + 2] - values[i + 1]) * right
+        bend[i] = rise_right - rise_left
+        jacobian[i, offset + i] = left
+        jacobian[i, offset + i + 1] = -left - right
+        jacobian[i, offset + i + 2] = right
+        if with_positions:
+            left, right = rise_left * left * size, rise_right * right * size
+            jacobian[i, i] = -left
+            jacobian[i, i + 1] = left + right
+            jacobian[i, i + 2] = -right
+    return bend, jacobian
+
+
+@njit(cache=True)
+def add_bends(
+    break_points: np.ndarray,
+    values: np.ndarray,
+    with_positions: bool,
+    weight: float,
+    matrix: np.ndarray,
+    vector: np.ndarray,
+    first: int,
+) -> float:
+    """Add the rows of all bends to normal equations.
+
+    The slope that counts as one is the mean slope here and grows as the map does, so that
+    a factor on the map changes nothing: measured by a slope that stays, every search would
+    win by making the map smaller and the next block larger, for ever.
+
+    Parameters
+    ----------
+    break_points, values : ndarray, shape (units,)
+    weight : float
+        Of the squared bends.
+    matrix : ndarray, shape (n_parameters, n_parameters)
+    vector : ndarray, shape (n_parameters,)
+    first : int
+        Where the map's parameters begin.
+
+    Returns
+    -------
+    float
+        Sum of the squared bends.
+    """
+    bend, jacobian = bends(break_points, values, with_positions)
+    units = break_points.size
+    offset = units if with_positions else 0
+    rates, growing = _relative_growth(break_points, values, with_positions)
+    total = 0.0
+    places = np.empty(10, dtype=np.int64)
+    slopes = np.empty(10)
+    for i in range(bend.size):
+        total += bend[i] * bend[i]
+        count = 0
+        for k in range(3):
+            places[count], slopes[count] = (
+                offset + i + k,
+                jacobian[i, offset + i + k],
+            )
+            count += 1
+            if with_positions:
+                places[count], slopes[count] = i + k, jacobian[i, i + k]
+                count += 1
+        for k in range(growing.size):
+            places[count], slopes[count] = growing[k], -bend[i] * rates[k]
+            count += 1
+        for a in range(count):
+            left = weight * slopes[a]
+            vector[first + places[a]] -= left * bend[i]
+            for b in range(count):
+                matrix[first + places[a], first + places[b]] += left * slopes[b]
+    return total
+
+
+@njit(cache=True)
+def _relative_growth(
+    break_points: np.ndarray, values: np.ndarray, with_positions: bool
+) -> tuple[np.ndarray, np.ndarray]:
+    """Derivatives of the logarithm of `growth`, and the columns that have any."""
+    units = break_points.size
+    first, last = _inner_ends(units)
+    low = first + np.argmin(values[first : last + 1])
+    high = first + np.argmax(values[first : last + 1])
+    size = values[high] - values[low]
+    if size == 0.0:
+        return np.empty(0), np.empty(0, dtype=np.int64)
+    offset = units if with_positions else 0
+    if not with_positions:
+        return (
+            np.array([-1.0 / size, 1.0 / size]),
+            np.array([offset + low, offset + high]),
+        )
+    width = break_points[last] - break_points[first]
+    return (
+        np.array([-1.0 / size, 1.0 / size, 1.0 / width, -1.0 / width]),
+        np.array([offset + low, offset + high, first, last]),
+    )
+
+
+@njit(cache=True)
+def _inner_ends(units: int) -> tuple[int, int]:
+    """Break-points between which a map's growth is measured.
+
+    The outermost ones may slide along the line on which the map goes on; they would run
+    away if that made the bends look smaller.
+    """
+    return (1, units - 2) if units > 3 else (0, units - 1)
+
+
+@njit(cache=True)
+def growth(
+    break_points: np.ndarray,
+    values: np.ndarray,
+    before: np.ndarray,
+    values_before: np.ndarray,
+) -> float:
+    """Factor by which a map has become steeper, measured between its inner break-points.
+
+    Parameters
+    ----------
+    break_points, values : ndarray, shape (units,)
+    before, values_before : ndarray, shape (units,)
+        Of the map as it was.
+
+    Returns
+    -------
+    float
+        1 where one of the two is constant.
+    """
+    first, last = _inner_ends(values.size)
+    size = np.ptp(values[first : last + 1])
+    size_before = np.ptp(values_before[first : last + 1])
+    if size == 0.0 or size_before == 0.0:
+        return 1.0
+    width = break_points[last] - break_points[first]
+    return size / size_before * (before[last] - before[first]) / width
+
+
+@njit(cache=True)
+def squared_bends_after(
+    break_points: np.ndarray,
+    values: np.ndarray,
+    before: np.ndarray,
+    values_before: np.ndarray,
+) -> float:
+    """Sum of the squared changes of slope after a step, as the step saw them.
+
+    The slope that counts as one is the mean slope before the step, times the growth of
+    the map in it.
+
+    Parameters
+    ----------
+    break_points, values : ndarray, shape (units,)
+    before, values_before : ndarray, shape (units,)
+        Of the map before the step.
+    """
+    size = _mean_slope(before, values_before)
+    size *= growth(break_points, values, before, values_before)
+    total = 0.0
+    last = 0.0
+    for i in range(values.size - 1):
+        slope = (values[i + 1] - values[i]) / (break_points[i + 1] - break_points[i])
+        if i > 0:
+            total += ((slope - last) / size) ** 2
+        last = slope
+    return total
+
+
+# Fewer samples than this in a segment leave its line open, and the share of a map's mean
+# slope by which it must bend to have a break-point there.
+_FEW, _BENDS = 5, 1e-3
+
+
+def _why_flat(one: StaticMap, moved: np.ndarray, argument: np.ndarray) -> str:
+    """Segments without samples, or break-points at which the map does not bend."""
+    points, values = break_points_and_values(one)
+    units = points.size
+    slopes = np.diff(values) / np.diff(points)
+    scale = np.ptp(values) / np.ptp(points)
+    for number in moved % units:
+        gap = _gap_beside(points, int(number), argument)
+        if gap:
+            return gap
+    for place in moved:
+        inner = 0 < place < units - 1
+        if inner and abs(slopes[place] - slopes[place - 1]) < _BENDS * scale:
+            return f"the map does not bend at {points[place]:.3g}"
+    return ""
+
+
+def _gap_beside(points: np.ndarray, number: int, signal: np.ndarray) -> str:
+    """Segments beside a break-point with hardly any sample; empty where there are many."""
+    before, after = max(number - 1, 0), min(number + 1, points.size - 1)
+    found = []
+    for low, high in ((before, after), (before, number), (number, after)):
+        between = (signal > points[low]) & (signal < points[high])
+        if low < high:
+            found.append((int(between.sum()), points[low], points[high]))
+    # The emptiest of them; of equally empty ones the longest, which comes first.
+    count, left, right = min(found, key=lambda one: one[0])
+    if count >= _FEW:
+        return ""
+    many = f"only {count} sample{'s' * (count > 1)}" if count else "no sample"
+    verb = "lie" if count > 1 else "lies"
+    return f"{many} of {{what}} {verb} between {left:.3g} and {right:.3g}"
+
+
+_C = """\
+/* Piecewise linear: the first and last line go on beyond the ends. */
+static const double @side@_points[@size_break_points@] = {@break_points@};
+static const double @side@_values[@size_break_points@] = {@values@};
+
+static double @side@_map(double v)
+{
+    int low = 0, high = @size_break_points@ - 1;
+    double slope;
+    while (high - low > 1) {
+        const int middle = (low + high) / 2;
+        if (v >= @side@_points[middle]) {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    slope = @side@_values[low + 1] - @side@_values[low];
+    slope /= @side@_points[low + 1] - @side@_points[low];
+    return @side@_values[low] + slope * (v - @side@_points[low]);
+}
+"""
+
 RULE = MapRule(
     evaluate=_evaluate,
     differentiate=_differentiate,
     starts=_starts,
-    identity=lambda options, low, high: _starts(options, low, high, np.asarray)[0],
     with_domain=_with_domain,
     names=_names,
     amplify=lambda one, factor: amplified(one, one.parameters.size // 2, factor),
@@ -187,4 +812,37 @@ RULE = MapRule(
     derivatives=_derivatives,
     # The outermost ones may slide along the straight line beyond them.
     held=lambda static_map: (0, static_map.parameters.size // 2 - 1),
+    outlined=outlined,
+    straightened=straightened,
+    placing=Placing(lambda one: break_points_and_values(one)[0], _finer, _coarser),
+    prior=Prior(
+        # A bend needs a break-point between two ends.
+        applies=lambda one: one.parameters.size > 4,
+        add=lambda one, *system: add_bends(*break_points_and_values(one), *system),
+        after=lambda one, before: squared_bends_after(
+            *break_points_and_values(one), *break_points_and_values(before)
+        ),
+    ),
+    why_flat=_why_flat,
+    portable=Portable(
+        (
+            Part(
+                "break_points",
+                lambda total: total // 2,
+                "Rising arguments.",
+                least=2,
+                is_rising=True,
+            ),
+            Part(
+                "values",
+                lambda total: total // 2,
+                "Value at each break-point; the first and the last straight line go on "
+                "beyond the ends.",
+                least=2,
+            ),
+        ),
+        "as many values as break_points, at least two",
+        c=_C,
+        matlab="v = interp1(map.break_points(:), map.values(:), v, 'linear', 'extrap');",
+    ),
 )

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.polynomial import chebyshev
 
-from hwid_cli.model.maps.rule import MapRule, Shape
+from hwid_cli.model.maps.rule import MapRule, Part, Portable, Shape
 from hwid_cli.records.maps import MapOptions, StaticMap
 
 
@@ -90,15 +90,66 @@ def _size(static_map: StaticMap) -> tuple[float, np.ndarray]:
     return norm / half, gradient
 
 
+_C = """\
+/* Polynomial: Chebyshev coefficients over its domain, by Clenshaw's recursion. */
+static const double @side@_chebyshev[@size_chebyshev@] = {@chebyshev@};
+static const double @side@_domain[2] = {@domain@};
+
+static double @side@_map(double v)
+{
+    const double low = @side@_domain[0], high = @side@_domain[1];
+    const double s = (2.0 * v - low - high) / (high - low);
+    double now = @side@_chebyshev[0], ahead = 0.0;
+    int i;
+    if (@size_chebyshev@ > 1) {
+        now = @side@_chebyshev[(@size_chebyshev@ + @size_chebyshev@ - 2) % @size_chebyshev@];
+        ahead = @side@_chebyshev[@size_chebyshev@ - 1];
+    }
+    for (i = @size_chebyshev@ - 3; i >= 0; --i) {
+        const double before = now;
+        now = @side@_chebyshev[i] - ahead;
+        ahead = before + ahead * (2.0 * s);
+    }
+    return now + ahead * s;
+}
+"""
+
+_MATLAB = """\
+function v = chebyshev(c, s)
+ahead = zeros(size(s));
+beyond = ahead;
+for i = numel(c):-1:2
+    here = c(i) + 2 * s .* ahead - beyond;
+    beyond = ahead;
+    ahead = here;
+end
+v = c(1) + s .* ahead - beyond;
+end
+"""
+
 RULE = MapRule(
     evaluate=_evaluate,
     differentiate=_differentiate,
     starts=_starts,
-    identity=lambda options, low, high: _starts(options, low, high, np.asarray)[0],
     with_domain=_with_domain,
     names=_names,
     amplify=_amplify,
     compress=_compress,
     size=_size,
     shifts=True,
+    portable=Portable(
+        (
+            Part(
+                "chebyshev",
+                lambda total: total,
+                "Chebyshev coefficients, constant first, of the argument scaled from "
+                "domain to -1 ... 1.",
+                least=1,
+            ),
+        ),
+        "at least one",
+        c=_C,
+        matlab="v = chebyshev(map.chebyshev, (2 * v - sum(map.domain)) / diff(map.domain));",
+        matlab_function=_MATLAB,
+    ),
 )

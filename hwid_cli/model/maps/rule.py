@@ -1,7 +1,7 @@
 """What one kind of static map must offer."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,33 +13,8 @@ Differentiate = Callable[
 ]
 
 
-def no_positions(static_map: StaticMap) -> int:  # noqa: ARG001 - a rule's signature
-    """Tell that all parameters move from the first phase on."""
-    return 0
-
-
-def none_held(static_map: StaticMap) -> tuple[int, ...]:  # noqa: ARG001
-    """Tell that data may determine every parameter."""
-    return ()
-
-
-def keep_proposed(old: StaticMap, parameters: np.ndarray) -> None:
-    """Accept all proposed parameters.
-
-    Parameters
-    ----------
-    parameters : ndarray, shape (n_parameters,)
-    """
-
-
-def no_corners(static_map: StaticMap) -> np.ndarray:  # noqa: ARG001
-    """Tell that a map is smooth.
-
-    Returns
-    -------
-    ndarray, shape (0,)
-    """
-    return np.zeros(0)
+def _over(one: StaticMap, domain: tuple[float, float]) -> StaticMap:
+    return replace(one, domain=domain)
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,6 +49,108 @@ class Derivatives:
 
 
 @dataclass(frozen=True)
+class Placing:
+    """How the corners of a kind are put where they matter.
+
+    Parameters
+    ----------
+    corners : callable (StaticMap) -> ndarray
+        Those that it has.
+    finer : callable (StaticMap, corners, argument) -> StaticMap
+        The same map with these corners beside its own, over the range of the argument.
+    coarser : callable (StaticMap, argument, units) -> StaticMap
+        The map with so many corners, those that it needs most for what reaches it.
+    """
+
+    corners: Callable[[StaticMap], np.ndarray]
+    finer: Callable[[StaticMap, np.ndarray, np.ndarray], StaticMap]
+    coarser: Callable[[StaticMap, np.ndarray, int], StaticMap]
+
+
+@dataclass(frozen=True)
+class Prior:
+    """What a search holds a map's shape with where no data ask for it.
+
+    Parameters
+    ----------
+    applies : callable (StaticMap) -> bool
+    add : callable (StaticMap, with_positions, weight, matrix, vector, first) -> float
+        Adds the rows of the prior to normal equations, the map's parameters beginning
+        at `first`; its unweighted share of the total.
+    after : callable (StaticMap, StaticMap before a step) -> float
+        The unweighted share of the total after the step, as the step saw it.
+    """
+
+    applies: Callable[[StaticMap], bool]
+    add: Callable[[StaticMap, bool, float, np.ndarray, np.ndarray, int], float]
+    after: Callable[[StaticMap, StaticMap], float]
+
+
+@dataclass(frozen=True)
+class Part:
+    """One named part of a map's parameters in a file.
+
+    Parameters
+    ----------
+    size : callable (int) -> int
+        Its length, from the number of all parameters.
+    about : str
+        What its numbers are.
+    least : int
+        Fewest numbers.
+    most : int or None
+    is_rising, is_positive : bool
+        Whether its numbers must rise, and be above zero.
+    """
+
+    name: str
+    size: Callable[[int], int]
+    about: str
+    least: int = 0
+    most: int | None = None
+    is_rising: bool = False
+    is_positive: bool = False
+
+
+@dataclass(frozen=True)
+class Portable:
+    """How maps of a kind leave the program.
+
+    Texts may say ``@side@`` (input or output), ``@domain@``, and of every part and
+    derived part ``@name@`` for its numbers and ``@size_name@`` for their count.
+
+    Parameters
+    ----------
+    parts : tuple of Part
+        One after the other they are the parameters.
+    lengths : str
+        How many numbers the parts must have, for a message.
+    are_limits : bool
+        Whether the one part is a pair, the lower one first.
+    derived : callable (StaticMap) -> mapping of str to ndarray
+        What a program elsewhere should not have to compute.
+    derived_parts : tuple of Part
+        What these are.
+    c : str or None
+        ``static double @side@_map(double v)`` in C99; None where C cannot compute it.
+    matlab : str or None
+        Statements that turn the column ``v`` into values, the parts being fields of
+        ``map``.
+    matlab_function : str
+        A function that these statements call; several kinds may name the same one.
+    """
+
+    parts: tuple[Part, ...] = ()
+    lengths: str = ""
+    are_limits: bool = False
+    derived: Callable[[StaticMap], Mapping[str, np.ndarray]] = lambda one: {}
+    derived_parts: tuple[Part, ...] = ()
+    c: str | None = None
+    matlab: str | None = None
+    matlab_function: str = ""
+
+
+@dataclass(frozen=True)
 class MapRule:
     """What one kind of static map can do.
 
@@ -84,13 +161,13 @@ class MapRule:
         Writes a column for each active parameter into `out`, from column `first` on.
     starts : callable (MapOptions, lowest, highest, shape) -> tuple of StaticMap
         Maps over the given range that follow the function `shape` where the kind can.
-    identity : callable (MapOptions, lowest, highest) -> StaticMap
-        A map that passes on what lies in the range unchanged; kinds that cannot give
-        one that comes near.
-    with_domain : callable (StaticMap, (lowest, highest)) -> StaticMap
-        The same map with another domain.
     names : callable (StaticMap) -> tuple of str
         Names of the parameters.
+    identity : callable (MapOptions, lowest, highest) -> StaticMap, or None
+        A map that passes on what lies in the range unchanged, or comes near; None where
+        the first start that follows the identity does.
+    with_domain : callable (StaticMap, (lowest, highest)) -> StaticMap
+        The same map with another domain.
     amplify : callable (StaticMap, factor) -> StaticMap, or None
         The map v -> factor * map(v); None where the kind has no free gain.
     compress : callable (StaticMap, factor) -> StaticMap, or None
@@ -113,21 +190,52 @@ class MapRule:
     has_slope : bool
         Whether the slope in `differentiate` is that of the map, not a stand-in that
         serves the search only.
+    portable : Portable
+        How maps of the kind leave the program.
+    repeatable : callable (StaticMap, v) -> ndarray, or None
+        The value by the arithmetic that a program elsewhere repeats to the last bit;
+        None where `evaluate` does that.
+    outlined : callable (StaticMap) -> StaticMap
+        The same map, its parameters alone giving its values everywhere.
+    straightened : callable (StaticMap, v) -> StaticMap
+        The map where samples have been, as straight as they allow elsewhere.
+    placing : Placing or None
+        None where a fit leaves corners where a start put them, or there are none.
+    prior : Prior or None
+    why_flat : callable (StaticMap, moved, v) -> str
+        Why the data do not tell the parameters of the indices `moved`, with ``{what}``
+        for the name of v; empty where the kind knows no reason of its own.
+    is_identity : bool
+        Whether the kind is no map at all.
+    has_common_sizes : bool
+        Whether positions have one size and values another; else each parameter has its
+        own.
     """
 
     evaluate: Callable[[StaticMap, np.ndarray], np.ndarray]
     differentiate: Differentiate
     starts: Callable[[MapOptions, float, float, Shape], tuple[StaticMap, ...]]
-    identity: Callable[[MapOptions, float, float], StaticMap]
-    with_domain: Callable[[StaticMap, tuple[float, float]], StaticMap]
     names: Callable[[StaticMap], tuple[str, ...]]
+    identity: Callable[[MapOptions, float, float], StaticMap] | None = None
+    with_domain: Callable[[StaticMap, tuple[float, float]], StaticMap] = _over
     amplify: Callable[[StaticMap, float], StaticMap] | None = None
     compress: Callable[[StaticMap, float], StaticMap] | None = None
     size: Callable[[StaticMap], tuple[float, np.ndarray]] | None = None
-    n_positions: Callable[[StaticMap], int] = no_positions
-    settle: Callable[[StaticMap, np.ndarray], None] = keep_proposed
-    corners: Callable[[StaticMap], np.ndarray] = no_corners
+    n_positions: Callable[[StaticMap], int] = lambda one: 0
+    settle: Callable[[StaticMap, np.ndarray], None] = lambda old, parameters: None
+    corners: Callable[[StaticMap], np.ndarray] = lambda one: np.zeros(0)
     derivatives: Callable[[StaticMap, np.ndarray, bool], Derivatives] | None = None
-    held: Callable[[StaticMap], tuple[int, ...]] = none_held
+    held: Callable[[StaticMap], tuple[int, ...]] = lambda one: ()
     shifts: bool = False
     has_slope: bool = True
+    portable: Portable = Portable()
+    repeatable: Callable[[StaticMap, np.ndarray], np.ndarray] | None = None
+    outlined: Callable[[StaticMap], StaticMap] = lambda one: one
+    straightened: Callable[[StaticMap, np.ndarray], StaticMap] = lambda one, v: one
+    placing: Placing | None = None
+    prior: Prior | None = None
+    why_flat: Callable[[StaticMap, np.ndarray, np.ndarray], str] = (
+        lambda one, moved, v: ""
+    )
+    is_identity: bool = False
+    has_common_sizes: bool = True

@@ -8,7 +8,10 @@ References
 docs/method.md, eqs. (4a), (4b).
 """
 
+import math
+
 import numpy as np
+from numba import njit
 
 from hwid_cli.model.maps.network import Unit, network_rule
 
@@ -30,4 +33,42 @@ def _layout(count: int) -> tuple[np.ndarray, np.ndarray]:
     return (np.arange(count) + 0.5) / count, np.full(count, _WIDTH_SHARE / count)
 
 
-RULE = network_rule("sigmoid_network", Unit(_value, _slope, -1.0, _layout))
+@njit(cache=True)
+def _sum(
+    argument: np.ndarray, centres: np.ndarray, widths: np.ndarray, heights: np.ndarray
+) -> np.ndarray:
+    """Sum of smooth steps.
+
+    Parameters
+    ----------
+    argument : ndarray, shape (n,)
+    centres, widths, heights : ndarray, shape (units,)
+
+    Returns
+    -------
+    ndarray, shape (n,)
+    """
+    out = np.empty(argument.size)
+    for t in range(argument.size):
+        value = 0.0
+        for i in range(centres.size):
+            s = (argument[t] - centres[i]) / widths[i]
+            value += heights[i] * 0.5 * math.tanh(0.5 * s)
+        out[t] = value
+    return out
+
+
+RULE = network_rule(
+    "sigmoid_network",
+    Unit(
+        _value,
+        _slope,
+        -1.0,
+        _layout,
+        _sum,
+        title="Sigmoid network: a straight line and smooth steps.",
+        formula="tanh(s / 2) / 2",
+        c="0.5 * tanh(0.5 * s)",
+        matlab="0.5 * tanh(0.5 * s)",
+    ),
+)

@@ -7,7 +7,10 @@ References
 Zhang, Benveniste, Wavelet networks (1992). docs/method.md, eqs. (4a), (4c).
 """
 
+import math
+
 import numpy as np
+from numba import njit
 
 from hwid_cli.model.maps.network import Unit, network_rule
 
@@ -39,4 +42,42 @@ def _layout(count: int) -> tuple[np.ndarray, np.ndarray]:
     return np.array(centres), np.array(widths)
 
 
-RULE = network_rule("wavelet_network", Unit(_value, _slope, 1.0, _layout))
+@njit(cache=True)
+def _sum(
+    argument: np.ndarray, centres: np.ndarray, widths: np.ndarray, heights: np.ndarray
+) -> np.ndarray:
+    """Sum of "Mexican hats".
+
+    Parameters
+    ----------
+    argument : ndarray, shape (n,)
+    centres, widths, heights : ndarray, shape (units,)
+
+    Returns
+    -------
+    ndarray, shape (n,)
+    """
+    out = np.empty(argument.size)
+    for t in range(argument.size):
+        value = 0.0
+        for i in range(centres.size):
+            s = (argument[t] - centres[i]) / widths[i]
+            value += heights[i] * (1.0 - s * s) * math.exp(-0.5 * s * s)
+        out[t] = value
+    return out
+
+
+RULE = network_rule(
+    "wavelet_network",
+    Unit(
+        _value,
+        _slope,
+        1.0,
+        _layout,
+        _sum,
+        title='Wavelet network: a straight line and "Mexican hats".',
+        formula="(1 - s^2) exp(-s^2 / 2)",
+        c="(1.0 - s * s) * exp(-0.5 * s * s)",
+        matlab="(1 - s .^ 2) .* exp(-0.5 * s .^ 2)",
+    ),
+)

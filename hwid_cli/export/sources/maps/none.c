@@ -1,4 +1,0 @@
-static double @side@_map(double v)
-{
-    return v;
-}
