@@ -1,25 +1,92 @@
-"""Which reader serves which kind of measurement file."""
+"""Which reader serves which kind of measurement file: one table.
 
-from collections.abc import Callable
+A new format is a file with its reader, and a line in ``READERS``.
+"""
+
+import os
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import AbstractContextManager
+from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any, TypeVar
 
-from hwid_cli.data.array_files import (
-    read_h5_columns,
-    read_mat_columns,
-    read_npz_columns,
-)
-from hwid_cli.data.columns import FileColumns
-from hwid_cli.data.csv_files import read_csv_columns
+from hwid_cli.data.array_columns import Variables, list_variables, pick_columns
+from hwid_cli.data.columns import Column, FileColumns, array_column
+from hwid_cli.data.csv_files import list_csv_columns, read_csv_columns
+from hwid_cli.data.hdf5_files import open_hdf5
+from hwid_cli.data.isolated_reading import IsolatedReader, Labelled, serve
+from hwid_cli.data.mat_files import open_mat
+from hwid_cli.data.npz_files import open_npz
 from hwid_cli.errors import MeasurementError
 from hwid_cli.files.messages import escaped
 from hwid_cli.records.experiment import Columns
+from hwid_cli.records.starter import FoundColumn
 
-READERS: dict[str, Callable[[Path, Columns], FileColumns]] = {
-    ".csv": read_csv_columns,
-    ".mat": read_mat_columns,
-    ".npz": read_npz_columns,
-    ".h5": read_h5_columns,
-}
+Item = TypeVar("Item")
+
+
+@dataclass(frozen=True)
+class Reader:
+    """How a kind of measurement file is read.
+
+    Parameters
+    ----------
+    suffixes : tuple of str
+        Endings of such files, in lower case.
+    read : callable
+        Gives the columns that are wanted one by one, each with its role.
+    list_columns : callable
+        Gives all columns of numbers, for ``hwid init``.
+    needs : str
+        Library to install beside hwid; empty for none.
+    is_isolated : bool
+        Whether a process of its own reads: for what a damaged file may crash. Its rows
+        are counted from 0.
+    is_one_table : bool
+        Whether columns of different length belong together.
+    """
+
+    suffixes: tuple[str, ...]
+    read: Callable[[Path, Columns], Iterable[tuple[str, Column]]]
+    list_columns: Callable[[Path], Iterable[FoundColumn]]
+    needs: str = ""
+    is_isolated: bool = False
+    is_one_table: bool = False
+
+
+def _of_arrays(
+    *suffixes: str,
+    opened: Callable[[Path], AbstractContextManager[Variables]],
+    needs: str = "",
+) -> Reader:
+    """Reader of files that hold arrays with names."""
+
+    def read(path: Path, columns: Columns) -> Iterator[tuple[str, Column]]:
+        with opened(path) as variables:
+            yield from pick_columns(path, columns, variables)
+
+    def list_columns(path: Path) -> Iterator[FoundColumn]:
+        with opened(path) as variables:
+            yield from list_variables(variables)
+
+    return Reader(suffixes, read, list_columns, needs, is_isolated=True)
+
+
+READERS = (
+    Reader((".csv",), read_csv_columns, list_csv_columns, is_one_table=True),
+    _of_arrays(".mat", opened=open_mat),
+    _of_arrays(".npz", opened=open_npz),
+    _of_arrays(".h5", opened=open_hdf5),
+)
+SUFFIXES = tuple(suffix for reader in READERS for suffix in reader.suffixes)
+
+_ISOLATED = IsolatedReader("hwid_cli.data.formats")
+
+
+def reader_of(name: str | Path) -> Reader | None:
+    """Find the reader of a file by the ending of its name."""
+    suffix = Path(name).suffix.lower()
+    return next((one for one in READERS if suffix in one.suffixes), None)
 
 
 def read_columns(path: Path, columns: Columns) -> FileColumns:
@@ -35,11 +102,11 @@ def read_columns(path: Path, columns: Columns) -> FileColumns:
     MeasurementError
         If the format is unknown, or the file is empty, damaged or lacks a column.
     """
-    reader = READERS.get(path.suffix.lower())
+    reader = reader_of(path)
     if reader is None:
         raise MeasurementError(
             f"{path}: has the ending {path.suffix!r}; expected one of "
-            f"{', '.join(READERS)}; convert the file or leave it out"
+            f"{', '.join(SUFFIXES)}; convert the file or leave it out"
         )
     try:
         if path.stat().st_size == 0:
@@ -47,7 +114,12 @@ def read_columns(path: Path, columns: Columns) -> FileColumns:
                 f"{path}: is empty; expected a measurement; export it again or leave "
                 "the file out"
             )
-        return reader(path, columns)
+        if reader.is_isolated:
+            replies = _ISOLATED.ask(_request(path, columns))
+            found = {role: array_column(title, one) for (role, title), one in replies}
+        else:
+            found = dict(_read(reader, path, columns))
+        return FileColumns(**found)
     except MeasurementError:
         raise
     except Exception as error:
@@ -57,3 +129,77 @@ def read_columns(path: Path, columns: Columns) -> FileColumns:
             f"{path}: cannot be read ({said}); expected a readable {path.suffix} file; "
             "export it again or leave it out"
         ) from error
+
+
+def list_columns(path: Path) -> tuple[FoundColumn, ...]:
+    """List the columns of numbers in a measurement file.
+
+    Returns
+    -------
+    tuple of FoundColumn
+        Vectors and single numbers by their names; columns of tables by their number, or
+        by their name where a header has one.
+
+    Raises
+    ------
+    Exception
+        Whatever the reader stumbles on.
+    """
+    reader = reader_of(path)
+    if reader is None or not reader.is_isolated:
+        return tuple(_listed(reader, path))
+    return tuple(
+        FoundColumn(title, key, values, variable)
+        for (title, key, variable), values in _ISOLATED.ask(_request(path))
+    )
+
+
+def _read(
+    reader: Reader | None, path: Path, columns: Columns
+) -> Iterator[tuple[str, Column]]:
+    return _importing(reader, path, lambda one: one.read(path, columns))
+
+
+def _listed(reader: Reader | None, path: Path) -> Iterator[FoundColumn]:
+    return _importing(reader, path, lambda one: one.list_columns(path))
+
+
+def _importing(
+    reader: Reader | None, path: Path, read: Callable[[Reader], Iterable[Item]]
+) -> Iterator[Item]:
+    """What a reader gives; where its library is missing, which one to install."""
+    if reader is None:
+        raise ValueError(f"no reader of {path.suffix!r}")
+    try:
+        yield from read(reader)
+    except ImportError as error:
+        if not reader.needs:
+            raise
+        raise MeasurementError(
+            f"{path}: is read by {reader.needs}, which is missing ({error}); expected it "
+            f"to be installed; run: pip install {reader.needs}, or convert the file"
+        ) from error
+
+
+def _request(path: Path, columns: Columns | None = None) -> dict[str, Any]:
+    folder = "" if path.is_absolute() else os.getcwd()  # noqa: PTH109
+    wanted = None if columns is None else asdict(columns)
+    return {"folder": folder, "path": str(path), "columns": wanted}
+
+
+def _answer(request: dict[str, Any]) -> Iterator[Labelled]:
+    """What the process of its own gives: columns with roles, or all columns."""
+    # Messages name the path as the program knows it.
+    os.chdir(request["folder"] or "/")
+    path = Path(request["path"])
+    reader = reader_of(path)
+    if request["columns"] is None:
+        for one in _listed(reader, path):
+            yield [one.title, one.key, one.variable], one.values
+    else:
+        for role, column in _read(reader, path, Columns(**request["columns"])):
+            yield [role, column.title], column.values
+
+
+if __name__ == "__main__":
+    serve(_answer)
