@@ -113,7 +113,11 @@ def find_measurements(session: "Session") -> None:
         With code 0 and one line that says where to put the data.
     """
     from hwid_cli.cli.simulate import simulate_stage
-    from hwid_cli.data.paths import find_files, missing_files_message, recordings_base
+    from hwid_cli.data.recording_files import (
+        find_files,
+        missing_files_message,
+        recordings_base,
+    )
 
     if session.experiment.simulate is not None:
         simulate_stage(session)

@@ -66,7 +66,11 @@ def command(
 
 def _is_waiting(experiment: "Experiment", folder: Path) -> bool:
     """Whether there are no data to check yet, which is no fault."""
-    from hwid_cli.data.paths import find_files, missing_files_message, recordings_base
+    from hwid_cli.data.recording_files import (
+        find_files,
+        missing_files_message,
+        recordings_base,
+    )
     from hwid_cli.errors import MeasurementError
 
     if experiment.recordings is None and experiment.simulate is not None:
@@ -93,7 +97,7 @@ def _is_waiting(experiment: "Experiment", folder: Path) -> bool:
 
 def _data(experiment: "Experiment", folder: Path) -> "tuple[Checked, tuple[str, ...]]":
     """Show the recordings, and collect what is wrong with them or their names."""
-    from hwid_cli.data.survey import survey_recordings
+    from hwid_cli.data.recordings import survey_recordings
     from hwid_cli.errors import HwidError
     from hwid_cli.report.check_tables import recordings_table
     from hwid_cli.stages.own_functions import check_own_functions

@@ -58,7 +58,7 @@ def chosen_model(session: "Session", asked: str) -> "Exported":
     ConfigError
         If there is no such model.
     """
-    from hwid_cli.data.paths import recordings_options
+    from hwid_cli.data.recording_files import recordings_options
     from hwid_cli.export.contents import SIMULATION, export_model, find_fit
     from hwid_cli.report.tables import thesis_name_of
 
@@ -110,7 +110,7 @@ def _named_fits(session: "Session", asked: str) -> "tuple[dict[str, Fit], str]":
 def _simulation(session: "Session") -> "Exported":
     """The physics simulation with what a diagnosis added."""
     from hwid_cli.cli.diagnose import diagnose_stage, what_to_diagnose
-    from hwid_cli.data.paths import recordings_options
+    from hwid_cli.data.recording_files import recordings_options
     from hwid_cli.export.contents import export_simulation
     from hwid_cli.stages.diagnose import extended_options
 

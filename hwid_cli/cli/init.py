@@ -35,9 +35,8 @@ def command(folder: Path, out: Path, force: bool, quiet: bool) -> None:
         starter_text,
         write_starter,
     )
-    from hwid_cli.data.folder import list_measurements
-    from hwid_cli.data.layout import guess_layout
-    from hwid_cli.data.survey import survey_recordings
+    from hwid_cli.data.folder import guess_layout, list_measurements
+    from hwid_cli.data.recordings import survey_recordings
     from hwid_cli.errors import MeasurementError
     from hwid_cli.stages.proposal import propose
 

@@ -83,10 +83,21 @@ SUFFIXES = tuple(suffix for reader in READERS for suffix in reader.suffixes)
 _ISOLATED = IsolatedReader("hwid_cli.data.formats")
 
 
-def reader_of(name: str | Path) -> Reader | None:
-    """Find the reader of a file by the ending of its name."""
-    suffix = Path(name).suffix.lower()
-    return next((one for one in READERS if suffix in one.suffixes), None)
+def reader_of(path: Path) -> Reader:
+    """Find the reader of a file by its ending.
+
+    Raises
+    ------
+    MeasurementError
+        If no reader knows it.
+    """
+    for reader in READERS:
+        if path.suffix.lower() in reader.suffixes:
+            return reader
+    raise MeasurementError(
+        f"{path}: has the ending {path.suffix!r}; expected one of "
+        f"{', '.join(SUFFIXES)}; convert the file or leave it out"
+    )
 
 
 def read_columns(path: Path, columns: Columns) -> FileColumns:
@@ -103,11 +114,6 @@ def read_columns(path: Path, columns: Columns) -> FileColumns:
         If the format is unknown, or the file is empty, damaged or lacks a column.
     """
     reader = reader_of(path)
-    if reader is None:
-        raise MeasurementError(
-            f"{path}: has the ending {path.suffix!r}; expected one of "
-            f"{', '.join(SUFFIXES)}; convert the file or leave it out"
-        )
     try:
         if path.stat().st_size == 0:
             raise MeasurementError(
@@ -146,7 +152,7 @@ def list_columns(path: Path) -> tuple[FoundColumn, ...]:
         Whatever the reader stumbles on.
     """
     reader = reader_of(path)
-    if reader is None or not reader.is_isolated:
+    if not reader.is_isolated:
         return tuple(_listed(reader, path))
     return tuple(
         FoundColumn(title, key, values, variable)
@@ -154,24 +160,20 @@ def list_columns(path: Path) -> tuple[FoundColumn, ...]:
     )
 
 
-def _read(
-    reader: Reader | None, path: Path, columns: Columns
-) -> Iterator[tuple[str, Column]]:
-    return _importing(reader, path, lambda one: one.read(path, columns))
+def _read(reader: Reader, path: Path, columns: Columns) -> Iterator[tuple[str, Column]]:
+    return _importing(reader, path, lambda: reader.read(path, columns))
 
 
-def _listed(reader: Reader | None, path: Path) -> Iterator[FoundColumn]:
-    return _importing(reader, path, lambda one: one.list_columns(path))
+def _listed(reader: Reader, path: Path) -> Iterator[FoundColumn]:
+    return _importing(reader, path, lambda: reader.list_columns(path))
 
 
 def _importing(
-    reader: Reader | None, path: Path, read: Callable[[Reader], Iterable[Item]]
+    reader: Reader, path: Path, read: Callable[[], Iterable[Item]]
 ) -> Iterator[Item]:
     """What a reader gives; where its library is missing, which one to install."""
-    if reader is None:
-        raise ValueError(f"no reader of {path.suffix!r}")
     try:
-        yield from read(reader)
+        yield from read()
     except ImportError as error:
         if not reader.needs:
             raise

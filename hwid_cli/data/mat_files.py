@@ -3,6 +3,7 @@
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -39,7 +40,7 @@ def open_mat(path: Path) -> Iterator[Variables]:
     for name, value in content.items():
         if not name.startswith("__"):
             found.update(_with_members(name, value))
-    yield {name: lambda value=value: value for name, value in found.items()}
+    yield {name: partial(found.get, name) for name in found}
 
 
 def _with_members(name: str, value: Any) -> dict[str, Any]:
