@@ -71,7 +71,13 @@ def list_variables(variables: Variables) -> Iterator[FoundColumn]:
 
 
 def member_of(value: np.ndarray, member: str) -> Any:
-    """Member of a MATLAB struct; a struct array of one holds it in its only cell."""
+    """Member of a MATLAB struct; a struct array of one holds it in its only cell.
+
+    Parameters
+    ----------
+    value : ndarray, any shape
+        Of records.
+    """
     inner = value[member]
     return inner.flat[0] if inner.dtype == object and inner.size == 1 else inner
 

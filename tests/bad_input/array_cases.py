@@ -224,12 +224,12 @@ MAT = [
         "mat",
         "cut off",
         _cut(lambda p: scipy.io.savemat(p, _ARRAYS), 0.5),
-        "longer than",
+        "could not read bytes",
     ),
     _case(
         "mat", "text file", lambda p: p.write_text("hello " * 99), "Unknown mat file"
     ),
-    _case("mat", "complex by its flags", _mat_complex_flag, "has 4 parts, not 5"),
+    _case("mat", "complex by its flags", _mat_complex_flag, "crashes on it"),
     _case("mat", "bomb", _mat_bomb, *_BOMB),
     _mat73("text", _marked(MATLAB_class=np.bytes_("char")), "holds text"),
     _mat73("cell", _marked(MATLAB_class=np.bytes_("cell")), *_PLAIN),

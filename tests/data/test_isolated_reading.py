@@ -1,5 +1,6 @@
 """The process that reads foreign files: its crashes, its end, and what it may send."""
 
+import json
 import os
 import signal
 import subprocess
@@ -142,23 +143,27 @@ def test_messages_name_the_path_as_it_was_given(good, tmp_path, monkeypatch):
 
 # Reads a file, then waits, for input or for a file without an end.
 PROGRAM = """
-import sys
-from pathlib import Path
-from hwid_cli.data import formats
-from tests.data.test_isolated_reading import request
-formats._ISOLATED.ask(request(sys.argv[1]))
-print(formats._ISOLATED._process.pid, flush=True)
-if sys.argv[2]:
-    formats._ISOLATED.ask(request(sys.argv[2]), most_seconds=1.0)
+import json, sys
+from hwid_cli.data.isolated_reading import IsolatedReader
+reader = IsolatedReader("hwid_cli.data.formats")
+reader.ask(json.loads(sys.argv[1]))
+print(reader._process.pid, flush=True)
+if len(sys.argv) > 2:
+    reader.ask(json.loads(sys.argv[2]), most_seconds=1.0)
 input()
 """
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
-@pytest.mark.parametrize("is_busy", [False, True], ids=["idle", "busy"])
+@pytest.mark.parametrize(
+    "is_busy",
+    [False, pytest.param(True, marks=pytest.mark.slow)],
+    ids=["idle", "busy"],
+)
 def test_the_process_ends_with_the_program(good, endless, number, is_busy):
+    asked = [json.dumps(request(one)) for one in (good, endless)[: 1 + is_busy]]
     with subprocess.Popen(
-        [sys.executable, "-c", PROGRAM, good, endless if is_busy else ""],
+        [sys.executable, "-c", PROGRAM, *asked],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
