@@ -5,10 +5,10 @@ A new format is a file with its reader, and a line in ``READERS``.
 
 import os
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 from hwid_cli.data.array_columns import Variables, list_variables, pick_columns
 from hwid_cli.data.columns import Column, FileColumns, array_column
@@ -21,8 +21,6 @@ from hwid_cli.errors import MeasurementError
 from hwid_cli.files.messages import escaped
 from hwid_cli.records.experiment import Columns
 from hwid_cli.records.starter import FoundColumn
-
-Item = TypeVar("Item")
 
 
 @dataclass(frozen=True)
@@ -120,11 +118,11 @@ def read_columns(path: Path, columns: Columns) -> FileColumns:
                 f"{path}: is empty; expected a measurement; export it again or leave "
                 "the file out"
             )
-        if reader.is_isolated:
+        with _importing(reader, path):
+            if not reader.is_isolated:
+                return FileColumns(**dict(reader.read(path, columns)))
             replies = _ISOLATED.ask(_request(path, columns))
-            found = {role: array_column(title, one) for (role, title), one in replies}
-        else:
-            found = dict(_read(reader, path, columns))
+        found = {role: array_column(title, one) for (role, title), one in replies}
         return FileColumns(**found)
     except MeasurementError:
         raise
@@ -138,13 +136,7 @@ def read_columns(path: Path, columns: Columns) -> FileColumns:
 
 
 def list_columns(path: Path) -> tuple[FoundColumn, ...]:
-    """List the columns of numbers in a measurement file.
-
-    Returns
-    -------
-    tuple of FoundColumn
-        Vectors and single numbers by their names; columns of tables by their number, or
-        by their name where a header has one.
+    """List the columns of numbers in a measurement file, as ``FoundColumn`` names them.
 
     Raises
     ------
@@ -152,28 +144,21 @@ def list_columns(path: Path) -> tuple[FoundColumn, ...]:
         Whatever the reader stumbles on.
     """
     reader = reader_of(path)
-    if not reader.is_isolated:
-        return tuple(_listed(reader, path))
+    with _importing(reader, path):
+        if not reader.is_isolated:
+            return tuple(reader.list_columns(path))
+        replies = _ISOLATED.ask(_request(path))
     return tuple(
         FoundColumn(title, key, values, variable)
-        for (title, key, variable), values in _ISOLATED.ask(_request(path))
+        for (title, key, variable), values in replies
     )
 
 
-def _read(reader: Reader, path: Path, columns: Columns) -> Iterator[tuple[str, Column]]:
-    return _importing(reader, path, lambda: reader.read(path, columns))
-
-
-def _listed(reader: Reader, path: Path) -> Iterator[FoundColumn]:
-    return _importing(reader, path, lambda: reader.list_columns(path))
-
-
-def _importing(
-    reader: Reader, path: Path, read: Callable[[], Iterable[Item]]
-) -> Iterator[Item]:
-    """What a reader gives; where its library is missing, which one to install."""
+@contextmanager
+def _importing(reader: Reader, path: Path) -> Iterator[None]:
+    """Say which library is missing, and how to get it."""
     try:
-        yield from read()
+        yield
     except ImportError as error:
         if not reader.needs:
             raise
@@ -196,10 +181,10 @@ def _answer(request: dict[str, Any]) -> Iterator[Labelled]:
     path = Path(request["path"])
     reader = reader_of(path)
     if request["columns"] is None:
-        for one in _listed(reader, path):
+        for one in reader.list_columns(path):
             yield [one.title, one.key, one.variable], one.values
     else:
-        for role, column in _read(reader, path, Columns(**request["columns"])):
+        for role, column in reader.read(path, Columns(**request["columns"])):
             yield [role, column.title], column.values
 
 

@@ -43,6 +43,8 @@ _DYING_S = 1.0
 
 # What JSON can hold about an array, and the array.
 Labelled = tuple[list[Any], np.ndarray]
+# What is raised here as it was raised there.
+_KINDS = {"measurement": MeasurementError, "import": ImportError}
 
 
 class _CrashError(ValueError):
@@ -60,7 +62,7 @@ class IsolatedReader:
 
     def __init__(self, module: str) -> None:
         self._module = module
-        self._process: subprocess.Popen[bytes] | None = None
+        self._process: Any = None
         self._lock = threading.Lock()
         atexit.register(self.end)
 
@@ -81,7 +83,7 @@ class IsolatedReader:
 
         Raises
         ------
-        MeasurementError
+        MeasurementError, ImportError
             As it was raised over there.
         ValueError
             If anything else was raised, or the process crashed or took too long.
@@ -97,11 +99,11 @@ class IsolatedReader:
                 found, end = self._exchange(request, most_seconds)
         if "error" not in end:
             return found
-        kind = MeasurementError if end.get("is_measurement_error") else ValueError
+        kind = _KINDS.get(end.get("kind"), ValueError)
         raise kind(str(end["error"])[:_LONGEST_TEXT])
 
     def end(self, grace_s: float = 0.0) -> int:
-        """End the process if there is one, and give the code that it ended with.
+        """End the process if there is one, and give its code.
 
         Parameters
         ----------
@@ -116,22 +118,23 @@ class IsolatedReader:
         process.kill()
         for pipe in (process.stdin, process.stdout):
             with suppress(OSError):
-                _there(pipe).close()
+                pipe.close()
         return process.wait()
 
     def _exchange(
         self, request: Mapping[str, Any], most_seconds: float
     ) -> tuple[list[Labelled], dict[str, Any]]:
-        process = self._process = self._process or _start(self._module)
+        process: Any = self._process or _start(self._module)
+        self._process = process
         line = json.dumps({**request, "seconds": most_seconds}).encode()
         timer = threading.Timer(most_seconds, process.kill)
         timer.daemon = True
         begin = time.monotonic()
         timer.start()
         try:
-            _there(process.stdin).write(line + b"\n")
-            _there(process.stdin).flush()
-            return _hear(_there(process.stdout))
+            process.stdin.write(line + b"\n")
+            process.stdin.flush()
+            return _hear(process.stdout)
         except (EOFError, OSError, LookupError, TypeError, ValueError):
             is_late = time.monotonic() - begin >= most_seconds
             code = self.end(_DYING_S)
@@ -146,12 +149,6 @@ class IsolatedReader:
             raise
         finally:
             timer.cancel()
-
-
-def _there(pipe: IO[bytes] | None) -> IO[bytes]:
-    if pipe is None:
-        raise ValueError("the process was started without pipes")
-    return pipe
 
 
 def _start(module: str) -> "subprocess.Popen[bytes]":
@@ -212,13 +209,12 @@ def serve(answer: Callable[[dict[str, Any]], Iterable[Labelled]]) -> None:
                 numbers = np.ascontiguousarray(values, np.float64)
                 _say(replies, {"label": label, "size": numbers.size})
                 replies.write(numbers.data)
-        except MeasurementError as error:
-            end = {"error": str(error), "is_measurement_error": True}
         except MemoryError:
             end = {"error": f"needs more than {_MOST_MEMORY // 2**30} GB of memory"}
         except Exception as error:
             # Readers of foreign formats raise whatever their parser stumbles on.
             end = {"error": str(error) or type(error).__name__}
+            end["kind"] = next((n for n in _KINDS if isinstance(error, _KINDS[n])), "")
         _say(replies, end)
         replies.flush()
         _set_alarm(0)
