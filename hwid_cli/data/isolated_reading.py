@@ -99,7 +99,7 @@ class IsolatedReader:
                 found, end = self._exchange(request, most_seconds)
         if "error" not in end:
             return found
-        kind = _KINDS.get(end.get("kind"), ValueError)
+        kind = _KINDS.get(str(end.get("kind")), ValueError)
         raise kind(str(end["error"])[:_LONGEST_TEXT])
 
     def end(self, grace_s: float = 0.0) -> int:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hwid_cli.data.array_columns import Variables
+from hwid_cli.data.array_columns import Variables, check_size
 from hwid_cli.errors import MeasurementError
 
 
@@ -25,7 +25,7 @@ def open_npz(path: Path) -> Iterator[Variables]:
     MeasurementError
         If it is no archive.
     ValueError
-        If two arrays have one name.
+        If an array is too large, or two have one name.
     """
     # np.load does not close a file that it cannot read.
     with path.open("rb") as file:
@@ -35,8 +35,10 @@ def open_npz(path: Path) -> Iterator[Variables]:
                 f"{path}: holds a single array; expected an archive of named arrays; "
                 "save it with numpy.savez"
             )
-        names = content.files
-        for name in names:
-            if names.count(name) > 1:
-                raise ValueError(f"holds {name!r} twice")
-        yield {name: partial(content.__getitem__, name) for name in names}
+        names = set()
+        for member in content.zip.infolist():
+            check_size(member.filename, member.file_size)
+            if member.filename in names:
+                raise ValueError(f"holds {member.filename!r} twice")
+            names.add(member.filename)
+        yield {name: partial(content.__getitem__, name) for name in content.files}

@@ -123,7 +123,7 @@ def _mat_bomb(path):
     packed = packer.compress(tags + struct.pack("<II", 9, 8 * _HUGE))
     zeros = b"\0" * 2**24
     packed += b"".join(packer.compress(zeros) for _ in range(8 * _HUGE // 2**24))
-    packed += packer.flush()
+    packed += packer.compress(zeros[: 8 * _HUGE % 2**24]) + packer.flush()
     first = b"MATLAB 5.0 MAT-file".ljust(124) + struct.pack("<H", 0x0100) + b"IM"
     path.write_bytes(first + struct.pack("<II", 15, len(packed)) + packed)
 
