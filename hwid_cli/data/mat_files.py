@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from hwid_cli.data.array_columns import Variables, member_of
+from hwid_cli.data.array_columns import Variables, check_size, member_of
 from hwid_cli.data.hdf5_files import open_hdf5
 
 
@@ -23,7 +23,7 @@ def open_mat(path: Path) -> Iterator[Variables]:
     Raises
     ------
     ValueError
-        If the file holds two variables of one name.
+        If the variables are too large together, or two have one name.
     """
     import h5py
     import scipy.io
@@ -36,6 +36,7 @@ def open_mat(path: Path) -> Iterator[Variables]:
         # Such as two variables of one name: which one was meant?
         warnings.simplefilter("error")
         content = scipy.io.loadmat(path)
+    check_size("variables", sum(getattr(v, "nbytes", 0) for v in content.values()))
     found: dict[str, Any] = {}
     for name, value in content.items():
         if not name.startswith("__"):

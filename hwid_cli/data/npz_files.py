@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
+from zipfile import ZipFile
 
 import numpy as np
 
@@ -36,7 +37,7 @@ def open_npz(path: Path) -> Iterator[Variables]:
                 "save it with numpy.savez"
             )
         names = set()
-        for member in content.zip.infolist():
+        for member in ZipFile(file).infolist():
             check_size(member.filename, member.file_size)
             if member.filename in names:
                 raise ValueError(f"holds {member.filename!r} twice")
