@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import click
 
 if TYPE_CHECKING:
-    from hwid_cli.records.starter import Layout, Proposal
+    from hwid_cli.records.starter import FolderLayout, Proposal
 
 
 @click.command("init")
@@ -53,7 +53,7 @@ def command(folder: Path, out: Path, force: bool, quiet: bool) -> None:
 
 
 def _show(
-    out: Path, layout: "Layout", proposal: "Proposal", problems: tuple[str, ...]
+    out: Path, layout: "FolderLayout", proposal: "Proposal", problems: tuple[str, ...]
 ) -> None:
     from hwid_cli.report.starter_words import starter_words
 

@@ -17,7 +17,7 @@ from hwid_cli.data.column_roles import (
 from hwid_cli.data.formats import SUFFIXES, list_columns, reader_of
 from hwid_cli.data.recording_files import PLAN_NAME
 from hwid_cli.errors import ConfigError, MeasurementError
-from hwid_cli.records.starter import FoundColumn, FoundFile, Layout, Role
+from hwid_cli.records.starter import FolderLayout, FoundColumn, FoundFile, Role
 
 # What spreadsheets and systems leave beside data.
 _SYSTEM_NAMES = ("~$", "._", "Thumbs", "desktop")
@@ -85,12 +85,12 @@ def _listed(path: Path, folder: Path) -> FoundFile:
 UNKNOWN_SAMPLE_TIME_S = 1.0
 
 
-def guess_layout(files: Sequence[FoundFile]) -> Layout:
+def guess_layout(files: Sequence[FoundFile]) -> FolderLayout:
     """Guess how the files of a folder are read.
 
     Returns
     -------
-    Layout
+    FolderLayout
         Of the largest set of files with the same columns.
 
     Raises
@@ -124,7 +124,7 @@ def guess_layout(files: Sequence[FoundFile]) -> Layout:
     sample_time_s = time.sample_time_s
     if time.role is None and sample_time_s is None:
         sample_time_s = UNKNOWN_SAMPLE_TIME_S
-    return Layout(
+    return FolderLayout(
         patterns=_patterns(alike, files),
         input=_role(input_, reasons["input"]),
         output=_role(output, reasons["output"]),
