@@ -172,7 +172,7 @@ def _hear(replies: IO[bytes]) -> tuple[list[Labelled], dict[str, Any]]:
         line = replies.readline(_LONGEST_LINE)
         if not line:
             raise EOFError
-        said = json.loads(line)
+        said = dict(json.loads(line))
         if "label" not in said:
             return found, said
         if 8 * said["size"] > _MOST_MEMORY:
