@@ -88,10 +88,6 @@ def check_size(name: str, size: int) -> None:
     Parameters
     ----------
     size : int, [bytes]
-
-    Raises
-    ------
-    ValueError
     """
     if size > _MOST_BYTES:
         raise ValueError(f"{name!r} unpacks to more than {_MOST_BYTES // 2**20} MB")
