@@ -6,8 +6,12 @@ from typing import NoReturn
 import click
 
 from hwid_cli.config.problems import config_problems
-from hwid_cli.data.paths import find_files, missing_files_message, recordings_base
-from hwid_cli.data.survey import survey_recordings
+from hwid_cli.data.recording_files import (
+    find_files,
+    missing_files_message,
+    recordings_base,
+)
+from hwid_cli.data.recordings import survey_recordings
 from hwid_cli.errors import HwidError, MeasurementError
 from hwid_cli.files.messages import did_you_mean
 from hwid_cli.records.check import FitCost

@@ -5,7 +5,7 @@ import click
 from hwid_cli.cli.driver import result_of
 from hwid_cli.cli.options import Choices
 from hwid_cli.cli.session import Session, open_session
-from hwid_cli.data.paths import recordings_options
+from hwid_cli.data.recording_files import recordings_options
 from hwid_cli.export.contents import (
     SIMULATION,
     export_model,

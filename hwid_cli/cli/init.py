@@ -11,11 +11,10 @@ from hwid_cli.config.starter import (
     starter_text,
     write_starter,
 )
-from hwid_cli.data.folder import list_measurements
-from hwid_cli.data.layout import guess_layout
-from hwid_cli.data.survey import survey_recordings
+from hwid_cli.data.folder import guess_layout, list_measurements
+from hwid_cli.data.recordings import survey_recordings
 from hwid_cli.errors import MeasurementError
-from hwid_cli.records.starter import Layout, Proposal
+from hwid_cli.records.starter import FolderLayout, Proposal
 from hwid_cli.report.starter_words import starter_words
 from hwid_cli.stages.proposal import propose
 
@@ -37,7 +36,7 @@ def write_starter_configuration(
 
 
 def _show(
-    out: Path, layout: Layout, proposal: Proposal, problems: tuple[str, ...]
+    out: Path, layout: FolderLayout, proposal: Proposal, problems: tuple[str, ...]
 ) -> None:
 
     click.echo(starter_words(str(out), layout, proposal, problems))

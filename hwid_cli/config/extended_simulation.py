@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from hwid_cli.config.yaml_text import yaml_text
-from hwid_cli.data.paths import expand_variables, recordings_base
+from hwid_cli.data.recording_files import expand_variables, recordings_base
 from hwid_cli.files.atomic import replace_file
 from hwid_cli.records.experiment import (
     DiagnoseOptions,

@@ -10,7 +10,7 @@ import yaml
 from hwid_cli.config.load import experiment_of
 from hwid_cli.errors import ConfigError
 from hwid_cli.records.experiment import Experiment
-from hwid_cli.records.starter import Layout, Proposal, Role
+from hwid_cli.records.starter import FolderLayout, Proposal, Role
 
 # Stands for a unit that no name says.
 _UNKNOWN_UNIT = "-"
@@ -29,7 +29,7 @@ _STARTS = {
 }
 
 
-def draft_experiment(layout: Layout, folder: Path) -> Experiment:
+def draft_experiment(layout: FolderLayout, folder: Path) -> Experiment:
     """Experiment that reads all recordings as guessed, for trying it.
 
     Parameters
@@ -55,7 +55,9 @@ def starter_name(folder: Path) -> str:
     return kept or "measurements"
 
 
-def starter_text(layout: Layout, proposal: Proposal, folder: Path, path: Path) -> str:
+def starter_text(
+    layout: FolderLayout, proposal: Proposal, folder: Path, path: Path
+) -> str:
     """Text of a starter configuration.
 
     Parameters
@@ -139,7 +141,7 @@ def _relative(folder: Path, path: Path) -> str:
     return "" if relative == "." else glob.escape(relative.replace(os.sep, "/")) + "/"
 
 
-def _recordings(layout: Layout, own: str) -> dict[str, Any]:
+def _recordings(layout: FolderLayout, own: str) -> dict[str, Any]:
     section: dict[str, Any] = {
         "files": [own + pattern for pattern in layout.patterns],
         "columns": _columns(layout),
@@ -153,7 +155,7 @@ def _recordings(layout: Layout, own: str) -> dict[str, Any]:
     return section
 
 
-def _columns(layout: Layout) -> dict[str, str | int]:
+def _columns(layout: FolderLayout) -> dict[str, str | int]:
     columns: dict[str, str | int] = {}
     if layout.variable is not None:
         columns["variable"] = layout.variable
@@ -163,7 +165,7 @@ def _columns(layout: Layout) -> dict[str, str | int]:
     return columns
 
 
-def _recordings_lines(layout: Layout, proposal: Proposal, own: str) -> list[str]:
+def _recordings_lines(layout: FolderLayout, proposal: Proposal, own: str) -> list[str]:
     section = _recordings(layout, own)
     lines = ["recordings:", f"  files: {_flow(section['files'])}"]
     if proposal.exclude:
@@ -213,7 +215,7 @@ def _role_lines(name: str, role: Role | None) -> list[str]:
     return [f"  # {name}: {called}, {role.reason}."]
 
 
-def _unit_lines(layout: Layout) -> list[str]:
+def _unit_lines(layout: FolderLayout) -> list[str]:
     lines = []
     for name, role in (("input", layout.input), ("output", layout.output)):
         why = "from the name" if role.unit else "no name says it; put yours"
@@ -242,7 +244,7 @@ def _fit_lines(proposal: Proposal) -> list[str]:
     ]
 
 
-def _judging_lines(layout: Layout, proposal: Proposal) -> list[str]:
+def _judging_lines(layout: FolderLayout, proposal: Proposal) -> list[str]:
     unit = layout.output.unit or "the output's unit"
     lines = ["# Models of these recordings, judged on all of them."]
     chosen = _flow(list(proposal.identify)) if proposal.identify else "all"
@@ -269,7 +271,7 @@ def _group_lines(proposal: Proposal) -> list[str]:
     ]
 
 
-def _diagnose_lines(layout: Layout, proposal: Proposal) -> list[str]:
+def _diagnose_lines(layout: FolderLayout, proposal: Proposal) -> list[str]:
     lines = [
         "# What does a physics simulation of the drive lack? Put the values that you "
         "simulate with,",

@@ -24,13 +24,7 @@ _SHORTEST_S, _LONGEST_S = 1e-12, 1e9
 
 
 def check_numbers(path: Path, columns: FileColumns) -> None:
-    """Refuse cells that hold no finite number.
-
-    Raises
-    ------
-    MeasurementError
-        For the first such row.
-    """
+    """Refuse cells that hold no finite number."""
     for column in (columns.time, columns.input, columns.output, columns.reference):
         if column is None:
             continue
@@ -51,13 +45,7 @@ def check_numbers(path: Path, columns: FileColumns) -> None:
 
 
 def check_excitation(path: Path, columns: FileColumns) -> None:
-    """Refuse a constant input or output.
-
-    Raises
-    ------
-    MeasurementError
-        If one of the two never changes.
-    """
+    """Refuse a constant input or output."""
     for column in (columns.input, columns.output):
         if np.min(column.values) == np.max(column.values):
             raise MeasurementError(
@@ -99,10 +87,6 @@ def check_clock(path: Path, step: float) -> None:
     Parameters
     ----------
     step : float, [s]
-
-    Raises
-    ------
-    MeasurementError
     """
     if not _SHORTEST_S <= step <= _LONGEST_S:
         raise MeasurementError(
@@ -175,11 +159,6 @@ def check_names(named: Sequence[tuple[Path, str]]) -> None:
     ----------
     named : sequence of (Path, str)
         File and name of each recording.
-
-    Raises
-    ------
-    MeasurementError
-        For the first name that comes twice or holds a plus.
     """
     first: dict[str, Path] = {}
     for path, name in named:
@@ -210,11 +189,6 @@ def check_sample_times(recordings: Sequence[RawRecording], tolerance: float) -> 
     ----------
     tolerance : float, [-]
         Share of the sample time by which two may differ.
-
-    Raises
-    ------
-    MeasurementError
-        For the first recording that differs from the first one of all.
     """
     for recording in recordings:
         common = recordings[0].sample_time_s

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hwid_cli.data.columns import ROLES, Column, FileColumns
+from hwid_cli.data.columns import ROLES, Column
 from hwid_cli.errors import MeasurementError
 from hwid_cli.files.messages import did_you_mean
 from hwid_cli.records.experiment import Columns
@@ -33,7 +33,7 @@ class _Sheet:
     separator: str
 
 
-def read_csv_columns(path: Path, columns: Columns) -> FileColumns:
+def read_csv_columns(path: Path, columns: Columns) -> list[tuple[str, Column]]:
     """Read input, output, time and reference from a CSV file.
 
     Parameters
@@ -43,8 +43,8 @@ def read_csv_columns(path: Path, columns: Columns) -> FileColumns:
 
     Returns
     -------
-    FileColumns
-        Cells without a number are NaN here and are refused by the checks.
+    list of (str, Column)
+        With their roles; cells without a number are NaN and are refused by the checks.
 
     Raises
     ------
@@ -65,11 +65,10 @@ def read_csv_columns(path: Path, columns: Columns) -> FileColumns:
             "export the measurement again or leave the file out"
         )
     _check_widths(path, sheet, body)
-    found = {
-        role: _column(path, f"{role} {wanted[role]!r}", sheet, body, place)
+    return [
+        (role, _column(path, f"{role} {wanted[role]!r}", sheet, body, place))
         for role, place in places.items()
-    }
-    return FileColumns(**found)
+    ]
 
 
 def list_csv_columns(path: Path) -> tuple[FoundColumn, ...]:

@@ -1,25 +1,101 @@
-"""Which reader serves which kind of measurement file."""
+"""Which reader serves which kind of measurement file: one table.
 
-from collections.abc import Callable
+A new format is a file with its reader, and a line in ``READERS``.
+"""
+
+import os
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
-from hwid_cli.data.array_files import (
-    read_h5_columns,
-    read_mat_columns,
-    read_npz_columns,
-)
-from hwid_cli.data.columns import FileColumns
-from hwid_cli.data.csv_files import read_csv_columns
+from hwid_cli.data.array_columns import Variables, list_variables, pick_columns
+from hwid_cli.data.columns import Column, FileColumns, array_column
+from hwid_cli.data.csv_files import list_csv_columns, read_csv_columns
+from hwid_cli.data.hdf5_files import open_hdf5
+from hwid_cli.data.isolated_reading import IsolatedReader, Labelled, serve
+from hwid_cli.data.mat_files import open_mat
+from hwid_cli.data.npz_files import open_npz
 from hwid_cli.errors import MeasurementError
 from hwid_cli.files.messages import escaped
 from hwid_cli.records.experiment import Columns
+from hwid_cli.records.starter import FoundColumn
 
-READERS: dict[str, Callable[[Path, Columns], FileColumns]] = {
-    ".csv": read_csv_columns,
-    ".mat": read_mat_columns,
-    ".npz": read_npz_columns,
-    ".h5": read_h5_columns,
-}
+
+@dataclass(frozen=True)
+class Reader:
+    """How a kind of measurement file is read.
+
+    Parameters
+    ----------
+    suffixes : tuple of str
+        Endings of such files, in lower case.
+    read : callable
+        Gives the columns that are wanted one by one, each with its role.
+    list_columns : callable
+        Gives all columns of numbers, for ``hwid init``.
+    needs : str
+        Library to install beside hwid; empty for none.
+    is_isolated : bool
+        Whether a process of its own reads: for what a damaged file may crash. Its rows
+        are counted from 0.
+    is_one_table : bool
+        Whether columns of different length belong together.
+    """
+
+    suffixes: tuple[str, ...]
+    read: Callable[[Path, Columns], Iterable[tuple[str, Column]]]
+    list_columns: Callable[[Path], Iterable[FoundColumn]]
+    needs: str = ""
+    is_isolated: bool = False
+    is_one_table: bool = False
+
+
+def _of_arrays(
+    *suffixes: str,
+    opened: Callable[[Path], AbstractContextManager[Variables]],
+    needs: str = "",
+) -> Reader:
+    """Reader of files that hold arrays with names."""
+
+    def read(path: Path, columns: Columns) -> Iterator[tuple[str, Column]]:
+        with opened(path) as variables:
+            yield from pick_columns(path, columns, variables)
+
+    def list_columns(path: Path) -> Iterator[FoundColumn]:
+        with opened(path) as variables:
+            yield from list_variables(variables)
+
+    return Reader(suffixes, read, list_columns, needs, is_isolated=True)
+
+
+READERS = (
+    Reader((".csv",), read_csv_columns, list_csv_columns, is_one_table=True),
+    _of_arrays(".mat", opened=open_mat),
+    _of_arrays(".npz", opened=open_npz),
+    _of_arrays(".h5", opened=open_hdf5),
+)
+SUFFIXES = tuple(suffix for reader in READERS for suffix in reader.suffixes)
+
+_ISOLATED = IsolatedReader("hwid_cli.data.formats")
+
+
+def reader_of(path: Path) -> Reader:
+    """Find the reader of a file by its ending.
+
+    Raises
+    ------
+    MeasurementError
+        If no reader knows it.
+    """
+    for reader in READERS:
+        if path.suffix.lower() in reader.suffixes:
+            return reader
+    raise MeasurementError(
+        f"{path}: has the ending {path.suffix!r}; expected one of "
+        f"{', '.join(SUFFIXES)}; convert the file or leave it out"
+    )
 
 
 def read_columns(path: Path, columns: Columns) -> FileColumns:
@@ -35,19 +111,19 @@ def read_columns(path: Path, columns: Columns) -> FileColumns:
     MeasurementError
         If the format is unknown, or the file is empty, damaged or lacks a column.
     """
-    reader = READERS.get(path.suffix.lower())
-    if reader is None:
-        raise MeasurementError(
-            f"{path}: has the ending {path.suffix!r}; expected one of "
-            f"{', '.join(READERS)}; convert the file or leave it out"
-        )
+    reader = reader_of(path)
     try:
         if path.stat().st_size == 0:
             raise MeasurementError(
                 f"{path}: is empty; expected a measurement; export it again or leave "
                 "the file out"
             )
-        return reader(path, columns)
+        with _importing(reader, path):
+            if not reader.is_isolated:
+                return FileColumns(**dict(reader.read(path, columns)))
+            replies = _ISOLATED.ask(_request(path, columns))
+        found = {role: array_column(title, one) for (role, title), one in replies}
+        return FileColumns(**found)
     except MeasurementError:
         raise
     except Exception as error:
@@ -57,3 +133,60 @@ def read_columns(path: Path, columns: Columns) -> FileColumns:
             f"{path}: cannot be read ({said}); expected a readable {path.suffix} file; "
             "export it again or leave it out"
         ) from error
+
+
+def list_columns(path: Path) -> tuple[FoundColumn, ...]:
+    """List the columns of numbers in a measurement file, as ``FoundColumn`` names them.
+
+    Raises
+    ------
+    Exception
+        Whatever the reader stumbles on.
+    """
+    reader = reader_of(path)
+    with _importing(reader, path):
+        if not reader.is_isolated:
+            return tuple(reader.list_columns(path))
+        replies = _ISOLATED.ask(_request(path))
+    return tuple(
+        FoundColumn(title, key, values, variable)
+        for (title, key, variable), values in replies
+    )
+
+
+@contextmanager
+def _importing(reader: Reader, path: Path) -> Iterator[None]:
+    """Say which library is missing, and how to get it."""
+    try:
+        yield
+    except ImportError as error:
+        if not reader.needs:
+            raise
+        raise MeasurementError(
+            f"{path}: is read by {reader.needs}, which is missing ({error}); expected it "
+            f"to be installed; run: pip install {reader.needs}, or convert the file"
+        ) from error
+
+
+def _request(path: Path, columns: Columns | None = None) -> dict[str, Any]:
+    folder = "" if path.is_absolute() else os.getcwd()  # noqa: PTH109
+    wanted = None if columns is None else asdict(columns)
+    return {"folder": folder, "path": str(path), "columns": wanted}
+
+
+def _answer(request: dict[str, Any]) -> Iterator[Labelled]:
+    """What the process of its own gives: columns with roles, or all columns."""
+    # Messages name the path as the program knows it.
+    os.chdir(request["folder"] or "/")
+    path = Path(request["path"])
+    reader = reader_of(path)
+    if request["columns"] is None:
+        for one in reader.list_columns(path):
+            yield [one.title, one.key, one.variable], one.values
+    else:
+        for role, column in reader.read(path, Columns(**request["columns"])):
+            yield [role, column.title], column.values
+
+
+if __name__ == "__main__":
+    serve(_answer)

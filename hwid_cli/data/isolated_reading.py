@@ -1,86 +1,240 @@
-"""Reading a foreign binary file in a copy of the process first.
+"""A process of its own that reads foreign binary files, with bounded time and memory.
 
-The library of HDF5 is C and takes a file's word for much: about one in 5000 damaged files
-was seen to crash the interpreter, or to keep it busy for ever. A fork costs
-milliseconds; it reads the file and ends, and only where it ends well is the file read
-here.
+Compiled readers (MAT, HDF5) take a file's word for much: damaged files were seen to
+crash the interpreter, to keep it busy for ever, and to unpack to terabytes. One process
+reads all such files of a run. It starts with the first of them, starts again after a
+file has ended it, and ends with the program, which holds its input open.
+
+It answers with lines of JSON, and with bytes that are taken for 64-bit floats: whatever
+a file makes of it, text and numbers are all that comes back. Systems without
+``resource`` (Windows) bound its time only; macOS bounds no address space.
 """
 
-import faulthandler
+import atexit
+import json
+import math
 import os
 import signal
+import subprocess
+import sys
+import threading
 import time
-import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
+from typing import IO, Any
+
+import numpy as np
+
+from hwid_cli.errors import MeasurementError
+
+try:
+    import resource
+except ImportError:
+    resource = None  # type: ignore[assignment]
 
 # A file of 512 MB takes seconds.
 MOST_SECONDS = 20.0
-_FIRST_NAP_S, _LONGEST_NAP_S = 0.001, 0.05
+# Address space, [bytes]: half a GB of libraries; a column of the largest size as it was
+# read, as 64-bit floats and with its rows; and the rest of a MAT file.
+_MOST_MEMORY = 3 * 2**30
+_LONGEST_LINE, _LONGEST_TEXT = 2**20, 2000
+# What dies has closed its pipe a moment before it is gone, [s].
+_DYING_S = 1.0
+
+# What JSON can hold about an array, and the array.
+Labelled = tuple[list[Any], np.ndarray]
+# What is raised here as it was raised there.
+_KINDS = {"measurement": MeasurementError, "import": ImportError}
 
 
-def rehearse(read: Callable[[], object], *, most_seconds: float = MOST_SECONDS) -> None:
-    """Try in a copy of this process whether a call comes back at all.
+class _CrashError(ValueError):
+    """The process has ended in place of an answer."""
+
+
+class IsolatedReader:
+    """The process, seen from the program.
 
     Parameters
     ----------
-    read : callable
-        What it gives or raises does not matter here.
-    most_seconds : float, [s]
-
-    Raises
-    ------
-    ValueError
-        If the call crashed or did not come back in time. Systems without ``fork`` go
-        without the rehearsal.
+    module : str
+        What runs there; it hands its answers to ``serve``.
     """
-    if not hasattr(os, "fork"):
-        return
-    with warnings.catch_warnings():
-        # Newer Pythons warn of threads; the copy uses none and only reads a file.
-        warnings.simplefilter("ignore", DeprecationWarning)
-        child = os.fork()
-    if child == 0:
-        _read_and_end(read)
-    try:
-        status = _wait(child, most_seconds)
-    except BaseException:
-        _end(child)
-        raise
-    if status is None:
-        _end(child)
-        raise ValueError(f"its reader did not come back within {most_seconds:g} s")
-    if os.WIFSIGNALED(status):
-        name = signal.Signals(os.WTERMSIG(status)).name
-        raise ValueError(f"its reader crashes on it, {name}")
+
+    def __init__(self, module: str) -> None:
+        self._module = module
+        self._process: Any = None
+        self._lock = threading.Lock()
+        atexit.register(self.end)
+
+    def ask(
+        self, request: Mapping[str, Any], *, most_seconds: float = MOST_SECONDS
+    ) -> list[Labelled]:
+        """Have something read.
+
+        Parameters
+        ----------
+        request : mapping
+            Of what JSON can hold.
+        most_seconds : float, [s]
+
+        Returns
+        -------
+        list of (list, ndarray of float64, shape (n,))
+
+        Raises
+        ------
+        MeasurementError, ImportError
+            As it was raised over there.
+        ValueError
+            If anything else was raised, or the process crashed or took too long.
+        """
+        with self._lock:
+            was_used = self._process is not None
+            try:
+                found, end = self._exchange(request, most_seconds)
+            except _CrashError:
+                if not was_used:
+                    raise
+                # An earlier file may be the one that spoilt it; a new process tells.
+                found, end = self._exchange(request, most_seconds)
+        if "error" not in end:
+            return found
+        kind = _KINDS.get(str(end.get("kind")), ValueError)
+        raise kind(str(end["error"])[:_LONGEST_TEXT])
+
+    def end(self, grace_s: float = 0.0) -> int:
+        """End the process if there is one, and give its code.
+
+        Parameters
+        ----------
+        grace_s : float, [s]
+            Time to end by itself.
+        """
+        process, self._process = self._process, None
+        if process is None:
+            return 0
+        with suppress(subprocess.TimeoutExpired):
+            process.wait(grace_s)
+        process.kill()
+        for pipe in (process.stdin, process.stdout):
+            with suppress(OSError):
+                pipe.close()
+        return process.wait()
+
+    def _exchange(
+        self, request: Mapping[str, Any], most_seconds: float
+    ) -> tuple[list[Labelled], dict[str, Any]]:
+        process: Any = self._process or _start(self._module)
+        self._process = process
+        line = json.dumps({**request, "seconds": most_seconds}).encode()
+        timer = threading.Timer(most_seconds, process.kill)
+        timer.daemon = True
+        begin = time.monotonic()
+        timer.start()
+        try:
+            process.stdin.write(line + b"\n")
+            process.stdin.flush()
+            return _hear(process.stdout)
+        except (EOFError, OSError, LookupError, TypeError, ValueError):
+            is_late = time.monotonic() - begin >= most_seconds
+            code = self.end(_DYING_S)
+            if is_late:
+                said = f"its reader did not come back within {most_seconds:g} s"
+                raise ValueError(said) from None
+            name = signal.Signals(-code).name if code < 0 else f"code {code}"
+            raise _CrashError(f"its reader crashes on it, {name}") from None
+        except BaseException:
+            # Interrupted in the middle of an answer.
+            self.end()
+            raise
+        finally:
+            timer.cancel()
 
 
-def _read_and_end(read: Callable[[], object]) -> None:
-    """Life of the copy: no clean-up of what belongs to the original."""
-    try:
-        for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, signal.SIG_DFL)
-        faulthandler.disable()
-        read()
-    except BaseException:  # noqa: BLE001, S110, RUF100
-        # The original meets it too, and says it in words.
-        pass
-    finally:
-        os._exit(0)
+def _start(module: str) -> "subprocess.Popen[bytes]":
+    """Start the process: it imports from where this one does, and nowhere else."""
+    folders = os.pathsep.join(os.path.abspath(one) for one in sys.path)  # noqa: PTH100
+    # Threads of linear algebra would take address space, and have nothing to do.
+    alone = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+    return subprocess.Popen(
+        [sys.executable, "-P", "-m", module],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        env={**os.environ, **alone, "PYTHONPATH": folders},
+    )
 
 
-def _wait(child: int, most_seconds: float) -> int | None:
-    end, nap = time.monotonic() + most_seconds, _FIRST_NAP_S
-    while time.monotonic() < end:
-        found, status = os.waitpid(child, os.WNOHANG)
-        if found:
-            return status
-        time.sleep(nap)
-        nap = min(2 * nap, _LONGEST_NAP_S)
-    return None
+def _hear(replies: IO[bytes]) -> tuple[list[Labelled], dict[str, Any]]:
+    """Arrays with their labels, and the last line."""
+    found: list[Labelled] = []
+    while True:
+        line = replies.readline(_LONGEST_LINE)
+        if not line:
+            raise EOFError
+        said = dict(json.loads(line))
+        if "label" not in said:
+            return found, said
+        if 8 * said["size"] > _MOST_MEMORY:
+            raise ValueError("no reader can hold so much")
+        values = np.empty(said["size"])
+        if replies.readinto(values.view(np.uint8)) < values.nbytes:  # type: ignore[attr-defined]
+            raise EOFError
+        found.append((said["label"], values))
 
 
-def _end(child: int) -> None:
-    with suppress(ProcessLookupError, ChildProcessError):
-        os.kill(child, signal.SIGKILL)
-        os.waitpid(child, 0)
+def serve(answer: Callable[[dict[str, Any]], Iterable[Labelled]]) -> None:
+    """Answer requests until there are no more: the life of the process.
+
+    Parameters
+    ----------
+    answer : callable
+        From a request to its arrays, which are sent one by one.
+    """
+    # Ctrl-C reaches the whole group of processes, and nobody reads a traceback.
+    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+    if resource is not None:
+        _bound("RLIMIT_AS", _MOST_MEMORY)
+        _bound("RLIMIT_CORE", 0)
+    replies = os.fdopen(os.dup(1), "wb")
+    # What a library prints is no answer.
+    os.dup2(2, 1)
+    for line in sys.stdin.buffer:
+        request = json.loads(line)
+        _set_alarm(math.ceil(request["seconds"]) + 1)
+        end: dict[str, Any] = {}
+        try:
+            for label, values in answer(request):
+                numbers = np.ascontiguousarray(values, np.float64)
+                _say(replies, {"label": label, "size": numbers.size})
+                replies.write(numbers.data)
+        except MemoryError:
+            end = {"error": f"needs more than {_MOST_MEMORY // 2**30} GB of memory"}
+        except Exception as error:
+            # Readers of foreign formats raise whatever their parser stumbles on.
+            end = {"error": str(error) or type(error).__name__}
+            end["kind"] = next((n for n in _KINDS if isinstance(error, _KINDS[n])), "")
+        _say(replies, end)
+        replies.flush()
+        _set_alarm(0)
+
+
+def _say(replies: IO[bytes], content: dict[str, Any]) -> None:
+    replies.write(json.dumps(content).encode() + b"\n")
+
+
+def _set_alarm(seconds: int) -> None:
+    """End the process after some time, which the program does unless it was killed."""
+    if hasattr(signal, "alarm"):
+        signal.alarm(seconds)
+
+
+def _bound(name: str, most: int) -> None:
+    kind = getattr(resource, name)
+    hard = resource.getrlimit(kind)[1]
+    if hard != resource.RLIM_INFINITY:
+        most = min(most, hard)
+    # A system may know a bound and not set it.
+    with suppress(OSError, ValueError):
+        resource.setrlimit(kind, (most, hard))

@@ -1,4 +1,4 @@
-"""What looks odd in a recording though it can be used: limits, dead stretches, damage.
+"""Data-quality checks of a usable recording: limits, dead stretches, damage.
 
 A sensor that runs into its limit repeats its largest value, one that fails repeats any
 value; an input that holds levels repeats them on purpose. So only signals that otherwise
@@ -21,20 +21,20 @@ _DEAD_SHARE = 0.05
 _FAR = 50.0
 
 
-def signal_oddities(values: np.ndarray, *, may_hold: bool = False) -> tuple[str, ...]:
-    """Say what looks odd in a signal.
+def quality_notes(values: np.ndarray, *, may_hold: bool = False) -> tuple[str, ...]:
+    """Say what is doubtful in a signal.
 
     Parameters
     ----------
     values : ndarray, shape (n,)
         Finite.
     may_hold : bool
-        Whether long stretches without change are nothing odd, as in an input.
+        Whether long stretches without change are no fault, as in an input.
 
     Examples
     --------
     >>> t = np.arange(400) / 400
-    >>> signal_oddities(np.minimum(np.sin(20 * t), 0.8))
+    >>> quality_notes(np.minimum(np.sin(20 * t), 0.8))
     ('at its largest value 0.8 for 20 % of the time: clipped?',)
     """
     notes = []

@@ -1,187 +1,40 @@
 """Measurement files as raw recordings, or one clear line that says why not.
 
-The time column: is it a clock, what does it tick, and a uniform grid where not.
-
-Models are discrete, so a recording must be sampled uniformly. Small jitter passes;
-larger jitter is refused, or resampled where the configuration says so.
+A command stops at the first fault; ``hwid check`` and ``init`` survey every file.
 """
 
 import hashlib
 import logging
-from collections.abc import Mapping
-from dataclasses import replace
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
 from hwid_cli.data import checks
 from hwid_cli.data.columns import (
-    Column,
     FileColumns,
-    array_column,
     block_means,
-    place_of,
     with_each,
 )
 from hwid_cli.data.formats import read_columns
-from hwid_cli.data.kinds import kind_of, read_plan
-from hwid_cli.data.parts import FilePart, cut_part, parts_of_files
-from hwid_cli.data.paths import find_files, recordings_base, recordings_options
-from hwid_cli.errors import MeasurementError
+from hwid_cli.data.recording_files import (
+    FilePart,
+    cut_part,
+    find_files,
+    kind_of,
+    parts_of_files,
+    read_plan,
+    recordings_base,
+    recordings_options,
+)
+from hwid_cli.data.sampling import sample_uniformly
+from hwid_cli.errors import HwidError, MeasurementError
 from hwid_cli.records.experiment import CalibrateOptions, Experiment, RecordingsOptions
 from hwid_cli.records.recordings import KINDS, RawRecording
 
 _log = logging.getLogger(__name__)
-
-# Time stamps carry rounding errors; a relative difference below this is one.
-_ROUNDING = 1e-9
-# Digits of a resampling step that was read off jittering time stamps.
-_CLOCK_STEP_DIGITS = 6
-# Resampling fills gaps by straight lines; beyond this growth it would invent data.
-_MOST_GROWTH = 2
-# Two time stamps make one step; one makes none.
-_FEWEST_STAMPS = 2
-
-
-def sample_uniformly(
-    path: Path, columns: FileColumns, options: RecordingsOptions
-) -> tuple[FileColumns, float]:
-    """Give the columns on a uniform grid, and its step.
-
-    Parameters
-    ----------
-    path : Path
-        For messages.
-    columns : FileColumns
-        Checked for finite numbers.
-    options : RecordingsOptions
-        ``sample_time_s``, ``sampling_tolerance`` and ``resample``.
-
-    Returns
-    -------
-    FileColumns
-        Unchanged unless it had to be resampled.
-    float, [s]
-
-    Raises
-    ------
-    MeasurementError
-        If time is too short, repeats, goes back, jumps or contradicts
-        ``sample_time_s``.
-    """
-    time = columns.time
-    if time is None:
-        if options.sample_time_s is None:
-            raise ValueError("neither a time column nor sample_time_s")
-        return columns, options.sample_time_s
-    _check_length(path, columns, time)
-    steps = np.diff(time.values)
-    _check_order(path, time, steps)
-    median = float(np.median(steps))
-    _check_against_options(path, median, options)
-    jumps = np.abs(steps - median) > options.sampling_tolerance * median
-    if not jumps.any():
-        return columns, options.sample_time_s or _simplest_step(time.values)
-    if not options.resample:
-        index = int(np.argmax(jumps))
-        raise MeasurementError(
-            f"{place_of(path, time, index + 1)}: time steps by {steps[index]:.6g} s, "
-            f"from {time.values[index]:.9g} s to {time.values[index + 1]:.9g} s; "
-            f"expected {median:.6g} s within {options.sampling_tolerance:.3g} of it; "
-            "set recordings.resample: true, or raise recordings.sampling_tolerance"
-        )
-    step = options.sample_time_s or float(f"{median:.{_CLOCK_STEP_DIGITS}g}")
-    _check_gaps(path, time, steps, step)
-    _log.info(
-        "%s: resampled to %.9g s, because %d of %d steps lie beyond the tolerance",
-        path,
-        step,
-        int(jumps.sum()),
-        steps.size,
-    )
-    return _resample(columns, time.values, step), step
-
-
-def _check_length(path: Path, columns: FileColumns, time: Column) -> None:
-    others = (columns.input, columns.output, columns.reference)
-    longest = max(one.values.size for one in others if one is not None)
-    if time.values.size < longest:
-        raise MeasurementError(
-            f"{path}: {time.title} has {time.values.size} values for {longest} rows; "
-            "expected a time in every row; fill the column, or leave out columns.time "
-            "and give recordings.sample_time_s"
-        )
-    if time.values.size < _FEWEST_STAMPS:
-        raise MeasurementError(
-            f"{path}: has {time.values.size} rows; expected a whole measurement; "
-            "export it again or leave the file out"
-        )
-
-
-def _check_order(path: Path, time: Column, steps: np.ndarray) -> None:
-    if (steps > 0).all():
-        return
-    index = int(np.argmin(steps > 0))
-    before, after = time.values[index], time.values[index + 1]
-    place = place_of(path, time, index + 1)
-    if after < before:
-        raise MeasurementError(
-            f"{place}: time goes back from {before:.9g} s to {after:.9g} s; expected "
-            "time to go on; sort or cut the file"
-        )
-    raise MeasurementError(
-        f"{place}: time {after:.9g} s is repeated; expected a later time than in the "
-        "row before; remove repeated rows"
-    )
-
-
-def _check_against_options(
-    path: Path, median: float, options: RecordingsOptions
-) -> None:
-    stated = options.sample_time_s
-    if stated and abs(stated - median) > options.sampling_tolerance * stated:
-        raise MeasurementError(
-            f"{path}: the time column steps by {median:.6g} s; expected {stated:.6g} s "
-            "as recordings.sample_time_s says; correct that key or leave it out"
-        )
-
-
-def _simplest_step(time: np.ndarray) -> float:
-    """Shortest decimal number that fits the stamps as well as their mean step does."""
-    count = time.size - 1
-    step = float(time[-1] - time[0]) / count
-    misfit = float(np.max(np.abs(time - time[0] - step * np.arange(count + 1))))
-    allowed = max(misfit / count, _ROUNDING * step)
-    for digits in range(1, 17):
-        simple = float(f"{step:.{digits}g}")
-        if abs(simple - step) <= allowed:
-            return simple
-    return step
-
-
-def _check_gaps(path: Path, time: Column, steps: np.ndarray, step: float) -> None:
-    """Refuse to make up most of a recording."""
-    if steps.sum() / step > _MOST_GROWTH * time.values.size:
-        index = int(np.argmax(steps))
-        raise MeasurementError(
-            f"{place_of(path, time, index + 1)}: time jumps by {steps[index]:.6g} s, "
-            f"from {time.values[index]:.9g} s to {time.values[index + 1]:.9g} s; "
-            f"expected steps near {step:.6g} s; cut the file at the gap"
-        )
-
-
-def _resample(columns: FileColumns, stamps: np.ndarray, step: float) -> FileColumns:
-    """Interpolate every column linearly over its own stretch of time."""
-
-    def resampled(column: Column) -> Column:
-        known = stamps[: column.values.size]
-        # The small share keeps a last sample that rounding pushed past the end.
-        count = int((known[-1] - known[0]) / step * (1 + _ROUNDING)) + 1
-        grid = known[0] + step * np.arange(count)
-        return array_column(column.title, np.interp(grid, known, column.values))
-
-    return replace(with_each(columns, resampled), time=None)
-
 
 # Decimal digits of a sample time after thinning: removes 3 * 0.1 = 0.30000000000000004.
 _STEP_DIGITS = 12
@@ -223,8 +76,7 @@ def read_recordings(experiment: Experiment, out: Path) -> list[RawRecording]:
             )
         for part in parts:
             if part.path == path:
-                kind = kind_of(path, options.kind, plans[path.parent], name=part.name)
-                raw = read_part(part, columns, kind, experiment)
+                raw = _read_part(part, columns, plans[path.parent], experiment)
                 recordings.append(replace(raw, sha256=digest))
     _warn_of_unused_kinds(recordings, experiment.source, options)
     recordings.sort(key=lambda recording: KINDS.index(recording.kind))
@@ -236,30 +88,16 @@ def read_recordings(experiment: Experiment, out: Path) -> list[RawRecording]:
     ]
 
 
-def read_part(
-    part: FilePart, columns: FileColumns, kind: str, experiment: Experiment
+def _read_part(
+    part: FilePart,
+    columns: FileColumns,
+    plan: Mapping[str, str],
+    experiment: Experiment,
 ) -> RawRecording:
-    """Read and check one recording, apart from what it has in common with others.
-
-    Parameters
-    ----------
-    part : FilePart
-        Stretch of the file.
-    columns : FileColumns
-        Of the whole file.
-
-    Returns
-    -------
-    RawRecording
-        Without the hash of its file.
-
-    Raises
-    ------
-    MeasurementError
-        For the first fault.
-    """
+    """Read and check one recording, apart from what it has in common with others."""
     options = recordings_options(experiment)
     place = part.place
+    kind = kind_of(part.path, options.kind, plan, name=part.name)
     columns = cut_part(columns, part)
     checks.check_numbers(place, columns)
     columns, step = sample_uniformly(place, columns, options)
@@ -340,3 +178,98 @@ def _warn_of_unused_kinds(
                 kind,
                 " or ".join(repr(pattern) for pattern in options.kind[kind]),
             )
+
+
+@dataclass(frozen=True, eq=False)
+class Survey:
+    """What the files of an experiment hold.
+
+    Parameters
+    ----------
+    recordings : tuple of RawRecording
+        Those without a fault, in the order of ``read_recordings``.
+    problems : tuple of str
+        One line each.
+    unusable : tuple of str
+        Names of the recordings with a fault.
+    jitter : dict of str to float, [-]
+        Largest deviation of a step of the time column from the median one, as a share of
+        it, by name; without recordings that have no time column.
+    """
+
+    recordings: tuple[RawRecording, ...]
+    problems: tuple[str, ...]
+    unusable: tuple[str, ...] = ()
+    jitter: dict[str, float] = field(default_factory=dict)
+
+
+def survey_recordings(experiment: Experiment, out: Path) -> Survey:
+    """Read every recording of an experiment, and collect the faults.
+
+    Parameters
+    ----------
+    out : Path
+        Folder of the results, where simulated measurements lie.
+    """
+    problems: list[str] = []
+    paths: list[Path] = []
+    with _noting(problems):
+        paths = find_files(experiment, recordings_base(experiment, out))
+    parts = parts_of_files(paths, recordings_options(experiment)) if paths else []
+    with _noting(problems):
+        checks.check_names([(part.path, part.name) for part in parts])
+    read: list[RawRecording] = []
+    jitter: dict[str, float] = {}
+    for path in paths:
+        columns = plan = None
+        with _noting(problems):
+            columns = read_columns(path, recordings_options(experiment).columns)
+        with _noting(problems):
+            plan = read_plan(path.parent)
+        if columns is None or plan is None:
+            continue
+        for part in parts:
+            if part.path == path:
+                with _noting(problems):
+                    raw = _read_part(part, columns, plan, experiment)
+                    read.append(replace(raw, sha256=file_sha256(path)))
+                    if (time := cut_part(columns, part).time) is not None:
+                        jitter[part.name] = _jitter(time.values)
+    common = _of_one_clock(read, experiment, problems)
+    common.sort(key=lambda recording: KINDS.index(recording.kind))
+    good = {recording.name for recording in common}
+    bad = tuple(part.name for part in parts if part.name not in good)
+    return Survey(tuple(common), tuple(problems), bad, jitter)
+
+
+def _jitter(stamps: np.ndarray) -> float:
+    """Largest deviation of a step from the median one, as a share of it."""
+    steps = np.diff(stamps)
+    median = float(np.median(steps))
+    return float(np.max(np.abs(steps - median))) / median
+
+
+def _of_one_clock(
+    read: list[RawRecording], experiment: Experiment, problems: list[str]
+) -> list[RawRecording]:
+    """Recordings with the usual sample time; each of the others is a fault."""
+    by_step = sorted(read, key=lambda one: one.sample_time_s)
+    common = []
+    for one in read:
+        usual = by_step[len(by_step) // 2]
+        with _noting(problems):
+            tolerance = recordings_options(experiment).sampling_tolerance
+            checks.check_sample_times([usual, one], tolerance)
+            common.append(replace(one, sample_time_s=usual.sample_time_s))
+    return common
+
+
+@contextmanager
+def _noting(problems: list[str]) -> Iterator[None]:
+    """Note a fault once, and go on behind what raised it."""
+    try:
+        yield
+    except HwidError as error:
+        said = " ".join(str(error).split())
+        if said not in problems:
+            problems.append(said)

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from hwid_cli import __version__
-from hwid_cli.data.kinds import PLAN_NAME
+from hwid_cli.data.recording_files import PLAN_NAME
 from hwid_cli.errors import CacheError
 from hwid_cli.files.atomic import replace_file
 from hwid_cli.files.csv_tables import write_table_csv

@@ -70,7 +70,7 @@ class Role:
 
 
 @dataclass(frozen=True)
-class Layout:
+class FolderLayout:
     """How the files of a folder are read.
 
     Parameters

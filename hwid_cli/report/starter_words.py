@@ -2,11 +2,11 @@
 
 from collections.abc import Sequence
 
-from hwid_cli.records.starter import Layout, Proposal, Role
+from hwid_cli.records.starter import FolderLayout, Proposal, Role
 
 
 def starter_words(
-    path: str, layout: Layout, proposal: Proposal, problems: Sequence[str]
+    path: str, layout: FolderLayout, proposal: Proposal, problems: Sequence[str]
 ) -> str:
     """Say what was guessed, why, and what to check.
 
@@ -45,7 +45,7 @@ def _role(role: Role) -> str:
     return f"{called}{unit}: {role.reason}"
 
 
-def _time(layout: Layout, proposal: Proposal) -> str:
+def _time(layout: FolderLayout, proposal: Proposal) -> str:
     if layout.time is None:
         return f"sample time {layout.sample_time_s:g} s: {layout.clock_reason}"
     called = (

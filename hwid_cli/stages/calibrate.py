@@ -13,7 +13,11 @@ from pathlib import Path
 import numpy as np
 
 from hwid_cli.data.calibration import LEAST_QUIET, OFFSETS, Draft, run_recipe
-from hwid_cli.data.paths import find_files, missing_files_message, recordings_base
+from hwid_cli.data.recording_files import (
+    find_files,
+    missing_files_message,
+    recordings_base,
+)
 from hwid_cli.data.recordings import read_recordings
 from hwid_cli.errors import ConfigError, MeasurementError, NothingToDo
 from hwid_cli.files.atomic import replace_file

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from hwid_cli.data.quality import signal_oddities
+from hwid_cli.data.quality import quality_notes
 from hwid_cli.errors import HwidError
 from hwid_cli.records.check import RecordingFacts
 from hwid_cli.records.experiment import Experiment
@@ -72,7 +72,7 @@ def _notes(raw: RawRecording, jitter: float) -> tuple[str, ...]:
     notes = [
         f"{side} {note}"
         for side, values in (("input", raw.input), ("output", raw.output))
-        for note in signal_oddities(values, may_hold=side == "input")
+        for note in quality_notes(values, may_hold=side == "input")
     ]
     if jitter > _NOTED_JITTER:
         notes.append(f"the clock jitters by up to {100 * jitter:.2g} % of a step")

@@ -21,7 +21,7 @@ import h5py
 import numpy as np
 from h5py import h5a, h5d, h5s, h5t
 
-from hwid_cli.files.array_bounds import check_declared
+from hwid_cli.data.array_columns import check_size
 
 Scalar = str | bool | int | float
 
@@ -141,12 +141,12 @@ def read_array(group: h5py.Group, name: str) -> np.ndarray:
     KeyError
         If there is no such data set.
     ValueError
-        If it unpacks to more than ``array_bounds.MOST_BYTES``.
+        If it is larger than a measurement may be.
     """
     dataset = h5d.open(group.id, name.encode())
     if h5py.check_string_dtype(dataset.dtype) is not None:
         return np.array(h5py.Dataset(dataset).asstr()[()], dtype=np.str_)
-    check_declared(name, math.prod(dataset.shape) * dataset.dtype.itemsize)
+    check_size(name, math.prod(dataset.shape) * dataset.dtype.itemsize)
     values = np.zeros(dataset.shape, dtype=dataset.dtype)
     if values.size:
         dataset.read(h5s.ALL, h5s.ALL, values)

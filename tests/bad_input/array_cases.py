@@ -123,7 +123,7 @@ def _mat_bomb(path):
     packed = packer.compress(tags + struct.pack("<II", 9, 8 * _HUGE))
     zeros = b"\0" * 2**24
     packed += b"".join(packer.compress(zeros) for _ in range(8 * _HUGE // 2**24))
-    packed += packer.flush()
+    packed += packer.compress(zeros[: 8 * _HUGE % 2**24]) + packer.flush()
     first = b"MATLAB 5.0 MAT-file".ljust(124) + struct.pack("<H", 0x0100) + b"IM"
     path.write_bytes(first + struct.pack("<II", 15, len(packed)) + packed)
 
@@ -224,12 +224,12 @@ MAT = [
         "mat",
         "cut off",
         _cut(lambda p: scipy.io.savemat(p, _ARRAYS), 0.5),
-        "longer than",
+        "could not read bytes",
     ),
     _case(
         "mat", "text file", lambda p: p.write_text("hello " * 99), "Unknown mat file"
     ),
-    _case("mat", "complex by its flags", _mat_complex_flag, "has 4 parts, not 5"),
+    _case("mat", "complex by its flags", _mat_complex_flag, "crashes on it"),
     _case("mat", "bomb", _mat_bomb, *_BOMB),
     _mat73("text", _marked(MATLAB_class=np.bytes_("char")), "holds text"),
     _mat73("cell", _marked(MATLAB_class=np.bytes_("cell")), *_PLAIN),

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hwid_cli.data.csv_files import read_csv_columns
+from hwid_cli.data.formats import read_columns
 from hwid_cli.errors import MeasurementError
 from hwid_cli.records.experiment import Columns
 
@@ -16,7 +16,7 @@ def read(tmp_path):
     def read_text(text, columns=BY_NAME, encoding="utf-8"):
         path = tmp_path / "run.csv"
         path.write_bytes(text.encode(encoding))
-        found = read_csv_columns(path, columns)
+        found = read_columns(path, columns)
         return found.time.values, found.input.values, found.output.values
 
     return read_text
@@ -72,7 +72,7 @@ def test_other_encodings_of_header_and_numbers_are_read(read):
 def test_columns_that_end_in_blank_cells_are_shorter(tmp_path):
     path = tmp_path / "run.csv"
     path.write_text("t,u,y\n0,1,5\n1,2,\n2,,\n")
-    found = read_csv_columns(path, BY_NAME)
+    found = read_columns(path, BY_NAME)
     assert found.time.values.tolist() == [0, 1, 2]
     assert found.input.values.tolist() == [1, 2]
     assert found.output.values.tolist() == [5]
@@ -81,7 +81,7 @@ def test_columns_that_end_in_blank_cells_are_shorter(tmp_path):
 def test_rows_are_lines_of_the_file_counted_from_one(tmp_path):
     path = tmp_path / "run.csv"
     path.write_text('# note\n"t\nx",u,y\n\n0,1,5\n# pause\n1,2,6\n')
-    found = read_csv_columns(path, Columns(input="u", output="y"))
+    found = read_columns(path, Columns(input="u", output="y"))
     assert found.input.rows.tolist() == [5, 7]
     assert not found.input.rows_from_zero
 
@@ -89,7 +89,7 @@ def test_rows_are_lines_of_the_file_counted_from_one(tmp_path):
 def test_cell_without_a_number_is_kept_as_text_of_its_row(tmp_path):
     path = tmp_path / "run.csv"
     path.write_text("t,u,y\n0,1,5\n1,off,6\n2,1_0,7\n3,,8\n4,nan,9\n")
-    column = read_csv_columns(path, BY_NAME).input
+    column = read_columns(path, BY_NAME).input
     assert column.texts == {3: "off", 4: "1_0", 5: ""}
     assert np.isnan(column.values[1:]).all()
 
@@ -141,6 +141,6 @@ def test_every_float_is_read_back_bit_by_bit(tmp_path_factory, values, mark, dec
     path = tmp_path_factory.mktemp("csv") / "run.csv"
     lines = [mark.join(["u", "y"])] + [mark.join([cell, cell]) for cell in cells]
     path.write_text("\n".join(lines))
-    found = read_csv_columns(path, Columns(input="u", output="y"))
+    found = read_columns(path, Columns(input="u", output="y"))
     assert found.input.values.tobytes() == np.array(values).tobytes()
     assert found.output.values.tobytes() == np.array(values).tobytes()

@@ -2,7 +2,7 @@ from pathlib import Path
 
 import pytest
 
-from hwid_cli.data.kinds import kind_of, read_plan
+from hwid_cli.data.recording_files import kind_of, read_plan
 from hwid_cli.errors import MeasurementError
 
 PATTERNS = {"step": ("step_*", "jump"), "sine": ("*sine*",)}

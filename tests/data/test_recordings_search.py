@@ -5,7 +5,11 @@ from pathlib import Path
 import pytest
 
 from hwid_cli.config.load import load_experiment
-from hwid_cli.data.paths import find_files, missing_files_message, recordings_base
+from hwid_cli.data.recording_files import (
+    find_files,
+    missing_files_message,
+    recordings_base,
+)
 from hwid_cli.data.recordings import read_recordings
 from hwid_cli.errors import ConfigError, MeasurementError
 

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hwid_cli.data.columns import FileColumns, array_column
-from hwid_cli.data.recordings import sample_uniformly
+from hwid_cli.data.sampling import sample_uniformly
 from hwid_cli.errors import MeasurementError
 from hwid_cli.records.experiment import Columns, RecordingsOptions
 
@@ -138,6 +138,13 @@ def test_resampling_interpolates_linearly_and_is_logged(caplog):
     np.testing.assert_allclose(found.input.values, 2 * np.arange(8), rtol=1e-15)
     np.testing.assert_allclose(found.output.values, -np.arange(8.0), rtol=1e-15)
     assert "data/run07.csv: resampled to 1 s, because 2 of 7 steps" in caplog.text
+
+
+def test_a_resampling_step_has_six_digits():
+    # The median of the steps is 0.012345678 s.
+    time = np.cumsum([0, 0.012345678, 0.012345678, 0.02, 0.012345678, 0.012345678])
+    _, step = sample_uniformly(PATH, columns(time), options(resample=True))
+    assert step == 0.0123457
 
 
 def test_resampling_keeps_each_column_to_its_own_end():

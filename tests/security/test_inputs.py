@@ -196,19 +196,6 @@ def test_only_the_function_that_a_configuration_names_runs(tmp_path):
     assert sorted(folder.glob("*.ran")) == []
 
 
-def test_a_crash_of_a_reader_is_a_message():
-    import signal
-
-    from hwid_cli.data.isolated_reading import rehearse
-
-    rehearse(lambda: None)
-    rehearse(lambda: 1 / 0)
-    with pytest.raises(ValueError, match="its reader crashes on it, SIGSEGV"):
-        rehearse(lambda: os.kill(os.getpid(), signal.SIGSEGV))
-    with pytest.raises(ValueError, match=r"did not come back within 0\.1 s"):
-        rehearse(signal.pause, most_seconds=0.1)
-
-
 def test_an_entry_of_the_cache_answers_under_its_own_name_only(tmp_path):
     from hwid_cli.records.recordings import CalibrationLog
     from hwid_cli.store.cache import Hdf5Store

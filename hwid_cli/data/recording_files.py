@@ -1,16 +1,27 @@
-"""Which files the recordings of an experiment are, and how to say that there are none."""
+"""Which recordings an experiment has: their files, the parts of a file, their kinds.
 
+A kind comes from the configuration's patterns, else from ``plan.csv``.
+"""
+
+import csv
 import glob
+import io
 import os
 import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from pathlib import Path
 
-from hwid_cli.data.kinds import PLAN_NAME
+from hwid_cli.data.columns import FileColumns, keep_rows, with_each
 from hwid_cli.errors import ConfigError, MeasurementError
-from hwid_cli.files.messages import shown
+from hwid_cli.files.messages import did_you_mean, shown
+from hwid_cli.files.small_files import read_small_file
 from hwid_cli.records.experiment import Experiment, RecordingsOptions
+from hwid_cli.records.recordings import KINDS
 
+PLAN_NAME = "plan.csv"
+_OTHER = "other"
 REAL_DATA_VARIABLE = "HWID_REALDATA"
 # Of a path in a message.
 _LONGEST_PATH = 400
@@ -193,3 +204,160 @@ def _natural(name: str) -> list[tuple[int, int, str]]:
     """Key that sorts numbers in names by value."""
     parts = re.split(r"(\d+)", name)
     return [(0, int(p), "") if p.isdecimal() else (1, 0, p) for p in parts if p]
+
+
+@dataclass(frozen=True)
+class FilePart:
+    """A stretch of a file that becomes a recording.
+
+    Parameters
+    ----------
+    name : str
+        Of the recording.
+    part : str
+        Name of the part; empty where the file is taken as a whole.
+    first : int, [samples]
+    stop : int or None, [samples]
+        The sample after the last one; None for the file's end.
+    """
+
+    path: Path
+    name: str
+    part: str
+    first: int
+    stop: int | None
+
+    @property
+    def place(self) -> Path:
+        """The file, for messages, with the part where there is one."""
+        return Path(f"{self.path} (part {self.part})") if self.part else self.path
+
+
+def parts_of_files(paths: Sequence[Path], options: RecordingsOptions) -> list[FilePart]:
+    """Say which recordings the files of an experiment hold.
+
+    Returns
+    -------
+    list of FilePart
+        File by file; named after the part where there is one file, after file and part
+        where there are several.
+    """
+    if not options.parts:
+        last = options.last_sample
+        stop = None if last is None else last + 1
+        return [
+            FilePart(path, path.stem, "", options.first_sample, stop) for path in paths
+        ]
+    return [
+        FilePart(path, part if len(paths) == 1 else f"{path.stem}_{part}", part, *cut)
+        for path in paths
+        for part, cut in options.parts.items()
+    ]
+
+
+def cut_part(columns: FileColumns, part: FilePart) -> FileColumns:
+    """Keep the rows of a part.
+
+    Parameters
+    ----------
+    columns : FileColumns
+        Of the whole file.
+
+    Raises
+    ------
+    MeasurementError
+        If a named part goes beyond the end of the file.
+    """
+    size = max(columns.input.values.size, columns.output.values.size)
+    if part.part and part.stop is not None and part.stop > size:
+        raise MeasurementError(
+            f"{part.path}: has {size} samples; expected at least {part.stop} for "
+            f"recordings.parts.{part.part}; correct that part"
+        )
+    selection = slice(part.first, part.stop)
+    return with_each(columns, lambda column: keep_rows(column, selection))
+
+
+def kind_of(
+    path: Path,
+    patterns: Mapping[str, tuple[str, ...]],
+    plan: Mapping[str, str],
+    *,
+    name: str = "",
+) -> str:
+    """Find the kind of a recording.
+
+    Parameters
+    ----------
+    patterns : mapping of str to tuple of str
+        Patterns on the recording's name, or on the file's name without its ending, for
+        each kind.
+    plan : mapping of str to str
+        Kinds by recording name, as ``read_plan`` gives them.
+    name : str
+        Of the recording; empty means the file's name without its ending.
+
+    Returns
+    -------
+    str
+        One of ``records.recordings.KINDS``; ``other`` where nothing says more.
+
+    Raises
+    ------
+    MeasurementError
+        If patterns of two kinds match.
+    """
+    names = {name or path.stem, path.stem}
+    matching = [
+        kind
+        for kind, of_kind in patterns.items()
+        if any(fnmatchcase(one, pattern) for pattern in of_kind for one in names)
+    ]
+    if len(matching) > 1:
+        raise MeasurementError(
+            f"{path}: matches the patterns of {' and '.join(matching)} in "
+            "recordings.kind; expected one kind for each file; make the patterns "
+            "narrower"
+        )
+    if matching:
+        return matching[0]
+    return plan.get(name or path.stem, plan.get(path.stem, _OTHER))
+
+
+def read_plan(folder: Path) -> dict[str, str]:
+    """Read the kinds that a folder's ``plan.csv`` states.
+
+    Returns
+    -------
+    dict of str to str
+        Kind by recording name; empty where there is no plan, or one without the
+        columns ``name`` and ``kind``.
+
+    Raises
+    ------
+    MeasurementError
+        If a row states an unknown kind.
+    """
+    path = folder / PLAN_NAME
+    if not path.is_file():
+        return {}
+    kinds = {}
+    try:
+        text = read_small_file(path).decode("utf-8-sig", errors="replace")
+        reader = csv.DictReader(io.StringIO(text, newline=""))
+        if not {"name", "kind"} <= set(reader.fieldnames or ()):
+            return {}
+        for row in reader:
+            kind = (row["kind"] or "").strip()
+            if kind not in KINDS:
+                raise MeasurementError(
+                    f"{path}, row {reader.line_num}: the kind is {shown(kind)}; "
+                    f"{did_you_mean(kind, KINDS)}"
+                )
+            kinds[(row["name"] or "").strip()] = kind
+    except (OSError, csv.Error) as error:
+        raise MeasurementError(
+            f"{path}: cannot be read ({getattr(error, 'strerror', None) or error}); "
+            "expected a table with the columns name and kind; mend the file or remove it"
+        ) from error
+    return kinds

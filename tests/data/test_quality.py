@@ -1,21 +1,21 @@
 import numpy as np
 
-from hwid_cli.data.quality import signal_oddities
+from hwid_cli.data.quality import quality_notes
 
 T = np.arange(1000) / 1000
 WAVE = np.sin(2 * np.pi * 3 * T) + 0.01 * np.random.default_rng(1).standard_normal(1000)
 
 
 def test_a_sound_signal_has_nothing_odd():
-    assert signal_oddities(WAVE) == ()
+    assert quality_notes(WAVE) == ()
 
 
 def test_a_held_input_has_nothing_odd():
-    assert signal_oddities(np.where(T > 0.3, 2.0, 0.0)) == ()
+    assert quality_notes(np.where(T > 0.3, 2.0, 0.0)) == ()
 
 
 def test_limits_on_both_sides_are_named():
-    notes = signal_oddities(np.clip(WAVE, -0.7, 0.9))
+    notes = quality_notes(np.clip(WAVE, -0.7, 0.9))
     assert len(notes) == 2
     assert notes[0].startswith("at its largest value 0.9 for")
     assert notes[1].startswith("at its smallest value -0.7 for")
@@ -24,17 +24,17 @@ def test_limits_on_both_sides_are_named():
 def test_a_sensor_that_stands_still_is_named():
     stuck = WAVE.copy()
     stuck[400:500] = stuck[400]
-    assert signal_oddities(stuck) == ("does not change for 100 samples in a row",)
-    assert signal_oddities(stuck, may_hold=True) == ()
+    assert quality_notes(stuck) == ("does not change for 100 samples in a row",)
+    assert quality_notes(stuck, may_hold=True) == ()
 
 
 def test_damaged_samples_are_counted():
     damaged = WAVE.copy()
     damaged[300] += 5.0
-    assert signal_oddities(damaged) == ("1 single sample looks damaged",)
+    assert quality_notes(damaged) == ("1 single sample looks damaged",)
 
 
 def test_a_signal_far_from_zero_is_named():
-    (note,) = signal_oddities(293.0 + 0.5 * WAVE)
+    (note,) = quality_notes(293.0 + 0.5 * WAVE)
     assert "standard deviations from zero: take the offset off" in note
-    assert signal_oddities(3.0 + WAVE) == ()
+    assert quality_notes(3.0 + WAVE) == ()

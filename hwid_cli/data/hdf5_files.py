@@ -1,0 +1,71 @@
+"""Data sets of an HDF5 file, and of MATLAB's version 7.3, which is HDF5.
+
+MATLAB stores every array transposed, which is undone here.
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hwid_cli.data.array_columns import Variables, check_size
+
+if TYPE_CHECKING:
+    import h5py
+
+_MATLAB_NUMBERS = {
+    *(b"double", b"single", b"logical"),
+    *(b"int8", b"int16", b"int32", b"int64"),
+    *(b"uint8", b"uint16", b"uint32", b"uint64"),
+}
+
+
+@contextmanager
+def open_hdf5(path: Path, *, is_matlab: bool = False) -> Iterator[Variables]:
+    """Open an HDF5 file.
+
+    Parameters
+    ----------
+    is_matlab : bool
+        Whether MATLAB wrote it: its names of members have dots.
+
+    Yields
+    ------
+    mapping of str to callable
+        Data sets by their paths; each reads its array, as long as the file is open.
+    """
+    import h5py
+
+    variables = {}
+
+    def note(name: str, item: Any) -> None:
+        if isinstance(item, h5py.Dataset) and not name.startswith("#"):
+            key = name.replace("/", ".") if is_matlab else name
+            variables[key] = partial(_from_matlab if is_matlab else _values, item)
+
+    with h5py.File(path, "r") as file:
+        file.visititems(note)
+        yield variables
+
+
+def _values(dataset: "h5py.Dataset") -> Any:
+    if dataset.external or dataset.is_virtual:
+        raise ValueError(
+            f"{dataset.name!r} takes its values from other files, which is not followed"
+        )
+    check_size(dataset.name, (dataset.size or 0) * dataset.dtype.itemsize)
+    return dataset[()]
+
+
+def _from_matlab(dataset: "h5py.Dataset") -> Any:
+    """An array that MATLAB stored: objects and functions are stored as such too."""
+    kind = dataset.attrs.get("MATLAB_class", b"double")
+    if kind not in _MATLAB_NUMBERS or "MATLAB_object_decode" in dataset.attrs:
+        return np.array("text") if kind == b"char" else None
+    values = _values(dataset)
+    if "MATLAB_empty" in dataset.attrs:
+        return np.zeros(0)
+    return values.T if values.dtype.names is None else values
