@@ -3,19 +3,29 @@
 The training recordings decide the parameters; held-out recordings are only simulated.
 What belongs to one recording alone (a phase, a start) is found from that recording.
 docs/method_diagnosis.md, eq. (D18) and (D19).
+
+What a stored fit stands for: its drive, its effects, its place in a search.
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
-from hwid_cli.diagnosis.comparing import residuals, total
 from hwid_cli.diagnosis.noise import whiteness
-from hwid_cli.diagnosis.own_parameters import fit_own, with_own_trials
+from hwid_cli.diagnosis.parameters import (
+    Layout,
+    Point,
+    drive_at,
+    effects_at,
+    first_point,
+    layout,
+    residuals,
+    total,
+)
 from hwid_cli.diagnosis.problem import Problem
-from hwid_cli.diagnosis.search import Fitted, fit
-from hwid_cli.diagnosis.unknowns import Point, drive_at, effects_at, first_point, layout
+from hwid_cli.diagnosis.search import Fitted, fit, fit_own, with_own_trials
 from hwid_cli.drive.effect import Scales
 from hwid_cli.drive.simulation import drive_effects
 from hwid_cli.records.candidates import CandidateFit
@@ -236,3 +246,83 @@ def _neighbour(parts: list[np.ndarray]) -> float:
     together = sum(float(part[1:] @ part[:-1]) for part in parts)
     size = total(parts)
     return together / size if size > 0 else 0.0
+
+
+def rebuilt(
+    problem: Problem, found: CandidateFit, scales: Scales
+) -> tuple[Layout, Point]:
+    """Layout and point of a stored fit.
+
+    Parameters
+    ----------
+    problem : Problem
+        The recordings that it was judged on, in their order.
+    """
+    ids = (*drive_effects(problem.drive), *found.effects)
+    start: dict[str, dict[str, float]] = {one: {} for one in ids}
+    base: dict[str, float] = {}
+    for name, value in zip(found.names, found.values, strict=True):
+        owner, _, parameter = name.partition("/")
+        (base if owner == "base" else start[owner])[parameter] = float(value)
+    fit_layout = layout(problem, ids, start, scales)
+    shared = [
+        one.coordinate(
+            base[one.name] if one.owner == "base" else start[one.owner][one.name]
+        )
+        for one in fit_layout.shared
+    ]
+    own = np.array(
+        [
+            [one.coordinate(v) for one, v in zip(fit_layout.own, row, strict=True)]
+            for row in found.own
+        ]
+    ).reshape(found.own.shape)
+    return fit_layout, Point(np.array(shared), own)
+
+
+def fitted_start(
+    found: CandidateFit, present: dict[str, dict[str, float]]
+) -> dict[str, dict[str, float]]:
+    """Effects that the simulation has, with their fitted values.
+
+    Parameters
+    ----------
+    present : dict of str to dict of str to float
+        Effects of the simulation with the values that it gives.
+    """
+    start = {name: dict(values) for name, values in present.items()}
+    for name, value in zip(found.names, found.values, strict=True):
+        owner, _, parameter = name.partition("/")
+        if owner in start:
+            start[owner][parameter] = float(value)
+    return start
+
+
+def fitted_effects(found: CandidateFit) -> dict[str, dict[str, float]]:
+    """Shared parameters of every effect of a fit.
+
+    Returns
+    -------
+    dict of str to dict of str to float
+        By the ids in the catalogue.
+    """
+    effects: dict[str, dict[str, float]] = {}
+    for name, value in zip(found.names, found.values, strict=True):
+        owner, _, parameter = name.partition("/")
+        if owner != "base":
+            effects.setdefault(owner, {})[parameter] = float(value)
+    for name in found.own_names:
+        owner, _, parameter = name.partition("/")
+        if owner != "start":
+            effects.setdefault(owner, {})[parameter] = 0.0
+    return effects
+
+
+def fitted_drive(drive: Drive, found: CandidateFit) -> Drive:
+    """Drive with the base of a fit."""
+    base: dict[str, Any] = {
+        name.partition("/")[2]: float(value)
+        for name, value in zip(found.names, found.values, strict=True)
+        if name.startswith("base/")
+    }
+    return replace(drive, **base)

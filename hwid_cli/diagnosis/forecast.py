@@ -14,11 +14,9 @@ from itertools import combinations
 import numpy as np
 
 from hwid_cli.diagnosis.candidate import Start
-from hwid_cli.diagnosis.comparing import residuals
-from hwid_cli.diagnosis.own_parameters import with_own_trials
+from hwid_cli.diagnosis.parameters import first_point, layout, residuals
 from hwid_cli.diagnosis.problem import Problem
-from hwid_cli.diagnosis.search import derivatives
-from hwid_cli.diagnosis.unknowns import first_point, layout
+from hwid_cli.diagnosis.search import derivatives, with_own_trials
 from hwid_cli.drive.catalogue import CATALOGUE
 from hwid_cli.drive.effect import Scales
 from hwid_cli.records.drive import Drive

@@ -9,10 +9,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hwid_cli.diagnosis.comparing import residuals, simulate
+from hwid_cli.diagnosis.parameters import Layout, Point, residuals, simulate
 from hwid_cli.diagnosis.problem import Problem, Signals
 from hwid_cli.diagnosis.search import derivatives
-from hwid_cli.diagnosis.unknowns import Layout, Point
 from hwid_cli.drive.effect import Scales
 
 # Samples of a proposed recording.

@@ -13,18 +13,28 @@ from typing import Any
 
 import numpy as np
 
-from hwid_cli.diagnosis.candidate import Footing, fit_candidate
-from hwid_cli.diagnosis.comparing import compare
-from hwid_cli.diagnosis.judge import Judge
-from hwid_cli.diagnosis.lines import line_frequencies, line_share
+from hwid_cli.diagnosis.candidate import Footing, fit_candidate, fitted_drive, rebuilt
+from hwid_cli.diagnosis.findings import Findings, describe
 from hwid_cli.diagnosis.noise import noise_floor
-from hwid_cli.diagnosis.own_parameters import fit_own
-from hwid_cli.diagnosis.preparing import prepare
-from hwid_cli.diagnosis.problem import Compared, Problem, scales
-from hwid_cli.diagnosis.scaling import scales_of
-from hwid_cli.diagnosis.splitting import held_out_names
-from hwid_cli.diagnosis.stored_fit import fitted_drive, rebuilt
-from hwid_cli.diagnosis.unknowns import first_point, layout
+from hwid_cli.diagnosis.parameters import compare, first_point, layout
+from hwid_cli.diagnosis.problem import (
+    Compared,
+    Problem,
+    held_out_names,
+    prepare,
+    scales,
+)
+from hwid_cli.diagnosis.rounds import (
+    STAGE,
+    STAGE_VERSION,
+    Announce,
+    Found,
+    Rounds,
+    run_rounds,
+)
+from hwid_cli.diagnosis.scales import line_frequencies, line_share, scales_of
+from hwid_cli.diagnosis.search import fit_own
+from hwid_cli.diagnosis.selection import Judge
 from hwid_cli.drive.catalogue import CATALOGUE, public_id
 from hwid_cli.drive.effect import Scales
 from hwid_cli.drive.simulation import drive_effects
@@ -33,9 +43,6 @@ from hwid_cli.records.candidates import CandidateFit
 from hwid_cli.records.diagnosis import Diagnosis, NoiseFloor
 from hwid_cli.records.experiment import DiagnoseOptions, SimulationOptions
 from hwid_cli.records.recordings import Recording
-from hwid_cli.stages.candidate_rounds import Found, run_rounds
-from hwid_cli.stages.candidate_tasks import STAGE, STAGE_VERSION, Announce, Rounds
-from hwid_cli.stages.findings import Findings, describe
 from hwid_cli.stages.selection import select_recordings
 from hwid_cli.tasks.cache import MemoryStore, task_key
 from hwid_cli.tasks.runner import RunSettings, Workers

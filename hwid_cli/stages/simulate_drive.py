@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from hwid_cli.diagnosis.preparing import prepare
+from hwid_cli.diagnosis.problem import prepare
 from hwid_cli.records.drive import SimulatedRecording
 from hwid_cli.records.experiment import DiagnoseOptions, SimulationOptions
 from hwid_cli.records.recordings import Recording

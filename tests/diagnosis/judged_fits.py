@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from hwid_cli.diagnosis.judge import Judge
+from hwid_cli.diagnosis.selection import Judge
 from hwid_cli.records.candidates import CandidateFit
 from tests.diagnosis.small_drive import white
 

@@ -4,8 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from hwid_cli.diagnosis.preparing import prepare
-from hwid_cli.diagnosis.problem import scales
+from hwid_cli.diagnosis.problem import prepare, scales
 from hwid_cli.drive.simulation import simulate_drive
 from hwid_cli.records.diagnosis import NoiseFloor
 from hwid_cli.records.drive import Drive

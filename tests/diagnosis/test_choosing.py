@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hwid_cli.diagnosis.choosing import LEAST_ADDED, TIE, is_part_of, rivals, winner
+from hwid_cli.diagnosis.selection import LEAST_ADDED, TIE, is_part_of, rivals, winner
 from tests.diagnosis.judged_fits import JUDGE, base, made_up
 
 COULOMB = ("coulomb_friction",)

@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from hwid_cli.diagnosis.candidate import Footing, fit_candidate
+from hwid_cli.diagnosis.candidate import Footing, fit_candidate, fitted_drive
 from hwid_cli.diagnosis.forecast import Forecast, forecast, ground, pair_shares
-from hwid_cli.diagnosis.stored_fit import fitted_drive
 from hwid_cli.drive.catalogue import CATALOGUE
 from tests.diagnosis.small_drive import problem, recordings, sizes, white
 

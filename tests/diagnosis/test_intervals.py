@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from hwid_cli.diagnosis.candidate import Footing, fit_candidate
-from hwid_cli.diagnosis.intervals import intervals
+from hwid_cli.diagnosis.findings import intervals
 from tests.diagnosis.small_drive import (
     NOISE,
     problem,

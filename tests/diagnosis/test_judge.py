@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hwid_cli.diagnosis.judge import (
+from hwid_cli.diagnosis.selection import (
     LEAST_EXPLAINED,
     LEAST_EXPLAINED_SET,
     LEAST_GAIN,

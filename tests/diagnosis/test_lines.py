@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from hwid_cli.diagnosis.latent_force import Smoothed
-from hwid_cli.diagnosis.lines import line_frequencies, line_share, waves_along
 from hwid_cli.diagnosis.problem import Compared
+from hwid_cli.diagnosis.scales import line_frequencies, line_share, waves_along
 from tests.diagnosis.small_drive import STEP_S, problem, white
 
 TIME = STEP_S * np.arange(400)

@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from hwid_cli.diagnosis.candidate import Footing, fit_candidate
+from hwid_cli.diagnosis.candidate import Footing, fit_candidate, rebuilt
 from hwid_cli.diagnosis.next_experiment import Model, Separation, best_separation, menu
-from hwid_cli.diagnosis.stored_fit import rebuilt
-from hwid_cli.diagnosis.unknowns import first_point, layout
+from hwid_cli.diagnosis.parameters import first_point, layout
 from hwid_cli.drive.simulation import simulate_drive
 from hwid_cli.records.recordings import Recording
 from tests.diagnosis.small_drive import (

@@ -5,9 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hwid_cli.diagnosis.comparing import residuals
-from hwid_cli.diagnosis.own_parameters import fit_own, with_own_trials
-from hwid_cli.diagnosis.unknowns import Point, first_point, layout
+from hwid_cli.diagnosis.parameters import Point, first_point, layout, residuals
+from hwid_cli.diagnosis.search import fit_own, with_own_trials
 from hwid_cli.records.experiment import DiagnoseOptions
 from tests.diagnosis.small_drive import problem, recordings, sizes
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hwid_cli.diagnosis.preparing import prepare
+from hwid_cli.diagnosis.problem import prepare
 from hwid_cli.records.drive import Controller
 from hwid_cli.records.experiment import DiagnoseOptions, SimulationOptions
 from hwid_cli.records.recordings import Recording

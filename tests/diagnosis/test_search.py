@@ -5,9 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hwid_cli.diagnosis.comparing import residuals, total
+from hwid_cli.diagnosis.parameters import (
+    Point,
+    drive_at,
+    effects_at,
+    first_point,
+    layout,
+    residuals,
+    total,
+)
 from hwid_cli.diagnosis.search import derivatives, fit, local_matrix
-from hwid_cli.diagnosis.unknowns import Point, drive_at, effects_at, first_point, layout
 from hwid_cli.records.experiment import DiagnoseOptions
 from tests.diagnosis.small_drive import DRIVE, NOISE, problem, recordings, sizes
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hwid_cli.diagnosis.splitting import held_out_names
+from hwid_cli.diagnosis.problem import held_out_names
 from hwid_cli.records.recordings import Recording
 
 TIME = 1e-3 * np.arange(400)

@@ -5,14 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hwid_cli.diagnosis.candidate import Footing, fit_candidate
-from hwid_cli.diagnosis.comparing import residuals
-from hwid_cli.diagnosis.stored_fit import (
+from hwid_cli.diagnosis.candidate import (
+    Footing,
+    fit_candidate,
     fitted_drive,
     fitted_effects,
     fitted_start,
     rebuilt,
 )
+from hwid_cli.diagnosis.parameters import residuals
 from hwid_cli.records.experiment import DiagnoseOptions
 from tests.diagnosis.small_drive import (
     DRIVE,

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hwid_cli.diagnosis.unknowns import (
+from hwid_cli.diagnosis.parameters import (
     START,
     Point,
     Unknown,

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hwid_cli.diagnosis.verdict import decide
+from hwid_cli.diagnosis.selection import decide
 from hwid_cli.records.diagnosis import VERDICTS
 from tests.diagnosis.judged_fits import JUDGE, base, made_up
 

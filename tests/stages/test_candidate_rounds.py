@@ -2,17 +2,16 @@
 
 import pytest
 
-from hwid_cli.diagnosis.candidate import Footing, fit_candidate
-from hwid_cli.diagnosis.judge import Judge
-from hwid_cli.diagnosis.stored_fit import fitted_drive
-from hwid_cli.drive.catalogue import CATALOGUE
-from hwid_cli.stages.candidate_rounds import (
+from hwid_cli.diagnosis.candidate import Footing, fit_candidate, fitted_drive
+from hwid_cli.diagnosis.rounds import (
     FEWEST_SINGLES,
     FITTED_ON_TOP,
     FITTED_PAIRS,
+    Rounds,
     run_rounds,
 )
-from hwid_cli.stages.candidate_tasks import Rounds
+from hwid_cli.diagnosis.selection import Judge
+from hwid_cli.drive.catalogue import CATALOGUE
 from tests.diagnosis.small_drive import problem, recordings, sizes, white
 from tests.stages.diagnosed_drive import FRICTION, settings
 

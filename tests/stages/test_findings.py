@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hwid_cli.stages.findings import MOST_OVERLAYS
+from hwid_cli.diagnosis.findings import MOST_OVERLAYS
 from tests.diagnosis.small_drive import N, recordings, simulation
 from tests.stages.diagnosed_drive import FRICTION, breathing, diagnosed
 

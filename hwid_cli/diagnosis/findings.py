@@ -1,6 +1,10 @@
 """What a diagnosis found, put together for files and reports.
 
 Effects of a fit as a report tells them: parameters with intervals, in plain words.
+
+Intervals of fitted parameters, from the derivatives at a fit.
+
+docs/method_diagnosis.md, eq. (D20).
 """
 
 from collections.abc import Sequence
@@ -8,13 +12,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hwid_cli.diagnosis.comparing import compare
-from hwid_cli.diagnosis.intervals import intervals
-from hwid_cli.diagnosis.judge import Judge, ranked
+from hwid_cli.diagnosis.candidate import fitted_drive, rebuilt
 from hwid_cli.diagnosis.latent_force import latent_force
+from hwid_cli.diagnosis.parameters import Layout, Point, compare, residuals, total
 from hwid_cli.diagnosis.problem import Compared, Problem
-from hwid_cli.diagnosis.stored_fit import fitted_drive, rebuilt
-from hwid_cli.diagnosis.verdict import decide
+from hwid_cli.diagnosis.rounds import Found
+from hwid_cli.diagnosis.search import local_matrix
+from hwid_cli.diagnosis.selection import Judge, decide, ranked
+from hwid_cli.diagnosis.sentences import hidden_from_view, propose, summarise
 from hwid_cli.diagnosis.where import latent_force_curves, places
 from hwid_cli.drive.catalogue import CATALOGUE, public_id
 from hwid_cli.drive.effect import Scales
@@ -31,8 +36,73 @@ from hwid_cli.records.diagnosis import (
     RecordingGap,
 )
 from hwid_cli.records.drive import BASE_PARAMETERS
-from hwid_cli.stages.candidate_rounds import Found
-from hwid_cli.stages.diagnosis_sentences import hidden_from_view, propose, summarise
+
+# Normal quantile of a 95 % interval.
+_QUANTILE = 1.96
+# Share of the best determined direction below which one counts as undetermined.
+_DETERMINED = 1e-12
+
+
+def intervals(
+    problem: Problem, found: CandidateFit, scales: Scales
+) -> tuple[np.ndarray, np.ndarray]:
+    """95 % intervals of what all recordings share.
+
+    Parameters
+    ----------
+    problem : Problem
+        Training and held-out recordings; the training ones decide.
+
+    Returns
+    -------
+    low, high : ndarray, shape (n_names,)
+        NaN where a recording cannot be simulated.
+    """
+    if not found.is_usable:
+        nothing = np.full(found.values.size, np.nan)
+        return nothing, nothing
+    fit_layout, point = rebuilt(problem, found, scales)
+    deviations = _standard_errors(problem, found, fit_layout, point)
+    with np.errstate(over="ignore"):
+        ends = np.array(
+            [
+                [
+                    one.value(q + sign * _QUANTILE * deviation)
+                    for one, q, deviation in zip(
+                        fit_layout.shared, point.shared, deviations, strict=True
+                    )
+                ]
+                for sign in (-1.0, 1.0)
+            ]
+        )
+    return ends.min(axis=0), ends.max(axis=0)
+
+
+def _standard_errors(
+    problem: Problem, found: CandidateFit, fit_layout: Layout, point: Point
+) -> np.ndarray:
+    """Standard errors of the shared coordinates."""
+    rows = [row for row, one in enumerate(problem.signals) if not one.is_held_out]
+    train = problem.part(held_out=False)
+    at = Point(point.shared, point.own[rows])
+    matrix = local_matrix(train, fit_layout, at)
+    sse = total(residuals(train, fit_layout, at))
+    freedom = max(train.n_judged - matrix.shape[0], 1)
+    # Residuals that go together count as fewer samples.
+    together = max(found.neighbour, 0.0)
+    inflation = (1 + together) / max(1 - together, 1e-3)
+    scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
+    variances = np.diag(_inverse(matrix / scale[:, None] / scale))
+    shared = slice(len(fit_layout.shared))
+    errors = np.sqrt(sse / freedom * inflation * variances[shared]) / scale[shared]
+    return np.asarray(errors)
+
+
+def _inverse(matrix: np.ndarray) -> np.ndarray:
+    """Inverse in which what nothing determines is large, not infinite."""
+    sizes, turned = np.linalg.eigh(matrix)
+    sizes = np.maximum(sizes, _DETERMINED * sizes[-1])
+    return np.asarray((turned / sizes) @ turned.T)
 
 
 def fitted_effects_of(

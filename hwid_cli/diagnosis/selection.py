@@ -1,9 +1,17 @@
-"""How strong the evidence for a candidate is, and whether it may be named.
+"""The verdict: named, ambiguous, parameters, unknown or none.
+
+docs/method_diagnosis.md, eq. (D21) to (D25).
+
+How strong the evidence for a candidate is, and whether it may be named.
 
 An information criterion alone names something even where nothing is missing: input
 noise or a coarse sensor is enough. Naming therefore also asks for held-out recordings:
 most of their error beyond the noise must be explained, in most of them.
 docs/method_diagnosis.md, eq. (D21) and (D24).
+
+Which candidate is best, and which ones the recordings cannot tell from it.
+
+docs/method_diagnosis.md, eq. (D22), (D23) and (D25).
 """
 
 from collections.abc import Sequence
@@ -12,6 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hwid_cli.diagnosis.problem import Problem
+from hwid_cli.drive.catalogue import CATALOGUE, public_id
 from hwid_cli.records.candidates import CandidateFit, RankedCandidate
 from hwid_cli.records.diagnosis import NoiseFloor
 
@@ -231,3 +240,168 @@ def _row(
         whiteness=found.whiteness,
         note="" if found.has_converged else "stopped at the iteration limit",
     )
+
+
+# Candidates closer than this are not told apart.
+TIE = 6.0
+# An effect that includes another one must add this share of what both gain.
+LEAST_ADDED = 0.03
+
+
+def winner(
+    judge: Judge, found: Sequence[CandidateFit], base: CandidateFit
+) -> CandidateFit | None:
+    """Pick the best candidate, the simplest of those that are as good.
+
+    Parameters
+    ----------
+    found : sequence of CandidateFit
+        Of sets of the same size.
+
+    Returns
+    -------
+    CandidateFit or None
+        None where nothing could be simulated.
+    """
+    usable = [one for one in found if one.is_usable]
+    if not usable:
+        return None
+    best = max(usable, key=lambda one: judge.gain(one, base))
+    for rival in sorted(usable, key=count):
+        if count(rival) >= count(best):
+            continue
+        if is_part_of(rival, best):
+            if not _adds_enough(judge, best, rival, base):
+                best = rival
+        elif judge.gain(best, rival) < TIE:
+            best = rival
+    return best
+
+
+def is_part_of(smaller: CandidateFit, larger: CandidateFit) -> bool:
+    """Whether each effect of one set is in the other, or a limit case of one there."""
+    left = list(larger.effects)
+    for effect in smaller.effects:
+        match = next(
+            (one for one in left if one == effect or effect in CATALOGUE[one].contains),
+            None,
+        )
+        if match is None:
+            return False
+        left.remove(match)
+    return True
+
+
+def _adds_enough(
+    judge: Judge, larger: CandidateFit, smaller: CandidateFit, base: CandidateFit
+) -> bool:
+    gain = judge.gain(larger, smaller)
+    if gain < TIE:
+        return False
+    added = smaller.sse.sum() - larger.sse.sum()
+    together = base.sse.sum() - larger.sse.sum()
+    is_clear = judge.is_complete(larger) and not judge.is_complete(smaller)
+    return bool(added >= LEAST_ADDED * together or is_clear)
+
+
+def rivals(
+    judge: Judge, found: Sequence[CandidateFit], best: CandidateFit
+) -> list[CandidateFit]:
+    """List the candidates that the data cannot tell from the best one.
+
+    Returns
+    -------
+    list of CandidateFit
+        Those that include the best one, or are included in it, are left out: they are
+        judged by what they add.
+    """
+    return [
+        one
+        for one in found
+        if one.is_usable
+        and one is not best
+        and not is_part_of(best, one)
+        and not is_part_of(one, best)
+        and names_of(one) != names_of(best)
+        and judge.gain(best, one) < TIE
+    ]
+
+
+def names_of(found: CandidateFit) -> tuple[str, ...]:
+    """Public ids of a set of effects, sorted."""
+    return tuple(sorted(public_id(one) for one in found.effects))
+
+
+# Whiteness up to which a small remainder counts as noise that is not quite white.
+_NEARLY_WHITE = 2.0
+
+
+@dataclass(frozen=True, eq=False)
+class Verdict:
+    """What is said, and the fit that it rests on.
+
+    Parameters
+    ----------
+    word : str
+        One of ``records.diagnosis.VERDICTS``.
+    chosen : CandidateFit
+        With the effects that are named; the base where there are none.
+    rivals : tuple of CandidateFit
+        Sets of effects that the data cannot tell from the chosen one.
+    """
+
+    word: str
+    is_complete: bool
+    chosen: CandidateFit
+    rivals: tuple[CandidateFit, ...]
+
+
+def decide(
+    judge: Judge,
+    given_sse: np.ndarray,
+    base: CandidateFit,
+    fits: Sequence[CandidateFit],
+    best: Sequence[CandidateFit],
+) -> Verdict:
+    """Weigh the evidence.
+
+    Parameters
+    ----------
+    given_sse : ndarray, shape (n_recordings,)
+        Of the simulation with the parameters that the configuration gives.
+    base : CandidateFit
+        Re-fitted, without further effects.
+    fits : sequence of CandidateFit
+        Of all sets of effects.
+    best : sequence of CandidateFit
+        The best of each size, each worth its further effect.
+    """
+    if judge.is_complete(base):
+        return Verdict(_without_effect(judge, given_sse, base), True, base, ())
+    for chosen in reversed(best):
+        if not judge.may_be_named(chosen, base):
+            continue
+        same_size = [one for one in fits if len(one.effects) == len(chosen.effects)]
+        near = [
+            one
+            for one in rivals(judge, same_size, chosen)
+            if judge.may_be_named(one, base)
+        ]
+        word = "ambiguous" if near else "named"
+        return Verdict(word, judge.is_complete(chosen), chosen, tuple(near))
+    if judge.ratio(base) <= CLOSE_TO_NOISE and base.whiteness <= _NEARLY_WHITE:
+        return Verdict(_without_effect(judge, given_sse, base), True, base, ())
+    return Verdict("unknown", False, base, ())
+
+
+def _without_effect(judge: Judge, given_sse: np.ndarray, base: CandidateFit) -> str:
+    """``parameters`` if the re-fit was needed, else ``none``."""
+    before, after = float(given_sse.sum()), float(base.sse.sum())
+    if not np.isfinite(before):
+        return "parameters"
+    n = float(judge.n_samples.sum())
+    gain = n * np.log(max(before, 1e-300) / max(after, 1e-300))
+    least = LEAST_GAIN + base.values.size * np.log(n)
+    # Noise-free records: rounding differences are no parameters.
+    is_visible = before > after * 1.001
+    return "parameters" if gain > least and is_visible else "none"

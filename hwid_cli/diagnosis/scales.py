@@ -1,4 +1,6 @@
-"""Lines of an error: frequencies in time, periods along the way.
+"""Sizes for start values, from what a fit leaves of the recordings.
+
+Lines of an error: frequencies in time, periods along the way.
 
 docs/method_diagnosis.md, eq. (D15).
 """
@@ -8,11 +10,14 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.signal import lfilter
 
+from hwid_cli.diagnosis.candidate import fitted_drive, rebuilt
 from hwid_cli.diagnosis.covariates import judged_force, judged_position
-from hwid_cli.diagnosis.latent_force import Smoothed, finite
-from hwid_cli.diagnosis.problem import Compared
+from hwid_cli.diagnosis.latent_force import Smoothed, finite, latent_force
+from hwid_cli.diagnosis.parameters import compare
+from hwid_cli.diagnosis.problem import Compared, Problem, scales
 from hwid_cli.diagnosis.segments import parabolic_peak
-from hwid_cli.drive.effect import Wave
+from hwid_cli.drive.effect import Scales, Wave
+from hwid_cli.records.candidates import CandidateFit
 from hwid_cli.records.diagnosis import NoiseFloor
 
 _MOST_LINES = 3
@@ -160,3 +165,27 @@ def _highest_peaks(values: np.ndarray) -> list[float]:
         if len(chosen) == _MOST_LINES:
             break
     return [float(parabolic_peak(values, peak)) for peak in chosen]
+
+
+def scales_of(
+    problem: Problem, found: CandidateFit, given: Scales, noise: NoiseFloor
+) -> Scales:
+    """Sizes with the speeds of a fit, and the lines of the error that it leaves.
+
+    Parameters
+    ----------
+    problem : Problem
+        The recordings that the fit was judged on.
+    found : CandidateFit
+        Able to simulate them all.
+    given : Scales
+        That the fit was made with.
+    """
+    compared = compare(problem, *rebuilt(problem, found, given))
+    drive = fitted_drive(problem.drive, found)
+    return scales(
+        problem,
+        [one.velocity for one in compared],
+        line_frequencies(compared, noise),
+        waves_along(compared, latent_force(compared, drive, noise)),
+    )

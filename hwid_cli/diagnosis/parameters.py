@@ -1,4 +1,6 @@
-"""What a fit may change: parameters of the base, of effects, and of each recording.
+"""Simulations beside measurements, at a point of a fit.
+
+What a fit may change: parameters of the base, of effects, and of each recording.
 
 A fit works on coordinates without units: logarithms of what is positive, multiples of a
 typical size of what may have either sign. docs/method_diagnosis.md, eq. (D17).
@@ -10,11 +12,17 @@ from typing import Any
 
 import numpy as np
 
-from hwid_cli.diagnosis.problem import Problem
+from hwid_cli.diagnosis.problem import Compared, Problem
 from hwid_cli.drive import slots
 from hwid_cli.drive.catalogue import CATALOGUE
 from hwid_cli.drive.effect import Parameter, Scales
-from hwid_cli.drive.simulation import parameter_vector, set_start
+from hwid_cli.drive.simulation import (
+    REFINEMENT,
+    Motion,
+    parameter_vector,
+    run,
+    set_start,
+)
 from hwid_cli.records.drive import BASE_PARAMETERS, Drive
 
 START = "start"
@@ -281,3 +289,48 @@ def _place_start(
             vector[slots.OUTPUT_ZERO] = found["position"] - rest_position
     elif problem.drive.stiffness_N_per_m == 0:
         set_start(vector, rest_position, 0.0)
+
+
+def simulate(problem: Problem, fit_layout: Layout, point: Point) -> list[Motion]:
+    """Simulate all recordings at a point."""
+    vectors = vectors_at(problem, fit_layout, point)
+    pairs = zip(problem.signals, vectors, strict=True)
+    if problem.drive.hold == "smooth":
+        return [
+            run(
+                signals.finely_driven_by,
+                vector,
+                signals.sample_time_s,
+                refinement=REFINEMENT,
+            )
+            for signals, vector in pairs
+        ]
+    return [
+        run(signals.driven_by, vector, signals.sample_time_s)
+        for signals, vector in pairs
+    ]
+
+
+def compare(problem: Problem, fit_layout: Layout, point: Point) -> list[Compared]:
+    """Put simulations beside the measurements."""
+    motions = simulate(problem, fit_layout, point)
+    return [
+        Compared(
+            signals,
+            motion.command if problem.compares_command else motion.output,
+            motion.position,
+            motion.velocity,
+        )
+        for signals, motion in zip(problem.signals, motions, strict=True)
+    ]
+
+
+def residuals(problem: Problem, fit_layout: Layout, point: Point) -> list[np.ndarray]:
+    """Measured minus simulated of each recording, where it is judged."""
+    return [one.residual for one in compare(problem, fit_layout, point)]
+
+
+def total(parts: list[np.ndarray]) -> float:
+    """Sum of squares; infinite where a simulation ran away."""
+    sse = sum(float(one @ one) for one in parts)
+    return sse if np.isfinite(sse) else float("inf")

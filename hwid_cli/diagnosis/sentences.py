@@ -4,17 +4,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hwid_cli.diagnosis.candidate import rebuilt
 from hwid_cli.diagnosis.next_experiment import Model, best_separation
 from hwid_cli.diagnosis.problem import Problem
-from hwid_cli.diagnosis.stored_fit import rebuilt
-from hwid_cli.diagnosis.verdict import Verdict
+from hwid_cli.diagnosis.selection import Verdict
 from hwid_cli.drive.catalogue import public_id
 from hwid_cli.records.candidates import CandidateFit
 from hwid_cli.records.diagnosis import FittedEffect, NextExperiment
 from hwid_cli.records.units import behind
 
 if TYPE_CHECKING:
-    from hwid_cli.stages.findings import Findings
+    from hwid_cli.diagnosis.findings import Findings
 
 # Share of the largest displacement that counts as motion to one side.
 _ONE_SIDE = 0.05
