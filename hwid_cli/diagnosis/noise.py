@@ -18,7 +18,7 @@ from scipy.optimize import least_squares
 from scipy.signal import lfilter
 from scipy.stats import chi2
 
-from hwid_cli.diagnosis.problem import Problem, Signals, rest_length
+from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals, rest_length
 from hwid_cli.records.diagnosis import NoiseFloor
 from hwid_cli.records.units import behind
 
@@ -238,7 +238,7 @@ class _Stretch:
     whitening: tuple[float, ...]
 
 
-def noise_floor(problem: Problem, *, rests: bool = True) -> NoiseFloor:
+def noise_floor(problem: DiagnosisProblem, *, rests: bool = True) -> NoiseFloor:
     """How much of what is compared is noise.
 
     Parameters
@@ -251,7 +251,9 @@ def noise_floor(problem: Problem, *, rests: bool = True) -> NoiseFloor:
     NoiseFloor
         Never NaN; next to 0 where the recordings hold none.
     """
-    pieces = [one.compared[one.judged] for one in problem.signals if one.n_judged > 0]
+    pieces = [
+        one.compared[one.evaluated] for one in problem.signals if one.n_evaluated > 0
+    ]
     grid = _grid(pieces)
     step = grid / np.sqrt(12)
     differences = _from_differences(pieces, step)

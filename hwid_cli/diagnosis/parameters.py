@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from hwid_cli.diagnosis.problem import Compared, Problem
+from hwid_cli.diagnosis.problem import Compared, DiagnosisProblem
 from hwid_cli.drive import slots
 from hwid_cli.drive.catalogue import CATALOGUE
 from hwid_cli.drive.effect import Parameter, Scales
@@ -23,9 +23,11 @@ from hwid_cli.drive.simulation import (
     run,
     set_start,
 )
+from hwid_cli.records.candidates import ParameterRef
 from hwid_cli.records.drive import BASE_PARAMETERS, Drive
 
-START = "start"
+# Owners beside the effects: the base, and how a recording starts.
+BASE, START = "base", "start"
 # A damping of zero is searched from this share of what halves an oscillation.
 _SMALL_DAMPING = 0.02
 
@@ -50,6 +52,11 @@ class Unknown:
     scale: float
     low: float
     high: float
+
+    @property
+    def ref(self) -> ParameterRef:
+        """What a fit keeps of it."""
+        return ParameterRef(self.owner, self.name)
 
     def value(self, coordinate: float) -> float:
         """Value at a coordinate.
@@ -84,7 +91,7 @@ class Unknown:
 
 
 @dataclass(frozen=True)
-class Layout:
+class ParameterLayout:
     """All coordinates of a fit.
 
     Parameters
@@ -113,7 +120,7 @@ class Layout:
 
 
 @dataclass(frozen=True, eq=False)
-class Point:
+class ParameterPoint:
     """Values of all coordinates.
 
     Parameters
@@ -126,12 +133,12 @@ class Point:
     own: np.ndarray
 
 
-def layout(
-    problem: Problem,
+def parameter_layout(
+    problem: DiagnosisProblem,
     effects: Sequence[str],
     start: Mapping[str, Mapping[str, float]],
     scales: Scales,
-) -> Layout:
+) -> ParameterLayout:
     """Coordinates of a fit of the base and effects.
 
     Parameters
@@ -155,7 +162,7 @@ def layout(
     if problem.start == "estimated":
         speed = scales.velocity_m_per_s
         own.append(Unknown(START, "velocity", False, speed, -far, far))
-    return Layout(tuple(shared), tuple(own), tuple(effects))
+    return ParameterLayout(tuple(shared), tuple(own), tuple(effects))
 
 
 def _base_unknowns(drive: Drive) -> list[Unknown]:
@@ -172,7 +179,7 @@ def _base_unknowns(drive: Drive) -> list[Unknown]:
         low, high = (
             (1e-4 * size, 1e4 * size) if value > 0 else (-1e4 * size, -1e-4 * size)
         )
-        unknowns.append(Unknown("base", name, True, value, low, high))
+        unknowns.append(Unknown(BASE, name, True, value, low, high))
     return unknowns
 
 
@@ -186,11 +193,11 @@ def _unknown(owner: str, parameter: Parameter, value: float, scales: Scales) -> 
 
 
 def first_point(
-    problem: Problem,
-    fit_layout: Layout,
+    problem: DiagnosisProblem,
+    fit_layout: ParameterLayout,
     drive: Drive,
     start: Mapping[str, Mapping[str, float]],
-) -> Point:
+) -> ParameterPoint:
     """Point that a search starts from.
 
     Parameters
@@ -202,7 +209,7 @@ def first_point(
     """
     shared = []
     for one in fit_layout.shared:
-        if one.owner == "base":
+        if one.owner == BASE:
             value = getattr(drive, one.name) or one.scale
         else:
             value = start[one.owner][one.name]
@@ -215,21 +222,23 @@ def first_point(
                 each[row, column] = one.coordinate(value)
             elif one.name == "position" and problem.start == "estimated":
                 each[row, column] = one.coordinate(float(signals.output[0]))
-    return Point(np.array(shared), each)
+    return ParameterPoint(np.array(shared), each)
 
 
-def drive_at(problem: Problem, fit_layout: Layout, point: Point) -> Drive:
+def drive_at(
+    problem: DiagnosisProblem, fit_layout: ParameterLayout, point: ParameterPoint
+) -> Drive:
     """Drive with the base of a point."""
     base: dict[str, Any] = {
         one.name: one.value(q)
         for one, q in zip(fit_layout.shared, point.shared, strict=True)
-        if one.owner == "base"
+        if one.owner == BASE
     }
     return replace(problem.drive, **base)
 
 
 def effects_at(
-    fit_layout: Layout, point: Point, row: int | None = None
+    fit_layout: ParameterLayout, point: ParameterPoint, row: int | None = None
 ) -> dict[str, dict[str, float]]:
     """Effects with the values of a point.
 
@@ -249,7 +258,9 @@ def effects_at(
     return values
 
 
-def vectors_at(problem: Problem, fit_layout: Layout, point: Point) -> list[np.ndarray]:
+def vectors_at(
+    problem: DiagnosisProblem, fit_layout: ParameterLayout, point: ParameterPoint
+) -> list[np.ndarray]:
     """Vector of parameters for each recording.
 
     Returns
@@ -272,9 +283,9 @@ def vectors_at(problem: Problem, fit_layout: Layout, point: Point) -> list[np.nd
 
 def _place_start(
     vector: np.ndarray,
-    problem: Problem,
+    problem: DiagnosisProblem,
     rest_position: float,
-    fit_layout: Layout,
+    fit_layout: ParameterLayout,
     own: np.ndarray,
 ) -> None:
     if problem.start != "rest":
@@ -291,7 +302,9 @@ def _place_start(
         set_start(vector, rest_position, 0.0)
 
 
-def simulate(problem: Problem, fit_layout: Layout, point: Point) -> list[Motion]:
+def simulate_at(
+    problem: DiagnosisProblem, fit_layout: ParameterLayout, point: ParameterPoint
+) -> list[Motion]:
     """Simulate all recordings at a point."""
     vectors = vectors_at(problem, fit_layout, point)
     pairs = zip(problem.signals, vectors, strict=True)
@@ -311,9 +324,11 @@ def simulate(problem: Problem, fit_layout: Layout, point: Point) -> list[Motion]
     ]
 
 
-def compare(problem: Problem, fit_layout: Layout, point: Point) -> list[Compared]:
+def compare_at(
+    problem: DiagnosisProblem, fit_layout: ParameterLayout, point: ParameterPoint
+) -> list[Compared]:
     """Put simulations beside the measurements."""
-    motions = simulate(problem, fit_layout, point)
+    motions = simulate_at(problem, fit_layout, point)
     return [
         Compared(
             signals,
@@ -325,12 +340,26 @@ def compare(problem: Problem, fit_layout: Layout, point: Point) -> list[Compared
     ]
 
 
-def residuals(problem: Problem, fit_layout: Layout, point: Point) -> list[np.ndarray]:
-    """Measured minus simulated of each recording, where it is judged."""
-    return [one.residual for one in compare(problem, fit_layout, point)]
+def residuals_at(
+    problem: DiagnosisProblem, fit_layout: ParameterLayout, point: ParameterPoint
+) -> list[np.ndarray]:
+    """Measured minus simulated of each recording, where it is evaluated."""
+    return [one.residual for one in compare_at(problem, fit_layout, point)]
 
 
-def total(parts: list[np.ndarray]) -> float:
+def sum_of_squares(parts: list[np.ndarray]) -> float:
     """Sum of squares; infinite where a simulation ran away."""
     sse = sum(float(one @ one) for one in parts)
     return sse if np.isfinite(sse) else float("inf")
+
+
+def each_sum_of_squares(parts: Sequence[np.ndarray]) -> np.ndarray:
+    """Sum of squares of each recording; infinite where a simulation ran away.
+
+    Returns
+    -------
+    ndarray, shape (n_recordings,), [output unit squared]
+    """
+    sse = np.array([float(part @ part) for part in parts])
+    sse[~np.isfinite(sse)] = np.inf
+    return sse

@@ -11,7 +11,6 @@ from functools import cached_property
 
 import numpy as np
 
-from hwid_cli.drive.effect import Scales, Wave
 from hwid_cli.drive.simulation import refined
 from hwid_cli.records.drive import Drive
 from hwid_cli.records.experiment import DiagnoseOptions, SimulationOptions
@@ -36,7 +35,7 @@ class Signals:
     output : ndarray, shape (n_samples,), [m]
     sample_time_s : float, [s]
     skip : int, [samples]
-        First samples that are not judged.
+        First samples that are not evaluated.
     """
 
     name: str
@@ -55,13 +54,13 @@ class Signals:
         return refined(self.driven_by)
 
     @property
-    def judged(self) -> slice:
-        """Samples that are judged."""
+    def evaluated(self) -> slice:
+        """Samples that are evaluated."""
         return slice(self.skip, None)
 
     @property
-    def n_judged(self) -> int:
-        """Number of samples that are judged."""
+    def n_evaluated(self) -> int:
+        """Number of samples that are evaluated."""
         return int(self.compared.size - self.skip)
 
     @cached_property
@@ -72,7 +71,7 @@ class Signals:
 
 
 @dataclass(frozen=True, eq=False)
-class Problem:
+class DiagnosisProblem:
     """Recordings that one fit works on, and the drive that it starts from.
 
     Parameters
@@ -96,11 +95,11 @@ class Problem:
         return self.drive.controller is not None
 
     @property
-    def n_judged(self) -> int:
-        """Number of samples that are judged in all recordings."""
-        return sum(one.n_judged for one in self.signals)
+    def n_evaluated(self) -> int:
+        """Number of samples that are evaluated in all recordings."""
+        return sum(one.n_evaluated for one in self.signals)
 
-    def part(self, *, held_out: bool) -> "Problem":
+    def part(self, *, held_out: bool) -> "DiagnosisProblem":
         """Only the recordings that are held out, or only the others."""
         chosen = tuple(one for one in self.signals if one.is_held_out == held_out)
         return replace(self, signals=chosen)
@@ -125,8 +124,8 @@ class Compared:
 
     @property
     def residual(self) -> np.ndarray:
-        """Measured minus simulated, where it is judged."""
-        return (self.signals.compared - self.simulated)[self.signals.judged]
+        """Measured minus simulated, where it is evaluated."""
+        return (self.signals.compared - self.simulated)[self.signals.evaluated]
 
     @property
     def rms(self) -> float:
@@ -151,59 +150,12 @@ def rest_length(driven_by: np.ndarray) -> int:
     return int(moved[0]) if moved.size else int(driven_by.size)
 
 
-def scales(
-    problem: Problem,
-    velocities: Sequence[np.ndarray],
-    frequencies_Hz: tuple[float, ...] = (),
-    waves: tuple[Wave, ...] = (),
-) -> Scales:
-    """Sizes of what the recordings hold.
-
-    Parameters
-    ----------
-    velocities : sequence of ndarray, [m/s]
-        Of the base's simulation, one for each recording.
-    frequencies_Hz : tuple of float, [Hz]
-        Highest lines of the base's error.
-    waves : tuple of Wave
-        With which it repeats along the way.
-    """
-    drive, all_signals = problem.drive, problem.signals
-    largest = [max(float(np.max(np.abs(one.output))) for one in all_signals)]
-    current = max(float(np.max(np.abs(one.input))) for one in all_signals)
-    stroke = max(float(np.ptp(one.output)) for one in all_signals)
-    rate = max(
-        float(np.max(np.abs(np.diff(one.input)))) / one.sample_time_s
-        for one in all_signals
-    )
-    speed = max(float(np.nanmax(np.abs(one))) for one in velocities)
-    duration = max(one.compared.size * one.sample_time_s for one in all_signals)
-    natural = np.sqrt(drive.stiffness_N_per_m / drive.mass_kg) / (2 * np.pi)
-    force = abs(drive.force_constant_N_per_A) * current
-    if drive.resistance_ohm is not None:
-        force /= drive.resistance_ohm
-    return Scales(
-        displacement_m=max(largest[0], 1e-12),
-        velocity_m_per_s=max(speed, 1e-12),
-        current_A=max(current, 1e-12),
-        current_rate_A_per_s=max(rate, 1e-12),
-        stroke_m=max(stroke, 1e-12),
-        force_N=max(force, 1e-12),
-        mass_kg=drive.mass_kg,
-        natural_Hz=float(max(natural, 2.0 / duration)),
-        sample_time_s=min(one.sample_time_s for one in all_signals),
-        duration_s=duration,
-        frequencies_Hz=frequencies_Hz,
-        waves=waves,
-    )
-
-
 def prepare(
     recordings: Sequence[Recording],
     simulation: SimulationOptions,
     options: DiagnoseOptions,
     held_out: Sequence[str],
-) -> Problem:
+) -> DiagnosisProblem:
     """Recordings as the fits need them, and the drive with its references.
 
     Parameters
@@ -215,7 +167,7 @@ def prepare(
     """
     signals = tuple(_signals(one, simulation, options, held_out) for one in recordings)
     train = [one for one in signals if not one.is_held_out] or list(signals)
-    return Problem(
+    return DiagnosisProblem(
         signals,
         drive_of(simulation, train),
         options.initial_state,
@@ -277,7 +229,7 @@ def _signals(
     )
 
 
-# Every third recording of a kind judges; amplitudes and speeds take turns.
+# Every third recording of a kind validates; amplitudes and speeds take turns.
 _EVERY = 3
 _SAME = 0.05
 

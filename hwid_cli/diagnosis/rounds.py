@@ -1,45 +1,104 @@
-"""Rounds of candidate fits: single effects, then pairs, then sets of three.
+"""Rounds of candidate fits: forecasts, single effects, pairs, then sets of three.
 
-Forecasts and fits of candidates, over the workers; fits are kept in the store.
+Each round describes its fits as tasks and hands them to a runner that it is given, so
+that nothing here knows of processes or of a cache. docs/method_diagnosis.md.
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from math import exp
+from typing import Any, Protocol
+
+import numpy as np
 
 from hwid_cli.diagnosis.candidate import (
-    RACE_SAMPLES,
-    Footing,
+    SCREENING_SAMPLES,
+    Baseline,
     Start,
+    fewer_recordings,
     fit_candidate,
     fitted_drive,
     fitted_effects,
     fitted_start,
-    thinned,
 )
-from hwid_cli.diagnosis.forecast import Forecast, Ground, forecast, ground, pair_shares
-from hwid_cli.diagnosis.parameters import total
-from hwid_cli.diagnosis.problem import Problem
-from hwid_cli.diagnosis.scales import scales_of
+from hwid_cli.diagnosis.forecast import (
+    Forecast,
+    Linearisation,
+    forecast,
+    linearise,
+    pair_shares,
+)
+from hwid_cli.diagnosis.parameters import sum_of_squares
+from hwid_cli.diagnosis.problem import DiagnosisProblem
+from hwid_cli.diagnosis.scales import scales_of_fit
 from hwid_cli.diagnosis.selection import (
     LEAST_EXPLAINED_SET,
     LEAST_GAIN,
     LEAST_IMPROVED,
     TIE,
-    Judge,
-    winner,
+    SelectionCriteria,
+    select_best,
 )
-from hwid_cli.drive.catalogue import CATALOGUE
+from hwid_cli.drive.catalogue import CATALOGUE, public_id
 from hwid_cli.drive.simulation import drive_effects
 from hwid_cli.records.candidates import CandidateFit
-from hwid_cli.tasks.cache import MemoryStore, task_key
-from hwid_cli.tasks.runner import RunSettings, Task, run_tasks
 
-STAGE = "diagnose"
-STAGE_VERSION = 1
+# Candidates that are fitted: the first ones by their forecast, more while they reach a
+# share of the best one's, and what includes the first few or is included in them.
+FEWEST_SINGLES = 5
+MOST_SINGLES = 10
+PROMISING = 0.1
+NESTED_OF = 3
+# A candidate that comes to less than this share of the best forecast is not finished.
+PRUNED_SHARE = 0.5
+# A further effect is fitted where it should explain this share of what is left beyond
+# the noise, a pair where it should explain this much more than its better half.
+PROMISING_ON_TOP = 0.15
+PROMISING_PAIR = 0.1
+FITTED_PAIRS = 10
+FITTED_ON_TOP = 8
+# Starts of a simpler effect in the place of another one.
+MOST_STARTS = 4
 
-Announce = Callable[[str, int], None]
+OnRound = Callable[[str, int], None]
 EffectSet = tuple[tuple[str, ...], list[Start]]
+
+
+@dataclass(frozen=True, eq=False)
+class DiagnosisTask:
+    """One call for whoever runs the tasks of a diagnosis.
+
+    Parameters
+    ----------
+    name : str
+        For people.
+    function : callable
+        At module level, so that a worker can import it.
+    result_type : type
+        Record type of the result.
+    content : mapping
+        With the arrays, all that tells it from other tasks of the same diagnosis.
+    """
+
+    name: str
+    function: Callable[..., Any]
+    arguments: tuple[Any, ...]
+    result_type: type
+    content: Mapping[str, Any]
+    arrays: tuple[np.ndarray, ...] = ()
+
+
+class RunTasks(Protocol):
+    """Whatever runs tasks: in turn, over processes, from a cache."""
+
+    def __call__(self, tasks: Sequence[DiagnosisTask], *, keep: bool) -> list[Any]:
+        """Results in the order of the tasks.
+
+        Parameters
+        ----------
+        keep : bool
+            Whether the results are worth keeping for another run.
+        """
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,127 +107,25 @@ class Rounds:
 
     Parameters
     ----------
-    key : str
-        Hash of the recordings, the simulation and the options.
-    footing : Footing
+    baseline : Baseline
         With the re-fitted base.
     allowed : tuple of str
         Ids in the catalogue that may be named.
-    announce : callable
+    on_round : callable
         Called with what begins and its number of tasks.
     """
 
-    problem: Problem
-    key: str
-    footing: Footing
-    judge: Judge
+    problem: DiagnosisProblem
+    baseline: Baseline
+    criteria: SelectionCriteria
     base: CandidateFit
     allowed: tuple[str, ...]
-    settings: RunSettings
-    announce: Announce
-
-
-def forecast_all(
-    rounds: Rounds, level: Ground, candidates: Sequence[str]
-) -> list[Forecast]:
-    """Rank candidates by what they should explain; quick, so not kept in the store.
-
-    Parameters
-    ----------
-    candidates : sequence of str
-        Ids in the catalogue.
-
-    Returns
-    -------
-    list of Forecast
-        The largest share first.
-    """
-    rounds.announce("forecasts", len(candidates))
-    tasks = [Task(one, one, forecast, (level, one), Forecast) for one in candidates]
-    settings = replace(rounds.settings, store=MemoryStore())
-    found = [one.result for one in run_tasks(tasks, settings)]
-    return sorted(found, key=lambda one: -one.share)
-
-
-def fit_all(
-    rounds: Rounds,
-    what: str,
-    sets: Sequence[EffectSet],
-    hopeless: float,
-) -> list[CandidateFit]:
-    """Fit sets of effects, or take their fits from the store.
-
-    Parameters
-    ----------
-    what : str
-        Announced.
-    sets : sequence of (tuple of str, list of mapping)
-        Ids of a set's effects, and the values to start from.
-    hopeless : float
-        Sum of squares in a race beyond which a fit is not finished.
-    """
-    if not sets:
-        return []
-    rounds.announce(what, len(sets))
-    tasks = [
-        Task(
-            key=task_key(
-                STAGE,
-                STAGE_VERSION,
-                {
-                    "problem": rounds.key,
-                    "effects": ids,
-                    "starts": starts,
-                    "hopeless": hopeless,
-                },
-                [rounds.base.values],
-            ),
-            name="+".join(ids),
-            function=_fit_task,
-            arguments=(
-                rounds.problem,
-                ids,
-                tuple(starts),
-                rounds.footing,
-                hopeless,
-            ),
-            result_type=CandidateFit,
-        )
-        for ids, starts in sets
-    ]
-    return [one.result for one in run_tasks(tasks, rounds.settings)]
-
-
-def _fit_task(
-    problem: Problem,
-    effects: tuple[str, ...],
-    starts: tuple[Start, ...],
-    footing: Footing,
-    hopeless: float,
-) -> CandidateFit:
-    return fit_candidate(problem, effects, starts, footing, hopeless=hopeless)
-
-
-# Candidates that are fitted: the first ones by their forecast, more while they reach a
-# share of the best one's, and what includes the first few or is included in them.
-FEWEST_SINGLES = 5
-MOST_SINGLES = 10
-PROMISING = 0.1
-# A candidate that comes to less than this share of the best forecast is not finished.
-HOPELESS = 0.5
-# A further effect is fitted where it should explain this share of what is left beyond
-# the noise, a pair where it should explain this much more than its better half.
-PROMISING_ON_TOP = 0.15
-PROMISING_PAIR = 0.1
-KIN_OF = 3
-FITTED_PAIRS = 10
-FITTED_ON_TOP = 8
-# Starts of a simpler effect in the place of another one.
-MOST_STARTS = 4
+    run_tasks: RunTasks
+    on_round: OnRound
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class RoundsResult:
     """What the rounds have found.
 
     Parameters
@@ -184,59 +141,119 @@ class Found:
     shares: dict[tuple[str, ...], float]
 
 
-def run_rounds(rounds: Rounds, max_effects: int) -> Found:
+def run_rounds(rounds: Rounds, max_effects: int) -> RoundsResult:
     """Fit single effects, and larger sets while something remains."""
     present = drive_effects(rounds.problem.drive)
-    thin = thinned(rounds.problem.part(held_out=False), RACE_SAMPLES)
+    few = fewer_recordings(rounds.problem.part(held_out=False), SCREENING_SAMPLES)
     start = fitted_start(rounds.base, present)
-    level = ground(thin, rounds.footing.drive, start, rounds.footing.scales)
-    forecasts = forecast_all(rounds, level, rounds.allowed)
+    at_base = linearise(few, rounds.baseline.drive, start, rounds.baseline.scales)
+    forecasts = forecast_all(rounds, at_base, rounds.allowed)
     shares: dict[tuple[str, ...], float] = {
         (one.effect,): one.share for one in forecasts
     }
     if not forecasts or max_effects < 1:
-        return Found((), (), shares)
-    singles = _fit_singles(rounds, level, forecasts)
-    best = winner(rounds.judge, singles, rounds.base)
+        return RoundsResult((), (), shares)
+    singles = _fit_singles(rounds, at_base, forecasts)
+    best = select_best(rounds.criteria, singles, rounds.base)
     if best is None:
-        return Found(tuple(singles), (), shares)
-    found = Found(tuple(singles), (best,), shares)
-    if rounds.judge.is_complete(best) or max_effects < 2:
+        return RoundsResult(tuple(singles), (), shares)
+    found = RoundsResult(tuple(singles), (best,), shares)
+    if rounds.criteria.is_complete(best) or max_effects < 2:
         return found
-    together = pair_shares(forecasts, level.error)
+    pairs = pair_shares(forecasts, at_base.error)
     for size in range(2, max_effects + 1):
-        larger, hopeless = _larger_sets(rounds, found, forecasts, together, thin, size)
-        found, has_grown = _with_larger(rounds, found, larger, hopeless)
-        if not has_grown or rounds.judge.is_complete(found.best[-1]):
+        sets, pruning_limit = _sets_on_top(rounds, found, few)
+        if size == 2:
+            sets = _with_likely_pairs(sets, forecasts, pairs)
+        found, is_worth_it = _fit_larger_sets(rounds, found, sets, pruning_limit)
+        if not is_worth_it or rounds.criteria.is_complete(found.best[-1]):
             break
     return found
 
 
+def forecast_all(
+    rounds: Rounds, at_base: Linearisation, candidates: Sequence[str]
+) -> list[Forecast]:
+    """Rank candidates by what they should explain; too quick to be kept.
+
+    Parameters
+    ----------
+    candidates : sequence of str
+        Ids in the catalogue.
+
+    Returns
+    -------
+    list of Forecast
+        The largest share first.
+    """
+    rounds.on_round("forecasts", len(candidates))
+    tasks = [
+        DiagnosisTask(one, forecast, (at_base, one), Forecast, {"effect": one})
+        for one in candidates
+    ]
+    found: list[Forecast] = rounds.run_tasks(tasks, keep=False)
+    return sorted(found, key=lambda one: -one.share)
+
+
+def fit_all(
+    rounds: Rounds, what: str, sets: Sequence[EffectSet], pruning_limit: float
+) -> list[CandidateFit]:
+    """Fit sets of effects.
+
+    Parameters
+    ----------
+    what : str
+        Announced.
+    sets : sequence of (tuple of str, list of mapping)
+        Ids of a set's effects, and the values to start from.
+    pruning_limit : float
+        Sum of squares in the screening beyond which a fit is not finished.
+    """
+    if not sets:
+        return []
+    rounds.on_round(what, len(sets))
+    tasks = [
+        DiagnosisTask(
+            name="+".join(ids),
+            function=fit_candidate,
+            arguments=(
+                rounds.problem, ids, tuple(starts), rounds.baseline, pruning_limit,
+            ),
+            result_type=CandidateFit,
+            # Part of the keys of kept fits: another word would lose them all.
+            content={"effects": ids, "starts": starts, "hopeless": pruning_limit},
+            arrays=(rounds.base.values,),
+        )
+        for ids, starts in sets
+    ]  # fmt: skip
+    return rounds.run_tasks(tasks, keep=True)
+
+
 def _fit_singles(
-    rounds: Rounds, level: Ground, forecasts: Sequence[Forecast]
+    rounds: Rounds, at_base: Linearisation, forecasts: Sequence[Forecast]
 ) -> list[CandidateFit]:
     """Fit single effects; those that include others come last and must be better."""
-    chosen = _chosen(forecasts)
+    chosen = _promising(forecasts)
     ids = {one.effect for one in chosen}
     wide = {one for one in ids if ids & set(CATALOGUE[one].contains)}
-    hopeless = _hopeless(level, forecasts)
+    pruning_limit = _pruning_limit(at_base, forecasts)
     narrow = [((one.effect,), _starts(one)) for one in chosen if one.effect not in wide]
-    fits = fit_all(rounds, "single effects", narrow, hopeless)
-    best = winner(rounds.judge, fits, rounds.base)
+    fits = fit_all(rounds, "single effects", narrow, pruning_limit)
+    best = select_best(rounds.criteria, fits, rounds.base)
     for is_wider in (False, True):
         sets = [
             ((one.effect,), _starts(one))
             for one in chosen
             if one.effect in wide and is_wider == _includes(one.effect, best)
         ]
-        least = hopeless
+        least = pruning_limit
         if best is not None:
-            names = {one.name for one in level.problem.signals}
+            names = {one.name for one in at_base.problem.signals}
             rows = [one.name in names for one in rounds.problem.signals]
-            # What includes the best must gain in a race; a rival may be as good.
+            # What includes the best must gain in the screening; a rival may be as good.
             likelihood = -1.0 if is_wider else TIE
-            near = exp(likelihood / level.problem.n_judged)
-            least = min(hopeless, float(best.sse[rows].sum() * near))
+            near = exp(likelihood / at_base.problem.n_evaluated)
+            least = min(pruning_limit, float(best.sse[rows].sum() * near))
         fits += fit_all(rounds, "effects that include others", sets, least)
     return fits
 
@@ -249,108 +266,109 @@ def _starts(expected: Forecast) -> list[Start]:
     return [{expected.effect: start} for start in expected.starts]
 
 
-def _chosen(forecasts: Sequence[Forecast]) -> list[Forecast]:
-    """First ones by forecast, with the kin of the very first."""
+def _promising(forecasts: Sequence[Forecast]) -> list[Forecast]:
+    """First ones by forecast, with those nested with the very first."""
     least = PROMISING * forecasts[0].share
-    first = {
+    chosen = {
         one.effect
         for rank, one in enumerate(forecasts[:MOST_SINGLES])
         if rank < FEWEST_SINGLES or one.share >= least
     }
-    kin = [one.effect for one in forecasts[:KIN_OF]]
+    first = [one.effect for one in forecasts[:NESTED_OF]]
     for one in forecasts:
         contains = CATALOGUE[one.effect].contains
-        if any(name in contains for name in kin):
-            first.add(one.effect)
-        if one.effect in kin:
-            first |= set(contains)
-    return [one for one in forecasts if one.effect in first]
+        if any(name in contains for name in first):
+            chosen.add(one.effect)
+        if one.effect in first:
+            chosen |= set(contains)
+    return [one for one in forecasts if one.effect in chosen]
 
 
-def _larger_sets(
-    rounds: Rounds,
-    found: Found,
-    forecasts: Sequence[Forecast],
-    together: Sequence[tuple[float, str, str]],
-    thin: Problem,
-    size: int,
-) -> tuple[list[EffectSet], float]:
-    """Sets that may be better: the best one with another effect, and likely pairs."""
-    best = found.best[-1]
-    held = fitted_effects(best)
-    drive = fitted_drive(rounds.problem.drive, best)
-    others = [one for one in rounds.allowed if not _is_kin(one, best.effects)]
-    footing = rounds.footing
-    sizes = scales_of(rounds.problem, best, footing.scales, footing.noise)
-    level = ground(thin, drive, held, sizes)
+def _sets_on_top(
+    rounds: Rounds, found: RoundsResult, few: DiagnosisProblem
+) -> tuple[dict[tuple[str, ...], list[Start]], float]:
+    """Sets of the best one with another effect, and the limit to prune them by."""
+    best, baseline = found.best[-1], rounds.baseline
+    values = fitted_effects(best)
+    scales = scales_of_fit(rounds.problem, best, baseline.scales, baseline.noise)
+    at_best = linearise(few, fitted_drive(rounds.problem.drive, best), values, scales)
+    others = [one for one in rounds.allowed if not _is_nested(one, best.effects)]
     on_top = [
         one
-        for one in forecast_all(rounds, level, others)[:FITTED_ON_TOP]
-        if _of_excess(rounds, level, one.share) >= PROMISING_ON_TOP
+        for one in forecast_all(rounds, at_best, others)[:FITTED_ON_TOP]
+        if _share_of_excess(rounds, at_best, one.share) >= PROMISING_ON_TOP
     ]
+    kept = {name: values[name] for name in best.effects}
     sets: dict[tuple[str, ...], list[Start]] = {}
-    chosen = {name: held[name] for name in best.effects}
     for one in on_top:
         ids = tuple(sorted((*best.effects, one.effect)))
-        sets[ids] = [{**chosen, one.effect: start} for start in one.starts[:2]]
-    hopeless = _hopeless(level, on_top)
-    if size == 2:
-        starts = {one.effect: one.starts[0] for one in forecasts}
-        least = forecasts[0].share + PROMISING_PAIR
-        likely = [
-            pair
-            for pair in together
-            if pair[0] >= least and not _is_kin(pair[1], (pair[2],))
-        ]
-        for _, first, second in likely[:FITTED_PAIRS]:
-            ids = tuple(sorted((first, second)))
-            begin: Start = {first: starts[first], second: starts[second]}
-            sets.setdefault(ids, []).append(begin)
-    return list(sets.items()), hopeless
+        sets[ids] = [{**kept, one.effect: start} for start in one.starts[:2]]
+    return sets, _pruning_limit(at_best, on_top)
 
 
-def _of_excess(rounds: Rounds, level: Ground, share: float) -> float:
+def _with_likely_pairs(
+    sets: Mapping[tuple[str, ...], list[Start]],
+    forecasts: Sequence[Forecast],
+    pairs: Sequence[tuple[float, str, str]],
+) -> dict[tuple[str, ...], list[Start]]:
+    """Add pairs that should explain much more than their better half."""
+    starts = {one.effect: one.starts[0] for one in forecasts}
+    least = forecasts[0].share + PROMISING_PAIR
+    likely = [
+        pair
+        for pair in pairs
+        if pair[0] >= least and not _is_nested(pair[1], (pair[2],))
+    ]
+    together = dict(sets)
+    for _, first, second in likely[:FITTED_PAIRS]:
+        ids = tuple(sorted((first, second)))
+        start: Start = {first: starts[first], second: starts[second]}
+        together[ids] = [*together.get(ids, []), start]
+    return together
+
+
+def _share_of_excess(rounds: Rounds, at_best: Linearisation, share: float) -> float:
     """Share of the error beyond the noise, from a share of the whole error."""
-    size = total(level.parts)
-    excess = size - level.problem.n_judged * rounds.footing.noise.rms**2
+    size = sum_of_squares(at_best.parts)
+    excess = size - at_best.problem.n_evaluated * rounds.baseline.noise.rms**2
     return share * size / excess if excess > 0 else 0.0
 
 
-def _hopeless(level: Ground, forecasts: Sequence[Forecast]) -> float:
-    """Sum of squares in a race beyond which a candidate is far behind."""
+def _pruning_limit(at: Linearisation, forecasts: Sequence[Forecast]) -> float:
+    """Sum of squares in the screening beyond which a candidate is far behind."""
     share = max((one.share for one in forecasts), default=0.0)
-    return total(level.parts) * (1 - HOPELESS * share)
+    return sum_of_squares(at.parts) * (1 - PRUNED_SHARE * share)
 
 
-def _is_kin(effect: str, others: Sequence[str]) -> bool:
+def _is_nested(effect: str, others: Sequence[str]) -> bool:
     """Whether an effect is, includes, or is included in one of the others."""
     return any(
         effect == other
         or effect in CATALOGUE[other].contains
         or other in CATALOGUE[effect].contains
         or bool(set(CATALOGUE[effect].contains) & set(CATALOGUE[other].contains))
-        or effect.partition(":")[0] == other.partition(":")[0]
+        or public_id(effect) == public_id(other)
         for other in others
     )
 
 
-def _with_larger(
+def _fit_larger_sets(
     rounds: Rounds,
-    found: Found,
-    sets: list[EffectSet],
-    hopeless: float,
-) -> tuple[Found, bool]:
+    found: RoundsResult,
+    sets: Mapping[tuple[str, ...], list[Start]],
+    pruning_limit: float,
+) -> tuple[RoundsResult, bool]:
     """Fit larger sets, and take the best one if it is worth it."""
-    size = len(found.best) + 1
-    fits = fit_all(rounds, f"sets of {size} effects", sets, hopeless)
-    larger = winner(rounds.judge, fits, rounds.base)
+    what = f"sets of {len(found.best) + 1} effects"
+    fits = fit_all(rounds, what, list(sets.items()), pruning_limit)
+    larger = select_best(rounds.criteria, fits, rounds.base)
     simpler = _simpler_sets(rounds, larger, [one.effects for one in fits])
-    fits += fit_all(rounds, "simpler effects in the best set", simpler, hopeless)
-    larger = winner(rounds.judge, fits, rounds.base)
-    together = Found((*found.fits, *fits), found.best, found.shares)
+    fits += fit_all(rounds, "simpler effects in the best set", simpler, pruning_limit)
+    larger = select_best(rounds.criteria, fits, rounds.base)
+    together = (*found.fits, *fits)
     if larger is None or not _is_worth_it(rounds, larger, found.best[-1]):
-        return together, False
-    return Found(together.fits, (*found.best, larger), found.shares), True
+        return RoundsResult(together, found.best, found.shares), False
+    return RoundsResult(together, (*found.best, larger), found.shares), True
 
 
 def _simpler_sets(
@@ -367,15 +385,15 @@ def _simpler_sets(
         for simpler in CATALOGUE[effect].contains:
             ids = tuple(sorted((*others, simpler)))
             if simpler in rounds.allowed and ids not in tried:
-                starts = CATALOGUE[simpler].starts(rounds.footing.scales)[:MOST_STARTS]
+                starts = CATALOGUE[simpler].starts(rounds.baseline.scales)[:MOST_STARTS]
                 found.append((ids, [{**kept, simpler: one} for one in starts]))
     return found
 
 
 def _is_worth_it(rounds: Rounds, larger: CandidateFit, smaller: CandidateFit) -> bool:
     """Whether a further effect explains most of what the smaller set leaves."""
-    judge = rounds.judge
-    against = judge.evidence(larger, smaller)
-    explains = against.explained >= LEAST_EXPLAINED_SET or judge.is_complete(larger)
+    criteria = rounds.criteria
+    against = criteria.evidence(larger, smaller)
+    explains = against.explained >= LEAST_EXPLAINED_SET or criteria.is_complete(larger)
     is_clear = against.gain >= LEAST_GAIN and against.improved >= LEAST_IMPROVED
     return is_clear and explains

@@ -21,14 +21,14 @@ import numpy as np
 
 from hwid_cli.diagnosis.parameters import (
     START,
-    Layout,
-    Point,
+    ParameterLayout,
+    ParameterPoint,
     Unknown,
     first_point,
-    residuals,
-    total,
+    residuals_at,
+    sum_of_squares,
 )
-from hwid_cli.diagnosis.problem import Problem
+from hwid_cli.diagnosis.problem import DiagnosisProblem
 
 # Difference for derivatives, in coordinates; large enough to look across the corners of
 # thresholds, small enough for a straight line.
@@ -41,7 +41,7 @@ _LEAST_DIAGONAL = 1e-14
 
 
 @dataclass(frozen=True, eq=False)
-class Fitted:
+class SearchResult:
     """Where a search ended.
 
     Parameters
@@ -50,66 +50,66 @@ class Fitted:
         Sum of squared residuals; infinite where nothing could be simulated.
     """
 
-    layout: Layout
-    point: Point
+    layout: ParameterLayout
+    point: ParameterPoint
     sse: float
     iterations: int
     has_converged: bool
 
 
 @dataclass(frozen=True, eq=False)
-class _Place:
+class _Iterate:
     """Where a search is."""
 
-    point: Point
+    point: ParameterPoint
     parts: list[np.ndarray]
     sse: float
 
 
-def fit(
-    problem: Problem,
-    fit_layout: Layout,
-    point: Point,
+def fit_point(
+    problem: DiagnosisProblem,
+    fit_layout: ParameterLayout,
+    point: ParameterPoint,
     *,
     max_iterations: int,
     only_own: bool = False,
-) -> Fitted:
+) -> SearchResult:
     """Lower the sum of squared residuals until it stands still.
 
     Parameters
     ----------
-    point : Point
+    point : ParameterPoint
         Where to start.
     max_iterations : int
         Limit on accepted steps.
     only_own : bool
         Hold what is shared, find each recording's own values.
     """
-    parts = residuals(problem, fit_layout, point)
-    place = _Place(point, parts, total(parts))
+    parts = residuals_at(problem, fit_layout, point)
+    place = _Iterate(point, parts, sum_of_squares(parts))
     free = _free(fit_layout, len(problem.signals), only_own=only_own)
     if not np.isfinite(place.sse) or not free.any():
-        return Fitted(fit_layout, point, place.sse, 0, False)
+        return SearchResult(fit_layout, point, place.sse, 0, False)
     damping, small = _FIRST_DAMPING, 0
     for iteration in range(max_iterations):
         better, damping = _one_step(problem, fit_layout, place, free, damping)
         if better is None:
-            return Fitted(fit_layout, place.point, place.sse, iteration, True)
+            return SearchResult(fit_layout, place.point, place.sse, iteration, True)
         gain = (place.sse - better.sse) / max(place.sse, 1e-300)
         place = better
         small = small + 1 if gain < LEAST_GAIN else 0
         if small == 2 or place.sse == 0.0:
-            return Fitted(fit_layout, place.point, place.sse, iteration + 1, True)
-    return Fitted(fit_layout, place.point, place.sse, max_iterations, False)
+            return SearchResult(fit_layout, place.point, place.sse, iteration + 1, True)
+    return SearchResult(fit_layout, place.point, place.sse, max_iterations, False)
 
 
 def _one_step(
-    problem: Problem,
-    fit_layout: Layout,
-    place: _Place,
+    problem: DiagnosisProblem,
+    fit_layout: ParameterLayout,
+    place: _Iterate,
     free: np.ndarray,
     damping: float,
-) -> tuple[_Place | None, float]:
+) -> tuple[_Iterate | None, float]:
     """Take a step, shorter and shorter until it lowers the sum of squares."""
     matrix, vector = _normal_equations(
         problem, fit_layout, place.point, place.parts, free
@@ -118,12 +118,12 @@ def _one_step(
     while damping < _LARGEST_DAMPING:
         step, predicted = _step(matrix, vector, damping, free)
         proposed = moved(fit_layout, place.point, step)
-        parts = residuals(problem, fit_layout, proposed)
-        sse = total(parts)
+        parts = residuals_at(problem, fit_layout, proposed)
+        sse = sum_of_squares(parts)
         if sse < place.sse:
             ratio = (place.sse - sse) / max(predicted, 1e-300)
             damping *= max(1 / 3, 1 - (2 * min(ratio, 1.0) - 1) ** 3)
-            return _Place(proposed, parts, sse), damping
+            return _Iterate(proposed, parts, sse), damping
         if predicted < 1e-3 * LEAST_GAIN * place.sse:
             break
         damping, growth = damping * growth, growth * 2
@@ -131,7 +131,10 @@ def _one_step(
 
 
 def derivatives(
-    problem: Problem, fit_layout: Layout, point: Point, parts: list[np.ndarray]
+    problem: DiagnosisProblem,
+    fit_layout: ParameterLayout,
+    point: ParameterPoint,
+    parts: list[np.ndarray],
 ) -> list[np.ndarray]:
     """Derivatives of each recording's simulation by all coordinates that touch it.
 
@@ -160,28 +163,30 @@ def derivatives(
             own[:, column] += width
         else:
             shared[column] += width
-        shifted = residuals(problem, fit_layout, Point(shared, own))
+        shifted = residuals_at(problem, fit_layout, ParameterPoint(shared, own))
         for row, (before, after) in enumerate(zip(parts, shifted, strict=True)):
             columns[row].append((before - after) / width)
     return [np.column_stack(one) for one in columns]
 
 
-def local_matrix(problem: Problem, fit_layout: Layout, point: Point) -> np.ndarray:
+def local_matrix(
+    problem: DiagnosisProblem, fit_layout: ParameterLayout, point: ParameterPoint
+) -> np.ndarray:
     """Normal equations of a search at a point.
 
     Returns
     -------
     ndarray, shape (n_unknowns, n_unknowns)
     """
-    parts = residuals(problem, fit_layout, point)
+    parts = residuals_at(problem, fit_layout, point)
     free = _free(fit_layout, len(problem.signals), only_own=False)
     return _normal_equations(problem, fit_layout, point, parts, free)[0]
 
 
 def _normal_equations(
-    problem: Problem,
-    fit_layout: Layout,
-    point: Point,
+    problem: DiagnosisProblem,
+    fit_layout: ParameterLayout,
+    point: ParameterPoint,
     parts: list[np.ndarray],
     free: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -198,7 +203,9 @@ def _normal_equations(
     return matrix, vector
 
 
-def _free(fit_layout: Layout, recordings: int, *, only_own: bool) -> np.ndarray:
+def _free(
+    fit_layout: ParameterLayout, recordings: int, *, only_own: bool
+) -> np.ndarray:
     free = np.ones(fit_layout.size(recordings), dtype=bool)
     if only_own:
         free[: len(fit_layout.shared)] = False
@@ -228,7 +235,9 @@ def _step(
     return step, gain
 
 
-def moved(fit_layout: Layout, point: Point, step: np.ndarray) -> Point:
+def moved(
+    fit_layout: ParameterLayout, point: ParameterPoint, step: np.ndarray
+) -> ParameterPoint:
     """Point that a step leads to, kept inside the bounds.
 
     Parameters
@@ -243,7 +252,7 @@ def moved(fit_layout: Layout, point: Point, step: np.ndarray) -> Point:
         shared[column] = _inside(one, shared[column])
     for column, one in enumerate(fit_layout.own):
         own[:, column] = [_inside(one, q) for q in own[:, column]]
-    return Point(shared, own)
+    return ParameterPoint(shared, own)
 
 
 def _inside(unknown: Unknown, coordinate: float) -> float:
@@ -263,7 +272,9 @@ _OWN_TRIALS = {
 }
 
 
-def with_own_trials(problem: Problem, fit_layout: Layout, point: Point) -> Point:
+def with_own_trials(
+    problem: DiagnosisProblem, fit_layout: ParameterLayout, point: ParameterPoint
+) -> ParameterPoint:
     """Set each recording's own parameters to the best of a few values."""
     for column, unknown in enumerate(fit_layout.own):
         if unknown.owner == START:
@@ -273,18 +284,20 @@ def with_own_trials(problem: Problem, fit_layout: Layout, point: Point) -> Point
         for value in _OWN_TRIALS[unknown.name]:
             own = point.own.copy()
             own[:, column] = unknown.coordinate(value)
-            parts = residuals(problem, fit_layout, Point(point.shared, own))
+            parts = residuals_at(problem, fit_layout, ParameterPoint(point.shared, own))
             sse = np.array([float(part @ part) for part in parts])
             better = sse < best
             chosen[better] = own[better, column]
             best[better] = sse[better]
         own = point.own.copy()
         own[:, column] = chosen
-        point = Point(point.shared, own)
+        point = ParameterPoint(point.shared, own)
     return point
 
 
-def fit_own(problem: Problem, fit_layout: Layout, shared: np.ndarray) -> Point:
+def fit_own(
+    problem: DiagnosisProblem, fit_layout: ParameterLayout, shared: np.ndarray
+) -> ParameterPoint:
     """Find each recording's own parameters for given shared ones.
 
     Parameters
@@ -292,17 +305,19 @@ def fit_own(problem: Problem, fit_layout: Layout, shared: np.ndarray) -> Point:
     shared : ndarray, shape (n_shared,)
         Coordinates.
     """
-    point = Point(shared, np.zeros((len(problem.signals), len(fit_layout.own))))
+    point = ParameterPoint(
+        shared, np.zeros((len(problem.signals), len(fit_layout.own)))
+    )
     if not fit_layout.own:
         return point
     start = {one: dict[str, float]() for one in fit_layout.effects}
     first = first_point(problem, _only_own(fit_layout), problem.drive, start)
-    point = with_own_trials(problem, fit_layout, Point(shared, first.own))
-    found = fit(
+    point = with_own_trials(problem, fit_layout, ParameterPoint(shared, first.own))
+    found = fit_point(
         problem, fit_layout, point, max_iterations=OWN_ITERATIONS, only_own=True
     )
     return found.point
 
 
-def _only_own(fit_layout: Layout) -> Layout:
-    return Layout((), fit_layout.own, fit_layout.effects)
+def _only_own(fit_layout: ParameterLayout) -> ParameterLayout:
+    return ParameterLayout((), fit_layout.own, fit_layout.effects)

@@ -15,7 +15,7 @@ import numpy as np
 from hwid_cli.diagnosis.covariates import (
     Variable,
     binned,
-    judged_force,
+    evaluated_force,
     quantile_edges,
     shares,
     variables,
@@ -88,7 +88,7 @@ def segment_places(
             continue
         error = finite(one.residual)
         for name, mask in parts.items():
-            inside = error[mask[one.signals.judged]]
+            inside = error[mask[one.signals.evaluated]]
             squares[name] += float(inside @ inside)
             sizes[name] += inside.size
     if not any(sizes.values()):
@@ -273,8 +273,8 @@ def is_at_reversals(compared: Sequence[Compared], smoothed: Sequence[Smoothed]) 
     for one, two in zip(compared, smoothed, strict=True):
         if two.force.size < 2:
             continue
-        near = near_reversals(finite(one.velocity))[one.signals.judged]
-        change = np.square(np.gradient(two.force))[one.signals.judged]
+        near = near_reversals(finite(one.velocity))[one.signals.evaluated]
+        change = np.square(np.gradient(two.force))[one.signals.evaluated]
         inside, outside = inside + change[near].sum(), outside + change[~near].sum()
         n_inside, n_outside = n_inside + near.sum(), n_outside + (~near).sum()
     if inside <= 0:
@@ -482,7 +482,7 @@ def latent_force_curves(
     if not compared_before:
         return ()
     before = variables(compared_before, smoothed_before, drive)
-    force = judged_force(compared_before, smoothed_before)
+    force = evaluated_force(compared_before, smoothed_before)
     found, _ = shares(force, before)
     drawn = [place for place, one in enumerate(before) if one.unit]
     order = sorted(drawn, key=lambda place: -_whole_share(found, before, place))[:top]
@@ -496,7 +496,7 @@ def latent_force_curves(
         ]
         law_smoothed = latent_force(instead, drive, noise)
         law_variables = variables(instead, law_smoothed, drive)
-        law_force = judged_force(instead, law_smoothed)
+        law_force = evaluated_force(instead, law_smoothed)
     curves = []
     for place in order:
         one = before[place]
@@ -520,7 +520,7 @@ def _variable_places(
 ) -> list[Place]:
     """Variables that the missing force goes with, the largest share first."""
     all_variables = variables(compared, smoothed, drive)
-    found, constant = shares(judged_force(compared, smoothed), all_variables)
+    found, constant = shares(evaluated_force(compared, smoothed), all_variables)
     ranked = [
         (one.name, _whole_share(found, all_variables, place))
         for place, one in enumerate(all_variables)
