@@ -113,8 +113,9 @@ def diagnose(
     verdict = decide(criteria, given_sse, base, found.fits, found.best)
     return describe(
         Findings(
-            problem=problem, criteria=criteria, scales=scales, given_sse=given_sse, base=base,
-            before=before, force=force, where=where, found=found, verdict=verdict,
+            problem=problem, criteria=criteria, scales=scales, given_sse=given_sse,
+            base=base, before=before, force=force, where=where,
+            found=found, verdict=verdict,
         )
     )  # fmt: skip
 

@@ -52,7 +52,7 @@ class Forecast:
 
 @dataclass(frozen=True, eq=False)
 class Linearisation:
-    """The re-fitted base and what its parameters can absorb: there candidates are tried.
+    """The re-fitted base and what its parameters absorb; candidates are tried there.
 
     Parameters
     ----------

@@ -1,12 +1,10 @@
-"""Noise floor of the measurements, without any model.
+"""Noise floor of the measurements, without any model, and whether residuals hold more.
 
 From repeats where there are some; else from differences of high order, which remove any
 smooth motion; from the rest before the input moves where the noise there is coloured,
-because differences see only its fast part. docs/method_diagnosis.md.
-
-Colour of noise: correlation between neighbouring samples, and what removes it.
-
-Everything is pooled over pieces of different length. docs/method_diagnosis.md.
+because differences see only its fast part. Colour is correlation between neighbouring
+samples; a filter removes it. All is pooled over pieces of different length.
+docs/method_diagnosis.md.
 """
 
 from collections.abc import Sequence
@@ -28,6 +26,110 @@ _LAGS_OF_COLOUR = 10
 _HIGHEST_ORDER = 20
 # Fewest samples for each coefficient of a filter.
 _SAMPLES_PER_COEFFICIENT = 20
+# Inputs that differ by less than this share of their largest value are repeats.
+_SAME_INPUT = 0.02
+_SAME_LENGTH = 2
+_FEWEST_AT_REST = 30
+_FEWEST_RESTS = 3
+# Orders of differences: the second where the first still sees motion or colour.
+_ORDER, _HIGHER_ORDER = 6, 16
+_SEES_MOTION = 0.7
+# A difference that is larger than this many standard deviations is a jump.
+_JUMP = 5.0
+# The grid of a sensor limits it while it makes this share of the noise or more: below,
+# the other noise moves the reading over several steps, and the error of rounding is
+# noise like any other.
+_GRID_SHARE = 0.5
+# Repeats that differ this much more in motion than at rest differ by more than noise.
+# Slow noise reads a little less in a short rest.
+_MORE_IN_MOTION = 2.0
+
+
+def noise_floor(problem: DiagnosisProblem, *, rests: bool = True) -> NoiseFloor:
+    """How much of what is compared is noise.
+
+    Parameters
+    ----------
+    rests : bool
+        Whether what is read before the input moves is noise.
+
+    Returns
+    -------
+    NoiseFloor
+        Never NaN; next to 0 where the recordings hold none.
+    """
+    pieces = [
+        one.compared[one.evaluated] for one in problem.signals if one.n_evaluated > 0
+    ]
+    grid = _grid(pieces)
+    step = grid / np.sqrt(12)
+    differences = _from_differences(pieces, step)
+    is_limited = grid > 0 and step >= _GRID_SHARE * max(differences, step)
+    repeats = _from_repeats(problem.signals, differences)
+    rest = None if is_limited or not rests else _from_rest(problem.signals)
+    if repeats is not None and not (is_limited and repeats.rms < step):
+        found, method = repeats, "repeats"
+    elif rest is not None and rest.is_coloured:
+        found, method = rest, "rest"
+    else:
+        rms = differences
+        if rest is not None and 0 < rest.rms < _SEES_MOTION * differences:
+            rms, method = rest.rms, "rest"
+        else:
+            method = "differences"
+        if is_limited:
+            rms = max(step, _upper_quartile(pieces, step))
+        found = _Stretch(rms, False, (1.0,))
+    unit = problem.unit
+    resolution = float(grid) if is_limited else 0.0
+    sentence = _sentence(found, method, resolution, unit)
+    return NoiseFloor(
+        float(found.rms), method, resolution, found.is_coloured, found.whitening,
+        sentence,
+    )  # fmt: skip
+
+
+def whiteness(
+    residuals: Sequence[np.ndarray], noise: NoiseFloor, lags: int = 30
+) -> float:
+    """Whether residuals hold more than noise.
+
+    Where the grid of the sensor is the limit, what lies within half a step counts as
+    zero: the reading stands still there although the motion goes on.
+
+    Parameters
+    ----------
+    residuals : sequence of ndarray, shape (n_samples,), [output unit]
+
+    Returns
+    -------
+    float, [-]
+        Portmanteau statistic over its 99.9 % limit: about 0.5 for noise, above 1
+        something remains; infinite where a residual is not finite.
+    """
+    pieces = [np.asarray(one, dtype=np.float64) for one in residuals]
+    if not all(np.isfinite(piece).all() for piece in pieces):
+        return float("inf")
+    largest = max((float(np.max(np.abs(one))) for one in pieces if one.size), default=0)
+    if largest == 0:
+        return 0.0
+    # Scaled, because the statistic goes with the fourth power.
+    pieces = [piece / largest for piece in pieces]
+    least = 0.0
+    if noise.resolution > 0:
+        half = noise.resolution / (2 * largest)
+        pieces = [np.sign(one) * np.maximum(np.abs(one) - half, 0.0) for one in pieces]
+        least = (noise.rms / largest) ** 2
+    return portmanteau(pieces, noise.whitening, n_lags=lags, least_variance=least)
+
+
+@dataclass(frozen=True, eq=False)
+class _Stretch:
+    """Noise that was set free from the signal: pieces around zero, and its colour."""
+
+    rms: float
+    is_coloured: bool
+    whitening: tuple[float, ...]
 
 
 def autocovariances(
@@ -208,112 +310,6 @@ def _errors_of(taps: np.ndarray, n_lags: int) -> np.ndarray:
     columns = [np.concatenate([np.zeros(j), answer[: n_lags - j]])
                for j in range(min(order, n_lags - 1))]  # fmt: skip
     return np.array(columns).reshape(-1, n_lags).T
-
-
-# Inputs that differ by less than this share of their largest value are repeats.
-_SAME_INPUT = 0.02
-_SAME_LENGTH = 2
-_FEWEST_AT_REST = 30
-_FEWEST_RESTS = 3
-# Orders of differences: the second where the first still sees motion or colour.
-_ORDER, _HIGHER_ORDER = 6, 16
-_SEES_MOTION = 0.7
-# A difference that is larger than this many standard deviations is a jump.
-_JUMP = 5.0
-# The grid of a sensor limits it while it makes this share of the noise or more: below,
-# the other noise moves the reading over several steps, and the error of rounding is
-# noise like any other.
-_GRID_SHARE = 0.5
-# Repeats that differ this much more in motion than at rest differ by more than noise.
-# Slow noise reads a little less in a short rest.
-_MORE_IN_MOTION = 2.0
-
-
-@dataclass(frozen=True, eq=False)
-class _Stretch:
-    """Noise that was set free from the signal: pieces around zero, and its colour."""
-
-    rms: float
-    is_coloured: bool
-    whitening: tuple[float, ...]
-
-
-def noise_floor(problem: DiagnosisProblem, *, rests: bool = True) -> NoiseFloor:
-    """How much of what is compared is noise.
-
-    Parameters
-    ----------
-    rests : bool
-        Whether what is read before the input moves is noise.
-
-    Returns
-    -------
-    NoiseFloor
-        Never NaN; next to 0 where the recordings hold none.
-    """
-    pieces = [
-        one.compared[one.evaluated] for one in problem.signals if one.n_evaluated > 0
-    ]
-    grid = _grid(pieces)
-    step = grid / np.sqrt(12)
-    differences = _from_differences(pieces, step)
-    is_limited = grid > 0 and step >= _GRID_SHARE * max(differences, step)
-    repeats = _from_repeats(problem.signals, differences)
-    rest = None if is_limited or not rests else _from_rest(problem.signals)
-    if repeats is not None and not (is_limited and repeats.rms < step):
-        found, method = repeats, "repeats"
-    elif rest is not None and rest.is_coloured:
-        found, method = rest, "rest"
-    else:
-        rms = differences
-        if rest is not None and 0 < rest.rms < _SEES_MOTION * differences:
-            rms, method = rest.rms, "rest"
-        else:
-            method = "differences"
-        if is_limited:
-            rms = max(step, _upper_quartile(pieces, step))
-        found = _Stretch(rms, False, (1.0,))
-    unit = problem.unit
-    resolution = float(grid) if is_limited else 0.0
-    sentence = _sentence(found, method, resolution, unit)
-    return NoiseFloor(
-        float(found.rms), method, resolution, found.is_coloured, found.whitening,
-        sentence,
-    )  # fmt: skip
-
-
-def whiteness(
-    residuals: Sequence[np.ndarray], noise: NoiseFloor, lags: int = 30
-) -> float:
-    """Whether residuals hold more than noise.
-
-    Where the grid of the sensor is the limit, what lies within half a step counts as
-    zero: the reading stands still there although the motion goes on.
-
-    Parameters
-    ----------
-    residuals : sequence of ndarray, shape (n_samples,), [output unit]
-
-    Returns
-    -------
-    float, [-]
-        Portmanteau statistic over its 99.9 % limit: about 0.5 for noise, above 1
-        something remains; infinite where a residual is not finite.
-    """
-    pieces = [np.asarray(one, dtype=np.float64) for one in residuals]
-    if not all(np.isfinite(piece).all() for piece in pieces):
-        return float("inf")
-    largest = max((float(np.max(np.abs(one))) for one in pieces if one.size), default=0)
-    if largest == 0:
-        return 0.0
-    # Scaled, because the statistic goes with the fourth power.
-    pieces = [piece / largest for piece in pieces]
-    least = 0.0
-    if noise.resolution > 0:
-        half = noise.resolution / (2 * largest)
-        pieces = [np.sign(one) * np.maximum(np.abs(one) - half, 0.0) for one in pieces]
-        least = (noise.rms / largest) ** 2
-    return portmanteau(pieces, noise.whitening, n_lags=lags, least_variance=least)
 
 
 def _from_differences(pieces: Sequence[np.ndarray], step: float) -> float:

@@ -1,9 +1,8 @@
-"""Simulations beside measurements, at a point of a fit.
-
-What a fit may change: parameters of the base, of effects, and of each recording.
+"""What a fit may change, and what the simulation gives at a point of it.
 
 A fit works on coordinates without units: logarithms of what is positive, multiples of a
-typical size of what may have either sign. docs/method_diagnosis.md, eq. (D17).
+typical size of what may have either sign. Shared ones are those of the base and of
+effects; each recording may have some of its own. docs/method_diagnosis.md, eq. (D17).
 """
 
 from collections.abc import Mapping, Sequence

@@ -1,8 +1,6 @@
 """What a diagnosis works on: recordings, the drive, and what is compared.
 
-From recordings and a simulation to the problem that a diagnosis works on.
-
-Which recordings are held out: whole ones, spread over kinds, sizes and speeds.
+Whole recordings are held out, spread over kinds, sizes and speeds.
 """
 
 from collections.abc import Sequence
@@ -18,6 +16,9 @@ from hwid_cli.records.recordings import Recording
 
 # Share of the range of a signal below which a change is rest.
 _REST = 1e-3
+# Every third recording of a kind validates; amplitudes and speeds take turns.
+_EVERY = 3
+_SAME = 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,23 +134,6 @@ class Compared:
         return float(np.sqrt(np.mean(np.square(self.residual))))
 
 
-def rest_length(driven_by: np.ndarray) -> int:
-    """Count the samples before an input first moves.
-
-    Parameters
-    ----------
-    driven_by : ndarray, shape (n_samples,)
-
-    Returns
-    -------
-    int, [samples]
-        The sample from which it moves counts as well: there it has not moved yet.
-    """
-    size = float(np.max(np.abs(driven_by - driven_by[0])))
-    moved = np.flatnonzero(np.abs(driven_by - driven_by[0]) > _REST * size)
-    return int(moved[0]) if moved.size else int(driven_by.size)
-
-
 def prepare(
     recordings: Sequence[Recording],
     simulation: SimulationOptions,
@@ -229,9 +213,21 @@ def _signals(
     )
 
 
-# Every third recording of a kind validates; amplitudes and speeds take turns.
-_EVERY = 3
-_SAME = 0.05
+def rest_length(driven_by: np.ndarray) -> int:
+    """Count the samples before an input first moves.
+
+    Parameters
+    ----------
+    driven_by : ndarray, shape (n_samples,)
+
+    Returns
+    -------
+    int, [samples]
+        The sample from which it moves counts as well: there it has not moved yet.
+    """
+    size = float(np.max(np.abs(driven_by - driven_by[0])))
+    moved = np.flatnonzero(np.abs(driven_by - driven_by[0]) > _REST * size)
+    return int(moved[0]) if moved.size else int(driven_by.size)
 
 
 def held_out_names(recordings: Sequence[Recording]) -> tuple[str, ...]:

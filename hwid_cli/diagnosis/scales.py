@@ -1,4 +1,4 @@
-"""Sizes for start values and bounds: of the recordings, and of what a fit leaves of them.
+"""Sizes for start values and bounds, from recordings and from what a fit leaves.
 
 A fit leaves lines: frequencies in time, periods along the way.
 docs/method_diagnosis.md, eq. (D15).

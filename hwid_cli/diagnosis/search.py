@@ -1,18 +1,14 @@
 """Fit of a drive's base and effects to recordings by its simulation error.
 
 Levenberg-Marquardt on the residuals of all recordings together. Parameters that belong
-to one recording only (a phase, a start) change that recording alone, so one simulation
-of all recordings gives the derivatives by all of them.
+to one recording only (a phase, a factor, a start) change that recording alone, so one
+simulation of all recordings gives the derivatives by all of them; for given shared
+values they are found from that recording.
 
 References
 ----------
 Marquardt (1963); damping rule of Nielsen (1999), IMM-REP-1999-05.
 docs/method_diagnosis.md, eq. (D16) to (D18).
-
-What belongs to one recording alone: a phase, a factor, a start.
-
-Found from that recording, for given values of what all recordings share.
-docs/method_diagnosis.md, eq. (D18).
 """
 
 from dataclasses import dataclass
@@ -38,6 +34,14 @@ _FIRST_DAMPING = 1e-3
 _LARGEST_DAMPING = 1e8
 _LARGEST_STEP = 1.5
 _LEAST_DIAGONAL = 1e-14
+OWN_ITERATIONS = 12
+# Values that an own parameter is tried at before its search.
+_OWN_TRIALS = {
+    "phase_rad": (0.0, 0.5 * np.pi, np.pi, 1.5 * np.pi),
+    "log_stiffness": (-0.1, -0.03, 0.0, 0.03, 0.1),
+    "log_force_constant": (-0.1, -0.03, 0.0, 0.03, 0.1),
+    "log_damping": (-0.2, -0.06, 0.0, 0.06, 0.2),
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -260,16 +264,6 @@ def _inside(unknown: Unknown, coordinate: float) -> float:
     if unknown.low <= value <= unknown.high:
         return float(coordinate)
     return unknown.coordinate(value)
-
-
-OWN_ITERATIONS = 12
-# Values that an own parameter is tried at before its search.
-_OWN_TRIALS = {
-    "phase_rad": (0.0, 0.5 * np.pi, np.pi, 1.5 * np.pi),
-    "log_stiffness": (-0.1, -0.03, 0.0, 0.03, 0.1),
-    "log_force_constant": (-0.1, -0.03, 0.0, 0.03, 0.1),
-    "log_damping": (-0.2, -0.06, 0.0, 0.06, 0.2),
-}
 
 
 def with_own_trials(

@@ -1,4 +1,4 @@
-"""Fits made up for selection: six recordings of 100 samples, the last three held out."""
+"""Made-up fits for selection: six recordings of 100 samples, the last three held out."""
 
 import numpy as np
 
