@@ -263,7 +263,7 @@ def _neighbour(parts: list[np.ndarray]) -> float:
     return together / size if size > 0 else 0.0
 
 
-def values_by_owner(found: CandidateFit) -> dict[str, dict[str, float]]:
+def _values_by_owner(found: CandidateFit) -> dict[str, dict[str, float]]:
     """Shared values of a fit: those of the base, and of each effect."""
     values: dict[str, dict[str, float]] = {}
     for one, value in zip(found.names, found.values, strict=True):
@@ -282,7 +282,7 @@ def rebuilt(
         The recordings that it was evaluated on, in their order.
     """
     ids = (*drive_effects(problem.drive), *found.effects)
-    values = values_by_owner(found)
+    values = _values_by_owner(found)
     start = {one: values.get(one, {}) for one in ids}
     fit_layout = parameter_layout(problem, ids, start, scales)
     shared = [one.coordinate(values[one.owner][one.name]) for one in fit_layout.shared]
@@ -312,7 +312,7 @@ def fitted_start(
     present : dict of str to dict of str to float
         Effects of the simulation with the values that it gives.
     """
-    values = values_by_owner(found)
+    values = _values_by_owner(found)
     return {name: {**given, **values.get(name, {})} for name, given in present.items()}
 
 
@@ -324,7 +324,7 @@ def fitted_effects(found: CandidateFit) -> dict[str, dict[str, float]]:
     dict of str to dict of str to float
         By the ids in the catalogue.
     """
-    effects = values_by_owner(found)
+    effects = _values_by_owner(found)
     effects.pop(BASE, None)
     for one in found.own_names:
         if one.owner != START:
@@ -334,5 +334,5 @@ def fitted_effects(found: CandidateFit) -> dict[str, dict[str, float]]:
 
 def fitted_drive(drive: Drive, found: CandidateFit) -> Drive:
     """Drive with the base of a fit."""
-    base: dict[str, Any] = values_by_owner(found).get(BASE, {})
+    base: dict[str, Any] = _values_by_owner(found).get(BASE, {})
     return replace(drive, **base)

@@ -86,10 +86,10 @@ def diagnose(
     on_round("base", 0)
     given = compared_as_given(problem)
     scales = scales_of_recordings(problem, [one.velocity for one in given])
-    base = refit_base(problem, scales, noise)
+    base = _refit_base(problem, scales, noise)
     if _shakes_at_rest(problem, base, scales, noise):
         noise = noise_floor(problem, rests=False)
-        base = refit_base(problem, scales, noise)
+        base = _refit_base(problem, scales, noise)
     if base.is_usable:
         scales = scales_of_fit(problem, base, scales, noise)
     drive = fitted_drive(problem.drive, base)
@@ -137,7 +137,7 @@ def compared_as_given(problem: DiagnosisProblem) -> list[Compared]:
     return compare_at(problem, fit_layout, own)
 
 
-def refit_base(
+def _refit_base(
     problem: DiagnosisProblem, scales: Scales, noise: NoiseFloor
 ) -> CandidateFit:
     """Base, and the effects that the simulation has already, fitted again."""

@@ -86,7 +86,7 @@ def describe(findings: Findings) -> Diagnosis:
     given_sse = findings.given_sse
     from_sse = given_sse if verdict.word in ("parameters", "none") else base.sse
     present = tuple(drive_effects(problem.drive))
-    told = fitted_effects_of(problem, chosen, scales, (*present, *chosen.effects))
+    told = _fitted_effects_of(problem, chosen, scales, (*present, *chosen.effects))
     effects = told[len(present) :]
     return Diagnosis(
         verdict=verdict.word,
@@ -215,16 +215,10 @@ def _overlays(
     )
 
 
-def fitted_effects_of(
+def _fitted_effects_of(
     problem: DiagnosisProblem, found: CandidateFit, scales: Scales, ids: Sequence[str]
 ) -> tuple[FittedEffect, ...]:
-    """Describe effects of a fit.
-
-    Parameters
-    ----------
-    ids : sequence of str
-        Ids in the catalogue; all of them in the fit.
-    """
+    """Describe effects of a fit, by their ids in the catalogue."""
     if not ids:
         return ()
     parameters: dict[str, list[FittedParameter]] = {one: [] for one in ids}

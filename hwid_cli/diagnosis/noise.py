@@ -132,20 +132,12 @@ class _Stretch:
     whitening: tuple[float, ...]
 
 
-def autocovariances(
+def _autocovariances(
     pieces: Sequence[np.ndarray], n_lags: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """Pooled sums of products at each lag, and how many products each has.
 
-    Parameters
-    ----------
-    pieces : sequence of ndarray, shape (n_samples,)
-        Used as they are: no mean is taken off.
-
-    Returns
-    -------
-    sums : ndarray, shape (n_lags + 1,)
-    counts : ndarray, shape (n_lags + 1,)
+    Pieces are used as they are: no mean is taken off.
     """
     sums, counts = np.zeros(n_lags + 1), np.zeros(n_lags + 1)
     for piece in pieces:
@@ -155,21 +147,13 @@ def autocovariances(
     return sums, counts
 
 
-def is_white(pieces: Sequence[np.ndarray], *, n_removed: int = 1) -> bool:
+def _is_white(pieces: Sequence[np.ndarray], *, n_removed: int = 1) -> bool:
     """Whether neighbouring samples do not go together.
 
-    Parameters
-    ----------
-    pieces : sequence of ndarray, shape (n_samples,)
-    n_removed : int
-        Number of regressors, the mean among them, that were taken off each piece.
-
-    Returns
-    -------
-    bool
-        By the pooled portmanteau statistic of the first ten lags.
+    By the pooled portmanteau statistic of the first ten lags; ``n_removed`` regressors,
+    the mean among them, were taken off each piece.
     """
-    sums, counts = autocovariances(pieces, _LAGS_OF_COLOUR)
+    sums, counts = _autocovariances(pieces, _LAGS_OF_COLOUR)
     if sums[0] <= 0 or counts[-1] == 0:
         return True
     # Taking off one regressor pulls every correlation down by one over the length.
@@ -179,25 +163,12 @@ def is_white(pieces: Sequence[np.ndarray], *, n_removed: int = 1) -> bool:
     return statistic < chi2.ppf(1 - FALSE_ALARM, _LAGS_OF_COLOUR)
 
 
-def whitening_filter(pieces: Sequence[np.ndarray]) -> np.ndarray:
-    """Autoregressive filter that makes coloured noise white.
+def _whitening_filter(pieces: Sequence[np.ndarray]) -> np.ndarray:
+    """Coefficients of an autoregressive filter that makes noise white; the first is 1.
 
     Either of an order up to 20, or the long one of slow noise beside white noise,
-    ``(1 - phi/z) / (1 - theta/z)``, whichever has the lowest information criterion.
-
-    Parameters
-    ----------
-    pieces : sequence of ndarray, shape (n_samples,)
-        Noise around zero.
-
-    Returns
-    -------
-    ndarray, shape (order + 1,), [-]
-        The first is 1.
-
-    References
-    ----------
-    Least squares on earlier samples; criterion of Schwarz.
+    ``(1 - phi/z) / (1 - theta/z)``, whichever has the lowest information criterion of
+    Schwarz. Least squares on earlier samples.
     """
     total = sum(piece.size for piece in pieces)
     shortest = min(piece.size for piece in pieces)
@@ -281,7 +252,7 @@ def portmanteau(
         # The filter does not know what came before the first samples.
         unknown = min(taps.size - 1, piece.size // 4)
         white.append(lfilter(taps, [1.0], piece)[unknown:])
-    sums, counts = autocovariances(white, n_lags)
+    sums, counts = _autocovariances(white, n_lags)
     if counts[0] == 0:
         return 0.0
     variance = max(sums[0] / counts[0], least_variance)
@@ -442,11 +413,11 @@ def _stretch(own: list[np.ndarray], around: list[np.ndarray]) -> _Stretch:
         ([_detrended(one, 1) for one in own], 2),
         (_without_sine(own), 3),
     ):
-        if is_white(free, n_removed=n_removed):
+        if _is_white(free, n_removed=n_removed):
             total = sum(one.size for one in free)
             share = total / max(total - n_removed * len(free), 1)
             return _Stretch(_rms(free) * float(np.sqrt(share)), False, (1.0,))
-    taps = tuple(float(tap) for tap in whitening_filter(around))
+    taps = tuple(float(tap) for tap in _whitening_filter(around))
     return _Stretch(_rms(around), len(taps) > 1, taps)
 
 

@@ -147,7 +147,7 @@ def run_rounds(rounds: Rounds, max_effects: int) -> RoundsResult:
     few = fewer_recordings(rounds.problem.part(held_out=False), SCREENING_SAMPLES)
     start = fitted_start(rounds.base, present)
     at_base = linearise(few, rounds.baseline.drive, start, rounds.baseline.scales)
-    forecasts = forecast_all(rounds, at_base, rounds.allowed)
+    forecasts = _forecast_all(rounds, at_base, rounds.allowed)
     shares: dict[tuple[str, ...], float] = {
         (one.effect,): one.share for one in forecasts
     }
@@ -171,21 +171,10 @@ def run_rounds(rounds: Rounds, max_effects: int) -> RoundsResult:
     return found
 
 
-def forecast_all(
+def _forecast_all(
     rounds: Rounds, at_base: Linearisation, candidates: Sequence[str]
 ) -> list[Forecast]:
-    """Rank candidates by what they should explain; too quick to be kept.
-
-    Parameters
-    ----------
-    candidates : sequence of str
-        Ids in the catalogue.
-
-    Returns
-    -------
-    list of Forecast
-        The largest share first.
-    """
+    """Rank candidates by what they should explain; too quick to be kept."""
     rounds.on_round("forecasts", len(candidates))
     tasks = [
         DiagnosisTask(one, forecast, (at_base, one), Forecast, {"effect": one})
@@ -195,20 +184,10 @@ def forecast_all(
     return sorted(found, key=lambda one: -one.share)
 
 
-def fit_all(
+def _fit_all(
     rounds: Rounds, what: str, sets: Sequence[EffectSet], pruning_limit: float
 ) -> list[CandidateFit]:
-    """Fit sets of effects.
-
-    Parameters
-    ----------
-    what : str
-        Announced.
-    sets : sequence of (tuple of str, list of mapping)
-        Ids of a set's effects, and the values to start from.
-    pruning_limit : float
-        Sum of squares in the screening beyond which a fit is not finished.
-    """
+    """Fit sets of effects; beyond the limit on the sum of squares none is finished."""
     if not sets:
         return []
     rounds.on_round(what, len(sets))
@@ -238,7 +217,7 @@ def _fit_singles(
     wide = {one for one in ids if ids & set(CATALOGUE[one].contains)}
     pruning_limit = _pruning_limit(at_base, forecasts)
     narrow = [((one.effect,), _starts(one)) for one in chosen if one.effect not in wide]
-    fits = fit_all(rounds, "single effects", narrow, pruning_limit)
+    fits = _fit_all(rounds, "single effects", narrow, pruning_limit)
     best = select_best(rounds.criteria, fits, rounds.base)
     for is_wider in (False, True):
         sets = [
@@ -254,7 +233,7 @@ def _fit_singles(
             likelihood = -1.0 if is_wider else TIE
             near = exp(likelihood / at_base.problem.n_evaluated)
             least = min(pruning_limit, float(best.sse[rows].sum() * near))
-        fits += fit_all(rounds, "effects that include others", sets, least)
+        fits += _fit_all(rounds, "effects that include others", sets, least)
     return fits
 
 
@@ -295,7 +274,7 @@ def _sets_on_top(
     others = [one for one in rounds.allowed if not _is_nested(one, best.effects)]
     on_top = [
         one
-        for one in forecast_all(rounds, at_best, others)[:FITTED_ON_TOP]
+        for one in _forecast_all(rounds, at_best, others)[:FITTED_ON_TOP]
         if _share_of_excess(rounds, at_best, one.share) >= PROMISING_ON_TOP
     ]
     kept = {name: values[name] for name in best.effects}
@@ -360,10 +339,10 @@ def _fit_larger_sets(
 ) -> tuple[RoundsResult, bool]:
     """Fit larger sets, and take the best one if it is worth it."""
     what = f"sets of {len(found.best) + 1} effects"
-    fits = fit_all(rounds, what, list(sets.items()), pruning_limit)
+    fits = _fit_all(rounds, what, list(sets.items()), pruning_limit)
     larger = select_best(rounds.criteria, fits, rounds.base)
     simpler = _simpler_sets(rounds, larger, [one.effects for one in fits])
-    fits += fit_all(rounds, "simpler effects in the best set", simpler, pruning_limit)
+    fits += _fit_all(rounds, "simpler effects in the best set", simpler, pruning_limit)
     larger = select_best(rounds.criteria, fits, rounds.base)
     together = (*found.fits, *fits)
     if larger is None or not _is_worth_it(rounds, larger, found.best[-1]):

@@ -121,7 +121,7 @@ def _one_step(
     growth = 2.0
     while damping < _LARGEST_DAMPING:
         step, predicted = _step(matrix, vector, damping, free)
-        proposed = moved(fit_layout, place.point, step)
+        proposed = _moved(fit_layout, place.point, step)
         parts = residuals_at(problem, fit_layout, proposed)
         sse = sum_of_squares(parts)
         if sse < place.sse:
@@ -239,16 +239,10 @@ def _step(
     return step, gain
 
 
-def moved(
+def _moved(
     fit_layout: ParameterLayout, point: ParameterPoint, step: np.ndarray
 ) -> ParameterPoint:
-    """Point that a step leads to, kept inside the bounds.
-
-    Parameters
-    ----------
-    step : ndarray, shape (n_unknowns,)
-        In coordinates; shared ones first, then recording by recording.
-    """
+    """Point that a step in coordinates, shared ones first, leads to within the bounds."""
     n_shared = len(fit_layout.shared)
     shared = point.shared + step[:n_shared]
     own = point.own + step[n_shared:].reshape(point.own.shape)
