@@ -43,9 +43,9 @@ def variables(
     Returns
     -------
     tuple of Variable
-        Judged samples of all recordings, one after the other.
+        Evaluated samples of all recordings, one after the other.
     """
-    position = judged_position(compared, smoothed)
+    position = evaluated_position(compared, smoothed)
     velocity = _joined(compared, [one.velocity for one in smoothed])
     inputs = [one.signals.input for one in compared]
     rates = [
@@ -75,10 +75,10 @@ def variables(
     )
 
 
-def judged_force(
+def evaluated_force(
     compared: Sequence[Compared], smoothed: Sequence[Smoothed]
 ) -> np.ndarray:
-    """Missing force at the judged samples of all recordings.
+    """Missing force at the evaluated samples of all recordings.
 
     Returns
     -------
@@ -87,10 +87,10 @@ def judged_force(
     return _joined(compared, [one.force for one in smoothed])
 
 
-def judged_position(
+def evaluated_position(
     compared: Sequence[Compared], smoothed: Sequence[Smoothed]
 ) -> np.ndarray:
-    """Measured position, smoothed, at the judged samples of all recordings.
+    """Measured position, smoothed, at the evaluated samples of all recordings.
 
     Returns
     -------
@@ -200,8 +200,8 @@ def _between(force: np.ndarray, values: np.ndarray) -> float:
 
 
 def _joined(compared: Sequence[Compared], signals: Sequence[np.ndarray]) -> np.ndarray:
-    """Judged samples of all recordings, one after the other."""
+    """Evaluated samples of all recordings, one after the other."""
     parts = [
-        one[two.signals.judged] for one, two in zip(signals, compared, strict=True)
+        one[two.signals.evaluated] for one, two in zip(signals, compared, strict=True)
     ]
     return np.concatenate(parts) if parts else np.zeros(0)

@@ -14,11 +14,9 @@ from itertools import combinations
 import numpy as np
 
 from hwid_cli.diagnosis.candidate import Start
-from hwid_cli.diagnosis.comparing import residuals
-from hwid_cli.diagnosis.own_parameters import with_own_trials
-from hwid_cli.diagnosis.problem import Problem
-from hwid_cli.diagnosis.search import derivatives
-from hwid_cli.diagnosis.unknowns import first_point, layout
+from hwid_cli.diagnosis.parameters import first_point, parameter_layout, residuals_at
+from hwid_cli.diagnosis.problem import DiagnosisProblem
+from hwid_cli.diagnosis.search import derivatives, with_own_trials
 from hwid_cli.drive.catalogue import CATALOGUE
 from hwid_cli.drive.effect import Scales
 from hwid_cli.records.drive import Drive
@@ -53,12 +51,12 @@ class Forecast:
 
 
 @dataclass(frozen=True, eq=False)
-class Ground:
-    """The base, from which candidates are tried.
+class Linearisation:
+    """The re-fitted base and what its parameters absorb; candidates are tried there.
 
     Parameters
     ----------
-    problem : Problem
+    problem : DiagnosisProblem
         Training recordings, or some of them.
     drive : Drive
         With the re-fitted base.
@@ -72,7 +70,7 @@ class Ground:
         Error of the base without what they absorb.
     """
 
-    problem: Problem
+    problem: DiagnosisProblem
     drive: Drive
     present: Start
     scales: Scales
@@ -81,21 +79,23 @@ class Ground:
     error: np.ndarray
 
 
-def ground(problem: Problem, drive: Drive, present: Start, scales: Scales) -> Ground:
+def linearise(
+    problem: DiagnosisProblem, drive: Drive, present: Start, scales: Scales
+) -> Linearisation:
     """Simulate the base and its derivatives."""
-    fit_layout = layout(problem, tuple(present), present, scales)
+    fit_layout = parameter_layout(problem, tuple(present), present, scales)
     point = first_point(problem, fit_layout, drive, present)
     point = with_own_trials(problem, fit_layout, point)
-    parts = residuals(problem, fit_layout, point)
+    parts = residuals_at(problem, fit_layout, point)
     jacobians = derivatives(problem, fit_layout, point, parts)
     shared = len(fit_layout.shared)
     absorbed = _orthonormal(np.vstack([one[:, :shared] for one in jacobians]))
     error = np.concatenate(parts)
     error = error - absorbed @ (absorbed.T @ error)
-    return Ground(problem, drive, present, scales, parts, absorbed, error)
+    return Linearisation(problem, drive, present, scales, parts, absorbed, error)
 
 
-def forecast(base: Ground, identifier: str) -> Forecast:
+def forecast(at_base: Linearisation, identifier: str) -> Forecast:
     """Try the start values of one candidate.
 
     Parameters
@@ -103,14 +103,14 @@ def forecast(base: Ground, identifier: str) -> Forecast:
     identifier : str
         Id in the catalogue.
     """
-    effect, error = CATALOGUE[identifier], base.error
+    effect, error = CATALOGUE[identifier], at_base.error
     size = float(error @ error)
     tried: list[tuple[float, dict[str, float], np.ndarray]] = []
-    for start in effect.starts(base.scales):
-        changed = _changed(base, identifier, start)
+    for start in effect.starts(at_base.scales):
+        changed = _changed(at_base, identifier, start)
         if changed is None:
             continue
-        column = changed - base.absorbed @ (base.absorbed.T @ changed)
+        column = changed - at_base.absorbed @ (at_base.absorbed.T @ changed)
         length = float(np.sqrt(column @ column))
         if length <= _VISIBLE * np.sqrt(float(changed @ changed)) or size == 0:
             continue
@@ -119,7 +119,7 @@ def forecast(base: Ground, identifier: str) -> Forecast:
         gain = 2 * multiple * along - multiple**2
         tried.append((gain / size, start, column / length))
     if not tried:
-        starts = tuple(effect.starts(base.scales)[:1])
+        starts = tuple(effect.starts(at_base.scales)[:1])
         return Forecast(identifier, 0.0, starts, np.zeros_like(error))
     tried.sort(key=lambda one: -one[0])
     starts = tuple(start for _, start, _ in tried[:KEPT_STARTS])
@@ -127,15 +127,15 @@ def forecast(base: Ground, identifier: str) -> Forecast:
 
 
 def _changed(
-    base: Ground, identifier: str, start: dict[str, float]
+    at_base: Linearisation, identifier: str, start: dict[str, float]
 ) -> np.ndarray | None:
     """What a candidate adds to the simulation; None where it ran away."""
-    full = {**base.present, identifier: start}
-    fit_layout = layout(base.problem, tuple(full), full, base.scales)
-    point = first_point(base.problem, fit_layout, base.drive, full)
-    point = with_own_trials(base.problem, fit_layout, point)
-    with_effect = residuals(base.problem, fit_layout, point)
-    changed = np.concatenate(base.parts) - np.concatenate(with_effect)
+    full = {**at_base.present, identifier: start}
+    fit_layout = parameter_layout(at_base.problem, tuple(full), full, at_base.scales)
+    point = first_point(at_base.problem, fit_layout, at_base.drive, full)
+    point = with_own_trials(at_base.problem, fit_layout, point)
+    with_effect = residuals_at(at_base.problem, fit_layout, point)
+    changed = np.concatenate(at_base.parts) - np.concatenate(with_effect)
     return changed if np.isfinite(changed).all() else None
 
 

@@ -5,33 +5,93 @@ does not count. The input of the menu that leaves most is proposed.
 docs/method_diagnosis.md, eq. (D26).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hwid_cli.diagnosis.comparing import residuals, simulate
-from hwid_cli.diagnosis.problem import Problem, Signals
+from hwid_cli.diagnosis.candidate import rebuilt
+from hwid_cli.diagnosis.parameters import (
+    ParameterLayout,
+    ParameterPoint,
+    residuals_at,
+    simulate_at,
+)
+from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals
 from hwid_cli.diagnosis.search import derivatives
-from hwid_cli.diagnosis.unknowns import Layout, Point
+from hwid_cli.diagnosis.selection import (
+    DiagnosisVerdict,
+    SelectionCriteria,
+    title_of,
+)
 from hwid_cli.drive.effect import Scales
+from hwid_cli.records.candidates import CandidateFit
+from hwid_cli.records.diagnosis import NextExperiment
+from hwid_cli.records.units import behind
 
 # Samples of a proposed recording.
 _MOST_SAMPLES = 6000
 _PERIODS = 12
 
 
+def propose(
+    problem: DiagnosisProblem,
+    criteria: SelectionCriteria,
+    scales: Scales,
+    verdict: DiagnosisVerdict,
+    fits: Sequence[CandidateFit],
+) -> NextExperiment:
+    """Find the input that would separate what the recordings do not.
+
+    Parameters
+    ----------
+    fits : sequence of CandidateFit
+        Of all sets of effects, the best of which are separated where none is named.
+
+    Returns
+    -------
+    NextExperiment
+        With an empty input where none is needed.
+    """
+    if verdict.word == "ambiguous":
+        pair = [verdict.chosen, verdict.rivals[0]]
+    elif verdict.word == "unknown":
+        # The chosen one is the base then.
+        pair = [one for one in fits if one.is_usable]
+        pair = sorted(pair, key=lambda one: -criteria.gain(one, verdict.chosen))[:2]
+    else:
+        return NextExperiment("", "the recordings decide; no further one is needed")
+    if len(pair) < 2:
+        return NextExperiment("", "no candidate could be simulated")
+    if problem.compares_command:
+        return NextExperiment(
+            "a slower and a faster motion along the same path",
+            "friction, inertia and delay then weigh differently",
+        )
+    models = [FittedCandidate(*rebuilt(problem, one, scales)) for one in pair]
+    best = best_separation(problem, models[0], models[1], scales)
+    # The dash of a dimensionless output would be a minus behind a number.
+    by = f"{best.rms:.2g}{behind(problem.unit)}"
+    return NextExperiment(
+        best.input,
+        f"{title_of(pair[0])} and {title_of(pair[1])} then differ by {by} "
+        f"({best.rms / max(criteria.noise.rms, 1e-300):.2g} times the noise) after the "
+        "parameters have been fitted again",
+    )
+
+
 @dataclass(frozen=True, eq=False)
-class Model:
+class FittedCandidate:
     """A fitted candidate, ready to be simulated on other inputs.
 
     Parameters
     ----------
-    point : Point
+    point : ParameterPoint
         Own values of one recording.
     """
 
-    layout: Layout
-    point: Point
+    layout: ParameterLayout
+    point: ParameterPoint
 
 
 @dataclass(frozen=True)
@@ -51,13 +111,16 @@ class Separation:
 
 
 def best_separation(
-    problem: Problem, favourite: Model, rival: Model, scales: Scales
+    problem: DiagnosisProblem,
+    favourite: FittedCandidate,
+    rival: FittedCandidate,
+    scales: Scales,
 ) -> Separation:
     """Input of the menu that separates two candidates best.
 
     Parameters
     ----------
-    problem : Problem
+    problem : DiagnosisProblem
         For the drive.
     """
     found = []
@@ -67,7 +130,7 @@ def best_separation(
             scales.sample_time_s,
         )  # fmt: skip
         one = replace(problem, signals=(signals,))
-        (truth,) = simulate(one, favourite.layout, _single(favourite.point))
+        (truth,) = simulate_at(one, favourite.layout, _single(favourite.point))
         seen = Signals(
             name, "other", command, truth.output, command, truth.output,
             scales.sample_time_s,
@@ -77,14 +140,14 @@ def best_separation(
     return max(found, key=lambda item: item.rms)
 
 
-def _single(point: Point) -> Point:
-    return Point(point.shared, point.own[:1])
+def _single(point: ParameterPoint) -> ParameterPoint:
+    return ParameterPoint(point.shared, point.own[:1])
 
 
-def _left_over(asked: Problem, rival: Model) -> float:
+def _left_over(asked: DiagnosisProblem, rival: FittedCandidate) -> float:
     """RMS of what the rival's parameters cannot absorb."""
     point = _single(rival.point)
-    parts = residuals(asked, rival.layout, point)
+    parts = residuals_at(asked, rival.layout, point)
     if not np.isfinite(parts[0]).all():
         return 0.0
     (slopes,) = derivatives(asked, rival.layout, point, parts)

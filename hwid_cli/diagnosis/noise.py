@@ -1,12 +1,10 @@
-"""Noise floor of the measurements, without any model.
+"""Noise floor of the measurements, without any model, and whether residuals hold more.
 
 From repeats where there are some; else from differences of high order, which remove any
 smooth motion; from the rest before the input moves where the noise there is coloured,
-because differences see only its fast part. docs/method_diagnosis.md.
-
-Colour of noise: correlation between neighbouring samples, and what removes it.
-
-Everything is pooled over pieces of different length. docs/method_diagnosis.md.
+because differences see only its fast part. Colour is correlation between neighbouring
+samples; a filter removes it. All is pooled over pieces of different length.
+docs/method_diagnosis.md.
 """
 
 from collections.abc import Sequence
@@ -18,7 +16,7 @@ from scipy.optimize import least_squares
 from scipy.signal import lfilter
 from scipy.stats import chi2
 
-from hwid_cli.diagnosis.problem import Problem, Signals, rest_length
+from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals, rest_length
 from hwid_cli.records.diagnosis import NoiseFloor
 from hwid_cli.records.units import behind
 
@@ -28,22 +26,118 @@ _LAGS_OF_COLOUR = 10
 _HIGHEST_ORDER = 20
 # Fewest samples for each coefficient of a filter.
 _SAMPLES_PER_COEFFICIENT = 20
+# Inputs that differ by less than this share of their largest value are repeats.
+_SAME_INPUT = 0.02
+_SAME_LENGTH = 2
+_FEWEST_AT_REST = 30
+_FEWEST_RESTS = 3
+# Orders of differences: the second where the first still sees motion or colour.
+_ORDER, _HIGHER_ORDER = 6, 16
+_SEES_MOTION = 0.7
+# A difference that is larger than this many standard deviations is a jump.
+_JUMP = 5.0
+# The grid of a sensor limits it while it makes this share of the noise or more: below,
+# the other noise moves the reading over several steps, and the error of rounding is
+# noise like any other.
+_GRID_SHARE = 0.5
+# Repeats that differ this much more in motion than at rest differ by more than noise.
+# Slow noise reads a little less in a short rest.
+_MORE_IN_MOTION = 2.0
 
 
-def autocovariances(
+def noise_floor(problem: DiagnosisProblem, *, rests: bool = True) -> NoiseFloor:
+    """How much of what is compared is noise.
+
+    Parameters
+    ----------
+    rests : bool
+        Whether what is read before the input moves is noise.
+
+    Returns
+    -------
+    NoiseFloor
+        Never NaN; next to 0 where the recordings hold none.
+    """
+    pieces = [
+        one.compared[one.evaluated] for one in problem.signals if one.n_evaluated > 0
+    ]
+    grid = _grid(pieces)
+    step = grid / np.sqrt(12)
+    differences = _from_differences(pieces, step)
+    is_limited = grid > 0 and step >= _GRID_SHARE * max(differences, step)
+    repeats = _from_repeats(problem.signals, differences)
+    rest = None if is_limited or not rests else _from_rest(problem.signals)
+    if repeats is not None and not (is_limited and repeats.rms < step):
+        found, method = repeats, "repeats"
+    elif rest is not None and rest.is_coloured:
+        found, method = rest, "rest"
+    else:
+        rms = differences
+        if rest is not None and 0 < rest.rms < _SEES_MOTION * differences:
+            rms, method = rest.rms, "rest"
+        else:
+            method = "differences"
+        if is_limited:
+            rms = max(step, _upper_quartile(pieces, step))
+        found = _Stretch(rms, False, (1.0,))
+    unit = problem.unit
+    resolution = float(grid) if is_limited else 0.0
+    sentence = _sentence(found, method, resolution, unit)
+    return NoiseFloor(
+        float(found.rms), method, resolution, found.is_coloured, found.whitening,
+        sentence,
+    )  # fmt: skip
+
+
+def whiteness(
+    residuals: Sequence[np.ndarray], noise: NoiseFloor, lags: int = 30
+) -> float:
+    """Whether residuals hold more than noise.
+
+    Where the grid of the sensor is the limit, what lies within half a step counts as
+    zero: the reading stands still there although the motion goes on.
+
+    Parameters
+    ----------
+    residuals : sequence of ndarray, shape (n_samples,), [output unit]
+
+    Returns
+    -------
+    float, [-]
+        Portmanteau statistic over its 99.9 % limit: about 0.5 for noise, above 1
+        something remains; infinite where a residual is not finite.
+    """
+    pieces = [np.asarray(one, dtype=np.float64) for one in residuals]
+    if not all(np.isfinite(piece).all() for piece in pieces):
+        return float("inf")
+    largest = max((float(np.max(np.abs(one))) for one in pieces if one.size), default=0)
+    if largest == 0:
+        return 0.0
+    # Scaled, because the statistic goes with the fourth power.
+    pieces = [piece / largest for piece in pieces]
+    least = 0.0
+    if noise.resolution > 0:
+        half = noise.resolution / (2 * largest)
+        pieces = [np.sign(one) * np.maximum(np.abs(one) - half, 0.0) for one in pieces]
+        least = (noise.rms / largest) ** 2
+    return portmanteau(pieces, noise.whitening, n_lags=lags, least_variance=least)
+
+
+@dataclass(frozen=True, eq=False)
+class _Stretch:
+    """Noise that was set free from the signal: pieces around zero, and its colour."""
+
+    rms: float
+    is_coloured: bool
+    whitening: tuple[float, ...]
+
+
+def _autocovariances(
     pieces: Sequence[np.ndarray], n_lags: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """Pooled sums of products at each lag, and how many products each has.
 
-    Parameters
-    ----------
-    pieces : sequence of ndarray, shape (n_samples,)
-        Used as they are: no mean is taken off.
-
-    Returns
-    -------
-    sums : ndarray, shape (n_lags + 1,)
-    counts : ndarray, shape (n_lags + 1,)
+    Pieces are used as they are: no mean is taken off.
     """
     sums, counts = np.zeros(n_lags + 1), np.zeros(n_lags + 1)
     for piece in pieces:
@@ -53,21 +147,13 @@ def autocovariances(
     return sums, counts
 
 
-def is_white(pieces: Sequence[np.ndarray], *, n_removed: int = 1) -> bool:
+def _is_white(pieces: Sequence[np.ndarray], *, n_removed: int = 1) -> bool:
     """Whether neighbouring samples do not go together.
 
-    Parameters
-    ----------
-    pieces : sequence of ndarray, shape (n_samples,)
-    n_removed : int
-        Number of regressors, the mean among them, that were taken off each piece.
-
-    Returns
-    -------
-    bool
-        By the pooled portmanteau statistic of the first ten lags.
+    By the pooled portmanteau statistic of the first ten lags; ``n_removed`` regressors,
+    the mean among them, were taken off each piece.
     """
-    sums, counts = autocovariances(pieces, _LAGS_OF_COLOUR)
+    sums, counts = _autocovariances(pieces, _LAGS_OF_COLOUR)
     if sums[0] <= 0 or counts[-1] == 0:
         return True
     # Taking off one regressor pulls every correlation down by one over the length.
@@ -77,25 +163,12 @@ def is_white(pieces: Sequence[np.ndarray], *, n_removed: int = 1) -> bool:
     return statistic < chi2.ppf(1 - FALSE_ALARM, _LAGS_OF_COLOUR)
 
 
-def whitening_filter(pieces: Sequence[np.ndarray]) -> np.ndarray:
-    """Autoregressive filter that makes coloured noise white.
+def _whitening_filter(pieces: Sequence[np.ndarray]) -> np.ndarray:
+    """Coefficients of an autoregressive filter that makes noise white; the first is 1.
 
     Either of an order up to 20, or the long one of slow noise beside white noise,
-    ``(1 - phi/z) / (1 - theta/z)``, whichever has the lowest information criterion.
-
-    Parameters
-    ----------
-    pieces : sequence of ndarray, shape (n_samples,)
-        Noise around zero.
-
-    Returns
-    -------
-    ndarray, shape (order + 1,), [-]
-        The first is 1.
-
-    References
-    ----------
-    Least squares on earlier samples; criterion of Schwarz.
+    ``(1 - phi/z) / (1 - theta/z)``, whichever has the lowest information criterion of
+    Schwarz. Least squares on earlier samples.
     """
     total = sum(piece.size for piece in pieces)
     shortest = min(piece.size for piece in pieces)
@@ -179,7 +252,7 @@ def portmanteau(
         # The filter does not know what came before the first samples.
         unknown = min(taps.size - 1, piece.size // 4)
         white.append(lfilter(taps, [1.0], piece)[unknown:])
-    sums, counts = autocovariances(white, n_lags)
+    sums, counts = _autocovariances(white, n_lags)
     if counts[0] == 0:
         return 0.0
     variance = max(sums[0] / counts[0], least_variance)
@@ -208,110 +281,6 @@ def _errors_of(taps: np.ndarray, n_lags: int) -> np.ndarray:
     columns = [np.concatenate([np.zeros(j), answer[: n_lags - j]])
                for j in range(min(order, n_lags - 1))]  # fmt: skip
     return np.array(columns).reshape(-1, n_lags).T
-
-
-# Inputs that differ by less than this share of their largest value are repeats.
-_SAME_INPUT = 0.02
-_SAME_LENGTH = 2
-_FEWEST_AT_REST = 30
-_FEWEST_RESTS = 3
-# Orders of differences: the second where the first still sees motion or colour.
-_ORDER, _HIGHER_ORDER = 6, 16
-_SEES_MOTION = 0.7
-# A difference that is larger than this many standard deviations is a jump.
-_JUMP = 5.0
-# The grid of a sensor limits it while it makes this share of the noise or more: below,
-# the other noise moves the reading over several steps, and the error of rounding is
-# noise like any other.
-_GRID_SHARE = 0.5
-# Repeats that differ this much more in motion than at rest differ by more than noise.
-# Slow noise reads a little less in a short rest.
-_MORE_IN_MOTION = 2.0
-
-
-@dataclass(frozen=True, eq=False)
-class _Stretch:
-    """Noise that was set free from the signal: pieces around zero, and its colour."""
-
-    rms: float
-    is_coloured: bool
-    whitening: tuple[float, ...]
-
-
-def noise_floor(problem: Problem, *, rests: bool = True) -> NoiseFloor:
-    """How much of what is compared is noise.
-
-    Parameters
-    ----------
-    rests : bool
-        Whether what is read before the input moves is noise.
-
-    Returns
-    -------
-    NoiseFloor
-        Never NaN; next to 0 where the recordings hold none.
-    """
-    pieces = [one.compared[one.judged] for one in problem.signals if one.n_judged > 0]
-    grid = _grid(pieces)
-    step = grid / np.sqrt(12)
-    differences = _from_differences(pieces, step)
-    is_limited = grid > 0 and step >= _GRID_SHARE * max(differences, step)
-    repeats = _from_repeats(problem.signals, differences)
-    rest = None if is_limited or not rests else _from_rest(problem.signals)
-    if repeats is not None and not (is_limited and repeats.rms < step):
-        found, method = repeats, "repeats"
-    elif rest is not None and rest.is_coloured:
-        found, method = rest, "rest"
-    else:
-        rms = differences
-        if rest is not None and 0 < rest.rms < _SEES_MOTION * differences:
-            rms, method = rest.rms, "rest"
-        else:
-            method = "differences"
-        if is_limited:
-            rms = max(step, _upper_quartile(pieces, step))
-        found = _Stretch(rms, False, (1.0,))
-    unit = problem.unit
-    resolution = float(grid) if is_limited else 0.0
-    sentence = _sentence(found, method, resolution, unit)
-    return NoiseFloor(
-        float(found.rms), method, resolution, found.is_coloured, found.whitening,
-        sentence,
-    )  # fmt: skip
-
-
-def whiteness(
-    residuals: Sequence[np.ndarray], noise: NoiseFloor, lags: int = 30
-) -> float:
-    """Whether residuals hold more than noise.
-
-    Where the grid of the sensor is the limit, what lies within half a step counts as
-    zero: the reading stands still there although the motion goes on.
-
-    Parameters
-    ----------
-    residuals : sequence of ndarray, shape (n_samples,), [output unit]
-
-    Returns
-    -------
-    float, [-]
-        Portmanteau statistic over its 99.9 % limit: about 0.5 for noise, above 1
-        something remains; infinite where a residual is not finite.
-    """
-    pieces = [np.asarray(one, dtype=np.float64) for one in residuals]
-    if not all(np.isfinite(piece).all() for piece in pieces):
-        return float("inf")
-    largest = max((float(np.max(np.abs(one))) for one in pieces if one.size), default=0)
-    if largest == 0:
-        return 0.0
-    # Scaled, because the statistic goes with the fourth power.
-    pieces = [piece / largest for piece in pieces]
-    least = 0.0
-    if noise.resolution > 0:
-        half = noise.resolution / (2 * largest)
-        pieces = [np.sign(one) * np.maximum(np.abs(one) - half, 0.0) for one in pieces]
-        least = (noise.rms / largest) ** 2
-    return portmanteau(pieces, noise.whitening, n_lags=lags, least_variance=least)
 
 
 def _from_differences(pieces: Sequence[np.ndarray], step: float) -> float:
@@ -444,11 +413,11 @@ def _stretch(own: list[np.ndarray], around: list[np.ndarray]) -> _Stretch:
         ([_detrended(one, 1) for one in own], 2),
         (_without_sine(own), 3),
     ):
-        if is_white(free, n_removed=n_removed):
+        if _is_white(free, n_removed=n_removed):
             total = sum(one.size for one in free)
             share = total / max(total - n_removed * len(free), 1)
             return _Stretch(_rms(free) * float(np.sqrt(share)), False, (1.0,))
-    taps = tuple(float(tap) for tap in whitening_filter(around))
+    taps = tuple(float(tap) for tap in _whitening_filter(around))
     return _Stretch(_rms(around), len(taps) > 1, taps)
 
 

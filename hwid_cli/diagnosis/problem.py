@@ -1,4 +1,7 @@
-"""What a diagnosis works on: recordings, the drive, and what is compared."""
+"""What a diagnosis works on: recordings, the drive, and what is compared.
+
+Whole recordings are held out, spread over kinds, sizes and speeds.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -6,12 +9,16 @@ from functools import cached_property
 
 import numpy as np
 
-from hwid_cli.drive.effect import Scales, Wave
 from hwid_cli.drive.simulation import refined
 from hwid_cli.records.drive import Drive
+from hwid_cli.records.experiment import DiagnoseOptions, SimulationOptions
+from hwid_cli.records.recordings import Recording
 
 # Share of the range of a signal below which a change is rest.
 _REST = 1e-3
+# Every third recording of a kind validates; amplitudes and speeds take turns.
+_EVERY = 3
+_SAME = 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +36,7 @@ class Signals:
     output : ndarray, shape (n_samples,), [m]
     sample_time_s : float, [s]
     skip : int, [samples]
-        First samples that are not judged.
+        First samples that are not evaluated.
     """
 
     name: str
@@ -48,13 +55,13 @@ class Signals:
         return refined(self.driven_by)
 
     @property
-    def judged(self) -> slice:
-        """Samples that are judged."""
+    def evaluated(self) -> slice:
+        """Samples that are evaluated."""
         return slice(self.skip, None)
 
     @property
-    def n_judged(self) -> int:
-        """Number of samples that are judged."""
+    def n_evaluated(self) -> int:
+        """Number of samples that are evaluated."""
         return int(self.compared.size - self.skip)
 
     @cached_property
@@ -65,7 +72,7 @@ class Signals:
 
 
 @dataclass(frozen=True, eq=False)
-class Problem:
+class DiagnosisProblem:
     """Recordings that one fit works on, and the drive that it starts from.
 
     Parameters
@@ -89,11 +96,11 @@ class Problem:
         return self.drive.controller is not None
 
     @property
-    def n_judged(self) -> int:
-        """Number of samples that are judged in all recordings."""
-        return sum(one.n_judged for one in self.signals)
+    def n_evaluated(self) -> int:
+        """Number of samples that are evaluated in all recordings."""
+        return sum(one.n_evaluated for one in self.signals)
 
-    def part(self, *, held_out: bool) -> "Problem":
+    def part(self, *, held_out: bool) -> "DiagnosisProblem":
         """Only the recordings that are held out, or only the others."""
         chosen = tuple(one for one in self.signals if one.is_held_out == held_out)
         return replace(self, signals=chosen)
@@ -118,13 +125,92 @@ class Compared:
 
     @property
     def residual(self) -> np.ndarray:
-        """Measured minus simulated, where it is judged."""
-        return (self.signals.compared - self.simulated)[self.signals.judged]
+        """Measured minus simulated, where it is evaluated."""
+        return (self.signals.compared - self.simulated)[self.signals.evaluated]
 
     @property
     def rms(self) -> float:
         """RMS of the residual."""
         return float(np.sqrt(np.mean(np.square(self.residual))))
+
+
+def prepare(
+    recordings: Sequence[Recording],
+    simulation: SimulationOptions,
+    options: DiagnoseOptions,
+    held_out: Sequence[str],
+) -> DiagnosisProblem:
+    """Recordings as the fits need them, and the drive with its references.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+        At least one; with a reference each where the simulation has a controller.
+    held_out : sequence of str
+        Names of the recordings that are not trained on.
+    """
+    signals = tuple(_signals(one, simulation, options, held_out) for one in recordings)
+    train = [one for one in signals if not one.is_held_out] or list(signals)
+    return DiagnosisProblem(
+        signals,
+        drive_of(simulation, train),
+        options.initial_state,
+        recordings[0].input_unit
+        if simulation.controller is not None
+        else recordings[0].output_unit,
+    )
+
+
+def drive_of(simulation: SimulationOptions, train: Sequence[Signals]) -> Drive:
+    """Drive that a configuration describes.
+
+    Parameters
+    ----------
+    train : sequence of Signals
+        Training recordings, whose largest magnitudes are the references where the
+        configuration gives none.
+    """
+    current = max(float(np.max(np.abs(one.input))) for one in train)
+    displacement = max(float(np.max(np.abs(one.output))) for one in train)
+    return Drive(
+        mass_kg=simulation.mass_kg,
+        damping_N_s_per_m=simulation.damping_N_s_per_m,
+        stiffness_N_per_m=simulation.stiffness_N_per_m,
+        force_constant_N_per_A=simulation.force_constant_N_per_A,
+        effects=simulation.effects,
+        reference_current_A=simulation.reference_current_A or current or 1.0,
+        reference_displacement_m=simulation.reference_displacement_m
+        or displacement
+        or 1.0,
+        resistance_ohm=simulation.resistance_ohm,
+        inductance_H=simulation.inductance_H,
+        back_emf_V_s_per_m=simulation.back_emf_V_s_per_m,
+        hold=simulation.hold,
+        controller=simulation.controller,
+    )
+
+
+def _signals(
+    recording: Recording,
+    simulation: SimulationOptions,
+    options: DiagnoseOptions,
+    held_out: Sequence[str],
+) -> Signals:
+    driven_by, compared = recording.input, recording.output
+    if simulation.controller is not None and recording.reference is not None:
+        driven_by, compared = recording.reference, recording.input
+    # Compiled loops tell read-only arrays apart: plain copies need one compilation.
+    return Signals(
+        name=recording.name,
+        kind=recording.kind,
+        driven_by=np.array(driven_by),
+        compared=np.array(compared),
+        input=np.array(recording.input),
+        output=np.array(recording.output),
+        sample_time_s=recording.sample_time_s,
+        skip=min(options.skip_samples, recording.n_samples - 1),
+        is_held_out=recording.name in held_out,
+    )
 
 
 def rest_length(driven_by: np.ndarray) -> int:
@@ -144,48 +230,67 @@ def rest_length(driven_by: np.ndarray) -> int:
     return int(moved[0]) if moved.size else int(driven_by.size)
 
 
-def scales(
-    problem: Problem,
-    velocities: Sequence[np.ndarray],
-    frequencies_Hz: tuple[float, ...] = (),
-    waves: tuple[Wave, ...] = (),
-) -> Scales:
-    """Sizes of what the recordings hold.
+def held_out_names(recordings: Sequence[Recording]) -> tuple[str, ...]:
+    """Names of the recordings that are held out.
 
-    Parameters
-    ----------
-    velocities : sequence of ndarray, [m/s]
-        Of the base's simulation, one for each recording.
-    frequencies_Hz : tuple of float, [Hz]
-        Highest lines of the base's error.
-    waves : tuple of Wave
-        With which it repeats along the way.
+    Within each kind of recording, amplitudes and speeds of change are numbered; a
+    recording is held out where the sum of its two numbers is a multiple of three, so
+    that every amplitude and every speed is on both sides where the plan is a table.
+
+    Returns
+    -------
+    tuple of str
+        In the order of the recordings; empty for a single recording.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> ramp = np.linspace(0, 1, 50)
+    >>> names = [Recording(f"r{k}", k * ramp, ramp, 1e-3) for k in (1, 2, 3)]
+    >>> held_out_names(names)
+    ('r2',)
     """
-    drive, all_signals = problem.drive, problem.signals
-    largest = [max(float(np.max(np.abs(one.output))) for one in all_signals)]
-    current = max(float(np.max(np.abs(one.input))) for one in all_signals)
-    stroke = max(float(np.ptp(one.output)) for one in all_signals)
-    rate = max(
-        float(np.max(np.abs(np.diff(one.input)))) / one.sample_time_s
-        for one in all_signals
-    )
-    speed = max(float(np.nanmax(np.abs(one))) for one in velocities)
-    duration = max(one.compared.size * one.sample_time_s for one in all_signals)
-    natural = np.sqrt(drive.stiffness_N_per_m / drive.mass_kg) / (2 * np.pi)
-    force = abs(drive.force_constant_N_per_A) * current
-    if drive.resistance_ohm is not None:
-        force /= drive.resistance_ohm
-    return Scales(
-        displacement_m=max(largest[0], 1e-12),
-        velocity_m_per_s=max(speed, 1e-12),
-        current_A=max(current, 1e-12),
-        current_rate_A_per_s=max(rate, 1e-12),
-        stroke_m=max(stroke, 1e-12),
-        force_N=max(force, 1e-12),
-        mass_kg=drive.mass_kg,
-        natural_Hz=float(max(natural, 2.0 / duration)),
-        sample_time_s=min(one.sample_time_s for one in all_signals),
-        duration_s=duration,
-        frequencies_Hz=frequencies_Hz,
-        waves=waves,
-    )
+    chosen: set[str] = set()
+    for kind in dict.fromkeys(one.kind for one in recordings):
+        members = [one for one in recordings if one.kind == kind]
+        if len(members) > 1:
+            chosen |= _of_kind(members)
+    if not chosen and len(recordings) > 1:
+        chosen = {recordings[-1].name}
+    return tuple(one.name for one in recordings if one.name in chosen)
+
+
+def _of_kind(members: Sequence[Recording]) -> set[str]:
+    sizes = _levels([float(np.max(np.abs(one.input))) for one in members])
+    speeds = _levels([_speed(one) for one in members])
+    repeats: dict[tuple[int, int], int] = {}
+    turns = []
+    for size, speed in zip(sizes, speeds, strict=True):
+        number = repeats.get((size, speed), 0)
+        repeats[size, speed] = number + 1
+        turns.append((size + speed + number) % _EVERY)
+    chosen = {one.name for one, turn in zip(members, turns, strict=True) if turn == 1}
+    if not chosen or len(chosen) == len(members):
+        return {members[len(members) // 2].name}
+    return chosen
+
+
+def _speed(recording: Recording) -> float:
+    """RMS of the input's change over that of the input: its mean frequency."""
+    moved = recording.input - recording.input[0]
+    size = float(np.sqrt(np.mean(moved**2))) or 1.0
+    change = float(np.sqrt(np.mean(np.diff(recording.input) ** 2)))
+    return change / size / recording.sample_time_s
+
+
+def _levels(values: Sequence[float]) -> list[int]:
+    """Number values by size; neighbours within 5 % are one level."""
+    order = np.argsort(values)
+    levels = [0] * len(values)
+    level, last = 0, None
+    for index in order:
+        value = values[int(index)]
+        if last is not None and value > last * (1 + _SAME):
+            level += 1
+        levels[int(index)], last = level, value
+    return levels

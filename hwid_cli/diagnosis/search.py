@@ -1,8 +1,9 @@
 """Fit of a drive's base and effects to recordings by its simulation error.
 
 Levenberg-Marquardt on the residuals of all recordings together. Parameters that belong
-to one recording only (a phase, a start) change that recording alone, so one simulation
-of all recordings gives the derivatives by all of them.
+to one recording only (a phase, a factor, a start) change that recording alone, so one
+simulation of all recordings gives the derivatives by all of them; for given shared
+values they are found from that recording.
 
 References
 ----------
@@ -14,9 +15,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hwid_cli.diagnosis.comparing import residuals, total
-from hwid_cli.diagnosis.problem import Problem
-from hwid_cli.diagnosis.unknowns import Layout, Point, Unknown
+from hwid_cli.diagnosis.parameters import (
+    START,
+    ParameterLayout,
+    ParameterPoint,
+    Unknown,
+    first_point,
+    residuals_at,
+    sum_of_squares,
+)
+from hwid_cli.diagnosis.problem import DiagnosisProblem
 
 # Difference for derivatives, in coordinates; large enough to look across the corners of
 # thresholds, small enough for a straight line.
@@ -26,10 +34,18 @@ _FIRST_DAMPING = 1e-3
 _LARGEST_DAMPING = 1e8
 _LARGEST_STEP = 1.5
 _LEAST_DIAGONAL = 1e-14
+OWN_ITERATIONS = 12
+# Values that an own parameter is tried at before its search.
+_OWN_TRIALS = {
+    "phase_rad": (0.0, 0.5 * np.pi, np.pi, 1.5 * np.pi),
+    "log_stiffness": (-0.1, -0.03, 0.0, 0.03, 0.1),
+    "log_force_constant": (-0.1, -0.03, 0.0, 0.03, 0.1),
+    "log_damping": (-0.2, -0.06, 0.0, 0.06, 0.2),
+}
 
 
 @dataclass(frozen=True, eq=False)
-class Fitted:
+class SearchResult:
     """Where a search ended.
 
     Parameters
@@ -38,66 +54,66 @@ class Fitted:
         Sum of squared residuals; infinite where nothing could be simulated.
     """
 
-    layout: Layout
-    point: Point
+    layout: ParameterLayout
+    point: ParameterPoint
     sse: float
     iterations: int
     has_converged: bool
 
 
 @dataclass(frozen=True, eq=False)
-class _Place:
+class _Iterate:
     """Where a search is."""
 
-    point: Point
+    point: ParameterPoint
     parts: list[np.ndarray]
     sse: float
 
 
-def fit(
-    problem: Problem,
-    fit_layout: Layout,
-    point: Point,
+def fit_point(
+    problem: DiagnosisProblem,
+    fit_layout: ParameterLayout,
+    point: ParameterPoint,
     *,
     max_iterations: int,
     only_own: bool = False,
-) -> Fitted:
+) -> SearchResult:
     """Lower the sum of squared residuals until it stands still.
 
     Parameters
     ----------
-    point : Point
+    point : ParameterPoint
         Where to start.
     max_iterations : int
         Limit on accepted steps.
     only_own : bool
         Hold what is shared, find each recording's own values.
     """
-    parts = residuals(problem, fit_layout, point)
-    place = _Place(point, parts, total(parts))
+    parts = residuals_at(problem, fit_layout, point)
+    place = _Iterate(point, parts, sum_of_squares(parts))
     free = _free(fit_layout, len(problem.signals), only_own=only_own)
     if not np.isfinite(place.sse) or not free.any():
-        return Fitted(fit_layout, point, place.sse, 0, False)
+        return SearchResult(fit_layout, point, place.sse, 0, False)
     damping, small = _FIRST_DAMPING, 0
     for iteration in range(max_iterations):
         better, damping = _one_step(problem, fit_layout, place, free, damping)
         if better is None:
-            return Fitted(fit_layout, place.point, place.sse, iteration, True)
+            return SearchResult(fit_layout, place.point, place.sse, iteration, True)
         gain = (place.sse - better.sse) / max(place.sse, 1e-300)
         place = better
         small = small + 1 if gain < LEAST_GAIN else 0
         if small == 2 or place.sse == 0.0:
-            return Fitted(fit_layout, place.point, place.sse, iteration + 1, True)
-    return Fitted(fit_layout, place.point, place.sse, max_iterations, False)
+            return SearchResult(fit_layout, place.point, place.sse, iteration + 1, True)
+    return SearchResult(fit_layout, place.point, place.sse, max_iterations, False)
 
 
 def _one_step(
-    problem: Problem,
-    fit_layout: Layout,
-    place: _Place,
+    problem: DiagnosisProblem,
+    fit_layout: ParameterLayout,
+    place: _Iterate,
     free: np.ndarray,
     damping: float,
-) -> tuple[_Place | None, float]:
+) -> tuple[_Iterate | None, float]:
     """Take a step, shorter and shorter until it lowers the sum of squares."""
     matrix, vector = _normal_equations(
         problem, fit_layout, place.point, place.parts, free
@@ -105,13 +121,13 @@ def _one_step(
     growth = 2.0
     while damping < _LARGEST_DAMPING:
         step, predicted = _step(matrix, vector, damping, free)
-        proposed = moved(fit_layout, place.point, step)
-        parts = residuals(problem, fit_layout, proposed)
-        sse = total(parts)
+        proposed = _moved(fit_layout, place.point, step)
+        parts = residuals_at(problem, fit_layout, proposed)
+        sse = sum_of_squares(parts)
         if sse < place.sse:
             ratio = (place.sse - sse) / max(predicted, 1e-300)
             damping *= max(1 / 3, 1 - (2 * min(ratio, 1.0) - 1) ** 3)
-            return _Place(proposed, parts, sse), damping
+            return _Iterate(proposed, parts, sse), damping
         if predicted < 1e-3 * LEAST_GAIN * place.sse:
             break
         damping, growth = damping * growth, growth * 2
@@ -119,7 +135,10 @@ def _one_step(
 
 
 def derivatives(
-    problem: Problem, fit_layout: Layout, point: Point, parts: list[np.ndarray]
+    problem: DiagnosisProblem,
+    fit_layout: ParameterLayout,
+    point: ParameterPoint,
+    parts: list[np.ndarray],
 ) -> list[np.ndarray]:
     """Derivatives of each recording's simulation by all coordinates that touch it.
 
@@ -148,28 +167,30 @@ def derivatives(
             own[:, column] += width
         else:
             shared[column] += width
-        shifted = residuals(problem, fit_layout, Point(shared, own))
+        shifted = residuals_at(problem, fit_layout, ParameterPoint(shared, own))
         for row, (before, after) in enumerate(zip(parts, shifted, strict=True)):
             columns[row].append((before - after) / width)
     return [np.column_stack(one) for one in columns]
 
 
-def local_matrix(problem: Problem, fit_layout: Layout, point: Point) -> np.ndarray:
+def local_matrix(
+    problem: DiagnosisProblem, fit_layout: ParameterLayout, point: ParameterPoint
+) -> np.ndarray:
     """Normal equations of a search at a point.
 
     Returns
     -------
     ndarray, shape (n_unknowns, n_unknowns)
     """
-    parts = residuals(problem, fit_layout, point)
+    parts = residuals_at(problem, fit_layout, point)
     free = _free(fit_layout, len(problem.signals), only_own=False)
     return _normal_equations(problem, fit_layout, point, parts, free)[0]
 
 
 def _normal_equations(
-    problem: Problem,
-    fit_layout: Layout,
-    point: Point,
+    problem: DiagnosisProblem,
+    fit_layout: ParameterLayout,
+    point: ParameterPoint,
     parts: list[np.ndarray],
     free: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -186,7 +207,9 @@ def _normal_equations(
     return matrix, vector
 
 
-def _free(fit_layout: Layout, recordings: int, *, only_own: bool) -> np.ndarray:
+def _free(
+    fit_layout: ParameterLayout, recordings: int, *, only_own: bool
+) -> np.ndarray:
     free = np.ones(fit_layout.size(recordings), dtype=bool)
     if only_own:
         free[: len(fit_layout.shared)] = False
@@ -216,14 +239,10 @@ def _step(
     return step, gain
 
 
-def moved(fit_layout: Layout, point: Point, step: np.ndarray) -> Point:
-    """Point that a step leads to, kept inside the bounds.
-
-    Parameters
-    ----------
-    step : ndarray, shape (n_unknowns,)
-        In coordinates; shared ones first, then recording by recording.
-    """
+def _moved(
+    fit_layout: ParameterLayout, point: ParameterPoint, step: np.ndarray
+) -> ParameterPoint:
+    """Point that a step in coordinates, shared ones first, leads to within the bounds."""
     n_shared = len(fit_layout.shared)
     shared = point.shared + step[:n_shared]
     own = point.own + step[n_shared:].reshape(point.own.shape)
@@ -231,7 +250,7 @@ def moved(fit_layout: Layout, point: Point, step: np.ndarray) -> Point:
         shared[column] = _inside(one, shared[column])
     for column, one in enumerate(fit_layout.own):
         own[:, column] = [_inside(one, q) for q in own[:, column]]
-    return Point(shared, own)
+    return ParameterPoint(shared, own)
 
 
 def _inside(unknown: Unknown, coordinate: float) -> float:
@@ -239,3 +258,54 @@ def _inside(unknown: Unknown, coordinate: float) -> float:
     if unknown.low <= value <= unknown.high:
         return float(coordinate)
     return unknown.coordinate(value)
+
+
+def with_own_trials(
+    problem: DiagnosisProblem, fit_layout: ParameterLayout, point: ParameterPoint
+) -> ParameterPoint:
+    """Set each recording's own parameters to the best of a few values."""
+    for column, unknown in enumerate(fit_layout.own):
+        if unknown.owner == START:
+            continue
+        best = np.full(len(problem.signals), np.inf)
+        chosen = point.own[:, column].copy()
+        for value in _OWN_TRIALS[unknown.name]:
+            own = point.own.copy()
+            own[:, column] = unknown.coordinate(value)
+            parts = residuals_at(problem, fit_layout, ParameterPoint(point.shared, own))
+            sse = np.array([float(part @ part) for part in parts])
+            better = sse < best
+            chosen[better] = own[better, column]
+            best[better] = sse[better]
+        own = point.own.copy()
+        own[:, column] = chosen
+        point = ParameterPoint(point.shared, own)
+    return point
+
+
+def fit_own(
+    problem: DiagnosisProblem, fit_layout: ParameterLayout, shared: np.ndarray
+) -> ParameterPoint:
+    """Find each recording's own parameters for given shared ones.
+
+    Parameters
+    ----------
+    shared : ndarray, shape (n_shared,)
+        Coordinates.
+    """
+    point = ParameterPoint(
+        shared, np.zeros((len(problem.signals), len(fit_layout.own)))
+    )
+    if not fit_layout.own:
+        return point
+    start = {one: dict[str, float]() for one in fit_layout.effects}
+    first = first_point(problem, _only_own(fit_layout), problem.drive, start)
+    point = with_own_trials(problem, fit_layout, ParameterPoint(shared, first.own))
+    found = fit_point(
+        problem, fit_layout, point, max_iterations=OWN_ITERATIONS, only_own=True
+    )
+    return found.point
+
+
+def _only_own(fit_layout: ParameterLayout) -> ParameterLayout:
+    return ParameterLayout((), fit_layout.own, fit_layout.effects)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from hwid_cli.diagnosis.preparing import drive_of, prepare
+from hwid_cli.diagnosis.problem import drive_of, prepare
 from hwid_cli.drive.simulation import drive_effects, parameter_vector
 from hwid_cli.errors import ConfigError, ModelFileError
 from hwid_cli.model.extrapolation import outlined_model

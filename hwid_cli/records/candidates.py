@@ -40,6 +40,40 @@ class RankedCandidate:
     note: str = ""
 
 
+@dataclass(frozen=True)
+class ParameterRef:
+    """Which parameter of a fit a value belongs to.
+
+    Files hold it as text, ``<owner>/<parameter>``; this is the one place that writes
+    and reads that form.
+
+    Parameters
+    ----------
+    owner : str
+        Id of an effect in the catalogue, ``base``, or ``start`` for how a recording
+        starts.
+
+    Examples
+    --------
+    >>> str(ParameterRef("coulomb_friction", "force_N"))
+    'coulomb_friction/force_N'
+    >>> ParameterRef.of_text("base/stiffness_N_per_m").parameter
+    'stiffness_N_per_m'
+    """
+
+    owner: str
+    parameter: str
+
+    def __str__(self) -> str:
+        return f"{self.owner}/{self.parameter}"
+
+    @classmethod
+    def of_text(cls, text: str) -> "ParameterRef":
+        """Read what ``str`` gives."""
+        owner, _, parameter = text.partition("/")
+        return cls(owner, parameter)
+
+
 @dataclass(frozen=True, eq=False)
 class CandidateFit:
     """Base and effects as fitted to the training recordings, and how they do.
@@ -48,11 +82,11 @@ class CandidateFit:
     ----------
     effects : tuple of str
         Ids in the catalogue of drive effects, without those that the simulation had.
-    names : tuple of str
-        ``<owner>/<parameter>`` of what all recordings share.
+    names : tuple of ParameterRef
+        Of what all recordings share.
     values : ndarray, shape (n_names,)
-    own_names : tuple of str
-        ``<owner>/<parameter>`` of what each recording has for itself.
+    own_names : tuple of ParameterRef
+        Of what each recording has for itself.
     own : ndarray, shape (n_recordings, n_own)
         In the order of the recordings.
     sse : ndarray, shape (n_recordings,)
@@ -64,9 +98,9 @@ class CandidateFit:
     """
 
     effects: tuple[str, ...]
-    names: tuple[str, ...]
+    names: tuple[ParameterRef, ...]
     values: np.ndarray
-    own_names: tuple[str, ...]
+    own_names: tuple[ParameterRef, ...]
     own: np.ndarray
     sse: np.ndarray
     whiteness: float

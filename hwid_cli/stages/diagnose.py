@@ -1,10 +1,7 @@
-"""Stage ``diagnose``: what a simulation of the drive lacks, and what shows it.
+"""Stage ``diagnose``: its key, its tasks from the cache, and what it leaves.
 
-The base is re-fitted first, because wrong parameters are not a missing effect; then
-effects of the catalogue are tried, alone and in sets; held-out recordings decide.
-docs/method_diagnosis.md.
-
-A diagnosis in memory, for programs that hold recordings and write no results.
+What a diagnosis does is in ``hwid_cli.diagnosis.diagnose``. Here as well: a diagnosis
+in memory, for programs that hold recordings and write no results.
 """
 
 from collections.abc import Sequence
@@ -13,39 +10,19 @@ from math import nan
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from hwid_cli.config.extended_simulation import write_extended_simulation
-from hwid_cli.diagnosis.candidate import Footing, fit_candidate
-from hwid_cli.diagnosis.comparing import compare
-from hwid_cli.diagnosis.judge import Judge
-from hwid_cli.diagnosis.lines import line_frequencies, line_share
-from hwid_cli.diagnosis.noise import noise_floor
-from hwid_cli.diagnosis.own_parameters import fit_own
-from hwid_cli.diagnosis.preparing import prepare
-from hwid_cli.diagnosis.problem import Compared, Problem, scales
-from hwid_cli.diagnosis.scaling import scales_of
-from hwid_cli.diagnosis.splitting import held_out_names
-from hwid_cli.diagnosis.stored_fit import fitted_drive, rebuilt
-from hwid_cli.diagnosis.unknowns import first_point, layout
-from hwid_cli.drive.catalogue import CATALOGUE, public_id
-from hwid_cli.drive.effect import Scales
-from hwid_cli.drive.simulation import drive_effects
+from hwid_cli.diagnosis import diagnose as pipeline
+from hwid_cli.diagnosis.rounds import DiagnosisTask, OnRound, RunTasks
 from hwid_cli.errors import CacheError, ConfigError
 from hwid_cli.files.atomic import replace_file
-from hwid_cli.records.candidates import CandidateFit
 from hwid_cli.records.check import StagePlan
-from hwid_cli.records.diagnosis import Diagnosis, NoiseFloor
+from hwid_cli.records.diagnosis import Diagnosis
 from hwid_cli.records.experiment import DiagnoseOptions, Experiment, SimulationOptions
 from hwid_cli.records.recordings import Recording
 from hwid_cli.report.diagnosis_tables import diagnosis_text
 from hwid_cli.report.figures.diagnosis import diagnosis_figures
 from hwid_cli.report.plots import as_png
-from hwid_cli.stages.candidate_rounds import Found, run_rounds
-from hwid_cli.stages.candidate_tasks import STAGE as NAME
-from hwid_cli.stages.candidate_tasks import STAGE_VERSION, Announce, Rounds
 from hwid_cli.stages.diagnosis_starts import doubtful_starts, starts_sentence
-from hwid_cli.stages.findings import Findings, describe
 from hwid_cli.stages.fit_seconds import counted
 from hwid_cli.stages.selection import select_recordings
 from hwid_cli.stages.stage import Context, Planning, Runner, Stage, in_results
@@ -58,11 +35,11 @@ from hwid_cli.store.diagnosis_results import (
 )
 from hwid_cli.store.result_files import Provenance
 from hwid_cli.tasks.cache import MemoryStore, task_key
-from hwid_cli.tasks.runner import RunSettings, Workers
-from hwid_cli.tasks.task import one_thread
+from hwid_cli.tasks.runner import RunSettings, Workers, run_tasks
+from hwid_cli.tasks.task import Task, one_thread
 
-# A line that takes this share of what the base leaves is no colour of noise.
-LINE_SHARE = 0.3
+NAME = "diagnose"
+STAGE_VERSION = 1
 
 
 def diagnosis_key(
@@ -86,7 +63,7 @@ def diagnose_all(
     simulation: SimulationOptions,
     options: DiagnoseOptions,
     settings: RunSettings,
-    on_stage: Announce,
+    on_stage: OnRound,
 ) -> Diagnosis:
     """Find what a simulation lacks.
 
@@ -97,103 +74,41 @@ def diagnose_all(
     on_stage : callable
         Called with what begins and its number of tasks.
     """
+    key = diagnosis_key(recordings, simulation, options)
+    runner = _runner(key, settings)
     with one_thread():
-        return _diagnose(recordings, simulation, options, settings, on_stage)
+        return pipeline.diagnose(recordings, simulation, options, runner, on_stage)
 
 
-def _diagnose(
-    recordings: Sequence[Recording],
-    simulation: SimulationOptions,
-    options: DiagnoseOptions,
-    settings: RunSettings,
-    on_stage: Announce,
-) -> Diagnosis:
-    held_out = (
-        held_out_names(recordings)
-        if isinstance(options.hold_out, str)
-        else options.hold_out
-    )
-    problem = prepare(recordings, simulation, options, held_out)
-    noise = noise_floor(problem)
-    on_stage("base", 0)
-    given = compared_as_given(problem)
-    sizes = scales(problem, [one.velocity for one in given])
-    base = _base(problem, sizes, noise)
-    if _shakes_at_rest(problem, base, sizes, noise):
-        noise = noise_floor(problem, rests=False)
-        base = _base(problem, sizes, noise)
-    judge = Judge.of(problem, noise)
-    found = Found((), (), {})
-    if base.is_usable:
-        sizes = scales_of(problem, base, sizes, noise)
-    if base.is_usable and not judge.is_complete(base):
-        rounds = Rounds(
-            problem=problem,
-            key=diagnosis_key(recordings, simulation, options),
-            footing=Footing(
-                fitted_drive(problem.drive, base), sizes, noise, problem.drive
-            ),
-            judge=judge,
-            base=base,
-            allowed=_allowed(problem, options),
-            settings=settings,
-            announce=on_stage,
-        )
-        found = run_rounds(rounds, options.max_effects)
-    on_stage("verdict", 0)
-    return describe(Findings(problem, noise, judge, sizes, given, base, found))
+def _runner(key: str, settings: RunSettings) -> RunTasks:
+    """Run the tasks of one diagnosis over the workers, memoised.
 
-
-def _base(problem: Problem, sizes: Scales, noise: NoiseFloor) -> CandidateFit:
-    """Base, and the effects that the simulation has already, fitted again."""
-    present = drive_effects(problem.drive)
-    return fit_candidate(problem, (), [present], Footing(problem.drive, sizes, noise))
-
-
-def _shakes_at_rest(
-    problem: Problem, base: CandidateFit, sizes: Scales, noise: NoiseFloor
-) -> bool:
-    """Whether the colour at rest is a line that goes on all the time: motion."""
-    if not (noise.is_coloured and noise.method == "rest" and base.is_usable):
-        return False
-    compared = compare(problem, *rebuilt(problem, base, sizes))
-    white = replace(noise, whitening=(1.0,))
-    line = line_frequencies(compared, white)[0]
-    return line_share(compared, line) > LINE_SHARE
-
-
-def compared_as_given(problem: Problem) -> list[Compared]:
-    """Simulate with the parameters that the configuration gives.
-
-    What belongs to one recording alone (a start, a phase) is found from it.
+    Parameters
+    ----------
+    key : str
+        Of the diagnosis.
     """
-    present = drive_effects(problem.drive)
-    speeds = [
-        np.gradient(signals.output, signals.sample_time_s)
-        for signals in problem.signals
-    ]
-    rough = scales(problem, speeds)
-    fit_layout = layout(problem, tuple(present), present, rough)
-    point = first_point(problem, fit_layout, problem.drive, present)
-    own = fit_own(problem, fit_layout, point.shared)
-    return compare(problem, fit_layout, own)
+
+    def run(tasks: Sequence[DiagnosisTask], *, keep: bool) -> list[Any]:
+        keyed = [
+            Task(
+                key=_fit_key(key, one) if keep else one.name,
+                name=one.name,
+                function=one.function,
+                arguments=one.arguments,
+                result_type=one.result_type,
+            )
+            for one in tasks
+        ]
+        chosen = settings if keep else replace(settings, store=MemoryStore())
+        return [one.result for one in run_tasks(keyed, chosen)]
+
+    return run
 
 
-def _allowed(problem: Problem, options: DiagnoseOptions) -> tuple[str, ...]:
-    """Ids that may be named: those asked for that make sense for this drive."""
-    wanted = options.effects
-    has_spring = problem.drive.stiffness_N_per_m > 0
-    several = len(problem.part(held_out=False).signals) > 2
-    return tuple(
-        name
-        for name, effect in CATALOGUE.items()
-        if (wanted is None or public_id(name) in wanted)
-        and public_id(name)
-        not in {public_id(one) for one in drive_effects(problem.drive)}
-        and (has_spring or not effect.needs_spring)
-        and (several or not any(one.is_own for one in effect.parameters))
-        and not (problem.compares_command and effect.enters == "output")
-    )
+def _fit_key(key: str, task: DiagnosisTask) -> str:
+    content = {"problem": key, **task.content}
+    return task_key(NAME, STAGE_VERSION, content, task.arrays)
 
 
 def extended_options(

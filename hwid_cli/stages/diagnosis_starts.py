@@ -11,7 +11,7 @@ import numpy as np
 
 from hwid_cli.data.calibration import LEAST_QUIET, find_onset
 from hwid_cli.diagnosis.noise import noise_floor
-from hwid_cli.diagnosis.preparing import prepare
+from hwid_cli.diagnosis.problem import prepare
 from hwid_cli.records.experiment import (
     CalibrateOptions,
     DiagnoseOptions,

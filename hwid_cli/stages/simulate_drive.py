@@ -4,11 +4,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from hwid_cli.diagnosis.preparing import prepare
+from hwid_cli.diagnosis.diagnose import compared_as_given
+from hwid_cli.diagnosis.problem import prepare
 from hwid_cli.records.drive import SimulatedRecording
 from hwid_cli.records.experiment import DiagnoseOptions, SimulationOptions
 from hwid_cli.records.recordings import Recording
-from hwid_cli.stages.diagnose import compared_as_given
 
 
 def simulate_recordings(

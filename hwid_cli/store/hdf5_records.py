@@ -2,7 +2,8 @@
 
 Scalars and tuples of scalars become attributes (data sets where they are too long for
 one), arrays data sets, records groups, tuples of records numbered groups. None is
-absent. Floats come back bit by bit.
+absent. Floats come back bit by bit. A record with a text form of its own (``str`` and
+``of_text``) is stored as that text where there is a tuple of it.
 
 Single values in HDF5: attributes for what is small, data sets for arrays.
 
@@ -213,6 +214,8 @@ def write_record(group: h5py.Group, record: Any) -> None:
             members = group.create_group(name)
             for number, item in enumerate(value):
                 write_record(members.create_group(str(number)), item)
+        elif form == "texts":
+            write_small(group, name, [str(item) for item in value], str)
         else:
             write_small(group, name, value, member)
 
@@ -254,10 +257,12 @@ def _read_field(group: h5py.Group, field: StoredField) -> Any:
             read_record(numbered[str(number)], member)
             for number in range(len(numbered))
         )
-    value = read_small(group, name, member)
-    if isinstance(value, list) != (form == "tuple"):
+    value = read_small(group, name, str if form == "texts" else member)
+    if isinstance(value, list) != (form != "scalar"):
         raise TypeError(f"{group.name}: {name} has the wrong shape")
-    return tuple(value) if isinstance(value, list) else value
+    if not isinstance(value, list):
+        return value
+    return tuple(map(member.of_text, value) if form == "texts" else value)
 
 
 def _read_schema(record_type: Any) -> list[StoredField]:
@@ -301,5 +306,6 @@ def _field(record_type: type, name: str, hint: Any) -> StoredField:
         if isinstance(inner, type) and is_dataclass(inner):
             return StoredField(name, "record", inner, is_optional)
         if isinstance(item, type) and is_dataclass(item):
-            return StoredField(name, "records", item, is_optional)
+            form = "texts" if hasattr(item, "of_text") else "records"
+            return StoredField(name, form, item, is_optional)
     raise TypeError(f"{record_type.__name__}.{name}: {hint} has no place in HDF5")

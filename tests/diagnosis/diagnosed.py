@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from hwid_cli.diagnosis.problem import Compared, Problem, Signals
+from hwid_cli.diagnosis.problem import Compared, DiagnosisProblem, Signals
 from hwid_cli.drive.simulation import simulate_drive
 from hwid_cli.records.diagnosis import NoiseFloor
 from hwid_cli.records.drive import Drive
@@ -74,4 +74,4 @@ def problem_of(measured, driven_by, drive=DRIVE):
         Signals(f"r{j}", "step", u, y, u, y, SAMPLE_TIME_S)
         for j, (u, y) in enumerate(zip(driven_by, measured, strict=True))
     )
-    return Problem(signals, drive)
+    return DiagnosisProblem(signals, drive)

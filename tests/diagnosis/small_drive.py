@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from hwid_cli.diagnosis.preparing import prepare
-from hwid_cli.diagnosis.problem import scales
+from hwid_cli.diagnosis.problem import prepare
+from hwid_cli.diagnosis.scales import scales_of_recordings
 from hwid_cli.drive.simulation import simulate_drive
 from hwid_cli.records.diagnosis import NoiseFloor
 from hwid_cli.records.drive import Drive
@@ -85,9 +85,14 @@ def sizes(of, frequencies_Hz=()):
     """Scales with a speed that the drive may reach."""
     largest = max(float(np.max(np.abs(one.output))) for one in of.signals)
     velocity = [np.full(3, 60.0 * largest) for _ in of.signals]
-    return scales(of, velocity, frequencies_Hz)
+    return scales_of_recordings(of, velocity, frequencies_Hz)
 
 
 def white(rms=NOISE):
     """Noise floor of a white sensor."""
     return NoiseFloor(rms, "differences", 0.0, False, (1.0,), "")
+
+
+def in_turn(tasks, *, keep):
+    """Run the tasks of a diagnosis one after the other, and keep nothing."""
+    return [one.function(*one.arguments) for one in tasks]

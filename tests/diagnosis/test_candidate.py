@@ -1,17 +1,30 @@
-"""A candidate's fit: training recordings decide, held-out ones are only simulated."""
+"""A fit of a candidate: training recordings decide, and it stands for what it found."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from hwid_cli.diagnosis.candidate import RACE_SAMPLES, Footing, fit_candidate, thinned
-from hwid_cli.diagnosis.problem import Problem
+from hwid_cli.diagnosis.candidate import (
+    SCREENING_SAMPLES,
+    Baseline,
+    fewer_recordings,
+    fit_candidate,
+    fitted_drive,
+    fitted_effects,
+    fitted_start,
+    rebuilt,
+)
+from hwid_cli.diagnosis.parameters import residuals_at
+from hwid_cli.diagnosis.problem import DiagnosisProblem
+from hwid_cli.records.candidates import ParameterRef
+from hwid_cli.records.experiment import DiagnoseOptions
 from tests.diagnosis.small_drive import (
     DRIVE,
     NOISE,
     problem,
     recordings,
+    simulation,
     sizes,
     white,
 )
@@ -21,30 +34,30 @@ COULOMB = {"coulomb_friction": {"force_N": 0.8}}
 START = {"coulomb_friction": {"force_N": 0.3}}
 
 
-def footing(of, drive=None):
-    return Footing(drive or of.drive, sizes(of), white())
+def baseline(of, drive=None):
+    return Baseline(drive or of.drive, sizes(of), white())
 
 
 def fitted(given, effects=("coulomb_friction",), starts=(START,), **options):
     of = problem(given, held_out=HELD_OUT)
     # Scales of what was not spoilt: they are no part of what is shown here.
-    return fit_candidate(of, effects, starts, footing(problem()), **options)
+    return fit_candidate(of, effects, starts, baseline(problem()), **options)
 
 
 def value(found, name):
-    return found.values[found.names.index(name)]
+    return found.values[[str(one) for one in found.names].index(name)]
 
 
 def test_base_and_effect_are_found_with_their_names():
     found = fitted(recordings(COULOMB))
 
     assert found.effects == ("coulomb_friction",)
-    assert found.names == (
+    assert [str(one) for one in found.names] == [
         "base/damping_N_s_per_m",
         "base/stiffness_N_per_m",
         "base/force_constant_N_per_A",
         "coulomb_friction/force_N",
-    )
+    ]
     assert found.has_converged
     assert found.is_usable
     # One percent is many times the interval of these recordings.
@@ -95,7 +108,7 @@ def test_the_order_of_the_recordings_only_orders_the_result():
 
 def test_effects_that_the_simulation_has_are_fitted_again():
     of = problem(recordings(COULOMB), effects={"coulomb_friction": {"force_N": 0.5}})
-    found = fit_candidate(of, (), ({},), footing(of))
+    found = fit_candidate(of, (), ({},), baseline(of))
     assert found.effects == ()
     assert value(found, "coulomb_friction/force_N") == pytest.approx(0.8, rel=0.01)
 
@@ -123,7 +136,7 @@ def test_phases_of_held_out_recordings_are_found_as_well():
     start = {"periodic_force": {"amplitude_N": 0.2, "frequency_Hz": 30.6}}
     found = fitted(given, ("periodic_force",), (start,))
 
-    assert found.own_names == ("periodic_force/phase_rad",)
+    assert found.own_names == (ParameterRef("periodic_force", "phase_rad"),)
     apart = np.angle(np.exp(1j * (found.own[:, 0] - 0.9 * np.arange(9))))
     # Phase and frequency share the noise: about 0.03 rad over these short recordings.
     assert np.abs(apart).max() < 0.15
@@ -146,10 +159,10 @@ def test_factors_of_held_out_recordings_are_found_as_well():
     np.testing.assert_allclose(total, 1184.0 * factors, rtol=5e-3)
 
 
-def test_a_hopeless_candidate_is_not_finished():
+def test_a_pruned_candidate_is_not_finished():
     given = recordings(COULOMB)
     start = {"input_dead_zone": {"threshold_A": 0.2}}
-    found = fitted(given, ("input_dead_zone",), (start,), hopeless=0.0)
+    found = fitted(given, ("input_dead_zone",), (start,), pruning_limit=0.0)
 
     assert found.iterations <= 1
     assert not found.has_converged
@@ -171,7 +184,7 @@ def test_wrong_parameters_to_start_from_do_not_matter():
     off = replace(DRIVE, damping_N_s_per_m=20.0, force_constant_N_per_A=4.0)
     of = problem(recordings(COULOMB))
     found = [
-        fit_candidate(of, ("coulomb_friction",), (START,), footing(of, drive)).values
+        fit_candidate(of, ("coulomb_friction",), (START,), baseline(of, drive)).values
         for drive in (DRIVE, off)
     ]
     # Both stop when a step gains a hundred-thousandth.
@@ -180,11 +193,11 @@ def test_wrong_parameters_to_start_from_do_not_matter():
 
 def test_few_samples_are_taken_from_every_kind_and_the_largest_first():
     of = problem(recordings())
-    few = thinned(of, 900)
+    few = fewer_recordings(of, 900)
     names = [one.name for one in few.signals]
 
     assert {one.kind for one in few.signals} == {"step", "sine"}
-    assert few.n_judged <= 900 + 400
+    assert few.n_evaluated <= 900 + 400
     largest = max(
         (one for one in of.signals if one.kind == "step"),
         key=lambda one: np.max(np.abs(one.output)),
@@ -195,11 +208,80 @@ def test_few_samples_are_taken_from_every_kind_and_the_largest_first():
 
 def test_recordings_that_are_few_anyway_are_all_taken():
     of = problem(recordings())
-    assert thinned(of, RACE_SAMPLES) is of
+    assert fewer_recordings(of, SCREENING_SAMPLES) is of
 
 
 def test_a_single_recording_can_be_fitted():
     of = problem(recordings(COULOMB)[5:6])
-    assert isinstance(of, Problem)
-    found = fit_candidate(of, ("coulomb_friction",), (START,), footing(of))
+    assert isinstance(of, DiagnosisProblem)
+    found = fit_candidate(of, ("coulomb_friction",), (START,), baseline(of))
     assert value(found, "coulomb_friction/force_N") == pytest.approx(0.8, rel=0.05)
+
+
+PHASES = 0.9 * np.arange(9)
+
+
+def found_in(of, effects, start):
+    return fit_candidate(of, effects, (start,), Baseline(of.drive, sizes(of), white()))
+
+
+@pytest.fixture(scope="module")
+def pushed():
+    force = {"amplitude_N": 0.4, "frequency_Hz": 31.0}
+    given = recordings(
+        own=lambda number, drive: replace(
+            drive,
+            effects={
+                "sensor_drift": {"drift_m_per_s": 0.01},
+                "periodic_force": {**force, "phase_rad": PHASES[number]},
+            },
+        )
+    )
+    of = problem(
+        given,
+        held_out=("sine_1",),
+        options=DiagnoseOptions(initial_state="estimated"),
+        effects={"sensor_drift": {"drift_m_per_s": 0.008}},
+    )
+    start = {"periodic_force": {"amplitude_N": 0.3, "frequency_Hz": 31.2}}
+    return of, found_in(of, ("periodic_force",), start)
+
+
+def test_it_simulates_as_it_did(pushed):
+    of, found = pushed
+    fit_layout, point = rebuilt(of, found, sizes(of))
+    sse = [float(part @ part) for part in residuals_at(of, fit_layout, point)]
+    # Values go through a logarithm and back.
+    np.testing.assert_allclose(sse, found.sse, rtol=1e-6)
+
+
+def test_it_keeps_its_drive(pushed):
+    of, found = pushed
+    drive = fitted_drive(of.drive, found)
+    assert drive.stiffness_N_per_m == found.values[1]
+    # One percent: some hundred samples of 0.1 % noise, over many.
+    assert drive.stiffness_N_per_m == pytest.approx(DRIVE.stiffness_N_per_m, rel=0.01)
+    assert drive.mass_kg == of.drive.mass_kg
+
+
+def test_it_keeps_its_effects_and_marks_what_is_own(pushed):
+    _, found = pushed
+    effects = fitted_effects(found)
+    assert set(effects) == {"sensor_drift", "periodic_force"}
+    assert effects["periodic_force"]["frequency_Hz"] == pytest.approx(31.0, rel=0.01)
+    assert effects["periodic_force"]["phase_rad"] == 0.0
+    assert "start" not in effects
+
+
+def test_effects_of_the_simulation_take_their_fitted_values(pushed):
+    _, found = pushed
+    start = fitted_start(found, {"sensor_drift": {"drift_m_per_s": 0.008}})
+    assert set(start) == {"sensor_drift"}
+    assert start["sensor_drift"]["drift_m_per_s"] == pytest.approx(0.01, rel=0.05)
+
+
+def test_a_fit_of_the_base_alone_has_no_effects():
+    of = problem(recordings()[:2])
+    found = found_in(of, (), {})
+    assert fitted_effects(found) == {}
+    assert simulation().effects == {}

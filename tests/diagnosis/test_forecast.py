@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from hwid_cli.diagnosis.candidate import Footing, fit_candidate
-from hwid_cli.diagnosis.forecast import Forecast, forecast, ground, pair_shares
-from hwid_cli.diagnosis.stored_fit import fitted_drive
+from hwid_cli.diagnosis.candidate import Baseline, fit_candidate, fitted_drive
+from hwid_cli.diagnosis.forecast import Forecast, forecast, linearise, pair_shares
 from hwid_cli.drive.catalogue import CATALOGUE
 from tests.diagnosis.small_drive import problem, recordings, sizes, white
 
@@ -21,64 +20,66 @@ HIDDEN = {
 }
 
 
-def ground_of(effects, **changes):
+def linearised(effects, **changes):
     of = problem(recordings(effects), **changes)
-    footing = Footing(of.drive, sizes(of), white())
-    base = fit_candidate(of, (), ({},), footing)
-    return ground(of, fitted_drive(of.drive, base), {}, footing.scales)
+    baseline = Baseline(of.drive, sizes(of), white())
+    base = fit_candidate(of, (), ({},), baseline)
+    return linearise(of, fitted_drive(of.drive, base), {}, baseline.scales)
 
 
 @pytest.mark.parametrize("hidden", HIDDEN)
 def test_the_hidden_effect_is_among_the_first_three_of_all(hidden):
-    level = ground_of({hidden: HIDDEN[hidden]})
-    found = [forecast(level, one) for one in CATALOGUE if "parameter" not in one]
+    at_base = linearised({hidden: HIDDEN[hidden]})
+    found = [forecast(at_base, one) for one in CATALOGUE if "parameter" not in one]
     found.sort(key=lambda one: -one.share)
     assert hidden in [one.effect for one in found[:3]]
 
 
 def test_shares_lie_between_nothing_and_all():
-    level = ground_of({"coulomb_friction": {"force_N": 0.8}})
-    shares = [forecast(level, one).share for one in HIDDEN]
+    at_base = linearised({"coulomb_friction": {"force_N": 0.8}})
+    shares = [forecast(at_base, one).share for one in HIDDEN]
     assert all(-1e-12 <= one <= 1 for one in shares)
     assert max(shares) > 0.8
 
 
 def test_starts_are_ordered_by_how_near_they_come():
     # A twelfth, a twenty-fifth and a hundredth of the largest force, 20 N, are tried.
-    level = ground_of({"coulomb_friction": {"force_N": 0.8}})
-    starts = forecast(level, "coulomb_friction").starts
+    at_base = linearised({"coulomb_friction": {"force_N": 0.8}})
+    starts = forecast(at_base, "coulomb_friction").starts
     assert starts[0]["force_N"] == pytest.approx(0.8)
     assert len(starts) == 3
 
 
 def test_the_base_absorbs_its_own_directions():
-    level = ground_of({"coulomb_friction": {"force_N": 0.8}})
-    np.testing.assert_allclose(level.absorbed.T @ level.absorbed, np.eye(3), atol=1e-12)
-    assert np.abs(level.absorbed.T @ level.error).max() < 1e-12
-    column = forecast(level, "coulomb_friction").column
+    at_base = linearised({"coulomb_friction": {"force_N": 0.8}})
+    np.testing.assert_allclose(
+        at_base.absorbed.T @ at_base.absorbed, np.eye(3), atol=1e-12
+    )
+    assert np.abs(at_base.absorbed.T @ at_base.error).max() < 1e-12
+    column = forecast(at_base, "coulomb_friction").column
     assert column @ column == pytest.approx(1.0)
-    assert np.abs(level.absorbed.T @ column).max() < 1e-9
+    assert np.abs(at_base.absorbed.T @ column).max() < 1e-9
 
 
 def test_an_effect_of_the_wrong_sign_explains_nothing():
     # Friction only resists: what drags along looks like its opposite.
-    level = ground_of({"coulomb_friction": {"force_N": 0.8}})
-    turned = type(level)(
-        level.problem, level.drive, level.present, level.scales,
-        [-one for one in level.parts], level.absorbed, -level.error,
+    at_base = linearised({"coulomb_friction": {"force_N": 0.8}})
+    turned = type(at_base)(
+        at_base.problem, at_base.drive, at_base.present, at_base.scales,
+        [-one for one in at_base.parts], at_base.absorbed, -at_base.error,
     )  # fmt: skip
-    assert forecast(level, "coulomb_friction").share > 0.8
+    assert forecast(at_base, "coulomb_friction").share > 0.8
     changed = forecast(turned, "quadratic_drag")
     assert changed.share >= 0.0
 
 
 def test_an_effect_that_changes_nothing_gets_no_share():
     # No current is cut at a limit that it never reaches.
-    level = ground_of({"coulomb_friction": {"force_N": 0.8}})
-    far = type(level)(
-        level.problem, level.drive, level.present,
-        type(level.scales)(**{**vars(level.scales), "current_A": 100.0}),
-        level.parts, level.absorbed, level.error,
+    at_base = linearised({"coulomb_friction": {"force_N": 0.8}})
+    far = type(at_base)(
+        at_base.problem, at_base.drive, at_base.present,
+        type(at_base.scales)(**{**vars(at_base.scales), "current_A": 100.0}),
+        at_base.parts, at_base.absorbed, at_base.error,
     )  # fmt: skip
     found = forecast(far, "input_saturation")
     assert found.share == 0.0

@@ -152,7 +152,7 @@ def test_recordings_may_differ_in_length_and_sample_time():
     pairs = compared({"coulomb_friction": {"force_N": 0.8}}, chosen="sine_5")
     first, second = pairs[1], pairs[2]
     signals = second.signals
-    thinned = replace(
+    fewer_recordings = replace(
         signals,
         driven_by=signals.driven_by[::2],
         compared=signals.compared[::2],
@@ -161,7 +161,10 @@ def test_recordings_may_differ_in_length_and_sample_time():
         sample_time_s=2 * SAMPLE_TIME_S,
     )
     second = Compared(
-        thinned, second.simulated[::2], second.position[::2], second.velocity[::2]
+        fewer_recordings,
+        second.simulated[::2],
+        second.position[::2],
+        second.velocity[::2],
     )
 
     alone = latent_force([pairs[2]], DRIVE, white(SIGMA))

@@ -3,10 +3,14 @@
 import numpy as np
 import pytest
 
-from hwid_cli.diagnosis.candidate import Footing, fit_candidate
-from hwid_cli.diagnosis.next_experiment import Model, Separation, best_separation, menu
-from hwid_cli.diagnosis.stored_fit import rebuilt
-from hwid_cli.diagnosis.unknowns import first_point, layout
+from hwid_cli.diagnosis.candidate import Baseline, fit_candidate, rebuilt
+from hwid_cli.diagnosis.next_experiment import (
+    FittedCandidate,
+    Separation,
+    best_separation,
+    menu,
+)
+from hwid_cli.diagnosis.parameters import first_point, parameter_layout
 from hwid_cli.drive.simulation import simulate_drive
 from hwid_cli.records.recordings import Recording
 from tests.diagnosis.small_drive import (
@@ -36,15 +40,15 @@ def rivals():
         read = motion.output + NOISE * rng.standard_normal(400)
         given.append(Recording(f"step_{size}", current, read, STEP_S, kind="step"))
     of = problem(given)
-    footing = Footing(of.drive, sizes(of), white())
+    baseline = Baseline(of.drive, sizes(of), white())
     models = []
     for effect, start in (
         ("coulomb_friction", {"force_N": 0.4}),
         ("output_backlash", {"half_gap_m": 2e-4}),
     ):
-        found = fit_candidate(of, (effect,), ({effect: start},), footing)
-        models.append(Model(*rebuilt(of, found, footing.scales)))
-    return of, models, footing.scales
+        found = fit_candidate(of, (effect,), ({effect: start},), baseline)
+        models.append(FittedCandidate(*rebuilt(of, found, baseline.scales)))
+    return of, models, baseline.scales
 
 
 def test_friction_and_backlash_are_separated_by_reversals(rivals):
@@ -66,7 +70,7 @@ def test_what_the_rival_can_absorb_does_not_count(rivals):
     point = coulomb.point
     # Another force of friction: a new measurement would only correct it.
     moved = point.shared + np.array([0.0, 0.0, 0.0, 1e-3])
-    other = Model(coulomb.layout, type(point)(moved, point.own))
+    other = FittedCandidate(coulomb.layout, type(point)(moved, point.own))
     found = best_separation(of, coulomb, other, scales)
     unabsorbed = 1e-3 * 0.8 / DRIVE.stiffness_N_per_m
     assert found.rms < 0.05 * unabsorbed
@@ -75,8 +79,8 @@ def test_what_the_rival_can_absorb_does_not_count(rivals):
 def test_a_rival_that_runs_away_separates_nothing(rivals):
     of, (coulomb, _), scales = rivals
     start = {"cubic_stiffness": {"stiffness_N_per_m3": -1e9}}
-    lost = layout(of, ("cubic_stiffness",), start, scales)
-    model = Model(lost, first_point(of, lost, of.drive, start))
+    lost = parameter_layout(of, ("cubic_stiffness",), start, scales)
+    model = FittedCandidate(lost, first_point(of, lost, of.drive, start))
     assert best_separation(of, coulomb, model, scales) == Separation(
         next(iter(menu(scales))), 0.0
     )

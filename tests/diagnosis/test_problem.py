@@ -1,10 +1,21 @@
-"""What a diagnosis works on: recordings as signals, what is judged, typical sizes."""
+"""From recordings to the problem: signals, what is held out, what is evaluated."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from hwid_cli.diagnosis.problem import Compared, Problem, Signals, rest_length, scales
+from hwid_cli.diagnosis.problem import (
+    Compared,
+    DiagnosisProblem,
+    Signals,
+    held_out_names,
+    prepare,
+    rest_length,
+)
 from hwid_cli.records.drive import Controller, Drive
+from hwid_cli.records.experiment import DiagnoseOptions, SimulationOptions
+from hwid_cli.records.recordings import Recording
 
 
 def signals(driven_by, output, *, skip=0, held_out=False, step=0.01):
@@ -37,20 +48,20 @@ def test_an_input_that_moves_at_once_rests_at_its_first_sample():
     assert one.rest_position_m == 4.0
 
 
-def test_skipped_samples_are_not_judged():
+def test_skipped_samples_are_not_evaluated():
     one = signals([0, 1, 1, 1], [9.0, 9.0, 1.0, 3.0], skip=2)
     beside = Compared(one, np.zeros(4), np.zeros(4), np.zeros(4))
 
-    assert one.n_judged == 2
+    assert one.n_evaluated == 2
     np.testing.assert_array_equal(beside.residual, [1.0, 3.0])
     assert beside.rms == pytest.approx(np.sqrt(5.0))
 
 
 def test_a_problem_is_parted_into_held_out_and_other_recordings():
     first, second = signals([0, 1], [0, 1]), signals([0, 1], [0, 1], held_out=True)
-    whole = Problem((first, second), Drive(), start="held")
+    whole = DiagnosisProblem((first, second), Drive(), start="held")
 
-    assert whole.n_judged == 4
+    assert whole.n_evaluated == 4
     assert whole.part(held_out=True).signals == (second,)
     assert whole.part(held_out=False).signals == (first,)
     assert whole.part(held_out=True).start == "held"
@@ -58,52 +69,183 @@ def test_a_problem_is_parted_into_held_out_and_other_recordings():
 
 def test_under_a_controller_the_command_is_compared():
     one = signals([0, 1], [0, 1])
-    assert not Problem((one,), Drive()).compares_command
-    assert Problem((one,), Drive(controller=Controller(1.0, 1.0))).compares_command
+    assert not DiagnosisProblem((one,), Drive()).compares_command
+    assert DiagnosisProblem(
+        (one,), Drive(controller=Controller(1.0, 1.0))
+    ).compares_command
 
 
-def two_recordings(**drive):
-    return Problem(
-        (
-            signals([0.0, 2.0, 2.0], [0.0, -0.3, 0.1]),
-            signals([0.0, -3.0, -2.5, -2.5], [0.0, 0.2, 0.0, 0.0]),
-        ),
-        Drive(**drive),
+TRAIN = Recording("a", np.array([0.0, 2.0, -3.0]), np.array([0.0, 0.1, -0.4]), 1e-3)
+HELD = Recording("b", np.array([0.0, 9.0, 0.0]), np.array([0.0, 0.8, 0.0]), 1e-3)
+
+
+def prepared(**changes):
+    options = DiagnoseOptions(**changes)
+    return prepare([TRAIN, HELD], SimulationOptions(), options, ["b"])
+
+
+def test_references_are_the_largest_magnitudes_of_the_training_recordings():
+    drive = prepared().drive
+    assert drive.reference_current_A == 3.0
+    assert drive.reference_displacement_m == pytest.approx(0.4)
+
+
+def test_references_of_the_configuration_stand():
+    simulation = SimulationOptions(
+        reference_current_A=7.0, reference_displacement_m=0.5
     )
+    drive = prepare([TRAIN], simulation, DiagnoseOptions(), []).drive
+    assert (drive.reference_current_A, drive.reference_displacement_m) == (7.0, 0.5)
 
 
-def test_scales_are_the_largest_of_all_recordings():
-    of = two_recordings(
-        mass_kg=2.0, stiffness_N_per_m=50.0, force_constant_N_per_A=-4.0
+def test_a_recording_without_motion_leaves_references_that_can_be_divided_by():
+    still = replace(TRAIN, input=np.zeros(3), output=np.zeros(3))
+    drive = prepare([still], SimulationOptions(), DiagnoseOptions(), []).drive
+    assert (drive.reference_current_A, drive.reference_displacement_m) == (1.0, 1.0)
+
+
+def test_if_all_are_held_out_they_give_the_references():
+    drive = prepare([HELD], SimulationOptions(), DiagnoseOptions(), ["b"]).drive
+    assert drive.reference_current_A == 9.0
+
+
+def test_the_names_that_are_held_out_are_marked():
+    assert [one.is_held_out for one in prepared().signals] == [False, True]
+
+
+def test_at_least_one_sample_is_evaluated():
+    assert [one.n_evaluated for one in prepared(skip_samples=2).signals] == [1, 1]
+    assert [one.n_evaluated for one in prepared(skip_samples=99).signals] == [1, 1]
+
+
+def test_the_start_is_estimated_only_where_the_options_say_so():
+    assert prepared().start == "rest"
+    assert prepared(initial_state="estimated").start == "estimated"
+
+
+def test_the_input_drives_and_the_output_is_compared():
+    first = prepared().signals[0]
+    np.testing.assert_array_equal(first.driven_by, TRAIN.input)
+    np.testing.assert_array_equal(first.compared, TRAIN.output)
+
+
+def test_under_a_controller_the_reference_drives_and_the_command_is_compared():
+    path = np.array([0.0, 0.2, -0.5])
+    simulation = SimulationOptions(controller=Controller(20.0, 50.0))
+    one = replace(TRAIN, reference=path)
+    (signals,) = prepare([one], simulation, DiagnoseOptions(), []).signals
+
+    np.testing.assert_array_equal(signals.driven_by, path)
+    np.testing.assert_array_equal(signals.compared, TRAIN.input)
+    np.testing.assert_array_equal(signals.output, TRAIN.output)
+
+
+def test_every_setting_of_the_simulation_reaches_the_drive():
+    simulation = SimulationOptions(
+        mass_kg=2.0,
+        damping_N_s_per_m=3.0,
+        stiffness_N_per_m=4.0,
+        force_constant_N_per_A=5.0,
+        effects={"coulomb_friction": {"force_N": 6.0}},
+        reference_current_A=7.0,
+        reference_displacement_m=8.0,
+        resistance_ohm=9.0,
+        inductance_H=10.0,
+        back_emf_V_s_per_m=11.0,
+        hold="smooth",
     )
-    found = scales(of, [np.array([0.5, -0.7]), np.array([0.6, np.nan])], (12.0,))
-
-    assert found.displacement_m == pytest.approx(0.3)
-    assert found.stroke_m == pytest.approx(0.4)
-    assert found.current_A == pytest.approx(3.0)
-    assert found.current_rate_A_per_s == pytest.approx(300.0)
-    assert found.velocity_m_per_s == pytest.approx(0.7)
-    assert found.force_N == pytest.approx(12.0)
-    assert found.duration_s == pytest.approx(0.04)
-    assert found.frequencies_Hz == (12.0,)
+    drive = prepare([TRAIN], simulation, DiagnoseOptions(), []).drive
+    for name in vars(simulation):
+        if name != "kind":
+            assert getattr(drive, name) == getattr(simulation, name), name
 
 
-def test_the_natural_frequency_comes_from_mass_and_spring():
-    of = two_recordings(mass_kg=2.0, stiffness_N_per_m=2.0 * (2 * np.pi * 80) ** 2)
-    assert scales(of, [np.ones(2)] * 2).natural_Hz == pytest.approx(80.0)
+TIME = 1e-3 * np.arange(400)
 
 
-def test_a_free_axis_has_two_periods_in_its_longest_recording():
-    of = two_recordings(stiffness_N_per_m=0.0)
-    assert scales(of, [np.ones(2)] * 2).natural_Hz == pytest.approx(50.0)
+def recording(name, current, kind="step"):
+    return Recording(name, current, np.zeros(current.size), 1e-3, kind=kind)
 
 
-def test_the_force_of_a_voltage_is_that_of_its_current():
-    of = two_recordings(force_constant_N_per_A=4.0, resistance_ohm=8.0)
-    assert scales(of, [np.ones(2)] * 2).force_N == pytest.approx(1.5)
+def step(name, size, ramp=0.05):
+    return recording(name, size * np.interp(TIME, [0.1, 0.1 + ramp], [0, 1]))
 
 
-def test_scales_of_recordings_without_motion_are_not_zero():
-    still = Problem((signals([0, 1, 1], [0, 0, 0]),), Drive())
-    found = scales(still, [np.zeros(3)])
-    assert min(found.displacement_m, found.velocity_m_per_s, found.stroke_m) > 0
+def sine(name, size, frequency):
+    current = size * np.sin(2 * np.pi * frequency * TIME)
+    return recording(name, current, "sine")
+
+
+def table():
+    """Every size with every speed."""
+    return [
+        step(f"{size}_{ramp}", size, ramp)
+        for size in (1.0, 2.0, 3.0)
+        for ramp in (0.005, 0.02, 0.1)
+    ]
+
+
+def test_every_third_of_a_table_is_held_out():
+    assert len(held_out_names(table())) == 3
+
+
+def test_every_size_and_every_speed_is_on_both_sides():
+    held = held_out_names(table())
+    sizes = {name.split("_")[0] for name in held}
+    speeds = {name.split("_")[1] for name in held}
+    assert (len(sizes), len(speeds)) == (3, 3)
+
+
+def test_repeats_are_on_both_sides():
+    repeats = [step(f"r{k}", 2.0) for k in range(3)]
+    assert len(held_out_names(repeats)) == 1
+
+
+def test_repeats_of_a_noisy_current_are_still_repeats():
+    rng = np.random.default_rng(3)
+    repeats = [
+        recording(f"r{k}", step("", 2.0).input + 1e-3 * rng.standard_normal(400))
+        for k in range(6)
+    ]
+    assert len(held_out_names(repeats)) == 2
+
+
+def test_every_kind_is_on_both_sides():
+    given = [
+        *(step(f"step_{k}", k) for k in (1, 2, 3)),
+        *(sine(f"sine_{k}", 2.0, k) for k in (2, 5, 9)),
+    ]
+    held = held_out_names(given)
+    assert {name.split("_")[0] for name in held} == {"step", "sine"}
+    assert len(held) == 2
+
+
+def test_a_lone_recording_of_a_kind_trains():
+    given = [*(step(f"step_{k}", k) for k in (1, 2, 3)), sine("sine", 2.0, 5)]
+    assert "sine" not in held_out_names(given)
+
+
+def test_of_two_recordings_one_is_held_out():
+    assert len(held_out_names([step("a", 1.0), step("b", 2.0)])) == 1
+    assert len(held_out_names([step("a", 1.0), sine("b", 2.0, 5)])) == 1
+
+
+def test_a_single_recording_is_not_held_out():
+    assert held_out_names([step("a", 1.0)]) == ()
+
+
+def test_names_are_in_the_order_of_the_recordings():
+    given = table()
+    names = [one.name for one in given]
+    held = held_out_names(given)
+    assert list(held) == [name for name in names if name in held]
+
+
+@pytest.mark.parametrize("n", range(2, 13))
+def test_both_sides_always_have_a_recording(n):
+    rng = np.random.default_rng(n)
+    given = [
+        sine(f"r{k}", size, frequency)
+        for k, (size, frequency) in enumerate(rng.uniform(1, 20, (n, 2)))
+    ]
+    assert 1 <= len(held_out_names(given)) < n

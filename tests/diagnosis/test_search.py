@@ -5,9 +5,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hwid_cli.diagnosis.comparing import residuals, total
-from hwid_cli.diagnosis.search import derivatives, fit, local_matrix
-from hwid_cli.diagnosis.unknowns import Point, drive_at, effects_at, first_point, layout
+from hwid_cli.diagnosis.parameters import (
+    ParameterPoint,
+    drive_at,
+    effects_at,
+    first_point,
+    parameter_layout,
+    residuals_at,
+    sum_of_squares,
+)
+from hwid_cli.diagnosis.search import (
+    derivatives,
+    fit_own,
+    fit_point,
+    local_matrix,
+    with_own_trials,
+)
 from hwid_cli.records.experiment import DiagnoseOptions
 from tests.diagnosis.small_drive import DRIVE, NOISE, problem, recordings, sizes
 
@@ -21,13 +34,13 @@ OFF = replace(
 
 def begun(of, start=None, drive=None):
     start = start or {}
-    found = layout(of, tuple(start), start, sizes(of))
+    found = parameter_layout(of, tuple(start), start, sizes(of))
     return found, first_point(of, found, drive or of.drive, start)
 
 
 def fitted(of, start=None, drive=None, **options):
     found, point = begun(of, start, drive)
-    return fit(of, found, point, **{"max_iterations": 40, **options})
+    return fit_point(of, found, point, **{"max_iterations": 40, **options})
 
 
 @pytest.mark.parametrize(
@@ -48,18 +61,18 @@ def test_derivatives_agree_with_central_differences(start, initial_state):
         recordings()[3:7], options=DiagnoseOptions(initial_state=initial_state)
     )
     found, point = begun(of, start)
-    columns = derivatives(of, found, point, residuals(of, found, point))
+    columns = derivatives(of, found, point, residuals_at(of, found, point))
 
     shared, width = len(found.shared), 1e-4
     for column in range(shared + len(found.own)):
         shifted = []
         for sign in (1, -1):
-            moved = Point(point.shared.copy(), point.own.copy())
+            moved = ParameterPoint(point.shared.copy(), point.own.copy())
             if column < shared:
                 moved.shared[column] += sign * width
             else:
                 moved.own[:, column - shared] += sign * width
-            shifted.append(residuals(of, found, moved))
+            shifted.append(residuals_at(of, found, moved))
         for row, (more, less) in enumerate(zip(*shifted, strict=True)):
             central = (less - more) / (2 * width)
             # One-sided differences of 3e-4 miss 1.5e-4 of the curvature, which is up
@@ -73,7 +86,7 @@ def test_a_derivative_at_an_upper_bound_looks_inwards():
     limit = sizes(of).current_A
     # At its bound, the largest current, the limit cuts nothing; beyond it neither.
     found, point = begun(of, {"input_saturation": {"limit_A": limit}})
-    (columns,) = derivatives(of, found, point, residuals(of, found, point))
+    (columns,) = derivatives(of, found, point, residuals_at(of, found, point))
     assert np.linalg.norm(columns[:, -1]) > 0
 
 
@@ -171,7 +184,7 @@ def test_a_start_that_is_not_at_rest_is_estimated():
 def test_only_own_parameters_move_where_the_shared_ones_are_held():
     of = problem(recordings(), options=DiagnoseOptions(initial_state="estimated"))
     found, point = begun(of, drive=OFF)
-    ended = fit(of, found, point, max_iterations=5, only_own=True)
+    ended = fit_point(of, found, point, max_iterations=5, only_own=True)
     np.testing.assert_array_equal(ended.point.shared, point.shared)
     assert not np.array_equal(ended.point.own, point.own)
 
@@ -181,8 +194,8 @@ def test_a_search_never_ends_above_its_start():
     for period in (2e-3, 3e-3, 6e-3):
         start = {"cogging": {"amplitude_N": 0.3, "period_m": period, "phase_rad": 0.0}}
         found, point = begun(of, start)
-        before = total(residuals(of, found, point))
-        assert fit(of, found, point, max_iterations=3).sse <= before
+        before = sum_of_squares(residuals_at(of, found, point))
+        assert fit_point(of, found, point, max_iterations=3).sse <= before
 
 
 def test_a_search_says_that_it_was_stopped():
@@ -217,3 +230,88 @@ def test_what_is_skipped_has_no_influence():
     options = DiagnoseOptions(skip_samples=30)
     found = [fitted(problem(one, options=options)).sse for one in (given, spoilt)]
     assert found[0] == pytest.approx(found[1], abs=1e-20)
+
+
+FORCE = {"amplitude_N": 0.3, "frequency_Hz": 31.0}
+START = {"periodic_force": FORCE}
+
+
+def pushed(number, drive):
+    phase = 0.4 + 0.9 * number
+    return replace(drive, effects={"periodic_force": {**FORCE, "phase_rad": phase}})
+
+
+def test_phases_are_found_for_a_given_force():
+    of = problem(recordings(own=pushed, noise=0.0))
+    found, point = begun(of, START)
+    own = fit_own(of, found, point.shared)
+
+    phases = own.own[:, 0] * found.own[0].scale
+    apart = np.angle(np.exp(1j * (phases - 0.4 - 0.9 * np.arange(9))))
+    # The search stops when a step gains a hundred-thousandth of what is left.
+    np.testing.assert_allclose(apart, 0.0, atol=1e-5)
+    np.testing.assert_array_equal(own.shared, point.shared)
+
+
+def test_a_trial_takes_each_recording_to_the_nearest_quarter_turn():
+    of = problem(recordings(own=pushed, noise=0.0))
+    found, point = begun(of, START)
+    tried = with_own_trials(of, found, point).own[:, 0] * found.own[0].scale
+    apart = np.angle(np.exp(1j * (tried - 0.4 - 0.9 * np.arange(9))))
+    # Half of a quarter turn, and a little where the mass still answers to the start.
+    assert np.abs(apart).max() < 0.25 * np.pi + 0.1
+
+
+def test_factors_between_recordings_are_found():
+    factors = 1 + 0.08 * np.sin(2.1 * np.arange(9))
+    of = problem(
+        recordings(
+            own=lambda number, drive: replace(
+                drive, stiffness_N_per_m=1184.0 * factors[number]
+            ),
+            noise=0.0,
+        )
+    )
+    found, point = begun(of, {"parameter_change:stiffness": {"log_stiffness": 0.0}})
+    own = fit_own(of, found, point.shared)
+    logarithms = own.own[:, 0] * found.own[0].scale
+    np.testing.assert_allclose(np.exp(logarithms), factors, rtol=1e-6)
+
+
+def test_a_start_in_motion_is_found():
+    cut = [
+        replace(one, input=one.input[130:], output=one.output[130:])
+        for one in recordings(noise=0.0)
+    ]
+    of = problem(cut, options=DiagnoseOptions(initial_state="estimated"))
+    found, point = begun(of, {})
+    own = fit_own(of, found, point.shared)
+    left = np.concatenate(residuals_at(of, found, own))
+    assert np.abs(left).max() < 1e-9
+
+
+def test_one_recording_does_not_move_another():
+    given = recordings(own=pushed)
+    spoilt = [given[0], replace(given[1], output=-given[1].output), *given[2:]]
+    found = []
+    for one in (given, spoilt):
+        of = problem(one, reference_displacement_m=0.02)
+        start, point = begun(problem(given), START)
+        found.append(with_own_trials(of, start, point).own)
+    np.testing.assert_array_equal(np.delete(found[0], 1), np.delete(found[1], 1))
+    assert found[0][1] != found[1][1]
+
+
+def test_without_own_parameters_there_is_nothing_to_find():
+    of = problem(recordings()[:2])
+    found, point = begun(of, {})
+    own = fit_own(of, found, point.shared)
+    assert isinstance(own, ParameterPoint)
+    assert own.own.shape == (2, 0)
+
+
+@pytest.mark.parametrize("which", ["stiffness", "force_constant", "damping"])
+def test_every_own_parameter_has_values_to_try(which):
+    of = problem(recordings()[:2])
+    found, point = begun(of, {f"parameter_change:{which}": {f"log_{which}": 0.0}})
+    assert with_own_trials(of, found, point).own.shape == (2, 1)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from hwid_cli.diagnosis.latent_force import latent_force
-from hwid_cli.diagnosis.lines import line_frequencies
 from hwid_cli.diagnosis.problem import Compared, Signals
+from hwid_cli.diagnosis.scales import line_frequencies
 from hwid_cli.diagnosis.where import latent_force_curves, places
 from hwid_cli.drive.simulation import simulate_drive
 from tests.diagnosis.diagnosed import (

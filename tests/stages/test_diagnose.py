@@ -182,13 +182,13 @@ def test_a_second_run_computes_no_candidate_again(with_friction, friction_found)
     store, seen = MemoryStore(), []
     run = settings(store, on_done=seen.append)
     first = diagnosed(with_friction, run=run)
-    fitted = [one for one in seen if one.task.function.__name__ == "_fit_task"]
+    fitted = [one for one in seen if one.task.function.__name__ == "fit_candidate"]
     assert fitted
     assert not any(one.from_cache for one in fitted)
 
     seen.clear()
     second = diagnosed(with_friction, run=run)
-    fitted = [one for one in seen if one.task.function.__name__ == "_fit_task"]
+    fitted = [one for one in seen if one.task.function.__name__ == "fit_candidate"]
     assert fitted
     assert all(one.from_cache for one in fitted)
     assert_same(second, first)

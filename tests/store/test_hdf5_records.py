@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 from hypothesis import given
 
+from hwid_cli.records.candidates import CandidateFit, ParameterRef
 from hwid_cli.records.model import LinearBlock
 from hwid_cli.store.hdf5_records import LONGEST_ATTRIBUTE, read_record, write_record
 from hwid_cli.store.hdf5_tables import read_table, write_table
+from tests.diagnosis.made_up_fits import made_up
 from tests.store.record_examples import (
     WITH_MORE,
     Everything,
@@ -187,3 +189,37 @@ def test_a_given_linear_block_comes_back():
         fit.options,
         other.options,
     ]
+
+
+def test_parameters_of_a_candidate_are_stored_as_text():
+    fit = CandidateFit(
+        effects=("coulomb_friction",),
+        names=(
+            ParameterRef("base", "damping_N_s_per_m"),
+            ParameterRef("parameter_change:stiffness", "x"),
+        ),
+        values=np.array([15.0, 0.1]),
+        own_names=(),
+        own=np.zeros((2, 0)),
+        sse=np.ones(2),
+        whiteness=0.5,
+        neighbour=0.1,
+        iterations=3,
+        has_converged=True,
+    )
+    with in_memory() as file:
+        write_record(file, fit)
+        stored = file.attrs["names"].tolist()
+        assert stored == ["base/damping_N_s_per_m", "parameter_change:stiffness/x"]
+        assert file.attrs["own_names"].shape == (0,)
+        again = read_record(file, CandidateFit)
+    assert (again.names, again.own_names) == (fit.names, ())
+
+
+def test_a_single_text_in_place_of_parameters_is_an_error():
+    fit = made_up(("coulomb_friction",), 1.0)
+    with in_memory() as file:
+        write_record(file, fit)
+        file.attrs["names"] = "base/damping_N_s_per_m"
+        with pytest.raises(TypeError, match="names has the wrong shape"):
+            read_record(file, CandidateFit)

@@ -1,9 +1,10 @@
-"""How strong the evidence for a candidate is, and whether it may be named.
+"""Which candidate is best, whether its evidence suffices, and what the verdict is.
 
 An information criterion alone names something even where nothing is missing: input
 noise or a coarse sensor is enough. Naming therefore also asks for held-out recordings:
-most of their error beyond the noise must be explained, in most of them.
-docs/method_diagnosis.md, eq. (D21) and (D24).
+most of their error beyond the noise must be explained, in most of them. Candidates that
+the recordings cannot tell apart are all given.
+docs/method_diagnosis.md, eq. (D21) to (D25).
 """
 
 from collections.abc import Sequence
@@ -11,7 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hwid_cli.diagnosis.problem import Problem
+from hwid_cli.diagnosis.problem import DiagnosisProblem
+from hwid_cli.drive.catalogue import CATALOGUE, public_id
 from hwid_cli.records.candidates import CandidateFit, RankedCandidate
 from hwid_cli.records.diagnosis import NoiseFloor
 
@@ -32,6 +34,12 @@ LEAST_SPREAD = 0.01
 LEAST_PIECES = 10
 # Ratio to the noise up to which what remains is of no account.
 CLOSE_TO_NOISE = 1.03
+# Whiteness up to which a small remainder counts as noise that is not quite white.
+_NEARLY_WHITE = 2.0
+# Candidates closer than this are not told apart.
+TIE = 6.0
+# An effect that includes another one must add this share of what both gain.
+LEAST_ADDED = 0.03
 
 
 @dataclass(frozen=True)
@@ -54,8 +62,8 @@ class Evidence:
 
 
 @dataclass(frozen=True, eq=False)
-class Judge:
-    """What judging needs beside the fits.
+class SelectionCriteria:
+    """What selection needs beside the fits.
 
     Parameters
     ----------
@@ -68,12 +76,12 @@ class Judge:
     noise: NoiseFloor
 
     @classmethod
-    def of(cls, problem: Problem, noise: NoiseFloor) -> "Judge":
-        """Judge of a problem."""
+    def of(cls, problem: DiagnosisProblem, noise: NoiseFloor) -> "SelectionCriteria":
+        """Criteria for the recordings of a problem."""
         held = np.array([one.is_held_out for one in problem.signals])
-        # A single recording judges itself; the report says so.
+        # A single recording validates itself; the report says so.
         held = held if held.any() else ~held
-        counts = np.array([one.n_judged for one in problem.signals])
+        counts = np.array([one.n_evaluated for one in problem.signals])
         return cls(counts, held, noise)
 
     def rms(self, found: CandidateFit, *, held_out: bool) -> float:
@@ -169,14 +177,15 @@ def count(found: CandidateFit) -> int:
 
 def has_size(found: CandidateFit) -> bool:
     """Whether changes between recordings are more than scatter."""
-    for column, name in enumerate(found.own_names):
-        if "/log_" in name and float(np.std(found.own[:, column])) < LEAST_SPREAD:
-            return False
-    return True
+    return not any(
+        one.parameter.startswith("log_")
+        and float(np.std(found.own[:, column])) < LEAST_SPREAD
+        for column, one in enumerate(found.own_names)
+    )
 
 
 def ranked(
-    judge: Judge,
+    criteria: SelectionCriteria,
     found: Sequence[CandidateFit],
     base: CandidateFit,
     shares: dict[tuple[str, ...], float],
@@ -188,7 +197,7 @@ def ranked(
     shares : dict of tuple of str to float
         Forecasts, of candidates that were not fitted as well.
     """
-    rows = [_row(judge, one, base, shares) for one in found]
+    rows = [_row(criteria, one, base, shares) for one in found]
     rows.sort(key=lambda row: -row.bic_gain if np.isfinite(row.bic_gain) else np.inf)
     fitted = {one.effects for one in found}
     nan = float("nan")
@@ -206,7 +215,7 @@ def ranked(
 
 
 def _row(
-    judge: Judge,
+    criteria: SelectionCriteria,
     found: CandidateFit,
     base: CandidateFit,
     shares: dict[tuple[str, ...], float],
@@ -218,16 +227,185 @@ def _row(
         return RankedCandidate(
             found.effects, share, True, nan, nan, nan, nan, nan, nan, text
         )
-    against = judge.evidence(found, base)
+    against = criteria.evidence(found, base)
     return RankedCandidate(
         effects=found.effects,
         forecast_share=share,
         is_fitted=True,
-        train_rms=judge.rms(found, held_out=False),
-        held_out_rms=judge.rms(found, held_out=True),
+        train_rms=criteria.rms(found, held_out=False),
+        held_out_rms=criteria.rms(found, held_out=True),
         bic_gain=against.gain,
         explained_share=against.explained,
         improved_share=against.improved,
         whiteness=found.whiteness,
         note="" if found.has_converged else "stopped at the iteration limit",
     )
+
+
+def select_best(
+    criteria: SelectionCriteria, found: Sequence[CandidateFit], base: CandidateFit
+) -> CandidateFit | None:
+    """Pick the best candidate, the simplest of those that are as good.
+
+    Parameters
+    ----------
+    found : sequence of CandidateFit
+        Of sets of the same size.
+
+    Returns
+    -------
+    CandidateFit or None
+        None where nothing could be simulated.
+    """
+    usable = [one for one in found if one.is_usable]
+    if not usable:
+        return None
+    best = max(usable, key=lambda one: criteria.gain(one, base))
+    for rival in sorted(usable, key=count):
+        if count(rival) >= count(best):
+            continue
+        if is_part_of(rival, best):
+            if not _adds_enough(criteria, best, rival, base):
+                best = rival
+        elif criteria.gain(best, rival) < TIE:
+            best = rival
+    return best
+
+
+def is_part_of(smaller: CandidateFit, larger: CandidateFit) -> bool:
+    """Whether each effect of one set is in the other, or a limit case of one there."""
+    left = list(larger.effects)
+    for effect in smaller.effects:
+        match = next(
+            (one for one in left if one == effect or effect in CATALOGUE[one].contains),
+            None,
+        )
+        if match is None:
+            return False
+        left.remove(match)
+    return True
+
+
+def _adds_enough(
+    criteria: SelectionCriteria,
+    larger: CandidateFit,
+    smaller: CandidateFit,
+    base: CandidateFit,
+) -> bool:
+    gain = criteria.gain(larger, smaller)
+    if gain < TIE:
+        return False
+    added = smaller.sse.sum() - larger.sse.sum()
+    together = base.sse.sum() - larger.sse.sum()
+    is_clear = criteria.is_complete(larger) and not criteria.is_complete(smaller)
+    return bool(added >= LEAST_ADDED * together or is_clear)
+
+
+def rivals(
+    criteria: SelectionCriteria, found: Sequence[CandidateFit], best: CandidateFit
+) -> list[CandidateFit]:
+    """List the candidates that the data cannot tell from the best one.
+
+    Returns
+    -------
+    list of CandidateFit
+        Those that include the best one, or are included in it, are left out: they are
+        measured by what they add.
+    """
+    return [
+        one
+        for one in found
+        if one.is_usable
+        and one is not best
+        and not is_part_of(best, one)
+        and not is_part_of(one, best)
+        and names_of(one) != names_of(best)
+        and criteria.gain(best, one) < TIE
+    ]
+
+
+def title_of(found: CandidateFit) -> str:
+    """Public ids of a set of effects, in words."""
+    return " with ".join(public_id(one) for one in found.effects)
+
+
+def names_of(found: CandidateFit) -> tuple[str, ...]:
+    """Public ids of a set of effects, sorted."""
+    return tuple(sorted(public_id(one) for one in found.effects))
+
+
+@dataclass(frozen=True, eq=False)
+class DiagnosisVerdict:
+    """What is said, and the fit that it rests on.
+
+    Parameters
+    ----------
+    word : str
+        One of ``records.diagnosis.VERDICTS``.
+    chosen : CandidateFit
+        With the effects that are named; the base where there are none.
+    rivals : tuple of CandidateFit
+        Sets of effects that the data cannot tell from the chosen one.
+    """
+
+    word: str
+    is_complete: bool
+    chosen: CandidateFit
+    rivals: tuple[CandidateFit, ...]
+
+
+def decide(
+    criteria: SelectionCriteria,
+    given_sse: np.ndarray,
+    base: CandidateFit,
+    fits: Sequence[CandidateFit],
+    best: Sequence[CandidateFit],
+) -> DiagnosisVerdict:
+    """Weigh the evidence.
+
+    Parameters
+    ----------
+    given_sse : ndarray, shape (n_recordings,)
+        Of the simulation with the parameters that the configuration gives.
+    base : CandidateFit
+        Re-fitted, without further effects.
+    fits : sequence of CandidateFit
+        Of all sets of effects.
+    best : sequence of CandidateFit
+        The best of each size, each worth its further effect.
+    """
+    if criteria.is_complete(base):
+        return DiagnosisVerdict(
+            _without_effect(criteria, given_sse, base), True, base, ()
+        )
+    for chosen in reversed(best):
+        if not criteria.may_be_named(chosen, base):
+            continue
+        same_size = [one for one in fits if len(one.effects) == len(chosen.effects)]
+        near = [
+            one
+            for one in rivals(criteria, same_size, chosen)
+            if criteria.may_be_named(one, base)
+        ]
+        word = "ambiguous" if near else "named"
+        return DiagnosisVerdict(word, criteria.is_complete(chosen), chosen, tuple(near))
+    if criteria.ratio(base) <= CLOSE_TO_NOISE and base.whiteness <= _NEARLY_WHITE:
+        return DiagnosisVerdict(
+            _without_effect(criteria, given_sse, base), True, base, ()
+        )
+    return DiagnosisVerdict("unknown", False, base, ())
+
+
+def _without_effect(
+    criteria: SelectionCriteria, given_sse: np.ndarray, base: CandidateFit
+) -> str:
+    """``parameters`` if the re-fit was needed, else ``none``."""
+    before, after = float(given_sse.sum()), float(base.sse.sum())
+    if not np.isfinite(before):
+        return "parameters"
+    n = float(criteria.n_samples.sum())
+    gain = n * np.log(max(before, 1e-300) / max(after, 1e-300))
+    least = LEAST_GAIN + base.values.size * np.log(n)
+    # Noise-free records: rounding differences are no parameters.
+    is_visible = before > after * 1.001
+    return "parameters" if gain > least and is_visible else "none"

@@ -2,19 +2,18 @@
 
 import pytest
 
-from hwid_cli.diagnosis.candidate import Footing, fit_candidate
-from hwid_cli.diagnosis.judge import Judge
-from hwid_cli.diagnosis.stored_fit import fitted_drive
-from hwid_cli.drive.catalogue import CATALOGUE
-from hwid_cli.stages.candidate_rounds import (
+from hwid_cli.diagnosis.candidate import Baseline, fit_candidate, fitted_drive
+from hwid_cli.diagnosis.rounds import (
     FEWEST_SINGLES,
     FITTED_ON_TOP,
     FITTED_PAIRS,
+    Rounds,
     run_rounds,
 )
-from hwid_cli.stages.candidate_tasks import Rounds
-from tests.diagnosis.small_drive import problem, recordings, sizes, white
-from tests.stages.diagnosed_drive import FRICTION, settings
+from hwid_cli.diagnosis.selection import SelectionCriteria
+from hwid_cli.drive.catalogue import CATALOGUE
+from tests.diagnosis.small_drive import in_turn, problem, recordings, sizes, white
+from tests.stages.diagnosed_drive import FRICTION
 
 STIFFNESS = {"cubic_stiffness": {"stiffness_N_per_m3": 8e5}}
 HELD_OUT = ("step_1", "sine_1", "sine_3")
@@ -22,20 +21,19 @@ HELD_OUT = ("step_1", "sine_1", "sine_3")
 
 def rounds_of(effects, allowed, **options):
     of = problem(recordings(effects), held_out=HELD_OUT)
-    footing = Footing(of.drive, sizes(of, (31.0,)), white())
-    base = fit_candidate(of, (), ({},), footing)
+    baseline = Baseline(of.drive, sizes(of, (31.0,)), white())
+    base = fit_candidate(of, (), ({},), baseline)
     return Rounds(
         **{
             "problem": of,
-            "key": "key",
-            "footing": Footing(
-                fitted_drive(of.drive, base), footing.scales, footing.noise
+            "baseline": Baseline(
+                fitted_drive(of.drive, base), baseline.scales, baseline.noise
             ),
-            "judge": Judge.of(of, white()),
+            "criteria": SelectionCriteria.of(of, white()),
             "base": base,
             "allowed": allowed,
-            "settings": settings(),
-            "announce": lambda what, count: None,
+            "run_tasks": in_turn,
+            "on_round": lambda what, count: None,
             **options,
         }
     )
@@ -66,7 +64,7 @@ def test_what_includes_the_first_one_is_fitted_as_well(of_all):
             assert (name,) in fitted
 
 
-def test_hopeless_candidates_are_not_finished(of_all):
+def test_pruned_candidates_are_not_finished(of_all):
     by_name = {one.effects: one for one in of_all.fits}
     best = by_name["coulomb_friction",]
     poor = [one for one in of_all.fits if one.sse.sum() > 100 * best.sse.sum()]
@@ -81,7 +79,7 @@ def test_no_larger_set_is_tried_once_nothing_remains(of_all):
         rounds_of(
             FRICTION,
             ("coulomb_friction", "input_dead_zone"),
-            announce=lambda what, count: announced.append((what, count)),
+            on_round=lambda what, count: announced.append((what, count)),
         ),
         3,
     )
@@ -102,7 +100,7 @@ def test_a_pair_is_found_although_neither_effect_explains_much_alone():
         rounds_of(
             {**FRICTION, **STIFFNESS},
             allowed,
-            announce=lambda what, count: announced.append((what, count)),
+            on_round=lambda what, count: announced.append((what, count)),
         ),
         3,
     )
@@ -114,9 +112,9 @@ def test_a_pair_is_found_although_neither_effect_explains_much_alone():
     assert not any(what == "sets of 3 effects" for what, _ in announced)
 
 
-def test_kin_are_never_put_together():
-    kin = ("coulomb_friction", "stribeck_friction", "hysteresis", "cubic_stiffness")
-    found = run_rounds(rounds_of({**FRICTION, **STIFFNESS}, kin), 2)
+def test_nested_effects_are_never_put_together():
+    nested = ("coulomb_friction", "stribeck_friction", "hysteresis", "cubic_stiffness")
+    found = run_rounds(rounds_of({**FRICTION, **STIFFNESS}, nested), 2)
     pairs = {one.effects for one in found.fits if len(one.effects) == 2}
     assert pairs
     for pair in pairs:

@@ -1,7 +1,8 @@
-"""What a fit may change: parameters of the base, of effects, and of each recording.
+"""What a fit may change, and what the simulation gives at a point of it.
 
 A fit works on coordinates without units: logarithms of what is positive, multiples of a
-typical size of what may have either sign. docs/method_diagnosis.md, eq. (D17).
+typical size of what may have either sign. Shared ones are those of the base and of
+effects; each recording may have some of its own. docs/method_diagnosis.md, eq. (D17).
 """
 
 from collections.abc import Mapping, Sequence
@@ -10,14 +11,22 @@ from typing import Any
 
 import numpy as np
 
-from hwid_cli.diagnosis.problem import Problem
+from hwid_cli.diagnosis.problem import Compared, DiagnosisProblem
 from hwid_cli.drive import slots
 from hwid_cli.drive.catalogue import CATALOGUE
 from hwid_cli.drive.effect import Parameter, Scales
-from hwid_cli.drive.simulation import parameter_vector, set_start
+from hwid_cli.drive.simulation import (
+    REFINEMENT,
+    Motion,
+    parameter_vector,
+    run,
+    set_start,
+)
+from hwid_cli.records.candidates import ParameterRef
 from hwid_cli.records.drive import BASE_PARAMETERS, Drive
 
-START = "start"
+# Owners beside the effects: the base, and how a recording starts.
+BASE, START = "base", "start"
 # A damping of zero is searched from this share of what halves an oscillation.
 _SMALL_DAMPING = 0.02
 
@@ -42,6 +51,11 @@ class Unknown:
     scale: float
     low: float
     high: float
+
+    @property
+    def ref(self) -> ParameterRef:
+        """What a fit keeps of it."""
+        return ParameterRef(self.owner, self.name)
 
     def value(self, coordinate: float) -> float:
         """Value at a coordinate.
@@ -76,7 +90,7 @@ class Unknown:
 
 
 @dataclass(frozen=True)
-class Layout:
+class ParameterLayout:
     """All coordinates of a fit.
 
     Parameters
@@ -105,7 +119,7 @@ class Layout:
 
 
 @dataclass(frozen=True, eq=False)
-class Point:
+class ParameterPoint:
     """Values of all coordinates.
 
     Parameters
@@ -118,12 +132,12 @@ class Point:
     own: np.ndarray
 
 
-def layout(
-    problem: Problem,
+def parameter_layout(
+    problem: DiagnosisProblem,
     effects: Sequence[str],
     start: Mapping[str, Mapping[str, float]],
     scales: Scales,
-) -> Layout:
+) -> ParameterLayout:
     """Coordinates of a fit of the base and effects.
 
     Parameters
@@ -147,7 +161,7 @@ def layout(
     if problem.start == "estimated":
         speed = scales.velocity_m_per_s
         own.append(Unknown(START, "velocity", False, speed, -far, far))
-    return Layout(tuple(shared), tuple(own), tuple(effects))
+    return ParameterLayout(tuple(shared), tuple(own), tuple(effects))
 
 
 def _base_unknowns(drive: Drive) -> list[Unknown]:
@@ -164,7 +178,7 @@ def _base_unknowns(drive: Drive) -> list[Unknown]:
         low, high = (
             (1e-4 * size, 1e4 * size) if value > 0 else (-1e4 * size, -1e-4 * size)
         )
-        unknowns.append(Unknown("base", name, True, value, low, high))
+        unknowns.append(Unknown(BASE, name, True, value, low, high))
     return unknowns
 
 
@@ -178,11 +192,11 @@ def _unknown(owner: str, parameter: Parameter, value: float, scales: Scales) -> 
 
 
 def first_point(
-    problem: Problem,
-    fit_layout: Layout,
+    problem: DiagnosisProblem,
+    fit_layout: ParameterLayout,
     drive: Drive,
     start: Mapping[str, Mapping[str, float]],
-) -> Point:
+) -> ParameterPoint:
     """Point that a search starts from.
 
     Parameters
@@ -194,7 +208,7 @@ def first_point(
     """
     shared = []
     for one in fit_layout.shared:
-        if one.owner == "base":
+        if one.owner == BASE:
             value = getattr(drive, one.name) or one.scale
         else:
             value = start[one.owner][one.name]
@@ -207,21 +221,23 @@ def first_point(
                 each[row, column] = one.coordinate(value)
             elif one.name == "position" and problem.start == "estimated":
                 each[row, column] = one.coordinate(float(signals.output[0]))
-    return Point(np.array(shared), each)
+    return ParameterPoint(np.array(shared), each)
 
 
-def drive_at(problem: Problem, fit_layout: Layout, point: Point) -> Drive:
+def drive_at(
+    problem: DiagnosisProblem, fit_layout: ParameterLayout, point: ParameterPoint
+) -> Drive:
     """Drive with the base of a point."""
     base: dict[str, Any] = {
         one.name: one.value(q)
         for one, q in zip(fit_layout.shared, point.shared, strict=True)
-        if one.owner == "base"
+        if one.owner == BASE
     }
     return replace(problem.drive, **base)
 
 
 def effects_at(
-    fit_layout: Layout, point: Point, row: int | None = None
+    fit_layout: ParameterLayout, point: ParameterPoint, row: int | None = None
 ) -> dict[str, dict[str, float]]:
     """Effects with the values of a point.
 
@@ -241,7 +257,9 @@ def effects_at(
     return values
 
 
-def vectors_at(problem: Problem, fit_layout: Layout, point: Point) -> list[np.ndarray]:
+def vectors_at(
+    problem: DiagnosisProblem, fit_layout: ParameterLayout, point: ParameterPoint
+) -> list[np.ndarray]:
     """Vector of parameters for each recording.
 
     Returns
@@ -264,9 +282,9 @@ def vectors_at(problem: Problem, fit_layout: Layout, point: Point) -> list[np.nd
 
 def _place_start(
     vector: np.ndarray,
-    problem: Problem,
+    problem: DiagnosisProblem,
     rest_position: float,
-    fit_layout: Layout,
+    fit_layout: ParameterLayout,
     own: np.ndarray,
 ) -> None:
     if problem.start != "rest":
@@ -281,3 +299,66 @@ def _place_start(
             vector[slots.OUTPUT_ZERO] = found["position"] - rest_position
     elif problem.drive.stiffness_N_per_m == 0:
         set_start(vector, rest_position, 0.0)
+
+
+def simulate_at(
+    problem: DiagnosisProblem, fit_layout: ParameterLayout, point: ParameterPoint
+) -> list[Motion]:
+    """Simulate all recordings at a point."""
+    vectors = vectors_at(problem, fit_layout, point)
+    pairs = zip(problem.signals, vectors, strict=True)
+    if problem.drive.hold == "smooth":
+        return [
+            run(
+                signals.finely_driven_by,
+                vector,
+                signals.sample_time_s,
+                refinement=REFINEMENT,
+            )
+            for signals, vector in pairs
+        ]
+    return [
+        run(signals.driven_by, vector, signals.sample_time_s)
+        for signals, vector in pairs
+    ]
+
+
+def compare_at(
+    problem: DiagnosisProblem, fit_layout: ParameterLayout, point: ParameterPoint
+) -> list[Compared]:
+    """Put simulations beside the measurements."""
+    motions = simulate_at(problem, fit_layout, point)
+    return [
+        Compared(
+            signals,
+            motion.command if problem.compares_command else motion.output,
+            motion.position,
+            motion.velocity,
+        )
+        for signals, motion in zip(problem.signals, motions, strict=True)
+    ]
+
+
+def residuals_at(
+    problem: DiagnosisProblem, fit_layout: ParameterLayout, point: ParameterPoint
+) -> list[np.ndarray]:
+    """Measured minus simulated of each recording, where it is evaluated."""
+    return [one.residual for one in compare_at(problem, fit_layout, point)]
+
+
+def sum_of_squares(parts: list[np.ndarray]) -> float:
+    """Sum of squares; infinite where a simulation ran away."""
+    sse = sum(float(one @ one) for one in parts)
+    return sse if np.isfinite(sse) else float("inf")
+
+
+def each_sum_of_squares(parts: Sequence[np.ndarray]) -> np.ndarray:
+    """Sum of squares of each recording; infinite where a simulation ran away.
+
+    Returns
+    -------
+    ndarray, shape (n_recordings,), [output unit squared]
+    """
+    sse = np.array([float(part @ part) for part in parts])
+    sse[~np.isfinite(sse)] = np.inf
+    return sse

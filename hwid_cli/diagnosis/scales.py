@@ -1,5 +1,6 @@
-"""Lines of an error: frequencies in time, periods along the way.
+"""Sizes for start values and bounds, from recordings and from what a fit leaves.
 
+A fit leaves lines: frequencies in time, periods along the way.
 docs/method_diagnosis.md, eq. (D15).
 """
 
@@ -8,11 +9,13 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.signal import lfilter
 
-from hwid_cli.diagnosis.covariates import judged_force, judged_position
-from hwid_cli.diagnosis.latent_force import Smoothed, finite
-from hwid_cli.diagnosis.problem import Compared
+from hwid_cli.diagnosis.candidate import compared_with_fit, fitted_drive
+from hwid_cli.diagnosis.covariates import evaluated_force, evaluated_position
+from hwid_cli.diagnosis.latent_force import Smoothed, finite, latent_force
+from hwid_cli.diagnosis.problem import Compared, DiagnosisProblem
 from hwid_cli.diagnosis.segments import parabolic_peak
-from hwid_cli.drive.effect import Wave
+from hwid_cli.drive.effect import Scales, Wave
+from hwid_cli.records.candidates import CandidateFit
 from hwid_cli.records.diagnosis import NoiseFloor
 
 _MOST_LINES = 3
@@ -22,6 +25,77 @@ _PLACES = 2048
 _SLOW_BENDS = 5
 # Periods of a line along the stroke: fewer imitate a spring, more are not resolved.
 _FEWEST_PERIODS, _MOST_PERIODS = 3.0, 200.0
+
+
+def scales_of_recordings(
+    problem: DiagnosisProblem,
+    velocities: Sequence[np.ndarray],
+    frequencies_Hz: tuple[float, ...] = (),
+    waves: tuple[Wave, ...] = (),
+) -> Scales:
+    """Sizes of what the recordings hold.
+
+    Parameters
+    ----------
+    velocities : sequence of ndarray, [m/s]
+        Of the base's simulation, one for each recording.
+    frequencies_Hz : tuple of float, [Hz]
+        Highest lines of the base's error.
+    waves : tuple of Wave
+        With which it repeats along the way.
+    """
+    drive, all_signals = problem.drive, problem.signals
+    largest = [max(float(np.max(np.abs(one.output))) for one in all_signals)]
+    current = max(float(np.max(np.abs(one.input))) for one in all_signals)
+    stroke = max(float(np.ptp(one.output)) for one in all_signals)
+    rate = max(
+        float(np.max(np.abs(np.diff(one.input)))) / one.sample_time_s
+        for one in all_signals
+    )
+    speed = max(float(np.nanmax(np.abs(one))) for one in velocities)
+    duration = max(one.compared.size * one.sample_time_s for one in all_signals)
+    natural = np.sqrt(drive.stiffness_N_per_m / drive.mass_kg) / (2 * np.pi)
+    force = abs(drive.force_constant_N_per_A) * current
+    if drive.resistance_ohm is not None:
+        force /= drive.resistance_ohm
+    return Scales(
+        displacement_m=max(largest[0], 1e-12),
+        velocity_m_per_s=max(speed, 1e-12),
+        current_A=max(current, 1e-12),
+        current_rate_A_per_s=max(rate, 1e-12),
+        stroke_m=max(stroke, 1e-12),
+        force_N=max(force, 1e-12),
+        mass_kg=drive.mass_kg,
+        natural_Hz=float(max(natural, 2.0 / duration)),
+        sample_time_s=min(one.sample_time_s for one in all_signals),
+        duration_s=duration,
+        frequencies_Hz=frequencies_Hz,
+        waves=waves,
+    )
+
+
+def scales_of_fit(
+    problem: DiagnosisProblem, found: CandidateFit, given: Scales, noise: NoiseFloor
+) -> Scales:
+    """Sizes with the speeds of a fit, and the lines of the error that it leaves.
+
+    Parameters
+    ----------
+    problem : DiagnosisProblem
+        The recordings that the fit was evaluated on.
+    found : CandidateFit
+        Able to simulate them all.
+    given : Scales
+        That the fit was made with.
+    """
+    compared = compared_with_fit(problem, found, given)
+    drive = fitted_drive(problem.drive, found)
+    return scales_of_recordings(
+        problem,
+        [one.velocity for one in compared],
+        line_frequencies(compared, noise),
+        waves_along(compared, latent_force(compared, drive, noise)),
+    )
 
 
 def line_frequencies(
@@ -114,8 +188,8 @@ def waves_along(
     tuple of Wave
         The strongest first, at most three; none where nothing moves.
     """
-    force = judged_force(compared, smoothed)
-    position = judged_position(compared, smoothed)
+    force = evaluated_force(compared, smoothed)
+    position = evaluated_position(compared, smoothed)
     stroke = float(np.ptp(position)) if position.size else 0.0
     if stroke <= 0:
         return ()

@@ -1,14 +1,14 @@
-"""Fits made up for judging: six recordings of 100 samples, the last three held out."""
+"""Made-up fits for selection: six recordings of 100 samples, the last three held out."""
 
 import numpy as np
 
-from hwid_cli.diagnosis.judge import Judge
-from hwid_cli.records.candidates import CandidateFit
+from hwid_cli.diagnosis.selection import SelectionCriteria
+from hwid_cli.records.candidates import CandidateFit, ParameterRef
 from tests.diagnosis.small_drive import white
 
 HELD_OUT = np.array([False] * 3 + [True] * 3)
 # Noise of size 1: a sum of squares of 100 is noise alone.
-JUDGE = Judge(np.full(6, 100), HELD_OUT, white(1.0))
+CRITERIA = SelectionCriteria(np.full(6, 100), HELD_OUT, white(1.0))
 
 
 def made_up(effects, sse, *, parameters=1, whiteness=3.0, neighbour=0.0, own=None):
@@ -17,9 +17,10 @@ def made_up(effects, sse, *, parameters=1, whiteness=3.0, neighbour=0.0, own=Non
     own = np.zeros((6, 0)) if own is None else np.asarray(own, float)[:, None]
     return CandidateFit(
         effects=tuple(effects),
-        names=tuple(f"n/{j}" for j in range(n)),
+        names=tuple(ParameterRef("n", str(j)) for j in range(n)),
         values=np.ones(n),
-        own_names=("parameter_change:damping/log_damping",) * own.shape[1],
+        own_names=(ParameterRef("parameter_change:damping", "log_damping"),)
+        * own.shape[1],
         own=own,
         sse=np.broadcast_to(np.asarray(sse, float), 6).copy(),
         whiteness=whiteness,

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from hwid_cli.diagnosis.sentences import hidden_from_view
 from hwid_cli.records.drive import Controller
-from hwid_cli.stages.diagnosis_sentences import hidden_from_view
 from tests.diagnosis.small_drive import problem, recordings, simulation
 from tests.stages.diagnosed_drive import FRICTION, breathing, diagnosed
 

@@ -5,14 +5,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hwid_cli.diagnosis.unknowns import (
+from hwid_cli.diagnosis.parameters import (
     START,
-    Point,
+    ParameterPoint,
     Unknown,
     drive_at,
     effects_at,
     first_point,
-    layout,
+    parameter_layout,
     vectors_at,
 )
 from hwid_cli.drive import slots
@@ -28,7 +28,7 @@ LINEAR = Unknown("effect", "coefficient", False, 0.05, -0.4, 0.4)
 def laid_out(effects=(), start=None, *, of=None, **changes):
     of = problem(recordings()[:3], **changes) if of is None else of
     start = start or {}
-    found = layout(of, effects, start, sizes(of))
+    found = parameter_layout(of, effects, start, sizes(of))
     return of, found, first_point(of, found, of.drive, start)
 
 
@@ -111,7 +111,9 @@ def test_a_phase_belongs_to_each_recording():
     assert [one.name for one in found.own] == ["phase_rad"]
     assert found.size(3) == 3 + 2 + 3
 
-    own = Point(point.shared, np.array([[0.1], [0.2], [0.3]]) / found.own[0].scale)
+    own = ParameterPoint(
+        point.shared, np.array([[0.1], [0.2], [0.3]]) / found.own[0].scale
+    )
     vectors = vectors_at(of, found, own)
     phases = [vector[slots.PERIODIC_PHASE] for vector in vectors]
     assert phases == pytest.approx([0.1, 0.2, 0.3])
@@ -125,7 +127,7 @@ def test_a_factor_between_recordings_acts_on_the_base():
     start = {"parameter_change:damping": {"log_damping": 0.0}}
     of, found, point = laid_out(("parameter_change:damping",), start)
     own = np.log([[0.5], [1.0], [2.0]]) / found.own[0].scale
-    vectors = vectors_at(of, found, Point(point.shared, own))
+    vectors = vectors_at(of, found, ParameterPoint(point.shared, own))
     assert [vector[slots.DAMPING] for vector in vectors] == pytest.approx(
         [7.5, 15.0, 30.0]
     )
@@ -167,7 +169,7 @@ def test_a_spring_starts_in_equilibrium():
 
 def test_the_base_of_a_point_is_that_of_its_drive():
     of, found, _ = laid_out()
-    point = Point(np.log([2.0, 0.5, 3.0]), np.zeros((3, 0)))
+    point = ParameterPoint(np.log([2.0, 0.5, 3.0]), np.zeros((3, 0)))
     drive = drive_at(of, found, point)
     assert drive.damping_N_s_per_m == pytest.approx(2 * DRIVE.damping_N_s_per_m)
     assert drive.stiffness_N_per_m == pytest.approx(0.5 * DRIVE.stiffness_N_per_m)

@@ -1,24 +1,14 @@
-"""What a diagnosis says in words: the summary, the next experiment, what is hidden."""
-
-from typing import TYPE_CHECKING
+"""What a diagnosis says in words: the summary, and what recordings cannot show."""
 
 import numpy as np
 
-from hwid_cli.diagnosis.next_experiment import Model, best_separation
-from hwid_cli.diagnosis.problem import Problem
-from hwid_cli.diagnosis.stored_fit import rebuilt
-from hwid_cli.diagnosis.verdict import Verdict
-from hwid_cli.drive.catalogue import public_id
+from hwid_cli.diagnosis.problem import DiagnosisProblem
+from hwid_cli.diagnosis.selection import DiagnosisVerdict, SelectionCriteria, title_of
 from hwid_cli.records.candidates import CandidateFit
-from hwid_cli.records.diagnosis import FittedEffect, NextExperiment
-from hwid_cli.records.units import behind
-
-if TYPE_CHECKING:
-    from hwid_cli.stages.findings import Findings
+from hwid_cli.records.diagnosis import FittedEffect, NoiseFloor
 
 # Share of the largest displacement that counts as motion to one side.
 _ONE_SIDE = 0.05
-_MOST_RIVALS = 3
 # The gap sits in recordings that hold this share of it ...
 _NEARLY_ALL = 0.95
 # ... and are of one kind, or no more than this share of all.
@@ -27,12 +17,23 @@ _MOST_NAMED = 6
 
 
 def summarise(
-    findings: "Findings", verdict: Verdict, effects: tuple[FittedEffect, ...]
+    problem: DiagnosisProblem,
+    criteria: SelectionCriteria,
+    base: CandidateFit,
+    verdict: DiagnosisVerdict,
+    effects: tuple[FittedEffect, ...],
 ) -> str:
-    """Say the verdict in one or two sentences."""
-    judge, base = findings.judge, findings.base
-    before = judge.ratio(base)
-    after = judge.ratio(verdict.chosen)
+    """Say the verdict in one or two sentences.
+
+    Parameters
+    ----------
+    base : CandidateFit
+        Re-fitted, without further effects.
+    effects : tuple of FittedEffect
+        Those that are named.
+    """
+    before = criteria.ratio(base)
+    after = criteria.ratio(verdict.chosen)
     names = " and ".join(one.id for one in effects)
     if verdict.word == "none":
         return (
@@ -48,7 +49,7 @@ def summarise(
         return (
             f"The simulation differs from the recordings by {before:.3g} times their "
             "noise, and no effect of the catalogue explains most of it."
-            f"{_where_it_sits(findings, verdict.chosen)}"
+            f"{_where_it_sits(problem, criteria.noise, verdict.chosen)}"
         )
     meaning = "; ".join(one.sentence for one in effects)
     text = (
@@ -56,18 +57,19 @@ def summarise(
         f"recordings falls from {before:.3g} to {after:.3g} times the noise."
     )
     if verdict.word == "ambiguous":
-        others = ", ".join(_name(one) for one in verdict.rivals)
+        others = ", ".join(title_of(one) for one in verdict.rivals)
         text += f" These recordings cannot tell it from {others}."
     if not verdict.is_complete:
         text += " Something smaller remains."
     return text
 
 
-def _where_it_sits(findings: "Findings", chosen: CandidateFit) -> str:
+def _where_it_sits(
+    problem: DiagnosisProblem, noise: NoiseFloor, chosen: CandidateFit
+) -> str:
     """Name the recordings that hold the gap, if they are of one kind or few."""
-    problem = findings.problem
     signals = problem.signals
-    floor = np.array([one.n_judged for one in signals]) * findings.noise.rms**2
+    floor = np.array([one.n_evaluated for one in signals]) * noise.rms**2
     excess = np.maximum(chosen.sse - floor, 0.0)
     if not 0 < excess.sum() < np.inf:
         return ""
@@ -97,47 +99,7 @@ def _rows_of_gap(excess: np.ndarray, kinds: list[str]) -> list[int]:
     return sorted(largest[:n_most]) if n_most <= _FEW * len(kinds) else []
 
 
-def _name(found: CandidateFit) -> str:
-    return " with ".join(public_id(one) for one in found.effects)
-
-
-def propose(findings: "Findings", verdict: Verdict) -> NextExperiment:
-    """Find the input that would separate what the recordings do not.
-
-    Returns
-    -------
-    NextExperiment
-        With an empty input where none is needed.
-    """
-    if verdict.word == "ambiguous":
-        pair = (verdict.chosen, verdict.rivals[0])
-    elif verdict.word == "unknown":
-        judge = findings.judge
-        usable = [one for one in findings.found.fits if one.is_usable]
-        usable.sort(key=lambda one: -judge.gain(one, findings.base))
-        if len(usable) < 2:
-            return NextExperiment("", "no candidate could be simulated")
-        pair = (usable[0], usable[1])
-    else:
-        return NextExperiment("", "the recordings decide; no further one is needed")
-    if findings.problem.compares_command:
-        return NextExperiment(
-            "a slower and a faster motion along the same path",
-            "friction, inertia and delay then weigh differently",
-        )
-    models = [Model(*rebuilt(findings.problem, one, findings.scales)) for one in pair]
-    best = best_separation(findings.problem, models[0], models[1], findings.scales)
-    # The dash of a dimensionless output would be a minus behind a number.
-    by = f"{best.rms:.2g}{behind(findings.problem.unit)}"
-    return NextExperiment(
-        best.input,
-        f"{_name(pair[0])} and {_name(pair[1])} then differ by {by} "
-        f"({best.rms / max(findings.noise.rms, 1e-300):.2g} times the noise) after the "
-        "parameters have been fitted again",
-    )
-
-
-def hidden_from_view(problem: Problem) -> tuple[str, ...]:
+def hidden_from_view(problem: DiagnosisProblem) -> tuple[str, ...]:
     """Say what these recordings cannot show, whatever the drive does."""
     drive, texts = problem.drive, []
     if drive.resistance_ohm is None:

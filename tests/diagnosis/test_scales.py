@@ -1,4 +1,4 @@
-"""Lines of an error, in time and along the way."""
+"""Sizes of recordings; lines of an error, in time and along the way."""
 
 from dataclasses import replace
 
@@ -6,8 +6,14 @@ import numpy as np
 import pytest
 
 from hwid_cli.diagnosis.latent_force import Smoothed
-from hwid_cli.diagnosis.lines import line_frequencies, line_share, waves_along
-from hwid_cli.diagnosis.problem import Compared
+from hwid_cli.diagnosis.problem import Compared, DiagnosisProblem, Signals
+from hwid_cli.diagnosis.scales import (
+    line_frequencies,
+    line_share,
+    scales_of_recordings,
+    waves_along,
+)
+from hwid_cli.records.drive import Drive
 from tests.diagnosis.small_drive import STEP_S, problem, white
 
 TIME = STEP_S * np.arange(400)
@@ -69,3 +75,59 @@ def test_without_motion_nothing_repeats():
     (one,) = compared([np.zeros(400)])[:1]
     still = Smoothed(np.ones(400), np.zeros(400), np.zeros(400), np.zeros(400))
     assert waves_along([replace(one, position=np.zeros(400))], [still]) == ()
+
+
+def signals(driven_by, output, *, skip=0, held_out=False, step=0.01):
+    driven_by, output = np.asarray(driven_by, float), np.asarray(output, float)
+    return Signals(
+        "r", "other", driven_by, output, driven_by, output, step, skip, held_out
+    )  # fmt: skip
+
+
+def two_recordings(**drive):
+    return DiagnosisProblem(
+        (
+            signals([0.0, 2.0, 2.0], [0.0, -0.3, 0.1]),
+            signals([0.0, -3.0, -2.5, -2.5], [0.0, 0.2, 0.0, 0.0]),
+        ),
+        Drive(**drive),
+    )
+
+
+def test_scales_are_the_largest_of_all_recordings():
+    of = two_recordings(
+        mass_kg=2.0, stiffness_N_per_m=50.0, force_constant_N_per_A=-4.0
+    )
+    found = scales_of_recordings(
+        of, [np.array([0.5, -0.7]), np.array([0.6, np.nan])], (12.0,)
+    )
+
+    assert found.displacement_m == pytest.approx(0.3)
+    assert found.stroke_m == pytest.approx(0.4)
+    assert found.current_A == pytest.approx(3.0)
+    assert found.current_rate_A_per_s == pytest.approx(300.0)
+    assert found.velocity_m_per_s == pytest.approx(0.7)
+    assert found.force_N == pytest.approx(12.0)
+    assert found.duration_s == pytest.approx(0.04)
+    assert found.frequencies_Hz == (12.0,)
+
+
+def test_the_natural_frequency_comes_from_mass_and_spring():
+    of = two_recordings(mass_kg=2.0, stiffness_N_per_m=2.0 * (2 * np.pi * 80) ** 2)
+    assert scales_of_recordings(of, [np.ones(2)] * 2).natural_Hz == pytest.approx(80.0)
+
+
+def test_a_free_axis_has_two_periods_in_its_longest_recording():
+    of = two_recordings(stiffness_N_per_m=0.0)
+    assert scales_of_recordings(of, [np.ones(2)] * 2).natural_Hz == pytest.approx(50.0)
+
+
+def test_the_force_of_a_voltage_is_that_of_its_current():
+    of = two_recordings(force_constant_N_per_A=4.0, resistance_ohm=8.0)
+    assert scales_of_recordings(of, [np.ones(2)] * 2).force_N == pytest.approx(1.5)
+
+
+def test_scales_of_recordings_without_motion_are_not_zero():
+    still = DiagnosisProblem((signals([0, 1, 1], [0, 0, 0]),), Drive())
+    found = scales_of_recordings(still, [np.zeros(3)])
+    assert min(found.displacement_m, found.velocity_m_per_s, found.stroke_m) > 0

@@ -1,0 +1,176 @@
+"""What a simulation of a drive lacks, and what shows it: the whole way, in order.
+
+The base is re-fitted first, because wrong parameters are not a missing effect; then
+effects of the catalogue are tried, alone and in sets; held-out recordings decide.
+docs/method_diagnosis.md.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from hwid_cli.diagnosis.candidate import (
+    Baseline,
+    compared_with_fit,
+    fit_candidate,
+    fitted_drive,
+)
+from hwid_cli.diagnosis.findings import Findings, describe
+from hwid_cli.diagnosis.latent_force import latent_force
+from hwid_cli.diagnosis.noise import noise_floor
+from hwid_cli.diagnosis.parameters import (
+    compare_at,
+    each_sum_of_squares,
+    first_point,
+    parameter_layout,
+)
+from hwid_cli.diagnosis.problem import (
+    Compared,
+    DiagnosisProblem,
+    held_out_names,
+    prepare,
+)
+from hwid_cli.diagnosis.rounds import (
+    OnRound,
+    Rounds,
+    RoundsResult,
+    RunTasks,
+    run_rounds,
+)
+from hwid_cli.diagnosis.scales import (
+    line_frequencies,
+    line_share,
+    scales_of_fit,
+    scales_of_recordings,
+)
+from hwid_cli.diagnosis.search import fit_own
+from hwid_cli.diagnosis.selection import SelectionCriteria, decide
+from hwid_cli.diagnosis.where import places
+from hwid_cli.drive.catalogue import CATALOGUE, public_id
+from hwid_cli.drive.effect import Scales
+from hwid_cli.drive.simulation import drive_effects
+from hwid_cli.records.candidates import CandidateFit
+from hwid_cli.records.diagnosis import Diagnosis, NoiseFloor
+from hwid_cli.records.experiment import DiagnoseOptions, SimulationOptions
+from hwid_cli.records.recordings import Recording
+
+# A line that takes this share of what the base leaves is no colour of noise.
+LINE_SHARE = 0.3
+
+
+def diagnose(
+    recordings: Sequence[Recording],
+    simulation: SimulationOptions,
+    options: DiagnoseOptions,
+    run_tasks: RunTasks,
+    on_round: OnRound,
+) -> Diagnosis:
+    """Find what a simulation lacks.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+        At least one.
+    run_tasks : callable
+        Computes tasks, or takes their results from where it kept them.
+    on_round : callable
+        Called with what begins and its number of tasks.
+    """
+    held_out = options.hold_out
+    if isinstance(held_out, str):
+        held_out = held_out_names(recordings)
+    problem = prepare(recordings, simulation, options, held_out)
+    noise = noise_floor(problem)
+
+    on_round("base", 0)
+    given = compared_as_given(problem)
+    scales = scales_of_recordings(problem, [one.velocity for one in given])
+    base = _refit_base(problem, scales, noise)
+    if _shakes_at_rest(problem, base, scales, noise):
+        noise = noise_floor(problem, rests=False)
+        base = _refit_base(problem, scales, noise)
+    if base.is_usable:
+        scales = scales_of_fit(problem, base, scales, noise)
+    drive = fitted_drive(problem.drive, base)
+
+    before = compared_with_fit(problem, base, scales)
+    force = latent_force(before, drive, noise)
+    where = places(before, noise, drive, force)
+
+    criteria = SelectionCriteria.of(problem, noise)
+    found = RoundsResult((), (), {})
+    if base.is_usable and not criteria.is_complete(base):
+        baseline = Baseline(drive, scales, noise, problem.drive)
+        allowed = allowed_effects(problem, options)
+        found = run_rounds(
+            Rounds(problem, baseline, criteria, base, allowed, run_tasks, on_round),
+            options.max_effects,
+        )
+
+    on_round("verdict", 0)
+    given_sse = each_sum_of_squares([one.residual for one in given])
+    verdict = decide(criteria, given_sse, base, found.fits, found.best)
+    return describe(
+        Findings(
+            problem=problem, criteria=criteria, scales=scales, given_sse=given_sse,
+            base=base, before=before, force=force, where=where,
+            found=found, verdict=verdict,
+        )
+    )  # fmt: skip
+
+
+def compared_as_given(problem: DiagnosisProblem) -> list[Compared]:
+    """Simulate with the parameters that the configuration gives.
+
+    What belongs to one recording alone (a start, a phase) is found from it.
+    """
+    present = drive_effects(problem.drive)
+    speeds = [
+        np.gradient(signals.output, signals.sample_time_s)
+        for signals in problem.signals
+    ]
+    rough = scales_of_recordings(problem, speeds)
+    fit_layout = parameter_layout(problem, tuple(present), present, rough)
+    point = first_point(problem, fit_layout, problem.drive, present)
+    own = fit_own(problem, fit_layout, point.shared)
+    return compare_at(problem, fit_layout, own)
+
+
+def _refit_base(
+    problem: DiagnosisProblem, scales: Scales, noise: NoiseFloor
+) -> CandidateFit:
+    """Base, and the effects that the simulation has already, fitted again."""
+    present = drive_effects(problem.drive)
+    return fit_candidate(problem, (), [present], Baseline(problem.drive, scales, noise))
+
+
+def _shakes_at_rest(
+    problem: DiagnosisProblem, base: CandidateFit, scales: Scales, noise: NoiseFloor
+) -> bool:
+    """Whether the colour at rest is a line that goes on all the time: motion."""
+    if not (noise.is_coloured and noise.method == "rest" and base.is_usable):
+        return False
+    compared = compared_with_fit(problem, base, scales)
+    white = replace(noise, whitening=(1.0,))
+    line = line_frequencies(compared, white)[0]
+    return line_share(compared, line) > LINE_SHARE
+
+
+def allowed_effects(
+    problem: DiagnosisProblem, options: DiagnoseOptions
+) -> tuple[str, ...]:
+    """Ids that may be named: those asked for that make sense for this drive."""
+    wanted = options.effects
+    present = {public_id(one) for one in drive_effects(problem.drive)}
+    has_spring = problem.drive.stiffness_N_per_m > 0
+    several = len(problem.part(held_out=False).signals) > 2
+    return tuple(
+        name
+        for name, effect in CATALOGUE.items()
+        if (wanted is None or public_id(name) in wanted)
+        and public_id(name) not in present
+        and (has_spring or not effect.needs_spring)
+        and (several or not any(one.is_own for one in effect.parameters))
+        and not (problem.compares_command and effect.enters == "output")
+    )

@@ -1,0 +1,319 @@
+"""What a diagnosis found, put together for files and reports.
+
+Gaps, parameters with their intervals, and the curves that show them.
+docs/method_diagnosis.md, eq. (D20).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from hwid_cli.diagnosis.candidate import compared_with_fit, fitted_drive, rebuilt
+from hwid_cli.diagnosis.latent_force import Smoothed
+from hwid_cli.diagnosis.next_experiment import propose
+from hwid_cli.diagnosis.parameters import (
+    ParameterLayout,
+    ParameterPoint,
+    residuals_at,
+    sum_of_squares,
+)
+from hwid_cli.diagnosis.problem import Compared, DiagnosisProblem
+from hwid_cli.diagnosis.rounds import RoundsResult
+from hwid_cli.diagnosis.search import local_matrix
+from hwid_cli.diagnosis.selection import DiagnosisVerdict, SelectionCriteria, ranked
+from hwid_cli.diagnosis.sentences import hidden_from_view, summarise
+from hwid_cli.diagnosis.where import latent_force_curves
+from hwid_cli.drive.catalogue import CATALOGUE, public_id
+from hwid_cli.drive.effect import Scales
+from hwid_cli.drive.simulation import drive_effects
+from hwid_cli.records.candidates import CandidateFit, ParameterRef
+from hwid_cli.records.diagnosis import (
+    BaseParameter,
+    Diagnosis,
+    FittedEffect,
+    FittedParameter,
+    Gap,
+    NoiseFloor,
+    Overlay,
+    Place,
+    RecordingGap,
+)
+from hwid_cli.records.drive import BASE_PARAMETERS, Drive
+
+MOST_OVERLAYS = 4
+# Normal quantile of a 95 % interval.
+_QUANTILE = 1.96
+# Share of the best determined direction below which one counts as undetermined.
+_DETERMINED = 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class Findings:
+    """All that the verdict and its presentation rest on.
+
+    Parameters
+    ----------
+    given_sse : ndarray, shape (n_recordings,), [output unit squared]
+        Of the simulation with the parameters that the configuration gives.
+    base : CandidateFit
+        Re-fitted, without further effects.
+    before : list of Compared
+        Simulations with the re-fitted base.
+    force : list of Smoothed
+        That the re-fitted base lacks.
+    """
+
+    problem: DiagnosisProblem
+    criteria: SelectionCriteria
+    scales: Scales
+    given_sse: np.ndarray
+    base: CandidateFit
+    before: list[Compared]
+    force: list[Smoothed]
+    where: tuple[Place, ...]
+    found: RoundsResult
+    verdict: DiagnosisVerdict
+
+
+def describe(findings: Findings) -> Diagnosis:
+    """Put together what shows the verdict."""
+    problem, criteria, base = findings.problem, findings.criteria, findings.base
+    verdict, noise, scales = findings.verdict, criteria.noise, findings.scales
+    chosen, before, found = verdict.chosen, findings.before, findings.found
+    is_base = chosen is base
+    after = before if is_base else compared_with_fit(problem, chosen, scales)
+    given_sse = findings.given_sse
+    from_sse = given_sse if verdict.word in ("parameters", "none") else base.sse
+    present = tuple(drive_effects(problem.drive))
+    told = _fitted_effects_of(problem, chosen, scales, (*present, *chosen.effects))
+    effects = told[len(present) :]
+    return Diagnosis(
+        verdict=verdict.word,
+        complete=verdict.is_complete,
+        summary=summarise(problem, criteria, base, verdict, effects),
+        effects=effects,
+        ambiguous_with=tuple(
+            "+".join(public_id(name) for name in one.effects) for one in verdict.rivals
+        ),
+        noise=noise,
+        given=_gap(criteria, given_sse),
+        before=_gap(criteria, from_sse),
+        after=_gap(criteria, chosen.sse),
+        explained_share=_explained(criteria, chosen.sse, from_sse),
+        base=_base(problem.drive, base, chosen),
+        places=findings.where,
+        not_observable=hidden_from_view(problem),
+        next_experiment=propose(problem, criteria, scales, verdict, found.fits),
+        train=tuple(one.name for one in problem.signals if not one.is_held_out),
+        held_out=tuple(one.name for one in problem.signals if one.is_held_out),
+        candidates=ranked(criteria, found.fits, base, found.shares),
+        gaps=_recording_gaps(problem, given_sse, base, chosen),
+        overlays=_overlays(before, after, noise),
+        latent_force=latent_force_curves(
+            before, None if is_base else after, findings.force,
+            fitted_drive(problem.drive, base), noise,
+        ),
+        present=told[: len(present)],
+        reference_current_A=problem.drive.reference_current_A,
+        reference_displacement_m=problem.drive.reference_displacement_m,
+        output_unit=problem.unit,
+    )  # fmt: skip
+
+
+def _gap(criteria: SelectionCriteria, sse: np.ndarray) -> Gap:
+    held = criteria.is_held_out
+    train = ~held if (~held).any() else held
+    train_rms, held_rms = (
+        float(np.sqrt(sse[rows].sum() / criteria.n_samples[rows].sum()))
+        for rows in (train, held)
+    )
+    noise_rms = criteria.noise.rms
+    ratio = held_rms / noise_rms if noise_rms > 0 else float("inf")
+    return Gap(train_rms, held_rms, ratio)
+
+
+def _explained(
+    criteria: SelectionCriteria, after: np.ndarray, before: np.ndarray
+) -> float:
+    """Share of the held-out excess over the noise; 0 where there is none."""
+    held = criteria.is_held_out
+    floor = criteria.n_samples[held].sum() * criteria.noise.rms**2
+    excess = before[held].sum() - floor
+    if not np.isfinite(excess):
+        return 1.0
+    if excess <= 0:
+        return 0.0
+    return float(min((before[held].sum() - after[held].sum()) / excess, 1.0))
+
+
+def _base(
+    drive: Drive, base: CandidateFit, chosen: CandidateFit
+) -> tuple[BaseParameter, ...]:
+    refitted, after = fitted_drive(drive, base), fitted_drive(drive, chosen)
+    return tuple(
+        BaseParameter(
+            name,
+            getattr(drive, name),
+            getattr(refitted, name),
+            getattr(after, name) * _mean_factor(chosen, name),
+        )
+        for name in BASE_PARAMETERS
+    )
+
+
+def _mean_factor(chosen: CandidateFit, name: str) -> float:
+    """Mean of the factors by which recordings change a parameter; 1 without any."""
+    mean = 1.0
+    for column, one in enumerate(chosen.own_names):
+        changed = one.parameter.removeprefix("log_")
+        if changed != one.parameter and name.startswith(f"{changed}_"):
+            mean = float(np.mean(np.exp(chosen.own[:, column])))
+    return mean
+
+
+def _recording_gaps(
+    problem: DiagnosisProblem,
+    given_sse: np.ndarray,
+    base: CandidateFit,
+    chosen: CandidateFit,
+) -> tuple[RecordingGap, ...]:
+    def rms(sse: np.ndarray, row: int) -> float:
+        return float(np.sqrt(sse[row] / problem.signals[row].n_evaluated))
+
+    return tuple(
+        RecordingGap(
+            one.name,
+            one.kind,
+            one.is_held_out,
+            rms(given_sse, row),
+            rms(base.sse, row),
+            rms(chosen.sse, row),
+        )
+        for row, one in enumerate(problem.signals)
+    )
+
+
+def _overlays(
+    before: Sequence[Compared], after: Sequence[Compared], noise: NoiseFloor
+) -> tuple[Overlay, ...]:
+    held = [row for row, one in enumerate(before) if one.signals.is_held_out]
+    rows = held or list(range(len(before)))
+    rows.sort(key=lambda row: -before[row].rms)
+    return tuple(
+        Overlay(
+            before[row].signals.name,
+            before[row].signals.sample_time_s
+            * np.arange(before[row].signals.compared.size),
+            before[row].signals.driven_by,
+            before[row].signals.compared,
+            before[row].simulated,
+            after[row].simulated,
+            noise.rms,
+        )
+        for row in rows[:MOST_OVERLAYS]
+    )
+
+
+def _fitted_effects_of(
+    problem: DiagnosisProblem, found: CandidateFit, scales: Scales, ids: Sequence[str]
+) -> tuple[FittedEffect, ...]:
+    """Describe effects of a fit, by their ids in the catalogue."""
+    if not ids:
+        return ()
+    parameters: dict[str, list[FittedParameter]] = {one: [] for one in ids}
+    ends = zip(*intervals(problem, found, scales), strict=True)
+    for one, value, (low, high) in zip(found.names, found.values, ends, strict=True):
+        if one.owner in parameters:
+            parameters[one.owner].append(
+                FittedParameter(one.parameter, float(value), float(low), float(high))
+            )
+    for identifier in ids:
+        which = identifier.partition(":")[2]
+        if which:
+            own = ParameterRef(identifier, f"log_{which}")
+            column = found.own_names.index(own)
+            parameters[identifier] = [
+                FittedParameter("which", float("nan"), text=which),
+                _spread(np.exp(found.own[:, column])),
+            ]
+    return tuple(_described(one, parameters[one]) for one in ids)
+
+
+def _described(identifier: str, parameters: Sequence[FittedParameter]) -> FittedEffect:
+    entry = CATALOGUE[identifier]
+    return FittedEffect(
+        public_id(identifier), entry.sentence, entry.equation, tuple(parameters)
+    )
+
+
+def _spread(factors: np.ndarray) -> FittedParameter:
+    """Relative standard deviation between recordings, with its usual interval."""
+    spread = float(np.std(factors, ddof=1) / np.mean(factors))
+    reach = 1.96 / float(np.sqrt(2 * max(factors.size - 1, 1)))
+    return FittedParameter("spread", spread, spread * (1 - reach), spread * (1 + reach))
+
+
+def intervals(
+    problem: DiagnosisProblem, found: CandidateFit, scales: Scales
+) -> tuple[np.ndarray, np.ndarray]:
+    """95 % intervals of what all recordings share.
+
+    Parameters
+    ----------
+    problem : DiagnosisProblem
+        Training and held-out recordings; the training ones decide.
+
+    Returns
+    -------
+    low, high : ndarray, shape (n_names,)
+        NaN where a recording cannot be simulated.
+    """
+    if not found.is_usable:
+        nothing = np.full(found.values.size, np.nan)
+        return nothing, nothing
+    fit_layout, point = rebuilt(problem, found, scales)
+    deviations = _standard_errors(problem, found, fit_layout, point)
+    with np.errstate(over="ignore"):
+        ends = np.array(
+            [
+                [
+                    one.value(q + sign * _QUANTILE * deviation)
+                    for one, q, deviation in zip(
+                        fit_layout.shared, point.shared, deviations, strict=True
+                    )
+                ]
+                for sign in (-1.0, 1.0)
+            ]
+        )
+    return ends.min(axis=0), ends.max(axis=0)
+
+
+def _standard_errors(
+    problem: DiagnosisProblem,
+    found: CandidateFit,
+    fit_layout: ParameterLayout,
+    point: ParameterPoint,
+) -> np.ndarray:
+    """Standard errors of the shared coordinates."""
+    rows = [row for row, one in enumerate(problem.signals) if not one.is_held_out]
+    train = problem.part(held_out=False)
+    at = ParameterPoint(point.shared, point.own[rows])
+    matrix = local_matrix(train, fit_layout, at)
+    sse = sum_of_squares(residuals_at(train, fit_layout, at))
+    freedom = max(train.n_evaluated - matrix.shape[0], 1)
+    # Residuals that go together count as fewer samples.
+    together = max(found.neighbour, 0.0)
+    inflation = (1 + together) / max(1 - together, 1e-3)
+    scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
+    variances = np.diag(_inverse(matrix / scale[:, None] / scale))
+    shared = slice(len(fit_layout.shared))
+    errors = np.sqrt(sse / freedom * inflation * variances[shared]) / scale[shared]
+    return np.asarray(errors)
+
+
+def _inverse(matrix: np.ndarray) -> np.ndarray:
+    """Inverse in which what nothing determines is large, not infinite."""
+    sizes, turned = np.linalg.eigh(matrix)
+    sizes = np.maximum(sizes, _DETERMINED * sizes[-1])
+    return np.asarray((turned / sizes) @ turned.T)

@@ -1,0 +1,69 @@
+"""The whole way of a diagnosis, with a runner that keeps nothing."""
+
+import pytest
+
+from hwid_cli.diagnosis.diagnose import allowed_effects, diagnose
+from hwid_cli.drive.catalogue import CATALOGUE
+from hwid_cli.records.drive import Controller
+from hwid_cli.records.experiment import DiagnoseOptions
+from tests.diagnosis.small_drive import in_turn, problem, recordings, simulation
+from tests.stages.diagnosed_drive import FEW, FRICTION, diagnosed
+from tests.store.record_examples import assert_same
+
+
+def test_any_runner_gives_what_the_stage_gives():
+    given = recordings(FRICTION)
+    options = DiagnoseOptions(effects=FEW, max_effects=1)
+    found = diagnose(given, simulation(), options, in_turn, lambda what, count: None)
+    assert [one.id for one in found.effects] == ["coulomb_friction"]
+    assert_same(found, diagnosed(given))
+
+
+def test_fits_are_to_be_kept_and_forecasts_are_not():
+    seen = []
+
+    def run(tasks, *, keep):
+        seen.append((keep, {one.result_type.__name__ for one in tasks}))
+        return in_turn(tasks, keep=keep)
+
+    options = DiagnoseOptions(effects=FEW, max_effects=1)
+    diagnose(recordings(FRICTION), simulation(), options, run, lambda what, count: None)
+    assert seen == [(False, {"Forecast"}), (True, {"CandidateFit"})]
+
+
+def test_tasks_of_one_diagnosis_differ_in_their_content():
+    contents = []
+
+    def run(tasks, *, keep):
+        contents.extend(str(one.content) for one in tasks)
+        return in_turn(tasks, keep=keep)
+
+    options = DiagnoseOptions(effects=FEW, max_effects=1)
+    diagnose(recordings(FRICTION), simulation(), options, run, lambda what, count: None)
+    assert len(contents) == len(set(contents)) == 2 * len(FEW)
+
+
+@pytest.mark.parametrize(
+    ("changes", "lost"),
+    [
+        ({"effects": {"coulomb_friction": {"force_N": 0.1}}}, {"coulomb_friction"}),
+        (
+            {"stiffness_N_per_m": 0.0},
+            {name for name, one in CATALOGUE.items() if one.needs_spring},
+        ),
+        (
+            {"controller": Controller(20.0, 30.0)},
+            {name for name, one in CATALOGUE.items() if one.enters == "output"},
+        ),
+    ],
+)
+def test_what_makes_no_sense_for_a_drive_is_not_tried(changes, lost):
+    of = problem(recordings(), **changes)
+    allowed = set(allowed_effects(of, DiagnoseOptions()))
+    assert lost
+    assert allowed == set(CATALOGUE) - lost
+
+
+def test_two_recordings_show_no_change_between_recordings():
+    few = allowed_effects(problem(recordings()[:2]), DiagnoseOptions())
+    assert not any(CATALOGUE[one].parameters[0].is_own for one in few)

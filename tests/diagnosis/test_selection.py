@@ -1,0 +1,413 @@
+"""Evidence, against calculations by hand; the best candidate; each of five verdicts."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hwid_cli.diagnosis.selection import (
+    LEAST_ADDED,
+    LEAST_EXPLAINED,
+    LEAST_EXPLAINED_SET,
+    LEAST_GAIN,
+    LEAST_IMPROVED,
+    TIE,
+    SelectionCriteria,
+    count,
+    decide,
+    has_size,
+    is_part_of,
+    ranked,
+    rivals,
+    select_best,
+)
+from hwid_cli.records.diagnosis import VERDICTS
+from tests.diagnosis.made_up_fits import CRITERIA, HELD_OUT, base, made_up
+from tests.diagnosis.small_drive import problem, recordings, white
+
+GOOD = ("coulomb_friction",)
+PAIR = ("coulomb_friction", "input_dead_zone")
+
+
+def test_the_gain_is_that_of_the_information_criterion():
+    found = made_up(GOOD, 150.0, parameters=2)
+    # 600 ln(400 / 150) - 2 ln 600
+    assert CRITERIA.gain(found, base()) == pytest.approx(575.704, abs=1e-3)
+    assert CRITERIA.gain(base(), found) == pytest.approx(-575.704, abs=1e-3)
+
+
+def test_own_parameters_count_once_for_each_recording():
+    found = made_up(GOOD, 400.0, parameters=0, own=np.arange(6))
+    assert count(found) == 9
+    # 0 - 6 ln 600
+    assert CRITERIA.gain(found, base()) == pytest.approx(-38.382, abs=1e-3)
+
+
+def test_residuals_that_go_together_count_as_fewer_samples():
+    found = made_up(GOOD, 150.0, neighbour=0.5)
+    # 600 / 3 samples: 200 ln(400 / 150) - ln 200
+    assert CRITERIA.gain(found, base(neighbour=0.8)) == pytest.approx(190.868, abs=1e-3)
+
+
+def test_only_what_goes_together_in_both_counts():
+    found = made_up(GOOD, 150.0)
+    assert CRITERIA.gain(found, base(neighbour=0.99)) == CRITERIA.gain(found, base())
+
+
+def test_residuals_that_all_go_together_still_count_as_some():
+    found = made_up(GOOD, 150.0, neighbour=1.0)
+    # Ten pieces of each recording: 60 ln(400 / 150) - ln 60
+    assert CRITERIA.gain(found, base(neighbour=1.0)) == pytest.approx(54.756, abs=1e-3)
+
+
+def test_what_could_not_be_simulated_loses_against_everything():
+    lost = made_up(GOOD, np.inf)
+    assert CRITERIA.gain(lost, base()) == -float("inf")
+    assert CRITERIA.gain(base(), lost) == float("inf")
+    assert not CRITERIA.may_be_named(lost, base())
+
+
+def test_a_perfect_fit_has_a_finite_gain():
+    assert np.isfinite(CRITERIA.gain(made_up(GOOD, 0.0), base()))
+
+
+def test_held_out_recordings_alone_are_the_evidence():
+    found = made_up(GOOD, [1, 1, 1, 100, 250, 500])
+    against = CRITERIA.evidence(found, base())
+    # 1200 before, 850 after, 300 of noise.
+    assert against.explained == pytest.approx(350 / 900)
+    assert against.improved == pytest.approx(2 / 3)
+
+
+def test_nothing_is_explained_where_there_is_no_excess():
+    assert CRITERIA.evidence(made_up(GOOD, 80.0), base(90.0)).explained == 0.0
+
+
+def test_rms_of_both_sides_and_ratio_to_the_noise():
+    found = made_up(GOOD, [100, 200, 300, 400, 900, 1400])
+    assert CRITERIA.rms(found, held_out=False) == pytest.approx(np.sqrt(2.0))
+    assert CRITERIA.rms(found, held_out=True) == pytest.approx(3.0)
+    assert CRITERIA.ratio(found) == pytest.approx(3.0)
+
+
+def test_without_noise_the_ratio_is_infinite():
+    silent = replace(CRITERIA, noise=white(0.0))
+    assert silent.ratio(base()) == float("inf")
+
+
+def test_a_single_recording_validates_itself():
+    criteria = SelectionCriteria.of(problem(recordings()[:1]), white())
+    np.testing.assert_array_equal(criteria.is_held_out, [True])
+    found = replace(base(), sse=np.array([4.0]))
+    assert (
+        criteria.rms(found, held_out=False) == criteria.rms(found, held_out=True) == 0.1
+    )
+
+
+def test_skipped_samples_do_not_count():
+    of = problem(recordings()[:2])
+    short = replace(of, signals=tuple(replace(one, skip=100) for one in of.signals))
+    np.testing.assert_array_equal(
+        SelectionCriteria.of(short, white()).n_samples, [300, 300]
+    )
+
+
+# Each of the next cases fails one rule and only that one.
+def rules(found, against):
+    evidence = CRITERIA.evidence(found, against)
+    least = LEAST_EXPLAINED if len(found.effects) == 1 else LEAST_EXPLAINED_SET
+    return {
+        "gain": evidence.gain >= LEAST_GAIN,
+        "explained": evidence.explained >= least or CRITERIA.is_complete(found),
+        "improved": evidence.improved >= LEAST_IMPROVED,
+        "size": has_size(found),
+    }
+
+
+def test_clear_evidence_suffices():
+    found = made_up(GOOD, 110.0)
+    assert all(rules(found, base()).values())
+    assert CRITERIA.may_be_named(found, base())
+
+
+@pytest.mark.parametrize(
+    ("rule", "found", "against"),
+    [
+        # 600 ln(102 / 100.5) - ln 600 = 2.5
+        ("gain", made_up(GOOD, 100.5), base(102.0)),
+        # 100 of 300 beyond the noise.
+        ("explained", made_up(GOOD, 300.0), base()),
+        # 180 of 300: enough for one effect, too little for two.
+        ("explained", made_up(PAIR, 220.0), base()),
+        # One of three held-out recordings, though most of the error goes.
+        (
+            "improved",
+            made_up(GOOD, [100] * 4 + [500] * 2),
+            base([400] * 3 + [1400, 400, 400]),
+        ),
+        # Factors that scatter by half a percent.
+        (
+            "size",
+            made_up(GOOD, 110.0, own=[0.005, -0.005] * 3),
+            base(),
+        ),
+    ],
+)
+def test_evidence_that_fails_one_rule_does_not_suffice(rule, found, against):
+    assert [name for name, holds in rules(found, against).items() if not holds] == [
+        rule
+    ]
+    assert not CRITERIA.may_be_named(found, against)
+
+
+def test_one_effect_may_explain_less_than_two_must():
+    assert CRITERIA.may_be_named(made_up(GOOD, 220.0), base())
+
+
+def test_what_leaves_white_noise_need_not_explain_half():
+    assert CRITERIA.may_be_named(made_up(GOOD, 300.0, whiteness=0.9), base())
+
+
+def test_factors_beyond_scatter_have_a_size():
+    assert has_size(made_up(GOOD, 1.0, own=[0.05, -0.05] * 3))
+    assert has_size(made_up(GOOD, 1.0))
+
+
+def test_complete_is_what_leaves_white_noise():
+    assert CRITERIA.is_complete(made_up(GOOD, 100.0, whiteness=1.0))
+    assert not CRITERIA.is_complete(made_up(GOOD, 100.0, whiteness=1.001))
+    assert not CRITERIA.is_complete(made_up(GOOD, np.inf, whiteness=0.5))
+
+
+def test_the_table_is_ordered_by_gain_with_the_lost_and_the_waiting_last():
+    fits = [
+        made_up(("a",), 300.0),
+        made_up(("b",), np.inf),
+        made_up(("c",), 150.0),
+        replace(made_up(("d",), 350.0), has_converged=False),
+    ]
+    shares = {("a",): 0.2, ("b",): 0.1, ("e",): 0.01, ("f",): 0.02}
+    rows = ranked(CRITERIA, fits, base(), shares)
+
+    assert [row.effects[0] for row in rows] == ["c", "a", "d", "b", "f", "e"]
+    assert [row.is_fitted for row in rows] == [True] * 4 + [False] * 2
+    assert rows[1].forecast_share == 0.2
+    assert np.isnan(rows[0].forecast_share)
+    assert rows[2].note == "stopped at the iteration limit"
+    assert rows[3].note == "could not be simulated"
+    assert np.isnan(rows[3].held_out_rms)
+    assert "not fitted" in rows[4].note
+    assert rows[0].held_out_rms == pytest.approx(np.sqrt(1.5))
+    assert rows[0].improved_share == 1.0
+
+
+def test_the_made_up_recordings_are_as_said():
+    assert HELD_OUT.sum() == 3
+
+
+COULOMB = ("coulomb_friction",)
+STRIBECK = ("stribeck_friction",)
+DEAD_ZONE = ("input_dead_zone",)
+
+
+def after(gain, effects, than=200.0, **options):
+    """A fit whose criterion is lower by ``gain`` than that of one parameter's."""
+    more = options.get("parameters", 1) - 1
+    # gain = 600 ln(than / sse) - more ln 600
+    sse = than * np.exp(-(gain + more * np.log(600.0)) / 600.0)
+    return made_up(effects, sse, **options)
+
+
+def test_the_largest_gain_wins():
+    fits = [made_up(COULOMB, 200.0), made_up(DEAD_ZONE, 180.0)]
+    assert select_best(CRITERIA, fits, base()).effects == DEAD_ZONE
+
+
+def test_what_could_not_be_simulated_never_wins():
+    fits = [made_up(COULOMB, np.inf), made_up(DEAD_ZONE, 399.0)]
+    assert select_best(CRITERIA, fits, base()).effects == DEAD_ZONE
+    assert select_best(CRITERIA, fits[:1], base()) is None
+    assert select_best(CRITERIA, [], base()) is None
+
+
+@pytest.mark.parametrize(
+    ("gain", "chosen"), [(TIE - 0.5, COULOMB), (TIE + 0.5, ("second_mode",))]
+)
+def test_between_ties_the_one_with_fewer_parameters_wins(gain, chosen):
+    simple = made_up(COULOMB, 200.0)
+    fits = [after(gain, ("second_mode",), parameters=3), simple]
+    assert CRITERIA.gain(*fits) == pytest.approx(gain)
+    assert select_best(CRITERIA, fits, base()).effects == chosen
+
+
+def test_of_equal_numbers_of_parameters_the_better_one_wins_however_close():
+    fits = [made_up(COULOMB, 200.0), after(0.1, DEAD_ZONE)]
+    assert select_best(CRITERIA, fits, base()).effects == DEAD_ZONE
+
+
+def larger_by(share, **options):
+    """Stribeck, which adds a share of what both gain over the base, beside Coulomb."""
+    larger = made_up(STRIBECK, 150.0, parameters=3, **options)
+    smaller = made_up(COULOMB, 150.0 + share * 250.0)
+    return [larger, smaller]
+
+
+def test_an_effect_that_includes_another_must_add_enough():
+    fits = larger_by(0.9 * LEAST_ADDED)
+    # Far from a tie: without the rule the larger one would win.
+    assert CRITERIA.gain(*fits) > TIE
+    assert select_best(CRITERIA, fits, base()).effects == COULOMB
+
+    fits = larger_by(1.1 * LEAST_ADDED)
+    assert select_best(CRITERIA, fits, base()).effects == STRIBECK
+
+
+def test_it_wins_without_where_it_alone_leaves_white_noise():
+    fits = larger_by(0.9 * LEAST_ADDED, whiteness=0.5)
+    assert select_best(CRITERIA, fits, base()).effects == STRIBECK
+
+
+def test_white_noise_does_not_save_it_from_a_tie():
+    fits = [
+        after(TIE - 0.5, STRIBECK, parameters=3, whiteness=0.5),
+        made_up(COULOMB, 200.0),
+    ]
+    assert select_best(CRITERIA, fits, base()).effects == COULOMB
+
+
+@pytest.mark.parametrize(
+    ("smaller", "larger", "holds"),
+    [
+        (COULOMB, STRIBECK, True),
+        (STRIBECK, COULOMB, False),
+        (COULOMB, COULOMB, True),
+        (COULOMB, DEAD_ZONE, False),
+        (COULOMB, ("hysteresis", "input_delay"), True),
+        (("coulomb_friction", "input_delay"), ("hysteresis", "input_delay"), True),
+        (("coulomb_friction", "input_delay"), ("hysteresis",), False),
+        (("coulomb_friction", "coulomb_friction"), STRIBECK, False),
+        (("input_saturation",), ("voltage_limit",), True),
+    ],
+)
+def test_what_is_part_of_what(smaller, larger, holds):
+    assert is_part_of(made_up(smaller, 1.0), made_up(larger, 1.0)) is holds
+
+
+def test_rivals_are_those_that_cannot_be_told_apart():
+    best = made_up(COULOMB, 200.0)
+    near = after(-TIE + 0.5, ("output_backlash",))
+    far = after(-TIE - 0.5, DEAD_ZONE)
+    lost = made_up(("quadratic_drag",), np.inf)
+    assert rivals(CRITERIA, [best, near, far, lost], best) == [near]
+
+
+def test_what_includes_the_best_one_is_no_rival():
+    best = made_up(COULOMB, 200.0)
+    assert rivals(CRITERIA, [best, after(-1.0, STRIBECK)], best) == []
+    best = made_up(STRIBECK, 200.0)
+    assert rivals(CRITERIA, [best, after(-1.0, COULOMB)], best) == []
+
+
+NAMED = made_up(("coulomb_friction",), 110.0, whiteness=0.6)
+BOTH = made_up(
+    ("coulomb_friction", "input_dead_zone"), 101.0, parameters=2, whiteness=0.5
+)
+RIVAL = made_up(("input_dead_zone",), 110.0, whiteness=0.6)
+GIVEN = np.full(6, 400.0)
+
+
+def test_nothing_is_missing_where_the_base_leaves_noise():
+    found = base(100.0, whiteness=0.5)
+    verdict = decide(CRITERIA, np.full(6, 100.5), found, [], [])
+    assert (verdict.word, verdict.is_complete) == ("none", True)
+    assert verdict.chosen is found
+
+
+def test_parameters_were_off_where_the_refit_gained_much():
+    verdict = decide(CRITERIA, GIVEN, base(100.0, whiteness=0.5), [], [])
+    assert (verdict.word, verdict.is_complete) == ("parameters", True)
+
+
+def test_a_simulation_that_ran_away_as_given_had_wrong_parameters():
+    given = np.full(6, np.inf)
+    verdict = decide(CRITERIA, given, base(100.0, whiteness=0.5), [], [])
+    assert verdict.word == "parameters"
+
+
+@pytest.mark.parametrize(("given", "word"), [(104.0, "none"), (106.5, "parameters")])
+def test_the_refit_must_gain_more_than_its_parameters_cost(given, word):
+    # 600 ln(104 / 100) = 24 < 10 + 3 ln 600 = 29 < 600 ln(106.5 / 100) = 38
+    found = base(100.0, whiteness=0.5)
+    assert decide(CRITERIA, np.full(6, given), found, [], []).word == word
+
+
+def test_rounding_is_no_parameter():
+    criteria = replace(CRITERIA, n_samples=np.full(6, 10**6))
+    found = base(1e-20, whiteness=0.5)
+    # A thousandth less, in six million samples without noise.
+    assert decide(criteria, np.full(6, 1.0009e-20), found, [], []).word == "none"
+
+
+def test_an_effect_with_clear_evidence_is_named():
+    verdict = decide(CRITERIA, GIVEN, base(), [NAMED], [NAMED])
+    assert (verdict.word, verdict.is_complete) == ("named", True)
+    assert verdict.chosen is NAMED
+    assert verdict.rivals == ()
+
+
+def test_a_named_effect_is_incomplete_while_something_remains():
+    left = replace(NAMED, whiteness=1.5)
+    verdict = decide(CRITERIA, GIVEN, base(), [left], [left])
+    assert (verdict.word, verdict.is_complete) == ("named", False)
+
+
+def test_the_largest_set_that_may_be_named_is():
+    verdict = decide(CRITERIA, GIVEN, base(), [NAMED, BOTH], [NAMED, BOTH])
+    assert verdict.chosen is BOTH
+
+
+def test_without_evidence_for_the_set_its_part_is_named():
+    weak = replace(BOTH, sse=np.full(6, 220.0), whiteness=2.0)
+    verdict = decide(CRITERIA, GIVEN, base(), [NAMED, weak], [NAMED, weak])
+    assert verdict.chosen is NAMED
+
+
+def test_two_that_are_as_good_are_ambiguous():
+    verdict = decide(CRITERIA, GIVEN, base(), [NAMED, RIVAL], [NAMED])
+    assert verdict.word == "ambiguous"
+    assert verdict.rivals == (RIVAL,)
+
+
+def test_a_rival_that_may_not_be_named_does_not_count():
+    # As good on the whole, but worse in two of three held-out recordings.
+    weak = replace(RIVAL, sse=np.array([80, 80, 80, 20, 200, 200.0]))
+    found = base(np.array([400, 400, 400, 900, 150, 150.0]))
+    assert CRITERIA.gain(NAMED, weak) < 6
+    verdict = decide(CRITERIA, GIVEN, found, [NAMED, weak], [NAMED])
+    assert verdict.word == "named"
+
+
+def test_rivals_are_of_the_same_size():
+    verdict = decide(CRITERIA, GIVEN, base(), [BOTH, NAMED, RIVAL], [NAMED, BOTH])
+    assert (verdict.word, verdict.rivals) == ("named", ())
+
+
+def test_a_gap_without_evidence_is_unknown():
+    weak = made_up(("coulomb_friction",), 350.0)
+    found = base()
+    verdict = decide(CRITERIA, GIVEN, found, [weak], [weak])
+    assert (verdict.word, verdict.is_complete) == ("unknown", False)
+    assert verdict.chosen is found
+
+
+def test_a_small_remainder_that_is_nearly_white_is_noise():
+    found = base(103.0, whiteness=1.5)
+    assert decide(CRITERIA, np.full(6, 103.0), found, [], []).word == "none"
+    coloured = replace(found, whiteness=2.5)
+    assert decide(CRITERIA, np.full(6, 103.0), coloured, [], []).word == "unknown"
+    larger = base(115.0, whiteness=1.5)
+    assert decide(CRITERIA, np.full(6, 115.0), larger, [], []).word == "unknown"
+
+
+def test_there_is_a_word_for_every_case_and_no_other():
+    assert set(VERDICTS) == {"named", "ambiguous", "parameters", "unknown", "none"}
