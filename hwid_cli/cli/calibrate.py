@@ -32,11 +32,12 @@ def command(choices: Choices) -> None:
     samples, and writes calibrated.h5 and a figure before/after of each recording.
     """
     from hwid_cli.cli.session import open_session, say
-    from hwid_cli.report.tables import calibration_table
+    from hwid_cli.report.calibration import calibration_table
+    from hwid_cli.report.table import as_text
 
     session = open_session(choices, "calibrate")
     calibrated = calibrate_stage(session)
-    say(session, calibration_table(calibrated.logs))
+    say(session, as_text([calibration_table(calibrated.logs)]))
     say(session, f"results: {session.calibrated_path}, {session.out / 'figures'}")
 
 

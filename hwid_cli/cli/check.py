@@ -95,7 +95,8 @@ def _data(experiment: "Experiment", folder: Path) -> "tuple[Checked, tuple[str, 
     """Show the recordings, and collect what is wrong with them or their names."""
     from hwid_cli.data.survey import survey_recordings
     from hwid_cli.errors import HwidError
-    from hwid_cli.report.check_tables import recordings_table
+    from hwid_cli.report.check import recordings_table
+    from hwid_cli.report.table import as_text
     from hwid_cli.stages.own_functions import check_own_functions
     from hwid_cli.stages.recording_facts import check_recordings
 
@@ -108,7 +109,7 @@ def _data(experiment: "Experiment", folder: Path) -> "tuple[Checked, tuple[str, 
     checked = check_recordings(survey.recordings, experiment, survey.jitter)
     problems += [*survey.problems, *checked.problems]
     if checked.facts:
-        click.echo(recordings_table(checked.facts))
+        click.echo(as_text([recordings_table(checked.facts)]))
     known = {one.name for one in survey.recordings} | set(survey.unusable)
     if known:
         problems += _names(experiment, known)
@@ -154,7 +155,8 @@ def _show_plan(
     checked: "Checked",
     how: tuple[Path, int | None, bool],
 ) -> None:
-    from hwid_cli.report.check_tables import stages_table
+    from hwid_cli.report.check import stages_table
+    from hwid_cli.report.table import as_text
     from hwid_cli.stages.check import plan_stages
     from hwid_cli.store.cache import Hdf5Store
     from hwid_cli.tasks.task import one_thread
@@ -168,7 +170,7 @@ def _show_plan(
         plans = plan_stages(
             experiment, checked.recordings, cost, store, workers=workers
         )
-    click.echo(f"\n{stages_table(plans, cost, workers)}")
+    click.echo(f"\n{as_text([stages_table(plans, cost, workers)])}")
 
 
 def _cost(experiment: "Experiment", checked: "Checked", *, timing: bool) -> "FitCost":

@@ -65,14 +65,14 @@ def command(
 
     Writes compare.csv and figures/compare.png.
     """
-    from hwid_cli.cli.session import open_session, say, screen_width
-    from hwid_cli.report.comparison_table import comparison_table
+    from hwid_cli.cli.session import open_session, say, show
+    from hwid_cli.report.comparison import comparison_tables
 
     session = open_session(Choices(**values), "compare")
     comparison = _compared(session, models, recordings)
     had_results = (session.out / "compare.csv").exists()
     _write(session, comparison)
-    say(session, f"\n{comparison_table(comparison, width=screen_width())}")
+    show(session, *comparison_tables(comparison))
     say(
         session,
         f"\nresults: {session.out / 'compare.csv'}, "

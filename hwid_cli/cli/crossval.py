@@ -92,14 +92,13 @@ def show_coverage(
     session: "Session", identified: Identified, crossval: "CrossValidation"
 ) -> None:
     """Show the models that cover the most recordings."""
-    from hwid_cli.cli.session import say, screen_width
-    from hwid_cli.report.tables import coverage_table, cross_table
+    from hwid_cli.cli.session import show
+    from hwid_cli.report.crossval import coverage_table, cross_table
     from hwid_cli.stages.ranking import best_of_each, score_models
+    from hwid_cli.stages.report import cross_matrix
 
     scores = score_models(identified.fits, crossval)
     best = best_of_each(scores, crossval.identified_on)
     rule = session.experiment.fit.initial_state
-    wide = coverage_table(scores, crossval, initial_state=rule)
-    say(session, f"\n{wide}")
-    each = cross_table(best, crossval, initial_state=rule, width=screen_width())
-    say(session, f"\n{each}")
+    show(session, coverage_table(scores, crossval, initial_state=rule))
+    show(session, cross_table(cross_matrix(best, crossval), initial_state=rule))

@@ -227,7 +227,7 @@ def _draw(out: Path, diagnosis: "Diagnosis") -> list[str]:
 
 def show_diagnosis(session: "Session", diagnosis: "Diagnosis") -> None:
     """Show the verdict, what it rests on, and what to do next."""
-    from hwid_cli.cli.session import say, screen_width
-    from hwid_cli.report.diagnosis_tables import diagnosis_text
+    from hwid_cli.cli.session import show
+    from hwid_cli.report.diagnosis import diagnosis_blocks
 
-    say(session, f"\n{diagnosis_text(diagnosis, width=screen_width())}")
+    show(session, *diagnosis_blocks(diagnosis))

@@ -60,7 +60,7 @@ def chosen_model(session: "Session", asked: str) -> "Exported":
     """
     from hwid_cli.data.paths import recordings_options
     from hwid_cli.export.contents import SIMULATION, export_model, find_fit
-    from hwid_cli.report.tables import thesis_name_of
+    from hwid_cli.report.thesis_names import thesis_name_of
 
     if asked == SIMULATION:
         return _simulation(session)

@@ -57,15 +57,14 @@ def group_stage(session: "Session") -> "GroupSearch":
 
 def show_groups(session: "Session", search: "GroupSearch") -> None:
     """Show the coverage of every group, what the levels filtered, and the chain."""
-    from hwid_cli.cli.session import say, screen_width
-    from hwid_cli.report.group_tables import chain_table, join_table, levels_table
+    from hwid_cli.cli.session import show
+    from hwid_cli.report.groups import chain_table, join_table, levels_table
 
     rule = session.experiment.fit.initial_state
     for level in search.levels[1:]:
-        table = join_table(search, level, initial_state=rule, width=screen_width())
-        say(session, f"\n{table}")
-    say(session, f"\n{levels_table(search, initial_state=rule)}")
-    say(session, f"\n{chain_table(search, initial_state=rule)}")
+        show(session, join_table(search, level, initial_state=rule))
+    show(session, levels_table(search, initial_state=rule))
+    show(session, chain_table(search, initial_state=rule))
 
 
 def _plan(session: "Session") -> "GroupPlan":

@@ -88,9 +88,9 @@ def identify_stage(session: "Session") -> Identified:
 
 def show_fits(session: "Session", identified: Identified) -> None:
     """Show the best models of each recording, what they leave, and how the fits ended."""
-    from hwid_cli.cli.session import say
-    from hwid_cli.report.fit_tables import best_models_table, failure_lines, status_line
-    from hwid_cli.report.residual_tables import residual_table
+    from hwid_cli.cli.session import show
+    from hwid_cli.report.fits import best_models_table, fits_ended
+    from hwid_cli.report.residuals import residual_table
     from hwid_cli.stages.ranking import best_fits, count_statuses
     from hwid_cli.stages.residuals import own_residuals
 
@@ -102,12 +102,9 @@ def show_fits(session: "Session", identified: Identified) -> None:
         identified.recordings[0].output_unit,
         nk_is_delay=nk_role == "delay",
     )
-    say(session, f"\n{table}")
+    show(session, table)
     left = own_residuals(identified.fits, identified.recordings, nk_role)
     if left:
         rule = session.experiment.fit.initial_state
-        say(session, f"\n{residual_table(left, rule)}")
-    say(session, f"\n{status_line(count_statuses(identified.fits))}")
-    reasons = failure_lines(identified.fits)
-    if reasons:
-        say(session, reasons)
+        show(session, residual_table(left, initial_state=rule))
+    show(session, *fits_ended(count_statuses(identified.fits), identified.fits))

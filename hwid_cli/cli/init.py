@@ -56,6 +56,7 @@ def command(folder: Path, out: Path, force: bool, quiet: bool) -> None:
 def _show(
     out: Path, layout: "Layout", proposal: "Proposal", problems: tuple[str, ...]
 ) -> None:
-    from hwid_cli.report.starter_words import starter_words
+    from hwid_cli.report.starter import starter_summary
+    from hwid_cli.report.table import as_text
 
-    click.echo(starter_words(str(out), layout, proposal, problems))
+    click.echo(as_text([starter_summary(str(out), layout, proposal, problems)]))

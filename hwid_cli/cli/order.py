@@ -77,12 +77,11 @@ def order_stage(session: "Session") -> "OrderAdvice":
 
 def show_advice(session: "Session", advice: "OrderAdvice") -> None:
     """Show the recommended orders and the reasons."""
-    from hwid_cli.cli.session import say
-    from hwid_cli.report.order_tables import order_sentences, order_table
+    from hwid_cli.cli.session import show
+    from hwid_cli.report.orders import order_reasons, order_table
 
     rule = session.experiment.fit.initial_state
-    say(session, f"\n{order_table(advice, initial_state=rule)}")
-    say(session, f"\n{order_sentences(advice)}")
+    show(session, order_table(advice, initial_state=rule), *order_reasons(advice))
 
 
 @once
@@ -133,14 +132,13 @@ def map_stage(session: "Session") -> "MapAdvice | None":
 
 def show_maps(session: "Session", advice: "MapAdvice | None") -> None:
     """Show the recommended maps and the reasons."""
-    from hwid_cli.cli.session import say
-    from hwid_cli.report.order_tables import map_sentences, map_table
+    from hwid_cli.cli.session import show
+    from hwid_cli.report.orders import map_reasons, map_table
 
     if advice is None:
         return
     rule = session.experiment.fit.initial_state
-    say(session, f"\n{map_table(advice, initial_state=rule)}")
-    say(session, f"\n{map_sentences(advice)}")
+    show(session, map_table(advice, initial_state=rule), *map_reasons(advice))
 
 
 def _judging(

@@ -53,7 +53,7 @@ def command(
     from hwid_cli.export.prediction import check_target, read_input, write_prediction
     from hwid_cli.model.input_range import outside_share
     from hwid_cli.records.units import behind
-    from hwid_cli.report.simulation_words import prediction_words
+    from hwid_cli.report.simulation_note import prediction_note
 
     exported = read_exported(model)
     check_trust(exported, model, is_trusted=run_own_functions)
@@ -74,5 +74,5 @@ def command(
     write_prediction(out, exported, time, values, predicted)
     click.echo(
         f"{out}: {predicted.size} samples of {card.name}; time in s, predicted in "
-        f"{card.output_unit}\n{prediction_words(initial_state, exported.initial_state)}"
+        f"{card.output_unit}\n{prediction_note(initial_state, exported.initial_state)}"
     )

@@ -140,6 +140,7 @@ def read_stored(session: "Session") -> "StoredResults":
         final_test=read_final_test(path) if "test" in done else None,
         diagnosis=read_diagnosis(session.out / "diagnosis.json"),
         diagnosis_record=read_diagnosis_record(path) if "diagnose" in done else None,
+        thesis_names=session.experiment.thesis_names,
     )
 
 

@@ -117,6 +117,14 @@ def say(session: Session, text: str) -> None:
         click.echo(text)
 
 
+def show(session: Session, *blocks: object) -> None:
+    """Show tables and paragraphs to people, set off by a line."""
+    from hwid_cli.report.table import as_text
+
+    names = session.experiment.thesis_names
+    say(session, "\n" + as_text(blocks, width=screen_width(), thesis_names=names))
+
+
 def screen_width() -> int:
     """Characters in a line of the terminal; 80 where there is none.
 

@@ -79,8 +79,8 @@ def simulate_drive(session: "Session") -> None:
         If the configuration has no such model, or names unknown recordings.
     """
     from hwid_cli.cli.diagnose import what_to_diagnose
-    from hwid_cli.cli.session import say, start_timer
-    from hwid_cli.report.text_table import number, text_table
+    from hwid_cli.cli.session import say, show, start_timer
+    from hwid_cli.report.diagnosis import simulated_table
     from hwid_cli.stages.simulate_drive import simulate_recordings
     from hwid_cli.store.diagnosis_results import write_simulated_csv
 
@@ -95,8 +95,5 @@ def simulate_drive(session: "Session") -> None:
     # In a closed loop it is the controller's command that the two are compared by.
     side = "output" if given.simulation.controller is None else "input"
     unit = getattr(given.recordings[0], f"{side}_unit")
-    rows = [(one.name, number(one.rms)) for one in curves]
-    title = f"RMS of measured minus simulated {side}"
-    heads = ("recording", f"RMS [{unit}]")
-    say(session, "\n" + text_table(title, heads, rows, text_columns=(0,)))
+    show(session, simulated_table(curves, side, unit))
     say(session, f"\nresults: {folder}")

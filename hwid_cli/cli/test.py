@@ -146,38 +146,27 @@ def write_tables(session: "Session", final: "FinalTest") -> None:
 
 def show_final_test(session: "Session", final: "FinalTest") -> None:
     """Show the chain, the coverage matrix, the smallest set and the predictions."""
-    from hwid_cli.cli.session import say, screen_width
-    from hwid_cli.report import final_test_tables
+    from hwid_cli.cli.session import show
+    from hwid_cli.report import final_test
+    from hwid_cli.report.thesis_names import names_of_groups
     from hwid_cli.stages.test import chain_trend
+    from hwid_cli.store.group_results import read_group
     from hwid_cli.store.results import read_calibrated
 
-    width = screen_width()
     rule = session.experiment.fit.initial_state
-    parts = []
     if final.chain:
         recordings = read_calibrated(session.calibrated_path).recordings
         kinds = {recording.name: recording.kind for recording in recordings}
         trend = chain_trend(final, kinds)
-        parts += [
-            final_test_tables.chain_on_tests_table(
-                final, trend, initial_state=rule, width=width
-            ),
-            final_test_tables.chain_coverage_table(
-                final,
-                trend,
-                initial_state=rule,
-                nf=session.experiment.orders.nf,
-                has_names=not session.experiment.fit.delays,
-            ),
-            final_test_tables.chain_tables(
-                final, trend, kinds, initial_state=rule, width=width
-            ),
-        ]
-    parts += [
-        final_test_tables.coverage_matrix_table(final, initial_state=rule, width=width),
-        final_test_tables.gaps_text(final, width=width),
-        final_test_tables.smallest_set_table(final, initial_state=rule, width=width),
-        final_test_tables.prediction_table(final, initial_state=rule),
-    ]
-    for part in parts:
-        say(session, f"\n{part}")
+        is_asked = session.experiment.thesis_names
+        names = names_of_groups(read_group(session.results_path)) if is_asked else {}
+        show(
+            session,
+            final_test.chain_on_tests_table(final, trend, initial_state=rule),
+            final_test.chain_coverage_table(final, trend, names, initial_state=rule),
+            *final_test.chain_tables(final, trend, kinds, initial_state=rule),
+        )
+    show(session, final_test.coverage_matrix_table(final, initial_state=rule))
+    show(session, *final_test.gap_sentences(final))
+    show(session, final_test.smallest_set_table(final, initial_state=rule))
+    show(session, final_test.prediction_table(final, initial_state=rule))

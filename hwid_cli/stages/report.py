@@ -36,6 +36,7 @@ from hwid_cli.stages.ranking import (
     score_models,
 )
 from hwid_cli.stages.residuals import judge_residual
+from hwid_cli.stages.test import chain_trend
 from hwid_cli.tasks.cache import task_key
 
 # The output has begun to move, and has moved most of its way, at these shares of its
@@ -209,7 +210,7 @@ _SECTIONS = {
 _BESIDE = {"diagnose": ("identify", "crossval", "group", "test")}
 STAGES = tuple(_SECTIONS)
 # Raised when the page or a figure changes, so that pages are drawn again.
-REPORT_VERSION = 3
+REPORT_VERSION = 4
 
 
 def report_key(stored: StoredResults, figures: Mapping[str, bytes]) -> str:
@@ -274,22 +275,25 @@ def report_contents(stored: StoredResults) -> ReportContents:
     crossval, final = stored.crossval, stored.final_test
     is_fresh = crossval is None or _belongs(stored.fits, crossval)
     scores: tuple[ModelScore, ...] = ()
+    widest: tuple[ModelScore, ...] = ()
     if crossval is not None and is_fresh:
-        scores = best_of_each(
-            score_models(stored.fits, crossval), crossval.identified_on
-        )
+        scores = tuple(score_models(stored.fits, crossval))
+        widest = best_of_each(scores, crossval.identified_on)
     simulated = _simulated(stored, crossval if is_fresh else None)
     covered = {one.recording.name for one in simulated}
-    names = [recording.name for recording in stored.recordings]
+    kinds = {recording.name: recording.kind for recording in stored.recordings}
     return ReportContents(
         stored=stored,
         statuses=count_statuses(stored.fits),
         simulated=simulated,
-        without_model=tuple(name for name in names if name not in covered),
+        without_model=tuple(name for name in kinds if name not in covered),
+        best=best_fits(stored.fits),
         grid=own_grid(stored),
-        cross=cross_matrix(scores, crossval) if crossval and scores else None,
-        models=model_views(stored, scores),
+        scores=scores,
+        cross=cross_matrix(widest, crossval) if crossval and widest else None,
+        models=model_views(stored, widest),
         trend=None if final is None else chain_on_tests(final),
+        chain=None if final is None else chain_trend(final, kinds),
         chain_matrix=None if final is None else final_matrix(final, final.chain),
         full_matrix=None if final is None else final_matrix(final, final.models),
         predictions=None if final is None else _count_predictions(final),

@@ -1,12 +1,4 @@
-"""Recommended orders as a table, and the reasons as sentences.
-
-Why the smallest good one of some candidates is to be taken, in words.
-
-Recommended maps as a table, and the reasons as sentences.
-"""
-
-import textwrap
-from collections.abc import Sequence
+"""Recommended orders and maps as tables, and the reasons as sentences."""
 
 from hwid_cli.records.order import (
     Judgement,
@@ -15,14 +7,21 @@ from hwid_cli.records.order import (
     OrderAdvice,
     OrderChoice,
 )
-from hwid_cli.report.simulation_words import simulation_words
-from hwid_cli.report.text_table import MISSING, WIDTH, number, text_table
+from hwid_cli.report.formats import MISSING, counted, decimals, number
+from hwid_cli.report.simulation_note import validation_note
+from hwid_cli.report.table import Table, Text, numbers, texts
+
+# Maps that are shown; maps.csv has all.
+_SHOWN = 12
+# Delay of a grid whose second axis counts poles, [samples].
+_GRID_DELAY = 1
+_ALL = "all together"
 
 
-def reason_to_take(
+def _reason_to_take(
     judgement: Judgement, tolerance: float, things: str, best: str | None
 ) -> str:
-    """Say why candidates are taken that other recordings have judged.
+    """Say why candidates are taken that validation recordings have ranked.
 
     Parameters
     ----------
@@ -58,71 +57,34 @@ def reason_to_take(
     )
 
 
-def beyond_sentence(judgement: Judgement) -> str:
-    """Say which pairs of model and recording do not judge.
-
-    Returns
-    -------
-    str
-        Empty where all do.
-    """
-    count = judgement.n_beyond
-    if not count:
-        return ""
-    return (
-        f"{count} pair{'s' * (count != 1)} of model and recording {'do' if count != 1 else 'does'} "
-        "not judge: there the input goes beyond what the model has seen, and a map is only "
-        "a continuation."
-    )
-
-
-def outlier_sentence(judgement: Judgement) -> str:
-    """Say how many samples of the judging recordings do not count.
-
-    Returns
-    -------
-    str
-        Empty where all do.
-    """
-    count = judgement.n_outliers
-    if not count:
-        return ""
-    return (
-        f"{count} sample{'s' * (count != 1)} of the judging recordings "
-        f"{'are outliers' if count != 1 else 'is an outlier'} and "
-        f"{'do' if count != 1 else 'does'} not count here, as in the fits (fit.loss)."
-    )
+def _left_out(judgement: Judgement) -> tuple[str, ...]:
+    """Say which pairs of model and recording, and which samples, the selection leaves out."""
+    found = []
+    if count := judgement.n_beyond:
+        found.append(
+            f"{counted(count, 'pair')} of model and recording {'do' if count != 1 else 'does'} "
+            "not count: there the input leaves the range that the model was fitted in, and "
+            "its maps extrapolate."
+        )
+    if count := judgement.n_outliers:
+        found.append(
+            f"{counted(count, 'sample')} of the validation recordings "
+            f"{'are outliers' if count != 1 else 'is an outlier'} and "
+            f"{'do' if count != 1 else 'does'} not count here, as in the fits (fit.loss)."
+        )
+    return tuple(found)
 
 
-def paragraphs(sentences: Sequence[str], width: int) -> str:
-    """Give each reason a paragraph of its own.
-
-    Parameters
-    ----------
-    sentences : sequence of str
-        Empty ones are left out.
-    width : int, [characters]
-        Of a line.
-    """
-    return "\n".join(
-        textwrap.fill(one, width, subsequent_indent="  ") for one in sentences if one
-    )
-
-
-# Rows on the screen; maps.csv has all.
-_SHOWN = 12
-
-
-def map_table(advice: MapAdvice, *, initial_state: str) -> str:
+def map_table(advice: MapAdvice, *, initial_state: str | None) -> Table:
     """Show the pairs of maps that predict best, that to take and that of the configuration.
 
     Parameters
     ----------
-    initial_state : str
-        Rule of the fits.
+    initial_state : str or None
+        Rule of the fits; None on a page.
     """
     lowest = min(one.bic for one in advice.candidates)
-    rows = [
+    rows = tuple(
         (
             _mark(one, advice),
             _map(one.input_map, one.input_units),
@@ -130,42 +92,27 @@ def map_table(advice: MapAdvice, *, initial_state: str) -> str:
             str(one.n_parameters or MISSING),
             number(one.rmsd),
             f"{one.factor:.2f}",
-            f"{one.bic - lowest:.0f}" if lowest < one.bic < float("inf") else MISSING,
+            decimals(one.bic - lowest, 0) if lowest < one.bic else MISSING,
         )
         for place, one in enumerate(advice.candidates)
         if place < _SHOWN or one in (advice.chosen, advice.given)
-    ]
+    )
     nb, nf, nk = advice.orders
-    title = (
+    caption = (
         f"Maps at the orders [{nb} {nf} {nk}], with p parameters: cross-validated RMSD "
-        f"[{advice.unit}]\n(geometric mean), factor above the best (ten at most on one "
-        "recording),\nBIC above the lowest; "
-        f"{len(rows)} of {len(advice.candidates)} pairs\n"
-        f"{simulation_words(initial_state, is_validation=True)}"
+        f"[{advice.unit}] (geometric mean), factor above the best (ten at most on one "
+        f"recording), BIC above the lowest; {len(rows)} of {len(advice.candidates)} pairs"
     )
-    heads = ("", "input map", "output map", "p", "RMSD", "factor", "BIC")
-    return text_table(title, heads, rows, text_columns=(0, 1, 2))
-
-
-def map_sentences(advice: MapAdvice, *, width: int = WIDTH) -> str:
-    """Say which maps to take, and why.
-
-    Parameters
-    ----------
-    width : int, [characters]
-        Of a line.
-
-    Returns
-    -------
-    str
-        A paragraph for each reason.
-    """
-    sentences = (
-        _map_recommendation(advice),
-        beyond_sentence(advice.judgement),
-        outlier_sentence(advice.judgement),
+    columns = (
+        *texts("", "input map", "output map"),
+        *numbers("p", "RMSD", "factor", "BIC"),
     )
-    return paragraphs(sentences, width)
+    return Table(caption, columns, rows, how=validation_note(initial_state))
+
+
+def map_reasons(advice: MapAdvice) -> tuple[Text, ...]:
+    """Say which maps to take, and why, each reason a paragraph."""
+    return tuple(map(Text, (_map_recommendation(advice), *_left_out(advice.judgement))))
 
 
 def _map_recommendation(advice: MapAdvice) -> str:
@@ -173,13 +120,13 @@ def _map_recommendation(advice: MapAdvice) -> str:
     take = f"Take fit: {{{_keys(one)}}}: "
     if not advice.judgement.n_judges:
         return (
-            f"{take}they have the lowest BIC. No other recording judges, and BIC takes "
-            "residuals for white; cut the recording into several (recordings.parts) to let "
-            "data judge that were not fitted."
+            f"{take}they have the lowest BIC. There is no validation recording, and BIC takes "
+            "residuals for white; cut the recording into several (recordings.parts) to "
+            "validate on data that were not fitted."
         )
     words = f"maps, {_map(best.input_map, best.input_units)} and "
     words += _map(best.output_map, best.output_units)
-    reason = reason_to_take(
+    reason = _reason_to_take(
         advice.judgement, advice.tolerance, "maps", None if one == best else words
     )
     if one == advice.given:
@@ -213,18 +160,13 @@ def _map(kind: str, units: int) -> str:
     return f"{words}, {units}" if units else words
 
 
-# Delay of a grid whose second axis counts poles, [samples].
-_GRID_DELAY = 1
-_ALL = "all together"
-
-
-def order_table(advice: OrderAdvice, *, initial_state: str) -> str:
+def order_table(advice: OrderAdvice, *, initial_state: str | None) -> Table:
     """Show the recommended orders, over all recordings and for each.
 
     Parameters
     ----------
-    initial_state : str
-        Rule of the fits.
+    initial_state : str or None
+        Rule of the fits; None on a page.
     """
     seen = {one.recording: (one.delay, one.n_poles) for one in advice.responses}
     seen[""] = (advice.delay, advice.n_poles)
@@ -244,49 +186,27 @@ def order_table(advice: OrderAdvice, *, initial_state: str) -> str:
                 str(n_poles or MISSING),
             )
         )
-    heads = (
-        "models of",
-        "take",
-        "RMSD",
-        "factor",
-        "best",
-        "AIC",
-        "BIC",
-        "delay <=",
-        "poles",
-    )
-    title = (
+    caption = (
         f"Orders nb/nk to take, cross-validated RMSD [{advice.unit}] (geometric mean), the "
-        "factor\nabove the best orders (ten at most on one recording), what AIC and BIC\n"
-        "choose, delay and poles that data show\n"
-        f"{simulation_words(initial_state, is_validation=True)}"
+        "factor above the best orders (ten at most on one recording), what AIC and BIC "
+        "choose, delay and poles that data show"
     )
-    return text_table(title, heads, rows, text_columns=(0,))
+    heads = ("take", "RMSD", "factor", "best", "AIC", "BIC", "delay <=", "poles")
+    columns = (*texts("models of"), *numbers(*heads))
+    return Table(caption, columns, tuple(rows), how=validation_note(initial_state))
 
 
-def order_sentences(advice: OrderAdvice, *, width: int = WIDTH) -> str:
-    """Say which orders to take, and why.
-
-    Parameters
-    ----------
-    width : int, [characters]
-        Of a line.
-
-    Returns
-    -------
-    str
-        A paragraph for each reason.
-    """
-    sentences = [
+def order_reasons(advice: OrderAdvice) -> tuple[Text, ...]:
+    """Say which orders to take, and why, each reason a paragraph."""
+    sentences = (
         _recommendation(advice),
         _criteria(advice.overall),
-        beyond_sentence(advice.overall.judgement),
-        outlier_sentence(advice.overall.judgement),
+        *_left_out(advice.overall.judgement),
         _edges(advice),
         _delays(advice),
         _poles(advice),
-    ]
-    return paragraphs(sentences, width)
+    )
+    return tuple(Text(one) for one in sentences if one)
 
 
 def _pair(nb: int, nk: int) -> str:
@@ -308,13 +228,13 @@ def _recommendation(advice: OrderAdvice) -> str:
     if not one.judgement.n_judges:
         return (
             f"{take}the smallest orders within {100 * advice.tolerance:g} % of the best on "
-            "the recording of the fit itself. No other recording judges, so this rewards "
-            "models that follow noise; trust BIC more, or add a recording."
+            "the recording of the fit itself. There is no validation recording, so this "
+            "rewards models that follow noise; trust BIC more, or add a recording."
         )
     best = None
     if (one.nb, one.nk) != (one.best_nb, one.best_nk):
         best = f"orders of the grid, {_orders(one.best_nb, one.best_nk, advice)}"
-    return take + reason_to_take(one.judgement, advice.tolerance, "orders", best)
+    return take + _reason_to_take(one.judgement, advice.tolerance, "orders", best)
 
 
 def _criteria(one: OrderChoice) -> str:
@@ -348,12 +268,12 @@ def _edges(advice: OrderAdvice) -> str:
 def _delays(advice: OrderAdvice) -> str:
     found = [one.delay for one in advice.responses if one.delay >= 0]
     if not found:
-        return "Delay: no output answers its input."
-    spread = _samples(max(found))
+        return "Delay: no output responds to its input."
+    spread = counted(max(found), "sample")
     if min(found) < max(found):
         spread = f"{min(found)} to {spread}"
     text = (
-        f"Delay: at most {_samples(advice.delay)}; a quarter of the recordings contradict a "
+        f"Delay: at most {counted(advice.delay, 'sample')}; a quarter of the recordings contradict a "
         f"longer one (single recordings allow {spread}, smooth inputs leave it open)."
     )
     if advice.nk_role == "delay":
@@ -391,7 +311,3 @@ def _poles(advice: OrderAdvice) -> str:
         f"{len(advice.responses)} recordings). A hint from linear models of the data, apart "
         "from the grid."
     )
-
-
-def _samples(count: int) -> str:
-    return f"{count} sample{'s' * (count != 1)}"

@@ -4,8 +4,11 @@ Prediction or simulation, and from which state, decides what an RMSD means; ever
 and figure of fits says it in these words.
 """
 
+from hwid_cli.records.report import ReportContents
+from hwid_cli.report.table import Text
+
 # What numbers of fits that bear outliers still count.
-HUBER_WORDS = (
+HUBER_NOTE = (
     "Fitted with Huber's loss; RMSD and fit % count outliers in full, criteria do not."
 )
 
@@ -28,7 +31,7 @@ _PREDICTED = _OWN | {
 _ASKED = {"steady": "steady", "empty": "zero"}
 
 
-def simulation_words(initial_state: str, *, is_validation: bool) -> str:
+def simulation_note(initial_state: str, *, is_validation: bool) -> str:
     """Say that numbers are of a free-run simulation, and how it starts.
 
     Parameters
@@ -42,16 +45,52 @@ def simulation_words(initial_state: str, *, is_validation: bool) -> str:
 
     Examples
     --------
-    >>> simulation_words("zero", is_validation=True)
+    >>> simulation_note("zero", is_validation=True)
     'Free-run simulation, no prediction; initial state zero.'
-    >>> simulation_words("estimated", is_validation=False)
+    >>> simulation_note("estimated", is_validation=False)
     'Free-run simulation, no prediction; initial state estimated with the model.'
     """
     start = (_VALIDATED if is_validation else _OWN)[initial_state]
     return f"Free-run simulation, no prediction; {start}."
 
 
-def joined_words(initial_state: str, join: str) -> str:
+def validation_note(initial_state: str | None) -> tuple[str, ...]:
+    """Say the same of validations, for ``Table.how``.
+
+    Parameters
+    ----------
+    initial_state : str or None
+        None on a page, where ``section_notes`` says it.
+    """
+    if initial_state is None:
+        return ()
+    return (simulation_note(initial_state, is_validation=True),)
+
+
+def section_notes(contents: ReportContents, *, is_validation: bool) -> list[Text]:
+    """Say how the models of a section were fitted and simulated.
+
+    Parameters
+    ----------
+    is_validation : bool
+        As for ``simulation_note``.
+
+    Returns
+    -------
+    list of Text
+        None where there are no models.
+    """
+    fits = list(contents.stored.fits)
+    if contents.stored.search is not None:
+        fits += [one for one in contents.stored.search.fits if one is not None]
+    rules = dict.fromkeys(one.options.initial_state for one in fits)
+    notes = [simulation_note(rule, is_validation=is_validation) for rule in rules]
+    if any(one.options.loss == "huber" for one in fits):
+        notes.append(HUBER_NOTE)
+    return [Text(one, is_note=True) for one in notes]
+
+
+def joined_note(initial_state: str, join: str) -> str:
     """Say how the fit of several joined recordings starts.
 
     Parameters
@@ -63,9 +102,9 @@ def joined_words(initial_state: str, join: str) -> str:
 
     Examples
     --------
-    >>> joined_words("estimated", "concatenate")
+    >>> joined_note("estimated", "concatenate")
     'In a fit, joined recordings start once, with an estimated state.'
-    >>> joined_words("zero", "experiments")
+    >>> joined_note("zero", "experiments")
     'In a fit, each joined recording starts by itself, with a zero state.'
     """
     state = {
@@ -78,7 +117,7 @@ def joined_words(initial_state: str, join: str) -> str:
     return f"In a fit, each joined recording starts by itself, with {state}."
 
 
-def prediction_words(start: str, model_rule: str | None) -> str:
+def prediction_note(start: str, model_rule: str | None) -> str:
     """Say from which initial state an exported model predicts.
 
     Parameters
@@ -90,12 +129,11 @@ def prediction_words(start: str, model_rule: str | None) -> str:
 
     Examples
     --------
-    >>> prediction_words("fitted", "steady")
+    >>> prediction_note("fitted", "steady")
     'Free-run simulation; initial state steady at the first input.'
-    >>> prediction_words("steady", None)
+    >>> prediction_note("steady", None)
     'Free-run simulation; it starts at rest.'
     """
     if model_rule is None:
         return "Free-run simulation; it starts at rest."
-    start_words = _PREDICTED[_ASKED.get(start, model_rule)]
-    return f"Free-run simulation; {start_words}."
+    return f"Free-run simulation; {_PREDICTED[_ASKED.get(start, model_rule)]}."

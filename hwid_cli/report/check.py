@@ -5,14 +5,15 @@ from collections.abc import Sequence
 
 from hwid_cli.records.check import FitCost, RecordingFacts, StagePlan
 from hwid_cli.records.units import behind
-from hwid_cli.report.text_table import MISSING, text_table
+from hwid_cli.report.formats import MISSING
+from hwid_cli.report.table import Table, numbers, texts
 
 _KILO = 1000.0
 
 
-def recordings_table(facts: Sequence[RecordingFacts]) -> str:
+def recordings_table(facts: Sequence[RecordingFacts]) -> Table:
     """Show the recordings as they are read, and beneath what looks odd."""
-    rows = [
+    rows = tuple(
         (
             one.name,
             one.kind,
@@ -25,19 +26,17 @@ def recordings_table(facts: Sequence[RecordingFacts]) -> str:
             _range(one.output_range, one.output_unit),
         )
         for one in facts
-    ]
-    heads = ("recording", "kind", "samples", "used", "step [s]", "input", "output")
-    table = text_table(
-        f"{len(facts)} recordings (used: after calibration)",
-        heads,
-        rows,
-        text_columns=(0, 1),
     )
-    notes = [f"{one.name}: {note}" for one in facts for note in one.notes]
-    return "\n".join([table, *notes])
+    columns = (
+        *texts("recording", "kind"),
+        *numbers("samples", "used", "step [s]", "input", "output"),
+    )
+    caption = f"{len(facts)} recordings (used: after calibration)"
+    notes = tuple(f"{one.name}: {note}" for one in facts for note in one.notes)
+    return Table(caption, columns, rows, notes)
 
 
-def stages_table(plans: Sequence[StagePlan], cost: FitCost, workers: int) -> str:
+def stages_table(plans: Sequence[StagePlan], cost: FitCost, workers: int) -> Table:
     """Show what each stage would do, and what it takes.
 
     Parameters
@@ -45,7 +44,7 @@ def stages_table(plans: Sequence[StagePlan], cost: FitCost, workers: int) -> str
     workers : int, [-]
         Processes that share the work.
     """
-    rows = [
+    rows = tuple(
         (
             plan.stage,
             plan.what,
@@ -53,34 +52,26 @@ def stages_table(plans: Sequence[StagePlan], cost: FitCost, workers: int) -> str
             duration(plan.seconds),
         )
         for plan in plans
-    ]
+    )
     known = [plan.seconds for plan in plans if math.isfinite(plan.seconds)]
     least = sum(
         plan.seconds
         for plan in plans
         if math.isfinite(plan.seconds) and not plan.is_bound
     )
-    table = text_table(
-        "What would run",
-        ("stage", "tasks", "in the cache", "time"),
-        rows,
-        text_columns=(0, 1),
-    )
     total = duration(sum(known))
     if least < sum(known):
         total = f"{duration(least)} to {total} (the search may end early)"
     apart = ["start of the program"]
     apart += [plan.stage for plan in plans if not math.isfinite(plan.seconds)]
-    return "\n".join(
-        [
-            table,
-            f"Estimate, to a factor of 2: {total} on {workers} "
-            f"{'process' if workers == 1 else 'processes'}, {' and '.join(apart)} apart.",
-            f"Scaled from {cost.source}: {cost.seconds:.3f} s for {cost.n_samples} "
-            "samples.",
-            f"Disk: about {size(sum(plan.size_bytes for plan in plans))} more.",
-        ]
+    notes = (
+        f"Estimate, to a factor of 2: {total} on {workers} "
+        f"{'process' if workers == 1 else 'processes'}, {' and '.join(apart)} apart.",
+        f"Scaled from {cost.source}: {cost.seconds:.3f} s for {cost.n_samples} samples.",
+        f"Disk: about {size(sum(plan.size_bytes for plan in plans))} more.",
     )
+    columns = (*texts("stage", "tasks"), *numbers("in the cache", "time"))
+    return Table("What would run", columns, rows, notes)
 
 
 def duration(seconds: float) -> str:

@@ -1,27 +1,27 @@
 """Section about the diagnosis: with its figures, or from ``diagnosis.json`` alone."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from hwid_cli.records.diagnosis import Diagnosis, RecordingGap
 from hwid_cli.records.report import ReportContents
-from hwid_cli.report.diagnosis_tables import (
+from hwid_cli.report.diagnosis import (
     INTERVALS_OF_A_PART,
     base_table,
     closing_sentences,
+    effect_sentences,
     effects_table,
-    explained_line,
     gap_table,
     ranking_table,
     recordings_table,
+    used_sentence,
 )
 from hwid_cli.report.figures.diagnosis import diagnosis_figures
-from hwid_cli.report.page import Block, Figures, Folded, Heading, Section, Table, Text
-from hwid_cli.report.sections.words import counted, drawn, listed, with_unit
-from hwid_cli.report.text_table import MISSING
+from hwid_cli.report.formats import MISSING, counted, listed, with_unit
+from hwid_cli.report.page import Block, Figures, Folded, Section, drawn
+from hwid_cli.report.table import Heading, Table, Text, numbers, texts
 
 # Places that are told in words, and recordings that are called the worst.
 _MOST_PLACES, _MOST_NAMED = 5, 3
@@ -80,12 +80,11 @@ def _record_blocks(diagnosis: Diagnosis) -> list[Block]:
         return [Figures((figures[name],), sentence)] if name in figures else []
 
     blocks: list[Block] = [Text(diagnosis.summary)]
-    for effect in diagnosis.effects:
-        blocks.append(Text(f"{effect.sentence.rstrip('.')}. Law: {effect.equation}"))
+    blocks += map(Text, effect_sentences(diagnosis))
     if diagnosis.effects:
         blocks.append(effects_table(diagnosis))
     blocks += [Text(line) for line in closing_sentences(diagnosis)]
-    blocks += [Heading("The gap"), gap_table(diagnosis), Text(_gap_remark(diagnosis))]
+    blocks += [Heading("The gap"), gap_table(diagnosis), Text(used_sentence(diagnosis))]
     blocks += figure("diagnosis_gap", _worst(diagnosis))
     if diagnosis.gaps:
         about = f"The gap in {counted(len(diagnosis.gaps), 'recording')} as a table"
@@ -100,25 +99,14 @@ def _record_blocks(diagnosis: Diagnosis) -> list[Block]:
     places += figure("diagnosis_force", _force_sentence(diagnosis))
     blocks += [Heading("Where the error sits"), *places] if places else []
     if diagnosis.base:
-        # The heading says what the caption would.
-        table = replace(base_table(diagnosis), caption="Shift: from given to the last")
-        blocks += [Heading("Parameters of the simulation"), table]
+        blocks += [Heading("Parameters of the simulation"), base_table(diagnosis)]
     if diagnosis.candidates:
         about = f"{counted(len(diagnosis.candidates), 'candidate')} as a table"
-        table = ranking_table(diagnosis, with_notes=True)
+        table = ranking_table(diagnosis)
         sentence = "The best candidates that were fitted, and the simulation alone."
         blocks.append(Heading("Candidates"))
         blocks += [*figure("diagnosis_ranking", sentence), Folded(about, (table,))]
     return blocks
-
-
-def _gap_remark(diagnosis: Diagnosis) -> str:
-    used = (
-        f"Trained on {counted(len(diagnosis.train), 'recording')}, judged on "
-        f"{counted(len(diagnosis.held_out), 'recording')} held out."
-    )
-    parts = [explained_line(diagnosis)] if diagnosis.effects else []
-    return " ".join([*parts, diagnosis.noise.sentence, used]).strip()
 
 
 def _worst(diagnosis: Diagnosis) -> str:
@@ -196,11 +184,14 @@ def _effects_table(
         for parameter, value in parameters.items():
             rows.append((name, about, parameter, _value(value), _interval(value)))
             name = about = ""
-    heads = ("effect", "meaning", "parameter", "value", "95 % interval")
+    columns = (
+        *texts("effect", "meaning", "parameter"),
+        *numbers("value", "95 % interval"),
+    )
     caption = "Effects that the simulation lacks; the unit ends each parameter's name"
     if not is_all:
         caption += f"; {INTERVALS_OF_A_PART}"
-    return Table(caption, heads, tuple(rows), text_columns=(0, 1, 2))
+    return Table(caption, columns, tuple(rows))
 
 
 def _value(parameter: object) -> str:
@@ -228,8 +219,8 @@ def _gap_table(found: Mapping[str, Any]) -> Table | None:
     )
     if isinstance(share, int | float):
         caption += f", explained share {share:.1%}"
-    heads = ("simulation", "train RMS", "held-out RMS", "ratio to noise [-]")
-    return Table(caption, heads, tuple(rows))
+    heads = ("train RMS", "held-out RMS", "ratio to noise [-]")
+    return Table(caption, (*texts("simulation"), *numbers(*heads)), tuple(rows))
 
 
 def _text(value: object) -> str:

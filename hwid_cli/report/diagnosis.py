@@ -1,11 +1,5 @@
-"""A diagnosis as text for the screen.
+"""A diagnosis as tables and sentences, and all that the screen shows of it."""
 
-Names of parameters that end in their unit, taken apart for people.
-
-Tables and sentences of a diagnosis: what the screen and the page of the report show alike.
-"""
-
-import textwrap
 from collections.abc import Sequence
 
 import numpy as np
@@ -17,9 +11,10 @@ from hwid_cli.records.diagnosis import (
     Gap,
     RankedCandidate,
 )
+from hwid_cli.records.drive import SimulatedRecording
 from hwid_cli.records.units import behind
-from hwid_cli.report.page import Cell, Table
-from hwid_cli.report.text_table import GAP, MISSING, WIDTH, number, text_table
+from hwid_cli.report.formats import MISSING, counted, decimals, number
+from hwid_cli.report.table import Column, Heading, Table, Text, numbers, texts
 
 # What a unit in a name is made of.
 _UNITS = {"N", "m", "kg", "A", "V", "H", "ohm", "s", "Hz", "rad", "deg"}
@@ -111,12 +106,12 @@ def effects_table(diagnosis: Diagnosis) -> Table:
     title = "Effects that the simulation lacks"
     if rows and not diagnosis.complete:
         title += f"; {INTERVALS_OF_A_PART}"
-    return Table(
-        title,
-        ("effect", "parameter", "value", "95 % interval", "unit"),
-        tuple(rows),
-        text_columns=(0, 1, 4),
+    columns = (
+        *texts("effect", "parameter"),
+        *numbers("value", "95 % interval"),
+        *texts("unit"),
     )
+    return Table(title, columns, tuple(rows))
 
 
 def _interval(parameter: FittedParameter) -> str:
@@ -138,16 +133,20 @@ def gap_table(diagnosis: Diagnosis) -> Table:
         ("with the effects", diagnosis.after),
     ]
     unit = diagnosis.output_unit
+    notes = [explained_sentence(diagnosis)] if diagnosis.effects else []
+    if diagnosis.noise.sentence:
+        notes.append(diagnosis.noise.sentence)
     return Table(
         f"Gap between simulation and measurement; noise {number(diagnosis.noise.rms)}"
         f"{behind(unit)}",
         (
-            "simulation",
-            f"train RMS [{unit}]",
-            f"held-out RMS [{unit}]",
-            "held-out / noise",
+            *texts("simulation"),
+            *numbers(
+                f"train RMS [{unit}]", f"held-out RMS [{unit}]", "held-out / noise"
+            ),
         ),
         tuple(_gap_row(*step) for step in steps[: 3 if diagnosis.effects else 2]),
+        tuple(notes),
     )
 
 
@@ -172,12 +171,9 @@ def base_table(diagnosis: Diagnosis) -> Table:
         quantity, unit = quantity_and_unit(one.name)
         values = [one.before, one.refitted, one.after][: len(heads) - 3]
         rows.append((quantity, *map(_value, values), _shift(one, values[-1]), unit))
-    return Table(
-        "Parameters of the simulation",
-        tuple(heads),
-        tuple(rows),
-        text_columns=(0, len(heads) - 1),
-    )
+    columns = (*texts(heads[0]), *numbers(*heads[1:-1]), *texts(heads[-1]))
+    caption = "Parameters of the simulation; shift: from given to the last"
+    return Table(caption, columns, tuple(rows))
 
 
 def _shift(one: BaseParameter, fitted: float) -> str:
@@ -186,17 +182,13 @@ def _shift(one: BaseParameter, fitted: float) -> str:
     return f"{100.0 * (fitted / one.before - 1.0):+.1f} %"
 
 
-def ranking_table(
-    diagnosis: Diagnosis, *, count: int | None = None, with_notes: bool = False
-) -> Table:
+def ranking_table(diagnosis: Diagnosis, *, count: int | None = None) -> Table:
     """Show the candidates, the best first.
 
     Parameters
     ----------
     count : int or None, [-]
         How many; None for all.
-    with_notes : bool
-        Whether a last column holds the notes.
 
     Returns
     -------
@@ -214,43 +206,47 @@ def ranking_table(
                 _ratio(error / diagnosis.noise.rms) if has_noise else number(error),
                 percent(one.explained_share),
                 percent(one.improved_share),
-                f"{one.bic_gain:.0f}" if np.isfinite(one.bic_gain) else MISSING,
-                *([one.note] * with_notes),
+                decimals(one.bic_gain, 0),
+                one.note,
             )
         )
     mark = " (* the diagnosis)" if diagnosis.effects else ""
+    heads = (
+        "forecast",
+        "held-out/noise" if has_noise else f"RMS [{diagnosis.output_unit}]",
+        "explained",
+        "improved",
+        "BIC gain",
+    )
     return Table(
-        f"Candidates, the best first{mark}; forecast, explained and improved\n"
-        "are shares of the error, of its excess over the noise, and of the recordings",
+        f"Candidates, the best first{mark}; forecast, explained and improved are shares of "
+        "the error, of its excess over the noise, and of the recordings",
         (
-            "added to the simulation",
-            "forecast",
-            "held-out/noise" if has_noise else f"RMS [{diagnosis.output_unit}]",
-            "explained",
-            "improved",
-            "BIC gain",
-            *(["note"] * with_notes),
+            Column("added to the simulation", is_text=True, joint=AND),
+            *numbers(*heads),
+            Column("note", is_text=True, is_detail=True),
         ),
         tuple(rows),
-        text_columns=(0, 6),
     )
 
 
 def recordings_table(diagnosis: Diagnosis) -> Table:
     """Show the gap in every recording."""
-    heads = ["recording", "kind", "used to", "given", "re-fitted", "with the effects"]
+    heads = ["given", "re-fitted", "with the effects"]
     rows = []
     for one in diagnosis.gaps:
         values = [one.rms_given, one.rms_before, one.rms_after]
         if not diagnosis.effects:
             values.pop()
-        use = "judge" if one.is_held_out else "train"
+        use = "validation" if one.is_held_out else "training"
         rows.append((one.name, one.kind, use, *map(number, values)))
     return Table(
         f"RMS gap of every recording [{diagnosis.output_unit}]",
-        tuple(heads if diagnosis.effects else heads[:-1]),
+        (
+            *texts("recording", "kind", "used for"),
+            *numbers(*(heads if diagnosis.effects else heads[:-1])),
+        ),
         tuple(rows),
-        text_columns=(0, 1, 2),
     )
 
 
@@ -272,7 +268,7 @@ def closing_sentences(diagnosis: Diagnosis) -> list[str]:
     return lines
 
 
-def explained_line(diagnosis: Diagnosis) -> str:
+def explained_sentence(diagnosis: Diagnosis) -> str:
     """Say how much of the gap the effects explain."""
     share = percent(diagnosis.explained_share)
     return f"Explained: {share} of the excess over the noise, held-out recordings."
@@ -303,13 +299,30 @@ def _ratio(value: float) -> str:
     return f"{value:.{digits}f}" if np.isfinite(value) else MISSING
 
 
+def simulated_table(
+    curves: Sequence[SimulatedRecording], side: str, unit: str
+) -> Table:
+    """Show how far a simulation is from the measurements.
+
+    Parameters
+    ----------
+    side : str
+        What the two are compared by: output, or input in a closed loop.
+    unit : str
+        Of that side.
+    """
+    columns = (*texts("recording"), *numbers(f"RMS [{unit}]"))
+    rows = tuple((one.name, number(one.rms)) for one in curves)
+    return Table(f"RMS of measured minus simulated {side}", columns, rows)
+
+
 # Candidates and places that the screen shows.
 _MOST_SHOWN = 5
 # Verdicts that need no effect, so that little has to be said.
 _SHORT = ("none", "parameters")
 
 
-def verdict_line(diagnosis: Diagnosis) -> str:
+def verdict_sentence(diagnosis: Diagnosis) -> str:
     """Say the verdict in a few words."""
     line = f"Verdict: {diagnosis.verdict}"
     if diagnosis.effects:
@@ -319,70 +332,39 @@ def verdict_line(diagnosis: Diagnosis) -> str:
     return line
 
 
-def diagnosis_text(diagnosis: Diagnosis, *, width: int = WIDTH) -> str:
-    """Show a diagnosis on the screen.
-
-    Parameters
-    ----------
-    width : int, [characters]
-        Of the screen.
-
-    Returns
-    -------
-    str
-        Short where nothing is missing.
-    """
-    is_short = diagnosis.verdict in _SHORT
-    about = (
-        f"Trained on {len(diagnosis.train)} recordings, judged on "
-        f"{len(diagnosis.held_out)} held out."
-    )
-    parts = [_wrapped([verdict_line(diagnosis), diagnosis.summary, about], width)]
-    for effect in diagnosis.effects:
-        parts.append(_wrapped([effect.sentence, f"  {effect.equation}"], width))
-    if diagnosis.effects:
-        parts.append(_shown(effects_table(diagnosis), width))
-    parts.append(_shown(gap_table(diagnosis), width))
-    if diagnosis.effects:
-        parts[-1] += f"\n{explained_line(diagnosis)}"
-    parts[-1] += f"\n{_wrapped([diagnosis.noise.sentence], width)}"
-    if not is_short and diagnosis.places:
-        places = [f"- {one.sentence}" for one in diagnosis.places[:_MOST_SHOWN]]
-        parts.append(f"Where the error sits\n{_wrapped(places, width)}")
-    if diagnosis.base and diagnosis.verdict != "none":
-        parts.append(_shown(base_table(diagnosis), width))
-    parts.append(_wrapped(closing_sentences(diagnosis), width))
-    if not is_short and diagnosis.candidates:
-        parts.append(_shown(ranking_table(diagnosis, count=_MOST_SHOWN), width))
-    return "\n\n".join(part.rstrip() for part in parts if part.strip())
-
-
-def _wrapped(lines: Sequence[str], width: int) -> str:
-    """Lines no wider than the screen; what goes on is indented as a point of a list is."""
-    return "\n".join(
-        textwrap.fill(
-            line,
-            width,
-            subsequent_indent="  " if line.startswith(("- ", "  ")) else "",
-        )
-        for line in lines
-        if line.strip()
-    )
-
-
-def _shown(table: Table, width: int) -> str:
-    """A table as text; sets of effects go on in the next row where there is no room."""
-    rows = [
-        [one.text if isinstance(one, Cell) else one for one in row]
-        for row in table.rows
+def effect_sentences(diagnosis: Diagnosis) -> list[str]:
+    """Say what each effect does, and its law."""
+    return [
+        f"{effect.sentence.rstrip('.')}. Law: {effect.equation}"
+        for effect in diagnosis.effects
     ]
-    sizes = [max(map(len, column)) for column in zip(table.heads, *rows, strict=True)]
-    if sum(sizes) + len(GAP) * (len(sizes) - 1) > width:
-        rows = [part for row in rows for part in _stacked(row)]
-    return text_table(table.caption, table.heads, rows, text_columns=table.text_columns)
 
 
-def _stacked(row: Sequence[str]) -> list[list[str]]:
-    first, *others = row[0].split(AND)
-    blank = [""] * (len(row) - 1)
-    return [[first, *row[1:]], *([f"  + {one}", *blank] for one in others)]
+def used_sentence(diagnosis: Diagnosis) -> str:
+    """Say what the effects were fitted to and validated on."""
+    return (
+        f"Trained on {counted(len(diagnosis.train), 'recording')}, validated on "
+        f"{counted(len(diagnosis.held_out), 'recording')} held out."
+    )
+
+
+def diagnosis_blocks(diagnosis: Diagnosis) -> list[Text | Heading | Table]:
+    """Collect what the screen shows of a diagnosis: little where nothing is missing."""
+    is_short = diagnosis.verdict in _SHORT
+    sentences = [verdict_sentence(diagnosis), diagnosis.summary]
+    sentences += [used_sentence(diagnosis), *effect_sentences(diagnosis)]
+    blocks: list[Text | Heading | Table] = [
+        Text(one) for one in sentences if one.strip()
+    ]
+    if diagnosis.effects:
+        blocks.append(effects_table(diagnosis))
+    blocks.append(gap_table(diagnosis))
+    if not is_short and diagnosis.places:
+        places = [Text(f"- {one.sentence}") for one in diagnosis.places[:_MOST_SHOWN]]
+        blocks += [Heading("Where the error sits"), *places]
+    if diagnosis.base and diagnosis.verdict != "none":
+        blocks.append(base_table(diagnosis))
+    blocks += [Text(one) for one in closing_sentences(diagnosis)]
+    if not is_short and diagnosis.candidates:
+        blocks.append(ranking_table(diagnosis, count=_MOST_SHOWN))
+    return blocks

@@ -2,13 +2,31 @@
 
 import numpy as np
 
-from hwid_cli.records.groups import FinalTest, Prediction
 from hwid_cli.records.report import ChainOnTests, ReportContents, RmsdMatrix
 from hwid_cli.report.figures.final_test import trend_figure
 from hwid_cli.report.figures.matrices import rmsd_matrix_figure
-from hwid_cli.report.page import Block, Cell, Figures, Folded, Section, Table, Text
-from hwid_cli.report.sections.words import drawn, listed, simulation_note, with_unit
-from hwid_cli.report.text_table import number
+from hwid_cli.report.final_test import (
+    assignment_table,
+    chain_coverage_table,
+    chain_on_tests_table,
+    chain_tables,
+    coverage_matrix_table,
+    gap_sentences,
+    prediction_table,
+    smallest_set_table,
+)
+from hwid_cli.report.formats import counted, listed, with_unit
+from hwid_cli.report.page import (
+    Block,
+    Figures,
+    Folded,
+    Section,
+    drawn,
+    folded_beyond,
+)
+from hwid_cli.report.simulation_note import section_notes
+from hwid_cli.report.table import Text
+from hwid_cli.report.thesis_names import names_of_groups
 
 _NOT_RUN = Text("Not run yet: run 'hwid test CONFIG'.", is_note=True)
 # Rows of a table that is shown open.
@@ -24,7 +42,7 @@ def final_test_section(contents: ReportContents) -> Section:
     elif not trend.models:
         blocks.append(Text("There is no chain of groups to test.", is_note=True))
     else:
-        blocks += simulation_note(contents, is_validation=True)
+        blocks += section_notes(contents, is_validation=True)
         if trend.recordings:
             alt = "RMSD on the test recordings along the chain of groups"
             figure = drawn("test/trend", trend_figure(trend), alt)
@@ -38,9 +56,26 @@ def final_test_section(contents: ReportContents) -> Section:
             f"On all {len(matrix.recordings)} recordings the chain's {ways[0]} "
             f"{covers}, {ways[1]} own left out."
         )
-        blocks.append(Figures((figure,), sentence))
+        blocks += [Figures((figure,), sentence), *_chain(contents)]
     title = "Test: the chain of groups on recordings that nothing else has used"
     return Section("test", title, "Test", tuple(blocks))
+
+
+def _chain(contents: ReportContents) -> list[Block]:
+    """The chain's numbers as tables."""
+    final, trend, stored = contents.stored.final_test, contents.chain, contents.stored
+    if final is None or trend is None:
+        return []
+    kinds = {one.name: one.kind for one in stored.recordings}
+    names = names_of_groups(stored.search)
+    tables = (
+        chain_on_tests_table(final, trend, initial_state=None),
+        *chain_tables(final, trend, kinds, initial_state=None),
+    )
+    return [
+        chain_coverage_table(final, trend, names, initial_state=None),
+        Folded("The RMSD along the chain as tables", tables),
+    ]
 
 
 def _trend_sentence(trend: ChainOnTests) -> str:
@@ -62,20 +97,13 @@ def coverage_section(contents: ReportContents) -> Section:
     if final is None or matrix is None:
         blocks.append(_NOT_RUN)
     else:
-        blocks += simulation_note(contents, is_validation=True)
+        blocks += section_notes(contents, is_validation=True)
         alt = "Heat map of the RMSD of all models on all recordings"
         figure = drawn("coverage/matrix", rmsd_matrix_figure(matrix), alt)
         blocks.append(Figures((figure,), _matrix_sentence(matrix)))
-        if len(final.uncovered) == len(final.recordings):
-            covered = "No model covers any recording, not even its own."
-        elif final.uncovered:
-            covered = f"No model covers {listed(final.uncovered)}."
-        else:
-            covered = "Every recording is covered by some model."
-        blocks.append(Text(covered))
-        hard = [name for name in final.hard_to_cover if name not in final.uncovered]
-        if hard:
-            blocks.append(Text(f"Hardly any foreign model covers {listed(hard)}."))
+        blocks += gap_sentences(final)
+        table = coverage_matrix_table(final, initial_state=None)
+        blocks.append(Folded("The coverage as a table", (table,)))
     title = "Coverage: all models on all recordings"
     return Section("coverage", title, "Coverage", tuple(blocks))
 
@@ -102,10 +130,12 @@ def assignment_section(contents: ReportContents) -> Section:
     if final is None:
         blocks.append(_NOT_RUN)
     else:
-        blocks.append(Text(_smallest_set(final)))
         if final.smallest_set:
-            blocks += simulation_note(contents, is_validation=True)
-        blocks.append(_maybe_folded("The assignment", _assignment_table(final)))
+            blocks += section_notes(contents, is_validation=True)
+        blocks.append(smallest_set_table(final, initial_state=None))
+        of = counted(len(final.recordings), "recording")
+        table = assignment_table(final)
+        blocks.append(folded_beyond(_MOST_OPEN, table, f"The assignment of {of}"))
         counts = contents.predictions
         if counts is not None and counts.total:
             text = (
@@ -115,85 +145,7 @@ def assignment_section(contents: ReportContents) -> Section:
                 "model that could have been chosen."
             )
             blocks.append(Text(text))
-            blocks.append(_maybe_folded("The predictions", _prediction_table(final)))
+            table = prediction_table(final, initial_state=None)
+            blocks.append(folded_beyond(_MOST_OPEN, table, f"The predictions of {of}"))
     title = "Assignment: which model for which recording"
     return Section("assignment", title, "Assignment", tuple(blocks))
-
-
-def _smallest_set(final: FinalTest) -> str:
-    within = len(final.recordings) - len(final.uncovered)
-    names = listed(final.smallest_set)
-    which = f"the {within} of {len(final.recordings)} recordings that any model covers"
-    if not final.smallest_set:
-        return "No model covers any recording: there is no set of models to choose."
-    if len(final.smallest_set) == 1:
-        return f"One model, {names}, covers {which}."
-    return f"{len(final.smallest_set)} models together cover {which}: {names}."
-
-
-def _maybe_folded(what: str, table: Table) -> Block:
-    if len(table.rows) <= _MOST_OPEN:
-        return table
-    return Folded(f"{what} of {len(table.rows)} recordings", (table,))
-
-
-def _assignment_table(final: FinalTest) -> Table:
-    rows = []
-    for column, name in enumerate(final.recordings):
-        best = _rmsd_cell(final, final.assigned[column], column)
-        in_set = _rmsd_cell(final, final.assigned_in_set[column], column)
-        rows.append(
-            (name, final.assigned[column], best, final.assigned_in_set[column], in_set)
-        )
-    heads = (
-        "recording",
-        "best model",
-        f"RMSD [{final.unit}]",
-        "best of the smallest set",
-        f"RMSD [{final.unit}]",
-    )
-    caption = f"Bold: below the threshold of {with_unit(final.threshold, final.unit)}"
-    return Table(caption, heads, tuple(rows), text_columns=(0, 1, 3))
-
-
-def _rmsd_cell(final: FinalTest, model: str, column: int) -> Cell:
-    if model not in final.models:
-        return Cell("-")
-    value = final.rmsd[final.models.index(model), column]
-    return Cell(number(value), is_marked=bool(value < final.threshold))
-
-
-def _prediction_table(final: FinalTest) -> Table:
-    heads = (
-        "recording",
-        "verdict",
-        "most similar input",
-        "distance [-]",
-        "model told",
-        f"RMSD [{final.unit}]",
-        "best choice",
-        f"RMSD [{final.unit}]",
-    )
-    rows = tuple(
-        (
-            one.recording,
-            _verdict(one),
-            one.nearest,
-            f"{one.distance:.3g}",
-            one.model,
-            Cell(number(one.rmsd), is_marked=bool(one.rmsd < final.threshold)),
-            one.best_model,
-            Cell(
-                number(one.best_rmsd), is_marked=bool(one.best_rmsd < final.threshold)
-            ),
-        )
-        for one in final.predictions
-    )
-    caption = "The model for each recording, told from its input alone"
-    return Table(caption, heads, rows, text_columns=(0, 1, 2, 4, 6))
-
-
-def _verdict(one: Prediction) -> str:
-    if one.is_right:
-        return "right"
-    return "wrong" if one.is_possible else "no choice covers it"

@@ -1,13 +1,14 @@
-"""What ``hwid init`` guessed, in words."""
+"""What ``hwid init`` guessed."""
 
 from collections.abc import Sequence
 
 from hwid_cli.records.starter import Layout, Proposal, Role
+from hwid_cli.report.table import Code
 
 
-def starter_words(
+def starter_summary(
     path: str, layout: Layout, proposal: Proposal, problems: Sequence[str]
-) -> str:
+) -> Code:
     """Say what was guessed, why, and what to check.
 
     Parameters
@@ -36,7 +37,7 @@ def starter_words(
         f"  hwid check {path}",
         f"  hwid run {path}",
     ]
-    return "\n".join(lines)
+    return Code("\n".join(lines))
 
 
 def _role(role: Role) -> str:
