@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from hwid_cli.records.check import FitCost, RecordingFacts, StagePlan
 from hwid_cli.records.units import behind
 from hwid_cli.report.formats import MISSING
-from hwid_cli.report.table import Table, numbers, texts
+from hwid_cli.report.table import Column, Table, numbers, texts
 
 _KILO = 1000.0
 
@@ -70,7 +70,11 @@ def stages_table(plans: Sequence[StagePlan], cost: FitCost, workers: int) -> Tab
         f"Scaled from {cost.source}: {cost.seconds:.3f} s for {cost.n_samples} samples.",
         f"Disk: about {size(sum(plan.size_bytes for plan in plans))} more.",
     )
-    columns = (*texts("stage", "tasks"), *numbers("in the cache", "time"))
+    columns = (
+        *texts("stage"),
+        Column("tasks", is_text=True, joint=" "),
+        *numbers("in the cache", "time"),
+    )
     return Table("What would run", columns, rows, notes)
 
 

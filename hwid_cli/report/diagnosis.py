@@ -335,8 +335,9 @@ def verdict_sentence(diagnosis: Diagnosis) -> str:
 def effect_sentences(diagnosis: Diagnosis) -> list[str]:
     """Say what each effect does, and its law."""
     return [
-        f"{effect.sentence.rstrip('.')}. Law: {effect.equation}"
+        line
         for effect in diagnosis.effects
+        for line in (effect.sentence, f"Law: {effect.equation}")
     ]
 
 

@@ -236,12 +236,14 @@ def _table_text(table: Table, width: int) -> str:
     ]
     above = [line for line in (table.caption, *table.how) if line]
     cells = [cell for row in table.rows for cell in row if isinstance(cell, Cell)]
-    short = dict.fromkeys(f"{one.short}: {one.text}" for one in cells if one.short)
+    short = {one.short: f"{one.short}: {one.text}" for one in cells if one.short}
+    # C2 before C10.
+    legend = [short[label] for label in sorted(short, key=lambda one: (len(one), one))]
     return "\n".join(
         [
             *(_paragraph(line, width) for line in above),
             "\n\n".join(blocks),
-            *(_paragraph(line, width, "  ") for line in (*short, *table.notes)),
+            *(_paragraph(line, width, "  ") for line in (*legend, *table.notes)),
         ]
     )
 
@@ -252,11 +254,11 @@ _Grid = list[list[list[str]]]
 
 def _grid(table: Table, width: int) -> _Grid:
     """Lines of all cells, those that may go on in as many lines as they need."""
-    columns = zip(*table.rows, strict=True) if table.rows else [()] * len(table.columns)
-    shown = [_shown(cells, table.mark) for cells in columns]
+    cells = [cell for row in table.rows for cell in row if isinstance(cell, Cell)]
+    mark = table.mark if any(cell.is_marked for cell in cells) else ""
     texts_of = [
-        [column.head, *cells]
-        for column, cells in zip(table.columns, shown, strict=True)
+        [column.head, *(_shown(row[place], column, mark) for row in table.rows)]
+        for place, column in enumerate(table.columns)
     ]
     sizes = [
         1 if column.is_upright else max(map(len, cells))
@@ -274,49 +276,32 @@ def _grid(table: Table, width: int) -> _Grid:
             if column.is_upright:
                 lines.append(list(text.rjust(height)))
             elif column.joint and over > 0:
-                lines.append(
-                    joined(
-                        text.split(column.joint),
-                        column.joint,
-                        max(_LEAST_ROOM, size - over),
-                    )
-                )
+                room = max(_LEAST_ROOM, size - over)
+                lines.append(_joined(text.split(column.joint), column.joint, room))
             else:
                 lines.append([text])
         grid.append(lines)
     return grid
 
 
-def _shown(cells: Sequence[Cell | str], mark: str) -> list[str]:
-    """Cells of a column; where some are marked the others keep room for it."""
-    is_marked = [isinstance(one, Cell) and one.is_marked for one in cells]
-    other = " " if any(is_marked) else ""
-    return [
-        ((one.short or one.text) if isinstance(one, Cell) else one)
-        + (mark if has_mark else other)
-        for one, has_mark in zip(cells, is_marked, strict=True)
-    ]
+def _shown(cell: Cell | str, column: Column, mark: str) -> str:
+    """Text of a cell; numbers without a mark keep room for that of others."""
+    if isinstance(cell, str):
+        return cell
+    text = cell.short or cell.text
+    if cell.is_marked:
+        return text + mark
+    return text if column.is_text else text + " " * len(mark)
 
 
-def joined(names: Sequence[str], joint: str, width: int) -> list[str]:
-    """Join names to lines, none of them cut.
-
-    Parameters
-    ----------
-    width : int, [characters]
-        Of a line; a single longer name is a line of its own.
-
-    Examples
-    --------
-    >>> joined(["step_01", "step_02", "step_03"], ", ", 18)
-    ['step_01, step_02,', 'step_03']
-    """
+def _joined(names: Sequence[str], joint: str, width: int) -> list[str]:
+    """Join names to lines no longer than a width in characters, none of them cut."""
     lines = [names[0]]
     for name in names[1:]:
         # A line that goes on ends with what joins.
         if len(lines[-1]) + len(joint) + len(name) + len(joint.rstrip()) > width:
             lines[-1] += joint.rstrip()
-            lines.append(name)
+            lines.append(f"  {name}")
         else:
             lines[-1] += joint + name
     return lines

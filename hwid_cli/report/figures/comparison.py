@@ -18,7 +18,7 @@ from hwid_cli.report.figures.style import (
     number_decades,
     styled,
 )
-from hwid_cli.report.text_table import number
+from hwid_cli.report.formats import number
 
 # Of the figure, of that of one recording, and of a line of its legend, [inch].
 _HEIGHT, _HEIGHT_OF_ONE, _LINE = 7.5, 5.0, 0.2

@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import pytest
 
-from hwid_cli.report.final_test_tables import (
+from hwid_cli.report.crossval import coverage_table, cross_table
+from hwid_cli.report.final_test import (
     chain_coverage_table,
     chain_on_tests_table,
     chain_tables,
@@ -12,29 +13,28 @@ from hwid_cli.report.final_test_tables import (
     prediction_table,
     smallest_set_table,
 )
-from hwid_cli.report.fit_tables import best_models_table
-from hwid_cli.report.group_tables import chain_table, join_table, levels_table
-from hwid_cli.report.page import Text
-from hwid_cli.report.sections.final_test import (
+from hwid_cli.report.fits import best_models_table
+from hwid_cli.report.groups import chain_table, join_table, levels_table
+from hwid_cli.report.sections.crossval import crossval_section
+from hwid_cli.report.sections.group import groups_section
+from hwid_cli.report.sections.identify import (
+    orders_section,
+    recordings_section,
+    residuals_section,
+)
+from hwid_cli.report.sections.models import models_section
+from hwid_cli.report.sections.summary import summary_section
+from hwid_cli.report.sections.test import (
     assignment_section,
     coverage_section,
     final_test_section,
 )
-from hwid_cli.report.sections.groups import groups_section
-from hwid_cli.report.sections.models import models_section
-from hwid_cli.report.sections.recordings import (
-    crossval_section,
-    orders_section,
-    recordings_section,
-)
-from hwid_cli.report.sections.residuals import residuals_section
-from hwid_cli.report.sections.summary import summary_section
-from hwid_cli.report.simulation_words import HUBER_WORDS, simulation_words
-from hwid_cli.report.tables import coverage_table, cross_table
+from hwid_cli.report.simulation_note import HUBER_NOTE, simulation_note
+from hwid_cli.report.table import Text, as_text
 from tests.report.report_examples import fit, group_search
-from tests.report.test_assignment_tables import FINAL as ASSIGNED
-from tests.report.test_final_test_tables import FINAL, KINDS, TREND
-from tests.report.test_tables import CROSSVAL, SCORES
+from tests.report.test_assignment import FINAL as ASSIGNED
+from tests.report.test_crossval import CROSS, CROSSVAL, SCORES
+from tests.report.test_final_test import FINAL, KINDS, TREND
 
 RULES = ("zero", "steady", "estimated")
 SEARCH = group_search(levels=2)
@@ -47,13 +47,13 @@ def started(rule):
 
 VALIDATED = {
     "coverage": lambda rule: coverage_table(SCORES, CROSSVAL, initial_state=rule),
-    "cross": lambda rule: cross_table(SCORES, CROSSVAL, initial_state=rule),
+    "cross": lambda rule: cross_table(CROSS, initial_state=rule),
     "levels": lambda rule: levels_table(SEARCH, initial_state=rule),
     "joins": lambda rule: join_table(SEARCH, 2, initial_state=rule),
     "chain": lambda rule: chain_table(SEARCH, initial_state=rule),
     "on tests": lambda rule: chain_on_tests_table(FINAL, TREND, initial_state=rule),
-    "kinds": lambda rule: chain_coverage_table(FINAL, TREND, initial_state=rule),
-    "on all": lambda rule: chain_tables(FINAL, TREND, KINDS, initial_state=rule),
+    "kinds": lambda rule: chain_coverage_table(FINAL, TREND, {}, initial_state=rule),
+    "on all": lambda rule: chain_tables(FINAL, TREND, KINDS, initial_state=rule)[0],
     "matrix": lambda rule: coverage_matrix_table(FINAL, initial_state=rule),
     "set": lambda rule: smallest_set_table(ASSIGNED, initial_state=rule),
     "told": lambda rule: prediction_table(ASSIGNED, initial_state=rule),
@@ -63,13 +63,13 @@ VALIDATED = {
 @pytest.mark.parametrize("rule", RULES)
 @pytest.mark.parametrize("table", VALIDATED)
 def test_every_table_of_validations_says_how_models_start(table, rule):
-    text = VALIDATED[table](rule)
-    words = simulation_words(rule, is_validation=True)
+    text = as_text([VALIDATED[table](rule)])
+    words = simulation_note(rule, is_validation=True)
 
     assert words in text.splitlines()
     assert len(words) <= 80
     for other in set(RULES) - {rule}:
-        assert simulation_words(other, is_validation=True) not in text
+        assert simulation_note(other, is_validation=True) not in text
 
 
 @pytest.mark.parametrize(
@@ -92,14 +92,14 @@ def test_every_section_of_the_report_says_how_models_start(
 ):
     notes = [one.text for one in section(contents).blocks if isinstance(one, Text)]
 
-    assert simulation_words("estimated", is_validation=is_validation) in notes
+    assert simulation_note("estimated", is_validation=is_validation) in notes
 
 
 @pytest.mark.parametrize("rule", RULES)
 def test_the_table_of_the_best_models_says_how_their_fits_start(rule):
-    text = best_models_table([(started(rule),)], "m")
+    text = as_text([best_models_table([(started(rule),)], "m", nk_is_delay=False)])
 
-    assert simulation_words(rule, is_validation=False) in text.splitlines()
+    assert simulation_note(rule, is_validation=False) in text.splitlines()
 
 
 @pytest.mark.parametrize(
@@ -109,7 +109,7 @@ def test_the_table_of_the_best_models_says_how_their_fits_start(rule):
 def test_the_chain_of_groups_says_how_joined_recordings_start(join, words):
     search = replace(SEARCH, join=join)
 
-    assert words in chain_table(search, initial_state="estimated")
+    assert words in chain_table(search, initial_state="estimated").how[1]
 
 
 def test_a_section_of_fits_that_bear_outliers_says_so(contents):
@@ -123,4 +123,4 @@ def test_a_section_of_fits_that_bear_outliers_says_so(contents):
         notes = [
             one.text for one in crossval_section(found).blocks if isinstance(one, Text)
         ]
-        assert (HUBER_WORDS in notes) == is_said
+        assert (HUBER_NOTE in notes) == is_said

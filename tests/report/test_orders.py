@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from hwid_cli.records.order import Judgement, OrderAdvice, OrderChoice, ResponseEstimate
-from hwid_cli.report.order_tables import order_sentences, order_table
-from hwid_cli.report.simulation_words import simulation_words
+from hwid_cli.report.orders import order_reasons, order_table
+from hwid_cli.report.simulation_note import simulation_note
+from hwid_cli.report.table import as_text
 
 NAN = float("nan")
 JUDGEMENT = Judgement(1.2e-3, 1.15e-3, 1.04, 0.02, 4)
@@ -29,18 +30,18 @@ ADVICE = OrderAdvice(
 
 
 def said(**changes):
-    return " ".join(order_sentences(replace(ADVICE, **changes)).split())
+    return " ".join(as_text(order_reasons(replace(ADVICE, **changes))).split())
 
 
 @pytest.mark.parametrize("rule", ["zero", "steady", "estimated"])
 def test_the_table_has_a_row_for_each_and_says_how_models_start(rule):
-    lines = order_table(ADVICE, initial_state=rule).splitlines()
+    lines = as_text([order_table(ADVICE, initial_state=rule)]).splitlines()
 
     assert lines[-1].split()[:3] == ["all", "together", "2/3"]
     assert lines[-2].split() == [
         "step_02", "2/3", "1.20e-03", "1.04", "3/4", "4/4", "2/3", "1", "2",
     ]  # fmt: skip
-    assert simulation_words(rule, is_validation=True) in lines
+    assert simulation_note(rule, is_validation=True) in lines
     assert max(map(len, lines)) <= 80
 
 
@@ -56,7 +57,7 @@ def test_the_recommendation_says_why():
     assert "Delay: at most 1 sample; a quarter" in text
     assert "Poles: 2 singular values of the impulse response's Hankel matrix" in text
     assert "so in 3 of 3 recordings" in text
-    assert max(map(len, order_sentences(ADVICE).splitlines())) <= 80
+    assert max(map(len, as_text(order_reasons(ADVICE)).splitlines())) <= 80
 
 
 @pytest.mark.parametrize(
@@ -64,7 +65,7 @@ def test_the_recommendation_says_why():
     [
         ({"factor": 1.09, "standard_error": 0.1}, "within one standard error (0.1)"),
         ({"best_nb": 2, "best_nk": 3}, "they have the lowest RMSD on recordings"),
-        ({"n_judges": 0, "standard_error": NAN}, "No other recording judges"),
+        ({"n_judges": 0, "standard_error": NAN}, "There is no validation recording"),
         (
             {"best_nb": 4, "best_nk": 5},
             "widen orders.nb (beyond 4) and orders.nk (beyond 5)",
@@ -82,15 +83,15 @@ def test_each_case_has_its_reason(changes, words):
 @pytest.mark.parametrize(
     ("count", "words"),
     [
-        (1, "1 pair of model and recording does not judge"),
-        (48, "48 pairs of model and recording do not judge"),
+        (1, "1 pair of model and recording does not count"),
+        (48, "48 pairs of model and recording do not count"),
     ],
 )
-def test_pairs_that_do_not_judge_are_told(count, words):
+def test_pairs_that_are_extrapolated_are_told(count, words):
     judgement = replace(JUDGEMENT, n_beyond=count)
 
     assert words in said(overall=replace(OVERALL, judgement=judgement))
-    assert "not judge" not in said()
+    assert "not count" not in said()
 
 
 def test_a_delay_that_the_grid_does_not_have_is_told():
@@ -114,7 +115,7 @@ def test_what_the_data_do_not_show_is_said():
     blind = tuple(replace(one, delay=-1, n_poles=0) for one in ADVICE.responses)
     text = said(responses=blind, n_poles=0, overall=replace(OVERALL, bic_nb=0))
 
-    assert "no output answers its input" in text
+    assert "no output responds to its input" in text
     assert "no hint of their number" in text
     assert "BIC" not in text
 
@@ -131,11 +132,17 @@ def test_delays_that_every_fit_tries_are_not_asked_for_again():
 @pytest.mark.parametrize(
     ("count", "words"),
     [
-        (1, "1 sample of the judging recordings is an outlier and does not count here"),
-        (25, "25 samples of the judging recordings are outliers and do not count here"),
+        (
+            1,
+            "1 sample of the validation recordings is an outlier and does not count here",
+        ),
+        (
+            25,
+            "25 samples of the validation recordings are outliers and do not count here",
+        ),
     ],
 )
-def test_outliers_that_do_not_judge_are_told(count, words):
+def test_outliers_that_do_not_count_are_told(count, words):
     judgement = replace(JUDGEMENT, n_outliers=count)
 
     assert words in said(overall=replace(OVERALL, judgement=judgement))

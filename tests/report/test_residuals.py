@@ -6,14 +6,18 @@ import pytest
 from hwid_cli.model.residual_tests import residual_tests
 from hwid_cli.records.residuals import ModelResiduals
 from hwid_cli.report.figures.residuals import residuals_figure
-from hwid_cli.report.page import Table
-from hwid_cli.report.residual_tables import residual_table, residual_verdict
-from hwid_cli.report.sections.residuals import residuals_section
-from hwid_cli.report.simulation_words import simulation_words
+from hwid_cli.report.residuals import residual_table, residual_verdict
+from hwid_cli.report.sections.identify import residuals_section
+from hwid_cli.report.simulation_note import simulation_note
+from hwid_cli.report.table import Table, as_text
 
 RNG = np.random.default_rng(4)
 INPUT, NOISE = RNG.normal(size=(2, 600))
 WHITE = residual_tests(NOISE, INPUT)
+
+
+def left(model, flat):
+    return ModelResiduals(model, WHITE, flat, model.split("/")[0], 1e-3, "m")
 
 
 @pytest.mark.parametrize(
@@ -42,29 +46,31 @@ def test_a_missing_lag_is_named():
 
 def test_the_table_says_what_is_not_identifiable_and_how_fits_start():
     flat = ("not identifiable: b[0], because of this", "another")
-    found = [ModelResiduals("step_06/3/7", WHITE, flat)]
-    lines = residual_table(found, "steady").splitlines()
+    found = [left("step_06/3/7", flat)]
+    lines = as_text([residual_table(found, initial_state="steady")]).splitlines()
 
     assert lines[-1].endswith("because of this (1 more).")
     assert lines[-2].startswith("step_06/3/7  white (p = ")
-    assert simulation_words("steady", is_validation=False) in " ".join(lines)
+    assert simulation_note("steady", is_validation=False) in " ".join(lines)
     assert max(map(len, lines)) <= 80
 
 
 def test_only_a_few_models_tell_what_is_not_identifiable():
-    found = [ModelResiduals(f"s{n}/1/1", WHITE, ("flat: b",)) for n in range(9)]
-    text = residual_table(found, "zero")
+    found = [left(f"s{n}/1/1", ("flat: b",)) for n in range(9)]
+    text = " ".join(residual_table(found, initial_state="zero").notes)
 
     assert text.count("flat: b") == 5
     assert "in 4 more models" in text
-    assert "in 1 more model:" in residual_table(found[:6], "zero")
+    assert "in 1 more model:" in str(
+        residual_table(found[:6], initial_state=None).notes
+    )
 
 
 def test_the_section_has_a_row_and_a_figure_for_each_recording(contents):
     section = residuals_section(contents)
     (table,) = [one for one in section.blocks if isinstance(one, Table)]
 
-    assert [row[0] for row in table.rows] == [
+    assert [row[1] for row in table.rows] == [
         one.recording.name for one in contents.simulated
     ]
     assert len(table.heads) == len(table.rows[0])

@@ -5,14 +5,15 @@ import numpy as np
 import pytest
 
 from hwid_cli.records.groups import ChainTrend
-from hwid_cli.report.final_test_tables import (
+from hwid_cli.report.final_test import (
     chain_coverage_table,
     chain_on_tests_table,
     chain_tables,
     coverage_matrix_table,
-    gaps_text,
-    trend_line,
+    gap_sentences,
+    trend_sentence,
 )
+from hwid_cli.report.table import as_text
 from hwid_cli.stages.test import chain_trend
 from tests.stages.final_test_examples import KINDS, example_final_test
 
@@ -27,13 +28,14 @@ def widest_line(text):
 
 
 def test_the_chain_on_the_tests_shows_each_rmsd_and_the_mean():
-    text = chain_on_tests_table(FINAL, TREND, initial_state="estimated")
-    *_, last, line = text.splitlines()
+    table = chain_on_tests_table(FINAL, TREND, initial_state="estimated")
+    text = as_text([table], thesis_names=True)
+    last = next(line for line in text.splitlines() if line.startswith(WINNER))
 
     values = FINAL.rmsd[-1][[FINAL.recordings.index(n) for n in FINAL.tested_on]]
     shown = last.replace("*", "").split()
     assert shown == [WINNER, *(f"{v:.2e}" for v in [*values, np.mean(values)])]
-    assert line == trend_line(TREND)
+    assert " ".join(text.split()).endswith(trend_sentence(TREND))
     assert "form of T3.3.3.4-1" in text
     assert widest_line(text) <= 80
 
@@ -47,36 +49,33 @@ def test_the_chain_on_the_tests_shows_each_rmsd_and_the_mean():
         ((0.1, 0.05, 0.1), "does not fall."),
         ((0.1, 0.2), "does not fall."),
         ((0.1, float("nan")), "is not known at every level."),
-        ((0.1,), "no trend to judge."),
+        ((0.1,), "so there is no trend."),
     ],
 )
 def test_the_trend_is_told_in_words(values, expected):
     names = tuple(map(str, range(len(values))))
     trend = ChainTrend(names, values, ("step",), np.zeros((len(values), 1), dtype=int))
 
-    assert trend_line(trend).endswith(expected)
+    assert trend_sentence(trend).endswith(expected)
 
 
 def test_the_chain_covers_kind_by_kind():
-    text = chain_coverage_table(FINAL, TREND, initial_state="estimated")
-
-    assert text.splitlines()[3].split()[:4] == ["model", "step", "sine", "all"]
+    table = chain_coverage_table(FINAL, TREND, {WINNER: "W"}, initial_state=None)
     steps, sines = TREND.coverage[-1]
-    assert text.splitlines()[-1].split() == [
-        WINNER, str(steps), str(sines), str(steps + sines), "NLHW-Step-6-9-1-8-7-7-1",
-    ]  # fmt: skip
-    assert widest_line(text) <= 80
-    delay = chain_coverage_table(FINAL, TREND, nf=2, initial_state="estimated")
-    assert delay.endswith("NLHW-Step-6-9-1-8-7-2-7")
-    bare = chain_coverage_table(
-        FINAL, TREND, has_names=False, initial_state="estimated"
-    )
-    assert "NLHW" not in bare
-    assert bare.splitlines()[-1].split()[0] == WINNER
+    counts = [WINNER, str(steps), str(sines), str(steps + sines)]
+
+    lines = as_text([table]).splitlines()
+    assert lines[1].split() == ["model", "step", "sine", "all"]
+    assert lines[-1].split() == counts
+    asked = as_text([table], thesis_names=True)
+    assert asked.splitlines()[-1].split() == [*counts, "W"]
+    assert asked.splitlines()[-2].split()[-1] == "-"
+    assert widest_line(asked) <= 80
 
 
 def test_the_chain_is_shown_on_every_recording_once():
-    text = chain_tables(FINAL, TREND, KINDS, initial_state="estimated")
+    tables = chain_tables(FINAL, TREND, KINDS, initial_state="estimated")
+    text = as_text(tables, thesis_names=True)
 
     for name in FINAL.recordings:
         assert text.count(f" {name}") == 1
@@ -84,7 +83,17 @@ def test_the_chain_is_shown_on_every_recording_once():
         mark = "*" if value < FINAL.threshold else " "
         assert f"{value:.2e}{mark}" in text
     assert "kind step" in text
-    assert "(form of T3.4.1-3)" in text
+    assert "(form of T3.4.1-3)" in " ".join(text.split())
+
+
+def matrix_text(final, width=80):
+    return as_text([coverage_matrix_table(final, initial_state=None)], width=width)
+
+
+def matrix_lines(final):
+    """Lines of the matrix beneath its caption."""
+    lines = matrix_text(final).splitlines()
+    return lines[next(n for n, line in enumerate(lines) if line.startswith(" ")) :]
 
 
 def matrix_rows(text):
@@ -102,10 +111,10 @@ def matrix_rows(text):
 
 @pytest.mark.parametrize("width", [80, 40])
 def test_the_matrix_holds_every_pair_and_fits_the_screen(width):
-    text = coverage_matrix_table(FINAL, width=width, initial_state="estimated")
+    text = matrix_text(FINAL, width)
     rows = matrix_rows(text)
 
-    assert widest_line(text.split("\n", 3)[3]) <= width
+    assert widest_line(text) <= width
     labels = list(rows)
     assert labels[0] == FINAL.models[0]
     # The chain's first model has its own name; those above it are what they add.
@@ -123,7 +132,7 @@ def test_the_matrix_holds_every_pair_and_fits_the_screen(width):
 
 
 def test_recordings_names_run_downwards_over_their_column():
-    lines = coverage_matrix_table(FINAL, initial_state="estimated").splitlines()[3:]
+    lines = matrix_lines(FINAL)
     heads = [line.ljust(80) for line in lines[:7]]
     row = next(line for line in lines if line.startswith("sine_23"))
     # The only blank cell of this row that is no gap is its own, the last one.
@@ -139,10 +148,7 @@ def test_recordings_names_run_downwards_over_their_column():
 
 def test_counts_above_nine_run_downwards_too():
     counts = np.full(38, 12)
-    text = coverage_matrix_table(
-        replace(FINAL, covered_by=counts), initial_state="estimated"
-    )
-    tens, units = text.splitlines()[-2:]
+    tens, units = matrix_text(replace(FINAL, covered_by=counts)).splitlines()[-2:]
 
     assert tens.split(maxsplit=2)[2].replace(" ", "") == "1" * 38
     assert units.replace(" ", "") == "2" * 38
@@ -151,7 +157,7 @@ def test_counts_above_nine_run_downwards_too():
 def test_long_names_are_never_cut():
     names = tuple(f"idf_neg_0.045_{n}" for n in range(38))
     final = replace(FINAL, recordings=names)
-    lines = coverage_matrix_table(final, initial_state="estimated").splitlines()[3:]
+    lines = matrix_lines(final)
     height = max(map(len, names))
     columns = {"".join(letters).strip() for letters in zip(
         *(line.ljust(80) for line in lines[:height]), strict=True
@@ -165,17 +171,24 @@ def test_a_model_of_another_family_keeps_its_whole_name():
     names = (*FINAL.models[:-1], "step_09+step_06+step_01+step_08/7/7")
     final = replace(FINAL, models=names, chain=names[-4:])
 
-    assert names[-1] in coverage_matrix_table(final, initial_state="estimated")
+    assert names[-1] in matrix_text(final)
 
 
 def test_gaps_are_named_and_counted():
-    final = replace(FINAL, uncovered=("step_05",), hard_to_cover=FINAL.recordings)
-    text = gaps_text(final, width=40)
+    hard = ("step_05", "step_01", "sine_02")
+    final = replace(FINAL, uncovered=("step_05",), hard_to_cover=hard)
 
-    assert "not even their own: 1 of 38 recordings\n  step_05\n" in text
-    assert "a tenth of the other models: 38 of 38" in text
-    assert all(text.count(name) >= 1 for name in FINAL.recordings)
-    assert "0 of 38 recordings" in gaps_text(replace(FINAL, uncovered=()))
+    assert [one.text for one in gap_sentences(final)] == [
+        "No model covers 1 of 38 recordings, not even their own: step_05.",
+        "Fewer than a tenth of the other models cover 2 of 38 recordings: step_01, "
+        "sine_02.",
+    ]
+    nothing = gap_sentences(replace(FINAL, uncovered=FINAL.recordings))
+    assert nothing[0].text == "No model covers any recording, not even its own."
+    everything = gap_sentences(replace(FINAL, uncovered=(), hard_to_cover=()))
+    assert [one.text for one in everything] == [
+        "Every recording is covered by some model."
+    ]
 
 
 def test_long_names_of_groups_stand_beneath_the_table_once():
@@ -188,10 +201,14 @@ def test_long_names_of_groups_stand_beneath_the_table_once():
         chain=tuple(longer.values()),
     )
     trend = chain_trend(final, KINDS)
-    lines = chain_on_tests_table(final, trend, initial_state="estimated").splitlines()
+    table = chain_on_tests_table(final, trend, initial_state="estimated")
+    lines = as_text([table]).splitlines()
 
     assert f"C1: {final.chain[0]}" in lines
     assert sum(final.chain[-1] in line for line in lines) == 1
     # All test recordings stand in one block.
     assert sum(line.startswith("model") for line in lines) == 1
-    assert "\nC1 " in chain_tables(final, trend, KINDS, initial_state="estimated")
+    tables = chain_tables(final, trend, KINDS, initial_state="estimated")
+    assert "\nC1 " in as_text(tables)
+    # A page has room for the names themselves.
+    assert tables[0].rows[0][0].text == final.chain[0]

@@ -5,8 +5,9 @@ import numpy as np
 from hwid_cli.records.comparison import Comparison, NamedModel, ShownRecording
 from hwid_cli.records.maps import StaticMap
 from hwid_cli.records.model import HammersteinWiener
-from hwid_cli.report.comparison_table import comparison_table
+from hwid_cli.report.comparison import comparison_tables
 from hwid_cli.report.figures.comparison import comparison_figure
+from hwid_cli.report.table import as_text
 
 NONE = StaticMap("none", np.zeros(0))
 
@@ -31,14 +32,18 @@ def comparison(rules=("zero", "steady")):
     )
 
 
+def comparison_text(compared):
+    return as_text(comparison_tables(compared))
+
+
 def test_rules_that_differ_are_each_said():
-    text = comparison_table(comparison())
+    text = comparison_text(comparison())
     assert "A: Free-run simulation, no prediction; initial state zero." in text
     assert "B: Free-run simulation, no prediction; initial state steady" in text
 
 
 def test_the_best_own_recordings_and_pooled_numbers_are_shown():
-    rows = [line.split() for line in comparison_table(comparison()).splitlines()]
+    rows = [line.split() for line in comparison_text(comparison()).splitlines()]
     assert ["step_1", "3.00e-01'", "1.00e-01", "B"] in rows
     # A model that diverges somewhere wins nothing there, and not over all.
     assert ["step_2", "4.00e-01", "-", "A"] in rows
@@ -52,7 +57,7 @@ def test_a_tie_in_the_printed_digits_has_no_winner():
         rmsd=np.array([[0.3, 0.4], [0.300000001, 0.5]]),
         fit_percent=np.array([[70.0, 60.0], [70.001, 50.0]]),
     )
-    rows = [line.split() for line in comparison_table(tied).splitlines()]
+    rows = [line.split() for line in comparison_text(tied).splitlines()]
 
     assert ["step_1", "3.00e-01'", "3.00e-01", "="] in rows
     assert ["step_1", "70.00", "70.00", "="] in rows
@@ -73,7 +78,7 @@ def alone(compared):
 
 
 def test_a_single_model_wins_nothing():
-    text = comparison_table(alone(comparison()))
+    text = comparison_text(alone(comparison()))
     assert "best" not in text
     assert ["step_1", "70.00"] in [line.split() for line in text.splitlines()]
 

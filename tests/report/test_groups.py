@@ -1,7 +1,8 @@
 import numpy as np
 
 from hwid_cli.records.groups import Group, GroupSearch, Join
-from hwid_cli.report.group_tables import chain_table, join_table, levels_table
+from hwid_cli.report.groups import chain_table, join_table, levels_table
+from hwid_cli.report.table import as_text
 
 NAN = float("nan")
 RULE = "estimated"
@@ -48,7 +49,9 @@ def cells(line):
 
 
 def test_a_level_is_shown_base_by_add_on():
-    lines = join_table(search(), 2, initial_state=RULE).splitlines()
+    lines = as_text(
+        [join_table(search(), 2, initial_state=RULE)], thesis_names=True
+    ).splitlines()
 
     assert "of 3" in lines[0]
     assert "T3.3.3.1-2" in lines[1]
@@ -58,7 +61,9 @@ def test_a_level_is_shown_base_by_add_on():
 
 
 def test_a_wide_level_is_shown_in_blocks():
-    lines = join_table(search(), 2, initial_state=RULE, width=22).splitlines()
+    lines = as_text(
+        [join_table(search(), 2, initial_state=RULE)], width=22
+    ).splitlines()
 
     assert [cells(line) for line in lines if line.startswith("base")] == [
         ["base", "s1", "s2", "widest"],
@@ -69,13 +74,15 @@ def test_a_wide_level_is_shown_in_blocks():
 def test_an_asterisk_marks_what_goes_on():
     kept = search()
     groups = (*kept.groups[:-1], group("s3+s2", 3, is_kept=True))
-    text = join_table(search(groups=groups), 2, initial_state=RULE)
+    text = as_text([join_table(search(groups=groups), 2, initial_state=RULE)])
 
     assert text.count("3*") == 1
 
 
 def test_each_level_counts_what_was_fitted_filtered_and_kept():
-    lines = levels_table(search(), initial_state=RULE).splitlines()
+    lines = as_text(
+        [levels_table(search(), initial_state=RULE)], thesis_names=True
+    ).splitlines()
 
     assert cells(lines[-2]) == [
         *("1", "3", "3", "12", "6", "0", "2", "of", "3", "2", "2"),
@@ -87,7 +94,7 @@ def test_each_level_counts_what_was_fitted_filtered_and_kept():
 
 
 def test_the_chain_is_shown_with_the_reason_to_stop():
-    text = chain_table(search(), initial_state=RULE)
+    text = as_text([chain_table(search(), initial_state=RULE)], width=200)
 
     assert "s2/3/7" in text
     assert "s2+s3/3/7" in text
@@ -98,8 +105,8 @@ def test_the_chain_is_shown_with_the_reason_to_stop():
 
 
 def test_a_search_that_found_nothing_says_so():
-    text = chain_table(
+    found = chain_table(
         search(chain=(), reason="no group passes group.keep"), initial_state=RULE
     )
 
-    assert text == "No group covers anything: no group passes group.keep."
+    assert found.text == "No group covers anything: no group passes group.keep."

@@ -3,8 +3,9 @@ from dataclasses import replace
 import pytest
 
 from hwid_cli.records.order import Judgement, MapAdvice, MapCandidate
-from hwid_cli.report.order_tables import map_sentences, map_table
-from hwid_cli.report.simulation_words import simulation_words
+from hwid_cli.report.orders import map_reasons, map_table
+from hwid_cli.report.simulation_note import simulation_note
+from hwid_cli.report.table import as_text
 
 PIECEWISE = "piecewise_linear"
 BEST = MapCandidate(PIECEWISE, 5, "none", 0, 13, 1.1e-3, 1.0, -120.0)
@@ -26,17 +27,17 @@ ADVICE = MapAdvice(
 
 
 def said(**changes):
-    return " ".join(map_sentences(replace(ADVICE, **changes)).split())
+    return " ".join(as_text(map_reasons(replace(ADVICE, **changes))).split())
 
 
 @pytest.mark.parametrize("rule", ["zero", "steady", "estimated"])
 def test_the_best_come_first_and_those_of_the_configuration_are_there(rule):
-    lines = map_table(ADVICE, initial_state=rule).splitlines()
+    lines = as_text([map_table(ADVICE, initial_state=rule)]).splitlines()
     heads = next(n for n, line in enumerate(lines) if "input map" in line)
     rows = lines[heads + 2 :]
 
     assert "[1 2 1]" in lines[0]
-    assert simulation_words(rule, is_validation=True) in lines
+    assert simulation_note(rule, is_validation=True) in lines
     assert rows[0].split() == [
         "piecewise", "linear,", "5", "none", "13", "1.10e-03", "1.00", "-",
     ]  # fmt: skip
@@ -56,8 +57,8 @@ def test_the_recommendation_can_be_pasted_and_says_why():
     )
     assert "3 % further off than the best maps, piecewise linear, 5 and none" in text
     assert "Those of the configuration are 1.62 times as far off as the best." in text
-    assert "6 pairs of model and recording do not judge" in text
-    assert max(map(len, map_sentences(ADVICE).splitlines())) <= 80
+    assert "6 pairs of model and recording do not count" in text
+    assert max(map(len, as_text(map_reasons(ADVICE)).splitlines())) <= 80
 
 
 @pytest.mark.parametrize(
@@ -68,7 +69,7 @@ def test_the_recommendation_can_be_pasted_and_says_why():
         ({"given": BEST}, "Those of the configuration are the best."),
         (
             {"judgement": replace(ADVICE.judgement, n_judges=0)},
-            "they have the lowest BIC. No other recording judges",
+            "they have the lowest BIC. There is no validation recording",
         ),
     ],
 )

@@ -4,16 +4,17 @@ from dataclasses import replace
 import pytest
 
 from hwid_cli.records.diagnosis import FittedEffect, FittedParameter, NextExperiment
-from hwid_cli.report.diagnosis_tables import (
+from hwid_cli.report.diagnosis import (
     base_table,
     closing_sentences,
-    diagnosis_text,
+    diagnosis_blocks,
     effects_table,
     gap_table,
     quantity_and_unit,
     ranking_table,
     recordings_table,
 )
+from hwid_cli.report.table import as_text
 from tests.report.diagnosis_examples import (
     DRAG,
     FRICTION,
@@ -22,6 +23,10 @@ from tests.report.diagnosis_examples import (
     nothing_missing,
     unknown,
 )
+
+
+def diagnosis_text(diagnosis, width):
+    return as_text(diagnosis_blocks(diagnosis), width=width)
 
 
 def widest_line(text):
@@ -97,8 +102,9 @@ def test_the_ranking_marks_the_chosen_candidate_only():
         "99.8 %",
         "100.0 %",
         "9980",
+        "",
     )
-    assert rows[-1] == ("cogging", "10.0 %", "-", "-", "-", "-")
+    assert rows[-1] == ("cogging", "10.0 %", "-", "-", "-", "-", "not fitted")
     assert not [row for row in ranking_table(unknown()).rows if "*" in row[0]]
 
 
@@ -110,11 +116,12 @@ def test_the_ranking_without_noise_shows_the_rms_itself():
     assert table.rows[0][2] == f"{found.candidates[0].held_out_rms:.2e}"
 
 
-def test_notes_are_a_column_of_their_own():
-    table = ranking_table(named(), with_notes=True)
+def test_notes_are_a_column_that_a_page_has_room_for():
+    table = ranking_table(named())
 
     assert table.heads[-1] == "note"
     assert table.rows[-1][-1] == "not fitted"
+    assert "not fitted" not in as_text([table])
 
 
 def test_every_recording_has_its_row():
@@ -124,8 +131,13 @@ def test_every_recording_has_its_row():
     assert len(rows) == 43
     first = found.gaps[0]
     values = (first.rms_given, first.rms_before, first.rms_after)
-    assert rows[0] == ("step_00", "step", "judge", *(f"{one:.2e}" for one in values))
-    assert rows[1][2] == "train"
+    assert rows[0] == (
+        "step_00",
+        "step",
+        "validation",
+        *(f"{one:.2e}" for one in values),
+    )
+    assert rows[1][2] == "training"
 
 
 def test_the_closing_sentences_end_once():
@@ -156,7 +168,7 @@ def test_the_screen_shows_everything_that_was_found(width):
         "Explained: 99.8 % of the excess",
         "noise 2.10e-05 m",
         "- The missing force follows the velocity: 55 %.",
-        "Trained on 6 recordings, judged on 3 held out.",
+        "Trained on 6 recordings, validated on 3 recordings held out.",
         "stiffness        1184       1210              1185  +0.1 %  N/m",
         "Next experiment: a slow triangle",
     ):
@@ -176,8 +188,9 @@ def test_a_set_of_effects_that_is_too_wide_goes_on_in_the_next_row():
     long = replace(found, candidates=found.candidates[6:7])
     lines = diagnosis_text(long, width=80).splitlines()
 
-    assert lines[-3].startswith("force_constant_saturation ")
-    assert lines[-2:] == ["  + asymmetric_friction", "  + second_mode"]
+    heads = next(n for n, line in enumerate(lines) if line.startswith("added to"))
+    assert lines[heads + 2].startswith("force_constant_saturation +")
+    assert lines[heads + 3 : heads + 5] == ["  asymmetric_friction +", "  second_mode"]
     assert "force_constant_saturation + asymmetric_friction" in diagnosis_text(
         long, width=140
     )
