@@ -73,7 +73,7 @@ def stages_table(plans: Sequence[StagePlan], cost: FitCost, workers: int) -> Tab
     columns = (
         *texts("stage"),
         Column("tasks", is_text=True, joint=" "),
-        *numbers("in the cache", "time"),
+        *numbers("cached", "time"),
     )
     return Table("What would run", columns, rows, notes)
 
