@@ -99,6 +99,5 @@ def show_coverage(
 
     scores = score_models(identified.fits, crossval)
     best = best_of_each(scores, crossval.identified_on)
-    rule = session.experiment.fit.initial_state
-    show(session, coverage_table(scores, crossval, initial_state=rule))
-    show(session, cross_table(cross_matrix(best, crossval), initial_state=rule))
+    show(session, coverage_table(scores, crossval))
+    show(session, cross_table(cross_matrix(best, crossval)))

@@ -60,11 +60,10 @@ def show_groups(session: "Session", search: "GroupSearch") -> None:
     from hwid_cli.cli.session import show
     from hwid_cli.report.groups import chain_table, join_table, levels_table
 
-    rule = session.experiment.fit.initial_state
     for level in search.levels[1:]:
-        show(session, join_table(search, level, initial_state=rule))
-    show(session, levels_table(search, initial_state=rule))
-    show(session, chain_table(search, initial_state=rule))
+        show(session, join_table(search, level))
+    show(session, levels_table(search))
+    show(session, chain_table(search))
 
 
 def _plan(session: "Session") -> "GroupPlan":

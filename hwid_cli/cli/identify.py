@@ -105,6 +105,5 @@ def show_fits(session: "Session", identified: Identified) -> None:
     show(session, table)
     left = own_residuals(identified.fits, identified.recordings, nk_role)
     if left:
-        rule = session.experiment.fit.initial_state
-        show(session, residual_table(left, initial_state=rule))
+        show(session, residual_table(left))
     show(session, *fits_ended(count_statuses(identified.fits), identified.fits))

@@ -80,8 +80,7 @@ def show_advice(session: "Session", advice: "OrderAdvice") -> None:
     from hwid_cli.cli.session import show
     from hwid_cli.report.orders import order_reasons, order_table
 
-    rule = session.experiment.fit.initial_state
-    show(session, order_table(advice, initial_state=rule), *order_reasons(advice))
+    show(session, order_table(advice), *order_reasons(advice))
 
 
 @once
@@ -137,8 +136,7 @@ def show_maps(session: "Session", advice: "MapAdvice | None") -> None:
 
     if advice is None:
         return
-    rule = session.experiment.fit.initial_state
-    show(session, map_table(advice, initial_state=rule), *map_reasons(advice))
+    show(session, map_table(advice), *map_reasons(advice))
 
 
 def _judging(

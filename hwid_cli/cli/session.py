@@ -121,8 +121,13 @@ def show(session: Session, *blocks: object) -> None:
     """Show tables and paragraphs to people, set off by a line."""
     from hwid_cli.report.table import as_text
 
-    names = session.experiment.thesis_names
-    say(session, "\n" + as_text(blocks, width=screen_width(), thesis_names=names))
+    text = as_text(
+        blocks,
+        width=screen_width(),
+        initial_state=session.experiment.fit.initial_state,
+        thesis_names=session.experiment.thesis_names,
+    )
+    say(session, f"\n{text}")
 
 
 def screen_width() -> int:

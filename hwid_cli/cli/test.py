@@ -153,7 +153,6 @@ def show_final_test(session: "Session", final: "FinalTest") -> None:
     from hwid_cli.store.group_results import read_group
     from hwid_cli.store.results import read_calibrated
 
-    rule = session.experiment.fit.initial_state
     if final.chain:
         recordings = read_calibrated(session.calibrated_path).recordings
         kinds = {recording.name: recording.kind for recording in recordings}
@@ -162,11 +161,11 @@ def show_final_test(session: "Session", final: "FinalTest") -> None:
         names = names_of_groups(read_group(session.results_path)) if is_asked else {}
         show(
             session,
-            final_test.chain_on_tests_table(final, trend, initial_state=rule),
-            final_test.chain_coverage_table(final, trend, names, initial_state=rule),
-            *final_test.chain_tables(final, trend, kinds, initial_state=rule),
+            final_test.chain_on_tests_table(final, trend),
+            final_test.chain_coverage_table(final, trend, names),
+            *final_test.chain_tables(final, trend, kinds),
         )
-    show(session, final_test.coverage_matrix_table(final, initial_state=rule))
+    show(session, final_test.coverage_matrix_table(final))
     show(session, *final_test.gap_sentences(final))
-    show(session, final_test.smallest_set_table(final, initial_state=rule))
-    show(session, final_test.prediction_table(final, initial_state=rule))
+    show(session, final_test.smallest_set_table(final))
+    show(session, final_test.prediction_table(final))

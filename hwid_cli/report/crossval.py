@@ -6,7 +6,6 @@ from hwid_cli.records.report import RmsdMatrix
 from hwid_cli.records.results import CrossValidation, ModelScore
 from hwid_cli.records.units import behind
 from hwid_cli.report.formats import number
-from hwid_cli.report.simulation_note import validation_note
 from hwid_cli.report.table import Cell, Column, Row, Table, numbers, texts
 from hwid_cli.report.thesis_names import thesis_name_of
 
@@ -14,20 +13,13 @@ from hwid_cli.report.thesis_names import thesis_name_of
 _SHOWN = 15
 
 
-def coverage_table(
-    scores: Sequence[ModelScore],
-    crossval: CrossValidation,
-    *,
-    initial_state: str | None,
-) -> Table:
+def coverage_table(scores: Sequence[ModelScore], crossval: CrossValidation) -> Table:
     """Show the models that cover the most recordings.
 
     Parameters
     ----------
     scores : sequence of ModelScore
         As ``ranking.score_models`` gives them.
-    initial_state : str or None
-        Rule of the fits; None on a page.
     """
     rows = tuple(
         (
@@ -49,17 +41,11 @@ def coverage_table(
         f"Models that cover the most recordings: RMSD below {crossval.threshold:g}"
         f"{behind(crossval.unit)}"
     )
-    how = validation_note(initial_state)
-    return Table(caption, columns, rows, how=how, published="T3.2.2.2-2")
+    return Table(caption, columns, rows, is_validation=True, published="T3.2.2.2-2")
 
 
-def cross_table(matrix: RmsdMatrix, *, initial_state: str | None) -> Table:
+def cross_table(matrix: RmsdMatrix) -> Table:
     """Show the widest model of each recording on all recordings.
-
-    Parameters
-    ----------
-    initial_state : str or None
-        Rule of the fits; None on a page.
 
     Returns
     -------
@@ -85,6 +71,6 @@ def cross_table(matrix: RmsdMatrix, *, initial_state: str | None) -> Table:
         caption,
         (*columns, Column("covers", stays=True)),
         rows,
-        how=validation_note(initial_state),
+        is_validation=True,
         published="T3.2.2.2-3",
     )

@@ -8,7 +8,6 @@ import numpy as np
 from hwid_cli.records.groups import ChainTrend, FinalTest, Prediction
 from hwid_cli.records.units import behind
 from hwid_cli.report.formats import MISSING, counted, decimals, number
-from hwid_cli.report.simulation_note import validation_note
 from hwid_cli.report.table import Cell, Column, Row, Table, Text, numbers, texts
 
 # Published tables of the chain on all recordings of a kind.
@@ -17,15 +16,8 @@ _FORMS = {"step": "T3.4.1-2", "sine": "T3.4.1-3"}
 _LONGEST_NAME = 36
 
 
-def chain_on_tests_table(
-    final: FinalTest, trend: ChainTrend, *, initial_state: str | None
-) -> Table:
+def chain_on_tests_table(final: FinalTest, trend: ChainTrend) -> Table:
     """Show the chain on the recordings that nothing else has used.
-
-    Parameters
-    ----------
-    initial_state : str or None
-        Rule of the fits; None on a page.
 
     Returns
     -------
@@ -39,7 +31,7 @@ def chain_on_tests_table(
         _chain_columns(final.tested_on, "mean"),
         _chain_rows(final, final.tested_on, last),
         (trend_sentence(trend),),
-        validation_note(initial_state),
+        is_validation=True,
         published="T3.3.3.4-1",
     )
 
@@ -68,11 +60,7 @@ def trend_sentence(trend: ChainTrend) -> str:
 
 
 def chain_coverage_table(
-    final: FinalTest,
-    trend: ChainTrend,
-    names: Mapping[str, str],
-    *,
-    initial_state: str | None,
+    final: FinalTest, trend: ChainTrend, names: Mapping[str, str]
 ) -> Table:
     """Show how many recordings the chain covers, level by level.
 
@@ -80,8 +68,6 @@ def chain_coverage_table(
     ----------
     names : mapping of str to str
         Of models in the thesis, by ours.
-    initial_state : str or None
-        Rule of the fits; None on a page.
     """
     rows = tuple(
         (model, *map(str, counts), str(total), names.get(model, MISSING))
@@ -97,17 +83,13 @@ def chain_coverage_table(
             Column("thesis's name", is_text=True, is_thesis=True),
         ),
         rows,
-        how=validation_note(initial_state),
+        is_validation=True,
         published="T3.4.1-1 and T3.4.2-1",
     )
 
 
 def chain_tables(
-    final: FinalTest,
-    trend: ChainTrend,
-    kinds: Mapping[str, str],
-    *,
-    initial_state: str | None,
+    final: FinalTest, trend: ChainTrend, kinds: Mapping[str, str]
 ) -> tuple[Table, ...]:
     """Show the chain on all recordings, kind by kind.
 
@@ -115,8 +97,6 @@ def chain_tables(
     ----------
     kinds : mapping of str to str
         Kind of each recording by its name.
-    initial_state : str or None
-        Rule of the fits; None on a page.
     """
     found = []
     for place, kind in enumerate(trend.kinds):
@@ -127,7 +107,7 @@ def chain_tables(
             f"{final.threshold:g}",
             _chain_columns(names, "covers"),
             _chain_rows(final, names, covers),
-            how=validation_note(initial_state),
+            is_validation=True,
             published=_FORMS.get(kind, ""),
         )
         found.append(table)
@@ -159,13 +139,8 @@ def _rmsd(value: float, final: FinalTest) -> Cell:
     return Cell(number(value), is_marked=bool(value < final.threshold))
 
 
-def coverage_matrix_table(final: FinalTest, *, initial_state: str | None) -> Table:
+def coverage_matrix_table(final: FinalTest) -> Table:
     """Show which model covers which recording.
-
-    Parameters
-    ----------
-    initial_state : str or None
-        Rule of the fits; None on a page.
 
     Returns
     -------
@@ -189,8 +164,9 @@ def coverage_matrix_table(final: FinalTest, *, initial_state: str | None) -> Tab
         f"Coverage of all models on all recordings: 1 RMSD below {final.threshold:g}"
         f"{behind(final.unit)}, . not, blank its own; a + adds to the model above it"
     )
-    how = validation_note(initial_state)
-    return Table(caption, columns, tuple(rows), how=how, published="T3.4.3-1")
+    return Table(
+        caption, columns, tuple(rows), is_validation=True, published="T3.4.3-1"
+    )
 
 
 def _short_names(final: FinalTest) -> list[str]:
@@ -226,14 +202,8 @@ def gap_sentences(final: FinalTest) -> tuple[Text, ...]:
     return tuple(map(Text, found))
 
 
-def smallest_set_table(final: FinalTest, *, initial_state: str | None) -> Table | Text:
-    """Show the smallest set of models and what each serves.
-
-    Parameters
-    ----------
-    initial_state : str or None
-        Rule of the fits; None on a page.
-    """
+def smallest_set_table(final: FinalTest) -> Table | Text:
+    """Show the smallest set of models and what each serves."""
     if not final.smallest_set:
         return Text("No model covers any recording, so no set of models is of use.")
     rows = []
@@ -254,7 +224,7 @@ def smallest_set_table(final: FinalTest, *, initial_state: str | None) -> Table 
             Column("recordings", is_text=True, joint=", "),
         ),
         tuple(rows),
-        how=validation_note(initial_state),
+        is_validation=True,
         published="T3.4.3-2",
     )
 
@@ -296,14 +266,8 @@ def _of(final: FinalTest, model: str, column: int) -> Cell:
     return _rmsd(final.rmsd[final.models.index(model), column], final)
 
 
-def prediction_table(final: FinalTest, *, initial_state: str | None) -> Table:
-    """Show which model the input alone tells to use, and how that went.
-
-    Parameters
-    ----------
-    initial_state : str or None
-        Rule of the fits; None on a page.
-    """
+def prediction_table(final: FinalTest) -> Table:
+    """Show which model the input alone tells to use, and how that went."""
     labels = {model: f"M{n}" for n, model in enumerate(final.smallest_set, 1)}
 
     def model(name: str) -> Cell:
@@ -338,7 +302,7 @@ def prediction_table(final: FinalTest, *, initial_state: str | None) -> Table:
         f"RMSD [{final.unit}], * covered; models fitted to the recording itself are left out"
     )
     notes = (prediction_sentence(final),)
-    return Table(caption, columns, rows, notes, validation_note(initial_state))
+    return Table(caption, columns, rows, notes, is_validation=True)
 
 
 def _verdict(told: Prediction) -> str:

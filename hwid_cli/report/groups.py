@@ -3,7 +3,7 @@
 from hwid_cli.records.groups import Group, GroupSearch
 from hwid_cli.records.units import behind
 from hwid_cli.report.formats import MISSING, number, with_unit
-from hwid_cli.report.simulation_note import joined_note, validation_note
+from hwid_cli.report.simulation_note import joined_note
 from hwid_cli.report.table import Cell, Column, Row, Table, Text, numbers, texts
 
 NOTHING_COVERED = "no group covers any recording."
@@ -12,14 +12,8 @@ NOTHING_COVERED = "no group covers any recording."
 _PUBLISHED = {2: "T3.3.3.1-2", 3: "T3.3.3.2-2", 4: "T3.3.3.3-2"}
 
 
-def levels_table(search: GroupSearch, *, initial_state: str | None) -> Table:
-    """Show what each level tried, filtered and kept.
-
-    Parameters
-    ----------
-    initial_state : str or None
-        Rule of the fits; None on a page.
-    """
+def levels_table(search: GroupSearch) -> Table:
+    """Show what each level tried, filtered and kept."""
     rows = []
     for level in search.levels:
         groups = [one for one in search.groups if one.level == level]
@@ -47,19 +41,17 @@ def levels_table(search: GroupSearch, *, initial_state: str | None) -> Table:
         caption,
         numbers(*heads, "reach it", "go on"),
         tuple(rows),
-        how=validation_note(initial_state),
+        is_validation=True,
     )
 
 
-def join_table(search: GroupSearch, level: int, *, initial_state: str | None) -> Table:
+def join_table(search: GroupSearch, level: int) -> Table:
     """Show the coverage of every join of a level, base by add-on.
 
     Parameters
     ----------
     level : int, [-]
         Recordings in the groups, at least 2.
-    initial_state : str or None
-        Rule of the fits; None on a page.
 
     Returns
     -------
@@ -86,7 +78,7 @@ def join_table(search: GroupSearch, level: int, *, initial_state: str | None) ->
         caption,
         (*texts("base"), *numbers(*add_ons), Column("widest", stays=True)),
         rows,
-        how=validation_note(initial_state),
+        is_validation=True,
         published=_PUBLISHED.get(level, ""),
     )
 
@@ -111,14 +103,8 @@ def _join_cell(group: Group | None, search: GroupSearch) -> Cell:
     )
 
 
-def chain_table(search: GroupSearch, *, initial_state: str | None) -> Table | Text:
-    """Show the winner and what it grew from, level by level: the chain of groups.
-
-    Parameters
-    ----------
-    initial_state : str or None
-        Rule of the fits; None on a page.
-    """
+def chain_table(search: GroupSearch) -> Table | Text:
+    """Show the winner and what it grew from, level by level: the chain of groups."""
     if not search.chain:
         return Text(f"No group covers anything: {search.reason}.")
     rows = tuple(
@@ -131,9 +117,8 @@ def chain_table(search: GroupSearch, *, initial_state: str | None) -> Table | Te
         for one in search.chain_groups
     )
     columns = (*texts("model"), *numbers("covers", "own RMSD", "validation RMSD"))
-    how = validation_note(initial_state)
-    if initial_state is not None:
-        how += (joined_note(initial_state, search.join),)
+    rules = dict.fromkeys(one.options.initial_state for one in search.fits if one)
+    how = tuple(joined_note(rule, search.join) for rule in rules)
     note = (
         "What a model covers, and its validation RMSD, which pools all samples, include "
         f"the recordings of its own fit. The search stopped: {search.reason}."
@@ -141,4 +126,4 @@ def chain_table(search: GroupSearch, *, initial_state: str | None) -> Table | Te
     caption = (
         f"The chain of groups, from one recording to the winner: RMSD [{search.unit}]"
     )
-    return Table(caption, columns, rows, (note,), how)
+    return Table(caption, columns, rows, (note,), how, is_validation=True)

@@ -8,7 +8,6 @@ from hwid_cli.records.order import (
     OrderChoice,
 )
 from hwid_cli.report.formats import MISSING, counted, decimals, number
-from hwid_cli.report.simulation_note import validation_note
 from hwid_cli.report.table import Table, Text, numbers, texts
 
 # Maps that are shown; maps.csv has all.
@@ -75,14 +74,8 @@ def _left_out(judgement: Judgement) -> tuple[str, ...]:
     return tuple(found)
 
 
-def map_table(advice: MapAdvice, *, initial_state: str | None) -> Table:
-    """Show the pairs of maps that predict best, that to take and that of the configuration.
-
-    Parameters
-    ----------
-    initial_state : str or None
-        Rule of the fits; None on a page.
-    """
+def map_table(advice: MapAdvice) -> Table:
+    """Show the pairs of maps that predict best, that to take and that of the configuration."""
     lowest = min(one.bic for one in advice.candidates)
     rows = tuple(
         (
@@ -107,7 +100,7 @@ def map_table(advice: MapAdvice, *, initial_state: str | None) -> Table:
         *texts("", "input map", "output map"),
         *numbers("p", "RMSD", "factor", "BIC"),
     )
-    return Table(caption, columns, rows, how=validation_note(initial_state))
+    return Table(caption, columns, rows, is_validation=True)
 
 
 def map_reasons(advice: MapAdvice) -> tuple[Text, ...]:
@@ -160,14 +153,8 @@ def _map(kind: str, units: int) -> str:
     return f"{words}, {units}" if units else words
 
 
-def order_table(advice: OrderAdvice, *, initial_state: str | None) -> Table:
-    """Show the recommended orders, over all recordings and for each.
-
-    Parameters
-    ----------
-    initial_state : str or None
-        Rule of the fits; None on a page.
-    """
+def order_table(advice: OrderAdvice) -> Table:
+    """Show the recommended orders, over all recordings and for each."""
     seen = {one.recording: (one.delay, one.n_poles) for one in advice.responses}
     seen[""] = (advice.delay, advice.n_poles)
     rows = []
@@ -193,7 +180,7 @@ def order_table(advice: OrderAdvice, *, initial_state: str | None) -> Table:
     )
     heads = ("take", "RMSD", "factor", "best", "AIC", "BIC", "delay <=", "poles")
     columns = (*texts("models of"), *numbers(*heads))
-    return Table(caption, columns, tuple(rows), how=validation_note(initial_state))
+    return Table(caption, columns, tuple(rows), is_validation=True)
 
 
 def order_reasons(advice: OrderAdvice) -> tuple[Text, ...]:

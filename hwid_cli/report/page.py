@@ -8,7 +8,9 @@ from typing import ClassVar
 
 from matplotlib.figure import Figure
 
+from hwid_cli.records.report import ReportContents
 from hwid_cli.report.figures.style import DOTS, as_png
+from hwid_cli.report.simulation_note import HUBER_NOTE, simulation_note
 from hwid_cli.report.table import Code, Heading, Table, Text
 
 
@@ -119,6 +121,29 @@ def images_of(blocks: tuple[Block, ...]) -> tuple[Image, ...]:
         elif isinstance(block, Pairs):
             found += images_of(block.figures)
     return tuple(found)
+
+
+def section_notes(contents: ReportContents, *, is_validation: bool) -> list[Text]:
+    """Say how the models of a section were fitted and simulated.
+
+    Parameters
+    ----------
+    is_validation : bool
+        As for ``simulation_note``.
+
+    Returns
+    -------
+    list of Text
+        None where there are no models.
+    """
+    fits = list(contents.stored.fits)
+    if contents.stored.search is not None:
+        fits += [one for one in contents.stored.search.fits if one is not None]
+    rules = dict.fromkeys(one.options.initial_state for one in fits)
+    notes = [simulation_note(rule, is_validation=is_validation) for rule in rules]
+    if any(one.options.loss == "huber" for one in fits):
+        notes.append(HUBER_NOTE)
+    return [Text(one, is_note=True) for one in notes]
 
 
 def folded_beyond(most: int, table: Table, summary: str) -> Table | Folded:

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 
 from hwid_cli.records.residuals import ModelResiduals, ResidualTests
 from hwid_cli.report.formats import MISSING, counted, with_unit
-from hwid_cli.report.simulation_note import simulation_note
 from hwid_cli.report.table import Column, Table, texts
 
 # Below this a p value says no more, and models whose flat directions are shown.
@@ -50,15 +49,8 @@ def p_value(value: float) -> str:
     return "p < 0.001" if value < _LEAST_P else f"p = {value:.2g}"
 
 
-def residual_table(
-    found: Sequence[ModelResiduals], *, initial_state: str | None
-) -> Table:
+def residual_table(found: Sequence[ModelResiduals]) -> Table:
     """Show what the tests say of the residuals of some models.
-
-    Parameters
-    ----------
-    initial_state : str or None
-        Rule of the fits; None on a page.
 
     Returns
     -------
@@ -95,10 +87,8 @@ def residual_table(
         "(p: probability that chance alone gives correlations as large) or not, and what the "
         "model misses"
     )
-    how: tuple[str, ...] = ()
-    if initial_state is not None:
-        how = (simulation_note(initial_state, is_validation=False),)
-    return Table(caption, columns, rows, _not_identifiable(found), how)
+    notes = _not_identifiable(found)
+    return Table(caption, columns, rows, notes, is_validation=False)
 
 
 def _not_identifiable(found: Sequence[ModelResiduals]) -> tuple[str, ...]:

@@ -4,9 +4,6 @@ Prediction or simulation, and from which state, decides what an RMSD means; ever
 and figure of fits says it in these words.
 """
 
-from hwid_cli.records.report import ReportContents
-from hwid_cli.report.table import Text
-
 # What numbers of fits that bear outliers still count.
 HUBER_NOTE = (
     "Fitted with Huber's loss; RMSD and fit % count outliers in full, criteria do not."
@@ -52,42 +49,6 @@ def simulation_note(initial_state: str, *, is_validation: bool) -> str:
     """
     start = (_VALIDATED if is_validation else _OWN)[initial_state]
     return f"Free-run simulation, no prediction; {start}."
-
-
-def validation_note(initial_state: str | None) -> tuple[str, ...]:
-    """Say the same of validations, for ``Table.how``.
-
-    Parameters
-    ----------
-    initial_state : str or None
-        None on a page, where ``section_notes`` says it.
-    """
-    if initial_state is None:
-        return ()
-    return (simulation_note(initial_state, is_validation=True),)
-
-
-def section_notes(contents: ReportContents, *, is_validation: bool) -> list[Text]:
-    """Say how the models of a section were fitted and simulated.
-
-    Parameters
-    ----------
-    is_validation : bool
-        As for ``simulation_note``.
-
-    Returns
-    -------
-    list of Text
-        None where there are no models.
-    """
-    fits = list(contents.stored.fits)
-    if contents.stored.search is not None:
-        fits += [one for one in contents.stored.search.fits if one is not None]
-    rules = dict.fromkeys(one.options.initial_state for one in fits)
-    notes = [simulation_note(rule, is_validation=is_validation) for rule in rules]
-    if any(one.options.loss == "huber" for one in fits):
-        notes.append(HUBER_NOTE)
-    return [Text(one, is_note=True) for one in notes]
 
 
 def joined_note(initial_state: str, join: str) -> str:

@@ -9,6 +9,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
+from hwid_cli.report.simulation_note import simulation_note
+
 # Characters in a line where no terminal says otherwise.
 WIDTH = 80
 _GAP = "  "
@@ -129,6 +131,9 @@ class Table:
     how : tuple of str
         How the numbers were got: beneath the caption on the screen. A section of a page
         says it once for all of its tables and figures.
+    is_validation : bool or None
+        Whether models are simulated after their fit, as for ``simulation_note``, which
+        stands above ``how``; None where that says it all, or nothing is simulated.
     published : str
         The thesis's table whose form it has, if any.
     mark : str
@@ -141,6 +146,7 @@ class Table:
     rows: tuple[Row, ...]
     notes: tuple[str, ...] = ()
     how: tuple[str, ...] = ()
+    is_validation: bool | None = None
     published: str = ""
     mark: str = "*"
 
@@ -176,7 +182,11 @@ def shown_part(table: Table, *, is_screen: bool, thesis_names: bool) -> Table:
 
 
 def as_text(
-    blocks: Sequence[object], *, width: int = WIDTH, thesis_names: bool = False
+    blocks: Sequence[object],
+    *,
+    width: int = WIDTH,
+    initial_state: str = "",
+    thesis_names: bool = False,
 ) -> str:
     """Show paragraphs and tables as plain text, for a screen, a file and a pipe.
 
@@ -186,6 +196,8 @@ def as_text(
     width : int, [characters]
         Of a line. What a table has too much stands in further blocks beneath; a single
         column may be wider.
+    initial_state : str
+        Rule of the fits, which tables of simulations name; empty where there are none.
     thesis_names : bool
         Whether the reader asked for the thesis's names.
 
@@ -204,6 +216,9 @@ def as_text(
     for block in blocks:
         if isinstance(block, Table):
             part = shown_part(block, is_screen=True, thesis_names=thesis_names)
+            if initial_state and part.is_validation is not None:
+                note = simulation_note(initial_state, is_validation=part.is_validation)
+                part = replace(part, how=(note, *part.how))
             text = _table_text(part, width)
         elif isinstance(block, Text):
             text = _paragraph(block.text, width, "  ")

@@ -91,6 +91,21 @@ def test_the_published_tables_are_shown(first_run):
     assert "Right for " in said
 
 
+def test_every_table_says_how_its_models_start(first_run):
+    note = (
+        "Free-run simulation, no prediction; initial state estimated on each recording."
+    )
+    captions = ("The chain on ", "Recordings that the chain ", "Coverage of all ")
+    captions += ("Fewest models that cover ", "Model for a recording ")
+    found = [
+        block for block in first_run[1].split("\n\n") if block.startswith(captions)
+    ]
+
+    assert len(found) > len(captions)
+    for block in found:
+        assert note in block.splitlines()
+
+
 def test_without_groups_the_single_models_are_judged(again, edit, out):
     edit(GROUP, "")
     result = again()

@@ -22,7 +22,7 @@ def rows_of(text):
 
 
 def test_the_smallest_set_serves_every_recording_once():
-    text = as_text([smallest_set_table(FINAL, initial_state="estimated")])
+    text = as_text([smallest_set_table(FINAL)])
     number = len(FINAL.smallest_set)
 
     assert f"{number} of 38 models for 38 of 38 recordings" in " ".join(text.split())
@@ -46,7 +46,7 @@ def test_the_smallest_set_serves_every_recording_once():
 def test_what_the_set_serves_without_covering_bears_no_mark():
     last = FINAL.rmsd.copy()
     last[:, -1] = 0.5
-    table = smallest_set_table(replace(FINAL, rmsd=last), initial_state=None)
+    table = smallest_set_table(replace(FINAL, rmsd=last))
     served = " ".join(row[-1] for row in table.rows)
 
     assert "sine_23*" not in served
@@ -54,13 +54,13 @@ def test_what_the_set_serves_without_covering_bears_no_mark():
 
 
 def test_without_a_set_it_is_said_that_there_is_none():
-    found = smallest_set_table(replace(FINAL, smallest_set=()), initial_state=None)
+    found = smallest_set_table(replace(FINAL, smallest_set=()))
 
     assert found.text == "No model covers any recording, so no set of models is of use."
 
 
 def test_the_predictions_show_what_was_chosen_and_what_was_best():
-    text = as_text([prediction_table(FINAL, initial_state="estimated")])
+    text = as_text([prediction_table(FINAL)])
     labels = {model: f"M{n}" for n, model in enumerate(FINAL.smallest_set, 1)}
     rows = {line.split()[0]: line for line in rows_of(text)[: len(FINAL.recordings)]}
 
@@ -92,7 +92,7 @@ def test_a_page_says_of_each_prediction_how_it_went():
         replace(wrong, is_right=False, is_possible=True),
         replace(without, is_right=False, is_possible=False),
     )
-    table = prediction_table(replace(FINAL, predictions=told), initial_state=None)
+    table = prediction_table(replace(FINAL, predictions=told))
     verdict = table.heads.index("verdict")
 
     assert [row[verdict] for row in table.rows] == [
@@ -106,7 +106,7 @@ def test_no_model_to_choose_from_is_a_dash():
         "step_01", "", np.nan, "", np.nan, "", np.nan, is_right=False, is_possible=False
     )
     final = replace(FINAL, predictions=(nothing, *FINAL.predictions[1:]))
-    row = rows_of(as_text([prediction_table(final, initial_state="estimated")]))[0]
+    row = rows_of(as_text([prediction_table(final)]))[0]
 
     assert row.split() == ["step_01", "-", "-", "-", "-", "-", "-"]
 

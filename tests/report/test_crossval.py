@@ -32,11 +32,11 @@ def assert_fits_the_screen(text):
 
 
 def coverage_text(scores, crossval, **how):
-    return as_text([coverage_table(scores, crossval, initial_state="zero")], **how)
+    return as_text([coverage_table(scores, crossval)], **how)
 
 
 def cross_text(scores, crossval):
-    table = cross_table(cross_matrix(scores, crossval), initial_state="zero")
+    table = cross_table(cross_matrix(scores, crossval))
     return as_text([table])
 
 
@@ -65,7 +65,7 @@ def test_the_delay_that_was_found_stands_in_the_name():
 def test_the_coverage_table_shows_the_first_models_only():
     text = coverage_text(2 * SCORES, CROSSVAL, thesis_names=True)
 
-    rows = text.splitlines()[4:]
+    rows = text.splitlines()[3:]
     assert len(rows) == 15
     assert rows[3].split() == [
         "step_04", "10", "10", "7", "of", "15", "1.23e-04", "NLHW-Step-4-10-10-1",

@@ -28,7 +28,7 @@ def widest_line(text):
 
 
 def test_the_chain_on_the_tests_shows_each_rmsd_and_the_mean():
-    table = chain_on_tests_table(FINAL, TREND, initial_state="estimated")
+    table = chain_on_tests_table(FINAL, TREND)
     text = as_text([table], thesis_names=True)
     last = next(line for line in text.splitlines() if line.startswith(WINNER))
 
@@ -60,7 +60,7 @@ def test_the_trend_is_told_in_words(values, expected):
 
 
 def test_the_chain_covers_kind_by_kind():
-    table = chain_coverage_table(FINAL, TREND, {WINNER: "W"}, initial_state=None)
+    table = chain_coverage_table(FINAL, TREND, {WINNER: "W"})
     steps, sines = TREND.coverage[-1]
     counts = [WINNER, str(steps), str(sines), str(steps + sines)]
 
@@ -74,7 +74,7 @@ def test_the_chain_covers_kind_by_kind():
 
 
 def test_the_chain_is_shown_on_every_recording_once():
-    tables = chain_tables(FINAL, TREND, KINDS, initial_state="estimated")
+    tables = chain_tables(FINAL, TREND, KINDS)
     text = as_text(tables, thesis_names=True)
 
     for name in FINAL.recordings:
@@ -87,7 +87,7 @@ def test_the_chain_is_shown_on_every_recording_once():
 
 
 def matrix_text(final, width=80):
-    return as_text([coverage_matrix_table(final, initial_state=None)], width=width)
+    return as_text([coverage_matrix_table(final)], width=width)
 
 
 def matrix_lines(final):
@@ -201,14 +201,14 @@ def test_long_names_of_groups_stand_beneath_the_table_once():
         chain=tuple(longer.values()),
     )
     trend = chain_trend(final, KINDS)
-    table = chain_on_tests_table(final, trend, initial_state="estimated")
+    table = chain_on_tests_table(final, trend)
     lines = as_text([table]).splitlines()
 
     assert f"C1: {final.chain[0]}" in lines
     assert sum(final.chain[-1] in line for line in lines) == 1
     # All test recordings stand in one block.
     assert sum(line.startswith("model") for line in lines) == 1
-    tables = chain_tables(final, trend, KINDS, initial_state="estimated")
+    tables = chain_tables(final, trend, KINDS)
     assert "\nC1 " in as_text(tables)
     # A page has room for the names themselves.
     assert tables[0].rows[0][0].text == final.chain[0]

@@ -50,7 +50,7 @@ def cells(line):
 
 def test_a_level_is_shown_base_by_add_on():
     lines = as_text(
-        [join_table(search(), 2, initial_state=RULE)], thesis_names=True
+        [join_table(search(), 2)], initial_state=RULE, thesis_names=True
     ).splitlines()
 
     assert "of 3" in lines[0]
@@ -62,7 +62,7 @@ def test_a_level_is_shown_base_by_add_on():
 
 def test_a_wide_level_is_shown_in_blocks():
     lines = as_text(
-        [join_table(search(), 2, initial_state=RULE)], width=22
+        [join_table(search(), 2)], initial_state=RULE, width=22
     ).splitlines()
 
     assert [cells(line) for line in lines if line.startswith("base")] == [
@@ -74,14 +74,14 @@ def test_a_wide_level_is_shown_in_blocks():
 def test_an_asterisk_marks_what_goes_on():
     kept = search()
     groups = (*kept.groups[:-1], group("s3+s2", 3, is_kept=True))
-    text = as_text([join_table(search(groups=groups), 2, initial_state=RULE)])
+    text = as_text([join_table(search(groups=groups), 2)])
 
     assert text.count("3*") == 1
 
 
 def test_each_level_counts_what_was_fitted_filtered_and_kept():
     lines = as_text(
-        [levels_table(search(), initial_state=RULE)], thesis_names=True
+        [levels_table(search())], initial_state=RULE, thesis_names=True
     ).splitlines()
 
     assert cells(lines[-2]) == [
@@ -94,7 +94,7 @@ def test_each_level_counts_what_was_fitted_filtered_and_kept():
 
 
 def test_the_chain_is_shown_with_the_reason_to_stop():
-    text = as_text([chain_table(search(), initial_state=RULE)], width=200)
+    text = as_text([chain_table(search())], width=200)
 
     assert "s2/3/7" in text
     assert "s2+s3/3/7" in text
@@ -105,8 +105,6 @@ def test_the_chain_is_shown_with_the_reason_to_stop():
 
 
 def test_a_search_that_found_nothing_says_so():
-    found = chain_table(
-        search(chain=(), reason="no group passes group.keep"), initial_state=RULE
-    )
+    found = chain_table(search(chain=(), reason="no group passes group.keep"))
 
     assert found.text == "No group covers anything: no group passes group.keep."

@@ -237,7 +237,7 @@ def test_what_the_thesis_calls_things_is_on_a_page_that_asks_for_it(contents):
 
 def test_a_page_shows_the_tables_of_the_screen_with_details_and_notes(page, contents):
     heads = re.findall(r'<th scope="col"[^>]*>(.*?)</th>', page.html)
-    table = chain_table(contents.stored.search, initial_state=None)
+    table = chain_table(contents.stored.search)
 
     assert {*table.heads, "reach it", "linear RMSD"} <= set(heads)
     # Only a page has room for these.

@@ -32,7 +32,7 @@ def said(**changes):
 
 @pytest.mark.parametrize("rule", ["zero", "steady", "estimated"])
 def test_the_best_come_first_and_those_of_the_configuration_are_there(rule):
-    lines = as_text([map_table(ADVICE, initial_state=rule)]).splitlines()
+    lines = as_text([map_table(ADVICE)], initial_state=rule).splitlines()
     heads = next(n for n, line in enumerate(lines) if "input map" in line)
     rows = lines[heads + 2 :]
 

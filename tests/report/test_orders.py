@@ -35,7 +35,7 @@ def said(**changes):
 
 @pytest.mark.parametrize("rule", ["zero", "steady", "estimated"])
 def test_the_table_has_a_row_for_each_and_says_how_models_start(rule):
-    lines = as_text([order_table(ADVICE, initial_state=rule)]).splitlines()
+    lines = as_text([order_table(ADVICE)], initial_state=rule).splitlines()
 
     assert lines[-1].split()[:3] == ["all", "together", "2/3"]
     assert lines[-2].split() == [

@@ -47,7 +47,7 @@ def test_a_missing_lag_is_named():
 def test_the_table_says_what_is_not_identifiable_and_how_fits_start():
     flat = ("not identifiable: b[0], because of this", "another")
     found = [left("step_06/3/7", flat)]
-    lines = as_text([residual_table(found, initial_state="steady")]).splitlines()
+    lines = as_text([residual_table(found)], initial_state="steady").splitlines()
 
     assert lines[-1].endswith("because of this (1 more).")
     assert lines[-2].startswith("step_06/3/7  white (p = ")
@@ -57,13 +57,11 @@ def test_the_table_says_what_is_not_identifiable_and_how_fits_start():
 
 def test_only_a_few_models_tell_what_is_not_identifiable():
     found = [left(f"s{n}/1/1", ("flat: b",)) for n in range(9)]
-    text = " ".join(residual_table(found, initial_state="zero").notes)
+    text = " ".join(residual_table(found).notes)
 
     assert text.count("flat: b") == 5
     assert "in 4 more models" in text
-    assert "in 1 more model:" in str(
-        residual_table(found[:6], initial_state=None).notes
-    )
+    assert "in 1 more model:" in str(residual_table(found[:6]).notes)
 
 
 def test_the_section_has_a_row_and_a_figure_for_each_recording(contents):

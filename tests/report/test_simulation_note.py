@@ -46,24 +46,24 @@ def started(rule):
 
 
 VALIDATED = {
-    "coverage": lambda rule: coverage_table(SCORES, CROSSVAL, initial_state=rule),
-    "cross": lambda rule: cross_table(CROSS, initial_state=rule),
-    "levels": lambda rule: levels_table(SEARCH, initial_state=rule),
-    "joins": lambda rule: join_table(SEARCH, 2, initial_state=rule),
-    "chain": lambda rule: chain_table(SEARCH, initial_state=rule),
-    "on tests": lambda rule: chain_on_tests_table(FINAL, TREND, initial_state=rule),
-    "kinds": lambda rule: chain_coverage_table(FINAL, TREND, {}, initial_state=rule),
-    "on all": lambda rule: chain_tables(FINAL, TREND, KINDS, initial_state=rule)[0],
-    "matrix": lambda rule: coverage_matrix_table(FINAL, initial_state=rule),
-    "set": lambda rule: smallest_set_table(ASSIGNED, initial_state=rule),
-    "told": lambda rule: prediction_table(ASSIGNED, initial_state=rule),
+    "coverage": coverage_table(SCORES, CROSSVAL),
+    "cross": cross_table(CROSS),
+    "levels": levels_table(SEARCH),
+    "joins": join_table(SEARCH, 2),
+    "chain": chain_table(SEARCH),
+    "on tests": chain_on_tests_table(FINAL, TREND),
+    "kinds": chain_coverage_table(FINAL, TREND, {}),
+    "on all": chain_tables(FINAL, TREND, KINDS)[0],
+    "matrix": coverage_matrix_table(FINAL),
+    "set": smallest_set_table(ASSIGNED),
+    "told": prediction_table(ASSIGNED),
 }
 
 
 @pytest.mark.parametrize("rule", RULES)
 @pytest.mark.parametrize("table", VALIDATED)
 def test_every_table_of_validations_says_how_models_start(table, rule):
-    text = as_text([VALIDATED[table](rule)])
+    text = as_text([VALIDATED[table]], initial_state=rule)
     words = simulation_note(rule, is_validation=True)
 
     assert words in text.splitlines()
@@ -109,7 +109,7 @@ def test_the_table_of_the_best_models_says_how_their_fits_start(rule):
 def test_the_chain_of_groups_says_how_joined_recordings_start(join, words):
     search = replace(SEARCH, join=join)
 
-    assert words in chain_table(search, initial_state="estimated").how[1]
+    assert words in chain_table(search).how[0]
 
 
 def test_a_section_of_fits_that_bear_outliers_says_so(contents):

@@ -6,8 +6,7 @@ from hwid_cli.records.report import ReportContents, RmsdMatrix
 from hwid_cli.report.crossval import coverage_table, cross_table
 from hwid_cli.report.figures.matrices import rmsd_matrix_figure
 from hwid_cli.report.formats import counted, listed, with_unit
-from hwid_cli.report.page import Block, Figures, Folded, Section, drawn
-from hwid_cli.report.simulation_note import section_notes
+from hwid_cli.report.page import Block, Figures, Folded, Section, drawn, section_notes
 from hwid_cli.report.table import Text
 
 
@@ -30,13 +29,13 @@ def crossval_section(contents: ReportContents) -> Section:
             "of the fit, the line in the colour bar the threshold."
         )
         blocks.append(Figures((figure,), sentence))
-        widest = cross_table(matrix, initial_state=None)
+        widest = cross_table(matrix)
         blocks.append(
             Folded("The widest model of each recording as a table", (widest,))
         )
         if contents.scores and contents.stored.crossval is not None:
             found = contents.stored.crossval
-            table = coverage_table(contents.scores, found, initial_state=None)
+            table = coverage_table(contents.scores, found)
             blocks.append(Folded("The models that cover the most recordings", (table,)))
     title = "Cross-validation: the widest model of each recording"
     return Section("crossval", title, "Cross-validation", tuple(blocks))

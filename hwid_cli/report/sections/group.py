@@ -10,8 +10,7 @@ from hwid_cli.report.groups import (
     join_table,
     levels_table,
 )
-from hwid_cli.report.page import Block, Figures, Folded, Section, drawn
-from hwid_cli.report.simulation_note import section_notes
+from hwid_cli.report.page import Block, Figures, Folded, Section, drawn, section_notes
 from hwid_cli.report.table import Text
 
 _JOINS = {
@@ -30,10 +29,10 @@ def groups_section(contents: ReportContents) -> Section:
         joined = _JOINS.get(search.join, search.join)
         blocks.append(Text(f"Recordings are joined {joined}. {_stop(search)}"))
         blocks += section_notes(contents, is_validation=True)
-        blocks += [_tree(search), chain_table(search, initial_state=None)]
-        blocks += [_histogram(search), levels_table(search, initial_state=None)]
+        blocks += [_tree(search), chain_table(search)]
+        blocks += [_histogram(search), levels_table(search)]
         for level in search.levels[1:]:
-            table = join_table(search, level, initial_state=None)
+            table = join_table(search, level)
             blocks.append(
                 Folded(f"Coverage on level {level}: base and add-on", (table,))
             )

@@ -9,9 +9,16 @@ from hwid_cli.report.figures.recordings import simulation_figure
 from hwid_cli.report.figures.residuals import residuals_figure
 from hwid_cli.report.fits import best_models_table
 from hwid_cli.report.formats import counted, listed, percent, with_unit
-from hwid_cli.report.page import Block, Figures, Folded, Section, drawn, file_names
+from hwid_cli.report.page import (
+    Block,
+    Figures,
+    Folded,
+    Section,
+    drawn,
+    file_names,
+    section_notes,
+)
 from hwid_cli.report.residuals import residual_table, residual_verdict
-from hwid_cli.report.simulation_note import section_notes
 from hwid_cli.report.table import Text
 
 # Figures that are shown open; all others are folded.
@@ -112,7 +119,7 @@ def residuals_section(contents: ReportContents) -> Section:
             for one in tested
             if one.tests is not None
         ]
-        blocks.append(residual_table(found, initial_state=None))
+        blocks.append(residual_table(found))
         files = file_names([one.recording.name for one in tested], ("",))
         shown = [_residuals(one, files[one.recording.name]) for one in tested]
         blocks += shown[:_MOST_RESIDUALS]

@@ -6,8 +6,14 @@ from hwid_cli.records.report import ModelView, ReportContents
 from hwid_cli.report.figures.models import bode_figure, maps_figure, poles_figure
 from hwid_cli.report.formats import counted, with_unit
 from hwid_cli.report.groups import NOTHING_COVERED
-from hwid_cli.report.page import Block, Figures, Section, drawn, file_names
-from hwid_cli.report.simulation_note import section_notes
+from hwid_cli.report.page import (
+    Block,
+    Figures,
+    Section,
+    drawn,
+    file_names,
+    section_notes,
+)
 from hwid_cli.report.table import Heading, Text
 
 # What the files of a model's figures end with.

@@ -4,8 +4,7 @@ from hwid_cli.records.report import ChainOnTests, ReportContents
 from hwid_cli.report.fits import fits_status
 from hwid_cli.report.formats import MISSING, counted, listed, with_unit
 from hwid_cli.report.groups import NOTHING_COVERED
-from hwid_cli.report.page import Block, Folded, Section, folded_beyond
-from hwid_cli.report.simulation_note import section_notes
+from hwid_cli.report.page import Block, Folded, Section, folded_beyond, section_notes
 from hwid_cli.report.table import Cell, Code, Table, Text, numbers, texts
 
 # Characters of a hash that tell files and runs apart for the eye.

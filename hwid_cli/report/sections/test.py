@@ -23,8 +23,8 @@ from hwid_cli.report.page import (
     Section,
     drawn,
     folded_beyond,
+    section_notes,
 )
-from hwid_cli.report.simulation_note import section_notes
 from hwid_cli.report.table import Text
 from hwid_cli.report.thesis_names import names_of_groups
 
@@ -69,11 +69,11 @@ def _chain(contents: ReportContents) -> list[Block]:
     kinds = {one.name: one.kind for one in stored.recordings}
     names = names_of_groups(stored.search)
     tables = (
-        chain_on_tests_table(final, trend, initial_state=None),
-        *chain_tables(final, trend, kinds, initial_state=None),
+        chain_on_tests_table(final, trend),
+        *chain_tables(final, trend, kinds),
     )
     return [
-        chain_coverage_table(final, trend, names, initial_state=None),
+        chain_coverage_table(final, trend, names),
         Folded("The RMSD along the chain as tables", tables),
     ]
 
@@ -102,7 +102,7 @@ def coverage_section(contents: ReportContents) -> Section:
         figure = drawn("coverage/matrix", rmsd_matrix_figure(matrix), alt)
         blocks.append(Figures((figure,), _matrix_sentence(matrix)))
         blocks += gap_sentences(final)
-        table = coverage_matrix_table(final, initial_state=None)
+        table = coverage_matrix_table(final)
         blocks.append(Folded("The coverage as a table", (table,)))
     title = "Coverage: all models on all recordings"
     return Section("coverage", title, "Coverage", tuple(blocks))
@@ -132,7 +132,7 @@ def assignment_section(contents: ReportContents) -> Section:
     else:
         if final.smallest_set:
             blocks += section_notes(contents, is_validation=True)
-        blocks.append(smallest_set_table(final, initial_state=None))
+        blocks.append(smallest_set_table(final))
         of = counted(len(final.recordings), "recording")
         table = assignment_table(final)
         blocks.append(folded_beyond(_MOST_OPEN, table, f"The assignment of {of}"))
@@ -145,7 +145,7 @@ def assignment_section(contents: ReportContents) -> Section:
                 "model that could have been chosen."
             )
             blocks.append(Text(text))
-            table = prediction_table(final, initial_state=None)
+            table = prediction_table(final)
             blocks.append(folded_beyond(_MOST_OPEN, table, f"The predictions of {of}"))
     title = "Assignment: which model for which recording"
     return Section("assignment", title, "Assignment", tuple(blocks))
