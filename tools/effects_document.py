@@ -16,7 +16,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from hwid_cli.drive.catalogue import CATALOGUE, configured_effects
 from hwid_cli.drive.effect import Effect, Parameter, Scales, Stated
-from hwid_cli.report.diagnosis_tables import quantity_and_unit
+from hwid_cli.report.diagnosis import quantity_and_unit
 from tools.effects_figures import SCALES, draw
 
 DOCS = Path(__file__).parents[1] / "docs"

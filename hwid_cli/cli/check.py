@@ -17,7 +17,8 @@ from hwid_cli.files.messages import did_you_mean
 from hwid_cli.records.check import FitCost
 from hwid_cli.records.experiment import Experiment
 from hwid_cli.records.recordings import Calibrated
-from hwid_cli.report.check_tables import recordings_table, stages_table
+from hwid_cli.report.check import recordings_table, stages_table
+from hwid_cli.report.table import as_text
 from hwid_cli.stages.fit_seconds import MEASURED, compiled_loops_place, time_one_fit
 from hwid_cli.stages.own_functions import check_own_functions
 from hwid_cli.stages.recording_facts import Checked, check_recordings
@@ -83,7 +84,7 @@ def _data(experiment: Experiment, folder: Path) -> tuple[Checked, tuple[str, ...
     checked = check_recordings(survey.recordings, experiment, survey.jitter)
     problems += [*survey.problems, *checked.problems]
     if checked.facts:
-        click.echo(recordings_table(checked.facts))
+        click.echo(as_text([recordings_table(checked.facts)]))
     known = {one.name for one in survey.recordings} | set(survey.unusable)
     if known:
         problems += _names(experiment, known)
@@ -128,7 +129,7 @@ def _show_plan(
             for name in to_run(experiment)
             for plan in stage_named(name).plan(planning)
         ]
-    click.echo(f"\n{stages_table(plans, cost, workers)}")
+    click.echo(f"\n{as_text([stages_table(plans, cost, workers)])}")
 
 
 def _cost(experiment: Experiment, checked: Checked, *, timing: bool) -> FitCost:

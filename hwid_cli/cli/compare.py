@@ -3,9 +3,9 @@
 from pathlib import Path
 from typing import Any
 
-from hwid_cli.cli.driver import StageRunner, result_of
+from hwid_cli.cli.driver import StageRunner, result_of, show_blocks
 from hwid_cli.cli.options import Choices
-from hwid_cli.cli.session import Session, open_session, screen_width
+from hwid_cli.cli.session import Session, open_session
 from hwid_cli.errors import ConfigError
 from hwid_cli.export.stored_models import (
     chosen_model,
@@ -17,7 +17,7 @@ from hwid_cli.files.atomic import replace_file
 from hwid_cli.files.csv_tables import write_compare_csv
 from hwid_cli.records.comparison import Comparison, NamedModel
 from hwid_cli.records.model import Fit, Orders
-from hwid_cli.report.comparison_table import comparison_table
+from hwid_cli.report.comparison import comparison_tables
 from hwid_cli.report.figures.comparison import comparison_figure
 from hwid_cli.report.figures.style import as_png
 from hwid_cli.stages.compare import compare_models, fit_linear
@@ -36,7 +36,7 @@ def compare(
     comparison = _compared(session, models, recordings)
     had_results = (session.out / "compare.csv").exists()
     _write(session, comparison)
-    session.say(f"\n{comparison_table(comparison, width=screen_width())}")
+    show_blocks(session, comparison_tables(comparison))
     session.say(
         f"\nresults: {session.out / 'compare.csv'}, "
         f"{session.out / 'figures' / 'compare.png'}"

@@ -1,7 +1,7 @@
 """How any stage is brought up to date and shown: the one driver of all of them."""
 
 import logging
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
@@ -12,6 +12,7 @@ from hwid_cli.config.load import describe_experiment
 from hwid_cli.data.recordings import check_unchanged
 from hwid_cli.errors import CacheError
 from hwid_cli.report.progress import StageProgress
+from hwid_cli.report.table import Block, as_text
 from hwid_cli.stages.stage import Context, Stage
 from hwid_cli.stages.table import needed, stage_named
 from hwid_cli.store.cache import Hdf5Store
@@ -63,15 +64,24 @@ def show(session: Session, name: str) -> None:
     if session.is_quiet:
         return
     stage = stage_named(name)
-    for text in stage.tables(context_of(session), session.results[name]):
-        session.say(f"\n{text}")
+    show_blocks(session, stage.tables(context_of(session), session.results[name]))
+
+
+def show_blocks(session: Session, blocks: Sequence[Block]) -> None:
+    """Show tables and paragraphs to people, set off by a line."""
+    experiment = session.experiment
+    text = as_text(
+        blocks,
+        width=screen_width(),
+        initial_state=experiment.fit.initial_state,
+        thesis_names=experiment.thesis_names,
+    )
+    session.say(f"\n{text}")
 
 
 def context_of(session: Session) -> Context:
     """What stages may know of a session."""
-    return Context(
-        session.experiment, session.out, session.results, session.say, screen_width()
-    )
+    return Context(session.experiment, session.out, session.results, session.say)
 
 
 def _run(session: Session, stage: Stage) -> Any:

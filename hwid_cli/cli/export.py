@@ -16,7 +16,7 @@ from hwid_cli.export.formats import write_exported
 from hwid_cli.records.exported import Exported
 from hwid_cli.records.model import Fit
 from hwid_cli.records.report import StoredResults
-from hwid_cli.report.tables import thesis_name_of
+from hwid_cli.report.thesis_names import thesis_name_of
 from hwid_cli.stages.diagnose import extended_options
 from hwid_cli.stages.model_views import named_fits
 from hwid_cli.store.result_files import has_left_results, read_provenance, results_file

@@ -15,7 +15,8 @@ from hwid_cli.data.folder import guess_layout, list_measurements
 from hwid_cli.data.recordings import survey_recordings
 from hwid_cli.errors import MeasurementError
 from hwid_cli.records.starter import FolderLayout, Proposal
-from hwid_cli.report.starter_words import starter_words
+from hwid_cli.report.starter import starter_summary
+from hwid_cli.report.table import as_text
 from hwid_cli.stages.proposal import propose
 
 
@@ -39,4 +40,4 @@ def _show(
     out: Path, layout: FolderLayout, proposal: Proposal, problems: tuple[str, ...]
 ) -> None:
 
-    click.echo(starter_words(str(out), layout, proposal, problems))
+    click.echo(as_text([starter_summary(str(out), layout, proposal, problems)]))

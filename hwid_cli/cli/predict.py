@@ -10,7 +10,7 @@ from hwid_cli.export.predict import predict
 from hwid_cli.export.prediction import check_target, read_input, write_prediction
 from hwid_cli.model.input_range import outside_share
 from hwid_cli.records.units import behind
-from hwid_cli.report.simulation_words import prediction_words
+from hwid_cli.report.simulation_note import prediction_note
 
 
 def predict_file(
@@ -41,5 +41,5 @@ def predict_file(
     write_prediction(out, exported, time, values, predicted)
     click.echo(
         f"{out}: {predicted.size} samples of {card.name}; time in s, predicted in "
-        f"{card.output_unit}\n{prediction_words(initial_state, exported.initial_state)}"
+        f"{card.output_unit}\n{prediction_note(initial_state, exported.initial_state)}"
     )

@@ -119,6 +119,7 @@ def read_stored(session: Session) -> StoredResults:
         stages=tuple(runs),
         results=results,
         diagnosis=read_diagnosis(session.out / "diagnosis.json"),
+        thesis_names=experiment.thesis_names,
     )
 
 

@@ -1,9 +1,9 @@
 """``hwid simulate``: virtual measurements, and a physics model beside the recordings."""
 
-from hwid_cli.cli.driver import context_of, result_of
+from hwid_cli.cli.driver import context_of, result_of, show_blocks
 from hwid_cli.cli.options import Choices
 from hwid_cli.cli.session import Session, Timer, open_session
-from hwid_cli.report.text_table import number, text_table
+from hwid_cli.report.diagnosis import simulated_table
 from hwid_cli.stages.diagnose import choose
 from hwid_cli.stages.simulate_drive import simulate_recordings
 from hwid_cli.store.diagnosis_results import write_simulated_csv
@@ -42,8 +42,5 @@ def _simulate_drive(session: Session) -> None:
     # In a closed loop it is the controller's command that the two are compared by.
     side = "output" if given.simulation.controller is None else "input"
     unit = getattr(given.recordings[0], f"{side}_unit")
-    rows = [(one.name, number(one.rms)) for one in curves]
-    title = f"RMS of measured minus simulated {side}"
-    heads = ("recording", f"RMS [{unit}]")
-    session.say("\n" + text_table(title, heads, rows, text_columns=(0,)))
+    show_blocks(session, [simulated_table(curves, side, unit)])
     session.say(f"\nresults: {folder}")

@@ -159,6 +159,11 @@ class Experiment:
 
     A section that the file leaves out is None where it names work to do, and holds the
     defaults where it only says how.
+
+    Parameters
+    ----------
+    thesis_names : bool
+        Whether screens and pages show the thesis's names of models and tables, too.
     """
 
     name: str
@@ -175,3 +180,4 @@ class Experiment:
     test: FinalTestOptions | None = None
     simulation: SimulationOptions | None = None
     diagnose: DiagnoseOptions | None = None
+    thesis_names: bool = False

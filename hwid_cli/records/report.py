@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 
 from hwid_cli.records.diagnosis import Diagnosis
-from hwid_cli.records.groups import FinalTest, GroupSearch
+from hwid_cli.records.groups import ChainTrend, FinalTest, GroupSearch
 from hwid_cli.records.model import Fit, Information
 from hwid_cli.records.recordings import Calibrated, CalibrationLog, Recording
 from hwid_cli.records.residuals import ResidualTests
-from hwid_cli.records.results import CrossValidation
+from hwid_cli.records.results import CrossValidation, ModelScore
 
 # Why a recording is shown with a model: it is the best of those fitted to it, the one
 # that the final test assigned, or the best of the cross-validation.
@@ -59,6 +59,8 @@ class StoredResults:
         What each of them gave, by its name.
     diagnosis : mapping or None
         Content of ``diagnosis.json``.
+    thesis_names : bool
+        Whether the configuration asks for the thesis's names of models and tables.
     """
 
     name: str
@@ -67,6 +69,7 @@ class StoredResults:
     stages: tuple[StageRun, ...] = ()
     results: Mapping[str, Any] = field(default_factory=dict)
     diagnosis: Mapping[str, Any] | None = None
+    thesis_names: bool = False
 
     @property
     def recordings(self) -> tuple[Recording, ...]:
@@ -308,12 +311,18 @@ class ReportContents:
         In the order of the recordings, without those that no model is there for.
     without_model : tuple of str
         Those recordings.
+    best : tuple of tuple of Fit
+        The best fits of each recording.
+    scores : tuple of ModelScore
+        All models of single recordings, the widest first.
     cross : RmsdMatrix or None
         The widest model of each recording on all that judge.
     models : tuple of ModelView
         The chain of groups, or the widest models.
     chain_matrix, full_matrix : RmsdMatrix or None
         The chain, and all models of the final test, on all recordings.
+    chain : ChainTrend or None
+        What happens along that chain; None without one.
     outdated : tuple of str
         Stages whose stored results do not belong to the models that are stored now.
     """
@@ -322,10 +331,13 @@ class ReportContents:
     statuses: Mapping[str, int] = field(default_factory=dict)
     simulated: tuple[SimulatedRecording, ...] = ()
     without_model: tuple[str, ...] = ()
+    best: tuple[tuple[Fit, ...], ...] = ()
     grid: OrderGrid | None = None
+    scores: tuple[ModelScore, ...] = ()
     cross: RmsdMatrix | None = None
     models: tuple[ModelView, ...] = ()
     trend: ChainOnTests | None = None
+    chain: ChainTrend | None = None
     chain_matrix: RmsdMatrix | None = None
     full_matrix: RmsdMatrix | None = None
     predictions: PredictionCounts | None = None

@@ -77,8 +77,14 @@ class ModelResiduals:
         ``step_06/3/7``.
     flat : tuple of str
         As in ``Uncertainty``.
+    rmsd : float, [unit]
+    unit : str
+        Of the output.
     """
 
     model: str
     tests: ResidualTests
     flat: tuple[str, ...]
+    recording: str
+    rmsd: float
+    unit: str

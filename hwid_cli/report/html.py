@@ -8,22 +8,23 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from hwid_cli.records.report import ReportContents
 from hwid_cli.report.page import images_of
-from hwid_cli.report.sections.diagnosis import diagnosis_section
-from hwid_cli.report.sections.final_test import (
+from hwid_cli.report.sections.calibrate import calibration_section
+from hwid_cli.report.sections.crossval import crossval_section
+from hwid_cli.report.sections.diagnose import diagnosis_section
+from hwid_cli.report.sections.group import groups_section
+from hwid_cli.report.sections.identify import (
+    orders_section,
+    recordings_section,
+    residuals_section,
+)
+from hwid_cli.report.sections.models import models_section
+from hwid_cli.report.sections.summary import summary_section
+from hwid_cli.report.sections.test import (
     assignment_section,
     coverage_section,
     final_test_section,
 )
-from hwid_cli.report.sections.groups import groups_section
-from hwid_cli.report.sections.models import models_section
-from hwid_cli.report.sections.recordings import (
-    calibration_section,
-    crossval_section,
-    orders_section,
-    recordings_section,
-)
-from hwid_cli.report.sections.residuals import residuals_section
-from hwid_cli.report.sections.summary import summary_section
+from hwid_cli.report.table import shown_part
 
 TEMPLATE = "report.html"
 
@@ -80,6 +81,9 @@ def report_page(
         keep_trailing_newline=True,
     )
     environment.filters["base64"] = lambda png: base64.b64encode(png).decode("ascii")
+    environment.filters["shown"] = lambda table: shown_part(
+        table, is_screen=False, thesis_names=contents.stored.thesis_names
+    )
     html = environment.get_template(TEMPLATE).render(
         name=contents.stored.name, sections=sections
     )

@@ -1,30 +1,17 @@
 """Blocks that a page of the report is made of; templates/report.html draws them."""
 
+import re
+import struct
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import ClassVar
 
+from matplotlib.figure import Figure
 
-@dataclass(frozen=True)
-class Text:
-    """A paragraph.
-
-    Parameters
-    ----------
-    is_note : bool
-        Whether it stands back, as remarks and missing stages do.
-    """
-
-    kind: ClassVar[str] = "text"
-    text: str
-    is_note: bool = False
-
-
-@dataclass(frozen=True)
-class Code:
-    """Text in a type of fixed width, line by line."""
-
-    kind: ClassVar[str] = "code"
-    text: str
+from hwid_cli.records.report import ReportContents
+from hwid_cli.report.figures.style import DOTS, as_png
+from hwid_cli.report.simulation_note import HUBER_NOTE, simulation_note
+from hwid_cli.report.table import Block, Table, Text
 
 
 @dataclass(frozen=True)
@@ -71,53 +58,6 @@ class Figures:
 
 
 @dataclass(frozen=True)
-class Cell:
-    """A cell of a table.
-
-    Parameters
-    ----------
-    title : str
-        Shown when the pointer rests on it; empty for nothing.
-    share : float or None, [-]
-        Place between the table's lowest and highest number, for its colour.
-    is_marked : bool
-        Whether it stands out.
-    """
-
-    text: str
-    title: str = ""
-    share: float | None = None
-    is_marked: bool = False
-
-
-@dataclass(frozen=True)
-class Table:
-    """A table that scrolls inside its own box where the screen is narrow.
-
-    Parameters
-    ----------
-    rows : tuple of tuple of Cell or str
-        The first cell of each is its head.
-    text_columns : tuple of int, [-]
-        Columns that stand left; numbers stand right.
-    """
-
-    kind: ClassVar[str] = "table"
-    caption: str
-    heads: tuple[str, ...]
-    rows: tuple[tuple["Cell | str", ...], ...]
-    text_columns: tuple[int, ...] = (0,)
-
-
-@dataclass(frozen=True)
-class Heading:
-    """A heading inside a section."""
-
-    kind: ClassVar[str] = "heading"
-    text: str
-
-
-@dataclass(frozen=True)
 class Folded:
     """Blocks that open when they are asked for.
 
@@ -131,7 +71,7 @@ class Folded:
 
     kind: ClassVar[str] = "folded"
     summary: str
-    blocks: "tuple[Block, ...]"
+    blocks: "tuple[PageBlock, ...]"
     is_printed: bool = True
 
 
@@ -143,7 +83,7 @@ class Pairs:
     figures: tuple[Figures, ...]
 
 
-Block = Text | Code | Figures | Pairs | Table | Heading | Folded
+PageBlock = Block | Figures | Pairs | Folded
 
 
 @dataclass(frozen=True)
@@ -161,10 +101,10 @@ class Section:
     id: str
     title: str
     short: str
-    blocks: tuple[Block, ...] = field(default_factory=tuple)
+    blocks: tuple[PageBlock, ...] = field(default_factory=tuple)
 
 
-def images_of(blocks: tuple[Block, ...]) -> tuple[Image, ...]:
+def images_of(blocks: tuple[PageBlock, ...]) -> tuple[Image, ...]:
     """Collect the figures of some blocks, folded ones too.
 
     Returns
@@ -181,3 +121,97 @@ def images_of(blocks: tuple[Block, ...]) -> tuple[Image, ...]:
         elif isinstance(block, Pairs):
             found += images_of(block.figures)
     return tuple(found)
+
+
+def section_notes(contents: ReportContents, *, is_validation: bool) -> list[Text]:
+    """Say how the models of a section were fitted and simulated.
+
+    Parameters
+    ----------
+    is_validation : bool
+        As for ``simulation_note``.
+
+    Returns
+    -------
+    list of Text
+        None where there are no models.
+    """
+    fits = list(contents.stored.fits)
+    if contents.stored.search is not None:
+        fits += [one for one in contents.stored.search.fits if one is not None]
+    rules = dict.fromkeys(one.options.initial_state for one in fits)
+    notes = [simulation_note(rule, is_validation=is_validation) for rule in rules]
+    if any(one.options.loss == "huber" for one in fits):
+        notes.append(HUBER_NOTE)
+    return [Text(one, is_note=True) for one in notes]
+
+
+def folded_beyond(most: int, table: Table, summary: str) -> Table | Folded:
+    """Fold a table that is long.
+
+    Parameters
+    ----------
+    most : int, [-]
+        Rows that are shown open.
+    summary : str
+        What is inside.
+    """
+    return table if len(table.rows) <= most else Folded(summary, (table,))
+
+
+def drawn(file: str, figure: Figure, alt: str) -> Image:
+    """Render a figure for the page.
+
+    Parameters
+    ----------
+    file : str
+        Where it lies below ``figures/``; without ending.
+    """
+    return image(f"{file}.png", as_png(figure), alt, dots_per_inch=DOTS)
+
+
+def image(file: str, png: bytes, alt: str, *, dots_per_inch: int) -> Image:
+    """Take a finished PNG file into the page.
+
+    Parameters
+    ----------
+    file : str
+        Where it lies below ``figures/``.
+    dots_per_inch : int, [pixels/inch]
+    """
+    # Width and height stand at a fixed place in every PNG file, behind its signature
+    # and the head of its first part.
+    width, height = struct.unpack(">II", png[16:24])
+    return Image(file, png, alt, width, height, dots_per_inch)
+
+
+def file_names(names: Iterable[str], endings: Sequence[str] = ("",)) -> dict[str, str]:
+    """Make file names of recordings or models that every disk takes and tells apart.
+
+    Parameters
+    ----------
+    endings : sequence of str
+        What follows a name in the files that belong to it.
+
+    Returns
+    -------
+    dict of str to str
+        By the names; equal ones are numbered. Large and small letters count as equal,
+        as they do on some disks.
+
+    Examples
+    --------
+    >>> file_names(["step_06+step_09/3/7", "c#", "c_"])
+    {'step_06+step_09/3/7': 'step_06+step_09_3_7', 'c#': 'c_', 'c_': 'c__2'}
+    """
+    found: dict[str, str] = {}
+    taken: set[str] = set()
+    for name in dict.fromkeys(names):
+        plain = re.sub(r"[^\w.+ -]", "_", name)
+        file, number = plain, 1
+        while taken & (files := {f"{file}{end}".casefold() for end in endings}):
+            number += 1
+            file = f"{plain}_{number}"
+        taken |= files
+        found[name] = file
+    return found

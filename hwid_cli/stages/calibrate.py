@@ -29,8 +29,8 @@ from hwid_cli.records.recordings import (
     RawRecording,
     Recording,
 )
+from hwid_cli.report.calibration import calibration_table
 from hwid_cli.report.plots import as_png, calibration_figure
-from hwid_cli.report.tables import calibration_table
 from hwid_cli.stages.fit_seconds import counted
 from hwid_cli.stages.selection import named_recordings, select_recordings
 from hwid_cli.stages.stage import Context, Planning, Runner, Stage, in_results

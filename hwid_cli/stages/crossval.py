@@ -11,14 +11,16 @@ from pathlib import Path
 import numpy as np
 
 from hwid_cli.files.csv_tables import write_coverage_csv, write_crossval_csv
-from hwid_cli.model.scores import rmsd
+from hwid_cli.model.scores import coverage, rmsd
 from hwid_cli.model.simulate import validation_output
 from hwid_cli.records.check import StagePlan
 from hwid_cli.records.experiment import CrossvalOptions, Experiment, OrdersOptions
 from hwid_cli.records.model import Fit, HammersteinWiener
 from hwid_cli.records.recordings import Recording
-from hwid_cli.records.results import CrossValidation
-from hwid_cli.report.tables import coverage_table, cross_table
+from hwid_cli.records.report import RmsdMatrix
+from hwid_cli.records.results import CrossValidation, ModelScore
+from hwid_cli.report.crossval import coverage_table, cross_table
+from hwid_cli.report.table import Block
 from hwid_cli.stages.fit_seconds import (
     PAIR_BYTES,
     SECONDS_PER_SIMULATED_SAMPLE,
@@ -187,6 +189,42 @@ def _deviations(
     return Deviations(values, np.array(status))
 
 
+def cross_matrix(best: Sequence[ModelScore], crossval: CrossValidation) -> RmsdMatrix:
+    """Put the widest models' RMSDs on all judging recordings together.
+
+    Parameters
+    ----------
+    best : sequence of ModelScore
+        As ``ranking.best_of_each`` gives them.
+
+    Returns
+    -------
+    RmsdMatrix
+        Counts a model's own recording, as the tables of ``hwid crossval`` do.
+    """
+    rows = [
+        crossval.rmsd[
+            crossval.identified_on.index(score.identified_on),
+            crossval.nb.index(score.nb),
+            crossval.nk.index(score.nk),
+        ]
+        for score in best
+    ]
+    values = np.array(rows)
+    return RmsdMatrix(
+        models=tuple(f"{s.identified_on}/{s.nb}/{s.nk}" for s in best),
+        recordings=crossval.validated_on,
+        rmsd=values,
+        is_own=np.array(
+            [[s.identified_on == name for name in crossval.validated_on] for s in best]
+        ),
+        covers=np.array([score.coverage for score in best]),
+        covered_by=coverage(values.T, crossval.threshold),
+        unit=crossval.unit,
+        threshold=crossval.threshold,
+    )
+
+
 @dataclass(frozen=True, eq=False)
 class _Given:
     """Models, and the recordings that validate them."""
@@ -241,15 +279,11 @@ def _write_csv(
     write_coverage_csv(out / "coverage.csv", scores, len(result.validated_on))
 
 
-def _tables(context: Context, result: CrossValidation) -> list[str]:
+def _tables(context: Context, result: CrossValidation) -> list[Block]:
     """The models that cover the most recordings."""
     scores = score_models(context.results["identify"], result)
     best = best_of_each(scores, result.identified_on)
-    rule = context.experiment.fit.initial_state
-    return [
-        coverage_table(scores, result, initial_state=rule),
-        cross_table(best, result, initial_state=rule, width=context.width),
-    ]
+    return [coverage_table(scores, result), cross_table(cross_matrix(best, result))]
 
 
 def _plan(planning: Planning) -> tuple[StagePlan, ...]:

@@ -19,7 +19,7 @@ from hwid_cli.records.check import StagePlan
 from hwid_cli.records.diagnosis import Diagnosis
 from hwid_cli.records.experiment import DiagnoseOptions, Experiment, SimulationOptions
 from hwid_cli.records.recordings import Recording
-from hwid_cli.report.diagnosis_tables import diagnosis_text
+from hwid_cli.report.diagnosis import diagnosis_blocks
 from hwid_cli.report.figures.diagnosis import diagnosis_figures
 from hwid_cli.report.plots import as_png
 from hwid_cli.stages.diagnosis_starts import doubtful_starts, starts_sentence
@@ -349,7 +349,7 @@ STAGE = Stage(
         f"{len(given.recordings)} recordings from the cache" if is_stored else ""
     ),
     write_files=_write_files,
-    tables=lambda context, result: [diagnosis_text(result, width=context.width)],
+    tables=lambda context, result: diagnosis_blocks(result),
     files=(
         "diagnosis.json",
         "ranking.csv",

@@ -43,7 +43,8 @@ from hwid_cli.records.experiment import CrossvalOptions, GroupOptions, OrdersOpt
 from hwid_cli.records.groups import Group, GroupSearch, Join
 from hwid_cli.records.model import Fit, FitOptions, HammersteinWiener, Orders
 from hwid_cli.records.recordings import Recording
-from hwid_cli.report.group_tables import chain_table, join_table, levels_table
+from hwid_cli.report.groups import chain_table, join_table, levels_table
+from hwid_cli.report.table import Block
 from hwid_cli.stages.crossval import deviation_tasks
 from hwid_cli.stages.fit_seconds import (
     FIT_BYTES,
@@ -690,17 +691,10 @@ def _compute(plan: GroupPlan, runner: Runner) -> GroupSearch:
     return search_all(plan, run)
 
 
-def _tables(context: Context, search: GroupSearch) -> list[str]:
+def _tables(_: Context, search: GroupSearch) -> list[Block]:
     """The coverage of every group, what the levels filtered, and the chain."""
-    rule = context.experiment.fit.initial_state
-    return [
-        *(
-            join_table(search, level, initial_state=rule, width=context.width)
-            for level in search.levels[1:]
-        ),
-        levels_table(search, initial_state=rule),
-        chain_table(search, initial_state=rule),
-    ]
+    joins = [join_table(search, level) for level in search.levels[1:]]
+    return [*joins, levels_table(search), chain_table(search)]
 
 
 def group_bound(

@@ -13,8 +13,9 @@ from hwid_cli.records.experiment import Experiment, OrdersOptions
 from hwid_cli.records.maps import StaticMap
 from hwid_cli.records.model import Fit, FitOptions, HammersteinWiener, Orders
 from hwid_cli.records.recordings import Recording
-from hwid_cli.report.fit_tables import best_models_table, failure_lines, status_line
-from hwid_cli.report.residual_tables import residual_table
+from hwid_cli.report.fits import best_models_table, fits_ended
+from hwid_cli.report.residuals import residual_table
+from hwid_cli.report.table import Block
 from hwid_cli.stages.fit_seconds import FIT_BYTES, counted, grid_seconds
 from hwid_cli.stages.order_grid import SEARCHED_ROUNDS, candidate_orders, growth
 from hwid_cli.stages.ranking import best_fits, count_statuses
@@ -225,18 +226,17 @@ def _write(
     write_fits(path, result, given.orders, origin)
 
 
-def _tables(context: Context, fits: tuple[Fit, ...]) -> list[str]:
+def _tables(context: Context, fits: tuple[Fit, ...]) -> list[Block]:
     """The best models of each recording, what they leave, and how the fits ended."""
     experiment, recordings = context.experiment, context.results["calibrate"].recordings
     nk_role = experiment.orders.nk_role
     unit = recordings[0].output_unit
-    texts = [best_models_table(best_fits(fits), unit, nk_is_delay=nk_role == "delay")]
+    table = best_models_table(best_fits(fits), unit, nk_is_delay=nk_role == "delay")
+    blocks: list[Block] = [table]
     left = own_residuals(fits, recordings, nk_role)
     if left:
-        texts.append(residual_table(left, experiment.fit.initial_state))
-    reasons = failure_lines(fits)
-    status = status_line(count_statuses(fits))
-    return [*texts, f"{status}\n{reasons}" if reasons else status]
+        blocks.append(residual_table(left))
+    return [*blocks, *fits_ended(count_statuses(fits), fits)]
 
 
 def _plan(planning: Planning) -> tuple[StagePlan, ...]:

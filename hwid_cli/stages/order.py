@@ -19,12 +19,8 @@ from hwid_cli.records.model import Fit
 from hwid_cli.records.order import MapAdvice, OrderAdvice, OrderChoice
 from hwid_cli.records.recordings import Recording
 from hwid_cli.records.results import CrossValidation
-from hwid_cli.report.order_tables import (
-    map_sentences,
-    map_table,
-    order_sentences,
-    order_table,
-)
+from hwid_cli.report.orders import map_reasons, map_table, order_reasons, order_table
+from hwid_cli.report.table import Block
 from hwid_cli.stages.candidate_selection import ScoredCandidates, scored, smallest_good
 from hwid_cli.stages.fit_seconds import FIT_BYTES, counted, map_seconds
 from hwid_cli.stages.identify import recordings_with_models
@@ -295,18 +291,11 @@ def _write_csv(
         write_maps_csv(out / "maps.csv", result.maps)
 
 
-def _tables(context: Context, result: Advice) -> list[str]:
-    rule = context.experiment.fit.initial_state
-    texts = [
-        order_table(result.orders, initial_state=rule),
-        order_sentences(result.orders),
-    ]
+def _tables(_: Context, result: Advice) -> list[Block]:
+    blocks: list[Block] = [order_table(result.orders), *order_reasons(result.orders)]
     if result.maps is not None:
-        texts += [
-            map_table(result.maps, initial_state=rule),
-            map_sentences(result.maps),
-        ]
-    return texts
+        blocks += [map_table(result.maps), *map_reasons(result.maps)]
+    return blocks
 
 
 def _plan(planning: Planning) -> tuple[StagePlan, ...]:

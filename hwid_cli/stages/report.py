@@ -27,6 +27,7 @@ from hwid_cli.records.report import (
     StoredResults,
 )
 from hwid_cli.records.results import CrossValidation, ModelScore
+from hwid_cli.stages.crossval import cross_matrix
 from hwid_cli.stages.model_views import model_views, named_fits
 from hwid_cli.stages.order_grid import grid_place
 from hwid_cli.stages.ranking import (
@@ -37,6 +38,7 @@ from hwid_cli.stages.ranking import (
 )
 from hwid_cli.stages.residuals import judge_residual
 from hwid_cli.stages.table import needed, stage_named
+from hwid_cli.stages.test import chain_trend
 from hwid_cli.tasks.cache import task_key
 
 # The output has begun to move, and has moved most of its way, at these shares of its
@@ -117,42 +119,6 @@ def own_grid(stored: StoredResults) -> OrderGrid | None:
     return OrderGrid(names, nb, nk, stored.nk_role, values, unit)
 
 
-def cross_matrix(best: Sequence[ModelScore], crossval: CrossValidation) -> RmsdMatrix:
-    """Put the widest models' RMSDs on all judging recordings together.
-
-    Parameters
-    ----------
-    best : sequence of ModelScore
-        As ``ranking.best_of_each`` gives them.
-
-    Returns
-    -------
-    RmsdMatrix
-        Counts a model's own recording, as the tables of ``hwid crossval`` do.
-    """
-    rows = [
-        crossval.rmsd[
-            crossval.identified_on.index(score.identified_on),
-            crossval.nb.index(score.nb),
-            crossval.nk.index(score.nk),
-        ]
-        for score in best
-    ]
-    values = np.array(rows)
-    return RmsdMatrix(
-        models=tuple(f"{s.identified_on}/{s.nb}/{s.nk}" for s in best),
-        recordings=crossval.validated_on,
-        rmsd=values,
-        is_own=np.array(
-            [[s.identified_on == name for name in crossval.validated_on] for s in best]
-        ),
-        covers=np.array([score.coverage for score in best]),
-        covered_by=coverage(values.T, crossval.threshold),
-        unit=crossval.unit,
-        threshold=crossval.threshold,
-    )
-
-
 def final_matrix(final: FinalTest, models: Sequence[str]) -> RmsdMatrix:
     """Put some of the final test's models and all recordings together.
 
@@ -197,7 +163,7 @@ def chain_on_tests(final: FinalTest) -> ChainOnTests:
 
 
 # Raised when the page or a figure changes, so that pages are drawn again.
-REPORT_VERSION = 3
+REPORT_VERSION = 4
 
 
 def report_key(stored: StoredResults, figures: Mapping[str, bytes]) -> str:
@@ -258,22 +224,25 @@ def report_contents(stored: StoredResults) -> ReportContents:
     crossval, final = stored.crossval, stored.final_test
     is_fresh = crossval is None or _belongs(stored.fits, crossval)
     scores: tuple[ModelScore, ...] = ()
+    widest: tuple[ModelScore, ...] = ()
     if crossval is not None and is_fresh:
-        scores = best_of_each(
-            score_models(stored.fits, crossval), crossval.identified_on
-        )
+        scores = tuple(score_models(stored.fits, crossval))
+        widest = best_of_each(scores, crossval.identified_on)
     simulated = _simulated(stored, crossval if is_fresh else None)
     covered = {one.recording.name for one in simulated}
-    names = [recording.name for recording in stored.recordings]
+    kinds = {recording.name: recording.kind for recording in stored.recordings}
     return ReportContents(
         stored=stored,
         statuses=count_statuses(stored.fits),
         simulated=simulated,
-        without_model=tuple(name for name in names if name not in covered),
+        without_model=tuple(name for name in kinds if name not in covered),
+        best=best_fits(stored.fits),
         grid=own_grid(stored),
-        cross=cross_matrix(scores, crossval) if crossval and scores else None,
-        models=model_views(stored, scores),
+        scores=scores,
+        cross=cross_matrix(widest, crossval) if crossval and widest else None,
+        models=model_views(stored, widest),
         trend=None if final is None else chain_on_tests(final),
+        chain=None if final is None else chain_trend(final, kinds),
         chain_matrix=None if final is None else final_matrix(final, final.chain),
         full_matrix=None if final is None else final_matrix(final, final.models),
         predictions=None if final is None else _count_predictions(final),

@@ -41,11 +41,15 @@ def own_residuals(
     found = []
     for best in best_fits(fits, 1):
         for fit in best:
-            tests = judge_residual(by_name[fit.name], fit)
+            recording = by_name[fit.name]
+            tests = judge_residual(recording, fit)
             if tests is not None:
                 nb, nk = grid_place(fit, nk_role)
-                name = f"{fit.name}/{nb}/{nk}"
-                found.append(ModelResiduals(name, tests, fit.uncertainty.flat))
+                name, unit = f"{fit.name}/{nb}/{nk}", recording.output_unit
+                flat = fit.uncertainty.flat
+                found.append(
+                    ModelResiduals(name, tests, flat, fit.name, fit.rmsd, unit)
+                )
     return tuple(found)
 
 

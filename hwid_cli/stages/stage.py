@@ -16,6 +16,7 @@ from typing import Any, Protocol
 from hwid_cli.records.check import FitCost, StagePlan
 from hwid_cli.records.experiment import Experiment
 from hwid_cli.records.recordings import Recording
+from hwid_cli.report.table import Block
 from hwid_cli.store.result_files import Provenance, read_stage_key, results_file
 from hwid_cli.tasks.cache import Store
 from hwid_cli.tasks.runner import RunSettings
@@ -33,15 +34,12 @@ class Context:
         What the stages before it gave, by their names.
     say : callable
         Shows a line to people.
-    width : int, [characters]
-        Of the screen.
     """
 
     experiment: Experiment
     out: Path
     results: Mapping[str, Any]
     say: Callable[[str], None]
-    width: int = 80
 
 
 class Runner(Protocol):
@@ -162,7 +160,8 @@ class Stage:
         was chosen, the results, where they come from (None where they are not stored)
         and whether they are new.
     tables : callable
-        From a ``Context`` and the results to the texts that the screen shows.
+        From a ``Context`` and the results to the tables and paragraphs that the screen
+        shows.
     is_shown_in_run : bool
         Whether ``hwid run`` shows them too.
     shows_before : tuple of str
@@ -187,7 +186,7 @@ class Stage:
     write_files: Callable[[Path, Any, Any, Provenance | None, bool], None] = (
         _write_nothing
     )
-    tables: Callable[[Context, Any], Sequence[str]] = _nothing
+    tables: Callable[[Context, Any], Sequence[Block]] = _nothing
     is_shown_in_run: bool = True
     shows_before: tuple[str, ...] = ()
     files: tuple[str, ...] = ()

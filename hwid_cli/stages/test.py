@@ -39,7 +39,9 @@ from hwid_cli.records.groups import ChainTrend, FinalTest, GroupSearch, Predicti
 from hwid_cli.records.model import Fit
 from hwid_cli.records.recordings import Recording
 from hwid_cli.records.results import CrossValidation
-from hwid_cli.report import final_test_tables
+from hwid_cli.report import final_test
+from hwid_cli.report.table import Block
+from hwid_cli.report.thesis_names import names_of_groups
 from hwid_cli.stages.coverage_matrix import (
     ScoredModels,
     are_hard_to_cover,
@@ -533,36 +535,26 @@ def _write_csv(
     write_coverage_matrix_csv(out / "coverage_matrix.csv", final)
 
 
-def _tables(context: Context, final: FinalTest) -> list[str]:
+def _tables(context: Context, final: FinalTest) -> list[Block]:
     """The chain, the coverage matrix, the smallest set and the predictions."""
-    experiment, width = context.experiment, context.width
-    rule = experiment.fit.initial_state
-    parts = []
+    blocks: list[Block] = []
     if final.chain:
         recordings = context.results["calibrate"].recordings
         kinds = {recording.name: recording.kind for recording in recordings}
         trend = chain_trend(final, kinds)
-        parts += [
-            final_test_tables.chain_on_tests_table(
-                final, trend, initial_state=rule, width=width
-            ),
-            final_test_tables.chain_coverage_table(
-                final,
-                trend,
-                initial_state=rule,
-                nf=experiment.orders.nf,
-                has_names=not experiment.fit.delays,
-            ),
-            final_test_tables.chain_tables(
-                final, trend, kinds, initial_state=rule, width=width
-            ),
+        search = context.results.get("group")
+        names = names_of_groups(search) if context.experiment.thesis_names else {}
+        blocks += [
+            final_test.chain_on_tests_table(final, trend),
+            final_test.chain_coverage_table(final, trend, names),
+            *final_test.chain_tables(final, trend, kinds),
         ]
     return [
-        *parts,
-        final_test_tables.coverage_matrix_table(final, initial_state=rule, width=width),
-        final_test_tables.gaps_text(final, width=width),
-        final_test_tables.smallest_set_table(final, initial_state=rule, width=width),
-        final_test_tables.prediction_table(final, initial_state=rule),
+        *blocks,
+        final_test.coverage_matrix_table(final),
+        *final_test.gap_sentences(final),
+        final_test.smallest_set_table(final),
+        final_test.prediction_table(final),
     ]
 
 

@@ -42,11 +42,20 @@ def test_the_tensor_and_the_tables_are_written(hwid, out):
     assert {row["of"] for row in coverage} == {"3"}
 
 
-def test_the_three_published_tables_are_shown(after_run, hwid):
-    text = hwid("crossval").stdout
+def test_what_the_thesis_calls_things_is_shown_on_request(after_run, hwid, config):
+    plain = hwid("crossval").stdout
+    config.write_text(config.read_text() + "thesis_names: true\n")
+    result = hwid("crossval")
 
+    # Names change no number: nothing is computed again.
+    assert "identify: 6 fits from the cache, 0 computed" in result.stdout
+    assert "crossval: 9 pairs from the cache, 0 computed" in result.stdout
+    asked = " ".join(result.stdout.split())
     for table in ("T3.2.2-1", "T3.2.2.2-2", "T3.2.2.2-3"):
-        assert f"(form of {table})" in text
+        assert f"(form of {table})" in asked
+    assert "NLHW-Step-2-1-2-1" in asked
+    for word in ("(form of", "thesis's", "NLHW"):
+        assert word not in plain
 
 
 def test_a_second_run_answers_from_the_cache_with_the_same_numbers(

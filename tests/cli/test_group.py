@@ -28,7 +28,7 @@ def test_the_search_is_written_and_shown(grouped, out):
     assert list(rows[0])[:7] == [
         *("level", "base", "add_on", "coverage", "nb", "nk", "kept"),
     ]
-    assert "T3.3.3.1-2" in grouped.stdout
+    assert "Groups of 2: recordings covered of " in grouped.stdout
     assert "The search stopped: " in grouped.stdout
     assert "group level 1: 6 fits from the cache, 0 computed" in grouped.stdout
 

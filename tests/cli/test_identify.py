@@ -12,7 +12,7 @@ def test_models_are_written_and_the_best_are_shown(hwid, out):
     names = [fit.name for fit in read_fits(out / "results.h5")]
     assert names == 2 * ["step_02"] + 2 * ["step_12"] + 2 * ["sine_12"]
     assert "identify: 0 fits from the cache, 6 computed" in result.stdout
-    assert "NLHW-Step-2-1-2-1" in result.stdout
+    assert "\nstep_02/1/2  " in result.stdout
 
 
 def test_a_second_run_answers_from_the_cache(after_run, hwid):

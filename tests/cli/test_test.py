@@ -12,7 +12,9 @@ from tests.cli.conftest import CONFIG
 PLAN = "only: [step_02, step_12, sine_12]"
 MORE = "only: [step_02, step_05, step_12, sine_03, sine_12]"
 SECTION = "test: {recordings: [step_05, sine_03]}\n"
-GROUP = "group: {start: [step_02], keep: {best: true}, max_level: 2}\n"
+GROUP = (
+    "group: {start: [step_02], keep: {best: true}, max_level: 2}\nthesis_names: true\n"
+)
 WITH_TEST = CONFIG.replace(PLAN, MORE) + SECTION
 TABLES = ("test.csv", "assignment.csv", "coverage_matrix.csv")
 
@@ -82,9 +84,26 @@ def test_the_chain_of_groups_comes_last(first_run):
 
 
 def test_the_published_tables_are_shown(first_run):
+    said = " ".join(first_run[1].split())
     for form in ("3.3.3.4-1", "3.4.1-1", "3.4.1-2", "3.4.1-3", "3.4.3-1", "3.4.3-2"):
-        assert f"(form of T{form}" in first_run[1].replace("\n", " ")
-    assert "Right for " in first_run[1]
+        assert f"(form of T{form}" in said
+    assert "NLHW-Step-2-1-" in said
+    assert "Right for " in said
+
+
+def test_every_table_says_how_its_models_start(first_run):
+    note = (
+        "Free-run simulation, no prediction; initial state estimated on each recording."
+    )
+    captions = ("The chain on ", "Recordings that the chain ", "Coverage of all ")
+    captions += ("Fewest models that cover ", "Model for a recording ")
+    found = [
+        block for block in first_run[1].split("\n\n") if block.startswith(captions)
+    ]
+
+    assert len(found) > len(captions)
+    for block in found:
+        assert note in block.splitlines()
 
 
 def test_without_groups_the_single_models_are_judged(again, edit, out):

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from hwid_cli.records.report import ReportContents, StoredResults
+from hwid_cli.report.groups import chain_table
 from hwid_cli.report.html import report_page
 from hwid_cli.stages.report import report_contents
 from tests.report.report_examples import (
@@ -218,3 +219,27 @@ def test_a_diagnosis_may_hold_little(contents, diagnosis, expected):
     html = report_page(ReportContents(stored), {}).html
 
     assert expected in Reader(html).text
+
+
+@pytest.mark.usefixtures("blank_figures")
+def test_what_the_thesis_calls_things_is_on_a_page_that_asks_for_it(contents):
+    stored = replace(contents.stored, thesis_names=True)
+    plain, asked = (
+        report_page(one, {}).html
+        for one in (contents, replace(contents, stored=stored))
+    )
+
+    for word in ("(form of T3.2.2.2-2)", "(form of T3.4.1-1", "NLHW-Step-1-"):
+        assert word in asked
+        assert word not in plain
+
+
+def test_a_page_shows_the_tables_of_the_screen_with_details_and_notes(page, contents):
+    heads = re.findall(r'<th scope="col"[^>]*>(.*?)</th>', page.html)
+    table = chain_table(contents.stored.search)
+
+    assert {*table.heads, "reach it", "linear RMSD"} <= set(heads)
+    # Only a page has room for these.
+    assert {"verdict", "follows its square", "note"} <= set(heads)
+    assert f'<p class="note">{table.notes[0]}</p>' in page.html
+    assert re.search(r'<td class=" marked">\d\.\d\de', page.html)

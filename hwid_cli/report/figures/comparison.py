@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from hwid_cli.records.comparison import Comparison
 from hwid_cli.records.units import behind
-from hwid_cli.report.comparison_table import model_letters, start_words
+from hwid_cli.report.comparison import model_letters, start_notes
 from hwid_cli.report.figures.style import (
     BLACK,
     FULL_WIDTH,
@@ -18,7 +18,7 @@ from hwid_cli.report.figures.style import (
     number_decades,
     styled,
 )
-from hwid_cli.report.text_table import number
+from hwid_cli.report.formats import number
 
 # Of the figure, of that of one recording, and of a line of its legend, [inch].
 _HEIGHT, _HEIGHT_OF_ONE, _LINE = 7.5, 5.0, 0.2
@@ -91,8 +91,8 @@ def _draw_deviations(axes: Axes, comparison: Comparison) -> None:
         axes.set_ylim(low, high)
         number_decades(axes.yaxis, low, high)
     axes.set_ylabel(f"RMSD [{comparison.output_unit}]")
-    words = start_words(comparison).split("\n")[0]
-    axes.set_title(f"{words} Filled: identified on it.")
+    start = start_notes(comparison)[0]
+    axes.set_title(f"{start} Filled: identified on it.")
     if len(places) <= _MOST_NAMES:
         axes.set_xticks(places, comparison.recordings, rotation=30, ha="right")
     else:
@@ -111,8 +111,8 @@ def _draw_outputs(axes: Axes, comparison: Comparison) -> None:
     if len(comparison.recordings) > 1:
         axes.set_title(f"{shown.name}, where the models differ most (grey: measured)")
         return
-    words = start_words(comparison).split("\n")[0]
-    axes.set_title(f"{shown.name} (grey: measured). {words}")
+    start = start_notes(comparison)[0]
+    axes.set_title(f"{shown.name} (grey: measured). {start}")
 
 
 def _draw_rests(axes: Axes, comparison: Comparison) -> None:

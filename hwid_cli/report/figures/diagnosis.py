@@ -22,7 +22,7 @@ from hwid_cli.records.diagnosis import (
     RecordingGap,
 )
 from hwid_cli.records.units import behind
-from hwid_cli.report.diagnosis_tables import candidate_name, is_chosen
+from hwid_cli.report.diagnosis import candidate_name, is_chosen
 from hwid_cli.report.figures.style import (
     BLACK,
     BLUE,

@@ -4,15 +4,17 @@ from math import isfinite, sqrt
 
 from hwid_cli.records.report import ModelView, ReportContents
 from hwid_cli.report.figures.models import bode_figure, maps_figure, poles_figure
-from hwid_cli.report.page import Block, Figures, Heading, Section, Text
-from hwid_cli.report.sections.words import (
-    NOTHING_COVERED,
-    counted,
+from hwid_cli.report.formats import counted, with_unit
+from hwid_cli.report.groups import NOTHING_COVERED
+from hwid_cli.report.page import (
+    Figures,
+    PageBlock,
+    Section,
     drawn,
     file_names,
-    simulation_note,
-    with_unit,
+    section_notes,
 )
+from hwid_cli.report.table import Heading, Text
 
 # What the files of a model's figures end with.
 _FIGURES = ("_maps", "_bode", "_poles")
@@ -20,7 +22,7 @@ _FIGURES = ("_maps", "_bode", "_poles")
 
 def models_section(contents: ReportContents) -> Section:
     """Show the chain of groups, or else the widest models, from all sides."""
-    blocks: list[Block] = []
+    blocks: list[PageBlock] = []
     if not contents.models:
         blocks.append(Text(_why_none(contents), is_note=True))
     elif contents.stored.search is not None:
@@ -28,7 +30,7 @@ def models_section(contents: ReportContents) -> Section:
     else:
         blocks.append(Text("The models that cover the most recordings."))
     if contents.models:
-        blocks += simulation_note(contents, is_validation=True)
+        blocks += section_notes(contents, is_validation=True)
     files = file_names([view.model for view in contents.models], _FIGURES)
     for view in contents.models:
         file = f"models/{files[view.model]}"

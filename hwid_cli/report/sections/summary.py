@@ -1,16 +1,17 @@
 """What was run on what, and what came out, in a few sentences."""
 
 from hwid_cli.records.report import ChainOnTests, ReportContents
-from hwid_cli.report.fit_tables import status_line
-from hwid_cli.report.page import Block, Cell, Code, Folded, Section, Table, Text
-from hwid_cli.report.sections.words import (
-    NOTHING_COVERED,
-    counted,
-    listed,
-    simulation_note,
-    with_unit,
+from hwid_cli.report.fits import fits_status
+from hwid_cli.report.formats import MISSING, counted, listed, with_unit
+from hwid_cli.report.groups import NOTHING_COVERED
+from hwid_cli.report.page import (
+    Folded,
+    PageBlock,
+    Section,
+    folded_beyond,
+    section_notes,
 )
-from hwid_cli.report.text_table import MISSING
+from hwid_cli.report.table import Cell, Code, Table, Text, numbers, texts
 
 # Characters of a hash that tell files and runs apart for the eye.
 _SHORT = 10
@@ -21,17 +22,13 @@ _MOST_OPEN = 12
 def summary_section(contents: ReportContents) -> Section:
     """Write the first section."""
     stored = contents.stored
-    recordings = _recordings_table(contents)
-    many = len(stored.recordings) > _MOST_OPEN
-    blocks: list[Block] = [Text(line) for line in _headline(contents)]
-    blocks += simulation_note(contents, is_validation=True)
+    blocks: list[PageBlock] = [Text(line) for line in _headline(contents)]
+    blocks += section_notes(contents, is_validation=True)
     blocks.append(_stages_table(contents))
     blocks += [Text(line, is_note=True) for line in _remarks(contents)]
-    if many:
+    if stored.recordings:
         summary = f"All {counted(len(stored.recordings), 'recording')}"
-        blocks.append(Folded(summary, (recordings,)))
-    elif stored.recordings:
-        blocks.append(recordings)
+        blocks.append(folded_beyond(_MOST_OPEN, _recordings_table(contents), summary))
     configuration = "The configuration with all defaults filled in"
     blocks.append(Folded(configuration, (Code(stored.config),), is_printed=False))
     return Section("summary", "Summary", "Summary", tuple(blocks))
@@ -42,8 +39,8 @@ def _headline(contents: ReportContents) -> list[str]:
     if stored.recordings:
         about = counted(len(stored.recordings), "recording")
         if stored.fits:
-            kinds = status_line(contents.statuses).removeprefix("Fits: ")
-            about += f" and {counted(len(stored.fits), 'fitted model')} ({kinds})"
+            ended = fits_status(contents.statuses)
+            about += f" and {counted(len(stored.fits), 'fitted model')} ({ended})"
         lines.append(f"{about}.")
     if contents.cross is not None:
         cross = contents.cross
@@ -103,9 +100,14 @@ def _stages_table(contents: ReportContents) -> Table:
         )
     return Table(
         "Stages whose results are shown; seconds are those of the run that gave them",
-        ("stage", "seconds [s]", "key", "hwid", "state"),
+        (
+            *texts("stage"),
+            *numbers("seconds [s]"),
+            *texts("key"),
+            *numbers("hwid"),
+            *texts("state"),
+        ),
         tuple(rows),
-        text_columns=(0, 2, 4),
     )
 
 
@@ -146,7 +148,10 @@ def _recordings_table(contents: ReportContents) -> Table:
     )
     return Table(
         "Recordings after calibration; the hash is that of the measured file",
-        ("recording", "kind", "samples", "sample time [s]", "length [s]", "SHA-256"),
+        (
+            *texts("recording", "kind"),
+            *numbers("samples", "sample time [s]", "length [s]"),
+            *texts("SHA-256"),
+        ),
         rows,
-        text_columns=(0, 1, 5),
     )

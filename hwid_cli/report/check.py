@@ -1,0 +1,126 @@
+"""What a check found, as tables."""
+
+import math
+from collections.abc import Sequence
+
+from hwid_cli.records.check import FitCost, RecordingFacts, StagePlan
+from hwid_cli.records.units import behind
+from hwid_cli.report.formats import MISSING
+from hwid_cli.report.table import Column, Table, numbers, texts
+
+_KILO = 1000.0
+
+
+def recordings_table(facts: Sequence[RecordingFacts]) -> Table:
+    """Show the recordings as they are read, and beneath what looks odd."""
+    rows = tuple(
+        (
+            one.name,
+            one.kind,
+            str(one.n_input)
+            if one.n_input == one.n_output
+            else f"{one.n_input}/{one.n_output}",
+            str(one.n_used or MISSING),
+            f"{one.sample_time_s:g}",
+            _range(one.input_range, one.input_unit),
+            _range(one.output_range, one.output_unit),
+        )
+        for one in facts
+    )
+    columns = (
+        *texts("recording", "kind"),
+        *numbers("samples", "used", "step [s]", "input", "output"),
+    )
+    caption = f"{len(facts)} recordings (used: after calibration)"
+    notes = tuple(f"{one.name}: {note}" for one in facts for note in one.notes)
+    return Table(caption, columns, rows, notes)
+
+
+def stages_table(plans: Sequence[StagePlan], cost: FitCost, workers: int) -> Table:
+    """Show what each stage would do, and what it takes.
+
+    Parameters
+    ----------
+    workers : int, [-]
+        Processes that share the work.
+    """
+    rows = tuple(
+        (
+            plan.stage,
+            plan.what,
+            MISSING if plan.cached is None else f"{plan.cached} of {plan.tasks}",
+            duration(plan.seconds),
+        )
+        for plan in plans
+    )
+    known = [plan.seconds for plan in plans if math.isfinite(plan.seconds)]
+    least = sum(
+        plan.seconds
+        for plan in plans
+        if math.isfinite(plan.seconds) and not plan.is_bound
+    )
+    total = duration(sum(known))
+    if least < sum(known):
+        total = f"{duration(least)} to {total} (the search may end early)"
+    apart = ["start of the program"]
+    apart += [plan.stage for plan in plans if not math.isfinite(plan.seconds)]
+    notes = (
+        f"Estimate, to a factor of 2: {total} on {workers} "
+        f"{'process' if workers == 1 else 'processes'}, {' and '.join(apart)} apart.",
+        f"Scaled from {cost.source}: {cost.seconds:.3f} s for {cost.n_samples} samples.",
+        f"Disk: about {size(sum(plan.size_bytes for plan in plans))} more.",
+    )
+    columns = (
+        *texts("stage"),
+        Column("tasks", is_text=True, joint=" "),
+        *numbers("cached", "time"),
+    )
+    return Table("What would run", columns, rows, notes)
+
+
+def duration(seconds: float) -> str:
+    """Write a time so that its size is seen at once.
+
+    Parameters
+    ----------
+    seconds : float, [s]
+
+    Examples
+    --------
+    >>> [duration(value) for value in (0.02, 7.3, 300.0, 9000.0, float("nan"))]
+    ['< 1 s', '7 s', '5 min', '2.5 h', '-']
+    """
+    if not math.isfinite(seconds):
+        return MISSING
+    if seconds < 1.0:
+        return "< 1 s"
+    for limit, unit, name, digits in (
+        (120.0, 1.0, "s", 0),
+        (7200.0, 60.0, "min", 0),
+        (math.inf, 3600.0, "h", 1),
+    ):
+        if seconds < limit:
+            return f"{seconds / unit:.{digits}f} {name}"
+    return MISSING
+
+
+def size(n_bytes: float) -> str:
+    """Write a size on the disk.
+
+    Parameters
+    ----------
+    n_bytes : float, [bytes]
+
+    Examples
+    --------
+    >>> size(2.5e6), size(3.1e9)
+    ('3 MB', '3.1 GB')
+    """
+    if n_bytes < _KILO**3:
+        return f"{math.ceil(n_bytes / _KILO**2)} MB"
+    return f"{n_bytes / _KILO**3:.1f} GB"
+
+
+def _range(limits: tuple[float, float], unit: str) -> str:
+    # Adding zero takes the sign off a negative one.
+    return f"{limits[0] + 0.0:.3g} to {limits[1] + 0.0:.3g}{behind(unit)}"

@@ -1,0 +1,371 @@
+"""A diagnosis as tables and sentences, and all that the screen shows of it."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from hwid_cli.records.diagnosis import (
+    BaseParameter,
+    Diagnosis,
+    FittedParameter,
+    Gap,
+    RankedCandidate,
+)
+from hwid_cli.records.drive import SimulatedRecording
+from hwid_cli.records.units import behind
+from hwid_cli.report.formats import MISSING, counted, decimals, number
+from hwid_cli.report.table import Column, Heading, Table, Text, numbers, texts
+
+# What a unit in a name is made of.
+_UNITS = {"N", "m", "kg", "A", "V", "H", "ohm", "s", "Hz", "rad", "deg"}
+_PER = "per"
+
+
+def quantity_and_unit(name: str) -> tuple[str, str]:
+    """Take the name of a parameter apart.
+
+    Returns
+    -------
+    quantity : str
+        In words.
+    unit : str
+        A dash where there is none.
+
+    Examples
+    --------
+    >>> quantity_and_unit("drag_N_s2_per_m2")
+    ('drag', 'N s^2/m^2')
+    >>> quantity_and_unit("position_gain_per_s"), quantity_and_unit("damping_ratio")
+    (('position gain', '1/s'), ('damping ratio', '-'))
+    """
+    words = name.split("_")
+    first = len(words)
+    # The first word is never a unit: it says what the number is.
+    while first > 1 and _is_unit(words[first - 1]):
+        first -= 1
+    above, _, below = "_".join(words[first:]).partition(_PER)
+    unit = _product(above) or "1"
+    if below:
+        unit += f"/{_product(below)}"
+    return " ".join(words[:first]), unit if first < len(words) else "-"
+
+
+def _is_unit(word: str) -> bool:
+    return word == _PER or word.rstrip("234") in _UNITS
+
+
+def _product(words: str) -> str:
+    """``_N_s2_`` as ``N s^2``."""
+    parts = [word for word in words.split("_") if word]
+    return " ".join(
+        f"{part[:-1]}^{part[-1]}" if part[-1].isdigit() else part for part in parts
+    )
+
+
+# Joins the effects of a candidate.
+AND = " + "
+NO_EFFECT = "no effect added"
+
+
+def candidate_name(effects: Sequence[str]) -> str:
+    """Name a set of effects.
+
+    Parameters
+    ----------
+    effects : sequence of str
+        Ids.
+
+    Examples
+    --------
+    >>> candidate_name(["cogging", "second_mode"]), candidate_name([])
+    ('cogging + second_mode', 'no effect added')
+    """
+    return AND.join(effects) or NO_EFFECT
+
+
+def is_chosen(candidate: RankedCandidate, diagnosis: Diagnosis) -> bool:
+    """Say whether a candidate is what the diagnosis names."""
+    found = {effect.id for effect in diagnosis.effects}
+    return bool(found) and set(candidate.effects) == found
+
+
+# Where something else remains, an effect also takes up some of that.
+INTERVALS_OF_A_PART = "intervals hold as if nothing else were missing"
+
+
+def effects_table(diagnosis: Diagnosis) -> Table:
+    """Show the parameters of the effects that the simulation lacks."""
+    rows = []
+    for effect in diagnosis.effects:
+        name = effect.id
+        for parameter in effect.parameters:
+            quantity, unit = quantity_and_unit(parameter.name)
+            value = parameter.text or _value(parameter.value)
+            rows.append((name, quantity, value, _interval(parameter), unit))
+            name = ""
+    title = "Effects that the simulation lacks"
+    if rows and not diagnosis.complete:
+        title += f"; {INTERVALS_OF_A_PART}"
+    columns = (
+        *texts("effect", "parameter"),
+        *numbers("value", "95 % interval"),
+        *texts("unit"),
+    )
+    return Table(title, columns, tuple(rows))
+
+
+def _interval(parameter: FittedParameter) -> str:
+    bounds = (parameter.low, parameter.high)
+    return " to ".join(map(_value, bounds)) if np.isfinite(bounds).all() else MISSING
+
+
+def gap_table(diagnosis: Diagnosis) -> Table:
+    """Show the gap between simulation and measurement, step by step.
+
+    Returns
+    -------
+    Table
+        The last row, with the effects, only where there are any.
+    """
+    steps = [
+        ("as given", diagnosis.given),
+        ("base re-fitted", diagnosis.before),
+        ("with the effects", diagnosis.after),
+    ]
+    unit = diagnosis.output_unit
+    notes = [explained_sentence(diagnosis)] if diagnosis.effects else []
+    if diagnosis.noise.sentence:
+        notes.append(diagnosis.noise.sentence)
+    return Table(
+        f"Gap between simulation and measurement; noise {number(diagnosis.noise.rms)}"
+        f"{behind(unit)}",
+        (
+            *texts("simulation"),
+            *numbers(
+                f"train RMS [{unit}]", f"held-out RMS [{unit}]", "held-out / noise"
+            ),
+        ),
+        tuple(_gap_row(*step) for step in steps[: 3 if diagnosis.effects else 2]),
+        tuple(notes),
+    )
+
+
+def _gap_row(label: str, gap: Gap) -> tuple[str, ...]:
+    values = number(gap.train_rms), number(gap.held_out_rms)
+    return (label, *values, _ratio(gap.ratio_to_noise))
+
+
+def base_table(diagnosis: Diagnosis) -> Table:
+    """Show the parameters of the simulation as given and as fitted.
+
+    Returns
+    -------
+    Table
+        Its last column is how far the last fit moved each of them.
+    """
+    heads = ["parameter", "given", "re-fitted", "with the effects", "shift", "unit"]
+    if not diagnosis.effects:
+        heads.remove("with the effects")
+    rows = []
+    for one in diagnosis.base:
+        quantity, unit = quantity_and_unit(one.name)
+        values = [one.before, one.refitted, one.after][: len(heads) - 3]
+        rows.append((quantity, *map(_value, values), _shift(one, values[-1]), unit))
+    columns = (*texts(heads[0]), *numbers(*heads[1:-1]), *texts(heads[-1]))
+    caption = "Parameters of the simulation; shift: from given to the last"
+    return Table(caption, columns, tuple(rows))
+
+
+def _shift(one: BaseParameter, fitted: float) -> str:
+    if one.before == 0.0 or not np.isfinite(fitted / one.before):
+        return MISSING
+    return f"{100.0 * (fitted / one.before - 1.0):+.1f} %"
+
+
+def ranking_table(diagnosis: Diagnosis, *, count: int | None = None) -> Table:
+    """Show the candidates, the best first.
+
+    Parameters
+    ----------
+    count : int or None, [-]
+        How many; None for all.
+
+    Returns
+    -------
+    Table
+        What was not fitted has a forecast only.
+    """
+    has_noise = diagnosis.noise.rms > 0.0
+    rows = []
+    for one in diagnosis.candidates[:count]:
+        error = one.held_out_rms
+        rows.append(
+            (
+                candidate_name(one.effects) + "*" * is_chosen(one, diagnosis),
+                percent(one.forecast_share),
+                _ratio(error / diagnosis.noise.rms) if has_noise else number(error),
+                percent(one.explained_share),
+                percent(one.improved_share),
+                decimals(one.bic_gain, 0),
+                one.note,
+            )
+        )
+    mark = " (* the diagnosis)" if diagnosis.effects else ""
+    heads = (
+        "forecast",
+        "held-out/noise" if has_noise else f"RMS [{diagnosis.output_unit}]",
+        "explained",
+        "improved",
+        "BIC gain",
+    )
+    return Table(
+        f"Candidates, the best first{mark}; forecast, explained and improved are shares of "
+        "the error, of its excess over the noise, and of the recordings",
+        (
+            Column("added to the simulation", is_text=True, joint=AND),
+            *numbers(*heads),
+            Column("note", is_text=True, is_detail=True),
+        ),
+        tuple(rows),
+    )
+
+
+def recordings_table(diagnosis: Diagnosis) -> Table:
+    """Show the gap in every recording."""
+    heads = ["given", "re-fitted", "with the effects"]
+    rows = []
+    for one in diagnosis.gaps:
+        values = [one.rms_given, one.rms_before, one.rms_after]
+        if not diagnosis.effects:
+            values.pop()
+        use = "validation" if one.is_held_out else "training"
+        rows.append((one.name, one.kind, use, *map(number, values)))
+    return Table(
+        f"RMS gap of every recording [{diagnosis.output_unit}]",
+        (
+            *texts("recording", "kind", "used for"),
+            *numbers(*(heads if diagnosis.effects else heads[:-1])),
+        ),
+        tuple(rows),
+    )
+
+
+def closing_sentences(diagnosis: Diagnosis) -> list[str]:
+    """Say what the data cannot tell apart, what to measure next, what nothing shows."""
+    lines = []
+    if diagnosis.ambiguous_with:
+        names = ", ".join(one.replace("+", AND) for one in diagnosis.ambiguous_with)
+        lines.append(f"These data cannot tell it from: {names}.")
+    following = diagnosis.next_experiment
+    if following.input:
+        # Both may end with a full stop of their own.
+        parts = [one.strip().rstrip(".") for one in (following.input, following.reason)]
+        text = " - ".join(part for part in parts if part)
+        lines.append(f"Next experiment: {text}.")
+    if diagnosis.not_observable:
+        names = "; ".join(one.rstrip(".") for one in diagnosis.not_observable)
+        lines.append(f"Cannot be seen in these recordings: {names}.")
+    return lines
+
+
+def explained_sentence(diagnosis: Diagnosis) -> str:
+    """Say how much of the gap the effects explain."""
+    share = percent(diagnosis.explained_share)
+    return f"Explained: {share} of the excess over the noise, held-out recordings."
+
+
+def percent(share: float) -> str:
+    """Write a share in percent with one decimal.
+
+    Parameters
+    ----------
+    share : float, [-]
+
+    Examples
+    --------
+    >>> percent(0.998), percent(float("nan"))
+    ('99.8 %', '-')
+    """
+    return f"{100.0 * share:.1f} %" if np.isfinite(share) else MISSING
+
+
+def _value(value: float) -> str:
+    return f"{value:.4g}" if np.isfinite(value) else MISSING
+
+
+def _ratio(value: float) -> str:
+    # Close to 1 each thousandth tells whether something remains.
+    digits = 3 if value < 10.0 else 1
+    return f"{value:.{digits}f}" if np.isfinite(value) else MISSING
+
+
+def simulated_table(
+    curves: Sequence[SimulatedRecording], side: str, unit: str
+) -> Table:
+    """Show how far a simulation is from the measurements.
+
+    Parameters
+    ----------
+    side : str
+        What the two are compared by: output, or input in a closed loop.
+    unit : str
+        Of that side.
+    """
+    columns = (*texts("recording"), *numbers(f"RMS [{unit}]"))
+    rows = tuple((one.name, number(one.rms)) for one in curves)
+    return Table(f"RMS of measured minus simulated {side}", columns, rows)
+
+
+# Candidates and places that the screen shows.
+_MOST_SHOWN = 5
+# Verdicts that need no effect, so that little has to be said.
+_SHORT = ("none", "parameters")
+
+
+def verdict_sentence(diagnosis: Diagnosis) -> str:
+    """Say the verdict in a few words."""
+    line = f"Verdict: {diagnosis.verdict}"
+    if diagnosis.effects:
+        names = candidate_name([effect.id for effect in diagnosis.effects])
+        rest = "complete" if diagnosis.complete else "a part stays unexplained"
+        line += f", {names} ({rest})"
+    return line
+
+
+def effect_sentences(diagnosis: Diagnosis) -> list[str]:
+    """Say what each effect does, and its law."""
+    return [
+        line
+        for effect in diagnosis.effects
+        for line in (effect.sentence, f"Law: {effect.equation}")
+    ]
+
+
+def used_sentence(diagnosis: Diagnosis) -> str:
+    """Say what the effects were fitted to and validated on."""
+    return (
+        f"Trained on {counted(len(diagnosis.train), 'recording')}, validated on "
+        f"{counted(len(diagnosis.held_out), 'recording')} held out."
+    )
+
+
+def diagnosis_blocks(diagnosis: Diagnosis) -> list[Text | Heading | Table]:
+    """Collect what the screen shows of a diagnosis: little where nothing is missing."""
+    is_short = diagnosis.verdict in _SHORT
+    sentences = [verdict_sentence(diagnosis), diagnosis.summary]
+    sentences += [used_sentence(diagnosis), *effect_sentences(diagnosis)]
+    blocks: list[Text | Heading | Table] = [
+        Text(one) for one in sentences if one.strip()
+    ]
+    if diagnosis.effects:
+        blocks.append(effects_table(diagnosis))
+    blocks.append(gap_table(diagnosis))
+    if not is_short and diagnosis.places:
+        places = [Text(f"- {one.sentence}") for one in diagnosis.places[:_MOST_SHOWN]]
+        blocks += [Heading("Where the error sits"), *places]
+    if diagnosis.base and diagnosis.verdict != "none":
+        blocks.append(base_table(diagnosis))
+    blocks += [Text(one) for one in closing_sentences(diagnosis)]
+    if not is_short and diagnosis.candidates:
+        blocks.append(ranking_table(diagnosis, count=_MOST_SHOWN))
+    return blocks

@@ -1,0 +1,74 @@
+"""Section about calibration."""
+
+from collections.abc import Mapping
+
+from hwid_cli.records.recordings import CalibrationLog
+from hwid_cli.records.report import ReportContents
+from hwid_cli.report import plots
+from hwid_cli.report.calibration import calibration_table
+from hwid_cli.report.formats import counted
+from hwid_cli.report.page import (
+    Figures,
+    Folded,
+    Image,
+    PageBlock,
+    Pairs,
+    Section,
+    folded_beyond,
+    image,
+)
+from hwid_cli.report.table import Text
+
+# Figures that are shown open; all others are folded.
+_MOST_OPEN = 4
+# Rows of a table that stands open before the first figure.
+_MOST_ROWS = 12
+
+
+def calibration_section(
+    contents: ReportContents, figures: Mapping[str, bytes]
+) -> Section:
+    """Show what calibration did.
+
+    Parameters
+    ----------
+    figures : mapping of str to bytes
+        PNG files by the names of the recordings.
+    """
+    logs = contents.stored.logs
+    blocks: list[PageBlock] = []
+    if not logs:
+        blocks.append(Text("Not run yet: run 'hwid calibrate CONFIG'.", is_note=True))
+    else:
+        summary = f"The table of all {counted(len(logs), 'recording')}"
+        blocks.append(folded_beyond(_MOST_ROWS, calibration_table(logs), summary))
+        shown = [
+            Figures((_calibration_image(log, figures[log.name]),), _cut_sentence(log))
+            for log in logs
+            if log.name in figures
+        ]
+        if shown:
+            blocks.append(Pairs(tuple(shown[:_MOST_OPEN])))
+        if shown[_MOST_OPEN:]:
+            more = counted(len(shown) - _MOST_OPEN, "more recording")
+            rest = Pairs(tuple(shown[_MOST_OPEN:]))
+            blocks.append(Folded(f"{more} before and after calibration", (rest,)))
+        if not shown:
+            text = "No figures: the configuration leaves the recordings as they are."
+            blocks.append(Text(text, is_note=True))
+    title = "Calibration: what was kept of each recording"
+    return Section("calibration", title, "Calibration", tuple(blocks))
+
+
+def _calibration_image(log: CalibrationLog, png: bytes) -> Image:
+    alt = f"Input and output of {log.name} before and after calibration"
+    return image(f"calibrate/{log.name}.png", png, alt, dots_per_inch=plots.DOTS)
+
+
+def _cut_sentence(log: CalibrationLog) -> str:
+    last = log.first_sample + log.n_samples - 1
+    repaired = len(log.repaired_input) + len(log.repaired_output)
+    kept = f"{log.name}: samples {log.first_sample} to {last} of {log.n_raw_input} are kept"
+    if repaired:
+        kept += f", {counted(repaired, 'damaged sample')} replaced"
+    return f"{kept}."

@@ -1,0 +1,64 @@
+"""What ``hwid init`` guessed."""
+
+from collections.abc import Sequence
+
+from hwid_cli.records.starter import FolderLayout, Proposal, Role
+from hwid_cli.report.table import Code
+
+
+def starter_summary(
+    path: str, layout: FolderLayout, proposal: Proposal, problems: Sequence[str]
+) -> Code:
+    """Say what was guessed, why, and what to check.
+
+    Parameters
+    ----------
+    path : str
+        Of the configuration that was written.
+    problems : sequence of str
+        About files that are left out.
+    """
+    lines = [
+        f"files: {', '.join(layout.patterns)}",
+        f"time: {_time(layout, proposal)}",
+        f"input: {_role(layout.input)}",
+        f"output: {_role(layout.output)}",
+        *(f"note: {note}" for note in layout.notes),
+        *(f"left out: {problem}" for problem in problems),
+        f"kinds: {_kinds(proposal)}",
+        f"calibrate: {proposal.recipe_reason}",
+        f"threshold: {proposal.threshold:g}, {proposal.threshold_reason}",
+    ]
+    if proposal.held_out:
+        lines.append(f"held out for the test: {', '.join(proposal.held_out)}")
+    lines += [
+        "",
+        f"{path} is written; check columns, units, threshold and recipes in it. Then:",
+        f"  hwid check {path}",
+        f"  hwid run {path}",
+    ]
+    return Code("\n".join(lines))
+
+
+def _role(role: Role) -> str:
+    called = repr(role.title) if role.title else f"column {role.key}"
+    unit = f" in {role.unit}" if role.unit else ", unit not known"
+    return f"{called}{unit}: {role.reason}"
+
+
+def _time(layout: FolderLayout, proposal: Proposal) -> str:
+    if layout.time is None:
+        return f"sample time {layout.sample_time_s:g} s: {layout.clock_reason}"
+    called = (
+        repr(layout.time.title) if layout.time.title else f"column {layout.time.key}"
+    )
+    more = "; jitters, so it is resampled" if layout.resample else ""
+    step = f"{proposal.sample_time_s:g} s"
+    return f"{called}, a sample every {step}: {layout.time.reason}{more}"
+
+
+def _kinds(proposal: Proposal) -> str:
+    if proposal.parts:
+        return "one file, cut into two recordings"
+    found = [f"{kind} {', '.join(names)}" for kind, names in proposal.kinds.items()]
+    return f"{'; '.join(found) or 'other'} ({proposal.kind_reason})"

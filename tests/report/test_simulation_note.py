@@ -1,0 +1,126 @@
+"""Every printed fit says that it was simulated in free run, and from which state."""
+
+from dataclasses import replace
+
+import pytest
+
+from hwid_cli.report.crossval import coverage_table, cross_table
+from hwid_cli.report.final_test import (
+    chain_coverage_table,
+    chain_on_tests_table,
+    chain_tables,
+    coverage_matrix_table,
+    prediction_table,
+    smallest_set_table,
+)
+from hwid_cli.report.fits import best_models_table
+from hwid_cli.report.groups import chain_table, join_table, levels_table
+from hwid_cli.report.sections.crossval import crossval_section
+from hwid_cli.report.sections.group import groups_section
+from hwid_cli.report.sections.identify import (
+    orders_section,
+    recordings_section,
+    residuals_section,
+)
+from hwid_cli.report.sections.models import models_section
+from hwid_cli.report.sections.summary import summary_section
+from hwid_cli.report.sections.test import (
+    assignment_section,
+    coverage_section,
+    final_test_section,
+)
+from hwid_cli.report.simulation_note import HUBER_NOTE, simulation_note
+from hwid_cli.report.table import Text, as_text
+from tests.report.report_examples import fit, group_search, with_results
+from tests.report.test_assignment import FINAL as ASSIGNED
+from tests.report.test_crossval import CROSS, CROSSVAL, SCORES
+from tests.report.test_final_test import FINAL, KINDS, TREND
+
+RULES = ("zero", "steady", "estimated")
+SEARCH = group_search(levels=2)
+
+
+def started(rule):
+    one = fit(("step_01",))
+    return replace(one, options=replace(one.options, initial_state=rule))
+
+
+VALIDATED = {
+    "coverage": coverage_table(SCORES, CROSSVAL),
+    "cross": cross_table(CROSS),
+    "levels": levels_table(SEARCH),
+    "joins": join_table(SEARCH, 2),
+    "chain": chain_table(SEARCH),
+    "on tests": chain_on_tests_table(FINAL, TREND),
+    "kinds": chain_coverage_table(FINAL, TREND, {}),
+    "on all": chain_tables(FINAL, TREND, KINDS)[0],
+    "matrix": coverage_matrix_table(FINAL),
+    "set": smallest_set_table(ASSIGNED),
+    "told": prediction_table(ASSIGNED),
+}
+
+
+@pytest.mark.parametrize("rule", RULES)
+@pytest.mark.parametrize("table", VALIDATED)
+def test_every_table_of_validations_says_how_models_start(table, rule):
+    text = as_text([VALIDATED[table]], initial_state=rule)
+    words = simulation_note(rule, is_validation=True)
+
+    assert words in text.splitlines()
+    assert len(words) <= 80
+    for other in set(RULES) - {rule}:
+        assert simulation_note(other, is_validation=True) not in text
+
+
+@pytest.mark.parametrize(
+    ("section", "is_validation"),
+    [
+        (summary_section, True),
+        (recordings_section, True),
+        (residuals_section, True),
+        (orders_section, False),
+        (crossval_section, True),
+        (models_section, True),
+        (groups_section, True),
+        (final_test_section, True),
+        (coverage_section, True),
+        (assignment_section, True),
+    ],
+)
+def test_every_section_of_the_report_says_how_models_start(
+    contents, section, is_validation
+):
+    notes = [one.text for one in section(contents).blocks if isinstance(one, Text)]
+
+    assert simulation_note("estimated", is_validation=is_validation) in notes
+
+
+@pytest.mark.parametrize("rule", RULES)
+def test_the_table_of_the_best_models_says_how_their_fits_start(rule):
+    text = as_text([best_models_table([(started(rule),)], "m", nk_is_delay=False)])
+
+    assert simulation_note(rule, is_validation=False) in text.splitlines()
+
+
+@pytest.mark.parametrize(
+    ("join", "words"),
+    [("concatenate", "start once"), ("experiments", "starts by itself")],
+)
+def test_the_chain_of_groups_says_how_joined_recordings_start(join, words):
+    search = replace(SEARCH, join=join)
+
+    assert words in chain_table(search).how[0]
+
+
+def test_a_section_of_fits_that_bear_outliers_says_so(contents):
+    robust = tuple(
+        replace(one, options=replace(one.options, loss="huber"))
+        for one in contents.stored.fits
+    )
+    stored = with_results(contents.stored, identify=robust)
+
+    for found, is_said in ((contents, False), (replace(contents, stored=stored), True)):
+        notes = [
+            one.text for one in crossval_section(found).blocks if isinstance(one, Text)
+        ]
+        assert (HUBER_NOTE in notes) == is_said
