@@ -3,13 +3,18 @@
 Names of the effects that a drive's simulation may hold, and of their parameters.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
-from hwid_cli.config.requirements import require, require_distinct, require_known
-from hwid_cli.errors import ConfigError
-from hwid_cli.files.messages import did_you_mean
-from hwid_cli.records.drive import CHANGING, HOLDS, STARTS
-from hwid_cli.records.experiment import DiagnoseOptions, Experiment, SimulationOptions
+from hwid_cli.config.faults import (
+    Fault,
+    Place,
+    missing,
+    unknown_key,
+    wrong,
+    wrong_word,
+)
+from hwid_cli.records.drive import CHANGING
+from hwid_cli.records.experiment import DiagnoseOptions, Experiment
 
 # Every parameter that an effect has to state; the law of each is in docs/effects.md.
 EFFECT_PARAMETERS: dict[str, tuple[str, ...]] = {
@@ -83,140 +88,113 @@ NOT_NEGATIVE_PARAMETERS: dict[str, tuple[str, ...]] = {
 # Parameters that are a word and no number.
 WORD_PARAMETERS: dict[str, tuple[str, ...]] = {"parameter_change": ("which",)}
 
-
-_KIND = "drive"
-_POSITIVE = (
-    "mass_kg",
-    "force_constant_N_per_A",
-    "reference_current_A",
-    "reference_displacement_m",
-    "resistance_ohm",
-)
-_NOT_NEGATIVE = (
-    "damping_N_s_per_m",
-    "stiffness_N_per_m",
-    "inductance_H",
-    "back_emf_V_s_per_m",
-)
 # What the electrical circuit has besides its resistance.
 _OF_CIRCUIT = ("inductance_H", "back_emf_V_s_per_m")
 
 
-def check_simulation(experiment: Experiment) -> None:
-    """Refuse a physics model, or a diagnosis of it, that cannot be computed.
-
-    Parameters
-    ----------
-    experiment : Experiment
-        ``source`` names the file in messages.
-
-    Raises
-    ------
-    ConfigError
-        For the first value that cannot be used.
-    """
-    file, simulation = experiment.source, experiment.simulation
-    if simulation is not None:
-        _check_drive(simulation, f"{file}: simulation")
-        _check_controller(experiment)
-        for name, parameters in simulation.effects.items():
-            _check_effect(name, parameters, f"{file}: simulation.effects")
-    if experiment.diagnose is not None:
-        if simulation is None:
-            raise ConfigError(
-                f"{file}: simulation: missing; expected the physics model that "
-                "diagnose judges; add the section (configs/README.md explains it), or "
-                "remove diagnose"
-            )
-        _check_diagnose(experiment.diagnose, f"{file}: diagnose")
-
-
-def _check_drive(options: SimulationOptions, at: str) -> None:
-    require_known((options.kind,), (_KIND,), f"{at}.kind")
-    require_known((options.hold,), HOLDS, f"{at}.hold")
-    for name in _POSITIVE:
+def circuit_faults(experiment: Experiment) -> Iterator[Fault]:
+    """Parts of an electrical circuit that has no resistance."""
+    options = experiment.simulation
+    if options is None or options.resistance_ohm is not None:
+        return
+    for name in _OF_CIRCUIT:
         value = getattr(options, name)
-        require(value is None or value > 0, f"{at}.{name}", value, "a number > 0")
-    for name in _NOT_NEGATIVE:
-        value = getattr(options, name)
-        require(value is None or value >= 0, f"{at}.{name}", value, "a number >= 0")
-    if options.resistance_ohm is None:
-        for name in _OF_CIRCUIT:
-            value = getattr(options, name)
-            require(
-                not value,
-                f"{at}.{name}",
+        if value:
+            yield wrong(
+                ("simulation", name),
                 value,
                 "simulation.resistance_ohm too, because without it the input is the "
-                "current; add that key or remove this one",
+                "current",
+                "add that key or remove this one",
             )
 
 
-def _check_controller(experiment: Experiment) -> None:
+def controller_faults(experiment: Experiment) -> Iterator[Fault]:
+    """A controller without the column that it follows."""
     simulation, recordings = experiment.simulation, experiment.recordings
     if simulation is None or simulation.controller is None or recordings is None:
         return
     if recordings.columns.reference is None:
-        raise ConfigError(
-            f"{experiment.source}: recordings.columns.reference: missing; expected the "
-            "column that the controller follows; name it, or remove "
-            "simulation.controller"
+        yield missing(
+            ("recordings", "columns", "reference"),
+            "the column that the controller follows",
+            "name it, or remove simulation.controller",
+            without=("simulation", "controller"),
         )
 
 
-def _check_effect(name: str, found: Mapping[str, float | str], at: str) -> None:
-    require_known((name,), EFFECT_PARAMETERS, at)
-    at = f"{at}.{name}"
+def effect_faults(experiment: Experiment) -> Iterator[Fault]:
+    """Effects of the simulation that there are not, or that lack a parameter."""
+    if experiment.simulation is not None:
+        for name, parameters in experiment.simulation.effects.items():
+            yield from _effect(name, parameters, ("simulation", "effects"))
+
+
+def _effect(
+    name: str, found: Mapping[str, float | str], place: Place
+) -> Iterator[Fault]:
+    if name not in EFFECT_PARAMETERS:
+        yield wrong_word(place, name, EFFECT_PARAMETERS)
+        return
+    place = (*place, name)
     needed = EFFECT_PARAMETERS[name]
     known = (*needed, *OPTIONAL_PARAMETERS.get(name, ()))
     for key in found:
         if key not in known:
-            raise ConfigError(f"{at}.{key}: unknown key; {did_you_mean(key, known)}")
+            yield unknown_key((*place, key), known)
     for key in needed:
         is_word = key in WORD_PARAMETERS.get(name, ())
         expected = f"one of {', '.join(CHANGING)}" if is_word else "a finite number"
         if key not in found:
-            raise ConfigError(f"{at}.{key}: missing; expected {expected}; add the key")
+            yield missing((*place, key), expected)
     for key, value in found.items():
-        _check_parameter(name, key, value, f"{at}.{key}")
+        if key in known:
+            yield from _parameter(name, key, value, (*place, key))
 
 
-def _check_parameter(effect: str, key: str, value: float | str, at: str) -> None:
+def _parameter(
+    effect: str, key: str, value: float | str, place: Place
+) -> Iterator[Fault]:
     if key in WORD_PARAMETERS.get(effect, ()):
         if value not in CHANGING:
-            raise ConfigError(f"{at}: found {value!r}; {did_you_mean(value, CHANGING)}")
+            yield wrong_word(place, value, CHANGING)
     elif isinstance(value, str):
-        require(False, at, value, "a finite number")
-    elif key in POSITIVE_PARAMETERS.get(effect, ()):
-        require(value > 0, at, value, "a number > 0")
-    elif key in NOT_NEGATIVE_PARAMETERS.get(effect, ()):
-        require(value >= 0, at, value, "a number >= 0")
-    if key == "motor_share" and not isinstance(value, str):
-        require(value < 1, at, value, "a share of the mass below 1")
+        yield wrong(place, value, "a finite number")
+    elif key in POSITIVE_PARAMETERS.get(effect, ()) and value <= 0:
+        yield wrong(place, value, "a number > 0")
+    elif key in NOT_NEGATIVE_PARAMETERS.get(effect, ()) and value < 0:
+        yield wrong(place, value, "a number >= 0")
+    elif key == "motor_share" and value >= 1:
+        yield wrong(place, value, "a share of the mass below 1")
 
 
-def _check_diagnose(options: DiagnoseOptions, at: str) -> None:
-    for name in ("max_effects", "skip_samples"):
-        value = getattr(options, name)
-        require(value >= 0, f"{at}.{name}", value, "an integer >= 0")
-    require_known((options.initial_state,), STARTS, f"{at}.initial_state")
-    if options.effects is not None:
-        require_known(options.effects, EFFECT_PARAMETERS, f"{at}.effects")
-        require_distinct(options.effects, f"{at}.effects")
-    names = options.recordings
-    if names is not None:
-        require(len(names) > 0, f"{at}.recordings", [], "at least one recording")
-        require_distinct(names, f"{at}.recordings")
-    held_out = options.hold_out
-    if isinstance(held_out, str):
+def diagnose_faults(experiment: Experiment) -> Iterator[Fault]:
+    """A diagnosis without a simulation, of unknown effects, or without data to train on."""
+    options = experiment.diagnose
+    if options is None:
         return
-    require(len(held_out) > 0, f"{at}.hold_out", [], "auto, or at least one recording")
-    require_distinct(held_out, f"{at}.hold_out")
-    if names is not None:
-        require_known(held_out, names, f"{at}.hold_out")
-        require(
-            len(held_out) < len(names),
-            f"{at}.hold_out",
-            list(held_out),
-            "at least one of diagnose.recordings left to train on",
+    if experiment.simulation is None:
+        yield missing(
+            ("simulation",),
+            "the physics model that diagnose judges",
+            "add the section (configs/README.md explains it), or remove diagnose",
+            without=("diagnose",),
+        )
+    for effect in options.effects or ():
+        if effect not in EFFECT_PARAMETERS:
+            yield wrong_word(("diagnose", "effects"), effect, EFFECT_PARAMETERS)
+    yield from _held_out(options)
+
+
+def _held_out(options: DiagnoseOptions) -> Iterator[Fault]:
+    names, held_out = options.recordings, options.hold_out
+    if names is None or isinstance(held_out, str):
+        return
+    place = ("diagnose", "hold_out")
+    unknown = [name for name in held_out if name not in names]
+    if unknown:
+        yield wrong_word(place, unknown[0], names)
+    elif len(held_out) >= len(names):
+        yield wrong(
+            place, held_out, "at least one of diagnose.recordings left to train on"
         )
