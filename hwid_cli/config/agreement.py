@@ -7,8 +7,10 @@ from hwid_cli.config.faults import Fault, Place, missing, wrong
 from hwid_cli.config.simulation_checks import (
     circuit_faults,
     controller_faults,
-    diagnose_faults,
     effect_faults,
+    held_out_faults,
+    named_effect_faults,
+    simulation_faults,
 )
 from hwid_cli.files.messages import name_fault
 from hwid_cli.records.experiment import Experiment
@@ -123,8 +125,13 @@ def _parts(experiment: Experiment) -> Iterator[Fault]:
                 bounds,
                 "[first, last + 1]: two samples counted from 0, the second one larger",
             )
-    is_cut = options.first_sample != 0 or options.last_sample is not None
-    if options.parts and is_cut:
+
+
+def _cut_or_parts(experiment: Experiment) -> Iterator[Fault]:
+    options = experiment.recordings
+    if options is None or not options.parts:
+        return
+    if options.first_sample != 0 or options.last_sample is not None:
         name = "first_sample" if options.first_sample else "last_sample"
         yield wrong(
             ("recordings", name),
@@ -255,15 +262,16 @@ _AGREEMENTS = (
     _Agreement(_columns, "recordings.columns"),
     _Agreement(_clock, "recordings.columns.time recordings.sample_time_s"),
     _Agreement(_range, "recordings.first_sample recordings.last_sample"),
-    _Agreement(
-        _parts, "recordings.parts recordings.first_sample recordings.last_sample"
-    ),
+    _Agreement(_parts, "recordings.parts"),
+    _Agreement(_cut_or_parts, "recordings.first_sample recordings.last_sample"),
     _Agreement(_delay_grid, "orders.nk_role orders.nf fit.delays"),
     _Agreement(_linear_block, f"{_GRID} fit.linear_block"),
     _Agreement(_keep, "group.keep"),
     _Agreement(circuit_faults, "simulation.resistance_ohm"),
     _Agreement(controller_faults, "simulation.controller recordings.columns.reference"),
     _Agreement(effect_faults, "simulation.effects"),
-    _Agreement(diagnose_faults, "simulation diagnose"),
+    _Agreement(simulation_faults, "simulation"),
+    _Agreement(named_effect_faults, "diagnose.effects"),
+    _Agreement(held_out_faults, "diagnose.recordings diagnose.hold_out"),
     _Agreement(_test, "test identify crossval group"),
 )

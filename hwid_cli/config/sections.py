@@ -38,7 +38,7 @@ from pydantic import (
 # Those of the library itself are refused by pydantic before Python 3.12.
 from typing_extensions import TypedDict
 
-from hwid_cli.config.faults import Fault, Place, missing, refused, unknown_key, wrong
+from hwid_cli.config.faults import Fault, missing, refused, unknown_key, wrong
 from hwid_cli.config.own_functions import OwnFunctionFile, read_own_function
 from hwid_cli.files.messages import is_plain
 from hwid_cli.records.model import FitOptions
@@ -110,11 +110,13 @@ def _readable(hint: Any) -> Any:
     if is_dataclass(hint):
         return _section(hint)
     if origin is tuple:
+        item: Any = _readable(args[0])
         listed = BeforeValidator(partial(_as_list, hint))
-        return Annotated[tuple[_readable(args[0]), ...], listed]
+        return Annotated[tuple[item, ...], listed]
     if origin is dict:
-        keys = Annotated[str, Strict()]
-        return Annotated[dict[keys, _readable(args[1])], BeforeValidator(_as_section)]
+        inner: Any = _readable(args[1])
+        sections = dict[Annotated[str, Strict()], inner]
+        return Annotated[sections, BeforeValidator(_as_section)]
     return _SCALARS[hint]
 
 
@@ -158,7 +160,7 @@ def _is_required(field: Field) -> bool:
 
 def _build(record_type: Any, values: dict[str, Any], info: ValidationInfo) -> Any:
     if record_type is FitOptions:
-        values = _with_functions(values, Path(info.context).parent)
+        values = _with_functions(values, Path(str(info.context)).parent)
     if "source" in record_type.__dataclass_fields__:
         values = {**values, "source": info.context}
     return record_type(**values)
@@ -297,7 +299,8 @@ def expected(hint: Any) -> str:
 
 def _fault(record_type: Any, content: Any, error: Any) -> Fault:
     """What pydantic says of a value, as a fault."""
-    place, kind, value = tuple(error["loc"]), error["type"], error["input"]
+    place: tuple[Any, ...] = tuple(error["loc"])
+    kind, value = error["type"], error["input"]
     if kind == "value_error":
         return refused(place, error["ctx"]["error"].refusal)
     if kind in _UNKNOWN_KEY:
@@ -318,7 +321,7 @@ def _fault(record_type: Any, content: Any, error: Any) -> Fault:
     return wrong(place, value, _EXPECTED[kind], quotes)
 
 
-def _unknown_key(place: Place, record_type: Any, content: Any) -> Fault:
+def _unknown_key(place: tuple[Any, ...], record_type: Any, content: Any) -> Fault:
     elsewhere = [
         repr(f"{section}.{place[-1]}")
         for section, keys in _sections(record_type).items()
@@ -344,7 +347,7 @@ def _records_of(hint: Any) -> list[Any]:
     return [one for one in get_args(hint) or (hint,) if is_dataclass(one)]
 
 
-def _record_at(place: Place, record_type: Any, content: Any) -> Any:
+def _record_at(place: tuple[Any, ...], record_type: Any, content: Any) -> Any:
     """The record whose keys stand at a place."""
     for key in place:
         content = content[key]

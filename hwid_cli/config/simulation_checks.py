@@ -168,25 +168,28 @@ def _parameter(
         yield wrong(place, value, "a share of the mass below 1")
 
 
-def diagnose_faults(experiment: Experiment) -> Iterator[Fault]:
-    """A diagnosis without a simulation, of unknown effects, or without data to train on."""
-    options = experiment.diagnose
-    if options is None:
-        return
-    if experiment.simulation is None:
+def simulation_faults(experiment: Experiment) -> Iterator[Fault]:
+    """A diagnosis without a simulation."""
+    if experiment.diagnose is not None and experiment.simulation is None:
         yield missing(
             ("simulation",),
             "the physics model that diagnose judges",
             "add the section (configs/README.md explains it), or remove diagnose",
             without=("diagnose",),
         )
-    for effect in options.effects or ():
+
+
+def named_effect_faults(experiment: Experiment) -> Iterator[Fault]:
+    """Effects that a diagnosis may name, but that there are not."""
+    options = experiment.diagnose
+    for effect in (options and options.effects) or ():
         if effect not in EFFECT_PARAMETERS:
             yield wrong_word(("diagnose", "effects"), effect, EFFECT_PARAMETERS)
-    yield from _held_out(options)
 
 
-def _held_out(options: DiagnoseOptions) -> Iterator[Fault]:
+def held_out_faults(experiment: Experiment) -> Iterator[Fault]:
+    """Recordings that are held out of a diagnosis that does not use them, or of all."""
+    options = experiment.diagnose or DiagnoseOptions()
     names, held_out = options.recordings, options.hold_out
     if names is None or isinstance(held_out, str):
         return

@@ -6,7 +6,7 @@ calls ``check_fields``; a configuration file is read by the same rules.
 
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import cache
 from types import MappingProxyType
@@ -333,8 +333,7 @@ def check_fields(record: object) -> None:
                 raise refused.below(name) from None
 
 
-@cache
-def _rules(record_type: Any) -> list[tuple[str, list[Rule]]]:
+def _read_rules(record_type: Any) -> list[tuple[str, list[Rule]]]:
     """Rules of each field that has some, but those for reading a file."""
     found = []
     for name, hint in get_type_hints(record_type, include_extras=True).items():
@@ -343,3 +342,7 @@ def _rules(record_type: Any) -> list[tuple[str, list[Rule]]]:
         if rules:
             found.append((name, rules))
     return found
+
+
+# mypy does not take a class for hashable, hence the plain annotation.
+_rules: Callable[[Any], list[tuple[str, list[Rule]]]] = cache(_read_rules)

@@ -147,7 +147,10 @@ FAULTS = {
         change("linear_block.numerator", []),
         "numerator: found no numbers",
     ),
-    "not monic": (change("linear_block.denominator", [2.0, 1.0]), "starts with 1"),
+    "not monic": (
+        change("linear_block.denominator", [2.0, 1.0]),
+        "[0]: found 2.0; expected 1",
+    ),
     "many poles": (
         change("linear_block.denominator", [1.0] * 5000),
         "denominator: found 5000 numbers; expected at most 1001",
@@ -160,7 +163,7 @@ FAULTS = {
         change("input_map.break_points", [1.0, 0.0]),
         "break_points: found [1.0, 0.0]; expected numbers that rise",
     ),
-    "lengths": (change("input_map.values", [1.0]), "expected as many values"),
+    "lengths": (change("input_map.values", [1.0] * 9), "expected as many values"),
     "domain": (change("input_map.domain", [1.0, 1.0]), "domain: found [1.0, 1.0]"),
     "widths": (change("output_map.widths", [0.0]), "numbers above 0"),
     "range": (change("input_range", [1.0]), "input_range: found [1.0]"),
