@@ -188,7 +188,7 @@ def _as_section(value: Any) -> Any:
 def _as_list(hint: Any, value: Any) -> Any:
     if value is None or isinstance(value, dict):
         raise Refused(Refusal(value, expected(hint)))
-    return tuple(value) if isinstance(value, list | tuple) else (value,)
+    return tuple(value) if isinstance(value, list) else (value,)
 
 
 def _read_union(members: tuple[Any, ...], value: Any, info: ValidationInfo) -> Any:
@@ -225,7 +225,7 @@ def _is_of(value: Any, member: Any) -> bool:
     if isinstance(value, int | float):
         is_whole = isinstance(value, int) or value.is_integer()
         return member is float or (member is int and is_whole)
-    return isinstance(value, list | tuple) and get_origin(member) is tuple
+    return isinstance(value, list) and get_origin(member) is tuple
 
 
 def _of_kind(value: Any, records: list[Any]) -> Any:
@@ -325,7 +325,7 @@ def _unknown_key(place: tuple[Any, ...], record_type: Any, content: Any) -> Faul
     elsewhere = [
         repr(f"{section}.{place[-1]}")
         for section, keys in _sections(record_type).items()
-        if len(place) == 2 and place[-1] in keys
+        if len(place) == 2 and section != place[0] and place[-1] in keys
     ]
     if 1 <= len(elsewhere) <= 2:
         # The key of another section is no slip of the pen.

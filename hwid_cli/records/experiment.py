@@ -16,6 +16,7 @@ from hwid_cli.records.rules import (
     NOT_NEGATIVE,
     POSITIVE,
     Distinct,
+    Each,
     FileLimit,
     Filled,
     Integer,
@@ -23,7 +24,6 @@ from hwid_cli.records.rules import (
     OneOf,
     OrderAxis,
     StandsFor,
-    Unlike,
 )
 
 RECIPE_STEPS = ("cut", "input_offset", "output_offset", "recut")
@@ -33,8 +33,8 @@ KEEP_RULES = ("top", "best", "coverage_at_least")
 _MOST_ORDER = 1000
 
 _COLUMN = Integer(least=0, words="a number >= 0")
-_PATTERN = Unlike("", "a file name or pattern")
-_SCALE = Unlike(0, "a number other than 0")
+_PATTERN = Each(bool, "a file name or pattern")
+_SCALE = Each(bool, "a number other than 0")
 _Recipe = Annotated[tuple[str, ...], OneOf(RECIPE_STEPS), Distinct()]
 _SOME_NAMES = (Filled("at least one recording"), Distinct())
 _Names = Annotated[tuple[str, ...] | None, StandsFor("all", None), *_SOME_NAMES]
@@ -140,7 +140,7 @@ class OrderOptions:
     tolerance: Annotated[float, NOT_NEGATIVE] = 0.05
     # A function of the user's own needs a file beside it.
     maps: Annotated[
-        tuple[str, ...], OneOf(kind for kind in MAP_KINDS if kind != "own_function")
+        tuple[str, ...], OneOf([kind for kind in MAP_KINDS if kind != "own_function"])
     ] = ()
     units: Annotated[
         tuple[int, ...], Integer(least=2, words="integers >= 2"), FileLimit(1000)

@@ -5,6 +5,7 @@ tells the machines apart. docs/method_simulation.md gives the equations and the 
 for the numbers.
 """
 
+import re
 from dataclasses import dataclass, field
 from typing import Annotated
 
@@ -16,9 +17,9 @@ from hwid_cli.records.rules import (
     NOT_NEGATIVE,
     POSITIVE,
     SHARE,
+    Each,
     FileLimit,
     Integer,
-    Matching,
     OneOf,
     Refusal,
     Refused,
@@ -193,7 +194,10 @@ class GunPlan:
     sine_amplitudes_A: tuple[float, ...] = (1.0, 2.0, 3.0, 4.0, 5.0)
     sine_left_out: Annotated[
         tuple[str, ...],
-        Matching(r"[1-9]\d*x[1-9]\d*", "cells such as 4x5 (row x column)"),
+        Each(
+            re.compile(r"[1-9]\d*x[1-9]\d*").fullmatch,
+            "cells such as 4x5 (row x column)",
+        ),
     ] = ("4x4", "4x5")
     sine_fade_in_samples: _CountOrNone = 500
     random_amplitudes_A: tuple[float, ...] = (1.0, 2.0, 3.0, 4.0, 5.0)

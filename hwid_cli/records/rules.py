@@ -5,8 +5,7 @@ calls ``check_fields``; a configuration file is read by the same rules.
 """
 
 import math
-import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass, replace
 from functools import cache
 from types import MappingProxyType
@@ -77,16 +76,10 @@ class Rule:
         Refused
         """
         if value is not None:
-            self.check(value)
+            self._check(value)
         return value
 
-    def check(self, value: Any) -> None:
-        """Refuse a value.
-
-        Raises
-        ------
-        Refused
-        """
+    def _check(self, value: Any) -> None:
         raise NotImplementedError
 
 
@@ -96,14 +89,10 @@ class Reading(Rule):
 
 @dataclass(frozen=True)
 class Number(Rule):
-    """Finite, and within limits; text beside numbers is left alone.
+    """Finite, at least ``least``, above ``above``, at most ``most``.
 
     Parameters
     ----------
-    least, most : float or None
-        Limits that are allowed.
-    above : float or None
-        Limit that is not.
     words : str
         What was expected, where there are better words than the limits.
     """
@@ -129,9 +118,9 @@ class Number(Rule):
             return f"{self.noun} from {lower:g} to {self.most:g}"
         return f"{self.noun} above {lower:g} and at most {self.most:g}"
 
-    def check(self, value: Any) -> None:
-        """Refuse the first number that is out of range."""
+    def _check(self, value: Any) -> None:
         for number in _items(value):
+            # Where a number or text may stand, text is left alone.
             if not isinstance(number, str) and not self._holds(number):
                 raise Refused(Refusal(number, self.expected))
 
@@ -145,7 +134,7 @@ class Number(Rule):
 
 
 class Integer(Number):
-    """Without a fraction, and within limits."""
+    """The same without a fraction."""
 
     noun = "an integer"
 
@@ -162,74 +151,34 @@ SHARE = Number(least=0, most=1)
 class OneOf(Rule):
     """A word, a list of words or the keys of a section, out of those that are known."""
 
-    known: tuple[str, ...]
+    known: Collection[str]
 
-    def __init__(self, known: Iterable[str]) -> None:
-        object.__setattr__(self, "known", tuple(known))
-
-    def check(self, value: Any) -> None:
-        """Refuse the first word that is not known."""
+    def _check(self, value: Any) -> None:
         for word in _items(value):
             if word not in self.known:
-                raise Refused(Refusal(word, known=self.known))
+                raise Refused(Refusal(word, known=tuple(self.known)))
 
 
 @dataclass(frozen=True)
-class Unlike(Rule):
-    """Anything but one value.
+class Each(Rule):
+    """Values for which a function holds, and this in words."""
 
-    Parameters
-    ----------
-    expected : str
-        In words.
-    """
-
-    value: object
+    holds: Callable[[Any], object]
     expected: str
 
-    def check(self, value: Any) -> None:
-        """Refuse the value, alone or in a list."""
+    def _check(self, value: Any) -> None:
         for item in _items(value):
-            if item == self.value:
+            if not self.holds(item):
                 raise Refused(Refusal(item, self.expected))
 
 
 @dataclass(frozen=True)
-class Matching(Rule):
-    """Text of some form.
-
-    Parameters
-    ----------
-    pattern : str
-        A regular expression for all of it.
-    expected : str
-        In words.
-    """
-
-    pattern: str
-    expected: str
-
-    def check(self, value: Any) -> None:
-        """Refuse the first text of another form."""
-        for text in _items(value):
-            if not re.fullmatch(self.pattern, text):
-                raise Refused(Refusal(text, self.expected))
-
-
-@dataclass(frozen=True)
 class Filled(Rule):
-    """A list that is not empty.
-
-    Parameters
-    ----------
-    expected : str
-        In words.
-    """
+    """A list that is not empty, and this in words."""
 
     expected: str
 
-    def check(self, value: Any) -> None:
-        """Refuse an empty list."""
+    def _check(self, value: Any) -> None:
         if len(value) == 0:
             raise Refused(Refusal([], self.expected))
 
@@ -238,8 +187,7 @@ class Filled(Rule):
 class Distinct(Rule):
     """A list in which nothing comes twice."""
 
-    def check(self, value: Any) -> None:
-        """Refuse the first value that comes again."""
+    def _check(self, value: Any) -> None:
         seen = set()
         for item in _items(value):
             if item in seen:
@@ -250,18 +198,14 @@ class Distinct(Rule):
 
 @dataclass(frozen=True)
 class FileLimit(Reading):
-    """The largest number that a file may ask for: a slip of six zeros ends in a message.
+    """The largest number that a file may ask for, far beyond any use.
 
-    Parameters
-    ----------
-    most : int
-        Far beyond any use; more would fill the memory, or compute for years.
+    A slip of six zeros would else fill the memory, or compute for years.
     """
 
     most: int
 
-    def check(self, value: Any) -> None:
-        """Refuse the first number that is larger."""
+    def _check(self, value: Any) -> None:
         for number in _items(value):
             if number > self.most:
                 step = "correct the key"
@@ -270,13 +214,7 @@ class FileLimit(Reading):
 
 @dataclass(frozen=True)
 class StandsFor(Reading):
-    """A word of a file in place of a value.
-
-    Parameters
-    ----------
-    value : object
-        What the record holds then.
-    """
+    """A word of a file, and the value that a record holds for it."""
 
     word: str
     value: object
@@ -288,13 +226,7 @@ class StandsFor(Reading):
 
 @dataclass(frozen=True)
 class OrderAxis(Reading):
-    """Orders of a grid: ``[first, last]`` is a range, anything else a list.
-
-    Parameters
-    ----------
-    most : int, [-]
-        Largest order, see ``FileLimit``.
-    """
+    """Orders of a grid, at most ``most``: ``[first, last]`` is a range."""
 
     most: int
 
