@@ -42,7 +42,7 @@ def read_model_file(path: Path) -> dict[str, Any]:
     if errors:
         raise ModelFileError(_fault(_nearest(errors)).message(path))
     for place, value in _numbers(content):
-        if place[0] != "provenance" and not _is_finite(value):
+        if not _is_finite(value):
             refuse(path, place, value, "a finite number")
     return content
 
@@ -209,10 +209,11 @@ def _expected(schema: dict[str, Any], rule: str) -> str:
 
 
 def _numbers(value: Any, place: tuple[Any, ...] = ()) -> Iterator[tuple[Any, Any]]:
-    """Numbers in plain data, with their places."""
+    """Numbers in plain data, with their places; what is for people is left out."""
     if isinstance(value, dict):
         for key, item in value.items():
-            yield from _numbers(item, (*place, key))
+            if key != "provenance":
+                yield from _numbers(item, (*place, key))
     elif isinstance(value, list):
         for at, item in enumerate(value):
             yield from _numbers(item, (*place, at))

@@ -153,6 +153,9 @@ class OneOf(Rule):
 
     known: Collection[str]
 
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "known", tuple(self.known))
+
     def _check(self, value: Any) -> None:
         for word in _items(value):
             if word not in self.known:

@@ -210,6 +210,21 @@ def test_what_is_no_model_is_refused(text, said, tmp_path):
         read_exported(Path("nowhere.json"))
 
 
+def test_brackets_of_any_depth_are_refused(tmp_path):
+    path = tmp_path / "m.json"
+    content = described(exported_of(example_model(1, kinds=("none", "none"))))
+    text = json.dumps({**content, "name": "deep"})
+    said = []
+    # Python's own limit, 1000, lies between them.
+    for depth in (10, 900, 940, 980, 1100):
+        path.write_text(text.replace('"deep"', "[" * depth + "]" * depth))
+        with pytest.raises(ModelFileError) as error:
+            read_exported(path)
+        said.append(str(error.value))
+    assert "name: found [[[" in said[0]
+    assert "is no JSON" in said[-1]
+
+
 def test_effects_of_a_simulation_are_checked_as_in_a_configuration(tmp_path):
     path = tmp_path / "s.json"
     content = described(exported_drive())
