@@ -123,7 +123,7 @@ class MapOptions:
 
     def __post_init__(self) -> None:
         if self.kind not in MAP_KINDS:
-            raise Refused(Refusal(self.kind, key=("map",), known=MAP_KINDS))
+            raise Refused(Refusal(self.kind, key=("map",), known=tuple(MAP_KINDS)))
         least = _LEAST_UNITS.get(self.kind, 1)
         if self.units != int(self.units) or self.units < least:
             expected = f"an integer >= {least} for {self.kind}"
