@@ -1,10 +1,13 @@
-"""All that is wrong with a configuration file, not only the first thing."""
+"""All that is wrong with a configuration, not only the first thing."""
 
-import re
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from hwid_cli.config.load import experiment_of
+from hwid_cli.config.agreement import disagreements
+from hwid_cli.config.faults import Fault, Place
+from hwid_cli.config.sections import read_section
+from hwid_cli.config.yaml_text import read_yaml
 from hwid_cli.errors import ConfigError
 from hwid_cli.records.experiment import Experiment
 
@@ -17,8 +20,6 @@ _MOST = 20
 def config_problems(path: Path) -> tuple[tuple[str, ...], Experiment | None]:
     """List what is wrong with a configuration file.
 
-    Each fault is taken out of what was read, and the rest is looked at again.
-
     Returns
     -------
     problems : tuple of str
@@ -28,67 +29,79 @@ def config_problems(path: Path) -> tuple[tuple[str, ...], Experiment | None]:
         What the rest describes; None where the faults lie in what decides how the data
         are read.
     """
-    from hwid_cli.config.yaml_text import read_yaml  # noqa: PLC0415, RUF100
-
     try:
         content = read_yaml(Path(path))
     except ConfigError as error:
         return (str(error),), None
-    whole = {name: repr(content.get(name)) for name in _DECIDE_READING}
-    problems: list[str] = []
-    removed: list[list[str]] = []
-    while len(removed) < _MOST:
-        try:
-            rest = experiment_of(content, str(path))
-        except ConfigError as error:
-            said = str(error)
-            keys = _place(said, str(path))
-            # What is said of a key that is out already is no fault of the file: then the
-            # section cannot do without that key.
-            follows = bool(keys) and keys in removed
-            if not follows:
-                problems = list(dict.fromkeys([*problems, said]))
-            out = keys[:-1] if follows or _is_missing(said) else keys
-            if not _take_out(content, said, out):
-                return tuple(problems), None
-            removed += [keys, out]
-        else:
-            is_same = all(repr(content.get(name)) == old for name, old in whole.items())
-            return tuple(problems), rest if is_same else None
-    return tuple(problems), None
+    faults, rest = examine(content, str(path))
+    return tuple(fault.message(path) for fault in faults), rest
 
 
-def _place(said: str, source: str) -> list[str]:
-    """Keys that a message names, the outermost first."""
-    place = re.match(r"[\w.+-]+", said.removeprefix(f"{source}: "))
-    return place[0].rstrip(".").split(".") if place else []
+def examine(
+    content: Mapping[Any, Any], source: str
+) -> tuple[list[Fault], Experiment | None]:
+    """Read plain data as an experiment, and find all of their faults.
+
+    Whatever is at fault is taken out, and the rest is looked at again, until nothing is
+    left to say: what only follows from a fault is none.
+
+    Parameters
+    ----------
+    content : mapping
+        Sections by name, as a YAML file holds them.
+    source : str
+        The file; paths in it are relative to its folder.
+
+    Returns
+    -------
+    faults : list of Fault
+        The first ones are those of single keys.
+    experiment : Experiment or None
+        As for ``config_problems``.
+    """
+    rest = _copied(content)
+    faults: list[Fault] = []
+    left_out: list[Place] = []
+    while len(faults) < _MOST:
+        experiment, found = read_section(Experiment, rest, source)
+        if experiment is not None:
+            found = list(disagreements(experiment, left_out))
+        if not found:
+            is_whole = all(place[0] not in _DECIDE_READING for place in left_out)
+            return faults, experiment if is_whole else None
+        # A key that is out already is missed by its section: that is no new fault.
+        faults += [one for one in found if one.place not in left_out]
+        for fault in found:
+            place = _take_out(rest, fault.without or fault.place)
+            if not place:
+                return faults[:_MOST], None
+            left_out += [fault.place, place]
+    return faults[:_MOST], None
 
 
-def _is_missing(said: str) -> bool:
-    """Tell whether a key is missing: it goes with its section."""
-    return "missing" in said.split(";")[0]
+def _copied(content: Any) -> Any:
+    """The same, with sections of its own: an anchor's may stand in several places."""
+    if isinstance(content, dict):
+        return {key: _copied(item) for key, item in content.items()}
+    return content
 
 
-def _take_out(content: dict[Any, Any], said: str, keys: list[str]) -> bool:
-    """Remove the key that a message names; whether there was one."""
-    if not keys:
-        # A section that is missing is only needed by another one, which is named.
-        needed_by = re.search(r"or remove (\w+)", said)
-        keys = [needed_by[1]] if needed_by else []
-    return bool(keys) and _remove(content, keys)
+def _take_out(content: dict[Any, Any], place: Place) -> Place:
+    """Remove what stands at a place, or else the section that lacks it.
 
-
-def _remove(section: Any, keys: list[str]) -> bool:
-    """Remove what the longest known part of a path of keys names."""
-    if not isinstance(section, dict):
-        return False
-    named = {str(key): key for key in section}
-    # Names of files may hold dots.
-    for length in range(1, len(keys) + 1):
-        key = ".".join(keys[:length])
-        if key in named:
-            rest = keys[length:]
-            if not rest or not _remove(section[named[key]], rest):
-                del section[named[key]]
-            return True
-    return False
+    Returns
+    -------
+    tuple
+        What is gone; empty where nothing is left to remove.
+    """
+    sections = [content]
+    for key in place[:-1]:
+        if not isinstance(sections[-1], dict) or key not in sections[-1]:
+            break
+        sections.append(sections[-1][key])
+    for depth in range(len(sections) - 1, -1, -1):
+        section, key = sections[depth], place[depth]
+        if isinstance(section, dict) and key in section:
+            del section[key]
+            return place[: depth + 1]
+    return ()

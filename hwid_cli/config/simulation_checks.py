@@ -3,151 +3,127 @@
 Which effects a drive's simulation may hold, and with which parameters, says the catalogue.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
-from hwid_cli.config.requirements import require, require_distinct, require_known
+from hwid_cli.config.faults import (
+    Fault,
+    Place,
+    missing,
+    unknown_key,
+    wrong,
+    wrong_word,
+)
 from hwid_cli.drive.catalogue import configured_effects
 from hwid_cli.drive.effect import Stated
-from hwid_cli.errors import ConfigError
-from hwid_cli.files.messages import did_you_mean
-from hwid_cli.records.drive import HOLDS, STARTS
-from hwid_cli.records.experiment import DiagnoseOptions, Experiment, SimulationOptions
+from hwid_cli.records.experiment import DiagnoseOptions, Experiment
 
-_KIND = "drive"
-_POSITIVE = (
-    "mass_kg",
-    "force_constant_N_per_A",
-    "reference_current_A",
-    "reference_displacement_m",
-    "resistance_ohm",
-)
-_NOT_NEGATIVE = (
-    "damping_N_s_per_m",
-    "stiffness_N_per_m",
-    "inductance_H",
-    "back_emf_V_s_per_m",
-)
 # What the electrical circuit has besides its resistance.
 _OF_CIRCUIT = ("inductance_H", "back_emf_V_s_per_m")
 
 
-def check_simulation(experiment: Experiment) -> None:
-    """Refuse a physics model, or a diagnosis of it, that cannot be computed.
-
-    Parameters
-    ----------
-    experiment : Experiment
-        ``source`` names the file in messages.
-
-    Raises
-    ------
-    ConfigError
-        For the first value that cannot be used.
-    """
-    file, simulation = experiment.source, experiment.simulation
-    if simulation is not None:
-        _check_drive(simulation, f"{file}: simulation")
-        _check_controller(experiment)
-        for name, parameters in simulation.effects.items():
-            _check_effect(name, parameters, f"{file}: simulation.effects")
-    if experiment.diagnose is not None:
-        if simulation is None:
-            raise ConfigError(
-                f"{file}: simulation: missing; expected the physics model that "
-                "diagnose judges; add the section (configs/README.md explains it), or "
-                "remove diagnose"
-            )
-        _check_diagnose(experiment.diagnose, f"{file}: diagnose")
-
-
-def _check_drive(options: SimulationOptions, at: str) -> None:
-    require_known((options.kind,), (_KIND,), f"{at}.kind")
-    require_known((options.hold,), HOLDS, f"{at}.hold")
-    for name in _POSITIVE:
+def circuit_faults(experiment: Experiment) -> Iterator[Fault]:
+    """Parts of an electrical circuit that has no resistance."""
+    options = experiment.simulation
+    if options is None or options.resistance_ohm is not None:
+        return
+    for name in _OF_CIRCUIT:
         value = getattr(options, name)
-        require(value is None or value > 0, f"{at}.{name}", value, "a number > 0")
-    for name in _NOT_NEGATIVE:
-        value = getattr(options, name)
-        require(value is None or value >= 0, f"{at}.{name}", value, "a number >= 0")
-    if options.resistance_ohm is None:
-        for name in _OF_CIRCUIT:
-            value = getattr(options, name)
-            require(
-                not value,
-                f"{at}.{name}",
+        if value:
+            yield wrong(
+                ("simulation", name),
                 value,
                 "simulation.resistance_ohm too, because without it the input is the "
-                "current; add that key or remove this one",
+                "current",
+                "add that key or remove this one",
             )
 
 
-def _check_controller(experiment: Experiment) -> None:
+def controller_faults(experiment: Experiment) -> Iterator[Fault]:
+    """A controller without the column that it follows."""
     simulation, recordings = experiment.simulation, experiment.recordings
     if simulation is None or simulation.controller is None or recordings is None:
         return
     if recordings.columns.reference is None:
-        raise ConfigError(
-            f"{experiment.source}: recordings.columns.reference: missing; expected the "
-            "column that the controller follows; name it, or remove "
-            "simulation.controller"
+        yield missing(
+            ("recordings", "columns", "reference"),
+            "the column that the controller follows",
+            "name it, or remove simulation.controller",
+            without=("simulation", "controller"),
         )
 
 
-def _check_effect(name: str, found: Mapping[str, float | str], at: str) -> None:
+def effect_faults(experiment: Experiment) -> Iterator[Fault]:
+    """Effects of the simulation that there are not, or that lack a parameter."""
+    if experiment.simulation is not None:
+        for name, parameters in experiment.simulation.effects.items():
+            yield from _effect(name, parameters, ("simulation", "effects"))
+
+
+def _effect(
+    name: str, found: Mapping[str, float | str], place: Place
+) -> Iterator[Fault]:
     effects = configured_effects()
-    require_known((name,), effects, at)
-    at = f"{at}.{name}"
+    if name not in effects:
+        yield wrong_word(place, name, effects)
+        return
+    place = (*place, name)
     known = {one.name: one for one in effects[name]}
     for key in found:
         if key not in known:
-            raise ConfigError(f"{at}.{key}: unknown key; {did_you_mean(key, known)}")
+            yield unknown_key((*place, key), known)
     for one in known.values():
         if one.is_needed and one.name not in found:
-            expected = (
-                f"one of {', '.join(one.words)}" if one.words else "a finite number"
-            )
-            raise ConfigError(
-                f"{at}.{one.name}: missing; expected {expected}; add the key"
-            )
+            words = f"one of {', '.join(one.words)}"
+            expected = words if one.words else "a finite number"
+            yield missing((*place, one.name), expected)
     for key, value in found.items():
-        _check_stated(known[key], value, f"{at}.{key}")
+        if key in known:
+            yield from _parameter(known[key], value, (*place, key))
 
 
-def _check_stated(one: Stated, value: float | str, at: str) -> None:
+def _parameter(one: Stated, value: float | str, place: Place) -> Iterator[Fault]:
     if one.words:
         if value not in one.words:
-            raise ConfigError(
-                f"{at}: found {value!r}; {did_you_mean(value, one.words)}"
-            )
+            yield wrong_word(place, value, one.words)
     elif isinstance(value, str):
-        require(False, at, value, "a finite number")
+        yield wrong(place, value, "a finite number")
     else:
         for limit in one.limits:
-            require(limit.holds(value), at, value, limit.expected)
+            if not limit.holds(value):
+                yield wrong(place, value, limit.expected)
+                return
 
 
-def _check_diagnose(options: DiagnoseOptions, at: str) -> None:
-    for name in ("max_effects", "skip_samples"):
-        value = getattr(options, name)
-        require(value >= 0, f"{at}.{name}", value, "an integer >= 0")
-    require_known((options.initial_state,), STARTS, f"{at}.initial_state")
-    if options.effects is not None:
-        require_known(options.effects, configured_effects(), f"{at}.effects")
-        require_distinct(options.effects, f"{at}.effects")
-    names = options.recordings
-    if names is not None:
-        require(len(names) > 0, f"{at}.recordings", [], "at least one recording")
-        require_distinct(names, f"{at}.recordings")
-    held_out = options.hold_out
-    if isinstance(held_out, str):
+def simulation_faults(experiment: Experiment) -> Iterator[Fault]:
+    """A diagnosis without a simulation."""
+    if experiment.diagnose is not None and experiment.simulation is None:
+        yield missing(
+            ("simulation",),
+            "the physics model that diagnose judges",
+            "add the section (configs/README.md explains it), or remove diagnose",
+            without=("diagnose",),
+        )
+
+
+def named_effect_faults(experiment: Experiment) -> Iterator[Fault]:
+    """Effects that a diagnosis may name, but that there are not."""
+    options = experiment.diagnose
+    for effect in (options and options.effects) or ():
+        if effect not in configured_effects():
+            yield wrong_word(("diagnose", "effects"), effect, configured_effects())
+
+
+def held_out_faults(experiment: Experiment) -> Iterator[Fault]:
+    """Recordings that are held out of a diagnosis that does not use them, or of all."""
+    options = experiment.diagnose or DiagnoseOptions()
+    names, held_out = options.recordings, options.hold_out
+    if names is None or isinstance(held_out, str):
         return
-    require(len(held_out) > 0, f"{at}.hold_out", [], "auto, or at least one recording")
-    require_distinct(held_out, f"{at}.hold_out")
-    if names is not None:
-        require_known(held_out, names, f"{at}.hold_out")
-        require(
-            len(held_out) < len(names),
-            f"{at}.hold_out",
-            list(held_out),
-            "at least one of diagnose.recordings left to train on",
+    place = ("diagnose", "hold_out")
+    unknown = [name for name in held_out if name not in names]
+    if unknown:
+        yield wrong_word(place, unknown[0], names)
+    elif len(held_out) >= len(names):
+        yield wrong(
+            place, held_out, "at least one of diagnose.recordings left to train on"
         )

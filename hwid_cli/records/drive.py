@@ -2,10 +2,11 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Annotated
 
 import numpy as np
 
-from hwid_cli.records.ranges import require_not_negative, require_positive
+from hwid_cli.records.rules import NOT_NEGATIVE, POSITIVE, OneOf, check_fields
 
 # How recordings start: at rest in equilibrium; at rest wherever friction holds the drive;
 # anyhow, so that position and velocity are found from the recording.
@@ -36,14 +37,12 @@ class Controller:
         The command is cut to plus and minus this; None for no limit.
     """
 
-    position_gain_per_s: float
-    velocity_gain: float
-    limit: float | None = None
+    position_gain_per_s: Annotated[float, POSITIVE]
+    velocity_gain: Annotated[float, POSITIVE]
+    limit: Annotated[float | None, POSITIVE] = None
 
     def __post_init__(self) -> None:
-        require_positive(self, "position_gain_per_s", "velocity_gain")
-        if self.limit is not None:
-            require_positive(self, "limit")
+        check_fields(self)
 
 
 @dataclass(frozen=True)
@@ -73,32 +72,21 @@ class Drive:
         None: the input is given. Else it follows a reference.
     """
 
-    mass_kg: float = 1.0
-    damping_N_s_per_m: float = 0.0
-    stiffness_N_per_m: float = 0.0
+    mass_kg: Annotated[float, POSITIVE] = 1.0
+    damping_N_s_per_m: Annotated[float, NOT_NEGATIVE] = 0.0
+    stiffness_N_per_m: Annotated[float, NOT_NEGATIVE] = 0.0
     force_constant_N_per_A: float = 1.0
     effects: Mapping[str, Mapping[str, float | str]] = field(default_factory=dict)
-    reference_current_A: float = 1.0
-    reference_displacement_m: float = 1.0
-    resistance_ohm: float | None = None
-    inductance_H: float = 0.0
+    reference_current_A: Annotated[float, POSITIVE] = 1.0
+    reference_displacement_m: Annotated[float, POSITIVE] = 1.0
+    resistance_ohm: Annotated[float | None, POSITIVE] = None
+    inductance_H: Annotated[float, NOT_NEGATIVE] = 0.0
     back_emf_V_s_per_m: float | None = None
-    hold: str = "linear"
+    hold: Annotated[str, OneOf(HOLDS)] = "linear"
     controller: Controller | None = None
 
     def __post_init__(self) -> None:
-        require_positive(
-            self, "mass_kg", "reference_current_A", "reference_displacement_m"
-        )
-        require_not_negative(
-            self, "damping_N_s_per_m", "stiffness_N_per_m", "inductance_H"
-        )
-        if self.resistance_ohm is not None:
-            require_positive(self, "resistance_ohm")
-        if self.hold not in HOLDS:
-            raise ValueError(
-                f"hold must be one of {', '.join(HOLDS)}, got {self.hold!r}"
-            )
+        check_fields(self)
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,17 +4,42 @@ Every key of a configuration file is a field here. ``configs/README.md`` explain
 """
 
 from dataclasses import dataclass, field
-from typing import Annotated
+from typing import Annotated, Literal
 
-from hwid_cli.records.drive import Controller
+from hwid_cli.records.drive import HOLDS, STARTS, Controller
 from hwid_cli.records.machines import GunMachine, ServoMachine
+from hwid_cli.records.maps import MAP_KINDS
 from hwid_cli.records.model import FitOptions
+from hwid_cli.records.recordings import KINDS
+from hwid_cli.records.rules import (
+    NO_KEY,
+    NOT_NEGATIVE,
+    POSITIVE,
+    Distinct,
+    Each,
+    FileLimit,
+    Filled,
+    Integer,
+    Number,
+    OneOf,
+    OrderAxis,
+    StandsFor,
+)
 
 RECIPE_STEPS = ("cut", "input_offset", "output_offset", "recut")
 NK_ROLES = ("poles", "delay")
+KEEP_RULES = ("top", "best", "coverage_at_least")
+# Far beyond any use: grids of the literature end at 20 orders, maps at 100 units.
+_MOST_ORDER = 1000
+
+_COLUMN = Integer(least=0, words="a number >= 0")
+_PATTERN = Each(bool, "a file name or pattern")
+_SCALE = Each(bool, "a number other than 0")
+_Recipe = Annotated[tuple[str, ...], OneOf(RECIPE_STEPS), Distinct()]
 # Marks the keys that name recordings, so that a misspelt one is told at once.
 OF_RECORDINGS = "of recordings"
-RecordingNames = Annotated[tuple[str, ...], OF_RECORDINGS]
+_SOME_NAMES = (OF_RECORDINGS, Filled("at least one recording"), Distinct())
+_Names = Annotated[tuple[str, ...] | None, StandsFor("all", None), *_SOME_NAMES]
 
 
 @dataclass(frozen=True)
@@ -25,10 +50,10 @@ class Columns:
     ``variable`` with 0-based column numbers.
     """
 
-    input: str | int
-    output: str | int
-    time: str | int | None = None
-    reference: str | int | None = None
+    input: Annotated[str | int, _COLUMN]
+    output: Annotated[str | int, _COLUMN]
+    time: Annotated[str | int | None, _COLUMN] = None
+    reference: Annotated[str | int | None, _COLUMN] = None
     variable: str | None = None
 
 
@@ -36,21 +61,27 @@ class Columns:
 class RecordingsOptions:
     """Which files hold the recordings and how to read them."""
 
-    files: tuple[str, ...]
+    files: Annotated[tuple[str, ...], Filled("at least one name or pattern"), _PATTERN]
     columns: Columns
-    sample_time_s: float | None = None
-    kind: dict[str, tuple[str, ...]] = field(default_factory=dict)
-    exclude: tuple[str, ...] = ()
+    sample_time_s: Annotated[
+        float | None, Number(above=0, words="a number of seconds > 0")
+    ] = None
+    kind: Annotated[dict[str, tuple[str, ...]], OneOf(KINDS)] = field(
+        default_factory=dict
+    )
+    exclude: Annotated[tuple[str, ...], _PATTERN] = ()
     resample: bool = False
-    sampling_tolerance: float = 0.01
+    sampling_tolerance: Annotated[
+        float, Number(above=0, words="a share of the sample time > 0, such as 0.01")
+    ] = 0.01
     input_unit: str = "A"
     output_unit: str = "m"
-    input_scale: float = 1.0
-    output_scale: float = 1.0
-    first_sample: int = 0
+    input_scale: Annotated[float, _SCALE] = 1.0
+    output_scale: Annotated[float, _SCALE] = 1.0
+    first_sample: Annotated[int, Integer(least=0)] = 0
     last_sample: int | None = None
     parts: dict[str, tuple[int, ...]] = field(default_factory=dict)
-    average: int = 1
+    average: Annotated[int, Integer(least=1), FileLimit(1_000_000)] = 1
     optional: bool = False
 
 
@@ -58,12 +89,12 @@ class RecordingsOptions:
 class CalibrateOptions:
     """The recipe for each kind of recording; an empty recipe leaves it as it is."""
 
-    step: tuple[str, ...] = ()
-    sine: tuple[str, ...] = ()
-    random: tuple[str, ...] = ()
-    other: tuple[str, ...] = ()
-    samples: int | None = None
-    rest_samples: int = 100
+    step: _Recipe = ()
+    sine: _Recipe = ()
+    random: _Recipe = ()
+    other: _Recipe = ()
+    samples: Annotated[int | None, Integer(least=1)] = None
+    rest_samples: Annotated[int, Integer(least=1)] = 100
     repair: bool = True
 
 
@@ -71,47 +102,65 @@ class CalibrateOptions:
 class OrdersOptions:
     """The grid of candidate orders."""
 
-    nb: tuple[int, ...] = tuple(range(1, 11))
-    nk: tuple[int, ...] = tuple(range(1, 11))
-    nk_role: str = "poles"
-    nf: int | None = None
+    nb: Annotated[
+        tuple[int, ...],
+        OrderAxis(_MOST_ORDER),
+        Filled("at least one order"),
+        Integer(least=1, words="orders >= 1"),
+        Distinct(),
+    ] = tuple(range(1, 11))
+    nk: Annotated[
+        tuple[int, ...],
+        OrderAxis(_MOST_ORDER),
+        Filled("at least one order"),
+        Integer(least=0, words="orders >= 0"),
+        Distinct(),
+    ] = tuple(range(1, 11))
+    nk_role: Annotated[str, OneOf(NK_ROLES)] = "poles"
+    nf: Annotated[int | None, Integer(least=0), FileLimit(_MOST_ORDER)] = None
 
 
 @dataclass(frozen=True)
 class IdentifyOptions:
     """Which recordings get models; None means all."""
 
-    recordings: RecordingNames | None = None
+    recordings: _Names = None
 
 
 @dataclass(frozen=True)
 class CrossvalOptions:
     """Which recordings judge the models, and where a model counts as good."""
 
-    threshold: float = 0.01
-    recordings: RecordingNames | None = None
+    threshold: Annotated[float, POSITIVE] = 0.01
+    recordings: _Names = None
 
 
 @dataclass(frozen=True)
 class OrderOptions:
     """When smaller ones count as good as the best, and which maps to compare."""
 
-    tolerance: float = 0.05
-    maps: tuple[str, ...] = ()
-    units: tuple[int, ...] = ()
+    tolerance: Annotated[float, NOT_NEGATIVE] = 0.05
+    # A function of the user's own needs a file beside it.
+    maps: Annotated[
+        tuple[str, ...],
+        OneOf([kind for kind, one in MAP_KINDS.items() if not one.has_function]),
+    ] = ()
+    units: Annotated[
+        tuple[int, ...], Integer(least=2, words="integers >= 2"), FileLimit(1000)
+    ] = ()
 
 
 @dataclass(frozen=True)
 class GroupOptions:
     """The greedy search for groups of recordings."""
 
-    start: RecordingNames | None = None
-    candidates: RecordingNames | None = None
-    validate: RecordingNames | None = None
-    keep: dict[str, int | bool | tuple[int, ...]] = field(
+    start: _Names = None
+    candidates: _Names = None
+    validate: _Names = None
+    keep: Annotated[dict[str, int | bool | tuple[int, ...]], OneOf(KEEP_RULES)] = field(
         default_factory=lambda: {"top": 3}
     )
-    max_level: int = 4
+    max_level: Annotated[int, Integer(least=1), FileLimit(1000)] = 4
     warm_start: bool = True
 
 
@@ -119,25 +168,25 @@ class GroupOptions:
 class FinalTestOptions:
     """Recordings that judge the final models and are used nowhere else."""
 
-    recordings: RecordingNames
+    recordings: Annotated[tuple[str, ...], *_SOME_NAMES]
 
 
 @dataclass(frozen=True)
 class SimulationOptions:
     """The physics model that diagnosis judges, in SI units."""
 
-    kind: str = "drive"
-    mass_kg: float = 1.0
-    damping_N_s_per_m: float = 0.0
-    stiffness_N_per_m: float = 0.0
-    force_constant_N_per_A: float = 1.0
+    kind: Annotated[str, OneOf(["drive"])] = "drive"
+    mass_kg: Annotated[float, POSITIVE] = 1.0
+    damping_N_s_per_m: Annotated[float, NOT_NEGATIVE] = 0.0
+    stiffness_N_per_m: Annotated[float, NOT_NEGATIVE] = 0.0
+    force_constant_N_per_A: Annotated[float, POSITIVE] = 1.0
     effects: dict[str, dict[str, float | str]] = field(default_factory=dict)
-    reference_current_A: float | None = None
-    reference_displacement_m: float | None = None
-    resistance_ohm: float | None = None
-    inductance_H: float = 0.0
-    back_emf_V_s_per_m: float | None = None
-    hold: str = "linear"
+    reference_current_A: Annotated[float | None, POSITIVE] = None
+    reference_displacement_m: Annotated[float | None, POSITIVE] = None
+    resistance_ohm: Annotated[float | None, POSITIVE] = None
+    inductance_H: Annotated[float, NOT_NEGATIVE] = 0.0
+    back_emf_V_s_per_m: Annotated[float | None, NOT_NEGATIVE] = None
+    hold: Annotated[str, OneOf(HOLDS)] = "linear"
     controller: Controller | None = None
 
 
@@ -145,12 +194,19 @@ class SimulationOptions:
 class DiagnoseOptions:
     """What diagnosis may use."""
 
-    recordings: RecordingNames | None = None
-    hold_out: str | RecordingNames = "auto"
-    effects: tuple[str, ...] | None = None
-    max_effects: int = 3
-    initial_state: str = "rest"
-    skip_samples: int = 0
+    recordings: _Names = None
+    hold_out: Annotated[
+        Literal["auto"] | tuple[str, ...],
+        OF_RECORDINGS,
+        Filled("auto, or at least one recording"),
+        Distinct(),
+    ] = "auto"
+    effects: Annotated[tuple[str, ...] | None, StandsFor("all", None), Distinct()] = (
+        None
+    )
+    max_effects: Annotated[int, Integer(least=0), FileLimit(1000)] = 3
+    initial_state: Annotated[str, OneOf(STARTS)] = "rest"
+    skip_samples: Annotated[int, Integer(least=0)] = 0
 
 
 @dataclass(frozen=True)
@@ -167,7 +223,7 @@ class Experiment:
     """
 
     name: str
-    source: str
+    source: str = field(metadata=NO_KEY)
     recordings: RecordingsOptions | None = None
     simulate: ServoMachine | GunMachine | None = None
     calibrate: CalibrateOptions | None = None

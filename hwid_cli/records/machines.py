@@ -7,18 +7,29 @@ for the numbers.
 
 import re
 from dataclasses import dataclass, field
+from typing import Annotated
 
 import numpy as np
 
 from hwid_cli.records.mechanics import Mechanics
-from hwid_cli.records.ranges import (
-    require_not_negative,
-    require_positive,
-    require_share,
-)
 from hwid_cli.records.recordings import KINDS, frozen_vector
+from hwid_cli.records.rules import (
+    NOT_NEGATIVE,
+    POSITIVE,
+    SHARE,
+    Each,
+    FileLimit,
+    Integer,
+    OneOf,
+    Refusal,
+    Refused,
+    check_fields,
+)
 
 CHANGING_PARAMETERS = ("stiffness", "damping", "force_constant")
+_Count = Annotated[int, Integer(least=1), FileLimit(10_000_000)]
+_CountOrNone = Annotated[int, Integer(least=0), FileLimit(10_000_000)]
+_Seed = Annotated[int, Integer(least=0)]
 
 
 @dataclass(frozen=True)
@@ -58,54 +69,30 @@ class ServoMachine:
     seed : int, [-]
     """
 
-    kind: str = "servo"
-    source_voltage_V: float = 220.0
-    currents_A: tuple[float, ...] = (1.0, 2.0, 3.0, 4.0, 5.0)
-    resistance_ohm: float = 100.0
-    inductance_H: float = 1.0
-    back_emf_V_per_rpm: float = 7.2e-5
-    motor_resistance_ohm: float = 3.9
-    motor_inductance_H: float = 1.2e-5
-    inertia_kg_m2: float = 0.3
-    wheel_radius_m: float = 1.0
-    spring_rate_N_per_mm: float = 293.1
-    damping_ratio: float = 0.02
-    sample_time_s: float = 2e-4
-    samples: int = 2500
-    rest_s: float = 0.04
-    noise_relative: float = 0.0
-    seed: int = 1
+    kind: Annotated[str, OneOf(["servo"])] = "servo"
+    source_voltage_V: Annotated[float, POSITIVE] = 220.0
+    currents_A: Annotated[tuple[float, ...], POSITIVE] = (1.0, 2.0, 3.0, 4.0, 5.0)
+    resistance_ohm: Annotated[float, NOT_NEGATIVE] = 100.0
+    inductance_H: Annotated[float, POSITIVE] = 1.0
+    back_emf_V_per_rpm: Annotated[float, NOT_NEGATIVE] = 7.2e-5
+    motor_resistance_ohm: Annotated[float, NOT_NEGATIVE] = 3.9
+    motor_inductance_H: Annotated[float, NOT_NEGATIVE] = 1.2e-5
+    inertia_kg_m2: Annotated[float, POSITIVE] = 0.3
+    wheel_radius_m: Annotated[float, POSITIVE] = 1.0
+    spring_rate_N_per_mm: Annotated[float, POSITIVE] = 293.1
+    damping_ratio: Annotated[float, NOT_NEGATIVE] = 0.02
+    sample_time_s: Annotated[float, POSITIVE] = 2e-4
+    samples: _Count = 2500
+    rest_s: Annotated[float, NOT_NEGATIVE] = 0.04
+    noise_relative: Annotated[float, NOT_NEGATIVE] = 0.0
+    seed: _Seed = 1
 
     def __post_init__(self) -> None:
-        _require_kind(self.kind, "servo")
-        require_positive(
-            self,
-            "source_voltage_V",
-            "inductance_H",
-            "inertia_kg_m2",
-            "wheel_radius_m",
-            "spring_rate_N_per_mm",
-            "sample_time_s",
-            "samples",
-        )
-        require_not_negative(
-            self,
-            "resistance_ohm",
-            "motor_resistance_ohm",
-            "motor_inductance_H",
-            "back_emf_V_per_rpm",
-            "damping_ratio",
-            "rest_s",
-            "noise_relative",
-            "seed",
-        )
-        if any(not current > 0 for current in self.currents_A):
-            raise ValueError(f"currents_A must be positive, got {self.currents_A!r}")
-        if self.rest_s >= self.samples * self.sample_time_s:
-            raise ValueError(
-                f"rest_s must be shorter than the recording of "
-                f"{self.samples * self.sample_time_s:g} s, got {self.rest_s!r}"
-            )
+        check_fields(self)
+        length_s = self.samples * self.sample_time_s
+        if self.rest_s >= length_s:
+            expected = f"shorter than the recording of {length_s:g} s"
+            raise Refused(Refusal(self.rest_s, expected, ("rest_s",)))
 
 
 @dataclass(frozen=True)
@@ -122,17 +109,12 @@ class ParameterChange:
         Probability that a recording is changed.
     """
 
-    parameter: str = "stiffness"
-    largest: float = 0.1
-    share: float = 0.7
+    parameter: Annotated[str, OneOf(CHANGING_PARAMETERS)] = "stiffness"
+    largest: Annotated[float, SHARE] = 0.1
+    share: Annotated[float, SHARE] = 0.7
 
     def __post_init__(self) -> None:
-        if self.parameter not in CHANGING_PARAMETERS:
-            raise ValueError(
-                f"parameter must be one of {', '.join(CHANGING_PARAMETERS)}, "
-                f"got {self.parameter!r}"
-            )
-        require_share(self, "largest", "share")
+        check_fields(self)
 
 
 @dataclass(frozen=True)
@@ -153,17 +135,17 @@ class Sensors:
         A damaged sample is off by 50 to 100 % of this, in either direction.
     """
 
-    displacement_noise_m: float = 1e-4
-    displacement_offset_m: float = 3e-3
-    displacement_resolution_m: float = 1e-4
-    displacement_damage_m: float = 0.4
-    current_noise_A: float = 0.004
-    current_offset_A: float = 0.03
-    current_damage_A: float = 8.0
-    damaged_samples: int = 3
+    displacement_noise_m: Annotated[float, NOT_NEGATIVE] = 1e-4
+    displacement_offset_m: Annotated[float, NOT_NEGATIVE] = 3e-3
+    displacement_resolution_m: Annotated[float, NOT_NEGATIVE] = 1e-4
+    displacement_damage_m: Annotated[float, NOT_NEGATIVE] = 0.4
+    current_noise_A: Annotated[float, NOT_NEGATIVE] = 0.004
+    current_offset_A: Annotated[float, NOT_NEGATIVE] = 0.03
+    current_damage_A: Annotated[float, NOT_NEGATIVE] = 8.0
+    damaged_samples: _CountOrNone = 3
 
     def __post_init__(self) -> None:
-        require_not_negative(self, *self.__dataclass_fields__)
+        check_fields(self)
 
 
 @dataclass(frozen=True)
@@ -200,47 +182,44 @@ class GunPlan:
         the others.
     """
 
-    sample_time_s: float = 0.005
-    samples: int = 7500
-    step_ramps_samples: tuple[int, ...] = (0, 100, 300)
+    sample_time_s: Annotated[float, POSITIVE] = 0.005
+    samples: _Count = 7500
+    step_ramps_samples: Annotated[tuple[int, ...], FileLimit(10_000_000)] = (
+        0,
+        100,
+        300,
+    )
     step_amplitudes_A: tuple[float, ...] = (2.0, 4.0, 6.0, 8.0, 10.0)
     sine_frequencies_rad_per_sample: tuple[float, ...] = (0.5, 0.34, 0.22, 0.11, 0.005)
     sine_amplitudes_A: tuple[float, ...] = (1.0, 2.0, 3.0, 4.0, 5.0)
-    sine_left_out: tuple[str, ...] = ("4x4", "4x5")
-    sine_fade_in_samples: int = 500
+    sine_left_out: Annotated[
+        tuple[str, ...],
+        Each(
+            re.compile(r"[1-9]\d*x[1-9]\d*").fullmatch,
+            "cells such as 4x5 (row x column)",
+        ),
+    ] = ("4x4", "4x5")
+    sine_fade_in_samples: _CountOrNone = 500
     random_amplitudes_A: tuple[float, ...] = (1.0, 2.0, 3.0, 4.0, 5.0)
-    random_shortest_samples: int = 20
-    random_longest_samples: int = 80
-    shortest_lead_in_samples: int = 150
-    longest_lead_in_samples: int = 400
-    shortest_tail_samples: int = 20
-    longest_tail_samples: int = 200
+    random_shortest_samples: _Count = 20
+    random_longest_samples: _Count = 80
+    shortest_lead_in_samples: _CountOrNone = 150
+    longest_lead_in_samples: _CountOrNone = 400
+    shortest_tail_samples: _CountOrNone = 20
+    longest_tail_samples: _CountOrNone = 200
     only: tuple[str, ...] | None = None
 
     def __post_init__(self) -> None:
-        require_positive(self, "sample_time_s", "samples", "random_shortest_samples")
-        require_not_negative(
-            self,
-            "sine_fade_in_samples",
-            "shortest_lead_in_samples",
-            "shortest_tail_samples",
-        )
+        check_fields(self)
         for shortest, longest in (
             ("random_shortest_samples", "random_longest_samples"),
             ("shortest_lead_in_samples", "longest_lead_in_samples"),
             ("shortest_tail_samples", "longest_tail_samples"),
         ):
-            if getattr(self, longest) < getattr(self, shortest):
-                raise ValueError(
-                    f"{longest} must be at least {shortest} = "
-                    f"{getattr(self, shortest)!r}, got {getattr(self, longest)!r}"
-                )
-        for cell in self.sine_left_out:
-            if not re.fullmatch(r"[1-9]\d*x[1-9]\d*", cell):
-                raise ValueError(
-                    f"sine_left_out must hold cells such as 4x5 (row x column), "
-                    f"got {cell!r}"
-                )
+            found, least = getattr(self, longest), getattr(self, shortest)
+            if found < least:
+                expected = f"at least {shortest} = {least!r}"
+                raise Refused(Refusal(found, expected, (longest,)))
 
 
 @dataclass(frozen=True)
@@ -256,18 +235,16 @@ class GunMachine:
     seed : int, [-]
     """
 
-    kind: str = "gun"
+    kind: Annotated[str, OneOf(["gun"])] = "gun"
     mechanics: Mechanics = field(default_factory=Mechanics)
-    current_limit_A: float = 9.5
+    current_limit_A: Annotated[float, POSITIVE] = 9.5
     change: ParameterChange = field(default_factory=ParameterChange)
     sensors: Sensors = field(default_factory=Sensors)
     plan: GunPlan = field(default_factory=GunPlan)
-    seed: int = 1
+    seed: _Seed = 1
 
     def __post_init__(self) -> None:
-        _require_kind(self.kind, "gun")
-        require_positive(self, "current_limit_A")
-        require_not_negative(self, "seed")
+        check_fields(self)
 
 
 @dataclass(frozen=True, eq=False)
@@ -304,8 +281,3 @@ class VirtualMeasurement:
                 f"time_s must be as long as the longer column, "
                 f"{max(self.input.size, self.output.size)}, got {self.time_s.size}"
             )
-
-
-def _require_kind(found: str, expected: str) -> None:
-    if found != expected:
-        raise ValueError(f"kind must be {expected!r}, got {found!r}")

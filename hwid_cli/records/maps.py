@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hwid_cli.records.recordings import frozen_vector
+from hwid_cli.records.rules import Refusal, Refused
 
 
 @dataclass(frozen=True)
@@ -134,21 +135,15 @@ class MapOptions:
 
     def __post_init__(self) -> None:
         if self.kind not in MAP_KINDS:
-            raise ValueError(
-                f"map must be one of {', '.join(MAP_KINDS)}, got {self.kind!r}"
-            )
+            raise Refused(Refusal(self.kind, key=("map",), known=tuple(MAP_KINDS)))
         kind = MAP_KINDS[self.kind]
         least = kind.least_units or 1
         if self.units != int(self.units) or self.units < least:
-            raise ValueError(
-                f"units must be an integer >= {least} for {self.kind}, "
-                f"got {self.units!r}"
-            )
+            expected = f"an integer >= {least} for {self.kind}"
+            raise Refused(Refusal(self.units, expected, ("units",)))
         if kind.has_function and self.function is None:
-            raise ValueError(
-                f"map {self.kind} needs a function; name its file: "
-                "{file: my_map.py, name: my_function}"
-            )
+            said, step = "{} needs a function", "name its file: {file: a.py, name: f}"
+            raise Refused(Refusal(self.kind, key=("map",), said=said, step=step))
 
 
 @dataclass(frozen=True, eq=False)

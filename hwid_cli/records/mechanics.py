@@ -1,8 +1,15 @@
 """Parameters of a current-driven mechanism: mass, spring, damper, friction, contact."""
 
 from dataclasses import dataclass, field
+from typing import Annotated
 
-from hwid_cli.records.ranges import require_not_negative, require_positive
+from hwid_cli.records.rules import (
+    NOT_NEGATIVE,
+    POSITIVE,
+    Refusal,
+    Refused,
+    check_fields,
+)
 
 
 @dataclass(frozen=True)
@@ -17,16 +24,14 @@ class Friction:
         Force that must be exceeded to start from rest; at least ``coulomb_N``.
     """
 
-    coulomb_N: float = 4.8
+    coulomb_N: Annotated[float, NOT_NEGATIVE] = 4.8
     break_away_N: float = 7.2
 
     def __post_init__(self) -> None:
-        require_not_negative(self, "coulomb_N")
+        check_fields(self)
         if not self.break_away_N >= self.coulomb_N:
-            raise ValueError(
-                f"break_away_N must be at least coulomb_N = {self.coulomb_N!r}, "
-                f"got {self.break_away_N!r}"
-            )
+            expected = f"at least coulomb_N = {self.coulomb_N!r}"
+            raise Refused(Refusal(self.break_away_N, expected, ("break_away_N",)))
 
 
 @dataclass(frozen=True)
@@ -43,13 +48,12 @@ class Contact:
         Whether there is one at ``-position_m`` too.
     """
 
-    position_m: float = 0.33
-    stiffness_N_per_m: float = 1000.0
+    position_m: Annotated[float, POSITIVE] = 0.33
+    stiffness_N_per_m: Annotated[float, NOT_NEGATIVE] = 1000.0
     both_sides: bool = False
 
     def __post_init__(self) -> None:
-        require_positive(self, "position_m")
-        require_not_negative(self, "stiffness_N_per_m")
+        check_fields(self)
 
 
 @dataclass(frozen=True)
@@ -65,13 +69,12 @@ class Mechanics:
     force_constant_N_per_A : float, [N/A]
     """
 
-    mass_kg: float = 2.0
-    damping_N_s_per_m: float = 15.0
-    stiffness_N_per_m: float = 968.0
+    mass_kg: Annotated[float, POSITIVE] = 2.0
+    damping_N_s_per_m: Annotated[float, NOT_NEGATIVE] = 15.0
+    stiffness_N_per_m: Annotated[float, NOT_NEGATIVE] = 968.0
     force_constant_N_per_A: float = 48.4
     friction: Friction = field(default_factory=Friction)
     contact: Contact = field(default_factory=Contact)
 
     def __post_init__(self) -> None:
-        require_positive(self, "mass_kg")
-        require_not_negative(self, "damping_N_s_per_m", "stiffness_N_per_m")
+        check_fields(self)

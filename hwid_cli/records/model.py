@@ -7,14 +7,23 @@ How well a fit's parameters are known.
 Information criteria of a fit: how its error weighs against its parameters.
 """
 
-import math
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import Annotated
 
 import numpy as np
 
 from hwid_cli.records.maps import MAP_KINDS, MapOptions, OwnFunction, StaticMap
 from hwid_cli.records.recordings import frozen_vector
+from hwid_cli.records.rules import (
+    NO_KEY,
+    FileLimit,
+    Integer,
+    Number,
+    OneOf,
+    Refusal,
+    Refused,
+    check_fields,
+)
 from hwid_cli.records.stored import ADDED_LATER
 
 
@@ -92,29 +101,24 @@ class LinearBlock:
         If the numbers are no linear block.
     """
 
-    numerator: tuple[float, ...]
-    denominator: tuple[float, ...]
-    delay: int = 1
+    numerator: Annotated[tuple[float, ...], Number(words="finite numbers")]
+    denominator: Annotated[tuple[float, ...], Number(words="finite numbers")]
+    delay: Annotated[int, Integer(least=0), FileLimit(100_000)] = 1
     frozen: bool = False
 
     def __post_init__(self) -> None:
         for name in ("numerator", "denominator"):
             values = tuple(float(value) for value in getattr(self, name))
-            if not all(math.isfinite(value) for value in values):
-                raise ValueError(f"{name} must be finite numbers, got {list(values)}")
             object.__setattr__(self, name, values)
+        check_fields(self)
         if not any(self.numerator):
-            raise ValueError(
-                f"numerator must have a coefficient other than 0, got "
-                f"{list(self.numerator)}"
-            )
+            said = "must have a coefficient other than 0, got {}"
+            raise Refused(Refusal(list(self.numerator), key=("numerator",), said=said))
         if not self.denominator or self.denominator[0] != 1.0:
-            raise ValueError(
-                f"denominator must start with 1, got {list(self.denominator)}; divide "
-                "both by its first coefficient"
+            said = "must start with 1, got {}; divide both by its first coefficient"
+            raise Refused(
+                Refusal(list(self.denominator), key=("denominator",), said=said)
             )
-        if self.delay != int(self.delay) or self.delay < 0:
-            raise ValueError(f"delay must be an integer >= 0, got {self.delay!r}")
 
     @property
     def orders(self) -> Orders:
@@ -265,62 +269,43 @@ class FitOptions:
         orders say which one was found.
     """
 
-    input_map: str = "piecewise_linear"
-    output_map: str = "piecewise_linear"
-    units: int = 10
-    degree: int = 5
-    initial_state: str = "estimated"
-    join: str = "concatenate"
+    input_map: Annotated[str, OneOf(MAP_KINDS)] = "piecewise_linear"
+    output_map: Annotated[str, OneOf(MAP_KINDS)] = "piecewise_linear"
+    units: Annotated[int, Integer(least=2), FileLimit(1000)] = 10
+    degree: Annotated[int, Integer(least=1), FileLimit(100)] = 5
+    initial_state: Annotated[str, OneOf(INITIAL_STATES)] = "estimated"
+    join: Annotated[str, OneOf(JOINS)] = "concatenate"
     free_break_points: bool = True
-    max_iterations: int = 60
-    starts: int = 6
-    input_units: int | None = None
-    output_units: int | None = None
-    input_function: OwnFunction | None = None
-    output_function: OwnFunction | None = None
-    loss: str = field(default="squared", metadata=ADDED_LATER)
+    max_iterations: Annotated[int, Integer(least=1), FileLimit(1_000_000)] = 60
+    starts: Annotated[int, Integer(least=1), FileLimit(1000)] = 6
+    input_units: Annotated[int | None, Integer(least=1), FileLimit(1000)] = None
+    output_units: Annotated[int | None, Integer(least=1), FileLimit(1000)] = None
+    input_function: OwnFunction | None = field(default=None, metadata=NO_KEY)
+    output_function: OwnFunction | None = field(default=None, metadata=NO_KEY)
+    loss: Annotated[str, OneOf(LOSSES)] = field(default="squared", metadata=ADDED_LATER)
     linear_block: LinearBlock | None = None
-    largest_pole_radius: float = field(default=1.0, metadata=ADDED_LATER)
-    delays: tuple[int, ...] = field(default=(), metadata=ADDED_LATER)
+    largest_pole_radius: Annotated[float, Number(above=0, most=1)] = field(
+        default=1.0, metadata=ADDED_LATER
+    )
+    delays: Annotated[
+        tuple[int, ...], Integer(least=0, words="integers >= 0"), FileLimit(100_000)
+    ] = field(default=(), metadata=ADDED_LATER)
 
     def __post_init__(self) -> None:
-        for name, allowed in (
-            ("input_map", MAP_KINDS),
-            ("output_map", MAP_KINDS),
-            ("initial_state", INITIAL_STATES),
-            ("join", JOINS),
-            ("loss", LOSSES),
-        ):
-            if getattr(self, name) not in allowed:
-                raise ValueError(
-                    f"{name} must be one of {', '.join(allowed)}, "
-                    f"got {getattr(self, name)!r}"
-                )
-        for name, least in (
-            ("units", 2),
-            ("degree", 1),
-            ("max_iterations", 1),
-            ("starts", 1),
-        ):
-            value = getattr(self, name)
-            if value != int(value) or value < least:
-                raise ValueError(f"{name} must be an integer >= {least}, got {value!r}")
-        if not 0.0 < self.largest_pole_radius <= 1.0:
-            raise ValueError(
-                "largest_pole_radius must be a number above 0 and at most 1, got "
-                f"{self.largest_pole_radius!r}"
-            )
-        object.__setattr__(self, "delays", _checked_delays(self.delays))
+        check_fields(self)
+        delays = tuple(sorted({int(value) for value in self.delays}))
+        object.__setattr__(self, "delays", delays)
         if self.delays and self.keeps_block:
-            raise ValueError(
-                f"delays must be empty beside a frozen linear block, got {self.delays}"
-            )
+            expected = "empty beside a frozen linear block"
+            raise Refused(Refusal(list(self.delays), expected, ("delays",)))
         for side in ("input", "output"):
             try:
                 getattr(self, f"of_{side}")
-            except ValueError as error:
+            except Refused as error:
                 # What a map refuses, under the name of the key that asked for it.
-                raise ValueError(f"{side}_{error}") from None
+                (key,) = error.refusal.key
+                named = replace(error.refusal, key=(f"{side}_{key}",))
+                raise Refused(named) from None
 
     def delays_for(self, orders: Orders) -> tuple[int, ...]:
         """Delays that a fit of some orders tries, that of the orders first if it may.
@@ -369,12 +354,6 @@ class FitOptions:
             output_function=_in_unit(self.output_function, output_unit),
             linear_block=block and block.in_units(input_unit, output_unit),
         )
-
-
-def _checked_delays(delays: Sequence[int]) -> tuple[int, ...]:
-    if any(value != int(value) or value < 0 for value in delays):
-        raise ValueError(f"delays must be integers >= 0, got {list(delays)}")
-    return tuple(sorted({int(value) for value in delays}))
 
 
 def _in_unit(function: OwnFunction | None, unit: float) -> OwnFunction | None:

@@ -88,7 +88,8 @@ def test_help_needs_no_numerical_library():
     code = (
         "import sys; from hwid_cli.cli.main import main; "
         "main(['run', '--help'], standalone_mode=False); "
-        "heavy = {'numpy', 'scipy', 'numba', 'joblib', 'h5py', 'yaml', 'matplotlib'}; "
+        "heavy = {'numpy', 'scipy', 'numba', 'joblib', 'h5py', 'yaml', 'matplotlib', "
+        "'pydantic', 'jsonschema'}; "
         "print(sorted(heavy & set(sys.modules)))"
     )
     start = time.perf_counter()

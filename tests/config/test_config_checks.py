@@ -84,7 +84,7 @@ def test_columns_must_make_a_recording(load, section, message):
         ("group: {keep: {topp: 1}}", r"group.keep: found 'topp'; did you mean 'top'"),
         ("group: {keep: {top: 1, best: true}}", r"group.keep: .*exactly one of"),
         ("group: {keep: {best: false}}", r"group.keep.best: found False; .*true"),
-        ("group: {keep: {top: [3, 0]}}", r"group.keep.top: found \(3, 0\)"),
+        ("group: {keep: {top: [3, 0]}}", r"group.keep.top: found \[3, 0\]"),
         ("group: {max_level: 0}", r"group.max_level: found 0; .* >= 1"),
         ("identify: {recordings: []}", r"identify.recordings: found \[\]"),
         ("identify: {recordings: [a, a]}", r"identify.recordings: 'a' is listed twice"),

@@ -3,21 +3,14 @@
 from dataclasses import MISSING, fields, is_dataclass
 from pathlib import Path
 from types import NoneType
-from typing import get_args, get_origin, get_type_hints
+from typing import Literal, get_args, get_origin, get_type_hints
 
 import pytest
 
 from hwid_cli.records.experiment import Experiment
-from hwid_cli.records.model import FitOptions
 
 README = Path(__file__).parents[2] / "configs" / "README.md"
 
-# Fields that the program sets: no keys.
-SET_BY_THE_PROGRAM = {
-    (Experiment, "source"),
-    (FitOptions, "input_function"),
-    (FitOptions, "output_function"),
-}
 WORDS = {str: "text", int: "integer", float: "number", bool: "true or false"}
 
 
@@ -38,7 +31,8 @@ def keys_of(record_type, prefix="", kind=""):
     """Every key below a dataclass: (kind, dotted key, type, default) as written."""
     hints = get_type_hints(record_type)
     for field in fields(record_type):
-        if (record_type, field.name) in SET_BY_THE_PROGRAM:
+        # What the program sets is no key.
+        if not field.metadata.get("is_key", True):
             continue
         key, hint = prefix + field.name, hints[field.name]
         members = [m for m in get_args(hint) or (hint,) if is_dataclass(m)]
@@ -53,6 +47,8 @@ def keys_of(record_type, prefix="", kind=""):
 
 
 def type_in_words(hint):
+    if get_origin(hint) is Literal:
+        return "text"
     members = [part for part in get_args(hint) if part is not NoneType]
     if get_origin(hint) is tuple:
         return f"list of {type_in_words(members[0])}"

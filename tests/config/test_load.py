@@ -124,7 +124,7 @@ def test_source_is_the_path_as_given_and_no_key(load, write_config):
         ("fit: {units: 2.5}", r"fit.units: found 2.5; expected an integer"),
         ("fit: {units: true}", r"fit.units: found True; expected an integer"),
         ("fit: {units: }", r"fit.units: found no value; expected an integer"),
-        ("fit: {units: 1}", r"fit.units: must be an integer >= 2, got 1"),
+        ("fit: {units: 1}", r"fit.units: found 1; expected an integer >= 2"),
         ("fit: {input_map: wavy}", r"fit.input_map: found 'wavy'; expected one of pi"),
         (
             "fit: {input_map: piecewiselinear}",
@@ -153,7 +153,7 @@ def test_source_is_the_path_as_given_and_no_key(load, write_config):
         ),
         (
             "simulate: {kind: gun, mechanics: {friction: {coulomb_N: -1}}}",
-            r"tiny.yaml: simulate.mechanics.friction.coulomb_N: must",
+            r"tiny.yaml: simulate.mechanics.friction.coulomb_N: found -1.0; .* >= 0",
         ),
         ("simulation: {effects: {1: {}}}", r"effects.1: the key is 1; .*in quotes"),
         ("group: {keep: {top: few}}", r"group.keep.top: found 'few'; .*an integer"),

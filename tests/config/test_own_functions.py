@@ -37,7 +37,7 @@ def test_python_may_read_a_file_itself(write_map):
     [
         (
             "{file: a.py}",
-            r"fit.input_map.name: found no such key; expected text, as in",
+            r"fit.input_map.name: missing; expected text; add the key",
         ),
         ("{file: 3, name: a}", r"fit.input_map.file: found 3; expected text"),
         (
@@ -50,7 +50,7 @@ def test_python_may_read_a_file_itself(write_map):
         ),
         (
             "own_function",
-            r"fit.input_map: own_function needs a function; name its file",
+            r"fit.input_map: 'own_function' needs a function; name its file",
         ),
         ("sigmoid", r"fit.input_map: found 'sigmoid'; did you mean 'sigmoid_net"),
     ],
@@ -93,7 +93,7 @@ def test_function_is_no_key_of_its_own(write_config):
     [
         (
             "{input_units: 1}",
-            r"fit.input_units: must be an integer >= 2 for piecewise_l",
+            r"fit.input_units: found 1; expected an integer >= 2 for piece",
         ),
         ("{output_units: 2.5}", r"fit.output_units: found 2.5; expected an integer"),
     ],

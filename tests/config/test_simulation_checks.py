@@ -146,7 +146,7 @@ def test_effect_that_cannot_be_simulated_is_one_line(load_effect, text, message)
         ("mass: 1", r"simulation.mass: unknown key; did you mean 'mass_kg'\?"),
         (
             "controller: {position_gain_per_s: 0, velocity_gain: 1}",
-            r"simulation.controller.position_gain_per_s: must be positive, got 0.0",
+            r"simulation.controller.position_gain_per_s: found 0.0; .* number > 0",
         ),
         (
             "controller: {position_gain_per_s: 1}",

@@ -148,7 +148,10 @@ FAULTS = {
         change("linear_block.numerator", []),
         "numerator: found no numbers",
     ),
-    "not monic": (change("linear_block.denominator", [2.0, 1.0]), "starts with 1"),
+    "not monic": (
+        change("linear_block.denominator", [2.0, 1.0]),
+        "[0]: found 2.0; expected 1",
+    ),
     "many poles": (
         change("linear_block.denominator", [1.0] * 5000),
         "denominator: found 5000 numbers; expected at most 1001",
@@ -161,7 +164,7 @@ FAULTS = {
         change("input_map.break_points", [1.0, 0.0]),
         "break_points: found [1.0, 0.0]; expected numbers that rise",
     ),
-    "lengths": (change("input_map.values", [1.0]), "expected as many values"),
+    "lengths": (change("input_map.values", [1.0] * 9), "expected as many values"),
     "domain": (change("input_map.domain", [1.0, 1.0]), "domain: found [1.0, 1.0]"),
     "widths": (change("output_map.widths", [0.0]), "numbers above 0"),
     "range": (change("input_range", [1.0]), "input_range: found [1.0]"),
@@ -206,6 +209,21 @@ def test_what_is_no_model_is_refused(text, said, tmp_path):
         read_exported(path)
     with pytest.raises(ModelFileError, match="no such file"):
         read_exported(Path("nowhere.json"))
+
+
+def test_brackets_of_any_depth_are_refused(tmp_path):
+    path = tmp_path / "m.json"
+    content = described(exported_of(example_model(1, kinds=("none", "none"))))
+    text = json.dumps({**content, "name": "deep"})
+    said = []
+    # Python's own limit, 1000, lies between them.
+    for depth in (10, 900, 940, 980, 1100):
+        path.write_text(text.replace('"deep"', "[" * depth + "]" * depth))
+        with pytest.raises(ModelFileError) as error:
+            read_exported(path)
+        said.append(str(error.value))
+    assert "name: found [[[" in said[0]
+    assert "is no JSON" in said[-1]
 
 
 def test_effects_of_a_simulation_are_checked_as_in_a_configuration(tmp_path):

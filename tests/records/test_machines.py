@@ -17,17 +17,29 @@ from hwid_cli.records.mechanics import Contact, Friction, Mechanics
     [
         (lambda: ServoMachine(kind="gun"), "kind must be 'servo', got 'gun'"),
         (lambda: GunMachine(kind="servo"), "kind must be 'gun', got 'servo'"),
-        (lambda: ServoMachine(inertia_kg_m2=0.0), "inertia_kg_m2 must be positive"),
-        (lambda: ServoMachine(currents_A=(1.0, 0.0)), "currents_A must be positive"),
+        (lambda: ServoMachine(inertia_kg_m2=0.0), "inertia_kg_m2 must be a number > 0"),
+        (
+            lambda: ServoMachine(currents_A=(1.0, 0.0)),
+            "currents_A must be a number > 0",
+        ),
         (lambda: ServoMachine(rest_s=0.5), "rest_s must be shorter than"),
-        (lambda: ServoMachine(noise_relative=-1.0), "noise_relative must not be neg"),
+        (
+            lambda: ServoMachine(noise_relative=-1.0),
+            "noise_relative must be a number >=",
+        ),
         (lambda: Friction(3.0, 2.0), "break_away_N must be at least coulomb_N = 3.0"),
-        (lambda: Contact(position_m=0.0), "position_m must be positive"),
-        (lambda: Mechanics(mass_kg=float("nan")), "mass_kg must be positive, got nan"),
+        (lambda: Contact(position_m=0.0), "position_m must be a number > 0"),
+        (
+            lambda: Mechanics(mass_kg=float("nan")),
+            "mass_kg must be a number > 0, got n",
+        ),
         (lambda: ParameterChange(parameter="mass"), "parameter must be one of stiff"),
-        (lambda: ParameterChange(share=1.5), "share must lie between 0 and 1"),
-        (lambda: Sensors(current_noise_A=-0.1), "current_noise_A must not be negative"),
-        (lambda: GunPlan(samples=0), "samples must be positive, got 0"),
+        (lambda: ParameterChange(share=1.5), "share must be a number from 0 to 1"),
+        (
+            lambda: Sensors(current_noise_A=-0.1),
+            "current_noise_A must be a number >= 0",
+        ),
+        (lambda: GunPlan(samples=0), "samples must be an integer >= 1, got 0"),
         (lambda: GunPlan(sine_left_out=("4-5",)), "cells such as 4x5"),
         (
             lambda: GunPlan(longest_lead_in_samples=10),

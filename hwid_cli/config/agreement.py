@@ -1,0 +1,277 @@
+"""What the keys of one configuration must agree on, beyond the rules of each."""
+
+from collections.abc import Callable, Collection, Iterator
+from typing import NamedTuple
+
+from hwid_cli.config.faults import Fault, Place, missing, wrong
+from hwid_cli.config.simulation_checks import (
+    circuit_faults,
+    controller_faults,
+    effect_faults,
+    held_out_faults,
+    named_effect_faults,
+    simulation_faults,
+)
+from hwid_cli.files.messages import name_fault
+from hwid_cli.records.experiment import Experiment
+from hwid_cli.records.model import LinearBlock, Orders
+
+# Lists of recordings that may not hold a test recording, and what they do with it.
+_SEEN_BEFORE_TEST = (
+    ("identify", "recordings", "identifies"),
+    ("crossval", "recordings", "validates"),
+    ("group", "start", "starts groups"),
+    ("group", "candidates", "is a candidate"),
+    ("group", "validate", "validates"),
+)
+
+
+class _Agreement(NamedTuple):
+    """A rule over several keys, and these keys (or their sections)."""
+
+    faults: Callable[[Experiment], Iterator[Fault]]
+    keys: str
+
+
+def disagreements(
+    experiment: Experiment, left_out: Collection[Place] = ()
+) -> Iterator[Fault]:
+    """Whatever makes the values of a configuration unusable together.
+
+    Parameters
+    ----------
+    left_out : collection of tuple
+        Places of keys that were at fault and are not looked at: a rule that compares one
+        of them has nothing to say.
+    """
+    for agreement in _AGREEMENTS:
+        compared = [tuple(key.split(".")) for key in agreement.keys.split()]
+        if not any(_overlap(one, two) for one in compared for two in left_out):
+            yield from agreement.faults(experiment)
+
+
+def _overlap(one: Place, two: Place) -> bool:
+    """Whether one place is the other, or lies in it."""
+    length = min(len(one), len(two))
+    return one[:length] == two[:length]
+
+
+def _name(experiment: Experiment) -> Iterator[Fault]:
+    fault = name_fault(experiment.name)
+    if fault:
+        expected = f"a name that can be a folder (letters, digits, - and _): {fault}"
+        yield wrong(("name",), experiment.name, expected)
+
+
+def _columns(experiment: Experiment) -> Iterator[Fault]:
+    options = experiment.recordings
+    if options is None:
+        return
+    taken: dict[object, str] = {}
+    for name in ("time", "input", "output", "reference"):
+        column = getattr(options.columns, name)
+        if column is None:
+            continue
+        if column in taken:
+            yield Fault(
+                ("recordings", "columns", name),
+                f"found {column!r}, which is the {taken[column]} too",
+                "another column",
+            )
+        taken[column] = name
+
+
+def _clock(experiment: Experiment) -> Iterator[Fault]:
+    options = experiment.recordings
+    if options is None or options.columns.time is not None:
+        return
+    if options.sample_time_s is None:
+        yield Fault(
+            ("recordings", "sample_time_s"),
+            "missing, and columns.time too",
+            "one of them",
+            "name the time column or give the sample time",
+        )
+    if options.resample:
+        yield Fault(
+            ("recordings", "resample"),
+            "found true",
+            "a time column to resample by",
+            "name it in columns.time",
+        )
+
+
+def _range(experiment: Experiment) -> Iterator[Fault]:
+    options = experiment.recordings
+    if options is None or options.last_sample is None:
+        return
+    first = options.first_sample
+    if options.last_sample <= first:
+        expected = f"an integer > first_sample = {first}"
+        yield wrong(("recordings", "last_sample"), options.last_sample, expected)
+
+
+def _parts(experiment: Experiment) -> Iterator[Fault]:
+    options = experiment.recordings
+    if options is None:
+        return
+    for name, bounds in options.parts.items():
+        place = ("recordings", "parts", name)
+        if name_fault(name) or "+" in name:
+            yield wrong(place, name, "a name of letters, digits, - and _")
+        elif len(bounds) != 2 or not 0 <= bounds[0] < bounds[1]:
+            yield wrong(
+                place,
+                bounds,
+                "[first, last + 1]: two samples counted from 0, the second one larger",
+            )
+
+
+def _cut_or_parts(experiment: Experiment) -> Iterator[Fault]:
+    options = experiment.recordings
+    if options is None or not options.parts:
+        return
+    if options.first_sample != 0 or options.last_sample is not None:
+        name = "first_sample" if options.first_sample else "last_sample"
+        yield wrong(
+            ("recordings", name),
+            getattr(options, name),
+            "no such key beside recordings.parts, which says what is used",
+            "remove one of the two",
+        )
+
+
+def _delay_grid(experiment: Experiment) -> Iterator[Fault]:
+    options = experiment.orders
+    if options.nk_role == "delay" and options.nf is None:
+        yield missing(("orders", "nf"), "the number of poles, because nk_role is delay")
+    if options.nk_role != "delay" and options.nf is not None:
+        yield wrong(
+            ("orders", "nf"),
+            options.nf,
+            "no such key, because with nk_role poles the number of poles is nk",
+            "remove it or set nk_role: delay",
+        )
+    if options.nk_role == "delay" and experiment.fit.delays:
+        yield wrong(
+            ("fit", "delays"),
+            experiment.fit.delays,
+            "none with orders.nk_role: delay, where the grid tries the delays",
+            "remove one of the two",
+        )
+
+
+def _linear_block(experiment: Experiment) -> Iterator[Fault]:
+    """A linear block that some fit of the grid can begin with, or keep."""
+    block = experiment.fit.linear_block
+    if block is None:
+        return
+    if block.frozen:
+        yield from _frozen_block(block, experiment)
+    else:
+        yield from _contained_block(block, experiment)
+
+
+def _frozen_block(block: LinearBlock, experiment: Experiment) -> Iterator[Fault]:
+    """A frozen block must fill the grid, and its poles lie where they may."""
+    grid = experiment.orders
+    own, place = block.orders, ("fit", "linear_block")
+    counts_poles = grid.nk_role == "poles"
+    second = own.nf if counts_poles else own.nk
+    other = ("delay", own.nk, 1) if counts_poles else ("poles", own.nf, grid.nf)
+    word, found, wanted = other
+    if (grid.nb, grid.nk) != ((own.nb,), (second,)):
+        yield Fault(
+            place,
+            f"found a frozen block of {own.nb} numerator coefficients, {own.nf} poles "
+            f"and delay {own.nk}",
+            "the orders of the grid",
+            f"set orders: {{nb: {own.nb}, nk: {second}}}",
+        )
+    elif found != wanted:
+        yield Fault(
+            place,
+            f"found {word} {found}",
+            f"{wanted} as in the grid of orders.nk_role: {grid.nk_role}",
+            f"set orders: {{nb: {own.nb}, nf: {own.nf}, nk: {own.nk}, nk_role: delay}}",
+        )
+    radius = experiment.fit.largest_pole_radius
+    if block.pole_radius >= radius:
+        yield Fault(
+            (*place, "denominator"),
+            f"found a pole at radius {block.pole_radius:.4g}",
+            f"all poles of a frozen block inside radius {radius:g}",
+            "correct the coefficients, or set frozen: false, which draws them in",
+        )
+
+
+def _contained_block(block: LinearBlock, experiment: Experiment) -> Iterator[Fault]:
+    """A block that is a start must be contained in some orders of the grid."""
+    grid, own = experiment.orders, block.orders
+    counts_poles = grid.nk_role == "poles"
+    delays = experiment.fit.delays or ((1,) if counts_poles else grid.nk)
+    n_poles = max(grid.nk) if counts_poles else grid.nf or 0
+    if not any(Orders(max(grid.nb), n_poles, nk).contains(own) for nk in delays):
+        yield Fault(
+            ("fit", "linear_block"),
+            f"found {own.nb} numerator coefficients, {own.nf} poles and delay "
+            f"{own.nk}, which no orders of the grid contain",
+            "a block of smaller or equal orders",
+            "widen orders.nb and the poles, or leave the block out",
+        )
+
+
+def _keep(experiment: Experiment) -> Iterator[Fault]:
+    if experiment.group is None:
+        return
+    keep, place = experiment.group.keep, ("group", "keep")
+    if len(keep) != 1:
+        yield wrong(place, keep, "exactly one of top, best, coverage_at_least")
+        return
+    ((rule, value),) = keep.items()
+    if rule == "best":
+        if value is not True:
+            yield wrong((*place, rule), value, "true")
+        return
+    counts = value if isinstance(value, tuple) else (value,)
+    is_count = [not isinstance(n, bool) and n >= 1 for n in counts]
+    if not counts or not all(is_count):
+        yield wrong((*place, rule), value, "an integer >= 1, or one for each level")
+
+
+def _test(experiment: Experiment) -> Iterator[Fault]:
+    held_out = _listed(experiment, "test", "recordings") or ()
+    for section, name, what_it_does in _SEEN_BEFORE_TEST:
+        both = sorted(set(held_out) & set(_listed(experiment, section, name) or ()))
+        if both:
+            yield Fault(
+                ("test", "recordings"),
+                f"{both[0]!r} {what_it_does} too ({section}.{name})",
+                "recordings that are used nowhere else",
+                "take it out of one of the two lists",
+            )
+
+
+def _listed(experiment: Experiment, section: str, name: str) -> tuple[str, ...] | None:
+    return getattr(getattr(experiment, section), name, None)
+
+
+_GRID = "orders fit.delays fit.largest_pole_radius"
+_AGREEMENTS = (
+    _Agreement(_name, "name"),
+    _Agreement(_columns, "recordings.columns"),
+    _Agreement(_clock, "recordings.columns.time recordings.sample_time_s"),
+    _Agreement(_range, "recordings.first_sample recordings.last_sample"),
+    _Agreement(_parts, "recordings.parts"),
+    _Agreement(_cut_or_parts, "recordings.first_sample recordings.last_sample"),
+    _Agreement(_delay_grid, "orders.nk_role orders.nf fit.delays"),
+    _Agreement(_linear_block, f"{_GRID} fit.linear_block"),
+    _Agreement(_keep, "group.keep"),
+    _Agreement(circuit_faults, "simulation.resistance_ohm"),
+    _Agreement(controller_faults, "simulation.controller recordings.columns.reference"),
+    _Agreement(effect_faults, "simulation.effects"),
+    _Agreement(simulation_faults, "simulation"),
+    _Agreement(named_effect_faults, "diagnose.effects"),
+    _Agreement(held_out_faults, "diagnose.recordings diagnose.hold_out"),
+    _Agreement(_test, "test identify crossval group"),
+)
