@@ -9,6 +9,7 @@ from hwid_cli.cli.session import Session, Timer, open_session
 from hwid_cli.config.load import describe_experiment
 from hwid_cli.errors import ConfigError
 from hwid_cli.files.atomic import replace_file
+from hwid_cli.records.recordings import Calibrated
 from hwid_cli.records.report import StageRun, StoredResults
 from hwid_cli.report.html import report_page
 from hwid_cli.stages.report import changed_sections, report_contents, report_key
@@ -50,14 +51,13 @@ def write_report(session: Session) -> Path:
             f"{session.out}: holds no results; expected those of at least one stage; "
             f"run 'hwid run {source}' first, with the same --out"
         )
-    figures = _calibration_figures(session, stored)
-    key = report_key(stored, figures)
+    key = report_key(stored)
     path = session.out / FILE
     stages = ", ".join(run.stage for run in stored.stages) or "the diagnosis"
     if "report" not in session.forced and _is_complete(session.out, path, key):
         session.say(f"report: {path} shows {stages} already, {timer}")
         return path
-    page = report_page(report_contents(stored), figures)
+    page = report_page(report_contents(stored), STAGES)
     for name, png in page.figures.items():
         place = session.out / FIGURES / name
         if not (place.is_file() and place.read_bytes() == png):
@@ -110,7 +110,7 @@ def read_stored(session: Session) -> StoredResults:
             StageRun(name, origin.key, origin.seconds, origin.versions, changed)
         )
         results[name] = storage.read(path)
-    crossval = results.get("crossval")
+    calibrated, crossval = results.get("calibrate"), results.get("crossval")
     nk_role = experiment.orders.nk_role if crossval is None else crossval.nk_role
     return StoredResults(
         name=experiment.name,
@@ -120,11 +120,14 @@ def read_stored(session: Session) -> StoredResults:
         results=results,
         diagnosis=read_diagnosis(session.out / "diagnosis.json"),
         thesis_names=experiment.thesis_names,
+        calibration_figures={}
+        if calibrated is None
+        else _calibration_figures(session.out, calibrated),
     )
 
 
-def _calibration_figures(session: Session, stored: StoredResults) -> dict[str, bytes]:
+def _calibration_figures(out: Path, calibrated: Calibrated) -> dict[str, bytes]:
     """Figures that calibration left, by the names of the recordings."""
-    folder = session.out / FIGURES / "calibrate"
-    paths = {log.name: folder / f"{log.name}.png" for log in stored.logs}
+    folder = out / FIGURES / "calibrate"
+    paths = {log.name: folder / f"{log.name}.png" for log in calibrated.logs}
     return {name: path.read_bytes() for name, path in paths.items() if path.is_file()}

@@ -61,6 +61,8 @@ class StoredResults:
         Content of ``diagnosis.json``.
     thesis_names : bool
         Whether the configuration asks for the thesis's names of models and tables.
+    calibration_figures : mapping of str to bytes
+        PNG files of ``hwid calibrate`` by the names of the recordings.
     """
 
     name: str
@@ -70,6 +72,7 @@ class StoredResults:
     results: Mapping[str, Any] = field(default_factory=dict)
     diagnosis: Mapping[str, Any] | None = None
     thesis_names: bool = False
+    calibration_figures: Mapping[str, bytes] = field(default_factory=dict)
 
     @property
     def recordings(self) -> tuple[Recording, ...]:

@@ -1,32 +1,20 @@
 """The report as one HTML file that needs nothing else: records in, text and figures out."""
 
 import base64
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from importlib import import_module
+from importlib.util import find_spec
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from hwid_cli.records.report import ReportContents
-from hwid_cli.report.page import images_of
-from hwid_cli.report.sections.calibrate import calibration_section
-from hwid_cli.report.sections.crossval import crossval_section
-from hwid_cli.report.sections.diagnose import diagnosis_section
-from hwid_cli.report.sections.group import groups_section
-from hwid_cli.report.sections.identify import (
-    orders_section,
-    recordings_section,
-    residuals_section,
-)
-from hwid_cli.report.sections.models import models_section
+from hwid_cli.report.page import Section, images_of
 from hwid_cli.report.sections.summary import summary_section
-from hwid_cli.report.sections.test import (
-    assignment_section,
-    coverage_section,
-    final_test_section,
-)
 from hwid_cli.report.table import shown_part
 
 TEMPLATE = "report.html"
+_SECTIONS = "hwid_cli.report.sections"
 
 
 @dataclass(frozen=True)
@@ -43,35 +31,21 @@ class Page:
     figures: Mapping[str, bytes]
 
 
-def report_page(
-    contents: ReportContents, calibration_figures: Mapping[str, bytes]
-) -> Page:
+def report_page(contents: ReportContents, stages: Iterable[str]) -> Page:
     """Write the report.
 
     Parameters
     ----------
-    calibration_figures : mapping of str to bytes
-        PNG files of ``hwid calibrate`` by the names of the recordings.
+    stages : iterable of str
+        All there are, in the order of their sections.
 
     Returns
     -------
     Page
         The same contents give the same bytes.
     """
-    sections = (
-        summary_section(contents),
-        calibration_section(contents, calibration_figures),
-        recordings_section(contents),
-        residuals_section(contents),
-        orders_section(contents),
-        crossval_section(contents),
-        models_section(contents),
-        groups_section(contents),
-        final_test_section(contents),
-        coverage_section(contents),
-        assignment_section(contents),
-        diagnosis_section(contents),
-    )
+    makers = [one for name in stages for one in _sections_of(name)]
+    sections = (summary_section(contents), *(make(contents) for make in makers))
     environment = Environment(
         loader=PackageLoader("hwid_cli.report"),
         autoescape=True,
@@ -89,3 +63,13 @@ def report_page(
     )
     images = images_of(tuple(block for one in sections for block in one.blocks))
     return Page(html, {one.file: one.png for one in images})
+
+
+def _sections_of(stage: str) -> tuple[Callable[[ReportContents], Section], ...]:
+    """What the module of a stage's name shows; a stage without one shows nothing."""
+    place = f"{_SECTIONS}.{stage}"
+    if find_spec(place) is None:
+        return ()
+    found: tuple[Callable[[ReportContents], Section], ...]
+    found = import_module(place).SECTIONS
+    return found

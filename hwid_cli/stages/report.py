@@ -166,14 +166,9 @@ def chain_on_tests(final: FinalTest) -> ChainOnTests:
 REPORT_VERSION = 4
 
 
-def report_key(stored: StoredResults, figures: Mapping[str, bytes]) -> str:
-    """Content key of a page: all that it shows comes from these.
-
-    Parameters
-    ----------
-    figures : mapping of str to bytes
-        PNG files of ``hwid calibrate``.
-    """
+def report_key(stored: StoredResults) -> str:
+    """Content key of a page: all that it shows comes from these."""
+    figures = stored.calibration_figures
     # Seconds may be NaN, which no key can hold; as text they can.
     settings = {
         "config": stored.config,

@@ -4,6 +4,7 @@ import pytest
 
 from hwid_cli.report.html import report_page
 from hwid_cli.stages.report import report_contents
+from hwid_cli.stages.table import STAGES
 from tests.report.report_examples import everything
 
 
@@ -16,4 +17,4 @@ def contents():
 @pytest.fixture(scope="session")
 def page(contents):
     """That report."""
-    return report_page(contents, {})
+    return report_page(contents, STAGES)

@@ -9,6 +9,7 @@ from hwid_cli.records.report import ReportContents, StoredResults
 from hwid_cli.report.groups import chain_table
 from hwid_cli.report.html import report_page
 from hwid_cli.stages.report import report_contents
+from hwid_cli.stages.table import STAGES
 from tests.report.report_examples import (
     calibrated,
     calibrated_only,
@@ -65,7 +66,7 @@ def read(page):
 @pytest.fixture(scope="module")
 def bare():
     """A report of calibration alone."""
-    return Reader(report_page(report_contents(calibrated_only()), {}).html)
+    return Reader(report_page(report_contents(calibrated_only()), STAGES).html)
 
 
 def test_every_section_is_there_and_linked_from_the_top(read):
@@ -144,7 +145,7 @@ def test_a_missing_stage_is_one_line_with_the_command(bare):
 @pytest.mark.usefixtures("blank_figures")
 def test_a_tensor_of_other_models_is_called_outdated(contents):
     outdated = replace(contents, cross=None, outdated=("crossval",))
-    text = Reader(report_page(small(outdated), {}).html).text
+    text = Reader(report_page(small(outdated), STAGES).html).text
 
     assert "belongs to other models: run 'hwid crossval CONFIG'" in text
     assert "older than the models" in text
@@ -154,7 +155,7 @@ def test_settings_that_changed_since_are_named(contents):
     run = replace(stages("calibrate")[0], changed=("recordings", "calibrate"))
     stored = StoredResults("a", "{}", "poles", stages=(run,))
 
-    text = Reader(report_page(ReportContents(stored), {}).html).text
+    text = Reader(report_page(ReportContents(stored), STAGES).html).text
     assert "other settings now: recordings and calibrate" in text
 
 
@@ -162,7 +163,7 @@ def test_unknown_seconds_and_versions_are_said_to_be_unknown():
     run = replace(stages("calibrate")[0], seconds=float("nan"), versions={})
     stored = StoredResults("a", "{}", "poles", stages=(run,))
 
-    text = Reader(report_page(ReportContents(stored), {}).html).text
+    text = Reader(report_page(ReportContents(stored), STAGES).html).text
     assert text.count("unknown") == 2
 
 
@@ -187,10 +188,9 @@ def test_names_cannot_become_elements_of_the_page(page):
         name=name,
         config='{"name": "<b>"}',
         diagnosis={"verdict": "<i>none</i>"},
+        calibration_figures={name: next(iter(page.figures.values()))},
     )
-    hostile = report_page(
-        report_contents(stored), {name: next(iter(page.figures.values()))}
-    )
+    hostile = report_page(report_contents(stored), STAGES)
     read = Reader(hostile.html)
 
     assert len(read.all("script")) == 1
@@ -216,7 +216,7 @@ def test_recordings_are_folded_after_the_first_four(page):
 )
 def test_a_diagnosis_may_hold_little(contents, diagnosis, expected):
     stored = StoredResults("a", "{}", "poles", diagnosis=diagnosis)
-    html = report_page(ReportContents(stored), {}).html
+    html = report_page(ReportContents(stored), STAGES).html
 
     assert expected in Reader(html).text
 
@@ -225,7 +225,7 @@ def test_a_diagnosis_may_hold_little(contents, diagnosis, expected):
 def test_what_the_thesis_calls_things_is_on_a_page_that_asks_for_it(contents):
     stored = replace(contents.stored, thesis_names=True)
     plain, asked = (
-        report_page(one, {}).html
+        report_page(one, STAGES).html
         for one in (contents, replace(contents, stored=stored))
     )
 

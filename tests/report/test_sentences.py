@@ -270,6 +270,6 @@ def test_figures_of_models_that_look_alike_are_files_of_their_own(contents):
 @pytest.mark.parametrize(("count", "is_folded"), [(12, False), (13, True)])
 def test_a_long_calibration_table_is_folded(count, is_folded):
     stored = with_results(calibrated_only(), calibrate=calibrated(names(count)))
-    first = calibration_section(ReportContents(stored), {}).blocks[0]
+    first = calibration_section(ReportContents(stored)).blocks[0]
 
     assert isinstance(first, Folded) == is_folded

@@ -1,15 +1,14 @@
 import csv
 from dataclasses import replace
 
-from tests.report.test_map_tables import ADVICE as MAP_ADVICE
-from tests.report.test_order_tables import ADVICE
-
 from hwid_cli.store.order_results import (
     MAP_COLUMNS,
     ORDER_COLUMNS,
     write_maps_csv,
     write_order_csv,
 )
+from tests.report.test_map_choice import ADVICE as MAP_ADVICE
+from tests.report.test_orders import ADVICE
 
 
 def test_all_recordings_come_first_and_unknown_cells_are_blank(tmp_path):

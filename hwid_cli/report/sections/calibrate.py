@@ -1,7 +1,5 @@
 """Section about calibration."""
 
-from collections.abc import Mapping
-
 from hwid_cli.records.recordings import CalibrationLog
 from hwid_cli.records.report import ReportContents
 from hwid_cli.report import plots
@@ -25,17 +23,9 @@ _MOST_OPEN = 4
 _MOST_ROWS = 12
 
 
-def calibration_section(
-    contents: ReportContents, figures: Mapping[str, bytes]
-) -> Section:
-    """Show what calibration did.
-
-    Parameters
-    ----------
-    figures : mapping of str to bytes
-        PNG files by the names of the recordings.
-    """
-    logs = contents.stored.logs
+def calibration_section(contents: ReportContents) -> Section:
+    """Show what calibration did."""
+    logs, figures = contents.stored.logs, contents.stored.calibration_figures
     blocks: list[PageBlock] = []
     if not logs:
         blocks.append(Text("Not run yet: run 'hwid calibrate CONFIG'.", is_note=True))
@@ -72,3 +62,7 @@ def _cut_sentence(log: CalibrationLog) -> str:
     if repaired:
         kept += f", {counted(repaired, 'damaged sample')} replaced"
     return f"{kept}."
+
+
+# Sections of the page, in their order.
+SECTIONS = (calibration_section,)

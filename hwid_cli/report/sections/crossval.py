@@ -14,6 +14,7 @@ from hwid_cli.report.page import (
     drawn,
     section_notes,
 )
+from hwid_cli.report.sections.models import models_section
 from hwid_cli.report.table import Text
 
 
@@ -64,3 +65,7 @@ def _coverage_sentence(matrix: RmsdMatrix) -> str:
         f"{widest}; hardest to cover is {matrix.recordings[column]}, by "
         f"{counted(int(matrix.covered_by[column]), 'model')}."
     )
+
+
+# Sections of the page, in their order.
+SECTIONS = (crossval_section, models_section)

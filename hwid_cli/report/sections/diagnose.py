@@ -227,3 +227,7 @@ def _text(value: object) -> str:
     if isinstance(value, bool) or not isinstance(value, int | float):
         return MISSING if value is None else str(value)
     return f"{value:.4g}"
+
+
+# Sections of the page, in their order.
+SECTIONS = (diagnosis_section,)

@@ -98,3 +98,7 @@ def _histogram(search: GroupSearch) -> Figures:
         )
     figure = coverage_histogram_figure(search)
     return Figures((drawn("groups/coverage", figure, alt),), sentence)
+
+
+# Sections of the page, in their order.
+SECTIONS = (groups_section,)

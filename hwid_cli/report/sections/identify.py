@@ -177,3 +177,7 @@ def _grid_sentence(grid: OrderGrid) -> str:
 def _grid_name(grid: OrderGrid, place: int) -> str:
     name, nb, nk = np.unravel_index(place, grid.rmsd.shape)
     return f"{grid.recordings[name]}/{grid.nb[nb]}/{grid.nk[nk]}"
+
+
+# Sections of the page, in their order.
+SECTIONS = (recordings_section, residuals_section, orders_section)

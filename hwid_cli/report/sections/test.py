@@ -149,3 +149,7 @@ def assignment_section(contents: ReportContents) -> Section:
             blocks.append(folded_beyond(_MOST_OPEN, table, f"The predictions of {of}"))
     title = "Assignment: which model for which recording"
     return Section("assignment", title, "Assignment", tuple(blocks))
+
+
+# Sections of the page, in their order.
+SECTIONS = (final_test_section, coverage_section, assignment_section)
