@@ -2,7 +2,7 @@
 
 The rooms, and the only direction in which they import each other::
 
-    cli -> stages -> export | simulations | report | tasks -> config | store -> data
+    cli -> stages -> export | report | tasks -> config | store -> data | simulations
         -> files -> diagnosis -> drive | model -> records -> errors
 
 ``records`` holds the data handed between rooms; ``model``, ``drive`` and ``diagnosis``

@@ -4,8 +4,8 @@ from hwid_cli.cli.driver import context_of, result_of, show_blocks
 from hwid_cli.cli.options import Choices
 from hwid_cli.cli.session import Session, Timer, open_session
 from hwid_cli.report.diagnosis import simulated_table
+from hwid_cli.simulations.kinds import kind_named
 from hwid_cli.stages.diagnose import choose
-from hwid_cli.stages.simulate_drive import simulate_recordings
 from hwid_cli.store.diagnosis_results import write_simulated_csv
 
 
@@ -33,7 +33,8 @@ def _simulate_drive(session: Session) -> None:
     """Simulate the recordings by the physics model and show how far off it is."""
     result_of(session, "calibrate")
     given, timer = choose(context_of(session)), Timer()
-    curves = simulate_recordings(given.recordings, given.simulation, given.options)
+    kind = kind_named(given.simulation.kind)
+    curves = kind.simulate(given.recordings, given.simulation, given.options)
     folder = session.out / "simulated"
     for one in curves:
         columns = (one.time_s, one.input, one.measured, one.simulated)

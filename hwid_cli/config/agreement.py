@@ -9,6 +9,7 @@ from hwid_cli.config.simulation_checks import (
     controller_faults,
     effect_faults,
     held_out_faults,
+    kind_faults,
     named_effect_faults,
     simulation_faults,
 )
@@ -267,6 +268,7 @@ _AGREEMENTS = (
     _Agreement(_delay_grid, "orders.nk_role orders.nf fit.delays"),
     _Agreement(_linear_block, f"{_GRID} fit.linear_block"),
     _Agreement(_keep, "group.keep"),
+    _Agreement(kind_faults, "simulation.kind"),
     _Agreement(circuit_faults, "simulation.resistance_ohm"),
     _Agreement(controller_faults, "simulation.controller recordings.columns.reference"),
     _Agreement(effect_faults, "simulation.effects"),

@@ -16,6 +16,7 @@ from hwid_cli.config.faults import (
 from hwid_cli.drive.catalogue import configured_effects
 from hwid_cli.drive.effect import Stated
 from hwid_cli.records.experiment import DiagnoseOptions, Experiment
+from hwid_cli.simulations.kinds import KINDS
 
 # What the electrical circuit has besides its resistance.
 _OF_CIRCUIT = ("inductance_H", "back_emf_V_s_per_m")
@@ -92,6 +93,13 @@ def _parameter(one: Stated, value: float | str, place: Place) -> Iterator[Fault]
             if not limit.holds(value):
                 yield wrong(place, value, limit.expected)
                 return
+
+
+def kind_faults(experiment: Experiment) -> Iterator[Fault]:
+    """A kind of simulation that there is not."""
+    options = experiment.simulation
+    if options is not None and options.kind not in KINDS:
+        yield wrong_word(("simulation", "kind"), options.kind, KINDS)
 
 
 def simulation_faults(experiment: Experiment) -> Iterator[Fault]:

@@ -8,7 +8,7 @@ import pytest
 from hwid_cli.drive.simulation import simulate_drive
 from hwid_cli.records.drive import Controller
 from hwid_cli.records.experiment import DiagnoseOptions
-from hwid_cli.stages.simulate_drive import simulate_recordings
+from hwid_cli.simulations.drive import simulate_recordings
 from tests.diagnosis.small_drive import (
     DRIVE,
     NOISE,

@@ -9,6 +9,7 @@ from hwid_cli.diagnosis.problem import prepare
 from hwid_cli.records.drive import SimulatedRecording
 from hwid_cli.records.experiment import DiagnoseOptions, SimulationOptions
 from hwid_cli.records.recordings import Recording
+from hwid_cli.simulations.simulation import SimulationKind
 
 
 def simulate_recordings(
@@ -42,3 +43,6 @@ def simulate_recordings(
         )
         for one in compared_as_given(problem)
     )
+
+
+KIND = SimulationKind(simulate_recordings)
