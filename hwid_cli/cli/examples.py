@@ -4,22 +4,19 @@ from collections.abc import Mapping
 
 import click
 
+# Commands that are not named take a configuration and nothing else.
 EXAMPLES: Mapping[str, tuple[str, ...]] = {
     "init": ("hwid init measured/", "hwid init measured/ --out configs/gun.yaml"),
     "check": ("hwid check gun.yaml", "hwid check gun.yaml --no-timing --jobs 8"),
     "run": ("hwid run gun.yaml", "hwid run gun.yaml --out results/second --jobs 2"),
     "simulate": ("hwid simulate gun.yaml", "hwid simulate gun.yaml --force"),
-    "calibrate": ("hwid calibrate gun.yaml",),
     "identify": (
         "hwid identify gun.yaml",
         "hwid identify gun.yaml --cache results/cache -v",
     ),
     "crossval": ("hwid crossval gun.yaml", "hwid crossval gun.yaml --quiet"),
-    "order": ("hwid order gun.yaml",),
     "group": ("hwid group gun.yaml", "hwid group gun.yaml --force"),
-    "test": ("hwid test gun.yaml",),
     "diagnose": ("hwid diagnose gun.yaml", "hwid diagnose gun.yaml --jobs 1"),
-    "report": ("hwid report gun.yaml",),
     "export": (
         "hwid export gun.yaml --model step_06/3/7",
         "hwid export gun.yaml --model step_06+step_09/3/7 --format c",
@@ -36,6 +33,11 @@ EXAMPLES: Mapping[str, tuple[str, ...]] = {
 }
 
 
+def examples_of(name: str) -> tuple[str, ...]:
+    """Command lines that show what a command is for."""
+    return EXAMPLES.get(name, (f"hwid {name} gun.yaml",))
+
+
 def add_examples(command: click.Command) -> click.Command:
     """Give a command's help its examples.
 
@@ -44,8 +46,7 @@ def add_examples(command: click.Command) -> click.Command:
     click.Command
         The same one.
     """
-    lines = EXAMPLES.get(command.name or "", ())
-    if lines:
-        # The mark keeps click from joining the lines.
-        command.epilog = "\n".join(["\b", "Examples:", *(f"  {one}" for one in lines)])
+    # The mark keeps click from joining the lines.
+    shown = [f"  {one}" for one in examples_of(str(command.name))]
+    command.epilog = "\n".join(["\b", "Examples:", *shown])
     return command
