@@ -49,9 +49,9 @@ def _compared(
 ) -> Comparison:
 
     calibrated = result_of(session, "calibrate").recordings
-    judges = select_recordings(calibrated, names or None, key="--recording")
+    chosen = select_recordings(calibrated, names or None, key="--recording")
     found = [_model(session, text) for text in models]
-    return compare_models(found, judges)
+    return compare_models(found, chosen)
 
 
 def _model(session: Session, text: str) -> NamedModel:

@@ -78,7 +78,7 @@ def starter_text(
         _recordings_lines(layout, proposal, own),
         _calibrate_lines(proposal),
         _fit_lines(proposal),
-        _judging_lines(layout, proposal),
+        _validation_lines(layout, proposal),
         _group_lines(proposal),
         _diagnose_lines(layout, proposal),
     ]
@@ -244,7 +244,7 @@ def _fit_lines(proposal: Proposal) -> list[str]:
     ]
 
 
-def _judging_lines(layout: FolderLayout, proposal: Proposal) -> list[str]:
+def _validation_lines(layout: FolderLayout, proposal: Proposal) -> list[str]:
     unit = layout.output.unit or "the output's unit"
     lines = ["# Models of these recordings, judged on all of them."]
     chosen = _flow(list(proposal.identify)) if proposal.identify else "all"

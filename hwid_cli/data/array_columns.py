@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from hwid_cli.data.columns import ROLES, Column, array_column
+from hwid_cli.data.columns import ROLES, MeasuredColumn, array_column
 from hwid_cli.errors import MeasurementError
 from hwid_cli.files.messages import did_you_mean
 from hwid_cli.records.experiment import Columns
@@ -26,7 +26,7 @@ Variables = Mapping[str, Callable[[], Any]]
 
 def pick_columns(
     path: Path, columns: Columns, variables: Variables
-) -> Iterator[tuple[str, Column]]:
+) -> Iterator[tuple[str, MeasuredColumn]]:
     """Give the columns that are wanted, each with its role.
 
     Raises

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hwid_cli.data.columns import Column, FileColumns, place_of
+from hwid_cli.data.columns import FileColumns, MeasuredColumn, place_of
 from hwid_cli.errors import MeasurementError
 from hwid_cli.files.messages import name_fault, shown
 from hwid_cli.records.experiment import (
@@ -201,7 +201,7 @@ def check_sample_times(recordings: Sequence[RawRecording], tolerance: float) -> 
             )
 
 
-def _what_stands_there(column: Column, index: int) -> str:
+def _what_stands_there(column: MeasuredColumn, index: int) -> str:
     text = column.texts.get(int(column.rows[index]))
     if text is None:
         value = column.values[index]

@@ -8,7 +8,7 @@ import numpy as np
 
 
 @dataclass(frozen=True, eq=False)
-class Column:
+class MeasuredColumn:
     """Numbers of one column and the rows of the file that they stand in.
 
     Parameters
@@ -44,17 +44,19 @@ class FileColumns:
         What a controller was told to follow.
     """
 
-    input: Column
-    output: Column
-    time: Column | None = None
-    reference: Column | None = None
+    input: MeasuredColumn
+    output: MeasuredColumn
+    time: MeasuredColumn | None = None
+    reference: MeasuredColumn | None = None
 
 
 # Names of the columns in ``FileColumns`` and in ``records.experiment.Columns``.
 ROLES = ("input", "output", "time", "reference")
 
 
-def with_each(columns: FileColumns, change: Callable[[Column], Column]) -> FileColumns:
+def with_each(
+    columns: FileColumns, change: Callable[[MeasuredColumn], MeasuredColumn]
+) -> FileColumns:
     """Change every column that is there in the same way."""
     there = {role: getattr(columns, role) for role in ROLES}
     return FileColumns(
@@ -62,7 +64,7 @@ def with_each(columns: FileColumns, change: Callable[[Column], Column]) -> FileC
     )
 
 
-def array_column(title: str, values: np.ndarray) -> Column:
+def array_column(title: str, values: np.ndarray) -> MeasuredColumn:
     """Make the column of an array; its rows are sample numbers from 0.
 
     Parameters
@@ -72,15 +74,15 @@ def array_column(title: str, values: np.ndarray) -> Column:
     # What is too large for 64 bits becomes infinite and is refused by the checks.
     with np.errstate(over="ignore"):
         numbers = np.asarray(values, np.float64)
-    return Column(title, numbers, np.arange(values.size))
+    return MeasuredColumn(title, numbers, np.arange(values.size))
 
 
-def keep_rows(column: Column, selection: slice) -> Column:
+def keep_rows(column: MeasuredColumn, selection: slice) -> MeasuredColumn:
     """Keep a stretch of a column, together with the numbers of its rows."""
     return replace(column, values=column.values[selection], rows=column.rows[selection])
 
 
-def block_means(column: Column, n: int) -> Column:
+def block_means(column: MeasuredColumn, n: int) -> MeasuredColumn:
     """Replace each block of n values by its mean; an incomplete last block goes.
 
     Parameters
@@ -100,7 +102,7 @@ def block_means(column: Column, n: int) -> Column:
     )
 
 
-def place_of(path: Path, column: Column, index: int) -> str:
+def place_of(path: Path, column: MeasuredColumn, index: int) -> str:
     """Name the place of a value, for a message.
 
     Parameters

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hwid_cli.data.columns import ROLES, Column
+from hwid_cli.data.columns import ROLES, MeasuredColumn
 from hwid_cli.errors import MeasurementError
 from hwid_cli.files.messages import did_you_mean
 from hwid_cli.records.experiment import Columns
@@ -33,7 +33,7 @@ class _Sheet:
     separator: str
 
 
-def read_csv_columns(path: Path, columns: Columns) -> list[tuple[str, Column]]:
+def read_csv_columns(path: Path, columns: Columns) -> list[tuple[str, MeasuredColumn]]:
     """Read input, output, time and reference from a CSV file.
 
     Parameters
@@ -204,7 +204,9 @@ def _check_widths(path: Path, sheet: _Sheet, body: int) -> None:
             )
 
 
-def _column(path: Path, title: str, sheet: _Sheet, body: int, place: int) -> Column:
+def _column(
+    path: Path, title: str, sheet: _Sheet, body: int, place: int
+) -> MeasuredColumn:
     cells = [row[place] if place < len(row) else "" for row in sheet.rows[body:]]
     length = len(cells)
     while length and not cells[length - 1]:
@@ -220,7 +222,7 @@ def _column(path: Path, title: str, sheet: _Sheet, body: int, place: int) -> Col
         values[index] = np.nan if number is None else number
         if number is None:
             texts[int(lines[index])] = cell
-    return Column(title, values, lines, rows_from_zero=False, texts=texts)
+    return MeasuredColumn(title, values, lines, rows_from_zero=False, texts=texts)
 
 
 def _with_points(

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from hwid_cli.data.array_columns import Variables, list_variables, pick_columns
-from hwid_cli.data.columns import Column, FileColumns, array_column
+from hwid_cli.data.columns import FileColumns, MeasuredColumn, array_column
 from hwid_cli.data.csv_files import list_csv_columns, read_csv_columns
 from hwid_cli.data.hdf5_files import open_hdf5
 from hwid_cli.data.isolated_reading import IsolatedReader, Labelled, serve
@@ -45,7 +45,7 @@ class Reader:
     """
 
     suffixes: tuple[str, ...]
-    read: Callable[[Path, Columns], Iterable[tuple[str, Column]]]
+    read: Callable[[Path, Columns], Iterable[tuple[str, MeasuredColumn]]]
     list_columns: Callable[[Path], Iterable[FoundColumn]]
     needs: str = ""
     is_isolated: bool = False
@@ -59,7 +59,7 @@ def _of_arrays(
 ) -> Reader:
     """Reader of files that hold arrays with names."""
 
-    def read(path: Path, columns: Columns) -> Iterator[tuple[str, Column]]:
+    def read(path: Path, columns: Columns) -> Iterator[tuple[str, MeasuredColumn]]:
         with opened(path) as variables:
             yield from pick_columns(path, columns, variables)
 

@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from hwid_cli.data.columns import (
-    Column,
     FileColumns,
+    MeasuredColumn,
     array_column,
     place_of,
     with_each,
@@ -91,7 +91,7 @@ def sample_uniformly(
     return _resample(columns, time.values, step), step
 
 
-def _check_length(path: Path, columns: FileColumns, time: Column) -> None:
+def _check_length(path: Path, columns: FileColumns, time: MeasuredColumn) -> None:
     others = (columns.input, columns.output, columns.reference)
     longest = max(one.values.size for one in others if one is not None)
     if time.values.size < longest:
@@ -107,7 +107,7 @@ def _check_length(path: Path, columns: FileColumns, time: Column) -> None:
         )
 
 
-def _check_order(path: Path, time: Column, steps: np.ndarray) -> None:
+def _check_order(path: Path, time: MeasuredColumn, steps: np.ndarray) -> None:
     if (steps > 0).all():
         return
     index = int(np.argmin(steps > 0))
@@ -148,7 +148,9 @@ def _simplest_step(time: np.ndarray) -> float:
     return step
 
 
-def _check_gaps(path: Path, time: Column, steps: np.ndarray, step: float) -> None:
+def _check_gaps(
+    path: Path, time: MeasuredColumn, steps: np.ndarray, step: float
+) -> None:
     """Refuse to make up most of a recording."""
     if steps.sum() / step > _MOST_GROWTH * time.values.size:
         index = int(np.argmax(steps))
@@ -162,7 +164,7 @@ def _check_gaps(path: Path, time: Column, steps: np.ndarray, step: float) -> Non
 def _resample(columns: FileColumns, stamps: np.ndarray, step: float) -> FileColumns:
     """Interpolate every column linearly over its own stretch of time."""
 
-    def resampled(column: Column) -> Column:
+    def resampled(column: MeasuredColumn) -> MeasuredColumn:
         known = stamps[: column.values.size]
         # The small share keeps a last sample that rounding pushed past the end.
         count = int((known[-1] - known[0]) / step * (1 + _ROUNDING)) + 1

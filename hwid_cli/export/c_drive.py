@@ -5,7 +5,7 @@ import textwrap
 
 from hwid_cli.drive import slots
 from hwid_cli.errors import ConfigError
-from hwid_cli.export.c_source import card_words, filled, numbers
+from hwid_cli.export.c_source import card_text, filled, numbers
 from hwid_cli.export.names import in_comment
 from hwid_cli.records.exported import ExportedSimulation
 
@@ -50,7 +50,7 @@ def drive_source(exported: ExportedSimulation) -> str:
     return filled(
         "drive.c",
         {
-            **card_words(exported.card, step),
+            **card_text(exported.card, step),
             "effects": "\n * ".join(textwrap.wrap(in_comment(effects), _WIDTH)),
             "hold": _HOLDS[drive.hold],
             "n_slots": exported.slots.size,

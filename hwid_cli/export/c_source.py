@@ -46,7 +46,7 @@ def c_source(exported: ExportedModel) -> str:
     return filled(
         "model.c",
         {
-            **card_words(exported.card, model.sample_time_s),
+            **card_text(exported.card, model.sample_time_s),
             "rule": _RULES[model.initial_state],
             "input_map": _map("input", model.input_map),
             "output_map": _map("output", model.output_map),
@@ -66,7 +66,7 @@ def c_source(exported: ExportedModel) -> str:
     )
 
 
-def card_words(card: ModelCard, sample_time_s: float) -> dict[str, str]:
+def card_text(card: ModelCard, sample_time_s: float) -> dict[str, str]:
     """What the comment at the top of a source says.
 
     Parameters

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.io import savemat
 
-from hwid_cli.export.c_source import card_words, filled
+from hwid_cli.export.c_source import card_text, filled
 from hwid_cli.export.json_writer import described
 from hwid_cli.export.map_parts import language_text, numbers_of
 from hwid_cli.export.names import identifier
@@ -42,12 +42,12 @@ def write_mat(path: Path, exported: ExportedModel) -> Path:
     name = identifier(exported.card.name)
     content = io.BytesIO()
     savemat(content, _variables(exported), long_field_names=True, oned_as="row")
-    words = card_words(exported.card, exported.sample_time_s)
+    words = card_text(exported.card, exported.sample_time_s)
     script = filled(
         "model.m",
         {
             **words,
-            **_map_words(),
+            **_map_text(),
             "about": words["about"].replace("\n *", "\n%  "),
             "identifier": name,
             "IDENTIFIER": name.upper(),
@@ -95,7 +95,7 @@ def _map(side: str, one: StaticMap) -> dict[str, Any]:
     return {"kind": one.kind, **numbers_of(one), "domain": np.array(one.domain)}
 
 
-def _map_words() -> dict[str, str]:
+def _map_text() -> dict[str, str]:
     """Every kind of map that MATLAB knows, and the functions that they call."""
     forms = {kind: rule.portable for kind, rule in RULES.items()}
     cases, functions = [], []

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hwid_cli.data.columns import Column, keep_rows, place_of
+from hwid_cli.data.columns import MeasuredColumn, keep_rows, place_of
 from hwid_cli.data.formats import read_columns
 from hwid_cli.errors import ConfigError, MeasurementError
 from hwid_cli.files.csv_tables import write_table_csv
@@ -69,7 +69,7 @@ def read_input(path: Path, exported: Exported) -> tuple[np.ndarray, np.ndarray]:
     return time.values, found.input.values
 
 
-def _check_numbers(path: Path, column: Column) -> None:
+def _check_numbers(path: Path, column: MeasuredColumn) -> None:
     if column.values.size == 0:
         raise MeasurementError(
             f"{path}: {column.title} holds no numbers; expected at least one; export "
@@ -85,7 +85,7 @@ def _check_numbers(path: Path, column: Column) -> None:
         )
 
 
-def _check_steps(path: Path, time: Column, step: float) -> None:
+def _check_steps(path: Path, time: MeasuredColumn, step: float) -> None:
     """Refuse a file that is sampled otherwise than the model."""
     if time.values.size == 1:
         return

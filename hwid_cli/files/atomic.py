@@ -71,7 +71,7 @@ def replaced_hdf5(
     format_name: str,
     version: int,
     start: bytes = b"",
-    seal: Callable[[bytes], bytes] = bytes,
+    checksum: Callable[[bytes], bytes] = bytes,
     is_lasting: bool = False,
 ) -> Iterator[h5py.File]:
     """Give an HDF5 file in memory that becomes the file on disk at the end.
@@ -84,7 +84,7 @@ def replaced_hdf5(
         Root attribute ``schema_version``.
     start : bytes
         HDF5 file to begin with; none gives an empty one.
-    seal : callable
+    checksum : callable
         From the finished file's bytes to those that are written.
     is_lasting : bool
         As for ``replace_file``.
@@ -105,7 +105,7 @@ def replaced_hdf5(
         _sign(file, format_name, version)
         yield file
         image = _image(file)
-    replace_file(path, seal(image), is_lasting=is_lasting)
+    replace_file(path, checksum(image), is_lasting=is_lasting)
 
 
 def hdf5_image(

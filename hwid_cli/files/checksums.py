@@ -9,17 +9,17 @@ MARK = b"hwid-sha256:"
 _LENGTH = len(MARK) + hashlib.sha256().digest_size
 
 
-def sealed(content: bytes) -> bytes:
+def with_checksum(content: bytes) -> bytes:
     """Add the checksum."""
     return content + MARK + hashlib.sha256(content).digest()
 
 
-def has_seal(content: bytes) -> bool:
+def has_checksum(content: bytes) -> bool:
     """Whether there is a checksum, right or wrong."""
     return content[-_LENGTH:].startswith(MARK)
 
 
-def unsealed(content: bytes) -> bytes:
+def without_checksum(content: bytes) -> bytes:
     """Check and take off the checksum where there is one.
 
     Raises
@@ -27,9 +27,9 @@ def unsealed(content: bytes) -> bytes:
     ValueError
         If content and checksum do not match.
     """
-    if not has_seal(content):
+    if not has_checksum(content):
         return content
-    inner, seal = content[:-_LENGTH], content[-_LENGTH:]
-    if MARK + hashlib.sha256(inner).digest() != seal:
+    inner, checksum = content[:-_LENGTH], content[-_LENGTH:]
+    if MARK + hashlib.sha256(inner).digest() != checksum:
         raise ValueError("content and checksum do not match")
     return inner

@@ -23,7 +23,7 @@ from hwid_cli.model.candidates import Candidate, FitData, JacobianColumns, colum
 from hwid_cli.model.linear_block import difference_basis, is_stable
 from hwid_cli.model.maps.rule import Prior
 from hwid_cli.model.normal_equations import scaled_equations
-from hwid_cli.model.points import ParameterPoint, candidate_at, moved, point_of
+from hwid_cli.model.points import ModelPoint, candidate_at, moved, point_of
 from hwid_cli.model.pole_bound import drawn_in, radii_held
 from hwid_cli.model.sensitivities import (
     Equations,
@@ -78,7 +78,7 @@ class _Step:
     Without a point no step did; the gain is then what the first one promised.
     """
 
-    point: ParameterPoint | None
+    point: ModelPoint | None
     found: Simulated
     gain: float
     damping: float
@@ -161,7 +161,7 @@ def minimise(
 
 
 def _accepted_step(
-    point: ParameterPoint, found: Simulated, damping: float, descent: _Descent
+    point: ModelPoint, found: Simulated, damping: float, descent: _Descent
 ) -> _Step:
     """Raise the damping until a step lowers the total and stays stable."""
     place = descent.place
@@ -197,12 +197,12 @@ def _accepted_step(
 
 
 def _within_bound(
-    point: ParameterPoint,
+    point: ModelPoint,
     step: np.ndarray,
-    proposed: ParameterPoint,
+    proposed: ModelPoint,
     equations: tuple[np.ndarray, np.ndarray, np.ndarray, float],
     descent: _Descent,
-) -> tuple[np.ndarray, ParameterPoint]:
+) -> tuple[np.ndarray, ModelPoint]:
     """The same step, or one along the bound on the poles where it would cross it."""
     radius = descent.largest_pole_radius
     if is_stable(proposed.denominator, radius):
@@ -231,7 +231,7 @@ def _solve(matrix: np.ndarray, vector: np.ndarray, damping: float) -> np.ndarray
     return step if info == 0 and np.isfinite(step @ step) else None
 
 
-def _squared_bends(point: ParameterPoint, before: ParameterPoint) -> float:
+def _squared_bends(point: ModelPoint, before: ModelPoint) -> float:
     """Sum of the squared bends of both maps after a step, as the step saw them."""
     total = 0.0
     for one, other in (
@@ -245,7 +245,7 @@ def _squared_bends(point: ParameterPoint, before: ParameterPoint) -> float:
 
 
 def _add_prior(
-    system: Equations, point: ParameterPoint, weight: float, place: JacobianColumns
+    system: Equations, point: ModelPoint, weight: float, place: JacobianColumns
 ) -> float:
     """Add the bends' rows to the normal equations; their share of the total."""
     total = 0.0

@@ -19,7 +19,7 @@ Signals = tuple[tuple[np.ndarray, np.ndarray], ...]
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class ParameterPoint:
+class ModelPoint:
     """Parameters of a candidate.
 
     Parameters
@@ -39,10 +39,10 @@ class ParameterPoint:
     is_steady: bool
 
 
-def point_of(candidate: Candidate) -> ParameterPoint:
+def point_of(candidate: Candidate) -> ModelPoint:
     """Where a candidate stands."""
     model = candidate.model
-    return ParameterPoint(
+    return ModelPoint(
         model.input_map,
         as_loops_take_it(model.numerator),
         as_loops_take_it(model.denominator),
@@ -53,7 +53,7 @@ def point_of(candidate: Candidate) -> ParameterPoint:
     )
 
 
-def candidate_at(point: ParameterPoint, like: Candidate) -> Candidate:
+def candidate_at(point: ModelPoint, like: Candidate) -> Candidate:
     """Candidate that stands at a point.
 
     Parameters
@@ -71,9 +71,7 @@ def candidate_at(point: ParameterPoint, like: Candidate) -> Candidate:
     return replace(like, model=model, free_responses=point.states)
 
 
-def moved(
-    point: ParameterPoint, step: np.ndarray, place: JacobianColumns
-) -> ParameterPoint:
+def moved(point: ModelPoint, step: np.ndarray, place: JacobianColumns) -> ModelPoint:
     """Point after a step.
 
     Parameters
@@ -92,7 +90,7 @@ def moved(
     if states.size:
         c_step = step[place.free_responses].reshape(states.shape)
         states = states + c_step @ difference_basis(place.n_state).T
-    return ParameterPoint(
+    return ModelPoint(
         static_map.move(point.input_map, step[place.input_map]),
         numerator,
         denominator,
@@ -104,7 +102,7 @@ def moved(
 
 
 def block_signals(
-    point: ParameterPoint, index: int, experiment: FitData
+    point: ModelPoint, index: int, experiment: FitData
 ) -> tuple[np.ndarray, np.ndarray]:
     """Signals before and after the linear block.
 
@@ -129,7 +127,7 @@ def block_signals(
     return w, x
 
 
-def all_signals(point: ParameterPoint, experiments: Sequence[FitData]) -> Signals:
+def all_signals(point: ModelPoint, experiments: Sequence[FitData]) -> Signals:
     """Signals before and after the linear block, for each experiment.
 
     Returns
@@ -139,9 +137,7 @@ def all_signals(point: ParameterPoint, experiments: Sequence[FitData]) -> Signal
     return tuple(block_signals(point, i, one) for i, one in enumerate(experiments))
 
 
-def before_output_map(
-    point: ParameterPoint, experiments: Sequence[FitData]
-) -> np.ndarray:
+def before_output_map(point: ModelPoint, experiments: Sequence[FitData]) -> np.ndarray:
     """Signal that reaches the output map.
 
     Returns

@@ -21,7 +21,7 @@ from hwid_cli.model.distinct import WHILE_FIXED, distinct
 from hwid_cli.model.levenberg_marquardt import Search, minimise
 from hwid_cli.model.linear_block import as_loops_take_it
 from hwid_cli.model.maps.piecewise_linear import piecewise_linear_shares
-from hwid_cli.model.points import ParameterPoint, Signals, all_signals
+from hwid_cli.model.points import ModelPoint, Signals, all_signals
 from hwid_cli.model.sensitivities import compared
 from hwid_cli.model.starts import Start
 from hwid_cli.records.model import FitOptions, HammersteinWiener, StaticMap
@@ -117,7 +117,7 @@ def starting_candidates(
         inputs.max(),
         shape=lambda u: np.interp(u, start.input_points, start.input_values),
     ):
-        point = ParameterPoint(
+        point = ModelPoint(
             input_map,
             as_loops_take_it(start.numerator),
             as_loops_take_it(start.denominator),

@@ -32,7 +32,7 @@ from hwid_cli.model.derivative_rows import derivative_rows, local_sums
 from hwid_cli.model.linear_block import residuals_and_loss
 from hwid_cli.model.maps.rule import Derivatives
 from hwid_cli.model.normal_equations import combined
-from hwid_cli.model.points import ParameterPoint, Signals, all_signals, point_of
+from hwid_cli.model.points import ModelPoint, Signals, all_signals, point_of
 from hwid_cli.records.model import StaticMap
 
 
@@ -132,7 +132,7 @@ def equations(
     return normal_equations(point, place, experiments, simulated(point, experiments))
 
 
-def simulated(point: ParameterPoint, experiments: Sequence[FitData]) -> Simulated:
+def simulated(point: ModelPoint, experiments: Sequence[FitData]) -> Simulated:
     """Simulate every experiment and compare it with what was measured."""
     return compared(point.output_map, all_signals(point, experiments), experiments)
 
@@ -157,7 +157,7 @@ def compared(
 
 
 def normal_equations(
-    point: ParameterPoint,
+    point: ModelPoint,
     place: JacobianColumns,
     experiments: Sequence[FitData],
     found: Simulated,
@@ -203,7 +203,7 @@ def normal_equations(
 
 
 def _rows(
-    point: ParameterPoint,
+    point: ModelPoint,
     place: JacobianColumns,
     maps: tuple[Derivatives, Derivatives],
     where: tuple[int, Simulated, np.ndarray],

@@ -90,7 +90,7 @@ class Drive:
 
 
 @dataclass(frozen=True, eq=False)
-class SimulatedRecording:
+class DriveResponse:
     """A recording beside the simulation of its drive.
 
     Parameters

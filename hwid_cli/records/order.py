@@ -28,32 +28,32 @@ class ResponseEstimate:
 
 
 @dataclass(frozen=True)
-class Judgement:
+class SelectionEvidence:
     """How the smallest good candidate compares with the best one.
 
     Parameters
     ----------
     rmsd, best_rmsd : float, [output unit]
-        Cross-validated: geometric mean over the pairs of model and judging recording.
+        Cross-validated: geometric mean over the pairs of model and validation recording.
     factor : float, [-]
         By how much the smallest good candidate is worse than the best one, on average.
     standard_error : float, [-]
-        Of that factor, from its spread over the judging recordings; NaN with one judge.
-    n_judges : int, [-]
-        Recordings that judge and were not fitted; 0 where only the own one is there.
-    n_beyond : int, [-]
-        Pairs of model and recording that do not judge, because the recording's input goes
+        Of that factor, from its spread over the validation recordings; NaN with one.
+    n_validation : int, [-]
+        Validation recordings; 0 where only the own one is there.
+    n_unexcited : int, [-]
+        Pairs of model and recording that do not count, because the recording's input goes
         beyond what the model has seen.
     n_outliers : int, [samples]
-        Of the judging recordings, that do not count because the fits bear outliers too.
+        Of the validation recordings, that do not count because the fits bear outliers too.
     """
 
     rmsd: float
     best_rmsd: float
     factor: float
     standard_error: float
-    n_judges: int
-    n_beyond: int = 0
+    n_validation: int
+    n_unexcited: int = 0
     n_outliers: int = 0
 
 
@@ -78,7 +78,7 @@ class OrderChoice:
     nk: int
     best_nb: int
     best_nk: int
-    judgement: Judgement
+    evidence: SelectionEvidence
     aic_nb: int
     aic_nk: int
     bic_nb: int
@@ -140,9 +140,9 @@ class MapCandidate:
     n_parameters : int, [-]
         That the data determine; the most over the recordings, 0 where no fit has them.
     rmsd : float, [output unit]
-        Cross-validated, as in ``Judgement``.
+        Cross-validated, as in ``SelectionEvidence``.
     factor : float, [-]
-        Average over the judging recordings of RMSD over that of the best pair of maps.
+        Average over the validation recordings of RMSD over that of the best pair of maps.
     bic : float, [-]
         Sum over the fits of all recordings; infinite where one has none.
     """
@@ -171,8 +171,8 @@ class MapAdvice:
         The one to take.
     given : MapCandidate
         That of the configuration.
-    judgement : Judgement
-        The one to take against the best; where nobody judges, BIC has chosen.
+    evidence : SelectionEvidence
+        The one to take against the best; without validation recordings, BIC has chosen.
     tolerance : float, [-]
     unit : str
         Of the output.
@@ -182,6 +182,6 @@ class MapAdvice:
     candidates: tuple[MapCandidate, ...]
     chosen: MapCandidate
     given: MapCandidate
-    judgement: Judgement
+    evidence: SelectionEvidence
     tolerance: float
     unit: str

@@ -11,7 +11,7 @@ from hwid_cli.records.diagnosis import (
     Gap,
     RankedCandidate,
 )
-from hwid_cli.records.drive import SimulatedRecording
+from hwid_cli.records.drive import DriveResponse
 from hwid_cli.records.units import behind
 from hwid_cli.report.formats import MISSING, counted, decimals, number
 from hwid_cli.report.table import Column, Heading, Table, Text, numbers, texts
@@ -299,9 +299,7 @@ def _ratio(value: float) -> str:
     return f"{value:.{digits}f}" if np.isfinite(value) else MISSING
 
 
-def simulated_table(
-    curves: Sequence[SimulatedRecording], side: str, unit: str
-) -> Table:
+def simulated_table(curves: Sequence[DriveResponse], side: str, unit: str) -> Table:
     """Show how far a simulation is from the measurements.
 
     Parameters

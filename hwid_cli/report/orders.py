@@ -1,11 +1,11 @@
 """Recommended orders and maps as tables, and the reasons as sentences."""
 
 from hwid_cli.records.order import (
-    Judgement,
     MapAdvice,
     MapCandidate,
     OrderAdvice,
     OrderChoice,
+    SelectionEvidence,
 )
 from hwid_cli.report.formats import MISSING, counted, decimals, number
 from hwid_cli.report.table import Table, Text, numbers, texts
@@ -18,7 +18,7 @@ _ALL = "all together"
 
 
 def _reason_to_take(
-    judgement: Judgement, tolerance: float, things: str, best: str | None
+    evidence: SelectionEvidence, tolerance: float, things: str, best: str | None
 ) -> str:
     """Say why candidates are taken that validation recordings have ranked.
 
@@ -37,7 +37,7 @@ def _reason_to_take(
     """
     on = (
         "recordings that the models were not fitted to"
-        if judgement.n_judges > 1
+        if evidence.n_validation > 1
         else "the one recording that it was not fitted to"
     )
     if best is None:
@@ -46,26 +46,24 @@ def _reason_to_take(
             f"{100 * tolerance:g} % or one standard error of it."
         )
     within = f"the tolerance of {100 * tolerance:g} %"
-    if judgement.factor > 1.0 + tolerance:
-        within = (
-            f"one standard error ({judgement.standard_error:.2g}) of the difference"
-        )
+    if evidence.factor > 1.0 + tolerance:
+        within = f"one standard error ({evidence.standard_error:.2g}) of the difference"
     return (
-        f"on {on} they are on average {100 * (judgement.factor - 1):.3g} % further off than "
+        f"on {on} they are on average {100 * (evidence.factor - 1):.3g} % further off than "
         f"the best {best}; that is within {within}, and no smaller {things} are."
     )
 
 
-def _left_out(judgement: Judgement) -> tuple[str, ...]:
+def _left_out(evidence: SelectionEvidence) -> tuple[str, ...]:
     """Say which pairs of model and recording, and which samples, the selection leaves out."""
     found = []
-    if count := judgement.n_beyond:
+    if count := evidence.n_unexcited:
         found.append(
             f"{counted(count, 'pair')} of model and recording {'do' if count != 1 else 'does'} "
             "not count: there the input leaves the range that the model was fitted in, and "
             "its maps extrapolate."
         )
-    if count := judgement.n_outliers:
+    if count := evidence.n_outliers:
         found.append(
             f"{counted(count, 'sample')} of the validation recordings "
             f"{'are outliers' if count != 1 else 'is an outlier'} and "
@@ -105,13 +103,13 @@ def map_table(advice: MapAdvice) -> Table:
 
 def map_reasons(advice: MapAdvice) -> tuple[Text, ...]:
     """Say which maps to take, and why, each reason a paragraph."""
-    return tuple(map(Text, (_map_recommendation(advice), *_left_out(advice.judgement))))
+    return tuple(map(Text, (_map_recommendation(advice), *_left_out(advice.evidence))))
 
 
 def _map_recommendation(advice: MapAdvice) -> str:
     one, best = advice.chosen, advice.candidates[0]
     take = f"Take fit: {{{_keys(one)}}}: "
-    if not advice.judgement.n_judges:
+    if not advice.evidence.n_validation:
         return (
             f"{take}they have the lowest BIC. There is no validation recording, and BIC takes "
             "residuals for white; cut the recording into several (recordings.parts) to "
@@ -120,7 +118,7 @@ def _map_recommendation(advice: MapAdvice) -> str:
     words = f"maps, {_map(best.input_map, best.input_units)} and "
     words += _map(best.output_map, best.output_units)
     reason = _reason_to_take(
-        advice.judgement, advice.tolerance, "maps", None if one == best else words
+        advice.evidence, advice.tolerance, "maps", None if one == best else words
     )
     if one == advice.given:
         return f"{take}{reason} They are those of the configuration."
@@ -164,8 +162,8 @@ def order_table(advice: OrderAdvice) -> Table:
             (
                 one.recording or _ALL,
                 _pair(one.nb, one.nk),
-                number(one.judgement.rmsd),
-                f"{one.judgement.factor:.2f}",
+                number(one.evidence.rmsd),
+                f"{one.evidence.factor:.2f}",
                 _pair(one.best_nb, one.best_nk),
                 _pair(one.aic_nb, one.aic_nk),
                 _pair(one.bic_nb, one.bic_nk),
@@ -188,7 +186,7 @@ def order_reasons(advice: OrderAdvice) -> tuple[Text, ...]:
     sentences = (
         _recommendation(advice),
         _criteria(advice.overall),
-        *_left_out(advice.overall.judgement),
+        *_left_out(advice.overall.evidence),
         _edges(advice),
         _delays(advice),
         _poles(advice),
@@ -212,7 +210,7 @@ def _orders(nb: int, nk: int, advice: OrderAdvice) -> str:
 def _recommendation(advice: OrderAdvice) -> str:
     one = advice.overall
     take = f"Take nb = {one.nb}, nk = {one.nk} (orders {_orders(one.nb, one.nk, advice)}): "
-    if not one.judgement.n_judges:
+    if not one.evidence.n_validation:
         return (
             f"{take}the smallest orders within {100 * advice.tolerance:g} % of the best on "
             "the recording of the fit itself. There is no validation recording, so this "
@@ -221,7 +219,7 @@ def _recommendation(advice: OrderAdvice) -> str:
     best = None
     if (one.nb, one.nk) != (one.best_nb, one.best_nk):
         best = f"orders of the grid, {_orders(one.best_nb, one.best_nk, advice)}"
-    return take + _reason_to_take(one.judgement, advice.tolerance, "orders", best)
+    return take + _reason_to_take(one.evidence, advice.tolerance, "orders", best)
 
 
 def _criteria(one: OrderChoice) -> str:

@@ -58,7 +58,7 @@ class Figures:
 
 
 @dataclass(frozen=True)
-class Folded:
+class Collapsible:
     """Blocks that open when they are asked for.
 
     Parameters
@@ -83,7 +83,7 @@ class Pairs:
     figures: tuple[Figures, ...]
 
 
-PageBlock = Block | Figures | Pairs | Folded
+PageBlock = Block | Figures | Pairs | Collapsible
 
 
 @dataclass(frozen=True)
@@ -116,7 +116,7 @@ def images_of(blocks: tuple[PageBlock, ...]) -> tuple[Image, ...]:
     for block in blocks:
         if isinstance(block, Figures):
             found += block.images
-        elif isinstance(block, Folded):
+        elif isinstance(block, Collapsible):
             found += images_of(block.blocks)
         elif isinstance(block, Pairs):
             found += images_of(block.figures)
@@ -146,7 +146,7 @@ def section_notes(contents: ReportContents, *, is_validation: bool) -> list[Text
     return [Text(one, is_note=True) for one in notes]
 
 
-def folded_beyond(most: int, table: Table, summary: str) -> Table | Folded:
+def collapsed_beyond(most: int, table: Table, summary: str) -> Table | Collapsible:
     """Fold a table that is long.
 
     Parameters
@@ -156,7 +156,7 @@ def folded_beyond(most: int, table: Table, summary: str) -> Table | Folded:
     summary : str
         What is inside.
     """
-    return table if len(table.rows) <= most else Folded(summary, (table,))
+    return table if len(table.rows) <= most else Collapsible(summary, (table,))
 
 
 def drawn(file: str, figure: Figure, alt: str) -> Image:

@@ -6,7 +6,7 @@ import numpy as np
 
 from hwid_cli.diagnosis.diagnose import compared_as_given
 from hwid_cli.diagnosis.problem import prepare
-from hwid_cli.records.drive import SimulatedRecording
+from hwid_cli.records.drive import DriveResponse
 from hwid_cli.records.experiment import DiagnoseOptions, SimulationOptions
 from hwid_cli.records.recordings import Recording
 from hwid_cli.simulations.simulation import SimulationKind
@@ -16,7 +16,7 @@ def simulate_recordings(
     recordings: Sequence[Recording],
     simulation: SimulationOptions,
     options: DiagnoseOptions,
-) -> tuple[SimulatedRecording, ...]:
+) -> tuple[DriveResponse, ...]:
     """Simulate a drive on the inputs of recordings, with the given parameters.
 
     Parameters
@@ -33,7 +33,7 @@ def simulate_recordings(
     """
     problem = prepare(recordings, simulation, options, ())
     return tuple(
-        SimulatedRecording(
+        DriveResponse(
             one.signals.name,
             one.signals.sample_time_s * np.arange(one.signals.compared.size),
             one.signals.driven_by,

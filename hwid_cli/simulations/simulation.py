@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from hwid_cli.records.drive import SimulatedRecording
+from hwid_cli.records.drive import DriveResponse
 from hwid_cli.records.experiment import DiagnoseOptions, SimulationOptions
 from hwid_cli.records.recordings import Recording
 
@@ -21,5 +21,5 @@ class SimulationKind:
 
     simulate: Callable[
         [Sequence[Recording], SimulationOptions, DiagnoseOptions],
-        tuple[SimulatedRecording, ...],
+        tuple[DriveResponse, ...],
     ]

@@ -14,38 +14,38 @@ from dataclasses import dataclass
 import numpy as np
 
 from hwid_cli.model.input_range import outside_share
-from hwid_cli.records.order import Judgement
+from hwid_cli.records.order import SelectionEvidence
 from hwid_cli.records.recordings import Recording
 
 # A model that is this many times worse than the best, or missing, is just bad: how bad
 # must not decide between the others.
 _MOST_FACTOR = 10.0
 # Share of a recording's input that may lie beyond what a model has seen for the recording
-# to judge it: beyond, a map is a continuation, however it was fitted.
+# to score it: beyond, a map extrapolates, however it was fitted.
 _MOST_UNEXCITED = 0.1
 
 
 @dataclass(frozen=True, eq=False)
 class ScoredCandidates:
-    """What recordings say of candidates, a row for each pair of model and judge.
+    """RMSDs of candidates, a row for each pair of model and validation recording.
 
     Parameters
     ----------
     factors : ndarray, shape (n_pairs, n_candidates), [-]
         Logarithms of the RMSDs over the pair's lowest.
     rmsd : ndarray, shape (n_pairs, n_candidates), [output unit]
-    judges : ndarray of int, shape (n_pairs,)
-        Number of the judging recording; -1 where a recording judges its own models.
-    n_beyond : int, [-]
-        Pairs that do not judge, because the input goes beyond what the model has seen.
+    validation : ndarray of int, shape (n_pairs,)
+        Number of the validation recording; -1 where it is the model's own.
+    n_unexcited : int, [-]
+        Pairs that do not count, because the input goes beyond what the model has seen.
     n_outliers : int, [samples]
-        Of the judges, that do not count.
+        In the validation recordings, that do not count.
     """
 
     factors: np.ndarray
     rmsd: np.ndarray
-    judges: np.ndarray
-    n_beyond: int
+    validation: np.ndarray
+    n_unexcited: int
     n_outliers: int
 
 
@@ -65,7 +65,7 @@ class Selected:
 
     chosen: int
     best: int
-    judgement: Judgement
+    evidence: SelectionEvidence
     factors: np.ndarray
     rmsd: np.ndarray
 
@@ -92,29 +92,29 @@ def scored(
     -------
     ScoredCandidates or None
         None where there is no RMSD at all. Where every recording's input goes beyond what
-        the models have seen, all judge.
+        the models have seen, all count.
     """
     inputs = {one.name: one.input for one in recordings}
     others = _known_pairs(rmsd, identified_on, validated_on, is_own=False)
     pairs = [
-        (place, judge)
-        for place, judge in others
-        if _is_within(inputs[identified_on[place]], inputs[validated_on[judge]])
+        (place, other)
+        for place, other in others
+        if _is_within(inputs[identified_on[place]], inputs[validated_on[other]])
     ] or others
     is_alone = not pairs
     if is_alone:
         pairs = _known_pairs(rmsd, identified_on, validated_on, is_own=True)
     if not pairs:
         return None
-    values = np.array([rmsd[place, :, judge] for place, judge in pairs])
+    values = np.array([rmsd[place, :, other] for place, other in pairs])
     with np.errstate(divide="ignore"):
         logs = np.log(np.maximum(values, 1e-300))
     factors = logs - np.nanmin(logs, axis=1, keepdims=True)
     factors = np.minimum(np.nan_to_num(factors, nan=np.inf), np.log(_MOST_FACTOR))
-    judges = np.array([-1 if is_alone else judge for _, judge in pairs])
-    n_beyond = max(len(others) - len(pairs), 0)
-    counts = [n_outliers[one] for one in {judge for _, judge in pairs} if n_outliers]
-    return ScoredCandidates(factors, values, judges, n_beyond, sum(counts))
+    validation = np.array([-1 if is_alone else other for _, other in pairs])
+    n_unexcited = max(len(others) - len(pairs), 0)
+    counts = [n_outliers[one] for one in {other for _, other in pairs} if n_outliers]
+    return ScoredCandidates(factors, values, validation, n_unexcited, sum(counts))
 
 
 def smallest_good(
@@ -133,31 +133,31 @@ def smallest_good(
     ----------
     docs/method.md, eq. (34).
     """
-    names = np.unique(found.judges)
-    by_judge = np.array(
-        [found.factors[found.judges == one].mean(axis=0) for one in names]
+    names = np.unique(found.validation)
+    by_recording = np.array(
+        [found.factors[found.validation == one].mean(axis=0) for one in names]
     )
-    mean = by_judge.mean(axis=0)
+    mean = by_recording.mean(axis=0)
     best = int(np.argmin(mean))
     error = np.full(mean.shape, np.nan)
-    if len(by_judge) > 1:
-        worse = by_judge - by_judge[:, [best]]
-        error = worse.std(axis=0, ddof=1) / np.sqrt(len(by_judge))
+    if len(by_recording) > 1:
+        worse = by_recording - by_recording[:, [best]]
+        error = worse.std(axis=0, ddof=1) / np.sqrt(len(by_recording))
     is_good = mean - mean[best] <= np.maximum(np.log1p(tolerance), np.nan_to_num(error))
     smallest = is_good & (sizes == sizes[is_good].min())
     chosen = int(np.argmin(np.where(smallest, mean, np.inf)))
     factors = np.exp(mean - mean[best])
     rmsd = np.array([_typical(column) for column in found.rmsd.T])
-    judgement = Judgement(
+    evidence = SelectionEvidence(
         rmsd=float(rmsd[chosen]),
         best_rmsd=float(rmsd[best]),
         factor=float(factors[chosen]),
         standard_error=float(error[chosen]),
-        n_judges=int(np.sum(names >= 0)),
-        n_beyond=found.n_beyond,
+        n_validation=int(np.sum(names >= 0)),
+        n_unexcited=found.n_unexcited,
         n_outliers=found.n_outliers,
     )
-    return Selected(chosen, best, judgement, factors, rmsd)
+    return Selected(chosen, best, evidence, factors, rmsd)
 
 
 def _known_pairs(
@@ -167,18 +167,18 @@ def _known_pairs(
     *,
     is_own: bool,
 ) -> list[tuple[int, int]]:
-    """Places of models and judges with an RMSD, of the same recording or of two."""
+    """Places of models and validation recordings with an RMSD, of the same recording or of two."""
     return [
-        (place, judge)
+        (place, other)
         for place, model in enumerate(identified_on)
-        for judge, name in enumerate(validated_on)
-        if (model == name) == is_own and np.isfinite(rmsd[place, :, judge]).any()
+        for other, name in enumerate(validated_on)
+        if (model == name) == is_own and np.isfinite(rmsd[place, :, other]).any()
     ]
 
 
-def _is_within(seen: np.ndarray, judging: np.ndarray) -> bool:
-    """Whether a judging recording's input stays in what a model has seen."""
-    share, *_ = outside_share(judging, (float(seen.min()), float(seen.max())))
+def _is_within(seen: np.ndarray, validating: np.ndarray) -> bool:
+    """Whether a validation recording's input stays in what a model has seen."""
+    share, *_ = outside_share(validating, (float(seen.min()), float(seen.max())))
     return share <= _MOST_UNEXCITED
 
 

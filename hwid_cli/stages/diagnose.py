@@ -22,7 +22,7 @@ from hwid_cli.records.recordings import Recording
 from hwid_cli.report.diagnosis import diagnosis_blocks
 from hwid_cli.report.figures.diagnosis import diagnosis_figures
 from hwid_cli.report.plots import as_png
-from hwid_cli.stages.diagnosis_starts import doubtful_starts, starts_sentence
+from hwid_cli.stages.diagnosis_starts import starts_sentence, unsettled_starts
 from hwid_cli.stages.fit_seconds import counted
 from hwid_cli.stages.selection import select_recordings
 from hwid_cli.stages.stage import Context, Planning, Runner, Stage, in_results
@@ -266,7 +266,7 @@ def _simulation(experiment: Experiment) -> SimulationOptions:
 
 def _warnings(context: Context, given: ToDiagnose) -> list[str]:
     """Which recordings cannot start in equilibrium, as the diagnosis takes them to."""
-    names = doubtful_starts(given.recordings, given.simulation, given.options)
+    names = unsettled_starts(given.recordings, given.simulation, given.options)
     said = starts_sentence(names, given.recordings, given.experiment.calibrate)
     return [f"{context.experiment.source}: {said}"] if said else []
 

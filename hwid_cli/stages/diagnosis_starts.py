@@ -27,7 +27,7 @@ _AWAY_SHARE = 0.5
 _MOST_NAMED = 4
 
 
-def doubtful_starts(
+def unsettled_starts(
     recordings: Sequence[Recording],
     simulation: SimulationOptions,
     options: DiagnoseOptions,
@@ -82,7 +82,7 @@ def starts_sentence(
     Parameters
     ----------
     names : sequence of str
-        From ``doubtful_starts``.
+        From ``unsettled_starts``.
 
     Returns
     -------

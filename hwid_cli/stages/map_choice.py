@@ -98,11 +98,11 @@ def fit_maps(
 def recommend_maps(
     fits: Sequence[Sequence[Fit]],
     recordings: Sequence[Recording],
-    judges: Sequence[Recording],
+    validation: Sequence[Recording],
     tolerance: float,
     settings: RunSettings,
 ) -> MapAdvice | None:
-    """Let recordings judge the maps that others were fitted with, and recommend a pair.
+    """Score maps on recordings that others were fitted to, and recommend a pair.
 
     Parameters
     ----------
@@ -115,18 +115,18 @@ def recommend_maps(
     Returns
     -------
     MapAdvice or None
-        None where no model could be judged.
+        None where no model could be scored.
 
     References
     ----------
     docs/method.md, section "Which maps".
     """
-    rmsd, n_outliers = _judging(fits, recordings, judges, settings)
+    rmsd, n_outliers = _validation_rmsd(fits, recordings, validation, settings)
     found = scored(
         rmsd,
         [one.name for one in recordings],
-        [one.name for one in judges],
-        (*recordings, *judges),
+        [one.name for one in validation],
+        (*recordings, *validation),
         n_outliers,
     )
     if found is None:
@@ -135,7 +135,7 @@ def recommend_maps(
     sizes = [max(one.information.n_parameters for one in each) for each in columns]
     bic = [_known(sum(one.information.bic for one in each)) for each in columns]
     verdict = smallest_good(found, np.array(sizes), tolerance)
-    chosen = verdict.chosen if verdict.judgement.n_judges else int(np.argmin(bic))
+    chosen = verdict.chosen if verdict.evidence.n_validation else int(np.argmin(bic))
     known = [
         MapCandidate(
             *_named(each[0].options),
@@ -152,28 +152,28 @@ def recommend_maps(
         candidates=tuple(sorted(known, key=lambda one: one.factor)),
         chosen=known[chosen],
         given=known[0],
-        judgement=verdict.judgement,
+        evidence=verdict.evidence,
         tolerance=tolerance,
-        unit=judges[0].output_unit,
+        unit=validation[0].output_unit,
     )
 
 
-def _judging(
+def _validation_rmsd(
     fits: Sequence[Sequence[Fit]],
     recordings: Sequence[Recording],
-    judges: Sequence[Recording],
+    validation: Sequence[Recording],
     settings: RunSettings,
 ) -> tuple[np.ndarray, tuple[int, ...]]:
-    """RMSDs, shape (n_recordings, n_candidates, n_judges), and the outliers left out."""
-    rmsd = _deviations(fits, recordings, judges, settings)
+    """RMSDs, shape (n_recordings, n_candidates, n_validation), and the outliers left out."""
+    rmsd = _deviations(fits, recordings, validation, settings)
     if fits[0][0].options.loss == "squared":
         return rmsd, ()
     models = [one.model for each in fits for one in each]
-    shape = (len(models), len(judges))
+    shape = (len(models), len(validation))
     table, n_outliers = without_outliers(
         models,
         rmsd.reshape(shape),
-        judges,
+        validation,
         lambda some: _deviations(fits, recordings, some, settings).reshape(shape),
     )
     return table.reshape(rmsd.shape), n_outliers
@@ -182,20 +182,20 @@ def _judging(
 def _deviations(
     fits: Sequence[Sequence[Fit]],
     recordings: Sequence[Recording],
-    judges: Sequence[Recording],
+    validation: Sequence[Recording],
     settings: RunSettings,
 ) -> np.ndarray:
-    """RMSDs, shape (n_recordings, n_candidates, n_judges)."""
-    contents = [recording_key(one) for one in judges]
+    """RMSDs, shape (n_recordings, n_candidates, n_validation)."""
+    contents = [recording_key(one) for one in validation]
     tasks = [
         task
         for each, recording in zip(fits, recordings, strict=True)
         for task in deviation_tasks(
-            [one.model for one in each], judges, contents, recording.name
+            [one.model for one in each], validation, contents, recording.name
         )
     ]
     values = np.array([one.result.rmsd for one in run_tasks(tasks, settings)])
-    return np.moveaxis(values.reshape(len(fits), len(judges), -1), 1, 2)
+    return np.moveaxis(values.reshape(len(fits), len(validation), -1), 1, 2)
 
 
 def _named(options: FitOptions) -> tuple[str, int, str, int]:

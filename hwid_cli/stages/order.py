@@ -47,14 +47,14 @@ def recommend_orders(
     fits : sequence of Fit
         Of which the tensor was made.
     recordings : sequence of Recording
-        Among them those of the fits and those that judge.
+        Among them those of the fits and the validation recordings.
     n_outliers : sequence of int, [samples]
-        Of each judging recording, that its RMSDs leave out; empty where all count.
+        Of each validation recording, that its RMSDs leave out; empty where all count.
 
     Returns
     -------
     OrderAdvice or None
-        None where no model could be judged.
+        None where no model could be scored.
 
     References
     ----------
@@ -62,8 +62,8 @@ def recommend_orders(
     """
     criteria = {name: _criterion(fits, crossval, name) for name in ("aic", "bic")}
     places = range(len(crossval.identified_on))
-    single = [_judged_by(crossval, [place], recordings, n_outliers) for place in places]
-    total = _judged_by(crossval, places, recordings, n_outliers)
+    single = [_scored_by(crossval, [place], recordings, n_outliers) for place in places]
+    total = _scored_by(crossval, places, recordings, n_outliers)
     if total is None:
         return None
     responses = tuple(
@@ -104,7 +104,7 @@ def _quantile(values: list[int], share: float, missing: int) -> int:
     return int(np.quantile(values, share, method="inverted_cdf"))
 
 
-def _judged_by(
+def _scored_by(
     crossval: CrossValidation,
     places: Sequence[int],
     recordings: Sequence[Recording],
@@ -139,7 +139,7 @@ def _choice(
         recording,
         *_named(verdict.chosen, crossval),
         *_named(verdict.best, crossval),
-        verdict.judgement,
+        verdict.evidence,
         **said,
     )
 
@@ -228,7 +228,7 @@ def _compute(given: _Given, runner: Runner) -> Advice:
     )
     if orders is None:
         raise ConfigError(
-            f"{experiment.source}: orders: no recording judges a usable model; expected "
+            f"{experiment.source}: orders: no validation recording has a usable model; expected "
             "at least one RMSD; widen the orders or change fit"
         )
     return Advice(orders, _recommend_maps(given, orders, runner))
@@ -272,7 +272,7 @@ def _recommend_maps(
         )
     if maps is None:
         raise ConfigError(
-            f"{experiment.source}: order.maps: no recording judges a usable model; "
+            f"{experiment.source}: order.maps: no validation recording has a usable model; "
             "expected at least one RMSD; change order.maps or order.units"
         )
     return maps

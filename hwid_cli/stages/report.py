@@ -36,7 +36,7 @@ from hwid_cli.stages.ranking import (
     count_statuses,
     score_models,
 )
-from hwid_cli.stages.residuals import judge_residual
+from hwid_cli.stages.residuals import examined_residual
 from hwid_cli.stages.table import needed, stage_named
 from hwid_cli.stages.test import chain_trend
 from hwid_cli.tasks.cache import task_key
@@ -307,7 +307,7 @@ def _simulate(
         detail=detail_window(
             recording.input, recording.output, is_periodic=recording.kind == "sine"
         ),
-        tests=judge_residual(recording, fit),
+        tests=examined_residual(recording, fit),
     )
 
 

@@ -42,7 +42,7 @@ def own_residuals(
     for best in best_fits(fits, 1):
         for fit in best:
             recording = by_name[fit.name]
-            tests = judge_residual(recording, fit)
+            tests = examined_residual(recording, fit)
             if tests is not None:
                 nb, nk = grid_place(fit, nk_role)
                 name, unit = f"{fit.name}/{nb}/{nk}", recording.output_unit
@@ -53,7 +53,7 @@ def own_residuals(
     return tuple(found)
 
 
-def judge_residual(recording: Recording, fit: Fit) -> ResidualTests | None:
+def examined_residual(recording: Recording, fit: Fit) -> ResidualTests | None:
     """Test the residual of a model on one recording.
 
     Parameters

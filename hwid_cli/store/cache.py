@@ -22,7 +22,7 @@ _log = logging.getLogger(__name__)
 
 FORMAT = "hwid-cache"
 SCHEMA_VERSION = 1
-_SEAL_BYTES = hashlib.sha256().digest_size
+_CHECKSUM_BYTES = hashlib.sha256().digest_size
 
 
 def pack_entry(key: str, record: object) -> bytes:
@@ -33,7 +33,7 @@ def pack_entry(key: str, record: object) -> bytes:
         file.attrs["record"] = type(record).__name__
         write_record(file.create_group("record"), record)
 
-    return _sealed(hdf5_image(fill, format_name=FORMAT, version=SCHEMA_VERSION))
+    return _with_checksum(hdf5_image(fill, format_name=FORMAT, version=SCHEMA_VERSION))
 
 
 class Hdf5Store:
@@ -87,7 +87,7 @@ class Hdf5Store:
             self._complain(path, error)
             return None
         try:
-            image = h5py.h5f.open_file_image(_unsealed(content))
+            image = h5py.h5f.open_file_image(_without_checksum(content))
             with h5py.File(image, "r") as file:
                 check_format(file, format_name=FORMAT, version=SCHEMA_VERSION)
                 if file.attrs.get("key") != key:
@@ -164,14 +164,14 @@ def count_entries(folder: Path) -> int:
     return sum(1 for _ in Path(folder).glob("??/*.h5"))
 
 
-def _sealed(image: bytes) -> bytes:
+def _with_checksum(image: bytes) -> bytes:
     """Add a checksum behind an HDF5 file; readers of HDF5 do not look there."""
     return image + hashlib.sha256(image).digest()
 
 
-def _unsealed(content: bytes) -> bytes:
+def _without_checksum(content: bytes) -> bytes:
     """Take the checksum off; HDF5 crashes the interpreter on some damaged files."""
-    image = content[:-_SEAL_BYTES]
-    if hashlib.sha256(image).digest() != content[-_SEAL_BYTES:]:
+    image = content[:-_CHECKSUM_BYTES]
+    if hashlib.sha256(image).digest() != content[-_CHECKSUM_BYTES:]:
         raise ValueError("content and checksum do not match")
     return image

@@ -90,15 +90,15 @@ def _cells(one: OrderChoice) -> tuple[object, ...]:
     return (
         one.nb,
         one.nk,
-        one.judgement.rmsd,
-        one.judgement.factor,
-        one.judgement.standard_error,
-        one.judgement.n_judges,
-        one.judgement.n_beyond,
-        one.judgement.n_outliers,
+        one.evidence.rmsd,
+        one.evidence.factor,
+        one.evidence.standard_error,
+        one.evidence.n_validation,
+        one.evidence.n_unexcited,
+        one.evidence.n_outliers,
         one.best_nb,
         one.best_nk,
-        one.judgement.best_rmsd,
+        one.evidence.best_rmsd,
         *(_known(n, 0) for n in (one.aic_nb, one.aic_nk, one.bic_nb, one.bic_nk)),
     )
 

@@ -20,7 +20,7 @@ import numpy as np
 from hwid_cli import __version__
 from hwid_cli.errors import CacheError
 from hwid_cli.files.atomic import check_format, replaced_hdf5
-from hwid_cli.files.checksums import has_seal, sealed, unsealed
+from hwid_cli.files.checksums import has_checksum, with_checksum, without_checksum
 from hwid_cli.store.hdf5_records import read_array, write_array
 
 Result = TypeVar("Result")
@@ -32,7 +32,7 @@ RESULTS = "results.h5"
 _OWN_FILES = {"calibrate": ("calibrated.h5", CALIBRATED_FORMAT)}
 SCHEMA_VERSION = 1
 # Root attribute of files with a checksum behind them; earlier versions had none.
-SEALED = "sealed"
+HAS_CHECKSUM = "sealed"
 
 _log = logging.getLogger(__name__)
 
@@ -195,10 +195,10 @@ def replaced_stage(
         format_name=RESULTS_FORMAT,
         version=SCHEMA_VERSION,
         start=_readable_bytes(path, stage),
-        seal=sealed,
+        checksum=with_checksum,
         is_lasting=True,
     ) as file:
-        file.attrs[SEALED] = True
+        file.attrs[HAS_CHECKSUM] = True
         if stage in file:
             # HDF5 gives the room to what is written before the file is closed.
             del file[stage]
@@ -215,7 +215,7 @@ def _readable_bytes(path: Path, stage: str) -> bytes:
         with _opened(path, stage) as file:
             # Damage below the root shows only where it is looked at.
             file.visititems(_look_at)
-            return unsealed(path.read_bytes())
+            return without_checksum(path.read_bytes())
     except CacheError:
         aside = path.with_name(f"{path.name}.bad")
         try:
@@ -276,10 +276,10 @@ def _opened(path: Path, stage: str) -> Iterator[h5py.File]:
         if not path.is_file():
             raise ValueError("it is no plain file")
         content = path.read_bytes()
-        unsealed(content)
+        without_checksum(content)
         with h5py.File(path, "r") as file:
             check_format(file, format_name=format_name, version=SCHEMA_VERSION)
-            if SEALED in file.attrs and not has_seal(content):
+            if HAS_CHECKSUM in file.attrs and not has_checksum(content):
                 raise ValueError("its checksum is gone: cut off, or changed since")
             del content
             yield file
@@ -310,7 +310,7 @@ def has_left_results(path: Path, stage: str) -> bool:
     if not path.is_file():
         return True
     try:
-        unsealed(path.read_bytes())
+        without_checksum(path.read_bytes())
         with h5py.File(path, "r") as file:
             is_whole = stage in _OWN_FILES or "format" not in file.attrs
             return is_whole or stage in file

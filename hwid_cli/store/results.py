@@ -11,7 +11,7 @@ import h5py
 import numpy as np
 
 from hwid_cli.files.atomic import replaced_hdf5
-from hwid_cli.files.checksums import sealed
+from hwid_cli.files.checksums import with_checksum
 from hwid_cli.records.experiment import OrdersOptions
 from hwid_cli.records.model import Fit
 from hwid_cli.records.recordings import Calibrated, CalibrationLog, Recording
@@ -26,8 +26,8 @@ from hwid_cli.store.hdf5_records import (
 from hwid_cli.store.hdf5_tables import read_table, write_table
 from hwid_cli.store.result_files import (
     CALIBRATED_FORMAT,
+    HAS_CHECKSUM,
     SCHEMA_VERSION,
-    SEALED,
     Provenance,
     read_results,
     replaced_stage,
@@ -57,10 +57,10 @@ def write_calibrated(
         path,
         format_name=CALIBRATED_FORMAT,
         version=SCHEMA_VERSION,
-        seal=sealed,
+        checksum=with_checksum,
         is_lasting=True,
     ) as file:
-        file.attrs[SEALED] = True
+        file.attrs[HAS_CHECKSUM] = True
         write_provenance(file, provenance)
         names = [recording.name for recording in recordings]
         write_array(file, "names", np.array(names, dtype=object))

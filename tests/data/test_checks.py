@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from hwid_cli.data import checks
-from hwid_cli.data.columns import Column, FileColumns, array_column
+from hwid_cli.data.columns import FileColumns, MeasuredColumn, array_column
 from hwid_cli.errors import MeasurementError
 from hwid_cli.records.experiment import CalibrateOptions, OrdersOptions
 from hwid_cli.records.recordings import RawRecording
@@ -33,7 +33,7 @@ def columns(n_input=100, n_output=100):
 )
 def test_cell_without_a_finite_number_is_refused(value, text, found):
     texts = {} if text is None else {4: text}
-    bad = Column(
+    bad = MeasuredColumn(
         "input 'u'", np.array([1, 2, value]), np.array([2, 3, 4]), False, texts
     )
     message = (

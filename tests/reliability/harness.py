@@ -14,7 +14,7 @@ import numpy as np
 from click.testing import CliRunner
 
 from hwid_cli.cli.main import main
-from hwid_cli.files.checksums import unsealed
+from hwid_cli.files.checksums import without_checksum
 from hwid_cli.files.locks import RUN_LOCK, USERS_LOCK
 
 CONFIG = """
@@ -121,7 +121,7 @@ def assert_readable(out: Path) -> None:
     for name in ("calibrated.h5", "results.h5"):
         if (out / name).exists():
             content = (out / name).read_bytes()
-            assert unsealed(content) != content, f"{name} has no checksum"
+            assert without_checksum(content) != content, f"{name} has no checksum"
     for path in (out / "cache").glob("??/*.h5"):
         content = path.read_bytes()
         assert hashlib.sha256(content[:-32]).digest() == content[-32:], path

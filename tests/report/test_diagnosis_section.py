@@ -3,7 +3,7 @@ from dataclasses import replace
 import pytest
 
 from hwid_cli.records.report import ReportContents, StoredResults
-from hwid_cli.report.page import Folded, images_of
+from hwid_cli.report.page import Collapsible, images_of
 from hwid_cli.report.sections.diagnose import diagnosis_section
 from hwid_cli.report.table import Heading, Table, Text
 from tests.report.diagnosis_examples import NAN, named, nothing_missing, unknown
@@ -89,7 +89,9 @@ def test_without_numbers_no_recording_is_the_worst():
 
 @blank
 def test_long_tables_are_folded():
-    folded = [one for one in section_of(named(43)).blocks if isinstance(one, Folded)]
+    folded = [
+        one for one in section_of(named(43)).blocks if isinstance(one, Collapsible)
+    ]
 
     assert [one.summary for one in folded] == [
         "The gap in 43 recordings as a table",

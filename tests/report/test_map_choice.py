@@ -2,7 +2,7 @@ from dataclasses import replace
 
 import pytest
 
-from hwid_cli.records.order import Judgement, MapAdvice, MapCandidate
+from hwid_cli.records.order import MapAdvice, MapCandidate, SelectionEvidence
 from hwid_cli.report.orders import map_reasons, map_table
 from hwid_cli.report.simulation_note import simulation_note
 from hwid_cli.report.table import as_text
@@ -20,7 +20,7 @@ ADVICE = MapAdvice(
     candidates=(BEST, SMALL, *OTHERS, GIVEN),
     chosen=SMALL,
     given=GIVEN,
-    judgement=Judgement(1.13e-3, 1.1e-3, 1.03, 0.02, 4, 6),
+    evidence=SelectionEvidence(1.13e-3, 1.1e-3, 1.03, 0.02, 4, 6),
     tolerance=0.05,
     unit="rad/s",
 )
@@ -68,7 +68,7 @@ def test_the_recommendation_can_be_pasted_and_says_why():
         ({"given": SMALL}, "They are those of the configuration."),
         ({"given": BEST}, "Those of the configuration are the best."),
         (
-            {"judgement": replace(ADVICE.judgement, n_judges=0)},
+            {"evidence": replace(ADVICE.evidence, n_validation=0)},
             "they have the lowest BIC. There is no validation recording",
         ),
     ],

@@ -3,13 +3,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hwid_cli.records.order import Judgement, OrderAdvice, OrderChoice, ResponseEstimate
+from hwid_cli.records.order import (
+    OrderAdvice,
+    OrderChoice,
+    ResponseEstimate,
+    SelectionEvidence,
+)
 from hwid_cli.report.orders import order_reasons, order_table
 from hwid_cli.report.simulation_note import simulation_note
 from hwid_cli.report.table import as_text
 
 NAN = float("nan")
-JUDGEMENT = Judgement(1.2e-3, 1.15e-3, 1.04, 0.02, 4)
+JUDGEMENT = SelectionEvidence(1.2e-3, 1.15e-3, 1.04, 0.02, 4)
 OVERALL = OrderChoice("", 2, 3, 3, 4, JUDGEMENT, 4, 4, 2, 3)
 ADVICE = OrderAdvice(
     overall=OVERALL,
@@ -65,7 +70,10 @@ def test_the_recommendation_says_why():
     [
         ({"factor": 1.09, "standard_error": 0.1}, "within one standard error (0.1)"),
         ({"best_nb": 2, "best_nk": 3}, "they have the lowest RMSD on recordings"),
-        ({"n_judges": 0, "standard_error": NAN}, "There is no validation recording"),
+        (
+            {"n_validation": 0, "standard_error": NAN},
+            "There is no validation recording",
+        ),
         (
             {"best_nb": 4, "best_nk": 5},
             "widen orders.nb (beyond 4) and orders.nk (beyond 5)",
@@ -75,9 +83,9 @@ def test_the_recommendation_says_why():
 def test_each_case_has_its_reason(changes, words):
     places = {key: value for key, value in changes.items() if key.startswith("best_n")}
     others = {key: value for key, value in changes.items() if key not in places}
-    judgement = replace(JUDGEMENT, **others)
+    evidence = replace(JUDGEMENT, **others)
 
-    assert words in said(overall=replace(OVERALL, judgement=judgement, **places))
+    assert words in said(overall=replace(OVERALL, evidence=evidence, **places))
 
 
 @pytest.mark.parametrize(
@@ -88,9 +96,9 @@ def test_each_case_has_its_reason(changes, words):
     ],
 )
 def test_pairs_that_are_extrapolated_are_told(count, words):
-    judgement = replace(JUDGEMENT, n_beyond=count)
+    evidence = replace(JUDGEMENT, n_unexcited=count)
 
-    assert words in said(overall=replace(OVERALL, judgement=judgement))
+    assert words in said(overall=replace(OVERALL, evidence=evidence))
     assert "not count" not in said()
 
 
@@ -143,7 +151,7 @@ def test_delays_that_every_fit_tries_are_not_asked_for_again():
     ],
 )
 def test_outliers_that_do_not_count_are_told(count, words):
-    judgement = replace(JUDGEMENT, n_outliers=count)
+    evidence = replace(JUDGEMENT, n_outliers=count)
 
-    assert words in said(overall=replace(OVERALL, judgement=judgement))
+    assert words in said(overall=replace(OVERALL, evidence=evidence))
     assert "outlier" not in said()

@@ -10,7 +10,7 @@ import pytest
 from hwid_cli.records.groups import Group, GroupSearch, Join
 from hwid_cli.records.model import Information
 from hwid_cli.records.report import ReportContents
-from hwid_cli.report.page import Figures, Folded, images_of
+from hwid_cli.report.page import Collapsible, Figures, images_of
 from hwid_cli.report.sections.calibrate import calibration_section
 from hwid_cli.report.sections.crossval import crossval_section
 from hwid_cli.report.sections.group import groups_section
@@ -49,7 +49,7 @@ def said(section):
 def tables(section):
     found = []
     for block in section.blocks:
-        found += block.blocks if isinstance(block, Folded) else [block]
+        found += block.blocks if isinstance(block, Collapsible) else [block]
     return [block for block in found if isinstance(block, Table)]
 
 
@@ -272,4 +272,4 @@ def test_a_long_calibration_table_is_folded(count, is_folded):
     stored = with_results(calibrated_only(), calibrate=calibrated(names(count)))
     first = calibration_section(ReportContents(stored)).blocks[0]
 
-    assert isinstance(first, Folded) == is_folded
+    assert isinstance(first, Collapsible) == is_folded

@@ -27,8 +27,8 @@ def test_inputs_beyond_what_a_model_has_seen_do_not_judge():
     found = scored(rmsd, NAMES[:2], NAMES, (SMALL, ALIKE, LARGE))
 
     # "alike" has not seen the level 0, at which "small" stands half of the time.
-    assert found.n_beyond == 3
-    assert found.judges.tolist() == [1]
+    assert found.n_unexcited == 3
+    assert found.validation.tolist() == [1]
     assert smallest_good(found, np.array([1, 2]), 0.05).chosen == 1
 
 
@@ -38,14 +38,14 @@ def test_a_few_samples_beyond_do_not_matter():
         tensor([[0.1, 0.5]]), ("small",), ("small", "nearly"), (SMALL, nearly)
     )
 
-    assert (found.n_beyond, len(found.judges)) == (0, 1)
+    assert (found.n_unexcited, len(found.validation)) == (0, 1)
 
 
 def test_where_all_inputs_go_beyond_all_judge():
     found = scored(tensor([[0.1, 8.0]]), ("small",), ("small", "large"), (SMALL, LARGE))
 
-    assert found.judges.tolist() == [1]
-    assert found.n_beyond == 0
+    assert found.validation.tolist() == [1]
+    assert found.n_unexcited == 0
 
 
 def test_where_those_within_have_no_number_the_others_judge():
@@ -53,15 +53,15 @@ def test_where_those_within_have_no_number_the_others_judge():
     rmsd[0, :, 1] = np.nan
     found = scored(rmsd, ("small",), NAMES, (SMALL, ALIKE, LARGE))
 
-    assert found.judges.tolist() == [2]
+    assert found.validation.tolist() == [2]
 
 
 def test_a_lone_recording_judges_itself():
     found = scored(tensor([[0.1]]), ("small",), ("small",), (SMALL,))
     verdict = smallest_good(found, np.array([1, 2]), 0.05)
 
-    assert found.judges.tolist() == [-1]
-    assert (verdict.chosen, verdict.judgement.n_judges) == (1, 0)
+    assert found.validation.tolist() == [-1]
+    assert (verdict.chosen, verdict.evidence.n_validation) == (1, 0)
 
 
 def test_without_a_number_nobody_judges():

@@ -10,7 +10,7 @@ from hwid_cli.config.load import load_experiment
 from hwid_cli.records.drive import Controller
 from hwid_cli.records.experiment import CalibrateOptions, DiagnoseOptions
 from hwid_cli.records.recordings import Recording
-from hwid_cli.stages.diagnosis_starts import doubtful_starts, starts_sentence
+from hwid_cli.stages.diagnosis_starts import starts_sentence, unsettled_starts
 from tests.blind.campaign import measured_case
 from tests.blind.cases import make_case
 from tests.blind.machine import SAMPLE_TIME_S
@@ -45,38 +45,38 @@ def simulation_gain():
 
 
 def test_sines_that_were_cut_at_their_onset_do_not_start_in_equilibrium():
-    found = doubtful_starts(with_lead_in(cut=True), simulation(), REST)
+    found = unsettled_starts(with_lead_in(cut=True), simulation(), REST)
     assert found == ("sine_01", "sine_02", "sine_03", "sine_04")
 
 
 def test_parameters_that_are_off_alter_nothing():
     wrong = simulation(force_constant_N_per_A=6.0, stiffness_N_per_m=1000.0)
-    assert len(doubtful_starts(with_lead_in(cut=True), wrong, REST)) == 4
-    assert doubtful_starts(with_lead_in(cut=False), wrong, REST) == ()
+    assert len(unsettled_starts(with_lead_in(cut=True), wrong, REST)) == 4
+    assert unsettled_starts(with_lead_in(cut=False), wrong, REST) == ()
 
 
 @pytest.mark.parametrize(("level", "zero"), [(0.0, 0.0), (0.8, 0.0), (0.0, 1e-3)])
 def test_what_keeps_its_rest_starts_in_equilibrium(level, zero):
     found = with_lead_in(cut=False, level=level, zero=zero)
-    assert doubtful_starts(found, simulation(), REST) == ()
+    assert unsettled_starts(found, simulation(), REST) == ()
 
 
 @pytest.mark.parametrize("rule", ["held", "estimated"])
 def test_a_start_that_is_fitted_is_never_doubtful(rule):
     options = DiagnoseOptions(initial_state=rule)
-    assert doubtful_starts(with_lead_in(cut=True), simulation(), options) == ()
+    assert unsettled_starts(with_lead_in(cut=True), simulation(), options) == ()
 
 
 def test_a_controller_and_a_free_axis_are_not_judged():
     found = with_lead_in(cut=True)
     ruled = simulation(controller=Controller(20.0, 30.0))
-    assert doubtful_starts(found, ruled, REST) == ()
-    assert doubtful_starts(found, simulation(stiffness_N_per_m=0.0), REST) == ()
+    assert unsettled_starts(found, ruled, REST) == ()
+    assert unsettled_starts(found, simulation(stiffness_N_per_m=0.0), REST) == ()
 
 
 def test_the_sentence_is_one_line_with_the_remedies():
     found = with_lead_in(cut=True)
-    names = doubtful_starts(found, simulation(), REST)
+    names = unsettled_starts(found, simulation(), REST)
     text = starts_sentence(names, found, CalibrateOptions(sine=("cut",)))
 
     assert "\n" not in text
@@ -103,16 +103,16 @@ def test_no_case_of_the_blind_test_is_doubted(case):
         for one in measured
     ]
     given = simulation(**truth["simulation"])
-    assert doubtful_starts(found, given, REST) == ()
+    assert unsettled_starts(found, given, REST) == ()
     # Not by luck: without their rest the sines would be.
     cut = [
         replace(one, input=one.input[108:], output=one.output[108:]) for one in found
     ]
-    assert doubtful_starts(cut, given, REST) != ()
+    assert unsettled_starts(cut, given, REST) != ()
 
 
 def test_the_demo_fits_how_its_recordings_start():
     demo = load_experiment(CONFIGS / "diagnose_demo.yaml")
     cut = with_lead_in(cut=True)
-    assert doubtful_starts(cut, simulation(), REST) != ()
-    assert doubtful_starts(cut, demo.simulation, demo.diagnose) == ()
+    assert unsettled_starts(cut, simulation(), REST) != ()
+    assert unsettled_starts(cut, demo.simulation, demo.diagnose) == ()

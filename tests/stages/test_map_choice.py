@@ -73,7 +73,7 @@ def test_the_maps_of_the_plant_are_recommended():
     )
     assert advice.candidates[0].factor == 1.0
     assert (advice.given.input_units, advice.given.output_units) == (10, 10)
-    assert advice.judgement.n_judges == 4
+    assert advice.evidence.n_validation == 4
 
 
 def test_too_many_units_for_few_data_are_not():
@@ -88,7 +88,7 @@ def test_a_lone_recording_leaves_the_choice_to_bic():
     options = OrderOptions(maps=("none", "dead_zone"))
     advice = advice_on(recordings(1), options)
 
-    assert advice.judgement.n_judges == 0
+    assert advice.evidence.n_validation == 0
     assert advice.chosen.bic == min(one.bic for one in advice.candidates)
     assert (advice.chosen.input_map, advice.chosen.output_map) == ("dead_zone", "none")
     # By its own RMSD the largest maps would have won.

@@ -47,10 +47,10 @@ def test_true_orders_of_a_plant_are_recommended():
     # A hint: one recording of four shows more, of its noise.
     assert np.median([found.n_poles for found in advice.responses]) == 2
     assert {found.delay for found in advice.responses} == {1}
-    assert one.judgement.n_judges == 4
-    assert all(choice.judgement.n_judges == 3 for choice in advice.choices)
-    assert one.judgement.factor <= 1.0 + max(
-        advice.tolerance, np.expm1(one.judgement.standard_error)
+    assert one.evidence.n_validation == 4
+    assert all(choice.evidence.n_validation == 3 for choice in advice.choices)
+    assert one.evidence.factor <= 1.0 + max(
+        advice.tolerance, np.expm1(one.evidence.standard_error)
     )
 
 
@@ -66,9 +66,9 @@ def test_a_single_recording_judges_itself_and_says_so():
     chosen = recordings(1, [0.0, 0.3], [0.8])
     one = advice_on(chosen, OrdersOptions(nb=(1, 2), nk=(1, 2))).overall
 
-    assert one.judgement.n_judges == 0
+    assert one.evidence.n_validation == 0
     assert (one.nb, one.nk) == (1, 1)
-    assert np.isnan(one.judgement.standard_error)
+    assert np.isnan(one.evidence.standard_error)
 
 
 def made_up(rmsd, bic=None):
@@ -107,7 +107,7 @@ def test_smaller_orders_within_the_tolerance_are_taken():
 
     assert (one.nb, one.nk) == (1, 1)
     assert (one.best_nb, one.best_nk) == (2, 2)
-    assert one.judgement.factor == pytest.approx(1.04 / 0.999)
+    assert one.evidence.factor == pytest.approx(1.04 / 0.999)
 
 
 def test_smaller_orders_beyond_the_tolerance_are_not():
@@ -124,7 +124,7 @@ def test_judges_that_disagree_allow_smaller_orders():
     one = made_up(rmsd).overall
 
     assert one.nk == 1
-    assert one.judgement.standard_error > np.log(1.05)
+    assert one.evidence.standard_error > np.log(1.05)
 
 
 def test_a_model_that_goes_astray_does_not_decide_alone():

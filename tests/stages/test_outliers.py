@@ -66,11 +66,11 @@ def test_judges_without_their_outliers_choose_the_true_poles(robust):
     *_, plain, advice = robust
 
     assert plain.overall.nk < 2
-    assert plain.overall.judgement.n_outliers == 0
+    assert plain.overall.evidence.n_outliers == 0
     assert advice.overall.nk == 2
-    assert advice.overall.judgement.n_outliers == 4 * N_OUTLIERS
+    assert advice.overall.evidence.n_outliers == 4 * N_OUTLIERS
     # What judges the models of one recording are the three others.
-    assert {one.judgement.n_outliers for one in advice.choices} == {3 * N_OUTLIERS}
+    assert {one.evidence.n_outliers for one in advice.choices} == {3 * N_OUTLIERS}
 
 
 def test_an_outlier_among_the_first_samples_does_not_hide_in_the_initial_state():
@@ -99,7 +99,7 @@ def test_maps_are_judged_without_outliers_too():
     fits = fit_maps(chosen, Orders(2, 2, 1), candidates, SETTINGS)
     advice = recommend_maps(fits, chosen, chosen, 0.05, SETTINGS)
 
-    assert advice.judgement.n_outliers == 4 * N_OUTLIERS
+    assert advice.evidence.n_outliers == 4 * N_OUTLIERS
     assert advice.chosen.input_map == "piecewise_linear"
     linear = next(one for one in advice.candidates if one.input_map == "none")
     assert linear.factor > 1.5

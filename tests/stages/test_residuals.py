@@ -3,7 +3,7 @@ from scipy.signal import lfilter
 
 from hwid_cli.records.model import Fit, FitOptions, HammersteinWiener, Orders, StaticMap
 from hwid_cli.records.recordings import Recording
-from hwid_cli.stages.residuals import judge_residual
+from hwid_cli.stages.residuals import examined_residual
 
 NONE = StaticMap("none", np.zeros(0))
 B, F = np.array([0.2, 0.15]), np.real(np.poly(0.8 * np.exp([0.5j, -0.5j])))
@@ -24,7 +24,7 @@ def alarms(loss):
         bad = rng.random(u.size) < 0.01
         y[bad] += rng.standard_normal(bad.sum())
         y[2] += 3.0
-        tests = judge_residual(Recording("r", u, y, 1.0), fit)
+        tests = examined_residual(Recording("r", u, y, 1.0), fit)
         count += tests.follows_input or tests.follows_square or not tests.is_white
     return count
 

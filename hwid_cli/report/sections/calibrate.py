@@ -6,13 +6,13 @@ from hwid_cli.report import plots
 from hwid_cli.report.calibration import calibration_table
 from hwid_cli.report.formats import counted
 from hwid_cli.report.page import (
+    Collapsible,
     Figures,
-    Folded,
     Image,
     PageBlock,
     Pairs,
     Section,
-    folded_beyond,
+    collapsed_beyond,
     image,
 )
 from hwid_cli.report.table import Text
@@ -31,7 +31,7 @@ def calibration_section(contents: ReportContents) -> Section:
         blocks.append(Text("Not run yet: run 'hwid calibrate CONFIG'.", is_note=True))
     else:
         summary = f"The table of all {counted(len(logs), 'recording')}"
-        blocks.append(folded_beyond(_MOST_ROWS, calibration_table(logs), summary))
+        blocks.append(collapsed_beyond(_MOST_ROWS, calibration_table(logs), summary))
         shown = [
             Figures((_calibration_image(log, figures[log.name]),), _cut_sentence(log))
             for log in logs
@@ -42,7 +42,7 @@ def calibration_section(contents: ReportContents) -> Section:
         if shown[_MOST_OPEN:]:
             more = counted(len(shown) - _MOST_OPEN, "more recording")
             rest = Pairs(tuple(shown[_MOST_OPEN:]))
-            blocks.append(Folded(f"{more} before and after calibration", (rest,)))
+            blocks.append(Collapsible(f"{more} before and after calibration", (rest,)))
         if not shown:
             text = "No figures: the configuration leaves the recordings as they are."
             blocks.append(Text(text, is_note=True))

@@ -7,8 +7,8 @@ from hwid_cli.report.crossval import coverage_table, cross_table
 from hwid_cli.report.figures.matrices import rmsd_matrix_figure
 from hwid_cli.report.formats import counted, listed, with_unit
 from hwid_cli.report.page import (
+    Collapsible,
     Figures,
-    Folded,
     PageBlock,
     Section,
     drawn,
@@ -39,12 +39,14 @@ def crossval_section(contents: ReportContents) -> Section:
         blocks.append(Figures((figure,), sentence))
         widest = cross_table(matrix)
         blocks.append(
-            Folded("The widest model of each recording as a table", (widest,))
+            Collapsible("The widest model of each recording as a table", (widest,))
         )
         if contents.scores and contents.stored.crossval is not None:
             found = contents.stored.crossval
             table = coverage_table(contents.scores, found)
-            blocks.append(Folded("The models that cover the most recordings", (table,)))
+            blocks.append(
+                Collapsible("The models that cover the most recordings", (table,))
+            )
     title = "Cross-validation: the widest model of each recording"
     return Section("crossval", title, "Cross-validation", tuple(blocks))
 

@@ -20,7 +20,7 @@ from hwid_cli.report.diagnosis import (
 )
 from hwid_cli.report.figures.diagnosis import diagnosis_figures
 from hwid_cli.report.formats import MISSING, counted, listed, with_unit
-from hwid_cli.report.page import Figures, Folded, PageBlock, Section, drawn
+from hwid_cli.report.page import Collapsible, Figures, PageBlock, Section, drawn
 from hwid_cli.report.table import Heading, Table, Text, numbers, texts
 
 # Places that are told in words, and recordings that are called the worst.
@@ -88,7 +88,7 @@ def _record_blocks(diagnosis: Diagnosis) -> list[PageBlock]:
     blocks += figure("diagnosis_gap", _worst(diagnosis))
     if diagnosis.gaps:
         about = f"The gap in {counted(len(diagnosis.gaps), 'recording')} as a table"
-        blocks.append(Folded(about, (recordings_table(diagnosis),)))
+        blocks.append(Collapsible(about, (recordings_table(diagnosis),)))
     blocks += figure("diagnosis_overlay", _overlay_sentence(diagnosis))
     where = [Text(one.sentence) for one in diagnosis.places if one.sentence]
     where_figure = "Shares of the error that parameters of the base cannot take away."
@@ -105,7 +105,7 @@ def _record_blocks(diagnosis: Diagnosis) -> list[PageBlock]:
         table = ranking_table(diagnosis)
         sentence = "The best candidates that were fitted, and the simulation alone."
         blocks.append(Heading("Candidates"))
-        blocks += [*figure("diagnosis_ranking", sentence), Folded(about, (table,))]
+        blocks += [*figure("diagnosis_ranking", sentence), Collapsible(about, (table,))]
     return blocks
 
 

@@ -11,8 +11,8 @@ from hwid_cli.report.groups import (
     levels_table,
 )
 from hwid_cli.report.page import (
+    Collapsible,
     Figures,
-    Folded,
     PageBlock,
     Section,
     drawn,
@@ -41,7 +41,7 @@ def groups_section(contents: ReportContents) -> Section:
         for level in search.levels[1:]:
             table = join_table(search, level)
             blocks.append(
-                Folded(f"Coverage on level {level}: base and add-on", (table,))
+                Collapsible(f"Coverage on level {level}: base and add-on", (table,))
             )
     title = "Grouping: recordings that share a model"
     return Section("groups", title, "Grouping", tuple(blocks))

@@ -10,8 +10,8 @@ from hwid_cli.report.figures.residuals import residuals_figure
 from hwid_cli.report.fits import best_models_table
 from hwid_cli.report.formats import counted, listed, percent, with_unit
 from hwid_cli.report.page import (
+    Collapsible,
     Figures,
-    Folded,
     PageBlock,
     Section,
     drawn,
@@ -54,13 +54,13 @@ def recordings_section(contents: ReportContents) -> Section:
     if shown[_MOST_OPEN:]:
         what = f"{counted(len(shown) - _MOST_OPEN, 'more recording')}"
         rest = tuple(shown[_MOST_OPEN:])
-        blocks.append(Folded(f"{what} with their best models", rest))
+        blocks.append(Collapsible(f"{what} with their best models", rest))
     if contents.best and contents.grid is not None:
         is_delay = contents.stored.nk_role == "delay"
         table = best_models_table(
             contents.best, contents.grid.unit, nk_is_delay=is_delay
         )
-        blocks.append(Folded("The best models as a table", (table,)))
+        blocks.append(Collapsible("The best models as a table", (table,)))
     if contents.simulated and contents.without_model:
         text = f"Without any model: {listed(contents.without_model)}."
         blocks.append(Text(text, is_note=True))
@@ -126,7 +126,7 @@ def residuals_section(contents: ReportContents) -> Section:
         rest = tuple(shown[_MOST_RESIDUALS:])
         if rest:
             summary = f"Residuals of {counted(len(rest), 'more recording')}"
-            blocks.append(Folded(summary, rest))
+            blocks.append(Collapsible(summary, rest))
     title = "Residuals: what the best models leave"
     return Section("residuals", title, "Residuals", tuple(blocks))
 

@@ -5,10 +5,10 @@ from hwid_cli.report.fits import fits_status
 from hwid_cli.report.formats import MISSING, counted, listed, with_unit
 from hwid_cli.report.groups import NOTHING_COVERED
 from hwid_cli.report.page import (
-    Folded,
+    Collapsible,
     PageBlock,
     Section,
-    folded_beyond,
+    collapsed_beyond,
     section_notes,
 )
 from hwid_cli.report.table import Cell, Code, Table, Text, numbers, texts
@@ -28,9 +28,11 @@ def summary_section(contents: ReportContents) -> Section:
     blocks += [Text(line, is_note=True) for line in _remarks(contents)]
     if stored.recordings:
         summary = f"All {counted(len(stored.recordings), 'recording')}"
-        blocks.append(folded_beyond(_MOST_OPEN, _recordings_table(contents), summary))
+        blocks.append(
+            collapsed_beyond(_MOST_OPEN, _recordings_table(contents), summary)
+        )
     configuration = "The configuration with all defaults filled in"
-    blocks.append(Folded(configuration, (Code(stored.config),), is_printed=False))
+    blocks.append(Collapsible(configuration, (Code(stored.config),), is_printed=False))
     return Section("summary", "Summary", "Summary", tuple(blocks))
 
 

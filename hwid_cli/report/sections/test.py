@@ -17,12 +17,12 @@ from hwid_cli.report.final_test import (
 )
 from hwid_cli.report.formats import counted, listed, with_unit
 from hwid_cli.report.page import (
+    Collapsible,
     Figures,
-    Folded,
     PageBlock,
     Section,
+    collapsed_beyond,
     drawn,
-    folded_beyond,
     section_notes,
 )
 from hwid_cli.report.table import Text
@@ -74,7 +74,7 @@ def _chain(contents: ReportContents) -> list[PageBlock]:
     )
     return [
         chain_coverage_table(final, trend, names),
-        Folded("The RMSD along the chain as tables", tables),
+        Collapsible("The RMSD along the chain as tables", tables),
     ]
 
 
@@ -103,7 +103,7 @@ def coverage_section(contents: ReportContents) -> Section:
         blocks.append(Figures((figure,), _matrix_sentence(matrix)))
         blocks += gap_sentences(final)
         table = coverage_matrix_table(final)
-        blocks.append(Folded("The coverage as a table", (table,)))
+        blocks.append(Collapsible("The coverage as a table", (table,)))
     title = "Coverage: all models on all recordings"
     return Section("coverage", title, "Coverage", tuple(blocks))
 
@@ -135,7 +135,7 @@ def assignment_section(contents: ReportContents) -> Section:
         blocks.append(smallest_set_table(final))
         of = counted(len(final.recordings), "recording")
         table = assignment_table(final)
-        blocks.append(folded_beyond(_MOST_OPEN, table, f"The assignment of {of}"))
+        blocks.append(collapsed_beyond(_MOST_OPEN, table, f"The assignment of {of}"))
         counts = contents.predictions
         if counts is not None and counts.total:
             text = (
@@ -146,7 +146,9 @@ def assignment_section(contents: ReportContents) -> Section:
             )
             blocks.append(Text(text))
             table = prediction_table(final)
-            blocks.append(folded_beyond(_MOST_OPEN, table, f"The predictions of {of}"))
+            blocks.append(
+                collapsed_beyond(_MOST_OPEN, table, f"The predictions of {of}")
+            )
     title = "Assignment: which model for which recording"
     return Section("assignment", title, "Assignment", tuple(blocks))
 
