@@ -35,18 +35,23 @@ def _log_level_as_before():
     logging.getLogger("hwid_cli").setLevel(logging.NOTSET)
 
 
-@pytest.fixture
-def blank_figures(monkeypatch):
-    """Draw figures, but leave their files blank, where a test does not look at them.
-
-    Rendering takes most of the time of a report; other tests of the same file do it.
-    """
+def leave_figures_blank(monkeypatch):
+    """Put a blank figure where one would be rendered."""
     from matplotlib.figure import Figure
 
     from hwid_cli.report import plots
 
     blank = plots.as_png(Figure((1, 1)))
     monkeypatch.setattr(plots, "as_png", lambda figure: blank)
+
+
+@pytest.fixture
+def blank_figures(monkeypatch):
+    """Draw figures, but leave their files blank, where a test does not look at them.
+
+    Rendering takes most of the time of a report; other tests of the same file do it.
+    """
+    leave_figures_blank(monkeypatch)
 
 
 @pytest.fixture

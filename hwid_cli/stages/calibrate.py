@@ -29,8 +29,8 @@ from hwid_cli.records.recordings import (
     RawRecording,
     Recording,
 )
+from hwid_cli.report import plots
 from hwid_cli.report.calibration import calibration_table
-from hwid_cli.report.plots import as_png, calibration_figure
 from hwid_cli.stages.fit_seconds import counted
 from hwid_cli.stages.selection import named_recordings, select_recordings
 from hwid_cli.stages.stage import Context, Planning, Runner, Stage, in_results
@@ -235,7 +235,8 @@ def _draw(
     ):
         path = out / "figures" / NAME / f"{raw.name}.png"
         if is_new or not path.is_file():
-            replace_file(path, as_png(calibration_figure(raw, recording, log)))
+            figure = plots.calibration_figure(raw, recording, log)
+            replace_file(path, plots.as_png(figure))
 
 
 def _summary(given: Measured, result: Calibrated, is_stored: bool) -> str:

@@ -19,9 +19,9 @@ from hwid_cli.records.check import StagePlan
 from hwid_cli.records.diagnosis import Diagnosis
 from hwid_cli.records.experiment import DiagnoseOptions, Experiment, SimulationOptions
 from hwid_cli.records.recordings import Recording
+from hwid_cli.report import plots
 from hwid_cli.report.diagnosis import diagnosis_blocks
 from hwid_cli.report.figures.diagnosis import diagnosis_figures
-from hwid_cli.report.plots import as_png
 from hwid_cli.stages.diagnosis_starts import starts_sentence, unsettled_starts
 from hwid_cli.stages.fit_seconds import counted
 from hwid_cli.stages.selection import select_recordings
@@ -316,7 +316,7 @@ def _drawn_before(out: Path, origin: Provenance) -> list[str] | None:
 
 def _draw(folder: Path, diagnosis: Diagnosis) -> list[str]:
     figures = diagnosis_figures(diagnosis)
-    drawn = {f"{name}.png": as_png(figure) for name, figure in figures.items()}
+    drawn = {f"{name}.png": plots.as_png(figure) for name, figure in figures.items()}
     for path in folder.glob("diagnosis_*.png"):
         # Another verdict may have fewer figures.
         if path.name not in drawn:

@@ -5,6 +5,7 @@ import pytest
 from click.testing import CliRunner
 
 from hwid_cli.cli.main import main
+from tests.conftest import leave_figures_blank
 
 # Small enough for a second: two steps and a sine, two pairs of orders.
 CONFIG = """
@@ -24,6 +25,11 @@ fit: {units: 3, starts: 1, max_iterations: 4}
 identify: {}
 crossval: {threshold: 0.01}
 """
+
+
+@pytest.fixture(autouse=True)
+def _blank_figures(blank_figures):
+    """Figures are rendered in tests/report and by the smoke run."""
 
 
 @pytest.fixture
@@ -57,7 +63,9 @@ def finished(tmp_path_factory):
     path = folder / "tiny.yaml"
     path.write_text(CONFIG)
     arguments = ["run", str(path), "--out", str(folder / "out"), "--jobs", "1"]
-    result = CliRunner().invoke(main, arguments)
+    with pytest.MonkeyPatch.context() as monkeypatch:
+        leave_figures_blank(monkeypatch)
+        result = CliRunner().invoke(main, arguments)
     assert result.exit_code == 0, result.output
     (folder / "out" / "said.txt").write_text(result.stdout)
     return folder / "out"
