@@ -4,7 +4,7 @@ import os
 
 import h5py
 
-from hwid_cli.files.checksums import sealed
+from hwid_cli.files.checksums import with_checksum
 from tests.bad_input.trial import Case
 
 
@@ -29,7 +29,7 @@ def _edited(name, change):
         path = folder / "out" / name
         with h5py.File(path, "a") as file:
             change(file)
-        path.write_bytes(sealed(path.read_bytes()))
+        path.write_bytes(with_checksum(path.read_bytes()))
 
     return spoil
 

@@ -10,8 +10,8 @@ from tests.blind.run_blind import score_of
 LARGEST_ERROR = 0.10
 NAMED = (
     "coulomb_friction",
-    "cubic_stiffness",
-    "input_dead_zone",
+    pytest.param("cubic_stiffness", marks=pytest.mark.slow),
+    pytest.param("input_dead_zone", marks=pytest.mark.slow),
     # The shapes of the effect are simulated one after the other in each of its fits.
     pytest.param("output_backlash", marks=pytest.mark.slow),
 )
@@ -50,10 +50,11 @@ def test_wrong_parameters_alone_are_no_missing_effect(tmp_path):
     assert outcome["named"] == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "max_effects",
     # The search for sets of effects that explain what none can takes most of a minute.
-    [1, pytest.param(3, marks=pytest.mark.slow)],
+    [1, 3],
 )
 def test_what_is_outside_the_catalogue_gets_no_name(max_effects, tmp_path):
     case = short_case("random_force", suite="outside", acceptable=())

@@ -123,20 +123,14 @@ def test_maps_come_from_the_cache_and_are_the_same(after_run, hwid, edit, out):
     assert (out / "maps.csv").read_bytes() == first
 
 
-def test_run_recommends_maps_too(after_run, hwid, edit, out):
+def test_run_recommends_maps_too_and_fits_them_anew_with_force(after_run, hwid, edit):
     edit("identify: {}", MAPS)
     result = hwid("run")
 
     assert result.exit_code == 0, result.output
     assert "Take fit: {input_map: " in result.stdout
-
-
-def test_run_with_force_fits_maps_anew(after_run, hwid, edit):
     # All stages that the table lists are forced, not only some of them.
-    edit("identify: {}", MAPS)
-    hwid("run")
     result = hwid("run", "--force")
-
     assert "order maps: 0 fits from the cache, 27 computed" in result.stdout
 
 

@@ -46,10 +46,11 @@ def values(found, effect):
 FRICTION = ["coulomb_friction", "asymmetric_friction", "quadratic_drag", "hysteresis"]
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("blank_figures")
 @pytest.mark.parametrize(
     "options",
-    [{"effects": FRICTION, "max_effects": 1}, pytest.param({}, marks=pytest.mark.slow)],
+    [{"effects": FRICTION, "max_effects": 1}, {}],
     ids=["friction", "everything"],
 )
 def test_the_emps_lacks_dry_friction_of_the_published_size(diagnosed, options):

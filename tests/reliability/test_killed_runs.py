@@ -31,6 +31,7 @@ def kill_when(config, out, count, jobs):
     assert harness.wait_until_gone(process.pid, 5) == []
 
 
+@pytest.mark.slow
 def test_three_kills_lose_nothing_and_leave_nothing(config, out, undisturbed):
     # Workers take a second each to start.
     for count, jobs in ((1, "1"), (5, "2"), (20, "1")):
