@@ -115,7 +115,14 @@ def test_a_smaller_model_keeps_its_own_delay_where_that_is_needed():
     assert one.free_responses.shape == (1, 2)
 
 
-@pytest.mark.parametrize("delays", [(1, 2, 3, 4, 5), (2, 3, 4), (2, 3)])
+@pytest.mark.parametrize(
+    "delays",
+    [
+        pytest.param((1, 2, 3, 4, 5), marks=pytest.mark.slow),
+        pytest.param((2, 3, 4), marks=pytest.mark.slow),
+        (2, 3),
+    ],
+)
 def test_the_cells_of_a_grid_find_the_delays_of_fits_alone(delays):
     # A short screening alone takes another delay in some of them.
     options = FitOptions(input_map="dead_zone", output_map="saturation", delays=delays)

@@ -73,6 +73,7 @@ def test_an_error_at_each_write_in_turn(small, tmp_path, whole):
     assert codes.count(1) > 50
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("blank_figures")
 def test_errors_at_some_writes(small, tmp_path, whole):
     last = len(whole[1])

@@ -81,10 +81,6 @@ def test_an_output_that_is_not_finite_is_a_missing_value_with_its_reason():
     assert set(result.status[0, 0, 0]) == {"not finite"}
 
 
-def test_the_number_of_workers_changes_no_number():
-    np.testing.assert_array_equal(validate(jobs=1).rmsd, validate(jobs=2).rmsd)
-
-
 def test_only_what_changed_is_validated_again():
     store, items = MemoryStore(), []
     validate(store=store)

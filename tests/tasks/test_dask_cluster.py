@@ -59,6 +59,7 @@ def test_results_are_those_of_this_process(address, tmp_path):
     assert [one.task.name for one in there] == [one.task.name for one in here]
 
 
+@pytest.mark.slow
 def test_a_large_argument_is_sent_once(address, tmp_path):
     with dask_processes.workers(address, tmp_path):
         run_tasks(tasks_of(slow_sum, 40), settings(address))
@@ -67,6 +68,7 @@ def test_a_large_argument_is_sent_once(address, tmp_path):
     assert len(sent) == 1
 
 
+@pytest.mark.slow
 def test_nothing_is_lost_when_one_of_two_workers_is_killed(address, tmp_path):
     done = []
     with dask_processes.workers(address, tmp_path) as numbers:
