@@ -68,7 +68,9 @@ def show(session: Session, name: str) -> None:
 
 
 def show_blocks(session: Session, blocks: Sequence[Block]) -> None:
-    """Show tables and paragraphs to people, set off by a line."""
+    """Show tables and paragraphs to people, set off by a line; nothing where none are."""
+    if not blocks:
+        return
     experiment = session.experiment
     text = as_text(
         blocks,

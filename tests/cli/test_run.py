@@ -8,6 +8,8 @@ def test_all_stages_run_in_order_and_the_results_are_named(finished):
     stages = ["simulate", "calibrate", "identify", "crossval", "report"]
     assert [one for one in said if one in stages] == stages
     assert lines[-1] == f"results: {finished}"
+    # A stage without tables leaves no gap.
+    assert "\n\n\n" not in "\n".join(lines)
 
 
 def test_a_second_run_computes_nothing_and_force_computes_all(after_run, hwid):
