@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from hwid_cli.diagnosis.noise import whiteness
+from hwid_cli.diagnosis.causes import left_over
 from hwid_cli.diagnosis.parameters import (
     BASE,
     START,
@@ -29,7 +29,13 @@ from hwid_cli.diagnosis.parameters import (
     sum_of_squares,
 )
 from hwid_cli.diagnosis.problem import Compared, DiagnosisProblem
-from hwid_cli.diagnosis.search import SearchResult, fit_own, fit_point, with_own_trials
+from hwid_cli.diagnosis.search import (
+    SearchResult,
+    cross_fitted,
+    fit_own,
+    fit_point,
+    with_own_trials,
+)
 from hwid_cli.drive.effect import Scales
 from hwid_cli.drive.simulation import drive_effects
 from hwid_cli.records.candidates import CandidateFit
@@ -39,13 +45,15 @@ from hwid_cli.records.drive import BASE_PARAMETERS, Drive
 Start = Mapping[str, Mapping[str, float]]
 
 # Samples that the screening of starts looks at.
-SCREENING_SAMPLES = 9000
-SCREENING_ITERATIONS = 5
+SCREENING_SAMPLES = 6000
+# Iterations from every start, then from the two best. A second start is worth further
+# time only where its sum of squares is within the factor.
+SCREENING = ((2, 2.0), (4, 1.2))
 SCREENED_STARTS = 2
-# A second start is worth its time only where the screening was this close.
-CLOSE_SCREENING = 1.5
 SAME_PLACE = 0.02
-MOST_ITERATIONS = 25
+MOST_ITERATIONS = 20
+
+
 # A base parameter that the re-fit changes by this factor or more is bent.
 BENT = 2.0
 
@@ -84,12 +92,39 @@ class Baseline:
         return [self.drive, self.given] if is_bent else [self.drive]
 
 
-@dataclass(frozen=True, eq=False)
-class _SearchStart:
-    """Where a search starts: a drive with its base, and the values of all effects."""
+@dataclass(frozen=True)
+class SearchStart:
+    """Where a search starts.
 
-    drive: Drive
-    start: Start
+    Parameters
+    ----------
+    base : mapping of str to float
+        Parameters of the base.
+    effects : mapping of str to mapping of str to float
+        Parameters of all effects, those of the simulation included.
+    """
+
+    base: Mapping[str, float]
+    effects: Start
+
+
+@dataclass(frozen=True, eq=False)
+class Screened:
+    """Where the first iterations on few recordings have brought a set of effects.
+
+    Parameters
+    ----------
+    effects : tuple of str
+        Ids in the catalogue, without those that the simulation has.
+    sse : float
+        Sum of squares on these few recordings; infinite where none could be simulated.
+    starts : tuple of SearchStart
+        Where to go on, the best first; at most two.
+    """
+
+    effects: tuple[str, ...]
+    sse: float
+    starts: tuple[SearchStart, ...]
 
 
 def fewer_recordings(problem: DiagnosisProblem, most_samples: int) -> DiagnosisProblem:
@@ -116,12 +151,60 @@ def fewer_recordings(problem: DiagnosisProblem, most_samples: int) -> DiagnosisP
     return replace(problem, signals=signals)
 
 
+def screen(
+    few: DiagnosisProblem,
+    effects: tuple[str, ...],
+    starts: Sequence[SearchStart],
+    scales: Scales,
+) -> Screened:
+    """Fit a set of effects cheaply: a few iterations from each start.
+
+    Parameters
+    ----------
+    few : DiagnosisProblem
+        Some of the training recordings.
+    effects : tuple of str
+        Ids in the catalogue, without those that the simulation has.
+    starts : sequence of SearchStart
+        At least one.
+    """
+    everything = (*drive_effects(few.drive), *effects)
+    reached = list(starts)
+    for iterations, close in SCREENING:
+        found = [
+            _fit_from(few, everything, start, scales, iterations) for start in reached
+        ]
+        found.sort(key=lambda one: one.sse)
+        if not np.isfinite(found[0].sse):
+            return Screened(effects, float("inf"), (starts[0],))
+        reached = [
+            _reached(few, one)
+            for one in found[:SCREENED_STARTS]
+            if one.sse <= close * found[0].sse
+        ]
+    kept = reached
+    if len(kept) > 1 and _is_same(kept[0].effects, kept[1].effects):
+        kept.pop()
+    return Screened(effects, found[0].sse, tuple(kept))
+
+
+def _reached(problem: DiagnosisProblem, found: SearchResult) -> SearchStart:
+    """Where a search came to, for another one to go on."""
+    drive = drive_at(problem, found.layout, found.point)
+    return SearchStart(base_of(drive), effects_at(found.layout, found.point))
+
+
+def base_of(drive: Drive) -> dict[str, float]:
+    """Parameters of a drive's base, by name."""
+    return {one: float(getattr(drive, one)) for one in BASE_PARAMETERS}
+
+
 def fit_candidate(
     problem: DiagnosisProblem,
     effects: tuple[str, ...],
-    starts: Sequence[Start],
-    baseline: Baseline,
-    pruning_limit: float = float("inf"),
+    starts: Sequence[SearchStart],
+    scales: Scales,
+    noise: NoiseFloor,
 ) -> CandidateFit:
     """Fit the base with effects from several starts, keep the best.
 
@@ -131,68 +214,16 @@ def fit_candidate(
         Training and held-out recordings.
     effects : tuple of str
         Ids in the catalogue, without those that the simulation has.
-    starts : sequence of mapping
-        Values of the effects to start from; the effects that the simulation has start
-        from their own values. At least one.
-    pruning_limit : float
-        Sum of squares in the screening beyond which the fit is not finished.
+    starts : sequence of SearchStart
+        At least one.
     """
-    present = drive_effects(problem.drive)
     train = problem.part(held_out=False)
-    everything = (*present, *effects)
-    search_starts = [
-        _SearchStart(drive, {**present, **start})
-        for drive in baseline.drives
-        for start in starts
-    ]
-    most_iterations = MOST_ITERATIONS
-    if effects:
-        few = fewer_recordings(train, SCREENING_SAMPLES)
-        search_starts, best_sse = _screened(
-            few, everything, search_starts, baseline.scales
-        )
-        if best_sse > pruning_limit:
-            search_starts, most_iterations = search_starts[:1], 1
+    everything = (*drive_effects(problem.drive), *effects)
     found = [
-        _fit_from(train, everything, search_start, baseline.scales, most_iterations)
-        for search_start in search_starts
+        _fit_from(train, everything, start, scales, MOST_ITERATIONS) for start in starts
     ]
     best = min(found, key=lambda one: one.sse)
-    return _evaluated(problem, effects, best, baseline.noise)
-
-
-def _screened(
-    problem: DiagnosisProblem,
-    effects: tuple[str, ...],
-    search_starts: list[_SearchStart],
-    scales: Scales,
-) -> tuple[list[_SearchStart], float]:
-    """Run the first iterations on few recordings.
-
-    Returns where the best came to, with a second one where the screening was close, and
-    the sum of squares of the best.
-    """
-    found = [
-        _fit_from(problem, effects, search_start, scales, SCREENING_ITERATIONS)
-        for search_start in search_starts
-    ]
-    found.sort(key=lambda one: one.sse)
-    if not np.isfinite(found[0].sse):
-        return search_starts[:1], float("inf")
-    close = [
-        one
-        for one in found[:SCREENED_STARTS]
-        if one.sse <= CLOSE_SCREENING * found[0].sse
-    ]
-    kept = [
-        _SearchStart(
-            drive_at(problem, one.layout, one.point), effects_at(one.layout, one.point)
-        )
-        for one in close
-    ]
-    if len(kept) > 1 and _is_same(kept[0].start, kept[1].start):
-        kept.pop()
-    return kept, found[0].sse
+    return _evaluated(problem, effects, best, noise)
 
 
 def _is_same(one: Start, other: Start) -> bool:
@@ -207,12 +238,14 @@ def _is_same(one: Start, other: Start) -> bool:
 def _fit_from(
     problem: DiagnosisProblem,
     effects: tuple[str, ...],
-    search_start: _SearchStart,
+    start: SearchStart,
     scales: Scales,
     max_iterations: int,
 ) -> SearchResult:
-    fit_layout = parameter_layout(problem, effects, search_start.start, scales)
-    point = first_point(problem, fit_layout, search_start.drive, search_start.start)
+    base: dict[str, Any] = dict(start.base)
+    drive = replace(problem.drive, **base)
+    fit_layout = parameter_layout(problem, effects, start.effects, scales)
+    point = first_point(problem, fit_layout, drive, start.effects)
     point = with_own_trials(problem, fit_layout, point)
     return fit_point(problem, fit_layout, point, max_iterations=max_iterations)
 
@@ -228,13 +261,21 @@ def _evaluated(
     held = [row for row, one in enumerate(problem.signals) if one.is_held_out]
     own = np.zeros((len(problem.signals), len(best.layout.own)))
     own[rows] = best.point.own
+    held_parts: list[np.ndarray] = []
     if held:
         part = problem.part(held_out=True)
         own[held] = fit_own(part, best.layout, best.point.shared).own
+        held_parts = cross_fitted(
+            part, best.layout, ParameterPoint(best.point.shared, own[held])
+        )
     parts = residuals_at(problem, best.layout, ParameterPoint(best.point.shared, own))
+    for row, part_of_row in zip(held, held_parts, strict=True):
+        parts[row] = part_of_row
     sse = each_sum_of_squares(parts)
     is_usable = bool(np.isfinite(sse).all())
     neighbour = _neighbour(parts) if is_usable else 0.0
+    fitted = drive_at(problem, best.layout, best.point)
+    white, cause = left_over(parts, problem, fitted, noise)
     shared = zip(best.layout.shared, best.point.shared, strict=True)
     own_values = np.array(
         [
@@ -249,10 +290,11 @@ def _evaluated(
         own_names=tuple(one.ref for one in best.layout.own),
         own=own_values,
         sse=sse,
-        whiteness=whiteness(parts, noise) if is_usable else float("inf"),
+        whiteness=white,
         neighbour=neighbour,
         iterations=best.iterations,
         has_converged=best.has_converged,
+        cause=cause,
     )
 
 
@@ -330,6 +372,13 @@ def fitted_effects(found: CandidateFit) -> dict[str, dict[str, float]]:
         if one.owner != START:
             effects.setdefault(one.owner, {})[one.parameter] = 0.0
     return effects
+
+
+def fitted_values(
+    found: CandidateFit, present: dict[str, dict[str, float]]
+) -> dict[str, dict[str, float]]:
+    """Shared parameters of all effects of a fit, those of the simulation included."""
+    return {**fitted_start(found, present), **fitted_effects(found)}
 
 
 def fitted_drive(drive: Drive, found: CandidateFit) -> Drive:

@@ -12,11 +12,15 @@ import numpy as np
 
 from hwid_cli.diagnosis.candidate import (
     Baseline,
+    SearchStart,
+    base_of,
     compared_with_fit,
     fit_candidate,
     fitted_drive,
 )
+from hwid_cli.diagnosis.causes import without_repeats
 from hwid_cli.diagnosis.findings import Findings, describe
+from hwid_cli.diagnosis.intervals import unclear_effects
 from hwid_cli.diagnosis.latent_force import latent_force
 from hwid_cli.diagnosis.noise import noise_floor
 from hwid_cli.diagnosis.parameters import (
@@ -80,7 +84,7 @@ def diagnose(
     held_out = options.hold_out
     if isinstance(held_out, str):
         held_out = held_out_names(recordings)
-    problem = prepare(recordings, simulation, options, held_out)
+    problem = without_repeats(prepare(recordings, simulation, options, held_out))
     noise = noise_floor(problem)
 
     on_round("base", 0)
@@ -99,7 +103,7 @@ def diagnose(
     where = places(before, noise, drive, force)
 
     criteria = SelectionCriteria.of(problem, noise)
-    found = RoundsResult((), (), {})
+    found = RoundsResult()
     if base.is_usable and not criteria.is_complete(base):
         baseline = Baseline(drive, scales, noise, problem.drive)
         allowed = allowed_effects(problem, options)
@@ -110,7 +114,14 @@ def diagnose(
 
     on_round("verdict", 0)
     given_sse = each_sum_of_squares([one.residual for one in given])
-    verdict = decide(criteria, given_sse, base, found.fits, found.best)
+    verdict = decide(
+        criteria,
+        given_sse,
+        base,
+        found.fits,
+        found.best,
+        lambda one: unclear_effects(problem, one, scales),
+    )
     return describe(
         Findings(
             problem=problem, criteria=criteria, scales=scales, given_sse=given_sse,
@@ -141,8 +152,8 @@ def _refit_base(
     problem: DiagnosisProblem, scales: Scales, noise: NoiseFloor
 ) -> CandidateFit:
     """Base, and the effects that the simulation has already, fitted again."""
-    present = drive_effects(problem.drive)
-    return fit_candidate(problem, (), [present], Baseline(problem.drive, scales, noise))
+    start = SearchStart(base_of(problem.drive), drive_effects(problem.drive))
+    return fit_candidate(problem, (), [start], scales, noise)
 
 
 def _shakes_at_rest(

@@ -9,18 +9,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hwid_cli.diagnosis.candidate import compared_with_fit, fitted_drive, rebuilt
+from hwid_cli.diagnosis.candidate import compared_with_fit, fitted_drive
+from hwid_cli.diagnosis.intervals import intervals
 from hwid_cli.diagnosis.latent_force import Smoothed
 from hwid_cli.diagnosis.next_experiment import propose
-from hwid_cli.diagnosis.parameters import (
-    ParameterLayout,
-    ParameterPoint,
-    residuals_at,
-    sum_of_squares,
-)
 from hwid_cli.diagnosis.problem import Compared, DiagnosisProblem
 from hwid_cli.diagnosis.rounds import RoundsResult
-from hwid_cli.diagnosis.search import local_matrix
 from hwid_cli.diagnosis.selection import DiagnosisVerdict, SelectionCriteria, ranked
 from hwid_cli.diagnosis.sentences import hidden_from_view, summarise
 from hwid_cli.diagnosis.where import latent_force_curves
@@ -42,10 +36,6 @@ from hwid_cli.records.diagnosis import (
 from hwid_cli.records.drive import BASE_PARAMETERS, Drive
 
 MOST_OVERLAYS = 4
-# Normal quantile of a 95 % interval.
-_QUANTILE = 1.96
-# Share of the best determined direction below which one counts as undetermined.
-_DETERMINED = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,10 +94,14 @@ def describe(findings: Findings) -> Diagnosis:
         base=_base(problem.drive, base, chosen),
         places=findings.where,
         not_observable=hidden_from_view(problem),
-        next_experiment=propose(problem, criteria, scales, verdict, found.fits),
+        next_experiment=propose(
+            problem, criteria, scales, verdict, list(found.fits.values())
+        ),
         train=tuple(one.name for one in problem.signals if not one.is_held_out),
         held_out=tuple(one.name for one in problem.signals if one.is_held_out),
-        candidates=ranked(criteria, found.fits, base, found.shares),
+        candidates=ranked(
+            criteria, list(found.fits.values()), base, found.shares
+        ),
         gaps=_recording_gaps(problem, given_sse, base, chosen),
         overlays=_overlays(before, after, noise),
         latent_force=latent_force_curves(
@@ -123,14 +117,16 @@ def describe(findings: Findings) -> Diagnosis:
 
 def _gap(criteria: SelectionCriteria, sse: np.ndarray) -> Gap:
     held = criteria.is_held_out
-    train = ~held if (~held).any() else held
-    train_rms, held_rms = (
+    # Without held-out recordings the training ones stand in for them.
+    has_held_out = bool((~held).any())
+    train = ~held if has_held_out else held
+    train_rms, judged_rms = (
         float(np.sqrt(sse[rows].sum() / criteria.n_samples[rows].sum()))
         for rows in (train, held)
     )
     noise_rms = criteria.noise.rms
-    ratio = held_rms / noise_rms if noise_rms > 0 else float("inf")
-    return Gap(train_rms, held_rms, ratio)
+    ratio = judged_rms / noise_rms if noise_rms > 0 else float("inf")
+    return Gap(train_rms, judged_rms if has_held_out else float("nan"), ratio)
 
 
 def _explained(
@@ -252,68 +248,3 @@ def _spread(factors: np.ndarray) -> FittedParameter:
     spread = float(np.std(factors, ddof=1) / np.mean(factors))
     reach = 1.96 / float(np.sqrt(2 * max(factors.size - 1, 1)))
     return FittedParameter("spread", spread, spread * (1 - reach), spread * (1 + reach))
-
-
-def intervals(
-    problem: DiagnosisProblem, found: CandidateFit, scales: Scales
-) -> tuple[np.ndarray, np.ndarray]:
-    """95 % intervals of what all recordings share.
-
-    Parameters
-    ----------
-    problem : DiagnosisProblem
-        Training and held-out recordings; the training ones decide.
-
-    Returns
-    -------
-    low, high : ndarray, shape (n_names,)
-        NaN where a recording cannot be simulated.
-    """
-    if not found.is_usable:
-        nothing = np.full(found.values.size, np.nan)
-        return nothing, nothing
-    fit_layout, point = rebuilt(problem, found, scales)
-    deviations = _standard_errors(problem, found, fit_layout, point)
-    with np.errstate(over="ignore"):
-        ends = np.array(
-            [
-                [
-                    one.value(q + sign * _QUANTILE * deviation)
-                    for one, q, deviation in zip(
-                        fit_layout.shared, point.shared, deviations, strict=True
-                    )
-                ]
-                for sign in (-1.0, 1.0)
-            ]
-        )
-    return ends.min(axis=0), ends.max(axis=0)
-
-
-def _standard_errors(
-    problem: DiagnosisProblem,
-    found: CandidateFit,
-    fit_layout: ParameterLayout,
-    point: ParameterPoint,
-) -> np.ndarray:
-    """Standard errors of the shared coordinates."""
-    rows = [row for row, one in enumerate(problem.signals) if not one.is_held_out]
-    train = problem.part(held_out=False)
-    at = ParameterPoint(point.shared, point.own[rows])
-    matrix = local_matrix(train, fit_layout, at)
-    sse = sum_of_squares(residuals_at(train, fit_layout, at))
-    freedom = max(train.n_evaluated - matrix.shape[0], 1)
-    # Residuals that go together count as fewer samples.
-    together = max(found.neighbour, 0.0)
-    inflation = (1 + together) / max(1 - together, 1e-3)
-    scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
-    variances = np.diag(_inverse(matrix / scale[:, None] / scale))
-    shared = slice(len(fit_layout.shared))
-    errors = np.sqrt(sse / freedom * inflation * variances[shared]) / scale[shared]
-    return np.asarray(errors)
-
-
-def _inverse(matrix: np.ndarray) -> np.ndarray:
-    """Inverse in which what nothing determines is large, not infinite."""
-    sizes, turned = np.linalg.eigh(matrix)
-    sizes = np.maximum(sizes, _DETERMINED * sizes[-1])
-    return np.asarray((turned / sizes) @ turned.T)

@@ -28,6 +28,8 @@ _LEAST_MULTIPLE, _MOST_MULTIPLE = 0.0, 4.0
 _VISIBLE = 1e-9
 # Starts that are kept for the fit of one candidate.
 KEPT_STARTS = 3
+# Of the best start's share.
+PROMISING_START = 0.3
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,7 +124,8 @@ def forecast(at_base: Linearisation, identifier: str) -> Forecast:
         starts = tuple(effect.starts(at_base.scales)[:1])
         return Forecast(identifier, 0.0, starts, np.zeros_like(error))
     tried.sort(key=lambda one: -one[0])
-    starts = tuple(start for _, start, _ in tried[:KEPT_STARTS])
+    least = PROMISING_START * tried[0][0]
+    starts = tuple(start for share, start, _ in tried[:KEPT_STARTS] if share >= least)
     return Forecast(identifier, tried[0][0], starts, tried[0][2])
 
 

@@ -85,7 +85,7 @@ def noise_floor(problem: DiagnosisProblem, *, rests: bool = True) -> NoiseFloor:
     sentence = _sentence(found, method, resolution, unit)
     return NoiseFloor(
         float(found.rms), method, resolution, found.is_coloured, found.whitening,
-        sentence,
+        sentence, _input_rms(problem),
     )  # fmt: skip
 
 
@@ -223,6 +223,7 @@ def portmanteau(
     whitening: Sequence[float],
     *,
     n_lags: int,
+    n_linked: int = 0,
     least_variance: float = 0.0,
 ) -> float:
     """Pooled portmanteau statistic over its limit; above 1 something remains.
@@ -234,6 +235,8 @@ def portmanteau(
     Parameters
     ----------
     pieces : sequence of ndarray, shape (n_samples,)
+    n_linked : int
+        First lags that are left out.
     least_variance : float
         The variance is taken as at least this.
 
@@ -256,11 +259,11 @@ def portmanteau(
     if counts[0] == 0:
         return 0.0
     variance = max(sums[0] / counts[0], least_variance)
-    used = counts[1:] > 0
+    used = (counts[1:] > 0) & (np.arange(n_lags) >= n_linked)
     if variance == 0 or not used.any():
         return 0.0
     scores = sums[1:][used] / (variance * np.sqrt(counts[1:][used]))
-    basis = np.linalg.qr(_errors_of(taps, scores.size))[0]
+    basis = np.linalg.qr(_errors_of(taps, n_lags)[used])[0]
     scores = scores - basis @ (basis.T @ scores)
     free = max(scores.size - basis.shape[1], 1)
     return float(scores @ scores / chi2.ppf(1 - FALSE_ALARM, free))
@@ -281,6 +284,12 @@ def _errors_of(taps: np.ndarray, n_lags: int) -> np.ndarray:
     columns = [np.concatenate([np.zeros(j), answer[: n_lags - j]])
                for j in range(min(order, n_lags - 1))]  # fmt: skip
     return np.array(columns).reshape(-1, n_lags).T
+
+
+def _input_rms(problem: DiagnosisProblem) -> float:
+    """Noise that the measured input may hold; a fast command makes it more."""
+    pieces = [one.driven_by[one.skip :] for one in problem.signals]
+    return float(_from_differences(pieces, 0.0))
 
 
 def _from_differences(pieces: Sequence[np.ndarray], step: float) -> float:

@@ -155,13 +155,22 @@ def parameter_layout(
             unknown = _unknown(identifier, parameter, value, scales)
             (own if parameter.is_own else shared).append(unknown)
     far = float("inf")
-    if problem.start != "rest":
+    if problem.start != "rest" or _rests_anywhere(problem):
         reach = scales.displacement_m
         own.append(Unknown(START, "position", False, reach, -far, far))
     if problem.start == "estimated":
         speed = scales.velocity_m_per_s
         own.append(Unknown(START, "velocity", False, speed, -far, far))
     return ParameterLayout(tuple(shared), tuple(own), tuple(effects))
+
+
+def _rests_anywhere(problem: DiagnosisProblem) -> bool:
+    """Whether recordings start at rest, but nothing says where: a free axis."""
+    return (
+        problem.start == "rest"
+        and problem.drive.stiffness_N_per_m == 0
+        and not problem.compares_command
+    )
 
 
 def _base_unknowns(drive: Drive) -> list[Unknown]:
@@ -221,6 +230,8 @@ def first_point(
                 each[row, column] = one.coordinate(value)
             elif one.name == "position" and problem.start == "estimated":
                 each[row, column] = one.coordinate(float(signals.output[0]))
+            elif one.name == "position" and problem.start == "rest":
+                each[row, column] = one.coordinate(signals.rest_position_m)
     return ParameterPoint(np.array(shared), each)
 
 
@@ -287,7 +298,7 @@ def _place_start(
     fit_layout: ParameterLayout,
     own: np.ndarray,
 ) -> None:
-    if problem.start != "rest":
+    if problem.start != "rest" or _rests_anywhere(problem):
         found = {
             one.name: one.value(q)
             for one, q in zip(fit_layout.own, own, strict=True)

@@ -37,6 +37,8 @@ class Signals:
     sample_time_s : float, [s]
     skip : int, [samples]
         First samples that are not evaluated.
+    used : ndarray of bool, shape (n_samples,), or None
+        Which of the others are; None means all.
     """
 
     name: str
@@ -48,6 +50,7 @@ class Signals:
     sample_time_s: float
     skip: int = 0
     is_held_out: bool = False
+    used: np.ndarray | None = None
 
     @cached_property
     def finely_driven_by(self) -> np.ndarray:
@@ -55,14 +58,37 @@ class Signals:
         return refined(self.driven_by)
 
     @property
-    def evaluated(self) -> slice:
-        """Samples that are evaluated."""
-        return slice(self.skip, None)
+    def evaluated(self) -> slice | np.ndarray:
+        """Samples that are evaluated, as an index."""
+        if self.used is None:
+            return slice(self.skip, None)
+        return np.flatnonzero(self.used[self.skip :]) + self.skip
 
     @property
     def n_evaluated(self) -> int:
         """Number of samples that are evaluated."""
-        return int(self.compared.size - self.skip)
+        if self.used is None:
+            return int(self.compared.size - self.skip)
+        return int(np.count_nonzero(self.used[self.skip :]))
+
+    def repaired(self, driven_by: np.ndarray) -> "Signals":
+        """Simulate with another input.
+
+        Parameters
+        ----------
+        driven_by : ndarray, shape (n_samples,)
+        """
+        return replace(self, driven_by=driven_by)
+
+    def only(self, used: np.ndarray) -> "Signals":
+        """Evaluate no other samples than these.
+
+        Parameters
+        ----------
+        used : ndarray of bool, shape (n_samples,)
+        """
+        both = used if self.used is None else used & self.used
+        return replace(self, used=both)
 
     @cached_property
     def rest_position_m(self) -> float:

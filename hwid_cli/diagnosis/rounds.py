@@ -1,12 +1,14 @@
-"""Rounds of candidate fits: forecasts, single effects, pairs, then sets of three.
+"""Rounds of candidate fits: single effects first, then larger and larger sets.
 
-Each round describes its fits as tasks and hands them to a runner that it is given, so
-that nothing here knows of processes or of a cache. docs/method_diagnosis.md.
+Every effect of the catalogue is fitted cheaply on top of the best sets so far; the
+promising ones are finished. What was found is used again: simpler effects start where
+richer ones ended, and the other way round, and each set is tried without each of its
+members. Each round describes its fits as tasks and hands them to a runner that it is
+given, so that nothing here knows of processes or of a cache. docs/method_diagnosis.md.
 """
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from math import exp
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
@@ -14,12 +16,15 @@ import numpy as np
 from hwid_cli.diagnosis.candidate import (
     SCREENING_SAMPLES,
     Baseline,
-    Start,
+    Screened,
+    SearchStart,
+    base_of,
     fewer_recordings,
     fit_candidate,
     fitted_drive,
-    fitted_effects,
     fitted_start,
+    fitted_values,
+    screen,
 )
 from hwid_cli.diagnosis.forecast import (
     Forecast,
@@ -28,40 +33,46 @@ from hwid_cli.diagnosis.forecast import (
     linearise,
     pair_shares,
 )
-from hwid_cli.diagnosis.parameters import sum_of_squares
 from hwid_cli.diagnosis.problem import DiagnosisProblem
 from hwid_cli.diagnosis.scales import scales_of_fit
 from hwid_cli.diagnosis.selection import (
-    LEAST_EXPLAINED_SET,
-    LEAST_GAIN,
-    LEAST_IMPROVED,
-    TIE,
+    LEAST_LAST_CONTRIBUTION,
     SelectionCriteria,
+    is_part_of,
     select_best,
 )
 from hwid_cli.drive.catalogue import CATALOGUE, public_id
+from hwid_cli.drive.effect import Values
 from hwid_cli.drive.simulation import drive_effects
 from hwid_cli.records.candidates import CandidateFit
 
-# Candidates that are fitted: the first ones by their forecast, more while they reach a
-# share of the best one's, and what includes the first few or is included in them.
-FEWEST_SINGLES = 5
-MOST_SINGLES = 10
-PROMISING = 0.1
-NESTED_OF = 3
-# A candidate that comes to less than this share of the best forecast is not finished.
-PRUNED_SHARE = 0.5
-# A further effect is fitted where it should explain this share of what is left beyond
-# the noise, a pair where it should explain this much more than its better half.
-PROMISING_ON_TOP = 0.15
-PROMISING_PAIR = 0.1
-FITTED_PAIRS = 10
-FITTED_ON_TOP = 8
-# Starts of a simpler effect in the place of another one.
-MOST_STARTS = 4
+# Candidates whose fit is finished: the first ones of the screening, more while what they
+# leave beyond the noise is at most so many times what the best one leaves.
+FEWEST_FINISHED = 4
+MOST_FINISHED = 10
+WITHIN_REACH = 4.0
+# Share of what a set leaves that counts as left beyond the noise, at least.
+LEAST_LEFT = 0.02
+# Candidates on top of a set, by their forecasts, that are screened.
+SCREENED_ON_TOP = 12
+# Sets that leave at most so many times what the best one leaves are searched on, at most
+# so many times.
+WORTH_MORE = 2.0
+MOST_TURNS = 3
+# Sets that the next larger ones are built on.
+MOST_PARENTS = 2
+LIKELY_PAIRS = 10
+# A pair is likely where it should explain this much more than its better half.
+PROMISING_PAIR = 0.05
+# Starts of one effect that are screened.
+SCREENED_STARTS = 3
+# A further effect is looked for only if the last one lowered the criterion by this much,
+# and explained this share of what the smaller set left.
+LEAST_STEP = 10.0
+LEAST_FURTHER = 0.25
 
 OnRound = Callable[[str, int], None]
-EffectSet = tuple[tuple[str, ...], list[Start]]
+Effects = tuple[str, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,193 +141,428 @@ class RoundsResult:
 
     Parameters
     ----------
+    fits : mapping of tuple of str to CandidateFit
+        The best fit of every set that was finished.
     best : tuple of CandidateFit
-        The best set of each size, from one on, up to the one that is chosen.
-    shares : dict of tuple of str to float
+        The best set of each size, from one on.
+    shares : mapping of tuple of str to float
         Forecast shares.
     """
 
-    fits: tuple[CandidateFit, ...]
-    best: tuple[CandidateFit, ...]
-    shares: dict[tuple[str, ...], float]
+    fits: Mapping[Effects, CandidateFit] = field(default_factory=dict)
+    best: tuple[CandidateFit, ...] = ()
+    shares: Mapping[Effects, float] = field(default_factory=dict)
 
 
 def run_rounds(rounds: Rounds, max_effects: int) -> RoundsResult:
     """Fit single effects, and larger sets while something remains."""
-    present = drive_effects(rounds.problem.drive)
-    few = fewer_recordings(rounds.problem.part(held_out=False), SCREENING_SAMPLES)
-    start = fitted_start(rounds.base, present)
-    at_base = linearise(few, rounds.baseline.drive, start, rounds.baseline.scales)
-    forecasts = _forecast_all(rounds, at_base, rounds.allowed)
-    shares: dict[tuple[str, ...], float] = {
-        (one.effect,): one.share for one in forecasts
-    }
-    if not forecasts or max_effects < 1:
-        return RoundsResult((), (), shares)
-    singles = _fit_singles(rounds, at_base, forecasts)
-    best = select_best(rounds.criteria, singles, rounds.base)
-    if best is None:
-        return RoundsResult(tuple(singles), (), shares)
-    found = RoundsResult(tuple(singles), (best,), shares)
-    if rounds.criteria.is_complete(best) or max_effects < 2:
-        return found
-    pairs = pair_shares(forecasts, at_base.error)
-    for size in range(2, max_effects + 1):
-        sets, pruning_limit = _sets_on_top(rounds, found, few)
-        if size == 2:
-            sets = _with_likely_pairs(sets, forecasts, pairs)
-        found, is_worth_it = _fit_larger_sets(rounds, found, sets, pruning_limit)
-        if not is_worth_it or rounds.criteria.is_complete(found.best[-1]):
+    search = _Search(rounds)
+    best: list[CandidateFit] = []
+    parents = [rounds.base]
+    for size in range(1, max_effects + 1):
+        if not rounds.allowed:
             break
-    return found
+        winner = search.round_of(size, parents)
+        if winner is None or (best and not search.is_better(winner, best[-1])):
+            break
+        best.append(winner)
+        if rounds.criteria.is_complete(winner) or search.is_nearly_all(winner):
+            break
+        parents = search.parents(size)
+    # From the largest down: what a set without one effect gains may be the better one.
+    for size in range(len(best), 1, -1):
+        search.fit_without_each(best[size - 1])
+        best[size - 2] = search.best_of_size(size - 1) or best[size - 2]
+    return RoundsResult(search.fits, tuple(best), search.shares)
 
 
-def _forecast_all(
-    rounds: Rounds, at_base: Linearisation, candidates: Sequence[str]
-) -> list[Forecast]:
-    """Rank candidates by what they should explain; too quick to be kept."""
-    rounds.on_round("forecasts", len(candidates))
-    tasks = [
-        DiagnosisTask(one, forecast, (at_base, one), Forecast, {"effect": one})
-        for one in candidates
-    ]
-    found: list[Forecast] = rounds.run_tasks(tasks, keep=False)
-    return sorted(found, key=lambda one: -one.share)
+class _Search:
+    """The state of a search over sets of effects: every fit so far."""
 
+    def __init__(self, rounds: Rounds) -> None:
+        self.rounds = rounds
+        self.fits: dict[Effects, CandidateFit] = {}
+        self.shares: dict[Effects, float] = {}
+        train = rounds.problem.part(held_out=False)
+        self._few = fewer_recordings(train, SCREENING_SAMPLES)
+        self._forecasts: list[Forecast] = []
+        self._error = np.zeros(0)
+        self._tried: set[tuple[Effects, str]] = set()
 
-def _fit_all(
-    rounds: Rounds, what: str, sets: Sequence[EffectSet], pruning_limit: float
-) -> list[CandidateFit]:
-    """Fit sets of effects; beyond the limit on the sum of squares none is finished."""
-    if not sets:
-        return []
-    rounds.on_round(what, len(sets))
-    tasks = [
-        DiagnosisTask(
-            name="+".join(ids),
-            function=fit_candidate,
-            arguments=(
-                rounds.problem, ids, tuple(starts), rounds.baseline, pruning_limit,
-            ),
-            result_type=CandidateFit,
-            # Part of the keys of kept fits: another word would lose them all.
-            content={"effects": ids, "starts": starts, "hopeless": pruning_limit},
-            arrays=(rounds.base.values,),
+    def round_of(
+        self, size: int, parents: Sequence[CandidateFit]
+    ) -> CandidateFit | None:
+        """Fit sets of one size on top of smaller ones; return the best of that size."""
+        proposed: dict[Effects, list[SearchStart]] = {}
+        for parent in parents:
+            for ids, starts in self._on_top(parent).items():
+                proposed.setdefault(ids, []).extend(starts)
+        if size == 2:
+            for ids, start in self._likely_pairs():
+                proposed.setdefault(ids, []).append(start)
+        name = _name_of(size)
+        screened = self._screen(name, proposed)
+        chosen = _promising(self.rounds, self._few, screened)
+        # What includes another candidate must be better; where the simpler one leaves
+        # nothing, it cannot be.
+        wide = {ids for ids in chosen if _includes_one_of(ids, chosen)}
+        self._finish(name, {ids: chosen[ids] for ids in chosen if ids not in wide})
+        best = self.best_of_size(size)
+        if best is None or not self.rounds.criteria.is_complete(best):
+            self._finish(
+                f"{name} that include others", {ids: chosen[ids] for ids in wide}
+            )
+        self._use_again(size)
+        self._go_on(size)
+        return self.best_of_size(size)
+
+    def best_of_size(self, size: int) -> CandidateFit | None:
+        """The best set of a size."""
+        return select_best(self.rounds.criteria, self._of_size(size), self.rounds.base)
+
+    def is_better(self, larger: CandidateFit, smaller: CandidateFit) -> bool:
+        """Whether a further effect is worth looking for more."""
+        against = self.rounds.criteria.evidence(larger, smaller)
+        return against.gain >= LEAST_STEP and against.explained >= LEAST_FURTHER
+
+    def is_nearly_all(self, found: CandidateFit) -> bool:
+        """Whether so little remains that no further effect could be named."""
+        criteria = self.rounds.criteria
+        whole = criteria.excess(self.rounds.base)
+        return criteria.excess(found) < LEAST_LAST_CONTRIBUTION * whole
+
+    def parents(self, size: int) -> list[CandidateFit]:
+        """Sets to build on: the best one, and the next that is of another kind."""
+        fits = sorted(
+            (one for one in self._of_size(size) if one.is_usable),
+            key=lambda one: -self.rounds.criteria.gain(one, self.rounds.base),
         )
-        for ids, starts in sets
-    ]  # fmt: skip
-    return rounds.run_tasks(tasks, keep=True)
+        best = self.best_of_size(size)
+        chosen = [best] if best is not None else []
+        for one in fits:
+            is_kin = any(is_part_of(one, two) or is_part_of(two, one) for two in chosen)
+            if not is_kin and len(chosen) < MOST_PARENTS:
+                chosen.append(one)
+        return chosen
 
+    def fit_without_each(self, whole: CandidateFit) -> None:
+        """Fit a set without each of its effects, from where the whole set ended."""
+        values = fitted_values(whole, drive_effects(self.rounds.problem.drive))
+        base = _base_values(whole, self.rounds)
+        sets = {}
+        for effect in whole.effects:
+            left = tuple(one for one in whole.effects if one != effect)
+            sets[left] = [SearchStart(base, _without(values, effect))]
+        self._finish("without each effect", sets)
 
-def _fit_singles(
-    rounds: Rounds, at_base: Linearisation, forecasts: Sequence[Forecast]
-) -> list[CandidateFit]:
-    """Fit single effects; those that include others come last and must be better."""
-    chosen = _promising(forecasts)
-    ids = {one.effect for one in chosen}
-    wide = {one for one in ids if ids & set(CATALOGUE[one].contains)}
-    pruning_limit = _pruning_limit(at_base, forecasts)
-    narrow = [((one.effect,), _starts(one)) for one in chosen if one.effect not in wide]
-    fits = _fit_all(rounds, "single effects", narrow, pruning_limit)
-    best = select_best(rounds.criteria, fits, rounds.base)
-    for is_wider in (False, True):
-        sets = [
-            ((one.effect,), _starts(one))
-            for one in chosen
-            if one.effect in wide and is_wider == _includes(one.effect, best)
+    def _of_size(self, size: int) -> list[CandidateFit]:
+        return [one for one in self.fits.values() if len(one.effects) == size]
+
+    def _on_top(self, parent: CandidateFit) -> dict[Effects, list[SearchStart]]:
+        """Starts of all sets with one effect more than a smaller set."""
+        rounds = self.rounds
+        baseline, present = rounds.baseline, drive_effects(rounds.problem.drive)
+        scales = baseline.scales
+        if parent is not rounds.base:
+            scales = scales_of_fit(rounds.problem, parent, scales, baseline.noise)
+        start = fitted_values(parent, present)
+        drive = fitted_drive(rounds.problem.drive, parent)
+        at = linearise(self._few, drive, start, scales)
+        others = [one for one in rounds.allowed if not _is_nested(one, parent.effects)]
+        found = self._forecast(at, others)
+        if parent is rounds.base:
+            self._forecasts, self._error = found, at.error
+            self.shares.update({(one.effect,): one.share for one in found})
+        else:
+            found = found[:SCREENED_ON_TOP]
+        bases = [base_of(drive)]
+        if parent is rounds.base:
+            bases = [base_of(one) for one in baseline.drives]
+        return {
+            _together(parent.effects, one.effect): [
+                SearchStart(base, {**start, one.effect: values})
+                for base in bases
+                for values in one.starts[:SCREENED_STARTS]
+            ]
+            for one in found
+        }
+
+    def _forecast(self, at: Linearisation, candidates: Sequence[str]) -> list[Forecast]:
+        """Rank candidates by what they should explain; too quick to be kept."""
+        self.rounds.on_round("forecasts", len(candidates))
+        tasks = [
+            DiagnosisTask(one, forecast, (at, one), Forecast, {"effect": one})
+            for one in candidates
         ]
-        least = pruning_limit
-        if best is not None:
-            names = {one.name for one in at_base.problem.signals}
-            rows = [one.name in names for one in rounds.problem.signals]
-            # What includes the best must gain in the screening; a rival may be as good.
-            likelihood = -1.0 if is_wider else TIE
-            near = exp(likelihood / at_base.problem.n_evaluated)
-            least = min(pruning_limit, float(best.sse[rows].sum() * near))
-        fits += _fit_all(rounds, "effects that include others", sets, least)
-    return fits
+        found: list[Forecast] = self.rounds.run_tasks(tasks, keep=False)
+        return sorted(found, key=lambda one: -one.share)
+
+    def _likely_pairs(self) -> Iterable[tuple[Effects, SearchStart]]:
+        """Pairs that should explain much more than their better half."""
+        found = {one.effect: one for one in self._forecasts}
+        present = fitted_start(
+            self.rounds.base, drive_effects(self.rounds.problem.drive)
+        )
+        base = base_of(self.rounds.baseline.drive)
+        likely = [
+            (first, second)
+            for share, first, second in pair_shares(self._forecasts, self._error)
+            if share >= max(found[first].share, found[second].share) + PROMISING_PAIR
+            and not _is_nested(first, (second,))
+        ]
+        for first, second in likely[:LIKELY_PAIRS]:
+            both = {one: found[one].starts[0] for one in (first, second)}
+            yield _together((first,), second), SearchStart(base, {**present, **both})
+
+    def _screen(
+        self, name: str, proposed: Mapping[Effects, list[SearchStart]]
+    ) -> list[Screened]:
+        """Fit all proposed sets cheaply."""
+        if not proposed:
+            return []
+        self.rounds.on_round(f"{name}, screening", len(proposed))
+        scales = self.rounds.baseline.scales
+        tasks = [
+            DiagnosisTask(
+                "+".join(ids), screen, (self._few, ids, starts, scales), Screened,
+                {"effects": ids},
+            )
+            for ids, starts in proposed.items()
+        ]  # fmt: skip
+        found: list[Screened] = self.rounds.run_tasks(tasks, keep=False)
+        return found
+
+    def _finish(self, what: str, sets: Mapping[Effects, Sequence[SearchStart]]) -> None:
+        """Fit sets of effects to the end; keep what is better than before."""
+        rounds = self.rounds
+        if not sets:
+            return
+        rounds.on_round(what, len(sets))
+        baseline = rounds.baseline
+        tasks = [
+            DiagnosisTask(
+                name="+".join(ids),
+                function=fit_candidate,
+                arguments=(
+                    rounds.problem, ids, tuple(starts), baseline.scales, baseline.noise,
+                ),
+                result_type=CandidateFit,
+                content={"effects": ids, "starts": list(starts)},
+                arrays=(rounds.base.values,),
+            )
+            for ids, starts in sets.items()
+        ]  # fmt: skip
+        for one in rounds.run_tasks(tasks, keep=True):
+            before = self.fits.get(one.effects)
+            if before is None or _train_sse(rounds, one) < _train_sse(rounds, before):
+                self.fits[one.effects] = one
+
+    def _use_again(self, size: int) -> None:
+        """Start simpler effects where richer ones ended, and the other way round."""
+        for _ in range(2):
+            sets = self._again(size)
+            if not sets:
+                return
+            name = f"{_name_of(size)}, from related ones"
+            best = self.best_of_size(size)
+            screened = self._screen(name, sets)
+            near = self._near(screened, best)
+            if not near:
+                return
+            self._finish(name, near)
+
+    def _go_on(self, size: int) -> None:
+        """Search on where the best sets stopped at the limit of iterations."""
+        present = drive_effects(self.rounds.problem.drive)
+        for _ in range(MOST_TURNS):
+            best = self.best_of_size(size)
+            if best is None:
+                return
+            least = WORTH_MORE * self.rounds.criteria.excess(best)
+            sets = {
+                one.effects: self._unless_tried(
+                    one.effects,
+                    [
+                        SearchStart(
+                            _base_values(one, self.rounds), fitted_values(one, present)
+                        )
+                    ],
+                )
+                for one in self._of_size(size)
+                if not one.has_converged
+                and one.is_usable
+                and self.rounds.criteria.excess(one) <= least
+            }
+            sets = {ids: starts for ids, starts in sets.items() if starts}
+            if not sets:
+                return
+            self._finish(f"{_name_of(size)}, going on", sets)
+
+    def _near(
+        self, screened: Sequence[Screened], best: CandidateFit | None
+    ) -> dict[Effects, Sequence[SearchStart]]:
+        """Sets that come close to the best one in the screening."""
+        if best is None:
+            return {}
+        names = {one.name for one in self._few.signals}
+        rows = [one.name in names for one in self.rounds.problem.signals]
+        floor = self._few.n_evaluated * self.rounds.baseline.noise.rms**2
+        reached = float(best.sse[rows].sum())
+        most = floor + WITHIN_REACH * max(reached - floor, LEAST_LEFT * reached)
+        return {one.effects: one.starts for one in screened if one.sse <= most}
+
+    def _again(self, size: int) -> dict[Effects, list[SearchStart]]:
+        """Starts from related fits that have come further than a set's own fit.
+
+        Related are sets in which one effect is another one, nested with it or easily
+        confused with it, and the smaller set with this effect faint.
+        """
+        rounds = self.rounds
+        present = drive_effects(rounds.problem.drive)
+        fits = self._of_size(size)
+        best = self.best_of_size(size)
+        is_complete = best is not None and rounds.criteria.is_complete(best)
+        if best is None or not np.isfinite(_train_sse(rounds, best)):
+            return {}
+        sets: dict[Effects, list[SearchStart]] = {}
+        for effect in best.effects:
+            others = tuple(one for one in best.effects if one != effect)
+            relatives = (
+                CATALOGUE[effect].contains if is_complete else _relatives(effect)
+            )
+            for relative in relatives:
+                ids = _together(others, relative)
+                if relative not in rounds.allowed or _is_nested(relative, others):
+                    continue
+                here = self.fits.get(ids)
+                if here is not None and not self._is_behind(here, best):
+                    continue
+                values = fitted_values(best, present)
+                scales = rounds.baseline.scales
+                starts = [
+                    SearchStart(
+                        _base_values(best, rounds),
+                        {**_without(values, effect), relative: one},
+                    )
+                    for one in _translated(relative, values[effect], scales)
+                ]
+                if here is not None:
+                    own = fitted_values(here, present)
+                    starts.append(SearchStart(_base_values(best, rounds), own))
+                sets[ids] = self._unless_tried(ids, starts)
+        for one in fits:
+            smaller = self._largest_part(one)
+            if is_complete or smaller is None or not self._is_behind(one, smaller):
+                continue
+            (added,) = set(one.effects) - set(smaller.effects)
+            values = fitted_values(smaller, present)
+            faint = CATALOGUE[added].faint(
+                fitted_values(one, present)[added], rounds.baseline.scales
+            )
+            start = SearchStart(_base_values(smaller, rounds), {**values, added: faint})
+            sets[one.effects] = [
+                *sets.get(one.effects, []),
+                *self._unless_tried(one.effects, [start]),
+            ]
+        return {ids: starts for ids, starts in sets.items() if starts}
+
+    def _unless_tried(
+        self, ids: Effects, starts: Sequence[SearchStart]
+    ) -> list[SearchStart]:
+        fresh = []
+        for one in starts:
+            key = (ids, repr(one))
+            if key not in self._tried:
+                self._tried.add(key)
+                fresh.append(one)
+        return fresh
+
+    def _largest_part(self, whole: CandidateFit) -> CandidateFit | None:
+        """The best fit with one effect less; the base for a single effect."""
+        if len(whole.effects) == 1:
+            return self.rounds.base
+        parts = [
+            self.fits[left]
+            for effect in whole.effects
+            if (left := tuple(one for one in whole.effects if one != effect))
+            in self.fits
+        ]
+        usable = [one for one in parts if one.is_usable]
+        return min(usable, key=lambda one: _train_sse(self.rounds, one), default=None)
+
+    def _is_behind(self, one: CandidateFit, other: CandidateFit) -> bool:
+        """Whether a fit has left more of the training recordings than another one."""
+        return _train_sse(self.rounds, one) > _train_sse(self.rounds, other)
 
 
-def _includes(effect: str, best: CandidateFit | None) -> bool:
-    return best is not None and best.effects[0] in CATALOGUE[effect].contains
+def _name_of(size: int) -> str:
+    return "single effects" if size == 1 else f"sets of {size} effects"
 
 
-def _starts(expected: Forecast) -> list[Start]:
-    return [{expected.effect: start} for start in expected.starts]
+def _together(effects: Effects, another: str) -> Effects:
+    return tuple(sorted((*effects, another)))
 
 
-def _promising(forecasts: Sequence[Forecast]) -> list[Forecast]:
-    """First ones by forecast, with those nested with the very first."""
-    least = PROMISING * forecasts[0].share
+def _without(values: Mapping[str, Values], effect: str) -> dict[str, Values]:
+    return {name: one for name, one in values.items() if name != effect}
+
+
+def _train_sse(rounds: Rounds, found: CandidateFit) -> float:
+    """Sum of squares of the training recordings."""
+    rows = np.array([not one.is_held_out for one in rounds.problem.signals])
+    return float(found.sse[rows].sum())
+
+
+def _base_values(found: CandidateFit, rounds: Rounds) -> dict[str, float]:
+    return base_of(fitted_drive(rounds.problem.drive, found))
+
+
+def _promising(
+    rounds: Rounds, few: DiagnosisProblem, screened: Sequence[Screened]
+) -> dict[Effects, Sequence[SearchStart]]:
+    """Sets whose fits are finished: the first ones of the screening, and their kin."""
+    ranked = sorted(screened, key=lambda one: one.sse)
+    usable = [one for one in ranked if np.isfinite(one.sse)]
+    if not usable:
+        return {}
+    floor = few.n_evaluated * rounds.baseline.noise.rms**2
+    least = max(usable[0].sse - floor, LEAST_LEFT * usable[0].sse)
     chosen = {
-        one.effect
-        for rank, one in enumerate(forecasts[:MOST_SINGLES])
-        if rank < FEWEST_SINGLES or one.share >= least
+        one.effects
+        for rank, one in enumerate(usable[:MOST_FINISHED])
+        if rank < FEWEST_FINISHED or one.sse - floor <= WITHIN_REACH * least
     }
-    first = [one.effect for one in forecasts[:NESTED_OF]]
-    for one in forecasts:
-        contains = CATALOGUE[one.effect].contains
-        if any(name in contains for name in first):
-            chosen.add(one.effect)
-        if one.effect in first:
-            chosen |= set(contains)
-    return [one for one in forecasts if one.effect in chosen]
+    return {one.effects: one.starts for one in usable if one.effects in chosen}
 
 
-def _sets_on_top(
-    rounds: Rounds, found: RoundsResult, few: DiagnosisProblem
-) -> tuple[dict[tuple[str, ...], list[Start]], float]:
-    """Sets of the best one with another effect, and the limit to prune them by."""
-    best, baseline = found.best[-1], rounds.baseline
-    values = fitted_effects(best)
-    scales = scales_of_fit(rounds.problem, best, baseline.scales, baseline.noise)
-    at_best = linearise(few, fitted_drive(rounds.problem.drive, best), values, scales)
-    others = [one for one in rounds.allowed if not _is_nested(one, best.effects)]
-    on_top = [
-        one
-        for one in _forecast_all(rounds, at_best, others)[:FITTED_ON_TOP]
-        if _share_of_excess(rounds, at_best, one.share) >= PROMISING_ON_TOP
-    ]
-    kept = {name: values[name] for name in best.effects}
-    sets: dict[tuple[str, ...], list[Start]] = {}
-    for one in on_top:
-        ids = tuple(sorted((*best.effects, one.effect)))
-        sets[ids] = [{**kept, one.effect: start} for start in one.starts[:2]]
-    return sets, _pruning_limit(at_best, on_top)
+def _includes_one_of(effects: Effects, others: Iterable[Effects]) -> bool:
+    """Whether a set is another one but for one effect that includes the other's."""
+    for other in others:
+        more, less = set(effects) - set(other), set(other) - set(effects)
+        if len(more) == 1 == len(less):
+            (wide,), (narrow,) = more, less
+            if narrow in CATALOGUE[wide].contains:
+                return True
+    return False
 
 
-def _with_likely_pairs(
-    sets: Mapping[tuple[str, ...], list[Start]],
-    forecasts: Sequence[Forecast],
-    pairs: Sequence[tuple[float, str, str]],
-) -> dict[tuple[str, ...], list[Start]]:
-    """Add pairs that should explain much more than their better half."""
-    starts = {one.effect: one.starts[0] for one in forecasts}
-    least = forecasts[0].share + PROMISING_PAIR
-    likely = [
-        pair
-        for pair in pairs
-        if pair[0] >= least and not _is_nested(pair[1], (pair[2],))
-    ]
-    together = dict(sets)
-    for _, first, second in likely[:FITTED_PAIRS]:
-        ids = tuple(sorted((first, second)))
-        start: Start = {first: starts[first], second: starts[second]}
-        together[ids] = [*together.get(ids, []), start]
-    return together
+def _relatives(effect: str) -> list[str]:
+    """Effects that an effect contains, that contain it, or that look like it."""
+    contained = CATALOGUE[effect].contains
+    containing = [name for name, one in CATALOGUE.items() if effect in one.contains]
+    alike = [name for name in CATALOGUE[effect].confused_with if name in CATALOGUE]
+    return list(dict.fromkeys((*contained, *containing, *alike)))
 
 
-def _share_of_excess(rounds: Rounds, at_best: Linearisation, share: float) -> float:
-    """Share of the error beyond the noise, from a share of the whole error."""
-    size = sum_of_squares(at_best.parts)
-    excess = size - at_best.problem.n_evaluated * rounds.baseline.noise.rms**2
-    return share * size / excess if excess > 0 else 0.0
-
-
-def _pruning_limit(at: Linearisation, forecasts: Sequence[Forecast]) -> float:
-    """Sum of squares in the screening beyond which a candidate is far behind."""
-    share = max((one.share for one in forecasts), default=0.0)
-    return sum_of_squares(at.parts) * (1 - PRUNED_SHARE * share)
+def _translated(effect: str, values: Values, scales: Any) -> list[dict[str, float]]:
+    """Start values of an effect from those of a related one: equal names, equal values."""
+    starts = CATALOGUE[effect].starts(scales)[:SCREENED_STARTS]
+    found = []
+    for start in starts:
+        same = {name: values.get(name, value) for name, value in start.items()}
+        if same not in found:
+            found.append(same)
+    return found
 
 
 def _is_nested(effect: str, others: Sequence[str]) -> bool:
@@ -329,50 +575,3 @@ def _is_nested(effect: str, others: Sequence[str]) -> bool:
         or public_id(effect) == public_id(other)
         for other in others
     )
-
-
-def _fit_larger_sets(
-    rounds: Rounds,
-    found: RoundsResult,
-    sets: Mapping[tuple[str, ...], list[Start]],
-    pruning_limit: float,
-) -> tuple[RoundsResult, bool]:
-    """Fit larger sets, and take the best one if it is worth it."""
-    what = f"sets of {len(found.best) + 1} effects"
-    fits = _fit_all(rounds, what, list(sets.items()), pruning_limit)
-    larger = select_best(rounds.criteria, fits, rounds.base)
-    simpler = _simpler_sets(rounds, larger, [one.effects for one in fits])
-    fits += _fit_all(rounds, "simpler effects in the best set", simpler, pruning_limit)
-    larger = select_best(rounds.criteria, fits, rounds.base)
-    together = (*found.fits, *fits)
-    if larger is None or not _is_worth_it(rounds, larger, found.best[-1]):
-        return RoundsResult(together, found.best, found.shares), False
-    return RoundsResult(together, (*found.best, larger), found.shares), True
-
-
-def _simpler_sets(
-    rounds: Rounds, best: CandidateFit | None, tried: Sequence[tuple[str, ...]]
-) -> list[EffectSet]:
-    """Sets with a limit case in the place of an effect of the best one."""
-    if best is None:
-        return []
-    values = fitted_effects(best)
-    found: list[EffectSet] = []
-    for effect in best.effects:
-        others = [one for one in best.effects if one != effect]
-        kept = {one: values[one] for one in others}
-        for simpler in CATALOGUE[effect].contains:
-            ids = tuple(sorted((*others, simpler)))
-            if simpler in rounds.allowed and ids not in tried:
-                starts = CATALOGUE[simpler].starts(rounds.baseline.scales)[:MOST_STARTS]
-                found.append((ids, [{**kept, simpler: one} for one in starts]))
-    return found
-
-
-def _is_worth_it(rounds: Rounds, larger: CandidateFit, smaller: CandidateFit) -> bool:
-    """Whether a further effect explains most of what the smaller set leaves."""
-    criteria = rounds.criteria
-    against = criteria.evidence(larger, smaller)
-    explains = against.explained >= LEAST_EXPLAINED_SET or criteria.is_complete(larger)
-    is_clear = against.gain >= LEAST_GAIN and against.improved >= LEAST_IMPROVED
-    return is_clear and explains

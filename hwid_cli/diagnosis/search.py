@@ -11,7 +11,8 @@ Marquardt (1963); damping rule of Nielsen (1999), IMM-REP-1999-05.
 docs/method_diagnosis.md, eq. (D16) to (D18).
 """
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -29,12 +30,16 @@ from hwid_cli.diagnosis.problem import DiagnosisProblem
 # Difference for derivatives, in coordinates; large enough to look across the corners of
 # thresholds, small enough for a straight line.
 _DIFFERENCE = 3e-4
-LEAST_GAIN = 1e-5
+LEAST_GAIN = 2e-5
+# A step that promises less than this is not tried shorter.
+LEAST_PROMISE = 2e-6
 _FIRST_DAMPING = 1e-3
 _LARGEST_DAMPING = 1e8
 _LARGEST_STEP = 1.5
 _LEAST_DIAGONAL = 1e-14
 OWN_ITERATIONS = 12
+# Blocks of a recording whose own values are evaluated on other blocks; an even number.
+_BLOCKS = 10
 # Values that an own parameter is tried at before its search.
 _OWN_TRIALS = {
     "phase_rad": (0.0, 0.5 * np.pi, np.pi, 1.5 * np.pi),
@@ -76,7 +81,7 @@ def fit_point(
     point: ParameterPoint,
     *,
     max_iterations: int,
-    only_own: bool = False,
+    own_columns: Sequence[int] | None = None,
 ) -> SearchResult:
     """Lower the sum of squared residuals until it stands still.
 
@@ -86,12 +91,13 @@ def fit_point(
         Where to start.
     max_iterations : int
         Limit on accepted steps.
-    only_own : bool
-        Hold what is shared, find each recording's own values.
+    own_columns : sequence of int or None
+        Hold what is shared, and find these of each recording's own values; None finds
+        everything.
     """
     parts = residuals_at(problem, fit_layout, point)
     place = _Iterate(point, parts, sum_of_squares(parts))
-    free = _free(fit_layout, len(problem.signals), only_own=only_own)
+    free = _free(fit_layout, len(problem.signals), own_columns)
     if not np.isfinite(place.sse) or not free.any():
         return SearchResult(fit_layout, point, place.sse, 0, False)
     damping, small = _FIRST_DAMPING, 0
@@ -128,7 +134,7 @@ def _one_step(
             ratio = (place.sse - sse) / max(predicted, 1e-300)
             damping *= max(1 / 3, 1 - (2 * min(ratio, 1.0) - 1) ** 3)
             return _Iterate(proposed, parts, sse), damping
-        if predicted < 1e-3 * LEAST_GAIN * place.sse:
+        if predicted < LEAST_PROMISE * place.sse:
             break
         damping, growth = damping * growth, growth * 2
     return None, damping
@@ -183,7 +189,7 @@ def local_matrix(
     ndarray, shape (n_unknowns, n_unknowns)
     """
     parts = residuals_at(problem, fit_layout, point)
-    free = _free(fit_layout, len(problem.signals), only_own=False)
+    free = _free(fit_layout, len(problem.signals), None)
     return _normal_equations(problem, fit_layout, point, parts, free)[0]
 
 
@@ -208,12 +214,13 @@ def _normal_equations(
 
 
 def _free(
-    fit_layout: ParameterLayout, recordings: int, *, only_own: bool
+    fit_layout: ParameterLayout, recordings: int, own_columns: Sequence[int] | None
 ) -> np.ndarray:
-    free = np.ones(fit_layout.size(recordings), dtype=bool)
-    if only_own:
-        free[: len(fit_layout.shared)] = False
-    return free
+    if own_columns is None:
+        return np.ones(fit_layout.size(recordings), dtype=bool)
+    each = np.zeros((recordings, len(fit_layout.own)), dtype=bool)
+    each[:, list(own_columns)] = True
+    return np.concatenate([np.zeros(len(fit_layout.shared), dtype=bool), each.ravel()])
 
 
 def _step(
@@ -302,9 +309,61 @@ def fit_own(
     first = first_point(problem, _only_own(fit_layout), problem.drive, start)
     point = with_own_trials(problem, fit_layout, ParameterPoint(shared, first.own))
     found = fit_point(
-        problem, fit_layout, point, max_iterations=OWN_ITERATIONS, only_own=True
+        problem,
+        fit_layout,
+        point,
+        max_iterations=OWN_ITERATIONS,
+        own_columns=range(len(fit_layout.own)),
     )
     return found.point
+
+
+def cross_fitted(
+    problem: DiagnosisProblem, fit_layout: ParameterLayout, point: ParameterPoint
+) -> list[np.ndarray]:
+    """Residuals of each recording with own values from its other samples.
+
+    A recording is cut into blocks. What belongs to it alone (a phase, a factor) is found
+    from every second block and evaluated on the others, and the other way round: no
+    value is evaluated on the samples that it was fitted to. How a recording starts is
+    kept, because later samples do not show it.
+
+    Parameters
+    ----------
+    point : ParameterPoint
+        Own values that were found from all samples.
+
+    Returns
+    -------
+    list of ndarray, shape (n_evaluated,)
+    """
+    parts = residuals_at(problem, fit_layout, point)
+    columns = [j for j, one in enumerate(fit_layout.own) if one.owner != START]
+    if not columns:
+        return parts
+    turns = [_blocks(one.driven_by.size) for one in problem.signals]
+    for is_first in (True, False):
+        signals = tuple(
+            one.only(turn == is_first)
+            for one, turn in zip(problem.signals, turns, strict=True)
+        )
+        found = fit_point(
+            replace(problem, signals=signals),
+            fit_layout,
+            point,
+            max_iterations=OWN_ITERATIONS,
+            own_columns=columns,
+        )
+        others = residuals_at(problem, fit_layout, found.point)
+        for row, (one, turn) in enumerate(zip(problem.signals, turns, strict=True)):
+            judged = (turn != is_first)[one.evaluated]
+            parts[row] = np.where(judged, others[row], parts[row])
+    return parts
+
+
+def _blocks(n_samples: int) -> np.ndarray:
+    """Which samples belong to every second block."""
+    return (np.arange(n_samples) * _BLOCKS // n_samples) % 2 == 0
 
 
 def _only_own(fit_layout: ParameterLayout) -> ParameterLayout:

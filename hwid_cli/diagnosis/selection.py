@@ -7,12 +7,13 @@ the recordings cannot tell apart are all given.
 docs/method_diagnosis.md, eq. (D21) to (D25).
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.stats import f as f_distribution
 
-from hwid_cli.diagnosis.problem import DiagnosisProblem
+from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals
 from hwid_cli.drive.catalogue import CATALOGUE, public_id
 from hwid_cli.records.candidates import CandidateFit, RankedCandidate
 from hwid_cli.records.diagnosis import NoiseFloor
@@ -21,10 +22,21 @@ from hwid_cli.records.diagnosis import NoiseFloor
 LEAST_GAIN = 10.0
 # Share of the held-out excess over the noise that a single effect must explain ...
 LEAST_EXPLAINED = 0.5
+# ... and one that leaves more than so many times the noise ...
+STILL_LARGE = 3.0
+LEAST_EXPLAINED_LARGE = 0.65
 # ... and a set of several, which imitates more ...
 LEAST_EXPLAINED_SET = 0.8
+# ... of which each effect must bring this share of all, less where nothing remains: a law
+# that is not quite right leaves as much.
+LEAST_CONTRIBUTION = 5e-3
+LEAST_LAST_CONTRIBUTION = 5e-4
 # ... in this share of the held-out recordings.
 LEAST_IMPROVED = 0.65
+# Chance at which changes between recordings are said to go with their inputs, and the
+# recordings beyond the fitted features that such a test needs.
+CHANCE = 1e-3
+_LEAST_FREEDOM = 3
 # A recording counts where its sum of squares changes by this share of the mean change.
 LEAST_CHANGE = 0.1
 # Changes of a parameter between recordings below this are scatter, [-].
@@ -38,6 +50,11 @@ CLOSE_TO_NOISE = 1.03
 _NEARLY_WHITE = 2.0
 # Candidates closer than this are not told apart.
 TIE = 6.0
+# Nor are those that leave at most so many times as much beyond the noise, where both
+# leave something.
+WITHIN_REACH = 1.25
+# Share that each of several rivals explains of what none of them explains for the most.
+LEAST_OF_RIVALS = 0.35
 # An effect that includes another one must add this share of what both gain.
 LEAST_ADDED = 0.03
 
@@ -69,11 +86,14 @@ class SelectionCriteria:
     ----------
     n_samples : ndarray, shape (n_recordings,)
     is_held_out : ndarray of bool, shape (n_recordings,)
+    inputs : ndarray, shape (n_recordings, n_features)
+        Size, direction and speed of each recording's input.
     """
 
     n_samples: np.ndarray
     is_held_out: np.ndarray
     noise: NoiseFloor
+    inputs: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
 
     @classmethod
     def of(cls, problem: DiagnosisProblem, noise: NoiseFloor) -> "SelectionCriteria":
@@ -82,7 +102,9 @@ class SelectionCriteria:
         # A single recording validates itself; the report says so.
         held = held if held.any() else ~held
         counts = np.array([one.n_evaluated for one in problem.signals])
-        return cls(counts, held, noise)
+        return cls(
+            counts, held, noise, np.array([_features(one) for one in problem.signals])
+        )
 
     def rms(self, found: CandidateFit, *, held_out: bool) -> float:
         """RMS over the held-out recordings, or the others.
@@ -144,6 +166,16 @@ class SelectionCriteria:
         more = count(found) - count(other)
         return float(n * fits - more * np.log(max(n, 2.0)))
 
+    def excess(self, found: CandidateFit) -> float:
+        """Sum of squares of all recordings beyond the noise.
+
+        Returns
+        -------
+        float, [output unit squared]
+        """
+        floor = float(self.n_samples.sum()) * self.noise.rms**2
+        return max(float(found.sse.sum()) - floor, 0.0)
+
     def is_complete(self, found: CandidateFit) -> bool:
         """Whether nothing but noise remains."""
         return found.is_usable and found.whiteness <= 1.0
@@ -161,13 +193,67 @@ class SelectionCriteria:
         docs/method_diagnosis.md, eq. (D24).
         """
         against = self.evidence(found, base)
-        least = LEAST_EXPLAINED if len(found.effects) == 1 else LEAST_EXPLAINED_SET
+        is_large = self.ratio(found) > STILL_LARGE
+        if len(found.effects) > 1:
+            # Where much remains, a further effect makes up for a law that is not right.
+            explains = against.explained >= LEAST_EXPLAINED_SET and not is_large
+        else:
+            least = LEAST_EXPLAINED_LARGE if is_large else LEAST_EXPLAINED
+            explains = against.explained >= least
         return (
             against.gain >= LEAST_GAIN
-            and (against.explained >= least or self.is_complete(found))
+            and (explains or self.is_complete(found))
             and against.improved >= LEAST_IMPROVED
             and has_size(found)
+            and not self.is_systematic(found)
         )
+
+    def is_systematic(self, found: CandidateFit) -> bool:
+        """Whether what should differ by chance goes with the recordings' inputs.
+
+        A parameter that changes with size, direction or speed of the input stands in for
+        a law that is missing.
+
+        References
+        ----------
+        docs/method_diagnosis.md, eq. (D24).
+        """
+        columns = [
+            column
+            for column, one in enumerate(found.own_names)
+            if one.parameter.startswith("log_")
+        ]
+        return any(_goes_with(found.own[:, one], self.inputs) for one in columns)
+
+
+def _features(signals: Signals) -> tuple[float, float, float]:
+    """Size, direction and speed of an input."""
+    moved = signals.driven_by - signals.driven_by[0]
+    size = float(np.max(np.abs(moved))) or 1.0
+    speed = float(np.sqrt(np.mean(np.diff(moved) ** 2))) / size
+    return (
+        float(np.log(size)),
+        float(np.mean(moved)) / size,
+        float(np.log(speed + 1e-9)),
+    )
+
+
+def _goes_with(values: np.ndarray, inputs: np.ndarray) -> bool:
+    """Whether values follow the inputs' features more than by chance (F test)."""
+    n = values.size
+    if inputs.shape[0] != n:
+        return False
+    spread = inputs.std(axis=0)
+    used = inputs[:, spread > 1e-6]
+    freedom = n - used.shape[1] - 1
+    if used.shape[1] == 0 or freedom < _LEAST_FREEDOM:
+        return False
+    columns = np.column_stack([np.ones(n), used])
+    left = values - columns @ np.linalg.lstsq(columns, values, rcond=None)[0]
+    whole = float(np.sum((values - values.mean()) ** 2))
+    unexplained = float(left @ left)
+    ratio = (whole - unexplained) / used.shape[1] / max(unexplained / freedom, 1e-300)
+    return bool(f_distribution.sf(ratio, used.shape[1], freedom) < CHANCE)
 
 
 def count(found: CandidateFit) -> int:
@@ -188,7 +274,7 @@ def ranked(
     criteria: SelectionCriteria,
     found: Sequence[CandidateFit],
     base: CandidateFit,
-    shares: dict[tuple[str, ...], float],
+    shares: Mapping[tuple[str, ...], float],
 ) -> tuple[RankedCandidate, ...]:
     """Table of all candidates, the best first.
 
@@ -207,7 +293,7 @@ def ranked(
     )
     rows += [
         RankedCandidate(
-            ids, share, False, nan, nan, nan, nan, nan, nan, "not fitted: far behind"
+            ids, share, False, nan, nan, nan, nan, nan, nan, "not finished: far behind"
         )
         for ids, share in waiting
     ]
@@ -218,7 +304,7 @@ def _row(
     criteria: SelectionCriteria,
     found: CandidateFit,
     base: CandidateFit,
-    shares: dict[tuple[str, ...], float],
+    shares: Mapping[tuple[str, ...], float],
 ) -> RankedCandidate:
     share = shares.get(found.effects, float("nan"))
     nan = float("nan")
@@ -306,12 +392,17 @@ def rivals(
 ) -> list[CandidateFit]:
     """List the candidates that the data cannot tell from the best one.
 
+    Where the best one leaves nothing but noise, its criterion decides. Where it leaves
+    more, its law is not quite the machine's, and neither is a rival's: those that leave
+    about as much are as likely.
+
     Returns
     -------
     list of CandidateFit
         Those that include the best one, or are included in it, are left out: they are
         measured by what they add.
     """
+    is_complete = criteria.is_complete(best)
     return [
         one
         for one in found
@@ -320,7 +411,13 @@ def rivals(
         and not is_part_of(best, one)
         and not is_part_of(one, best)
         and names_of(one) != names_of(best)
-        and criteria.gain(best, one) < TIE
+        and (
+            criteria.gain(best, one) < TIE
+            or (
+                not is_complete
+                and criteria.excess(one) <= WITHIN_REACH * criteria.excess(best)
+            )
+        )
     ]
 
 
@@ -358,8 +455,9 @@ def decide(
     criteria: SelectionCriteria,
     given_sse: np.ndarray,
     base: CandidateFit,
-    fits: Sequence[CandidateFit],
+    fits: Mapping[tuple[str, ...], CandidateFit],
     best: Sequence[CandidateFit],
+    unclear: Callable[[CandidateFit], tuple[str, ...]],
 ) -> DiagnosisVerdict:
     """Weigh the evidence.
 
@@ -369,31 +467,90 @@ def decide(
         Of the simulation with the parameters that the configuration gives.
     base : CandidateFit
         Re-fitted, without further effects.
-    fits : sequence of CandidateFit
+    fits : mapping of tuple of str to CandidateFit
         Of all sets of effects.
     best : sequence of CandidateFit
-        The best of each size, each worth its further effect.
+        The best of each size.
+    unclear : callable
+        Effects of a fit that may as well not be there.
     """
     if criteria.is_complete(base):
         return DiagnosisVerdict(
             _without_effect(criteria, given_sse, base), True, base, ()
         )
-    for chosen in reversed(best):
-        if not criteria.may_be_named(chosen, base):
+
+    def may_be_named(one: CandidateFit) -> bool:
+        return (
+            criteria.may_be_named(one, base)
+            and _needs_each(criteria, one, fits, base)
+            and not unclear(one)
+        )
+
+    for winner in reversed(best):
+        same_size = [one for one in fits.values()
+                     if len(one.effects) == len(winner.effects)]  # fmt: skip
+        simpler = [one for one in same_size
+                   if one is not winner and is_part_of(one, winner)]  # fmt: skip
+        chosen = next((one for one in (winner, *simpler) if may_be_named(one)), None)
+        if chosen is None:
             continue
-        same_size = [one for one in fits if len(one.effects) == len(chosen.effects)]
-        near = [
-            one
-            for one in rivals(criteria, same_size, chosen)
-            if criteria.may_be_named(one, base)
-        ]
+        near = [one for one in rivals(criteria, same_size, chosen) if may_be_named(one)]
         word = "ambiguous" if near else "named"
         return DiagnosisVerdict(word, criteria.is_complete(chosen), chosen, tuple(near))
     if criteria.ratio(base) <= CLOSE_TO_NOISE and base.whiteness <= _NEARLY_WHITE:
         return DiagnosisVerdict(
             _without_effect(criteria, given_sse, base), True, base, ()
         )
+    halves = _rivals_by_halves(criteria, base, fits, unclear)
+    if len(halves) > 1:
+        return DiagnosisVerdict("ambiguous", False, halves[0], tuple(halves[1:]))
     return DiagnosisVerdict("unknown", False, base, ())
+
+
+def _needs_each(
+    criteria: SelectionCriteria,
+    whole: CandidateFit,
+    fits: Mapping[tuple[str, ...], CandidateFit],
+    base: CandidateFit,
+) -> bool:
+    """Whether a set leaves much more without any one of its effects."""
+    if len(whole.effects) == 1:
+        return True
+    for effect in whole.effects:
+        left = tuple(one for one in whole.effects if one != effect)
+        if left not in fits:
+            continue
+        against = criteria.evidence(whole, fits[left])
+        completes = criteria.is_complete(whole) and not criteria.is_complete(fits[left])
+        explains = against.explained >= LEAST_EXPLAINED or completes
+        is_clear = against.gain >= LEAST_GAIN and against.improved >= LEAST_IMPROVED
+        brings = criteria.excess(fits[left]) - criteria.excess(whole)
+        least = LEAST_LAST_CONTRIBUTION if completes else LEAST_CONTRIBUTION
+        is_clear = is_clear and brings >= least * criteria.excess(base)
+        if not (is_clear and explains):
+            return False
+    return True
+
+
+def _rivals_by_halves(
+    criteria: SelectionCriteria,
+    base: CandidateFit,
+    fits: Mapping[tuple[str, ...], CandidateFit],
+    unclear: Callable[[CandidateFit], tuple[str, ...]],
+) -> list[CandidateFit]:
+    """Single effects that each explain a good part, in every recording, the best first."""
+    found = []
+    for one in fits.values():
+        if len(one.effects) != 1 or not one.is_usable or not has_size(one):
+            continue
+        against = criteria.evidence(one, base)
+        explains = against.explained >= LEAST_OF_RIVALS and against.improved == 1.0
+        if explains and against.gain >= LEAST_GAIN and not unclear(one):
+            found.append(one)
+    found.sort(key=lambda one: -criteria.gain(one, base))
+    if not found:
+        return []
+    return [found[0], *rivals(criteria, found, found[0])]
 
 
 def _without_effect(

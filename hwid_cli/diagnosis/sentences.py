@@ -3,8 +3,13 @@
 import numpy as np
 
 from hwid_cli.diagnosis.problem import DiagnosisProblem
-from hwid_cli.diagnosis.selection import DiagnosisVerdict, SelectionCriteria, title_of
-from hwid_cli.records.candidates import CandidateFit
+from hwid_cli.diagnosis.selection import (
+    STILL_LARGE,
+    DiagnosisVerdict,
+    SelectionCriteria,
+    title_of,
+)
+from hwid_cli.records.candidates import CAUSES, CandidateFit
 from hwid_cli.records.diagnosis import FittedEffect, NoiseFloor
 
 # Share of the largest displacement that counts as motion to one side.
@@ -34,16 +39,15 @@ def summarise(
     """
     before = criteria.ratio(base)
     after = criteria.ratio(verdict.chosen)
-    names = " and ".join(one.id for one in effects)
     if verdict.word == "none":
         return (
             "Nothing is missing: the simulation agrees with the recordings up to "
-            f"their noise ({after:.3g} times the noise)."
+            f"their noise ({after:.3g} times the noise).{_cause(verdict.chosen)}"
         )
     if verdict.word == "parameters":
         return (
             "No effect is missing: the parameters were off, and once they are fitted "
-            f"the error is {after:.3g} times the noise."
+            f"the error is {after:.3g} times the noise.{_cause(verdict.chosen)}"
         )
     if verdict.word == "unknown":
         return (
@@ -51,17 +55,45 @@ def summarise(
             "noise, and no effect of the catalogue explains most of it."
             f"{_where_it_sits(problem, criteria.noise, verdict.chosen)}"
         )
-    meaning = "; ".join(one.sentence for one in effects)
-    text = (
-        f"The simulation lacks {names} ({meaning}): with it the error on held-out "
-        f"recordings falls from {before:.3g} to {after:.3g} times the noise."
-    )
+    text = _named(problem, criteria, base, verdict, effects)
     if verdict.word == "ambiguous":
         others = ", ".join(title_of(one) for one in verdict.rivals)
         text += f" These recordings cannot tell it from {others}."
-    if not verdict.is_complete:
-        text += " Something smaller remains."
+    if not problem.part(held_out=True).signals:
+        text += " Named on training data only: no recording was held out to test it."
     return text
+
+
+def _cause(found: CandidateFit) -> str:
+    """Say what the measuring chain adds to the noise of the output."""
+    return f" What is left is {CAUSES[found.cause]}." if found.cause else ""
+
+
+def _named(
+    problem: DiagnosisProblem,
+    criteria: SelectionCriteria,
+    base: CandidateFit,
+    verdict: DiagnosisVerdict,
+    effects: tuple[FittedEffect, ...],
+) -> str:
+    """Say what was found as a fact, or as a part where much remains."""
+    before, after = criteria.ratio(base), criteria.ratio(verdict.chosen)
+    names = " and ".join(one.id for one in effects)
+    meaning = "; ".join(one.sentence for one in effects)
+    on = "held-out" if problem.part(held_out=True).signals else "these"
+    # What leaves that much is no fact, but a part of what is missing.
+    if after > STILL_LARGE:
+        share = criteria.evidence(verdict.chosen, base).explained
+        return (
+            f"{names} ({meaning}) explains {100 * share:.3g} % of what the simulation "
+            f"leaves of {on} recordings: the error falls from {before:.3g} to "
+            f"{after:.3g} times the noise. What remains is not explained."
+        )
+    text = (
+        f"The simulation lacks {names} ({meaning}): with it the error on {on} "
+        f"recordings falls from {before:.3g} to {after:.3g} times the noise."
+    )
+    return text if verdict.is_complete else f"{text} Something smaller remains."
 
 
 def _where_it_sits(

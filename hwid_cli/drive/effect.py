@@ -11,6 +11,9 @@ from math import inf
 
 Values = Mapping[str, float]
 
+# Share of a start value at which an effect changes next to nothing.
+FAINT = 1e-3
+
 
 @dataclass(frozen=True)
 class Wave:
@@ -207,6 +210,9 @@ class Effect:
         some they stand in for the parameters' own.
     stated : tuple of Stated
         What a configuration states where that is not the parameters.
+    strength : str
+        Name of the parameter without which the effect is not there: where it is zero,
+        or for a limit beyond all that it limits. Empty means the first one.
     """
 
     id: str
@@ -220,6 +226,20 @@ class Effect:
     needs_spring: bool = False
     seen: Callable[[Scales], tuple[dict[str, float], ...]] | None = None
     stated: tuple[Stated, ...] = ()
+    strength: str = ""
+
+    @property
+    def strongest(self) -> Parameter:
+        """The parameter without which the effect is not there."""
+        name = self.strength or self.parameters[0].name
+        return next(one for one in self.parameters if one.name == name)
+
+    def faint(self, values: Values, scales: Scales) -> dict[str, float]:
+        """Values with which the effect is there, but changes next to nothing."""
+        parameter = self.strongest
+        if parameter.off == inf:
+            return {**values, parameter.name: parameter.bounds(scales)[1]}
+        return {**values, parameter.name: FAINT * values.get(parameter.name, 0.0)}
 
     def starts(self, scales: Scales) -> list[dict[str, float]]:
         """List what the recordings show, or all combinations of start values."""

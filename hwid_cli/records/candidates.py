@@ -4,6 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+# What the measuring chain may add to the noise of the output, in words.
+CAUSES = {
+    "input_noise": "noise of the measured input, seen through the drive",
+    "interpolation": "noise that interpolation between uneven samples has linked",
+}
+
 
 @dataclass(frozen=True)
 class RankedCandidate:
@@ -95,6 +101,9 @@ class CandidateFit:
         Of all residuals, see ``RankedCandidate``.
     neighbour : float, [-]
         Correlation of neighbouring residuals.
+    cause : str
+        What beside the noise of the output makes up what is left, one of ``CAUSES``;
+        empty where that noise is all, or something remains.
     """
 
     effects: tuple[str, ...]
@@ -107,6 +116,7 @@ class CandidateFit:
     neighbour: float
     iterations: int
     has_converged: bool
+    cause: str = ""
 
     @property
     def is_usable(self) -> bool:

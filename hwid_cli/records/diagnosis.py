@@ -61,6 +61,8 @@ class NoiseFloor:
         Whether neighbouring samples of the noise go together.
     whitening : tuple of float
         Coefficients of the autoregressive filter that makes it white; (1,) if it is.
+    input_rms : float, [input unit]
+        Noise that the measured input holds at most, from its differences.
     """
 
     rms: float
@@ -69,6 +71,7 @@ class NoiseFloor:
     is_coloured: bool
     whitening: tuple[float, ...]
     sentence: str
+    input_rms: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -78,8 +81,9 @@ class Gap:
     Parameters
     ----------
     train_rms, held_out_rms : float, [output unit]
+        NaN where no recording was held out.
     ratio_to_noise : float, [-]
-        Of the held-out recordings.
+        Of the held-out recordings; of the others where none was held out.
     """
 
     train_rms: float
@@ -254,6 +258,11 @@ class Diagnosis:
     reference_current_A: float = 1.0
     reference_displacement_m: float = 1.0
     output_unit: str = "m"
+
+    @property
+    def judged_on(self) -> str:
+        """Which recordings decided: ``held_out``, or ``training`` where none was."""
+        return "held_out" if self.held_out else "training"
 
     def __post_init__(self) -> None:
         if self.verdict not in VERDICTS:

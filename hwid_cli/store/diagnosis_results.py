@@ -151,6 +151,7 @@ def _content(diagnosis: Diagnosis) -> dict[str, Any]:
     return {
         "verdict": diagnosis.verdict,
         "complete": diagnosis.complete,
+        "judged_on": diagnosis.judged_on,
         "summary": diagnosis.summary,
         "effects": [_effect(effect) for effect in diagnosis.effects],
         "present": [_effect(effect) for effect in diagnosis.present],

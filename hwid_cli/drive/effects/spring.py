@@ -77,6 +77,7 @@ QUADRATIC = Effect(
 
 END_STOP = Effect(
     id="end_stop",
+    strength="stiffness_N_per_m",
     sentence="a stiff stop at the same distance on both sides",
     equation="F = -ks (|x| - xs) sgn(x) beyond |x| = xs",
     enters="motion",
@@ -108,6 +109,7 @@ END_STOP = Effect(
 
 ONE_SIDED = Effect(
     id="one_sided_stop",
+    strength="stiffness_N_per_m",
     sentence="a stiff stop on one side only",
     equation="F = -ks (x - xs) beyond xs, on the side of the sign of xs",
     enters="motion",

@@ -1,0 +1,129 @@
+"""Intervals of what a fit has found, and which of its effects they leave open.
+
+docs/method_diagnosis.md, eq. (D20).
+"""
+
+from math import inf
+
+import numpy as np
+
+from hwid_cli.diagnosis.candidate import rebuilt
+from hwid_cli.diagnosis.parameters import (
+    ParameterLayout,
+    ParameterPoint,
+    residuals_at,
+    sum_of_squares,
+)
+from hwid_cli.diagnosis.problem import DiagnosisProblem
+from hwid_cli.diagnosis.search import local_matrix
+from hwid_cli.drive.catalogue import CATALOGUE
+from hwid_cli.drive.effect import Scales
+from hwid_cli.records.candidates import CandidateFit, ParameterRef
+
+# Normal quantile of a 95 % interval.
+_QUANTILE = 1.96
+# Share of the best determined direction below which one counts as undetermined.
+_DETERMINED = 1e-12
+
+
+def unclear_effects(
+    problem: DiagnosisProblem, found: CandidateFit, scales: Scales
+) -> tuple[str, ...]:
+    """Effects of a fit that may as well not be there.
+
+    The interval of an effect's strength reaches zero, or for a limit the largest value
+    that the recordings could show.
+
+    Returns
+    -------
+    tuple of str
+        Ids in the catalogue. What each recording has for itself has no interval.
+    """
+    if not found.is_usable:
+        return found.effects
+    fit_layout, point = rebuilt(problem, found, scales)
+    deviations = _standard_errors(problem, found, fit_layout, point)
+    unclear = []
+    for effect in found.effects:
+        parameter = CATALOGUE[effect].strongest
+        ref = ParameterRef(effect, parameter.name)
+        if ref not in found.names:
+            continue
+        column = found.names.index(ref)
+        unknown, q = fit_layout.shared[column], point.shared[column]
+        reach = _QUANTILE * float(deviations[column])
+        if parameter.off == inf:
+            is_clear = unknown.value(q + reach) < unknown.high
+        elif unknown.is_log:
+            # Linearised: a relative deviation of the value itself.
+            is_clear = reach < 1.0
+        else:
+            is_clear = abs(q) > reach
+        if not is_clear:
+            unclear.append(effect)
+    return tuple(unclear)
+
+
+def intervals(
+    problem: DiagnosisProblem, found: CandidateFit, scales: Scales
+) -> tuple[np.ndarray, np.ndarray]:
+    """95 % intervals of what all recordings share.
+
+    Parameters
+    ----------
+    problem : DiagnosisProblem
+        Training and held-out recordings; the training ones decide.
+
+    Returns
+    -------
+    low, high : ndarray, shape (n_names,)
+        NaN where a recording cannot be simulated.
+    """
+    if not found.is_usable:
+        nothing = np.full(found.values.size, np.nan)
+        return nothing, nothing
+    fit_layout, point = rebuilt(problem, found, scales)
+    deviations = _standard_errors(problem, found, fit_layout, point)
+    with np.errstate(over="ignore"):
+        ends = np.array(
+            [
+                [
+                    one.value(q + sign * _QUANTILE * deviation)
+                    for one, q, deviation in zip(
+                        fit_layout.shared, point.shared, deviations, strict=True
+                    )
+                ]
+                for sign in (-1.0, 1.0)
+            ]
+        )
+    return ends.min(axis=0), ends.max(axis=0)
+
+
+def _standard_errors(
+    problem: DiagnosisProblem,
+    found: CandidateFit,
+    fit_layout: ParameterLayout,
+    point: ParameterPoint,
+) -> np.ndarray:
+    """Standard errors of the shared coordinates."""
+    rows = [row for row, one in enumerate(problem.signals) if not one.is_held_out]
+    train = problem.part(held_out=False)
+    at = ParameterPoint(point.shared, point.own[rows])
+    matrix = local_matrix(train, fit_layout, at)
+    sse = sum_of_squares(residuals_at(train, fit_layout, at))
+    freedom = max(train.n_evaluated - matrix.shape[0], 1)
+    # Residuals that go together count as fewer samples.
+    together = max(found.neighbour, 0.0)
+    inflation = (1 + together) / max(1 - together, 1e-3)
+    scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
+    variances = np.diag(_inverse(matrix / scale[:, None] / scale))
+    shared = slice(len(fit_layout.shared))
+    errors = np.sqrt(sse / freedom * inflation * variances[shared]) / scale[shared]
+    return np.asarray(errors)
+
+
+def _inverse(matrix: np.ndarray) -> np.ndarray:
+    """Inverse in which what nothing determines is large, not infinite."""
+    sizes, turned = np.linalg.eigh(matrix)
+    sizes = np.maximum(sizes, _DETERMINED * sizes[-1])
+    return np.asarray((turned / sizes) @ turned.T)
