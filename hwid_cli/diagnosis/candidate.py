@@ -77,19 +77,18 @@ class Baseline:
     given: Drive | None = None
 
     @property
-    def drives(self) -> list[Drive]:
-        """Drives whose bases a fit is started from."""
+    def is_bent(self) -> bool:
+        """Whether the re-fit has moved a parameter of the base far away."""
         if self.given is None:
-            return [self.drive]
+            return False
         pairs = [
             (getattr(self.given, one), getattr(self.drive, one))
             for one in BASE_PARAMETERS
         ]
-        is_bent = any(
+        return any(
             abs(one) > BENT * abs(other) or abs(other) > BENT * abs(one)
             for one, other in pairs
         )
-        return [self.drive, self.given] if is_bent else [self.drive]
 
 
 @dataclass(frozen=True)

@@ -155,13 +155,20 @@ def parameter_layout(
             unknown = _unknown(identifier, parameter, value, scales)
             (own if parameter.is_own else shared).append(unknown)
     far = float("inf")
-    if problem.start != "rest" or _rests_anywhere(problem):
+    is_moving = _starts_in_motion(problem, effects)
+    if problem.start != "rest" or is_moving or _rests_anywhere(problem):
         reach = scales.displacement_m
         own.append(Unknown(START, "position", False, reach, -far, far))
-    if problem.start == "estimated":
+    if problem.start == "estimated" or is_moving:
         speed = scales.velocity_m_per_s
         own.append(Unknown(START, "velocity", False, speed, -far, far))
     return ParameterLayout(tuple(shared), tuple(own), tuple(effects))
+
+
+def _starts_in_motion(problem: DiagnosisProblem, effects: Sequence[str]) -> bool:
+    """Whether an effect moves the drive before its input does."""
+    is_free = problem.start == "rest" and not problem.compares_command
+    return is_free and any(CATALOGUE[one].moves_at_rest for one in effects)
 
 
 def _rests_anywhere(problem: DiagnosisProblem) -> bool:
@@ -298,12 +305,12 @@ def _place_start(
     fit_layout: ParameterLayout,
     own: np.ndarray,
 ) -> None:
-    if problem.start != "rest" or _rests_anywhere(problem):
-        found = {
-            one.name: one.value(q)
-            for one, q in zip(fit_layout.own, own, strict=True)
-            if one.owner == START
-        }
+    found = {
+        one.name: one.value(q)
+        for one, q in zip(fit_layout.own, own, strict=True)
+        if one.owner == START
+    }
+    if found:
         set_start(vector, found["position"], found.get("velocity", 0.0))
         if problem.start == "held":
             # The recording starts at its measured level, wherever the sensor's zero is.

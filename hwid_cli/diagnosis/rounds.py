@@ -55,6 +55,10 @@ WITHIN_REACH = 4.0
 LEAST_LEFT = 0.02
 # Candidates on top of a set, by their forecasts, that are screened.
 SCREENED_ON_TOP = 12
+# Sets are screened again, at most so often, until one of them explains this share of what
+# the smaller set leaves.
+MOST_SCREENINGS = 2
+STANDS_OUT = 0.5
 # Sets that leave at most so many times what the best one leaves are searched on, at most
 # so many times.
 WORTH_MORE = 2.0
@@ -202,6 +206,12 @@ class _Search:
                 proposed.setdefault(ids, []).append(start)
         name = _name_of(size)
         screened = self._screen(name, proposed)
+        for _ in range(MOST_SCREENINGS):
+            if self._stands_out(screened, parents[0]):
+                break
+            # Nothing has got far yet: all of them go on.
+            further = {one.effects: list(one.starts) for one in screened}
+            screened = self._screen(name, further)
         chosen = _promising(self.rounds, self._few, screened)
         # What includes another candidate must be better; where the simpler one leaves
         # nothing, it cannot be.
@@ -275,16 +285,20 @@ class _Search:
             self.shares.update({(one.effect,): one.share for one in found})
         else:
             found = found[:SCREENED_ON_TOP]
-        bases = [base_of(drive)]
-        if parent is rounds.base:
-            bases = [base_of(one) for one in baseline.drives]
-        return {
-            _together(parent.effects, one.effect): [
-                SearchStart(base, {**start, one.effect: values})
-                for base in bases
-                for values in one.starts[:SCREENED_STARTS]
-            ]
+        pairs = {
+            one.effect: [(base_of(drive), values) for values in one.starts]
             for one in found
+        }
+        if parent is rounds.base and baseline.given is not None:
+            given = base_of(baseline.given)
+            count = SCREENED_STARTS if baseline.is_bent else 1
+            for one in found:
+                pairs[one.effect] += [(given, values) for values in one.starts[:count]]
+        return {
+            _together(parent.effects, effect): [
+                SearchStart(base, {**start, effect: values}) for base, values in several
+            ]
+            for effect, several in pairs.items()
         }
 
     def _forecast(self, at: Linearisation, candidates: Sequence[str]) -> list[Forecast]:
@@ -371,6 +385,22 @@ class _Search:
                 return
             self._finish(name, near)
 
+    def _stands_out(self, screened: Sequence[Screened], parent: CandidateFit) -> bool:
+        """Whether a set has explained a good part of what the smaller one leaves."""
+        before, floor = self._few_sse(parent), self._floor()
+        after = min((one.sse for one in screened), default=before)
+        return before - after >= STANDS_OUT * (before - floor)
+
+    def _few_sse(self, found: CandidateFit) -> float:
+        """Sum of squares on the recordings of the screening."""
+        names = {one.name for one in self._few.signals}
+        rows = [one.name in names for one in self.rounds.problem.signals]
+        return float(found.sse[rows].sum())
+
+    def _floor(self) -> float:
+        """Sum of squares of the noise on these recordings."""
+        return self._few.n_evaluated * self.rounds.baseline.noise.rms**2
+
     def _go_on(self, size: int) -> None:
         """Search on where the best sets stopped at the limit of iterations."""
         present = drive_effects(self.rounds.problem.drive)
@@ -404,10 +434,7 @@ class _Search:
         """Sets that come close to the best one in the screening."""
         if best is None:
             return {}
-        names = {one.name for one in self._few.signals}
-        rows = [one.name in names for one in self.rounds.problem.signals]
-        floor = self._few.n_evaluated * self.rounds.baseline.noise.rms**2
-        reached = float(best.sse[rows].sum())
+        floor, reached = self._floor(), self._few_sse(best)
         most = floor + WITHIN_REACH * max(reached - floor, LEAST_LEFT * reached)
         return {one.effects: one.starts for one in screened if one.sse <= most}
 

@@ -210,6 +210,8 @@ class Effect:
         some they stand in for the parameters' own.
     stated : tuple of Stated
         What a configuration states where that is not the parameters.
+    moves_at_rest : bool
+        Whether the drive moves before its input does, so that recordings start in motion.
     strength : str
         Name of the parameter without which the effect is not there: where it is zero,
         or for a limit beyond all that it limits. Empty means the first one.
@@ -226,6 +228,7 @@ class Effect:
     needs_spring: bool = False
     seen: Callable[[Scales], tuple[dict[str, float], ...]] | None = None
     stated: tuple[Stated, ...] = ()
+    moves_at_rest: bool = False
     strength: str = ""
 
     @property

@@ -141,6 +141,7 @@ PERIODIC = Effect(
         ),
     ),
     confused_with={"cogging": "recordings at rest, where only a force in time goes on"},
+    moves_at_rest=True,
     # A free axis drifts off with the phase at the start: that imitates anything.
     needs_spring=True,
 )
