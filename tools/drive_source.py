@@ -50,6 +50,7 @@ MODULES = (
 LEFT_OUT = {
     "move",
     "read",
+    "on_other_clock",
     "_play",
     "glide_plain",
     "glide_inner",

@@ -19,7 +19,9 @@ def load(write_config):
 @pytest.fixture
 def load_effect(load):
     def load_one(text):
-        return load(f"simulation: {{effects: {{{text}}}}}").simulation.effects
+        # Some effects need a circuit.
+        text = f"simulation: {{resistance_ohm: 1, effects: {{{text}}}}}"
+        return load(text).simulation.effects
 
     return load_one
 
@@ -48,6 +50,16 @@ def test_what_an_effect_needs_is_required_and_the_rest_is_not(load_effect, ident
             ConfigError, match=rf"effects\.{identifier}\.{left_out}: missing; exp"
         ):
             load_effect(f"{identifier}: {{{written(others)}}}")
+
+
+def test_an_inductance_needs_a_circuit(load):
+    text = "simulation: {effects: {winding_inductance: {inductance_H: 0.01}}}"
+    with pytest.raises(
+        ConfigError,
+        match=r"effects\.winding_inductance: found without simulation\.resistance_ohm, "
+        r"so that the input is the current; expected simulation\.resistance_ohm too; add",
+    ):
+        load(text)
 
 
 def test_what_completes_a_law_may_be_given(load_effect):
@@ -111,6 +123,14 @@ def test_what_completes_a_law_may_be_given(load_effect):
         (
             "parameter_change: {which: damping, spread: wide}",
             r"parameter_change.spread: found 'wide'; expected a finite number",
+        ),
+        (
+            "elastic_coupling: {stiffness_N_per_m: 9, sensor: gear}",
+            r"elastic_coupling\.sensor: found 'gear'; expected one of motor, load",
+        ),
+        (
+            "clock_skew: {ratio: 11}",
+            r"clock_skew\.ratio: found 11\.0; expected a ratio from 0\.1 to 10",
         ),
         (
             "gear_backlash: {half_gap_m: 1, stiffness_N_per_m: 9, motor_share: 1}",

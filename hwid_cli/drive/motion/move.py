@@ -39,6 +39,7 @@ from hwid_cli.drive.motion.forces import (
     X,
     force_of,
     has_dry_friction,
+    is_anywhere,
     resting_point,
     wanted_current,
 )
@@ -66,7 +67,7 @@ MOST_EVENTS = 100
 def move(
     command: np.ndarray, sample_time: float, given_p: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return position, velocity and command at every sample.
+    """Return position and velocity of the measured place, and command, at every sample.
 
     Parameters
     ----------
@@ -91,7 +92,8 @@ def move(
     pieces = np.empty((MOST_PIECES + (0 if is_single else MANY_PIECES), N_PIECE))
     pushes, ends = np.zeros((pieces.shape[0], N_PUSH)), np.empty((2, n))
     room = np.zeros(N_ROOM)
-    positions[0], velocities[0] = state[X], state[V]
+    seen = MOTOR_X if p[slots.SENSOR_AT_MOTOR] > 0.0 else X
+    positions[0], velocities[0] = state[seen], state[seen + 1]
     # Not plain 0: numba would compile what it is handed to twice.
     sample = np.int64(0)
     while sample < n and np.isfinite(positions[sample]):
@@ -126,7 +128,7 @@ def move(
                 )
             at = int(pieces[j, SAMPLE])
             if at >= 0:
-                positions[at], velocities[at] = state[X], state[V]
+                positions[at], velocities[at] = state[seen], state[seen + 1]
             j += 1
         if count == 0:
             break
@@ -203,6 +205,7 @@ def _start(
     state: np.ndarray, memory: np.ndarray, command: float, p: np.ndarray
 ) -> float:
     """Set the drive to rest in equilibrium, or to the given start."""
+    _couple(p)
     command = static_command(command, p)
     memory[LAGGED] = command
     current = command
@@ -228,11 +231,31 @@ def _start(
     if p[slots.GEAR_STIFFNESS] > 0.0 and force != 0.0:
         state[MOTOR_X] += np.sign(force) * p[slots.GEAR_GAP]
         state[MOTOR_X] += force / p[slots.GEAR_STIFFNESS]
+    is_placed = p[slots.IS_START_GIVEN] > 0.0 or is_anywhere(p)
+    if p[slots.SENSOR_AT_MOTOR] > 0.0 and is_placed:
+        # The start is that of the place that is measured.
+        state[X], state[MOTOR_X] = 2.0 * state[X] - state[MOTOR_X], state[X]
     state[MOTOR_V] = state[V]
     state[PART_X], state[PART_V] = state[X], state[V]
     memory[WAY] = np.sign(state[V])
     memory[TURNED_AT] = state[X]
     return command
+
+
+@njit(**INNER)
+def _couple(p: np.ndarray) -> None:
+    """Make an elastic coupling what the loops know; with teeth both are in series."""
+    stiffness, teeth = p[slots.COUPLING_STIFFNESS], p[slots.GEAR_STIFFNESS]
+    if stiffness <= 0.0:
+        return
+    share = p[slots.COUPLING_SHARE]
+    if teeth > 0.0:
+        stiffness *= teeth / (stiffness + teeth)
+        share = 0.5 * (share + p[slots.MOTOR_SHARE])
+    else:
+        p[slots.IS_COUPLED] = 1.0
+    p[slots.GEAR_STIFFNESS], p[slots.MOTOR_SHARE] = stiffness, share
+    p[slots.GEAR_DAMPING_RATIO] += p[slots.COUPLING_DAMPING_RATIO]
 
 
 @njit(**INNER)

@@ -302,12 +302,12 @@ double HWID_NAME(step)(HWID_NAME(state) *state, double u)
             state->starts[n] = state->before;
             state->ends[n] = state->before;
         }
-        state->played = state->motion[X];
+        state->played = state->motion[p[SENSOR_AT_MOTOR] > 0.0 ? MOTOR_X : X];
     } else if (isfinite(state->position)) {
         interval(state, state->previous, is_held ? state->previous : u);
     }
-    state->position = state->motion[X];
-    state->velocity = state->motion[V];
+    state->position = state->motion[p[SENSOR_AT_MOTOR] > 0.0 ? MOTOR_X : X];
+    state->velocity = state->motion[p[SENSOR_AT_MOTOR] > 0.0 ? MOTOR_V : V];
     if (!isfinite(state->position)) {
         state->position = NAN;
         state->velocity = NAN;
