@@ -208,10 +208,15 @@ def parameter_vector(drive: Drive, effects: Mapping[str, Values]) -> np.ndarray:
             drive.force_constant_N_per_A if back_emf is None else back_emf
         )
     if drive.controller is not None:
-        vector[slots.POSITION_GAIN] = drive.controller.position_gain_per_s
-        vector[slots.VELOCITY_GAIN] = drive.controller.velocity_gain
-        if drive.controller.limit is not None:
-            vector[slots.COMMAND_LIMIT] = drive.controller.limit
+        one = drive.controller
+        vector[slots.POSITION_GAIN] = one.position_gain_per_s or 0.0
+        vector[slots.VELOCITY_GAIN] = one.velocity_gain or 0.0
+        vector[slots.RESET_RATE] = one.reset_rate_per_s
+        vector[slots.PROPORTIONAL_GAIN] = one.proportional_gain or 0.0
+        vector[slots.INTEGRAL_GAIN] = one.integral_gain
+        vector[slots.DERIVATIVE_GAIN] = one.derivative_gain
+        if one.limit is not None:
+            vector[slots.COMMAND_LIMIT] = one.limit
     for identifier, values in effects.items():
         if identifier not in CATALOGUE:
             raise ValueError(f"effect {identifier!r} is not in the catalogue")

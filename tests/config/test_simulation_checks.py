@@ -170,7 +170,22 @@ def test_effect_that_cannot_be_simulated_is_one_line(load_effect, text, message)
         ),
         (
             "controller: {position_gain_per_s: 1}",
-            r"simulation.controller.velocity_gain: missing; expected a finite number",
+            r"simulation.controller.velocity_gain: missing; expected a number > 0; add",
+        ),
+        (
+            "controller: {limit: 1}",
+            r"controller.position_gain_per_s: missing; expected a number > 0; add the key, "
+            r"or proportional_gain of a PID controller",
+        ),
+        (
+            "controller: {integral_gain: 1}",
+            r"controller.proportional_gain: missing; expected a number > 0; add the key$",
+        ),
+        (
+            "controller: {position_gain_per_s: 1, velocity_gain: 2, integral_gain: 3}",
+            r"controller.integral_gain: found 3.0 beside position_gain_per_s; expected a "
+            r"cascade \(position_gain_per_s, velocity_gain, reset_rate_per_s\) or a PID "
+            r"controller \(proportional_gain, integral_gain, derivative_gain\); remove one",
         ),
     ],
 )

@@ -53,7 +53,18 @@ MACHINES = (
     (cases.COULOMB, {"resistance_ohm": 2.0}),
     (cases.COULOMB | cases.HEAT, {"resistance_ohm": 2.0, "inductance_H": 1e-3}),
     (cases.STRIBECK, {"controller": Controller(20.0, 30.0, 4.0)}),
-    (COUPLED_MOTOR, {"controller": Controller(20.0, 30.0, 4.0)}),
+    (COUPLED_MOTOR, {"controller": Controller(20.0, 30.0, 4.0, 25.0)}),
+    (
+        cases.COULOMB,
+        {
+            "controller": Controller(
+                limit=0.8,
+                proportional_gain=300.0,
+                integral_gain=4000.0,
+                derivative_gain=4.0,
+            )
+        },
+    ),
     (COUPLED_MOTOR | BACKLASH | cases.COULOMB, {}),
     (COUPLED_MOTOR | cases.GEAR, {"stiffness_N_per_m": 0.0}),
 )

@@ -13,6 +13,7 @@ from numba import njit
 from hwid_cli.drive import slots
 from hwid_cli.drive.command import MOST_PIECES, static_command
 from hwid_cli.drive.compiled import INNER
+from hwid_cli.drive.controller import N_CONTROL, controlled, is_closed
 from hwid_cli.drive.motion.corners import corner_of, count_edges
 from hwid_cli.drive.motion.curved import is_always_curved, step_limit
 from hwid_cli.drive.motion.events import (
@@ -78,8 +79,8 @@ def move(
     n = command.size
     p = given_p.copy()
     positions, velocities, given = np.empty(n), np.empty(n), command.copy()
-    is_closed = p[slots.VELOCITY_GAIN] > 0.0
-    before = 0.0 if is_closed else command[0]
+    has_controller, control = is_closed(p), np.zeros(N_CONTROL)
+    before = 0.0 if has_controller else command[0]
     state, memory = np.zeros(N_STATE), np.zeros(N_MEMORY)
     followed = _start(state, memory, before, p)
     trial, inputs, active = state.copy(), np.zeros(N_INPUT), active_states(p)
@@ -88,7 +89,9 @@ def move(
     matrices, lengths = _make_room(sample_time, step, p)
     # Pieces are listed for many samples at once, or for one after the other where the
     # command or the temperature depends on the motion.
-    is_single = is_closed or (depends_on_motion(p) and p[slots.THERMAL_LOSS] != 0.0)
+    is_single = has_controller or (
+        depends_on_motion(p) and p[slots.THERMAL_LOSS] != 0.0
+    )
     pieces = np.empty((MOST_PIECES + (0 if is_single else MANY_PIECES), N_PIECE))
     pushes, ends = np.zeros((pieces.shape[0], N_PUSH)), np.empty((2, n))
     room = np.zeros(N_ROOM)
@@ -97,10 +100,11 @@ def move(
     # Not plain 0: numba would compile what it is handed to twice.
     sample = np.int64(0)
     while sample < n and np.isfinite(positions[sample]):
-        if is_closed:
-            given[sample] = _controlled(
-                command[sample], positions[sample], velocities[sample], p
-            )
+        if has_controller:
+            given[sample] = controlled(
+                command[sample], positions[sample], velocities[sample], sample_time,
+                control, p,
+            )  # fmt: skip
         now = _current_now(given[sample], state, p) if is_single else 0.0
         count, followed, sample = list_pieces(
             sample, sample_time, given, ends, before, followed, now, pieces, pushes,
@@ -191,13 +195,6 @@ def _make_room(
     lengths = np.array([step, part, sample_time - part])
     n_matrices = lengths.size * 2 * 3 ** count_edges(p)
     return np.zeros((n_matrices, N_STATE, N_COLUMNS)), lengths
-
-
-@njit(**INNER)
-def _controlled(reference: float, x: float, v: float, p: np.ndarray) -> float:
-    wanted = p[slots.VELOCITY_GAIN] * (p[slots.POSITION_GAIN] * (reference - x) - v)
-    limit = p[slots.COMMAND_LIMIT]
-    return min(max(wanted, -limit), limit)
 
 
 @njit(**INNER)

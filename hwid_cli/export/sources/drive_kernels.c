@@ -77,8 +77,16 @@ enum {
     ECCENTRIC_PERIOD = 73,
     ECCENTRIC_PHASE = 74,
     CLOCK_GAIN = 75,
-    N_SLOTS = 76,
+    RESET_RATE = 76,
+    PROPORTIONAL_GAIN = 77,
+    INTEGRAL_GAIN = 78,
+    DERIVATIVE_GAIN = 79,
+    N_SLOTS = 80,
     MOST_PIECES = 40,
+    ERROR_SUM = 0,
+    LAST_ERROR = 1,
+    HAS_ERROR = 2,
+    N_CONTROL = 3,
     DRIVE = 0,
     OTHER = 4,
     WARMTH = 8,
@@ -360,6 +368,45 @@ static double drive_static_command(double value, double *p)
     }
     limit = p[SATURATION];
     return least(most(value, -limit), limit);
+}
+
+static int drive_is_closed(double *p)
+{
+    return (p[VELOCITY_GAIN] > 0.0) || (p[PROPORTIONAL_GAIN] > 0.0);
+}
+
+static double drive_controlled(double reference, double x, double v, double sample_time, double *control, double *p)
+{
+    double error = 0.0;
+    double gain = 0.0;
+    double reset = 0.0;
+    double total = 0.0;
+    double wanted = 0.0;
+    double rate = 0.0;
+    double limit = 0.0;
+    double given = 0.0;
+    error = reference - x;
+    gain = p[PROPORTIONAL_GAIN];
+    reset = p[INTEGRAL_GAIN];
+    if (p[VELOCITY_GAIN] > 0.0) {
+        error = (p[POSITION_GAIN] * error) - v;
+        gain = p[VELOCITY_GAIN];
+        reset = gain * p[RESET_RATE];
+    }
+    total = control[ERROR_SUM] + (sample_time * error);
+    wanted = (gain * error) + (reset * total);
+    if ((p[DERIVATIVE_GAIN] != 0.0) && (control[HAS_ERROR] > 0.0)) {
+        rate = (error - control[LAST_ERROR]) / sample_time;
+        wanted += p[DERIVATIVE_GAIN] * rate;
+    }
+    control[LAST_ERROR] = error;
+    control[HAS_ERROR] = 1.0;
+    limit = p[COMMAND_LIMIT];
+    given = least(most(wanted, -limit), limit);
+    if (((wanted - given) * error) <= 0.0) {
+        control[ERROR_SUM] = total;
+    }
+    return given;
 }
 
 static int drive_depends_on_motion(double *p)
@@ -1752,15 +1799,6 @@ static double drive_longest_step(double sample_time, tuple_iiiiid kind)
         count = least(most(count, 1.0), MOST_STEPS);
     }
     return sample_time / count;
-}
-
-static double drive_controlled(double reference, double x, double v, double *p)
-{
-    double wanted = 0.0;
-    double limit = 0.0;
-    wanted = p[VELOCITY_GAIN] * ((p[POSITION_GAIN] * (reference - x)) - v);
-    limit = p[COMMAND_LIMIT];
-    return least(most(wanted, -limit), limit);
 }
 
 static void drive_couple(double *p)
