@@ -35,6 +35,7 @@ _END = "    N_SLOTS,\n) = range({})\n"
 _DRIVE = "hwid_cli.drive"
 MODULES = (
     f"{_DRIVE}.command",
+    f"{_DRIVE}.controller",
     f"{_DRIVE}.motion.push",
     f"{_DRIVE}.motion.forces",
     f"{_DRIVE}.motion.corners",
@@ -50,6 +51,7 @@ MODULES = (
 LEFT_OUT = {
     "move",
     "read",
+    "on_other_clock",
     "_play",
     "glide_plain",
     "glide_inner",

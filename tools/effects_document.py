@@ -14,7 +14,12 @@ from pathlib import Path
 # Run as a file, Python looks for modules beside it and not in the project.
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from hwid_cli.drive.catalogue import CATALOGUE, configured_effects
+from hwid_cli.drive.catalogue import (
+    CATALOGUE,
+    configured_effects,
+    public_id,
+    word_of,
+)
 from hwid_cli.drive.effect import Effect, Parameter, Scales, Stated
 from hwid_cli.report.diagnosis import quantity_and_unit
 from tools.effects_figures import SCALES, draw
@@ -43,6 +48,7 @@ SYMBOLS = {
     "natural_Hz": "fn",
     "sample_time_s": "Ts",
     "duration_s": "T",
+    "resistance_ohm": "Ro",
 }
 HEAD = """# Effects
 
@@ -53,7 +59,7 @@ Each figure shows the drive without and with the effect (left; two steps, then a
 lack along that motion (right): a force, or an error of the sensor.
 
 Start values and bounds of the search scale with the recordings: X largest displacement, V largest velocity, I largest current,
-R largest rate of the current, S stroke, F = kt I, M mass, fn natural frequency, Ts sample time, T longest recording.
+R largest rate of the current, S stroke, F = kt I, M mass, fn natural frequency, Ts sample time, T longest recording, Ro resistance.
 """
 CHANGE_SENTENCE = (
     "The stiffness, the force constant or the damping differs from recording to recording by more than chance. "
@@ -62,14 +68,26 @@ CHANGE_SENTENCE = (
 
 
 def plain_effects() -> list[Effect]:
-    """Effects that are one entry of the catalogue each.
+    """Effects with parameters of their own, by the first entry of each public id.
 
     Returns
     -------
     list of Effect
         All but ``parameter_change``, of which there is one for each parameter.
     """
-    return [one for one in CATALOGUE.values() if ":" not in one.id]
+    first = {public_id(one.id): one for one in reversed(CATALOGUE.values())}
+    return [first[name] for name in configured_effects() if name != "parameter_change"]
+
+
+def entries_of(public: str) -> list[Effect]:
+    """Entries of the catalogue with a public id.
+
+    Parameters
+    ----------
+    public : str
+        Public id.
+    """
+    return [one for one in CATALOGUE.values() if public_id(one.id) == public]
 
 
 def document() -> str:
@@ -80,7 +98,7 @@ def document() -> str:
     str
     """
     plain = plain_effects()
-    rows = [f"| [{one.id}](#{one.id}) | {one.sentence} |" for one in plain]
+    rows = [f"| {_link(one)} | {_short(one)} |" for one in plain]
     rows.append(
         "| [parameter_change](#parameter_change) | a parameter differs between recordings |"
     )
@@ -90,14 +108,25 @@ def document() -> str:
     return "\n\n".join(part.strip("\n") for part in parts) + "\n"
 
 
+def _link(effect: Effect) -> str:
+    name = public_id(effect.id)
+    return f"[{name}](#{name})"
+
+
+def _short(effect: Effect) -> str:
+    """What all entries of an id have in common."""
+    return effect.sentence.partition(";")[0] if word_of(effect.id) else effect.sentence
+
+
 def _section(effect: Effect) -> str:
-    lines = [
-        f"## {effect.id}",
-        "",
-        _claim(effect),
-        "",
-        f"    {effect.equation}",
-        "",
+    name = public_id(effect.id)
+    entries = entries_of(name)
+    lines = [f"## {name}", ""]
+    for one in entries:
+        told = word_of(one.id)
+        word = f"`{told[0]}: {told[1]}`: " if told else ""
+        lines += [f"{word}{_claim(one)}", "", f"    {one.equation}", ""]
+    lines += [
         "| parameter | unit | starts | bounds |",
         "|---|---|---|---|",
         *(_row(one) for one in effect.parameters),
@@ -109,13 +138,10 @@ def _section(effect: Effect) -> str:
         lines[-1] += f" Contains {names} as a limit."
     if effect.needs_spring:
         lines[-1] += " Means nothing on a free axis."
-    if effect.confused_with:
-        lines += ["", "Looks like:", ""]
-        lines += [
-            f"- `{other}`; told apart by {what}."
-            for other, what in effect.confused_with.items()
-        ]
-    lines += ["", f"![{effect.id}](figures/effects/{effect.id}.png)"]
+    if effect.needs_circuit:
+        lines[-1] += " Means nothing where the input is the current."
+    lines += _rivals(entries)
+    lines += ["", f"![{name}](figures/effects/{name}.png)"]
     return "\n".join(lines)
 
 
@@ -124,15 +150,20 @@ def _claim(effect: Effect) -> str:
 
 
 def _change() -> str:
-    changes = [one for one in CATALOGUE.values() if ":" in one.id]
+    changes = entries_of("parameter_change")
     lines = ["## parameter_change", "", CHANGE_SENTENCE, ""]
     lines += [f"    {one.equation}" for one in changes]
-    lines += ["", "Looks like:", ""]
+    return "\n".join([*lines, *_rivals(changes)])
+
+
+def _rivals(entries: Sequence[Effect]) -> list[str]:
     others = {
-        other: what for one in changes for other, what in one.confused_with.items()
+        other: what for one in entries for other, what in one.confused_with.items()
     }
-    lines += [f"- `{other}`; told apart by {what}." for other, what in others.items()]
-    return "\n".join(lines)
+    if not others:
+        return []
+    rows = [f"- `{other}`; told apart by {what}." for other, what in others.items()]
+    return ["", "Looks like:", "", *rows]
 
 
 def _row(parameter: Parameter) -> str:
@@ -157,7 +188,10 @@ def readme(text: str) -> str:
     """
     before, _, rest = text.partition(TABLE_HEAD)
     after = rest[rest.index("\n\n") :]
-    laws = {one.id: f"{_claim(one)} {one.equation}" for one in plain_effects()}
+    laws = {
+        name: " Or: ".join(f"{_claim(one)} {one.equation}" for one in entries_of(name))
+        for name in configured_effects()
+    }
     laws["parameter_change"] = "A parameter differs between recordings."
     rows = [
         f"| `{name}` | {laws[name].replace('|', BAR)} | {_keys(keys)} |"
@@ -181,15 +215,25 @@ def _key(one: Stated) -> str:
 def _starts(parameter: Parameter) -> str:
     if parameter.starts(SCALES) == SCALES.frequencies_Hz:
         return "highest lines in the spectrum of the error"
-    return _law(parameter.starts)
+    return _law_around(parameter.center, parameter.starts)
 
 
 def _bounds(parameter: Parameter) -> str:
     low, high = parameter.bounds(SCALES)
     if math.isinf(low) and math.isinf(high):
         return "above 0" if parameter.is_positive else "none"
-    ends = [_law(lambda scales, n=n: (parameter.bounds(scales)[n],)) for n in (0, 1)]
+    ends = [
+        _law_around(
+            parameter.center, lambda scales, n=n: (parameter.bounds(scales)[n],)
+        )
+        for n in (0, 1)
+    ]
     return " to ".join(ends)
+
+
+def _law_around(center: float, rule: Callable[[Scales], Sequence[float]]) -> str:
+    law = _law(lambda scales: [one - center for one in rule(scales)])
+    return f"{center:g} + ({law})" if center and " x " in law else _law(rule)
 
 
 def _law(rule: Callable[[Scales], Sequence[float]]) -> str:
@@ -246,7 +290,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         path.write_text(text)
     FIGURES.mkdir(parents=True, exist_ok=True)
     for effect in plain_effects():
-        draw(effect, FIGURES / f"{effect.id}.png")
+        draw(effect, FIGURES / f"{public_id(effect.id)}.png")
     return 0
 
 

@@ -12,6 +12,8 @@ from hwid_cli.records.drive import Drive
 
 SAMPLE_TIME_S = 1e-3
 MASS, DAMPING, STIFFNESS, CONSTANT = 0.3, 15.1, 1184.0, 5.0
+# Of effects that need a circuit: the command is a voltage then.
+RESISTANCE = 1.0
 # Sizes of recordings of that drive; rules for starts and bounds are read off on them.
 SCALES = Scales(
     displacement_m=0.02,
@@ -25,6 +27,7 @@ SCALES = Scales(
     sample_time_s=1e-5,
     duration_s=1.5,
     frequencies_Hz=(17.0,),
+    resistance_ohm=2.0,
 )
 # Sizes that are easier to see on a motion of 20 mm than the last values that a search
 # would start from.
@@ -65,6 +68,16 @@ EXAMPLES: dict[str, dict[str, float]] = {
     "sensor_cubic": {"coefficient": 0.2},
     "sensor_drift": {"drift_m_per_s": 2e-3},
     "periodic_force": {"amplitude_N": 2.0, "frequency_Hz": 12.0},
+    "winding_inductance": {"inductance_H": 0.02},
+    "elastic_coupling:motor": {
+        "stiffness_N_per_m": 3e3,
+        "motor_share": 0.4,
+        "damping_ratio": 0.05,
+    },
+    "sensor_saturation": {"limit_m": 0.015},
+    "sensor_hum": {"amplitude_m": 1e-3, "frequency_Hz": 12.0},
+    "sensor_eccentricity": {"amplitude_m": 1e-3, "period_m": 0.01},
+    "clock_skew": {"ratio": 1.01},
 }
 # What the missing force is best drawn over, where that is not time.
 OVER = {
@@ -78,6 +91,7 @@ OVER = {
     **dict.fromkeys(("end_stop", "one_sided_stop", "spring_gap"), "position"),
     **dict.fromkeys(("cogging", "output_backlash"), "position"),
     **dict.fromkeys(("sensor_quadratic", "sensor_cubic"), "position"),
+    **dict.fromkeys(("sensor_saturation", "sensor_eccentricity"), "position"),
     **dict.fromkeys(("input_dead_zone", "input_saturation"), "current"),
     **dict.fromkeys(("force_constant_saturation", "supply_sag"), "current"),
 }
@@ -125,8 +139,9 @@ def draw(effect: Effect, path: Path) -> None:
         Where to write the figure.
     """
     current = command()
-    plain = _simulate({}, current)
-    motion = _simulate({effect.id: example(effect)}, current)
+    resistance = RESISTANCE if effect.needs_circuit else None
+    plain = _simulate({}, current, resistance)
+    motion = _simulate({effect.id: example(effect)}, current, resistance)
     times = SAMPLE_TIME_S * np.arange(current.size)
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(7.2, 2.2), layout="constrained")
@@ -145,13 +160,20 @@ def draw(effect: Effect, path: Path) -> None:
         style = (
             {"lw": 0.8} if variable == "time" else {"marker": ".", "ms": 2, "ls": ""}
         )
+        if resistance is not None:
+            # What the plain drive's current makes along this motion.
+            current = (current - CONSTANT * motion.velocity) / resistance
         right.plot(axis, _missing(effect, motion, current), color="C3", **style)
         quantity = "sensor error [mm]" if effect.enters == "output" else "force [N]"
         right.set(xlabel=LABELS[variable], ylabel=f"what is missing:\n{quantity}")
         figure.savefig(path, dpi=80, metadata={"Software": None})
 
 
-def _simulate(effects: dict[str, dict[str, float]], current: np.ndarray) -> Motion:
+def _simulate(
+    effects: dict[str, dict[str, float]],
+    current: np.ndarray,
+    resistance: float | None,
+) -> Motion:
     drive = Drive(
         mass_kg=MASS,
         damping_N_s_per_m=DAMPING,
@@ -160,6 +182,7 @@ def _simulate(effects: dict[str, dict[str, float]], current: np.ndarray) -> Moti
         effects=effects,
         reference_current_A=5.0,
         reference_displacement_m=0.02,
+        resistance_ohm=resistance,
     )
     return simulate_drive(current, drive, sample_time_s=SAMPLE_TIME_S)
 

@@ -13,7 +13,7 @@ from hwid_cli.config.faults import (
     wrong,
     wrong_word,
 )
-from hwid_cli.drive.catalogue import configured_effects
+from hwid_cli.drive.catalogue import CATALOGUE, configured_effects, public_id
 from hwid_cli.drive.effect import Stated
 from hwid_cli.records.experiment import DiagnoseOptions, Experiment
 from hwid_cli.simulations.kinds import KINDS
@@ -36,6 +36,23 @@ def circuit_faults(experiment: Experiment) -> Iterator[Fault]:
                 "simulation.resistance_ohm too, because without it the input is the "
                 "current",
                 "add that key or remove this one",
+            )
+
+
+def effect_circuit_faults(experiment: Experiment) -> Iterator[Fault]:
+    """Effects of an electrical circuit that has no resistance."""
+    options = experiment.simulation
+    if options is None or options.resistance_ohm is not None:
+        return
+    needs = {public_id(one.id) for one in CATALOGUE.values() if one.needs_circuit}
+    for name in options.effects:
+        if name in needs:
+            yield Fault(
+                ("simulation", "effects", name),
+                "found without simulation.resistance_ohm, so that the input is the "
+                "current",
+                "simulation.resistance_ohm too",
+                "add that key or remove this effect",
             )
 
 

@@ -175,6 +175,7 @@ def allowed_effects(
     wanted = options.effects
     present = {public_id(one) for one in drive_effects(problem.drive)}
     has_spring = problem.drive.stiffness_N_per_m > 0
+    has_circuit = problem.drive.resistance_ohm is not None
     several = len(problem.part(held_out=False).signals) > 2
     return tuple(
         name
@@ -182,6 +183,7 @@ def allowed_effects(
         if (wanted is None or public_id(name) in wanted)
         and public_id(name) not in present
         and (has_spring or not effect.needs_spring)
+        and (has_circuit or not effect.needs_circuit)
         and (several or not any(one.is_own for one in effect.parameters))
         and not (problem.compares_command and effect.enters == "output")
     )

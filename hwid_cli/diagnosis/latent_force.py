@@ -24,7 +24,7 @@ from scipy.linalg import expm
 
 from hwid_cli.diagnosis.problem import Compared
 from hwid_cli.records.diagnosis import NoiseFloor
-from hwid_cli.records.drive import Drive
+from hwid_cli.records.drive import Controller, Drive
 
 _N = 3
 # Once the covariance changes by less than this share in a step, it is settled.
@@ -393,8 +393,7 @@ def _copy(drive: Drive, sample_time_s: float, sigma: float) -> _Copy:
         )
     reading, unit = np.array([1.0, 0.0, 0.0]), 1.0
     if drive.controller is not None:
-        gain = drive.controller.velocity_gain
-        stiffer = gain * drive.controller.position_gain_per_s
+        stiffer, gain = _feedback(drive.controller)
         damping, stiffness = damping + push * gain, stiffness + push * stiffer
         reading = np.array([-stiffer, -gain, 0.0])
         unit = max(stiffer, gain / sample_time_s)
@@ -405,6 +404,17 @@ def _copy(drive: Drive, sample_time_s: float, sigma: float) -> _Copy:
     )
     transition = expm(rates * sample_time_s) * sizes[None, :] / sizes[:, None]
     return _Copy(np.ascontiguousarray(transition), reading * sizes / sigma, sizes)
+
+
+def _feedback(controller: Controller) -> tuple[float, float]:
+    """Command that a displacement and a velocity take back at once.
+
+    What is summed up of a displacement acts too slowly to count.
+    """
+    if controller.velocity_gain is None or controller.position_gain_per_s is None:
+        return controller.proportional_gain or 0.0, controller.derivative_gain
+    gain = controller.velocity_gain
+    return gain * (controller.position_gain_per_s + controller.reset_rate_per_s), gain
 
 
 def _first(copy: _Copy, largest: float) -> np.ndarray:

@@ -40,9 +40,11 @@ class Unknown:
     owner : str
         Id of the effect; ``base`` or ``start``.
     scale : float
-        Sign and size: the value is ``scale * exp(q)`` or ``scale * q``.
+        Sign and size: the value is ``scale * exp(q)`` or ``center + scale * q``.
     low, high : float
         Bounds of the value.
+    center : float
+        Value at 0, where it has no logarithm.
     """
 
     owner: str
@@ -51,6 +53,7 @@ class Unknown:
     scale: float
     low: float
     high: float
+    center: float = 0.0
 
     @property
     def ref(self) -> ParameterRef:
@@ -70,7 +73,7 @@ class Unknown:
         """
         if self.is_log:
             return float(self.scale * np.exp(coordinate))
-        return self.scale * coordinate
+        return self.center + self.scale * coordinate
 
     def coordinate(self, value: float) -> float:
         """Coordinate of a value, moved into the bounds.
@@ -84,9 +87,9 @@ class Unknown:
         float, [-]
         """
         inside = min(max(value, self.low), self.high)
-        return (
-            float(np.log(inside / self.scale)) if self.is_log else inside / self.scale
-        )
+        if self.is_log:
+            return float(np.log(inside / self.scale))
+        return (inside - self.center) / self.scale
 
 
 @dataclass(frozen=True)
@@ -203,8 +206,10 @@ def _unknown(owner: str, parameter: Parameter, value: float, scales: Scales) -> 
     if parameter.is_positive:
         size = value if value > 0 else max(parameter.starts(scales))
         return Unknown(owner, parameter.name, True, size, max(low, 1e-9 * size), high)
-    sizes = [abs(one) for one in (value, *parameter.starts(scales))]
-    return Unknown(owner, parameter.name, False, max(sizes) or 1.0, low, high)
+    center = parameter.center
+    sizes = [abs(one - center) for one in (value, *parameter.starts(scales))]
+    size = max(sizes) or 1.0
+    return Unknown(owner, parameter.name, False, size, low, high, center)
 
 
 def first_point(

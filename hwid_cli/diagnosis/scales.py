@@ -71,6 +71,7 @@ def scales_of_recordings(
         duration_s=duration,
         frequencies_Hz=frequencies_Hz,
         waves=waves,
+        resistance_ohm=drive.resistance_ohm or 1.0,
     )
 
 

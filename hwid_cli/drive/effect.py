@@ -52,6 +52,8 @@ class Scales:
         Where the error of the base has its highest lines.
     waves : tuple of Wave
         With which it repeats most along the way.
+    resistance_ohm : float, [ohm]
+        Of the circuit; 1 where there is none and the input is the current.
     """
 
     displacement_m: float
@@ -66,6 +68,7 @@ class Scales:
     duration_s: float
     frequencies_Hz: tuple[float, ...] = ()
     waves: tuple[Wave, ...] = ()
+    resistance_ohm: float = 1.0
 
     @property
     def stiffness_N_per_m(self) -> float:
@@ -158,6 +161,8 @@ class Parameter:
         Lowest and highest value of the search, from the scales.
     is_positive : bool
         Searched by its logarithm.
+    center : float, [unit of the parameter]
+        What a search counts from, where it is not searched by its logarithm.
     is_own : bool
         Whether each recording has its own value.
     places : tuple of str
@@ -177,6 +182,7 @@ class Parameter:
     starts: Rule
     bounds: Bounds = _unbounded
     is_positive: bool = True
+    center: float = 0.0
     is_own: bool = False
     places: tuple[str, ...] = ()
     is_factor: bool = False
@@ -205,6 +211,8 @@ class Effect:
         Effects that it includes as limit cases.
     needs_spring : bool
         Whether it means nothing on a free axis.
+    needs_circuit : bool
+        Whether it means nothing where the input is the current.
     seen : callable or None
         Values to start from that the recordings show, from the scales; where there are
         some they stand in for the parameters' own.
@@ -226,6 +234,7 @@ class Effect:
     confused_with: Mapping[str, str] = field(default_factory=dict)
     contains: tuple[str, ...] = ()
     needs_spring: bool = False
+    needs_circuit: bool = False
     seen: Callable[[Scales], tuple[dict[str, float], ...]] | None = None
     stated: tuple[Stated, ...] = ()
     moves_at_rest: bool = False

@@ -8,6 +8,7 @@ from numba import njit
 
 from hwid_cli.drive import slots
 from hwid_cli.drive.compiled import INNER
+from hwid_cli.drive.motion.push import TURN
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -30,6 +31,40 @@ def read(
     return output
 
 
+@njit(cache=True, nogil=True, error_model="numpy")
+def on_other_clock(
+    positions: np.ndarray, velocities: np.ndarray, step: float, n: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the motion at other times, on the cubics through positions and velocities.
+
+    Parameters
+    ----------
+    positions, velocities : ndarray, shape (m,), [sample], [sample/sample]
+        Velocities are per sample; the last time must not be beyond the last sample.
+    step : float, [samples]
+        From one time to the next; the first one is 0.
+    n : int
+        Number of times.
+
+    Returns
+    -------
+    positions : ndarray, shape (n,)
+    velocities : ndarray, shape (n,), [1/sample]
+    """
+    places, speeds = np.empty(n), np.empty(n)
+    for i in range(n):
+        at = min(int(i * step), positions.size - 2)
+        t = i * step - at
+        x0, v0 = positions[at], velocities[at]
+        v1 = velocities[at + 1]
+        rise = positions[at + 1] - x0
+        # x0 + v0 t + a t^2 + b t^3
+        a, b = 3.0 * rise - 2.0 * v0 - v1, v0 + v1 - 2.0 * rise
+        places[i] = x0 + t * (v0 + t * (a + t * b))
+        speeds[i] = v0 + t * (2.0 * a + 3.0 * t * b)
+    return places, speeds
+
+
 @njit(**INNER)
 def sensed(y: float, time: float, p: np.ndarray) -> float:
     """Return what the sensor makes of the place that it measures.
@@ -42,11 +77,21 @@ def sensed(y: float, time: float, p: np.ndarray) -> float:
     """
     if p[slots.OUTPUT_ZERO] != 0.0:
         y -= p[slots.OUTPUT_ZERO]
+    if p[slots.ECCENTRICITY] != 0.0:
+        phase = p[slots.ECCENTRIC_PHASE]
+        swing = np.sin(TURN * y / p[slots.ECCENTRIC_PERIOD] + phase) - np.sin(phase)
+        y += p[slots.ECCENTRICITY] * swing
     if p[slots.SENSOR_QUADRATIC] != 0.0 or p[slots.SENSOR_CUBIC] != 0.0:
         share = y / p[slots.REFERENCE_DISPLACEMENT]
         y *= 1.0 + (p[slots.SENSOR_QUADRATIC] + p[slots.SENSOR_CUBIC] * share) * share
     if p[slots.SENSOR_DRIFT] != 0.0:
         y += p[slots.SENSOR_DRIFT] * time
+    if p[slots.HUM_AMPLITUDE] != 0.0:
+        angle = TURN * p[slots.HUM_FREQUENCY] * time + p[slots.HUM_PHASE]
+        y += p[slots.HUM_AMPLITUDE] * np.sin(angle)
+    limit = p[slots.OUTPUT_LIMIT]
+    if limit < np.inf:
+        y = min(max(y, -limit), limit)
     return y
 
 

@@ -12,10 +12,10 @@ import numpy as np
 from scipy.interpolate import make_interp_spline
 
 from hwid_cli.drive import slots
-from hwid_cli.drive.catalogue import CATALOGUE
+from hwid_cli.drive.catalogue import CATALOGUE, entry_id
 from hwid_cli.drive.effect import Effect, Values
 from hwid_cli.drive.motion.move import move
-from hwid_cli.drive.output import read
+from hwid_cli.drive.output import on_other_clock, read
 from hwid_cli.records.drive import Drive
 
 # A smooth input is followed in straight lines of a quarter of a sample: at a fifth of the
@@ -153,9 +153,21 @@ def run(
     refinement : int
         Samples of the input for one of the motion.
     """
-    columns = move(driven_by, sample_time_s / refinement, vector)
-    position, velocity, command = (column[::refinement] for column in columns)
-    output = read(position, velocity, sample_time_s, vector)
+    gain = vector[slots.CLOCK_GAIN]
+    n = (driven_by.size - 1) // refinement + 1
+    if gain > 0.0:
+        # What the other clock reads last: the input stays as it is until then.
+        more = int(np.ceil(gain * driven_by.size)) + 1
+        driven_by = np.concatenate([driven_by, np.full(more, driven_by[-1])])
+    fine_time = sample_time_s / refinement
+    columns = move(driven_by, fine_time, vector)
+    position, velocity, command = (column[::refinement][:n] for column in columns)
+    if gain == 0.0 or driven_by.size < 2:
+        output = read(position, velocity, sample_time_s, vector)
+    else:
+        ratio = 1.0 + gain
+        seen = on_other_clock(columns[0], fine_time * columns[1], ratio * refinement, n)
+        output = read(seen[0], seen[1] / fine_time, ratio * sample_time_s, vector)
     return Motion(output, position, velocity, command)
 
 
@@ -196,10 +208,15 @@ def parameter_vector(drive: Drive, effects: Mapping[str, Values]) -> np.ndarray:
             drive.force_constant_N_per_A if back_emf is None else back_emf
         )
     if drive.controller is not None:
-        vector[slots.POSITION_GAIN] = drive.controller.position_gain_per_s
-        vector[slots.VELOCITY_GAIN] = drive.controller.velocity_gain
-        if drive.controller.limit is not None:
-            vector[slots.COMMAND_LIMIT] = drive.controller.limit
+        one = drive.controller
+        vector[slots.POSITION_GAIN] = one.position_gain_per_s or 0.0
+        vector[slots.VELOCITY_GAIN] = one.velocity_gain or 0.0
+        vector[slots.RESET_RATE] = one.reset_rate_per_s
+        vector[slots.PROPORTIONAL_GAIN] = one.proportional_gain or 0.0
+        vector[slots.INTEGRAL_GAIN] = one.integral_gain
+        vector[slots.DERIVATIVE_GAIN] = one.derivative_gain
+        if one.limit is not None:
+            vector[slots.COMMAND_LIMIT] = one.limit
     for identifier, values in effects.items():
         if identifier not in CATALOGUE:
             raise ValueError(f"effect {identifier!r} is not in the catalogue")
@@ -240,14 +257,16 @@ def drive_effects(drive: Drive) -> dict[str, dict[str, float]]:
     """
     effects: dict[str, dict[str, float]] = {}
     for identifier, values in drive.effects.items():
-        if identifier == "parameter_change":
-            which = str(values["which"])
-            effects[f"{identifier}:{which}"] = {f"log_{which}": 0.0}
+        entry = CATALOGUE.get(entry_id(identifier, values))
+        if entry is None:
+            effects[identifier] = {name: float(one) for name, one in values.items()}
             continue
-        effects[identifier] = {name: float(one) for name, one in values.items()}
-        for one in CATALOGUE[identifier].parameters if identifier in CATALOGUE else ():
-            if one.default is not None and not one.is_own:
-                effects[identifier].setdefault(one.name, one.default)
+        numbers = effects[entry.id] = {}
+        for one in entry.parameters:
+            if one.name in values:
+                numbers[one.name] = float(values[one.name])
+            elif one.default is not None and (one.is_factor or not one.is_own):
+                numbers[one.name] = one.default
     return effects
 
 

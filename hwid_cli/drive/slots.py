@@ -69,5 +69,22 @@ that is switched off is 0, except where the comment says infinite.
     START_VELOCITY,
     IS_START_GIVEN,
     OUTPUT_ZERO,  # position at which the sensor reads 0
+    IS_COUPLED,  # set by the simulation: the teeth are an elastic coupling
+    COUPLING_STIFFNESS,
+    COUPLING_SHARE,
+    COUPLING_DAMPING_RATIO,
+    SENSOR_AT_MOTOR,
+    OUTPUT_LIMIT,  # infinite
+    HUM_AMPLITUDE,
+    HUM_FREQUENCY,
+    HUM_PHASE,
+    ECCENTRICITY,
+    ECCENTRIC_PERIOD,
+    ECCENTRIC_PHASE,
+    CLOCK_GAIN,  # of the output, over the input's clock
+    RESET_RATE,
+    PROPORTIONAL_GAIN,
+    INTEGRAL_GAIN,
+    DERIVATIVE_GAIN,
     N_SLOTS,
-) = range(64)
+) = range(81)

@@ -39,6 +39,11 @@ def drive_source(exported: ExportedSimulation) -> str:
             f"--format c: simulation.hold {drive.hold}: follows a smooth curve through "
             "inputs that are yet to come; expected linear or zero; use --format json"
         )
+    if exported.slots[slots.CLOCK_GAIN] != 0:
+        raise ConfigError(
+            "--format c: simulation.effects.clock_skew: reads the motion further and "
+            "further away from the input's time; expected one clock; use --format json"
+        )
     delay = float(exported.slots[slots.DELAY])
     n_history = math.floor(delay / step) + 2
     if n_history > _LONGEST_DELAY:

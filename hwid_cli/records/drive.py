@@ -6,7 +6,14 @@ from typing import Annotated
 
 import numpy as np
 
-from hwid_cli.records.rules import NOT_NEGATIVE, POSITIVE, OneOf, check_fields
+from hwid_cli.records.rules import (
+    NOT_NEGATIVE,
+    POSITIVE,
+    OneOf,
+    Refusal,
+    Refused,
+    check_fields,
+)
 
 # How recordings start: at rest in equilibrium; at rest wherever friction holds the drive;
 # anyhow, so that position and velocity are found from the recording.
@@ -18,31 +25,68 @@ BASE_PARAMETERS = (
     "stiffness_N_per_m",
     "force_constant_N_per_A",
 )
+# Keys of a controller that is a cascade, and of a PID controller; the needed ones first.
+CASCADE_KEYS = ("position_gain_per_s", "velocity_gain", "reset_rate_per_s")
+PID_KEYS = ("proportional_gain", "integral_gain", "derivative_gain")
 # What may differ between recordings (effect ``parameter_change``).
 CHANGING = ("stiffness", "force_constant", "damping")
 
 
 @dataclass(frozen=True)
 class Controller:
-    """A cascade: proportional position loop around a proportional velocity loop.
+    """A cascade or a PID controller, computed at every sample and held until the next.
 
-    ``input = velocity_gain (position_gain (reference - output) - velocity)``, computed
-    at every sample and held until the next one.
+    Cascade: a proportional position loop around a proportional velocity loop, with
+    ``reset_rate_per_s`` a proportional-integral one: ``error = position_gain (reference -
+    position) - velocity``, ``input = velocity_gain (error + reset_rate sum(error) dt)``.
+
+    PID, or P, PI and PD: ``error = reference - output``, ``input = proportional_gain
+    error + integral_gain sum(error) dt + derivative_gain (error - previous error) / dt``.
 
     Parameters
     ----------
-    position_gain_per_s : float, [1/s]
-    velocity_gain : float, [input unit s/m]
+    position_gain_per_s : float or None, [1/s]
+    velocity_gain : float or None, [input unit s/m]
+        None with a PID controller, as is the position gain.
     limit : float or None, [input unit]
-        The command is cut to plus and minus this; None for no limit.
+        The command is cut to plus and minus this; None for no limit. The integral part
+        does not grow while it is cut.
+    reset_rate_per_s : float, [1/s]
+    proportional_gain : float or None, [input unit/output unit]
+        None with a cascade.
+    integral_gain : float, [input unit/(output unit s)]
+    derivative_gain : float, [input unit s/output unit]
     """
 
-    position_gain_per_s: Annotated[float, POSITIVE]
-    velocity_gain: Annotated[float, POSITIVE]
+    position_gain_per_s: Annotated[float | None, POSITIVE] = None
+    velocity_gain: Annotated[float | None, POSITIVE] = None
     limit: Annotated[float | None, POSITIVE] = None
+    reset_rate_per_s: Annotated[float, NOT_NEGATIVE] = 0.0
+    proportional_gain: Annotated[float | None, POSITIVE] = None
+    integral_gain: Annotated[float, NOT_NEGATIVE] = 0.0
+    derivative_gain: Annotated[float, NOT_NEGATIVE] = 0.0
 
     def __post_init__(self) -> None:
         check_fields(self)
+        cascade, pid = (
+            [name for name in keys if getattr(self, name)]
+            for keys in (CASCADE_KEYS, PID_KEYS)
+        )
+        if cascade and pid:
+            expected = (
+                f"a cascade ({', '.join(CASCADE_KEYS)}) or a PID controller "
+                f"({', '.join(PID_KEYS)})"
+            )
+            said = f"found {{}} beside {cascade[0]}"
+            value = getattr(self, pid[0])
+            raise Refused(Refusal(value, expected, (pid[0],), said, step="remove one"))
+        for name in PID_KEYS[:1] if pid else CASCADE_KEYS[:2]:
+            if getattr(self, name) is None:
+                step = "add the key"
+                if not cascade and not pid:
+                    step += f", or {PID_KEYS[0]} of a PID controller"
+                refusal = Refusal(None, "a number > 0", (name,), "missing", step=step)
+                raise Refused(refusal)
 
 
 @dataclass(frozen=True)

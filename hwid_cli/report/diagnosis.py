@@ -100,7 +100,7 @@ def effects_table(diagnosis: Diagnosis) -> Table:
         name = effect.id
         for parameter in effect.parameters:
             quantity, unit = quantity_and_unit(parameter.name)
-            value = parameter.text or _value(parameter.value)
+            value = parameter.text or _value(parameter.value, parameter.name)
             rows.append((name, quantity, value, _interval(parameter), unit))
             name = ""
     title = "Effects that the simulation lacks"
@@ -116,7 +116,9 @@ def effects_table(diagnosis: Diagnosis) -> Table:
 
 def _interval(parameter: FittedParameter) -> str:
     bounds = (parameter.low, parameter.high)
-    return " to ".join(map(_value, bounds)) if np.isfinite(bounds).all() else MISSING
+    if not np.isfinite(bounds).all():
+        return MISSING
+    return " to ".join(_value(one, parameter.name) for one in bounds)
 
 
 def gap_table(diagnosis: Diagnosis) -> Table:
@@ -289,8 +291,24 @@ def percent(share: float) -> str:
     return f"{100.0 * share:.1f} %" if np.isfinite(share) else MISSING
 
 
-def _value(value: float) -> str:
-    return f"{value:.4g}" if np.isfinite(value) else MISSING
+def _value(value: float, name: str = "") -> str:
+    return shown_value(value, name) if np.isfinite(value) else MISSING
+
+
+def shown_value(value: float, name: str = "") -> str:
+    """Write the value of a parameter.
+
+    Parameters
+    ----------
+    name : str
+        Of the parameter: of two clocks each millionth of their ratio counts.
+
+    Examples
+    --------
+    >>> shown_value(0.81234, "force_N"), shown_value(1.00012, "ratio")
+    ('0.8123', '1.000120')
+    """
+    return f"{value:.6f}" if name == "ratio" else f"{value:.4g}"
 
 
 def _ratio(value: float) -> str:

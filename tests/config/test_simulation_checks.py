@@ -19,7 +19,9 @@ def load(write_config):
 @pytest.fixture
 def load_effect(load):
     def load_one(text):
-        return load(f"simulation: {{effects: {{{text}}}}}").simulation.effects
+        # Some effects need a circuit.
+        text = f"simulation: {{resistance_ohm: 1, effects: {{{text}}}}}"
+        return load(text).simulation.effects
 
     return load_one
 
@@ -48,6 +50,16 @@ def test_what_an_effect_needs_is_required_and_the_rest_is_not(load_effect, ident
             ConfigError, match=rf"effects\.{identifier}\.{left_out}: missing; exp"
         ):
             load_effect(f"{identifier}: {{{written(others)}}}")
+
+
+def test_an_inductance_needs_a_circuit(load):
+    text = "simulation: {effects: {winding_inductance: {inductance_H: 0.01}}}"
+    with pytest.raises(
+        ConfigError,
+        match=r"effects\.winding_inductance: found without simulation\.resistance_ohm, "
+        r"so that the input is the current; expected simulation\.resistance_ohm too; add",
+    ):
+        load(text)
 
 
 def test_what_completes_a_law_may_be_given(load_effect):
@@ -113,6 +125,14 @@ def test_what_completes_a_law_may_be_given(load_effect):
             r"parameter_change.spread: found 'wide'; expected a finite number",
         ),
         (
+            "elastic_coupling: {stiffness_N_per_m: 9, sensor: gear}",
+            r"elastic_coupling\.sensor: found 'gear'; expected one of motor, load",
+        ),
+        (
+            "clock_skew: {ratio: 11}",
+            r"clock_skew\.ratio: found 11\.0; expected a ratio from 0\.1 to 10",
+        ),
+        (
             "gear_backlash: {half_gap_m: 1, stiffness_N_per_m: 9, motor_share: 1}",
             r"motor_share: found 1.0; expected a share of the mass below 1",
         ),
@@ -150,7 +170,22 @@ def test_effect_that_cannot_be_simulated_is_one_line(load_effect, text, message)
         ),
         (
             "controller: {position_gain_per_s: 1}",
-            r"simulation.controller.velocity_gain: missing; expected a finite number",
+            r"simulation.controller.velocity_gain: missing; expected a number > 0; add",
+        ),
+        (
+            "controller: {limit: 1}",
+            r"controller.position_gain_per_s: missing; expected a number > 0; add the key, "
+            r"or proportional_gain of a PID controller",
+        ),
+        (
+            "controller: {integral_gain: 1}",
+            r"controller.proportional_gain: missing; expected a number > 0; add the key$",
+        ),
+        (
+            "controller: {position_gain_per_s: 1, velocity_gain: 2, integral_gain: 3}",
+            r"controller.integral_gain: found 3.0 beside position_gain_per_s; expected a "
+            r"cascade \(position_gain_per_s, velocity_gain, reset_rate_per_s\) or a PID "
+            r"controller \(proportional_gain, integral_gain, derivative_gain\); remove one",
         ),
     ],
 )

@@ -43,6 +43,9 @@ def test_tasks_of_one_diagnosis_differ_in_their_content():
     assert len(contents) == len(set(contents)) == 2 * len(FEW)
 
 
+OF_CIRCUIT = {name for name, one in CATALOGUE.items() if one.needs_circuit}
+
+
 @pytest.mark.parametrize(
     ("changes", "lost"),
     [
@@ -61,7 +64,14 @@ def test_what_makes_no_sense_for_a_drive_is_not_tried(changes, lost):
     of = problem(recordings(), **changes)
     allowed = set(allowed_effects(of, DiagnoseOptions()))
     assert lost
-    assert allowed == set(CATALOGUE) - lost
+    assert allowed == {name for name in CATALOGUE if name not in lost | OF_CIRCUIT}
+
+
+def test_a_circuit_may_have_an_inductance():
+    of = problem(recordings(), resistance_ohm=2.0)
+    allowed = allowed_effects(of, DiagnoseOptions())
+    assert set(CATALOGUE) - set(allowed) == set()
+    assert list(OF_CIRCUIT) == ["winding_inductance"]
 
 
 def test_two_recordings_show_no_change_between_recordings():

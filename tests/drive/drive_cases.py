@@ -87,6 +87,7 @@ SCALES = Scales(
     sample_time_s=SAMPLE_TIME_S,
     duration_s=0.4,
     frequencies_Hz=(17.0,),
+    resistance_ohm=2.0,
 )
 # All that can be simulated alone: where no size is chosen, the last that is searched from.
 EVERY = {
@@ -94,6 +95,13 @@ EVERY = {
     for effect in CATALOGUE.values()
     if not effect.id.startswith("parameter_change")
 }
+
+
+def machine_of(effect):
+    """What the drive needs for an effect to mean something."""
+    return {"resistance_ohm": 2.0} if CATALOGUE[effect].needs_circuit else {}
+
+
 TOGETHER = (
     COULOMB | LOAD,
     COULOMB | CUBIC,

@@ -1,8 +1,18 @@
 """What the sensor makes of the motion."""
 
 import numpy as np
+import pytest
+from scipy.interpolate import CubicHermiteSpline, CubicSpline
 
-from tests.drive.drive_cases import SAMPLE_TIME_S, rms, tool
+from tests.drive.drive_cases import (
+    CORNER_TIMES_S,
+    CORNERS,
+    COULOMB,
+    SAMPLE_TIME_S,
+    TIMES_S,
+    rms,
+    tool,
+)
 
 
 def follow(fine, half_gap):
@@ -36,3 +46,102 @@ def test_sensor_laws_act_on_the_position():
     drift = tool({"sensor_drift": {"drift_m_per_s": 0.1}}).output
     times = SAMPLE_TIME_S * np.arange(position.size)
     np.testing.assert_allclose(drift, position + 0.1 * times, atol=1e-16)
+
+
+def test_a_saturated_sensor_is_clipped_on_both_sides():
+    position = tool({}).position
+    output = tool({"sensor_saturation": {"limit_m": 0.012}}).output
+    np.testing.assert_array_equal(output, np.clip(position, -0.012, 0.012))
+    assert (output == 0.012).any()
+    assert (output == -0.012).any()
+
+
+def test_hum_swings_in_the_reading_alone():
+    plain = tool({})
+    values = {"amplitude_m": 2e-4, "frequency_Hz": 50.0, "phase_rad": 0.7}
+    found = tool({"sensor_hum": values})
+    expected = plain.position + 2e-4 * np.sin(2 * np.pi * 50.0 * TIMES_S + 0.7)
+    np.testing.assert_allclose(found.output, expected, atol=1e-15)
+    np.testing.assert_array_equal(found.position, plain.position)
+
+
+def test_an_eccentric_scale_errs_along_the_way():
+    position = tool({}).position
+    values = {"amplitude_m": 3e-4, "period_m": 4e-3, "phase_rad": 0.7}
+    found = tool({"sensor_eccentricity": values}).output
+    swing = np.sin(2 * np.pi * position / 4e-3 + 0.7) - np.sin(0.7)
+    np.testing.assert_allclose(found, position + 3e-4 * swing, atol=1e-15)
+
+
+def test_the_terms_of_the_sensor_act_in_their_order():
+    laws = {
+        "sensor_eccentricity": {"amplitude_m": 3e-4, "period_m": 4e-3},
+        "sensor_quadratic": {"coefficient": 0.1},
+        "sensor_drift": {"drift_m_per_s": 0.01},
+        "sensor_hum": {"amplitude_m": 2e-4, "frequency_Hz": 50.0},
+        "sensor_saturation": {"limit_m": 0.012},
+    }
+    y = tool({}).position
+    y = y + 3e-4 * np.sin(2 * np.pi * y / 4e-3)
+    y = y * (1 + 0.1 * y / 0.02) + 0.01 * TIMES_S
+    y = np.clip(y + 2e-4 * np.sin(2 * np.pi * 50.0 * TIMES_S), -0.012, 0.012)
+    np.testing.assert_allclose(tool(laws).output, y, atol=1e-15)
+
+
+def at_times(ratio, effects, fine=400):
+    """The motion at other times, from samples so fine that the nearest cubic is exact."""
+    command = np.append(CORNERS, CORNERS[-1])
+    corners = np.append(CORNER_TIMES_S, 1.0)
+    dense = SAMPLE_TIME_S / fine
+    times = dense * np.arange(round(0.45 / dense) + 1)
+    position = tool(
+        effects, np.interp(times, corners, command), sample_time=dense
+    ).position
+    return CubicSpline(times, position)(ratio * TIMES_S)
+
+
+@pytest.mark.parametrize("ratio", [0.97, 0.9999, 1.0003, 1.05])
+def test_another_clock_reads_the_motion_at_other_times(ratio):
+    found = tool({"clock_skew": {"ratio": ratio}})
+    # A cubic through positions and velocities leaves h^4/384 of the fourth derivative:
+    # 25 N/ms swing 0.3 kg by 3e5 m/s^3 at corners.
+    assert rms(found.output - at_times(ratio, {})) < 3e-8
+    np.testing.assert_array_equal(found.position, tool({}).position)
+
+
+def test_another_clock_reads_friction_as_well():
+    found = tool({"clock_skew": {"ratio": 1.01}} | COULOMB).output
+    # Where the drive stops, the acceleration jumps by 5 m/s^2 within a sample of 1 ms.
+    assert rms(found - at_times(1.01, COULOMB, fine=40)) < 1e-7
+
+
+def test_the_same_clock_changes_nothing():
+    found = tool({"clock_skew": {"ratio": 1.0}})
+    np.testing.assert_array_equal(found.output, tool({}).output)
+
+
+def test_play_and_drift_go_by_the_other_clock():
+    effects = {
+        "clock_skew": {"ratio": 0.98},
+        "output_backlash": {"half_gap_m": 1e-3},
+        "sensor_drift": {"drift_m_per_s": 0.01},
+    }
+    fine = tool({}, sample_time=SAMPLE_TIME_S / 100).position
+    expected = follow(fine, 1e-3)[::98][: TIMES_S.size] + 0.01 * 0.98 * TIMES_S
+    # As of the play with one clock.
+    assert rms(tool(effects).output - expected) < 3e-8
+
+
+@pytest.mark.parametrize("size", [1, 2])
+@pytest.mark.parametrize("ratio", [0.9, 1.1])
+def test_the_shortest_recordings_have_another_clock(size, ratio):
+    found = tool({"clock_skew": {"ratio": ratio}}, np.full(size, 2.0)).output
+    np.testing.assert_allclose(found, 2.0 * 5.0 / 1184.0, rtol=1e-12)
+
+
+def test_a_smooth_input_is_read_by_another_clock():
+    found = tool({"clock_skew": {"ratio": 0.99}}, hold="smooth").output
+    plain = tool({}, hold="smooth")
+    spline = CubicHermiteSpline(TIMES_S, plain.position, plain.velocity)
+    # Between samples the tool has finer ones.
+    assert rms(found - spline(0.99 * TIMES_S)) < 3e-8

@@ -32,6 +32,17 @@ SENSORS = {
     "sensor_quadratic": {"coefficient": 0.1},
     "sensor_cubic": {"coefficient": 0.05},
     "sensor_drift": {"drift_m_per_s": 0.01},
+    "sensor_eccentricity": {"amplitude_m": 3e-4, "period_m": 4e-3},
+    "sensor_hum": {"amplitude_m": 2e-4, "frequency_Hz": 50.0},
+    "sensor_saturation": {"limit_m": 0.01},
+}
+COUPLED_MOTOR = {
+    "elastic_coupling": {
+        "stiffness_N_per_m": 2e4,
+        "motor_share": 0.3,
+        "damping_ratio": 0.05,
+        "sensor": "motor",
+    }
 }
 MACHINES = (
     ({}, {}),
@@ -42,8 +53,27 @@ MACHINES = (
     (cases.COULOMB, {"resistance_ohm": 2.0}),
     (cases.COULOMB | cases.HEAT, {"resistance_ohm": 2.0, "inductance_H": 1e-3}),
     (cases.STRIBECK, {"controller": Controller(20.0, 30.0, 4.0)}),
+    (COUPLED_MOTOR, {"controller": Controller(20.0, 30.0, 4.0, 25.0)}),
+    (
+        cases.COULOMB,
+        {
+            "controller": Controller(
+                limit=0.8,
+                proportional_gain=300.0,
+                integral_gain=4000.0,
+                derivative_gain=4.0,
+            )
+        },
+    ),
+    (COUPLED_MOTOR | BACKLASH | cases.COULOMB, {}),
+    (COUPLED_MOTOR | cases.GEAR, {"stiffness_N_per_m": 0.0}),
 )
-ALONE = tuple(({name: values}, {}) for name, values in cases.EVERY.items())
+# Another clock is refused.
+ALONE = tuple(
+    ({name: values}, cases.machine_of(name))
+    for name, values in cases.EVERY.items()
+    if name != "clock_skew"
+)
 TOGETHER = tuple((both, {}) for both in cases.TOGETHER + cases.TOGETHER_SLOW)
 
 
@@ -116,6 +146,11 @@ def test_a_smooth_input_is_refused():
         ConfigError, match=r"simulation.hold smooth: .*use --format json"
     ):
         drive_source(exported_drive({}, hold="smooth"))
+
+
+def test_another_clock_is_refused():
+    with pytest.raises(ConfigError, match=r"effects.clock_skew: .*use --format json"):
+        drive_source(exported_drive({"clock_skew": {"ratio": 1.01}}))
 
 
 def test_matlab_is_refused(tmp_path):

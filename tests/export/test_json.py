@@ -72,10 +72,16 @@ def test_the_schema_describes_what_is_written(kind):
         SCHEMA.validate(content)
 
 
-def test_a_simulation_comes_back_and_fits_the_schema(tmp_path):
+@pytest.mark.parametrize(
+    "controller",
+    [
+        Controller(20.0, 3.0, 4.0, 5.0),
+        Controller(proportional_gain=20.0, integral_gain=3.0, derivative_gain=0.1),
+    ],
+)
+def test_a_simulation_comes_back_and_fits_the_schema(tmp_path, controller):
     given = exported_drive(
-        effects={"coulomb_friction": {"force_N": 0.7}},
-        controller=Controller(20.0, 3.0, 4.0),
+        effects={"coulomb_friction": {"force_N": 0.7}}, controller=controller
     )
     found = written(tmp_path / "s.json", given)
 

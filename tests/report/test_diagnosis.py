@@ -58,12 +58,15 @@ def test_a_name_is_taken_apart(name, expected):
 def test_the_effects_have_values_intervals_and_units():
     which = FittedParameter("which", NAN, text="stiffness")
     change = FittedEffect("parameter_change", "", "", (which,))
-    found = effects_table(replace(named(), effects=(FRICTION, DRAG, change)))
+    ratio = FittedParameter("ratio", 1.00012, 1.0001, 1.00014)
+    skew = FittedEffect("clock_skew", "", "", (ratio,))
+    found = effects_table(replace(named(), effects=(FRICTION, DRAG, change, skew)))
 
     assert found.rows == (
         ("coulomb_friction", "force", "0.8123", "0.7902 to 0.8344", "N"),
         ("quadratic_drag", "drag", "2.5", "-", "N s^2/m^2"),
         ("parameter_change", "which", "stiffness", "-", "-"),
+        ("clock_skew", "ratio", "1.000120", "1.000100 to 1.000140", "-"),
     )
 
 

@@ -146,3 +146,80 @@ def test_recordings_that_begin_in_motion_are_diagnosed():
     found = diagnosed(cut, initial_state="estimated")
     assert [one.id for one in found.effects] == ["coulomb_friction"]
     assert parameters(found.effects[0])["force_N"] == pytest.approx(0.8, rel=0.02)
+
+
+@pytest.mark.parametrize("sensor", ["motor", "load"])
+def test_an_elastic_coupling_is_extended_by_the_place_of_its_sensor(sensor):
+    hidden = {"stiffness_N_per_m": 2e4, "motor_share": 0.4, "damping_ratio": 0.05}
+    given = recordings({"elastic_coupling": hidden | {"sensor": sensor}})
+    found = diagnosed(given, effects=("elastic_coupling", "gear_backlash"))
+    (effect,) = found.effects
+    assert (effect.id, found.complete) == ("elastic_coupling", True)
+    assert [one.text for one in effect.parameters if one.text] == [sensor]
+    values = parameters(effect)
+    # 50 Hz in 0.4 s: some percent of the frequency's square.
+    assert values["stiffness_N_per_m"] == pytest.approx(2e4, rel=0.05)
+    assert values["motor_share"] == pytest.approx(0.4, abs=0.05)
+
+    extended = extended_options(found, simulation())
+    assert extended.effects["elastic_coupling"]["sensor"] == sensor
+    after = diagnosed(given, extended, effects=("second_mode",))
+    assert after.verdict == "none"
+    assert [one.text for one in after.present[0].parameters if one.text] == [sensor]
+
+
+@pytest.mark.parametrize(
+    ("hidden", "others"),
+    [
+        ({"sensor_saturation": {"limit_m": 0.009}}, ("end_stop", "input_saturation")),
+        (
+            {"sensor_eccentricity": {"amplitude_m": 3e-4, "period_m": 6e-3}},
+            ("cogging", "sensor_cubic"),
+        ),
+        ({"clock_skew": {"ratio": 0.98}}, ("input_delay",)),
+    ],
+)
+def test_what_the_sensor_does_is_named(hidden, others):
+    found = diagnosed(recordings(hidden), effects=(*hidden, *others))
+    ((identifier, values),) = hidden.items()
+    assert [one.id for one in found.effects] == [identifier]
+    assert found.complete
+    told = parameters(found.effects[0])
+    for name, value in values.items():
+        assert told[name] == pytest.approx(value, rel=0.01)
+
+
+def test_a_ratio_of_clocks_is_found_to_a_tenth_of_a_thousandth():
+    found = diagnosed(
+        recordings({"clock_skew": {"ratio": 1.004}}), effects=("clock_skew",)
+    )
+    (ratio,) = found.effects[0].parameters
+    # Of what the noise leaves: 20 um on 1 m/s after 0.4 s.
+    assert ratio.value == pytest.approx(1.004, abs=1e-4)
+    assert ratio.low < 1.004 < ratio.high
+
+
+def test_a_hum_of_the_sensor_is_no_force():
+    hum = {"amplitude_m": 4e-4, "frequency_Hz": 31.0}
+    given = recordings(
+        own=lambda number, drive: replace(
+            drive, effects={"sensor_hum": hum | {"phase_rad": 0.9 * number}}
+        )
+    )
+    found = diagnosed(given, effects=("sensor_hum", "periodic_force"))
+    assert [one.id for one in found.effects] == ["sensor_hum"]
+    told = parameters(found.effects[0])
+    assert told["amplitude_m"] == pytest.approx(4e-4, rel=0.02)
+    assert told["frequency_Hz"] == pytest.approx(31.0, rel=0.002)
+
+
+def test_a_coil_delays_what_a_voltage_does():
+    circuit = {"resistance_ohm": 1.0, "back_emf_V_s_per_m": 5.0}
+    coil = {"winding_inductance": {"inductance_H": 4e-3}}
+    given = recordings(coil, drive=replace(DRIVE, **circuit))
+    found = diagnosed(
+        given, simulation(**circuit), effects=(*coil, "actuator_lag", "input_delay")
+    )
+    assert [one.id for one in found.effects] == ["winding_inductance"]
+    told = parameters(found.effects[0])["inductance_H"]
+    assert told == pytest.approx(4e-3, rel=0.02)

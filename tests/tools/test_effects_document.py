@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from hwid_cli.drive.catalogue import CATALOGUE, configured_effects
+from hwid_cli.drive.catalogue import CATALOGUE, configured_effects, public_id
 from tools import effects_document
 from tools.effects_document import (
     DOCUMENT,
@@ -27,7 +27,7 @@ def test_every_effect_has_a_section_and_a_figure():
     sections = {line[3:] for line in document().splitlines() if line.startswith("## ")}
     assert sections == set(configured_effects())
     assert {path.stem for path in FIGURES.glob("*.png")} == {
-        one.id for one in plain_effects()
+        public_id(one.id) for one in plain_effects()
     }
 
 

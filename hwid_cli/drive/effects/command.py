@@ -107,7 +107,10 @@ LAG = Effect(
             "time_constant_s", _times, _time_bounds, places=("LAG",), limits=(POSITIVE,)
         ),
     ),
-    confused_with={"input_delay": "a sine far above the natural frequency"},
+    confused_with={
+        "input_delay": "a sine far above the natural frequency",
+        "winding_inductance": "fast motion without voltage, such as after a release",
+    },
 )
 
 CONSTANT_SATURATION = Effect(

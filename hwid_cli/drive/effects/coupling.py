@@ -12,6 +12,7 @@ from hwid_cli.drive.effect import (
     Limit,
     Parameter,
     Scales,
+    Stated,
     Values,
     shares_of,
     span_of,
@@ -83,6 +84,8 @@ GEAR = Effect(
         "output_backlash": "reversals with the spring unloaded",
         "input_delay": "large and small reversals",
     },
+    # Without a gap and without damping in contact, where teeth do not pull.
+    contains=("elastic_coupling:load",),
 )
 
 MODE = Effect(
@@ -140,10 +143,77 @@ PERIODIC = Effect(
             default=0.0,
         ),
     ),
-    confused_with={"cogging": "recordings at rest, where only a force in time goes on"},
+    confused_with={
+        "cogging": "recordings at rest, where only a force in time goes on",
+        "sensor_hum": "a drive that is held fast, where only a sensor's hum goes on",
+    },
     moves_at_rest=True,
     # A free axis drifts off with the phase at the start: that imitates anything.
     needs_spring=True,
 )
 
-EFFECTS = (GEAR, MODE, PERIODIC)
+
+def _elastic(sensor: str, looks_like: dict[str, str]) -> Effect:
+    """One entry of the elastic coupling, by the place of the sensor."""
+    return Effect(
+        id=f"elastic_coupling:{sensor}",
+        sentence="a shaft or belt that gives way between motor and load; "
+        f"the sensor is at the {sensor}",
+        equation="m1 xm'' = kt i - T, m2 x'' = T - c x' - k x; "
+        "T = kc (xm - x) + cc (xm' - x'), "
+        f"y = {'xm' if sensor == 'motor' else 'x'}",
+        enters="motion",
+        parameters=(
+            Parameter(
+                "stiffness_N_per_m",
+                shares_of("stiffness_N_per_m", 3, 15, 75, 400, 2000),
+                # Softer is no drive any more, stiffer is one mass.
+                span_of("stiffness_N_per_m", 0.5, 1e5),
+                places=("COUPLING_STIFFNESS",),
+                limits=(POSITIVE,),
+            ),
+            Parameter(
+                "motor_share",
+                lambda scales: (0.25, 0.6),
+                lambda scales: (0.02, 0.98),
+                places=("COUPLING_SHARE",),
+                default=0.5,
+                limits=(POSITIVE, _BELOW_WHOLE),
+            ),
+            Parameter(
+                "damping_ratio",
+                lambda scales: (0.05,),
+                lambda scales: (1e-4, 2.0),
+                places=("COUPLING_DAMPING_RATIO",),
+                default=0.0,
+                limits=(NOT_NEGATIVE,),
+            ),
+        ),
+        derived={"SENSOR_AT_MOTOR": lambda value: float(sensor == "motor")},
+        stated=(
+            Stated("stiffness_N_per_m", (POSITIVE,)),
+            Stated("sensor", words=("motor", "load")),
+            Stated("motor_share", (POSITIVE, _BELOW_WHOLE), is_needed=False),
+            Stated("damping_ratio", (NOT_NEGATIVE,), is_needed=False),
+        ),
+        confused_with=looks_like,
+    )
+
+
+ELASTIC_MOTOR = _elastic(
+    "motor",
+    {
+        "second_mode": "slow motion against the spring, which then pulls at the load",
+        "gear_backlash": "large and small reversals",
+    },
+)
+ELASTIC_LOAD = _elastic(
+    "load",
+    {
+        "gear_backlash": "large and small reversals",
+        "input_delay": "a multisine over the whole band",
+        "actuator_lag": "a multisine over the whole band",
+    },
+)
+
+EFFECTS = (GEAR, MODE, PERIODIC, ELASTIC_MOTOR, ELASTIC_LOAD)

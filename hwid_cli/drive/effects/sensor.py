@@ -3,7 +3,17 @@
 docs/method_diagnosis.md, eq. (D14).
 """
 
-from hwid_cli.drive.effect import POSITIVE, Effect, Parameter, shares_of, span_of
+from math import inf, pi
+
+from hwid_cli.drive.effect import (
+    POSITIVE,
+    Effect,
+    Limit,
+    Parameter,
+    Scales,
+    shares_of,
+    span_of,
+)
 
 BACKLASH = Effect(
     id="output_backlash",
@@ -84,4 +94,139 @@ DRIFT = Effect(
     confused_with={"constant_load": "long rests at the start and at the end"},
 )
 
-EFFECTS = (BACKLASH, QUADRATIC, CUBIC, DRIFT)
+SATURATION = Effect(
+    id="sensor_saturation",
+    sentence="the sensor reads nothing beyond its range",
+    equation="y = max(-Y, min(x, Y))",
+    enters="output",
+    parameters=(
+        Parameter(
+            "limit_m",
+            # What it reads at most is what the recordings reach.
+            shares_of("displacement_m", 0.8, 0.95, 1.0),
+            span_of("displacement_m", 0.05, 1.0),
+            places=("OUTPUT_LIMIT",),
+            limits=(POSITIVE,),
+            off=inf,
+        ),
+    ),
+    confused_with={
+        "end_stop": "how the drive comes back: from a stop it rebounds",
+        "input_saturation": "a sine near resonance at full amplitude",
+    },
+)
+
+HUM = Effect(
+    id="sensor_hum",
+    sentence="the reading alone swings at a fixed frequency all the time",
+    equation="y = x + A sin(2 pi f t + p), p free in every recording",
+    enters="output",
+    parameters=(
+        Parameter(
+            "amplitude_m",
+            shares_of("displacement_m", 0.01),
+            places=("HUM_AMPLITUDE",),
+        ),
+        Parameter(
+            "frequency_Hz",
+            lambda scales: scales.frequencies_Hz,
+            lambda scales: (0.5 / scales.duration_s, 0.5 / scales.sample_time_s),
+            places=("HUM_FREQUENCY",),
+            limits=(POSITIVE,),
+        ),
+        Parameter(
+            "phase_rad",
+            lambda scales: (0.0,),
+            is_positive=False,
+            is_own=True,
+            places=("HUM_PHASE",),
+            default=0.0,
+        ),
+    ),
+    confused_with={
+        "periodic_force": "a drive that is held fast, where only a sensor's hum goes on"
+    },
+)
+
+
+def _periods(scales: Scales) -> tuple[float, ...]:
+    """Periods with which the error repeats along the way, or any."""
+    seen = tuple(one.period_m for one in scales.waves)
+    return seen or tuple(
+        scales.stroke_m / count for count in (2, 3.5, 5, 7, 10, 14, 20)
+    )
+
+
+ECCENTRICITY = Effect(
+    id="sensor_eccentricity",
+    sentence="the reading errs periodically along the way, as of a scale off its center",
+    equation="y = x + A (sin(2 pi x / l + p) - sin(p))",
+    enters="output",
+    parameters=(
+        Parameter(
+            "amplitude_m", shares_of("displacement_m", 0.01), places=("ECCENTRICITY",)
+        ),
+        Parameter(
+            "period_m",
+            _periods,
+            # Longer periods imitate any bent sensor.
+            lambda scales: (scales.stroke_m / 200, scales.stroke_m / 1.5),
+            places=("ECCENTRIC_PERIOD",),
+            limits=(POSITIVE,),
+        ),
+        Parameter(
+            "phase_rad",
+            lambda scales: (-0.75 * pi, -0.25 * pi, 0.25 * pi, 0.75 * pi),
+            is_positive=False,
+            places=("ECCENTRIC_PHASE",),
+            default=0.0,
+        ),
+    ),
+    confused_with={
+        "cogging": "the same way slowly and fast: the error of a sensor stays",
+        "sensor_cubic": "motion over the whole stroke",
+    },
+)
+
+# Clocks of two devices agree far better; beyond it the recording is another one.
+_NEAR_ONE = Limit("a ratio from 0.1 to 10", lambda value: 0.1 <= value <= 10)
+
+
+def _ratios(scales: Scales) -> tuple[float, ...]:
+    """Ratios by which the longest recording shifts by some of a period at its end."""
+    periods = scales.natural_Hz * scales.duration_s
+    return tuple(1.0 + share / periods for share in (-0.2, -0.03, 0.03, 0.2))
+
+
+CLOCK = Effect(
+    id="clock_skew",
+    sentence="the clock of the output runs faster or slower than that of the input",
+    equation="y(t) = x(s t)",
+    enters="output",
+    parameters=(
+        Parameter(
+            "ratio",
+            _ratios,
+            lambda scales: (0.9, 1.1),
+            is_positive=False,
+            center=1.0,
+            limits=(_NEAR_ONE,),
+        ),
+    ),
+    # What a clock gains is 0 where both agree.
+    derived={"CLOCK_GAIN": lambda value: value["ratio"] - 1.0},
+    confused_with={
+        "input_delay": "events at the start and at the end of a long recording"
+    },
+)
+
+EFFECTS = (
+    BACKLASH,
+    QUADRATIC,
+    CUBIC,
+    DRIFT,
+    SATURATION,
+    HUM,
+    ECCENTRICITY,
+    CLOCK,
+)

@@ -12,6 +12,17 @@ from hwid_cli.drive.motion.forces import MOTOR_V, MOTOR_X, V, X, bite, wanted_cu
 
 
 @njit(**INNER)
+def has_teeth(p: np.ndarray) -> bool:
+    """Return whether motor and load can let go of each other.
+
+    Parameters
+    ----------
+    p : ndarray, shape (N_SLOTS,)
+    """
+    return p[slots.GEAR_STIFFNESS] > 0.0 and p[slots.IS_COUPLED] <= 0.0
+
+
+@njit(**INNER)
 def count_edges(p: np.ndarray) -> int:
     """Return how many effects have corners in their force.
 
@@ -22,7 +33,7 @@ def count_edges(p: np.ndarray) -> int:
     count = 0
     for slot in (slots.STOP_STIFFNESS, slots.SIDE_STIFFNESS, slots.SPRING_GAP):
         count += p[slot] > 0.0
-    count += p[slots.GEAR_STIFFNESS] > 0.0
+    count += has_teeth(p)
     count += p[slots.CLIP_LIMIT] < np.inf
     return count
 
@@ -69,7 +80,9 @@ def corner_of(
             code += 1
             stiffness += p[slots.SIDE_STIFFNESS]
             offset -= p[slots.SIDE_STIFFNESS] * edge
-    if p[slots.GEAR_STIFFNESS] > 0.0:
+    if p[slots.IS_COUPLED] > 0.0:
+        teeth = p[slots.GEAR_STIFFNESS]
+    if has_teeth(p):
         force = bite(state[MOTOR_X] - x, state[MOTOR_V] - state[V], p)
         side = 1 + int(np.sign(force))
         code = 3 * code + side
@@ -109,7 +122,7 @@ def margin(state: np.ndarray, command: float, corner: int, p: np.ndarray) -> flo
         wanted = wanted_current(command, state, p) + p[slots.CLIP_SLOPE] * speed
         left = _inside(wanted, p[slots.CLIP_LIMIT], corner % 3) / p[slots.CLIP_LIMIT]
         corner //= 3
-    if p[slots.GEAR_STIFFNESS] > 0.0:
+    if has_teeth(p):
         left = min(left, _inside_teeth(state, corner % 3, p) / p[slots.GEAR_GAP])
         corner //= 3
     if p[slots.SIDE_STIFFNESS] > 0.0:

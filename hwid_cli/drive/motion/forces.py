@@ -219,7 +219,7 @@ def beyond(x: float, half_gap: float) -> float:
 
 @njit(**INNER)
 def bite(twist: float, speed: float, p: np.ndarray) -> float:
-    """Return the force of the teeth, which push and never pull.
+    """Return the force of the teeth, which push and never pull, or of the coupling.
 
     Parameters
     ----------
@@ -228,6 +228,8 @@ def bite(twist: float, speed: float, p: np.ndarray) -> float:
     speed : float, [m/s]
     p : ndarray, shape (N_SLOTS,)
     """
+    if p[slots.IS_COUPLED] > 0.0:
+        return p[slots.GEAR_STIFFNESS] * twist + p[slots.GEAR_DAMPING] * speed
     into = beyond(twist, p[slots.GEAR_GAP])
     force = p[slots.GEAR_STIFFNESS] * into + p[slots.GEAR_DAMPING] * speed
     if into > 0.0:
@@ -296,6 +298,17 @@ def sliding_friction(way: float, v: float, p: np.ndarray) -> float:
 
 
 @njit(**INNER)
+def is_anywhere(p: np.ndarray) -> bool:
+    """Return whether nothing holds a position.
+
+    Parameters
+    ----------
+    p : ndarray, shape (N_SLOTS,)
+    """
+    return p[slots.STIFFNESS] <= 0.0 and p[slots.CUBIC] <= 0.0
+
+
+@njit(**INNER)
 def resting_point(current: float, has_cogging: bool, p: np.ndarray) -> float:
     """Return where the drive rests without friction, nearest to zero.
 
@@ -309,7 +322,7 @@ def resting_point(current: float, has_cogging: bool, p: np.ndarray) -> float:
     float, [m]
         The given start where nothing holds a position.
     """
-    if p[slots.STIFFNESS] <= 0.0 and p[slots.CUBIC] <= 0.0:
+    if is_anywhere(p):
         return p[slots.START_POSITION]
     limit = p[slots.CLIP_LIMIT]
     force = force_of(min(max(current, -limit), limit), 0.0, p) + p[slots.LOAD]

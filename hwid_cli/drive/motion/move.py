@@ -13,6 +13,7 @@ from numba import njit
 from hwid_cli.drive import slots
 from hwid_cli.drive.command import MOST_PIECES, static_command
 from hwid_cli.drive.compiled import INNER
+from hwid_cli.drive.controller import N_CONTROL, controlled, is_closed
 from hwid_cli.drive.motion.corners import corner_of, count_edges
 from hwid_cli.drive.motion.curved import is_always_curved, step_limit
 from hwid_cli.drive.motion.events import (
@@ -39,6 +40,7 @@ from hwid_cli.drive.motion.forces import (
     X,
     force_of,
     has_dry_friction,
+    is_anywhere,
     resting_point,
     wanted_current,
 )
@@ -66,7 +68,7 @@ MOST_EVENTS = 100
 def move(
     command: np.ndarray, sample_time: float, given_p: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return position, velocity and command at every sample.
+    """Return position and velocity of the measured place, and command, at every sample.
 
     Parameters
     ----------
@@ -77,8 +79,8 @@ def move(
     n = command.size
     p = given_p.copy()
     positions, velocities, given = np.empty(n), np.empty(n), command.copy()
-    is_closed = p[slots.VELOCITY_GAIN] > 0.0
-    before = 0.0 if is_closed else command[0]
+    has_controller, control = is_closed(p), np.zeros(N_CONTROL)
+    before = 0.0 if has_controller else command[0]
     state, memory = np.zeros(N_STATE), np.zeros(N_MEMORY)
     followed = _start(state, memory, before, p)
     trial, inputs, active = state.copy(), np.zeros(N_INPUT), active_states(p)
@@ -87,18 +89,22 @@ def move(
     matrices, lengths = _make_room(sample_time, step, p)
     # Pieces are listed for many samples at once, or for one after the other where the
     # command or the temperature depends on the motion.
-    is_single = is_closed or (depends_on_motion(p) and p[slots.THERMAL_LOSS] != 0.0)
+    is_single = has_controller or (
+        depends_on_motion(p) and p[slots.THERMAL_LOSS] != 0.0
+    )
     pieces = np.empty((MOST_PIECES + (0 if is_single else MANY_PIECES), N_PIECE))
     pushes, ends = np.zeros((pieces.shape[0], N_PUSH)), np.empty((2, n))
     room = np.zeros(N_ROOM)
-    positions[0], velocities[0] = state[X], state[V]
+    seen = MOTOR_X if p[slots.SENSOR_AT_MOTOR] > 0.0 else X
+    positions[0], velocities[0] = state[seen], state[seen + 1]
     # Not plain 0: numba would compile what it is handed to twice.
     sample = np.int64(0)
     while sample < n and np.isfinite(positions[sample]):
-        if is_closed:
-            given[sample] = _controlled(
-                command[sample], positions[sample], velocities[sample], p
-            )
+        if has_controller:
+            given[sample] = controlled(
+                command[sample], positions[sample], velocities[sample], sample_time,
+                control, p,
+            )  # fmt: skip
         now = _current_now(given[sample], state, p) if is_single else 0.0
         count, followed, sample = list_pieces(
             sample, sample_time, given, ends, before, followed, now, pieces, pushes,
@@ -126,7 +132,7 @@ def move(
                 )
             at = int(pieces[j, SAMPLE])
             if at >= 0:
-                positions[at], velocities[at] = state[X], state[V]
+                positions[at], velocities[at] = state[seen], state[seen + 1]
             j += 1
         if count == 0:
             break
@@ -192,17 +198,11 @@ def _make_room(
 
 
 @njit(**INNER)
-def _controlled(reference: float, x: float, v: float, p: np.ndarray) -> float:
-    wanted = p[slots.VELOCITY_GAIN] * (p[slots.POSITION_GAIN] * (reference - x) - v)
-    limit = p[slots.COMMAND_LIMIT]
-    return min(max(wanted, -limit), limit)
-
-
-@njit(**INNER)
 def _start(
     state: np.ndarray, memory: np.ndarray, command: float, p: np.ndarray
 ) -> float:
     """Set the drive to rest in equilibrium, or to the given start."""
+    _couple(p)
     command = static_command(command, p)
     memory[LAGGED] = command
     current = command
@@ -228,11 +228,31 @@ def _start(
     if p[slots.GEAR_STIFFNESS] > 0.0 and force != 0.0:
         state[MOTOR_X] += np.sign(force) * p[slots.GEAR_GAP]
         state[MOTOR_X] += force / p[slots.GEAR_STIFFNESS]
+    is_placed = p[slots.IS_START_GIVEN] > 0.0 or is_anywhere(p)
+    if p[slots.SENSOR_AT_MOTOR] > 0.0 and is_placed:
+        # The start is that of the place that is measured.
+        state[X], state[MOTOR_X] = 2.0 * state[X] - state[MOTOR_X], state[X]
     state[MOTOR_V] = state[V]
     state[PART_X], state[PART_V] = state[X], state[V]
     memory[WAY] = np.sign(state[V])
     memory[TURNED_AT] = state[X]
     return command
+
+
+@njit(**INNER)
+def _couple(p: np.ndarray) -> None:
+    """Make an elastic coupling what the loops know; with teeth both are in series."""
+    stiffness, teeth = p[slots.COUPLING_STIFFNESS], p[slots.GEAR_STIFFNESS]
+    if stiffness <= 0.0:
+        return
+    share = p[slots.COUPLING_SHARE]
+    if teeth > 0.0:
+        stiffness *= teeth / (stiffness + teeth)
+        share = 0.5 * (share + p[slots.MOTOR_SHARE])
+    else:
+        p[slots.IS_COUPLED] = 1.0
+    p[slots.GEAR_STIFFNESS], p[slots.MOTOR_SHARE] = stiffness, share
+    p[slots.GEAR_DAMPING_RATIO] += p[slots.COUPLING_DAMPING_RATIO]
 
 
 @njit(**INNER)

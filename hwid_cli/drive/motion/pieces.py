@@ -9,6 +9,7 @@ from numba import njit
 from hwid_cli.drive import slots
 from hwid_cli.drive.command import MOST_PIECES, command_pieces, is_untouched
 from hwid_cli.drive.compiled import INNER
+from hwid_cli.drive.controller import is_closed
 from hwid_cli.drive.motion.push import (
     DRIVE,
     OTHER,
@@ -68,7 +69,7 @@ def list_pieces(
     sample : int
         The sample at which the pieces end.
     """
-    is_held = p[slots.VELOCITY_GAIN] > 0.0 or p[slots.ZERO_ORDER_HOLD] > 0.0
+    is_held = is_closed(p) or p[slots.ZERO_ORDER_HOLD] > 0.0
     is_simple, is_plain = is_untouched(p), is_straight(p)
     gain = 1.0 if depends_on_motion(p) else p[slots.FORCE_CONSTANT]
     rows = np.empty((MOST_PIECES, 3))

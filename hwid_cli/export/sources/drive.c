@@ -27,6 +27,7 @@ typedef struct {
     double motion[8];
     double memory[6];
     double room[17];
+    double control[3];
     double starts[@n_history@];
     double ends[@n_history@];
     double before;
@@ -204,7 +205,7 @@ static void move_along(HWID_NAME(state) *s, double *push, double length, double 
 static void interval(HWID_NAME(state) *s, double first, double last)
 {
     double *p = s->p;
-    const int is_single = p[VELOCITY_GAIN] > 0.0
+    const int is_single = drive_is_closed(p)
         || (drive_depends_on_motion(p) && p[THERMAL_LOSS] != 0.0);
     const double gain = drive_depends_on_motion(p) ? 1.0 : p[FORCE_CONSTANT];
     const double now = is_single ? drive_current_now(first, s->motion, p) : 0.0;
@@ -283,6 +284,9 @@ void HWID_NAME(init)(HWID_NAME(state) *state)
     for (n = 0; n < N_ROOM; ++n) {
         state->room[n] = 0.0;
     }
+    for (n = 0; n < N_CONTROL; ++n) {
+        state->control[n] = 0.0;
+    }
     state->sample = 0;
     state->listed = 0;
     state->trusted = 0;
@@ -291,7 +295,7 @@ void HWID_NAME(init)(HWID_NAME(state) *state)
 double HWID_NAME(step)(HWID_NAME(state) *state, double u)
 {
     double *p = state->p;
-    const int is_closed = p[VELOCITY_GAIN] > 0.0;
+    const int is_closed = drive_is_closed(p);
     const int is_held = is_closed || p[ZERO_ORDER_HOLD] > 0.0;
     const double x0 = state->position, v0 = state->velocity;
     if (state->sample == 0) {
@@ -302,12 +306,12 @@ double HWID_NAME(step)(HWID_NAME(state) *state, double u)
             state->starts[n] = state->before;
             state->ends[n] = state->before;
         }
-        state->played = state->motion[X];
+        state->played = state->motion[p[SENSOR_AT_MOTOR] > 0.0 ? MOTOR_X : X];
     } else if (isfinite(state->position)) {
         interval(state, state->previous, is_held ? state->previous : u);
     }
-    state->position = state->motion[X];
-    state->velocity = state->motion[V];
+    state->position = state->motion[p[SENSOR_AT_MOTOR] > 0.0 ? MOTOR_X : X];
+    state->velocity = state->motion[p[SENSOR_AT_MOTOR] > 0.0 ? MOTOR_V : V];
     if (!isfinite(state->position)) {
         state->position = NAN;
         state->velocity = NAN;
@@ -318,7 +322,8 @@ double HWID_NAME(step)(HWID_NAME(state) *state, double u)
     }
     state->previous = u;
     if (is_closed) {
-        state->previous = drive_controlled(u, state->position, state->velocity, p);
+        state->previous = drive_controlled(u, state->position, state->velocity,
+                                           sample_time, state->control, p);
     }
     u = drive_sensed(p[OUTPUT_GAP] > 0.0 ? state->played : state->position,
                      sample_time * (double)state->sample, p);

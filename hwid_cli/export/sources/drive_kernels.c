@@ -64,8 +64,29 @@ enum {
     START_VELOCITY = 60,
     IS_START_GIVEN = 61,
     OUTPUT_ZERO = 62,
-    N_SLOTS = 63,
+    IS_COUPLED = 63,
+    COUPLING_STIFFNESS = 64,
+    COUPLING_SHARE = 65,
+    COUPLING_DAMPING_RATIO = 66,
+    SENSOR_AT_MOTOR = 67,
+    OUTPUT_LIMIT = 68,
+    HUM_AMPLITUDE = 69,
+    HUM_FREQUENCY = 70,
+    HUM_PHASE = 71,
+    ECCENTRICITY = 72,
+    ECCENTRIC_PERIOD = 73,
+    ECCENTRIC_PHASE = 74,
+    CLOCK_GAIN = 75,
+    RESET_RATE = 76,
+    PROPORTIONAL_GAIN = 77,
+    INTEGRAL_GAIN = 78,
+    DERIVATIVE_GAIN = 79,
+    N_SLOTS = 80,
     MOST_PIECES = 40,
+    ERROR_SUM = 0,
+    LAST_ERROR = 1,
+    HAS_ERROR = 2,
+    N_CONTROL = 3,
     DRIVE = 0,
     OTHER = 4,
     WARMTH = 8,
@@ -349,6 +370,45 @@ static double drive_static_command(double value, double *p)
     return least(most(value, -limit), limit);
 }
 
+static int drive_is_closed(double *p)
+{
+    return (p[VELOCITY_GAIN] > 0.0) || (p[PROPORTIONAL_GAIN] > 0.0);
+}
+
+static double drive_controlled(double reference, double x, double v, double sample_time, double *control, double *p)
+{
+    double error = 0.0;
+    double gain = 0.0;
+    double reset = 0.0;
+    double total = 0.0;
+    double wanted = 0.0;
+    double rate = 0.0;
+    double limit = 0.0;
+    double given = 0.0;
+    error = reference - x;
+    gain = p[PROPORTIONAL_GAIN];
+    reset = p[INTEGRAL_GAIN];
+    if (p[VELOCITY_GAIN] > 0.0) {
+        error = (p[POSITION_GAIN] * error) - v;
+        gain = p[VELOCITY_GAIN];
+        reset = gain * p[RESET_RATE];
+    }
+    total = control[ERROR_SUM] + (sample_time * error);
+    wanted = (gain * error) + (reset * total);
+    if ((p[DERIVATIVE_GAIN] != 0.0) && (control[HAS_ERROR] > 0.0)) {
+        rate = (error - control[LAST_ERROR]) / sample_time;
+        wanted += p[DERIVATIVE_GAIN] * rate;
+    }
+    control[LAST_ERROR] = error;
+    control[HAS_ERROR] = 1.0;
+    limit = p[COMMAND_LIMIT];
+    given = least(most(wanted, -limit), limit);
+    if (((wanted - given) * error) <= 0.0) {
+        control[ERROR_SUM] = total;
+    }
+    return given;
+}
+
 static int drive_depends_on_motion(double *p)
 {
     return (p[RESISTANCE] > 0.0) || (p[CLIP_LIMIT] < HUGE_VAL);
@@ -563,6 +623,9 @@ static double drive_bite(double twist, double speed, double *p)
 {
     double into = 0.0;
     double force = 0.0;
+    if (p[IS_COUPLED] > 0.0) {
+        return (p[GEAR_STIFFNESS] * twist) + (p[GEAR_DAMPING] * speed);
+    }
     into = drive_beyond(twist, p[GEAR_GAP]);
     force = (p[GEAR_STIFFNESS] * into) + (p[GEAR_DAMPING] * speed);
     if (into > 0.0) {
@@ -751,6 +814,11 @@ static double drive_surplus(double net, double *p)
     return fabs(net) - most(p[way] + p[STATIC_EXCESS], 0.0);
 }
 
+static int drive_is_anywhere(double *p)
+{
+    return (p[STIFFNESS] <= 0.0) && (p[CUBIC] <= 0.0);
+}
+
 static double drive_away(double x, double force, int has_cogging, double *p)
 {
     double left = 0.0;
@@ -770,7 +838,7 @@ static double drive_resting_point(double current, int has_cogging, double *p)
     double near = 0.0;
     int _ = 0;
     double middle = 0.0;
-    if ((p[STIFFNESS] <= 0.0) && (p[CUBIC] <= 0.0)) {
+    if (drive_is_anywhere(p)) {
         return p[START_POSITION];
     }
     limit = p[CLIP_LIMIT];
@@ -800,6 +868,11 @@ static double drive_resting_point(double current, int has_cogging, double *p)
     return far;
 }
 
+static int drive_has_teeth(double *p)
+{
+    return (p[GEAR_STIFFNESS] > 0.0) && (p[IS_COUPLED] <= 0.0);
+}
+
 static int drive_count_edges(double *p)
 {
     int count = 0;
@@ -811,7 +884,7 @@ static int drive_count_edges(double *p)
         slot = list1[k1];
         count += p[slot] > 0.0;
     }
-    count += p[GEAR_STIFFNESS] > 0.0;
+    count += drive_has_teeth(p);
     count += p[CLIP_LIMIT] < HUGE_VAL;
     return count;
 }
@@ -873,7 +946,10 @@ static tuple_iddddd drive_corner_of(double *state, double command, double *p)
             offset -= p[SIDE_STIFFNESS] * edge;
         }
     }
-    if (p[GEAR_STIFFNESS] > 0.0) {
+    if (p[IS_COUPLED] > 0.0) {
+        teeth = p[GEAR_STIFFNESS];
+    }
+    if (drive_has_teeth(p)) {
         force = drive_bite(state[MOTOR_X] - x, state[MOTOR_V] - state[V], p);
         side = 1 + (int)(sign_of(force));
         code = (3 * code) + side;
@@ -934,7 +1010,7 @@ static double drive_margin(double *state, double command, int corner, double *p)
         left = drive_inside(wanted, p[CLIP_LIMIT], corner % 3) / p[CLIP_LIMIT];
         corner /= 3;
     }
-    if (p[GEAR_STIFFNESS] > 0.0) {
+    if (drive_has_teeth(p)) {
         left = least(left, drive_inside_teeth(state, corner % 3, p) / p[GEAR_GAP]);
         corner /= 3;
     }
@@ -1725,13 +1801,26 @@ static double drive_longest_step(double sample_time, tuple_iiiiid kind)
     return sample_time / count;
 }
 
-static double drive_controlled(double reference, double x, double v, double *p)
+static void drive_couple(double *p)
 {
-    double wanted = 0.0;
-    double limit = 0.0;
-    wanted = p[VELOCITY_GAIN] * ((p[POSITION_GAIN] * (reference - x)) - v);
-    limit = p[COMMAND_LIMIT];
-    return least(most(wanted, -limit), limit);
+    double stiffness = 0.0;
+    double teeth = 0.0;
+    double share = 0.0;
+    stiffness = p[COUPLING_STIFFNESS];
+    teeth = p[GEAR_STIFFNESS];
+    if (stiffness <= 0.0) {
+        return;
+    }
+    share = p[COUPLING_SHARE];
+    if (teeth > 0.0) {
+        stiffness *= teeth / (stiffness + teeth);
+        share = 0.5 * (share + p[MOTOR_SHARE]);
+    } else {
+        p[IS_COUPLED] = 1.0;
+    }
+    p[GEAR_STIFFNESS] = stiffness;
+    p[MOTOR_SHARE] = share;
+    p[GEAR_DAMPING_RATIO] += p[COUPLING_DAMPING_RATIO];
 }
 
 static double drive_start(double *state, double *memory, double command, double *p)
@@ -1740,6 +1829,10 @@ static double drive_start(double *state, double *memory, double command, double 
     double swinging = 0.0;
     double limit = 0.0;
     double force = 0.0;
+    int is_placed = 0;
+    double t1 = 0.0;
+    double t2 = 0.0;
+    drive_couple(p);
     command = drive_static_command(command, p);
     memory[LAGGED] = command;
     current = command;
@@ -1768,6 +1861,13 @@ static double drive_start(double *state, double *memory, double command, double 
     if ((p[GEAR_STIFFNESS] > 0.0) && (force != 0.0)) {
         state[MOTOR_X] += sign_of(force) * p[GEAR_GAP];
         state[MOTOR_X] += force / p[GEAR_STIFFNESS];
+    }
+    is_placed = (p[IS_START_GIVEN] > 0.0) || drive_is_anywhere(p);
+    if ((p[SENSOR_AT_MOTOR] > 0.0) && is_placed) {
+        t1 = (2.0 * state[X]) - state[MOTOR_X];
+        t2 = state[X];
+        state[X] = t1;
+        state[MOTOR_X] = t2;
     }
     state[MOTOR_V] = state[V];
     state[PART_X] = state[X];
@@ -1909,9 +2009,18 @@ static void drive_move_piece(double *state, double *trial, double *memory, doubl
 
 static double drive_sensed(double y, double time, double *p)
 {
+    double phase = 0.0;
+    double swing = 0.0;
     double share = 0.0;
+    double angle = 0.0;
+    double limit = 0.0;
     if (p[OUTPUT_ZERO] != 0.0) {
         y -= p[OUTPUT_ZERO];
+    }
+    if (p[ECCENTRICITY] != 0.0) {
+        phase = p[ECCENTRIC_PHASE];
+        swing = sin(((6.283185307179586 * y) / p[ECCENTRIC_PERIOD]) + phase) - sin(phase);
+        y += p[ECCENTRICITY] * swing;
     }
     if ((p[SENSOR_QUADRATIC] != 0.0) || (p[SENSOR_CUBIC] != 0.0)) {
         share = y / p[REFERENCE_DISPLACEMENT];
@@ -1919,6 +2028,14 @@ static double drive_sensed(double y, double time, double *p)
     }
     if (p[SENSOR_DRIFT] != 0.0) {
         y += p[SENSOR_DRIFT] * time;
+    }
+    if (p[HUM_AMPLITUDE] != 0.0) {
+        angle = ((6.283185307179586 * p[HUM_FREQUENCY]) * time) + p[HUM_PHASE];
+        y += p[HUM_AMPLITUDE] * sin(angle);
+    }
+    limit = p[OUTPUT_LIMIT];
+    if (limit < HUGE_VAL) {
+        y = least(most(y, -limit), limit);
     }
     return y;
 }

@@ -16,6 +16,7 @@ from hwid_cli.report.diagnosis import (
     gap_table,
     ranking_table,
     recordings_table,
+    shown_value,
     used_sentence,
 )
 from hwid_cli.report.figures.diagnosis import diagnosis_figures
@@ -182,7 +183,8 @@ def _effects_table(
         about = str(effect.get("sentence", ""))
         parameters = effect.get("parameters") or {"": {}}
         for parameter, value in parameters.items():
-            rows.append((name, about, parameter, _value(value), _interval(value)))
+            cells = _value(value, parameter), _interval(value, parameter)
+            rows.append((name, about, parameter, *cells))
             name = about = ""
     columns = (
         *texts("effect", "meaning", "parameter"),
@@ -194,14 +196,14 @@ def _effects_table(
     return Table(caption, columns, tuple(rows))
 
 
-def _value(parameter: object) -> str:
+def _value(parameter: object, name: str) -> str:
     value = parameter.get("value") if isinstance(parameter, Mapping) else parameter
-    return _text(value)
+    return _text(value, name)
 
 
-def _interval(parameter: object) -> str:
+def _interval(parameter: object, name: str) -> str:
     bounds = parameter.get("ci95") if isinstance(parameter, Mapping) else None
-    return " to ".join(_text(one) for one in bounds) if bounds else MISSING
+    return " to ".join(_text(one, name) for one in bounds) if bounds else MISSING
 
 
 def _gap_table(found: Mapping[str, Any]) -> Table | None:
@@ -223,10 +225,10 @@ def _gap_table(found: Mapping[str, Any]) -> Table | None:
     return Table(caption, (*texts("simulation"), *numbers(*heads)), tuple(rows))
 
 
-def _text(value: object) -> str:
+def _text(value: object, name: str = "") -> str:
     if isinstance(value, bool) or not isinstance(value, int | float):
         return MISSING if value is None else str(value)
-    return f"{value:.4g}"
+    return shown_value(value, name)
 
 
 # Sections of the page, in their order.

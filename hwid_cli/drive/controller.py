@@ -1,0 +1,65 @@
+"""Compiled controllers: they set the command from what they read at a sample.
+
+docs/method_diagnosis.md, eq. (D1a), (D1b).
+"""
+
+import numpy as np
+from numba import njit
+
+from hwid_cli.drive import slots
+from hwid_cli.drive.compiled import INNER
+
+# Places in what a controller keeps: sum of the error over time, error at the last
+# sample, and whether there was one.
+ERROR_SUM, LAST_ERROR, HAS_ERROR, N_CONTROL = range(4)
+
+
+@njit(**INNER)
+def is_closed(p: np.ndarray) -> bool:
+    """Return whether a controller sets the command.
+
+    Parameters
+    ----------
+    p : ndarray, shape (N_SLOTS,)
+    """
+    return p[slots.VELOCITY_GAIN] > 0.0 or p[slots.PROPORTIONAL_GAIN] > 0.0
+
+
+@njit(**INNER)
+def controlled(
+    reference: float,
+    x: float,
+    v: float,
+    sample_time: float,
+    control: np.ndarray,
+    p: np.ndarray,
+) -> float:
+    """Return the command until the next sample.
+
+    Parameters
+    ----------
+    reference : float, [m]
+    x, v : float, [m], [m/s]
+        Of the place that is measured.
+    sample_time : float, [s]
+    control : ndarray, shape (N_CONTROL,)
+        Changed in place.
+    p : ndarray, shape (N_SLOTS,)
+    """
+    error, gain = reference - x, p[slots.PROPORTIONAL_GAIN]
+    reset = p[slots.INTEGRAL_GAIN]
+    if p[slots.VELOCITY_GAIN] > 0.0:
+        error, gain = p[slots.POSITION_GAIN] * error - v, p[slots.VELOCITY_GAIN]
+        reset = gain * p[slots.RESET_RATE]
+    total = control[ERROR_SUM] + sample_time * error
+    wanted = gain * error + reset * total
+    if p[slots.DERIVATIVE_GAIN] != 0.0 and control[HAS_ERROR] > 0.0:
+        rate = (error - control[LAST_ERROR]) / sample_time
+        wanted += p[slots.DERIVATIVE_GAIN] * rate
+    control[LAST_ERROR], control[HAS_ERROR] = error, 1.0
+    limit = p[slots.COMMAND_LIMIT]
+    given = min(max(wanted, -limit), limit)
+    # Beyond the limit the sum only goes back: it would wind up.
+    if (wanted - given) * error <= 0.0:
+        control[ERROR_SUM] = total
+    return given

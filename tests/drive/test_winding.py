@@ -1,0 +1,56 @@
+"""The circuit with an inductance against the matrix exponential and scipy's solver."""
+
+import numpy as np
+import pytest
+from scipy import signal
+
+from tests.drive.drive_cases import (
+    CORNER_TIMES_S,
+    CORNERS,
+    COULOMB,
+    SAMPLE_TIME_S,
+    TIMES_S,
+    rms,
+    tool,
+)
+from tests.drive.drive_oracle import simulate
+from tests.drive.drive_oracle_machine import Machine
+
+INDUCTANCE = {"winding_inductance": {"inductance_H": 2e-3}}
+CIRCUIT = {"resistance_ohm": 0.5, "back_emf_V_s_per_m": 5.0}
+
+
+def test_the_current_follows_the_linear_circuit():
+    # States: current, position, velocity.
+    a = [[-0.5 / 2e-3, 0, -5.0 / 2e-3], [0, 0, 1], [5 / 0.3, -1184 / 0.3, -15.1 / 0.3]]
+    system = signal.StateSpace(a, [[1 / 2e-3], [0], [0]], [[0, 1, 0]], [[0]])
+    voltage = np.interp(TIMES_S, CORNER_TIMES_S, CORNERS)
+    expected = signal.lsim(system, voltage, TIMES_S)[1]
+    found = tool(INDUCTANCE, **CIRCUIT).output
+    # Rounding of both.
+    assert rms(found - expected) < 1e-14
+
+
+def test_with_friction_it_follows_the_oracle():
+    machine = Machine(effects=COULOMB, resistance=0.5, inductance=2e-3, back_emf=5.0)
+    expected, _ = simulate(machine, CORNER_TIMES_S, CORNERS, TIMES_S)
+    assert rms(tool(INDUCTANCE | COULOMB, **CIRCUIT).output - expected) < 1e-10
+
+
+def test_it_adds_to_the_inductance_of_the_simulation():
+    half = {"winding_inductance": {"inductance_H": 1e-3}}
+    both = tool(half, **CIRCUIT, inductance_H=1e-3).output
+    np.testing.assert_array_equal(both, tool(INDUCTANCE, **CIRCUIT).output)
+
+
+def test_a_short_coil_is_none():
+    short = {"winding_inductance": {"inductance_H": 1e-7}}
+    # 0.2 us behind, at 1 m/s.
+    assert rms(tool(short, **CIRCUIT).output - tool({}, **CIRCUIT).output) < 1e-6
+
+
+@pytest.mark.parametrize("time", [SAMPLE_TIME_S, SAMPLE_TIME_S / 8])
+def test_a_step_of_voltage_at_a_blocked_drive_charges_the_coil(time):
+    stuck = {"coulomb_friction": {"force_N": 1e3}}
+    moved = tool(INDUCTANCE | stuck, np.full(50, 2.0), sample_time=time, **CIRCUIT)
+    assert np.all(moved.output == moved.output[0])
