@@ -10,6 +10,7 @@ from hwid_cli.config.simulation_checks import (
     effect_faults,
     held_out_faults,
     kind_faults,
+    known_faults,
     named_effect_faults,
     simulation_faults,
 )
@@ -272,6 +273,7 @@ _AGREEMENTS = (
     _Agreement(circuit_faults, "simulation.resistance_ohm"),
     _Agreement(controller_faults, "simulation.controller recordings.columns.reference"),
     _Agreement(effect_faults, "simulation.effects"),
+    _Agreement(known_faults, "simulation.known"),
     _Agreement(simulation_faults, "simulation"),
     _Agreement(named_effect_faults, "diagnose.effects"),
     _Agreement(held_out_faults, "diagnose.recordings diagnose.hold_out"),

@@ -20,6 +20,7 @@ from hwid_cli.records.rules import (
     FileLimit,
     Filled,
     Integer,
+    NamesFor,
     Number,
     OneOf,
     OrderAxis,
@@ -29,6 +30,9 @@ from hwid_cli.records.rules import (
 RECIPE_STEPS = ("cut", "input_offset", "output_offset", "recut")
 NK_ROLES = ("poles", "delay")
 KEEP_RULES = ("top", "best", "coverage_at_least")
+# A known parameter that is listed without a tolerance may move by so much: what data
+# sheets of motors promise at best, [-].
+KNOWN_TOLERANCE = 0.02
 # Far beyond any use: grids of the literature end at 20 orders, maps at 100 units.
 _MOST_ORDER = 1000
 
@@ -173,7 +177,14 @@ class FinalTestOptions:
 
 @dataclass(frozen=True)
 class SimulationOptions:
-    """The physics model that diagnosis judges, in SI units."""
+    """The physics model that diagnosis judges, in SI units.
+
+    Parameters
+    ----------
+    known : dict of str to float, [-]
+        Base parameters that a re-fit may not move beyond this share of their value; 0
+        holds one fixed.
+    """
 
     kind: str = "drive"
     mass_kg: Annotated[float, POSITIVE] = 1.0
@@ -188,6 +199,9 @@ class SimulationOptions:
     back_emf_V_s_per_m: Annotated[float | None, NOT_NEGATIVE] = None
     hold: Annotated[str, OneOf(HOLDS)] = "linear"
     controller: Controller | None = None
+    known: Annotated[dict[str, float], NamesFor(KNOWN_TOLERANCE)] = field(
+        default_factory=dict
+    )
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ in memory, for programs that hold recordings and write no results.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from math import nan
 from pathlib import Path
 from typing import Any
@@ -54,7 +54,11 @@ def diagnosis_key(
     ]
     arrays = [array for one in recordings for array in (one.input, one.output)]
     arrays += [one.reference for one in recordings if one.reference is not None]
-    settings = {"recordings": about, "simulation": simulation, "options": options}
+    model = asdict(simulation)
+    # Said only where there is something: keys without it stay as they were.
+    if not model["known"]:
+        del model["known"]
+    settings = {"recordings": about, "simulation": model, "options": options}
     return task_key(NAME, STAGE_VERSION, settings, arrays)
 
 

@@ -26,6 +26,7 @@ _FORMS: dict[str, type] = {
     "effects": list,
     "ambiguous_with": list,
     "not_observable": list,
+    "warnings": list,
     "where": list,
     "figures": list,
     "gap": dict,
@@ -183,6 +184,7 @@ def _content(diagnosis: Diagnosis) -> dict[str, Any]:
             for place in diagnosis.places
         ],
         "not_observable": list(diagnosis.not_observable),
+        "warnings": list(diagnosis.warnings),
         "next_experiment": asdict(diagnosis.next_experiment),
         "recordings": {
             "train": list(diagnosis.train),
