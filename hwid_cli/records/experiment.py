@@ -62,8 +62,26 @@ class Columns:
 
 
 @dataclass(frozen=True)
+class FileUnits:
+    """Units of a file's columns, where they are not those of the configuration."""
+
+    time: str | None = None
+    input: str | None = None
+    output: str | None = None
+
+
+@dataclass(frozen=True)
 class RecordingsOptions:
-    """Which files hold the recordings and how to read them."""
+    """Which files hold the recordings and how to read them.
+
+    Parameters
+    ----------
+    units : FileUnits
+        Of the columns; None where the file says it, or nobody does.
+    input_unit, output_unit : str or None
+        In which this configuration's numbers stand; None for those of the simulation,
+        else those of the file.
+    """
 
     files: Annotated[tuple[str, ...], Filled("at least one name or pattern"), _PATTERN]
     columns: Columns
@@ -78,8 +96,9 @@ class RecordingsOptions:
     sampling_tolerance: Annotated[
         float, Number(above=0, words="a share of the sample time > 0, such as 0.01")
     ] = 0.01
-    input_unit: str = "A"
-    output_unit: str = "m"
+    units: FileUnits = field(default_factory=FileUnits)
+    input_unit: str | None = None
+    output_unit: str | None = None
     input_scale: Annotated[float, _SCALE] = 1.0
     output_scale: Annotated[float, _SCALE] = 1.0
     first_sample: Annotated[int, Integer(least=0)] = 0
@@ -202,6 +221,18 @@ class SimulationOptions:
     known: Annotated[dict[str, float], NamesFor(KNOWN_TOLERANCE)] = field(
         default_factory=dict
     )
+
+    @property
+    def input_unit(self) -> str:
+        """Unit that the input's numbers must have: a voltage drives a circuit."""
+        return "A" if self.resistance_ohm is None else "V"
+
+    @property
+    def output_unit(self) -> str:
+        """Unit that the output's numbers must have."""
+        is_rotary = getattr(self, "inertia_kg_m2", None) is not None
+        is_speed = getattr(self, "output", "position") == "velocity"
+        return ("rad" if is_rotary else "m") + ("/s" if is_speed else "")
 
 
 @dataclass(frozen=True)
