@@ -84,7 +84,9 @@ def _unit_row(sheet: _Sheet, body: int) -> dict[int, str]:
     cells = {place: cell for place, cell in enumerate(sheet.rows[body]) if cell}
     if any(_number(cell.replace(",", ".")) is not None for cell in cells.values()):
         return {}
-    if not any(looks_like_unit(cell) for cell in cells.values()):
+    # 'second' is a unit and a word: most of the cells have to be units.
+    known = [looks_like_unit(cell) for cell in cells.values()]
+    if sum(known) * 2 < len(known) or not any(known):
         return {}
     return {place: bare_unit(cell) for place, cell in cells.items()}
 

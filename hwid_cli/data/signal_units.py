@@ -153,7 +153,8 @@ def reference_unit(
         If the two measure different things.
     """
     own = signal_unit(column, "output", experiment)
-    if not own.given:
+    is_label = experiment.simulation is None and own.unit != output.unit
+    if not own.given or is_label:
         return output
     if own.unit != output.unit and output.given:
         raise MeasurementError(

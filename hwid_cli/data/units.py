@@ -289,10 +289,14 @@ def looks_like_unit(text: str) -> bool:
 
     Examples
     --------
-    >>> [looks_like_unit(text) for text in ("[mm]", "mA", "1/min", "t", "position", "")]
-    [True, True, True, False, False, False]
+    >>> [looks_like_unit(text) for text in ("[mm]", "mA", "1/min", "-")]
+    [True, True, True, True]
+    >>> [looks_like_unit(text) for text in ("t", "position", "")]
+    [False, False, False]
     """
     bare = bare_unit(text)
+    if is_unitless(bare):
+        return bool(bare)
     return bool(quantity_of(bare)) and bare not in _ARGUMENTS
 
 

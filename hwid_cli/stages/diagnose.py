@@ -285,7 +285,7 @@ def _warnings(context: Context, given: ToDiagnose) -> list[str]:
     recordings, simulation, options = given.recordings, given.simulation, given.options
     said = [
         assumed_units(given.experiment, recordings, given.logs),
-        doubtful_sizes(given.experiment, recordings, simulation, options),
+        doubtful_sizes(given.experiment, recordings, simulation, options, given.logs),
     ]
     names = unsettled_starts(recordings, simulation, options)
     starts = starts_sentence(names, recordings, given.experiment.calibrate)

@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from hwid_cli.data.units import factor_between, is_unitless, quantity_of
+from hwid_cli.diagnosis.candidate import fewer_recordings
 from hwid_cli.diagnosis.diagnose import compared_as_given
 from hwid_cli.diagnosis.problem import Compared, prepare
 from hwid_cli.errors import ConfigError
@@ -22,7 +23,9 @@ from hwid_cli.records.experiment import (
 )
 from hwid_cli.records.recordings import CalibrationLog, Recording, SignalUnit
 
-_SIDES = ("input", "output")
+# Units of a recording of which a program says none.
+_USUAL = {"input": "A", "output": "m"}
+_SIDES = tuple(_USUAL)
 # What recordings.input_unit may say that the force constant counts from, where the input
 # is not the voltage of a circuit.
 _INPUTS = ("A", "V", "N", "N m")
@@ -30,8 +33,12 @@ _INPUTS = ("A", "V", "N", "N m")
 _OTHER_AXIS = {"m": "rad", "m/s": "rad/s"}
 # Sizes that differ by more are another unit, not a wrong parameter, [-].
 _FAR = 300.0
+# A unit that somebody has stated needs so much less misfit than one that is assumed, [-].
+_BETTER = 0.9
 # The simulation of a unit that explains the sizes comes so close, [-].
 _NEAR = 31.7
+# Sizes need no more samples than these, [samples].
+_ENOUGH_SAMPLES = 40_000
 # Neighbours differ by powers of ten; those that instruments use.
 _LADDERS = (
     ("um", "mm", "m"),
@@ -205,7 +212,7 @@ def in_simulation_units(
 def _in_units_of(recording: Recording, simulation: SimulationOptions) -> Recording:
     for side in _SIDES:
         unit, wanted = (getattr(one, f"{side}_unit") for one in (recording, simulation))
-        accepted = ("A", "m", wanted, *_other_units(side, simulation))
+        accepted = (_USUAL[side], wanted, *_other_units(side, simulation))
         if unit in accepted or is_unitless(unit):
             continue
         factor = factor_between(unit, wanted)
@@ -226,8 +233,14 @@ def doubtful_sizes(
     recordings: Sequence[Recording],
     simulation: SimulationOptions,
     options: DiagnoseOptions,
+    logs: Sequence[CalibrationLog] = (),
 ) -> str:
     """Say which unit would explain sizes that differ by powers of ten.
+
+    Parameters
+    ----------
+    logs : sequence of CalibrationLog
+        Of the recordings; what is missing counts as not known.
 
     Returns
     -------
@@ -238,7 +251,8 @@ def doubtful_sizes(
     ratio = _size_ratio(recordings, simulation, options)
     if not np.isfinite(ratio) or 1 / _FAR <= ratio <= _FAR:
         return ""
-    likely = _likely_unit(recordings, simulation, options)
+    units = _units_of_files(recordings[0], logs)
+    likely = _likely_unit(recordings, simulation, options, units)
     if likely is None:
         return ""
     role, now, unit = likely
@@ -250,16 +264,30 @@ def doubtful_sizes(
     )
 
 
+def _units_of_files(
+    first: Recording, logs: Sequence[CalibrationLog]
+) -> list[tuple[str, str]]:
+    """Role and unit of each signal's numbers in the files, what is assumed first."""
+    assumed, stated = [], []
+    for role in ("output", "input", "time"):
+        origin = _origin_of(role, first.name, logs)
+        if origin is not None and quantity_of(origin.given):
+            stated.append((role, origin.given))
+        else:
+            unit = "s" if role == "time" else getattr(first, f"{role}_unit")
+            assumed.append((role, unit))
+    return [*assumed, *stated]
+
+
 def _likely_unit(
     recordings: Sequence[Recording],
     simulation: SimulationOptions,
     options: DiagnoseOptions,
+    units: Sequence[tuple[str, str]],
 ) -> tuple[str, str, str] | None:
     """Role, unit and the unit whose simulation comes closest to what was measured."""
     best, least = None, np.inf
-    first = recordings[0]
-    sides = ("output", first.output_unit), ("input", first.input_unit), ("time", "s")
-    for role, unit in sides:
+    for role, unit in units:
         for other in _neighbours(unit):
             factor = factor_between(other, unit)
             if factor is None:
@@ -267,7 +295,7 @@ def _likely_unit(
             changed = [_rescaled(one, role, factor) for one in recordings]
             compared = _compared(changed, simulation, options)
             ratio, misfit = _ratio_of(compared), _misfit(compared)
-            if 1 / _NEAR <= ratio <= _NEAR and misfit < least:
+            if 1 / _NEAR <= ratio <= _NEAR and misfit < _BETTER * least:
                 best, least = (role, unit, other), misfit
     return best
 
@@ -292,8 +320,11 @@ def _compared(
     simulation: SimulationOptions,
     options: DiagnoseOptions,
 ) -> list[Compared]:
+    # Wherever they start, recordings have a size; finding the start would take long.
+    options = replace(options, initial_state="rest")
+    problem = prepare(recordings, simulation, options, ())
     with np.errstate(all="ignore"):
-        return compared_as_given(prepare(recordings, simulation, options, ()))
+        return compared_as_given(fewer_recordings(problem, _ENOUGH_SAMPLES))
 
 
 def _size_ratio(
