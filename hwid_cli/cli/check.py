@@ -23,6 +23,7 @@ from hwid_cli.stages.fit_seconds import MEASURED, compiled_loops_place, time_one
 from hwid_cli.stages.own_functions import check_own_functions
 from hwid_cli.stages.recording_facts import Checked, check_recordings
 from hwid_cli.stages.selection import named_recordings
+from hwid_cli.stages.simulation_units import refused_units
 from hwid_cli.stages.stage import Context, Planning
 from hwid_cli.stages.table import named, stage_named, to_run
 from hwid_cli.store.cache import Hdf5Store
@@ -83,6 +84,7 @@ def _data(experiment: Experiment, folder: Path) -> tuple[Checked, tuple[str, ...
     survey = survey_recordings(experiment, folder)
     checked = check_recordings(survey.recordings, experiment, survey.jitter)
     problems += [*survey.problems, *checked.problems]
+    problems += refused_units(experiment, checked.recordings, checked.logs)
     if checked.facts:
         click.echo(as_text([recordings_table(checked.facts)]))
     known = {one.name for one in survey.recordings} | set(survey.unusable)
@@ -103,9 +105,11 @@ def _names(experiment: Experiment, known: set[str]) -> list[str]:
 
 def _show_warnings(experiment: Experiment, checked: Checked, out: Path) -> None:
     """Say what stages would warn of that work on calibrated recordings alone."""
-    calibrated = Calibrated(checked.recordings, (), "")
+    calibrated = Calibrated(checked.recordings, checked.logs, "")
     context = Context(experiment, out, {"calibrate": calibrated}, click.echo)
-    for name in named(experiment):
+    # What a simulation is compared with needs no section 'diagnose' to be looked at.
+    extra = () if experiment.simulation is None else ("diagnose",)
+    for name in dict.fromkeys((*named(experiment), *extra)):
         stage = stage_named(name)
         if stage.needs == ("calibrate",):
             for warning in stage.warnings(context, stage.choose(context)):

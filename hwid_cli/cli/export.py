@@ -6,6 +6,7 @@ from hwid_cli.cli.driver import result_of
 from hwid_cli.cli.options import Choices
 from hwid_cli.cli.session import Session, open_session
 from hwid_cli.data.recording_files import recordings_options
+from hwid_cli.data.signal_units import as_files_are
 from hwid_cli.export.contents import (
     SIMULATION,
     export_model,
@@ -13,6 +14,7 @@ from hwid_cli.export.contents import (
     find_fit,
 )
 from hwid_cli.export.formats import write_exported
+from hwid_cli.records.experiment import RecordingsOptions
 from hwid_cli.records.exported import Exported
 from hwid_cli.records.model import Fit
 from hwid_cli.records.report import StoredResults
@@ -51,7 +53,7 @@ def chosen_model(session: Session, asked: str) -> Exported:
     return export_model(
         fit,
         result_of(session, "calibrate").recordings,
-        recordings_options(session.experiment),
+        _options(session),
         name=name,
         title=next(title for title, known in titles.items() if known == name),
         origin=_origin(session, stage if "+" in name else "identify"),
@@ -86,10 +88,16 @@ def _simulation(session: Session) -> Exported:
     return export_simulation(
         extended_options(diagnosis, given.simulation),
         given.recordings,
-        recordings_options(session.experiment),
+        _options(session),
         given.options,
         origin=_origin(session, "diagnose"),
     )
+
+
+def _options(session: Session) -> RecordingsOptions:
+    """How files are read, with the units that they were found to have."""
+    logs = result_of(session, "calibrate").logs
+    return as_files_are(recordings_options(session.experiment), logs)
 
 
 def _origin(session: Session, stage: str) -> dict[str, object]:

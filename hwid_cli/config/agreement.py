@@ -11,11 +11,13 @@ from hwid_cli.config.simulation_checks import (
     effect_faults,
     held_out_faults,
     kind_faults,
+    known_faults,
     named_effect_faults,
     simulation_faults,
 )
+from hwid_cli.data.units import factor_between, is_unitless, quantity_of
 from hwid_cli.files.messages import name_fault
-from hwid_cli.records.experiment import Experiment
+from hwid_cli.records.experiment import Experiment, RecordingsOptions
 from hwid_cli.records.model import LinearBlock, Orders
 
 # Lists of recordings that may not hold a test recording, and what they do with it.
@@ -26,6 +28,13 @@ _SEEN_BEFORE_TEST = (
     ("group", "candidates", "is a candidate"),
     ("group", "validate", "validates"),
 )
+
+
+_EXAMPLES = {
+    "time": "s, ms or us",
+    "input": "A, mA or V",
+    "output": "m, mm, rad or deg",
+}
 
 
 class _Agreement(NamedTuple):
@@ -100,6 +109,47 @@ def _clock(experiment: Experiment) -> Iterator[Fault]:
             "found true",
             "a time column to resample by",
             "name it in columns.time",
+        )
+
+
+def _units(experiment: Experiment) -> Iterator[Fault]:
+    """Units of columns that nobody knows, or that another key contradicts."""
+    options = experiment.recordings
+    if options is None:
+        return
+    for role in ("time", "input", "output"):
+        unit, place = getattr(options.units, role), ("recordings", "units", role)
+        if unit is None or is_unitless(unit):
+            continue
+        if not quantity_of(unit) or (role == "time") != (quantity_of(unit) == "time"):
+            yield wrong(place, unit, f"a unit such as {_EXAMPLES[role]}")
+        elif role == "time" and options.columns.time is None:
+            yield wrong(
+                place,
+                unit,
+                "recordings.columns.time too, because sample_time_s is in seconds",
+                "name the column of time, or remove this key",
+            )
+        elif role != "time":
+            yield from _unit_of_side(role, unit, options)
+
+
+def _unit_of_side(role: str, unit: str, options: RecordingsOptions) -> Iterator[Fault]:
+    place, label = ("recordings", "units", role), getattr(options, f"{role}_unit")
+    if label is not None and factor_between(unit, label) is None:
+        yield wrong(
+            place,
+            unit,
+            f"a unit that goes into recordings.{role}_unit, {label!r}",
+            "correct one of the two",
+        )
+    scale = getattr(options, f"{role}_scale")
+    if abs(scale) != 1.0:
+        yield wrong(
+            ("recordings", f"{role}_scale"),
+            scale,
+            f"1 or -1 beside recordings.units.{role}, which converts already",
+            "remove one of the two",
         )
 
 
@@ -263,6 +313,11 @@ _AGREEMENTS = (
     _Agreement(_name, "name"),
     _Agreement(_columns, "recordings.columns"),
     _Agreement(_clock, "recordings.columns.time recordings.sample_time_s"),
+    _Agreement(
+        _units,
+        "recordings.units recordings.columns.time recordings.input_unit "
+        "recordings.output_unit recordings.input_scale recordings.output_scale",
+    ),
     _Agreement(_range, "recordings.first_sample recordings.last_sample"),
     _Agreement(_parts, "recordings.parts"),
     _Agreement(_cut_or_parts, "recordings.first_sample recordings.last_sample"),
@@ -274,6 +329,7 @@ _AGREEMENTS = (
     _Agreement(controller_faults, "simulation.controller recordings.columns.reference"),
     _Agreement(effect_faults, "simulation.effects"),
     _Agreement(effect_circuit_faults, "simulation.effects simulation.resistance_ohm"),
+    _Agreement(known_faults, "simulation.known"),
     _Agreement(simulation_faults, "simulation"),
     _Agreement(named_effect_faults, "diagnose.effects"),
     _Agreement(held_out_faults, "diagnose.recordings diagnose.hold_out"),

@@ -15,11 +15,14 @@ from hwid_cli.config.faults import (
 )
 from hwid_cli.drive.catalogue import CATALOGUE, configured_effects, public_id
 from hwid_cli.drive.effect import Stated
+from hwid_cli.records.drive import BASE_PARAMETERS
 from hwid_cli.records.experiment import DiagnoseOptions, Experiment
 from hwid_cli.simulations.kinds import KINDS
 
 # What the electrical circuit has besides its resistance.
 _OF_CIRCUIT = ("inductance_H", "back_emf_V_s_per_m")
+# A parameter that may move by all of its value is not known, [-].
+_LARGEST_TOLERANCE = 1.0
 
 
 def circuit_faults(experiment: Experiment) -> Iterator[Fault]:
@@ -68,6 +71,17 @@ def controller_faults(experiment: Experiment) -> Iterator[Fault]:
             "name it, or remove simulation.controller",
             without=("simulation", "controller"),
         )
+
+
+def known_faults(experiment: Experiment) -> Iterator[Fault]:
+    """Known parameters that no re-fit moves, and tolerances that are none."""
+    options = experiment.simulation
+    for name, tolerance in (options.known if options else {}).items():
+        place = ("simulation", "known")
+        if name not in BASE_PARAMETERS:
+            yield wrong_word(place, name, BASE_PARAMETERS)
+        elif not 0 <= tolerance <= _LARGEST_TOLERANCE:
+            yield wrong((*place, name), tolerance, "a share from 0 to 1, such as 0.05")
 
 
 def effect_faults(experiment: Experiment) -> Iterator[Fault]:

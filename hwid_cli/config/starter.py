@@ -8,12 +8,19 @@ from typing import Any
 import yaml
 
 from hwid_cli.config.load import experiment_of
+from hwid_cli.data.units import QUANTITIES, quantity_of
 from hwid_cli.errors import ConfigError
 from hwid_cli.records.experiment import Experiment
 from hwid_cli.records.starter import FolderLayout, Proposal, Role
 
 # Stands for a unit that no name says.
 _UNKNOWN_UNIT = "-"
+# What a drive's signals are: their units are converted to SI, others are labels.
+_CONVERTED = {
+    "time": ("time",),
+    "input": ("current", "voltage", "force", "torque"),
+    "output": ("length", "angle", "velocity", "angular velocity"),
+}
 # Diagnose section by how recordings start, and why so.
 _STARTS = {
     "rest": ("# diagnose: {max_effects: 2}",),
@@ -145,14 +152,34 @@ def _recordings(layout: FolderLayout, own: str) -> dict[str, Any]:
     section: dict[str, Any] = {
         "files": [own + pattern for pattern in layout.patterns],
         "columns": _columns(layout),
-        "input_unit": layout.input.unit or _UNKNOWN_UNIT,
-        "output_unit": layout.output.unit or _UNKNOWN_UNIT,
     }
+    units = _units(layout)
+    if units:
+        section["units"] = units
+    for side, role in (("input", layout.input), ("output", layout.output)):
+        if side not in units:
+            section[f"{side}_unit"] = role.unit or _UNKNOWN_UNIT
     if layout.sample_time_s is not None:
         section["sample_time_s"] = layout.sample_time_s
     if layout.resample:
         section["resample"] = True
     return section
+
+
+def _units(layout: FolderLayout) -> dict[str, str]:
+    """Units of the columns that are converted, by role."""
+    roles = {"time": layout.time, "input": layout.input, "output": layout.output}
+    return {
+        name: role.unit
+        for name, role in roles.items()
+        if role is not None and quantity_of(role.unit) in _CONVERTED[name]
+    }
+
+
+def _si_unit(role: Role) -> str:
+    """Unit of a signal's numbers once its file is read; empty where it is not known."""
+    is_converted = quantity_of(role.unit) in _CONVERTED["input"] + _CONVERTED["output"]
+    return QUANTITIES[quantity_of(role.unit)] if is_converted else role.unit
 
 
 def _columns(layout: FolderLayout) -> dict[str, str | int]:
@@ -216,9 +243,19 @@ def _role_lines(name: str, role: Role | None) -> list[str]:
 
 
 def _unit_lines(layout: FolderLayout) -> list[str]:
-    lines = []
+    lines, units = [], _units(layout)
+    if units:
+        si = {one: QUANTITIES[quantity_of(unit)] for one, unit in units.items()}
+        lines += [
+            f"  units: {_flow(units)}   # as the file says",
+            f"  # All numbers here are in {', '.join(si.values())} after conversion.",
+        ]
     for name, role in (("input", layout.input), ("output", layout.output)):
-        why = "from the name" if role.unit else "no name says it; put yours"
+        if name in units:
+            continue
+        why = f"no name says it; put yours as units: {{{name}: ...}}"
+        if role.unit:
+            why = "as the file says; numbers stay as they are"
         lines += [f"  {name}_unit: {_flow(role.unit or _UNKNOWN_UNIT)}   # {why}"]
     return lines
 
@@ -245,7 +282,7 @@ def _fit_lines(proposal: Proposal) -> list[str]:
 
 
 def _validation_lines(layout: FolderLayout, proposal: Proposal) -> list[str]:
-    unit = layout.output.unit or "the output's unit"
+    unit = _si_unit(layout.output) or "the output's unit"
     lines = ["# Models of these recordings, judged on all of them."]
     chosen = _flow(list(proposal.identify)) if proposal.identify else "all"
     lines += [f"identify: {{recordings: {chosen}}}"]
@@ -277,10 +314,8 @@ def _diagnose_lines(layout: FolderLayout, proposal: Proposal) -> list[str]:
         "simulate with,",
         "# in SI units, and remove the marks.",
     ]
-    if layout.output.unit not in ("m", "rad"):
-        lines += [
-            "# (The output must be in metre then: recordings.output_scale and output_unit.)"
-        ]
+    if "output" not in _units(layout):
+        lines += ["# (The unit of the output must be known then: recordings.units.)"]
     return [
         *lines,
         "# simulation:",

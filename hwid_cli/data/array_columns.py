@@ -2,8 +2,12 @@
 
 A column is a named variable (row or column vector, ``a.b`` or ``a/b`` for a member of
 a struct or group), or a numbered column of one table, the ``variable``.
+
+Its unit is said by an attribute (HDF5), by text of a name like ``current_unit``,
+``units.current`` or ``current.unit`` beside ``current.value``, or by the column's own name.
 """
 
+import re
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -11,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from hwid_cli.data.columns import ROLES, MeasuredColumn, array_column
+from hwid_cli.data.units import bare_unit, unit_in_name
 from hwid_cli.errors import MeasurementError
 from hwid_cli.files.messages import did_you_mean
 from hwid_cli.records.experiment import Columns
@@ -20,8 +25,12 @@ from hwid_cli.records.starter import FoundColumn
 # samples.
 _MOST_BYTES = 2**29
 
-# A file's variables by name; each is loaded when it is asked for.
+# A file's variables by name; each is loaded when it is asked for. Behind the mark stand
+# attributes that say a unit.
 Variables = Mapping[str, Callable[[], Any]]
+UNIT_MARK = "@unit"
+# Members that hold the numbers of a signal whose unit stands beside them.
+_VALUES = ("value", "values", "data", "Value", "Values", "Data")
 
 
 def pick_columns(
@@ -47,7 +56,75 @@ def pick_columns(
             values = _numbered(path, columns.variable, table, key, role)
         else:
             values = _named(path, columns.variable, table, key, (variables, role))
-        yield role, array_column(f"{role} {key!r}", values)
+        unit, said_by = _unit_of(variables, columns.variable, key, role)
+        yield (
+            role,
+            array_column(f"{role} {key!r}", values, unit=unit, unit_said_by=said_by),
+        )
+
+
+def _unit_of(
+    variables: Variables, variable: str | None, key: str | int, role: str
+) -> tuple[str, str]:
+    """Unit of a column and what says it; two empty texts where nothing does."""
+    stated = _stated_unit(variables, variable, key)
+    if stated is not None:
+        return stated
+    last = re.split(r"[./]", key)[-1] if isinstance(key, str) else ""
+    named = unit_in_name(last, "output" if role == "reference" else role)
+    return (named, f"the name {key!r}") if named else ("", "")
+
+
+def _stated_unit(
+    variables: Variables, variable: str | None, key: str | int
+) -> tuple[str, str] | None:
+    """Unit that something beside a column states."""
+    if isinstance(key, int):
+        places = [f"{variable}{mark}" for mark in (UNIT_MARK, "_units", "_unit")]
+        places += ["units", "unit"]
+        column = key
+    else:
+        full = [f"{variable}{mark}{key}" for mark in "./"]
+        name = next((one for one in full if one in variables), key)
+        places, column = _places_of_units(name), 0
+    for place in places:
+        if place in variables:
+            texts = _texts(variables[place]())
+            text = texts[column] if column < len(texts) else ""
+            if bare_unit(text):
+                what = "the attribute" if place.endswith(UNIT_MARK) else "the variable"
+                return bare_unit(text), f"{what} {place.replace(UNIT_MARK, '.unit')!r}"
+    return None
+
+
+def _places_of_units(name: str) -> list[str]:
+    """Names under which the unit of a variable may stand."""
+    places = [name + UNIT_MARK]
+    places += [f"{name}{end}" for end in ("_unit", "_units", ".unit", ".units")]
+    parent, mark, last = _parted(name)
+    for word in ("units", "unit"):
+        places += [f"{parent}{mark}{word}{other}{last}" for other in (mark or ".", ".")]
+        if last in _VALUES and parent:
+            places.append(f"{parent}{mark}{word}")
+    return places
+
+
+def _parted(name: str) -> tuple[str, str, str]:
+    """Struct or group of a variable, the mark behind it, and its own name."""
+    found = re.fullmatch(r"(.*)([./])([^./]*)", name)
+    return (found[1], found[2], found[3]) if found else ("", "", name)
+
+
+def _texts(value: Any) -> list[str]:
+    """Text of an array, a cell array or an attribute; empty where it is none."""
+    texts = []
+    for one in np.asarray(value).ravel():
+        while isinstance(one, np.ndarray):
+            one = one.flat[0] if one.size else ""
+        if isinstance(one, bytes):
+            one = one.decode("utf-8", errors="replace")
+        texts.append(one if isinstance(one, str) else "")
+    return texts
 
 
 def list_variables(variables: Variables) -> Iterator[FoundColumn]:
@@ -59,15 +136,21 @@ def list_variables(variables: Variables) -> Iterator[FoundColumn]:
         If a variable is too large.
     """
     for name, load in variables.items():
+        if name.endswith(UNIT_MARK):
+            continue
         values = np.asarray(_checked(name, load()))
         if values.dtype.kind not in "fiub" or values.size == 0:
             continue
         vector = np.squeeze(values)
         if vector.ndim <= 1:
-            yield FoundColumn(name, name, np.atleast_1d(vector).astype(float))
+            unit = _stated_unit(variables, None, name) or ("", "")
+            numbers = np.atleast_1d(vector).astype(float)
+            yield FoundColumn(name, name, numbers, unit=unit[0])
         elif values.ndim == 2 and values.shape[0] > values.shape[1]:
             for number in range(values.shape[1]):
-                yield FoundColumn("", number, values[:, number].astype(float), name)
+                unit = _stated_unit(variables, name, number) or ("", "")
+                numbers = values[:, number].astype(float)
+                yield FoundColumn("", number, numbers, name, unit[0])
 
 
 def member_of(value: np.ndarray, member: str) -> Any:
@@ -105,11 +188,15 @@ def _is_group(name: str, variables: Variables) -> bool:
     )
 
 
+def _names(variables: Variables) -> list[str]:
+    return [name for name in variables if not name.endswith(UNIT_MARK)]
+
+
 def _variable(path: Path, name: str, variables: Variables, role: str) -> Any:
     if name not in variables:
         raise MeasurementError(
             f"{path}: has no variable {name!r} for recordings.columns.{role}; "
-            f"{did_you_mean(name, variables)}"
+            f"{did_you_mean(name, _names(variables))}"
         )
     return _checked(name, variables[name]())
 

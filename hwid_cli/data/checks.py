@@ -201,6 +201,21 @@ def check_sample_times(recordings: Sequence[RawRecording], tolerance: float) -> 
             )
 
 
+def check_units(recordings: Sequence[RawRecording]) -> None:
+    """Refuse recordings of different units in one experiment."""
+    for recording in recordings:
+        for side in ("input", "output"):
+            found, common = (
+                getattr(one, f"{side}_unit") for one in (recording, recordings[0])
+            )
+            if found != common:
+                raise MeasurementError(
+                    f"{recording.source}: has its {side} in {found!r}; expected "
+                    f"{common!r} as in {recordings[0].source}; say what they are in with "
+                    f"recordings.units.{side}, or make one experiment for each"
+                )
+
+
 def _what_stands_there(column: MeasuredColumn, index: int) -> str:
     text = column.texts.get(int(column.rows[index]))
     if text is None:

@@ -13,6 +13,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from hwid_cli.data import column_signs as signs
+from hwid_cli.data.units import split_unit, unit_in_name
 from hwid_cli.errors import MeasurementError
 from hwid_cli.records.starter import FoundColumn, Role
 
@@ -151,45 +152,14 @@ _SAMPLE_RATE = [
     "fabtast",
 ]
 
-# Units as they stand behind an underscore; in brackets anything may stand.
-_UNITS = {
-    unit: unit
-    for unit in [
-        "A",
-        "mA",
-        "kA",
-        "V",
-        "mV",
-        "kV",
-        "N",
-        "mN",
-        "kN",
-        "Nm",
-        "mNm",
-        "m",
-        "mm",
-        "cm",
-        "um",
-        "µm",
-        "rad",
-        "deg",
-        "s",
-        "ms",
-        "us",
-        "rpm",
-        "bar",
-        "Pa",
-        "K",
-    ]
-} | {"rad_s": "rad/s", "m_s": "m/s", "mm_s": "mm/s", "m_per_s": "m/s"}
 # What a unit in brackets says of the role, by its first word.
 _INPUT_UNITS = {"a", "ma", "ka", "v", "mv", "kv", "n", "kn", "nm", "n m", "mnm", "%"}
 _OUTPUT_UNITS = {
     *("m", "mm", "cm", "um", "µm", "rad", "deg", "°", "grad", "rad/s", "m/s", "mm/s"),
     *("rpm", "1/min", "u/min", "min^-1", "deg/s", "°/s", "inc", "ticks/s"),
 }
-# Seconds in one unit of a time column.
-TIME_UNITS = {"s": 1.0, "sec": 1.0, "sek": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6}
+# The same of a time.
+_TIME_UNITS = {"s", "sec", "sek", "ms", "us", "µs"}
 
 ROLES = ("time", "input", "output", "reference", "counter")
 _SHORTEST_INSIDE = 4
@@ -229,7 +199,7 @@ def meaning_of(title: str) -> Meaning:
     >>> meaning_of("pos_ref_rad").role, meaning_of("u2").rest
     ('reference', '2')
     """
-    bare, unit = _split_unit(title)
+    bare, unit = split_unit(title)
     words = _words(bare)
     is_reference = any(_rank(word, _REFERENCE) is not None for word in words)
     role, rank, used = "", 99, ""
@@ -275,23 +245,9 @@ def sample_time_named(title: str, value: float) -> float | None:
     return float(f"{1.0 / value:.9g}") if word in _SAMPLE_RATE else None
 
 
-def _split_unit(title: str) -> tuple[str, str]:
-    """Name without its unit, and the unit."""
-    bracket = re.search(r"[\[(]\s*([^\])]*?)\s*[\])]", title)
-    if bracket and bracket[1]:
-        return title[: bracket.start()] + title[bracket.end() :], bracket[1]
-    worded = re.search(r"(?:/| in )\s*([A-Za-zµ°%]{1,4})$", title)
-    if worded and worded[1] in _UNITS:
-        return title[: worded.start()], worded[1]
-    for suffix, unit in sorted(_UNITS.items(), key=lambda pair: -len(pair[0])):
-        if title.endswith(f"_{suffix}") and len(title) > len(suffix) + 1:
-            return title[: -len(suffix) - 1], unit
-    return title, ""
-
-
 def _role_of_unit(unit: str) -> str:
     plain = unit.lower()
-    if plain in TIME_UNITS:
+    if plain in _TIME_UNITS:
         return "time"
     if plain in _INPUT_UNITS and unit != "nm":
         return "input"
@@ -360,6 +316,11 @@ def long_columns(columns: Sequence[FoundColumn]) -> list[FoundColumn]:
     return [one for one in columns if one.values.size > FEWEST_SAMPLES]
 
 
+def unit_of_column(column: FoundColumn, role: str) -> str:
+    """Unit that a file states for a column, or that its name says; empty without one."""
+    return column.unit or unit_in_name(column.title, role)
+
+
 def guess_time(columns: Sequence[FoundColumn]) -> TimeGuess:
     """Find out how a file tells time.
 
@@ -379,13 +340,8 @@ def guess_time(columns: Sequence[FoundColumn]) -> TimeGuess:
         if meaning.role != "time" and (meaning.role or is_counter):
             continue
         why = "named so, and it grows evenly" if meaning.role else "it grows evenly"
-        scale = TIME_UNITS.get(meaning.unit.lower(), 1.0)
-        if scale != 1.0:
-            step = float(f"{clock.step * scale:.6g}")
-            return TimeGuess(
-                None, step, False, f"{_called(column)} counts {meaning.unit}"
-            )
-        role = Role(column.key, column.title, "s", why)
+        unit = unit_of_column(column, "time")
+        role = Role(column.key, column.title, unit, why)
         return TimeGuess(role, None, clock.jitter > _ROUND_STAMPS, why)
     for column in columns:
         if column.values.size <= 1:

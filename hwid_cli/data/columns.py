@@ -23,6 +23,10 @@ class MeasuredColumn:
         Whether that count starts at 0 (arrays) and not at 1 (lines of text).
     texts : mapping of int to str
         What stands in a row in place of a number.
+    unit : str
+        As the file says it; empty where it says none.
+    unit_said_by : str
+        What in the file says so, for messages.
     """
 
     title: str
@@ -30,6 +34,8 @@ class MeasuredColumn:
     rows: np.ndarray
     rows_from_zero: bool = True
     texts: Mapping[int, str] = field(default_factory=dict)
+    unit: str = ""
+    unit_said_by: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +70,9 @@ def with_each(
     )
 
 
-def array_column(title: str, values: np.ndarray) -> MeasuredColumn:
+def array_column(
+    title: str, values: np.ndarray, *, unit: str = "", unit_said_by: str = ""
+) -> MeasuredColumn:
     """Make the column of an array; its rows are sample numbers from 0.
 
     Parameters
@@ -74,7 +82,9 @@ def array_column(title: str, values: np.ndarray) -> MeasuredColumn:
     # What is too large for 64 bits becomes infinite and is refused by the checks.
     with np.errstate(over="ignore"):
         numbers = np.asarray(values, np.float64)
-    return MeasuredColumn(title, numbers, np.arange(values.size))
+    return MeasuredColumn(
+        title, numbers, np.arange(values.size), unit=unit, unit_said_by=unit_said_by
+    )
 
 
 def keep_rows(column: MeasuredColumn, selection: slice) -> MeasuredColumn:

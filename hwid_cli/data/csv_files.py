@@ -1,18 +1,20 @@
 """Columns of a CSV file, as laboratories and spreadsheets write them.
 
 Comma, semicolon or tab; decimal point or decimal comma; with or without a byte order
-mark, header, quotes and comment lines. Columns may end early in blank cells.
+mark, header, quotes and comment lines. A row of units may stand below the header. Columns
+may end early in blank cells.
 """
 
 import csv
 import io
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from hwid_cli.data.columns import ROLES, MeasuredColumn
+from hwid_cli.data.units import bare_unit, looks_like_unit, unit_in_name
 from hwid_cli.errors import MeasurementError
 from hwid_cli.files.messages import did_you_mean
 from hwid_cli.records.experiment import Columns
@@ -59,16 +61,50 @@ def read_csv_columns(path: Path, columns: Columns) -> list[tuple[str, MeasuredCo
     places = {
         role: _find(path, key, header, sheet, role) for role, key in wanted.items()
     }
+    units = _unit_row(sheet, body)
+    body += bool(units)
     if body == len(sheet.rows):
         raise MeasurementError(
             f"{path}: holds a header and no rows; expected rows of numbers; "
             "export the measurement again or leave the file out"
         )
     _check_widths(path, sheet, body)
-    return [
-        (role, _column(path, f"{role} {wanted[role]!r}", sheet, body, place))
-        for role, place in places.items()
-    ]
+    found = []
+    for role, place in places.items():
+        column = _column(path, f"{role} {wanted[role]!r}", sheet, body, place)
+        title = header[place] if place < len(header) else ""
+        found.append((role, _with_unit(path, column, role, title, units.get(place))))
+    return found
+
+
+def _unit_row(sheet: _Sheet, body: int) -> dict[int, str]:
+    """Units by column, where the row above the numbers holds units and no number."""
+    if body == len(sheet.rows):
+        return {}
+    cells = {place: cell for place, cell in enumerate(sheet.rows[body]) if cell}
+    if any(_number(cell.replace(",", ".")) is not None for cell in cells.values()):
+        return {}
+    # 'second' is a unit and a word: most of the cells have to be units.
+    known = [looks_like_unit(cell) for cell in cells.values()]
+    if sum(known) * 2 < len(known) or not any(known):
+        return {}
+    return {place: bare_unit(cell) for place, cell in cells.items()}
+
+
+def _with_unit(
+    path: Path, column: MeasuredColumn, role: str, title: str, in_row: str | None
+) -> MeasuredColumn:
+    """Column with the unit that the row of units or its name says."""
+    named = unit_in_name(title, "output" if role == "reference" else role)
+    if in_row and named and in_row != named:
+        raise MeasurementError(
+            f"{path}: the name {title!r} says {named!r} and the row of units {in_row!r}; "
+            f"expected one unit; say recordings.units.{role}, and mend the file"
+        )
+    if in_row:
+        return replace(column, unit=in_row, unit_said_by="the row of units")
+    said_by = f"the name {title!r}" if named else ""
+    return replace(column, unit=named, unit_said_by=said_by)
 
 
 def list_csv_columns(path: Path) -> tuple[FoundColumn, ...]:
@@ -89,13 +125,17 @@ def list_csv_columns(path: Path) -> tuple[FoundColumn, ...]:
     has_header = not any(_number(cell.replace(",", ".")) is not None for cell in cells)
     header = sheet.rows[0] if has_header else sheet.comment
     body = int(has_header)
+    units = _unit_row(sheet, body)
+    body += bool(units)
     found = []
     for place in range(len(sheet.rows[0])):
         column = _column(path, f"column {place}", sheet, body, place)
         title = header[place] if place < len(header) else ""
         is_name = bool(title) and header.count(title) == 1
         if np.isfinite(column.values).any():
-            found.append(FoundColumn(title, title if is_name else place, column.values))
+            key = title if is_name else place
+            unit = units.get(place, "")
+            found.append(FoundColumn(title, key, column.values, unit=unit))
     return tuple(found)
 
 

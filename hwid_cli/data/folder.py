@@ -13,6 +13,7 @@ from hwid_cli.data.column_roles import (
     guess_time,
     long_columns,
     meaning_of,
+    unit_of_column,
 )
 from hwid_cli.data.formats import SUFFIXES, list_columns, reader_of
 from hwid_cli.data.recording_files import PLAN_NAME
@@ -126,10 +127,12 @@ def guess_layout(files: Sequence[FoundFile]) -> FolderLayout:
         sample_time_s = UNKNOWN_SAMPLE_TIME_S
     return FolderLayout(
         patterns=_patterns(alike, files),
-        input=_role(input_, reasons["input"]),
-        output=_role(output, reasons["output"]),
+        input=_role(input_, "input", reasons["input"]),
+        output=_role(output, "output", reasons["output"]),
         time=time.role,
-        reference=None if reference is None else _role(reference, "by its name"),
+        reference=(
+            None if reference is None else _role(reference, "output", "by its name")
+        ),
         variable=input_.variable,
         sample_time_s=sample_time_s,
         clock_reason=time.reason,
@@ -180,8 +183,8 @@ def _table(file: FoundFile) -> list[FoundColumn]:
     return max(usable, key=worth, default=[])
 
 
-def _role(column: FoundColumn, reason: str) -> Role:
-    return Role(column.key, column.title, meaning_of(column.title).unit, reason)
+def _role(column: FoundColumn, side: str, reason: str) -> Role:
+    return Role(column.key, column.title, unit_of_column(column, side), reason)
 
 
 def _patterns(

@@ -122,7 +122,10 @@ def read_columns(path: Path, columns: Columns) -> FileColumns:
             if not reader.is_isolated:
                 return FileColumns(**dict(reader.read(path, columns)))
             replies = _ISOLATED.ask(_request(path, columns))
-        found = {role: array_column(title, one) for (role, title), one in replies}
+        found = {
+            role: array_column(title, one, unit=unit, unit_said_by=said_by)
+            for (role, title, unit, said_by), one in replies
+        }
         return FileColumns(**found)
     except MeasurementError:
         raise
@@ -149,8 +152,8 @@ def list_columns(path: Path) -> tuple[FoundColumn, ...]:
             return tuple(reader.list_columns(path))
         replies = _ISOLATED.ask(_request(path))
     return tuple(
-        FoundColumn(title, key, values, variable)
-        for (title, key, variable), values in replies
+        FoundColumn(title, key, values, variable, unit)
+        for (title, key, variable, unit), values in replies
     )
 
 
@@ -182,10 +185,11 @@ def _answer(request: dict[str, Any]) -> Iterator[Labelled]:
     reader = reader_of(path)
     if request["columns"] is None:
         for one in reader.list_columns(path):
-            yield [one.title, one.key, one.variable], one.values
+            yield [one.title, one.key, one.variable, one.unit], one.values
     else:
         for role, column in reader.read(path, Columns(**request["columns"])):
-            yield [role, column.title], column.values
+            label = [role, column.title, column.unit, column.unit_said_by]
+            yield label, column.values
 
 
 if __name__ == "__main__":

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hwid_cli.data.array_columns import Variables, check_size
+from hwid_cli.data.array_columns import UNIT_MARK, Variables, check_size
 
 if TYPE_CHECKING:
     import h5py
@@ -21,6 +21,7 @@ _MATLAB_NUMBERS = {
     *(b"int8", b"int16", b"int32", b"int64"),
     *(b"uint8", b"uint16", b"uint32", b"uint64"),
 }
+_UNIT_ATTRIBUTES = ("unit", "units")
 
 
 @contextmanager
@@ -45,6 +46,9 @@ def open_hdf5(path: Path, *, is_matlab: bool = False) -> Iterator[Variables]:
         if isinstance(item, h5py.Dataset) and not name.startswith("#"):
             key = name.replace("/", ".") if is_matlab else name
             variables[key] = partial(_from_matlab if is_matlab else _values, item)
+            for attribute in item.attrs:
+                if attribute.lower() in _UNIT_ATTRIBUTES:
+                    variables[key + UNIT_MARK] = partial(item.attrs.get, attribute)
 
     with h5py.File(path, "r") as file:
         file.visititems(note)
@@ -64,8 +68,16 @@ def _from_matlab(dataset: "h5py.Dataset") -> Any:
     """An array that MATLAB stored: objects and functions are stored as such too."""
     kind = dataset.attrs.get("MATLAB_class", b"double")
     if kind not in _MATLAB_NUMBERS or "MATLAB_object_decode" in dataset.attrs:
-        return np.array("text") if kind == b"char" else None
+        return _characters(dataset) if kind == b"char" else None
     values = _values(dataset)
     if "MATLAB_empty" in dataset.attrs:
         return np.zeros(0)
     return values.T if values.dtype.names is None else values
+
+
+def _characters(dataset: "h5py.Dataset") -> np.ndarray:
+    """Text of MATLAB, a number for each character."""
+    codes = np.asarray(_values(dataset)).ravel()
+    if dataset.dtype.kind != "u" or "MATLAB_empty" in dataset.attrs:
+        return np.array("text")
+    return np.array("".join(chr(code) for code in codes if code <= 0xFFFF))

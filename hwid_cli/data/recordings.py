@@ -30,6 +30,12 @@ from hwid_cli.data.recording_files import (
     recordings_options,
 )
 from hwid_cli.data.sampling import sample_uniformly
+from hwid_cli.data.signal_units import (
+    converted,
+    reference_unit,
+    signal_unit,
+    time_in_seconds,
+)
 from hwid_cli.errors import HwidError, MeasurementError
 from hwid_cli.records.experiment import CalibrateOptions, Experiment, RecordingsOptions
 from hwid_cli.records.recordings import KINDS, RawRecording
@@ -38,6 +44,7 @@ _log = logging.getLogger(__name__)
 
 # Decimal digits of a sample time after thinning: removes 3 * 0.1 = 0.30000000000000004.
 _STEP_DIGITS = 12
+_SIDES = ("input", "output")
 
 
 def read_recordings(experiment: Experiment, out: Path) -> list[RawRecording]:
@@ -81,6 +88,7 @@ def read_recordings(experiment: Experiment, out: Path) -> list[RawRecording]:
     _warn_of_unused_kinds(recordings, experiment.source, options)
     recordings.sort(key=lambda recording: KINDS.index(recording.kind))
     checks.check_sample_times(recordings, options.sampling_tolerance)
+    checks.check_units(recordings)
     # Within the tolerance they are the same clock; what follows may rely on it.
     return [
         replace(recording, sample_time_s=recordings[0].sample_time_s)
@@ -100,6 +108,8 @@ def _read_part(
     kind = kind_of(part.path, options.kind, plan, name=part.name)
     columns = cut_part(columns, part)
     checks.check_numbers(place, columns)
+    columns, of_time = time_in_seconds(place, columns, options)
+    units = [signal_unit(getattr(columns, side), side, experiment) for side in _SIDES]
     columns, step = sample_uniformly(place, columns, options)
     checks.check_clock(place, step)
     columns = with_each(columns, lambda one: block_means(one, options.average))
@@ -112,18 +122,23 @@ def _read_part(
     checks.check_sizes(place, columns, options)
     _log.debug("%s: %s, %d samples", place, kind, columns.input.values.size)
     reference = columns.reference
+    if reference is not None:
+        reference = converted(
+            reference, reference_unit(reference, units[1], experiment)
+        )
     return RawRecording(
         name=part.name,
-        input=columns.input.values * options.input_scale,
-        output=columns.output.values * options.output_scale,
+        input=converted(columns.input, units[0]).values * options.input_scale,
+        output=converted(columns.output, units[1]).values * options.output_scale,
         sample_time_s=float(f"{step * options.average:.{_STEP_DIGITS}g}"),
         kind=kind,
         source=str(part.path),
-        input_unit=options.input_unit,
-        output_unit=options.output_unit,
+        input_unit=units[0].unit,
+        output_unit=units[1].unit,
         reference=(
             None if reference is None else reference.values * options.output_scale
         ),
+        units=(*of_time, *units),
     )
 
 
@@ -260,6 +275,7 @@ def _of_one_clock(
         with _noting(problems):
             tolerance = recordings_options(experiment).sampling_tolerance
             checks.check_sample_times([usual, one], tolerance)
+            checks.check_units([usual, one])
             common.append(replace(one, sample_time_s=usual.sample_time_s))
     return common
 

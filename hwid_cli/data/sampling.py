@@ -169,6 +169,11 @@ def _resample(columns: FileColumns, stamps: np.ndarray, step: float) -> FileColu
         # The small share keeps a last sample that rounding pushed past the end.
         count = int((known[-1] - known[0]) / step * (1 + _ROUNDING)) + 1
         grid = known[0] + step * np.arange(count)
-        return array_column(column.title, np.interp(grid, known, column.values))
+        return array_column(
+            column.title,
+            np.interp(grid, known, column.values),
+            unit=column.unit,
+            unit_said_by=column.unit_said_by,
+        )
 
     return replace(with_each(columns, resampled), time=None)

@@ -16,7 +16,7 @@ from hwid_cli.diagnosis.next_experiment import propose
 from hwid_cli.diagnosis.problem import Compared, DiagnosisProblem
 from hwid_cli.diagnosis.rounds import RoundsResult
 from hwid_cli.diagnosis.selection import DiagnosisVerdict, SelectionCriteria, ranked
-from hwid_cli.diagnosis.sentences import hidden_from_view, summarise
+from hwid_cli.diagnosis.sentences import doubtful_values, hidden_from_view, summarise
 from hwid_cli.diagnosis.where import latent_force_curves
 from hwid_cli.drive.catalogue import CATALOGUE, public_id, word_of
 from hwid_cli.drive.effect import Scales
@@ -76,6 +76,7 @@ def describe(findings: Findings) -> Diagnosis:
     given_sse = findings.given_sse
     from_sse = given_sse if verdict.word in ("parameters", "none") else base.sse
     present = tuple(drive_effects(problem.drive))
+    parameters = _base(problem.drive, base, chosen)
     told = _fitted_effects_of(problem, chosen, scales, (*present, *chosen.effects))
     effects = told[len(present) :]
     return Diagnosis(
@@ -91,7 +92,7 @@ def describe(findings: Findings) -> Diagnosis:
         before=_gap(criteria, from_sse),
         after=_gap(criteria, chosen.sse),
         explained_share=_explained(criteria, chosen.sse, from_sse),
-        base=_base(problem.drive, base, chosen),
+        base=parameters,
         places=findings.where,
         not_observable=hidden_from_view(problem),
         next_experiment=propose(
@@ -112,6 +113,7 @@ def describe(findings: Findings) -> Diagnosis:
         reference_current_A=problem.drive.reference_current_A,
         reference_displacement_m=problem.drive.reference_displacement_m,
         output_unit=problem.unit,
+        warnings=doubtful_values(parameters),
     )  # fmt: skip
 
 

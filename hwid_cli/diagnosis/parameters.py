@@ -150,7 +150,7 @@ def parameter_layout(
     start : mapping of str to mapping of str to float
         Values that the search starts from, which set the sizes.
     """
-    shared = _base_unknowns(problem.drive)
+    shared = _base_unknowns(problem.drive, problem.known)
     own: list[Unknown] = []
     for identifier in effects:
         for parameter in CATALOGUE[identifier].parameters:
@@ -183,12 +183,17 @@ def _rests_anywhere(problem: DiagnosisProblem) -> bool:
     )
 
 
-def _base_unknowns(drive: Drive) -> list[Unknown]:
-    """Coordinates of the base; a spring that is not there stays away."""
+def _base_unknowns(drive: Drive, known: Mapping[str, float]) -> list[Unknown]:
+    """Coordinates of the base; a spring that is not there stays away.
+
+    What is known moves within its tolerance, or is no coordinate at all.
+    """
     unknowns = []
     for name in BASE_PARAMETERS:
         value = getattr(drive, name)
         if name == "stiffness_N_per_m" and value == 0:
+            continue
+        if name in known and known[name] * value == 0:
             continue
         if value == 0:
             rate = np.sqrt(drive.stiffness_N_per_m * drive.mass_kg) or drive.mass_kg
@@ -197,6 +202,9 @@ def _base_unknowns(drive: Drive) -> list[Unknown]:
         low, high = (
             (1e-4 * size, 1e4 * size) if value > 0 else (-1e4 * size, -1e-4 * size)
         )
+        if name in known:
+            reach = known[name] * size
+            low, high = max(low, value - reach), min(high, value + reach)
         unknowns.append(Unknown(BASE, name, True, value, low, high))
     return unknowns
 

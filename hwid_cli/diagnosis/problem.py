@@ -3,8 +3,8 @@
 Whole recordings are held out, spread over kinds, sizes and speeds.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -109,12 +109,15 @@ class DiagnosisProblem:
         One of ``records.drive.STARTS``: how recordings start.
     unit : str
         Of what is compared.
+    known : mapping of str to float, [-]
+        Parameters of the base that may not move beyond this share of their value.
     """
 
     signals: tuple[Signals, ...]
     drive: Drive
     start: str = "rest"
     unit: str = "m"
+    known: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def compares_command(self) -> bool:
@@ -184,6 +187,7 @@ def prepare(
         recordings[0].input_unit
         if simulation.controller is not None
         else recordings[0].output_unit,
+        simulation.known,
     )
 
 

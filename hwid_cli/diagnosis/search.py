@@ -176,7 +176,11 @@ def derivatives(
         shifted = residuals_at(problem, fit_layout, ParameterPoint(shared, own))
         for row, (before, after) in enumerate(zip(parts, shifted, strict=True)):
             columns[row].append((before - after) / width)
-    return [np.column_stack(one) for one in columns]
+    # All of the base may be known, so that there is nothing to derive by.
+    return [
+        np.column_stack(one) if one else np.zeros((part.size, 0))
+        for one, part in zip(columns, parts, strict=True)
+    ]
 
 
 def local_matrix(

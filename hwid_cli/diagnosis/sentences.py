@@ -1,5 +1,7 @@
 """What a diagnosis says in words: the summary, and what recordings cannot show."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from hwid_cli.diagnosis.problem import DiagnosisProblem
@@ -10,7 +12,7 @@ from hwid_cli.diagnosis.selection import (
     title_of,
 )
 from hwid_cli.records.candidates import CAUSES, CandidateFit
-from hwid_cli.records.diagnosis import FittedEffect, NoiseFloor
+from hwid_cli.records.diagnosis import BaseParameter, FittedEffect, NoiseFloor
 
 # Share of the largest displacement that counts as motion to one side.
 _ONE_SIDE = 0.05
@@ -19,6 +21,10 @@ _NEARLY_ALL = 0.95
 # ... and are of one kind, or no more than this share of all.
 _FEW = 1 / 3
 _MOST_NAMED = 6
+# A value off by more than this factor is a wrong one, not an inaccurate one, [-].
+_DOUBTFUL = 3.0
+# All move in one direction if the way back is no longer than this share of the way, [-].
+_WAY_BACK = 0.05
 
 
 def summarise(
@@ -131,6 +137,22 @@ def _rows_of_gap(excess: np.ndarray, kinds: list[str]) -> list[int]:
     return sorted(largest[:n_most]) if n_most <= _FEW * len(kinds) else []
 
 
+def doubtful_values(base: Sequence[BaseParameter]) -> tuple[str, ...]:
+    """Question the parameters that the last fit moved far away from what was given."""
+    texts = []
+    for one in base:
+        if one.before * one.after <= 0 or not np.isfinite(one.after):
+            continue
+        ratio = one.after / one.before
+        if max(ratio, 1 / ratio) > _DOUBTFUL:
+            texts.append(
+                f"{one.name} was {one.before:.3g} and is fitted as {one.after:.3g}: "
+                "check its value, or the units of the recordings; simulation.known: "
+                f"[{one.name}] holds it"
+            )
+    return tuple(texts)
+
+
 def hidden_from_view(problem: DiagnosisProblem) -> tuple[str, ...]:
     """Say what these recordings cannot show, whatever the drive does."""
     drive, texts = problem.drive, []
@@ -150,6 +172,11 @@ def hidden_from_view(problem: DiagnosisProblem) -> tuple[str, ...]:
         texts.append("anything on the negative side, where the drive never is")
     if highest < _ONE_SIDE * reach:
         texts.append("anything on the positive side, where the drive never is")
+    if _moves_one_way(problem):
+        texts.append(
+            "dry friction apart from a constant load: all recordings move in one "
+            "direction only, where the two are the same force"
+        )
     if drive.stiffness_N_per_m == 0 and not problem.compares_command:
         texts.append(
             "a constant offset of the sensor, because nothing holds a position"
@@ -157,3 +184,13 @@ def hidden_from_view(problem: DiagnosisProblem) -> tuple[str, ...]:
     if len(problem.part(held_out=True).signals) == 0:
         texts.append("how the result does on other recordings: there is only one")
     return tuple(texts)
+
+
+def _moves_one_way(problem: DiagnosisProblem) -> bool:
+    """Whether no recording goes back on more than a small share of the longest way."""
+    up = down = 0.0
+    for one in problem.signals:
+        output = one.output
+        up = max(up, float(np.max(output - np.minimum.accumulate(output))))
+        down = max(down, float(np.max(np.maximum.accumulate(output) - output)))
+    return min(up, down) <= _WAY_BACK * max(up, down)

@@ -90,7 +90,8 @@ def export_model(
     recordings : sequence of Recording
         Calibrated; those of the fit among them.
     options : RecordingsOptions
-        Which columns of a file the model reads, and in which units.
+        Which columns of a file the model reads, in which units, and what takes them to
+        those of the recordings.
     origin : mapping
         Configuration, hashes and versions; the fit is added.
 
@@ -169,6 +170,8 @@ def _following_reference(card: ModelCard) -> ModelCard:
         columns=replace(card.columns, input=reference),
         input_unit=card.output_unit,
         input_scale=card.output_scale,
+        file_units=card.file_units
+        and replace(card.file_units, input=card.file_units.output),
     )
 
 
@@ -196,6 +199,7 @@ def _card(
         output_unit=recordings[0].output_unit,
         input_scale=options.input_scale,
         output_scale=options.output_scale,
+        file_units=options.units,
         origin=origin,
     )
 

@@ -18,7 +18,7 @@ from hwid_cli.export.map_parts import parts_of, portable
 from hwid_cli.export.model_file import read_model_file, refuse
 from hwid_cli.model.maps.rule import Part
 from hwid_cli.records.drive import Drive
-from hwid_cli.records.experiment import Columns, Experiment
+from hwid_cli.records.experiment import Columns, Experiment, FileUnits
 from hwid_cli.records.exported import (
     Exported,
     ExportedModel,
@@ -157,5 +157,8 @@ def _card(path: Path, content: Mapping[str, Any]) -> ModelCard:
         output_unit=units["output"],
         input_scale=float(scales["input"]),
         output_scale=float(scales["output"]),
+        file_units=FileUnits(**content["file_units"])
+        if "file_units" in content
+        else None,
         origin=dict(content["provenance"]),
     )

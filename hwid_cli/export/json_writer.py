@@ -121,6 +121,7 @@ def _card(card: ModelCard) -> dict[str, Any]:
         },
         "units": {"time": "s", "input": card.input_unit, "output": card.output_unit},
         "scales": {"input": card.input_scale, "output": card.output_scale},
+        **({} if card.file_units is None else {"file_units": asdict(card.file_units)}),
         "input_range": list(card.input_range),
         "provenance": finite(card.origin),
     }

@@ -2,16 +2,18 @@
 
 import csv
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from hwid_cli.data.columns import MeasuredColumn, keep_rows, place_of
 from hwid_cli.data.formats import read_columns
+from hwid_cli.data.units import factor_between, in_unit, is_unitless
 from hwid_cli.errors import ConfigError, MeasurementError
 from hwid_cli.files.csv_tables import write_table_csv
 from hwid_cli.records.experiment import Columns
-from hwid_cli.records.exported import Exported
+from hwid_cli.records.exported import Exported, ModelCard
 
 # A time column may jitter by this share of a step, and differ so much in its mean step.
 _TOLERANCE = 0.01
@@ -32,13 +34,14 @@ def read_input(path: Path, exported: Exported) -> tuple[np.ndarray, np.ndarray]:
     time : ndarray, shape (n_samples,), [s]
         Counted from zero where the model names no column of time.
     values : ndarray, shape (n_samples,)
-        As they stand in the file.
+        As they stand in the file, or in the unit of the files that the model was made
+        of, where this file says another one.
 
     Raises
     ------
     MeasurementError
-        If the file or a column is missing, a value no finite number, or the sample time
-        another one than the model's.
+        If the file or a column is missing, a value no finite number, a unit none of what
+        the model takes, or the sample time another one than the model's.
     """
     if not path.is_file():
         raise MeasurementError(
@@ -54,9 +57,10 @@ def read_input(path: Path, exported: Exported) -> tuple[np.ndarray, np.ndarray]:
     )
     found = read_columns(path, wanted)
     _check_numbers(path, found.input)
+    values = _as_in_its_files(path, found.input, exported.card)
     if found.time is None:
-        return step * np.arange(found.input.values.size), found.input.values
-    n, time = found.input.values.size, found.time
+        return step * np.arange(values.size), values
+    n, time = found.input.values.size, _in_seconds(path, found.time, exported.card)
     if time.values.size < n:
         raise MeasurementError(
             f"{path}: {found.input.title} has {n} values and {time.title} "
@@ -66,7 +70,41 @@ def read_input(path: Path, exported: Exported) -> tuple[np.ndarray, np.ndarray]:
     time = keep_rows(time, slice(n))
     _check_numbers(path, time)
     _check_steps(path, time, step)
-    return time.values, found.input.values
+    return time.values, values
+
+
+def _as_in_its_files(path: Path, column: MeasuredColumn, card: ModelCard) -> np.ndarray:
+    """Values of the input in the unit that the model's scale counts from."""
+    known, unit = card.file_units, column.unit
+    if known is None or not unit or is_unitless(unit):
+        return column.values
+    before = known.input
+    if before is None and abs(card.input_scale) == 1.0:
+        before = card.input_unit
+    if before is None:
+        # The scale was made for numbers without a unit.
+        return column.values
+    if factor_between(unit, before) is None:
+        raise MeasurementError(
+            f"{path}: {column.unit_said_by} says that {column.title} is in {unit!r}; "
+            f"expected {before!r}, or a unit that goes into it, as the model was made "
+            "with; correct the file"
+        )
+    return np.asarray(in_unit(column.values, unit, before))
+
+
+def _in_seconds(path: Path, time: MeasuredColumn, card: ModelCard) -> MeasuredColumn:
+    if card.file_units is None:
+        return time
+    unit = time.unit or card.file_units.time or "s"
+    if is_unitless(unit):
+        return time
+    if factor_between(unit, "s") is None:
+        raise MeasurementError(
+            f"{path}: {time.unit_said_by} says that {time.title} is in {unit!r}; "
+            "expected a unit of time, such as s, ms or us; correct the file"
+        )
+    return replace(time, values=in_unit(time.values, unit, "s"))
 
 
 def _check_numbers(path: Path, column: MeasuredColumn) -> None:

@@ -1,10 +1,11 @@
 """What a diagnosis found: the verdict, how it was reached, and what shows it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from hwid_cli.records.candidates import RankedCandidate
+from hwid_cli.records.stored import ADDED_LATER
 
 VERDICTS = ("named", "ambiguous", "parameters", "unknown", "none")
 
@@ -232,6 +233,8 @@ class Diagnosis:
         Where laws that need a reference count from.
     output_unit : str
         Of the signal that is compared.
+    warnings : tuple of str
+        What a reader must check before believing the rest.
     """
 
     verdict: str
@@ -258,6 +261,7 @@ class Diagnosis:
     reference_current_A: float = 1.0
     reference_displacement_m: float = 1.0
     output_unit: str = "m"
+    warnings: tuple[str, ...] = field(default=(), metadata=ADDED_LATER)
 
     @property
     def judged_on(self) -> str:

@@ -20,6 +20,7 @@ from hwid_cli.records.rules import (
     FileLimit,
     Filled,
     Integer,
+    NamesFor,
     Number,
     OneOf,
     OrderAxis,
@@ -29,6 +30,9 @@ from hwid_cli.records.rules import (
 RECIPE_STEPS = ("cut", "input_offset", "output_offset", "recut")
 NK_ROLES = ("poles", "delay")
 KEEP_RULES = ("top", "best", "coverage_at_least")
+# A known parameter that is listed without a tolerance may move by so much: what data
+# sheets of motors promise at best, [-].
+KNOWN_TOLERANCE = 0.02
 # Far beyond any use: grids of the literature end at 20 orders, maps at 100 units.
 _MOST_ORDER = 1000
 
@@ -58,8 +62,26 @@ class Columns:
 
 
 @dataclass(frozen=True)
+class FileUnits:
+    """Units of a file's columns, where they are not those of the configuration."""
+
+    time: str | None = None
+    input: str | None = None
+    output: str | None = None
+
+
+@dataclass(frozen=True)
 class RecordingsOptions:
-    """Which files hold the recordings and how to read them."""
+    """Which files hold the recordings and how to read them.
+
+    Parameters
+    ----------
+    units : FileUnits
+        Of the columns; None where the file says it, or nobody does.
+    input_unit, output_unit : str or None
+        In which this configuration's numbers stand; None for those of the simulation,
+        else those of the file.
+    """
 
     files: Annotated[tuple[str, ...], Filled("at least one name or pattern"), _PATTERN]
     columns: Columns
@@ -74,8 +96,9 @@ class RecordingsOptions:
     sampling_tolerance: Annotated[
         float, Number(above=0, words="a share of the sample time > 0, such as 0.01")
     ] = 0.01
-    input_unit: str = "A"
-    output_unit: str = "m"
+    units: FileUnits = field(default_factory=FileUnits)
+    input_unit: str | None = None
+    output_unit: str | None = None
     input_scale: Annotated[float, _SCALE] = 1.0
     output_scale: Annotated[float, _SCALE] = 1.0
     first_sample: Annotated[int, Integer(least=0)] = 0
@@ -173,7 +196,14 @@ class FinalTestOptions:
 
 @dataclass(frozen=True)
 class SimulationOptions:
-    """The physics model that diagnosis judges, in SI units."""
+    """The physics model that diagnosis judges, in SI units.
+
+    Parameters
+    ----------
+    known : dict of str to float, [-]
+        Base parameters that a re-fit may not move beyond this share of their value; 0
+        holds one fixed.
+    """
 
     kind: str = "drive"
     mass_kg: Annotated[float, POSITIVE] = 1.0
@@ -188,6 +218,21 @@ class SimulationOptions:
     back_emf_V_s_per_m: Annotated[float | None, NOT_NEGATIVE] = None
     hold: Annotated[str, OneOf(HOLDS)] = "linear"
     controller: Controller | None = None
+    known: Annotated[dict[str, float], NamesFor(KNOWN_TOLERANCE)] = field(
+        default_factory=dict
+    )
+
+    @property
+    def input_unit(self) -> str:
+        """Unit that the input's numbers must have: a voltage drives a circuit."""
+        return "A" if self.resistance_ohm is None else "V"
+
+    @property
+    def output_unit(self) -> str:
+        """Unit that the output's numbers must have."""
+        is_rotary = getattr(self, "inertia_kg_m2", None) is not None
+        is_speed = getattr(self, "output", "position") == "velocity"
+        return ("rad" if is_rotary else "m") + ("/s" if is_speed else "")
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from hwid_cli.records.drive import Drive
-from hwid_cli.records.experiment import Columns
+from hwid_cli.records.experiment import Columns, FileUnits
 from hwid_cli.records.model import HammersteinWiener
 from hwid_cli.records.recordings import frozen_vector
 
@@ -31,6 +31,9 @@ class ModelCard:
         Lowest and highest input of the recordings that the model was made of.
     input_scale, output_scale : float
         What the columns of a file are multiplied by to be in these units.
+    file_units : FileUnits or None
+        Units of these columns before that, where they are known; None in files of earlier
+        versions, which do not say it.
     origin : mapping
         Configuration, hashes of the data, the fit, versions; plain data.
     """
@@ -43,6 +46,7 @@ class ModelCard:
     output_unit: str = "m"
     input_scale: float = 1.0
     output_scale: float = 1.0
+    file_units: FileUnits | None = None
     origin: Mapping[str, Any] = field(default_factory=dict)
 
 

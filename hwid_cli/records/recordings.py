@@ -4,6 +4,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from hwid_cli.records.stored import ADDED_LATER
+
 KINDS = ("step", "sine", "random", "other")
 
 
@@ -32,6 +34,31 @@ def frozen_vector(values: np.ndarray, name: str) -> np.ndarray:
     return vector
 
 
+@dataclass(frozen=True)
+class SignalUnit:
+    """In which unit a signal was, who says so, and what became of it.
+
+    Parameters
+    ----------
+    role : str
+        ``time``, ``input`` or ``output``.
+    given : str
+        Unit of the file's numbers; empty where nothing says it.
+    said_by : str
+        What says it: a key of the configuration, a name, a row, an attribute.
+    unit : str
+        Unit of the recording's numbers.
+    factor : float, [unit/given]
+        1 where nothing was converted.
+    """
+
+    role: str
+    given: str
+    said_by: str
+    unit: str
+    factor: float = 1.0
+
+
 @dataclass(frozen=True, eq=False)
 class RawRecording:
     """A measurement as the file holds it, before calibration.
@@ -52,6 +79,8 @@ class RawRecording:
         Hash of the file's bytes, hexadecimal.
     reference : ndarray or None, [output_unit]
         What a controller was told to follow; as long as the input.
+    units : tuple of SignalUnit
+        Where the units come from.
     """
 
     name: str
@@ -64,6 +93,7 @@ class RawRecording:
     input_unit: str = "A"
     output_unit: str = "m"
     reference: np.ndarray | None = None
+    units: tuple[SignalUnit, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "input", frozen_vector(self.input, "input"))
@@ -153,6 +183,8 @@ class CalibrationLog:
         Period found in a sine's input; 0 where the recipe needs none.
     repaired_input, repaired_output : tuple of int
         Indices in the raw record of single damaged samples that were replaced.
+    units : tuple of SignalUnit
+        Where the units come from, and what was converted.
     """
 
     name: str
@@ -166,6 +198,7 @@ class CalibrationLog:
     period_samples: float = 0.0
     repaired_input: tuple[int, ...] = field(default=())
     repaired_output: tuple[int, ...] = field(default=())
+    units: tuple[SignalUnit, ...] = field(default=(), metadata=ADDED_LATER)
 
 
 def _freeze_reference(record: "RawRecording | Recording") -> None:

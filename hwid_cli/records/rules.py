@@ -228,6 +228,22 @@ class StandsFor(Reading):
 
 
 @dataclass(frozen=True)
+class NamesFor(Reading):
+    """A list of names of a file, and the value that a record holds for each."""
+
+    value: object
+
+    def read(self, value: Any) -> Any:
+        """Value as the record holds it."""
+        if isinstance(value, str):
+            return {value: self.value}
+        is_list = isinstance(value, list | tuple)
+        if is_list and all(isinstance(name, str) for name in value):
+            return dict.fromkeys(value, self.value)
+        return value
+
+
+@dataclass(frozen=True)
 class OrderAxis(Reading):
     """Orders of a grid, at most ``most``: ``[first, last]`` is a range."""
 

@@ -19,12 +19,15 @@ class FoundColumn:
         NaN where the file holds no number.
     variable : str or None
         Table that a numbered column belongs to.
+    unit : str
+        That the file states beside the name; empty where it states none.
     """
 
     title: str
     key: str | int
     values: np.ndarray
     variable: str | None = None
+    unit: str = ""
 
     @property
     def place(self) -> tuple[str | None, str | int]:

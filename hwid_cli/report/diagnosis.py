@@ -270,6 +270,11 @@ def closing_sentences(diagnosis: Diagnosis) -> list[str]:
     return lines
 
 
+def warning_sentences(warnings: Sequence[str]) -> list[str]:
+    """Say what must be checked before the rest is believed."""
+    return [f"Warning: {one}." for one in warnings]
+
+
 def explained_sentence(diagnosis: Diagnosis) -> str:
     """Say how much of the gap the effects explain."""
     share = percent(diagnosis.explained_share)
@@ -369,6 +374,7 @@ def diagnosis_blocks(diagnosis: Diagnosis) -> list[Text | Heading | Table]:
     """Collect what the screen shows of a diagnosis: little where nothing is missing."""
     is_short = diagnosis.verdict in _SHORT
     sentences = [verdict_sentence(diagnosis), diagnosis.summary]
+    sentences += warning_sentences(diagnosis.warnings)
     sentences += [used_sentence(diagnosis), *effect_sentences(diagnosis)]
     blocks: list[Text | Heading | Table] = [
         Text(one) for one in sentences if one.strip()

@@ -145,6 +145,7 @@ def _calibrate(
             n_samples=raw.input.size,
             n_raw_input=raw.input.size,
             n_raw_output=raw.output.size,
+            units=raw.units,
         ),
     )
     if draft.recipe:
@@ -241,7 +242,19 @@ def _draw(
 
 def _summary(given: Measured, result: Calibrated, is_stored: bool) -> str:
     state = "from the cache" if is_stored else "done"
-    return f"{len(given.recordings)} recordings {state}, {_changed(given, result)}"
+    parts = [_changed(given, result), *_converted(result)]
+    return f"{len(given.recordings)} recordings {state}, {', '.join(parts)}"
+
+
+def _converted(result: Calibrated) -> list[str]:
+    """What was converted from one unit to another, once for all recordings."""
+    found = dict.fromkeys(
+        f"{one.role} converted from {one.given} to {one.unit}"
+        for log in result.logs
+        for one in log.units
+        if one.factor != 1.0
+    )
+    return list(found)
 
 
 def _changed(given: Measured, result: Calibrated) -> str:

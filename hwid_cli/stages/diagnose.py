@@ -5,7 +5,7 @@ in memory, for programs that hold recordings and write no results.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from math import nan
 from pathlib import Path
 from typing import Any
@@ -18,13 +18,19 @@ from hwid_cli.files.atomic import replace_file
 from hwid_cli.records.check import StagePlan
 from hwid_cli.records.diagnosis import Diagnosis
 from hwid_cli.records.experiment import DiagnoseOptions, Experiment, SimulationOptions
-from hwid_cli.records.recordings import Recording
+from hwid_cli.records.recordings import CalibrationLog, Recording
 from hwid_cli.report import plots
 from hwid_cli.report.diagnosis import diagnosis_blocks
 from hwid_cli.report.figures.diagnosis import diagnosis_figures
 from hwid_cli.stages.diagnosis_starts import starts_sentence, unsettled_starts
 from hwid_cli.stages.fit_seconds import counted
 from hwid_cli.stages.selection import select_recordings
+from hwid_cli.stages.simulation_units import (
+    assumed_units,
+    doubtful_sizes,
+    in_simulation_units,
+    refused_units,
+)
 from hwid_cli.stages.stage import Context, Planning, Runner, Stage, in_results
 from hwid_cli.store.diagnosis_results import (
     read_diagnosis,
@@ -54,7 +60,11 @@ def diagnosis_key(
     ]
     arrays = [array for one in recordings for array in (one.input, one.output)]
     arrays += [one.reference for one in recordings if one.reference is not None]
-    settings = {"recordings": about, "simulation": simulation, "options": options}
+    model = asdict(simulation)
+    # Said only where there is something: keys without it stay as they were.
+    if not model["known"]:
+        del model["known"]
+    settings = {"recordings": about, "simulation": model, "options": options}
     return task_key(NAME, STAGE_VERSION, settings, arrays)
 
 
@@ -202,7 +212,9 @@ def diagnose(
     for name in names:
         if names.count(name) > 1:
             raise ValueError(f"two recordings are named {name!r}")
-    chosen = select_recordings(recordings, options.recordings, key="recordings")
+    chosen = in_simulation_units(
+        select_recordings(recordings, options.recordings, key="recordings"), simulation
+    )
     if not isinstance(options.hold_out, str):
         held_out = select_recordings(chosen, options.hold_out, key="hold_out")
         if len(held_out) == len(chosen):
@@ -222,6 +234,7 @@ class ToDiagnose:
     recordings: tuple[Recording, ...]
     simulation: SimulationOptions
     options: DiagnoseOptions
+    logs: tuple[CalibrationLog, ...] = ()
 
 
 def choose(context: Context) -> ToDiagnose:
@@ -230,8 +243,8 @@ def choose(context: Context) -> ToDiagnose:
     Raises
     ------
     ConfigError
-        If the configuration has no simulation, names unknown recordings, or leaves none
-        to train on.
+        If the configuration has no simulation, names unknown recordings, leaves none to
+        train on, or a signal is in a unit that contradicts the simulation.
     """
     experiment = context.experiment
     simulation = _simulation(experiment)
@@ -251,7 +264,10 @@ def choose(context: Context) -> ToDiagnose:
                 f"{place}.hold_out: names all {len(recordings)} recordings; expected "
                 "at least one left to train on; take one out, or write 'auto'"
             )
-    return ToDiagnose(experiment, recordings, simulation, options)
+    logs = context.results["calibrate"].logs
+    for refused in refused_units(experiment, recordings, logs):
+        raise ConfigError(refused)
+    return ToDiagnose(experiment, recordings, simulation, options, logs)
 
 
 def _simulation(experiment: Experiment) -> SimulationOptions:
@@ -265,10 +281,17 @@ def _simulation(experiment: Experiment) -> SimulationOptions:
 
 
 def _warnings(context: Context, given: ToDiagnose) -> list[str]:
-    """Which recordings cannot start in equilibrium, as the diagnosis takes them to."""
-    names = unsettled_starts(given.recordings, given.simulation, given.options)
-    said = starts_sentence(names, given.recordings, given.experiment.calibrate)
-    return [f"{context.experiment.source}: {said}"] if said else []
+    """What the units are taken for, and which recordings cannot start in equilibrium."""
+    recordings, simulation, options = given.recordings, given.simulation, given.options
+    said = [
+        assumed_units(given.experiment, recordings, given.logs),
+        doubtful_sizes(given.experiment, recordings, simulation, options, given.logs),
+    ]
+    names = unsettled_starts(recordings, simulation, options)
+    starts = starts_sentence(names, recordings, given.experiment.calibrate)
+    if starts:
+        said.append(f"{context.experiment.source}: {starts}")
+    return [one for one in said if one]
 
 
 def _compute(given: ToDiagnose, runner: Runner) -> Diagnosis:
@@ -292,7 +315,10 @@ def _write_files(
     figures = None if is_new else _drawn_before(out, origin)
     if figures is None:
         figures = _draw(out / "figures", diagnosis)
-    write_diagnosis_json(path, diagnosis, origin.seconds, origin, figures=figures)
+    units = dict.fromkeys(one for log in given.logs for one in log.units)
+    write_diagnosis_json(
+        path, diagnosis, origin.seconds, origin, figures=figures, units=list(units)
+    )
     write_diagnosis_tables(out, diagnosis)
     write_extended_simulation(
         out / "extended_simulation.yaml",

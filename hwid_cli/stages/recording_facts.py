@@ -7,7 +7,7 @@ from hwid_cli.data.quality import quality_notes
 from hwid_cli.errors import HwidError
 from hwid_cli.records.check import RecordingFacts
 from hwid_cli.records.experiment import Experiment
-from hwid_cli.records.recordings import RawRecording, Recording
+from hwid_cli.records.recordings import CalibrationLog, RawRecording, Recording
 from hwid_cli.stages.calibrate import calibrate_all
 
 # Clocks that deviate by a larger share of the sample time are worth a note, [-].
@@ -22,11 +22,14 @@ class Checked:
     ----------
     recordings : tuple of Recording
         Those that can be calibrated.
+    logs : tuple of CalibrationLog
+        Theirs.
     """
 
     facts: tuple[RecordingFacts, ...]
     recordings: tuple[Recording, ...]
     problems: tuple[str, ...]
+    logs: tuple[CalibrationLog, ...] = ()
 
 
 def check_recordings(
@@ -39,16 +42,17 @@ def check_recordings(
     jitter : dict of str to float, [-]
         Largest deviation of a step of the time column by name, as a share of the step.
     """
-    facts, recordings, problems = [], [], []
+    facts, recordings, logs, problems = [], [], [], []
     for raw in raws:
         n_used, notes = 0, _notes(raw, jitter.get(raw.name, 0.0))
         try:
-            (recording,), _ = calibrate_all([raw], experiment.calibrate)
+            (recording,), (log,) = calibrate_all([raw], experiment.calibrate)
         except HwidError as error:
             if str(error) not in problems:
                 problems.append(str(error))
         else:
             recordings.append(recording)
+            logs.append(log)
             n_used = recording.n_samples
         facts.append(
             RecordingFacts(
@@ -65,7 +69,7 @@ def check_recordings(
                 notes=notes,
             )
         )
-    return Checked(tuple(facts), tuple(recordings), tuple(problems))
+    return Checked(tuple(facts), tuple(recordings), tuple(problems), tuple(logs))
 
 
 def _notes(raw: RawRecording, jitter: float) -> tuple[str, ...]:

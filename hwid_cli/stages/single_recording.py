@@ -22,8 +22,8 @@ def load_recording(
     sample_time_s: float | None = None,
     *,
     kind: str = "other",
-    input_unit: str = "A",
-    output_unit: str = "m",
+    input_unit: str | None = None,
+    output_unit: str | None = None,
 ) -> Recording:
     r"""Recording that a CSV, MAT, NPZ or HDF5 file holds.
 
@@ -39,6 +39,8 @@ def load_recording(
         Needed where there is no time column.
     kind : str
         One of ``step``, ``sine``, ``random``, ``other``.
+    input_unit, output_unit : str, optional
+        Labels; numbers are not converted. None: what the file says, else A and m.
 
     Returns
     -------

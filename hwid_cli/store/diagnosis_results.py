@@ -18,6 +18,7 @@ from hwid_cli.files.atomic import replace_file
 from hwid_cli.files.csv_tables import write_table_csv
 from hwid_cli.files.messages import shown
 from hwid_cli.records.diagnosis import Diagnosis, FittedEffect, FittedParameter
+from hwid_cli.records.recordings import SignalUnit
 from hwid_cli.store.hdf5_records import read_record, write_record
 from hwid_cli.store.result_files import Provenance, read_results, replaced_stage
 
@@ -26,6 +27,7 @@ _FORMS: dict[str, type] = {
     "effects": list,
     "ambiguous_with": list,
     "not_observable": list,
+    "warnings": list,
     "where": list,
     "figures": list,
     "gap": dict,
@@ -118,6 +120,7 @@ def write_diagnosis_json(
     origin: Provenance,
     *,
     figures: Sequence[str] = (),
+    units: Sequence[SignalUnit] = (),
 ) -> None:
     """Write ``diagnosis.json``.
 
@@ -129,6 +132,8 @@ def write_diagnosis_json(
         Of that run.
     figures : sequence of str
         Names of the figures that show it.
+    units : sequence of SignalUnit
+        Of the recordings' files, and what was converted.
 
     Raises
     ------
@@ -139,7 +144,7 @@ def write_diagnosis_json(
         **_content(diagnosis),
         "seconds": seconds,
         "figures": list(figures),
-        "provenance": _provenance(origin),
+        "provenance": {**_provenance(origin), "units": [asdict(one) for one in units]},
     }
     text = json.dumps(
         _without_nan(content), indent=2, ensure_ascii=False, allow_nan=False
@@ -184,6 +189,7 @@ def _content(diagnosis: Diagnosis) -> dict[str, Any]:
             for place in diagnosis.places
         ],
         "not_observable": list(diagnosis.not_observable),
+        "warnings": list(diagnosis.warnings),
         "next_experiment": asdict(diagnosis.next_experiment),
         "recordings": {
             "train": list(diagnosis.train),

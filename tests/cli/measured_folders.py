@@ -115,14 +115,17 @@ LAYOUTS = {
     "npz": write_npz,
     "h5": write_h5,
 }
-# Sample time, input, output, their units and the time column that must be found.
+# Time, input, output, and their units that must be found; None where nothing says one.
 EXPECTED = {
-    "german csv": ("Zeit [s]", "Motorstrom [A]", "Weg [mm]", "A", "mm"),
-    "english csv": (None, "current_A", "position_m", "A", "m"),
-    "bare csv": (None, 1, 0, "-", "-"),
-    "mat variables": ("t", "u", "y", "-", "-"),
-    "mat matrix": (0, 2, 3, "-", "-"),
-    "mat struct": ("data.time", "data.input", "data.output", "-", "-"),
-    "npz": (None, "u", "y", "-", "-"),
-    "h5": ("measured/time", "measured/current", "measured/position", "-", "-"),
+    "german csv": ("Zeit [s]", "Motorstrom [A]", "Weg [mm]", "s", "A", "mm"),
+    "english csv": ("time_ms", "current_A", "position_m", "ms", "A", "m"),
+    "bare csv": (None, 1, 0, None, None, None),
+    "mat variables": ("t", "u", "y", None, None, None),
+    "mat matrix": (0, 2, 3, None, None, None),
+    "mat struct": ("data.time", "data.input", "data.output", None, None, None),
+    "npz": (None, "u", "y", None, None, None),
+    "h5": (
+        *("measured/time", "measured/current", "measured/position"),
+        *(None, None, None),
+    ),
 }

@@ -45,9 +45,12 @@ def test_columns_clock_and_units_are_found(folder, tmp_path, layout):
         columns.time,
         columns.input,
         columns.output,
-        options.input_unit,
-        options.output_unit,
+        options.units.time,
+        options.units.input,
+        options.units.output,
     ) == EXPECTED[layout]
+    unknown = "-" if options.units.input is None else None
+    assert (options.input_unit, options.output_unit) == (unknown, unknown)
     raws = read_recordings(experiment, tmp_path)
     assert len(raws) == 6
     if layout == "bare csv":
@@ -72,8 +75,9 @@ def test_the_configuration_is_sound_and_says_why(folder, tmp_path):
     assert "# simulation:" in text
     experiment = load_experiment(out)
     assert set(experiment.test.recordings) == {"Sprung_2"}
-    # A swing of 1e3 tanh(1.5) mm; the threshold is rounded to one digit.
-    assert experiment.crossval.threshold == pytest.approx(45.0, abs=5.0)
+    # A swing of 1e3 tanh(1.5) mm, converted; the threshold is rounded to one digit.
+    assert experiment.crossval.threshold in (0.04, 0.05)
+    assert "RMSD lies below, in m:" in text
     assert "# diagnose:" in text
 
     checked = invoke("check", out, "--no-timing")

@@ -2,6 +2,7 @@ import pytest
 
 from hwid_cli.config.load import load_experiment
 from hwid_cli.errors import ConfigError
+from hwid_cli.records.experiment import FileUnits
 
 RECORDINGS = (
     "recordings: {{files: a.csv, columns: {{time: t, input: u, output: y}}, {}}}"
@@ -131,3 +132,71 @@ def test_delay_grid_with_poles_is_accepted(load):
 def test_list_for_each_level_is_accepted(load):
     keep = load("group: {keep: {coverage_at_least: [7, 8]}}").group.keep
     assert keep == {"coverage_at_least": (7, 8)}
+
+
+UNITS = "{files: a.csv, columns: {time: t, input: u, output: y}, units: {%s}%s}"
+
+
+@pytest.mark.parametrize(
+    ("units", "more", "match"),
+    [
+        (
+            "output: furlough",
+            "",
+            r"units.output: found 'furlough'; expected a unit such",
+        ),
+        ("output: 3", "", r"units.output: found 3; expected text"),
+        (
+            "output: s",
+            "",
+            r"units.output: found 's'; expected a unit such as m, mm, rad",
+        ),
+        (
+            "output: grad",
+            "",
+            r"found 'grad'; expected a unit such as m, mm, rad or deg",
+        ),
+        (
+            "time: mm",
+            "",
+            r"units.time: found 'mm'; expected a unit such as s, ms or us",
+        ),
+        ("force: N", "", r"units.force: unknown key; expected one of time, input, out"),
+        (
+            "output: mm",
+            ", output_unit: rad",
+            r"units.output: found 'mm'; expected a unit that goes into recordings.output",
+        ),
+        (
+            "input: mA",
+            ", input_scale: 0.001",
+            r"recordings.input_scale: found 0.001; expected 1 or -1 beside recordings.un",
+        ),
+    ],
+)
+def test_units_that_nobody_knows_or_that_contradict_are_refused(
+    write_config, units, more, match
+):
+    path = write_config(f"name: tiny\nrecordings: {UNITS % (units, more)}\n")
+    with pytest.raises(ConfigError, match=match):
+        load_experiment(path)
+
+
+def test_a_unit_of_time_needs_a_column_of_time(write_config):
+    text = "{files: a.csv, columns: {input: u, output: y}, sample_time_s: 1, units: {time: ms}}"
+    with pytest.raises(ConfigError, match="because sample_time_s is in seconds"):
+        load_experiment(write_config(f"name: tiny\nrecordings: {text}\n"))
+
+
+@pytest.mark.parametrize(
+    ("units", "more"),
+    [
+        ("time: ms, input: mA, output: mm", ""),
+        ("output: 1/min", ", output_unit: rpm"),
+        ("output: deg", ", output_unit: rad, output_scale: -1"),
+        ("input: '-', output: '-'", ""),
+    ],
+)
+def test_units_that_are_known_are_accepted(write_config, units, more):
+    path = write_config(f"name: tiny\nrecordings: {UNITS % (units, more)}\n")
+    assert load_experiment(path).recordings.units != FileUnits()

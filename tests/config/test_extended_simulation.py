@@ -206,3 +206,20 @@ def test_numbers_of_numpy_are_written_as_numbers(diagnosed, tmp_path):
     extended = write_and_load(diagnosed(), tmp_path, simulation)
 
     assert extended.simulation == simulation
+
+
+def test_units_and_known_parameters_come_along(diagnosed, tmp_path):
+    sections = CONFIG.replace(
+        "input_scale: 0.001", "units: {{time: s, input: mA}}\n  output_unit: m"
+    )
+    experiment = diagnosed(sections=sections)
+    known = {"damping_N_s_per_m": 0.0, "force_constant_N_per_A": 1 / 3}
+    out = tmp_path / "results"
+    extended = write_and_load(experiment, out, SimulationOptions(known=known))
+
+    assert extended.simulation.known == known
+    assert extended.recordings.units == experiment.recordings.units
+    assert extended.recordings.output_unit == "m"
+    same_recordings(
+        read_recordings(experiment, out), read_recordings(extended, tmp_path)
+    )

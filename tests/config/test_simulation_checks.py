@@ -261,3 +261,35 @@ def test_diagnosis_options_are_read(load):
     assert options.effects == ("cogging",)
     assert options.hold_out == ("a",)
     assert (options.initial_state, options.skip_samples) == ("estimated", 50)
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("[force_constant_N_per_A]", {"force_constant_N_per_A": 0.02}),
+        ("force_constant_N_per_A", {"force_constant_N_per_A": 0.02}),
+        (
+            "{force_constant_N_per_A: 0.05, damping_N_s_per_m: 0}",
+            {"force_constant_N_per_A": 0.05, "damping_N_s_per_m": 0.0},
+        ),
+        ("{}", {}),
+    ],
+)
+def test_known_parameters_may_be_a_list_or_have_tolerances(load, text, expected):
+    assert load(f"simulation: {{known: {text}}}").simulation.known == expected
+
+
+@pytest.mark.parametrize(
+    ("text", "match"),
+    [
+        ("[force_constant_N_per_V]", "known: found 'force_constant_N_per_V'; did you"),
+        ("[mass_kg]", "simulation.known: found 'mass_kg'; expected one of damping"),
+        ("{damping_N_s_per_m: -0.1}", r"known.damping_N_s_per_m: found -0.1; expected"),
+        ("{damping_N_s_per_m: 5}", r"a share from 0 to 1, such as 0.05"),
+        ("{damping_N_s_per_m: little}", r"found 'little'; expected a finite number"),
+        ("[1]", r"simulation.known: found \[1\]; expected a section"),
+    ],
+)
+def test_known_parameters_that_make_no_sense_are_refused(load, text, match):
+    with pytest.raises(ConfigError, match=match):
+        load(f"simulation: {{known: {text}}}")

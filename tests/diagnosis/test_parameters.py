@@ -175,3 +175,41 @@ def test_the_base_of_a_point_is_that_of_its_drive():
     assert drive.stiffness_N_per_m == pytest.approx(0.5 * DRIVE.stiffness_N_per_m)
     assert drive.force_constant_N_per_A == pytest.approx(15.0)
     assert drive.mass_kg == DRIVE.mass_kg
+
+
+def bounds_of(name, **changes):
+    _, found, _ = laid_out(**changes)
+    return next((one.low, one.high) for one in found.shared if one.name == name)
+
+
+def test_a_known_parameter_stays_within_its_tolerance():
+    known = {"force_constant_N_per_A": 0.05}
+    low, high = bounds_of("force_constant_N_per_A", known=known)
+    assert (low, high) == pytest.approx((5.0 * 0.95, 5.0 * 1.05), rel=1e-12)
+    low, high = bounds_of("damping_N_s_per_m", known=known)
+    assert high / low > 1e7
+
+
+def test_a_known_negative_force_constant_has_ordered_bounds():
+    known = {"force_constant_N_per_A": 0.1}
+    low, high = bounds_of(
+        "force_constant_N_per_A", known=known, force_constant_N_per_A=-5.0
+    )
+    assert (low, high) == pytest.approx((-5.5, -4.5), rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("name", "changes"),
+    [
+        ("force_constant_N_per_A", {"known": {"force_constant_N_per_A": 0.0}}),
+        # A share of zero is zero.
+        (
+            "damping_N_s_per_m",
+            {"known": {"damping_N_s_per_m": 0.1}, "damping_N_s_per_m": 0.0},
+        ),
+    ],
+)
+def test_what_cannot_move_is_no_coordinate(name, changes):
+    of, found, first = laid_out(**changes)
+    assert name not in {one.name for one in found.shared}
+    assert getattr(drive_at(of, found, first), name) == getattr(of.drive, name)

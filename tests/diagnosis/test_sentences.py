@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hwid_cli.diagnosis.sentences import hidden_from_view
+from hwid_cli.diagnosis.sentences import doubtful_values, hidden_from_view
+from hwid_cli.records.diagnosis import BaseParameter
 from hwid_cli.records.drive import Controller
 from tests.diagnosis.small_drive import problem, recordings, simulation
 from tests.stages.diagnosed_drive import FRICTION, breathing, diagnosed
@@ -122,3 +123,57 @@ def test_a_free_axis_hides_an_offset_unless_a_controller_holds_it():
 def test_without_held_out_recordings_it_says_so():
     assert "only one" in said(problem(recordings()[:1]))
     assert "only one" not in said(problem(recordings(), held_out=("step_0",)))
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "is_doubtful"),
+    [
+        (3.34, 0.41, True),
+        (1.0, 3.01, True),
+        (-1.0, -3.01, True),
+        (1.0, 2.99, False),
+        (1.0, 0.34, False),
+        # From none there is no factor.
+        (0.0, 5.0, False),
+        (1.0, float("nan"), False),
+    ],
+)
+def test_a_parameter_that_moved_by_more_than_a_factor_of_three_is_questioned(
+    before, after, is_doubtful
+):
+    one = BaseParameter("force_constant_N_per_A", before, 1.0, after)
+    assert bool(doubtful_values([one])) == is_doubtful
+
+
+def test_the_question_says_the_values_and_what_holds_the_parameter():
+    one = BaseParameter("force_constant_N_per_A", 3.34, 1.0, 0.4104)
+    assert doubtful_values([one]) == (
+        "force_constant_N_per_A was 3.34 and is fitted as 0.41: check its value, or the "
+        "units of the recordings; simulation.known: [force_constant_N_per_A] holds it",
+    )
+
+
+ONE_WAY = "all recordings move in one direction only"
+
+
+def ways(*outputs):
+    """Recordings of a free axis with these outputs."""
+    (first, *_) = recordings()
+    found = [
+        replace(first, name=f"r{number}", input=output, output=output)
+        for number, output in enumerate(outputs)
+    ]
+    return problem(found, stiffness_N_per_m=0.0)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_motion_in_one_direction_hides_friction_behind_a_load(sign):
+    way = np.linspace(0.0, 1.0, 200)
+    noise = 1e-3 * np.random.default_rng(2).standard_normal(200)
+    assert ONE_WAY in said(ways(sign * way + noise, sign * way**2))
+
+
+def test_motion_to_both_sides_shows_friction():
+    way = np.linspace(0.0, 1.0, 200)
+    assert ONE_WAY not in said(ways(way, -way))
+    assert ONE_WAY not in said(ways(np.sin(3 * way)))

@@ -3,6 +3,7 @@ from dataclasses import replace
 import pytest
 
 from hwid_cli.records.report import ReportContents, StoredResults
+from hwid_cli.report.diagnosis import diagnosis_blocks
 from hwid_cli.report.page import Collapsible, images_of
 from hwid_cli.report.sections.diagnose import diagnosis_section
 from hwid_cli.report.table import Heading, Table, Text
@@ -144,3 +145,19 @@ def test_counts_are_told(count):
     held_out = "1 recording held out" if count == 1 else "15 recordings held out"
 
     assert held_out in remark
+
+
+DOUBT = "force_constant_N_per_A was 3.34 and is fitted as 0.41: check its value"
+
+
+@blank
+def test_a_warning_stands_right_behind_the_summary_on_page_and_screen():
+    found = replace(named(), warnings=(DOUBT,))
+    assert texts(section_of(found))[1] == f"Warning: {DOUBT}."
+    shown = [one.text for one in diagnosis_blocks(found) if isinstance(one, Text)]
+    assert shown[1:3] == [found.summary, f"Warning: {DOUBT}."]
+
+
+def test_a_page_from_the_json_file_alone_has_the_warning_too():
+    section = section_of(diagnosis={**DIAGNOSIS, "warnings": [DOUBT]})
+    assert f"Warning: {DOUBT}." in texts(section)

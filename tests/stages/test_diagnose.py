@@ -1,16 +1,17 @@
 """Diagnoses end to end: each word of the verdict, on recordings that deserve it."""
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
 
 from hwid_cli.drive.catalogue import CATALOGUE
 from hwid_cli.drive.simulation import simulate_drive
+from hwid_cli.records.drive import BASE_PARAMETERS
 from hwid_cli.records.experiment import DiagnoseOptions
 from hwid_cli.records.recordings import Recording
 from hwid_cli.stages.diagnose import diagnosis_key, extended_options
-from hwid_cli.tasks.cache import MemoryStore
+from hwid_cli.tasks.cache import MemoryStore, task_key
 from tests.diagnosis.small_drive import (
     DRIVE,
     NOISE,
@@ -290,3 +291,54 @@ def test_a_simulation_may_leave_out_what_completes_a_law(effects, names):
     found = diagnosed(recordings(effects), simulation(effects=effects))
     assert [one.id for one in found.present] == list(effects)
     assert list(parameters(found.present[0])) == names
+
+
+def test_a_known_parameter_stays_where_data_would_move_it():
+    # A force constant that is 6 % too large, held to 2 %: its neighbours take the rest.
+    wrong = simulation(
+        force_constant_N_per_A=5.3, known={"force_constant_N_per_A": 0.02}
+    )
+    after = {one.name: one.after for one in diagnosed(recordings(), wrong).base}
+    # At its bound, but for the rounding of a logarithm.
+    assert after["force_constant_N_per_A"] == pytest.approx(5.3 * 0.98, rel=1e-12)
+    assert after["stiffness_N_per_m"] > 1184.0 * 1.01
+
+
+def test_a_parameter_without_tolerance_is_exactly_what_was_given():
+    held = dict.fromkeys(("force_constant_N_per_A", "damping_N_s_per_m"), 0.0)
+    wrong = simulation(force_constant_N_per_A=5.3, known=held)
+    found = diagnosed(recordings(FRICTION), wrong)
+    after = {one.name: one.after for one in found.base}
+    assert after["force_constant_N_per_A"] == 5.3
+    assert after["damping_N_s_per_m"] == 15.0
+    assert after["stiffness_N_per_m"] != 1184.0
+
+
+def test_all_of_the_base_may_be_known():
+    held = dict.fromkeys(BASE_PARAMETERS, 0.0)
+    assert diagnosed(recordings(), simulation(known=held)).verdict == "none"
+    found = diagnosed(recordings(FRICTION), simulation(known=held))
+    assert parameters(found.effects[0])["force_N"] == pytest.approx(0.8, rel=0.01)
+
+
+def test_keys_of_diagnoses_without_known_parameters_are_those_of_before():
+    given, options = recordings(), DiagnoseOptions()
+    model = asdict(simulation())
+    assert model.pop("known") == {}
+    about = [
+        {"name": one.name, "kind": one.kind, "sample_time_s": one.sample_time_s}
+        for one in given
+    ]
+    settings = {"recordings": about, "simulation": model, "options": options}
+    arrays = [array for one in given for array in (one.input, one.output)]
+    before = task_key("diagnose", 1, settings, arrays)
+    assert diagnosis_key(given, simulation(), options) == before
+    held = simulation(known={"damping_N_s_per_m": 0.1})
+    assert diagnosis_key(given, held, options) != before
+
+
+def test_a_force_constant_that_is_far_off_is_questioned():
+    found = diagnosed(recordings(), simulation(force_constant_N_per_A=20.0))
+    (warning,) = found.warnings
+    assert warning.startswith("force_constant_N_per_A was 20 and is fitted as 5:")
+    assert diagnosed(recordings()).warnings == ()

@@ -62,6 +62,7 @@ def test_every_key_of_the_design_is_there(written):
         "base",
         "where",
         "not_observable",
+        "warnings",
         "next_experiment",
         "recordings",
         "seconds",

@@ -18,6 +18,7 @@ from hwid_cli.report.diagnosis import (
     recordings_table,
     shown_value,
     used_sentence,
+    warning_sentences,
 )
 from hwid_cli.report.figures.diagnosis import diagnosis_figures
 from hwid_cli.report.formats import MISSING, counted, listed, with_unit
@@ -81,6 +82,7 @@ def _record_blocks(diagnosis: Diagnosis) -> list[PageBlock]:
         return [Figures((figures[name],), sentence)] if name in figures else []
 
     blocks: list[PageBlock] = [Text(diagnosis.summary)]
+    blocks += map(Text, warning_sentences(diagnosis.warnings))
     blocks += map(Text, effect_sentences(diagnosis))
     if diagnosis.effects:
         blocks.append(effects_table(diagnosis))
@@ -162,6 +164,7 @@ def _sentences(found: Mapping[str, Any]) -> list[str]:
     ]
     if ambiguous:
         lines.append(f"These data cannot tell it from {listed(ambiguous)}.")
+    lines += warning_sentences([str(one) for one in found.get("warnings") or ()])
     hidden = [str(one) for one in found.get("not_observable") or ()]
     if hidden:
         lines.append(f"Not observable in these recordings: {listed(hidden)}.")

@@ -1,0 +1,165 @@
+"""In which unit each signal of a file is, and in which the recording shall be.
+
+The first of these says the unit of a column: ``recordings.units``, the file (a row of
+units, an attribute, the name of the column), ``recordings.input_unit`` and
+``output_unit``. Time is always converted to seconds. Input and output are converted where
+the configuration has a simulation, whose numbers are SI, or says ``recordings.units``;
+else units are labels. What cannot be converted keeps its own unit: a diagnosis refuses it.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from hwid_cli.data.columns import FileColumns, MeasuredColumn
+from hwid_cli.data.units import (
+    QUANTITIES,
+    factor_between,
+    in_unit,
+    is_unitless,
+    quantity_of,
+)
+from hwid_cli.errors import MeasurementError
+from hwid_cli.records.experiment import Experiment, FileUnits, RecordingsOptions
+from hwid_cli.records.recordings import CalibrationLog, SignalUnit
+
+# Of recordings where nothing says more.
+_USUAL = {"input": "A", "output": "m"}
+
+
+def time_in_seconds(
+    path: Path, columns: FileColumns, options: RecordingsOptions
+) -> tuple[FileColumns, tuple[SignalUnit, ...]]:
+    """Give the columns with their time in seconds, and where its unit comes from.
+
+    Parameters
+    ----------
+    path : Path
+        For messages.
+
+    Returns
+    -------
+    FileColumns
+    tuple of SignalUnit
+        Empty where there is no column of time.
+
+    Raises
+    ------
+    MeasurementError
+        If the unit is none of time.
+    """
+    time = columns.time
+    if time is None:
+        return columns, ()
+    given, said_by = time.unit, time.unit_said_by
+    if options.units.time is not None:
+        given, said_by = options.units.time, "recordings.units.time"
+    if not given or is_unitless(given):
+        return columns, (SignalUnit("time", "", "", "s"),)
+    factor = factor_between(given, "s")
+    if factor is None:
+        raise MeasurementError(
+            f"{path}: {said_by} says that {time.title} is in {given!r}; expected a unit "
+            "of time, such as s, ms or us; correct it, or say recordings.units.time"
+        )
+    seconds = replace(time, values=in_unit(time.values, given, "s"))
+    unit = SignalUnit("time", given, said_by, "s", factor)
+    return replace(columns, time=seconds), (unit,)
+
+
+def signal_unit(
+    column: MeasuredColumn, role: str, experiment: Experiment
+) -> SignalUnit:
+    """Say which unit a signal has in its file, and which it shall have.
+
+    Parameters
+    ----------
+    role : str
+        ``input`` or ``output``.
+    """
+    options, simulation = experiment.recordings, experiment.simulation
+    if options is None:
+        raise ValueError("an experiment without recordings has no signals")
+    label = getattr(options, f"{role}_unit")
+    given, said_by = _given(column, role, options)
+    if given and is_unitless(given):
+        return SignalUnit(role, given, said_by, label or given)
+    stated = getattr(options.units, role)
+    if simulation is None and stated is None:
+        return SignalUnit(role, given, said_by, label or given or _USUAL[role])
+    target = label
+    if target is None and simulation is not None:
+        target = getattr(simulation, f"{role}_unit")
+    target = target or QUANTITIES.get(quantity_of(given), given)
+    factor = factor_between(given, target) if given else 1.0
+    if factor is None:
+        return SignalUnit(role, given, said_by, given)
+    return SignalUnit(role, given, said_by, target, factor)
+
+
+def _given(
+    column: MeasuredColumn, role: str, options: RecordingsOptions
+) -> tuple[str, str]:
+    """Unit of a column's numbers, times their scale, and who says so."""
+    stated = getattr(options.units, role)
+    if stated is not None:
+        return stated, f"recordings.units.{role}"
+    label = getattr(options, f"{role}_unit")
+    is_scaled = abs(getattr(options, f"{role}_scale")) != 1.0
+    is_other = label is not None and factor_between(column.unit, label) is None
+    # A scale takes the numbers to the unit of the configuration; a name that contradicts
+    # the configuration is overruled by it.
+    if column.unit and not is_scaled and not is_other:
+        return column.unit, column.unit_said_by
+    return (label, f"recordings.{role}_unit") if label is not None else ("", "")
+
+
+def converted(column: MeasuredColumn, unit: SignalUnit) -> MeasuredColumn:
+    """Give a column in the unit that its recording shall have."""
+    if unit.factor == 1.0:
+        return column
+    return replace(column, values=in_unit(column.values, unit.given, unit.unit))
+
+
+def as_files_are(
+    options: RecordingsOptions, logs: Sequence[CalibrationLog]
+) -> RecordingsOptions:
+    """Give options that state the units of the files, and scales that convert them.
+
+    Parameters
+    ----------
+    logs : sequence of CalibrationLog
+        Of the recordings that were read from these files.
+    """
+    changes: dict[str, Any] = {}
+    units = {one.role: one for log in reversed(logs) for one in log.units}
+    for side in ("input", "output"):
+        if side in units:
+            scale = getattr(options, f"{side}_scale")
+            changes[f"{side}_scale"] = scale * units[side].factor
+    given = {role: one.given or None for role, one in units.items()}
+    return replace(options, units=FileUnits(**given), **changes)
+
+
+def reference_unit(
+    column: MeasuredColumn, output: SignalUnit, experiment: Experiment
+) -> SignalUnit:
+    """Say the unit of a reference: its own, else that of the output.
+
+    Raises
+    ------
+    MeasurementError
+        If the two measure different things.
+    """
+    own = signal_unit(column, "output", experiment)
+    is_label = experiment.simulation is None and own.unit != output.unit
+    if not own.given or is_label:
+        return output
+    if own.unit != output.unit and output.given:
+        raise MeasurementError(
+            f"{experiment.source}: recordings.columns.reference: {own.said_by} says "
+            f"{own.given!r}; expected {output.unit!r} as the output has; name another "
+            "column, or say recordings.units.output"
+        )
+    return own

@@ -1,0 +1,308 @@
+"""Units of signals: what a text says, and the factor from one unit to another.
+
+Conversion is by pint, which is loaded only where a unit is not plain SI. An angle is no
+plain number here: rad, deg and turns go into each other and into nothing else, so that a
+frequency in Hz is not taken for an angular velocity.
+"""
+
+import re
+from functools import cache
+from typing import Any
+
+# What a drive's signals are, each with the SI unit that its numbers are converted to.
+QUANTITIES = {
+    "time": "s",
+    "current": "A",
+    "voltage": "V",
+    "force": "N",
+    "torque": "N m",
+    "length": "m",
+    "angle": "rad",
+    "velocity": "m/s",
+    "angular velocity": "rad/s",
+    "acceleration": "m/s^2",
+    "angular acceleration": "rad/s^2",
+    "pressure": "Pa",
+}
+# Numbers that have no unit, or whose unit nobody wants to say.
+UNITLESS = "-"
+# How laboratories write units that pint reads otherwise or not at all.
+_SPELLINGS = {
+    "Nm": "N*m",
+    "mNm": "mN*m",
+    "kNm": "kN*m",
+    "Ncm": "N*cm",
+    "Nmm": "N*mm",
+    "sek": "s",
+    "Sek": "s",
+    "secs": "s",
+    "amp": "A",
+    "amps": "A",
+    "Amp": "A",
+    "Amps": "A",
+    "Ampere": "A",
+    "Volt": "V",
+    "Newton": "N",
+    "°": "deg",
+    "°/s": "deg/s",
+    "1/min": "rpm",
+    "min^-1": "rpm",
+    "min-1": "rpm",
+    "U/min": "rpm",
+    "r/min": "rpm",
+    "rev/min": "rpm",
+    "rev": "turn",
+    "mps": "m/s",
+    "%": "percent",
+}
+# Degrees in German, gradians to pint: nobody can tell.
+_AMBIGUOUS = ("grad", "Grad", "gr")
+_UNITLESS_WORDS = ("", "-", "1", "none", "unitless", "dimensionless")
+_SYMBOL = r"[A-Za-z\u00b5\u03bc°Ωµ]+(?:(?:\^|\*\*)?-?[1-4])?"
+_FORM = re.compile(rf"{_SYMBOL}(?:[ */·.]{_SYMBOL}){{0,5}}")
+_LONGEST = 40
+
+
+def quantity_of(unit: str) -> str:
+    """Say which of ``QUANTITIES`` a unit measures.
+
+    Returns
+    -------
+    str
+        Empty for a unit that is not known, or of something else.
+
+    Examples
+    --------
+    >>> quantity_of("mm"), quantity_of("1/min"), quantity_of("furlong"), quantity_of("inc")
+    ('length', 'angular velocity', 'length', '')
+    >>> quantity_of("Hz"), quantity_of("N m"), quantity_of("kN")
+    ('', 'torque', 'force')
+    """
+    for quantity, plain in QUANTITIES.items():
+        if unit == plain:
+            return quantity
+    roots = _roots(unit)
+    if roots is None:
+        return ""
+    return next((one for one, si in QUANTITIES.items() if _roots(si) == roots), "")
+
+
+def factor_between(unit: str, target: str) -> float | None:
+    """Give the number of targets in one unit.
+
+    Returns
+    -------
+    float or None, [target/unit]
+        None where a unit is not known, or the two measure different things.
+
+    Examples
+    --------
+    >>> factor_between("mA", "A"), factor_between("mm", "rad")
+    (0.001, None)
+    >>> factor_between("ticks", "ticks")
+    1.0
+    """
+    if unit == target:
+        return 1.0
+    if _roots(unit) is None or _roots(unit) != _roots(target):
+        return None
+    registry = _registry()
+    one, none = (registry.Quantity(size, _spelt(unit)) for size in (1.0, 0.0))
+    # Such as degrees Celsius, whose zero lies elsewhere.
+    if none.to(_spelt(target)).magnitude != 0.0:
+        return None
+    return float(one.to(_spelt(target)).magnitude)
+
+
+def is_unitless(unit: str) -> bool:
+    """Whether a text says that numbers have no unit."""
+    return unit.strip() in _UNITLESS_WORDS
+
+
+def in_unit(values: Any, unit: str, target: str) -> Any:
+    """Convert numbers; a division keeps decimal fractions more exact than a factor.
+
+    Parameters
+    ----------
+    values : ndarray or float
+    unit, target : str
+        Of the same quantity.
+
+    Raises
+    ------
+    ValueError
+        If they are not.
+    """
+    factor = factor_between(unit, target)
+    if factor is None:
+        raise ValueError(f"{unit!r} is no {target!r}")
+    inverse = factor_between(target, unit)
+    if inverse is not None and inverse > 1.0 and inverse.is_integer():
+        return values / inverse
+    return values * factor
+
+
+@cache
+def _registry() -> Any:
+    # Half a second: loaded where it is needed.
+    import pint
+
+    return pint.UnitRegistry()
+
+
+def _spelt(unit: str) -> str:
+    """A unit as pint reads it."""
+    text = _SPELLINGS.get(unit.strip(), unit.strip())
+    text = re.sub(r"(?<=[A-Za-z\u00b5\u03bc°Ω])(?:\^|\*\*)?(-?\d)", r"**\1", text)
+    return re.sub(r"(?<=\D)[·.](?=\D)", "*", text)
+
+
+@cache
+def _roots(unit: str) -> str | None:
+    """The unit in base units; None where it is not known."""
+    text = unit.strip()
+    if len(text) > _LONGEST or text in _AMBIGUOUS:
+        return None
+    text = _SPELLINGS.get(text, text)
+    if not _FORM.fullmatch(text):
+        return None
+    try:
+        base = _registry().Quantity(1.0, _spelt(text)).to_root_units()
+    # pint raises whatever its parser stumbles on.
+    except Exception:
+        return None
+    return str(base.units) if base.magnitude > 0 else None
+
+
+# Units that stand behind an underscore; in brackets anything may stand.
+_SUFFIXES = {
+    unit: unit
+    for unit in [
+        *("A", "mA", "uA", "kA", "V", "mV", "kV", "N", "mN", "kN", "Nm", "mNm", "Ncm"),
+        *("m", "mm", "cm", "um", "µm", "rad", "mrad", "deg"),
+        *("s", "ms", "us", "µs", "rpm", "bar", "Pa", "K"),
+    ]
+} | {
+    "rad_s": "rad/s",
+    "m_s": "m/s",
+    "mm_s": "mm/s",
+    "deg_s": "deg/s",
+    "m_per_s": "m/s",
+    "mm_per_s": "mm/s",
+    "rad_per_s": "rad/s",
+    "deg_per_s": "deg/s",
+    "N_m": "N m",
+    "sec": "s",
+    "seconds": "s",
+    "msec": "ms",
+    "amps": "A",
+    "volts": "V",
+    "degrees": "deg",
+    "radians": "rad",
+    "meters": "m",
+    "metres": "m",
+}
+_BRACKET = re.compile(r"([\[(])\s*([^\])]*?)\s*[\])]")
+_BEHIND = re.compile(r"(?:/| in )\s*([A-Za-zµ°%]{1,4})$")
+# Arguments of a function, not units: x[k], i(t).
+_ARGUMENTS = ("t", "k", "n", "i", "j", "z", "x")
+# A letter behind a symbol may be an index: theta_m is the motor's angle, i_s the stator's
+# current. It is a unit behind those that are measured in it.
+_SYMBOLS = re.compile(r".{0,2}|alpha|beta|gamma|omega|phi|psi|theta|tau", re.IGNORECASE)
+_MEASURED_IN = {
+    "s": ("t",),
+    "A": ("i", "iq", "id"),
+    "V": ("u", "uq", "ud"),
+    "N": ("f",),
+    "m": ("x", "y", "z", "s", "l", "h"),
+}
+
+
+def split_unit(title: str) -> tuple[str, str]:
+    """Take the unit off the name of a column.
+
+    Returns
+    -------
+    bare, unit : str
+        The unit as it stands there, empty where there is none.
+
+    Examples
+    --------
+    >>> split_unit("current [mA]"), split_unit("t_ms"), split_unit("U/V")
+    (('current ', 'mA'), ('t', 'ms'), ('U', 'V'))
+    """
+    bracket = _BRACKET.search(title)
+    if bracket and bracket[2]:
+        return title[: bracket.start()] + title[bracket.end() :], bracket[2]
+    worded = _BEHIND.search(title)
+    if worded and worded[1] in _SUFFIXES:
+        return title[: worded.start()], worded[1]
+    for suffix, unit in sorted(_SUFFIXES.items(), key=lambda pair: -len(pair[0])):
+        if title.endswith(f"_{suffix}") and len(title) > len(suffix) + 1:
+            return title[: -len(suffix) - 1], unit
+    return title, ""
+
+
+def unit_in_name(title: str, role: str) -> str:
+    """Read the unit that the name of a column says, where it surely is one.
+
+    Parameters
+    ----------
+    role : str
+        ``time``, ``input`` or ``output``.
+
+    Returns
+    -------
+    str
+        Empty where the name says none. One that is not known comes back as it stands, if
+        it is in square brackets.
+
+    Examples
+    --------
+    >>> unit_in_name("position_mm", "output"), unit_in_name("I (mA)", "input")
+    ('mm', 'mA')
+    >>> unit_in_name("x[k]", "output"), unit_in_name("position [inc]", "output")
+    ('', 'inc')
+    >>> unit_in_name("theta_m", "output"), unit_in_name("current_A", "output")
+    ('', 'A')
+    """
+    bare, unit = split_unit(title)
+    if not unit:
+        return ""
+    bracket = _BRACKET.search(title)
+    if bracket and bracket[2]:
+        if is_unitless(unit):
+            return UNITLESS
+        if unit in _ARGUMENTS or not re.search(r"[^\W\d]|[%°]", unit):
+            return ""
+        is_round = bracket[1] == "("
+        return "" if is_round and not quantity_of(unit) else unit
+    if role == "time" and quantity_of(unit) != "time":
+        return ""
+    if len(unit) == 1 and _SYMBOLS.fullmatch(bare):
+        return unit if bare.lower() in _MEASURED_IN.get(unit, ()) else ""
+    return unit
+
+
+def looks_like_unit(text: str) -> bool:
+    """Whether a cell above numbers holds a unit, in brackets or without.
+
+    Examples
+    --------
+    >>> [looks_like_unit(text) for text in ("[mm]", "mA", "1/min", "-")]
+    [True, True, True, True]
+    >>> [looks_like_unit(text) for text in ("t", "position", "")]
+    [False, False, False]
+    """
+    bare = bare_unit(text)
+    if is_unitless(bare):
+        return bool(bare)
+    return bool(quantity_of(bare)) and bare not in _ARGUMENTS
+
+
+def bare_unit(text: str) -> str:
+    """Take the brackets off a unit."""
+    bare = text.strip()
+    if len(bare) > 1 and bare[0] in "[(" and bare[-1] in "])":
+        bare = bare[1:-1].strip()
+    return bare
