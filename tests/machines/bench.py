@@ -18,6 +18,8 @@ from tests.machines.plants import Base
 SEEDS = {"development": 20_260_101, "reporting": 77_431_902}
 # Largest share by which the simulation's parameters are wrong.
 LARGEST_ERROR = 0.3
+# Noise of the sensor, as a share of the motion's rms.
+USUAL_NOISE = (0.0007, 0.015)
 
 
 @dataclass
@@ -160,6 +162,8 @@ class Bench:
     ) -> Machine:
         """The machine with its effects; without `answers` only its own names are right."""
         simulation = {} if self.loop is None else {"hold": "zero"}
+        if self.loop is None and "noise" not in more:
+            more["noise"] = float(np.exp(self.draw.rng.uniform(*np.log(USUAL_NOISE))))
         return Machine(
             name=self.draw.name,
             family="",

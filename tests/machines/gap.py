@@ -56,6 +56,8 @@ def _rms(values: np.ndarray, lengths: np.ndarray) -> float:
 
 def refitted_gap(machine: Machine, recordings: Recordings, hold: str) -> float:
     """Rms between noise-free output and the refitted simple simulation, over the noise."""
+    if machine.known:
+        return projected_gap(machine, recordings, lambda effect: False)
     base = machine.base
     # The base's numbers may differ between recordings; a simulation has one of each.
     given = {

@@ -42,6 +42,8 @@ class Machine:
     top: float
     hidden: list[Hidden] = field(default_factory=list)
     nuisances: list[Hidden] = field(default_factory=list)
+    # Effects that the simulation has already.
+    known: list[Hidden] = field(default_factory=list)
     answers: Answers = Answers()
     loop: Loop | None = None
     # Standard deviations as shares of the signals' rms, and the noise's colour.
@@ -55,7 +57,9 @@ class Machine:
     lengths: tuple[float, float] = (1.0, 1.0)
     warm_up: int = 0
     held_at: np.ndarray | float = 0.0
-    cells: int = 12
+    cells: int = 6
+    # Whether the simulation takes a voltage drive for a force with a damper.
+    folded: bool = False
     # Factors on the base that the simulation gets, and more keys of the configuration.
     off: dict = field(default_factory=dict)
     simulation: dict = field(default_factory=dict)
@@ -70,7 +74,8 @@ class Machine:
 class Recordings:
     """What was commanded and what is read: columns are recordings.
 
-    `clean` is the reading without noise, `readings` what the logger wrote.
+    `clean` is the reading without noise, within the sensor's range; `readings` is what the
+    logger wrote.
     """
 
     times: np.ndarray
@@ -83,7 +88,8 @@ class Recordings:
 
 
 def plant_of(machine: Machine, hidden: Sequence[Hidden]) -> Plant:
-    """Equations of a machine with some of its effects."""
+    """Equations of a machine with what is known of it and some of its effects."""
+    hidden = [*machine.known, *hidden]
     base = machine.base
     dry = spring = None
     parts, torques, motor, on_load = [], [], None, False
@@ -97,6 +103,8 @@ def plant_of(machine: Machine, hidden: Sequence[Hidden]) -> Plant:
         if one.torque is not None:
             torques.append(one.torque)
     parts.sort(key=lambda part: type(part).__name__ != "SecondMass")
+    if dry is not None and dry.on_load and not on_load:
+        dry = replace(dry, on_load=False)
     shapes = [one.shape for one in hidden if one.shape]
     return Plant(
         base,
@@ -188,7 +196,7 @@ def clean_readings(
     fine = open_loop(plant_of(machine, hidden), first, last, step_s)
     fine = read(machine, hidden, fine[machine.warm_up * cells :])
     fine_times = step_s * np.arange(len(fine))
-    for one in hidden:
+    for one in [*hidden, *machine.nuisances]:
         fine = one.sensor(fine_times, fine) if one.sensor else fine
     skew = sum(one.clock_skew for one in hidden)
     if times is None and skew == 0:
@@ -203,12 +211,8 @@ def clean_readings(
     return np.stack(columns, axis=1)
 
 
-def _noise_size(machine, hidden, commands):
-    """Noise in the output's unit, from the rms of the motion of a coarse simulation."""
-    if machine.loop is None:
-        swing = clean_readings(machine, hidden, commands)
-    else:
-        swing = commands
+def _noise_size(machine, swing):
+    """Noise in the output's unit, from the rms of a motion."""
     return machine.noise * float(np.sqrt(np.mean((swing - swing[0]) ** 2)))
 
 
@@ -225,19 +229,21 @@ def record(machine: Machine) -> Recordings:
     """Run a machine once and log it."""
     wanted = machine.top * np.stack([one.values for one in machine.signals], axis=1)
     nominal = times_of(machine)[:, None] + np.zeros_like(wanted)
-    noise_rms = _noise_size(machine, machine.hidden, wanted)
-    noise = noise_rms * _white(machine, wanted.shape)
     times, commands = nominal, wanted
     if machine.loop is not None:
+        noise_rms = _noise_size(machine, wanted)
+        noise = noise_rms * _white(machine, wanted.shape)
         commands, _ = _closed(machine, wanted, noise)
     elif machine.jitter:
-        times = nominal + machine.sample_s * machine.jitter * machine.rng.uniform(
-            -1, 1, wanted.shape
-        )
+        late = machine.jitter * machine.rng.uniform(-1, 1, wanted.shape)
+        times = nominal + machine.sample_s * late
         times[0] = 0.0
     clean = clean_readings(
         machine, machine.hidden, commands, times=times if machine.jitter else None
     )
+    if machine.loop is None:
+        noise_rms = _noise_size(machine, clean)
+        noise = noise_rms * _white(machine, wanted.shape)
     logged = commands
     if machine.jitter:
         pairs = zip(times.T, commands.T, strict=True)
@@ -245,6 +251,8 @@ def record(machine: Machine) -> Recordings:
     size = machine.input_noise * np.sqrt(np.mean(commands**2))
     logged = logged + size * machine.rng.normal(size=wanted.shape)
     readings = _digits(machine, clean + noise, noise_rms)
+    for one in machine.hidden:
+        clean = one.digits(clean) if one.digits else clean
     share = machine.rng.uniform(*machine.lengths, wanted.shape[1])
     lengths = np.maximum(300, share * len(wanted)).astype(int)
     return Recordings(times, commands, logged, clean, readings, lengths, noise_rms)

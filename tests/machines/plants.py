@@ -330,7 +330,7 @@ class Plant:
             return self._free(0.0, state, command)[0][1][column] * self.base.mass
 
         at_zero = force(0.0)
-        if abs(at_zero) < 1e-12 * self.base.force_constant:
+        if abs(at_zero) < 1e-12 * np.max(self.base.force_constant):
             return 0.0
         reach = 1e-9
         while force(reach) * at_zero > 0 and force(-reach) * at_zero > 0:

@@ -14,6 +14,7 @@ import yaml
 
 from tests.machines.gap import projected_gap, refitted_gap
 from tests.machines.machine import Machine, Recordings, record
+from tests.machines.plants import Base
 
 NAMES = {
     "mass": "mass_kg",
@@ -26,6 +27,9 @@ NAMES = {
 def configuration(machine: Machine) -> dict:
     """What stands in experiment.yaml."""
     base = machine.base
+    if machine.folded:
+        kt, ohms = base.force_constant, base.resistance
+        base = Base(base.mass, base.damping + kt * kt / ohms, base.stiffness, kt / ohms)
     simulation = {"kind": "drive"}
     for name, key in NAMES.items():
         value = float(np.mean(getattr(base, name))) * machine.off.get(name, 1.0)
