@@ -79,7 +79,7 @@ def summary(rows: list[dict]) -> list[str]:
     ]
     if seconds:
         lines.append(
-            f"Seconds of a diagnosis: median {seconds[len(seconds) // 2]:.0f}, largest {seconds[-1]:.0f}."
+            f"Processor seconds of a diagnosis: median {seconds[len(seconds) // 2]:.0f}, largest {seconds[-1]:.0f}."
         )
     return lines
 
