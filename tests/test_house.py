@@ -238,6 +238,7 @@ def test_tests_mirror_the_package():
             "bad_input",
             "benchmarks",
             "blind",
+            "machines",
             "numerics",
             "reference",
             "reliability",
