@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.stats import f as f_distribution
 
+from hwid_cli.diagnosis.parameters import START
 from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals
 from hwid_cli.drive.catalogue import CATALOGUE, public_id
 from hwid_cli.records.candidates import CandidateFit, RankedCandidate
@@ -257,8 +258,12 @@ def _goes_with(values: np.ndarray, inputs: np.ndarray) -> bool:
 
 
 def count(found: CandidateFit) -> int:
-    """Number of parameters of a candidate."""
-    return int(found.values.size + found.own.size)
+    """Number of parameters of a candidate.
+
+    How recordings start does not count: it shows in their first samples only.
+    """
+    own = sum(one.owner != START for one in found.own_names)
+    return int(found.values.size + own * found.own.shape[0])
 
 
 def has_size(found: CandidateFit) -> bool:
