@@ -124,7 +124,8 @@ def in_unit(values: Any, unit: str, target: str) -> Any:
 
     Parameters
     ----------
-    values : ndarray or float
+    values : ndarray or float, any shape, [unit]
+        Finite or not.
     unit, target : str
         Of the same quantity.
 

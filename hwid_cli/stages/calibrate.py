@@ -92,6 +92,9 @@ def calibration_key(
     ]
     arrays = [one.pop(side) for one in about for side in ("input", "output")]
     for one in about:
+        # The log holds what is known of units; without that, keys stay as they were.
+        if not one["units"]:
+            del one["units"]
         reference = one.pop("reference")
         # Said only where there is one: keys of recordings without one stay as they were.
         if reference is not None:

@@ -169,12 +169,15 @@ def assumed_units(
         return ""
     si = {"time": "s", **{side: getattr(simulation, f"{side}_unit") for side in _SIDES}}
     unknown = {
-        one.role
+        one.role: one.said_by
         for log in logs
         for one in log.units
         if log.name in names and (not one.given or is_unitless(one.given))
     }
     roles = [role for role in ("input", "output", "time") if role in unknown]
+    # Numbers that are said to have no unit.
+    labels = [key for role in roles if (key := unknown[role]).endswith("_unit")]
+    step = f" in place of {_listed(labels)}" if labels else ""
     if not roles:
         return ""
     keys = ", ".join(f"{role}: {si[role]}" for role in roles)
@@ -182,7 +185,7 @@ def assumed_units(
     return (
         f"{experiment.source}: recordings.units: nothing says the unit of the "
         f"{_listed(roles, 'the ')}: taken as {units}, as the simulation's numbers are; "
-        f"correct or confirm it with recordings.units: {{{keys}}}"
+        f"correct or confirm it with recordings.units: {{{keys}}}{step}"
     )
 
 

@@ -153,11 +153,13 @@ def test_every_setting_of_the_simulation_reaches_the_drive():
         inductance_H=10.0,
         back_emf_V_s_per_m=11.0,
         hold="smooth",
+        known={"damping_N_s_per_m": 0.1},
     )
-    drive = prepare([TRAIN], simulation, DiagnoseOptions(), []).drive
+    problem = prepare([TRAIN], simulation, DiagnoseOptions(), [])
+    assert problem.known == simulation.known
     for name in vars(simulation):
-        if name != "kind":
-            assert getattr(drive, name) == getattr(simulation, name), name
+        if name not in ("kind", "known"):
+            assert getattr(problem.drive, name) == getattr(simulation, name), name
 
 
 TIME = 1e-3 * np.arange(400)

@@ -131,9 +131,9 @@ def test_what_nobody_says_is_taken_for_si_in_one_line():
 def test_what_is_known_is_not_assumed():
     known = SignalUnit("input", "mA", "the name 'mA'", "A", 1e-3)
     assert with_units(SignalUnit("time", "s", "x", "s"), known) == ""
-    assert "unit of the output: taken as m," in with_units(
-        known, SignalUnit("output", "-", "recordings.output_unit", "-")
-    )
+    line = with_units(known, SignalUnit("output", "-", "recordings.output_unit", "-"))
+    assert "unit of the output: taken as m," in line
+    assert line.endswith("{output: m} in place of recordings.output_unit")
 
 
 def rescaled(*, current=1.0, displacement=1.0, step=1.0, **changes):
