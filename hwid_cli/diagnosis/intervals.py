@@ -31,8 +31,7 @@ def unclear_effects(
 ) -> tuple[str, ...]:
     """Effects of a fit that may as well not be there.
 
-    The interval of an effect's strength reaches zero, or for a limit the largest value
-    that the recordings could show.
+    The interval of an effect's strength reaches zero.
 
     Returns
     -------
@@ -47,14 +46,13 @@ def unclear_effects(
     for effect in found.effects:
         parameter = CATALOGUE[effect].strongest
         ref = ParameterRef(effect, parameter.name)
-        if ref not in found.names:
+        # A limit shows in every sample that it cuts: the criterion decides.
+        if ref not in found.names or parameter.off == inf:
             continue
         column = found.names.index(ref)
         unknown, q = fit_layout.shared[column], point.shared[column]
         reach = _QUANTILE * float(deviations[column])
-        if parameter.off == inf:
-            is_clear = unknown.value(q + reach) < unknown.high
-        elif unknown.is_log:
+        if unknown.is_log:
             # Linearised: a relative deviation of the value itself.
             is_clear = reach < 1.0
         else:

@@ -19,6 +19,14 @@ _REST = 1e-3
 # Every third recording of a kind validates; amplitudes and speeds take turns.
 _EVERY = 3
 _SAME = 0.05
+# Extremes that training recordings come near to, by this share of the largest.
+_NEARLY = 0.95
+_EXTREMES: tuple[Callable[[Recording], float], ...] = (
+    lambda one: float(np.max(one.output) - one.output[0]),
+    lambda one: float(one.output[0] - np.min(one.output)),
+    lambda one: float(np.max(np.abs(one.input))),
+    lambda one: float(np.max(np.abs(np.diff(one.output)))) / one.sample_time_s,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -287,7 +295,23 @@ def held_out_names(recordings: Sequence[Recording]) -> tuple[str, ...]:
             chosen |= _of_kind(members)
     if not chosen and len(recordings) > 1:
         chosen = {recordings[-1].name}
+    chosen = _without_extremes(recordings, chosen)
     return tuple(one.name for one in recordings if one.name in chosen)
+
+
+def _without_extremes(recordings: Sequence[Recording], chosen: set[str]) -> set[str]:
+    """Give back what alone goes to an extreme: training has to see all of the range.
+
+    A stop that only held-out recordings reach can never be found.
+    """
+    held_out = set(chosen)
+    for extreme in _EXTREMES:
+        sizes = {one.name: extreme(one) for one in recordings}
+        largest = max(sizes.values())
+        reached = [name for name in sizes if sizes[name] >= _NEARLY * largest]
+        if largest > 0 and all(name in held_out for name in reached):
+            held_out.discard(max(sizes, key=lambda name: sizes[name]))
+    return held_out or chosen
 
 
 def _of_kind(members: Sequence[Recording]) -> set[str]:

@@ -165,7 +165,10 @@ class SelectionCriteria:
         least = 1e-24 * max(float(other.sse.sum()), 1e-300)
         fits = np.log((other.sse.sum() + least) / (found.sse.sum() + least))
         more = count(found) - count(other)
-        return float(n * fits - more * np.log(max(n, 2.0)))
+        # How recordings start shows in their first samples only, whatever n: each such
+        # value is charged what it gains by chance.
+        starts = _count_starts(found) - _count_starts(other)
+        return float(n * fits - more * np.log(max(n, 2.0)) - starts)
 
     def excess(self, found: CandidateFit) -> float:
         """Sum of squares of all recordings beyond the noise.
@@ -258,12 +261,14 @@ def _goes_with(values: np.ndarray, inputs: np.ndarray) -> bool:
 
 
 def count(found: CandidateFit) -> int:
-    """Number of parameters of a candidate.
-
-    How recordings start does not count: it shows in their first samples only.
-    """
+    """Number of parameters of a candidate, without how recordings start."""
     own = sum(one.owner != START for one in found.own_names)
     return int(found.values.size + own * found.own.shape[0])
+
+
+def _count_starts(found: CandidateFit) -> int:
+    starts = sum(one.owner == START for one in found.own_names)
+    return int(starts * found.own.shape[0])
 
 
 def has_size(found: CandidateFit) -> bool:
