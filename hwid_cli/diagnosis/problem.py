@@ -3,7 +3,7 @@
 Whole recordings are held out, spread over kinds, sizes and speeds.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
