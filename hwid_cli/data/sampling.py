@@ -20,6 +20,9 @@ from hwid_cli.data.columns import (
 from hwid_cli.errors import MeasurementError
 from hwid_cli.records.experiment import RecordingsOptions
 
+# The mean step of a clock that only scatters is this close to the median one.
+_SCATTER = 0.02
+
 _log = logging.getLogger(__name__)
 
 # Time stamps carry rounding errors; a relative difference below this is one.
@@ -79,7 +82,7 @@ def sample_uniformly(
             f"expected {median:.6g} s within {options.sampling_tolerance:.3g} of it; "
             "set recordings.resample: true, or raise recordings.sampling_tolerance"
         )
-    step = options.sample_time_s or float(f"{median:.{_STEP_DIGITS}g}")
+    step = options.sample_time_s or _grid_step(time.values, median)
     _check_gaps(path, time, steps, step)
     _log.info(
         "%s: resampled to %.9g s, because %d of %d steps lie beyond the tolerance",
@@ -89,6 +92,18 @@ def sample_uniformly(
         steps.size,
     )
     return _resample(columns, time.values, step), step
+
+
+def _grid_step(time: np.ndarray, median: float) -> float:
+    """Step to resample by: that of the clock which the stamps scatter around.
+
+    On the clock's own grid a reading moves by the jitter alone. Where samples are
+    missing, the mean step is no step of the clock.
+    """
+    mean = (time[-1] - time[0]) / (time.size - 1)
+    if abs(mean - median) <= _SCATTER * median:
+        return _simplest_step(time)
+    return float(f"{median:.{_STEP_DIGITS}g}")
 
 
 def _check_length(path: Path, columns: FileColumns, time: MeasuredColumn) -> None:
@@ -162,18 +177,38 @@ def _check_gaps(
 
 
 def _resample(columns: FileColumns, stamps: np.ndarray, step: float) -> FileColumns:
-    """Interpolate every column linearly over its own stretch of time."""
+    """Put every column on a grid over its own stretch of time.
+
+    An output is interpolated. An input is averaged over each step of the grid, because
+    what it moves follows its integral: corners keep their time.
+    """
 
     def resampled(column: MeasuredColumn) -> MeasuredColumn:
         known = stamps[: column.values.size]
         # The small share keeps a last sample that rounding pushed past the end.
         count = int((known[-1] - known[0]) / step * (1 + _ROUNDING)) + 1
         grid = known[0] + step * np.arange(count)
+        is_input = column is columns.input
+        values = _averaged if is_input else np.interp
         return array_column(
             column.title,
-            np.interp(grid, known, column.values),
+            values(grid, known, column.values),
             unit=column.unit,
             unit_said_by=column.unit_said_by,
         )
 
     return replace(with_each(columns, resampled), time=None)
+
+
+def _averaged(grid: np.ndarray, known: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Means of straight lines between samples, half a step to either side."""
+    edges = np.concatenate([grid[:1], 0.5 * (grid[1:] + grid[:-1]), grid[-1:]])
+    lines = np.concatenate(
+        [[0.0], np.cumsum(0.5 * np.diff(known) * (values[1:] + values[:-1]))]
+    )
+    # Within a line the integral is a parabola.
+    row = np.clip(np.searchsorted(known, edges, side="right") - 1, 0, known.size - 2)
+    done = np.clip(edges - known[row], 0.0, None)
+    slope = (values[row + 1] - values[row]) / (known[row + 1] - known[row])
+    integral = lines[row] + done * (values[row] + 0.5 * slope * done)
+    return np.diff(integral) / np.diff(edges)

@@ -343,6 +343,43 @@ def compared_with_fit(
     return compare_at(problem, *rebuilt(problem, found, scales))
 
 
+def at_point(
+    problem: DiagnosisProblem,
+    found: CandidateFit,
+    fit_layout: ParameterLayout,
+    point: ParameterPoint,
+    noise: NoiseFloor,
+) -> CandidateFit:
+    """The same candidate with other values.
+
+    Parameters
+    ----------
+    point : ParameterPoint
+        With own values of all recordings.
+    """
+    parts = residuals_at(problem, fit_layout, point)
+    sse = each_sum_of_squares(parts)
+    if not np.isfinite(sse).all():
+        return found
+    white, cause = left_over(
+        parts, problem, drive_at(problem, fit_layout, point), noise
+    )
+    shared = zip(fit_layout.shared, point.shared, strict=True)
+    own = [
+        [one.value(q) for one, q in zip(fit_layout.own, row, strict=True)]
+        for row in point.own
+    ]
+    return replace(
+        found,
+        values=np.array([one.value(q) for one, q in shared]),
+        own=np.array(own).reshape(point.own.shape),
+        sse=sse,
+        whiteness=white,
+        neighbour=_neighbour(parts),
+        cause=cause,
+    )
+
+
 def fitted_start(
     found: CandidateFit, present: dict[str, dict[str, float]]
 ) -> dict[str, dict[str, float]]:

@@ -11,9 +11,16 @@ from dataclasses import replace
 
 import numpy as np
 from scipy.linalg import expm, solve_discrete_are
+from scipy.optimize import least_squares
 from scipy.signal import lfilter
 
 from hwid_cli.diagnosis.noise import portmanteau, whiteness
+from hwid_cli.diagnosis.parameters import (
+    ParameterLayout,
+    ParameterPoint,
+    drive_at,
+    residuals_at,
+)
 from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals
 from hwid_cli.records.diagnosis import NoiseFloor
 from hwid_cli.records.drive import Drive
@@ -22,7 +29,11 @@ from hwid_cli.records.drive import Drive
 # a hold, fewer may be chance.
 _LEAST_REPEATED, _MOST_REPEATED = 2e-3, 0.25
 # The input's noise may be so many times what its differences show.
-_MORE_NOISE = 1.3
+_LESS_NOISE, _MORE_NOISE = 0.7, 1.3
+# Innovations may be so far from white where the noise's size is right.
+_NEARLY_WHITE = 6.0
+# Times that the filter follows the drive that was fitted with it.
+_REWEIGHTINGS = 2
 # Correlations of neighbours, and of the next but one, that interpolation makes at most.
 _MOST_LINKED = (0.35, 0.1)
 
@@ -94,16 +105,91 @@ def whiteness_with_input_noise(
     input_rms = noise.input_rms
     if input_rms <= 0 or noise.rms <= 0 or problem.compares_command:
         return float("inf")
-    n = sum(one.size for one in parts)
-    variance = sum(float(one @ one) for one in parts) / max(n, 1)
-    excess = variance - noise.rms**2
+    excess = _mean_square(parts) - noise.rms**2
     white = []
     for one, signals in zip(parts, problem.signals, strict=True):
         found = _innovations(one, signals, drive, noise.rms, excess, input_rms)
         if found is None:
             return float("inf")
         white.append(found)
-    return portmanteau(white, (1.0,), n_lags=30)
+    statistic = portmanteau(white, (1.0,), n_lags=30)
+    is_same = excess > 0 and _strength(parts, problem, drive, excess) >= (
+        (_LESS_NOISE * input_rms) ** 2
+    )
+    # The same size by two routes is evidence of its own: the innovations of a missing
+    # effect are neither of that size nor nearly white.
+    return statistic / _NEARLY_WHITE if is_same else statistic
+
+
+def _strength(
+    parts: Sequence[np.ndarray], problem: DiagnosisProblem, drive: Drive, excess: float
+) -> float:
+    """Variance of the input's noise that makes up what is left."""
+    gains = [
+        float(
+            np.sum(
+                np.square(_impulse(*_discrete(drive, signals.sample_time_s), one.size))
+            )
+        )
+        for one, signals in zip(parts, problem.signals, strict=True)
+    ]
+    return excess / max(float(np.mean(gains)), 1e-300)
+
+
+def fit_with_input_noise(
+    problem: DiagnosisProblem,
+    fit_layout: ParameterLayout,
+    point: ParameterPoint,
+    noise: NoiseFloor,
+) -> ParameterPoint:
+    """Fit again with the noise of the input taken into account.
+
+    A fit to the output alone makes the drive too sluggish, because a smaller answer to
+    the input's noise leaves less. The innovations have no such bias.
+
+    Parameters
+    ----------
+    point : ParameterPoint
+        Where the fit to the output ended.
+    """
+    n_shared = len(fit_layout.shared)
+
+    def at(coordinates: np.ndarray) -> ParameterPoint:
+        return ParameterPoint(
+            coordinates[:n_shared], coordinates[n_shared:].reshape(point.own.shape)
+        )
+
+    for _ in range(_REWEIGHTINGS):
+        drive = drive_at(problem, fit_layout, point)
+        parts = residuals_at(problem, fit_layout, point)
+        excess = _mean_square(parts) - noise.rms**2
+
+        def whitened(
+            coordinates: np.ndarray, drive: Drive = drive, excess: float = excess
+        ) -> np.ndarray:
+            filtered = [
+                _innovations(one, signals, drive, noise.rms, excess, np.inf)
+                for one, signals in zip(
+                    residuals_at(problem, fit_layout, at(coordinates)),
+                    problem.signals,
+                    strict=True,
+                )
+            ]
+            return np.concatenate(
+                [np.zeros(0) if one is None else one for one in filtered]
+            )
+
+        start = np.concatenate([point.shared, point.own.ravel()])
+        if whitened(start).size < start.size:
+            return point
+        found = least_squares(whitened, start, method="lm", x_scale=1.0)
+        point = at(found.x)
+    return point
+
+
+def _mean_square(parts: Sequence[np.ndarray]) -> float:
+    count = sum(one.size for one in parts)
+    return sum(float(one @ one) for one in parts) / max(count, 1)
 
 
 def _innovations(
@@ -115,32 +201,44 @@ def _innovations(
     input_rms: float,
 ) -> np.ndarray | None:
     """Residual through the whitening filter of input and output noise."""
-    time = signals.sample_time_s
-    a, b = _discrete(drive, time)
-    impulse = _impulse(a, b, residual.size)
+    a, b, through = _discrete(drive, signals.sample_time_s)
+    impulse = _impulse(a, b, through, residual.size)
     gain = float(impulse @ impulse)
     if gain <= 0:
         return None
     limit = (_MORE_NOISE * input_rms) ** 2
     if excess <= 0 or excess / gain > limit:
         return None
-    strength = excess / gain
+    # In units of the output's noise; the input's noise moves the reading at once, too.
+    strength = excess / gain / rms**2
     reading = np.array([[1.0, 0.0]])
-    scale = rms**2
-    moved = strength / scale * np.outer(b, b) + 1e-18 * np.eye(2) * float(b @ b)
+    moved = strength * np.outer(b, b)
+    both = strength * through * b[:, None]
+    read = np.array([[1.0 + strength * through**2]])
     try:
-        covariance = solve_discrete_are(a.T, reading.T, moved, np.eye(1))
+        covariance = solve_discrete_are(a.T, reading.T, moved, read, s=both)
     except (np.linalg.LinAlgError, ValueError):
         return None
-    innovation = float((reading @ covariance @ reading.T)[0, 0]) + 1.0
-    correct = (a @ covariance @ reading.T / innovation).ravel()
+    innovation = float((reading @ covariance @ reading.T)[0, 0]) + float(read[0, 0])
+    correct = ((a @ covariance @ reading.T + both) / innovation).ravel()
     top = np.poly(a)
     bottom = np.poly(a - np.outer(correct, reading))
     return np.asarray(lfilter(top, bottom, residual))
 
 
-def _discrete(drive: Drive, sample_time_s: float) -> tuple[np.ndarray, np.ndarray]:
-    """Linear drive from sample to sample: an input held for one sample."""
+def _discrete(
+    drive: Drive, sample_time_s: float
+) -> tuple[np.ndarray, np.ndarray, float]:
+    """Linear drive from sample to sample, the input a straight line between them.
+
+    Returns
+    -------
+    a : ndarray, shape (2, 2)
+    b : ndarray, shape (2,)
+        By which a sample of the input moves the following state.
+    through : float
+        By which it moves the position at once: its half of the line before it.
+    """
     push, damping = drive.force_constant_N_per_A, drive.damping_N_s_per_m
     if drive.resistance_ohm is not None:
         push /= drive.resistance_ohm
@@ -148,19 +246,23 @@ def _discrete(drive: Drive, sample_time_s: float) -> tuple[np.ndarray, np.ndarra
         damping += push * (
             drive.force_constant_N_per_A if back_emf is None else back_emf
         )
-    block = np.zeros((3, 3))
+    # State, input, and its slope.
+    block = np.zeros((4, 4))
     block[0, 1] = 1.0
-    block[1] = np.array([-drive.stiffness_N_per_m, -damping, push]) / drive.mass_kg
+    block[1, :3] = np.array([-drive.stiffness_N_per_m, -damping, push]) / drive.mass_kg
+    block[2, 3] = 1.0 / sample_time_s
     step = expm(block * sample_time_s)
-    return step[:2, :2], step[:2, 2]
+    a, rising = step[:2, :2], step[:2, 3]
+    falling = step[:2, 2] - rising
+    return a, a @ rising + falling, float(rising[0])
 
 
-def _impulse(a: np.ndarray, b: np.ndarray, size: int) -> np.ndarray:
+def _impulse(a: np.ndarray, b: np.ndarray, through: float, size: int) -> np.ndarray:
     """Answer of the position to one sample of the input."""
-    top = np.array([b[0], a[0, 1] * b[1] - a[1, 1] * b[0]])
-    pulse = np.zeros(max(size, 2))
-    pulse[1] = 1.0
-    return np.asarray(lfilter(top, np.poly(a), pulse))
+    top = np.array([0.0, b[0], a[0, 1] * b[1] - a[1, 1] * b[0]])
+    pulse = np.zeros(max(size, 3))
+    pulse[0] = 1.0
+    return np.asarray(lfilter(top, np.poly(a), pulse)) + through * pulse
 
 
 def whiteness_but_for_neighbours(

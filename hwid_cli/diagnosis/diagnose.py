@@ -13,12 +13,14 @@ import numpy as np
 from hwid_cli.diagnosis.candidate import (
     Baseline,
     SearchStart,
+    at_point,
     base_of,
     compared_with_fit,
     fit_candidate,
     fitted_drive,
+    rebuilt,
 )
-from hwid_cli.diagnosis.causes import without_repeats
+from hwid_cli.diagnosis.causes import fit_with_input_noise, without_repeats
 from hwid_cli.diagnosis.findings import Findings, describe
 from hwid_cli.diagnosis.intervals import unclear_effects
 from hwid_cli.diagnosis.latent_force import latent_force
@@ -94,6 +96,7 @@ def diagnose(
     if _shakes_at_rest(problem, base, scales, noise):
         noise = noise_floor(problem, rests=False)
         base = _refit_base(problem, scales, noise)
+    base = _with_input_noise(problem, base, scales, noise)
     if base.is_usable:
         scales = scales_of_fit(problem, base, scales, noise)
     drive = fitted_drive(problem.drive, base)
@@ -154,6 +157,19 @@ def _refit_base(
     """Base, and the effects that the simulation has already, fitted again."""
     start = SearchStart(base_of(problem.drive), drive_effects(problem.drive))
     return fit_candidate(problem, (), [start], scales, noise)
+
+
+def _with_input_noise(
+    problem: DiagnosisProblem, base: CandidateFit, scales: Scales, noise: NoiseFloor
+) -> CandidateFit:
+    """Base as fitted with the input's noise in mind, if nothing else remains then."""
+    may_help = 1.0 < base.whiteness < np.inf and noise.input_rms > 0
+    if not may_help or problem.compares_command:
+        return base
+    fit_layout, point = rebuilt(problem, base, scales)
+    point = fit_with_input_noise(problem, fit_layout, point, noise)
+    found = at_point(problem, base, fit_layout, point, noise)
+    return found if found.cause == "input_noise" else base
 
 
 def _shakes_at_rest(

@@ -52,11 +52,8 @@ def unclear_effects(
         column = found.names.index(ref)
         unknown, q = fit_layout.shared[column], point.shared[column]
         reach = _QUANTILE * float(deviations[column])
-        if unknown.is_log:
-            # Linearised: a relative deviation of the value itself.
-            is_clear = reach < 1.0
-        else:
-            is_clear = abs(q) > reach
+        # Of a logarithm linearised: a relative deviation of the value itself.
+        is_clear = reach < 1.0 if unknown.is_log else abs(q) > reach
         if not is_clear:
             unclear.append(effect)
     return tuple(unclear)

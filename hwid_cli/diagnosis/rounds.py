@@ -63,8 +63,9 @@ STANDS_OUT = 0.5
 # so many times.
 WORTH_MORE = 2.0
 MOST_TURNS = 3
-# Sets that the next larger ones are built on.
+# Sets that the next larger ones are built on, each of which explains this share.
 MOST_PARENTS = 2
+LEAST_OF_PARENT = 0.1
 LIKELY_PAIRS = 10
 # A pair is likely where it should explain this much more than its better half.
 PROMISING_PAIR = 0.05
@@ -207,7 +208,7 @@ class _Search:
         name = _name_of(size)
         screened = self._screen(name, proposed)
         for _ in range(MOST_SCREENINGS):
-            if self._stands_out(screened, parents[0]):
+            if not parents or self._stands_out(screened, parents[0]):
                 break
             # Nothing has got far yet: all of them go on.
             further = {one.effects: list(one.starts) for one in screened}
@@ -248,12 +249,19 @@ class _Search:
             key=lambda one: -self.rounds.criteria.gain(one, self.rounds.base),
         )
         best = self.best_of_size(size)
-        chosen = [best] if best is not None else []
+        chosen = [best] if best is not None and self._is_worth_it(best) else []
         for one in fits:
+            if not self._is_worth_it(one):
+                continue
             is_kin = any(is_part_of(one, two) or is_part_of(two, one) for two in chosen)
             if not is_kin and len(chosen) < MOST_PARENTS:
                 chosen.append(one)
         return chosen
+
+    def _is_worth_it(self, found: CandidateFit) -> bool:
+        """Whether a set explains enough for others to be built on it."""
+        against = self.rounds.criteria.evidence(found, self.rounds.base)
+        return against.explained >= LEAST_OF_PARENT
 
     def fit_without_each(self, whole: CandidateFit) -> None:
         """Fit a set without each of its effects, from where the whole set ended."""

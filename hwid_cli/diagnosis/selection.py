@@ -47,6 +47,9 @@ LEAST_SPREAD = 0.01
 LEAST_PIECES = 10
 # Ratio to the noise up to which what remains is of no account.
 CLOSE_TO_NOISE = 1.03
+# Ratio up to which a remainder that no effect explains is no missing effect: the logger,
+# a timer, a cable.
+SMALL_REMAINDER = 1.2
 # Whiteness up to which a small remainder counts as noise that is not quite white.
 _NEARLY_WHITE = 2.0
 # Candidates closer than this are not told apart.
@@ -507,9 +510,18 @@ def decide(
         near = [one for one in rivals(criteria, same_size, chosen) if may_be_named(one)]
         word = "ambiguous" if near else "named"
         return DiagnosisVerdict(word, criteria.is_complete(chosen), chosen, tuple(near))
-    if criteria.ratio(base) <= CLOSE_TO_NOISE and base.whiteness <= _NEARLY_WHITE:
+    is_close = criteria.ratio(base) <= CLOSE_TO_NOISE
+    if is_close and base.whiteness <= _NEARLY_WHITE:
         return DiagnosisVerdict(
             _without_effect(criteria, given_sse, base), True, base, ()
+        )
+    explained = [
+        criteria.evidence(one, base).explained for one in fits.values() if one.is_usable
+    ]
+    is_small = criteria.ratio(base) <= SMALL_REMAINDER
+    if is_small and max(explained, default=0.0) < LEAST_OF_RIVALS:
+        return DiagnosisVerdict(
+            _without_effect(criteria, given_sse, base), False, base, ()
         )
     halves = _rivals_by_halves(criteria, base, fits, unclear)
     if len(halves) > 1:

@@ -48,12 +48,12 @@ def summarise(
     if verdict.word == "none":
         return (
             "Nothing is missing: the simulation agrees with the recordings up to "
-            f"their noise ({after:.3g} times the noise).{_cause(verdict.chosen)}"
+            f"their noise ({after:.3g} times the noise).{_cause(verdict)}"
         )
     if verdict.word == "parameters":
         return (
             "No effect is missing: the parameters were off, and once they are fitted "
-            f"the error is {after:.3g} times the noise.{_cause(verdict.chosen)}"
+            f"the error is {after:.3g} times the noise.{_cause(verdict)}"
         )
     if verdict.word == "unknown":
         return (
@@ -70,9 +70,13 @@ def summarise(
     return text
 
 
-def _cause(found: CandidateFit) -> str:
+def _cause(verdict: DiagnosisVerdict) -> str:
     """Say what the measuring chain adds to the noise of the output."""
-    return f" What is left is {CAUSES[found.cause]}." if found.cause else ""
+    if verdict.chosen.cause:
+        return f" What is left is {CAUSES[verdict.chosen.cause]}."
+    if not verdict.is_complete:
+        return " The little that is left beyond the noise goes with no effect."
+    return ""
 
 
 def _named(

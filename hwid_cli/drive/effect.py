@@ -251,7 +251,9 @@ class Effect:
         parameter = self.strongest
         if parameter.off == inf:
             return {**values, parameter.name: parameter.bounds(scales)[1]}
-        return {**values, parameter.name: FAINT * values.get(parameter.name, 0.0)}
+        nothing = parameter.center
+        away = values.get(parameter.name, nothing) - nothing
+        return {**values, parameter.name: nothing + FAINT * away}
 
     def starts(self, scales: Scales) -> list[dict[str, float]]:
         """List what the recordings show, or all combinations of start values."""
