@@ -70,6 +70,22 @@ def controller_faults(experiment: Experiment) -> Iterator[Fault]:
         )
 
 
+def cascade_faults(experiment: Experiment) -> Iterator[Fault]:
+    """A cascade around a position that nobody measures."""
+    options = experiment.simulation
+    if options is None or options.controller is None or options.output == "position":
+        return
+    gain = options.controller.position_gain_per_s
+    if gain is not None:
+        yield wrong(
+            ("simulation", "controller", "position_gain_per_s"),
+            gain,
+            "a controller of the velocity (proportional_gain, integral_gain, "
+            "derivative_gain), because simulation.output is velocity",
+            "correct one of the two",
+        )
+
+
 def effect_faults(experiment: Experiment) -> Iterator[Fault]:
     """Effects of the simulation that there are not, or that lack a parameter."""
     if experiment.simulation is not None:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 
 from hwid_cli.drive.simulation import refined
 from hwid_cli.records.drive import Drive
@@ -33,10 +34,13 @@ class Signals:
         Measured output, or the measured command under a controller.
     input : ndarray, shape (n_samples,)
         Measured command.
-    output : ndarray, shape (n_samples,), [m]
+    output : ndarray, shape (n_samples,), [m] or [m/s]
     sample_time_s : float, [s]
     skip : int, [samples]
         First samples that are not evaluated.
+    is_velocity : bool
+        Whether the output is a velocity. What needs one or the other asks ``position``
+        and ``velocity``.
     """
 
     name: str
@@ -48,6 +52,22 @@ class Signals:
     sample_time_s: float
     skip: int = 0
     is_held_out: bool = False
+    is_velocity: bool = False
+
+    @cached_property
+    def position(self) -> np.ndarray:
+        """Measured position, [m]; of a velocity the way since the first sample."""
+        if not self.is_velocity:
+            return self.output
+        way = cumulative_trapezoid(self.output, dx=self.sample_time_s, initial=0.0)
+        return np.asarray(way)
+
+    @cached_property
+    def velocity(self) -> np.ndarray:
+        """Measured velocity, [m/s]; of a position with the noise of differences."""
+        if self.is_velocity or self.output.size < 2:
+            return self.output if self.is_velocity else np.zeros(self.output.size)
+        return np.gradient(self.output, self.sample_time_s)
 
     @cached_property
     def finely_driven_by(self) -> np.ndarray:
@@ -66,7 +86,9 @@ class Signals:
 
     @cached_property
     def rest_position_m(self) -> float:
-        """Mean of the output before the input first moves."""
+        """Mean of the position before the input first moves; of a velocity 0."""
+        if self.is_velocity:
+            return 0.0
         still = rest_length(self.driven_by)
         return float(np.mean(self.output[: max(1, still)]))
 
@@ -187,6 +209,7 @@ def drive_of(simulation: SimulationOptions, train: Sequence[Signals]) -> Drive:
         back_emf_V_s_per_m=simulation.back_emf_V_s_per_m,
         hold=simulation.hold,
         controller=simulation.controller,
+        output=simulation.output,
     )
 
 
@@ -210,6 +233,7 @@ def _signals(
         sample_time_s=recording.sample_time_s,
         skip=min(options.skip_samples, recording.n_samples - 1),
         is_held_out=recording.name in held_out,
+        is_velocity=simulation.output == "velocity",
     )
 
 

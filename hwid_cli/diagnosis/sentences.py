@@ -111,17 +111,27 @@ def hidden_from_view(problem: DiagnosisProblem) -> tuple[str, ...]:
         "the mass itself: force constant, damping and stiffness are known only in "
         "proportion to it"
     )
-    lowest = min(float(np.min(one.output)) for one in problem.signals)
-    highest = max(float(np.max(one.output)) for one in problem.signals)
-    reach = max(abs(lowest), abs(highest))
-    if lowest > -_ONE_SIDE * reach:
-        texts.append("anything on the negative side, where the drive never is")
-    if highest < _ONE_SIDE * reach:
-        texts.append("anything on the positive side, where the drive never is")
-    if drive.stiffness_N_per_m == 0 and not problem.compares_command:
+    if drive.output == "velocity":
+        texts.append("where the drive is, because its velocity is measured")
+    else:
+        texts += _unseen_sides(problem)
+    holds_nothing = drive.stiffness_N_per_m == 0 and drive.output == "position"
+    if holds_nothing and not problem.compares_command:
         texts.append(
             "a constant offset of the sensor, because nothing holds a position"
         )
     if len(problem.part(held_out=True).signals) == 0:
         texts.append("how the result does on other recordings: there is only one")
     return tuple(texts)
+
+
+def _unseen_sides(problem: DiagnosisProblem) -> list[str]:
+    lowest = min(float(np.min(one.output)) for one in problem.signals)
+    highest = max(float(np.max(one.output)) for one in problem.signals)
+    reach = max(abs(lowest), abs(highest))
+    texts = []
+    if lowest > -_ONE_SIDE * reach:
+        texts.append("anything on the negative side, where the drive never is")
+    if highest < _ONE_SIDE * reach:
+        texts.append("anything on the positive side, where the drive never is")
+    return texts

@@ -366,7 +366,7 @@ def _exponent(compared: Sequence[Compared], excess: np.ndarray) -> float | None:
 def _input_unit(drive: Drive) -> str:
     """Unit of what drives a recording."""
     if drive.controller is not None:
-        return "m"
+        return "m" if drive.output == "position" else "m/s"
     return "A" if drive.resistance_ohm is None else "V"
 
 

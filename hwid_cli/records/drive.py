@@ -19,6 +19,8 @@ from hwid_cli.records.rules import (
 # anyhow, so that position and velocity are found from the recording.
 STARTS = ("rest", "held", "estimated")
 HOLDS = ("linear", "zero", "smooth")
+# What the sensor of the output measures.
+OUTPUTS = ("position", "velocity")
 # Parameters of the base that a re-fit may move; the mass only sets the scale.
 BASE_PARAMETERS = (
     "damping_N_s_per_m",
@@ -114,6 +116,8 @@ class Drive:
         was low-pass filtered before it was sampled.
     controller : Controller or None
         None: the input is given. Else it follows a reference.
+    output : str
+        One of ``OUTPUTS``: what is measured.
     """
 
     mass_kg: Annotated[float, POSITIVE] = 1.0
@@ -128,6 +132,7 @@ class Drive:
     back_emf_V_s_per_m: float | None = None
     hold: Annotated[str, OneOf(HOLDS)] = "linear"
     controller: Controller | None = None
+    output: Annotated[str, OneOf(OUTPUTS)] = "position"
 
     def __post_init__(self) -> None:
         check_fields(self)

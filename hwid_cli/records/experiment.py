@@ -6,7 +6,7 @@ Every key of a configuration file is a field here. ``configs/README.md`` explain
 from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
-from hwid_cli.records.drive import HOLDS, STARTS, Controller
+from hwid_cli.records.drive import HOLDS, OUTPUTS, STARTS, Controller
 from hwid_cli.records.machines import GunMachine, ServoMachine
 from hwid_cli.records.maps import MAP_KINDS
 from hwid_cli.records.model import FitOptions
@@ -188,6 +188,7 @@ class SimulationOptions:
     back_emf_V_s_per_m: Annotated[float | None, NOT_NEGATIVE] = None
     hold: Annotated[str, OneOf(HOLDS)] = "linear"
     controller: Controller | None = None
+    output: Annotated[str, OneOf(OUTPUTS)] = "position"
 
 
 @dataclass(frozen=True)

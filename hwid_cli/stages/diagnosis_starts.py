@@ -44,11 +44,12 @@ def unsettled_starts(
     tuple of str
         Names of those without a rest before the excitation whose first output is far
         from the equilibrium of the linear drive with the first input. None where a
-        diagnosis fits how recordings start, under a controller and without a spring.
+        diagnosis fits how recordings start, under a controller, without a spring and
+        where a velocity is measured.
     """
     if options.initial_state != "rest" or simulation.controller is not None:
         return ()
-    if not simulation.stiffness_N_per_m > 0:
+    if not simulation.stiffness_N_per_m > 0 or simulation.output == "velocity":
         return ()
     noise = noise_floor(prepare(recordings, simulation, options, ())).rms
     gain = simulation.force_constant_N_per_A / (

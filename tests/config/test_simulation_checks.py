@@ -173,6 +173,15 @@ def test_effect_that_cannot_be_simulated_is_one_line(load_effect, text, message)
             r"simulation.controller.velocity_gain: missing; expected a number > 0; add",
         ),
         (
+            "output: speed",
+            r"simulation.output: found 'speed'; expected one of position, velocity",
+        ),
+        (
+            "output: velocity, controller: {position_gain_per_s: 1, velocity_gain: 2}",
+            r"controller.position_gain_per_s: found 1.0; expected a controller of the "
+            r"velocity \(proportional_gain, .*because simulation.output is velocity",
+        ),
+        (
             "controller: {limit: 1}",
             r"controller.position_gain_per_s: missing; expected a number > 0; add the key, "
             r"or proportional_gain of a PID controller",

@@ -129,6 +129,22 @@ def test_the_input_drives_and_the_output_is_compared():
     np.testing.assert_array_equal(first.compared, TRAIN.output)
 
 
+def test_a_measured_velocity_gives_a_way_and_a_measured_position_a_velocity():
+    simulation = SimulationOptions(output="velocity")
+    speed = np.full(101, 2.0)
+    given = [Recording("a", np.zeros(101), speed, 0.01, output_unit="m/s")]
+    (found,) = prepare(given, simulation, DiagnoseOptions(), ()).signals
+    np.testing.assert_allclose(found.position, 0.02 * np.arange(101), atol=1e-12)
+    np.testing.assert_array_equal(found.velocity, speed)
+    assert found.rest_position_m == 0.0
+
+    simulation = SimulationOptions()
+    given = [Recording("a", np.zeros(101), 0.02 * np.arange(101), 0.01)]
+    (found,) = prepare(given, simulation, DiagnoseOptions(), ()).signals
+    np.testing.assert_array_equal(found.position, given[0].output)
+    np.testing.assert_allclose(found.velocity, 2.0)
+
+
 def test_under_a_controller_the_reference_drives_and_the_command_is_compared():
     path = np.array([0.0, 0.2, -0.5])
     simulation = SimulationOptions(controller=Controller(20.0, 50.0))

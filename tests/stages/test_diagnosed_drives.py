@@ -223,3 +223,40 @@ def test_a_coil_delays_what_a_voltage_does():
     assert [one.id for one in found.effects] == ["winding_inductance"]
     told = parameters(found.effects[0])["inductance_H"]
     assert told == pytest.approx(4e-3, rel=0.02)
+
+
+def speeds(effects, **drive):
+    """Recordings of a velocity, with noise of some per mille."""
+    measured = recordings(
+        effects, drive=replace(DRIVE, output="velocity", **drive), noise=1e-3
+    )
+    return [replace(one, output_unit="m/s") for one in measured]
+
+
+@pytest.mark.parametrize("stiffness", [1184.0, 0.0], ids=["spring", "free"])
+def test_a_velocity_is_compared_where_it_is_measured(stiffness):
+    base = {"stiffness_N_per_m": stiffness}
+    options = simulation(output="velocity", **base)
+    found = diagnosed(
+        speeds(FRICTION, **base), options, effects=("coulomb_friction", "cogging")
+    )
+    assert [one.id for one in found.effects] == ["coulomb_friction"]
+    assert (found.complete, found.output_unit) == (True, "m/s")
+    assert parameters(found.effects[0])["force_N"] == pytest.approx(0.8, rel=0.01)
+    assert found.noise.rms == pytest.approx(1e-3, rel=0.05)
+    assert any("velocity is measured" in text for text in found.not_observable)
+
+    extended = extended_options(found, options)
+    after = diagnosed(speeds(FRICTION, **base), extended, effects=("cogging",))
+    assert after.verdict == "none"
+
+
+def test_a_saturated_sensor_of_the_velocity_has_a_limit_in_its_unit():
+    found = diagnosed(
+        speeds({"sensor_saturation": {"limit_m": 0.25}}),
+        simulation(output="velocity"),
+        effects=("sensor_saturation", "input_saturation"),
+    )
+    assert [one.id for one in found.effects] == ["sensor_saturation"]
+    limit = parameters(found.effects[0])["limit_m"]
+    assert limit == pytest.approx(0.25, rel=0.002)
