@@ -19,7 +19,7 @@ from hwid_cli.records.experiment import DiagnoseOptions, Experiment
 from hwid_cli.simulations.kinds import KINDS
 
 # What the electrical circuit has besides its resistance.
-_OF_CIRCUIT = ("inductance_H", "back_emf_V_s_per_m")
+_OF_CIRCUIT = ("inductance_H", "back_emf_V_s_per_m", "back_emf_V_s_per_rad")
 
 
 def circuit_faults(experiment: Experiment) -> Iterator[Fault]:

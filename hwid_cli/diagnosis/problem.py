@@ -11,6 +11,7 @@ import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
 from hwid_cli.drive.simulation import refined
+from hwid_cli.records.axis import base_of
 from hwid_cli.records.drive import Drive
 from hwid_cli.records.experiment import DiagnoseOptions, SimulationOptions
 from hwid_cli.records.recordings import Recording
@@ -195,10 +196,6 @@ def drive_of(simulation: SimulationOptions, train: Sequence[Signals]) -> Drive:
     current = max(float(np.max(np.abs(one.input))) for one in train)
     displacement = max(float(np.max(np.abs(one.output))) for one in train)
     return Drive(
-        mass_kg=simulation.mass_kg,
-        damping_N_s_per_m=simulation.damping_N_s_per_m,
-        stiffness_N_per_m=simulation.stiffness_N_per_m,
-        force_constant_N_per_A=simulation.force_constant_N_per_A,
         effects=simulation.effects,
         reference_current_A=simulation.reference_current_A or current or 1.0,
         reference_displacement_m=simulation.reference_displacement_m
@@ -206,10 +203,10 @@ def drive_of(simulation: SimulationOptions, train: Sequence[Signals]) -> Drive:
         or 1.0,
         resistance_ohm=simulation.resistance_ohm,
         inductance_H=simulation.inductance_H,
-        back_emf_V_s_per_m=simulation.back_emf_V_s_per_m,
         hold=simulation.hold,
         controller=simulation.controller,
         output=simulation.output,
+        **base_of(simulation),
     )
 
 

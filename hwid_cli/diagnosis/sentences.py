@@ -107,9 +107,12 @@ def hidden_from_view(problem: DiagnosisProblem) -> tuple[str, ...]:
             "what happens before the current (resistance, inductance, brush drop, "
             "supply voltage), because the current is the input"
         )
+    held, constant = (
+        ("mass", "force") if drive.axis == "linear" else ("inertia", "torque")
+    )
     texts.append(
-        "the mass itself: force constant, damping and stiffness are known only in "
-        "proportion to it"
+        f"the {held} itself: {constant} constant, damping and stiffness are known only "
+        "in proportion to it"
     )
     if drive.output == "velocity":
         texts.append("where the drive is, because its velocity is measured")

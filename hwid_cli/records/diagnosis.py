@@ -1,10 +1,11 @@
 """What a diagnosis found: the verdict, how it was reached, and what shows it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from hwid_cli.records.candidates import RankedCandidate
+from hwid_cli.records.stored import ADDED_LATER
 
 VERDICTS = ("named", "ambiguous", "parameters", "unknown", "none")
 
@@ -228,6 +229,8 @@ class Diagnosis:
         Where laws that need a reference count from.
     output_unit : str
         Of the signal that is compared.
+    axis, output : str
+        One of ``axis.AXES`` and of ``drive.OUTPUTS``: in which units parameters are.
     """
 
     verdict: str
@@ -254,6 +257,8 @@ class Diagnosis:
     reference_current_A: float = 1.0
     reference_displacement_m: float = 1.0
     output_unit: str = "m"
+    axis: str = field(default="linear", metadata=ADDED_LATER)
+    output: str = field(default="position", metadata=ADDED_LATER)
 
     def __post_init__(self) -> None:
         if self.verdict not in VERDICTS:

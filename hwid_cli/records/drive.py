@@ -6,6 +6,7 @@ from typing import Annotated
 
 import numpy as np
 
+from hwid_cli.records.axis import AXES
 from hwid_cli.records.rules import (
     NOT_NEGATIVE,
     POSITIVE,
@@ -118,6 +119,8 @@ class Drive:
         None: the input is given. Else it follows a reference.
     output : str
         One of ``OUTPUTS``: what is measured.
+    axis : str
+        One of ``AXES``: rotating where m stands for rad, N for N m and kg for kg m^2.
     """
 
     mass_kg: Annotated[float, POSITIVE] = 1.0
@@ -133,6 +136,7 @@ class Drive:
     hold: Annotated[str, OneOf(HOLDS)] = "linear"
     controller: Controller | None = None
     output: Annotated[str, OneOf(OUTPUTS)] = "position"
+    axis: Annotated[str, OneOf(AXES)] = "linear"
 
     def __post_init__(self) -> None:
         check_fields(self)

@@ -6,6 +6,7 @@ Every key of a configuration file is a field here. ``configs/README.md`` explain
 from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
+from hwid_cli.records.axis import ROTARY_NAMES, check_axis
 from hwid_cli.records.drive import HOLDS, OUTPUTS, STARTS, Controller
 from hwid_cli.records.machines import GunMachine, ServoMachine
 from hwid_cli.records.maps import MAP_KINDS
@@ -173,7 +174,11 @@ class FinalTestOptions:
 
 @dataclass(frozen=True)
 class SimulationOptions:
-    """The physics model that diagnosis judges, in SI units."""
+    """The physics model that diagnosis judges, in SI units.
+
+    A rotating axis is named by the keys that have an inertia, a torque or an angle in
+    them, in place of those of a straight one.
+    """
 
     kind: str = "drive"
     mass_kg: Annotated[float, POSITIVE] = 1.0
@@ -189,6 +194,21 @@ class SimulationOptions:
     hold: Annotated[str, OneOf(HOLDS)] = "linear"
     controller: Controller | None = None
     output: Annotated[str, OneOf(OUTPUTS)] = "position"
+    inertia_kg_m2: Annotated[float | None, POSITIVE] = None
+    damping_N_m_s_per_rad: Annotated[float | None, NOT_NEGATIVE] = None
+    stiffness_N_m_per_rad: Annotated[float | None, NOT_NEGATIVE] = None
+    torque_constant_N_m_per_A: Annotated[float | None, POSITIVE] = None
+    back_emf_V_s_per_rad: Annotated[float | None, NOT_NEGATIVE] = None
+
+    def __post_init__(self) -> None:
+        every = self.__dataclass_fields__
+        check_axis(
+            {
+                name: getattr(self, name)
+                for name in (*ROTARY_NAMES, *ROTARY_NAMES.values())
+                if getattr(self, name) != every[name].default
+            }
+        )
 
 
 @dataclass(frozen=True)

@@ -182,6 +182,8 @@ def _content(diagnosis: Diagnosis) -> dict[str, Any]:
             }
             for place in diagnosis.places
         ],
+        "axis": diagnosis.axis,
+        "output": diagnosis.output,
         "not_observable": list(diagnosis.not_observable),
         "next_experiment": asdict(diagnosis.next_experiment),
         "recordings": {
