@@ -13,6 +13,7 @@ from hwid_cli.diagnosis.problem import (
     prepare,
     rest_length,
 )
+from hwid_cli.records.axis import ROTARY_NAMES
 from hwid_cli.records.drive import Controller, Drive
 from hwid_cli.records.experiment import DiagnoseOptions, SimulationOptions
 from hwid_cli.records.recordings import Recording
@@ -169,11 +170,27 @@ def test_every_setting_of_the_simulation_reaches_the_drive():
         inductance_H=10.0,
         back_emf_V_s_per_m=11.0,
         hold="smooth",
+        output="velocity",
     )
     drive = prepare([TRAIN], simulation, DiagnoseOptions(), []).drive
     for name in vars(simulation):
-        if name != "kind":
+        if name not in ("kind", *ROTARY_NAMES.values()):
             assert getattr(drive, name) == getattr(simulation, name), name
+
+
+def test_a_rotating_axis_reaches_the_drive_by_the_names_of_a_straight_one():
+    simulation = SimulationOptions(
+        inertia_kg_m2=2.0,
+        damping_N_m_s_per_rad=3.0,
+        stiffness_N_m_per_rad=4.0,
+        torque_constant_N_m_per_A=5.0,
+        resistance_ohm=9.0,
+        back_emf_V_s_per_rad=11.0,
+    )
+    drive = prepare([TRAIN], simulation, DiagnoseOptions(), []).drive
+    assert drive.axis == "rotary"
+    for old, new in ROTARY_NAMES.items():
+        assert getattr(drive, old) == getattr(simulation, new)
 
 
 TIME = 1e-3 * np.arange(400)
