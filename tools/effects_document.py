@@ -49,6 +49,7 @@ SYMBOLS = {
     "sample_time_s": "Ts",
     "duration_s": "T",
     "resistance_ohm": "Ro",
+    "reading": "Y",
 }
 HEAD = """# Effects
 
@@ -59,7 +60,8 @@ Each figure shows the drive without and with the effect (left; two steps, then a
 lack along that motion (right): a force, or an error of the sensor.
 
 Start values and bounds of the search scale with the recordings: X largest displacement, V largest velocity, I largest current,
-R largest rate of the current, S stroke, F = kt I, M mass, fn natural frequency, Ts sample time, T longest recording, Ro resistance.
+R largest rate of the current, S stroke, F = kt I, M mass, fn natural frequency, Ts sample time, T longest recording, Ro resistance,
+Y largest reading of the sensor (X, or V where a velocity is measured).
 """
 CHANGE_SENTENCE = (
     "The stiffness, the force constant or the damping differs from recording to recording by more than chance. "

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 from hwid_cli.config.faults import Fault, Place, missing, wrong
 from hwid_cli.config.simulation_checks import (
+    cascade_faults,
     circuit_faults,
     controller_faults,
     effect_circuit_faults,
@@ -327,6 +328,7 @@ _AGREEMENTS = (
     _Agreement(kind_faults, "simulation.kind"),
     _Agreement(circuit_faults, "simulation.resistance_ohm"),
     _Agreement(controller_faults, "simulation.controller recordings.columns.reference"),
+    _Agreement(cascade_faults, "simulation.controller simulation.output"),
     _Agreement(effect_faults, "simulation.effects"),
     _Agreement(effect_circuit_faults, "simulation.effects simulation.resistance_ohm"),
     _Agreement(known_faults, "simulation.known"),

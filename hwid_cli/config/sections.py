@@ -41,6 +41,8 @@ from typing_extensions import TypedDict
 from hwid_cli.config.faults import Fault, missing, refused, unknown_key, wrong
 from hwid_cli.config.own_functions import OwnFunctionFile, read_own_function
 from hwid_cli.files.messages import is_plain
+from hwid_cli.records.axis import check_axis
+from hwid_cli.records.experiment import SimulationOptions
 from hwid_cli.records.model import FitOptions
 from hwid_cli.records.rules import NamesFor, Refusal, Refused, Rule, StandsFor
 
@@ -163,6 +165,9 @@ def _is_required(field: Field) -> bool:
 def _build(record_type: Any, values: dict[str, Any], info: ValidationInfo) -> Any:
     if record_type is FitOptions:
         values = _with_functions(values, Path(str(info.context)).parent)
+    if record_type is SimulationOptions:
+        # The record cannot tell what is stated from its defaults.
+        check_axis(values)
     if "source" in record_type.__dataclass_fields__:
         values = {**values, "source": info.context}
     return record_type(**values)

@@ -20,7 +20,7 @@ from hwid_cli.records.experiment import DiagnoseOptions, Experiment
 from hwid_cli.simulations.kinds import KINDS
 
 # What the electrical circuit has besides its resistance.
-_OF_CIRCUIT = ("inductance_H", "back_emf_V_s_per_m")
+_OF_CIRCUIT = ("inductance_H", "back_emf_V_s_per_m", "back_emf_V_s_per_rad")
 # A parameter that may move by all of its value is not known, [-].
 _LARGEST_TOLERANCE = 1.0
 
@@ -82,6 +82,22 @@ def known_faults(experiment: Experiment) -> Iterator[Fault]:
             yield wrong_word(place, name, BASE_PARAMETERS)
         elif not 0 <= tolerance <= _LARGEST_TOLERANCE:
             yield wrong((*place, name), tolerance, "a share from 0 to 1, such as 0.05")
+
+
+def cascade_faults(experiment: Experiment) -> Iterator[Fault]:
+    """A cascade around a position that nobody measures."""
+    options = experiment.simulation
+    if options is None or options.controller is None or options.output == "position":
+        return
+    gain = options.controller.position_gain_per_s
+    if gain is not None:
+        yield wrong(
+            ("simulation", "controller", "position_gain_per_s"),
+            gain,
+            "a controller of the velocity (proportional_gain, integral_gain, "
+            "derivative_gain), because simulation.output is velocity",
+            "correct one of the two",
+        )
 
 
 def effect_faults(experiment: Experiment) -> Iterator[Fault]:

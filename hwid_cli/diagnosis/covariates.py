@@ -7,6 +7,7 @@ import numpy as np
 
 from hwid_cli.diagnosis.latent_force import Smoothed
 from hwid_cli.diagnosis.problem import Compared
+from hwid_cli.records.axis import unit_on
 from hwid_cli.records.drive import Drive
 
 # Bins of equal count for the shares; finer ones for the curves.
@@ -64,9 +65,9 @@ def variables(
     fast = float(np.quantile(np.abs(velocity), 0.99)) if velocity.size else 0.0
     direction = np.sign(velocity) * (np.abs(velocity) > _STANDING * fast)
     return (
-        Variable("displacement", "m", position),
+        Variable("displacement", unit_on(drive.axis, "m"), position),
         Variable("size of the displacement", "", np.abs(position)),
-        Variable("velocity", "m/s", velocity),
+        Variable("velocity", unit_on(drive.axis, "m/s"), velocity),
         Variable("direction", "", direction),
         Variable("speed", "", np.abs(velocity)),
         Variable(source, unit, _joined(compared, inputs)),

@@ -140,10 +140,7 @@ def compared_as_given(problem: DiagnosisProblem) -> list[Compared]:
     What belongs to one recording alone (a start, a phase) is found from it.
     """
     present = drive_effects(problem.drive)
-    speeds = [
-        np.gradient(signals.output, signals.sample_time_s)
-        for signals in problem.signals
-    ]
+    speeds = [signals.velocity for signals in problem.signals]
     rough = scales_of_recordings(problem, speeds)
     fit_layout = parameter_layout(problem, tuple(present), present, rough)
     point = first_point(problem, fit_layout, problem.drive, present)

@@ -21,6 +21,7 @@ from hwid_cli.diagnosis.where import latent_force_curves
 from hwid_cli.drive.catalogue import CATALOGUE, public_id, word_of
 from hwid_cli.drive.effect import Scales
 from hwid_cli.drive.simulation import drive_effects
+from hwid_cli.records.axis import name_on
 from hwid_cli.records.candidates import CandidateFit, ParameterRef
 from hwid_cli.records.diagnosis import (
     BaseParameter,
@@ -114,6 +115,8 @@ def describe(findings: Findings) -> Diagnosis:
         reference_displacement_m=problem.drive.reference_displacement_m,
         output_unit=problem.unit,
         warnings=doubtful_values(parameters),
+        axis=problem.drive.axis,
+        output=problem.drive.output,
     )  # fmt: skip
 
 
@@ -151,7 +154,7 @@ def _base(
     refitted, after = fitted_drive(drive, base), fitted_drive(drive, chosen)
     return tuple(
         BaseParameter(
-            name,
+            name_on(drive.axis, name),
             getattr(drive, name),
             getattr(refitted, name),
             getattr(after, name) * _mean_factor(chosen, name),

@@ -392,8 +392,10 @@ def _copy(drive: Drive, sample_time_s: float, sigma: float) -> _Copy:
             drive.force_constant_N_per_A if back_emf is None else back_emf
         )
     reading, unit = np.array([1.0, 0.0, 0.0]), 1.0
+    if drive.output == "velocity":
+        reading, unit = np.array([0.0, 1.0, 0.0]), 1 / sample_time_s
     if drive.controller is not None:
-        stiffer, gain = _feedback(drive.controller)
+        stiffer, gain = _feedback(drive.controller, drive.output)
         damping, stiffness = damping + push * gain, stiffness + push * stiffer
         reading = np.array([-stiffer, -gain, 0.0])
         unit = max(stiffer, gain / sample_time_s)
@@ -406,13 +408,16 @@ def _copy(drive: Drive, sample_time_s: float, sigma: float) -> _Copy:
     return _Copy(np.ascontiguousarray(transition), reading * sizes / sigma, sizes)
 
 
-def _feedback(controller: Controller) -> tuple[float, float]:
+def _feedback(controller: Controller, output: str) -> tuple[float, float]:
     """Command that a displacement and a velocity take back at once.
 
     What is summed up of a displacement acts too slowly to count.
     """
     if controller.velocity_gain is None or controller.position_gain_per_s is None:
-        return controller.proportional_gain or 0.0, controller.derivative_gain
+        proportional = controller.proportional_gain or 0.0
+        if output == "velocity":
+            return controller.integral_gain, proportional
+        return proportional, controller.derivative_gain
     gain = controller.velocity_gain
     return gain * (controller.position_gain_per_s + controller.reset_rate_per_s), gain
 

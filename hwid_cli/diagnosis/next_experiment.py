@@ -129,13 +129,14 @@ def best_separation(
             name, "other", command, 0 * command, command, 0 * command,
             scales.sample_time_s,
         )  # fmt: skip
-        one = replace(problem, signals=(signals,))
+        is_velocity = problem.drive.output == "velocity"
+        one = replace(problem, signals=(replace(signals, is_velocity=is_velocity),))
         (truth,) = simulate_at(one, favourite.layout, _single(favourite.point))
         seen = Signals(
             name, "other", command, truth.output, command, truth.output,
             scales.sample_time_s,
         )  # fmt: skip
-        asked = replace(problem, signals=(seen,))
+        asked = replace(problem, signals=(replace(seen, is_velocity=is_velocity),))
         found.append(Separation(name, _left_over(asked, rival)))
     return max(found, key=lambda item: item.rms)
 

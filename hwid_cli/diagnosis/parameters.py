@@ -249,9 +249,11 @@ def first_point(
                 value = start[one.owner].get(one.name, 0.0)
                 each[row, column] = one.coordinate(value)
             elif one.name == "position" and problem.start == "estimated":
-                each[row, column] = one.coordinate(float(signals.output[0]))
+                each[row, column] = one.coordinate(float(signals.position[0]))
             elif one.name == "position" and problem.start == "rest":
                 each[row, column] = one.coordinate(signals.rest_position_m)
+            elif one.name == "velocity" and signals.is_velocity:
+                each[row, column] = one.coordinate(float(signals.velocity[0]))
     return ParameterPoint(np.array(shared), each)
 
 

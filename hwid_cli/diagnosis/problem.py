@@ -8,8 +8,10 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 
 from hwid_cli.drive.simulation import refined
+from hwid_cli.records.axis import base_of
 from hwid_cli.records.drive import Drive
 from hwid_cli.records.experiment import DiagnoseOptions, SimulationOptions
 from hwid_cli.records.recordings import Recording
@@ -41,12 +43,15 @@ class Signals:
         Measured output, or the measured command under a controller.
     input : ndarray, shape (n_samples,)
         Measured command.
-    output : ndarray, shape (n_samples,), [m]
+    output : ndarray, shape (n_samples,), [m] or [m/s]
     sample_time_s : float, [s]
     skip : int, [samples]
         First samples that are not evaluated.
     used : ndarray of bool, shape (n_samples,), or None
         Which of the others are; None means all.
+    is_velocity : bool
+        Whether the output is a velocity. What needs one or the other asks ``position``
+        and ``velocity``.
     """
 
     name: str
@@ -59,6 +64,22 @@ class Signals:
     skip: int = 0
     is_held_out: bool = False
     used: np.ndarray | None = None
+    is_velocity: bool = False
+
+    @cached_property
+    def position(self) -> np.ndarray:
+        """Measured position, [m]; of a velocity the way since the first sample."""
+        if not self.is_velocity:
+            return self.output
+        way = cumulative_trapezoid(self.output, dx=self.sample_time_s, initial=0.0)
+        return np.asarray(way)
+
+    @cached_property
+    def velocity(self) -> np.ndarray:
+        """Measured velocity, [m/s]; of a position with the noise of differences."""
+        if self.is_velocity or self.output.size < 2:
+            return self.output if self.is_velocity else np.zeros(self.output.size)
+        return np.gradient(self.output, self.sample_time_s)
 
     @cached_property
     def finely_driven_by(self) -> np.ndarray:
@@ -100,7 +121,9 @@ class Signals:
 
     @cached_property
     def rest_position_m(self) -> float:
-        """Mean of the output before the input first moves."""
+        """Mean of the position before the input first moves; of a velocity 0."""
+        if self.is_velocity:
+            return 0.0
         still = rest_length(self.driven_by)
         return float(np.mean(self.output[: max(1, still)]))
 
@@ -211,10 +234,6 @@ def drive_of(simulation: SimulationOptions, train: Sequence[Signals]) -> Drive:
     current = max(float(np.max(np.abs(one.input))) for one in train)
     displacement = max(float(np.max(np.abs(one.output))) for one in train)
     return Drive(
-        mass_kg=simulation.mass_kg,
-        damping_N_s_per_m=simulation.damping_N_s_per_m,
-        stiffness_N_per_m=simulation.stiffness_N_per_m,
-        force_constant_N_per_A=simulation.force_constant_N_per_A,
         effects=simulation.effects,
         reference_current_A=simulation.reference_current_A or current or 1.0,
         reference_displacement_m=simulation.reference_displacement_m
@@ -222,9 +241,10 @@ def drive_of(simulation: SimulationOptions, train: Sequence[Signals]) -> Drive:
         or 1.0,
         resistance_ohm=simulation.resistance_ohm,
         inductance_H=simulation.inductance_H,
-        back_emf_V_s_per_m=simulation.back_emf_V_s_per_m,
         hold=simulation.hold,
         controller=simulation.controller,
+        output=simulation.output,
+        **base_of(simulation),
     )
 
 
@@ -248,6 +268,7 @@ def _signals(
         sample_time_s=recording.sample_time_s,
         skip=min(options.skip_samples, recording.n_samples - 1),
         is_held_out=recording.name in held_out,
+        is_velocity=simulation.output == "velocity",
     )
 
 

@@ -45,9 +45,10 @@ def scales_of_recordings(
         With which it repeats along the way.
     """
     drive, all_signals = problem.drive, problem.signals
-    largest = [max(float(np.max(np.abs(one.output))) for one in all_signals)]
+    largest = max(float(np.max(np.abs(one.position))) for one in all_signals)
+    reading = max(float(np.max(np.abs(one.output))) for one in all_signals)
     current = max(float(np.max(np.abs(one.input))) for one in all_signals)
-    stroke = max(float(np.ptp(one.output)) for one in all_signals)
+    stroke = max(float(np.ptp(one.position)) for one in all_signals)
     rate = max(
         float(np.max(np.abs(np.diff(one.input)))) / one.sample_time_s
         for one in all_signals
@@ -59,7 +60,7 @@ def scales_of_recordings(
     if drive.resistance_ohm is not None:
         force /= drive.resistance_ohm
     return Scales(
-        displacement_m=max(largest[0], 1e-12),
+        displacement_m=max(largest, 1e-12),
         velocity_m_per_s=max(speed, 1e-12),
         current_A=max(current, 1e-12),
         current_rate_A_per_s=max(rate, 1e-12),
@@ -72,6 +73,7 @@ def scales_of_recordings(
         frequencies_Hz=frequencies_Hz,
         waves=waves,
         resistance_ohm=drive.resistance_ohm or 1.0,
+        reading=max(reading, 1e-12),
     )
 
 

@@ -165,23 +165,24 @@ def hidden_from_view(problem: DiagnosisProblem) -> tuple[str, ...]:
             "what happens before the current (resistance, inductance, brush drop, "
             "supply voltage), because the current is the input"
         )
-    texts.append(
-        "the mass itself: force constant, damping and stiffness are known only in "
-        "proportion to it"
+    held, constant = (
+        ("mass", "force") if drive.axis == "linear" else ("inertia", "torque")
     )
-    lowest = min(float(np.min(one.output)) for one in problem.signals)
-    highest = max(float(np.max(one.output)) for one in problem.signals)
-    reach = max(abs(lowest), abs(highest))
-    if lowest > -_ONE_SIDE * reach:
-        texts.append("anything on the negative side, where the drive never is")
-    if highest < _ONE_SIDE * reach:
-        texts.append("anything on the positive side, where the drive never is")
+    texts.append(
+        f"the {held} itself: {constant} constant, damping and stiffness are known only "
+        "in proportion to it"
+    )
+    if drive.output == "velocity":
+        texts.append("where the drive is, because its velocity is measured")
+    else:
+        texts += _unseen_sides(problem)
     if _moves_one_way(problem):
         texts.append(
             "dry friction apart from a constant load: all recordings move in one "
             "direction only, where the two are the same force"
         )
-    if drive.stiffness_N_per_m == 0 and not problem.compares_command:
+    holds_nothing = drive.stiffness_N_per_m == 0 and drive.output == "position"
+    if holds_nothing and not problem.compares_command:
         texts.append(
             "a constant offset of the sensor, because nothing holds a position"
         )
@@ -194,7 +195,19 @@ def _moves_one_way(problem: DiagnosisProblem) -> bool:
     """Whether no recording goes back on more than a small share of the longest way."""
     up = down = 0.0
     for one in problem.signals:
-        output = one.output
+        output = one.position
         up = max(up, float(np.max(output - np.minimum.accumulate(output))))
         down = max(down, float(np.max(np.maximum.accumulate(output) - output)))
     return min(up, down) <= _WAY_BACK * max(up, down)
+
+
+def _unseen_sides(problem: DiagnosisProblem) -> list[str]:
+    lowest = min(float(np.min(one.output)) for one in problem.signals)
+    highest = max(float(np.max(one.output)) for one in problem.signals)
+    reach = max(abs(lowest), abs(highest))
+    texts = []
+    if lowest > -_ONE_SIDE * reach:
+        texts.append("anything on the negative side, where the drive never is")
+    if highest < _ONE_SIDE * reach:
+        texts.append("anything on the positive side, where the drive never is")
+    return texts

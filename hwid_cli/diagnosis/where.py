@@ -28,6 +28,7 @@ from hwid_cli.diagnosis.segments import (
     harmonic_columns,
     step_parts,
 )
+from hwid_cli.records.axis import unit_on
 from hwid_cli.records.diagnosis import LatentForce, NoiseFloor, Place
 from hwid_cli.records.drive import Drive
 
@@ -366,7 +367,7 @@ def _exponent(compared: Sequence[Compared], excess: np.ndarray) -> float | None:
 def _input_unit(drive: Drive) -> str:
     """Unit of what drives a recording."""
     if drive.controller is not None:
-        return "m"
+        return unit_on(drive.axis, "m" if drive.output == "position" else "m/s")
     return "A" if drive.resistance_ohm is None else "V"
 
 

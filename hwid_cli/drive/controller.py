@@ -38,7 +38,7 @@ def controlled(
 
     Parameters
     ----------
-    reference : float, [m]
+    reference : float, [m] or [m/s]
     x, v : float, [m], [m/s]
         Of the place that is measured.
     sample_time : float, [s]
@@ -51,6 +51,8 @@ def controlled(
     if p[slots.VELOCITY_GAIN] > 0.0:
         error, gain = p[slots.POSITION_GAIN] * error - v, p[slots.VELOCITY_GAIN]
         reset = gain * p[slots.RESET_RATE]
+    elif p[slots.OUTPUT_IS_VELOCITY] > 0.0:
+        error = reference - v
     total = control[ERROR_SUM] + sample_time * error
     wanted = gain * error + reset * total
     if p[slots.DERIVATIVE_GAIN] != 0.0 and control[HAS_ERROR] > 0.0:

@@ -54,6 +54,8 @@ class Scales:
         With which it repeats most along the way.
     resistance_ohm : float, [ohm]
         Of the circuit; 1 where there is none and the input is the current.
+    reading : float, [m] or [m/s]
+        Largest magnitude of what the sensor reads; 0 stands for the displacement.
     """
 
     displacement_m: float
@@ -69,6 +71,11 @@ class Scales:
     frequencies_Hz: tuple[float, ...] = ()
     waves: tuple[Wave, ...] = ()
     resistance_ohm: float = 1.0
+    reading: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.reading == 0:
+            object.__setattr__(self, "reading", self.displacement_m)
 
     @property
     def stiffness_N_per_m(self) -> float:

@@ -1,6 +1,6 @@
 """Compiled output: one term for each effect of the sensor.
 
-docs/method_diagnosis.md, eq. (D14).
+docs/method_diagnosis.md, eq. (D14), (D14a).
 """
 
 import numpy as np
@@ -9,6 +9,9 @@ from numba import njit
 from hwid_cli.drive import slots
 from hwid_cli.drive.compiled import INNER
 from hwid_cli.drive.motion.push import TURN
+
+# Play is at its end within this share of it, for rounding.
+TOUCHING = 1e-9
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -27,7 +30,8 @@ def read(
     if p[slots.OUTPUT_GAP] > 0.0:
         output = _play(positions, velocities, sample_time, p[slots.OUTPUT_GAP])
     for i in range(output.size):
-        output[i] = sensed(output[i], sample_time * i, p)
+        lag = positions[i] - output[i]
+        output[i] = sensed(output[i], lag, velocities[i], sample_time * i, p)
     return output
 
 
@@ -66,21 +70,32 @@ def on_other_clock(
 
 
 @njit(**INNER)
-def sensed(y: float, time: float, p: np.ndarray) -> float:
+def sensed(y: float, lag: float, speed: float, time: float, p: np.ndarray) -> float:
     """Return what the sensor makes of the place that it measures.
 
     Parameters
     ----------
     y : float, [m]
+    lag : float, [m]
+        By which the drive is ahead of that place, which follows it with play.
+    speed : float, [m/s]
+        Of the drive.
     time : float, [s]
     p : ndarray, shape (N_SLOTS,)
     """
     if p[slots.OUTPUT_ZERO] != 0.0:
         y -= p[slots.OUTPUT_ZERO]
+    is_velocity = p[slots.OUTPUT_IS_VELOCITY] > 0.0
+    if is_velocity and p[slots.OUTPUT_GAP] > 0.0:
+        is_pushed = abs(lag) >= (1.0 - TOUCHING) * p[slots.OUTPUT_GAP]
+        speed = speed if is_pushed and lag * speed > 0.0 else 0.0
     if p[slots.ECCENTRICITY] != 0.0:
-        phase = p[slots.ECCENTRIC_PHASE]
-        swing = np.sin(TURN * y / p[slots.ECCENTRIC_PERIOD] + phase) - np.sin(phase)
-        y += p[slots.ECCENTRICITY] * swing
+        phase, size = p[slots.ECCENTRIC_PHASE], p[slots.ECCENTRICITY]
+        turn = TURN / p[slots.ECCENTRIC_PERIOD]
+        speed *= 1.0 + size * turn * np.cos(turn * y + phase)
+        y += size * (np.sin(turn * y + phase) - np.sin(phase))
+    if is_velocity:
+        y = speed
     if p[slots.SENSOR_QUADRATIC] != 0.0 or p[slots.SENSOR_CUBIC] != 0.0:
         share = y / p[slots.REFERENCE_DISPLACEMENT]
         y *= 1.0 + (p[slots.SENSOR_QUADRATIC] + p[slots.SENSOR_CUBIC] * share) * share

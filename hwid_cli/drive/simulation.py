@@ -39,7 +39,7 @@ class Motion:
 
     Parameters
     ----------
-    output : ndarray, shape (n_samples,), [m]
+    output : ndarray, shape (n_samples,), [m] or [m/s]
         What the sensor reads.
     position, velocity : ndarray, shape (n_samples,), [m], [m/s]
     command : ndarray, shape (n_samples,), [A] or [V]
@@ -200,6 +200,7 @@ def parameter_vector(drive: Drive, effects: Mapping[str, Values]) -> np.ndarray:
     vector[slots.REFERENCE_CURRENT] = drive.reference_current_A
     vector[slots.REFERENCE_DISPLACEMENT] = drive.reference_displacement_m
     vector[slots.ZERO_ORDER_HOLD] = float(drive.hold == "zero")
+    vector[slots.OUTPUT_IS_VELOCITY] = float(drive.output == "velocity")
     if drive.resistance_ohm is not None:
         back_emf = drive.back_emf_V_s_per_m
         vector[slots.RESISTANCE] = drive.resistance_ohm

@@ -82,9 +82,10 @@ that is switched off is 0, except where the comment says infinite.
     ECCENTRIC_PERIOD,
     ECCENTRIC_PHASE,
     CLOCK_GAIN,  # of the output, over the input's clock
+    OUTPUT_IS_VELOCITY,
     RESET_RATE,
     PROPORTIONAL_GAIN,
     INTEGRAL_GAIN,
     DERIVATIVE_GAIN,
     N_SLOTS,
-) = range(81)
+) = range(82)

@@ -17,6 +17,7 @@ from hwid_cli.export.json_writer import SIMULATION
 from hwid_cli.export.map_parts import parts_of, portable
 from hwid_cli.export.model_file import read_model_file, refuse
 from hwid_cli.model.maps.rule import Part
+from hwid_cli.records.axis import ROTARY_NAMES, base_of, name_on
 from hwid_cli.records.drive import Drive
 from hwid_cli.records.experiment import Columns, Experiment, FileUnits
 from hwid_cli.records.exported import (
@@ -141,7 +142,13 @@ def _drive(path: Path, given: Mapping[str, Any]) -> Drive:
     if faults:
         raise ModelFileError(faults[0].message(path))
     read = experiment.simulation
-    return Drive(**{name: getattr(read, name) for name in Drive.__dataclass_fields__})
+    base = base_of(read)
+    for name in ROTARY_NAMES:
+        if name_on(base["axis"], name) not in given:
+            place = ("simulation", name_on(base["axis"], name))
+            refuse(path, place, None, "a finite number")
+    others = set(Drive.__dataclass_fields__) - set(ROTARY_NAMES) - {"axis"}
+    return Drive(**base, **{name: getattr(read, name) for name in others})
 
 
 def _card(path: Path, content: Mapping[str, Any]) -> ModelCard:

@@ -9,6 +9,7 @@ from typing import Any
 from hwid_cli import __version__
 from hwid_cli.export.map_parts import numbers_of
 from hwid_cli.files.atomic import replace_file
+from hwid_cli.records.axis import name_on
 from hwid_cli.records.drive import Drive
 from hwid_cli.records.exported import (
     Exported,
@@ -98,9 +99,9 @@ def _simulation(exported: ExportedSimulation) -> dict[str, Any]:
 def plain_drive(drive: Drive) -> dict[str, Any]:
     """A drive as plain data."""
     content = {
-        name: getattr(drive, name)
+        name_on(drive.axis, name): getattr(drive, name)
         for name in Drive.__dataclass_fields__
-        if name not in ("effects", "controller")
+        if name not in ("effects", "controller", "axis")
     }
     content["effects"] = {
         identifier: dict(values) for identifier, values in drive.effects.items()

@@ -235,6 +235,8 @@ class Diagnosis:
         Of the signal that is compared.
     warnings : tuple of str
         What a reader must check before believing the rest.
+    axis, output : str
+        One of ``axis.AXES`` and of ``drive.OUTPUTS``: in which units parameters are.
     """
 
     verdict: str
@@ -262,6 +264,8 @@ class Diagnosis:
     reference_displacement_m: float = 1.0
     output_unit: str = "m"
     warnings: tuple[str, ...] = field(default=(), metadata=ADDED_LATER)
+    axis: str = field(default="linear", metadata=ADDED_LATER)
+    output: str = field(default="position", metadata=ADDED_LATER)
 
     @property
     def judged_on(self) -> str:

@@ -6,6 +6,7 @@ from typing import Annotated
 
 import numpy as np
 
+from hwid_cli.records.axis import AXES
 from hwid_cli.records.rules import (
     NOT_NEGATIVE,
     POSITIVE,
@@ -19,6 +20,8 @@ from hwid_cli.records.rules import (
 # anyhow, so that position and velocity are found from the recording.
 STARTS = ("rest", "held", "estimated")
 HOLDS = ("linear", "zero", "smooth")
+# What the sensor of the output measures.
+OUTPUTS = ("position", "velocity")
 # Parameters of the base that a re-fit may move; the mass only sets the scale.
 BASE_PARAMETERS = (
     "damping_N_s_per_m",
@@ -114,6 +117,10 @@ class Drive:
         was low-pass filtered before it was sampled.
     controller : Controller or None
         None: the input is given. Else it follows a reference.
+    output : str
+        One of ``OUTPUTS``: what is measured.
+    axis : str
+        One of ``AXES``: rotating where m stands for rad, N for N m and kg for kg m^2.
     """
 
     mass_kg: Annotated[float, POSITIVE] = 1.0
@@ -128,6 +135,8 @@ class Drive:
     back_emf_V_s_per_m: float | None = None
     hold: Annotated[str, OneOf(HOLDS)] = "linear"
     controller: Controller | None = None
+    output: Annotated[str, OneOf(OUTPUTS)] = "position"
+    axis: Annotated[str, OneOf(AXES)] = "linear"
 
     def __post_init__(self) -> None:
         check_fields(self)

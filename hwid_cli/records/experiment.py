@@ -6,7 +6,8 @@ Every key of a configuration file is a field here. ``configs/README.md`` explain
 from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
-from hwid_cli.records.drive import HOLDS, STARTS, Controller
+from hwid_cli.records.axis import ROTARY_NAMES, check_axis
+from hwid_cli.records.drive import HOLDS, OUTPUTS, STARTS, Controller
 from hwid_cli.records.machines import GunMachine, ServoMachine
 from hwid_cli.records.maps import MAP_KINDS
 from hwid_cli.records.model import FitOptions
@@ -198,6 +199,9 @@ class FinalTestOptions:
 class SimulationOptions:
     """The physics model that diagnosis judges, in SI units.
 
+    A rotating axis is named by the keys that have an inertia, a torque or an angle in
+    them, in place of those of a straight one.
+
     Parameters
     ----------
     known : dict of str to float, [-]
@@ -222,6 +226,13 @@ class SimulationOptions:
         default_factory=dict
     )
 
+    output: Annotated[str, OneOf(OUTPUTS)] = "position"
+    inertia_kg_m2: Annotated[float | None, POSITIVE] = None
+    damping_N_m_s_per_rad: Annotated[float | None, NOT_NEGATIVE] = None
+    stiffness_N_m_per_rad: Annotated[float | None, NOT_NEGATIVE] = None
+    torque_constant_N_m_per_A: Annotated[float | None, POSITIVE] = None
+    back_emf_V_s_per_rad: Annotated[float | None, NOT_NEGATIVE] = None
+
     @property
     def input_unit(self) -> str:
         """Unit that the input's numbers must have: a voltage drives a circuit."""
@@ -230,9 +241,19 @@ class SimulationOptions:
     @property
     def output_unit(self) -> str:
         """Unit that the output's numbers must have."""
-        is_rotary = getattr(self, "inertia_kg_m2", None) is not None
-        is_speed = getattr(self, "output", "position") == "velocity"
+        is_rotary = any(getattr(self, one) is not None for one in ROTARY_NAMES.values())
+        is_speed = self.output == "velocity"
         return ("rad" if is_rotary else "m") + ("/s" if is_speed else "")
+
+    def __post_init__(self) -> None:
+        every = self.__dataclass_fields__
+        check_axis(
+            {
+                name: getattr(self, name)
+                for name in (*ROTARY_NAMES, *ROTARY_NAMES.values())
+                if getattr(self, name) != every[name].default
+            }
+        )
 
 
 @dataclass(frozen=True)

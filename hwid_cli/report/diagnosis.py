@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from hwid_cli.records.axis import unit_of_effect
 from hwid_cli.records.diagnosis import (
     BaseParameter,
     Diagnosis,
@@ -100,6 +101,9 @@ def effects_table(diagnosis: Diagnosis) -> Table:
         name = effect.id
         for parameter in effect.parameters:
             quantity, unit = quantity_and_unit(parameter.name)
+            unit = unit_of_effect(
+                effect.id, unit, axis=diagnosis.axis, output=diagnosis.output
+            )
             value = parameter.text or _value(parameter.value, parameter.name)
             rows.append((name, quantity, value, _interval(parameter), unit))
             name = ""

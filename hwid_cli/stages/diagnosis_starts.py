@@ -12,6 +12,7 @@ import numpy as np
 from hwid_cli.data.calibration import LEAST_QUIET, find_onset
 from hwid_cli.diagnosis.noise import noise_floor
 from hwid_cli.diagnosis.problem import prepare
+from hwid_cli.records.axis import base_of
 from hwid_cli.records.experiment import (
     CalibrateOptions,
     DiagnoseOptions,
@@ -44,16 +45,18 @@ def unsettled_starts(
     tuple of str
         Names of those without a rest before the excitation whose first output is far
         from the equilibrium of the linear drive with the first input. None where a
-        diagnosis fits how recordings start, under a controller and without a spring.
+        diagnosis fits how recordings start, under a controller, without a spring and
+        where a velocity is measured.
     """
     if options.initial_state != "rest" or simulation.controller is not None:
         return ()
-    if not simulation.stiffness_N_per_m > 0:
+    base = base_of(simulation)
+    stiffness = base.get("stiffness_N_per_m", 0.0)
+    if not stiffness > 0 or simulation.output == "velocity":
         return ()
     noise = noise_floor(prepare(recordings, simulation, options, ())).rms
-    gain = simulation.force_constant_N_per_A / (
-        simulation.stiffness_N_per_m * (simulation.resistance_ohm or 1.0)
-    )
+    constant = base.get("force_constant_N_per_A", 1.0)
+    gain = constant / (stiffness * (simulation.resistance_ohm or 1.0))
     rests = [_rest(one) for one in recordings]
     zeros = [
         float(np.mean(one.output[:rest] - gain * one.input[:rest]))

@@ -188,6 +188,8 @@ def _content(diagnosis: Diagnosis) -> dict[str, Any]:
             }
             for place in diagnosis.places
         ],
+        "axis": diagnosis.axis,
+        "output": diagnosis.output,
         "not_observable": list(diagnosis.not_observable),
         "warnings": list(diagnosis.warnings),
         "next_experiment": asdict(diagnosis.next_experiment),

@@ -223,3 +223,30 @@ def test_units_and_known_parameters_come_along(diagnosed, tmp_path):
     same_recordings(
         read_recordings(experiment, out), read_recordings(extended, tmp_path)
     )
+
+
+def test_a_rotating_axis_keeps_its_names(diagnosed, tmp_path):
+    rotary = SimulationOptions(
+        inertia_kg_m2=0.1 + 0.2,
+        damping_N_m_s_per_rad=1 / 3,
+        torque_constant_N_m_per_A=5.1,
+        resistance_ohm=2.0,
+        back_emf_V_s_per_rad=5.0,
+        effects={
+            "elastic_coupling": {
+                "stiffness_N_per_m": 1e4,
+                "motor_share": 0.4,
+                "damping_ratio": 0.05,
+                "sensor": "motor",
+            }
+        },
+        output="velocity",
+        controller=Controller(proportional_gain=1 / 3, integral_gain=2.0),
+    )
+    out = tmp_path / "results"
+    out.mkdir()
+    again = write_and_load(diagnosed(), out, rotary)
+    assert again.simulation == rotary
+    text = (out / "extended_simulation.yaml").read_text()
+    assert "mass_kg" not in text
+    assert "force_constant" not in text

@@ -173,6 +173,39 @@ def test_effect_that_cannot_be_simulated_is_one_line(load_effect, text, message)
             r"simulation.controller.velocity_gain: missing; expected a number > 0; add",
         ),
         (
+            # Even where the number is that of the default.
+            "mass_kg: 1.0, inertia_kg_m2: 0.2",
+            r"simulation.mass_kg: found 1.0 beside inertia_kg_m2; expected names of one "
+            r"axis, straight or rotating; write inertia_kg_m2$",
+        ),
+        (
+            "inertia_kg_m2: 0.2, force_constant_N_per_A: 3, stiffness_N_m_per_rad: 1",
+            r"simulation.force_constant_N_per_A: found 3.0 beside inertia_kg_m2; .*; "
+            r"write torque_constant_N_m_per_A$",
+        ),
+        (
+            "torque_constant_N_m_per_A: 3",
+            r"simulation.inertia_kg_m2: missing; expected the inertia, because "
+            r"torque_constant_N_m_per_A is of a rotating axis; add the key$",
+        ),
+        (
+            "inertia_kg_m2: 0",
+            r"simulation.inertia_kg_m2: found 0.0; expected a number > 0",
+        ),
+        (
+            "inertia_kg_m2: 1, back_emf_V_s_per_rad: 1",
+            r"simulation.back_emf_V_s_per_rad: found 1.0; expected .*resistance_ohm too",
+        ),
+        (
+            "output: speed",
+            r"simulation.output: found 'speed'; expected one of position, velocity",
+        ),
+        (
+            "output: velocity, controller: {position_gain_per_s: 1, velocity_gain: 2}",
+            r"controller.position_gain_per_s: found 1.0; expected a controller of the "
+            r"velocity \(proportional_gain, .*because simulation.output is velocity",
+        ),
+        (
             "controller: {limit: 1}",
             r"controller.position_gain_per_s: missing; expected a number > 0; add the key, "
             r"or proportional_gain of a PID controller",

@@ -84,6 +84,61 @@ def test_coulomb_friction_shows_its_level_in_both_directions():
     assert level.mean() == pytest.approx(0.8, rel=0.05)
 
 
+@pytest.mark.parametrize("stiffness", [1184.0, 0.0], ids=["spring", "free"])
+def test_a_measured_velocity_shows_the_force_as_well(stiffness):
+    base = replace(DRIVE, output="velocity", stiffness_N_per_m=stiffness)
+    sigma = 1e-3
+    pairs = compared(
+        {"coulomb_friction": {"force_N": 0.8}},
+        base=base, noise_rms=sigma, chosen="sine_5_3",
+    )  # fmt: skip
+
+    (found,) = latent_force(pairs, base, white(sigma))
+
+    fast = np.abs(found.velocity) > 0.5 * np.max(np.abs(found.velocity))
+    level = -np.sign(found.velocity[fast]) * found.force[fast]
+    assert level.mean() == pytest.approx(0.8, rel=0.05)
+    assert np.std(found.velocity - pairs[0].signals.output) < 2 * sigma
+
+
+@pytest.mark.parametrize(
+    ("gains", "feedback"),
+    [
+        ({"proportional_gain": 600.0, "derivative_gain": 30.0}, "position"),
+        ({"proportional_gain": 30.0, "integral_gain": 600.0}, "velocity"),
+        (
+            {
+                "position_gain_per_s": 15.0,
+                "velocity_gain": 30.0,
+                "reset_rate_per_s": 5.0,
+            },
+            "position",
+        ),
+    ],
+    ids=["PD", "PI of a velocity", "cascade PI"],
+)
+def test_each_controller_answers_a_force(gains, feedback):
+    base = replace(
+        DRIVE, stiffness_N_per_m=0.0, controller=Controller(**gains), output=feedback
+    )
+    times = SAMPLE_TIME_S * np.arange(3000)
+    reference = 0.01 * np.sin(2 * np.pi * times)
+    true = replace(base, effects={"coulomb_friction": {"force_N": 0.8}})
+    load = simulate_drive(reference, true, sample_time_s=SAMPLE_TIME_S)
+    motion = simulate_drive(reference, base, sample_time_s=SAMPLE_TIME_S)
+    signals = Signals(
+        "a", "sine", reference, load.command, load.command, load.output, SAMPLE_TIME_S
+    )
+    pair = Compared(signals, motion.command, motion.position, motion.velocity)
+
+    (found,) = latent_force([pair], base, white(1e-4))
+
+    fast = np.abs(load.velocity) > 0.5 * np.max(np.abs(load.velocity))
+    level = -np.sign(load.velocity[fast]) * found.force[fast]
+    # What an integral part sums up of a displacement is left out.
+    assert level.mean() == pytest.approx(0.8, rel=0.15)
+
+
 def test_under_a_controller_the_command_shows_the_force():
     base = replace(
         DRIVE, stiffness_N_per_m=0.0, controller=Controller(20.0, 30.0), hold="zero"

@@ -13,6 +13,7 @@ from hwid_cli.diagnosis.problem import (
     prepare,
     rest_length,
 )
+from hwid_cli.records.axis import ROTARY_NAMES
 from hwid_cli.records.drive import Controller, Drive
 from hwid_cli.records.experiment import DiagnoseOptions, SimulationOptions
 from hwid_cli.records.recordings import Recording
@@ -129,6 +130,22 @@ def test_the_input_drives_and_the_output_is_compared():
     np.testing.assert_array_equal(first.compared, TRAIN.output)
 
 
+def test_a_measured_velocity_gives_a_way_and_a_measured_position_a_velocity():
+    simulation = SimulationOptions(output="velocity")
+    speed = np.full(101, 2.0)
+    given = [Recording("a", np.zeros(101), speed, 0.01, output_unit="m/s")]
+    (found,) = prepare(given, simulation, DiagnoseOptions(), ()).signals
+    np.testing.assert_allclose(found.position, 0.02 * np.arange(101), atol=1e-12)
+    np.testing.assert_array_equal(found.velocity, speed)
+    assert found.rest_position_m == 0.0
+
+    simulation = SimulationOptions()
+    given = [Recording("a", np.zeros(101), 0.02 * np.arange(101), 0.01)]
+    (found,) = prepare(given, simulation, DiagnoseOptions(), ()).signals
+    np.testing.assert_array_equal(found.position, given[0].output)
+    np.testing.assert_allclose(found.velocity, 2.0)
+
+
 def test_under_a_controller_the_reference_drives_and_the_command_is_compared():
     path = np.array([0.0, 0.2, -0.5])
     simulation = SimulationOptions(controller=Controller(20.0, 50.0))
@@ -154,12 +171,28 @@ def test_every_setting_of_the_simulation_reaches_the_drive():
         back_emf_V_s_per_m=11.0,
         hold="smooth",
         known={"damping_N_s_per_m": 0.1},
+        output="velocity",
     )
     problem = prepare([TRAIN], simulation, DiagnoseOptions(), [])
     assert problem.known == simulation.known
     for name in vars(simulation):
-        if name not in ("kind", "known"):
+        if name not in ("kind", "known", *ROTARY_NAMES.values()):
             assert getattr(problem.drive, name) == getattr(simulation, name), name
+
+
+def test_a_rotating_axis_reaches_the_drive_by_the_names_of_a_straight_one():
+    simulation = SimulationOptions(
+        inertia_kg_m2=2.0,
+        damping_N_m_s_per_rad=3.0,
+        stiffness_N_m_per_rad=4.0,
+        torque_constant_N_m_per_A=5.0,
+        resistance_ohm=9.0,
+        back_emf_V_s_per_rad=11.0,
+    )
+    drive = prepare([TRAIN], simulation, DiagnoseOptions(), []).drive
+    assert drive.axis == "rotary"
+    for old, new in ROTARY_NAMES.items():
+        assert getattr(drive, old) == getattr(simulation, new)
 
 
 TIME = 1e-3 * np.arange(400)

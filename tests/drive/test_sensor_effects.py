@@ -88,7 +88,7 @@ def test_the_terms_of_the_sensor_act_in_their_order():
     np.testing.assert_allclose(tool(laws).output, y, atol=1e-15)
 
 
-def at_times(ratio, effects, fine=400):
+def at_times(ratio, effects, fine=400, shift=0.0):
     """The motion at other times, from samples so fine that the nearest cubic is exact."""
     command = np.append(CORNERS, CORNERS[-1])
     corners = np.append(CORNER_TIMES_S, 1.0)
@@ -97,7 +97,7 @@ def at_times(ratio, effects, fine=400):
     position = tool(
         effects, np.interp(times, corners, command), sample_time=dense
     ).position
-    return CubicSpline(times, position)(ratio * TIMES_S)
+    return CubicSpline(times, position)(ratio * TIMES_S + shift)
 
 
 @pytest.mark.parametrize("ratio", [0.97, 0.9999, 1.0003, 1.05])

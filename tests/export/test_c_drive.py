@@ -66,6 +66,14 @@ MACHINES = (
         },
     ),
     (COUPLED_MOTOR | BACKLASH | cases.COULOMB, {}),
+    (BACKLASH | SENSORS, {"output": "velocity"}),
+    (
+        cases.COULOMB,
+        {
+            "output": "velocity",
+            "controller": Controller(None, None, 0.5, 0.0, 8.0, 9.0),
+        },
+    ),
     (COUPLED_MOTOR | cases.GEAR, {"stiffness_N_per_m": 0.0}),
 )
 # Another clock is refused.

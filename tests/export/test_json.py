@@ -91,6 +91,28 @@ def test_a_simulation_comes_back_and_fits_the_schema(tmp_path, controller):
         load_model(tmp_path / "s.json")
 
 
+@pytest.mark.parametrize("values", [{}, {"resistance_ohm": 2.0}])
+def test_a_rotating_axis_is_written_by_its_own_names(tmp_path, values):
+    given = exported_drive(effects={}, axis="rotary", output="velocity", **values)
+    content = described(given)
+
+    SCHEMA.validate(content)
+    assert "mass_kg" not in content["simulation"]
+    assert content["simulation"]["inertia_kg_m2"] == given.drive.mass_kg
+    assert written(tmp_path / "s.json", given).drive == given.drive
+
+
+@pytest.mark.parametrize("name", ["mass_kg", "inertia_kg_m2"])
+def test_a_simulation_without_one_of_its_base_is_refused(tmp_path, name):
+    axis = "linear" if name == "mass_kg" else "rotary"
+    content = described(exported_drive(effects={}, axis=axis))
+    del content["simulation"][name]
+    path = tmp_path / "s.json"
+    path.write_text(json.dumps(content))
+    with pytest.raises(ModelFileError, match=rf"simulation.{name}: "):
+        read_exported(path)
+
+
 def test_a_start_is_chosen(tmp_path):
     model = example_model(3, rule="estimated")
     exported, u = exported_of(model), example_input(1)

@@ -7,7 +7,9 @@ import pytest
 
 from hwid_cli.drive.simulation import simulate_drive
 from hwid_cli.records.drive import Controller
+from hwid_cli.records.experiment import SimulationOptions
 from hwid_cli.records.recordings import Recording
+from hwid_cli.report.diagnosis import base_table, effects_table
 from hwid_cli.stages.diagnose import extended_options
 from tests.diagnosis.small_drive import (
     DRIVE,
@@ -223,3 +225,80 @@ def test_a_coil_delays_what_a_voltage_does():
     assert [one.id for one in found.effects] == ["winding_inductance"]
     told = parameters(found.effects[0])["inductance_H"]
     assert told == pytest.approx(4e-3, rel=0.02)
+
+
+def speeds(effects, **drive):
+    """Recordings of a velocity, with noise of some per mille."""
+    measured = recordings(
+        effects, drive=replace(DRIVE, output="velocity", **drive), noise=1e-3
+    )
+    return [replace(one, output_unit="m/s") for one in measured]
+
+
+@pytest.mark.parametrize("stiffness", [1184.0, 0.0], ids=["spring", "free"])
+def test_a_velocity_is_compared_where_it_is_measured(stiffness):
+    base = {"stiffness_N_per_m": stiffness}
+    options = simulation(output="velocity", **base)
+    found = diagnosed(
+        speeds(FRICTION, **base), options, effects=("coulomb_friction", "cogging")
+    )
+    assert [one.id for one in found.effects] == ["coulomb_friction"]
+    assert (found.complete, found.output_unit) == (True, "m/s")
+    assert parameters(found.effects[0])["force_N"] == pytest.approx(0.8, rel=0.01)
+    assert found.noise.rms == pytest.approx(1e-3, rel=0.05)
+    assert any("velocity is measured" in text for text in found.not_observable)
+
+    extended = extended_options(found, options)
+    after = diagnosed(speeds(FRICTION, **base), extended, effects=("cogging",))
+    assert after.verdict == "none"
+
+
+def test_a_saturated_sensor_of_the_velocity_has_a_limit_in_its_unit():
+    found = diagnosed(
+        speeds({"sensor_saturation": {"limit_m": 0.25}}),
+        simulation(output="velocity"),
+        effects=("sensor_saturation", "input_saturation"),
+    )
+    assert [one.id for one in found.effects] == ["sensor_saturation"]
+    limit = parameters(found.effects[0])["limit_m"]
+    assert limit == pytest.approx(0.25, rel=0.002)
+
+
+def test_a_rotating_axis_is_told_by_its_own_names():
+    rotary = SimulationOptions(
+        inertia_kg_m2=DRIVE.mass_kg,
+        damping_N_m_s_per_rad=DRIVE.damping_N_s_per_m,
+        stiffness_N_m_per_rad=DRIVE.stiffness_N_per_m,
+        torque_constant_N_m_per_A=DRIVE.force_constant_N_per_A,
+        reference_current_A=DRIVE.reference_current_A,
+        reference_displacement_m=DRIVE.reference_displacement_m,
+    )
+    given = [replace(one, output_unit="rad") for one in recordings(FRICTION)]
+    found, straight = diagnosed(given, rotary), diagnosed(recordings(FRICTION))
+    assert (found.axis, found.output_unit) == ("rotary", "rad")
+    assert [one.name for one in found.base] == [
+        "damping_N_m_s_per_rad",
+        "stiffness_N_m_per_rad",
+        "torque_constant_N_m_per_A",
+    ]
+    for one, other in zip(found.base, straight.base, strict=True):
+        assert (one.before, one.refitted, one.after) == (
+            other.before,
+            other.refitted,
+            other.after,
+        )
+    assert parameters(found.effects[0]) == parameters(straight.effects[0])
+    assert any("the inertia itself: torque" in one for one in found.not_observable)
+    assert {one.unit for one in found.latent_force} <= {"rad", "rad/s", "A", "A/s", "s"}
+    assert effects_table(found).rows[0][-1] == "N m"
+    assert [row[-1] for row in base_table(found).rows] == [
+        "N m s/rad",
+        "N m/rad",
+        "N m/A",
+    ]
+
+    extended = extended_options(found, rotary)
+    assert extended.torque_constant_N_m_per_A == found.base[2].after
+    assert extended.mass_kg == 1.0
+    after = diagnosed(given, extended, effects=("cogging",))
+    assert (after.verdict, after.axis) == ("none", "rotary")

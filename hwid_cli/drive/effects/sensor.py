@@ -84,8 +84,7 @@ DRIFT = Effect(
         Parameter(
             "drift_m_per_s",
             lambda scales: tuple(
-                share * scales.displacement_m / scales.duration_s
-                for share in (-0.05, 0.05)
+                share * scales.reading / scales.duration_s for share in (-0.05, 0.05)
             ),
             is_positive=False,
             places=("SENSOR_DRIFT",),
@@ -103,8 +102,8 @@ SATURATION = Effect(
         Parameter(
             "limit_m",
             # What it reads at most is what the recordings reach.
-            shares_of("displacement_m", 0.8, 0.95, 1.0),
-            span_of("displacement_m", 0.05, 1.0),
+            shares_of("reading", 0.8, 0.95, 1.0),
+            span_of("reading", 0.05, 1.0),
             places=("OUTPUT_LIMIT",),
             limits=(POSITIVE,),
             off=inf,
@@ -124,7 +123,7 @@ HUM = Effect(
     parameters=(
         Parameter(
             "amplitude_m",
-            shares_of("displacement_m", 0.01),
+            shares_of("reading", 0.01),
             places=("HUM_AMPLITUDE",),
         ),
         Parameter(

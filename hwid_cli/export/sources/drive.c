@@ -325,7 +325,10 @@ double HWID_NAME(step)(HWID_NAME(state) *state, double u)
         state->previous = drive_controlled(u, state->position, state->velocity,
                                            sample_time, state->control, p);
     }
-    u = drive_sensed(p[OUTPUT_GAP] > 0.0 ? state->played : state->position,
+    if (!(p[OUTPUT_GAP] > 0.0)) {
+        state->played = state->position;
+    }
+    u = drive_sensed(state->played, state->position - state->played, state->velocity,
                      sample_time * (double)state->sample, p);
     state->sample += 1;
     return u;

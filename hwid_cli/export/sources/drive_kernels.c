@@ -77,11 +77,12 @@ enum {
     ECCENTRIC_PERIOD = 73,
     ECCENTRIC_PHASE = 74,
     CLOCK_GAIN = 75,
-    RESET_RATE = 76,
-    PROPORTIONAL_GAIN = 77,
-    INTEGRAL_GAIN = 78,
-    DERIVATIVE_GAIN = 79,
-    N_SLOTS = 80,
+    OUTPUT_IS_VELOCITY = 76,
+    RESET_RATE = 77,
+    PROPORTIONAL_GAIN = 78,
+    INTEGRAL_GAIN = 79,
+    DERIVATIVE_GAIN = 80,
+    N_SLOTS = 81,
     MOST_PIECES = 40,
     ERROR_SUM = 0,
     LAST_ERROR = 1,
@@ -392,6 +393,10 @@ static double drive_controlled(double reference, double x, double v, double samp
         error = (p[POSITION_GAIN] * error) - v;
         gain = p[VELOCITY_GAIN];
         reset = gain * p[RESET_RATE];
+    } else {
+        if (p[OUTPUT_IS_VELOCITY] > 0.0) {
+            error = reference - v;
+        }
     }
     total = control[ERROR_SUM] + (sample_time * error);
     wanted = (gain * error) + (reset * total);
@@ -2007,20 +2012,33 @@ static void drive_move_piece(double *state, double *trial, double *memory, doubl
     }
 }
 
-static double drive_sensed(double y, double time, double *p)
+static double drive_sensed(double y, double lag, double speed, double time, double *p)
 {
+    int is_velocity = 0;
+    int is_pushed = 0;
     double phase = 0.0;
-    double swing = 0.0;
+    double size = 0.0;
+    double turn = 0.0;
     double share = 0.0;
     double angle = 0.0;
     double limit = 0.0;
     if (p[OUTPUT_ZERO] != 0.0) {
         y -= p[OUTPUT_ZERO];
     }
+    is_velocity = p[OUTPUT_IS_VELOCITY] > 0.0;
+    if (is_velocity && (p[OUTPUT_GAP] > 0.0)) {
+        is_pushed = fabs(lag) >= ((1.0 - 1e-09) * p[OUTPUT_GAP]);
+        speed = (is_pushed && ((lag * speed) > 0.0)) ? speed : 0.0;
+    }
     if (p[ECCENTRICITY] != 0.0) {
         phase = p[ECCENTRIC_PHASE];
-        swing = sin(((6.283185307179586 * y) / p[ECCENTRIC_PERIOD]) + phase) - sin(phase);
-        y += p[ECCENTRICITY] * swing;
+        size = p[ECCENTRICITY];
+        turn = 6.283185307179586 / p[ECCENTRIC_PERIOD];
+        speed *= 1.0 + ((size * turn) * cos((turn * y) + phase));
+        y += size * (sin((turn * y) + phase) - sin(phase));
+    }
+    if (is_velocity) {
+        y = speed;
     }
     if ((p[SENSOR_QUADRATIC] != 0.0) || (p[SENSOR_CUBIC] != 0.0)) {
         share = y / p[REFERENCE_DISPLACEMENT];

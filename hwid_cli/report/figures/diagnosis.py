@@ -471,7 +471,8 @@ def force_figure(diagnosis: Diagnosis) -> Figure:
     for axes, force in zip(panels, shown, strict=True):
         _draw_force(axes, force)
     panels[0].set_ylim(*_force_limits(shown))
-    panels[0].set_ylabel("missing force F [N]")
+    what = "force F [N]" if diagnosis.axis == "linear" else "torque F [N m]"
+    panels[0].set_ylabel(f"missing {what}")
     _write_powers_above(panels[0])
     figure.legend(
         handles=[*panels[0].get_lines()[1:], *panels[0].collections],

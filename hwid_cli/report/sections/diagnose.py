@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from hwid_cli.records.axis import units_note
 from hwid_cli.records.diagnosis import Diagnosis, RecordingGap
 from hwid_cli.records.report import ReportContents
 from hwid_cli.report.diagnosis import (
@@ -54,7 +55,11 @@ def diagnosis_section(contents: ReportContents) -> Section:
     else:
         blocks += [Text(line) for line in _sentences(found)]
         effects = _effects_table(
-            _items(found, "effects"), is_all=found.get("complete") is True
+            _items(found, "effects"),
+            is_all=found.get("complete") is True,
+            note=units_note(
+                axis=str(found.get("axis")), output=str(found.get("output"))
+            ),
         )
         blocks += [table for table in (effects, _gap_table(found)) if table is not None]
         where = [
@@ -176,7 +181,7 @@ def _items(found: Mapping[str, Any], key: str) -> list[Mapping[str, Any]]:
 
 
 def _effects_table(
-    effects: Sequence[Mapping[str, Any]], *, is_all: bool
+    effects: Sequence[Mapping[str, Any]], *, is_all: bool, note: str
 ) -> Table | None:
     if not effects:
         return None
@@ -194,6 +199,8 @@ def _effects_table(
         *numbers("value", "95 % interval"),
     )
     caption = "Effects that the simulation lacks; the unit ends each parameter's name"
+    if note:
+        caption += f" ({note})"
     if not is_all:
         caption += f"; {INTERVALS_OF_A_PART}"
     return Table(caption, columns, tuple(rows))
