@@ -23,7 +23,7 @@ from hwid_cli.diagnosis.candidate import (
 from hwid_cli.diagnosis.causes import fit_with_input_noise, without_repeats
 from hwid_cli.diagnosis.findings import Findings, describe
 from hwid_cli.diagnosis.intervals import unclear_effects
-from hwid_cli.diagnosis.latent_force import latent_force
+from hwid_cli.diagnosis.latent_force import Smoothed, latent_force
 from hwid_cli.diagnosis.noise import noise_floor
 from hwid_cli.diagnosis.parameters import (
     compare_at,
@@ -31,6 +31,7 @@ from hwid_cli.diagnosis.parameters import (
     first_point,
     parameter_layout,
 )
+from hwid_cli.diagnosis.pieces import in_pieces
 from hwid_cli.diagnosis.problem import (
     Compared,
     DiagnosisProblem,
@@ -42,6 +43,7 @@ from hwid_cli.diagnosis.rounds import (
     Rounds,
     RoundsResult,
     RunTasks,
+    continue_rounds,
     run_rounds,
 )
 from hwid_cli.diagnosis.scales import (
@@ -51,7 +53,12 @@ from hwid_cli.diagnosis.scales import (
     scales_of_recordings,
 )
 from hwid_cli.diagnosis.search import fit_own
-from hwid_cli.diagnosis.selection import SelectionCriteria, decide
+from hwid_cli.diagnosis.selection import (
+    STILL_LARGE,
+    DiagnosisVerdict,
+    SelectionCriteria,
+    decide,
+)
 from hwid_cli.diagnosis.where import places
 from hwid_cli.drive.catalogue import CATALOGUE, public_id
 from hwid_cli.drive.effect import Scales
@@ -106,25 +113,32 @@ def diagnose(
     where = places(before, noise, drive, force)
 
     criteria = SelectionCriteria.of(problem, noise)
+    on_round("verdict", 0)
+    given_sse = each_sum_of_squares([one.residual for one in given])
+
+    def decided(found: RoundsResult) -> DiagnosisVerdict:
+        return decide(
+            criteria,
+            given_sse,
+            base,
+            found.fits,
+            found.best,
+            lambda one: unclear_effects(problem, one, scales),
+        )
+
     found = RoundsResult()
     if base.is_usable and not criteria.is_complete(base):
         baseline = Baseline(drive, scales, noise, problem.drive)
         allowed = allowed_effects(problem, options)
-        found = run_rounds(
-            Rounds(problem, baseline, criteria, base, allowed, run_tasks, on_round),
-            options.max_effects,
+        rounds = Rounds(problem, baseline, criteria, base, allowed, run_tasks, on_round)
+        found = run_rounds(rounds, options.max_effects)
+        is_lost = (
+            decided(found).word == "unknown" and criteria.ratio(base) > STILL_LARGE
         )
-
-    on_round("verdict", 0)
-    given_sse = each_sum_of_squares([one.residual for one in given])
-    verdict = decide(
-        criteria,
-        given_sse,
-        base,
-        found.fits,
-        found.best,
-        lambda one: unclear_effects(problem, one, scales),
-    )
+        if is_lost and not problem.compares_command:
+            seeds = _seeds_of_pieces(rounds, force, options.max_effects)
+            found = continue_rounds(rounds, found, seeds)
+    verdict = decided(found)
     return describe(
         Findings(
             problem=problem, criteria=criteria, scales=scales, given_sse=given_sse,
@@ -154,6 +168,26 @@ def _refit_base(
     """Base, and the effects that the simulation has already, fitted again."""
     start = SearchStart(base_of(problem.drive), drive_effects(problem.drive))
     return fit_candidate(problem, (), [start], scales, noise)
+
+
+def _seeds_of_pieces(
+    rounds: Rounds, force: Sequence[Smoothed], max_effects: int
+) -> tuple[CandidateFit, ...]:
+    """Best sets of each size on pieces of the recordings."""
+    pieces = in_pieces(rounds.problem, force)
+    baseline = rounds.baseline
+    start = SearchStart(base_of(baseline.drive), drive_effects(pieces.drive))
+    base = fit_candidate(pieces, (), [start], baseline.scales, baseline.noise)
+    if not base.is_usable:
+        return ()
+    of_pieces = replace(
+        rounds,
+        problem=pieces,
+        criteria=SelectionCriteria.of(pieces, baseline.noise),
+        base=base,
+        baseline=replace(baseline, drive=fitted_drive(pieces.drive, base)),
+    )
+    return run_rounds(of_pieces, max_effects).best
 
 
 def _with_input_noise(

@@ -158,6 +158,8 @@ def parameter_layout(
             unknown = _unknown(identifier, parameter, value, scales)
             (own if parameter.is_own else shared).append(unknown)
     far = float("inf")
+    if problem.has_starts:
+        return ParameterLayout(tuple(shared), tuple(own), tuple(effects))
     is_moving = _starts_in_motion(problem, effects)
     if problem.start != "rest" or is_moving or _rests_anywhere(problem):
         reach = scales.displacement_m
@@ -306,9 +308,12 @@ def vectors_at(
         if common is None or fit_layout.own:
             common = parameter_vector(drive, effects_at(fit_layout, point, row))
         vector = common.copy()
-        _place_start(
-            vector, problem, signals.rest_position_m, fit_layout, point.own[row]
-        )
+        if signals.start is not None:
+            set_start(vector, *signals.start)
+        else:
+            _place_start(
+                vector, problem, signals.rest_position_m, fit_layout, point.own[row]
+            )
         vectors.append(vector)
     return vectors
 

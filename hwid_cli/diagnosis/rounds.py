@@ -174,10 +174,35 @@ def run_rounds(rounds: Rounds, max_effects: int) -> RoundsResult:
         if rounds.criteria.is_complete(winner) or search.is_nearly_all(winner):
             break
         parents = search.parents(size)
-    # From the largest down: what a set without one effect gains may be the better one.
-    for size in range(len(best), 1, -1):
-        search.fit_without_each(best[size - 1])
-        best[size - 2] = search.best_of_size(size - 1) or best[size - 2]
+    search.fit_parts(best)
+    return RoundsResult(search.fits, tuple(best), search.shares)
+
+
+def continue_rounds(
+    rounds: Rounds, found: RoundsResult, seeds: Sequence[CandidateFit]
+) -> RoundsResult:
+    """Fit sets that another search has found, beside those of this one.
+
+    Parameters
+    ----------
+    seeds : sequence of CandidateFit
+        Sets with the values to start from, such as those that pieces of the recordings
+        have led to.
+    """
+    search = _Search(rounds)
+    search.fits.update(found.fits)
+    search.shares.update(found.shares)
+    search.fit_seeds(seeds)
+    largest = max((len(one) for one in search.fits), default=0)
+    best: list[CandidateFit] = []
+    for size in range(1, largest + 1):
+        winner = search.best_of_size(size)
+        if winner is None:
+            break
+        best.append(winner)
+        if rounds.criteria.is_complete(winner):
+            break
+    search.fit_parts(best)
     return RoundsResult(search.fits, tuple(best), search.shares)
 
 
@@ -262,6 +287,28 @@ class _Search:
         """Whether a set explains enough for others to be built on it."""
         against = self.rounds.criteria.evidence(found, self.rounds.base)
         return against.explained >= LEAST_OF_PARENT
+
+    def fit_parts(self, best: list[CandidateFit]) -> None:
+        """Fit each best set without each of its effects, from the largest down.
+
+        What a set without one effect gains may be the better one of its size.
+        """
+        for size in range(len(best), 1, -1):
+            self.fit_without_each(best[size - 1])
+            best[size - 2] = self.best_of_size(size - 1) or best[size - 2]
+
+    def fit_seeds(self, seeds: Sequence[CandidateFit]) -> None:
+        """Fit sets from the values that another search has found."""
+        present = drive_effects(self.rounds.problem.drive)
+        sets = {
+            one.effects: [
+                SearchStart(_base_values(one, self.rounds), fitted_values(one, present))
+            ]
+            for one in seeds
+        }
+        self._finish("sets that pieces have led to", sets)
+        for size in sorted({len(one.effects) for one in seeds}):
+            self._go_on(size)
 
     def fit_without_each(self, whole: CandidateFit) -> None:
         """Fit a set without each of its effects, from where the whole set ended."""
@@ -369,7 +416,11 @@ class _Search:
                     rounds.problem, ids, tuple(starts), baseline.scales, baseline.noise,
                 ),
                 result_type=CandidateFit,
-                content={"effects": ids, "starts": list(starts)},
+                content={
+                    "effects": ids,
+                    "starts": list(starts),
+                    "pieces": rounds.problem.has_starts,
+                },
                 arrays=(rounds.base.values,),
             )
             for ids, starts in sets.items()

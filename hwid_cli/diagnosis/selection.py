@@ -26,8 +26,9 @@ LEAST_EXPLAINED = 0.5
 # ... and one that leaves more than so many times the noise ...
 STILL_LARGE = 3.0
 LEAST_EXPLAINED_LARGE = 0.65
-# ... and a set of several, which imitates more ...
+# ... and a set of several, which imitates more, and may leave this many times ...
 LEAST_EXPLAINED_SET = 0.8
+MOST_LEFT_BY_SET = 2.0
 # ... of which each effect must bring this share of all, less where nothing remains: a law
 # that is not quite right leaves as much.
 LEAST_CONTRIBUTION = 5e-3
@@ -203,7 +204,8 @@ class SelectionCriteria:
         is_large = self.ratio(found) > STILL_LARGE
         if len(found.effects) > 1:
             # Where much remains, a further effect makes up for a law that is not right.
-            explains = against.explained >= LEAST_EXPLAINED_SET and not is_large
+            is_near = self.ratio(found) <= MOST_LEFT_BY_SET
+            explains = against.explained >= LEAST_EXPLAINED_SET and is_near
         else:
             least = LEAST_EXPLAINED_LARGE if is_large else LEAST_EXPLAINED
             explains = against.explained >= least
