@@ -41,6 +41,7 @@ from typing_extensions import TypedDict
 from hwid_cli.config.faults import Fault, missing, refused, unknown_key, wrong
 from hwid_cli.config.own_functions import OwnFunctionFile, read_own_function
 from hwid_cli.files.messages import is_plain
+from hwid_cli.records.drive import Repeatable
 from hwid_cli.records.model import FitOptions
 from hwid_cli.records.rules import Refusal, Refused, Rule, StandsFor
 
@@ -126,6 +127,8 @@ def _ruled(hint: Any, rules: tuple[Any, ...]) -> Any:
     for rule in rules:
         if isinstance(rule, StandsFor):
             readable = Annotated[readable | None, BeforeValidator(rule.read)]
+        elif isinstance(rule, Repeatable):
+            readable = Annotated[readable, BeforeValidator(rule.read)]
         elif isinstance(rule, Rule):
             readable = Annotated[readable, AfterValidator(rule.read)]
     return readable

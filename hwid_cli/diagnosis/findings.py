@@ -229,14 +229,15 @@ def _fitted_effects_of(
                 FittedParameter(one.parameter, float(value), float(low), float(high))
             )
     for identifier in ids:
-        which = identifier.partition(":")[2]
-        if which:
-            own = ParameterRef(identifier, f"log_{which}")
-            column = found.own_names.index(own)
-            parameters[identifier] = [
-                FittedParameter("which", float("nan"), text=which),
-                _spread(np.exp(found.own[:, column])),
-            ]
+        entry = CATALOGUE[identifier]
+        for name, word in entry.words.items():
+            told = FittedParameter(name, float("nan"), text=word)
+            parameters[identifier].append(told)
+        for one in entry.parameters:
+            if one.is_factor:
+                own = ParameterRef(identifier, one.name)
+                column = found.own_names.index(own)
+                parameters[identifier].append(_spread(np.exp(found.own[:, column])))
     return tuple(_described(one, parameters[one]) for one in ids)
 
 

@@ -3,7 +3,12 @@
 The only list: of the declarations in ``effects``, one module for each family. To add an
 effect: its declaration there, its term in a kernel, its test; then
 ``make drive-source effects`` for what follows from the declaration.
+
+Several entries may have one public id, the part before the colon: with another word of
+the configuration, with a richer law, or a second one of its kind.
 """
+
+from collections.abc import Collection, Mapping
 
 from hwid_cli.drive.effect import Effect, Stated
 from hwid_cli.drive.effects import change, command, coupling, friction, sensor, spring
@@ -28,4 +33,62 @@ def public_id(identifier: str) -> str:
 
 def configured_effects() -> dict[str, tuple[Stated, ...]]:
     """What a configuration states for each effect, by its public id."""
-    return {public_id(one.id): one.keys() for one in CATALOGUE.values()}
+    keys: dict[str, dict[str, Stated]] = {}
+    for entry in CATALOGUE.values():
+        known = keys.setdefault(public_id(entry.id), {})
+        for one in entry.keys():
+            known.setdefault(one.name, one)
+    return {name: tuple(known.values()) for name, known in keys.items()}
+
+
+def entry_of(identifier: str, stated: Mapping[str, float | str]) -> Effect | None:
+    """Entry for an effect as a configuration states it: the simplest that holds it.
+
+    Parameters
+    ----------
+    identifier : str
+        Public id, with a mark where it is the second one; or the id of an entry.
+    stated : mapping of str to float or str
+        Numbers and words by the keys of the configuration.
+
+    Returns
+    -------
+    Effect or None
+        None where the catalogue has no such entry.
+
+    Examples
+    --------
+    >>> entry_of("parameter_change", {"which": "damping", "spread": 0.1}).id
+    'parameter_change:damping'
+    """
+    name, _, mark = identifier.partition(":")
+    given = CATALOGUE.get(identifier)
+    if given is not None and mark and not given.beside:
+        return given
+    same = [
+        one
+        for one in CATALOGUE.values()
+        if public_id(one.id) == name
+        and all(stated.get(key) == word for key, word in one.words.items())
+    ]
+    seconds = [one for one in same if one.beside]
+    same = seconds if mark and seconds else [one for one in same if not one.beside]
+    return next(
+        (one for one in same if set(stated) <= {key.name for key in one.keys()}),
+        given,
+    )
+
+
+def may_be_added(identifier: str, present: Collection[str]) -> bool:
+    """Whether a simulation that holds some effects may get this one as well.
+
+    Parameters
+    ----------
+    identifier : str
+        Id of the entry.
+    present : collection of str
+        Ids of the entries that it holds.
+    """
+    name, beside = public_id(identifier), CATALOGUE[identifier].beside
+    same = [one for one in present if public_id(one) == name]
+    return len(same) == 1 if beside else not same

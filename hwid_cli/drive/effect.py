@@ -203,10 +203,14 @@ class Effect:
     needs_spring : bool
         Whether it means nothing on a free axis.
     seen : callable or None
-        Values to start from that the recordings show, from the scales; where there are
-        some they stand in for the parameters' own.
+        Values to start from that belong together, from the scales: what the recordings
+        show, say. Where there are some they stand in for the parameters' own.
     stated : tuple of Stated
         What a configuration states where that is not the parameters.
+    words : mapping of str to str
+        What it states in words for this one of several entries with one public id.
+    beside : str
+        Id of the entry of which this is the second one; without that it means nothing.
     """
 
     id: str
@@ -220,6 +224,8 @@ class Effect:
     needs_spring: bool = False
     seen: Callable[[Scales], tuple[dict[str, float], ...]] | None = None
     stated: tuple[Stated, ...] = ()
+    words: Mapping[str, str] = field(default_factory=dict)
+    beside: str = ""
 
     def starts(self, scales: Scales) -> list[dict[str, float]]:
         """List what the recordings show, or all combinations of start values."""

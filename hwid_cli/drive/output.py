@@ -7,7 +7,7 @@ import numpy as np
 from numba import njit
 
 from hwid_cli.drive import slots
-from hwid_cli.drive.compiled import INNER
+from hwid_cli.drive.compiled import INNER, MAKING
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -50,7 +50,7 @@ def sensed(y: float, time: float, p: np.ndarray) -> float:
     return y
 
 
-@njit(**INNER)
+@njit(**MAKING)
 def _play(
     positions: np.ndarray,
     velocities: np.ndarray,

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.interpolate import make_interp_spline
 
 from hwid_cli.drive import slots
-from hwid_cli.drive.catalogue import CATALOGUE
+from hwid_cli.drive.catalogue import CATALOGUE, entry_of
 from hwid_cli.drive.effect import Effect, Values
 from hwid_cli.drive.motion.move import move
 from hwid_cli.drive.output import read
@@ -237,17 +237,28 @@ def drive_effects(drive: Drive) -> dict[str, dict[str, float]]:
     dict of str to dict of str to float
         With the defaults of what is not stated, except where each recording has its own
         value. A change between recordings becomes none.
+
+    Raises
+    ------
+    ValueError
+        If the same entry of the catalogue is stated twice.
     """
     effects: dict[str, dict[str, float]] = {}
     for identifier, values in drive.effects.items():
-        if identifier == "parameter_change":
-            which = str(values["which"])
-            effects[f"{identifier}:{which}"] = {f"log_{which}": 0.0}
-            continue
-        effects[identifier] = {name: float(one) for name, one in values.items()}
-        for one in CATALOGUE[identifier].parameters if identifier in CATALOGUE else ():
-            if one.default is not None and not one.is_own:
-                effects[identifier].setdefault(one.name, one.default)
+        entry = entry_of(identifier, values)
+        name = identifier if entry is None else entry.id
+        if name in effects:
+            raise ValueError(f"effect {name!r} is there twice")
+        others = () if entry is None else entry.stated
+        known = {one.name for one in others}
+        parameters = () if entry is None else entry.parameters
+        known -= {one.name for one in parameters}
+        effects[name] = {
+            key: float(one) for key, one in values.items() if key not in known
+        }
+        for one in parameters:
+            if one.default is not None and (one.is_factor or not one.is_own):
+                effects[name].setdefault(one.name, one.default)
     return effects
 
 

@@ -69,5 +69,34 @@ that is switched off is 0, except where the comment says infinite.
     START_VELOCITY,
     IS_START_GIVEN,
     OUTPUT_ZERO,  # position at which the sensor reads 0
+    # Set by the simulation: what it has of what few drives have.
+    HAS_MORE,  # a force on the mass
+    HAS_FURTHER_EDGES,  # a further corner of a force
+    HAS_ZERO_EDGE,  # a force with a corner at 0
+    HAS_CONTACT,  # a stop whose force is curved
+    DRIVE_VARIES,  # a force of the motor that varies, or friction that follows it
+    CAPTURE_TIME,  # within which a preload brings a drive back that it catches
+    SPRING_SHARE,
+    DRIVE_SHARE,
+    WAVY_PERIOD,
+    WAVY_PHASE,
+    WAVY_FRICTION,
+    PRELOAD,
+    STOP_LOSS,
+    STOP_BEND,
+    SIDE_LOSS,
+    SIDE_BEND,
+    SECOND_POSITION,
+    SECOND_STIFFNESS,
+    SECOND_LOSS,
+    SECOND_BEND,
+    SECOND_COGGING_FORCE,
+    SECOND_COGGING_PERIOD,
+    SECOND_COGGING_PHASE,
+    GRAVITY_TORQUE,
+    GRAVITY_ANGLE,
+    RIPPLE_SHARE,
+    RIPPLE_PER_TURN,
+    RIPPLE_PHASE,
     N_SLOTS,
-) = range(64)
+) = range(92)

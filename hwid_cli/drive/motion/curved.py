@@ -7,7 +7,7 @@ import numpy as np
 from numba import njit
 
 from hwid_cli.drive import slots
-from hwid_cli.drive.compiled import INNER
+from hwid_cli.drive.compiled import INNER, MAKING
 from hwid_cli.drive.motion.forces import (
     MOTOR_V,
     N_STATE,
@@ -17,8 +17,12 @@ from hwid_cli.drive.motion.forces import (
     V,
     X,
     acceleration,
+    beyond,
+    beyond_side,
+    drive_now,
     is_force_curved,
     resisting,
+    ripple,
     spring_rate,
 )
 from hwid_cli.drive.motion.push import (
@@ -28,6 +32,7 @@ from hwid_cli.drive.motion.push import (
     depends_on_motion,
     has_losses,
     shift,
+    value_of,
 )
 
 # Beyond this many Stribeck velocities the excess is below rounding, exp(-6.1^2); and
@@ -35,6 +40,8 @@ from hwid_cli.drive.motion.push import (
 FAST, FAR = 6.1, 37.0
 # A step is so short that no smooth force turns by more than this, [rad].
 LONGEST_PHASE = 0.3
+# A contact's force begins with an edge in its slope: its steps are this much shorter.
+CONTACT_FINER = 2.0
 
 
 @njit(**INNER)
@@ -64,8 +71,53 @@ def is_curved_here(state: np.ndarray, memory: np.ndarray, p: np.ndarray) -> bool
             return True
     if p[slots.HYSTERESIS_FORCE] != 0.0 and memory[WAY] != 0.0:
         gone = abs(state[X] - memory[TURNED_AT])
-        return gone < FAR * p[slots.HYSTERESIS_YIELD]
+        if gone < FAR * p[slots.HYSTERESIS_YIELD]:
+            return True
+    return p[slots.HAS_CONTACT] != 0.0 and _touches(state[X], p)
+
+
+@njit(**INNER)
+def _touches(x: float, p: np.ndarray) -> bool:
+    """Whether the drive is in a contact whose force is curved."""
+    if p[slots.STOP_BEND] + p[slots.STOP_LOSS] != 0.0:
+        if beyond(x, p[slots.STOP_POSITION]) != 0.0:
+            return True
+    if p[slots.SIDE_BEND] + p[slots.SIDE_LOSS] != 0.0:
+        if beyond_side(x, p[slots.SIDE_POSITION]) != 0.0:
+            return True
+    if p[slots.SECOND_BEND] + p[slots.SECOND_LOSS] != 0.0:
+        return beyond_side(x, p[slots.SECOND_POSITION]) != 0.0
     return False
+
+
+@njit(**INNER)
+def _contact_rate(x: float, v: float, mass: float, p: np.ndarray) -> float:
+    """Return how fast the motion in curved contacts turns."""
+    into = beyond(x, p[slots.STOP_POSITION])
+    bend, loss = p[slots.STOP_BEND], p[slots.STOP_LOSS]
+    rate = _rate_of_contact(into, v, mass, p[slots.STOP_STIFFNESS], bend, loss)
+    into = beyond_side(x, p[slots.SIDE_POSITION])
+    bend, loss = p[slots.SIDE_BEND], p[slots.SIDE_LOSS]
+    rate += _rate_of_contact(into, v, mass, p[slots.SIDE_STIFFNESS], bend, loss)
+    into = beyond_side(x, p[slots.SECOND_POSITION])
+    bend, loss = p[slots.SECOND_BEND], p[slots.SECOND_LOSS]
+    return rate + _rate_of_contact(into, v, mass, p[slots.SECOND_STIFFNESS], bend, loss)
+
+
+@njit(**INNER)
+def _rate_of_contact(
+    into: float, v: float, mass: float, stiffness: float, bend: float, loss: float
+) -> float:
+    """Return it for one contact, with its stiffness where the speed will be used up."""
+    if into == 0.0 or bend + loss == 0.0:
+        return 0.0
+    exponent = 1.0 + bend
+    energy = 0.5 * (exponent + 1.0) * mass * v * v / stiffness
+    deep = abs(into) + np.power(energy, 1.0 / (exponent + 1.0))
+    steep = stiffness * np.power(deep, bend) * (1.0 + loss * abs(v))
+    return CONTACT_FINER * (
+        np.sqrt(exponent * steep / mass) + loss * steep * deep / mass
+    )
 
 
 @njit(**INNER)
@@ -103,7 +155,14 @@ def step_limit(
         stiffness += abs(p[slots.COGGING_FORCE]) * turn
         # A forcing, not a motion of its own: it may turn further.
         damping += 0.12 * mass * turn * speed
-    rate = np.sqrt(stiffness / mass) + damping / mass
+    turning = 0.0
+    if p[slots.HAS_MORE] != 0.0 or p[slots.DRIVE_VARIES] != 0.0:
+        more, turning = _further_stiffness(state, push, done, p)
+        stiffness += more
+        turning *= 0.12 * speed
+    rate = np.sqrt(stiffness / mass) + damping / mass + turning
+    if p[slots.HAS_CONTACT] != 0.0:
+        rate += _contact_rate(x, v, mass, p)
     if p[slots.MODE_MASS] > 0.0:
         both = 1.0 / p[slots.MODE_MASS] + 1.0 / mass
         rate += np.sqrt(p[slots.MODE_STIFFNESS] * both) + p[slots.MODE_DAMPING] * both
@@ -116,6 +175,28 @@ def step_limit(
         pull = abs(acceleration(state, memory, push, done, p)[0])
         rate += abs(p[slots.STATIC_EXCESS]) / (mass * slow) + 0.5 * pull / slow
     return LONGEST_PHASE / max(rate, 1e-9)
+
+
+@njit(**INNER)
+def _further_stiffness(
+    state: np.ndarray, push: np.ndarray, done: float, p: np.ndarray
+) -> tuple[float, float]:
+    """Return stiffness and waves per metre of forces that repeat along the way."""
+    stiffness = waves = 0.0
+    if p[slots.SECOND_COGGING_FORCE] != 0.0:
+        turn = TURN / p[slots.SECOND_COGGING_PERIOD]
+        stiffness += abs(p[slots.SECOND_COGGING_FORCE]) * turn
+        waves += turn
+    if p[slots.WAVY_FRICTION] != 0.0:
+        turn = TURN / p[slots.WAVY_PERIOD]
+        stiffness += abs(p[slots.WAVY_FRICTION]) * turn
+        waves += turn
+    if p[slots.RIPPLE_SHARE] != 0.0:
+        turn = p[slots.RIPPLE_PER_TURN]
+        force = abs(drive_now(state, push, done, p))
+        stiffness += abs(p[slots.RIPPLE_SHARE]) * force * turn
+        waves += turn
+    return stiffness, waves
 
 
 @njit(**INNER)
@@ -154,6 +235,8 @@ def step_plain(
         Since the start of the piece, and length of the step.
     p : ndarray, shape (N_SLOTS,)
     """
+    if p[slots.DRIVE_VARIES] != 0.0:
+        return _step_varying(x, v, memory, push, done, h, p)
     half, inverse = 0.5 * h, 1.0 / p[slots.MASS]
     a0, b0, c0, d0 = shift(push, DRIVE, done)
     a1, b1, c1, d1 = shift(push, OTHER, done)
@@ -174,6 +257,35 @@ def step_plain(
 
 
 @njit(**INNER)
+def _step_varying(
+    x: float,
+    v: float,
+    memory: np.ndarray,
+    push: np.ndarray,
+    done: float,
+    h: float,
+    p: np.ndarray,
+) -> tuple[float, float]:
+    """Step where the motor's force depends on position, or friction on that force."""
+    inverse = 1.0 / p[slots.MASS]
+    xs, vs = x, v
+    x1, v1 = x, v
+    for stage in range(4):
+        at = done + (0.0 if stage == 0 else (h if stage == 3 else 0.5 * h))
+        drive = value_of(push, DRIVE, at) * ripple(xs, p)
+        net = drive + value_of(push, OTHER, at) - resisting(xs, vs, memory, p)
+        net -= memory[WAY] * p[slots.DRIVE_SHARE] * abs(drive)
+        slope = vs
+        weight = h / 6.0 if stage in (0, 3) else h / 3.0
+        x1 += weight * slope
+        v1 += weight * net * inverse
+        way = h if stage == 2 else 0.5 * h
+        xs = x + way * slope
+        vs = v + way * net * inverse
+    return x1, v1
+
+
+@njit(**MAKING)
 def step_all(
     state: np.ndarray,
     trial: np.ndarray,
