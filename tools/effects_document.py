@@ -14,7 +14,7 @@ from pathlib import Path
 # Run as a file, Python looks for modules beside it and not in the project.
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from hwid_cli.drive.catalogue import CATALOGUE, configured_effects
+from hwid_cli.drive.catalogue import CATALOGUE, configured_effects, public_id
 from hwid_cli.drive.effect import Effect, Parameter, Scales, Stated
 from hwid_cli.report.diagnosis import quantity_and_unit
 from tools.effects_figures import SCALES, draw
@@ -55,21 +55,26 @@ lack along that motion (right): a force, or an error of the sensor.
 Start values and bounds of the search scale with the recordings: X largest displacement, V largest velocity, I largest current,
 R largest rate of the current, S stroke, F = kt I, M mass, fn natural frequency, Ts sample time, T longest recording.
 """
+CHANGE = "parameter_change"
 CHANGE_SENTENCE = (
     "The stiffness, the force constant or the damping differs from recording to recording by more than chance. "
     "Each recording gets its own value; the report gives which parameter and the relative standard deviation (`spread`)."
 )
 
 
-def plain_effects() -> list[Effect]:
-    """Effects that are one entry of the catalogue each.
+def effects_by_public_id() -> dict[str, list[Effect]]:
+    """Entries of the catalogue by their public ids, the simplest first.
 
     Returns
     -------
-    list of Effect
-        All but ``parameter_change``, of which there is one for each parameter.
+    dict of str to list of Effect
+        Without ``parameter_change``, of which there is one for each parameter.
     """
-    return [one for one in CATALOGUE.values() if ":" not in one.id]
+    found: dict[str, list[Effect]] = {}
+    for one in CATALOGUE.values():
+        if public_id(one.id) != CHANGE:
+            found.setdefault(public_id(one.id), []).append(one)
+    return found
 
 
 def document() -> str:
@@ -79,53 +84,78 @@ def document() -> str:
     -------
     str
     """
-    plain = plain_effects()
-    rows = [f"| [{one.id}](#{one.id}) | {one.sentence} |" for one in plain]
-    rows.append(
-        "| [parameter_change](#parameter_change) | a parameter differs between recordings |"
-    )
+    entries = effects_by_public_id()
+    rows = [
+        f"| [{name}](#{name}) | {_sentence(same)} |" for name, same in entries.items()
+    ]
+    rows.append(f"| [{CHANGE}](#{CHANGE}) | a parameter differs between recordings |")
     parts = [HEAD, "\n".join(["| id | what it is |", "|---|---|", *rows])]
-    parts += [_section(one) for one in plain]
+    parts += [_section(name, same) for name, same in entries.items()]
     parts.append(_change())
     return "\n\n".join(part.strip("\n") for part in parts) + "\n"
 
 
-def _section(effect: Effect) -> str:
+def _section(name: str, entries: Sequence[Effect]) -> str:
+    first = entries[0]
+    known = {one.name: one for entry in entries for one in entry.parameters}
     lines = [
-        f"## {effect.id}",
+        f"## {name}",
         "",
-        _claim(effect),
+        _claim(entries),
         "",
-        f"    {effect.equation}",
+        *(f"    {law}" for law in _laws(entries)),
         "",
         "| parameter | unit | starts | bounds |",
         "|---|---|---|---|",
-        *(_row(one) for one in effect.parameters),
+        *(_row(one) for one in known.values()),
         "",
-        f"Enters {ENTERS[effect.enters]}.",
+        f"Enters {ENTERS[first.enters]}.",
     ]
-    if effect.contains:
-        names = ", ".join(f"`{one}`" for one in effect.contains)
+    if first.contains:
+        names = ", ".join(f"`{one}`" for one in first.contains)
         lines[-1] += f" Contains {names} as a limit."
-    if effect.needs_spring:
+    if all(one.needs_spring for one in entries):
         lines[-1] += " Means nothing on a free axis."
-    if effect.confused_with:
+    if any(one.beside for one in entries):
+        lines[-1] += " May occur twice."
+    for one in entries:
+        if one.words:
+            said = ", ".join(f"`{key}: {word}`" for key, word in one.words.items())
+            lines[-1] += f" {_claim([one])[:-1]}: {said}."
+    # The simplest entry says it best.
+    looks_like = {
+        other: what
+        for one in reversed(entries)
+        for other, what in one.confused_with.items()
+    }
+    if looks_like:
         lines += ["", "Looks like:", ""]
         lines += [
-            f"- `{other}`; told apart by {what}."
-            for other, what in effect.confused_with.items()
+            f"- `{other}`; told apart by {what}." for other, what in looks_like.items()
         ]
-    lines += ["", f"![{effect.id}](figures/effects/{effect.id}.png)"]
+    lines += ["", f"![{name}](figures/effects/{name}.png)"]
     return "\n".join(lines)
 
 
-def _claim(effect: Effect) -> str:
-    return f"{effect.sentence[0].upper()}{effect.sentence[1:]}."
+def _laws(entries: Sequence[Effect]) -> list[str]:
+    """Different laws of entries with one public id."""
+    return list(dict.fromkeys(one.equation for one in entries))
+
+
+def _sentence(entries: Sequence[Effect]) -> str:
+    """What it is; of entries that a word tells apart, what each is."""
+    told = [one.sentence for one in entries if one.words] or [entries[0].sentence]
+    return "; or ".join(told)
+
+
+def _claim(entries: Sequence[Effect]) -> str:
+    sentence = _sentence(entries)
+    return f"{sentence[0].upper()}{sentence[1:]}."
 
 
 def _change() -> str:
-    changes = [one for one in CATALOGUE.values() if ":" in one.id]
-    lines = ["## parameter_change", "", CHANGE_SENTENCE, ""]
+    changes = [one for one in CATALOGUE.values() if public_id(one.id) == CHANGE]
+    lines = [f"## {CHANGE}", "", CHANGE_SENTENCE, ""]
     lines += [f"    {one.equation}" for one in changes]
     lines += ["", "Looks like:", ""]
     others = {
@@ -157,8 +187,11 @@ def readme(text: str) -> str:
     """
     before, _, rest = text.partition(TABLE_HEAD)
     after = rest[rest.index("\n\n") :]
-    laws = {one.id: f"{_claim(one)} {one.equation}" for one in plain_effects()}
-    laws["parameter_change"] = "A parameter differs between recordings."
+    laws = {
+        name: f"{_claim(same)} {'; or '.join(_laws(same))}"
+        for name, same in effects_by_public_id().items()
+    }
+    laws[CHANGE] = "A parameter differs between recordings."
     rows = [
         f"| `{name}` | {laws[name].replace('|', BAR)} | {_keys(keys)} |"
         for name, keys in configured_effects().items()
@@ -245,8 +278,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for path, text in texts.items():
         path.write_text(text)
     FIGURES.mkdir(parents=True, exist_ok=True)
-    for effect in plain_effects():
-        draw(effect, FIGURES / f"{effect.id}.png")
+    for name, same in effects_by_public_id().items():
+        draw(same[0], FIGURES / f"{name}.png")
     return 0
 
 

@@ -233,9 +233,9 @@ def _fitted_effects_of(
         for name, word in entry.words.items():
             told = FittedParameter(name, float("nan"), text=word)
             parameters[identifier].append(told)
-        for one in entry.parameters:
-            if one.is_factor:
-                own = ParameterRef(identifier, one.name)
+        for parameter in entry.parameters:
+            if parameter.is_factor:
+                own = ParameterRef(identifier, parameter.name)
                 column = found.own_names.index(own)
                 parameters[identifier].append(_spread(np.exp(found.own[:, column])))
     return tuple(_described(one, parameters[one]) for one in ids)

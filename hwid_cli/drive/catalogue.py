@@ -36,7 +36,7 @@ def configured_effects() -> dict[str, tuple[Stated, ...]]:
     keys: dict[str, dict[str, Stated]] = {}
     for entry in CATALOGUE.values():
         known = keys.setdefault(public_id(entry.id), {})
-        for one in entry.keys():
+        for one in entry.stated_keys():
             known.setdefault(one.name, one)
     return {name: tuple(known.values()) for name, known in keys.items()}
 
@@ -74,7 +74,7 @@ def entry_of(identifier: str, stated: Mapping[str, float | str]) -> Effect | Non
     seconds = [one for one in same if one.beside]
     same = seconds if mark and seconds else [one for one in same if not one.beside]
     return next(
-        (one for one in same if set(stated) <= {key.name for key in one.keys()}),
+        (one for one in same if set(stated) <= {key.name for key in one.stated_keys()}),
         given,
     )
 

@@ -235,7 +235,7 @@ class Effect:
         grids = [one.starts(scales) for one in self.parameters]
         return [dict(zip(names, values, strict=True)) for values in product(*grids)]
 
-    def keys(self) -> tuple[Stated, ...]:
+    def stated_keys(self) -> tuple[Stated, ...]:
         """What a configuration states, key by key."""
         return self.stated or tuple(
             Stated(one.name, one.limits, is_needed=one.default is None)

@@ -30,7 +30,7 @@ BASE_PARAMETERS = (
 CHANGING = ("stiffness", "force_constant", "damping")
 # Marks the id of an effect that is there for the second time.
 SECOND = ":second"
-EffectValues = Mapping[str, float | str]
+EffectValues = dict[str, float | str]
 
 
 def told_apart(
@@ -40,7 +40,7 @@ def told_apart(
 
     Parameters
     ----------
-    effects : iterable of (str, mapping of str to float or str)
+    effects : iterable of (str, dict of str to float or str)
         Ids and parameters.
 
     Raises

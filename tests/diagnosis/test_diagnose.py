@@ -61,7 +61,20 @@ def test_what_makes_no_sense_for_a_drive_is_not_tried(changes, lost):
     of = problem(recordings(), **changes)
     allowed = set(allowed_effects(of, DiagnoseOptions()))
     assert lost
-    assert allowed == set(CATALOGUE) - lost
+    seconds = {name for name, one in CATALOGUE.items() if one.beside}
+    assert allowed == set(CATALOGUE) - lost - seconds
+
+
+def test_a_second_one_is_tried_where_the_simulation_has_the_first():
+    stop = {"position_m": 0.01, "stiffness_N_per_m": 1e4}
+    one = problem(recordings(), effects={"one_sided_stop": stop})
+    both = {"one_sided_stop": stop, "one_sided_stop:second": stop}
+    two = problem(recordings(), effects=both)
+    stops = [
+        {name for name in allowed_effects(of, DiagnoseOptions()) if "one_sided" in name}
+        for of in (one, two)
+    ]
+    assert stops == [{"one_sided_stop:second", "one_sided_stop:second_contact"}, set()]
 
 
 def test_two_recordings_show_no_change_between_recordings():

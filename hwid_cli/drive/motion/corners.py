@@ -102,9 +102,7 @@ def corner_of(
 
 
 @njit(**INNER)
-def _further_corner(
-    code: int, state: np.ndarray, command: float, p: np.ndarray
-) -> int:
+def _further_corner(code: int, state: np.ndarray, command: float, p: np.ndarray) -> int:
     """Number that tells the sides of the edges that few drives have, too."""
     x = state[X]
     if p[slots.SECOND_STIFFNESS] > 0.0:

@@ -79,15 +79,14 @@ def is_curved_here(state: np.ndarray, memory: np.ndarray, p: np.ndarray) -> bool
 @njit(**INNER)
 def _touches(x: float, p: np.ndarray) -> bool:
     """Whether the drive is in a contact whose force is curved."""
-    if p[slots.STOP_BEND] + p[slots.STOP_LOSS] != 0.0:
-        if beyond(x, p[slots.STOP_POSITION]) != 0.0:
-            return True
-    if p[slots.SIDE_BEND] + p[slots.SIDE_LOSS] != 0.0:
-        if beyond_side(x, p[slots.SIDE_POSITION]) != 0.0:
-            return True
-    if p[slots.SECOND_BEND] + p[slots.SECOND_LOSS] != 0.0:
-        return beyond_side(x, p[slots.SECOND_POSITION]) != 0.0
-    return False
+    is_bent = p[slots.STOP_BEND] + p[slots.STOP_LOSS] != 0.0
+    if is_bent and beyond(x, p[slots.STOP_POSITION]) != 0.0:
+        return True
+    is_bent = p[slots.SIDE_BEND] + p[slots.SIDE_LOSS] != 0.0
+    if is_bent and beyond_side(x, p[slots.SIDE_POSITION]) != 0.0:
+        return True
+    is_bent = p[slots.SECOND_BEND] + p[slots.SECOND_LOSS] != 0.0
+    return is_bent and beyond_side(x, p[slots.SECOND_POSITION]) != 0.0
 
 
 @njit(**INNER)

@@ -192,13 +192,12 @@ def spring_rate(x: float, p: np.ndarray) -> float:
     if p[slots.CUBIC] != 0.0 or p[slots.QUADRATIC] != 0.0:
         bend = 3.0 * p[slots.CUBIC] * x + 2.0 * p[slots.QUADRATIC]
         stiffness += abs(bend * x)
-    if p[slots.STOP_STIFFNESS] > 0.0 and abs(x) > p[slots.STOP_POSITION]:
-        if p[slots.STOP_BEND] + p[slots.STOP_LOSS] == 0.0:
-            stiffness += p[slots.STOP_STIFFNESS]
-    edge = p[slots.SIDE_POSITION]
-    if p[slots.SIDE_STIFFNESS] > 0.0 and (x - edge) * edge > 0.0:
-        if p[slots.SIDE_BEND] + p[slots.SIDE_LOSS] == 0.0:
-            stiffness += p[slots.SIDE_STIFFNESS]
+    is_plain = p[slots.STOP_BEND] + p[slots.STOP_LOSS] == 0.0
+    if is_plain and abs(x) > p[slots.STOP_POSITION]:
+        stiffness += p[slots.STOP_STIFFNESS]
+    is_plain = p[slots.SIDE_BEND] + p[slots.SIDE_LOSS] == 0.0
+    if is_plain and beyond_side(x, p[slots.SIDE_POSITION]) != 0.0:
+        stiffness += p[slots.SIDE_STIFFNESS]
     if p[slots.HAS_MORE] != 0.0:
         stiffness += abs(p[slots.GRAVITY_TORQUE])
         stiffness += p[slots.SPRING_SHARE] * p[slots.STIFFNESS]

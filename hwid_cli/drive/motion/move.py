@@ -160,6 +160,7 @@ def _kind_of(p: np.ndarray) -> tuple[bool, bool, bool, bool, bool, float]:
     )
     is_watched = has_dry_friction(p) or p[slots.HYSTERESIS_FORCE] != 0.0
     at_times = p[slots.STATIC_EXCESS] != 0.0 or p[slots.HYSTERESIS_FORCE] != 0.0
+    at_times = at_times or p[slots.HAS_CONTACT] != 0.0
     return (
         has_inner,
         count_edges(p) > 0,

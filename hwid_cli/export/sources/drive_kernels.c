@@ -65,33 +65,34 @@ enum {
     IS_START_GIVEN = 61,
     OUTPUT_ZERO = 62,
     HAS_MORE = 63,
-    HAS_ZERO_EDGE = 64,
-    HAS_CONTACT = 65,
-    DRIVE_VARIES = 66,
-    CAPTURE_TIME = 67,
-    SPRING_SHARE = 68,
-    DRIVE_SHARE = 69,
-    WAVY_PERIOD = 70,
-    WAVY_PHASE = 71,
-    WAVY_FRICTION = 72,
-    PRELOAD = 73,
-    STOP_LOSS = 74,
-    STOP_BEND = 75,
-    SIDE_LOSS = 76,
-    SIDE_BEND = 77,
-    SECOND_POSITION = 78,
-    SECOND_STIFFNESS = 79,
-    SECOND_LOSS = 80,
-    SECOND_BEND = 81,
-    SECOND_COGGING_FORCE = 82,
-    SECOND_COGGING_PERIOD = 83,
-    SECOND_COGGING_PHASE = 84,
-    GRAVITY_TORQUE = 85,
-    GRAVITY_ANGLE = 86,
-    RIPPLE_SHARE = 87,
-    RIPPLE_PER_TURN = 88,
-    RIPPLE_PHASE = 89,
-    N_SLOTS = 90,
+    HAS_FURTHER_EDGES = 64,
+    HAS_ZERO_EDGE = 65,
+    HAS_CONTACT = 66,
+    DRIVE_VARIES = 67,
+    CAPTURE_TIME = 68,
+    SPRING_SHARE = 69,
+    DRIVE_SHARE = 70,
+    WAVY_PERIOD = 71,
+    WAVY_PHASE = 72,
+    WAVY_FRICTION = 73,
+    PRELOAD = 74,
+    STOP_LOSS = 75,
+    STOP_BEND = 76,
+    SIDE_LOSS = 77,
+    SIDE_BEND = 78,
+    SECOND_POSITION = 79,
+    SECOND_STIFFNESS = 80,
+    SECOND_LOSS = 81,
+    SECOND_BEND = 82,
+    SECOND_COGGING_FORCE = 83,
+    SECOND_COGGING_PERIOD = 84,
+    SECOND_COGGING_PHASE = 85,
+    GRAVITY_TORQUE = 86,
+    GRAVITY_ANGLE = 87,
+    RIPPLE_SHARE = 88,
+    RIPPLE_PER_TURN = 89,
+    RIPPLE_PHASE = 90,
+    N_SLOTS = 91,
     MOST_PIECES = 40,
     DRIVE = 0,
     OTHER = 4,
@@ -864,23 +865,19 @@ static double drive_spring_rate(double x, double *p)
 {
     double stiffness = 0.0;
     double bend = 0.0;
-    double edge = 0.0;
     int is_plain = 0;
     stiffness = p[STIFFNESS];
     if ((p[CUBIC] != 0.0) || (p[QUADRATIC] != 0.0)) {
         bend = ((3.0 * p[CUBIC]) * x) + (2.0 * p[QUADRATIC]);
         stiffness += fabs(bend * x);
     }
-    if ((p[STOP_STIFFNESS] > 0.0) && (fabs(x) > p[STOP_POSITION])) {
-        if ((p[STOP_BEND] + p[STOP_LOSS]) == 0.0) {
-            stiffness += p[STOP_STIFFNESS];
-        }
+    is_plain = (p[STOP_BEND] + p[STOP_LOSS]) == 0.0;
+    if (is_plain && (fabs(x) > p[STOP_POSITION])) {
+        stiffness += p[STOP_STIFFNESS];
     }
-    edge = p[SIDE_POSITION];
-    if ((p[SIDE_STIFFNESS] > 0.0) && (((x - edge) * edge) > 0.0)) {
-        if ((p[SIDE_BEND] + p[SIDE_LOSS]) == 0.0) {
-            stiffness += p[SIDE_STIFFNESS];
-        }
+    is_plain = (p[SIDE_BEND] + p[SIDE_LOSS]) == 0.0;
+    if (is_plain && (drive_beyond_side(x, p[SIDE_POSITION]) != 0.0)) {
+        stiffness += p[SIDE_STIFFNESS];
     }
     if (p[HAS_MORE] != 0.0) {
         stiffness += fabs(p[GRAVITY_TORQUE]);
@@ -1058,6 +1055,27 @@ static double drive_pushing(double *state, double command, double *p)
     return drive_depends_on_motion(p) ? drive_drawn_current(command, state, p) : command;
 }
 
+static int drive_further_corner(int code, double *state, double command, double *p)
+{
+    double x = 0.0;
+    double edge = 0.0;
+    x = state[X];
+    if (p[SECOND_STIFFNESS] > 0.0) {
+        edge = p[SECOND_POSITION];
+        code *= 3;
+        if (((x - edge) * edge) > 0.0) {
+            code += 1;
+        }
+    }
+    if (p[HAS_ZERO_EDGE] != 0.0) {
+        code = (3 * code) + drive_side(x, 0.0);
+    }
+    if (p[DRIVE_SHARE] > 0.0) {
+        code = (3 * code) + drive_side(drive_pushing(state, command, p), 0.0);
+    }
+    return code;
+}
+
 static tuple_iddddd drive_corner_of(double *state, double command, double *p)
 {
     double x = 0.0;
@@ -1104,21 +1122,11 @@ static tuple_iddddd drive_corner_of(double *state, double command, double *p)
             offset -= p[SIDE_STIFFNESS] * edge;
         }
     }
-    if ((p[HAS_MORE] != 0.0) || (p[DRIVE_SHARE] > 0.0)) {
-        if (p[SECOND_STIFFNESS] > 0.0) {
-            edge = p[SECOND_POSITION];
-            code *= 3;
-            if (((x - edge) * edge) > 0.0) {
-                code += 1;
-                stiffness += p[SECOND_STIFFNESS];
-                offset -= p[SECOND_STIFFNESS] * edge;
-            }
-        }
-        if (p[HAS_ZERO_EDGE] != 0.0) {
-            code = (3 * code) + drive_side(x, 0.0);
-        }
-        if (p[DRIVE_SHARE] > 0.0) {
-            code = (3 * code) + drive_side(drive_pushing(state, command, p), 0.0);
+    if (p[HAS_FURTHER_EDGES] != 0.0) {
+        code = drive_further_corner(code, state, command, p);
+        if (((x - p[SECOND_POSITION]) * p[SECOND_POSITION]) > 0.0) {
+            stiffness += p[SECOND_STIFFNESS];
+            offset -= p[SECOND_STIFFNESS] * p[SECOND_POSITION];
         }
     }
     if (p[GEAR_STIFFNESS] > 0.0) {
@@ -1186,21 +1194,19 @@ static double drive_margin(double *state, double command, int corner, double *p)
         left = least(left, drive_inside_teeth(state, corner % 3, p) / p[GEAR_GAP]);
         corner /= 3;
     }
-    if ((p[HAS_MORE] != 0.0) || (p[DRIVE_SHARE] > 0.0)) {
-        if (p[DRIVE_SHARE] > 0.0) {
-            left = least(left, drive_inside(drive_pushing(state, command, p), 0.0, corner % 3));
-            corner /= 3;
-        }
-        if (p[HAS_ZERO_EDGE] != 0.0) {
-            left = least(left, drive_inside(x, 0.0, corner % 3));
-            corner /= 3;
-        }
-        if (p[SECOND_STIFFNESS] > 0.0) {
-            edge = p[SECOND_POSITION];
-            into = (x - edge) * sign_of(edge);
-            left = least(left, (((corner % 3) == 1) ? into : (-into)) / fabs(edge));
-            corner /= 3;
-        }
+    if (p[DRIVE_SHARE] > 0.0) {
+        left = least(left, drive_inside(drive_pushing(state, command, p), 0.0, corner % 3));
+        corner /= 3;
+    }
+    if (p[HAS_ZERO_EDGE] != 0.0) {
+        left = least(left, drive_inside(x, 0.0, corner % 3));
+        corner /= 3;
+    }
+    if (p[SECOND_STIFFNESS] > 0.0) {
+        edge = p[SECOND_POSITION];
+        into = (x - edge) * sign_of(edge);
+        left = least(left, (((corner % 3) == 1) ? into : (-into)) / fabs(edge));
+        corner /= 3;
     }
     if (p[SIDE_STIFFNESS] > 0.0) {
         edge = p[SIDE_POSITION];
@@ -1227,20 +1233,17 @@ static int drive_is_always_curved(double *p)
 
 static int drive_touches(double x, double *p)
 {
-    if ((p[STOP_BEND] + p[STOP_LOSS]) != 0.0) {
-        if (drive_beyond(x, p[STOP_POSITION]) != 0.0) {
-            return 1;
-        }
+    int is_bent = 0;
+    is_bent = (p[STOP_BEND] + p[STOP_LOSS]) != 0.0;
+    if (is_bent && (drive_beyond(x, p[STOP_POSITION]) != 0.0)) {
+        return 1;
     }
-    if ((p[SIDE_BEND] + p[SIDE_LOSS]) != 0.0) {
-        if (drive_beyond_side(x, p[SIDE_POSITION]) != 0.0) {
-            return 1;
-        }
+    is_bent = (p[SIDE_BEND] + p[SIDE_LOSS]) != 0.0;
+    if (is_bent && (drive_beyond_side(x, p[SIDE_POSITION]) != 0.0)) {
+        return 1;
     }
-    if ((p[SECOND_BEND] + p[SECOND_LOSS]) != 0.0) {
-        return drive_beyond_side(x, p[SECOND_POSITION]) != 0.0;
-    }
-    return 0;
+    is_bent = (p[SECOND_BEND] + p[SECOND_LOSS]) != 0.0;
+    return is_bent && (drive_beyond_side(x, p[SECOND_POSITION]) != 0.0);
 }
 
 static int drive_is_curved_here(double *state, double *memory, double *p)
@@ -2179,6 +2182,7 @@ static tuple_iiiiid drive_kind_of(double *p)
     has_inner = (p[GEAR_STIFFNESS] > 0.0) || (p[MODE_MASS] > 0.0) || drive_depends_on_motion(p);
     is_watched = drive_has_dry_friction(p) || (p[HYSTERESIS_FORCE] != 0.0);
     at_times = (p[STATIC_EXCESS] != 0.0) || (p[HYSTERESIS_FORCE] != 0.0);
+    at_times = at_times || (p[HAS_CONTACT] != 0.0);
     return (tuple_iiiiid){has_inner, drive_count_edges(p) > 0, drive_is_always_curved(p), is_watched, at_times, drive_fastest(p)};
 }
 
@@ -2213,6 +2217,7 @@ static double drive_controlled(double reference, double x, double v, double *p)
 static void drive_take_stock(double sample_time, double *p)
 {
     int has_zero_edge = 0;
+    int has_edges = 0;
     double contact = 0.0;
     int has_second = 0;
     int has_more = 0;
@@ -2220,6 +2225,9 @@ static void drive_take_stock(double sample_time, double *p)
     p[CAPTURE_TIME] = 0.02 * sample_time;
     has_zero_edge = (p[PRELOAD] > 0.0) || (p[SPRING_SHARE] > 0.0);
     p[HAS_ZERO_EDGE] = has_zero_edge ? 1.0 : 0.0;
+    has_edges = has_zero_edge || (p[DRIVE_SHARE] > 0.0);
+    has_edges = has_edges || (p[SECOND_STIFFNESS] > 0.0);
+    p[HAS_FURTHER_EDGES] = has_edges ? 1.0 : 0.0;
     contact = (p[STOP_BEND] + p[SIDE_BEND]) + p[SECOND_BEND];
     contact += (p[STOP_LOSS] + p[SIDE_LOSS]) + p[SECOND_LOSS];
     p[HAS_CONTACT] = (contact > 0.0) ? 1.0 : 0.0;
