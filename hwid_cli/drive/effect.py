@@ -123,6 +123,19 @@ class Limit:
 POSITIVE = Limit("a number > 0", lambda value: value > 0)
 # Of parameters that only switch their law off at 0.
 NOT_NEGATIVE = Limit("a number >= 0", lambda value: value >= 0)
+# Of exponents: below 1 a force would begin infinitely steep.
+AT_LEAST_1 = Limit("a number >= 1", lambda value: value >= 1)
+
+
+def bend(values: Values) -> float:
+    """By how much an exponent exceeds that of a straight law.
+
+    Parameters
+    ----------
+    values : mapping of str to float
+        With ``exponent``.
+    """
+    return values["exponent"] - 1.0
 
 
 @dataclass(frozen=True)

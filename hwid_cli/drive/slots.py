@@ -74,6 +74,7 @@ that is switched off is 0, except where the comment says infinite.
     HAS_FURTHER_EDGES,  # a further corner of a force
     HAS_ZERO_EDGE,  # a force with a corner at 0
     HAS_CONTACT,  # a stop whose force is curved
+    HAS_SHAPE,  # a hysteresis of another shape than Dahl's
     DRIVE_VARIES,  # a force of the motor that varies, or friction that follows it
     CAPTURE_TIME,  # within which a preload brings a drive back that it catches
     SPRING_SHARE,
@@ -98,5 +99,7 @@ that is switched off is 0, except where the comment says infinite.
     RIPPLE_SHARE,
     RIPPLE_PER_TURN,
     RIPPLE_PHASE,
+    HYSTERESIS_RATIO,
+    HYSTERESIS_BEND,
     N_SLOTS,
-) = range(92)
+) = range(95)

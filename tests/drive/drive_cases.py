@@ -76,6 +76,15 @@ SIDE_CONTACT = {
         "damping_s_per_m": 0.5,
     }
 }
+BOUC_WEN = {
+    "hysteresis": {
+        "force_N": 0.8,
+        "yield_m": 2e-4,
+        "exponent": 2.5,
+        "shape_ratio": 0.6,
+    }
+}
+SHAPED = {"hysteresis": {"force_N": 0.8, "yield_m": 1e-3, "shape_ratio": 3.0}}
 TWO_STOPS = {
     "one_sided_stop": {"position_m": -0.008, "stiffness_N_per_m": 1e4},
     "one_sided_stop:second": {"position_m": 0.011, "stiffness_N_per_m": 3e4},
@@ -117,7 +126,16 @@ SINGLE = {
     **RIPPLE,
 }
 # What it has of several entries of one id, and of two of a kind.
-VARIANTS = (SPRING_LOAD, DRIVE_LOAD, CONTACT, SIDE_CONTACT, TWO_STOPS, TWO_WAVES)
+VARIANTS = (
+    SPRING_LOAD,
+    DRIVE_LOAD,
+    CONTACT,
+    SIDE_CONTACT,
+    TWO_STOPS,
+    TWO_WAVES,
+    BOUC_WEN,
+    SHAPED,
+)
 # What the corners do to the drive of these tests.
 SCALES = Scales(
     displacement_m=0.02,
@@ -165,6 +183,7 @@ TOGETHER = (
     CONTACT | COULOMB,
     TWO_STOPS | COULOMB,
     TWO_STOPS | SPRING_LOAD,
+    BOUC_WEN | COULOMB,
 )
 # The oracle stops at many events here, or follows a stiff pair of masses.
 TOGETHER_SLOW = (
@@ -177,6 +196,7 @@ TOGETHER_SLOW = (
     RIPPLE | GEAR,
     SPRING_LOAD | MODE,
     DRIVE_LOAD | GEAR,
+    BOUC_WEN | MODE,
 )
 
 

@@ -393,7 +393,11 @@ class _Run:
             out[WARMTH] = ((lagged / one.reference) ** 2 - y[WARMTH]) / tau
         if one.has("hysteresis"):
             way = one.value("hysteresis", "yield_m", 1.0)
-            out[YIELDED] = y[V] * (1 - y[YIELDED] * self.way) / way
+            ahead = y[YIELDED] * self.way
+            ratio = one.value("hysteresis", "shape_ratio")
+            share = (math.copysign(1.0, ahead) + ratio) / (1 + ratio)
+            share *= abs(ahead) ** one.value("hysteresis", "exponent", 1.0)
+            out[YIELDED] = y[V] * (1 - share) / way
         if one.resistance and one.inductance:
             wanted = y[LAGGED] if one.has("actuator_lag") else self.current(t)
             drop = one.back_emf * self._speed(y) + one.resistance * y[CIRCUIT]

@@ -53,9 +53,13 @@ CURVED_M = {
 BENT_M = 4e-9
 # A rattling gear amplifies what both sides leave, the more without a spring.
 RATTLING_M = 2e-8
+# The same of what Runge-Kutta steps leave.
+CURVED_RATTLING_M = 6e-7
 
 
 def tolerance(effects):
+    if "gear_backlash" in effects and set(effects) & set(CURVED_M):
+        return CURVED_RATTLING_M
     bent = [BENT_M for one in effects.values() if "exponent" in one]
     return max([EXACT_M, *bent, *(CURVED_M.get(one, 0.0) for one in effects)])
 

@@ -1,8 +1,10 @@
 """Declarations of effects: what resists motion. docs/method_diagnosis.md, (D8), (D9)."""
 
+from dataclasses import replace
 from math import pi
 
 from hwid_cli.drive.effect import (
+    AT_LEAST_1,
     NOT_NEGATIVE,
     POSITIVE,
     Effect,
@@ -10,12 +12,14 @@ from hwid_cli.drive.effect import (
     Parameter,
     Stated,
     Values,
+    bend,
     shares_of,
     span_of,
 )
 
 # What the friction of a load can follow: its words, and the places of its share.
 LOADS = {"spring": "SPRING_SHARE", "drive": "DRIVE_SHARE"}
+_ABOVE_MINUS_1 = Limit("a number above -1", lambda value: value > -1)
 _AT_MOST_WHOLE = Limit("a share from 0 to 1", lambda value: 0 <= value <= 1)
 
 
@@ -208,6 +212,35 @@ POSITION = Effect(
     contains=("coulomb_friction",),
 )
 
+BOUC_WEN = replace(
+    HYSTERESIS,
+    id="hysteresis:bouc_wen",
+    sentence="friction that builds up after each reversal, of any Bouc-Wen shape",
+    equation="F = -Fh z, dz/dx = (1 - |z|^n (sgn(z dx) + r) / (1 + r)) / zy",
+    parameters=(
+        *HYSTERESIS.parameters,
+        Parameter(
+            "exponent",
+            lambda scales: (1.0, 2.0),
+            lambda scales: (1.0, 10.0),
+            default=1.0,
+            limits=(AT_LEAST_1,),
+        ),
+        # Of gamma to beta; at 1 the way back from a deflection is straight.
+        Parameter(
+            "shape_ratio",
+            lambda scales: (0.0, 1.0),
+            lambda scales: (-0.8, 20.0),
+            is_positive=False,
+            places=("HYSTERESIS_RATIO",),
+            default=0.0,
+            limits=(_ABOVE_MINUS_1,),
+        ),
+    ),
+    derived={"HYSTERESIS_BEND": bend},
+    contains=("hysteresis", *HYSTERESIS.contains),
+)
+
 DRAG = Effect(
     id="quadratic_drag",
     sentence="resistance that grows with the square of the velocity",
@@ -228,4 +261,4 @@ DRAG = Effect(
     },
 )
 
-EFFECTS = (COULOMB, ASYMMETRIC, STRIBECK, *LOAD, POSITION, HYSTERESIS, DRAG)
+EFFECTS = (COULOMB, ASYMMETRIC, STRIBECK, *LOAD, POSITION, HYSTERESIS, BOUC_WEN, DRAG)

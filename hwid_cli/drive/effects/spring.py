@@ -5,19 +5,17 @@ from functools import partial
 from math import pi
 
 from hwid_cli.drive.effect import (
+    AT_LEAST_1,
     NOT_NEGATIVE,
     POSITIVE,
     Effect,
-    Limit,
     Parameter,
     Scales,
-    Values,
+    bend,
     shares_of,
     span_of,
 )
 
-# Exponents of contacts; below 1 a contact would be infinitely stiff at first.
-_AT_LEAST_1 = Limit("a number >= 1", lambda value: value >= 1)
 # Depth at which contacts of other exponents start as stiff, as a share of the motion.
 _USUAL_DEPTH = 0.05
 
@@ -157,7 +155,7 @@ def _contact(stop: Effect, slots: str, sentence: str) -> Effect:
                 lambda scales: (1.0, 1.5),
                 lambda scales: (1.0, 3.0),
                 default=1.0,
-                limits=(_AT_LEAST_1,),
+                limits=(AT_LEAST_1,),
             ),
             Parameter(
                 "damping_s_per_m",
@@ -171,15 +169,11 @@ def _contact(stop: Effect, slots: str, sentence: str) -> Effect:
                 limits=(NOT_NEGATIVE,),
             ),
         ),
-        derived={f"{slots}_BEND": _bend},
+        derived={f"{slots}_BEND": bend},
         confused_with={"cubic_stiffness": "hits at several speeds"},
         contains=(stop.id, *stop.contains),
         seen=partial(_contact_starts, stop),
     )
-
-
-def _bend(value: Values) -> float:
-    return value["exponent"] - 1.0
 
 
 def _contact_starts(stop: Effect, scales: Scales) -> tuple[dict[str, float], ...]:

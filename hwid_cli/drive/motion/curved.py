@@ -9,11 +9,13 @@ from numba import njit
 from hwid_cli.drive import slots
 from hwid_cli.drive.compiled import INNER, MAKING
 from hwid_cli.drive.motion.forces import (
+    DEFLECTION,
     MOTOR_V,
     N_STATE,
     PART_V,
     TURNED_AT,
     WAY,
+    YIELDED,
     V,
     X,
     acceleration,
@@ -24,6 +26,7 @@ from hwid_cli.drive.motion.forces import (
     resisting,
     ripple,
     spring_rate,
+    yielding,
 )
 from hwid_cli.drive.motion.push import (
     DRIVE,
@@ -70,8 +73,10 @@ def is_curved_here(state: np.ndarray, memory: np.ndarray, p: np.ndarray) -> bool
         if memory[WAY] != 0.0 and speed < FAST * p[slots.STRIBECK_VELOCITY]:
             return True
     if p[slots.HYSTERESIS_FORCE] != 0.0 and memory[WAY] != 0.0:
+        if p[slots.HAS_SHAPE] != 0.0 and memory[WAY] != memory[DEFLECTION]:
+            return True
         gone = abs(state[X] - memory[TURNED_AT])
-        if gone < FAR * p[slots.HYSTERESIS_YIELD]:
+        if p[slots.HAS_SHAPE] == 0.0 and gone < FAR * p[slots.HYSTERESIS_YIELD]:
             return True
     return p[slots.HAS_CONTACT] != 0.0 and _touches(state[X], p)
 
@@ -203,6 +208,8 @@ def _rate_of_yielding(
     state: np.ndarray, memory: np.ndarray, mass: float, p: np.ndarray
 ) -> float:
     """Return how fast the hysteresis changes, as long as it has not yielded."""
+    if p[slots.HAS_SHAPE] != 0.0:
+        return _rate_in_shape(state, memory, mass, p)
     gone = abs(state[X] - memory[TURNED_AT]) / p[slots.HYSTERESIS_YIELD]
     if gone >= FAR:
         return 0.0
@@ -211,6 +218,22 @@ def _rate_of_yielding(
     # How much of it is left decides how exactly it has to be followed.
     speed = abs(state[V]) / p[slots.HYSTERESIS_YIELD]
     return np.sqrt(stiffness * fading / mass) + 0.6 * speed * np.sqrt(np.sqrt(fading))
+
+
+@njit(**INNER)
+def _rate_in_shape(
+    state: np.ndarray, memory: np.ndarray, mass: float, p: np.ndarray
+) -> float:
+    """Return it for a hysteresis of any shape."""
+    ahead = memory[WAY] * memory[DEFLECTION]
+    if memory[WAY] == 0.0 or 1.0 - ahead <= YIELDED:
+        return 0.0
+    exponent = 1.0 + p[slots.HYSTERESIS_BEND]
+    slope = max(yielding(ahead, p), 1.0 - ahead)
+    stiffness = slope * abs(p[slots.HYSTERESIS_FORCE]) / p[slots.HYSTERESIS_YIELD]
+    fading = min(0.5 * slope, 1.0)
+    speed = exponent * abs(state[V]) / p[slots.HYSTERESIS_YIELD]
+    return np.sqrt(stiffness / mass) + 0.6 * speed * np.sqrt(np.sqrt(fading))
 
 
 @njit(**INNER)

@@ -25,6 +25,9 @@ X, V, MOTOR_X, MOTOR_V, PART_X, PART_V, CIRCUIT, N_STATE = range(8)
 WAY, TURNED_AT, DEFLECTION, LAGGED, HEAT, SIDE, N_MEMORY = range(7)
 # Tries that bracket the position at rest, each this much further, and that narrow it.
 MOST_TRIES, FURTHER, NARROWING = 120, 1.3, 90
+# Length of a step along the deflection of a hysteresis, in yield lengths, and what is
+# left of it when it has yielded, [-].
+SHAPE_STEP, YIELDED = 0.1, 1e-14
 # Tries that find how far a motor on its tooth has turned, each far below the last one.
 MOST_TURNS = 60
 
@@ -372,7 +375,73 @@ def yielded(x: float, memory: np.ndarray, p: np.ndarray) -> float:
     if way == 0.0:
         return memory[DEFLECTION]
     gone = abs(x - memory[TURNED_AT]) / p[slots.HYSTERESIS_YIELD]
+    if p[slots.HAS_SHAPE] != 0.0:
+        return way * _yielded_in_shape(way * memory[DEFLECTION], gone, p)
     return way - (way - memory[DEFLECTION]) * np.exp(-gone)
+
+
+@njit(**INNER)
+def yielding(ahead: float, p: np.ndarray) -> float:
+    """Return how the deflection of a hysteresis of any shape grows, [1/yield length].
+
+    Parameters
+    ----------
+    ahead : float, [-]
+        Deflection in the direction of motion.
+    p : ndarray, shape (N_SLOTS,)
+    """
+    share = np.power(abs(ahead), 1.0 + p[slots.HYSTERESIS_BEND])
+    if ahead < 0.0:
+        share *= (p[slots.HYSTERESIS_RATIO] - 1.0) / (p[slots.HYSTERESIS_RATIO] + 1.0)
+    return 1.0 - share
+
+
+@njit(**INNER)
+def _yielded_in_shape(ahead: float, gone: float, p: np.ndarray) -> float:
+    """Return the deflection in the direction of motion after a way in yield lengths."""
+    count = np.ceil(gone * (1.0 + p[slots.HYSTERESIS_BEND]) / SHAPE_STEP)
+    h = gone / max(count, 1.0)
+    left = gone
+    while left > 0.5 * h and 1.0 - ahead > YIELDED:
+        step = h
+        after = _shape_step(ahead, step, p)
+        if ahead < 0.0 and after > 0.0:
+            # The law has an edge at 0: there first, by Simpson's rule.
+            rest = 1.0 / yielding(ahead, p) + 4.0 / yielding(0.5 * ahead, p)
+            step = min(-ahead * (rest + 1.0) / 6.0, h)
+            after = _shape_step(0.0, h - step, p)
+        ahead = after
+        left -= h
+    return min(ahead, 1.0)
+
+
+@njit(**INNER)
+def _shape_step(ahead: float, h: float, p: np.ndarray) -> float:
+    """Return the deflection one Runge-Kutta step on."""
+    k1 = yielding(ahead, p)
+    k2 = yielding(ahead + 0.5 * h * k1, p)
+    k3 = yielding(ahead + 0.5 * h * k2, p)
+    k4 = yielding(ahead + h * k3, p)
+    return ahead + h / 6.0 * (k1 + 2.0 * (k2 + k3) + k4)
+
+
+@njit(**INNER)
+def remember(x: float, memory: np.ndarray, p: np.ndarray) -> None:
+    """Keep how far a hysteresis of any shape has yielded, at the end of a step.
+
+    Parameters
+    ----------
+    x : float, [m]
+    memory : ndarray, shape (N_MEMORY,)
+        Changed in place.
+    p : ndarray, shape (N_SLOTS,)
+    """
+    way = memory[WAY]
+    if way == 0.0:
+        return
+    deflection = yielded(x, memory, p)
+    memory[DEFLECTION] = way if 1.0 - way * deflection <= YIELDED else deflection
+    memory[TURNED_AT] = x
 
 
 @njit(**INNER)

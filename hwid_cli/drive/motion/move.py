@@ -43,6 +43,7 @@ from hwid_cli.drive.motion.forces import (
     X,
     drawn_current,
     has_dry_friction,
+    remember,
     resting_force,
     resting_point,
 )
@@ -267,6 +268,8 @@ def _take_stock(sample_time: float, p: np.ndarray) -> None:
     has_more = has_more or p[slots.GRAVITY_TORQUE] != 0.0
     has_more = has_more or p[slots.WAVY_FRICTION] != 0.0
     p[slots.HAS_MORE] = 1.0 if has_more else 0.0
+    has_shape = p[slots.HYSTERESIS_BEND] != 0.0 or p[slots.HYSTERESIS_RATIO] != 0.0
+    p[slots.HAS_SHAPE] = 1.0 if has_shape else 0.0
     varies = p[slots.RIPPLE_SHARE] != 0.0 or p[slots.DRIVE_SHARE] > 0.0
     p[slots.DRIVE_VARIES] = 1.0 if varies else 0.0
 
@@ -356,6 +359,8 @@ def _move_piece(
         for n in range(N_STATE):
             state[n] = trial[n]
         done = length if h >= left * (1.0 - 1e-12) else done + h
+        if p[slots.HAS_SHAPE] != 0.0:
+            remember(state[X], memory, p)
         if is_leaving:
             # Whether the force here is a last bit above or below, it is growing.
             way = np.sign(excess(state, memory, push, done, p)[0])

@@ -18,7 +18,7 @@ from hwid_cli.drive.motion.events import (
     set_inputs,
     steady_force,
 )
-from hwid_cli.drive.motion.forces import WAY, V, X
+from hwid_cli.drive.motion.forces import WAY, V, X, remember
 from hwid_cli.drive.motion.linear import (
     DRIVEN,
     N_STATE,
@@ -204,6 +204,8 @@ def glide_plain(
             if (is_watched and way * v1 < 0.0) or x1 < low or x1 > high:
                 break
             x, v = x1, v1
+            if p[slots.HAS_SHAPE] != 0.0:
+                remember(x, memory, p)
             done = length if h >= left * (1.0 - 1e-12) else done + h
         if done < length:
             break

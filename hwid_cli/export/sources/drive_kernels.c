@@ -68,31 +68,34 @@ enum {
     HAS_FURTHER_EDGES = 64,
     HAS_ZERO_EDGE = 65,
     HAS_CONTACT = 66,
-    DRIVE_VARIES = 67,
-    CAPTURE_TIME = 68,
-    SPRING_SHARE = 69,
-    DRIVE_SHARE = 70,
-    WAVY_PERIOD = 71,
-    WAVY_PHASE = 72,
-    WAVY_FRICTION = 73,
-    PRELOAD = 74,
-    STOP_LOSS = 75,
-    STOP_BEND = 76,
-    SIDE_LOSS = 77,
-    SIDE_BEND = 78,
-    SECOND_POSITION = 79,
-    SECOND_STIFFNESS = 80,
-    SECOND_LOSS = 81,
-    SECOND_BEND = 82,
-    SECOND_COGGING_FORCE = 83,
-    SECOND_COGGING_PERIOD = 84,
-    SECOND_COGGING_PHASE = 85,
-    GRAVITY_TORQUE = 86,
-    GRAVITY_ANGLE = 87,
-    RIPPLE_SHARE = 88,
-    RIPPLE_PER_TURN = 89,
-    RIPPLE_PHASE = 90,
-    N_SLOTS = 91,
+    HAS_SHAPE = 67,
+    DRIVE_VARIES = 68,
+    CAPTURE_TIME = 69,
+    SPRING_SHARE = 70,
+    DRIVE_SHARE = 71,
+    WAVY_PERIOD = 72,
+    WAVY_PHASE = 73,
+    WAVY_FRICTION = 74,
+    PRELOAD = 75,
+    STOP_LOSS = 76,
+    STOP_BEND = 77,
+    SIDE_LOSS = 78,
+    SIDE_BEND = 79,
+    SECOND_POSITION = 80,
+    SECOND_STIFFNESS = 81,
+    SECOND_LOSS = 82,
+    SECOND_BEND = 83,
+    SECOND_COGGING_FORCE = 84,
+    SECOND_COGGING_PERIOD = 85,
+    SECOND_COGGING_PHASE = 86,
+    GRAVITY_TORQUE = 87,
+    GRAVITY_ANGLE = 88,
+    RIPPLE_SHARE = 89,
+    RIPPLE_PER_TURN = 90,
+    RIPPLE_PHASE = 91,
+    HYSTERESIS_RATIO = 92,
+    HYSTERESIS_BEND = 93,
+    N_SLOTS = 94,
     MOST_PIECES = 40,
     DRIVE = 0,
     OTHER = 4,
@@ -678,6 +681,54 @@ static double drive_spring_force(double x, double *p)
     return force;
 }
 
+static double drive_yielding(double ahead, double *p)
+{
+    double share = 0.0;
+    share = pow(fabs(ahead), 1.0 + p[HYSTERESIS_BEND]);
+    if (ahead < 0.0) {
+        share *= (p[HYSTERESIS_RATIO] - 1.0) / (p[HYSTERESIS_RATIO] + 1.0);
+    }
+    return 1.0 - share;
+}
+
+static double drive_shape_step(double ahead, double h, double *p)
+{
+    double k1 = 0.0;
+    double k2 = 0.0;
+    double k3 = 0.0;
+    double k4 = 0.0;
+    k1 = drive_yielding(ahead, p);
+    k2 = drive_yielding(ahead + ((0.5 * h) * k1), p);
+    k3 = drive_yielding(ahead + ((0.5 * h) * k2), p);
+    k4 = drive_yielding(ahead + (h * k3), p);
+    return ahead + ((h / 6.0) * ((k1 + (2.0 * (k2 + k3))) + k4));
+}
+
+static double drive_yielded_in_shape(double ahead, double gone, double *p)
+{
+    double count = 0.0;
+    double h = 0.0;
+    double left = 0.0;
+    double step = 0.0;
+    double after = 0.0;
+    double rest = 0.0;
+    count = ceil((gone * (1.0 + p[HYSTERESIS_BEND])) / 0.1);
+    h = gone / most(count, 1.0);
+    left = gone;
+    while ((left > (0.5 * h)) && ((1.0 - ahead) > 1e-14)) {
+        step = h;
+        after = drive_shape_step(ahead, step, p);
+        if ((ahead < 0.0) && (after > 0.0)) {
+            rest = (1.0 / drive_yielding(ahead, p)) + (4.0 / drive_yielding(0.5 * ahead, p));
+            step = least(((-ahead) * (rest + 1.0)) / 6.0, h);
+            after = drive_shape_step(0.0, h - step, p);
+        }
+        ahead = after;
+        left -= h;
+    }
+    return least(ahead, 1.0);
+}
+
 static double drive_yielded(double x, double *memory, double *p)
 {
     double way = 0.0;
@@ -687,6 +738,9 @@ static double drive_yielded(double x, double *memory, double *p)
         return memory[DEFLECTION];
     }
     gone = fabs(x - memory[TURNED_AT]) / p[HYSTERESIS_YIELD];
+    if (p[HAS_SHAPE] != 0.0) {
+        return way * drive_yielded_in_shape(way * memory[DEFLECTION], gone, p);
+    }
     return way - ((way - memory[DEFLECTION]) * exp(-gone));
 }
 
@@ -895,6 +949,19 @@ static double drive_spring_rate(double x, double *p)
 static int drive_is_force_curved(double *p)
 {
     return (p[CUBIC] != 0.0) || (p[QUADRATIC] != 0.0) || (p[COGGING_FORCE] != 0.0) || (p[DRAG] != 0.0) || (p[GRAVITY_TORQUE] != 0.0) || (p[SECOND_COGGING_FORCE] != 0.0) || (p[WAVY_FRICTION] != 0.0) || (p[SPRING_SHARE] != 0.0) || (p[DRIVE_VARIES] != 0.0);
+}
+
+static void drive_remember(double x, double *memory, double *p)
+{
+    double way = 0.0;
+    double deflection = 0.0;
+    way = memory[WAY];
+    if (way == 0.0) {
+        return;
+    }
+    deflection = drive_yielded(x, memory, p);
+    memory[DEFLECTION] = ((1.0 - (way * deflection)) <= 1e-14) ? way : deflection;
+    memory[TURNED_AT] = x;
 }
 
 static int drive_has_dry_friction(double *p)
@@ -1257,8 +1324,11 @@ static int drive_is_curved_here(double *state, double *memory, double *p)
         }
     }
     if ((p[HYSTERESIS_FORCE] != 0.0) && (memory[WAY] != 0.0)) {
+        if ((p[HAS_SHAPE] != 0.0) && (memory[WAY] != memory[DEFLECTION])) {
+            return 1;
+        }
         gone = fabs(state[X] - memory[TURNED_AT]);
-        if (gone < (37.0 * p[HYSTERESIS_YIELD])) {
+        if ((p[HAS_SHAPE] == 0.0) && (gone < (37.0 * p[HYSTERESIS_YIELD]))) {
             return 1;
         }
     }
@@ -1328,12 +1398,35 @@ static tuple_dd drive_further_stiffness(double *state, double *push, double done
     return (tuple_dd){stiffness, waves};
 }
 
+static double drive_rate_in_shape(double *state, double *memory, double mass, double *p)
+{
+    double ahead = 0.0;
+    double exponent = 0.0;
+    double slope = 0.0;
+    double stiffness = 0.0;
+    double fading = 0.0;
+    double speed = 0.0;
+    ahead = memory[WAY] * memory[DEFLECTION];
+    if ((memory[WAY] == 0.0) || ((1.0 - ahead) <= 1e-14)) {
+        return 0.0;
+    }
+    exponent = 1.0 + p[HYSTERESIS_BEND];
+    slope = most(drive_yielding(ahead, p), 1.0 - ahead);
+    stiffness = (slope * fabs(p[HYSTERESIS_FORCE])) / p[HYSTERESIS_YIELD];
+    fading = least(0.5 * slope, 1.0);
+    speed = (exponent * fabs(state[V])) / p[HYSTERESIS_YIELD];
+    return sqrt(stiffness / mass) + ((0.6 * speed) * sqrt(sqrt(fading)));
+}
+
 static double drive_rate_of_yielding(double *state, double *memory, double mass, double *p)
 {
     double gone = 0.0;
     double fading = 0.0;
     double stiffness = 0.0;
     double speed = 0.0;
+    if (p[HAS_SHAPE] != 0.0) {
+        return drive_rate_in_shape(state, memory, mass, p);
+    }
     gone = fabs(state[X] - memory[TURNED_AT]) / p[HYSTERESIS_YIELD];
     if (gone >= 37.0) {
         return 0.0;
@@ -2221,6 +2314,7 @@ static void drive_take_stock(double sample_time, double *p)
     double contact = 0.0;
     int has_second = 0;
     int has_more = 0;
+    int has_shape = 0;
     int varies = 0;
     p[CAPTURE_TIME] = 0.02 * sample_time;
     has_zero_edge = (p[PRELOAD] > 0.0) || (p[SPRING_SHARE] > 0.0);
@@ -2237,6 +2331,8 @@ static void drive_take_stock(double sample_time, double *p)
     has_more = has_more || (p[GRAVITY_TORQUE] != 0.0);
     has_more = has_more || (p[WAVY_FRICTION] != 0.0);
     p[HAS_MORE] = has_more ? 1.0 : 0.0;
+    has_shape = (p[HYSTERESIS_BEND] != 0.0) || (p[HYSTERESIS_RATIO] != 0.0);
+    p[HAS_SHAPE] = has_shape ? 1.0 : 0.0;
     varies = (p[RIPPLE_SHARE] != 0.0) || (p[DRIVE_SHARE] > 0.0);
     p[DRIVE_VARIES] = varies ? 1.0 : 0.0;
 }
@@ -2403,6 +2499,9 @@ static void drive_move_piece(double *state, double *trial, double *memory, doubl
             state[n] = trial[n];
         }
         done = (h >= (left * (1.0 - 1e-12))) ? length : (done + h);
+        if (p[HAS_SHAPE] != 0.0) {
+            drive_remember(state[X], memory, p);
+        }
         if (is_leaving) {
             way = sign_of(drive_excess(state, memory, push, done, p).m0);
             drive_set_off(state, memory, way, p);
