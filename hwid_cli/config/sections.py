@@ -42,7 +42,7 @@ from hwid_cli.config.faults import Fault, missing, refused, unknown_key, wrong
 from hwid_cli.config.own_functions import OwnFunctionFile, read_own_function
 from hwid_cli.files.messages import is_plain
 from hwid_cli.records.model import FitOptions
-from hwid_cli.records.rules import NamesFor, Refusal, Refused, Rule, StandsFor
+from hwid_cli.records.rules import OtherForm, Refusal, Refused, Rule, StandsFor
 
 # A path of Linux has no more; a text of a configuration needs no more.
 _LONGEST_TEXT = 4096
@@ -126,7 +126,7 @@ def _ruled(hint: Any, rules: tuple[Any, ...]) -> Any:
     for rule in rules:
         if isinstance(rule, StandsFor):
             readable = Annotated[readable | None, BeforeValidator(rule.read)]
-        elif isinstance(rule, NamesFor):
+        elif isinstance(rule, OtherForm):
             readable = Annotated[readable, BeforeValidator(rule.read)]
         elif isinstance(rule, Rule):
             readable = Annotated[readable, AfterValidator(rule.read)]
