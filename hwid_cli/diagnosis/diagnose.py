@@ -60,7 +60,7 @@ from hwid_cli.diagnosis.selection import (
     decide,
 )
 from hwid_cli.diagnosis.where import places
-from hwid_cli.drive.catalogue import CATALOGUE, public_id
+from hwid_cli.drive.catalogue import CATALOGUE, may_be_added, public_id
 from hwid_cli.drive.effect import Scales
 from hwid_cli.drive.simulation import drive_effects
 from hwid_cli.records.candidates import CandidateFit
@@ -220,7 +220,7 @@ def allowed_effects(
 ) -> tuple[str, ...]:
     """Ids that may be named: those asked for that make sense for this drive."""
     wanted = options.effects
-    present = {public_id(one) for one in drive_effects(problem.drive)}
+    present = drive_effects(problem.drive)
     has_spring = problem.drive.stiffness_N_per_m > 0
     has_circuit = problem.drive.resistance_ohm is not None
     several = len(problem.part(held_out=False).signals) > 2
@@ -228,7 +228,8 @@ def allowed_effects(
         name
         for name, effect in CATALOGUE.items()
         if (wanted is None or public_id(name) in wanted)
-        and public_id(name) not in present
+        # A second one waits for the first.
+        and may_be_added(name, {*present, effect.beside})
         and (has_spring or not effect.needs_spring)
         and (has_circuit or not effect.needs_circuit)
         and (several or not any(one.is_own for one in effect.parameters))

@@ -18,7 +18,7 @@ from hwid_cli.diagnosis.rounds import RoundsResult
 from hwid_cli.diagnosis.selection import DiagnosisVerdict, SelectionCriteria, ranked
 from hwid_cli.diagnosis.sentences import doubtful_values, hidden_from_view, summarise
 from hwid_cli.diagnosis.where import latent_force_curves
-from hwid_cli.drive.catalogue import CATALOGUE, public_id, word_of
+from hwid_cli.drive.catalogue import CATALOGUE, public_id
 from hwid_cli.drive.effect import Scales
 from hwid_cli.drive.simulation import drive_effects
 from hwid_cli.records.axis import name_on
@@ -230,16 +230,15 @@ def _fitted_effects_of(
                 FittedParameter(one.parameter, float(value), float(low), float(high))
             )
     for identifier in ids:
-        told = word_of(identifier)
-        if told is None:
-            continue
-        word = FittedParameter(told[0], float("nan"), text=told[1])
-        parameters[identifier].append(word)
-        for parameter in CATALOGUE[identifier].parameters:
+        entry = CATALOGUE[identifier]
+        for name, word in entry.words.items():
+            told = FittedParameter(name, float("nan"), text=word)
+            parameters[identifier].append(told)
+        for parameter in entry.parameters:
             if parameter.is_factor:
                 own = ParameterRef(identifier, parameter.name)
-                factors = np.exp(found.own[:, found.own_names.index(own)])
-                parameters[identifier].append(_spread(factors))
+                column = found.own_names.index(own)
+                parameters[identifier].append(_spread(np.exp(found.own[:, column])))
     return tuple(_described(one, parameters[one]) for one in ids)
 
 

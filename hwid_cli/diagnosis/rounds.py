@@ -7,7 +7,7 @@ members. Each round describes its fits as tasks and hands them to a runner that 
 given, so that nothing here knows of processes or of a cache. docs/method_diagnosis.md.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
@@ -41,7 +41,7 @@ from hwid_cli.diagnosis.selection import (
     is_part_of,
     select_best,
 )
-from hwid_cli.drive.catalogue import CATALOGUE, public_id
+from hwid_cli.drive.catalogue import CATALOGUE, may_be_added, public_id
 from hwid_cli.drive.effect import Values
 from hwid_cli.drive.simulation import drive_effects
 from hwid_cli.records.candidates import CandidateFit
@@ -312,12 +312,14 @@ class _Search:
 
     def fit_without_each(self, whole: CandidateFit) -> None:
         """Fit a set without each of its effects, from where the whole set ended."""
-        values = fitted_values(whole, drive_effects(self.rounds.problem.drive))
+        present = drive_effects(self.rounds.problem.drive)
+        values = fitted_values(whole, present)
         base = _base_values(whole, self.rounds)
-        sets = {}
+        sets: dict[Effects, list[SearchStart]] = {}
         for effect in whole.effects:
             left = tuple(one for one in whole.effects if one != effect)
-            sets[left] = [SearchStart(base, _without(values, effect))]
+            ids, start = _moved_up(left, _without(values, effect), present)
+            sets.setdefault(ids, []).append(SearchStart(base, start))
         self._finish("without each effect", sets)
 
     def _of_size(self, size: int) -> list[CandidateFit]:
@@ -333,7 +335,11 @@ class _Search:
         start = fitted_values(parent, present)
         drive = fitted_drive(rounds.problem.drive, parent)
         at = linearise(self._few, drive, start, scales)
-        others = [one for one in rounds.allowed if not _is_nested(one, parent.effects)]
+        others = [
+            one
+            for one in rounds.allowed
+            if not _is_nested(one, parent.effects, present)
+        ]
         found = self._forecast(at, others)
         if parent is rounds.base:
             self._forecasts, self._error = found, at.error
@@ -518,7 +524,7 @@ class _Search:
             )
             for relative in relatives:
                 ids = _together(others, relative)
-                if relative not in rounds.allowed or _is_nested(relative, others):
+                if relative not in rounds.allowed or not _may_stand(ids, present):
                     continue
                 here = self.fits.get(ids)
                 if here is not None and not self._is_behind(here, best):
@@ -651,13 +657,44 @@ def _translated(effect: str, values: Values, scales: Any) -> list[dict[str, floa
     return found
 
 
-def _is_nested(effect: str, others: Sequence[str]) -> bool:
-    """Whether an effect is, includes, or is included in one of the others."""
-    return any(
-        effect == other
-        or effect in CATALOGUE[other].contains
+def _is_nested(
+    effect: str, others: Sequence[str], present: Collection[str] = ()
+) -> bool:
+    """Whether an effect is, includes, or is included in one of the others.
+
+    A second one of its kind stands beside its first, and never without it.
+
+    Parameters
+    ----------
+    present : collection of str
+        Ids of what the simulation holds.
+    """
+    return not may_be_added(effect, (*present, *others)) or any(
+        effect in CATALOGUE[other].contains
         or other in CATALOGUE[effect].contains
         or bool(set(CATALOGUE[effect].contains) & set(CATALOGUE[other].contains))
-        or public_id(effect) == public_id(other)
         for other in others
+        if public_id(other) != public_id(effect)
     )
+
+
+def _may_stand(effects: Effects, present: Collection[str]) -> bool:
+    """Whether no effect of a set is nested with another, or lacks its first."""
+    return not any(
+        _is_nested(one, tuple(other for other in effects if other != one), present)
+        for one in effects
+    )
+
+
+def _moved_up(
+    effects: Effects, values: Mapping[str, Values], present: Collection[str]
+) -> tuple[Effects, Mapping[str, Values]]:
+    """A set in which a second one whose first has gone is the first."""
+    for one in effects:
+        others = tuple(two for two in effects if two != one)
+        first = CATALOGUE[one].beside
+        if first and not may_be_added(one, (*present, *others)):
+            names = {parameter.name for parameter in CATALOGUE[first].parameters}
+            same = {name: value for name, value in values[one].items() if name in names}
+            return _together(others, first), {**_without(values, one), first: same}
+    return effects, values

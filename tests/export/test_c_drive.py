@@ -82,7 +82,9 @@ ALONE = tuple(
     for name, values in cases.EVERY.items()
     if name != "clock_skew"
 )
-TOGETHER = tuple((both, {}) for both in cases.TOGETHER + cases.TOGETHER_SLOW)
+TOGETHER = tuple(
+    (both, {}) for both in cases.VARIANTS + cases.TOGETHER + cases.TOGETHER_SLOW
+)
 
 
 def exported_drive(effects, **values):
@@ -126,8 +128,9 @@ def check(folder, effects, values, n):
         cases.COULOMB | cases.END_STOP | cases.DELAY,
         cases.GEAR | cases.HYSTERESIS,
         {"quadratic_drag": {"drag_N_s2_per_m2": 200.0}} | cases.CUBIC,
+        cases.PRELOAD | cases.SPRING_LOAD | cases.RIPPLE | cases.SIDE_CONTACT,
     ],
-    ids=["friction, stop, delay", "gear, hysteresis", "curved"],
+    ids=["friction, stop, delay", "gear, hysteresis", "curved", "preload, contact"],
 )
 def test_the_program_simulates_as_hwid_does(effects, tmp_path):
     check(tmp_path, effects, {}, 1500)
