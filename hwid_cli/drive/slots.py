@@ -94,7 +94,7 @@ that is switched off is 0, except where the comment says infinite.
     HAS_CONTACT,  # a stop whose force is curved
     HAS_SHAPE,  # a hysteresis of another shape than Dahl's
     DRIVE_VARIES,  # a force of the motor that varies, or friction that follows it
-    CAPTURE_TIME,  # within which a preload brings a drive back that it catches
+    CAPTURE_TIME,  # a preload catches a drive at 0 that it would stop within it
     SPRING_SHARE,
     DRIVE_SHARE,
     WAVY_PERIOD,

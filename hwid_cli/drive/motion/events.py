@@ -200,8 +200,8 @@ def pass_zero(
 ) -> None:
     """Notice on which side of 0 the drive is, and whether a preload catches it there.
 
-    A drive that would soon be back at 0 stays: smaller and smaller swings to both sides
-    of 0 would come without end.
+    A drive that would soon stop stays at 0: smaller and smaller swings to both sides
+    would come without end.
 
     Parameters
     ----------

@@ -67,7 +67,7 @@ LONGEST_PHASE = 0.5
 MANY_PIECES = 1000
 # Most events in one piece; what rattles more often is followed less exactly.
 MOST_EVENTS = 100
-# A preload catches a drive that it would bring back to 0 within this share of a sample.
+# A preload catches a drive at 0 that it would stop within this share of a sample.
 CAPTURE_SHARE = 0.02
 
 
