@@ -4,9 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from hwid_cli.diagnosis.candidate import SearchStart, base_of, fit_candidate
 from hwid_cli.diagnosis.problem import prepare
 from hwid_cli.diagnosis.scales import scales_of_recordings
-from hwid_cli.drive.simulation import simulate_drive
+from hwid_cli.drive.simulation import drive_effects, simulate_drive
 from hwid_cli.records.diagnosis import NoiseFloor
 from hwid_cli.records.drive import Drive
 from hwid_cli.records.experiment import DiagnoseOptions, SimulationOptions
@@ -91,6 +92,19 @@ def sizes(of, frequencies_Hz=()):
 def white(rms=NOISE):
     """Noise floor of a white sensor."""
     return NoiseFloor(rms, "differences", 0.0, False, (1.0,), "")
+
+
+def search_start(of, effects=None, *, drive=None):
+    """Where a search starts: the base as given, and the values of some effects."""
+    present = drive_effects(of.drive)
+    return SearchStart(base_of(drive or of.drive), {**present, **(effects or {})})
+
+
+def fit(of, *starts, drive=None, scales=None):
+    """Fit of the effects that the starts give values of; of the base without any."""
+    starts = starts or ({},)
+    begun = [search_start(of, one, drive=drive) for one in starts]
+    return fit_candidate(of, tuple(starts[0]), begun, scales or sizes(of), white())
 
 
 def in_turn(tasks, *, keep):

@@ -28,19 +28,22 @@ def test_fits_are_to_be_kept_and_forecasts_are_not():
 
     options = DiagnoseOptions(effects=FEW, max_effects=1)
     diagnose(recordings(FRICTION), simulation(), options, run, lambda what, count: None)
-    assert seen == [(False, {"Forecast"}), (True, {"CandidateFit"})]
+    assert (False, {"Forecast"}) in seen
+    assert (False, {"Screened"}) in seen
+    assert (True, {"CandidateFit"}) in seen
+    assert {keep for keep, names in seen if names != {"CandidateFit"}} == {False}
 
 
-def test_tasks_of_one_diagnosis_differ_in_their_content():
+def test_tasks_that_are_kept_differ_in_their_content():
     contents = []
 
     def run(tasks, *, keep):
-        contents.extend(str(one.content) for one in tasks)
+        contents.extend(str(one.content) for one in tasks if keep)
         return in_turn(tasks, keep=keep)
 
     options = DiagnoseOptions(effects=FEW, max_effects=1)
     diagnose(recordings(FRICTION), simulation(), options, run, lambda what, count: None)
-    assert len(contents) == len(set(contents)) == 2 * len(FEW)
+    assert len(contents) == len(set(contents)) >= len(FEW)
 
 
 OF_CIRCUIT = {name for name, one in CATALOGUE.items() if one.needs_circuit}

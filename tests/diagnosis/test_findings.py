@@ -5,17 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hwid_cli.diagnosis.candidate import Baseline, fit_candidate
-from hwid_cli.diagnosis.findings import MOST_OVERLAYS, intervals
+from hwid_cli.diagnosis.findings import MOST_OVERLAYS
+from hwid_cli.diagnosis.intervals import intervals
 from hwid_cli.records.candidates import ParameterRef
 from tests.diagnosis.small_drive import (
     NOISE,
     N,
+    fit,
     problem,
     recordings,
     simulation,
     sizes,
-    white,
 )
 from tests.stages.diagnosed_drive import FRICTION, breathing, diagnosed
 
@@ -141,15 +141,10 @@ COULOMB = {"coulomb_friction": {"force_N": 0.8}}
 TRUE = np.array([15.0, 1184.0, 5.0, 0.8])
 
 
-def with_interval(of, effects=("coulomb_friction",), start=None):
-    found = fit_candidate(
-        of, effects, (start or {"coulomb_friction": {"force_N": 0.3}},), baseline(of)
-    )
+def with_interval(of, start=None):
+    start = {"coulomb_friction": {"force_N": 0.3}} if start is None else start
+    found = fit(of, start)
     return found, *intervals(of, found, sizes(of))
-
-
-def baseline(of):
-    return Baseline(of.drive, sizes(of), white())
 
 
 def test_they_cover_the_truth_about_as_often_as_they_say():
@@ -169,14 +164,14 @@ def test_four_times_the_data_halve_them():
     four = problem([replace(given[5], name=f"r{j}") for j in range(4)])
     widths = []
     for of in (one, four):
-        found, low, high = with_interval(of, (), {})
+        found, low, high = with_interval(of, {})
         widths.append((high - low) / found.values)
     np.testing.assert_allclose(widths[1], widths[0] / 2, rtol=0.02)
 
 
 def test_residuals_that_go_together_widen_them():
     of = problem(recordings(COULOMB))
-    wrong, *ends = with_interval(of, (), {})
+    wrong, *ends = with_interval(of, {})
     assert wrong.neighbour > 0.9
     right, low, high = with_interval(of)
     assert abs(right.neighbour) < 0.1
@@ -194,7 +189,7 @@ def test_phases_of_recordings_are_allowed_for():
     )
     of = problem(given)
     start = {"periodic_force": {"amplitude_N": 0.2, "frequency_Hz": 30.6}}
-    found, low, high = with_interval(of, ("periodic_force",), start)
+    found, low, high = with_interval(of, start)
     for name, true in force.items():
         row = found.names.index(ParameterRef("periodic_force", name))
         assert low[row] < true < high[row]
@@ -205,7 +200,7 @@ def test_phases_of_recordings_are_allowed_for():
 def test_what_ran_away_has_none():
     of = problem(recordings())
     start = {"cubic_stiffness": {"stiffness_N_per_m3": -1e9}}
-    found, low, high = with_interval(of, ("cubic_stiffness",), start)
+    found, low, high = with_interval(of, start)
     assert not found.is_usable
     assert np.isnan([low, high]).all()
 
@@ -214,7 +209,7 @@ def test_they_grow_with_the_noise():
     widths = []
     for noise in (NOISE, 50 * NOISE):
         of = problem(recordings(noise=noise))
-        found, low, high = with_interval(of, (), {})
+        found, low, high = with_interval(of, {})
         widths.append((high - low) / found.values)
     np.testing.assert_allclose(widths[1] / widths[0], 50, rtol=0.1)
 
@@ -225,5 +220,5 @@ def test_what_nothing_determines_has_a_wide_one():
     current = np.full_like(held.input, 2.0)
     noise = NOISE * np.random.default_rng(2).standard_normal(current.size)
     flat = replace(held, input=current, output=2.0 * 5.0 / 1184.0 + noise)
-    found, low, high = with_interval(problem([flat]), (), {})
+    found, low, high = with_interval(problem([flat]), {})
     assert ((high - low) > found.values).all()

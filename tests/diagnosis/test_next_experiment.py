@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hwid_cli.diagnosis.candidate import Baseline, fit_candidate, rebuilt
+from hwid_cli.diagnosis.candidate import rebuilt
 from hwid_cli.diagnosis.next_experiment import (
     FittedCandidate,
     Separation,
@@ -17,10 +17,10 @@ from tests.diagnosis.small_drive import (
     DRIVE,
     NOISE,
     STEP_S,
+    fit,
     problem,
     replace,
     sizes,
-    white,
 )
 
 FRICTION = {"coulomb_friction": {"force_N": 0.8}}
@@ -40,15 +40,15 @@ def rivals():
         read = motion.output + NOISE * rng.standard_normal(400)
         given.append(Recording(f"step_{size}", current, read, STEP_S, kind="step"))
     of = problem(given)
-    baseline = Baseline(of.drive, sizes(of), white())
+    scales = sizes(of)
     models = []
     for effect, start in (
         ("coulomb_friction", {"force_N": 0.4}),
         ("output_backlash", {"half_gap_m": 2e-4}),
     ):
-        found = fit_candidate(of, (effect,), ({effect: start},), baseline)
-        models.append(FittedCandidate(*rebuilt(of, found, baseline.scales)))
-    return of, models, baseline.scales
+        found = fit(of, {effect: start}, scales=scales)
+        models.append(FittedCandidate(*rebuilt(of, found, scales)))
+    return of, models, scales
 
 
 def test_friction_and_backlash_are_separated_by_reversals(rivals):

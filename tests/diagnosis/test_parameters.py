@@ -108,12 +108,13 @@ def test_effects_share_one_value_over_all_recordings():
 def test_a_phase_belongs_to_each_recording():
     start = {"periodic_force": {"amplitude_N": 0.3, "frequency_Hz": 30.0}}
     of, found, point = laid_out(("periodic_force",), start)
-    assert [one.name for one in found.own] == ["phase_rad"]
-    assert found.size(3) == 3 + 2 + 3
+    # The force acts before the recording begins: it starts in motion.
+    assert [one.name for one in found.own] == ["phase_rad", "position", "velocity"]
+    assert found.size(3) == 3 + 2 + 3 * 3
 
-    own = ParameterPoint(
-        point.shared, np.array([[0.1], [0.2], [0.3]]) / found.own[0].scale
-    )
+    each = point.own.copy()
+    each[:, 0] = np.array([0.1, 0.2, 0.3]) / found.own[0].scale
+    own = ParameterPoint(point.shared, each)
     vectors = vectors_at(of, found, own)
     phases = [vector[slots.PERIODIC_PHASE] for vector in vectors]
     assert phases == pytest.approx([0.1, 0.2, 0.3])
@@ -214,11 +215,16 @@ def test_an_estimated_start_begins_at_the_first_output_at_rest():
         assert vector[slots.START_VELOCITY] == 0.0
 
 
-def test_a_free_axis_starts_where_it_rested():
+def test_the_search_for_the_start_of_a_free_axis_begins_where_it_rested():
     of, found, point = laid_out(stiffness_N_per_m=0.0)
+    assert [(one.owner, one.name) for one in found.own] == [(START, "position")]
     for signals, vector in zip(of.signals, vectors_at(of, found, point), strict=True):
         assert vector[slots.IS_START_GIVEN] == 1.0
-        assert vector[slots.START_POSITION] == signals.rest_position_m
+        # It goes through a coordinate without unit and back.
+        assert vector[slots.START_POSITION] == pytest.approx(
+            signals.rest_position_m, rel=1e-12
+        )
+        assert vector[slots.START_VELOCITY] == 0.0
 
 
 def test_a_spring_starts_in_equilibrium():

@@ -1,34 +1,42 @@
 """Rounds of candidate fits: which sets are tried, which are kept."""
 
+from collections import Counter
+
 import pytest
 
-from hwid_cli.diagnosis.candidate import Baseline, fit_candidate, fitted_drive
+from hwid_cli.diagnosis.candidate import Baseline, fitted_drive
 from hwid_cli.diagnosis.rounds import (
-    FEWEST_SINGLES,
-    FITTED_ON_TOP,
-    FITTED_PAIRS,
+    FEWEST_FINISHED,
+    MOST_FINISHED,
+    SCREENED_ON_TOP,
     Rounds,
     run_rounds,
 )
 from hwid_cli.diagnosis.selection import SelectionCriteria
 from hwid_cli.drive.catalogue import CATALOGUE
-from tests.diagnosis.small_drive import in_turn, problem, recordings, sizes, white
+from tests.diagnosis.small_drive import fit, in_turn, problem, recordings, sizes, white
 from tests.stages.diagnosed_drive import FRICTION
 
 STIFFNESS = {"cubic_stiffness": {"stiffness_N_per_m3": 8e5}}
 HELD_OUT = ("step_1", "sine_1", "sine_3")
+FEW = (
+    "coulomb_friction",
+    "cubic_stiffness",
+    "hysteresis",
+    "input_dead_zone",
+    "quadratic_drag",
+    "stribeck_friction",
+)
 
 
 def rounds_of(effects, allowed, **options):
     of = problem(recordings(effects), held_out=HELD_OUT)
-    baseline = Baseline(of.drive, sizes(of, (31.0,)), white())
-    base = fit_candidate(of, (), ({},), baseline)
+    scales = sizes(of, (31.0,))
+    base = fit(of, scales=scales)
     return Rounds(
         **{
             "problem": of,
-            "baseline": Baseline(
-                fitted_drive(of.drive, base), baseline.scales, baseline.noise
-            ),
+            "baseline": Baseline(fitted_drive(of.drive, base), scales, white()),
             "criteria": SelectionCriteria.of(of, white()),
             "base": base,
             "allowed": allowed,
@@ -39,100 +47,130 @@ def rounds_of(effects, allowed, **options):
     )
 
 
+class Watched:
+    """Rounds whose tasks and announcements are kept."""
+
+    def __init__(self, effects, allowed, most):
+        self.tasks, self.announced = [], []
+        self.rounds = rounds_of(
+            effects,
+            allowed,
+            run_tasks=self.run,
+            on_round=lambda what, count: self.announced.append((what, count)),
+        )
+        self.found = run_rounds(self.rounds, most)
+
+    def run(self, tasks, *, keep):
+        results = in_turn(tasks, keep=keep)
+        self.tasks.extend(zip(tasks, results, strict=True))
+        return results
+
+    def effects_of(self, function):
+        """Sets of effects of the tasks with a function, in their order."""
+        return [
+            tuple(one.content["effects"])
+            for one, _ in self.tasks
+            if one.function.__name__ == function
+        ]
+
+    def train_sse(self, one):
+        rows = [not signals.is_held_out for signals in self.rounds.problem.signals]
+        return float(one.sse[rows].sum())
+
+
 @pytest.fixture(scope="module")
-def of_all():
+def friction():
     """Coulomb friction, with the whole catalogue to choose from."""
-    return run_rounds(rounds_of(FRICTION, tuple(CATALOGUE)), 1)
+    return Watched(FRICTION, tuple(CATALOGUE), 1)
 
 
-def test_the_hidden_effect_wins_against_the_whole_catalogue(of_all):
-    assert of_all.best[-1].effects == ("coulomb_friction",)
-    assert len(of_all.best) == 1
+@pytest.fixture(scope="module")
+def pair():
+    """Two effects, a few to choose from."""
+    return Watched({**FRICTION, **STIFFNESS}, FEW, 3)
 
 
-def test_every_effect_gets_a_forecast_and_the_first_ones_a_fit(of_all):
-    assert set(of_all.shares) == {(name,) for name in CATALOGUE}
-    assert FEWEST_SINGLES <= len(of_all.fits) < len(CATALOGUE)
-    first = sorted(of_all.shares, key=of_all.shares.get)[-FEWEST_SINGLES:]
-    assert set(first) <= {one.effects for one in of_all.fits}
+def test_the_hidden_effect_wins_against_the_whole_catalogue(friction):
+    assert friction.found.best[-1].effects == ("coulomb_friction",)
+    assert len(friction.found.best) == 1
 
 
-def test_what_includes_the_first_one_is_fitted_as_well(of_all):
-    fitted = {one.effects for one in of_all.fits}
+def test_every_effect_gets_a_forecast_and_a_screening(friction):
+    assert set(friction.found.shares) == {(name,) for name in CATALOGUE}
+    screened = Counter(friction.effects_of("screen"))
+    assert {ids for ids, number in screened.items() if number >= 1} == {
+        (name,) for name in CATALOGUE
+    }
+
+
+def test_the_first_ones_of_the_screening_are_finished(pair):
+    sse = {}
+    for task, result in pair.tasks:
+        if task.function.__name__ == "fit_candidate":
+            break
+        if task.function.__name__ == "screen":
+            sse[result.effects] = result.sse
+    first = sorted(sse, key=sse.get)[:FEWEST_FINISHED]
+    assert len(first) == FEWEST_FINISHED
+    assert set(first) <= set(pair.effects_of("fit_candidate"))
+
+
+def test_what_includes_another_one_is_not_finished_where_that_leaves_noise(friction):
+    assert friction.found.best[0].whiteness <= 1
     for name, entry in CATALOGUE.items():
         if "coulomb_friction" in entry.contains:
-            assert (name,) in fitted
+            assert (name,) not in friction.found.fits
 
 
-def test_pruned_candidates_are_not_finished(of_all):
-    by_name = {one.effects: one for one in of_all.fits}
-    best = by_name["coulomb_friction",]
-    poor = [one for one in of_all.fits if one.sse.sum() > 100 * best.sse.sum()]
-    assert best.has_converged
-    assert poor
-    assert any(one.iterations <= 1 and not one.has_converged for one in poor)
+def test_what_includes_another_one_is_finished_after_it(pair):
+    finished = pair.effects_of("fit_candidate")
+    first = finished.index(("coulomb_friction",))
+    assert first < finished.index(("stribeck_friction",))
 
 
-def test_no_larger_set_is_tried_once_nothing_remains(of_all):
-    announced = []
-    found = run_rounds(
-        rounds_of(
-            FRICTION,
-            ("coulomb_friction", "input_dead_zone"),
-            on_round=lambda what, count: announced.append((what, count)),
-        ),
-        3,
-    )
-    assert announced == [("forecasts", 2), ("single effects", 2)]
-    assert len(found.best) == 1
+def test_no_larger_set_is_tried_once_nothing_remains():
+    watched = Watched(FRICTION, ("coulomb_friction", "input_dead_zone"), 3)
+    assert watched.announced[:2] == [
+        ("forecasts", 2),
+        ("single effects, screening", 2),
+    ]
+    assert not any(what.startswith("sets") for what, _ in watched.announced)
+    assert len(watched.found.best) == 1
 
 
-def test_a_pair_is_found_although_neither_effect_explains_much_alone():
-    allowed = (
-        "coulomb_friction",
-        "cubic_stiffness",
-        "input_dead_zone",
-        "quadratic_drag",
-        "stribeck_friction",
-    )
-    announced = []
-    found = run_rounds(
-        rounds_of(
-            {**FRICTION, **STIFFNESS},
-            allowed,
-            on_round=lambda what, count: announced.append((what, count)),
-        ),
-        3,
-    )
-    assert [len(one.effects) for one in found.best] == [1, 2]
-    assert found.best[-1].effects == ("coulomb_friction", "cubic_stiffness")
-    sets = [count for what, count in announced if what == "sets of 2 effects"]
-    assert 0 < sets[0] <= FITTED_ON_TOP + FITTED_PAIRS
+def test_a_pair_is_found_although_neither_effect_explains_much_alone(pair):
+    assert [len(one.effects) for one in pair.found.best] == [1, 2]
+    assert pair.found.best[-1].effects == ("coulomb_friction", "cubic_stiffness")
     # Nothing remains, so no set of three.
-    assert not any(what == "sets of 3 effects" for what, _ in announced)
+    assert not any("sets of 3 effects" in what for what, _ in pair.announced)
 
 
-def test_nested_effects_are_never_put_together():
-    nested = ("coulomb_friction", "stribeck_friction", "hysteresis", "cubic_stiffness")
-    found = run_rounds(rounds_of({**FRICTION, **STIFFNESS}, nested), 2)
-    pairs = {one.effects for one in found.fits if len(one.effects) == 2}
-    assert pairs
-    for pair in pairs:
-        assert sum(name != "cubic_stiffness" for name in pair) <= 1
+def test_the_larger_sets_that_are_finished_are_few(pair):
+    counts = dict(pair.announced)
+    assert 0 < counts["sets of 2 effects, screening"] <= 2 * SCREENED_ON_TOP
+    assert 0 < counts["sets of 2 effects"] <= MOST_FINISHED
+
+
+def test_nested_effects_are_never_put_together(pair):
+    screened = {ids for ids in pair.effects_of("screen") if len(ids) == 2}
+    assert screened
+    nested = {"coulomb_friction", "stribeck_friction", "hysteresis"}
+    for ids in screened | set(pair.found.fits):
+        assert len(nested & set(ids)) <= 1
 
 
 def test_a_second_effect_that_adds_nothing_is_not_taken():
     # Something remains, and drag looks like friction, but does not explain most of it.
-    found = run_rounds(
-        rounds_of({**FRICTION, **STIFFNESS}, ("cubic_stiffness", "quadratic_drag")),
-        2,
+    watched = Watched(
+        {**FRICTION, **STIFFNESS}, ("cubic_stiffness", "quadratic_drag"), 2
     )
-    assert [one.effects for one in found.best] == [("cubic_stiffness",)]
-    assert {len(one.effects) for one in found.fits} == {1, 2}
+    assert [one.effects for one in watched.found.best] == [("cubic_stiffness",)]
+    assert {len(ids) for ids in watched.found.fits} == {1, 2}
 
 
 @pytest.mark.parametrize(("allowed", "most"), [((), 3), (("coulomb_friction",), 0)])
 def test_without_candidates_nothing_is_fitted(allowed, most):
-    found = run_rounds(rounds_of(FRICTION, allowed), most)
-    assert (found.fits, found.best) == ((), ())
-    assert set(found.shares) == {(name,) for name in allowed}
+    watched = Watched(FRICTION, allowed, most)
+    assert (watched.found.fits, watched.found.best) == ({}, ())
+    assert watched.found.shares == {}
+    assert watched.tasks == []

@@ -184,9 +184,17 @@ def test_a_start_that_is_not_at_rest_is_estimated():
 def test_only_own_parameters_move_where_the_shared_ones_are_held():
     of = problem(recordings(), options=DiagnoseOptions(initial_state="estimated"))
     found, point = begun(of, drive=OFF)
-    ended = fit_point(of, found, point, max_iterations=5, only_own=True)
+    ended = fit_point(of, found, point, max_iterations=5, own_columns=[0, 1])
     np.testing.assert_array_equal(ended.point.shared, point.shared)
     assert not np.array_equal(ended.point.own, point.own)
+
+
+def test_own_parameters_that_are_not_asked_for_stay():
+    of = problem(recordings(), options=DiagnoseOptions(initial_state="estimated"))
+    found, point = begun(of, drive=OFF)
+    ended = fit_point(of, found, point, max_iterations=5, own_columns=[1])
+    np.testing.assert_array_equal(ended.point.own[:, 0], point.own[:, 0])
+    assert (ended.point.own[:, 1] != point.own[:, 1]).all()
 
 
 def test_a_search_never_ends_above_its_start():
@@ -298,8 +306,11 @@ def test_one_recording_does_not_move_another():
         of = problem(one, reference_displacement_m=0.02)
         start, point = begun(problem(given), START)
         found.append(with_own_trials(of, start, point).own)
-    np.testing.assert_array_equal(np.delete(found[0], 1), np.delete(found[1], 1))
-    assert found[0][1] != found[1][1]
+    np.testing.assert_array_equal(
+        np.delete(found[0], 1, axis=0), np.delete(found[1], 1, axis=0)
+    )
+    # The phase comes first.
+    assert found[0][1, 0] != found[1][1, 0]
 
 
 def test_without_own_parameters_there_is_nothing_to_find():

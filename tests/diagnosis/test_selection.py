@@ -196,7 +196,7 @@ def test_the_table_is_ordered_by_gain_with_the_lost_and_the_waiting_last():
     assert rows[2].note == "stopped at the iteration limit"
     assert rows[3].note == "could not be simulated"
     assert np.isnan(rows[3].held_out_rms)
-    assert "not fitted" in rows[4].note
+    assert "not finished" in rows[4].note
     assert rows[0].held_out_rms == pytest.approx(np.sqrt(1.5))
     assert rows[0].improved_share == 1.0
 
@@ -294,7 +294,7 @@ def test_what_is_part_of_what(smaller, larger, holds):
 
 
 def test_rivals_are_those_that_cannot_be_told_apart():
-    best = made_up(COULOMB, 200.0)
+    best = made_up(COULOMB, 200.0, whiteness=0.5)
     near = after(-TIE + 0.5, ("output_backlash",))
     far = after(-TIE - 0.5, DEAD_ZONE)
     lost = made_up(("quadratic_drag",), np.inf)
@@ -316,21 +316,32 @@ RIVAL = made_up(("input_dead_zone",), 110.0, whiteness=0.6)
 GIVEN = np.full(6, 400.0)
 
 
+def decided(found, fits=(), best=(), *, given=GIVEN, criteria=CRITERIA, unclear=()):
+    """Verdict on some fits, of which some effects may as well not be there."""
+    return decide(
+        criteria,
+        np.broadcast_to(given, 6),
+        found,
+        {one.effects: one for one in fits},
+        best,
+        lambda one: tuple(name for name in one.effects if name in unclear),
+    )
+
+
 def test_nothing_is_missing_where_the_base_leaves_noise():
     found = base(100.0, whiteness=0.5)
-    verdict = decide(CRITERIA, np.full(6, 100.5), found, [], [])
+    verdict = decided(found, given=100.5)
     assert (verdict.word, verdict.is_complete) == ("none", True)
     assert verdict.chosen is found
 
 
 def test_parameters_were_off_where_the_refit_gained_much():
-    verdict = decide(CRITERIA, GIVEN, base(100.0, whiteness=0.5), [], [])
+    verdict = decided(base(100.0, whiteness=0.5))
     assert (verdict.word, verdict.is_complete) == ("parameters", True)
 
 
 def test_a_simulation_that_ran_away_as_given_had_wrong_parameters():
-    given = np.full(6, np.inf)
-    verdict = decide(CRITERIA, given, base(100.0, whiteness=0.5), [], [])
+    verdict = decided(base(100.0, whiteness=0.5), given=np.inf)
     assert verdict.word == "parameters"
 
 
@@ -338,18 +349,18 @@ def test_a_simulation_that_ran_away_as_given_had_wrong_parameters():
 def test_the_refit_must_gain_more_than_its_parameters_cost(given, word):
     # 600 ln(104 / 100) = 24 < 10 + 3 ln 600 = 29 < 600 ln(106.5 / 100) = 38
     found = base(100.0, whiteness=0.5)
-    assert decide(CRITERIA, np.full(6, given), found, [], []).word == word
+    assert decided(found, given=given).word == word
 
 
 def test_rounding_is_no_parameter():
     criteria = replace(CRITERIA, n_samples=np.full(6, 10**6))
     found = base(1e-20, whiteness=0.5)
     # A thousandth less, in six million samples without noise.
-    assert decide(criteria, np.full(6, 1.0009e-20), found, [], []).word == "none"
+    assert decided(found, given=1.0009e-20, criteria=criteria).word == "none"
 
 
 def test_an_effect_with_clear_evidence_is_named():
-    verdict = decide(CRITERIA, GIVEN, base(), [NAMED], [NAMED])
+    verdict = decided(base(), [NAMED], [NAMED])
     assert (verdict.word, verdict.is_complete) == ("named", True)
     assert verdict.chosen is NAMED
     assert verdict.rivals == ()
@@ -357,23 +368,23 @@ def test_an_effect_with_clear_evidence_is_named():
 
 def test_a_named_effect_is_incomplete_while_something_remains():
     left = replace(NAMED, whiteness=1.5)
-    verdict = decide(CRITERIA, GIVEN, base(), [left], [left])
+    verdict = decided(base(), [left], [left])
     assert (verdict.word, verdict.is_complete) == ("named", False)
 
 
 def test_the_largest_set_that_may_be_named_is():
-    verdict = decide(CRITERIA, GIVEN, base(), [NAMED, BOTH], [NAMED, BOTH])
+    verdict = decided(base(), [NAMED, BOTH], [NAMED, BOTH])
     assert verdict.chosen is BOTH
 
 
 def test_without_evidence_for_the_set_its_part_is_named():
     weak = replace(BOTH, sse=np.full(6, 220.0), whiteness=2.0)
-    verdict = decide(CRITERIA, GIVEN, base(), [NAMED, weak], [NAMED, weak])
+    verdict = decided(base(), [NAMED, weak], [NAMED, weak])
     assert verdict.chosen is NAMED
 
 
 def test_two_that_are_as_good_are_ambiguous():
-    verdict = decide(CRITERIA, GIVEN, base(), [NAMED, RIVAL], [NAMED])
+    verdict = decided(base(), [NAMED, RIVAL], [NAMED])
     assert verdict.word == "ambiguous"
     assert verdict.rivals == (RIVAL,)
 
@@ -383,30 +394,34 @@ def test_a_rival_that_may_not_be_named_does_not_count():
     weak = replace(RIVAL, sse=np.array([80, 80, 80, 20, 200, 200.0]))
     found = base(np.array([400, 400, 400, 900, 150, 150.0]))
     assert CRITERIA.gain(NAMED, weak) < 6
-    verdict = decide(CRITERIA, GIVEN, found, [NAMED, weak], [NAMED])
+    verdict = decided(found, [NAMED, weak], [NAMED])
     assert verdict.word == "named"
 
 
 def test_rivals_are_of_the_same_size():
-    verdict = decide(CRITERIA, GIVEN, base(), [BOTH, NAMED, RIVAL], [NAMED, BOTH])
+    verdict = decided(base(), [BOTH, NAMED, RIVAL], [NAMED, BOTH])
     assert (verdict.word, verdict.rivals) == ("named", ())
 
 
 def test_a_gap_without_evidence_is_unknown():
     weak = made_up(("coulomb_friction",), 350.0)
     found = base()
-    verdict = decide(CRITERIA, GIVEN, found, [weak], [weak])
+    verdict = decided(found, [weak], [weak])
     assert (verdict.word, verdict.is_complete) == ("unknown", False)
     assert verdict.chosen is found
 
 
 def test_a_small_remainder_that_is_nearly_white_is_noise():
-    found = base(103.0, whiteness=1.5)
-    assert decide(CRITERIA, np.full(6, 103.0), found, [], []).word == "none"
-    coloured = replace(found, whiteness=2.5)
-    assert decide(CRITERIA, np.full(6, 103.0), coloured, [], []).word == "unknown"
-    larger = base(115.0, whiteness=1.5)
-    assert decide(CRITERIA, np.full(6, 115.0), larger, [], []).word == "unknown"
+    verdict = decided(base(103.0, whiteness=1.5), given=103.0)
+    assert (verdict.word, verdict.is_complete) == ("none", True)
+
+
+@pytest.mark.parametrize(("sse", "whiteness"), [(103.0, 2.5), (115.0, 1.5)])
+def test_a_small_remainder_that_goes_with_no_effect_is_none_but_not_all(
+    sse, whiteness
+):
+    verdict = decided(base(sse, whiteness=whiteness), given=sse)
+    assert (verdict.word, verdict.is_complete) == ("none", False)
 
 
 def test_there_is_a_word_for_every_case_and_no_other():
