@@ -112,8 +112,19 @@ def test_a_pair_is_found_although_neither_effect_explains_much_alone():
     assert not any(what == "sets of 3 effects" for what, _ in announced)
 
 
-def test_nested_effects_are_never_put_together():
-    nested = ("coulomb_friction", "stribeck_friction", "hysteresis", "cubic_stiffness")
+@pytest.mark.parametrize(
+    "frictions",
+    [
+        ("coulomb_friction", "asymmetric_friction"),
+        pytest.param(
+            ("coulomb_friction", "stribeck_friction", "hysteresis"),
+            marks=pytest.mark.slow,
+        ),
+    ],
+    ids=["two", "three"],
+)
+def test_nested_effects_are_never_put_together(frictions):
+    nested = (*frictions, "cubic_stiffness")
     found = run_rounds(rounds_of({**FRICTION, **STIFFNESS}, nested), 2)
     pairs = {one.effects for one in found.fits if len(one.effects) == 2}
     assert pairs
