@@ -20,7 +20,7 @@ UNITS = {
     "own_function": 2,
 }
 # Edges can be found to within the distance of samples only.
-SAMPLES = {"piecewise_constant": 5_000}
+SAMPLES = {"piecewise_constant": 10_000}
 
 
 def fitted(kind, side, *, noise=0.0, **others):
