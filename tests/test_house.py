@@ -34,6 +34,14 @@ MOST_LINES_OF_FUNCTION = 45
 FORBIDDEN_NAMES = {"utils", "helpers", "common", "core", "misc"}
 
 
+@pytest.fixture(scope="module", autouse=True)
+def _trees_are_forgotten():
+    """A million nodes would slow down the search for garbage in later tests."""
+    yield
+    functions_of.cache_clear()
+    tree_of.cache_clear()
+
+
 def short(path):
     return str(path.relative_to(PROJECT))
 
