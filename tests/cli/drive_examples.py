@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 MASS, DAMPING, STIFFNESS, FORCE_CONSTANT, FRICTION = 0.3, 15.0, 1184.0, 5.0, 0.8
-STEP_S, SUBSTEPS, N = 1e-3, 10, 700
+STEP_S, SUBSTEPS, N = 1e-3, 10, 500
 NOISE = 2e-5
 CONFIG = """\
 name: drive
