@@ -1,7 +1,3 @@
-import subprocess
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -175,10 +171,3 @@ def test_the_unit_of_a_simulation_answers_like_hwid(tmp_path):
     unit = write_exported(tmp_path, exported, "fmu")[0]
 
     assert deviation(answered(unit, u, STEP), predict(exported, u)) <= PROMISED
-
-
-def test_the_source_is_the_translation_of_todays_loops():
-    script = Path(__file__).parents[2] / "tools" / "drive_source.py"
-    done = subprocess.run([sys.executable, str(script), "--check"], check=False)
-
-    assert done.returncode == 0, "run 'make drive-source'"
