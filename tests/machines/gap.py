@@ -59,6 +59,9 @@ def refitted_gap(machine: Machine, recordings: Recordings, hold: str) -> float:
     if machine.known:
         return projected_gap(machine, recordings, lambda effect: False)
     base = machine.base
+    clean = recordings.clean
+    if machine.jitter:
+        clean = clean_readings(machine, machine.hidden, recordings.commands)
     # The base's numbers may differ between recordings; a simulation has one of each.
     given = {
         name: float(np.mean(value))
@@ -78,7 +81,7 @@ def refitted_gap(machine: Machine, recordings: Recordings, hold: str) -> float:
         made = linear_output(
             Base(**numbers), recordings.commands, machine.sample_s, hold
         )
-        left = made - recordings.clean
+        left = made - clean
         if held:
             left = left - np.array(
                 [one[part].mean() for one, part in zip(left.T, kept.T, strict=True)]
