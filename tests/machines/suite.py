@@ -452,7 +452,11 @@ def hanging_arm(draw):
         free=True,
     )
     arm = h.unbalance(draw.near(0.8 * b.force), 0.0)
-    return b.machine("arm that hangs", [arm], output_unit=("angle_rad", 1.0))
+    # A wave along the way of 2 pi is the same law.
+    answers = Answers(full=[["gravity"]], near=[["cogging"]])
+    return b.machine(
+        "arm that hangs", [arm], answers=answers, output_unit=("angle_rad", 1.0)
+    )
 
 
 @machine("springs")
@@ -469,8 +473,18 @@ def leaning_arm(draw):
         count=9,
     )
     arm = h.unbalance(draw.near(0.5 * b.force), draw.near(0.7))
+    # Cosine and sine of the angle as a series: a load, and springs of higher order.
+    series = ["constant_load", "quadratic_stiffness", "cubic_stiffness"]
+    answers = Answers(
+        full=[["gravity"]],
+        near=[series, series[:2], [series[0], series[2]], ["cogging", "constant_load"]],
+        partial=[["constant_load"]],
+    )
     return b.machine(
-        "arm on a torsion spring, at an angle", [arm], output_unit=("angle_rad", 1.0)
+        "arm on a torsion spring, at an angle",
+        [arm],
+        answers=answers,
+        output_unit=("angle_rad", 1.0),
     )
 
 
@@ -584,7 +598,9 @@ def pump_vibration(draw):
         count=8,
     )
     floor = h.shaker(0.06 * b.force, draw.near(9.0), draw.angles(b.count))
-    return b.machine("table beside a pump", [floor], warm_up=1500)
+    # A swing of the output with a phase of its own may be of the sensor as well.
+    answers = Answers(full=[["periodic_force"]], near=[["sensor_hum"]])
+    return b.machine("table beside a pump", [floor], answers=answers, warm_up=1500)
 
 
 # Motor and amplifier
@@ -607,6 +623,9 @@ def voltage_winding(draw):
     return b.machine(
         "coil on a voltage source",
         [h.winding(draw.near(4.0 * 0.012))],
+        answers=Answers(
+            full=[["winding_inductance"]], near=[["actuator_lag"], ["input_delay"]]
+        ),
         input_unit=("voltage_V", 1.0),
     )
 
@@ -745,7 +764,7 @@ def saturating_actuator(draw):
         count=10,
     )
     kin = ["force_constant_saturation", "supply_sag", "input_saturation"]
-    answers = Answers(near=[[one] for one in kin])
+    answers = Answers(near=[*([one] for one in kin), kin[:2]])
     return b.machine(
         "actuator with too little iron",
         [h.saturating_force(draw.near(1.1) * b.top)],
@@ -1206,7 +1225,10 @@ def mains_hum(draw):
         count=8,
     )
     noise = h.hum(draw.near(0.03) * b.travel, 50.0, draw.angles(b.count))
-    return b.machine("sensor cable beside a mains cable", [noise], noise=0.005)
+    answers = Answers(full=[["sensor_hum"]], near=[["periodic_force"]])
+    return b.machine(
+        "sensor cable beside a mains cable", [noise], answers=answers, noise=0.005
+    )
 
 
 @machine("sensors")
@@ -1511,8 +1533,16 @@ def winding_and_friction(draw):
         resistance=3.0,
     )
     both = [h.winding(draw.near(3.0 * 0.015)), h.coulomb(draw.near(0.06) * b.force)]
+    answers = Answers(
+        full=[["winding_inductance", "coulomb_friction"]],
+        near=[["actuator_lag", "coulomb_friction"]],
+        partial=[["winding_inductance"], ["coulomb_friction"], ["actuator_lag"]],
+    )
     return b.machine(
-        "rubbing coil on a voltage source", both, input_unit=("voltage_V", 1.0)
+        "rubbing coil on a voltage source",
+        both,
+        answers=answers,
+        input_unit=("voltage_V", 1.0),
     )
 
 
@@ -1618,6 +1648,62 @@ def coupling_three(draw):
     )
 
 
+# Small effects
+
+
+@machine("small")
+def faint_friction(draw):
+    b = draw.bench(
+        "steps sine triangles",
+        mass=0.9,
+        pace=5.0,
+        damping=0.12,
+        force_constant=7.0,
+        top=3.0,
+        sample_s=2e-3,
+        samples=1200,
+        count=8,
+    )
+    return b.machine(
+        "stage that hardly rubs", [h.coulomb(draw.near(0.002) * b.force)], noise=0.008
+    )
+
+
+@machine("small")
+def faint_hardening(draw):
+    b = draw.bench(
+        "steps sine levels",
+        mass=20.0,
+        pace=2.0,
+        damping=0.1,
+        force_constant=25.0,
+        top=8.0,
+        sample_s=4e-3,
+        samples=1000,
+        count=8,
+    )
+    spring = h.cubic(draw.near(0.012) * b.base.stiffness / b.travel**2)
+    return b.machine("spring that hardly hardens", [spring], noise=0.008)
+
+
+@machine("small")
+def faint_delay(draw):
+    b = draw.bench(
+        "steps multisine sine",
+        mass=0.05,
+        pace=10.0,
+        damping=0.15,
+        force_constant=1.0,
+        top=2.0,
+        sample_s=1e-3,
+        samples=1200,
+        count=8,
+    )
+    return b.machine(
+        "amplifier that is hardly late", [h.delay(draw.near(0.2e-3))], noise=0.015
+    )
+
+
 # What no catalogue holds
 
 REFUSE = Answers(honest_refusal=True)
@@ -1661,7 +1747,7 @@ def hose_in_the_way(draw):
     walk *= 0.08 * b.force / walk[-1].std()
     walk[0] = 0.0
     force = h.wandering_force(walk, b.duration / 190.0)
-    return b.machine("stage that somebody leans on", [force], answers=REFUSE)
+    return b.machine("stage that drags a hose", [force], answers=REFUSE)
 
 
 @machine("outside")
@@ -1852,7 +1938,7 @@ def clean_hum(draw):
         "a little mains hum in the sensor",
         nuisances=[noise],
         noise=0.01,
-        answers=Answers(full=[["sensor_hum"]]),
+        answers=Answers(full=[["sensor_hum"]], near=[["periodic_force"]]),
     )
 
 
