@@ -349,10 +349,8 @@ def press_hunt_crossley(draw):
         samples=1500,
         count=9,
     )
-    at = draw.near(0.45 * b.travel)
-    contact = h.hunt_crossley(
-        at, 6.0 * b.force / (0.2 * b.travel) ** 1.5, 0.3 / b.speed
-    )
+    at = draw.near(0.55 * b.usual)
+    contact = h.hunt_crossley(at, 6.0 * b.force / (0.2 * b.usual) ** 1.5, 0.3 / b.speed)
     answers = Answers(near=[["one_sided_stop"]])
     return b.machine("press that meets a ball", [contact], answers=answers)
 
@@ -372,8 +370,8 @@ def carriage_unequal_stops(draw):
     )
     stiff = 8.0 * b.base.stiffness
     pair = [
-        h.stop(0.5 * b.travel, stiff),
-        h.stop(-draw.near(0.32 * b.travel), 2.0 * stiff),
+        h.stop(0.7 * b.usual, stiff),
+        h.stop(-draw.near(0.5 * b.usual), 2.0 * stiff),
     ]
     answers = Answers(
         full=[["one_sided_stop", "one_sided_stop"]],
@@ -543,7 +541,7 @@ def slide_stops(draw):
         samples=1200,
         count=9,
     )
-    buffers = h.stops(draw.near(0.5 * b.travel), draw.near(12.0 * b.base.stiffness))
+    buffers = h.stops(draw.near(0.7 * b.usual), draw.near(12.0 * b.base.stiffness))
     return b.machine("slide between rubber buffers", [buffers])
 
 
@@ -1207,7 +1205,7 @@ def clipped_range(draw):
         count=9,
     )
     return b.machine(
-        "laser sensor whose range ends", [h.clipped(draw.near(0.6, 0.1) * b.travel)]
+        "laser sensor whose range ends", [h.clipped(draw.near(0.75, 0.1) * b.usual)]
     )
 
 
@@ -1349,7 +1347,7 @@ def slide_friction_and_stops(draw):
     )
     both = [
         h.coulomb(draw.near(0.05) * b.force),
-        h.stops(draw.near(0.55, 0.1) * b.travel, 10.0 * b.base.stiffness),
+        h.stops(draw.near(0.7, 0.1) * b.usual, 10.0 * b.base.stiffness),
     ]
     return b.machine("slide with seals and buffers", both)
 
@@ -1607,7 +1605,7 @@ def buffers_three(draw):
         count=12,
     )
     three = [
-        h.stops(draw.near(0.5, 0.1) * b.travel, 8.0 * b.base.stiffness),
+        h.stops(draw.near(0.7, 0.1) * b.usual, 8.0 * b.base.stiffness),
         h.current_limit(draw.near(0.75, 0.1) * b.top),
         h.coulomb(draw.near(0.04) * b.force),
     ]
@@ -1812,10 +1810,12 @@ def greased_spindle(draw):
     )
     thick = 1.2 * np.sqrt(b.base.stiffness * b.base.mass)
     grease = h.grease(thick, 0.15 * b.duration, 0.5 * b.travel)
+    # Stirred more in some recordings than in others.
+    answers = Answers(partial=[["parameter_change"]], honest_refusal=True)
     return b.machine(
         "spindle in old grease",
         [grease],
-        answers=REFUSE,
+        answers=answers,
         output_unit=("angle_rad", 1.0),
     )
 
