@@ -74,7 +74,7 @@ def refitted_gap(machine: Machine, recordings: Recordings, hold: str) -> float:
         *(["stiffness"] if given["stiffness"] > 0 else []),
     ]
     kept = np.arange(len(recordings.clean))[:, None] < recordings.lengths
-    held = np.ndim(machine.held_at) > 0
+    held = machine.settings.get("initial_state") == "held"
 
     def error(logs):
         numbers = given | dict(zip(free, np.exp(logs), strict=True))

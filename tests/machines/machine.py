@@ -61,11 +61,10 @@ class Machine:
     # Whether the simulation takes a voltage drive for a force with a damper.
     folded: bool = False
     # Factors on the base that the simulation gets, and more keys of the configuration's
-    # sections `simulation`, `diagnose` and `calibrate`.
+    # sections `simulation` and `diagnose`.
     off: dict = field(default_factory=dict)
     simulation: dict = field(default_factory=dict)
     settings: dict = field(default_factory=dict)
-    calibrate: dict = field(default_factory=dict)
     # Factors that turn SI into what the files hold, and the units' names.
     input_unit: tuple[str, float] = ("current_A", 1.0)
     output_unit: tuple[str, float] = ("displacement_m", 1.0)

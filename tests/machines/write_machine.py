@@ -55,11 +55,9 @@ def configuration(machine: Machine) -> dict:
         recordings["output_unit"] = "rad"
     if machine.jitter:
         recordings["resample"] = True
-    calibrated = {"calibrate": machine.calibrate} if machine.calibrate else {}
     return {
         "name": machine.name,
         "recordings": recordings,
-        **calibrated,
         "simulation": simulation | machine.simulation,
         "diagnose": machine.settings,
     }
