@@ -363,7 +363,7 @@ def select_best(
         return None
     best = max(usable, key=lambda one: criteria.gain(one, base))
     for rival in sorted(usable, key=count):
-        if count(rival) >= count(best):
+        if count(rival) >= count(best) and not _has_fewer_kinds(rival, best):
             continue
         if is_part_of(rival, best):
             if not _adds_enough(criteria, best, rival, base):
@@ -385,6 +385,12 @@ def is_part_of(smaller: CandidateFit, larger: CandidateFit) -> bool:
             return False
         left.remove(match)
     return True
+
+
+def _has_fewer_kinds(one: CandidateFit, other: CandidateFit) -> bool:
+    """Whether a set needs only some of another's kinds of effects: one of them twice."""
+    kinds, others = set(names_of(one)), set(names_of(other))
+    return kinds < others and count(one) <= count(other)
 
 
 def _adds_enough(
@@ -415,7 +421,8 @@ def rivals(
     -------
     list of CandidateFit
         Those that include the best one, or are included in it, are left out: they are
-        measured by what they add.
+        measured by what they add. So are those that need a further kind of effect where
+        the best one has one kind twice.
     """
     is_complete = criteria.is_complete(best)
     return [
@@ -426,6 +433,7 @@ def rivals(
         and not is_part_of(best, one)
         and not is_part_of(one, best)
         and names_of(one) != names_of(best)
+        and not _has_fewer_kinds(best, one)
         and (
             criteria.gain(best, one) < TIE
             or (
