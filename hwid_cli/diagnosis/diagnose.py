@@ -113,32 +113,19 @@ def diagnose(
     where = places(before, noise, drive, force)
 
     criteria = SelectionCriteria.of(problem, noise)
-    on_round("verdict", 0)
     given_sse = each_sum_of_squares([one.residual for one in given])
-
-    def decided(found: RoundsResult) -> DiagnosisVerdict:
-        return decide(
-            criteria,
-            given_sse,
-            base,
-            found.fits,
-            found.best,
-            lambda one: unclear_effects(problem, one, scales),
-        )
-
-    found = RoundsResult()
-    if base.is_usable and not criteria.is_complete(base):
-        baseline = Baseline(drive, scales, noise, problem.drive)
-        allowed = allowed_effects(problem, options)
-        rounds = Rounds(problem, baseline, criteria, base, allowed, run_tasks, on_round)
-        found = run_rounds(rounds, options.max_effects)
-        is_lost = (
-            decided(found).word == "unknown" and criteria.ratio(base) > STILL_LARGE
-        )
-        if is_lost and not problem.compares_command:
-            seeds = _seeds_of_pieces(rounds, force, options.max_effects)
-            found = continue_rounds(rounds, found, seeds)
-    verdict = decided(found)
+    rounds = Rounds(
+        problem,
+        Baseline(drive, scales, noise, problem.drive),
+        criteria,
+        base,
+        allowed_effects(problem, options),
+        run_tasks,
+        on_round,
+    )
+    found = _search(rounds, given_sse, force, options.max_effects)
+    on_round("verdict", 0)
+    verdict = _decided(rounds, given_sse, found)
     return describe(
         Findings(
             problem=problem, criteria=criteria, scales=scales, given_sse=given_sse,
@@ -146,6 +133,38 @@ def diagnose(
             found=found, verdict=verdict,
         )
     )  # fmt: skip
+
+
+def _search(
+    rounds: Rounds, given_sse: np.ndarray, force: Sequence[Smoothed], max_effects: int
+) -> RoundsResult:
+    """Sets of effects, from whole recordings and where these are lost from pieces."""
+    base, criteria = rounds.base, rounds.criteria
+    if not base.is_usable or criteria.is_complete(base):
+        return RoundsResult()
+    found = run_rounds(rounds, max_effects)
+    is_lost = (
+        _decided(rounds, given_sse, found).word == "unknown"
+        and criteria.ratio(base) > STILL_LARGE
+    )
+    if is_lost and not rounds.problem.compares_command:
+        seeds = _seeds_of_pieces(rounds, force, max_effects)
+        found = continue_rounds(rounds, found, seeds)
+    return found
+
+
+def _decided(
+    rounds: Rounds, given_sse: np.ndarray, found: RoundsResult
+) -> DiagnosisVerdict:
+    """Weigh what was found."""
+    return decide(
+        rounds.criteria,
+        given_sse,
+        rounds.base,
+        found.fits,
+        found.best,
+        lambda one: unclear_effects(rounds.problem, one, rounds.baseline.scales),
+    )
 
 
 def compared_as_given(problem: DiagnosisProblem) -> list[Compared]:

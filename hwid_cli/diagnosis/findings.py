@@ -71,7 +71,8 @@ def describe(findings: Findings) -> Diagnosis:
     """Put together what shows the verdict."""
     problem, criteria, base = findings.problem, findings.criteria, findings.base
     verdict, noise, scales = findings.verdict, criteria.noise, findings.scales
-    chosen, before, found = verdict.chosen, findings.before, findings.found
+    chosen, before = verdict.chosen, findings.before
+    fits = list(findings.found.fits.values())
     is_base = chosen is base
     after = before if is_base else compared_with_fit(problem, chosen, scales)
     given_sse = findings.given_sse
@@ -96,14 +97,10 @@ def describe(findings: Findings) -> Diagnosis:
         base=parameters,
         places=findings.where,
         not_observable=hidden_from_view(problem),
-        next_experiment=propose(
-            problem, criteria, scales, verdict, list(found.fits.values())
-        ),
+        next_experiment=propose(problem, criteria, scales, verdict, fits),
         train=tuple(one.name for one in problem.signals if not one.is_held_out),
         held_out=tuple(one.name for one in problem.signals if one.is_held_out),
-        candidates=ranked(
-            criteria, list(found.fits.values()), base, found.shares
-        ),
+        candidates=ranked(criteria, fits, base, findings.found.shares),
         gaps=_recording_gaps(problem, given_sse, base, chosen),
         overlays=_overlays(before, after, noise),
         latent_force=latent_force_curves(

@@ -504,59 +504,64 @@ class _Search:
         return {one.effects: one.starts for one in screened if one.sse <= most}
 
     def _again(self, size: int) -> dict[Effects, list[SearchStart]]:
-        """Starts from related fits that have come further than a set's own fit.
-
-        Related are sets in which one effect is another one, nested with it or easily
-        confused with it, and the smaller set with this effect faint.
-        """
-        rounds = self.rounds
-        present = drive_effects(rounds.problem.drive)
-        fits = self._of_size(size)
+        """Starts from related fits that have come further than a set's own fit."""
         best = self.best_of_size(size)
-        is_complete = best is not None and rounds.criteria.is_complete(best)
-        if best is None or not np.isfinite(_train_sse(rounds, best)):
+        if best is None or not np.isfinite(_train_sse(self.rounds, best)):
             return {}
+        sets = self._from_best(best)
+        if not self.rounds.criteria.is_complete(best):
+            for ids, start in self._from_parts(size):
+                sets.setdefault(ids, []).extend(self._unless_tried(ids, [start]))
+        return {ids: starts for ids, starts in sets.items() if starts}
+
+    def _from_best(self, best: CandidateFit) -> dict[Effects, list[SearchStart]]:
+        """Starts where the best set ended, with a relative in the place of an effect.
+
+        Where the best set is complete, simpler relatives only.
+        """
+        rounds, present = self.rounds, drive_effects(self.rounds.problem.drive)
+        is_complete = rounds.criteria.is_complete(best)
+        values, base = fitted_values(best, present), _base_values(best, rounds)
         sets: dict[Effects, list[SearchStart]] = {}
         for effect in best.effects:
             others = tuple(one for one in best.effects if one != effect)
-            relatives = (
-                CATALOGUE[effect].contains if is_complete else _relatives(effect)
-            )
-            for relative in relatives:
+            kin = CATALOGUE[effect].contains if is_complete else _relatives(effect)
+            for relative in kin:
                 ids = _together(others, relative)
                 if relative not in rounds.allowed or not _may_stand(ids, present):
                     continue
                 here = self.fits.get(ids)
                 if here is not None and not self._is_behind(here, best):
                     continue
-                values = fitted_values(best, present)
-                scales = rounds.baseline.scales
+                given = _translated(relative, values[effect], rounds.baseline.scales)
                 starts = [
-                    SearchStart(
-                        _base_values(best, rounds),
-                        {**_without(values, effect), relative: one},
-                    )
-                    for one in _translated(relative, values[effect], scales)
+                    SearchStart(base, {**_without(values, effect), relative: one})
+                    for one in given
                 ]
                 if here is not None:
-                    own = fitted_values(here, present)
-                    starts.append(SearchStart(_base_values(best, rounds), own))
+                    starts.append(SearchStart(base, fitted_values(here, present)))
                 sets[ids] = self._unless_tried(ids, starts)
-        for one in fits:
+        return sets
+
+    def _from_parts(self, size: int) -> Iterable[tuple[Effects, SearchStart]]:
+        """Starts at a smaller set, the further effect faint: none ends up worse."""
+        rounds, present = self.rounds, drive_effects(self.rounds.problem.drive)
+        for one in self._of_size(size):
             smaller = self._largest_part(one)
-            if is_complete or smaller is None or not self._is_behind(one, smaller):
+            if smaller is None or not self._is_behind(one, smaller):
                 continue
-            (added,) = set(one.effects) - set(smaller.effects)
+            added = set(one.effects) - set(smaller.effects)
+            if len(added) != 1:
+                continue
+            (effect,) = added
             values = fitted_values(smaller, present)
-            faint = CATALOGUE[added].faint(
-                fitted_values(one, present)[added], rounds.baseline.scales
+            faint = CATALOGUE[effect].faint(
+                fitted_values(one, present)[effect], rounds.baseline.scales
             )
-            start = SearchStart(_base_values(smaller, rounds), {**values, added: faint})
-            sets[one.effects] = [
-                *sets.get(one.effects, []),
-                *self._unless_tried(one.effects, [start]),
-            ]
-        return {ids: starts for ids, starts in sets.items() if starts}
+            yield (
+                one.effects,
+                SearchStart(_base_values(smaller, rounds), {**values, effect: faint}),
+            )
 
     def _unless_tried(
         self, ids: Effects, starts: Sequence[SearchStart]

@@ -82,10 +82,17 @@ def test_wrong_parameters_do_not_hide_friction(with_friction):
 
 
 def test_one_of_two_effects_is_named_as_incomplete():
-    found = diagnosed(recordings(PAIR), effects=TWO)
+    hidden = {**PAIR, "coulomb_friction": {"force_N": 0.2}}
+    found = diagnosed(recordings(hidden), effects=TWO)
     assert (found.verdict, found.complete) == ("named", False)
     assert found.effects[0].id in PAIR
     assert "remains" in found.summary
+
+
+def test_half_of_a_large_gap_is_no_name():
+    found = diagnosed(recordings(PAIR), effects=TWO)
+    assert found.after.ratio_to_noise > 10
+    assert found.verdict == "unknown"
 
 
 def test_both_of_two_effects_are_named():
