@@ -30,7 +30,13 @@ def linearised(effects, **changes):
 @pytest.mark.parametrize("hidden", HIDDEN)
 def test_the_hidden_effect_is_among_the_first_three_of_all(hidden):
     at_base = linearised({hidden: HIDDEN[hidden]})
-    found = [forecast(at_base, one) for one in CATALOGUE if "parameter" not in one]
+    # What contains it explains as much, and takes it along into the fits.
+    others = [
+        name
+        for name, one in CATALOGUE.items()
+        if "parameter" not in name and hidden not in one.contains
+    ]
+    found = [forecast(at_base, one) for one in others]
     found.sort(key=lambda one: -one.share)
     assert hidden in [one.effect for one in found[:3]]
 
