@@ -29,6 +29,7 @@ from hwid_cli.records.diagnosis import (
     FittedEffect,
     FittedParameter,
     Gap,
+    LatentForce,
     NoiseFloor,
     Overlay,
     Place,
@@ -103,10 +104,7 @@ def describe(findings: Findings) -> Diagnosis:
         candidates=ranked(criteria, fits, base, findings.found.shares),
         gaps=_recording_gaps(problem, given_sse, base, chosen),
         overlays=_overlays(before, after, noise),
-        latent_force=latent_force_curves(
-            before, None if is_base else after, findings.force,
-            fitted_drive(problem.drive, base), noise,
-        ),
+        latent_force=_force_curves(findings, None if is_base else after),
         present=told[: len(present)],
         reference_current_A=problem.drive.reference_current_A,
         reference_displacement_m=problem.drive.reference_displacement_m,
@@ -115,6 +113,15 @@ def describe(findings: Findings) -> Diagnosis:
         axis=problem.drive.axis,
         output=problem.drive.output,
     )  # fmt: skip
+
+
+def _force_curves(
+    findings: Findings, after: Sequence[Compared] | None
+) -> tuple[LatentForce, ...]:
+    drive = fitted_drive(findings.problem.drive, findings.base)
+    return latent_force_curves(
+        findings.before, after, findings.force, drive, findings.criteria.noise
+    )
 
 
 def _gap(criteria: SelectionCriteria, sse: np.ndarray) -> Gap:

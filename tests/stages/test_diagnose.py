@@ -251,6 +251,7 @@ def test_the_stages_are_announced(with_friction):
     assert seen == [
         ("base", 0),
         ("forecasts", 3),
+        ("single effects, screening", 3),
         ("single effects", 3),
         ("verdict", 0),
     ]
