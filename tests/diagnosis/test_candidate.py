@@ -228,10 +228,7 @@ def test_a_candidate_that_runs_away_is_a_value():
 def test_wrong_parameters_to_start_from_do_not_matter():
     off = replace(DRIVE, damping_N_s_per_m=20.0, force_constant_N_per_A=4.0)
     of = problem(recordings(COULOMB))
-    found = [
-        fit(of, START, drive=drive).values
-        for drive in (DRIVE, off)
-    ]
+    found = [fit(of, START, drive=drive).values for drive in (DRIVE, off)]
     # Both stop when a step gains a hundred-thousandth.
     np.testing.assert_allclose(found[0], found[1], rtol=2e-3)
 
@@ -294,9 +291,7 @@ def test_it_simulates_as_it_did(pushed):
     sse = [float(part @ part) for part in residuals_at(of, fit_layout, point)]
     trained = [not one.is_held_out for one in of.signals]
     # Values go through a logarithm and back.
-    np.testing.assert_allclose(
-        np.array(sse)[trained], found.sse[trained], rtol=1e-6
-    )
+    np.testing.assert_allclose(np.array(sse)[trained], found.sse[trained], rtol=1e-6)
     # A held-out one is evaluated with a phase from its other samples: three values
     # for 400 samples, which gain a part in a hundred by chance.
     row = trained.index(False)

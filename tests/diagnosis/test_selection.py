@@ -417,9 +417,7 @@ def test_a_small_remainder_that_is_nearly_white_is_noise():
 
 
 @pytest.mark.parametrize(("sse", "whiteness"), [(103.0, 2.5), (115.0, 1.5)])
-def test_a_small_remainder_that_goes_with_no_effect_is_none_but_not_all(
-    sse, whiteness
-):
+def test_a_small_remainder_that_goes_with_no_effect_is_none_but_not_all(sse, whiteness):
     verdict = decided(base(sse, whiteness=whiteness), given=sse)
     assert (verdict.word, verdict.is_complete) == ("none", False)
 

@@ -5,6 +5,11 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
+from hwid_cli.diagnosis.selection import (
+    LEAST_EXPLAINED,
+    LEAST_EXPLAINED_LARGE,
+    STILL_LARGE,
+)
 from hwid_cli.drive.catalogue import CATALOGUE
 from hwid_cli.drive.simulation import simulate_drive
 from hwid_cli.records.drive import BASE_PARAMETERS
@@ -82,10 +87,18 @@ def test_wrong_parameters_do_not_hide_friction(with_friction):
 
 
 def test_one_of_two_effects_is_named_as_incomplete():
-    found = diagnosed(recordings(PAIR), effects=TWO)
+    weaker = {**PAIR, "coulomb_friction": {"force_N": 0.3}}
+    found = diagnosed(recordings(weaker), effects=TWO)
     assert (found.verdict, found.complete) == ("named", False)
-    assert found.effects[0].id in PAIR
+    assert [one.id for one in found.effects] == ["cubic_stiffness"]
+    assert found.after.ratio_to_noise > STILL_LARGE
     assert "remains" in found.summary
+
+
+def test_one_of_two_effects_that_leaves_nearly_half_is_not_named():
+    found = diagnosed(recordings(PAIR), effects=TWO)
+    assert (found.verdict, found.effects) == ("unknown", ())
+    assert LEAST_EXPLAINED < found.candidates[0].explained_share < LEAST_EXPLAINED_LARGE
 
 
 def test_both_of_two_effects_are_named():
@@ -243,6 +256,7 @@ def test_the_stages_are_announced(with_friction):
     assert seen == [
         ("base", 0),
         ("forecasts", 3),
+        ("single effects, screening", 3),
         ("single effects", 3),
         ("verdict", 0),
     ]
