@@ -16,7 +16,13 @@ import numpy as np
 # Compiled loops build on their first call, which no deadline can foresee; examples are
 # derived from the test's name, so that a run can be repeated.
 settings.register_profile("hwid", deadline=None, derandomize=True)
-settings.load_profile("hwid")
+settings.register_profile("hwid-fast", settings.get_profile("hwid"), max_examples=30)
+
+
+def pytest_configure(config):
+    """Try fewer examples where slow tests are left out."""
+    is_fast = "not slow" in config.getoption("markexpr")
+    settings.load_profile("hwid-fast" if is_fast else "hwid")
 
 
 TINY_CONFIG = """\

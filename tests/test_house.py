@@ -4,11 +4,13 @@ import ast
 import re
 import subprocess
 from collections import Counter
+from functools import cache
 from pathlib import Path
 
 import pytest
 
 from hwid_cli.cli.main import COMMANDS
+from tests.syntax_trees import tree_of
 
 PROJECT = Path(__file__).parents[1]
 SOURCES = sorted((PROJECT / "hwid_cli").rglob("*.py"))
@@ -32,10 +34,19 @@ MOST_LINES_OF_FUNCTION = 45
 FORBIDDEN_NAMES = {"utils", "helpers", "common", "core", "misc"}
 
 
+@pytest.fixture(scope="module", autouse=True)
+def _trees_are_forgotten():
+    """A million nodes would slow down the search for garbage in later tests."""
+    yield
+    functions_of.cache_clear()
+    tree_of.cache_clear()
+
+
 def short(path):
     return str(path.relative_to(PROJECT))
 
 
+@cache
 def functions_of(path):
     """Functions and methods of a file; what lies inside one belongs to it."""
 
@@ -48,7 +59,7 @@ def functions_of(path):
             else:
                 yield from walk(child, outer)
 
-    return list(walk(ast.parse(path.read_text()), ()))
+    return list(walk(tree_of(path), ()))
 
 
 def body_lines(function):
@@ -205,9 +216,7 @@ def test_no_name_is_made_twice_in_a_module():
     twice = [
         f"{short(path)}: {name}"
         for path in SOURCES
-        for name, count in Counter(
-            names_bound_at_the_top(ast.parse(path.read_text()))
-        ).items()
+        for name, count in Counter(names_bound_at_the_top(tree_of(path))).items()
         if count > 1
     ]
     assert twice == []

@@ -16,6 +16,7 @@ _CALLS = {
     "floor": "floor",
     "ceil": "ceil",
     "cbrt": "cbrt",
+    "power": "pow",
     "sign": "sign_of",
 }
 _OPERATORS = {

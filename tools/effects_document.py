@@ -14,12 +14,7 @@ from pathlib import Path
 # Run as a file, Python looks for modules beside it and not in the project.
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from hwid_cli.drive.catalogue import (
-    CATALOGUE,
-    configured_effects,
-    public_id,
-    word_of,
-)
+from hwid_cli.drive.catalogue import CATALOGUE, configured_effects, public_id
 from hwid_cli.drive.effect import Effect, Parameter, Scales, Stated
 from hwid_cli.report.diagnosis import quantity_and_unit
 from tools.effects_figures import SCALES, draw
@@ -63,33 +58,26 @@ Start values and bounds of the search scale with the recordings: X largest displ
 R largest rate of the current, S stroke, F = kt I, M mass, fn natural frequency, Ts sample time, T longest recording, Ro resistance,
 Y largest reading of the sensor (X, or V where a velocity is measured).
 """
+CHANGE = "parameter_change"
 CHANGE_SENTENCE = (
     "The stiffness, the force constant or the damping differs from recording to recording by more than chance. "
     "Each recording gets its own value; the report gives which parameter and the relative standard deviation (`spread`)."
 )
 
 
-def plain_effects() -> list[Effect]:
-    """Effects with parameters of their own, by the first entry of each public id.
+def effects_by_public_id() -> dict[str, list[Effect]]:
+    """Entries of the catalogue by their public ids, the simplest first.
 
     Returns
     -------
-    list of Effect
-        All but ``parameter_change``, of which there is one for each parameter.
+    dict of str to list of Effect
+        Without ``parameter_change``, of which there is one for each parameter.
     """
-    first = {public_id(one.id): one for one in reversed(CATALOGUE.values())}
-    return [first[name] for name in configured_effects() if name != "parameter_change"]
-
-
-def entries_of(public: str) -> list[Effect]:
-    """Entries of the catalogue with a public id.
-
-    Parameters
-    ----------
-    public : str
-        Public id.
-    """
-    return [one for one in CATALOGUE.values() if public_id(one.id) == public]
+    found: dict[str, list[Effect]] = {}
+    for one in CATALOGUE.values():
+        if public_id(one.id) != CHANGE:
+            found.setdefault(public_id(one.id), []).append(one)
+    return found
 
 
 def document() -> str:
@@ -99,61 +87,71 @@ def document() -> str:
     -------
     str
     """
-    plain = plain_effects()
-    rows = [f"| {_link(one)} | {_short(one)} |" for one in plain]
-    rows.append(
-        "| [parameter_change](#parameter_change) | a parameter differs between recordings |"
-    )
+    entries = effects_by_public_id()
+    rows = [
+        f"| [{name}](#{name}) | {_sentence(same)} |" for name, same in entries.items()
+    ]
+    rows.append(f"| [{CHANGE}](#{CHANGE}) | a parameter differs between recordings |")
     parts = [HEAD, "\n".join(["| id | what it is |", "|---|---|", *rows])]
-    parts += [_section(one) for one in plain]
+    parts += [_section(name, same) for name, same in entries.items()]
     parts.append(_change())
     return "\n\n".join(part.strip("\n") for part in parts) + "\n"
 
 
-def _link(effect: Effect) -> str:
-    name = public_id(effect.id)
-    return f"[{name}](#{name})"
-
-
-def _short(effect: Effect) -> str:
-    """What all entries of an id have in common."""
-    return effect.sentence.partition(";")[0] if word_of(effect.id) else effect.sentence
-
-
-def _section(effect: Effect) -> str:
-    name = public_id(effect.id)
-    entries = entries_of(name)
-    lines = [f"## {name}", ""]
-    for one in entries:
-        told = word_of(one.id)
-        word = f"`{told[0]}: {told[1]}`: " if told else ""
-        lines += [f"{word}{_claim(one)}", "", f"    {one.equation}", ""]
-    lines += [
+def _section(name: str, entries: Sequence[Effect]) -> str:
+    first = entries[0]
+    known = {one.name: one for entry in entries for one in entry.parameters}
+    lines = [
+        f"## {name}",
+        "",
+        _claim(entries),
+        "",
+        *(f"    {law}" for law in _laws(entries)),
+        "",
         "| parameter | unit | starts | bounds |",
         "|---|---|---|---|",
-        *(_row(one) for one in effect.parameters),
+        *(_row(one) for one in known.values()),
         "",
-        f"Enters {ENTERS[effect.enters]}.",
+        f"Enters {ENTERS[first.enters]}.",
     ]
-    if effect.contains:
-        names = ", ".join(f"`{one}`" for one in effect.contains)
+    if first.contains:
+        names = ", ".join(f"`{one}`" for one in first.contains)
         lines[-1] += f" Contains {names} as a limit."
-    if effect.needs_spring:
+    if all(one.needs_spring for one in entries):
         lines[-1] += " Means nothing on a free axis."
-    if effect.needs_circuit:
+    if any(one.needs_circuit for one in entries):
         lines[-1] += " Means nothing where the input is the current."
-    lines += _rivals(entries)
+    if any(one.beside for one in entries):
+        lines[-1] += " May occur twice."
+    for one in entries:
+        if one.words:
+            said = ", ".join(f"`{key}: {word}`" for key, word in one.words.items())
+            lines[-1] += f" {_claim([one])[:-1]}: {said}."
+    # The simplest entry says it best.
+    lines += _rivals(entries[::-1])
     lines += ["", f"![{name}](figures/effects/{name}.png)"]
     return "\n".join(lines)
 
 
-def _claim(effect: Effect) -> str:
-    return f"{effect.sentence[0].upper()}{effect.sentence[1:]}."
+def _laws(entries: Sequence[Effect]) -> list[str]:
+    """Different laws of entries with one public id."""
+    return list(dict.fromkeys(one.equation for one in entries))
+
+
+def _sentence(entries: Sequence[Effect]) -> str:
+    """What it is; of entries that a word tells apart, what each is."""
+    told = [one.sentence for one in entries if one.words] or [entries[0].sentence]
+    return "; or ".join(told)
+
+
+def _claim(entries: Sequence[Effect]) -> str:
+    sentence = _sentence(entries)
+    return f"{sentence[0].upper()}{sentence[1:]}."
 
 
 def _change() -> str:
-    changes = entries_of("parameter_change")
-    lines = ["## parameter_change", "", CHANGE_SENTENCE, ""]
+    changes = [one for one in CATALOGUE.values() if public_id(one.id) == CHANGE]
+    lines = [f"## {CHANGE}", "", CHANGE_SENTENCE, ""]
     lines += [f"    {one.equation}" for one in changes]
     return "\n".join([*lines, *_rivals(changes)])
 
@@ -191,10 +189,10 @@ def readme(text: str) -> str:
     before, _, rest = text.partition(TABLE_HEAD)
     after = rest[rest.index("\n\n") :]
     laws = {
-        name: " Or: ".join(f"{_claim(one)} {one.equation}" for one in entries_of(name))
-        for name in configured_effects()
+        name: f"{_claim(same)} {'; or '.join(_laws(same))}"
+        for name, same in effects_by_public_id().items()
     }
-    laws["parameter_change"] = "A parameter differs between recordings."
+    laws[CHANGE] = "A parameter differs between recordings."
     rows = [
         f"| `{name}` | {laws[name].replace('|', BAR)} | {_keys(keys)} |"
         for name, keys in configured_effects().items()
@@ -291,8 +289,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for path, text in texts.items():
         path.write_text(text)
     FIGURES.mkdir(parents=True, exist_ok=True)
-    for effect in plain_effects():
-        draw(effect, FIGURES / f"{public_id(effect.id)}.png")
+    for name, same in effects_by_public_id().items():
+        draw(same[0], FIGURES / f"{name}.png")
     return 0
 
 

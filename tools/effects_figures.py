@@ -78,6 +78,16 @@ EXAMPLES: dict[str, dict[str, float]] = {
     "sensor_hum": {"amplitude_m": 1e-3, "frequency_Hz": 12.0},
     "sensor_eccentricity": {"amplitude_m": 1e-3, "period_m": 0.01},
     "clock_skew": {"ratio": 1.01},
+    "load_friction:spring": {"force_N": 0.5, "load_share": 0.2},
+    "position_friction": {
+        "force_N": 2.0,
+        "variation_share": 0.7,
+        "period_m": 12e-3,
+    },
+    "spring_preload": {"force_N": 5.0},
+    # On an axis that turns by little the weight is a load.
+    "gravity": {"torque_N_m": 5.0, "angle_rad": 0.8},
+    "torque_ripple": {"share": 0.25, "per_turn": 800.0},
 }
 # What the missing force is best drawn over, where that is not time.
 OVER = {
@@ -85,6 +95,10 @@ OVER = {
         ("coulomb_friction", "asymmetric_friction", "stribeck_friction"), "velocity"
     ),
     **dict.fromkeys(("quadratic_drag", "voltage_limit"), "velocity"),
+    **dict.fromkeys(
+        ("load_friction:spring", "position_friction", "spring_preload", "gravity"),
+        "position",
+    ),
     **dict.fromkeys(
         ("hysteresis", "cubic_stiffness", "quadratic_stiffness"), "position"
     ),

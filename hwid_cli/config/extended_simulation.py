@@ -9,6 +9,7 @@ from typing import Any
 from hwid_cli.config.yaml_text import yaml_text
 from hwid_cli.data.recording_files import expand_variables, recordings_base
 from hwid_cli.files.atomic import replace_file
+from hwid_cli.records.drive import as_written
 from hwid_cli.records.experiment import (
     DiagnoseOptions,
     Experiment,
@@ -49,6 +50,8 @@ def write_extended_simulation(
         "kind": simulation.kind,
         **_without_defaults(simulation),
     }
+    if simulation.effects:
+        content["simulation"]["effects"] = _plain(as_written(simulation.effects))
     content["diagnose"] = _without_defaults(experiment.diagnose or DiagnoseOptions())
     title = f"# The simulation of {experiment.name!r} as 'hwid diagnose' extended it.\n"
     replace_file(path, (title + yaml_text(content)).encode("utf-8"))

@@ -44,7 +44,7 @@ from hwid_cli.files.messages import is_plain
 from hwid_cli.records.axis import check_axis
 from hwid_cli.records.experiment import SimulationOptions
 from hwid_cli.records.model import FitOptions
-from hwid_cli.records.rules import NamesFor, Refusal, Refused, Rule, StandsFor
+from hwid_cli.records.rules import OtherForm, Refusal, Refused, Rule, StandsFor
 
 # A path of Linux has no more; a text of a configuration needs no more.
 _LONGEST_TEXT = 4096
@@ -128,7 +128,7 @@ def _ruled(hint: Any, rules: tuple[Any, ...]) -> Any:
     for rule in rules:
         if isinstance(rule, StandsFor):
             readable = Annotated[readable | None, BeforeValidator(rule.read)]
-        elif isinstance(rule, NamesFor):
+        elif isinstance(rule, OtherForm):
             readable = Annotated[readable, BeforeValidator(rule.read)]
         elif isinstance(rule, Rule):
             readable = Annotated[readable, AfterValidator(rule.read)]

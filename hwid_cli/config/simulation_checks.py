@@ -13,7 +13,12 @@ from hwid_cli.config.faults import (
     wrong,
     wrong_word,
 )
-from hwid_cli.drive.catalogue import CATALOGUE, configured_effects, public_id
+from hwid_cli.drive.catalogue import (
+    CATALOGUE,
+    configured_effects,
+    entry_of,
+    public_id,
+)
 from hwid_cli.drive.effect import Stated
 from hwid_cli.records.drive import BASE_PARAMETERS
 from hwid_cli.records.experiment import DiagnoseOptions, Experiment
@@ -103,19 +108,36 @@ def cascade_faults(experiment: Experiment) -> Iterator[Fault]:
 def effect_faults(experiment: Experiment) -> Iterator[Fault]:
     """Effects of the simulation that there are not, or that lack a parameter."""
     if experiment.simulation is not None:
+        place = ("simulation", "effects")
+        entries: set[str] = set()
         for name, parameters in experiment.simulation.effects.items():
-            yield from _effect(name, parameters, ("simulation", "effects"))
+            faults = list(_effect(name, parameters, place))
+            yield from faults
+            entry = None if faults else entry_of(name, parameters)
+            if entry is not None and entry.id in entries:
+                yield _same_effect(public_id(name), place)
+            entries |= set() if entry is None else {entry.id}
+
+
+def _same_effect(name: str, place: Place) -> Fault:
+    """An effect that is there twice, but that the simulation holds once."""
+    twice = {public_id(one.id) for one in CATALOGUE.values() if one.beside}
+    words = [one.name for one in configured_effects()[name] if one.words]
+    expected = f"twice only {', '.join(sorted(twice))}"
+    if words:
+        expected = f"each {name} with another {words[0]}"
+    return Fault(place, f"{name} is listed twice", expected, "remove one")
 
 
 def _effect(
     name: str, found: Mapping[str, float | str], place: Place
 ) -> Iterator[Fault]:
     effects = configured_effects()
-    if name not in effects:
-        yield wrong_word(place, name, effects)
+    if public_id(name) not in effects:
+        yield wrong_word(place, public_id(name), effects)
         return
     place = (*place, name)
-    known = {one.name: one for one in effects[name]}
+    known = {one.name: one for one in effects[public_id(name)]}
     for key in found:
         if key not in known:
             yield unknown_key((*place, key), known)

@@ -22,6 +22,8 @@ from hwid_cli.records.experiment import RecordingsOptions
 
 # The mean step of a clock that only scatters is this close to the median one.
 _SCATTER = 0.02
+# A clock that keeps its step most of the time has no jitter, but gaps.
+_REGULAR, _MOSTLY = 1e-3, 0.5
 
 _log = logging.getLogger(__name__)
 
@@ -107,7 +109,8 @@ def _grid_step(time: np.ndarray, median: float) -> float:
     counted = every + np.concatenate([[0.0], np.cumsum(missing)])
     ticks = min((every, counted), key=lambda one: _misfit(time, one))
     mean = float(time[-1] - time[0]) / ticks[-1]
-    if abs(mean - median) <= _SCATTER * median:
+    regular = np.abs(np.diff(time) - median) <= _REGULAR * median
+    if np.mean(regular) < _MOSTLY and abs(mean - median) <= _SCATTER * median:
         return _simplest_step(time, ticks)
     return float(f"{median:.{_STEP_DIGITS}g}")
 
@@ -221,4 +224,7 @@ def _averaged(grid: np.ndarray, known: np.ndarray, values: np.ndarray) -> np.nda
     done = np.clip(edges - known[row], 0.0, None)
     slope = (values[row + 1] - values[row]) / (known[row + 1] - known[row])
     integral = lines[row] + done * (values[row] + 0.5 * slope * done)
-    return np.diff(integral) / np.diff(edges)
+    means = np.diff(integral) / np.diff(edges)
+    # Half a step has no middle at the grid's ends.
+    means[[0, -1]] = np.interp(grid[[0, -1]], known, values)
+    return means

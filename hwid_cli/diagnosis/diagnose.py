@@ -23,7 +23,7 @@ from hwid_cli.diagnosis.candidate import (
 from hwid_cli.diagnosis.causes import fit_with_input_noise, without_repeats
 from hwid_cli.diagnosis.findings import Findings, describe
 from hwid_cli.diagnosis.intervals import unclear_effects
-from hwid_cli.diagnosis.latent_force import latent_force
+from hwid_cli.diagnosis.latent_force import Smoothed, latent_force
 from hwid_cli.diagnosis.noise import noise_floor
 from hwid_cli.diagnosis.parameters import (
     compare_at,
@@ -31,6 +31,7 @@ from hwid_cli.diagnosis.parameters import (
     first_point,
     parameter_layout,
 )
+from hwid_cli.diagnosis.pieces import in_pieces
 from hwid_cli.diagnosis.problem import (
     Compared,
     DiagnosisProblem,
@@ -42,6 +43,7 @@ from hwid_cli.diagnosis.rounds import (
     Rounds,
     RoundsResult,
     RunTasks,
+    continue_rounds,
     run_rounds,
 )
 from hwid_cli.diagnosis.scales import (
@@ -51,9 +53,14 @@ from hwid_cli.diagnosis.scales import (
     scales_of_recordings,
 )
 from hwid_cli.diagnosis.search import fit_own
-from hwid_cli.diagnosis.selection import SelectionCriteria, decide
+from hwid_cli.diagnosis.selection import (
+    STILL_LARGE,
+    DiagnosisVerdict,
+    SelectionCriteria,
+    decide,
+)
 from hwid_cli.diagnosis.where import places
-from hwid_cli.drive.catalogue import CATALOGUE, public_id
+from hwid_cli.drive.catalogue import CATALOGUE, may_be_added, public_id
 from hwid_cli.drive.effect import Scales
 from hwid_cli.drive.simulation import drive_effects
 from hwid_cli.records.candidates import CandidateFit
@@ -106,25 +113,19 @@ def diagnose(
     where = places(before, noise, drive, force)
 
     criteria = SelectionCriteria.of(problem, noise)
-    found = RoundsResult()
-    if base.is_usable and not criteria.is_complete(base):
-        baseline = Baseline(drive, scales, noise, problem.drive)
-        allowed = allowed_effects(problem, options)
-        found = run_rounds(
-            Rounds(problem, baseline, criteria, base, allowed, run_tasks, on_round),
-            options.max_effects,
-        )
-
-    on_round("verdict", 0)
     given_sse = each_sum_of_squares([one.residual for one in given])
-    verdict = decide(
+    rounds = Rounds(
+        problem,
+        Baseline(drive, scales, noise, problem.drive),
         criteria,
-        given_sse,
         base,
-        found.fits,
-        found.best,
-        lambda one: unclear_effects(problem, one, scales),
+        allowed_effects(problem, options),
+        run_tasks,
+        on_round,
     )
+    found = _search(rounds, given_sse, force, options.max_effects)
+    on_round("verdict", 0)
+    verdict = _decided(rounds, given_sse, found)
     return describe(
         Findings(
             problem=problem, criteria=criteria, scales=scales, given_sse=given_sse,
@@ -132,6 +133,38 @@ def diagnose(
             found=found, verdict=verdict,
         )
     )  # fmt: skip
+
+
+def _search(
+    rounds: Rounds, given_sse: np.ndarray, force: Sequence[Smoothed], max_effects: int
+) -> RoundsResult:
+    """Sets of effects, from whole recordings and where these are lost from pieces."""
+    base, criteria = rounds.base, rounds.criteria
+    if not base.is_usable or criteria.is_complete(base):
+        return RoundsResult()
+    found = run_rounds(rounds, max_effects)
+    is_lost = (
+        _decided(rounds, given_sse, found).word == "unknown"
+        and criteria.ratio(base) > STILL_LARGE
+    )
+    if is_lost and not rounds.problem.compares_command:
+        seeds = _seeds_of_pieces(rounds, force, max_effects)
+        found = continue_rounds(rounds, found, seeds)
+    return found
+
+
+def _decided(
+    rounds: Rounds, given_sse: np.ndarray, found: RoundsResult
+) -> DiagnosisVerdict:
+    """Weigh what was found."""
+    return decide(
+        rounds.criteria,
+        given_sse,
+        rounds.base,
+        found.fits,
+        found.best,
+        lambda one: unclear_effects(rounds.problem, one, rounds.baseline.scales),
+    )
 
 
 def compared_as_given(problem: DiagnosisProblem) -> list[Compared]:
@@ -154,6 +187,26 @@ def _refit_base(
     """Base, and the effects that the simulation has already, fitted again."""
     start = SearchStart(base_of(problem.drive), drive_effects(problem.drive))
     return fit_candidate(problem, (), [start], scales, noise)
+
+
+def _seeds_of_pieces(
+    rounds: Rounds, force: Sequence[Smoothed], max_effects: int
+) -> tuple[CandidateFit, ...]:
+    """Best sets of each size on pieces of the recordings."""
+    pieces = in_pieces(rounds.problem, force)
+    baseline = rounds.baseline
+    start = SearchStart(base_of(baseline.drive), drive_effects(pieces.drive))
+    base = fit_candidate(pieces, (), [start], baseline.scales, baseline.noise)
+    if not base.is_usable:
+        return ()
+    of_pieces = replace(
+        rounds,
+        problem=pieces,
+        criteria=SelectionCriteria.of(pieces, baseline.noise),
+        base=base,
+        baseline=replace(baseline, drive=fitted_drive(pieces.drive, base)),
+    )
+    return run_rounds(of_pieces, max_effects).best
 
 
 def _with_input_noise(
@@ -186,7 +239,7 @@ def allowed_effects(
 ) -> tuple[str, ...]:
     """Ids that may be named: those asked for that make sense for this drive."""
     wanted = options.effects
-    present = {public_id(one) for one in drive_effects(problem.drive)}
+    present = drive_effects(problem.drive)
     has_spring = problem.drive.stiffness_N_per_m > 0
     has_circuit = problem.drive.resistance_ohm is not None
     several = len(problem.part(held_out=False).signals) > 2
@@ -194,7 +247,8 @@ def allowed_effects(
         name
         for name, effect in CATALOGUE.items()
         if (wanted is None or public_id(name) in wanted)
-        and public_id(name) not in present
+        # A second one waits for the first.
+        and may_be_added(name, {*present, effect.beside})
         and (has_spring or not effect.needs_spring)
         and (has_circuit or not effect.needs_circuit)
         and (several or not any(one.is_own for one in effect.parameters))

@@ -18,7 +18,7 @@ from hwid_cli.diagnosis.rounds import RoundsResult
 from hwid_cli.diagnosis.selection import DiagnosisVerdict, SelectionCriteria, ranked
 from hwid_cli.diagnosis.sentences import doubtful_values, hidden_from_view, summarise
 from hwid_cli.diagnosis.where import latent_force_curves
-from hwid_cli.drive.catalogue import CATALOGUE, public_id, word_of
+from hwid_cli.drive.catalogue import CATALOGUE, public_id
 from hwid_cli.drive.effect import Scales
 from hwid_cli.drive.simulation import drive_effects
 from hwid_cli.records.axis import name_on
@@ -29,6 +29,7 @@ from hwid_cli.records.diagnosis import (
     FittedEffect,
     FittedParameter,
     Gap,
+    LatentForce,
     NoiseFloor,
     Overlay,
     Place,
@@ -71,7 +72,8 @@ def describe(findings: Findings) -> Diagnosis:
     """Put together what shows the verdict."""
     problem, criteria, base = findings.problem, findings.criteria, findings.base
     verdict, noise, scales = findings.verdict, criteria.noise, findings.scales
-    chosen, before, found = verdict.chosen, findings.before, findings.found
+    chosen, before = verdict.chosen, findings.before
+    fits = list(findings.found.fits.values())
     is_base = chosen is base
     after = before if is_base else compared_with_fit(problem, chosen, scales)
     given_sse = findings.given_sse
@@ -96,20 +98,13 @@ def describe(findings: Findings) -> Diagnosis:
         base=parameters,
         places=findings.where,
         not_observable=hidden_from_view(problem),
-        next_experiment=propose(
-            problem, criteria, scales, verdict, list(found.fits.values())
-        ),
+        next_experiment=propose(problem, criteria, scales, verdict, fits),
         train=tuple(one.name for one in problem.signals if not one.is_held_out),
         held_out=tuple(one.name for one in problem.signals if one.is_held_out),
-        candidates=ranked(
-            criteria, list(found.fits.values()), base, found.shares
-        ),
+        candidates=ranked(criteria, fits, base, findings.found.shares),
         gaps=_recording_gaps(problem, given_sse, base, chosen),
         overlays=_overlays(before, after, noise),
-        latent_force=latent_force_curves(
-            before, None if is_base else after, findings.force,
-            fitted_drive(problem.drive, base), noise,
-        ),
+        latent_force=_force_curves(findings, None if is_base else after),
         present=told[: len(present)],
         reference_current_A=problem.drive.reference_current_A,
         reference_displacement_m=problem.drive.reference_displacement_m,
@@ -118,6 +113,15 @@ def describe(findings: Findings) -> Diagnosis:
         axis=problem.drive.axis,
         output=problem.drive.output,
     )  # fmt: skip
+
+
+def _force_curves(
+    findings: Findings, after: Sequence[Compared] | None
+) -> tuple[LatentForce, ...]:
+    drive = fitted_drive(findings.problem.drive, findings.base)
+    return latent_force_curves(
+        findings.before, after, findings.force, drive, findings.criteria.noise
+    )
 
 
 def _gap(criteria: SelectionCriteria, sse: np.ndarray) -> Gap:
@@ -230,16 +234,15 @@ def _fitted_effects_of(
                 FittedParameter(one.parameter, float(value), float(low), float(high))
             )
     for identifier in ids:
-        told = word_of(identifier)
-        if told is None:
-            continue
-        word = FittedParameter(told[0], float("nan"), text=told[1])
-        parameters[identifier].append(word)
-        for parameter in CATALOGUE[identifier].parameters:
+        entry = CATALOGUE[identifier]
+        for name, word in entry.words.items():
+            told = FittedParameter(name, float("nan"), text=word)
+            parameters[identifier].append(told)
+        for parameter in entry.parameters:
             if parameter.is_factor:
                 own = ParameterRef(identifier, parameter.name)
-                factors = np.exp(found.own[:, found.own_names.index(own)])
-                parameters[identifier].append(_spread(factors))
+                column = found.own_names.index(own)
+                parameters[identifier].append(_spread(np.exp(found.own[:, column])))
     return tuple(_described(one, parameters[one]) for one in ids)
 
 

@@ -18,6 +18,7 @@ from hwid_cli.drive.effect import Parameter, Scales
 from hwid_cli.drive.simulation import (
     REFINEMENT,
     Motion,
+    drive_effects,
     parameter_vector,
     run,
     set_start,
@@ -29,6 +30,8 @@ from hwid_cli.records.drive import BASE_PARAMETERS, Drive
 BASE, START = "base", "start"
 # A damping of zero is searched from this share of what halves an oscillation.
 _SMALL_DAMPING = 0.02
+# Stands for zero where a value has a logarithm, as a share of its size.
+_NOTHING = 1e-9
 
 
 @dataclass(frozen=True)
@@ -152,12 +155,18 @@ def parameter_layout(
     """
     shared = _base_unknowns(problem.drive, problem.known)
     own: list[Unknown] = []
+    present = drive_effects(problem.drive)
     for identifier in effects:
+        stated = present.get(identifier, {})
         for parameter in CATALOGUE[identifier].parameters:
             value = start[identifier].get(parameter.name, 0.0)
             unknown = _unknown(identifier, parameter, value, scales)
+            if parameter.name in stated:
+                unknown = _with_room_for(unknown, stated[parameter.name])
             (own if parameter.is_own else shared).append(unknown)
     far = float("inf")
+    if problem.has_starts:
+        return ParameterLayout(tuple(shared), tuple(own), tuple(effects))
     is_moving = _starts_in_motion(problem, effects)
     if problem.start != "rest" or is_moving or _rests_anywhere(problem):
         reach = scales.displacement_m
@@ -211,13 +220,26 @@ def _base_unknowns(drive: Drive, known: Mapping[str, float]) -> list[Unknown]:
 
 def _unknown(owner: str, parameter: Parameter, value: float, scales: Scales) -> Unknown:
     low, high = parameter.bounds(scales)
-    if parameter.is_positive:
-        size = value if value > 0 else max(parameter.starts(scales))
-        return Unknown(owner, parameter.name, True, size, max(low, 1e-9 * size), high)
-    center = parameter.center
-    sizes = [abs(one - center) for one in (value, *parameter.starts(scales))]
-    size = max(sizes) or 1.0
-    return Unknown(owner, parameter.name, False, size, low, high, center)
+    name = parameter.name
+    if not parameter.is_positive:
+        center = parameter.center
+        sizes = [abs(one - center) for one in (value, *parameter.starts(scales))]
+        return Unknown(owner, name, False, max(sizes) or 1.0, low, high, center)
+    size = abs(value) or max(parameter.starts(scales))
+    low = max(low, _NOTHING * size)
+    if value < 0:
+        # A configuration may state it so, and its sign stays.
+        return Unknown(owner, name, True, value, -high, -low)
+    return Unknown(owner, name, True, size, low, high)
+
+
+def _with_room_for(unknown: Unknown, stated: float) -> Unknown:
+    """The same with bounds that hold what the configuration states."""
+    value = stated
+    if unknown.is_log and value * unknown.scale <= 0:
+        value = _NOTHING * unknown.scale
+    low, high = min(unknown.low, value), max(unknown.high, value)
+    return replace(unknown, low=low, high=high)
 
 
 def first_point(
@@ -306,9 +328,12 @@ def vectors_at(
         if common is None or fit_layout.own:
             common = parameter_vector(drive, effects_at(fit_layout, point, row))
         vector = common.copy()
-        _place_start(
-            vector, problem, signals.rest_position_m, fit_layout, point.own[row]
-        )
+        if signals.start is not None:
+            set_start(vector, *signals.start)
+        else:
+            _place_start(
+                vector, problem, signals.rest_position_m, fit_layout, point.own[row]
+            )
         vectors.append(vector)
     return vectors
 

@@ -49,6 +49,8 @@ class Signals:
         First samples that are not evaluated.
     used : ndarray of bool, shape (n_samples,), or None
         Which of the others are; None means all.
+    start : tuple of float, or None, [m], [m/s]
+        Position and velocity at the first sample, where they are known.
     is_velocity : bool
         Whether the output is a velocity. What needs one or the other asks ``position``
         and ``velocity``.
@@ -64,6 +66,7 @@ class Signals:
     skip: int = 0
     is_held_out: bool = False
     used: np.ndarray | None = None
+    start: tuple[float, float] | None = None
     is_velocity: bool = False
 
     @cached_property
@@ -154,6 +157,12 @@ class DiagnosisProblem:
     def compares_command(self) -> bool:
         """Whether the command is compared instead of the output."""
         return self.drive.controller is not None
+
+    @property
+    def has_starts(self) -> bool:
+        """Whether it is known how each recording starts."""
+        starts = [one.start for one in self.signals]
+        return bool(starts) and all(one is not None for one in starts)
 
     @property
     def n_evaluated(self) -> int:

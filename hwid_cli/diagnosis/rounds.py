@@ -7,7 +7,7 @@ members. Each round describes its fits as tasks and hands them to a runner that 
 given, so that nothing here knows of processes or of a cache. docs/method_diagnosis.md.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
@@ -41,7 +41,7 @@ from hwid_cli.diagnosis.selection import (
     is_part_of,
     select_best,
 )
-from hwid_cli.drive.catalogue import CATALOGUE, public_id
+from hwid_cli.drive.catalogue import CATALOGUE, may_be_added, public_id
 from hwid_cli.drive.effect import Values
 from hwid_cli.drive.simulation import drive_effects
 from hwid_cli.records.candidates import CandidateFit
@@ -174,10 +174,35 @@ def run_rounds(rounds: Rounds, max_effects: int) -> RoundsResult:
         if rounds.criteria.is_complete(winner) or search.is_nearly_all(winner):
             break
         parents = search.parents(size)
-    # From the largest down: what a set without one effect gains may be the better one.
-    for size in range(len(best), 1, -1):
-        search.fit_without_each(best[size - 1])
-        best[size - 2] = search.best_of_size(size - 1) or best[size - 2]
+    search.fit_parts(best)
+    return RoundsResult(search.fits, tuple(best), search.shares)
+
+
+def continue_rounds(
+    rounds: Rounds, found: RoundsResult, seeds: Sequence[CandidateFit]
+) -> RoundsResult:
+    """Fit sets that another search has found, beside those of this one.
+
+    Parameters
+    ----------
+    seeds : sequence of CandidateFit
+        Sets with the values to start from, such as those that pieces of the recordings
+        have led to.
+    """
+    search = _Search(rounds)
+    search.fits.update(found.fits)
+    search.shares.update(found.shares)
+    search.fit_seeds(seeds)
+    largest = max((len(one) for one in search.fits), default=0)
+    best: list[CandidateFit] = []
+    for size in range(1, largest + 1):
+        winner = search.best_of_size(size)
+        if winner is None:
+            break
+        best.append(winner)
+        if rounds.criteria.is_complete(winner):
+            break
+    search.fit_parts(best)
     return RoundsResult(search.fits, tuple(best), search.shares)
 
 
@@ -263,14 +288,38 @@ class _Search:
         against = self.rounds.criteria.evidence(found, self.rounds.base)
         return against.explained >= LEAST_OF_PARENT
 
+    def fit_parts(self, best: list[CandidateFit]) -> None:
+        """Fit each best set without each of its effects, from the largest down.
+
+        What a set without one effect gains may be the better one of its size.
+        """
+        for size in range(len(best), 1, -1):
+            self.fit_without_each(best[size - 1])
+            best[size - 2] = self.best_of_size(size - 1) or best[size - 2]
+
+    def fit_seeds(self, seeds: Sequence[CandidateFit]) -> None:
+        """Fit sets from the values that another search has found."""
+        present = drive_effects(self.rounds.problem.drive)
+        sets = {
+            one.effects: [
+                SearchStart(_base_values(one, self.rounds), fitted_values(one, present))
+            ]
+            for one in seeds
+        }
+        self._finish("sets that pieces have led to", sets)
+        for size in sorted({len(one.effects) for one in seeds}):
+            self._go_on(size)
+
     def fit_without_each(self, whole: CandidateFit) -> None:
         """Fit a set without each of its effects, from where the whole set ended."""
-        values = fitted_values(whole, drive_effects(self.rounds.problem.drive))
+        present = drive_effects(self.rounds.problem.drive)
+        values = fitted_values(whole, present)
         base = _base_values(whole, self.rounds)
-        sets = {}
+        sets: dict[Effects, list[SearchStart]] = {}
         for effect in whole.effects:
             left = tuple(one for one in whole.effects if one != effect)
-            sets[left] = [SearchStart(base, _without(values, effect))]
+            ids, start = _moved_up(left, _without(values, effect), present)
+            sets.setdefault(ids, []).append(SearchStart(base, start))
         self._finish("without each effect", sets)
 
     def _of_size(self, size: int) -> list[CandidateFit]:
@@ -286,7 +335,11 @@ class _Search:
         start = fitted_values(parent, present)
         drive = fitted_drive(rounds.problem.drive, parent)
         at = linearise(self._few, drive, start, scales)
-        others = [one for one in rounds.allowed if not _is_nested(one, parent.effects)]
+        others = [
+            one
+            for one in rounds.allowed
+            if not _is_nested(one, parent.effects, present)
+        ]
         found = self._forecast(at, others)
         if parent is rounds.base:
             self._forecasts, self._error = found, at.error
@@ -369,7 +422,11 @@ class _Search:
                     rounds.problem, ids, tuple(starts), baseline.scales, baseline.noise,
                 ),
                 result_type=CandidateFit,
-                content={"effects": ids, "starts": list(starts)},
+                content={
+                    "effects": ids,
+                    "starts": list(starts),
+                    "pieces": rounds.problem.has_starts,
+                },
                 arrays=(rounds.base.values,),
             )
             for ids, starts in sets.items()
@@ -447,59 +504,64 @@ class _Search:
         return {one.effects: one.starts for one in screened if one.sse <= most}
 
     def _again(self, size: int) -> dict[Effects, list[SearchStart]]:
-        """Starts from related fits that have come further than a set's own fit.
-
-        Related are sets in which one effect is another one, nested with it or easily
-        confused with it, and the smaller set with this effect faint.
-        """
-        rounds = self.rounds
-        present = drive_effects(rounds.problem.drive)
-        fits = self._of_size(size)
+        """Starts from related fits that have come further than a set's own fit."""
         best = self.best_of_size(size)
-        is_complete = best is not None and rounds.criteria.is_complete(best)
-        if best is None or not np.isfinite(_train_sse(rounds, best)):
+        if best is None or not np.isfinite(_train_sse(self.rounds, best)):
             return {}
+        sets = self._from_best(best)
+        if not self.rounds.criteria.is_complete(best):
+            for ids, start in self._from_parts(size):
+                sets.setdefault(ids, []).extend(self._unless_tried(ids, [start]))
+        return {ids: starts for ids, starts in sets.items() if starts}
+
+    def _from_best(self, best: CandidateFit) -> dict[Effects, list[SearchStart]]:
+        """Starts where the best set ended, with a relative in the place of an effect.
+
+        Where the best set is complete, simpler relatives only.
+        """
+        rounds, present = self.rounds, drive_effects(self.rounds.problem.drive)
+        is_complete = rounds.criteria.is_complete(best)
+        values, base = fitted_values(best, present), _base_values(best, rounds)
         sets: dict[Effects, list[SearchStart]] = {}
         for effect in best.effects:
             others = tuple(one for one in best.effects if one != effect)
-            relatives = (
-                CATALOGUE[effect].contains if is_complete else _relatives(effect)
-            )
-            for relative in relatives:
+            kin = CATALOGUE[effect].contains if is_complete else _relatives(effect)
+            for relative in kin:
                 ids = _together(others, relative)
-                if relative not in rounds.allowed or _is_nested(relative, others):
+                if relative not in rounds.allowed or not _may_stand(ids, present):
                     continue
                 here = self.fits.get(ids)
                 if here is not None and not self._is_behind(here, best):
                     continue
-                values = fitted_values(best, present)
-                scales = rounds.baseline.scales
+                given = _translated(relative, values[effect], rounds.baseline.scales)
                 starts = [
-                    SearchStart(
-                        _base_values(best, rounds),
-                        {**_without(values, effect), relative: one},
-                    )
-                    for one in _translated(relative, values[effect], scales)
+                    SearchStart(base, {**_without(values, effect), relative: one})
+                    for one in given
                 ]
                 if here is not None:
-                    own = fitted_values(here, present)
-                    starts.append(SearchStart(_base_values(best, rounds), own))
+                    starts.append(SearchStart(base, fitted_values(here, present)))
                 sets[ids] = self._unless_tried(ids, starts)
-        for one in fits:
+        return sets
+
+    def _from_parts(self, size: int) -> Iterable[tuple[Effects, SearchStart]]:
+        """Starts at a smaller set, the further effect faint: none ends up worse."""
+        rounds, present = self.rounds, drive_effects(self.rounds.problem.drive)
+        for one in self._of_size(size):
             smaller = self._largest_part(one)
-            if is_complete or smaller is None or not self._is_behind(one, smaller):
+            if smaller is None or not self._is_behind(one, smaller):
                 continue
-            (added,) = set(one.effects) - set(smaller.effects)
+            added = set(one.effects) - set(smaller.effects)
+            if len(added) != 1:
+                continue
+            (effect,) = added
             values = fitted_values(smaller, present)
-            faint = CATALOGUE[added].faint(
-                fitted_values(one, present)[added], rounds.baseline.scales
+            faint = CATALOGUE[effect].faint(
+                fitted_values(one, present)[effect], rounds.baseline.scales
             )
-            start = SearchStart(_base_values(smaller, rounds), {**values, added: faint})
-            sets[one.effects] = [
-                *sets.get(one.effects, []),
-                *self._unless_tried(one.effects, [start]),
-            ]
-        return {ids: starts for ids, starts in sets.items() if starts}
+            yield (
+                one.effects,
+                SearchStart(_base_values(smaller, rounds), {**values, effect: faint}),
+            )
 
     def _unless_tried(
         self, ids: Effects, starts: Sequence[SearchStart]
@@ -600,13 +662,44 @@ def _translated(effect: str, values: Values, scales: Any) -> list[dict[str, floa
     return found
 
 
-def _is_nested(effect: str, others: Sequence[str]) -> bool:
-    """Whether an effect is, includes, or is included in one of the others."""
-    return any(
-        effect == other
-        or effect in CATALOGUE[other].contains
+def _is_nested(
+    effect: str, others: Sequence[str], present: Collection[str] = ()
+) -> bool:
+    """Whether an effect is, includes, or is included in one of the others.
+
+    A second one of its kind stands beside its first, and never without it.
+
+    Parameters
+    ----------
+    present : collection of str
+        Ids of what the simulation holds.
+    """
+    return not may_be_added(effect, (*present, *others)) or any(
+        effect in CATALOGUE[other].contains
         or other in CATALOGUE[effect].contains
         or bool(set(CATALOGUE[effect].contains) & set(CATALOGUE[other].contains))
-        or public_id(effect) == public_id(other)
         for other in others
+        if public_id(other) != public_id(effect)
     )
+
+
+def _may_stand(effects: Effects, present: Collection[str]) -> bool:
+    """Whether no effect of a set is nested with another, or lacks its first."""
+    return not any(
+        _is_nested(one, tuple(other for other in effects if other != one), present)
+        for one in effects
+    )
+
+
+def _moved_up(
+    effects: Effects, values: Mapping[str, Values], present: Collection[str]
+) -> tuple[Effects, Mapping[str, Values]]:
+    """A set in which a second one whose first has gone is the first."""
+    for one in effects:
+        others = tuple(two for two in effects if two != one)
+        first = CATALOGUE[one].beside
+        if first and not may_be_added(one, (*present, *others)):
+            names = {parameter.name for parameter in CATALOGUE[first].parameters}
+            same = {name: value for name, value in values[one].items() if name in names}
+            return _together(others, first), {**_without(values, one), first: same}
+    return effects, values

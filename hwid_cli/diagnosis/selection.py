@@ -26,8 +26,9 @@ LEAST_EXPLAINED = 0.5
 # ... and one that leaves more than so many times the noise ...
 STILL_LARGE = 3.0
 LEAST_EXPLAINED_LARGE = 0.65
-# ... and a set of several, which imitates more ...
+# ... and a set of several, which imitates more, and may leave this many times ...
 LEAST_EXPLAINED_SET = 0.8
+MOST_LEFT_BY_SET = 2.0
 # ... of which each effect must bring this share of all, less where nothing remains: a law
 # that is not quite right leaves as much.
 LEAST_CONTRIBUTION = 5e-3
@@ -203,7 +204,8 @@ class SelectionCriteria:
         is_large = self.ratio(found) > STILL_LARGE
         if len(found.effects) > 1:
             # Where much remains, a further effect makes up for a law that is not right.
-            explains = against.explained >= LEAST_EXPLAINED_SET and not is_large
+            is_near = self.ratio(found) <= MOST_LEFT_BY_SET
+            explains = against.explained >= LEAST_EXPLAINED_SET and is_near
         else:
             least = LEAST_EXPLAINED_LARGE if is_large else LEAST_EXPLAINED
             explains = against.explained >= least
@@ -361,7 +363,7 @@ def select_best(
         return None
     best = max(usable, key=lambda one: criteria.gain(one, base))
     for rival in sorted(usable, key=count):
-        if count(rival) >= count(best):
+        if count(rival) >= count(best) and not _has_fewer_kinds(rival, best):
             continue
         if is_part_of(rival, best):
             if not _adds_enough(criteria, best, rival, base):
@@ -383,6 +385,12 @@ def is_part_of(smaller: CandidateFit, larger: CandidateFit) -> bool:
             return False
         left.remove(match)
     return True
+
+
+def _has_fewer_kinds(one: CandidateFit, other: CandidateFit) -> bool:
+    """Whether a set needs only some of another's kinds of effects: one of them twice."""
+    kinds, others = set(names_of(one)), set(names_of(other))
+    return kinds < others and count(one) <= count(other)
 
 
 def _adds_enough(
@@ -413,7 +421,8 @@ def rivals(
     -------
     list of CandidateFit
         Those that include the best one, or are included in it, are left out: they are
-        measured by what they add.
+        measured by what they add. So are those that need a further kind of effect where
+        the best one has one kind twice.
     """
     is_complete = criteria.is_complete(best)
     return [
@@ -424,6 +433,7 @@ def rivals(
         and not is_part_of(best, one)
         and not is_part_of(one, best)
         and names_of(one) != names_of(best)
+        and not _has_fewer_kinds(best, one)
         and (
             criteria.gain(best, one) < TIE
             or (

@@ -3,9 +3,12 @@
 The only list: of the declarations in ``effects``, one module for each family. To add an
 effect: its declaration there, its term in a kernel, its test; then
 ``make drive-source effects`` for what follows from the declaration.
+
+Several entries may have one public id, the part before the colon: with another word of
+the configuration, with a richer law, or a second one of its kind.
 """
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 from hwid_cli.drive.effect import Effect, Stated
 from hwid_cli.drive.effects import (
@@ -36,50 +39,65 @@ def public_id(identifier: str) -> str:
     return identifier.partition(":")[0]
 
 
-def entry_id(public: str, stated: Mapping[str, float | str]) -> str:
-    """Id in this catalogue of an effect that a configuration states.
+def configured_effects() -> dict[str, tuple[Stated, ...]]:
+    """What a configuration states for each effect, by its public id."""
+    keys: dict[str, dict[str, Stated]] = {}
+    for entry in CATALOGUE.values():
+        known = keys.setdefault(public_id(entry.id), {})
+        for one in entry.stated_keys():
+            known.setdefault(one.name, one)
+    return {name: tuple(known.values()) for name, known in keys.items()}
+
+
+def entry_of(identifier: str, stated: Mapping[str, float | str]) -> Effect | None:
+    """Entry for an effect as a configuration states it: the simplest that holds it.
 
     Parameters
     ----------
-    public : str
-        Public id.
+    identifier : str
+        Public id, with a mark where it is the second one; or the id of an entry.
     stated : mapping of str to float or str
-        What the configuration states for it; a word tells entries of one id apart.
-
-    Examples
-    --------
-    >>> entry_id("parameter_change", {"which": "stiffness", "spread": 0.1})
-    'parameter_change:stiffness'
-    """
-    words = [str(stated[one.name]) for one in _WORDS.get(public, ())]
-    return ":".join([public, *words])
-
-
-def word_of(identifier: str) -> tuple[str, str] | None:
-    """Key and word by which a configuration tells an entry from others of its id.
+        Numbers and words by the keys of the configuration.
 
     Returns
     -------
-    tuple of str, or None
-        None where the id has one entry only.
+    Effect or None
+        None where the catalogue has no such entry.
 
     Examples
     --------
-    >>> word_of("parameter_change:stiffness")
-    ('which', 'stiffness')
+    >>> entry_of("parameter_change", {"which": "damping", "spread": 0.1}).id
+    'parameter_change:damping'
     """
-    public, _, word = identifier.partition(":")
-    return (_WORDS[public][0].name, word) if word else None
+    name, _, mark = identifier.partition(":")
+    given = CATALOGUE.get(identifier)
+    if given is not None and mark and not given.beside:
+        return given
+    same = [
+        one
+        for one in CATALOGUE.values()
+        if public_id(one.id) == name
+        and all(stated.get(key) == word for key, word in one.words.items())
+    ]
+    seconds = [one for one in same if one.beside]
+    same = seconds if mark and seconds else [one for one in same if not one.beside]
+    return next(
+        (one for one in same if set(stated) <= {key.name for key in one.stated_keys()}),
+        given,
+    )
 
 
-def configured_effects() -> dict[str, tuple[Stated, ...]]:
-    """What a configuration states for each effect, by its public id."""
-    return {public_id(one.id): one.keys() for one in CATALOGUE.values()}
+def may_be_added(identifier: str, present: Collection[str]) -> bool:
+    """Whether a simulation that holds some effects may get this one as well.
 
-
-# Keys with words, by public id: one at most, whose words are those of the entries' ids.
-_WORDS = {
-    public: words
-    for public, keys in configured_effects().items()
-    if (words := tuple(one for one in keys if one.words))
-}
+    Parameters
+    ----------
+    identifier : str
+        Id of the entry.
+    present : collection of str
+        Ids of the entries that it holds.
+    """
+    same = [one for one in present if public_id(one) == public_id(identifier)]
+    seconds = [one for one in same if CATALOGUE[one].beside]
+    has_first = len(seconds) < len(same)
+    return has_first and not seconds if CATALOGUE[identifier].beside else not has_first

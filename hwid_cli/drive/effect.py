@@ -136,6 +136,19 @@ class Limit:
 POSITIVE = Limit("a number > 0", lambda value: value > 0)
 # Of parameters that only switch their law off at 0.
 NOT_NEGATIVE = Limit("a number >= 0", lambda value: value >= 0)
+# Of exponents: below 1 a force would begin infinitely steep.
+AT_LEAST_1 = Limit("a number >= 1", lambda value: value >= 1)
+
+
+def bend(values: Values) -> float:
+    """By how much an exponent exceeds that of a straight law.
+
+    Parameters
+    ----------
+    values : mapping of str to float
+        With ``exponent``.
+    """
+    return values["exponent"] - 1.0
 
 
 @dataclass(frozen=True)
@@ -221,8 +234,8 @@ class Effect:
     needs_circuit : bool
         Whether it means nothing where the input is the current.
     seen : callable or None
-        Values to start from that the recordings show, from the scales; where there are
-        some they stand in for the parameters' own.
+        Values to start from that belong together, from the scales: what the recordings
+        show, say. Where there are some they stand in for the parameters' own.
     stated : tuple of Stated
         What a configuration states where that is not the parameters.
     moves_at_rest : bool
@@ -230,6 +243,10 @@ class Effect:
     strength : str
         Name of the parameter without which the effect is not there: where it is zero,
         or for a limit beyond all that it limits. Empty means the first one.
+    words : mapping of str to str
+        What it states in words for this one of several entries with one public id.
+    beside : str
+        Id of the entry of which this is the second one; without that it means nothing.
     """
 
     id: str
@@ -246,6 +263,8 @@ class Effect:
     stated: tuple[Stated, ...] = ()
     moves_at_rest: bool = False
     strength: str = ""
+    words: Mapping[str, str] = field(default_factory=dict)
+    beside: str = ""
 
     @property
     def strongest(self) -> Parameter:
@@ -270,7 +289,7 @@ class Effect:
         grids = [one.starts(scales) for one in self.parameters]
         return [dict(zip(names, values, strict=True)) for values in product(*grids)]
 
-    def keys(self) -> tuple[Stated, ...]:
+    def stated_keys(self) -> tuple[Stated, ...]:
         """What a configuration states, key by key."""
         return self.stated or tuple(
             Stated(one.name, one.limits, is_needed=one.default is None)

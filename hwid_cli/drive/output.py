@@ -7,7 +7,7 @@ import numpy as np
 from numba import njit
 
 from hwid_cli.drive import slots
-from hwid_cli.drive.compiled import INNER
+from hwid_cli.drive.compiled import INNER, MAKING
 from hwid_cli.drive.motion.push import TURN
 
 # Play is at its end within this share of it, for rounding.
@@ -110,7 +110,7 @@ def sensed(y: float, lag: float, speed: float, time: float, p: np.ndarray) -> fl
     return y
 
 
-@njit(**INNER)
+@njit(**MAKING)
 def _play(
     positions: np.ndarray,
     velocities: np.ndarray,

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.interpolate import make_interp_spline
 
 from hwid_cli.drive import slots
-from hwid_cli.drive.catalogue import CATALOGUE, entry_id
+from hwid_cli.drive.catalogue import CATALOGUE, entry_of
 from hwid_cli.drive.effect import Effect, Values
 from hwid_cli.drive.motion.move import move
 from hwid_cli.drive.output import on_other_clock, read
@@ -255,19 +255,28 @@ def drive_effects(drive: Drive) -> dict[str, dict[str, float]]:
     dict of str to dict of str to float
         With the defaults of what is not stated, except where each recording has its own
         value. A change between recordings becomes none.
+
+    Raises
+    ------
+    ValueError
+        If the same entry of the catalogue is stated twice.
     """
     effects: dict[str, dict[str, float]] = {}
     for identifier, values in drive.effects.items():
-        entry = CATALOGUE.get(entry_id(identifier, values))
-        if entry is None:
-            effects[identifier] = {name: float(one) for name, one in values.items()}
-            continue
-        numbers = effects[entry.id] = {}
-        for one in entry.parameters:
-            if one.name in values:
-                numbers[one.name] = float(values[one.name])
-            elif one.default is not None and (one.is_factor or not one.is_own):
-                numbers[one.name] = one.default
+        entry = entry_of(identifier, values)
+        name = identifier if entry is None else entry.id
+        if name in effects:
+            raise ValueError(f"effect {name!r} is there twice")
+        parameters = () if entry is None else entry.parameters
+        # Words that tell entries apart, and what only describes them.
+        told = {one.name for one in entry.stated} if entry is not None else set()
+        told -= {one.name for one in parameters}
+        effects[name] = {
+            key: float(one) for key, one in values.items() if key not in told
+        }
+        for one in parameters:
+            if one.default is not None and (one.is_factor or not one.is_own):
+                effects[name].setdefault(one.name, one.default)
     return effects
 
 

@@ -87,5 +87,37 @@ that is switched off is 0, except where the comment says infinite.
     PROPORTIONAL_GAIN,
     INTEGRAL_GAIN,
     DERIVATIVE_GAIN,
+    # Set by the simulation: what it has of what few drives have.
+    HAS_MORE,  # a force on the mass
+    HAS_FURTHER_EDGES,  # a further corner of a force
+    HAS_ZERO_EDGE,  # a force with a corner at 0
+    HAS_CONTACT,  # a stop whose force is curved
+    HAS_SHAPE,  # a hysteresis of another shape than Dahl's
+    DRIVE_VARIES,  # a force of the motor that varies, or friction that follows it
+    CAPTURE_TIME,  # a preload catches a drive at 0 that it would stop within it
+    SPRING_SHARE,
+    DRIVE_SHARE,
+    WAVY_PERIOD,
+    WAVY_PHASE,
+    WAVY_FRICTION,
+    PRELOAD,
+    STOP_LOSS,
+    STOP_BEND,
+    SIDE_LOSS,
+    SIDE_BEND,
+    SECOND_POSITION,
+    SECOND_STIFFNESS,
+    SECOND_LOSS,
+    SECOND_BEND,
+    SECOND_COGGING_FORCE,
+    SECOND_COGGING_PERIOD,
+    SECOND_COGGING_PHASE,
+    GRAVITY_TORQUE,
+    GRAVITY_ANGLE,
+    RIPPLE_SHARE,
+    RIPPLE_PER_TURN,
+    RIPPLE_PHASE,
+    HYSTERESIS_RATIO,
+    HYSTERESIS_BEND,
     N_SLOTS,
-) = range(82)
+) = range(113)

@@ -10,7 +10,7 @@ from hwid_cli import __version__
 from hwid_cli.export.map_parts import numbers_of
 from hwid_cli.files.atomic import replace_file
 from hwid_cli.records.axis import name_on
-from hwid_cli.records.drive import Drive
+from hwid_cli.records.drive import Drive, as_written
 from hwid_cli.records.exported import (
     Exported,
     ExportedModel,
@@ -103,9 +103,9 @@ def plain_drive(drive: Drive) -> dict[str, Any]:
         for name in Drive.__dataclass_fields__
         if name not in ("effects", "controller", "axis")
     }
-    content["effects"] = {
-        identifier: dict(values) for identifier, values in drive.effects.items()
-    }
+    content["effects"] = as_written(
+        {identifier: dict(values) for identifier, values in drive.effects.items()}
+    )
     controller = drive.controller
     content["controller"] = None if controller is None else asdict(controller)
     return content

@@ -1,8 +1,8 @@
 """The physics simulation of a drive: mass, spring, damper, and effects on top."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from hwid_cli.records.rules import (
     NOT_NEGATIVE,
     POSITIVE,
     OneOf,
+    OtherForm,
     Refusal,
     Refused,
     check_fields,
@@ -33,6 +34,75 @@ CASCADE_KEYS = ("position_gain_per_s", "velocity_gain", "reset_rate_per_s")
 PID_KEYS = ("proportional_gain", "integral_gain", "derivative_gain")
 # What may differ between recordings (effect ``parameter_change``).
 CHANGING = ("stiffness", "force_constant", "damping")
+# Marks the id of an effect that is there for the second time.
+SECOND = ":second"
+EffectValues = dict[str, float | str]
+
+
+def told_apart(
+    effects: Iterable[tuple[str, EffectValues]],
+) -> dict[str, EffectValues]:
+    """Effects by their ids, the second one of an id with a mark.
+
+    Parameters
+    ----------
+    effects : iterable of (str, dict of str to float or str)
+        Ids and parameters.
+
+    Raises
+    ------
+    Refused
+        If an id comes a third time.
+
+    Examples
+    --------
+    >>> told_apart([("end_stop", {}), ("cogging", {}), ("end_stop", {})])
+    {'end_stop': {}, 'cogging': {}, 'end_stop:second': {}}
+    """
+    found: dict[str, EffectValues] = {}
+    for identifier, values in effects:
+        name = identifier + SECOND if identifier in found else identifier
+        if name in found:
+            said, step = "{} is there a third time", "an effect may occur twice"
+            raise Refused(Refusal(identifier, said=said, step=step))
+        found[name] = values
+    return found
+
+
+def as_written(
+    effects: Mapping[str, EffectValues],
+) -> dict[str, EffectValues] | list[dict[str, EffectValues]]:
+    """Effects as a file holds them: a list of one key each where one occurs twice.
+
+    Examples
+    --------
+    >>> as_written({"end_stop": {"position_m": 1}, "end_stop:second": {}})
+    [{'end_stop': {'position_m': 1}}, {'end_stop': {}}]
+    """
+    if not any(name.endswith(SECOND) for name in effects):
+        return dict(effects)
+    return [{name.removesuffix(SECOND): one} for name, one in effects.items()]
+
+
+@dataclass(frozen=True)
+class Repeatable(OtherForm):
+    """Effects of a file: a section with keys, or a list of sections with one key."""
+
+    def read(self, value: Any) -> Any:
+        """Value as the record holds it."""
+        if isinstance(value, dict):
+            marked = [key for key in value if isinstance(key, str) and SECOND in key]
+            if marked:
+                expected = "the id of an effect"
+                step = "write a list of effects, each with one key, to have one twice"
+                raise Refused(Refusal(marked[0], expected, step=step))
+        if not isinstance(value, list):
+            return value
+        for one in value:
+            if not isinstance(one, dict) or len(one) != 1:
+                expected = "an effect: one key with its parameters"
+                raise Refused(Refusal(one, expected))
+        return told_apart([next(iter(one.items())) for one in value])
 
 
 @dataclass(frozen=True)
@@ -104,7 +174,8 @@ class Drive:
         0 for a free axis.
     force_constant_N_per_A : float, [N/A]
     effects : mapping of str to mapping of str to float
-        Parameters of each effect by its id; ``which`` of ``parameter_change`` is text.
+        Parameters of each effect by its id, of the second one of an id marked
+        (``told_apart``); ``which`` of ``parameter_change`` is text.
     reference_current_A, reference_displacement_m : float, [A], [m]
         Where laws that need a reference count from (Iref and xr).
     resistance_ohm : float or None, [ohm]

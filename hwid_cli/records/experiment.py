@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
 from hwid_cli.records.axis import ROTARY_NAMES, check_axis
-from hwid_cli.records.drive import HOLDS, OUTPUTS, STARTS, Controller
+from hwid_cli.records.drive import HOLDS, OUTPUTS, STARTS, Controller, Repeatable
 from hwid_cli.records.machines import GunMachine, ServoMachine
 from hwid_cli.records.maps import MAP_KINDS
 from hwid_cli.records.model import FitOptions
@@ -214,7 +214,9 @@ class SimulationOptions:
     damping_N_s_per_m: Annotated[float, NOT_NEGATIVE] = 0.0
     stiffness_N_per_m: Annotated[float, NOT_NEGATIVE] = 0.0
     force_constant_N_per_A: Annotated[float, POSITIVE] = 1.0
-    effects: dict[str, dict[str, float | str]] = field(default_factory=dict)
+    effects: Annotated[dict[str, dict[str, float | str]], Repeatable()] = field(
+        default_factory=dict
+    )
     reference_current_A: Annotated[float | None, POSITIVE] = None
     reference_displacement_m: Annotated[float | None, POSITIVE] = None
     resistance_ohm: Annotated[float | None, POSITIVE] = None

@@ -227,8 +227,12 @@ class StandsFor(Reading):
         return self.value if value == self.word else value
 
 
+class OtherForm(Reading):
+    """Another form in which a file may hold a value, read before its type is checked."""
+
+
 @dataclass(frozen=True)
-class NamesFor(Reading):
+class NamesFor(OtherForm):
     """A list of names of a file, and the value that a record holds for each."""
 
     value: object

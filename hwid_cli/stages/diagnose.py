@@ -17,6 +17,7 @@ from hwid_cli.errors import CacheError, ConfigError
 from hwid_cli.files.atomic import replace_file
 from hwid_cli.records.check import StagePlan
 from hwid_cli.records.diagnosis import Diagnosis
+from hwid_cli.records.drive import told_apart
 from hwid_cli.records.experiment import DiagnoseOptions, Experiment, SimulationOptions
 from hwid_cli.records.recordings import CalibrationLog, Recording
 from hwid_cli.report import plots
@@ -132,15 +133,14 @@ def extended_options(
         With a re-fitted base only, where no effect was found.
     """
     base: dict[str, Any] = {one.name: one.after for one in diagnosis.base}
-    effects: dict[str, dict[str, float | str]] = {}
-    for effect in (*diagnosis.present, *diagnosis.effects):
-        effects[effect.id] = {
-            one.name: one.text or one.value for one in effect.parameters
-        }
+    effects = [
+        (effect.id, {one.name: one.text or one.value for one in effect.parameters})
+        for effect in (*diagnosis.present, *diagnosis.effects)
+    ]
     return replace(
         simulation,
         **base,
-        effects=effects,
+        effects=told_apart(effects),
         reference_current_A=diagnosis.reference_current_A,
         reference_displacement_m=diagnosis.reference_displacement_m,
     )

@@ -26,8 +26,7 @@ from hwid_cli.records.recordings import CalibrationLog, Recording, SignalUnit
 # Units of a recording of which a program says none.
 _USUAL = {"input": "A", "output": "m"}
 _SIDES = tuple(_USUAL)
-# What recordings.input_unit may say that the force constant counts from, where the input
-# is not the voltage of a circuit.
+# What the force constant may count from, where the input is not the voltage of a circuit.
 _INPUTS = ("A", "V", "N", "N m")
 # Rotating and linear drives have the same equations.
 _OTHER_AXIS = {"m": "rad", "m/s": "rad/s"}
@@ -94,7 +93,9 @@ def _fault(
     unit, wanted = (getattr(one, f"{side}_unit") for one in (recording, simulation))
     label = getattr(options, f"{side}_unit")
     others = _other_units(side, simulation)
-    if unit == wanted or is_unitless(unit) or (label == unit and unit in others):
+    # SI units that the same equations hold in: a force constant may count from volts,
+    # and a rotating axis may have the names of a straight one.
+    if unit == wanted or is_unitless(unit) or unit in others:
         return ""
     meant = "" if simulation.resistance_ohm is None else " over resistance_ohm"
     expected = (

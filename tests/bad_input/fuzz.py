@@ -1,7 +1,8 @@
 """Damaged files, and a process of its own that reads them.
 
-``python -m tests.bad_input.fuzz KIND SEED FIRST LAST FOLDER`` reads damaged file after
-damaged file under limits of memory and time, and says what came of each. What kills
+``python -m tests.bad_input.fuzz KINDS SEED FIRST LAST FOLDER`` reads damaged file after
+damaged file, of one kind after the other (``csv,mat``), under limits of memory and
+time, and says what came of each. What kills
 that process (the reader of HDF5 is C) is counted by the process that started it.
 """
 
@@ -130,29 +131,31 @@ def read(kind: str, path: Path) -> str:
     return "read"
 
 
-def main(kind: str, seed: int, first: int, last: int, folder: Path) -> None:
+def main(kinds: str, seed: int, first: int, last: int, folder: Path) -> None:
     """Read damaged files number first to last - 1."""
     warnings.simplefilter("error")
     resource.setrlimit(resource.RLIMIT_AS, (MOST_MEMORY, MOST_MEMORY))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    valid = seeds(kind)
-    path = folder / f"run.{kind}"
+    valid = {kind: seeds(kind) for kind in kinds.split(",")}
     for number in range(first, last):
-        rng = np.random.default_rng([seed, number])
-        path.write_bytes(damage(valid[number % len(valid)], rng))
+        turn, place = divmod(number, len(valid))
+        kind = list(valid)[place]
+        path = folder / f"run.{kind}"
+        rng = np.random.default_rng([seed, turn])
+        path.write_bytes(damage(valid[kind][turn % len(valid[kind])], rng))
         # Nobody handles it: the process ends, also inside of a library.
         signal.alarm(MOST_SECONDS)
-        print(f"{number} {read(kind, path)}", flush=True)  # noqa: T201
+        print(f"{kind}:{turn} {read(kind, path)}", flush=True)  # noqa: T201
         signal.alarm(0)
 
 
-def tried(kind: str, seed: int, count: int, folder: Path) -> tuple[Counter, list[str]]:
+def tried(kinds: str, seed: int, count: int, folder: Path) -> tuple[Counter, list[str]]:
     """How many damaged files were read and refused, and what broke."""
     outcomes: Counter = Counter()
     broken = []
     first = 0
     while first < count:
-        arguments = [kind, str(seed), str(first), str(count), str(folder)]
+        arguments = [kinds, str(seed), str(first), str(count), str(folder)]
         command = [sys.executable, "-m", "tests.bad_input.fuzz", *arguments]
         done = subprocess.run(
             command, cwd=PROJECT, capture_output=True, text=True, check=False

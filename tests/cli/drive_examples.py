@@ -1,9 +1,11 @@
 """Measurements of a drive with dry friction, and a simulation that lacks it."""
 
+import math
+
 import numpy as np
 
 MASS, DAMPING, STIFFNESS, FORCE_CONSTANT, FRICTION = 0.3, 15.0, 1184.0, 5.0, 0.8
-STEP_S, SUBSTEPS, N = 1e-3, 10, 700
+STEP_S, SUBSTEPS, N = 1e-3, 10, 500
 NOISE = 2e-5
 CONFIG = """\
 name: drive
@@ -26,13 +28,15 @@ def displacement(current):
     x = v = 0.0
     h = STEP_S / SUBSTEPS
     found = np.zeros(current.size)
+    # Plain numbers: numpy's own take five times as long one by one.
+    at = current.tolist()
     for k in range(1, current.size):
         for j in range(SUBSTEPS):
-            i = current[k - 1] + (current[k] - current[k - 1]) * (j + 0.5) / SUBSTEPS
+            i = at[k - 1] + (at[k] - at[k - 1]) * (j + 0.5) / SUBSTEPS
             push = FORCE_CONSTANT * i - STIFFNESS * x - DAMPING * v
             free = v + h * push / MASS
             most = h * FRICTION / MASS
-            v = np.sign(free) * max(abs(free) - most, 0.0)
+            v = math.copysign(max(abs(free) - most, 0.0), free)
             x += h * v
         found[k] = x
     return found

@@ -2,6 +2,7 @@ import csv
 
 import h5py
 import numpy as np
+import pytest
 
 from hwid_cli.store.result_files import read_provenance
 
@@ -58,10 +59,13 @@ def test_what_the_thesis_calls_things_is_shown_on_request(after_run, hwid, confi
         assert word not in plain
 
 
+@pytest.mark.parametrize("is_lost", [False, True])
 def test_a_second_run_answers_from_the_cache_with_the_same_numbers(
-    after_run, hwid, out
+    after_run, hwid, out, is_lost
 ):
     first = (out / "crossval.csv").read_bytes()
+    if is_lost:
+        (out / "results.h5").unlink()
     result = hwid("crossval")
 
     assert "identify: 6 fits from the cache, 0 computed" in result.stdout
@@ -69,18 +73,7 @@ def test_a_second_run_answers_from_the_cache_with_the_same_numbers(
     assert (out / "crossval.csv").read_bytes() == first
 
 
-def test_a_lost_results_file_is_made_from_the_cache_with_the_same_numbers(
-    after_run, hwid, out
-):
-    first = (out / "crossval.csv").read_bytes()
-    (out / "results.h5").unlink()
-    result = hwid("crossval")
-
-    assert "identify: 6 fits from the cache, 0 computed" in result.stdout
-    assert "crossval: 9 pairs from the cache, 0 computed" in result.stdout
-    assert (out / "crossval.csv").read_bytes() == first
-
-
+@pytest.mark.slow
 def test_two_jobs_give_the_numbers_of_one(after_run, hwid, out, tmp_path):
     result = hwid("crossval", "--jobs", "2", folder=tmp_path / "two")
 

@@ -226,22 +226,17 @@ def test_holding_everything_out_is_one_line(again, edit, config):
     )
 
 
-def test_the_report_shows_the_diagnosis(config, hwid, out):
-    result = hwid("report")
-
-    assert result.exit_code == 0, result.output
-    assert "shows calibrate, diagnose" in result.stdout
-    html = (out / "report.html").read_text()
-    assert found_in(out)["summary"] in html
-
-
 @blank
-def test_run_diagnoses_where_the_section_is_given(config, hwid, out):
+def test_run_diagnoses_where_the_section_is_given_and_the_report_shows_it(
+    config, hwid, out
+):
     result = hwid("run")
 
     assert result.exit_code == 0, result.output
     assert "diagnose: 8 recordings from the cache" in result.stdout
-    assert (out / "report.html").is_file()
+    assert "shows calibrate, diagnose" in result.stdout
+    html = (out / "report.html").read_text()
+    assert found_in(out)["summary"] in html
 
 
 @blank

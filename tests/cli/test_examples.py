@@ -34,7 +34,10 @@ def test_the_help_shows_each_example_on_a_line_of_its_own(name):
     assert all(line in shown for line in examples_of(name))
 
 
-@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+@pytest.mark.parametrize(
+    "shell",
+    ["zsh", *(pytest.param(one, marks=pytest.mark.slow) for one in ("bash", "fish"))],
+)
 def test_shells_get_a_script_and_names_to_complete(shell):
     def hwid(**environment):
         code = "from hwid_cli.cli.main import COMMANDS, main; main(prog_name='hwid')"

@@ -1,19 +1,39 @@
 import csv
+import shutil
 
 import h5py
 import pytest
+from click.testing import CliRunner
+
+from hwid_cli.cli.main import main
+from tests.cli.conftest import CONFIG
 
 SECTION = "group: {keep: {best: true}, max_level: 2}\n"
 
 
-@pytest.fixture
-def grouped(config, hwid, edit, after_run):
-    # Low enough that no single recording's models cover all three.
-    edit("crossval: {threshold: 0.01}", "crossval: {threshold: 0.004}")
-    config.write_text(config.read_text() + SECTION)
-    result = hwid("group")
+# Low enough that no single recording's models cover all three.
+GROUPED = CONFIG.replace("{threshold: 0.01}", "{threshold: 0.004}") + SECTION
+
+
+@pytest.fixture(scope="module")
+def first_search(finished, tmp_path_factory):
+    """Results of all stages and of a search: their folder and what it said."""
+    folder = tmp_path_factory.mktemp("grouped")
+    path, out = folder / "tiny.yaml", folder / "out"
+    path.write_text(GROUPED)
+    shutil.copytree(finished, out)
+    arguments = ["group", str(path), "--out", str(out), "--jobs", "1"]
+    result = CliRunner().invoke(main, arguments)
     assert result.exit_code == 0, result.output
-    return result
+    return out, result.stdout
+
+
+@pytest.fixture
+def grouped(first_search, config, out):
+    """Begin with the results of that search; gives what it said."""
+    config.write_text(GROUPED)
+    shutil.copytree(first_search[0], out)
+    return first_search[1]
 
 
 def rows_of(path):
@@ -28,9 +48,9 @@ def test_the_search_is_written_and_shown(grouped, out):
     assert list(rows[0])[:7] == [
         *("level", "base", "add_on", "coverage", "nb", "nk", "kept"),
     ]
-    assert "Groups of 2: recordings covered of " in grouped.stdout
-    assert "The search stopped: " in grouped.stdout
-    assert "group level 1: 6 fits from the cache, 0 computed" in grouped.stdout
+    assert "Groups of 2: recordings covered of " in grouped
+    assert "The search stopped: " in grouped
+    assert "group level 1: 6 fits from the cache, 0 computed" in grouped
 
 
 def test_a_second_run_answers_from_the_cache_with_the_same_table(grouped, hwid, out):

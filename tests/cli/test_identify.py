@@ -79,14 +79,15 @@ def own_map(config, edit):
     return path
 
 
-def test_a_map_of_ones_own_is_fitted_and_kept(own_map, hwid, out):
+def test_a_map_of_ones_own_is_fitted_and_kept(own_map, hwid, edit, out):
+    edit("nk: [1, 2]", "nk: 1")
     assert hwid("identify").exit_code == 0
     fit = read_fits(out / "results.h5")[0]
 
     assert fit.model.input_map.function.source == OWN_MAP
     assert "input_map.loss" in fit.uncertainty.names
     own_map.write_text(OWN_MAP.replace("start=[0.3", "start=[0.4"), encoding="utf-8")
-    assert "0 fits from the cache, 6 computed" in hwid("identify").stdout
+    assert "0 fits from the cache, 3 computed" in hwid("identify").stdout
 
 
 def test_a_map_of_ones_own_that_contradicts_itself_is_one_line(own_map, hwid):

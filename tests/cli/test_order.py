@@ -65,16 +65,6 @@ def test_a_tolerance_below_zero_is_refused(after_run, hwid, edit):
     assert "order.tolerance" in result.stderr
 
 
-def test_run_recommends_orders_where_the_configuration_names_them(
-    after_run, hwid, edit, out
-):
-    edit("identify: {}", "identify: {}\norder: {}")
-    result = hwid("run")
-
-    assert result.exit_code == 0, result.output
-    assert "Take nb = 1" in result.stdout
-
-
 def test_quiet_says_nothing(after_run, hwid, out):
     result = hwid("order", "--quiet")
 
@@ -97,7 +87,7 @@ def test_wrong_usage_is_told_from_what_can_be_mended(hwid):
 MAPS = "identify: {}\norder: {maps: [none], units: [2]}"
 
 
-def test_maps_are_recommended_where_the_configuration_names_some(
+def test_maps_are_recommended_and_come_from_the_cache_the_second_time(
     after_run, hwid, edit, out
 ):
     edit("identify: {}", MAPS)
@@ -112,26 +102,11 @@ def test_maps_are_recommended_where_the_configuration_names_some(
     rows = rows_of(out / "maps.csv")
     assert (len(rows), [row["take"] for row in rows].count("1")) == (9, 1)
 
-
-def test_maps_come_from_the_cache_and_are_the_same(after_run, hwid, edit, out):
-    edit("identify: {}", MAPS)
-    hwid("order")
     first = (out / "maps.csv").read_bytes()
     result = hwid("order")
 
     assert "order maps: 27 fits from the cache, 0 computed" in result.stdout
     assert (out / "maps.csv").read_bytes() == first
-
-
-def test_run_recommends_maps_too_and_fits_them_anew_with_force(after_run, hwid, edit):
-    edit("identify: {}", MAPS)
-    result = hwid("run")
-
-    assert result.exit_code == 0, result.output
-    assert "Take fit: {input_map: " in result.stdout
-    # All stages that the table lists are forced, not only some of them.
-    result = hwid("run", "--force")
-    assert "order maps: 0 fits from the cache, 27 computed" in result.stdout
 
 
 def test_check_counts_the_fits_of_maps(after_run, hwid, edit):

@@ -12,10 +12,16 @@ def test_all_stages_run_in_order_and_the_results_are_named(finished):
     assert "\n\n\n" not in "\n".join(lines)
 
 
-def test_a_second_run_computes_nothing_and_force_computes_all(after_run, hwid):
+def test_a_second_run_computes_nothing_and_force_computes_all(after_run, hwid, edit):
     assert hwid("run").stdout.count("from the cache, 0 computed") == 2
 
+    # Orders and maps are recommended where the configuration names them.
+    edit("identify: {}", "identify: {}\norder: {maps: [none]}")
     text = hwid("run", "--force").stdout
+    assert "Take nb = 1" in text
+    assert "Take fit: {input_map: " in text
+    # All stages that the table lists are forced, not only some of them.
+    assert "order maps: 0 fits from the cache, 12 computed" in text
     assert "simulate: 3 measurements computed" in text
     assert "calibrate: 3 recordings done" in text
     assert "0 fits from the cache, 6 computed" in text

@@ -7,6 +7,7 @@ from click.testing import CliRunner
 
 from hwid_cli.cli.main import main
 from tests.cli.conftest import CONFIG
+from tests.conftest import leave_figures_blank
 
 # One more step and one more sine, which nothing else uses.
 PLAN = "only: [step_02, step_12, sine_12]"
@@ -26,7 +27,9 @@ def first_run(tmp_path_factory):
     path = folder / "tiny.yaml"
     path.write_text(WITH_TEST + GROUP)
     arguments = ["test", str(path), "--out", str(folder / "out"), "--jobs", "1"]
-    result = CliRunner().invoke(main, arguments)
+    with pytest.MonkeyPatch.context() as monkeypatch:
+        leave_figures_blank(monkeypatch)
+        result = CliRunner().invoke(main, arguments)
     assert result.exit_code == 0, result.output
     return folder / "out", result.stdout
 

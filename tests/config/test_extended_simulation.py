@@ -90,6 +90,24 @@ def test_the_simulation_comes_back_with_every_digit(diagnosed, tmp_path):
     )
 
 
+def test_two_effects_of_one_id_come_back_too(diagnosed, tmp_path):
+    stops = {
+        "one_sided_stop": {"position_m": -0.01, "stiffness_N_per_m": 1e4},
+        "coulomb_friction": {"force_N": 0.5},
+        "one_sided_stop:second": {"position_m": 0.02, "stiffness_N_per_m": 1e5},
+    }
+    simulation = SimulationOptions(effects=stops)
+    extended = write_and_load(diagnosed(), tmp_path, simulation)
+
+    assert extended.simulation == simulation
+    written = read_yaml(tmp_path / "extended_simulation.yaml")["simulation"]["effects"]
+    assert [next(iter(one)) for one in written] == [
+        "one_sided_stop",
+        "coulomb_friction",
+        "one_sided_stop",
+    ]
+
+
 def test_the_same_recordings_are_read_from_there(diagnosed, tmp_path):
     experiment = diagnosed()
     out = tmp_path / "results" / "deep"

@@ -27,7 +27,9 @@ def load_effect(load):
 
 
 def some_value(one):
-    return one.words[0] if one.words else 0.25
+    numbers = (0.25, 1.25)
+    fitting = [n for n in numbers if all(limit.holds(n) for limit in one.limits)]
+    return one.words[0] if one.words else fitting[0]
 
 
 def written(values):
@@ -60,6 +62,84 @@ def test_an_inductance_needs_a_circuit(load):
         r"so that the input is the current; expected simulation\.resistance_ohm too; add",
     ):
         load(text)
+
+
+def test_an_effect_may_stand_in_a_list_twice(load):
+    text = """
+simulation:
+  effects:
+  - one_sided_stop: {position_m: -0.01, stiffness_N_per_m: 9}
+  - cogging: {amplitude_N: 1, period_m: 0.01}
+  - one_sided_stop: {position_m: 0.02, stiffness_N_per_m: 7, exponent: 1.5}
+"""
+    assert load(text).simulation.effects == {
+        "one_sided_stop": {"position_m": -0.01, "stiffness_N_per_m": 9},
+        "cogging": {"amplitude_N": 1, "period_m": 0.01},
+        "one_sided_stop:second": {
+            "position_m": 0.02,
+            "stiffness_N_per_m": 7,
+            "exponent": 1.5,
+        },
+    }
+
+
+def test_a_list_without_a_repeat_is_the_same_simulation(load):
+    listed = load("simulation: {effects: [{coulomb_friction: {force_N: 1}}]}")
+    section = load("simulation: {effects: {coulomb_friction: {force_N: 1}}}")
+    assert listed.simulation == section.simulation
+
+
+def test_what_words_tell_apart_may_stand_there_together(load):
+    text = (
+        "simulation: {effects: ["
+        "{load_friction: {force_N: 1, load_share: 0.1, load: spring}}, "
+        "{load_friction: {force_N: 1, load_share: 0.1, load: %s}}]}"
+    )
+    assert len(load(text % "drive").simulation.effects) == 2
+    with pytest.raises(
+        ConfigError,
+        match=r"simulation.effects: load_friction is listed twice; expected each "
+        r"load_friction with another load; remove one",
+    ):
+        load(text % "spring")
+
+
+@pytest.mark.parametrize(
+    ("effects", "message"),
+    [
+        (
+            "[{coulomb_friction: {force_N: 1}}, {coulomb_friction: {force_N: 2}}]",
+            r"coulomb_friction is listed twice; expected twice only cogging, one_sided_",
+        ),
+        (
+            "[cogging: {amplitude_N: 1, period_m: 1}, cogging: {amplitude_N: 2, "
+            "period_m: 2}, cogging: {amplitude_N: 3, period_m: 3}]",
+            r"effects: 'cogging' is there a third time; an effect may occur twice",
+        ),
+        (
+            "[{cogging: {amplitude_N: 1, period_m: 1}, coulomb_friction: {force_N: 1}}]",
+            r"simulation.effects: found .*; expected an effect: one key with its param",
+        ),
+        ("[cogging]", r"effects: found 'cogging'; expected an effect: one key"),
+        (
+            "{'cogging:second': {amplitude_N: 1, period_m: 1}}",
+            r"effects: found 'cogging:second'; expected the id of an effect; write a l",
+        ),
+        (
+            "[cogging: {amplitude_N: 1, period_m: 1}, cogging: {amplitude_N: 2}]",
+            r"effects.cogging:second.period_m: missing; expected a finite number",
+        ),
+        (
+            "[cogging: {amplitude_N: 1, period_m: 1}, cogging: {amplitude_N: many, "
+            "period_m: 1}]",
+            r"effects.cogging:second.amplitude_N: found 'many'; expected a finite num",
+        ),
+        ("3", r"simulation.effects: found 3; expected a section with keys"),
+    ],
+)
+def test_lists_of_effects_that_cannot_be_are_refused(load, effects, message):
+    with pytest.raises(ConfigError, match=message):
+        load(f"simulation: {{effects: {effects}}}")
 
 
 def test_what_completes_a_law_may_be_given(load_effect):

@@ -1,5 +1,5 @@
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from hwid_cli.config.yaml_text import read_yaml, yaml_text
@@ -66,7 +66,6 @@ def test_byte_order_mark_is_no_part_of_the_first_key(tmp_path):
     assert read_yaml(path) == {"name": "a"}
 
 
-@settings(max_examples=200)
 @given(
     st.recursive(
         st.floats(allow_nan=False, allow_infinity=False)

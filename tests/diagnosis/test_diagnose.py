@@ -77,6 +77,18 @@ def test_a_circuit_may_have_an_inductance():
     assert list(OF_CIRCUIT) == ["winding_inductance"]
 
 
+def test_a_second_one_is_tried_until_the_simulation_has_two():
+    stop = {"position_m": 0.01, "stiffness_N_per_m": 1e4}
+    one = problem(recordings(), effects={"one_sided_stop": stop})
+    both = {"one_sided_stop": stop, "one_sided_stop:second": stop}
+    two = problem(recordings(), effects=both)
+    stops = [
+        {name for name in allowed_effects(of, DiagnoseOptions()) if "one_sided" in name}
+        for of in (one, two)
+    ]
+    assert stops == [{"one_sided_stop:second", "one_sided_stop:second_contact"}, set()]
+
+
 def test_two_recordings_show_no_change_between_recordings():
     few = allowed_effects(problem(recordings()[:2]), DiagnoseOptions())
     assert not any(CATALOGUE[one].parameters[0].is_own for one in few)

@@ -147,15 +147,19 @@ def with_interval(of, start=None):
     return found, *intervals(of, found, sizes(of))
 
 
-def test_they_cover_the_truth_about_as_often_as_they_say():
+@pytest.mark.parametrize(
+    ("count", "fewest", "most"),
+    # 95 % on average; fewer once in a hundred times even if the four parameters of a
+    # fit went together in pairs. All of the many would be too wide.
+    [(12, 39, 48), pytest.param(40, 140, 159, marks=pytest.mark.slow)],
+)
+def test_they_cover_the_truth_about_as_often_as_they_say(count, fewest, most):
     hits = 0
-    for seed in range(40):
+    for seed in range(count):
         of = problem(recordings(COULOMB, noise=5 * NOISE, seed=seed)[1:7:2])
         _, low, high = with_interval(of)
         hits += int(((low < TRUE) & (high > TRUE)).sum())
-    # 152 of 160 on average; below 140 once in a hundred times even if the four
-    # parameters of a fit went together in pairs. All 160 would be too wide.
-    assert 140 <= hits < 160
+    assert fewest <= hits <= most
 
 
 def test_four_times_the_data_halve_them():

@@ -143,6 +143,65 @@ def test_effects_of_the_simulation_start_from_its_values():
     }
 
 
+@pytest.mark.parametrize(
+    "effects",
+    [
+        # Far beyond what the recordings reach, and beyond any bound of a search.
+        {"end_stop": {"position_m": 0.2, "stiffness_N_per_m": 1e4}},
+        {"end_stop": {"position_m": 1e-5, "stiffness_N_per_m": 1e-3}},
+        {"one_sided_stop": {"position_m": -0.2, "stiffness_N_per_m": 1e9}},
+        {"hysteresis": {"force_N": 0.3, "yield_m": 0.5}},
+        {"hysteresis": {"force_N": 0.3, "yield_m": 1e-8}},
+        {"cogging": {"amplitude_N": 0.1, "period_m": 1.0}},
+        {"input_delay": {"delay_s": 0.9}},
+        {"sensor_cubic": {"coefficient": 5.0}},
+        # A positive coordinate can hold a negative number with its sign.
+        {"cogging": {"amplitude_N": -0.1, "period_m": 4e-3, "phase_rad": 0.3}},
+        {"quadratic_drag": {"drag_N_s2_per_m2": -0.5}},
+        {"torque_ripple": {"share": 0.99, "per_turn": 1e-3}},
+        {
+            "one_sided_stop": {
+                "position_m": 0.01,
+                "stiffness_N_per_m": 1e5,
+                "exponent": 7.0,
+                "damping_s_per_m": 1e-9,
+            }
+        },
+    ],
+    ids=str,
+)
+def test_what_the_simulation_has_is_used_as_it_is_stated(effects):
+    of = problem(recordings()[:3], effects=effects)
+    present = drive_effects(of.drive)
+    identifier = next(iter(present))
+    _, found, point = laid_out(tuple(present), present, of=of)
+    # A logarithm and its exponential lose a few roundings.
+    assert effects_at(found, point)[identifier] == pytest.approx(
+        present[identifier], rel=1e-12
+    )
+    for one in found.shared:
+        if one.owner == identifier:
+            assert one.low <= present[identifier][one.name] <= one.high
+
+
+def test_what_the_simulation_has_with_no_size_stays_of_no_size():
+    stated = {"force_N": 0.0, "load_share": 0.0, "load": "spring"}
+    of = problem(recordings()[:3], effects={"load_friction": stated})
+    present = drive_effects(of.drive)
+    _, found, point = laid_out(tuple(present), present, of=of)
+    values = effects_at(found, point)["load_friction:spring"]
+    # Nothing beside forces of 20 N, and it may grow.
+    assert 0 < values["force_N"] < 1e-8
+    assert 0 < values["load_share"] < 1e-8
+
+
+def test_bounds_of_a_candidate_stay_those_of_the_search():
+    start = {"end_stop": {"position_m": 0.2, "stiffness_N_per_m": 1e4}}
+    of, found, point = laid_out(("end_stop",), start)
+    reach = sizes(of).displacement_m
+    assert effects_at(found, point)["end_stop"]["position_m"] == pytest.approx(reach)
+
+
 def test_an_estimated_start_begins_at_the_first_output_at_rest():
     of = problem(recordings()[:3], options=DiagnoseOptions(initial_state="estimated"))
     _, found, point = laid_out(of=of)

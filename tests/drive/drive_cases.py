@@ -47,6 +47,53 @@ PERIODIC = {
     "periodic_force": {"amplitude_N": 0.5, "frequency_Hz": 25.0, "phase_rad": 0.4}
 }
 
+GRAVITY = {"gravity": {"torque_N_m": 4.0, "angle_rad": 0.7}}
+PRELOAD = {"spring_preload": {"force_N": 1.5}}
+SPRING_LOAD = {"load_friction": {"force_N": 0.3, "load_share": 0.1, "load": "spring"}}
+DRIVE_LOAD = {"load_friction": {"force_N": 0.3, "load_share": 0.1, "load": "drive"}}
+POSITION = {
+    "position_friction": {
+        "force_N": 0.8,
+        "variation_share": 0.6,
+        "period_m": 8e-3,
+        "phase_rad": 0.4,
+    }
+}
+RIPPLE = {"torque_ripple": {"share": 0.2, "per_turn": 900.0, "phase_rad": 0.5}}
+CONTACT = {
+    "end_stop": {
+        "position_m": 0.012,
+        "stiffness_N_per_m": 3e5,
+        "exponent": 1.5,
+        "damping_s_per_m": 0.6,
+    }
+}
+SIDE_CONTACT = {
+    "one_sided_stop": {
+        "position_m": -0.008,
+        "stiffness_N_per_m": 1e5,
+        "exponent": 1.4,
+        "damping_s_per_m": 0.5,
+    }
+}
+BOUC_WEN = {
+    "hysteresis": {
+        "force_N": 0.8,
+        "yield_m": 2e-4,
+        "exponent": 2.5,
+        "shape_ratio": 0.6,
+    }
+}
+SHAPED = {"hysteresis": {"force_N": 0.8, "yield_m": 1e-3, "shape_ratio": 3.0}}
+TWO_STOPS = {
+    "one_sided_stop": {"position_m": -0.008, "stiffness_N_per_m": 1e4},
+    "one_sided_stop:second": {"position_m": 0.011, "stiffness_N_per_m": 3e4},
+}
+TWO_WAVES = {
+    **COGGING,
+    "cogging:second": {"amplitude_N": 0.3, "period_m": 2e-3, "phase_rad": -0.6},
+}
+
 # Effects that ``drive_oracle`` has too.
 SINGLE = {
     **COULOMB,
@@ -73,7 +120,22 @@ SINGLE = {
     **HEAT,
     **CLIP,
     **PERIODIC,
+    **GRAVITY,
+    **PRELOAD,
+    **POSITION,
+    **RIPPLE,
 }
+# What it has of several entries of one id, and of two of a kind.
+VARIANTS = (
+    SPRING_LOAD,
+    DRIVE_LOAD,
+    CONTACT,
+    SIDE_CONTACT,
+    TWO_STOPS,
+    TWO_WAVES,
+    BOUC_WEN,
+    SHAPED,
+)
 # What the corners do to the drive of these tests.
 SCALES = Scales(
     displacement_m=0.02,
@@ -115,6 +177,21 @@ TOGETHER = (
     LAG | LOSS,
     COGGING | LOAD,
     DEAD_ZONE | SATURATION | RATE | DELAY,
+    GRAVITY | LOAD | CUBIC,
+    PRELOAD | COULOMB,
+    PRELOAD | LOAD,
+    PRELOAD | CUBIC,
+    SPRING_LOAD | LAG,
+    SPRING_LOAD | PRELOAD,
+    DRIVE_LOAD | LAG,
+    DRIVE_LOAD | CLIP,
+    POSITION | COGGING,
+    RIPPLE | DRIVE_LOAD,
+    RIPPLE | COULOMB,
+    CONTACT | COULOMB,
+    TWO_STOPS | COULOMB,
+    TWO_STOPS | SPRING_LOAD,
+    BOUC_WEN | COULOMB,
 )
 # The oracle stops at many events here, or follows a stiff pair of masses.
 TOGETHER_SLOW = (
@@ -123,6 +200,11 @@ TOGETHER_SLOW = (
     HYSTERESIS | MODE,
     GAP | COGGING,
     END_STOP | GAP,
+    PRELOAD | MODE,
+    RIPPLE | GEAR,
+    SPRING_LOAD | MODE,
+    DRIVE_LOAD | GEAR,
+    BOUC_WEN | MODE,
 )
 
 

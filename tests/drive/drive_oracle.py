@@ -6,6 +6,7 @@ two corners ``solve_ivp`` runs with tight tolerances and stops at every event.
 
 import math
 from bisect import bisect_right
+from functools import partial
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -18,6 +19,10 @@ X, V, MOTOR_X, MOTOR_V, PART_X, PART_V, CIRCUIT, LAGGED, WARMTH, YIELDED = range
 RELATIVE, ABSOLUTE = 1e-10, 1e-14
 # Further than this from an edge an event is not looked at again, [s].
 NUDGE = 1e-13
+# Nearer than this to 0 the drive is at 0, [m].
+AT_ZERO = 1e-12
+# A preload catches what it would bring back to 0 within this time, [s]: half of the tool's.
+CAUGHT_S = 1e-5
 
 
 def simulate(machine, times, command, samples, start=None):
@@ -36,8 +41,12 @@ class _Run:
         self.corners, self.heights = times.tolist(), command.tolist()
         self.way = 0.0
         self.is_dry = machine.has(
-            "coulomb_friction", "asymmetric_friction", "stribeck_friction"
-        )
+            "coulomb_friction", "asymmetric_friction", "stribeck_friction",
+            "load_friction", "position_friction", "spring_preload",
+        )  # fmt: skip
+        # Side of a preload on which the drive is; 0 where it is held at 0.
+        self.side = 0.0
+        self.preload = machine.value("spring_preload", "force_N")
         self.origin = 0.0
         if machine.stiffness > 0:
             self.origin = self._rest(0.0, with_cogging=False)
@@ -70,6 +79,7 @@ class _Run:
                 gap = one.value("gear_backlash", "half_gap_m")
                 stiff = one.value("gear_backlash", "stiffness_N_per_m")
                 state[MOTOR_X] += math.copysign(gap, push) + push / stiff
+        self.side = float(np.sign(state[X]))
         self.way = float(np.sign(state[V]))
         positions, velocities = np.empty(len(samples)), np.empty(len(samples))
         done = 0
@@ -107,32 +117,71 @@ class _Run:
             if done.status == 1:
                 if len(done.t_events[0]) and self.way == 0.0:
                     self.way = float(np.sign(self._net(now, state, 0.0)))
+                    self.side = self.way if state[X] == 0.0 else self.side
                 elif len(done.t_events[0]):
                     state[V] = 0.0
                     self.way = 0.0
+                elif self.preload and abs(state[X]) < AT_ZERO:
+                    state, now = self._cross(now, state)
                 else:
                     # Just beyond the edge, so that it is not found twice.
                     state = state + NUDGE * self._rate(now, state)
                     now += NUDGE
         return state, found
 
+    def _cross(self, t, state):
+        """At 0 with a preload: on to the other side, or held for good."""
+        one = self.machine
+        state[X], self.side = 0.0, 0.0
+        way, self.way = self.way, 0.0
+        net = self._net(t, state, 0.0)
+        hold = self._level(math.copysign(1.0, net), t, state) + self.preload
+        is_back_soon = abs(state[V]) * one.mass < (hold - net * way) * CAUGHT_S
+        if abs(net) < hold and is_back_soon:
+            state[V] = 0.0
+            return state, t
+        self.side = self.way = way
+        return state + NUDGE * self._rate(t, state), t + NUDGE
+
     def _decide(self, t, state):
         """At rest: slide on where the force exceeds what friction holds."""
         if state[V] != 0.0 or self.way != 0.0:
             return
         net = self._net(t, state, 0.0)
-        if abs(net) > self._level(math.copysign(1.0, net), 0.0) + 1e-11:
+        if abs(net) > self._held(net, t, state) + 1e-11:
             self.way = math.copysign(1.0, net)
+            self.side = self.way if state[X] == 0.0 else self.side
 
-    def _level(self, way, v):
-        one = self.machine
+    def _held(self, net, t, state):
+        """What friction and a preload hold at rest."""
+        level = self._level(math.copysign(1.0, net), t, state)
+        return level + (self.preload if state[X] == 0.0 else 0.0)
+
+    def _level(self, way, t, y):
+        one, v = self.machine, y[V]
         level = one.value("coulomb_friction", "force_N")
         which = "force_forward_N" if way > 0 else "force_backward_N"
         level += one.value("asymmetric_friction", which)
         level += one.value("stribeck_friction", "force_N")
         excess = one.value("stribeck_friction", "static_excess_N")
         slow = one.value("stribeck_friction", "velocity_m_per_s", 1.0)
-        return level + excess * math.exp(-((v / slow) ** 2))
+        level += excess * math.exp(-((v / slow) ** 2))
+        if one.has("position_friction"):
+            share = one.value("position_friction", "variation_share")
+            angle = 2 * math.pi * y[X] / one.value("position_friction", "period_m")
+            angle += one.value("position_friction", "phase_rad")
+            level += one.value("position_friction", "force_N") * (
+                1 + share * math.sin(angle)
+            )
+        if one.has("load_friction"):
+            loads = {
+                "spring": lambda: one.stiffness * y[X],
+                "drive": lambda: self._push(self._wanted(t, y), y),
+            }
+            load = loads[one.value("load_friction", "load")]()
+            level += one.value("load_friction", "force_N")
+            level += one.value("load_friction", "load_share") * abs(load)
+        return level
 
     def _events(self, now, state):
         """The first is the reversal (or break-away); the others are corners of forces."""
@@ -142,7 +191,7 @@ class _Run:
 
             def leave(t, y):
                 net = self._net(t, y, 0.0)
-                return abs(net) - self._level(math.copysign(1.0, net), 0.0) - 2e-11
+                return abs(net) - self._held(net, t, y) - 2e-11
 
             leave.terminal, leave.direction = True, 1
             turns = leave
@@ -165,12 +214,11 @@ class _Run:
 
     def _distances(self, t, y):
         """Zero where a force has a corner."""
-        one, found = self.machine, []
-        if one.has("end_stop"):
-            edge = one.value("end_stop", "position_m")
-            found += [y[X] - edge, y[X] + edge]
-        if one.has("one_sided_stop"):
-            found.append(y[X] - one.value("one_sided_stop", "position_m"))
+        one, found = self.machine, self._edges_along(y)
+        if one.has("spring_preload", "load_friction"):
+            found.append(y[X] if y[X] != 0.0 else 1.0)
+        if one.value("load_friction", "load") == "drive":
+            found.append(self._push(self._wanted(t, y), y) or 1.0)
         if one.has("spring_gap"):
             edge = one.value("spring_gap", "half_gap_m")
             found += [y[X] - edge, y[X] + edge]
@@ -188,6 +236,16 @@ class _Run:
             found += [wanted - edge, wanted + edge]
         if one.has("quadratic_drag"):
             found.append(y[V] if y[V] != 0.0 else 1.0)
+        return found
+
+    def _edges_along(self, y):
+        one, found = self.machine, []
+        if one.has("end_stop"):
+            edge = one.value("end_stop", "position_m")
+            found += [y[X] - edge, y[X] + edge]
+        for stop in ("one_sided_stop", "one_sided_stop:second"):
+            if one.has(stop):
+                found.append(y[X] - one.value(stop, "position_m"))
         return found
 
     def _speed(self, y):
@@ -218,40 +276,57 @@ class _Run:
         )
         kept -= one.value("supply_sag", "loss_at_reference") * abs(share)
         kept -= one.value("thermal_gain_loss", "loss_at_reference") * y[WARMTH]
+        angle = y[MOTOR_X] if one.has("gear_backlash") else y[X]
+        angle *= one.value("torque_ripple", "per_turn")
+        angle += one.value("torque_ripple", "phase_rad")
+        kept *= 1 + one.value("torque_ripple", "share") * math.sin(angle)
         return one.constant * kept * current
 
-    def _spring(self, x, with_cogging=True):
+    def _stop(self, name, into, speed):
+        """Force of a stop at a depth, with the speed of going deeper."""
+        one = self.machine
+        depth = max(into, 0.0)
+        force = one.value(name, "stiffness_N_per_m")
+        force *= depth ** one.value(name, "exponent", 1.0)
+        damping = one.value(name, "damping_s_per_m")
+        return force * max(1.0 + damping * speed, 0.0)
+
+    def _spring(self, x, with_cogging=True, v=0.0):
         one = self.machine
         gap = one.value("spring_gap", "half_gap_m")
         force = one.stiffness * math.copysign(max(abs(x) - gap, 0.0), x)
         force += one.value("cubic_stiffness", "stiffness_N_per_m3") * x**3
         force += one.value("quadratic_stiffness", "stiffness_N_per_m2") * x**2
         if one.has("end_stop"):
-            into = max(abs(x) - one.value("end_stop", "position_m"), 0.0)
-            stiff = one.value("end_stop", "stiffness_N_per_m")
-            force += stiff * math.copysign(into, x)
-        if one.has("one_sided_stop"):
-            edge = one.value("one_sided_stop", "position_m")
-            into = max((x - edge) * math.copysign(1.0, edge), 0.0)
-            stiff = one.value("one_sided_stop", "stiffness_N_per_m")
-            force += stiff * math.copysign(into, edge)
-        if one.has("cogging") and with_cogging:
-            q = one.value("cogging", "phase_rad")
-            way = 2 * math.pi * (x - self.origin) / one.value("cogging", "period_m")
-            swing = math.sin(way + q) - math.sin(q)
-            force -= one.value("cogging", "amplitude_N") * swing
-        return force
+            into = abs(x) - one.value("end_stop", "position_m")
+            side = math.copysign(1.0, x)
+            force += side * self._stop("end_stop", into, side * v)
+        for stop in ("one_sided_stop", "one_sided_stop:second"):
+            if one.has(stop):
+                edge = one.value(stop, "position_m")
+                side = math.copysign(1.0, edge)
+                force += side * self._stop(stop, (x - edge) * side, side * v)
+        for teeth in ("cogging", "cogging:second"):
+            if one.has(teeth) and with_cogging:
+                q = one.value(teeth, "phase_rad")
+                way = 2 * math.pi * (x - self.origin) / one.value(teeth, "period_m")
+                swing = math.sin(way + q) - math.sin(q)
+                force -= one.value(teeth, "amplitude_N") * swing
+        angle = x + one.value("gravity", "angle_rad")
+        return force + one.value("gravity", "torque_N_m") * math.sin(angle)
 
     def _rest(self, current, with_cogging=True):
         y = np.zeros(10)
 
-        def away(x):
-            load = self.machine.value("constant_load", "force_N")
+        def away(x, side=0.0):
+            y[X] = y[MOTOR_X] = x
+            load = self.machine.value("constant_load", "force_N") - side * self.preload
             return self._push(current, y) + load - self._spring(x, with_cogging)
 
-        if away(0.0) == 0.0:
+        if abs(away(0.0)) <= self.preload:
             return 0.0
         far = math.copysign(1e-5, away(0.0))
+        away = partial(away, side=math.copysign(1.0, far))
         while away(far) * away(0.0) > 0:
             far *= 1.3
         return brentq(away, 0.0, far, xtol=1e-17, rtol=1e-14)
@@ -263,7 +338,7 @@ class _Run:
         if one.has("gear_backlash"):
             push = self._bite(y)
         net = push + one.value("constant_load", "force_N")
-        net -= one.damping * v + self._spring(y[X])
+        net -= one.damping * v + self._spring(y[X], v=v) + self.side * self.preload
         net -= one.value("quadratic_drag", "drag_N_s2_per_m2") * v * abs(v)
         net -= one.value("hysteresis", "force_N") * y[YIELDED]
         if one.has("periodic_force"):
@@ -272,7 +347,7 @@ class _Run:
             net += one.value("periodic_force", "amplitude_N") * math.sin(angle)
         if one.has("second_mode"):
             net += self._pull(y)
-        return net - way * self._level(way, v)
+        return net - (way * self._level(way, t, y) if way else 0.0)
 
     def _bite(self, y):
         """Spring and damper of the teeth, which push and never pull."""
@@ -318,7 +393,11 @@ class _Run:
             out[WARMTH] = ((lagged / one.reference) ** 2 - y[WARMTH]) / tau
         if one.has("hysteresis"):
             way = one.value("hysteresis", "yield_m", 1.0)
-            out[YIELDED] = y[V] * (1 - y[YIELDED] * self.way) / way
+            ahead = y[YIELDED] * self.way
+            ratio = one.value("hysteresis", "shape_ratio")
+            share = (math.copysign(1.0, ahead) + ratio) / (1 + ratio)
+            share *= abs(ahead) ** one.value("hysteresis", "exponent", 1.0)
+            out[YIELDED] = y[V] * (1 - share) / way
         if one.resistance and one.inductance:
             wanted = y[LAGGED] if one.has("actuator_lag") else self.current(t)
             drop = one.back_emf * self._speed(y) + one.resistance * y[CIRCUIT]

@@ -1,7 +1,3 @@
-import subprocess
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -82,7 +78,9 @@ ALONE = tuple(
     for name, values in cases.EVERY.items()
     if name != "clock_skew"
 )
-TOGETHER = tuple((both, {}) for both in cases.TOGETHER + cases.TOGETHER_SLOW)
+TOGETHER = tuple(
+    (both, {}) for both in cases.VARIANTS + cases.TOGETHER + cases.TOGETHER_SLOW
+)
 
 
 def exported_drive(effects, **values):
@@ -126,8 +124,9 @@ def check(folder, effects, values, n):
         cases.COULOMB | cases.END_STOP | cases.DELAY,
         cases.GEAR | cases.HYSTERESIS,
         {"quadratic_drag": {"drag_N_s2_per_m2": 200.0}} | cases.CUBIC,
+        cases.PRELOAD | cases.SPRING_LOAD | cases.RIPPLE | cases.SIDE_CONTACT,
     ],
-    ids=["friction, stop, delay", "gear, hysteresis", "curved"],
+    ids=["friction, stop, delay", "gear, hysteresis", "curved", "preload, contact"],
 )
 def test_the_program_simulates_as_hwid_does(effects, tmp_path):
     check(tmp_path, effects, {}, 1500)
@@ -172,10 +171,3 @@ def test_the_unit_of_a_simulation_answers_like_hwid(tmp_path):
     unit = write_exported(tmp_path, exported, "fmu")[0]
 
     assert deviation(answered(unit, u, STEP), predict(exported, u)) <= PROMISED
-
-
-def test_the_source_is_the_translation_of_todays_loops():
-    script = Path(__file__).parents[2] / "tools" / "drive_source.py"
-    done = subprocess.run([sys.executable, str(script), "--check"], check=False)
-
-    assert done.returncode == 0, "run 'make drive-source'"

@@ -113,6 +113,27 @@ def test_a_simulation_without_one_of_its_base_is_refused(tmp_path, name):
         read_exported(path)
 
 
+def test_two_effects_of_one_id_come_back_and_fit_the_schema(tmp_path):
+    effects = {
+        "one_sided_stop": {"position_m": -0.01, "stiffness_N_per_m": 1e4},
+        "one_sided_stop:second": {"position_m": 0.02, "stiffness_N_per_m": 1e5},
+        "load_friction": {"force_N": 0.1, "load_share": 0.1, "load": "drive"},
+    }
+    given = exported_drive(effects=effects)
+    content = described(given)
+
+    assert written(tmp_path / "s.json", given).drive == given.drive
+    SCHEMA.validate(content)
+    assert [list(one) for one in content["simulation"]["effects"]] == [
+        ["one_sided_stop"],
+        ["one_sided_stop"],
+        ["load_friction"],
+    ]
+    content["simulation"]["effects"][0]["cogging"] = {}
+    with pytest.raises(jsonschema.ValidationError):
+        SCHEMA.validate(content)
+
+
 def test_a_start_is_chosen(tmp_path):
     model = example_model(3, rule="estimated")
     exported, u = exported_of(model), example_input(1)

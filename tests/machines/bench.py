@@ -131,7 +131,10 @@ class Draw:
 
 @dataclass
 class Bench:
-    """A base with recordings; force, travel and speed are those of the linear machine."""
+    """A base with recordings; force, travel and speed are those of the linear machine.
+
+    `travel` is the longest way of any recording, `usual` what at least three reach.
+    """
 
     draw: Draw
     base: Base
@@ -142,6 +145,7 @@ class Bench:
     force: float = 0.0
     travel: float = 0.0
     speed: float = 0.0
+    usual: float = 0.0
 
     def __post_init__(self):
         commands = self.top * np.stack([one.values for one in self.signals], axis=1)
@@ -149,6 +153,7 @@ class Bench:
         self.force = self.base.force_constant * self.top / (self.base.resistance or 1.0)
         outputs = linear_output(self.base, commands, self.sample_s, "linear")
         self.travel = float(np.abs(outputs).max())
+        self.usual = float(np.sort(np.abs(outputs).max(axis=0))[-3])
         self.speed = float(np.abs(np.diff(outputs, axis=0)).max() / self.sample_s)
 
     def machine(

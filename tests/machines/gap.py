@@ -59,6 +59,9 @@ def refitted_gap(machine: Machine, recordings: Recordings, hold: str) -> float:
     if machine.known:
         return projected_gap(machine, recordings, lambda effect: False)
     base = machine.base
+    clean = recordings.clean
+    if machine.jitter:
+        clean = clean_readings(machine, machine.hidden, recordings.commands)
     # The base's numbers may differ between recordings; a simulation has one of each.
     given = {
         name: float(np.mean(value))
@@ -71,14 +74,14 @@ def refitted_gap(machine: Machine, recordings: Recordings, hold: str) -> float:
         *(["stiffness"] if given["stiffness"] > 0 else []),
     ]
     kept = np.arange(len(recordings.clean))[:, None] < recordings.lengths
-    held = np.ndim(machine.held_at) > 0
+    held = machine.settings.get("initial_state") == "held"
 
     def error(logs):
         numbers = given | dict(zip(free, np.exp(logs), strict=True))
         made = linear_output(
             Base(**numbers), recordings.commands, machine.sample_s, hold
         )
-        left = made - recordings.clean
+        left = made - clean
         if held:
             left = left - np.array(
                 [one[part].mean() for one, part in zip(left.T, kept.T, strict=True)]

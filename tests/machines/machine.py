@@ -60,7 +60,8 @@ class Machine:
     cells: int = 6
     # Whether the simulation takes a voltage drive for a force with a damper.
     folded: bool = False
-    # Factors on the base that the simulation gets, and more keys of the configuration.
+    # Factors on the base that the simulation gets, and more keys of the configuration's
+    # sections `simulation` and `diagnose`.
     off: dict = field(default_factory=dict)
     simulation: dict = field(default_factory=dict)
     settings: dict = field(default_factory=dict)

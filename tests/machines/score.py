@@ -1,7 +1,8 @@
 """Judges a diagnosis against a machine's truth.
 
-right             an accepted answer is named, or is in an ambiguous list, or an honest
-                  refusal is accepted; `none` and `parameters` too where nothing can be seen
+right             an accepted answer is named, or is in an ambiguous list; where an honest
+                  refusal is accepted `unknown`, `law` or part of the truth, not called
+                  complete; where nothing can be seen `none` and `parameters`, too
 partly            part of the truth is named, with `complete: false`
 wrong             something is named that is in no accepted answer; an ambiguous list without
                   any accepted answer
@@ -114,6 +115,8 @@ def outcome(truth: dict, diagnosis: dict) -> str:
         return "falsely complete" if falsely_complete(truth, diagnosis) else "right"
     if falsely_complete(truth, diagnosis):
         return "falsely complete"
+    if truth["honest_refusal"]:
+        return "right"
     # Nothing else can be seen, so part of the truth is all that can be said.
     return "right" if diagnosis.get("complete") else "partly"
 
@@ -122,29 +125,36 @@ def intervals(truth: dict, diagnosis: dict) -> tuple[int, list[str]]:
     """Number of 95 % intervals that can be checked, and those that miss."""
     if diagnosis["verdict"] != "named":
         return 0, []
-    waiting = [dict(one) for one in truth["parameters"]]
+    waiting = list(truth["parameters"])
     count, missed = 0, []
     for effect in diagnosis["effects"]:
-        match = next((one for one in waiting if one["effect"] == effect["id"]), None)
-        if match is None:
+        alike = [one for one in waiting if one["effect"] == effect["id"]]
+        if not alike:
             continue
-        waiting.remove(match)
-        for name, value in match["values"].items():
-            given = effect["parameters"].get(name)
-            if (
-                not isinstance(given, dict)
-                or not given.get("ci95")
-                or isinstance(value, str)
-            ):
-                continue
-            low, high = given["ci95"]
-            if low is None or high is None:
-                continue
-            count += 1
-            if not low <= value <= high:
-                missed.append(
-                    f"{effect['id']}.{name}: {value:.4g} not in {low:.4g} ... {high:.4g}"
-                )
+        # Of two effects of one kind, the one that fits is meant.
+        meant = min(alike, key=lambda one: len(_missed(one, effect)[1]))
+        waiting.remove(meant)
+        checked, outside = _missed(meant, effect)
+        count += checked
+        missed += outside
+    return count, missed
+
+
+def _missed(true: dict, effect: dict) -> tuple[int, list[str]]:
+    """Intervals of one effect that can be checked, and those that miss."""
+    count, missed = 0, []
+    for name, value in true["values"].items():
+        given = effect["parameters"].get(name)
+        if not isinstance(given, dict) or isinstance(value, str):
+            continue
+        limits = given.get("ci95") or [None, None]
+        if None in limits:
+            continue
+        count += 1
+        if not limits[0] <= value <= limits[1]:
+            missed.append(
+                f"{effect['id']}.{name}: {value:.4g} not in {limits[0]:.4g} ... {limits[1]:.4g}"
+            )
     return count, missed
 
 

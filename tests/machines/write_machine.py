@@ -63,6 +63,18 @@ def configuration(machine: Machine) -> dict:
     }
 
 
+def accepted(machine: Machine) -> dict:
+    """The part of a truth that says which answers do it justice."""
+    answers = machine.answers
+    return {
+        "full": [list(one) for one in answers.full],
+        "near": [list(one) for one in answers.near],
+        "partial": [list(one) for one in answers.partial],
+        "honest_refusal": answers.honest_refusal,
+        "may_be_complete": bool(answers.full),
+    }
+
+
 def truth(machine: Machine, recordings: Recordings) -> dict:
     """What stands in truth.json."""
     hold = machine.simulation.get("hold", "linear")
@@ -73,17 +85,12 @@ def truth(machine: Machine, recordings: Recordings) -> dict:
             alone[name] = projected_gap(
                 machine, recordings, lambda other, name=name: other != name
             )
-    answers = machine.answers
     return {
         "name": machine.name,
         "family": machine.family,
         "story": machine.story,
         "hidden": names,
-        "full": [list(one) for one in answers.full],
-        "near": [list(one) for one in answers.near],
-        "partial": [list(one) for one in answers.partial],
-        "honest_refusal": answers.honest_refusal,
-        "may_be_complete": bool(answers.full),
+        **accepted(machine),
         "parameters": [
             {"effect": one.effect, "values": one.parameters}
             for one in machine.hidden

@@ -25,7 +25,9 @@ def delayed(delay, output_map="polynomial", input_map="dead_zone"):
     return replace(plant(input_map, output_map), delay=delay)
 
 
-@pytest.mark.parametrize("delay", [1, 2, 3, 4])
+@pytest.mark.parametrize(
+    "delay", [1, *(pytest.param(one, marks=pytest.mark.slow) for one in (2, 3)), 4]
+)
 @pytest.mark.parametrize(
     ("input_map", "output_map"),
     [("dead_zone", "polynomial"), ("none", "saturation"), ("polynomial", "none")],
@@ -115,19 +117,23 @@ def test_a_smaller_model_keeps_its_own_delay_where_that_is_needed():
     assert one.free_responses.shape == (1, 2)
 
 
+FOUR = (10, 11, 12, 13)
+
+
 @pytest.mark.parametrize(
-    "delays",
+    ("delays", "seeds"),
     [
-        pytest.param((1, 2, 3, 4, 5), marks=pytest.mark.slow),
-        pytest.param((2, 3, 4), marks=pytest.mark.slow),
-        (2, 3),
+        pytest.param((1, 2, 3, 4, 5), FOUR, marks=pytest.mark.slow),
+        pytest.param((2, 3, 4), FOUR, marks=pytest.mark.slow),
+        pytest.param((2, 3), FOUR, marks=pytest.mark.slow),
+        ((2, 3), (10, 12)),
     ],
 )
-def test_the_cells_of_a_grid_find_the_delays_of_fits_alone(delays):
+def test_the_cells_of_a_grid_find_the_delays_of_fits_alone(delays, seeds):
     # A short screening alone takes another delay in some of them.
     options = FitOptions(input_map="dead_zone", output_map="saturation", delays=delays)
     settings = RunSettings(store=MemoryStore(), workers=Workers(jobs=1))
-    recordings = [late_plant(seed) for seed in (10, 11, 12, 13)]
+    recordings = [late_plant(seed) for seed in seeds]
     grid = OrdersOptions(nb=(1, 2), nk=(1, 2))
     for found in identify_all(recordings, grid, options, settings):
         (recording,) = (one for one in recordings if one.name == found.name)

@@ -198,8 +198,15 @@ def test_numbers_that_are_no_block_are_refused(values, message):
         LinearBlock(*values)
 
 
-@pytest.mark.parametrize("radius", [0.85, 0.6])
-@pytest.mark.parametrize("output_map", ["none", "polynomial"])
+@pytest.mark.parametrize(
+    ("radius", "output_map"),
+    [
+        (0.85, "polynomial"),
+        (0.6, "none"),
+        pytest.param(0.85, "none", marks=pytest.mark.slow),
+        pytest.param(0.6, "polynomial", marks=pytest.mark.slow),
+    ],
+)
 def test_no_pole_lies_beyond_the_bound(radius, output_map):
     true = plant("dead_zone", output_map)
     recording = measured(true, noise=0.01)
@@ -220,6 +227,10 @@ def gun_like(u, block, edges, limits):
     return np.clip(lfilter(*block, u - np.clip(u, *edges)), *limits)
 
 
+# Each plant and each bound once or twice.
+IN_SHORT = ((10, 0.82), (11, 0.7), (12, 0.8), (13, 0.82))
+
+
 def rmsd_on_the_bound(recording, radius):
     """Second way: the pair of poles lies on the bound, its angle and the rest are free."""
 
@@ -233,8 +244,18 @@ def rmsd_on_the_bound(recording, radius):
     return float(np.sqrt(np.mean(least_squares(residuals, begin).fun ** 2)))
 
 
-@pytest.mark.parametrize("radius", [0.7, 0.8, 0.82])
-@pytest.mark.parametrize("seed", [10, 11, 12, 13])
+@pytest.mark.parametrize(
+    ("seed", "radius"),
+    [
+        pytest.param(
+            seed,
+            radius,
+            marks=() if (seed, radius) in IN_SHORT else pytest.mark.slow,
+        )
+        for seed in (10, 11, 12, 13)
+        for radius in (0.7, 0.8, 0.82)
+    ],
+)
 def test_the_best_model_that_lies_on_the_bound_is_found(radius, seed):
     # A search that only refuses to cross the bound stops 2 to 15 times as far off.
     rng = np.random.default_rng(seed)

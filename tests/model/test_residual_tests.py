@@ -136,14 +136,21 @@ def test_the_pull_begins_with_the_number_of_parameters():
     assert pulled[0] == pytest.approx(result.information.n_parameters, abs=1.001)
 
 
-def test_residuals_of_a_fit_with_many_parameters_are_white_where_the_noise_is():
+@pytest.mark.parametrize(
+    ("seeds", "most_off"),
+    # Three standard deviations of a share of 5 %, and what chi2 as a limit is off.
+    [(100, 0.07), pytest.param(SEEDS, 0.04, marks=pytest.mark.slow)],
+)
+def test_residuals_of_a_fit_with_many_parameters_are_white_where_the_noise_is(
+    seeds, most_off
+):
     white_ones = []
     u = white(0, 400)
     # Forty slow waves: what a fit of a fast sampled drive can follow.
     waves = np.cos(np.pi * np.outer(np.arange(400) + 0.5, np.arange(40)) / 400)
     basis, _ = np.linalg.qr(waves)
     pulled = np.array([np.sum(basis[: 400 - k] * basis[k:]) for k in range(26)])
-    for seed in range(SEEDS):
+    for seed in range(seeds):
         noise = white(seed, 400)
         residual = noise - basis @ (basis.T @ noise)
         white_ones.append(
@@ -154,7 +161,7 @@ def test_residuals_of_a_fit_with_many_parameters_are_white_where_the_noise_is():
         )
     with_pull, without = 1.0 - np.mean(white_ones, axis=0)
     # Forty parameters of 400 samples; without the correction white noise is lost.
-    assert with_pull == pytest.approx(0.05, abs=0.04)
+    assert with_pull == pytest.approx(0.05, abs=most_off)
     assert without > 0.15
 
 

@@ -47,8 +47,15 @@ def test_the_diagonal_holds_the_squares_of_the_standard_errors(join):
     )
 
 
-@pytest.mark.parametrize("join", ["concatenate", "experiments"])
-@pytest.mark.parametrize("loss", ["squared", "huber"])
+@pytest.mark.parametrize(
+    ("join", "loss"),
+    [
+        ("concatenate", "squared"),
+        ("experiments", "huber"),
+        pytest.param("concatenate", "huber", marks=pytest.mark.slow),
+        pytest.param("experiments", "squared", marks=pytest.mark.slow),
+    ],
+)
 def test_standard_errors_can_be_worked_out_afterwards(join, loss):
     true = plant("dead_zone", "polynomial", "estimated")
     pair = [measured(true, 600, seed=seed, noise=0.02) for seed in (1, 2)]

@@ -1,6 +1,12 @@
 import pytest
 
+from tests.conftest import leave_figures_blank
 from tests.reliability import harness
+
+
+@pytest.fixture(autouse=True)
+def _blank_figures(blank_figures):
+    """What is rendered here is the matter of tests/report."""
 
 
 @pytest.fixture(scope="session")
@@ -8,7 +14,9 @@ def undisturbed(tmp_path_factory):
     """What the tiny campaign finds when nothing happens to it."""
     folder = tmp_path_factory.mktemp("undisturbed")
     out = folder / "out"
-    done = harness.run_here(harness.write_config(folder), out)
+    with pytest.MonkeyPatch.context() as monkeypatch:
+        leave_figures_blank(monkeypatch)
+        done = harness.run_here(harness.write_config(folder), out)
     assert harness.count_computed(done.stdout) == len(harness.entries(out))
     return out
 

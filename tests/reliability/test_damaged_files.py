@@ -73,7 +73,11 @@ def test_damaged_entries_are_counted_in_one_line_and_computed_again(
     assert len(list(out.rglob("*.bad"))) == len(paths)
 
 
-@pytest.mark.parametrize("name", ["results.h5", "calibrated.h5"])
+@pytest.mark.parametrize(
+    "name",
+    # A bit of it is flipped below.
+    [pytest.param("results.h5", marks=pytest.mark.slow), "calibrated.h5"],
+)
 @pytest.mark.parametrize("damage", DAMAGES)
 def test_damaged_results_come_back_from_the_cache(run, out, undisturbed, name, damage):
     path = out / name

@@ -66,9 +66,16 @@ def test_every_figure_lies_in_its_folder(of_nine):
     ]
 
 
+def with_gaps_alone(**changes):
+    """That diagnosis with one figure to draw."""
+    return replace(
+        named(), overlays=(), places=(), latent_force=(), candidates=(), **changes
+    )
+
+
 @blank
 def test_the_worst_held_out_recordings_are_called_out():
-    found = named()
+    found = with_gaps_alone()
     rms = {"step_03": 9e-4, "step_00": 8e-4, "sine_01": 1.0}
     gaps = [
         replace(one, rms_after=rms.get(one.name, one.rms_after)) for one in found.gaps
@@ -82,7 +89,7 @@ def test_the_worst_held_out_recordings_are_called_out():
 
 @blank
 def test_without_numbers_no_recording_is_the_worst():
-    found = named()
+    found = with_gaps_alone()
     gaps = tuple(replace(one, rms_after=NAN) for one in found.gaps)
 
     assert sentences(section_of(replace(found, gaps=gaps)))[0].endswith("the noise.")
@@ -122,7 +129,7 @@ def test_an_unknown_gap_shows_the_force_without_a_law():
 
 @blank
 def test_the_record_goes_before_the_file():
-    found = section_of(named(), {"verdict": "none"})
+    found = section_of(with_gaps_alone(), {"verdict": "none"})
 
     assert "There is no gap beyond the noise." not in texts(found)
 
@@ -141,7 +148,8 @@ def test_older_results_have_the_file_alone():
 @blank
 @pytest.mark.parametrize("count", [1, 43])
 def test_counts_are_told(count):
-    remark = " ".join(texts(section_of(named(count))))
+    found = replace(named(count), overlays=(), places=(), latent_force=())
+    remark = " ".join(texts(section_of(found)))
     held_out = "1 recording held out" if count == 1 else "15 recordings held out"
 
     assert held_out in remark

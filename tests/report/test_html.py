@@ -222,16 +222,15 @@ def test_a_diagnosis_may_hold_little(contents, diagnosis, expected):
 
 
 @pytest.mark.usefixtures("blank_figures")
-def test_what_the_thesis_calls_things_is_on_a_page_that_asks_for_it(contents):
-    stored = replace(contents.stored, thesis_names=True)
-    plain, asked = (
-        report_page(one, STAGES).html
-        for one in (contents, replace(contents, stored=stored))
-    )
+def test_what_the_thesis_calls_things_is_on_a_page_that_asks_for_it(contents, page):
+    stored = with_results(contents.stored, diagnose=None)
+    stored = replace(stored, thesis_names=True)
+    few = replace(contents, stored=stored, simulated=(), models=())
+    asked = report_page(few, STAGES).html
 
     for word in ("(form of T3.2.2.2-2)", "(form of T3.4.1-1", "NLHW-Step-1-"):
         assert word in asked
-        assert word not in plain
+        assert word not in page.html
 
 
 def test_a_page_shows_the_tables_of_the_screen_with_details_and_notes(page, contents):

@@ -64,6 +64,7 @@ def test_only_a_few_models_tell_what_is_not_identifiable():
     assert "in 1 more model:" in str(residual_table(found[:6]).notes)
 
 
+@pytest.mark.usefixtures("blank_figures")
 def test_the_section_has_a_row_and_a_figure_for_each_recording(contents):
     section = residuals_section(contents)
     (table,) = [one for one in section.blocks if isinstance(one, Table)]

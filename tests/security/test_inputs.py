@@ -17,6 +17,7 @@ from hwid_cli.data.virtual_measurements import (
 )
 from hwid_cli.records.machines import VirtualMeasurement
 from tests.bad_input import trial
+from tests.conftest import leave_figures_blank
 
 # Names may hold none of < and >; what remains must not break out of an attribute.
 NASTY_NAME = "x' onmouseover='alert(1)' y&lt;script&gt;"
@@ -60,9 +61,9 @@ class Page(HTMLParser):
         self.text.append(text)
 
 
-@pytest.fixture
-def nasty(tmp_path):
-    folder = tmp_path / "nasty"
+@pytest.fixture(scope="module")
+def nasty(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("nasty") / "nasty"
     folder.mkdir()
     (folder / "config.yaml").write_text(CONFIG)
     (folder / f"{NASTY_NAME}.csv").write_text(trial.csv_text())
@@ -71,9 +72,8 @@ def nasty(tmp_path):
     return folder
 
 
-@pytest.fixture
-def no_network(monkeypatch):
-    """Sockets between processes of this machine only."""
+def forbid_network(monkeypatch):
+    """Let sockets be between processes of this machine only."""
     plain = socket.socket
 
     class Local(plain):
@@ -111,15 +111,21 @@ def is_device(path):
     return Path(path).exists() and stat.S_ISCHR(Path(path).stat().st_mode)
 
 
-def test_nasty_names_and_units_are_text_on_the_page_and_nothing_is_written_elsewhere(
-    nasty, no_network, blank_figures
-):
+@pytest.fixture(scope="module")
+def written(nasty):
+    """What a run of all stages writes, and where."""
     writes = Writes()
-    writes.is_on = True
-    result = trial.run(nasty, "run")
-    writes.is_on = False
-
+    with pytest.MonkeyPatch.context() as monkeypatch:
+        leave_figures_blank(monkeypatch)
+        forbid_network(monkeypatch)
+        writes.is_on = True
+        result = trial.run(nasty, "run")
+        writes.is_on = False
     assert result.exit_code == 0, (result.stderr, result.exception)
+    return writes.paths
+
+
+def test_nasty_names_and_units_are_text_on_the_page(nasty, written):
     text = (nasty / "out" / "report.html").read_text()
     page = Page(text)
     assert page.tags.count("script") == text.count("<script>") == 1
@@ -130,21 +136,22 @@ def test_nasty_names_and_units_are_text_on_the_page_and_nothing_is_written_elsew
     shown = "".join(page.text)
     assert NASTY_UNIT in shown
     assert NASTY_NAME in shown
+
+
+def test_nothing_is_written_elsewhere(nasty, written):
     outside = [
         path
-        for path in writes.paths
+        for path in written
         if not Path(path).resolve().is_relative_to(nasty / "out")
         # What numba has compiled lies beside the package.
         and "__pycache__" not in path
         and not is_device(path)
     ]
-    assert writes.paths
+    assert written
     assert outside == []
 
 
-def test_no_cell_of_any_table_is_a_formula(nasty, blank_figures):
-    trial.run(nasty, "run")
-
+def test_no_cell_of_any_table_is_a_formula(nasty, written):
     tables = sorted((nasty / "out").glob("*.csv"))
     assert tables
     for table in tables:

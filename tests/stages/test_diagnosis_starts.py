@@ -95,7 +95,13 @@ def blind_cases():
         yield make_case("nuisance", (), 0, plan="short", nuisance=nuisance)
 
 
-@pytest.mark.parametrize("case", list(blind_cases()), ids=lambda case: case.name)
+@pytest.mark.parametrize(
+    "case",
+    [
+        pytest.param(case, id=case.name, marks=pytest.mark.slow if row % 2 else ())
+        for row, case in enumerate(blind_cases())
+    ],
+)
 def test_no_case_of_the_blind_test_is_doubted(case):
     measured, truth = measured_case(case)
     found = [

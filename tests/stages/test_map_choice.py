@@ -11,6 +11,7 @@ from hwid_cli.records.recordings import Recording
 from hwid_cli.stages.map_choice import candidate_maps, fit_maps, recommend_maps
 from hwid_cli.tasks.cache import MemoryStore
 from hwid_cli.tasks.runner import RunSettings
+from hwid_cli.tasks.workers import Workers
 
 FIT = FitOptions(initial_state="zero")
 ORDERS = Orders(1, 2, 1)
@@ -29,7 +30,7 @@ def recordings(count, *, noise=0.02, samples=600):
 
 
 def advice_on(chosen, options, *, settings=None):
-    settings = settings or RunSettings(store=MemoryStore())
+    settings = settings or RunSettings(MemoryStore(), Workers(1))
     candidates = candidate_maps(FIT, options)
     fits = fit_maps(chosen, ORDERS, candidates, settings)
     return recommend_maps(fits, chosen, chosen, options.tolerance, settings)
@@ -97,7 +98,7 @@ def test_a_lone_recording_leaves_the_choice_to_bic():
 
 def test_all_comes_from_the_store_the_second_time():
     done = []
-    settings = RunSettings(store=MemoryStore(), on_done=done.append)
+    settings = RunSettings(MemoryStore(), Workers(1), on_done=done.append)
     options, chosen = OrderOptions(maps=("none",)), recordings(2)
     first = advice_on(chosen, options, settings=settings)
     count = len(done)
@@ -120,7 +121,7 @@ def test_recordings_that_a_model_cannot_be_fitted_to_give_no_advice():
 
 @pytest.mark.parametrize("join", ["concatenate", "experiments"])
 def test_the_rule_for_joining_is_no_part_of_a_fit_of_one(join):
-    settings, (one,) = RunSettings(store=MemoryStore()), recordings(1)
+    settings, (one,) = RunSettings(MemoryStore(), Workers(1)), recordings(1)
     linear = FitOptions(input_map="none", output_map="none", join=join)
     ((fit,),) = fit_maps([one], ORDERS, [linear], settings)
 

@@ -11,6 +11,7 @@ from hwid_cli.stages.identify import identify_all
 from hwid_cli.stages.order import recommend_orders
 from hwid_cli.tasks.cache import MemoryStore
 from hwid_cli.tasks.runner import RunSettings
+from hwid_cli.tasks.workers import Workers
 
 LINEAR = FitOptions(input_map="none", output_map="none", initial_state="zero")
 
@@ -28,7 +29,7 @@ def recordings(count, numerator, poles):
 
 
 def advice_on(chosen, grid, judges=None):
-    settings = RunSettings(store=MemoryStore())
+    settings = RunSettings(MemoryStore(), Workers(1))
     fits = identify_all(chosen, grid, LINEAR, settings)
     crossval = cross_validate(fits, judges or chosen, grid, CrossvalOptions(), settings)
     return recommend_orders(fits, crossval, chosen, grid, OrderOptions())

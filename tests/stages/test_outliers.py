@@ -14,13 +14,14 @@ from hwid_cli.stages.order import recommend_orders
 from hwid_cli.stages.outliers import cross_validate_without_outliers, without_outliers
 from hwid_cli.tasks.cache import MemoryStore
 from hwid_cli.tasks.runner import RunSettings
+from hwid_cli.tasks.workers import Workers
 
 N_OUTLIERS = 25
 ROBUST = FitOptions(
     input_map="none", output_map="none", initial_state="zero", loss="huber"
 )
 GRID = OrdersOptions(nb=(1, 2), nk=(1, 2, 3))
-SETTINGS = RunSettings(store=MemoryStore())
+SETTINGS = RunSettings(MemoryStore(), Workers(1))
 
 
 def recordings(*, outliers, gain=lambda u: u):

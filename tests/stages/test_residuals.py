@@ -8,7 +8,7 @@ from hwid_cli.stages.residuals import examined_residual
 NONE = StaticMap("none", np.zeros(0))
 B, F = np.array([0.2, 0.15]), np.real(np.poly(0.8 * np.exp([0.5j, -0.5j])))
 MODEL = HammersteinWiener(NONE, B, F, 1, NONE, 1.0, initial_state="estimated")
-SEEDS = 60
+SEEDS = 30
 
 
 def alarms(loss):

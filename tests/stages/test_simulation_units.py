@@ -39,7 +39,7 @@ def refused(model=DRIVE, *, said_by="the name 'y [x]'", options=None, **units):
     return refused_units(experiment(model, **(options or {})), [one], [log])
 
 
-@pytest.mark.parametrize("unit", ["A", "rad", "mm", "inc", "s", "m/s", "deg"])
+@pytest.mark.parametrize("unit", ["A", "mm", "inc", "s", "m/s", "deg"])
 def test_an_output_of_another_unit_is_refused(unit):
     (line,) = refused(output_unit=unit)
     assert line.startswith(
@@ -49,10 +49,17 @@ def test_an_output_of_another_unit_is_refused(unit):
     assert "\n" not in line
 
 
-@pytest.mark.parametrize("unit", ["m", "V", "mA", "%", "N", "rpm"])
+@pytest.mark.parametrize("unit", ["m", "mV", "mA", "%", "kN", "rpm"])
 def test_an_input_of_another_unit_is_refused(unit):
     (line,) = refused(input_unit=unit)
     assert "expected 'A', the unit of the simulation" in line
+
+
+@pytest.mark.parametrize(
+    ("side", "unit"), [("input", "V"), ("input", "N"), ("output", "rad")]
+)
+def test_si_units_of_the_same_equations_are_taken(side, unit):
+    assert refused(**{f"{side}_unit": unit}) == ()
 
 
 def test_a_circuit_takes_a_voltage_only():

@@ -170,7 +170,10 @@ for number in range(10**9):
 
 
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="needs SIGKILL")
-@pytest.mark.parametrize("pause_s", [0.0, 0.003, 0.011])
+@pytest.mark.parametrize(
+    "pause_s",
+    [0.003, *(pytest.param(one, marks=pytest.mark.slow) for one in (0.0, 0.011))],
+)
 def test_killing_the_writer_leaves_only_whole_entries(tmp_path, pause_s):
     process = subprocess.Popen(
         [sys.executable, "-c", PUT_FOR_EVER, str(tmp_path)],

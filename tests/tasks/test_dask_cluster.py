@@ -51,9 +51,11 @@ def settings(scheduler, on_done=None):
     return RunSettings(MemoryStore(), Workers(None, "dask", scheduler), on_done=on_done)
 
 
-def test_results_are_those_of_this_process(address, tmp_path):
+def test_results_and_errors_are_those_of_this_process(address, tmp_path):
     with dask_processes.workers(address, tmp_path):
         there = run_tasks(tasks_of(slow_sum, 60), settings(address))
+        with pytest.raises(ValueError, match="no 0"):
+            run_tasks(tasks_of(failing, 1), settings(address))
     here = run_tasks(tasks_of(slow_sum, 60), RunSettings(MemoryStore(), Workers(1)))
     assert [one.result for one in there] == [one.result for one in here]
     assert [one.task.name for one in there] == [one.task.name for one in here]
@@ -95,14 +97,6 @@ def test_a_task_that_kills_its_workers_is_named(address, tmp_path):
         run_tasks(mixed, there)
     # All the others are done all the same.
     assert all(store.get(f"key {n}", float) is not None for n in range(3))
-
-
-def test_what_a_task_raises_arrives(address, tmp_path):
-    with (
-        dask_processes.workers(address, tmp_path, 1),
-        pytest.raises(ValueError, match="no 0"),
-    ):
-        run_tasks(tasks_of(failing, 1), settings(address))
 
 
 def test_a_worker_of_another_version_is_refused():

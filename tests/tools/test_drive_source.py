@@ -35,8 +35,8 @@ def test_new_places_are_put_behind_the_others(monkeypatch):
     assert after == before | {"NEW": n, "FURTHER": n + 1, "N_SLOTS": n + 2}
 
 
-def test_a_place_that_is_missing_makes_the_source_out_of_date(monkeypatch):
+def test_the_source_is_the_translation_of_todays_loops_and_places(monkeypatch):
     monkeypatch.setattr("sys.argv", ["drive_source.py", "--check"])
-    assert drive_source.main() == 0
+    assert drive_source.main() == 0, "run 'make drive-source'"
     monkeypatch.setattr(drive_source, "missing_places", lambda: ["NEW"])
     assert drive_source.main() == 1

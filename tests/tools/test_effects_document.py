@@ -4,15 +4,15 @@ from dataclasses import replace
 
 import pytest
 
-from hwid_cli.drive.catalogue import CATALOGUE, configured_effects, public_id
+from hwid_cli.drive.catalogue import CATALOGUE, configured_effects
 from tools import effects_document
 from tools.effects_document import (
     DOCUMENT,
     FIGURES,
     README,
     document,
+    effects_by_public_id,
     main,
-    plain_effects,
     readme,
 )
 from tools.effects_figures import EXAMPLES, OVER, draw, example
@@ -26,9 +26,7 @@ def test_the_documents_are_up_to_date():
 def test_every_effect_has_a_section_and_a_figure():
     sections = {line[3:] for line in document().splitlines() if line.startswith("## ")}
     assert sections == set(configured_effects())
-    assert {path.stem for path in FIGURES.glob("*.png")} == {
-        public_id(one.id) for one in plain_effects()
-    }
+    assert {path.stem for path in FIGURES.glob("*.png")} == set(effects_by_public_id())
 
 
 def test_what_figures_choose_by_hand_is_of_the_catalogue():

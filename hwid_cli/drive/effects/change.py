@@ -30,6 +30,7 @@ EFFECTS = tuple(
             Stated("which", words=CHANGING),
             Stated("spread", limits=(NOT_NEGATIVE,)),
         ),
+        words={"which": which},
         confused_with={"force_constant_saturation": "repeats of the same recording"},
         needs_spring=which == "stiffness",
     )

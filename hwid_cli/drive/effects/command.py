@@ -3,17 +3,21 @@
 docs/method_diagnosis.md, eq. (D4) to (D7).
 """
 
-from math import inf
+from math import inf, pi
 
 from hwid_cli.drive.effect import (
     NOT_NEGATIVE,
     POSITIVE,
     Effect,
+    Limit,
     Parameter,
     Scales,
     shares_of,
     span_of,
 )
+
+# The force would change its sign along the way.
+_BELOW_WHOLE = Limit("a share below 1", lambda value: value < 1)
 
 
 def _times(scales: Scales) -> tuple[float, ...]:
@@ -154,6 +158,46 @@ SAG = Effect(
     },
 )
 
+RIPPLE = Effect(
+    id="torque_ripple",
+    sentence="the force constant varies with the position of the rotor",
+    equation="kt -> kt (1 + a sin(n x + p))",
+    enters="force",
+    parameters=(
+        Parameter(
+            "share",
+            lambda scales: (0.1,),
+            lambda scales: (1e-4, 0.95),
+            places=("RIPPLE_SHARE",),
+            limits=(NOT_NEGATIVE, _BELOW_WHOLE),
+        ),
+        Parameter(
+            "per_turn",
+            lambda scales: tuple(
+                2 * pi * count / scales.stroke_m
+                for count in (0.7, 1.3, 2, 3, 4.5, 6.5, 9, 13, 18)
+            ),
+            lambda scales: (
+                2 * pi * 0.4 / scales.stroke_m,
+                2 * pi * 200 / scales.stroke_m,
+            ),
+            places=("RIPPLE_PER_TURN",),
+            limits=(POSITIVE,),
+        ),
+        Parameter(
+            "phase_rad",
+            lambda scales: (-0.75 * pi, -0.25 * pi, 0.25 * pi, 0.75 * pi),
+            is_positive=False,
+            places=("RIPPLE_PHASE",),
+            default=0.0,
+        ),
+    ),
+    confused_with={
+        "cogging": "the same way at small and at large current",
+        "quadratic_stiffness": "motion over a large angle",
+    },
+)
+
 THERMAL = Effect(
     id="thermal_gain_loss",
     sentence="the force constant falls as the motor heats up",
@@ -224,6 +268,7 @@ EFFECTS = (
     LAG,
     CONSTANT_SATURATION,
     SAG,
+    RIPPLE,
     THERMAL,
     VOLTAGE_LIMIT,
 )

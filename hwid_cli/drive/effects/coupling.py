@@ -196,6 +196,7 @@ def _elastic(sensor: str, looks_like: dict[str, str]) -> Effect:
             Stated("motor_share", (POSITIVE, _BELOW_WHOLE), is_needed=False),
             Stated("damping_ratio", (NOT_NEGATIVE,), is_needed=False),
         ),
+        words={"sensor": sensor},
         confused_with=looks_like,
     )
 

@@ -1,13 +1,31 @@
 """Declarations of effects: what resists motion. docs/method_diagnosis.md, (D8), (D9)."""
 
+from dataclasses import replace
+from math import pi
+
 from hwid_cli.drive.effect import (
+    AT_LEAST_1,
     NOT_NEGATIVE,
     POSITIVE,
     Effect,
+    Limit,
     Parameter,
+    Stated,
+    Values,
+    bend,
     shares_of,
     span_of,
 )
+
+# What the friction of a load can follow: its words, and the places of its share.
+LOADS = {"spring": "SPRING_SHARE", "drive": "DRIVE_SHARE"}
+_ABOVE_MINUS_1 = Limit("a number above -1", lambda value: value > -1)
+_AT_MOST_WHOLE = Limit("a share from 0 to 1", lambda value: 0 <= value <= 1)
+
+
+def _wave(value: Values) -> float:
+    return value["force_N"] * value["variation_share"]
+
 
 COULOMB = Effect(
     id="coulomb_friction",
@@ -112,6 +130,118 @@ HYSTERESIS = Effect(
     contains=("coulomb_friction",),
 )
 
+LOAD = tuple(
+    Effect(
+        id=f"load_friction:{load}",
+        sentence=f"dry friction that grows with the force of the {load}",
+        equation=f"F = -(Fc + mu |F_{load}|) sgn(v); at rest F balances up to that",
+        enters="motion",
+        parameters=(
+            Parameter(
+                "force_N",
+                shares_of("force_N", 0.005, 0.04),
+                span_of("force_N", 1e-7, 10.0),
+                places=("FRICTION_FORWARD", "FRICTION_BACKWARD"),
+                limits=(NOT_NEGATIVE,),
+            ),
+            Parameter(
+                "load_share",
+                lambda scales: (0.03, 0.1, 0.3),
+                # The drive would lock itself at 1.
+                lambda scales: (1e-4, 0.95),
+                places=(place,),
+                limits=(NOT_NEGATIVE,),
+            ),
+        ),
+        stated=(
+            Stated("force_N", limits=(NOT_NEGATIVE,)),
+            Stated("load_share", limits=(NOT_NEGATIVE,)),
+            Stated("load", words=tuple(LOADS)),
+        ),
+        words={"load": load},
+        strength="load_share",
+        confused_with={
+            "coulomb_friction": "reversals at small and at large load",
+            "hysteresis": "slow triangles of several sizes",
+        },
+        contains=("coulomb_friction",),
+        needs_spring=load == "spring",
+    )
+    for load, place in LOADS.items()
+)
+
+POSITION = Effect(
+    id="position_friction",
+    sentence="dry friction that varies along the way",
+    equation="F = -Fc (1 + a sin(2 pi x / l + q)) sgn(v); at rest F balances up to that",
+    enters="motion",
+    parameters=(
+        Parameter(
+            "force_N",
+            shares_of("force_N", 0.05),
+            places=("FRICTION_FORWARD", "FRICTION_BACKWARD"),
+            limits=(NOT_NEGATIVE,),
+        ),
+        Parameter(
+            "variation_share",
+            lambda scales: (0.5,),
+            lambda scales: (1e-3, 1.0),
+            limits=(_AT_MOST_WHOLE,),
+        ),
+        Parameter(
+            "period_m",
+            lambda scales: tuple(
+                scales.stroke_m / count for count in (0.8, 1.5, 2.5, 4, 6, 9, 14, 20)
+            ),
+            lambda scales: (scales.stroke_m / 200, 2.0 * scales.stroke_m),
+            places=("WAVY_PERIOD",),
+            limits=(POSITIVE,),
+        ),
+        Parameter(
+            "phase_rad",
+            lambda scales: (-0.75 * pi, -0.25 * pi, 0.25 * pi, 0.75 * pi),
+            is_positive=False,
+            places=("WAVY_PHASE",),
+            default=0.0,
+        ),
+    ),
+    derived={"WAVY_FRICTION": _wave},
+    confused_with={
+        "cogging": "the same slow way forward and backward",
+        "coulomb_friction": "slow motion over the whole stroke",
+    },
+    contains=("coulomb_friction",),
+)
+
+BOUC_WEN = replace(
+    HYSTERESIS,
+    id="hysteresis:bouc_wen",
+    sentence="friction that builds up after each reversal, of any Bouc-Wen shape",
+    equation="F = -Fh z, dz/dx = (1 - |z|^n (sgn(z dx) + r) / (1 + r)) / zy",
+    parameters=(
+        *HYSTERESIS.parameters,
+        Parameter(
+            "exponent",
+            lambda scales: (1.0, 2.0),
+            lambda scales: (1.0, 10.0),
+            default=1.0,
+            limits=(AT_LEAST_1,),
+        ),
+        # Of gamma to beta; at 1 the way back from a deflection is straight.
+        Parameter(
+            "shape_ratio",
+            lambda scales: (0.0, 1.0),
+            lambda scales: (-0.8, 20.0),
+            is_positive=False,
+            places=("HYSTERESIS_RATIO",),
+            default=0.0,
+            limits=(_ABOVE_MINUS_1,),
+        ),
+    ),
+    derived={"HYSTERESIS_BEND": bend},
+    contains=("hysteresis", *HYSTERESIS.contains),
+)
+
 DRAG = Effect(
     id="quadratic_drag",
     sentence="resistance that grows with the square of the velocity",
@@ -132,4 +262,4 @@ DRAG = Effect(
     },
 )
 
-EFFECTS = (COULOMB, ASYMMETRIC, STRIBECK, HYSTERESIS, DRAG)
+EFFECTS = (COULOMB, ASYMMETRIC, STRIBECK, *LOAD, POSITION, HYSTERESIS, BOUC_WEN, DRAG)

@@ -1,16 +1,23 @@
 """Declarations of effects: what depends on position. docs/method_diagnosis.md, (D10)."""
 
+from dataclasses import replace
+from functools import partial
 from math import pi
 
 from hwid_cli.drive.effect import (
+    AT_LEAST_1,
     NOT_NEGATIVE,
     POSITIVE,
     Effect,
     Parameter,
     Scales,
+    bend,
     shares_of,
     span_of,
 )
+
+# Depth at which contacts of other exponents start as stiff, as a share of the motion.
+_USUAL_DEPTH = 0.05
 
 
 def _periods(scales: Scales) -> tuple[float, ...]:
@@ -135,6 +142,85 @@ ONE_SIDED = Effect(
     },
 )
 
+
+def _contact(stop: Effect, slots: str, sentence: str) -> Effect:
+    """The same stop with the law of a real contact."""
+    return replace(
+        stop,
+        id=f"{stop.id}_contact" if stop.beside else f"{stop.id}:contact",
+        sentence=sentence,
+        equation="F = -ks d^n (1 + c d') at a depth d beyond the position, never pulling",
+        parameters=(
+            *stop.parameters,
+            Parameter(
+                "exponent",
+                lambda scales: (1.0, 1.5),
+                lambda scales: (1.0, 3.0),
+                default=1.0,
+                limits=(AT_LEAST_1,),
+            ),
+            Parameter(
+                "damping_s_per_m",
+                lambda scales: (0.3 / scales.velocity_m_per_s,),
+                lambda scales: (
+                    1e-4 / scales.velocity_m_per_s,
+                    100.0 / scales.velocity_m_per_s,
+                ),
+                places=(f"{slots}_LOSS",),
+                default=0.0,
+                limits=(NOT_NEGATIVE,),
+            ),
+        ),
+        derived={f"{slots}_BEND": bend},
+        confused_with={"cubic_stiffness": "hits at several speeds"},
+        contains=(stop.id, *stop.contains),
+        seen=partial(_contact_starts, stop),
+    )
+
+
+def _contact_starts(stop: Effect, scales: Scales) -> tuple[dict[str, float], ...]:
+    """Starts of the plain stop with a damping, and as stiff where the exponent bends."""
+    damping = 0.3 / scales.velocity_m_per_s
+    depth = _USUAL_DEPTH * scales.displacement_m
+    return tuple(
+        {
+            **plain,
+            "stiffness_N_per_m": plain["stiffness_N_per_m"] * depth ** (1.0 - exponent),
+            "exponent": exponent,
+            "damping_s_per_m": damping,
+        }
+        for plain in stop.starts(scales)
+        for exponent in (1.0, 1.5)
+    )
+
+
+END_STOP_CONTACT = _contact(
+    END_STOP,
+    "STOP",
+    "a stop at the same distance on both sides, curved and damped as contacts are",
+)
+ONE_SIDED_CONTACT = _contact(
+    ONE_SIDED, "SIDE", "a stop on one side only, curved and damped as contacts are"
+)
+ONE_SIDED_SECOND = replace(
+    ONE_SIDED,
+    id="one_sided_stop:second",
+    sentence="a second stop, at another place",
+    parameters=tuple(
+        replace(
+            one,
+            places=tuple(place.replace("SIDE", "SECOND") for place in one.places),
+        )
+        for one in ONE_SIDED.parameters
+    ),
+    beside="one_sided_stop",
+)
+ONE_SIDED_SECOND_CONTACT = _contact(
+    ONE_SIDED_SECOND,
+    "SECOND",
+    "a second stop, at another place, curved and damped as contacts are",
+)
+
 SPRING_GAP = Effect(
     id="spring_gap",
     sentence="a spring that acts only beyond a clearance",
@@ -180,6 +266,75 @@ COGGING = Effect(
     seen=_waves,
 )
 
+COGGING_SECOND = replace(
+    COGGING,
+    id="cogging:second",
+    sentence="a second force that repeats along the way, with another period",
+    parameters=tuple(
+        replace(one, places=tuple(f"SECOND_{place}" for place in one.places))
+        for one in COGGING.parameters
+    ),
+    beside="cogging",
+)
+
+GRAVITY = Effect(
+    id="gravity",
+    sentence="the weight of an unbalanced arm on a rotating axis",
+    equation="F = -G sin(x + x0)",
+    enters="motion",
+    parameters=(
+        Parameter(
+            "torque_N_m",
+            shares_of("force_N", 0.1, 0.4),
+            span_of("force_N", 1e-6, 20.0),
+            places=("GRAVITY_TORQUE",),
+            limits=(NOT_NEGATIVE,),
+        ),
+        Parameter(
+            "angle_rad",
+            lambda scales: (
+                -0.75 * pi,
+                -0.5 * pi,
+                -0.2 * pi,
+                0.2 * pi,
+                0.5 * pi,
+                0.75 * pi,
+            ),
+            is_positive=False,
+            places=("GRAVITY_ANGLE",),
+        ),
+    ),
+    confused_with={
+        "constant_load": "rests in several positions",
+        "quadratic_stiffness": "motion over a large angle",
+        "cubic_stiffness": "motion over a large angle",
+    },
+    # On a way that is short beside a radian.
+    contains=("constant_load",),
+)
+
+PRELOAD = Effect(
+    id="spring_preload",
+    sentence="a preloaded spring: nothing moves from the middle below a force",
+    equation="F = -F0 sgn(x) beside the spring; at x = 0 F balances up to F0",
+    enters="motion",
+    parameters=(
+        Parameter(
+            "force_N",
+            shares_of("force_N", 0.02, 0.06, 0.15),
+            span_of("force_N", 1e-6, 10.0),
+            places=("PRELOAD",),
+            limits=(NOT_NEGATIVE,),
+        ),
+    ),
+    confused_with={
+        "input_dead_zone": "a step back to zero from a deflection",
+        "coulomb_friction": "slow motion to and fro on one side of the middle",
+        "cubic_stiffness": "small steps",
+    },
+    needs_spring=True,
+)
+
 LOAD = Effect(
     id="constant_load",
     sentence="a constant force, such as weight; or a zero offset of the sensor",
@@ -196,4 +351,19 @@ LOAD = Effect(
     confused_with={"sensor_drift": "long rests at the start and at the end"},
 )
 
-EFFECTS = (CUBIC, QUADRATIC, END_STOP, ONE_SIDED, SPRING_GAP, COGGING, LOAD)
+EFFECTS = (
+    CUBIC,
+    QUADRATIC,
+    PRELOAD,
+    END_STOP,
+    END_STOP_CONTACT,
+    ONE_SIDED,
+    ONE_SIDED_CONTACT,
+    ONE_SIDED_SECOND,
+    ONE_SIDED_SECOND_CONTACT,
+    SPRING_GAP,
+    COGGING,
+    COGGING_SECOND,
+    GRAVITY,
+    LOAD,
+)

@@ -8,7 +8,16 @@ from numba import njit
 
 from hwid_cli.drive import slots
 from hwid_cli.drive.compiled import INNER
-from hwid_cli.drive.motion.forces import MOTOR_V, MOTOR_X, V, X, bite, wanted_current
+from hwid_cli.drive.motion.forces import (
+    MOTOR_V,
+    MOTOR_X,
+    V,
+    X,
+    bite,
+    drawn_current,
+    wanted_current,
+)
+from hwid_cli.drive.motion.push import depends_on_motion
 
 
 @njit(**INNER)
@@ -32,6 +41,8 @@ def count_edges(p: np.ndarray) -> int:
     """
     count = 0
     for slot in (slots.STOP_STIFFNESS, slots.SIDE_STIFFNESS, slots.SPRING_GAP):
+        count += p[slot] > 0.0
+    for slot in (slots.SECOND_STIFFNESS, slots.HAS_ZERO_EDGE, slots.DRIVE_SHARE):
         count += p[slot] > 0.0
     count += has_teeth(p)
     count += p[slots.CLIP_LIMIT] < np.inf
@@ -80,6 +91,11 @@ def corner_of(
             code += 1
             stiffness += p[slots.SIDE_STIFFNESS]
             offset -= p[slots.SIDE_STIFFNESS] * edge
+    if p[slots.HAS_FURTHER_EDGES] != 0.0:
+        code = _further_corner(code, state, command, p)
+        if (x - p[slots.SECOND_POSITION]) * p[slots.SECOND_POSITION] > 0.0:
+            stiffness += p[slots.SECOND_STIFFNESS]
+            offset -= p[slots.SECOND_STIFFNESS] * p[slots.SECOND_POSITION]
     if p[slots.IS_COUPLED] > 0.0:
         teeth = p[slots.GEAR_STIFFNESS]
     if has_teeth(p):
@@ -96,6 +112,22 @@ def corner_of(
         code = 3 * code + side
         clip = side - 1.0
     return code, stiffness, offset, teeth, teeth_offset, clip
+
+
+@njit(**INNER)
+def _further_corner(code: int, state: np.ndarray, command: float, p: np.ndarray) -> int:
+    """Number that tells the sides of the edges that few drives have, too."""
+    x = state[X]
+    if p[slots.SECOND_STIFFNESS] > 0.0:
+        edge = p[slots.SECOND_POSITION]
+        code *= 3
+        if (x - edge) * edge > 0.0:
+            code += 1
+    if p[slots.HAS_ZERO_EDGE] != 0.0:
+        code = 3 * code + _side(x, 0.0)
+    if p[slots.DRIVE_SHARE] > 0.0:
+        code = 3 * code + _side(_pushing(state, command, p), 0.0)
+    return code
 
 
 @njit(**INNER)
@@ -125,6 +157,17 @@ def margin(state: np.ndarray, command: float, corner: int, p: np.ndarray) -> flo
     if has_teeth(p):
         left = min(left, _inside_teeth(state, corner % 3, p) / p[slots.GEAR_GAP])
         corner //= 3
+    if p[slots.DRIVE_SHARE] > 0.0:
+        left = min(left, _inside(_pushing(state, command, p), 0.0, corner % 3))
+        corner //= 3
+    if p[slots.HAS_ZERO_EDGE] != 0.0:
+        left = min(left, _inside(x, 0.0, corner % 3))
+        corner //= 3
+    if p[slots.SECOND_STIFFNESS] > 0.0:
+        edge = p[slots.SECOND_POSITION]
+        into = (x - edge) * np.sign(edge)
+        left = min(left, (into if corner % 3 == 1 else -into) / abs(edge))
+        corner //= 3
     if p[slots.SIDE_STIFFNESS] > 0.0:
         edge = p[slots.SIDE_POSITION]
         into = (x - edge) * np.sign(edge)
@@ -138,6 +181,12 @@ def margin(state: np.ndarray, command: float, corner: int, p: np.ndarray) -> flo
         gap = p[slots.SPRING_GAP]
         left = min(left, _inside(x, gap, corner) / gap)
     return left
+
+
+@njit(**INNER)
+def _pushing(state: np.ndarray, command: float, p: np.ndarray) -> float:
+    """Force of the motor, or the current that has its sign."""
+    return drawn_current(command, state, p) if depends_on_motion(p) else command
 
 
 @njit(**INNER)

@@ -7,19 +7,26 @@ import numpy as np
 from numba import njit
 
 from hwid_cli.drive import slots
-from hwid_cli.drive.compiled import INNER
+from hwid_cli.drive.compiled import INNER, MAKING
 from hwid_cli.drive.motion.forces import (
+    DEFLECTION,
     MOTOR_V,
     N_STATE,
     PART_V,
     TURNED_AT,
     WAY,
+    YIELDED,
     V,
     X,
     acceleration,
+    beyond,
+    beyond_side,
+    drive_now,
     is_force_curved,
     resisting,
+    ripple,
     spring_rate,
+    yielding,
 )
 from hwid_cli.drive.motion.push import (
     DRIVE,
@@ -28,6 +35,7 @@ from hwid_cli.drive.motion.push import (
     depends_on_motion,
     has_losses,
     shift,
+    value_of,
 )
 
 # Beyond this many Stribeck velocities the excess is below rounding, exp(-6.1^2); and
@@ -35,6 +43,8 @@ from hwid_cli.drive.motion.push import (
 FAST, FAR = 6.1, 37.0
 # A step is so short that no smooth force turns by more than this, [rad].
 LONGEST_PHASE = 0.3
+# A contact's force begins with an edge in its slope: its steps are this much shorter.
+CONTACT_FINER = 2.0
 
 
 @njit(**INNER)
@@ -63,9 +73,55 @@ def is_curved_here(state: np.ndarray, memory: np.ndarray, p: np.ndarray) -> bool
         if memory[WAY] != 0.0 and speed < FAST * p[slots.STRIBECK_VELOCITY]:
             return True
     if p[slots.HYSTERESIS_FORCE] != 0.0 and memory[WAY] != 0.0:
+        if p[slots.HAS_SHAPE] != 0.0 and memory[WAY] != memory[DEFLECTION]:
+            return True
         gone = abs(state[X] - memory[TURNED_AT])
-        return gone < FAR * p[slots.HYSTERESIS_YIELD]
-    return False
+        if p[slots.HAS_SHAPE] == 0.0 and gone < FAR * p[slots.HYSTERESIS_YIELD]:
+            return True
+    return p[slots.HAS_CONTACT] != 0.0 and _touches(state[X], p)
+
+
+@njit(**INNER)
+def _touches(x: float, p: np.ndarray) -> bool:
+    """Whether the drive is in a contact whose force is curved."""
+    is_bent = p[slots.STOP_BEND] + p[slots.STOP_LOSS] != 0.0
+    if is_bent and beyond(x, p[slots.STOP_POSITION]) != 0.0:
+        return True
+    is_bent = p[slots.SIDE_BEND] + p[slots.SIDE_LOSS] != 0.0
+    if is_bent and beyond_side(x, p[slots.SIDE_POSITION]) != 0.0:
+        return True
+    is_bent = p[slots.SECOND_BEND] + p[slots.SECOND_LOSS] != 0.0
+    return is_bent and beyond_side(x, p[slots.SECOND_POSITION]) != 0.0
+
+
+@njit(**INNER)
+def _contact_rate(x: float, v: float, mass: float, p: np.ndarray) -> float:
+    """Return how fast the motion in curved contacts turns."""
+    into = beyond(x, p[slots.STOP_POSITION])
+    bend, loss = p[slots.STOP_BEND], p[slots.STOP_LOSS]
+    rate = _rate_of_contact(into, v, mass, p[slots.STOP_STIFFNESS], bend, loss)
+    into = beyond_side(x, p[slots.SIDE_POSITION])
+    bend, loss = p[slots.SIDE_BEND], p[slots.SIDE_LOSS]
+    rate += _rate_of_contact(into, v, mass, p[slots.SIDE_STIFFNESS], bend, loss)
+    into = beyond_side(x, p[slots.SECOND_POSITION])
+    bend, loss = p[slots.SECOND_BEND], p[slots.SECOND_LOSS]
+    return rate + _rate_of_contact(into, v, mass, p[slots.SECOND_STIFFNESS], bend, loss)
+
+
+@njit(**INNER)
+def _rate_of_contact(
+    into: float, v: float, mass: float, stiffness: float, bend: float, loss: float
+) -> float:
+    """Return it for one contact, with its stiffness where the speed will be used up."""
+    if into == 0.0 or bend + loss == 0.0:
+        return 0.0
+    exponent = 1.0 + bend
+    energy = 0.5 * (exponent + 1.0) * mass * v * v / stiffness
+    deep = abs(into) + np.power(energy, 1.0 / (exponent + 1.0))
+    steep = stiffness * np.power(deep, bend) * (1.0 + loss * abs(v))
+    return CONTACT_FINER * (
+        np.sqrt(exponent * steep / mass) + loss * steep * deep / mass
+    )
 
 
 @njit(**INNER)
@@ -103,7 +159,14 @@ def step_limit(
         stiffness += abs(p[slots.COGGING_FORCE]) * turn
         # A forcing, not a motion of its own: it may turn further.
         damping += 0.12 * mass * turn * speed
-    rate = np.sqrt(stiffness / mass) + damping / mass
+    turning = 0.0
+    if p[slots.HAS_MORE] != 0.0 or p[slots.DRIVE_VARIES] != 0.0:
+        more, turning = _further_stiffness(state, push, done, p)
+        stiffness += more
+        turning *= 0.12 * speed
+    rate = np.sqrt(stiffness / mass) + damping / mass + turning
+    if p[slots.HAS_CONTACT] != 0.0:
+        rate += _contact_rate(x, v, mass, p)
     if p[slots.MODE_MASS] > 0.0:
         both = 1.0 / p[slots.MODE_MASS] + 1.0 / mass
         rate += np.sqrt(p[slots.MODE_STIFFNESS] * both) + p[slots.MODE_DAMPING] * both
@@ -119,10 +182,34 @@ def step_limit(
 
 
 @njit(**INNER)
+def _further_stiffness(
+    state: np.ndarray, push: np.ndarray, done: float, p: np.ndarray
+) -> tuple[float, float]:
+    """Return stiffness and waves per metre of forces that repeat along the way."""
+    stiffness = waves = 0.0
+    if p[slots.SECOND_COGGING_FORCE] != 0.0:
+        turn = TURN / p[slots.SECOND_COGGING_PERIOD]
+        stiffness += abs(p[slots.SECOND_COGGING_FORCE]) * turn
+        waves += turn
+    if p[slots.WAVY_FRICTION] != 0.0:
+        turn = TURN / p[slots.WAVY_PERIOD]
+        stiffness += abs(p[slots.WAVY_FRICTION]) * turn
+        waves += turn
+    if p[slots.RIPPLE_SHARE] != 0.0:
+        turn = p[slots.RIPPLE_PER_TURN]
+        force = abs(drive_now(state, push, done, p))
+        stiffness += abs(p[slots.RIPPLE_SHARE]) * force * turn
+        waves += turn
+    return stiffness, waves
+
+
+@njit(**INNER)
 def _rate_of_yielding(
     state: np.ndarray, memory: np.ndarray, mass: float, p: np.ndarray
 ) -> float:
     """Return how fast the hysteresis changes, as long as it has not yielded."""
+    if p[slots.HAS_SHAPE] != 0.0:
+        return _rate_in_shape(state, memory, mass, p)
     gone = abs(state[X] - memory[TURNED_AT]) / p[slots.HYSTERESIS_YIELD]
     if gone >= FAR:
         return 0.0
@@ -131,6 +218,22 @@ def _rate_of_yielding(
     # How much of it is left decides how exactly it has to be followed.
     speed = abs(state[V]) / p[slots.HYSTERESIS_YIELD]
     return np.sqrt(stiffness * fading / mass) + 0.6 * speed * np.sqrt(np.sqrt(fading))
+
+
+@njit(**INNER)
+def _rate_in_shape(
+    state: np.ndarray, memory: np.ndarray, mass: float, p: np.ndarray
+) -> float:
+    """Return it for a hysteresis of any shape."""
+    ahead = memory[WAY] * memory[DEFLECTION]
+    if memory[WAY] == 0.0 or 1.0 - ahead <= YIELDED:
+        return 0.0
+    exponent = 1.0 + p[slots.HYSTERESIS_BEND]
+    slope = max(yielding(ahead, p), 1.0 - ahead)
+    stiffness = slope * abs(p[slots.HYSTERESIS_FORCE]) / p[slots.HYSTERESIS_YIELD]
+    fading = min(0.5 * slope, 1.0)
+    speed = exponent * abs(state[V]) / p[slots.HYSTERESIS_YIELD]
+    return np.sqrt(stiffness / mass) + 0.6 * speed * np.sqrt(np.sqrt(fading))
 
 
 @njit(**INNER)
@@ -154,6 +257,8 @@ def step_plain(
         Since the start of the piece, and length of the step.
     p : ndarray, shape (N_SLOTS,)
     """
+    if p[slots.DRIVE_VARIES] != 0.0:
+        return _step_varying(x, v, memory, push, done, h, p)
     half, inverse = 0.5 * h, 1.0 / p[slots.MASS]
     a0, b0, c0, d0 = shift(push, DRIVE, done)
     a1, b1, c1, d1 = shift(push, OTHER, done)
@@ -174,6 +279,35 @@ def step_plain(
 
 
 @njit(**INNER)
+def _step_varying(
+    x: float,
+    v: float,
+    memory: np.ndarray,
+    push: np.ndarray,
+    done: float,
+    h: float,
+    p: np.ndarray,
+) -> tuple[float, float]:
+    """Step where the motor's force depends on position, or friction on that force."""
+    inverse = 1.0 / p[slots.MASS]
+    xs, vs = x, v
+    x1, v1 = x, v
+    for stage in range(4):
+        at = done + (0.0 if stage == 0 else (h if stage == 3 else 0.5 * h))
+        drive = value_of(push, DRIVE, at) * ripple(xs, p)
+        net = drive + value_of(push, OTHER, at) - resisting(xs, vs, memory, p)
+        net -= memory[WAY] * p[slots.DRIVE_SHARE] * abs(drive)
+        slope = vs
+        weight = h / 6.0 if stage in (0, 3) else h / 3.0
+        x1 += weight * slope
+        v1 += weight * net * inverse
+        way = h if stage == 2 else 0.5 * h
+        xs = x + way * slope
+        vs = v + way * net * inverse
+    return x1, v1
+
+
+@njit(**MAKING)
 def step_all(
     state: np.ndarray,
     trial: np.ndarray,

@@ -12,11 +12,13 @@ from hwid_cli.drive.motion.corners import corner_of, margin
 from hwid_cli.drive.motion.curved import is_curved_here, step_all, step_plain
 from hwid_cli.drive.motion.forces import (
     DEFLECTION,
+    SIDE,
     TURNED_AT,
     WAY,
     V,
     X,
     acceleration,
+    held_further,
     moved_mass,
     surplus,
     yielded,
@@ -39,13 +41,15 @@ BALANCE = 1e-12
 STILL_FAST = 5.0
 # Stands for the sign of a distance that is 0.
 TINY = 1e-300
+# Where the drive is that has just left 0, and nearer than that it is at 0, [m].
+OFF_EDGE, ON_EDGE = 1e-100, 1e-200
 # What can happen within a step.
 LEAVING, REVERSAL, EDGE = 0, 1, 2
 
 
 @njit(**INNER)
 def steady_force(memory: np.ndarray, p: np.ndarray) -> float:
-    """Return the friction on a stretch that is linear.
+    """Return friction and preload on a stretch that is linear.
 
     Parameters
     ----------
@@ -54,9 +58,13 @@ def steady_force(memory: np.ndarray, p: np.ndarray) -> float:
     """
     way = memory[WAY]
     if way == 0.0:
-        return -p[slots.HYSTERESIS_FORCE] * memory[DEFLECTION]
-    level = p[slots.FRICTION_FORWARD] if way > 0.0 else p[slots.FRICTION_BACKWARD]
-    return -way * (level + p[slots.HYSTERESIS_FORCE])
+        force = -p[slots.HYSTERESIS_FORCE] * memory[DEFLECTION]
+    else:
+        level = p[slots.FRICTION_FORWARD] if way > 0.0 else p[slots.FRICTION_BACKWARD]
+        force = -way * (level + p[slots.HYSTERESIS_FORCE])
+    if p[slots.PRELOAD] > 0.0:
+        force -= memory[SIDE] * p[slots.PRELOAD]
+    return force
 
 
 @njit(**INNER)
@@ -162,7 +170,62 @@ def excess(
     p : ndarray, shape (N_SLOTS,)
     """
     net = acceleration(state, memory, push, done, p)[0] * moved_mass(p)
-    return net, surplus(net, p) - BALANCE * p[slots.FORCE_CONSTANT]
+    more = surplus(net, p) - BALANCE * p[slots.FORCE_CONSTANT]
+    if p[slots.HAS_MORE] != 0.0 or p[slots.DRIVE_SHARE] > 0.0:
+        more -= held_further(state, push, done, p)
+    return net, more
+
+
+@njit(**INNER)
+def set_off(state: np.ndarray, memory: np.ndarray, way: float, p: np.ndarray) -> None:
+    """Let the drive slide from where it rests.
+
+    Parameters
+    ----------
+    state : ndarray, shape (N_STATE,)
+    memory : ndarray, shape (N_MEMORY,)
+    way : float
+        Direction of sliding.
+    p : ndarray, shape (N_SLOTS,)
+    """
+    memory[WAY] = way
+    if p[slots.HAS_ZERO_EDGE] != 0.0 and state[X] == 0.0:
+        state[X] = way * OFF_EDGE
+        memory[SIDE] = way
+
+
+@njit(**INNER)
+def pass_zero(
+    state: np.ndarray, memory: np.ndarray, push: np.ndarray, done: float, p: np.ndarray
+) -> None:
+    """Notice on which side of 0 the drive is, and whether a preload catches it there.
+
+    A drive that would soon stop stays at 0: smaller and smaller swings to both sides
+    would come without end.
+
+    Parameters
+    ----------
+    state : ndarray, shape (N_STATE,)
+    memory : ndarray, shape (N_MEMORY,)
+    push : ndarray, shape (N_PUSH,)
+    done : float, [s]
+        Since the start of the piece.
+    p : ndarray, shape (N_SLOTS,)
+    """
+    x, way = state[X], memory[WAY]
+    if way == 0.0 or np.sign(x) == memory[SIDE]:
+        return
+    if p[slots.PRELOAD] > 0.0:
+        state[X], memory[WAY], memory[SIDE] = 0.0, 0.0, 0.0
+        net, more = excess(state, memory, push, done, p)
+        # What drives it back once it is beyond 0, friction included.
+        back = abs(net) - more - net * way
+        if more <= 0.0 and abs(state[V]) * moved_mass(p) < back * p[slots.CAPTURE_TIME]:
+            state[V] = 0.0
+            return
+        state[X], memory[WAY] = x, way
+    set_off(state, memory, way, p)
+    memory[SIDE] = np.sign(state[X])
 
 
 @njit(**INNER)
@@ -187,7 +250,7 @@ def stop(
     memory[WAY] = 0.0
     net, more = excess(state, memory, push, done, p)
     if more > 0.0:
-        memory[WAY] = np.sign(net)
+        set_off(state, memory, np.sign(net), p)
 
 
 @njit(**INNER)

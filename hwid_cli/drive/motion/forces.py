@@ -21,10 +21,15 @@ from hwid_cli.drive.motion.push import (
 # Places in the state: mass, motor, appendage, current of the circuit.
 X, V, MOTOR_X, MOTOR_V, PART_X, PART_V, CIRCUIT, N_STATE = range(8)
 # Places in the memory: direction of sliding (0 at rest), position and deflection at the
-# last reversal, current after the lag, temperature.
-WAY, TURNED_AT, DEFLECTION, LAGGED, HEAT, N_MEMORY = range(6)
+# last reversal, current after the lag, temperature, side of a preload (0 held at 0).
+WAY, TURNED_AT, DEFLECTION, LAGGED, HEAT, SIDE, N_MEMORY = range(7)
 # Tries that bracket the position at rest, each this much further, and that narrow it.
 MOST_TRIES, FURTHER, NARROWING = 120, 1.3, 90
+# Length of a step along the deflection of a hysteresis, in yield lengths, and what is
+# left of it when it has yielded, [-].
+SHAPE_STEP, YIELDED = 0.1, 1e-14
+# Tries that find how far a motor on its tooth has turned, each far below the last one.
+MOST_TURNS = 60
 
 
 @njit(**INNER)
@@ -52,10 +57,11 @@ def acceleration(
             voltage = force - p[slots.BACK_EMF] * speed
             rate = voltage - p[slots.RESISTANCE] * state[CIRCUIT]
             rate /= p[slots.INDUCTANCE]
-        current = wanted_current(force, state, p)
-        middle, limit = -p[slots.CLIP_SLOPE] * speed, p[slots.CLIP_LIMIT]
-        current = min(max(current, middle - limit), middle + limit)
-        force = force_of(current, push[WARMTH], p)
+        force = force_of(drawn_current(force, state, p), push[WARMTH], p)
+    rubbing = 0.0
+    if p[slots.DRIVE_VARIES] != 0.0:
+        force *= ripple(state[MOTOR_X] if has_motor else x, p)
+        rubbing = memory[WAY] * p[slots.DRIVE_SHARE] * abs(force)
     mass, motor = p[slots.MASS], 0.0
     if has_motor:
         inner = p[slots.MOTOR_SHARE] * mass
@@ -64,6 +70,8 @@ def acceleration(
         motor = (force - teeth) / inner
         force = teeth
     net = force + value_of(push, OTHER, done) - resisting(x, v, memory, p)
+    if rubbing != 0.0:
+        net -= rubbing
     mode = 0.0
     if p[slots.MODE_MASS] > 0.0:
         pull = p[slots.MODE_STIFFNESS] * (state[PART_X] - x)
@@ -123,12 +131,15 @@ def resisting(x: float, v: float, memory: np.ndarray, p: np.ndarray) -> float:
     way = memory[WAY]
     if way != 0.0:
         force += way * sliding_friction(way, v, p)
+    if p[slots.HAS_MORE] != 0.0:
+        force += memory[SIDE] * p[slots.PRELOAD] + contact_damping(x, v, p)
+        force += way * friction_here(x, p)
     return force
 
 
 @njit(**INNER)
 def spring_force(x: float, p: np.ndarray) -> float:
-    """Return the force of everything that depends on position alone.
+    """Return the force of everything that depends on position alone but a preload.
 
     Parameters
     ----------
@@ -139,20 +150,41 @@ def spring_force(x: float, p: np.ndarray) -> float:
     force = p[slots.STIFFNESS] * free
     force += (p[slots.CUBIC] * x + p[slots.QUADRATIC]) * x * x
     if p[slots.STOP_STIFFNESS] > 0.0:
-        force += p[slots.STOP_STIFFNESS] * beyond(x, p[slots.STOP_POSITION])
+        into = beyond(x, p[slots.STOP_POSITION])
+        force += p[slots.STOP_STIFFNESS] * bent(into, p[slots.STOP_BEND])
     if p[slots.SIDE_STIFFNESS] > 0.0:
-        edge = p[slots.SIDE_POSITION]
-        into = x - edge
-        if into * edge > 0.0:
-            force += p[slots.SIDE_STIFFNESS] * into
+        into = beyond_side(x, p[slots.SIDE_POSITION])
+        force += p[slots.SIDE_STIFFNESS] * bent(into, p[slots.SIDE_BEND])
     if p[slots.COGGING_FORCE] != 0.0:
         force -= cogging(x, p)
+    if p[slots.HAS_MORE] != 0.0:
+        force += further_spring(x, p)
+    return force
+
+
+@njit(**INNER)
+def further_spring(x: float, p: np.ndarray) -> float:
+    """Return the force of what few drives have: weight, a second of a kind.
+
+    Parameters
+    ----------
+    x : float, [m]
+    p : ndarray, shape (N_SLOTS,)
+    """
+    force = 0.0
+    if p[slots.GRAVITY_TORQUE] != 0.0:
+        force += p[slots.GRAVITY_TORQUE] * np.sin(x + p[slots.GRAVITY_ANGLE])
+    if p[slots.SECOND_STIFFNESS] > 0.0:
+        into = beyond_side(x, p[slots.SECOND_POSITION])
+        force += p[slots.SECOND_STIFFNESS] * bent(into, p[slots.SECOND_BEND])
+    if p[slots.SECOND_COGGING_FORCE] != 0.0:
+        force -= second_cogging(x, p)
     return force
 
 
 @njit(**INNER)
 def spring_rate(x: float, p: np.ndarray) -> float:
-    """Return how stiff the springs are here at most, [N/m].
+    """Return how stiff the springs are here at most but for curved contacts, [N/m].
 
     Parameters
     ----------
@@ -163,11 +195,19 @@ def spring_rate(x: float, p: np.ndarray) -> float:
     if p[slots.CUBIC] != 0.0 or p[slots.QUADRATIC] != 0.0:
         bend = 3.0 * p[slots.CUBIC] * x + 2.0 * p[slots.QUADRATIC]
         stiffness += abs(bend * x)
-    if p[slots.STOP_STIFFNESS] > 0.0 and abs(x) > p[slots.STOP_POSITION]:
+    is_plain = p[slots.STOP_BEND] + p[slots.STOP_LOSS] == 0.0
+    if is_plain and abs(x) > p[slots.STOP_POSITION]:
         stiffness += p[slots.STOP_STIFFNESS]
-    edge = p[slots.SIDE_POSITION]
-    if p[slots.SIDE_STIFFNESS] > 0.0 and (x - edge) * edge > 0.0:
+    is_plain = p[slots.SIDE_BEND] + p[slots.SIDE_LOSS] == 0.0
+    if is_plain and beyond_side(x, p[slots.SIDE_POSITION]) != 0.0:
         stiffness += p[slots.SIDE_STIFFNESS]
+    if p[slots.HAS_MORE] != 0.0:
+        stiffness += abs(p[slots.GRAVITY_TORQUE])
+        stiffness += p[slots.SPRING_SHARE] * p[slots.STIFFNESS]
+        if p[slots.SECOND_STIFFNESS] > 0.0:
+            is_plain = p[slots.SECOND_BEND] + p[slots.SECOND_LOSS] == 0.0
+            if is_plain and beyond_side(x, p[slots.SECOND_POSITION]) != 0.0:
+                stiffness += p[slots.SECOND_STIFFNESS]
     return stiffness
 
 
@@ -184,6 +224,11 @@ def is_force_curved(p: np.ndarray) -> bool:
         or p[slots.QUADRATIC] != 0.0
         or p[slots.COGGING_FORCE] != 0.0
         or p[slots.DRAG] != 0.0
+        or p[slots.GRAVITY_TORQUE] != 0.0
+        or p[slots.SECOND_COGGING_FORCE] != 0.0
+        or p[slots.WAVY_FRICTION] != 0.0
+        or p[slots.SPRING_SHARE] != 0.0
+        or p[slots.DRIVE_VARIES] != 0.0
     )
 
 
@@ -199,6 +244,87 @@ def cogging(x: float, p: np.ndarray) -> float:
     angle = TURN * (x - p[slots.COGGING_ORIGIN]) / p[slots.COGGING_PERIOD]
     swing = np.sin(angle + p[slots.COGGING_PHASE]) - p[slots.COGGING_REST]
     return p[slots.COGGING_FORCE] * swing
+
+
+@njit(**INNER)
+def second_cogging(x: float, p: np.ndarray) -> float:
+    """Return the force that repeats along the way with another period.
+
+    Parameters
+    ----------
+    x : float, [m]
+    p : ndarray, shape (N_SLOTS,)
+    """
+    angle = TURN * (x - p[slots.COGGING_ORIGIN]) / p[slots.SECOND_COGGING_PERIOD]
+    phase = p[slots.SECOND_COGGING_PHASE]
+    return p[slots.SECOND_COGGING_FORCE] * (np.sin(angle + phase) - np.sin(phase))
+
+
+@njit(**INNER)
+def ripple(angle: float, p: np.ndarray) -> float:
+    """Return by what the motor's force is multiplied at an angle.
+
+    Parameters
+    ----------
+    angle : float, [rad] or [m]
+    p : ndarray, shape (N_SLOTS,)
+    """
+    turned = p[slots.RIPPLE_PER_TURN] * angle + p[slots.RIPPLE_PHASE]
+    return 1.0 + p[slots.RIPPLE_SHARE] * np.sin(turned)
+
+
+@njit(**INNER)
+def bent(into: float, bend: float) -> float:
+    """Return how a contact's force grows: ``into |into|^bend``.
+
+    Parameters
+    ----------
+    into : float, [m]
+        How far into the contact, with its sign.
+    bend : float, [-]
+        Exponent of the law less 1.
+    """
+    if bend == 0.0 or into == 0.0:
+        return into
+    return into * np.power(abs(into), bend)
+
+
+@njit(**INNER)
+def contact_damping(x: float, v: float, p: np.ndarray) -> float:
+    """Return what the damping of stops adds to their force; they never pull.
+
+    Parameters
+    ----------
+    x : float, [m]
+    v : float, [m/s]
+    p : ndarray, shape (N_SLOTS,)
+    """
+    force = 0.0
+    if p[slots.STOP_LOSS] > 0.0:
+        into = beyond(x, p[slots.STOP_POSITION])
+        elastic = p[slots.STOP_STIFFNESS] * bent(into, p[slots.STOP_BEND])
+        force += elastic * max(p[slots.STOP_LOSS] * np.sign(into) * v, -1.0)
+    if p[slots.SIDE_LOSS] > 0.0:
+        into = beyond_side(x, p[slots.SIDE_POSITION])
+        elastic = p[slots.SIDE_STIFFNESS] * bent(into, p[slots.SIDE_BEND])
+        force += elastic * max(p[slots.SIDE_LOSS] * np.sign(into) * v, -1.0)
+    if p[slots.SECOND_LOSS] > 0.0:
+        into = beyond_side(x, p[slots.SECOND_POSITION])
+        elastic = p[slots.SECOND_STIFFNESS] * bent(into, p[slots.SECOND_BEND])
+        force += elastic * max(p[slots.SECOND_LOSS] * np.sign(into) * v, -1.0)
+    return force
+
+
+@njit(**INNER)
+def beyond_side(x: float, edge: float) -> float:
+    """Return how far a position is beyond a stop on the side of its sign.
+
+    Parameters
+    ----------
+    x, edge : float, [m]
+    """
+    into = x - edge
+    return into if into * edge > 0.0 else 0.0
 
 
 @njit(**INNER)
@@ -251,7 +377,73 @@ def yielded(x: float, memory: np.ndarray, p: np.ndarray) -> float:
     if way == 0.0:
         return memory[DEFLECTION]
     gone = abs(x - memory[TURNED_AT]) / p[slots.HYSTERESIS_YIELD]
+    if p[slots.HAS_SHAPE] != 0.0:
+        return way * _yielded_in_shape(way * memory[DEFLECTION], gone, p)
     return way - (way - memory[DEFLECTION]) * np.exp(-gone)
+
+
+@njit(**INNER)
+def yielding(ahead: float, p: np.ndarray) -> float:
+    """Return how the deflection of a hysteresis of any shape grows, [1/yield length].
+
+    Parameters
+    ----------
+    ahead : float, [-]
+        Deflection in the direction of motion.
+    p : ndarray, shape (N_SLOTS,)
+    """
+    share = np.power(abs(ahead), 1.0 + p[slots.HYSTERESIS_BEND])
+    if ahead < 0.0:
+        share *= (p[slots.HYSTERESIS_RATIO] - 1.0) / (p[slots.HYSTERESIS_RATIO] + 1.0)
+    return 1.0 - share
+
+
+@njit(**INNER)
+def _yielded_in_shape(ahead: float, gone: float, p: np.ndarray) -> float:
+    """Return the deflection in the direction of motion after a way in yield lengths."""
+    count = np.ceil(gone * (1.0 + p[slots.HYSTERESIS_BEND]) / SHAPE_STEP)
+    h = gone / max(count, 1.0)
+    left = gone
+    while left > 0.5 * h and 1.0 - ahead > YIELDED:
+        step = h
+        after = _shape_step(ahead, step, p)
+        if ahead < 0.0 and after > 0.0:
+            # The law has an edge at 0: there first, by Simpson's rule.
+            rest = 1.0 / yielding(ahead, p) + 4.0 / yielding(0.5 * ahead, p)
+            step = min(-ahead * (rest + 1.0) / 6.0, h)
+            after = _shape_step(0.0, h - step, p)
+        ahead = after
+        left -= h
+    return min(ahead, 1.0)
+
+
+@njit(**INNER)
+def _shape_step(ahead: float, h: float, p: np.ndarray) -> float:
+    """Return the deflection one Runge-Kutta step on."""
+    k1 = yielding(ahead, p)
+    k2 = yielding(ahead + 0.5 * h * k1, p)
+    k3 = yielding(ahead + 0.5 * h * k2, p)
+    k4 = yielding(ahead + h * k3, p)
+    return ahead + h / 6.0 * (k1 + 2.0 * (k2 + k3) + k4)
+
+
+@njit(**INNER)
+def remember(x: float, memory: np.ndarray, p: np.ndarray) -> None:
+    """Keep how far a hysteresis of any shape has yielded, at the end of a step.
+
+    Parameters
+    ----------
+    x : float, [m]
+    memory : ndarray, shape (N_MEMORY,)
+        Changed in place.
+    p : ndarray, shape (N_SLOTS,)
+    """
+    way = memory[WAY]
+    if way == 0.0:
+        return
+    deflection = yielded(x, memory, p)
+    memory[DEFLECTION] = way if 1.0 - way * deflection <= YIELDED else deflection
+    memory[TURNED_AT] = x
 
 
 @njit(**INNER)
@@ -263,7 +455,86 @@ def has_dry_friction(p: np.ndarray) -> bool:
     p : ndarray, shape (N_SLOTS,)
     """
     level = max(p[slots.FRICTION_FORWARD], p[slots.FRICTION_BACKWARD])
+    level += p[slots.PRELOAD] + p[slots.SPRING_SHARE] + p[slots.DRIVE_SHARE]
     return level > 0.0 or p[slots.STATIC_EXCESS] != 0.0
+
+
+@njit(**INNER)
+def friction_here(x: float, p: np.ndarray) -> float:
+    """Return the part of dry friction that depends on position.
+
+    Parameters
+    ----------
+    x : float, [m]
+    p : ndarray, shape (N_SLOTS,)
+    """
+    level = 0.0
+    if p[slots.WAVY_FRICTION] != 0.0:
+        angle = TURN * x / p[slots.WAVY_PERIOD] + p[slots.WAVY_PHASE]
+        level += p[slots.WAVY_FRICTION] * np.sin(angle)
+    if p[slots.SPRING_SHARE] != 0.0:
+        free = beyond(x, p[slots.SPRING_GAP]) if p[slots.SPRING_GAP] > 0.0 else x
+        load = p[slots.STIFFNESS] * free
+        load += (p[slots.CUBIC] * x + p[slots.QUADRATIC]) * x * x
+        level += p[slots.SPRING_SHARE] * abs(load)
+    return level
+
+
+@njit(**INNER)
+def held_further(
+    state: np.ndarray, push: np.ndarray, done: float, p: np.ndarray
+) -> float:
+    """Return what holds a resting drive beside constant friction.
+
+    Parameters
+    ----------
+    state : ndarray, shape (N_STATE,)
+    push : ndarray, shape (N_PUSH,)
+    done : float, [s]
+        Since the start of the piece.
+    p : ndarray, shape (N_SLOTS,)
+    """
+    level = friction_here(state[X], p)
+    if state[X] == 0.0:
+        level += p[slots.PRELOAD]
+    if p[slots.DRIVE_SHARE] != 0.0:
+        level += p[slots.DRIVE_SHARE] * abs(drive_now(state, push, done, p))
+    return level
+
+
+@njit(**INNER)
+def drive_now(state: np.ndarray, push: np.ndarray, done: float, p: np.ndarray) -> float:
+    """Return the motor's force.
+
+    Parameters
+    ----------
+    state : ndarray, shape (N_STATE,)
+    push : ndarray, shape (N_PUSH,)
+    done : float, [s]
+        Since the start of the piece.
+    p : ndarray, shape (N_SLOTS,)
+    """
+    has_motor = p[slots.GEAR_STIFFNESS] > 0.0
+    force = value_of(push, DRIVE, done)
+    if depends_on_motion(p):
+        force = force_of(drawn_current(force, state, p), push[WARMTH], p)
+    return force * ripple(state[MOTOR_X] if has_motor else state[X], p)
+
+
+@njit(**INNER)
+def drawn_current(command: float, state: np.ndarray, p: np.ndarray) -> float:
+    """Return the current behind the voltage limit.
+
+    Parameters
+    ----------
+    command : float, [A] or [V]
+    state : ndarray, shape (N_STATE,)
+    p : ndarray, shape (N_SLOTS,)
+    """
+    speed = state[MOTOR_V] if p[slots.GEAR_STIFFNESS] > 0.0 else state[V]
+    middle, limit = -p[slots.CLIP_SLOPE] * speed, p[slots.CLIP_LIMIT]
+    current = wanted_current(command, state, p)
+    return min(max(current, middle - limit), middle + limit)
 
 
 @njit(**INNER)
@@ -324,22 +595,24 @@ def resting_point(current: float, has_cogging: bool, p: np.ndarray) -> float:
     """
     if is_anywhere(p):
         return p[slots.START_POSITION]
-    limit = p[slots.CLIP_LIMIT]
-    force = force_of(min(max(current, -limit), limit), 0.0, p) + p[slots.LOAD]
-    if force == 0.0:
+    force = resting_force(0.0, current, p) + p[slots.LOAD]
+    force -= p[slots.GRAVITY_TORQUE] * np.sin(p[slots.GRAVITY_ANGLE])
+    if abs(force) <= p[slots.PRELOAD]:
         return 0.0
+    side = np.sign(force)
+    force -= side * p[slots.PRELOAD]
     stiffness = p[slots.STIFFNESS]
     stiffness += np.cbrt(max(p[slots.CUBIC], 0.0) * force * force)
     far = 1e-3 * force / stiffness
     near = 0.0
     for _ in range(MOST_TRIES):
-        if _away(far, force, has_cogging, p) * force <= 0.0:
+        if _away(far, side, current, has_cogging, p) * force <= 0.0:
             break
         near = far
         far *= FURTHER
     for _ in range(NARROWING):
         middle = 0.5 * (near + far)
-        if _away(middle, force, has_cogging, p) * force > 0.0:
+        if _away(middle, side, current, has_cogging, p) * force > 0.0:
             near = middle
         else:
             far = middle
@@ -347,9 +620,38 @@ def resting_point(current: float, has_cogging: bool, p: np.ndarray) -> float:
 
 
 @njit(**INNER)
-def _away(x: float, force: float, has_cogging: bool, p: np.ndarray) -> float:
+def _away(
+    x: float, side: float, current: float, has_cogging: bool, p: np.ndarray
+) -> float:
     """Return the force that is not balanced."""
-    left = force - spring_force(x, p)
+    force = resting_force(x, current, p) + p[slots.LOAD]
+    left = force - side * p[slots.PRELOAD] - spring_force(x, p)
     if not has_cogging and p[slots.COGGING_FORCE] != 0.0:
         left -= cogging(x, p)
+    if not has_cogging and p[slots.SECOND_COGGING_FORCE] != 0.0:
+        left -= second_cogging(x, p)
     return left
+
+
+@njit(**INNER)
+def resting_force(x: float, current: float, p: np.ndarray) -> float:
+    """Return the motor's force at rest.
+
+    Parameters
+    ----------
+    x : float, [m]
+    current : float, [A]
+    p : ndarray, shape (N_SLOTS,)
+    """
+    limit = p[slots.CLIP_LIMIT]
+    constant = force_of(min(max(current, -limit), limit), 0.0, p)
+    force = constant
+    if p[slots.RIPPLE_SHARE] != 0.0 and p[slots.GEAR_STIFFNESS] > 0.0:
+        # The motor turns with its force, and the force with its angle.
+        for _ in range(MOST_TURNS):
+            turned = np.sign(force) * p[slots.GEAR_GAP]
+            turned += force / p[slots.GEAR_STIFFNESS]
+            force = constant * ripple(x + turned, p)
+    elif p[slots.RIPPLE_SHARE] != 0.0:
+        force *= ripple(x, p)
+    return force

@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit
 
 from hwid_cli.drive import slots
-from hwid_cli.drive.compiled import INNER
+from hwid_cli.drive.compiled import INNER, MAKING
 from hwid_cli.drive.motion.forces import N_STATE
 
 # Inputs of a step: offsets of gaps and stops, force on the mass, cubic of the drive,
@@ -33,7 +33,12 @@ def fastest(p: np.ndarray) -> float:
     p : ndarray, shape (N_SLOTS,)
     """
     mass, stiffness = p[slots.MASS], p[slots.STIFFNESS]
-    stiffness += p[slots.STOP_STIFFNESS] + p[slots.SIDE_STIFFNESS]
+    if p[slots.STOP_BEND] + p[slots.STOP_LOSS] == 0.0:
+        stiffness += p[slots.STOP_STIFFNESS]
+    if p[slots.SIDE_BEND] + p[slots.SIDE_LOSS] == 0.0:
+        stiffness += p[slots.SIDE_STIFFNESS]
+    if p[slots.SECOND_BEND] + p[slots.SECOND_LOSS] == 0.0:
+        stiffness += p[slots.SECOND_STIFFNESS]
     damping = p[slots.DAMPING]
     if p[slots.GEAR_STIFFNESS] > 0.0:
         share = p[slots.MOTOR_SHARE]
@@ -218,7 +223,7 @@ def sum_plain(
     return x, v
 
 
-@njit(**INNER)
+@njit(**MAKING)
 def active_states(p: np.ndarray) -> np.ndarray:
     """Return the places of the state that move at all.
 
@@ -241,7 +246,7 @@ def active_states(p: np.ndarray) -> np.ndarray:
     return active[:count]
 
 
-@njit(**INNER)
+@njit(**MAKING)
 def fill(
     matrices: np.ndarray,
     which: int,

@@ -12,16 +12,19 @@ from numba import njit
 
 from hwid_cli.drive import slots
 from hwid_cli.drive.command import MOST_PIECES, static_command
-from hwid_cli.drive.compiled import INNER
+from hwid_cli.drive.compiled import INNER, MAKING
 from hwid_cli.drive.controller import N_CONTROL, controlled, is_closed
 from hwid_cli.drive.motion.corners import corner_of, count_edges
 from hwid_cli.drive.motion.curved import is_always_curved, step_limit
 from hwid_cli.drive.motion.events import (
     EDGE,
     LEAVING,
+    OFF_EDGE,
     REVERSAL,
     advance,
     excess,
+    pass_zero,
+    set_off,
     stop,
     time_of,
 )
@@ -34,15 +37,17 @@ from hwid_cli.drive.motion.forces import (
     N_STATE,
     PART_V,
     PART_X,
+    SIDE,
     TURNED_AT,
     WAY,
     V,
     X,
-    force_of,
+    drawn_current,
     has_dry_friction,
     is_anywhere,
+    remember,
+    resting_force,
     resting_point,
-    wanted_current,
 )
 from hwid_cli.drive.motion.linear import N_COLUMNS, N_INPUT, active_states, fastest
 from hwid_cli.drive.motion.pieces import LENGTH, N_PIECE, SAMPLE, list_pieces
@@ -62,6 +67,8 @@ LONGEST_PHASE = 0.5
 MANY_PIECES = 1000
 # Most events in one piece; what rattles more often is followed less exactly.
 MOST_EVENTS = 100
+# A preload catches a drive at 0 that it would stop within this share of a sample.
+CAPTURE_SHARE = 0.02
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -82,7 +89,7 @@ def move(
     has_controller, control = is_closed(p), np.zeros(N_CONTROL)
     before = 0.0 if has_controller else command[0]
     state, memory = np.zeros(N_STATE), np.zeros(N_MEMORY)
-    followed = _start(state, memory, before, p)
+    followed = _start(state, memory, before, sample_time, p)
     trial, inputs, active = state.copy(), np.zeros(N_INPUT), active_states(p)
     kind = _kind_of(p)
     step = _longest_step(sample_time, kind)
@@ -105,7 +112,7 @@ def move(
                 command[sample], positions[sample], velocities[sample], sample_time,
                 control, p,
             )  # fmt: skip
-        now = _current_now(given[sample], state, p) if is_single else 0.0
+        now = drawn_current(given[sample], state, p) if is_single else 0.0
         count, followed, sample = list_pieces(
             sample, sample_time, given, ends, before, followed, now, pieces, pushes,
             room, memory, p,
@@ -160,6 +167,7 @@ def _kind_of(p: np.ndarray) -> tuple[bool, bool, bool, bool, bool, float]:
     )
     is_watched = has_dry_friction(p) or p[slots.HYSTERESIS_FORCE] != 0.0
     at_times = p[slots.STATIC_EXCESS] != 0.0 or p[slots.HYSTERESIS_FORCE] != 0.0
+    at_times = at_times or p[slots.HAS_CONTACT] != 0.0
     return (
         has_inner,
         count_edges(p) > 0,
@@ -183,7 +191,7 @@ def _longest_step(
     return sample_time / count
 
 
-@njit(**INNER)
+@njit(**MAKING)
 def _make_room(
     sample_time: float, step: float, p: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -199,10 +207,15 @@ def _make_room(
 
 @njit(**INNER)
 def _start(
-    state: np.ndarray, memory: np.ndarray, command: float, p: np.ndarray
+    state: np.ndarray,
+    memory: np.ndarray,
+    command: float,
+    sample_time: float,
+    p: np.ndarray,
 ) -> float:
     """Set the drive to rest in equilibrium, or to the given start."""
     _couple(p)
+    _take_stock(sample_time, p)
     command = static_command(command, p)
     memory[LAGGED] = command
     current = command
@@ -222,8 +235,7 @@ def _start(
         swinging = p[slots.MASS] * p[slots.MOTOR_SHARE] * (1.0 - p[slots.MOTOR_SHARE])
         p[slots.GEAR_DAMPING] = 2.0 * p[slots.GEAR_DAMPING_RATIO]
         p[slots.GEAR_DAMPING] *= np.sqrt(p[slots.GEAR_STIFFNESS] * swinging)
-    limit = p[slots.CLIP_LIMIT]
-    force = force_of(min(max(current, -limit), limit), 0.0, p)
+    force = resting_force(state[X], current, p)
     state[MOTOR_X] = state[X]
     if p[slots.GEAR_STIFFNESS] > 0.0 and force != 0.0:
         state[MOTOR_X] += np.sign(force) * p[slots.GEAR_GAP]
@@ -234,8 +246,11 @@ def _start(
         state[X], state[MOTOR_X] = 2.0 * state[X] - state[MOTOR_X], state[X]
     state[MOTOR_V] = state[V]
     state[PART_X], state[PART_V] = state[X], state[V]
-    memory[WAY] = np.sign(state[V])
+    memory[SIDE] = np.sign(state[X])
     memory[TURNED_AT] = state[X]
+    memory[WAY] = np.sign(state[V])
+    if memory[WAY] != 0.0:
+        set_off(state, memory, memory[WAY], p)
     return command
 
 
@@ -256,11 +271,27 @@ def _couple(p: np.ndarray) -> None:
 
 
 @njit(**INNER)
-def _current_now(command: float, state: np.ndarray, p: np.ndarray) -> float:
-    speed = state[MOTOR_V] if p[slots.GEAR_STIFFNESS] > 0.0 else state[V]
-    middle, limit = -p[slots.CLIP_SLOPE] * speed, p[slots.CLIP_LIMIT]
-    current = wanted_current(command, state, p)
-    return min(max(current, middle - limit), middle + limit)
+def _take_stock(sample_time: float, p: np.ndarray) -> None:
+    """Note what the drive has of what few drives have, so that others need not ask."""
+    p[slots.CAPTURE_TIME] = CAPTURE_SHARE * sample_time
+    has_zero_edge = p[slots.PRELOAD] > 0.0 or p[slots.SPRING_SHARE] > 0.0
+    p[slots.HAS_ZERO_EDGE] = 1.0 if has_zero_edge else 0.0
+    has_edges = has_zero_edge or p[slots.DRIVE_SHARE] > 0.0
+    has_edges = has_edges or p[slots.SECOND_STIFFNESS] > 0.0
+    p[slots.HAS_FURTHER_EDGES] = 1.0 if has_edges else 0.0
+    contact = p[slots.STOP_BEND] + p[slots.SIDE_BEND] + p[slots.SECOND_BEND]
+    contact += p[slots.STOP_LOSS] + p[slots.SIDE_LOSS] + p[slots.SECOND_LOSS]
+    p[slots.HAS_CONTACT] = 1.0 if contact > 0.0 else 0.0
+    has_second = p[slots.SECOND_STIFFNESS] > 0.0
+    has_second = has_second or p[slots.SECOND_COGGING_FORCE] != 0.0
+    has_more = has_zero_edge or has_second or contact > 0.0
+    has_more = has_more or p[slots.GRAVITY_TORQUE] != 0.0
+    has_more = has_more or p[slots.WAVY_FRICTION] != 0.0
+    p[slots.HAS_MORE] = 1.0 if has_more else 0.0
+    has_shape = p[slots.HYSTERESIS_BEND] != 0.0 or p[slots.HYSTERESIS_RATIO] != 0.0
+    p[slots.HAS_SHAPE] = 1.0 if has_shape else 0.0
+    varies = p[slots.RIPPLE_SHARE] != 0.0 or p[slots.DRIVE_SHARE] > 0.0
+    p[slots.DRIVE_VARIES] = 1.0 if varies else 0.0
 
 
 @njit(**INNER)
@@ -288,7 +319,9 @@ def _move_piece(
         if is_held and not is_wild and not is_stuck:
             net, more = excess(state, memory, push, done, p)
             if more > 0.0:
-                memory[WAY] = np.sign(net)
+                set_off(state, memory, np.sign(net), p)
+                if has_edges:
+                    corner = corner_of(state, value_of(push, DRIVE, done), p)
                 is_held = False
                 events += 1
         if is_curved or is_curved_at_times:
@@ -328,19 +361,35 @@ def _move_piece(
                 is_turned = is_turned and when == h
                 trial[V] = 0.0 if is_turned else trial[V]
             h = when
+        if p[slots.DRIVE_SHARE] > 0.0 and is_held and event == EDGE:
+            # At the edge the motor holds the drive least: it may have left before.
+            is_leaving = excess(trial, memory, push, done + h, p)[1] > 0.0
+            if is_leaving:
+                h = time_of(
+                    LEAVING, state, trial, memory, push, done, h, corner, is_held, kind,
+                    inputs, p,
+                )  # fmt: skip
         if is_stuck:
             # It left on rounding only: rest for one step.
             state[V], memory[WAY] = 0.0, 0.0
+            if p[slots.HAS_ZERO_EDGE] != 0.0 and abs(state[X]) <= OFF_EDGE:
+                state[X], memory[SIDE] = 0.0, 0.0
+                corner = corner_of(state, value_of(push, DRIVE, done), p)
             continue
         for n in range(N_STATE):
             state[n] = trial[n]
         done = length if h >= left * (1.0 - 1e-12) else done + h
-        if has_edges:
-            corner = corner_of(state, value_of(push, DRIVE, done), p)
+        if p[slots.HAS_SHAPE] != 0.0:
+            remember(state[X], memory, p)
         if is_leaving:
             # Whether the force here is a last bit above or below, it is growing.
-            memory[WAY] = np.sign(excess(state, memory, push, done, p)[0])
+            way = np.sign(excess(state, memory, push, done, p)[0])
+            set_off(state, memory, way, p)
         if is_turned and is_wild:
             memory[WAY] = np.sign(state[V])
         elif is_turned:
             stop(state, memory, push, done, p)
+        if p[slots.HAS_ZERO_EDGE] != 0.0:
+            pass_zero(state, memory, push, done, p)
+        if has_edges:
+            corner = corner_of(state, value_of(push, DRIVE, done), p)

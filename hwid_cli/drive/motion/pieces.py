@@ -8,7 +8,7 @@ from numba import njit
 
 from hwid_cli.drive import slots
 from hwid_cli.drive.command import MOST_PIECES, command_pieces, is_untouched
-from hwid_cli.drive.compiled import INNER
+from hwid_cli.drive.compiled import MAKING
 from hwid_cli.drive.controller import is_closed
 from hwid_cli.drive.motion.push import (
     DRIVE,
@@ -22,7 +22,7 @@ from hwid_cli.drive.motion.push import (
 LENGTH, SAMPLE, N_PIECE = range(3)
 
 
-@njit(**INNER)
+@njit(**MAKING)
 def list_pieces(
     sample: int,
     sample_time: float,

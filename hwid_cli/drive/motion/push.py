@@ -220,6 +220,20 @@ def value_of(push: np.ndarray, which: int, done: float) -> float:
 
 
 @njit(**INNER)
+def turns_sign(push: np.ndarray, done: float, h: float) -> bool:
+    """Return whether the motor's force has another sign at the end of a step.
+
+    Parameters
+    ----------
+    push : ndarray, shape (N_PUSH,)
+    done, h : float, [s]
+        Since the start of the piece, and length of the step.
+    """
+    first = np.sign(value_of(push, DRIVE, done))
+    return first != np.sign(value_of(push, DRIVE, done + h))
+
+
+@njit(**INNER)
 def shift(
     push: np.ndarray, which: int, done: float
 ) -> tuple[float, float, float, float]:

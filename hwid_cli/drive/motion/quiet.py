@@ -11,8 +11,14 @@ from hwid_cli.drive import slots
 from hwid_cli.drive.compiled import INNER
 from hwid_cli.drive.motion.corners import corner_of
 from hwid_cli.drive.motion.curved import is_curved_here, step_limit, step_plain
-from hwid_cli.drive.motion.events import STILL_FAST, excess, set_inputs, steady_force
-from hwid_cli.drive.motion.forces import WAY, V, X
+from hwid_cli.drive.motion.events import (
+    ON_EDGE,
+    STILL_FAST,
+    excess,
+    set_inputs,
+    steady_force,
+)
+from hwid_cli.drive.motion.forces import WAY, V, X, remember
 from hwid_cli.drive.motion.linear import (
     DRIVEN,
     N_STATE,
@@ -22,7 +28,7 @@ from hwid_cli.drive.motion.linear import (
     sum_series,
 )
 from hwid_cli.drive.motion.pieces import LENGTH, SAMPLE
-from hwid_cli.drive.motion.push import DRIVE, OTHER, shift, value_of
+from hwid_cli.drive.motion.push import DRIVE, OTHER, shift, turns_sign, value_of
 
 # The limit of curved steps is not looked at again for so many pieces if it was twice
 # the piece: forces that depend on position change little within them.
@@ -58,6 +64,18 @@ def bounds(x: float, p: np.ndarray) -> tuple[float, float]:
             low = max(low, edge)
         else:
             high = min(high, edge)
+    if p[slots.SECOND_STIFFNESS] > 0.0:
+        edge = p[slots.SECOND_POSITION]
+        if x > edge or (x == edge and edge < 0.0):
+            low = max(low, edge)
+        else:
+            high = min(high, edge)
+    if p[slots.HAS_ZERO_EDGE] != 0.0:
+        # At 0 itself the drive is on neither side.
+        if x > 0.0:
+            low = max(low, ON_EDGE)
+        elif x < 0.0:
+            high = min(high, -ON_EDGE)
     return low, high
 
 
@@ -143,6 +161,8 @@ def glide_plain(
                 break
             if excess(state, memory, push, length, p)[1] > 0.0:
                 break
+            if p[slots.DRIVE_SHARE] > 0.0 and turns_sign(push, 0.0, length):
+                break
             done = length
         while done < length:
             h = left = length - done
@@ -160,6 +180,8 @@ def glide_plain(
                     elif limit > 2.0 * left and not is_curved_at_times:
                         trusted = j + FAR_FROM_LIMIT
                 x1, v1 = step_plain(x, v, memory, push, done, h, p)
+                if p[slots.DRIVE_SHARE] > 0.0 and turns_sign(push, done, h):
+                    break
             else:
                 if h > step * (1.0 + 1e-9) or abs(h - step) < 1e-9 * step:
                     h = step
@@ -182,6 +204,8 @@ def glide_plain(
             if (is_watched and way * v1 < 0.0) or x1 < low or x1 > high:
                 break
             x, v = x1, v1
+            if p[slots.HAS_SHAPE] != 0.0:
+                remember(x, memory, p)
             done = length if h >= left * (1.0 - 1e-12) else done + h
         if done < length:
             break

@@ -25,7 +25,7 @@
 typedef struct {
     double p[@n_slots@];
     double motion[8];
-    double memory[6];
+    double memory[7];
     double room[17];
     double control[3];
     double starts[@n_history@];
@@ -78,7 +78,8 @@ static double glide_plain(HWID_NAME(state) *s, double *push, double length, doub
     }
     if (is_held) {
         if (drive_excess(state, memory, push, 0.0, p).m1 > 0.0
-            || drive_excess(state, memory, push, length, p).m1 > 0.0) {
+            || drive_excess(state, memory, push, length, p).m1 > 0.0
+            || (p[DRIVE_SHARE] > 0.0 && drive_turns_sign(push, 0.0, length))) {
             return 0.0;
         }
         return length;
@@ -107,6 +108,9 @@ static double glide_plain(HWID_NAME(state) *s, double *push, double length, doub
                 }
             }
             next = drive_step_plain(x, v, memory, push, done, h, p);
+            if (p[DRIVE_SHARE] > 0.0 && drive_turns_sign(push, done, h)) {
+                break;
+            }
         } else {
             const tuple_dddd one = drive_shift(push, DRIVE, done);
             const tuple_dddd two = drive_shift(push, OTHER, done);
@@ -125,6 +129,9 @@ static double glide_plain(HWID_NAME(state) *s, double *push, double length, doub
         }
         x = next.m0;
         v = next.m1;
+        if (p[HAS_SHAPE] != 0.0) {
+            drive_remember(x, memory, p);
+        }
         done = h >= left * (1.0 - 1e-12) ? length : done + h;
     }
     state[X] = x;
@@ -208,7 +215,7 @@ static void interval(HWID_NAME(state) *s, double first, double last)
     const int is_single = drive_is_closed(p)
         || (drive_depends_on_motion(p) && p[THERMAL_LOSS] != 0.0);
     const double gain = drive_depends_on_motion(p) ? 1.0 : p[FORCE_CONSTANT];
-    const double now = is_single ? drive_current_now(first, s->motion, p) : 0.0;
+    const double now = is_single ? drive_drawn_current(first, s->motion, p) : 0.0;
     double rows[MOST_PIECES][3], push[N_PUSH];
     double time = (double)(s->sample - 1) * sample_time;
     const drive_kind kind = drive_kind_of(p);
@@ -301,7 +308,8 @@ double HWID_NAME(step)(HWID_NAME(state) *state, double u)
     if (state->sample == 0) {
         int n;
         state->before = is_closed ? 0.0 : u;
-        state->followed = drive_start(state->motion, state->memory, state->before, p);
+        state->followed = drive_start(state->motion, state->memory, state->before,
+                                      sample_time, p);
         for (n = 0; n < N_HISTORY; ++n) {
             state->starts[n] = state->before;
             state->ends[n] = state->before;

@@ -82,7 +82,38 @@ enum {
     PROPORTIONAL_GAIN = 78,
     INTEGRAL_GAIN = 79,
     DERIVATIVE_GAIN = 80,
-    N_SLOTS = 81,
+    HAS_MORE = 81,
+    HAS_FURTHER_EDGES = 82,
+    HAS_ZERO_EDGE = 83,
+    HAS_CONTACT = 84,
+    HAS_SHAPE = 85,
+    DRIVE_VARIES = 86,
+    CAPTURE_TIME = 87,
+    SPRING_SHARE = 88,
+    DRIVE_SHARE = 89,
+    WAVY_PERIOD = 90,
+    WAVY_PHASE = 91,
+    WAVY_FRICTION = 92,
+    PRELOAD = 93,
+    STOP_LOSS = 94,
+    STOP_BEND = 95,
+    SIDE_LOSS = 96,
+    SIDE_BEND = 97,
+    SECOND_POSITION = 98,
+    SECOND_STIFFNESS = 99,
+    SECOND_LOSS = 100,
+    SECOND_BEND = 101,
+    SECOND_COGGING_FORCE = 102,
+    SECOND_COGGING_PERIOD = 103,
+    SECOND_COGGING_PHASE = 104,
+    GRAVITY_TORQUE = 105,
+    GRAVITY_ANGLE = 106,
+    RIPPLE_SHARE = 107,
+    RIPPLE_PER_TURN = 108,
+    RIPPLE_PHASE = 109,
+    HYSTERESIS_RATIO = 110,
+    HYSTERESIS_BEND = 111,
+    N_SLOTS = 112,
     MOST_PIECES = 40,
     ERROR_SUM = 0,
     LAST_ERROR = 1,
@@ -106,9 +137,11 @@ enum {
     DEFLECTION = 2,
     LAGGED = 3,
     HEAT = 4,
-    N_MEMORY = 5,
+    SIDE = 5,
+    N_MEMORY = 6,
     MOST_TRIES = 120,
     NARROWING = 90,
+    MOST_TURNS = 60,
     OFFSET = 0,
     STEADY = 1,
     DRIVEN = 2,
@@ -584,6 +617,13 @@ static double drive_value_of(double *push, int which, double done)
     return push[which] + (done * (push[which + 1] + (done * rest)));
 }
 
+static int drive_turns_sign(double *push, double done, double h)
+{
+    double first = 0.0;
+    first = sign_of(drive_value_of(push, DRIVE, done));
+    return first != sign_of(drive_value_of(push, DRIVE, done + h));
+}
+
 static tuple_dddd drive_shift(double *push, int which, double done)
 {
     double a = 0.0;
@@ -600,17 +640,11 @@ static tuple_dddd drive_shift(double *push, int which, double done)
     return (tuple_dddd){a + (done * (b + (done * (c + (done * d))))), b + (done * ((2.0 * c) + ((3.0 * done) * d))), c + ((3.0 * done) * d), d};
 }
 
-static double drive_wanted_current(double command, double *state, double *p)
+static double drive_ripple(double angle, double *p)
 {
-    double speed = 0.0;
-    if (p[RESISTANCE] <= 0.0) {
-        return command;
-    }
-    if (p[INDUCTANCE] > 0.0) {
-        return state[CIRCUIT];
-    }
-    speed = (p[GEAR_STIFFNESS] > 0.0) ? state[MOTOR_V] : state[V];
-    return (command - (p[BACK_EMF] * speed)) / p[RESISTANCE];
+    double turned = 0.0;
+    turned = (p[RIPPLE_PER_TURN] * angle) + p[RIPPLE_PHASE];
+    return 1.0 + (p[RIPPLE_SHARE] * sin(turned));
 }
 
 static double drive_beyond(double x, double half_gap)
@@ -639,6 +673,13 @@ static double drive_bite(double twist, double speed, double *p)
     return (into < 0.0) ? least(force, 0.0) : 0.0;
 }
 
+static double drive_beyond_side(double x, double edge)
+{
+    double into = 0.0;
+    into = x - edge;
+    return ((into * edge) > 0.0) ? into : 0.0;
+}
+
 static double drive_cogging(double x, double *p)
 {
     double angle = 0.0;
@@ -648,29 +689,112 @@ static double drive_cogging(double x, double *p)
     return p[COGGING_FORCE] * swing;
 }
 
+static double drive_second_cogging(double x, double *p)
+{
+    double angle = 0.0;
+    double phase = 0.0;
+    angle = (6.283185307179586 * (x - p[COGGING_ORIGIN])) / p[SECOND_COGGING_PERIOD];
+    phase = p[SECOND_COGGING_PHASE];
+    return p[SECOND_COGGING_FORCE] * (sin(angle + phase) - sin(phase));
+}
+
+static double drive_bent(double into, double bend)
+{
+    if ((bend == 0.0) || (into == 0.0)) {
+        return into;
+    }
+    return into * pow(fabs(into), bend);
+}
+
+static double drive_further_spring(double x, double *p)
+{
+    double force = 0.0;
+    double into = 0.0;
+    force = 0.0;
+    if (p[GRAVITY_TORQUE] != 0.0) {
+        force += p[GRAVITY_TORQUE] * sin(x + p[GRAVITY_ANGLE]);
+    }
+    if (p[SECOND_STIFFNESS] > 0.0) {
+        into = drive_beyond_side(x, p[SECOND_POSITION]);
+        force += p[SECOND_STIFFNESS] * drive_bent(into, p[SECOND_BEND]);
+    }
+    if (p[SECOND_COGGING_FORCE] != 0.0) {
+        force -= drive_second_cogging(x, p);
+    }
+    return force;
+}
+
 static double drive_spring_force(double x, double *p)
 {
     double free = 0.0;
     double force = 0.0;
-    double edge = 0.0;
     double into = 0.0;
     free = (p[SPRING_GAP] > 0.0) ? drive_beyond(x, p[SPRING_GAP]) : x;
     force = p[STIFFNESS] * free;
     force += (((p[CUBIC] * x) + p[QUADRATIC]) * x) * x;
     if (p[STOP_STIFFNESS] > 0.0) {
-        force += p[STOP_STIFFNESS] * drive_beyond(x, p[STOP_POSITION]);
+        into = drive_beyond(x, p[STOP_POSITION]);
+        force += p[STOP_STIFFNESS] * drive_bent(into, p[STOP_BEND]);
     }
     if (p[SIDE_STIFFNESS] > 0.0) {
-        edge = p[SIDE_POSITION];
-        into = x - edge;
-        if ((into * edge) > 0.0) {
-            force += p[SIDE_STIFFNESS] * into;
-        }
+        into = drive_beyond_side(x, p[SIDE_POSITION]);
+        force += p[SIDE_STIFFNESS] * drive_bent(into, p[SIDE_BEND]);
     }
     if (p[COGGING_FORCE] != 0.0) {
         force -= drive_cogging(x, p);
     }
+    if (p[HAS_MORE] != 0.0) {
+        force += drive_further_spring(x, p);
+    }
     return force;
+}
+
+static double drive_yielding(double ahead, double *p)
+{
+    double share = 0.0;
+    share = pow(fabs(ahead), 1.0 + p[HYSTERESIS_BEND]);
+    if (ahead < 0.0) {
+        share *= (p[HYSTERESIS_RATIO] - 1.0) / (p[HYSTERESIS_RATIO] + 1.0);
+    }
+    return 1.0 - share;
+}
+
+static double drive_shape_step(double ahead, double h, double *p)
+{
+    double k1 = 0.0;
+    double k2 = 0.0;
+    double k3 = 0.0;
+    double k4 = 0.0;
+    k1 = drive_yielding(ahead, p);
+    k2 = drive_yielding(ahead + ((0.5 * h) * k1), p);
+    k3 = drive_yielding(ahead + ((0.5 * h) * k2), p);
+    k4 = drive_yielding(ahead + (h * k3), p);
+    return ahead + ((h / 6.0) * ((k1 + (2.0 * (k2 + k3))) + k4));
+}
+
+static double drive_yielded_in_shape(double ahead, double gone, double *p)
+{
+    double count = 0.0;
+    double h = 0.0;
+    double left = 0.0;
+    double step = 0.0;
+    double after = 0.0;
+    double rest = 0.0;
+    count = ceil((gone * (1.0 + p[HYSTERESIS_BEND])) / 0.1);
+    h = gone / most(count, 1.0);
+    left = gone;
+    while ((left > (0.5 * h)) && ((1.0 - ahead) > 1e-14)) {
+        step = h;
+        after = drive_shape_step(ahead, step, p);
+        if ((ahead < 0.0) && (after > 0.0)) {
+            rest = (1.0 / drive_yielding(ahead, p)) + (4.0 / drive_yielding(0.5 * ahead, p));
+            step = least(((-ahead) * (rest + 1.0)) / 6.0, h);
+            after = drive_shape_step(0.0, h - step, p);
+        }
+        ahead = after;
+        left -= h;
+    }
+    return least(ahead, 1.0);
 }
 
 static double drive_yielded(double x, double *memory, double *p)
@@ -682,6 +806,9 @@ static double drive_yielded(double x, double *memory, double *p)
         return memory[DEFLECTION];
     }
     gone = fabs(x - memory[TURNED_AT]) / p[HYSTERESIS_YIELD];
+    if (p[HAS_SHAPE] != 0.0) {
+        return way * drive_yielded_in_shape(way * memory[DEFLECTION], gone, p);
+    }
     return way - ((way - memory[DEFLECTION]) * exp(-gone));
 }
 
@@ -693,6 +820,50 @@ static double drive_sliding_friction(double way, double v, double *p)
     if (p[STATIC_EXCESS] != 0.0) {
         share = v / p[STRIBECK_VELOCITY];
         level += p[STATIC_EXCESS] * exp((-share) * share);
+    }
+    return level;
+}
+
+static double drive_contact_damping(double x, double v, double *p)
+{
+    double force = 0.0;
+    double into = 0.0;
+    double elastic = 0.0;
+    force = 0.0;
+    if (p[STOP_LOSS] > 0.0) {
+        into = drive_beyond(x, p[STOP_POSITION]);
+        elastic = p[STOP_STIFFNESS] * drive_bent(into, p[STOP_BEND]);
+        force += elastic * most((p[STOP_LOSS] * sign_of(into)) * v, -1.0);
+    }
+    if (p[SIDE_LOSS] > 0.0) {
+        into = drive_beyond_side(x, p[SIDE_POSITION]);
+        elastic = p[SIDE_STIFFNESS] * drive_bent(into, p[SIDE_BEND]);
+        force += elastic * most((p[SIDE_LOSS] * sign_of(into)) * v, -1.0);
+    }
+    if (p[SECOND_LOSS] > 0.0) {
+        into = drive_beyond_side(x, p[SECOND_POSITION]);
+        elastic = p[SECOND_STIFFNESS] * drive_bent(into, p[SECOND_BEND]);
+        force += elastic * most((p[SECOND_LOSS] * sign_of(into)) * v, -1.0);
+    }
+    return force;
+}
+
+static double drive_friction_here(double x, double *p)
+{
+    double level = 0.0;
+    double angle = 0.0;
+    double free = 0.0;
+    double load = 0.0;
+    level = 0.0;
+    if (p[WAVY_FRICTION] != 0.0) {
+        angle = ((6.283185307179586 * x) / p[WAVY_PERIOD]) + p[WAVY_PHASE];
+        level += p[WAVY_FRICTION] * sin(angle);
+    }
+    if (p[SPRING_SHARE] != 0.0) {
+        free = (p[SPRING_GAP] > 0.0) ? drive_beyond(x, p[SPRING_GAP]) : x;
+        load = p[STIFFNESS] * free;
+        load += (((p[CUBIC] * x) + p[QUADRATIC]) * x) * x;
+        level += p[SPRING_SHARE] * fabs(load);
     }
     return level;
 }
@@ -712,7 +883,37 @@ static double drive_resisting(double x, double v, double *memory, double *p)
     if (way != 0.0) {
         force += way * drive_sliding_friction(way, v, p);
     }
+    if (p[HAS_MORE] != 0.0) {
+        force += (memory[SIDE] * p[PRELOAD]) + drive_contact_damping(x, v, p);
+        force += way * drive_friction_here(x, p);
+    }
     return force;
+}
+
+static double drive_wanted_current(double command, double *state, double *p)
+{
+    double speed = 0.0;
+    if (p[RESISTANCE] <= 0.0) {
+        return command;
+    }
+    if (p[INDUCTANCE] > 0.0) {
+        return state[CIRCUIT];
+    }
+    speed = (p[GEAR_STIFFNESS] > 0.0) ? state[MOTOR_V] : state[V];
+    return (command - (p[BACK_EMF] * speed)) / p[RESISTANCE];
+}
+
+static double drive_drawn_current(double command, double *state, double *p)
+{
+    double speed = 0.0;
+    double middle = 0.0;
+    double limit = 0.0;
+    double current = 0.0;
+    speed = (p[GEAR_STIFFNESS] > 0.0) ? state[MOTOR_V] : state[V];
+    middle = (-p[CLIP_SLOPE]) * speed;
+    limit = p[CLIP_LIMIT];
+    current = drive_wanted_current(command, state, p);
+    return least(most(current, middle - limit), middle + limit);
 }
 
 static tuple_dddd drive_acceleration(double *state, double *memory, double *push, double done, double *p)
@@ -724,9 +925,7 @@ static tuple_dddd drive_acceleration(double *state, double *memory, double *push
     double rate = 0.0;
     double speed = 0.0;
     double voltage = 0.0;
-    double current = 0.0;
-    double middle = 0.0;
-    double limit = 0.0;
+    double rubbing = 0.0;
     double mass = 0.0;
     double motor = 0.0;
     double inner = 0.0;
@@ -746,11 +945,12 @@ static tuple_dddd drive_acceleration(double *state, double *memory, double *push
             rate = voltage - (p[RESISTANCE] * state[CIRCUIT]);
             rate /= p[INDUCTANCE];
         }
-        current = drive_wanted_current(force, state, p);
-        middle = (-p[CLIP_SLOPE]) * speed;
-        limit = p[CLIP_LIMIT];
-        current = least(most(current, middle - limit), middle + limit);
-        force = drive_force_of(current, push[WARMTH], p);
+        force = drive_force_of(drive_drawn_current(force, state, p), push[WARMTH], p);
+    }
+    rubbing = 0.0;
+    if (p[DRIVE_VARIES] != 0.0) {
+        force *= drive_ripple(has_motor ? state[MOTOR_X] : x, p);
+        rubbing = (memory[WAY] * p[DRIVE_SHARE]) * fabs(force);
     }
     mass = p[MASS];
     motor = 0.0;
@@ -762,6 +962,9 @@ static tuple_dddd drive_acceleration(double *state, double *memory, double *push
         force = teeth;
     }
     net = (force + drive_value_of(push, OTHER, done)) - drive_resisting(x, v, memory, p);
+    if (rubbing != 0.0) {
+        net -= rubbing;
+    }
     mode = 0.0;
     if (p[MODE_MASS] > 0.0) {
         pull = p[MODE_STIFFNESS] * (state[PART_X] - x);
@@ -784,32 +987,82 @@ static double drive_spring_rate(double x, double *p)
 {
     double stiffness = 0.0;
     double bend = 0.0;
-    double edge = 0.0;
+    int is_plain = 0;
     stiffness = p[STIFFNESS];
     if ((p[CUBIC] != 0.0) || (p[QUADRATIC] != 0.0)) {
         bend = ((3.0 * p[CUBIC]) * x) + (2.0 * p[QUADRATIC]);
         stiffness += fabs(bend * x);
     }
-    if ((p[STOP_STIFFNESS] > 0.0) && (fabs(x) > p[STOP_POSITION])) {
+    is_plain = (p[STOP_BEND] + p[STOP_LOSS]) == 0.0;
+    if (is_plain && (fabs(x) > p[STOP_POSITION])) {
         stiffness += p[STOP_STIFFNESS];
     }
-    edge = p[SIDE_POSITION];
-    if ((p[SIDE_STIFFNESS] > 0.0) && (((x - edge) * edge) > 0.0)) {
+    is_plain = (p[SIDE_BEND] + p[SIDE_LOSS]) == 0.0;
+    if (is_plain && (drive_beyond_side(x, p[SIDE_POSITION]) != 0.0)) {
         stiffness += p[SIDE_STIFFNESS];
+    }
+    if (p[HAS_MORE] != 0.0) {
+        stiffness += fabs(p[GRAVITY_TORQUE]);
+        stiffness += p[SPRING_SHARE] * p[STIFFNESS];
+        if (p[SECOND_STIFFNESS] > 0.0) {
+            is_plain = (p[SECOND_BEND] + p[SECOND_LOSS]) == 0.0;
+            if (is_plain && (drive_beyond_side(x, p[SECOND_POSITION]) != 0.0)) {
+                stiffness += p[SECOND_STIFFNESS];
+            }
+        }
     }
     return stiffness;
 }
 
 static int drive_is_force_curved(double *p)
 {
-    return (p[CUBIC] != 0.0) || (p[QUADRATIC] != 0.0) || (p[COGGING_FORCE] != 0.0) || (p[DRAG] != 0.0);
+    return (p[CUBIC] != 0.0) || (p[QUADRATIC] != 0.0) || (p[COGGING_FORCE] != 0.0) || (p[DRAG] != 0.0) || (p[GRAVITY_TORQUE] != 0.0) || (p[SECOND_COGGING_FORCE] != 0.0) || (p[WAVY_FRICTION] != 0.0) || (p[SPRING_SHARE] != 0.0) || (p[DRIVE_VARIES] != 0.0);
+}
+
+static void drive_remember(double x, double *memory, double *p)
+{
+    double way = 0.0;
+    double deflection = 0.0;
+    way = memory[WAY];
+    if (way == 0.0) {
+        return;
+    }
+    deflection = drive_yielded(x, memory, p);
+    memory[DEFLECTION] = ((1.0 - (way * deflection)) <= 1e-14) ? way : deflection;
+    memory[TURNED_AT] = x;
 }
 
 static int drive_has_dry_friction(double *p)
 {
     double level = 0.0;
     level = most(p[FRICTION_FORWARD], p[FRICTION_BACKWARD]);
+    level += (p[PRELOAD] + p[SPRING_SHARE]) + p[DRIVE_SHARE];
     return (level > 0.0) || (p[STATIC_EXCESS] != 0.0);
+}
+
+static double drive_drive_now(double *state, double *push, double done, double *p)
+{
+    int has_motor = 0;
+    double force = 0.0;
+    has_motor = p[GEAR_STIFFNESS] > 0.0;
+    force = drive_value_of(push, DRIVE, done);
+    if (drive_depends_on_motion(p)) {
+        force = drive_force_of(drive_drawn_current(force, state, p), push[WARMTH], p);
+    }
+    return force * drive_ripple(has_motor ? state[MOTOR_X] : state[X], p);
+}
+
+static double drive_held_further(double *state, double *push, double done, double *p)
+{
+    double level = 0.0;
+    level = drive_friction_here(state[X], p);
+    if (state[X] == 0.0) {
+        level += p[PRELOAD];
+    }
+    if (p[DRIVE_SHARE] != 0.0) {
+        level += p[DRIVE_SHARE] * fabs(drive_drive_now(state, push, done, p));
+    }
+    return level;
 }
 
 static double drive_surplus(double net, double *p)
@@ -824,20 +1077,49 @@ static int drive_is_anywhere(double *p)
     return (p[STIFFNESS] <= 0.0) && (p[CUBIC] <= 0.0);
 }
 
-static double drive_away(double x, double force, int has_cogging, double *p)
+static double drive_resting_force(double x, double current, double *p)
 {
+    double limit = 0.0;
+    double constant = 0.0;
+    double force = 0.0;
+    int _ = 0;
+    double turned = 0.0;
+    limit = p[CLIP_LIMIT];
+    constant = drive_force_of(least(most(current, -limit), limit), 0.0, p);
+    force = constant;
+    if ((p[RIPPLE_SHARE] != 0.0) && (p[GEAR_STIFFNESS] > 0.0)) {
+        for (_ = 0; _ < MOST_TURNS; ++_) {
+            turned = sign_of(force) * p[GEAR_GAP];
+            turned += force / p[GEAR_STIFFNESS];
+            force = constant * drive_ripple(x + turned, p);
+        }
+    } else {
+        if (p[RIPPLE_SHARE] != 0.0) {
+            force *= drive_ripple(x, p);
+        }
+    }
+    return force;
+}
+
+static double drive_away(double x, double side, double current, int has_cogging, double *p)
+{
+    double force = 0.0;
     double left = 0.0;
-    left = force - drive_spring_force(x, p);
+    force = drive_resting_force(x, current, p) + p[LOAD];
+    left = (force - (side * p[PRELOAD])) - drive_spring_force(x, p);
     if ((!has_cogging) && (p[COGGING_FORCE] != 0.0)) {
         left -= drive_cogging(x, p);
+    }
+    if ((!has_cogging) && (p[SECOND_COGGING_FORCE] != 0.0)) {
+        left -= drive_second_cogging(x, p);
     }
     return left;
 }
 
 static double drive_resting_point(double current, int has_cogging, double *p)
 {
-    double limit = 0.0;
     double force = 0.0;
+    double side = 0.0;
     double stiffness = 0.0;
     double far = 0.0;
     double near = 0.0;
@@ -846,17 +1128,19 @@ static double drive_resting_point(double current, int has_cogging, double *p)
     if (drive_is_anywhere(p)) {
         return p[START_POSITION];
     }
-    limit = p[CLIP_LIMIT];
-    force = drive_force_of(least(most(current, -limit), limit), 0.0, p) + p[LOAD];
-    if (force == 0.0) {
+    force = drive_resting_force(0.0, current, p) + p[LOAD];
+    force -= p[GRAVITY_TORQUE] * sin(p[GRAVITY_ANGLE]);
+    if (fabs(force) <= p[PRELOAD]) {
         return 0.0;
     }
+    side = sign_of(force);
+    force -= side * p[PRELOAD];
     stiffness = p[STIFFNESS];
     stiffness += cbrt((most(p[CUBIC], 0.0) * force) * force);
     far = (0.001 * force) / stiffness;
     near = 0.0;
     for (_ = 0; _ < MOST_TRIES; ++_) {
-        if ((drive_away(far, force, has_cogging, p) * force) <= 0.0) {
+        if ((drive_away(far, side, current, has_cogging, p) * force) <= 0.0) {
             break;
         }
         near = far;
@@ -864,7 +1148,7 @@ static double drive_resting_point(double current, int has_cogging, double *p)
     }
     for (_ = 0; _ < NARROWING; ++_) {
         middle = 0.5 * (near + far);
-        if ((drive_away(middle, force, has_cogging, p) * force) > 0.0) {
+        if ((drive_away(middle, side, current, has_cogging, p) * force) > 0.0) {
             near = middle;
         } else {
             far = middle;
@@ -883,10 +1167,16 @@ static int drive_count_edges(double *p)
     int count = 0;
     int slot = 0;
     int k1 = 0;
+    int k2 = 0;
     count = 0;
     for (k1 = 0; k1 < 3; ++k1) {
         static const int list1[3] = {STOP_STIFFNESS, SIDE_STIFFNESS, SPRING_GAP};
         slot = list1[k1];
+        count += p[slot] > 0.0;
+    }
+    for (k2 = 0; k2 < 3; ++k2) {
+        static const int list2[3] = {SECOND_STIFFNESS, HAS_ZERO_EDGE, DRIVE_SHARE};
+        slot = list2[k2];
         count += p[slot] > 0.0;
     }
     count += drive_has_teeth(p);
@@ -903,6 +1193,32 @@ static int drive_side(double x, double edge)
         return 0;
     }
     return 1;
+}
+
+static double drive_pushing(double *state, double command, double *p)
+{
+    return drive_depends_on_motion(p) ? drive_drawn_current(command, state, p) : command;
+}
+
+static int drive_further_corner(int code, double *state, double command, double *p)
+{
+    double x = 0.0;
+    double edge = 0.0;
+    x = state[X];
+    if (p[SECOND_STIFFNESS] > 0.0) {
+        edge = p[SECOND_POSITION];
+        code *= 3;
+        if (((x - edge) * edge) > 0.0) {
+            code += 1;
+        }
+    }
+    if (p[HAS_ZERO_EDGE] != 0.0) {
+        code = (3 * code) + drive_side(x, 0.0);
+    }
+    if (p[DRIVE_SHARE] > 0.0) {
+        code = (3 * code) + drive_side(drive_pushing(state, command, p), 0.0);
+    }
+    return code;
 }
 
 static tuple_iddddd drive_corner_of(double *state, double command, double *p)
@@ -949,6 +1265,13 @@ static tuple_iddddd drive_corner_of(double *state, double command, double *p)
             code += 1;
             stiffness += p[SIDE_STIFFNESS];
             offset -= p[SIDE_STIFFNESS] * edge;
+        }
+    }
+    if (p[HAS_FURTHER_EDGES] != 0.0) {
+        code = drive_further_corner(code, state, command, p);
+        if (((x - p[SECOND_POSITION]) * p[SECOND_POSITION]) > 0.0) {
+            stiffness += p[SECOND_STIFFNESS];
+            offset -= p[SECOND_STIFFNESS] * p[SECOND_POSITION];
         }
     }
     if (p[IS_COUPLED] > 0.0) {
@@ -1019,6 +1342,20 @@ static double drive_margin(double *state, double command, int corner, double *p)
         left = least(left, drive_inside_teeth(state, corner % 3, p) / p[GEAR_GAP]);
         corner /= 3;
     }
+    if (p[DRIVE_SHARE] > 0.0) {
+        left = least(left, drive_inside(drive_pushing(state, command, p), 0.0, corner % 3));
+        corner /= 3;
+    }
+    if (p[HAS_ZERO_EDGE] != 0.0) {
+        left = least(left, drive_inside(x, 0.0, corner % 3));
+        corner /= 3;
+    }
+    if (p[SECOND_STIFFNESS] > 0.0) {
+        edge = p[SECOND_POSITION];
+        into = (x - edge) * sign_of(edge);
+        left = least(left, (((corner % 3) == 1) ? into : (-into)) / fabs(edge));
+        corner /= 3;
+    }
     if (p[SIDE_STIFFNESS] > 0.0) {
         edge = p[SIDE_POSITION];
         into = (x - edge) * sign_of(edge);
@@ -1042,6 +1379,21 @@ static int drive_is_always_curved(double *p)
     return drive_is_force_curved(p) || (drive_depends_on_motion(p) && drive_has_losses(p));
 }
 
+static int drive_touches(double x, double *p)
+{
+    int is_bent = 0;
+    is_bent = (p[STOP_BEND] + p[STOP_LOSS]) != 0.0;
+    if (is_bent && (drive_beyond(x, p[STOP_POSITION]) != 0.0)) {
+        return 1;
+    }
+    is_bent = (p[SIDE_BEND] + p[SIDE_LOSS]) != 0.0;
+    if (is_bent && (drive_beyond_side(x, p[SIDE_POSITION]) != 0.0)) {
+        return 1;
+    }
+    is_bent = (p[SECOND_BEND] + p[SECOND_LOSS]) != 0.0;
+    return is_bent && (drive_beyond_side(x, p[SECOND_POSITION]) != 0.0);
+}
+
 static int drive_is_curved_here(double *state, double *memory, double *p)
 {
     double speed = 0.0;
@@ -1053,10 +1405,98 @@ static int drive_is_curved_here(double *state, double *memory, double *p)
         }
     }
     if ((p[HYSTERESIS_FORCE] != 0.0) && (memory[WAY] != 0.0)) {
+        if ((p[HAS_SHAPE] != 0.0) && (memory[WAY] != memory[DEFLECTION])) {
+            return 1;
+        }
         gone = fabs(state[X] - memory[TURNED_AT]);
-        return gone < (37.0 * p[HYSTERESIS_YIELD]);
+        if ((p[HAS_SHAPE] == 0.0) && (gone < (37.0 * p[HYSTERESIS_YIELD]))) {
+            return 1;
+        }
     }
-    return 0;
+    return (p[HAS_CONTACT] != 0.0) && drive_touches(state[X], p);
+}
+
+static double drive_rate_of_contact(double into, double v, double mass, double stiffness, double bend, double loss)
+{
+    double exponent = 0.0;
+    double energy = 0.0;
+    double deep = 0.0;
+    double steep = 0.0;
+    if ((into == 0.0) || ((bend + loss) == 0.0)) {
+        return 0.0;
+    }
+    exponent = 1.0 + bend;
+    energy = ((((0.5 * (exponent + 1.0)) * mass) * v) * v) / stiffness;
+    deep = fabs(into) + pow(energy, 1.0 / (exponent + 1.0));
+    steep = (stiffness * pow(deep, bend)) * (1.0 + (loss * fabs(v)));
+    return 2.0 * (sqrt((exponent * steep) / mass) + (((loss * steep) * deep) / mass));
+}
+
+static double drive_contact_rate(double x, double v, double mass, double *p)
+{
+    double into = 0.0;
+    double bend = 0.0;
+    double loss = 0.0;
+    double rate = 0.0;
+    into = drive_beyond(x, p[STOP_POSITION]);
+    bend = p[STOP_BEND];
+    loss = p[STOP_LOSS];
+    rate = drive_rate_of_contact(into, v, mass, p[STOP_STIFFNESS], bend, loss);
+    into = drive_beyond_side(x, p[SIDE_POSITION]);
+    bend = p[SIDE_BEND];
+    loss = p[SIDE_LOSS];
+    rate += drive_rate_of_contact(into, v, mass, p[SIDE_STIFFNESS], bend, loss);
+    into = drive_beyond_side(x, p[SECOND_POSITION]);
+    bend = p[SECOND_BEND];
+    loss = p[SECOND_LOSS];
+    return rate + drive_rate_of_contact(into, v, mass, p[SECOND_STIFFNESS], bend, loss);
+}
+
+static tuple_dd drive_further_stiffness(double *state, double *push, double done, double *p)
+{
+    double waves = 0.0;
+    double stiffness = 0.0;
+    double turn = 0.0;
+    double force = 0.0;
+    waves = 0.0;
+    stiffness = waves;
+    if (p[SECOND_COGGING_FORCE] != 0.0) {
+        turn = 6.283185307179586 / p[SECOND_COGGING_PERIOD];
+        stiffness += fabs(p[SECOND_COGGING_FORCE]) * turn;
+        waves += turn;
+    }
+    if (p[WAVY_FRICTION] != 0.0) {
+        turn = 6.283185307179586 / p[WAVY_PERIOD];
+        stiffness += fabs(p[WAVY_FRICTION]) * turn;
+        waves += turn;
+    }
+    if (p[RIPPLE_SHARE] != 0.0) {
+        turn = p[RIPPLE_PER_TURN];
+        force = fabs(drive_drive_now(state, push, done, p));
+        stiffness += (fabs(p[RIPPLE_SHARE]) * force) * turn;
+        waves += turn;
+    }
+    return (tuple_dd){stiffness, waves};
+}
+
+static double drive_rate_in_shape(double *state, double *memory, double mass, double *p)
+{
+    double ahead = 0.0;
+    double exponent = 0.0;
+    double slope = 0.0;
+    double stiffness = 0.0;
+    double fading = 0.0;
+    double speed = 0.0;
+    ahead = memory[WAY] * memory[DEFLECTION];
+    if ((memory[WAY] == 0.0) || ((1.0 - ahead) <= 1e-14)) {
+        return 0.0;
+    }
+    exponent = 1.0 + p[HYSTERESIS_BEND];
+    slope = most(drive_yielding(ahead, p), 1.0 - ahead);
+    stiffness = (slope * fabs(p[HYSTERESIS_FORCE])) / p[HYSTERESIS_YIELD];
+    fading = least(0.5 * slope, 1.0);
+    speed = (exponent * fabs(state[V])) / p[HYSTERESIS_YIELD];
+    return sqrt(stiffness / mass) + ((0.6 * speed) * sqrt(sqrt(fading)));
 }
 
 static double drive_rate_of_yielding(double *state, double *memory, double mass, double *p)
@@ -1065,6 +1505,9 @@ static double drive_rate_of_yielding(double *state, double *memory, double mass,
     double fading = 0.0;
     double stiffness = 0.0;
     double speed = 0.0;
+    if (p[HAS_SHAPE] != 0.0) {
+        return drive_rate_in_shape(state, memory, mass, p);
+    }
     gone = fabs(state[X] - memory[TURNED_AT]) / p[HYSTERESIS_YIELD];
     if (gone >= 37.0) {
         return 0.0;
@@ -1085,6 +1528,9 @@ static double drive_step_limit(double *state, double *memory, double *push, doub
     double stiffness = 0.0;
     double damping = 0.0;
     double turn = 0.0;
+    double turning = 0.0;
+    tuple_dd t1 = {0};
+    double more = 0.0;
     double rate = 0.0;
     double both = 0.0;
     double slow = 0.0;
@@ -1114,7 +1560,18 @@ static double drive_step_limit(double *state, double *memory, double *push, doub
         stiffness += fabs(p[COGGING_FORCE]) * turn;
         damping += ((0.12 * mass) * turn) * speed;
     }
-    rate = sqrt(stiffness / mass) + (damping / mass);
+    turning = 0.0;
+    if ((p[HAS_MORE] != 0.0) || (p[DRIVE_VARIES] != 0.0)) {
+        t1 = drive_further_stiffness(state, push, done, p);
+        more = t1.m0;
+        turning = t1.m1;
+        stiffness += more;
+        turning *= 0.12 * speed;
+    }
+    rate = (sqrt(stiffness / mass) + (damping / mass)) + turning;
+    if (p[HAS_CONTACT] != 0.0) {
+        rate += drive_contact_rate(x, v, mass, p);
+    }
     if (p[MODE_MASS] > 0.0) {
         both = (1.0 / p[MODE_MASS]) + (1.0 / mass);
         rate += sqrt(p[MODE_STIFFNESS] * both) + (p[MODE_DAMPING] * both);
@@ -1131,6 +1588,41 @@ static double drive_step_limit(double *state, double *memory, double *push, doub
         rate += (fabs(p[STATIC_EXCESS]) / (mass * slow)) + ((0.5 * pull) / slow);
     }
     return 0.3 / most(rate, 1e-09);
+}
+
+static tuple_dd drive_step_varying(double x, double v, double *memory, double *push, double done, double h, double *p)
+{
+    double inverse = 0.0;
+    double xs = 0.0;
+    double vs = 0.0;
+    double x1 = 0.0;
+    double v1 = 0.0;
+    int stage = 0;
+    double at = 0.0;
+    double drive = 0.0;
+    double net = 0.0;
+    double slope = 0.0;
+    double weight = 0.0;
+    double way = 0.0;
+    inverse = 1.0 / p[MASS];
+    xs = x;
+    vs = v;
+    x1 = x;
+    v1 = v;
+    for (stage = 0; stage < 4; ++stage) {
+        at = done + ((stage == 0) ? 0.0 : ((stage == 3) ? h : (0.5 * h)));
+        drive = drive_value_of(push, DRIVE, at) * drive_ripple(xs, p);
+        net = (drive + drive_value_of(push, OTHER, at)) - drive_resisting(xs, vs, memory, p);
+        net -= (memory[WAY] * p[DRIVE_SHARE]) * fabs(drive);
+        slope = vs;
+        weight = (stage == 0 || stage == 3) ? (h / 6.0) : (h / 3.0);
+        x1 += weight * slope;
+        v1 += (weight * net) * inverse;
+        way = (stage == 2) ? h : (0.5 * h);
+        xs = x + (way * slope);
+        vs = v + ((way * net) * inverse);
+    }
+    return (tuple_dd){x1, v1};
 }
 
 static tuple_dd drive_step_plain(double x, double v, double *memory, double *push, double done, double h, double *p)
@@ -1161,6 +1653,9 @@ static tuple_dd drive_step_plain(double x, double v, double *memory, double *pus
     double v4 = 0.0;
     double k4 = 0.0;
     double sixth = 0.0;
+    if (p[DRIVE_VARIES] != 0.0) {
+        return drive_step_varying(x, v, memory, push, done, h, p);
+    }
     half = 0.5 * h;
     inverse = 1.0 / p[MASS];
     t1 = drive_shift(push, DRIVE, done);
@@ -1254,7 +1749,15 @@ static double drive_fastest(double *p)
     double both = 0.0;
     mass = p[MASS];
     stiffness = p[STIFFNESS];
-    stiffness += p[STOP_STIFFNESS] + p[SIDE_STIFFNESS];
+    if ((p[STOP_BEND] + p[STOP_LOSS]) == 0.0) {
+        stiffness += p[STOP_STIFFNESS];
+    }
+    if ((p[SIDE_BEND] + p[SIDE_LOSS]) == 0.0) {
+        stiffness += p[SIDE_STIFFNESS];
+    }
+    if ((p[SECOND_BEND] + p[SECOND_LOSS]) == 0.0) {
+        stiffness += p[SECOND_STIFFNESS];
+    }
     damping = p[DAMPING];
     if (p[GEAR_STIFFNESS] > 0.0) {
         share = p[MOTOR_SHARE];
@@ -1525,13 +2028,19 @@ static tuple_dd drive_sum_plain(double x, double v, tuple_dddd inputs, double le
 static double drive_steady_force(double *memory, double *p)
 {
     double way = 0.0;
+    double force = 0.0;
     double level = 0.0;
     way = memory[WAY];
     if (way == 0.0) {
-        return (-p[HYSTERESIS_FORCE]) * memory[DEFLECTION];
+        force = (-p[HYSTERESIS_FORCE]) * memory[DEFLECTION];
+    } else {
+        level = (way > 0.0) ? p[FRICTION_FORWARD] : p[FRICTION_BACKWARD];
+        force = (-way) * (level + p[HYSTERESIS_FORCE]);
     }
-    level = (way > 0.0) ? p[FRICTION_FORWARD] : p[FRICTION_BACKWARD];
-    return (-way) * (level + p[HYSTERESIS_FORCE]);
+    if (p[PRELOAD] > 0.0) {
+        force -= memory[SIDE] * p[PRELOAD];
+    }
+    return force;
 }
 
 static void drive_set_inputs(double *inputs, double *memory, double *push, double done, double *p)
@@ -1621,8 +2130,54 @@ static void drive_advance(double *state, double *trial, double *memory, double *
 static tuple_dd drive_excess(double *state, double *memory, double *push, double done, double *p)
 {
     double net = 0.0;
+    double more = 0.0;
     net = drive_acceleration(state, memory, push, done, p).m0 * drive_moved_mass(p);
-    return (tuple_dd){net, drive_surplus(net, p) - (1e-12 * p[FORCE_CONSTANT])};
+    more = drive_surplus(net, p) - (1e-12 * p[FORCE_CONSTANT]);
+    if ((p[HAS_MORE] != 0.0) || (p[DRIVE_SHARE] > 0.0)) {
+        more -= drive_held_further(state, push, done, p);
+    }
+    return (tuple_dd){net, more};
+}
+
+static void drive_set_off(double *state, double *memory, double way, double *p)
+{
+    memory[WAY] = way;
+    if ((p[HAS_ZERO_EDGE] != 0.0) && (state[X] == 0.0)) {
+        state[X] = way * 1e-100;
+        memory[SIDE] = way;
+    }
+}
+
+static void drive_pass_zero(double *state, double *memory, double *push, double done, double *p)
+{
+    double x = 0.0;
+    double way = 0.0;
+    tuple_dd t1 = {0};
+    double net = 0.0;
+    double more = 0.0;
+    double back = 0.0;
+    x = state[X];
+    way = memory[WAY];
+    if ((way == 0.0) || (sign_of(x) == memory[SIDE])) {
+        return;
+    }
+    if (p[PRELOAD] > 0.0) {
+        state[X] = 0.0;
+        memory[WAY] = 0.0;
+        memory[SIDE] = 0.0;
+        t1 = drive_excess(state, memory, push, done, p);
+        net = t1.m0;
+        more = t1.m1;
+        back = (fabs(net) - more) - (net * way);
+        if ((more <= 0.0) && ((fabs(state[V]) * drive_moved_mass(p)) < (back * p[CAPTURE_TIME]))) {
+            state[V] = 0.0;
+            return;
+        }
+        state[X] = x;
+        memory[WAY] = way;
+    }
+    drive_set_off(state, memory, way, p);
+    memory[SIDE] = sign_of(state[X]);
 }
 
 static void drive_stop(double *state, double *memory, double *push, double done, double *p)
@@ -1640,7 +2195,7 @@ static void drive_stop(double *state, double *memory, double *push, double done,
     net = t1.m0;
     more = t1.m1;
     if (more > 0.0) {
-        memory[WAY] = sign_of(net);
+        drive_set_off(state, memory, sign_of(net), p);
     }
 }
 
@@ -1773,6 +2328,23 @@ static tuple_dd drive_bounds(double x, double *p)
             high = least(high, edge);
         }
     }
+    if (p[SECOND_STIFFNESS] > 0.0) {
+        edge = p[SECOND_POSITION];
+        if ((x > edge) || ((x == edge) && (edge < 0.0))) {
+            low = most(low, edge);
+        } else {
+            high = least(high, edge);
+        }
+    }
+    if (p[HAS_ZERO_EDGE] != 0.0) {
+        if (x > 0.0) {
+            low = most(low, 1e-200);
+        } else {
+            if (x < 0.0) {
+                high = least(high, -1e-200);
+            }
+        }
+    }
     return (tuple_dd){low, high};
 }
 
@@ -1784,6 +2356,7 @@ static tuple_iiiiid drive_kind_of(double *p)
     has_inner = (p[GEAR_STIFFNESS] > 0.0) || (p[MODE_MASS] > 0.0) || drive_depends_on_motion(p);
     is_watched = drive_has_dry_friction(p) || (p[HYSTERESIS_FORCE] != 0.0);
     at_times = (p[STATIC_EXCESS] != 0.0) || (p[HYSTERESIS_FORCE] != 0.0);
+    at_times = at_times || (p[HAS_CONTACT] != 0.0);
     return (tuple_iiiiid){has_inner, drive_count_edges(p) > 0, drive_is_always_curved(p), is_watched, at_times, drive_fastest(p)};
 }
 
@@ -1828,16 +2401,46 @@ static void drive_couple(double *p)
     p[GEAR_DAMPING_RATIO] += p[COUPLING_DAMPING_RATIO];
 }
 
-static double drive_start(double *state, double *memory, double command, double *p)
+static void drive_take_stock(double sample_time, double *p)
+{
+    int has_zero_edge = 0;
+    int has_edges = 0;
+    double contact = 0.0;
+    int has_second = 0;
+    int has_more = 0;
+    int has_shape = 0;
+    int varies = 0;
+    p[CAPTURE_TIME] = 0.02 * sample_time;
+    has_zero_edge = (p[PRELOAD] > 0.0) || (p[SPRING_SHARE] > 0.0);
+    p[HAS_ZERO_EDGE] = has_zero_edge ? 1.0 : 0.0;
+    has_edges = has_zero_edge || (p[DRIVE_SHARE] > 0.0);
+    has_edges = has_edges || (p[SECOND_STIFFNESS] > 0.0);
+    p[HAS_FURTHER_EDGES] = has_edges ? 1.0 : 0.0;
+    contact = (p[STOP_BEND] + p[SIDE_BEND]) + p[SECOND_BEND];
+    contact += (p[STOP_LOSS] + p[SIDE_LOSS]) + p[SECOND_LOSS];
+    p[HAS_CONTACT] = (contact > 0.0) ? 1.0 : 0.0;
+    has_second = p[SECOND_STIFFNESS] > 0.0;
+    has_second = has_second || (p[SECOND_COGGING_FORCE] != 0.0);
+    has_more = has_zero_edge || has_second || (contact > 0.0);
+    has_more = has_more || (p[GRAVITY_TORQUE] != 0.0);
+    has_more = has_more || (p[WAVY_FRICTION] != 0.0);
+    p[HAS_MORE] = has_more ? 1.0 : 0.0;
+    has_shape = (p[HYSTERESIS_BEND] != 0.0) || (p[HYSTERESIS_RATIO] != 0.0);
+    p[HAS_SHAPE] = has_shape ? 1.0 : 0.0;
+    varies = (p[RIPPLE_SHARE] != 0.0) || (p[DRIVE_SHARE] > 0.0);
+    p[DRIVE_VARIES] = varies ? 1.0 : 0.0;
+}
+
+static double drive_start(double *state, double *memory, double command, double sample_time, double *p)
 {
     double current = 0.0;
     double swinging = 0.0;
-    double limit = 0.0;
     double force = 0.0;
     int is_placed = 0;
     double t1 = 0.0;
     double t2 = 0.0;
     drive_couple(p);
+    drive_take_stock(sample_time, p);
     command = drive_static_command(command, p);
     memory[LAGGED] = command;
     current = command;
@@ -1860,8 +2463,7 @@ static double drive_start(double *state, double *memory, double command, double 
         p[GEAR_DAMPING] = 2.0 * p[GEAR_DAMPING_RATIO];
         p[GEAR_DAMPING] *= sqrt(p[GEAR_STIFFNESS] * swinging);
     }
-    limit = p[CLIP_LIMIT];
-    force = drive_force_of(least(most(current, -limit), limit), 0.0, p);
+    force = drive_resting_force(state[X], current, p);
     state[MOTOR_X] = state[X];
     if ((p[GEAR_STIFFNESS] > 0.0) && (force != 0.0)) {
         state[MOTOR_X] += sign_of(force) * p[GEAR_GAP];
@@ -1877,22 +2479,13 @@ static double drive_start(double *state, double *memory, double command, double 
     state[MOTOR_V] = state[V];
     state[PART_X] = state[X];
     state[PART_V] = state[V];
-    memory[WAY] = sign_of(state[V]);
+    memory[SIDE] = sign_of(state[X]);
     memory[TURNED_AT] = state[X];
+    memory[WAY] = sign_of(state[V]);
+    if (memory[WAY] != 0.0) {
+        drive_set_off(state, memory, memory[WAY], p);
+    }
     return command;
-}
-
-static double drive_current_now(double command, double *state, double *p)
-{
-    double speed = 0.0;
-    double middle = 0.0;
-    double limit = 0.0;
-    double current = 0.0;
-    speed = (p[GEAR_STIFFNESS] > 0.0) ? state[MOTOR_V] : state[V];
-    middle = (-p[CLIP_SLOPE]) * speed;
-    limit = p[CLIP_LIMIT];
-    current = drive_wanted_current(command, state, p);
-    return least(most(current, middle - limit), middle + limit);
 }
 
 static void drive_move_piece(double *state, double *trial, double *memory, double *push, double done, double length, double step, tuple_iiiiid kind, double *inputs, double *p)
@@ -1920,6 +2513,7 @@ static void drive_move_piece(double *state, double *trial, double *memory, doubl
     tuple_iddddd there = {0};
     double when = 0.0;
     int n = 0;
+    double way = 0.0;
     t1 = kind;
     has_edges = t1.m1;
     is_curved = t1.m2;
@@ -1938,7 +2532,10 @@ static void drive_move_piece(double *state, double *trial, double *memory, doubl
             net = t2.m0;
             more = t2.m1;
             if (more > 0.0) {
-                memory[WAY] = sign_of(net);
+                drive_set_off(state, memory, sign_of(net), p);
+                if (has_edges) {
+                    corner = drive_corner_of(state, drive_value_of(push, DRIVE, done), p);
+                }
                 is_held = 0;
                 events += 1;
             }
@@ -1987,20 +2584,32 @@ static void drive_move_piece(double *state, double *trial, double *memory, doubl
             }
             h = when;
         }
+        if ((p[DRIVE_SHARE] > 0.0) && is_held && (event == EDGE)) {
+            is_leaving = drive_excess(trial, memory, push, done + h, p).m1 > 0.0;
+            if (is_leaving) {
+                h = drive_time_of(LEAVING, state, trial, memory, push, done, h, corner, is_held, kind, inputs, p);
+            }
+        }
         if (is_stuck) {
             state[V] = 0.0;
             memory[WAY] = 0.0;
+            if ((p[HAS_ZERO_EDGE] != 0.0) && (fabs(state[X]) <= 1e-100)) {
+                state[X] = 0.0;
+                memory[SIDE] = 0.0;
+                corner = drive_corner_of(state, drive_value_of(push, DRIVE, done), p);
+            }
             continue;
         }
         for (n = 0; n < N_STATE; ++n) {
             state[n] = trial[n];
         }
         done = (h >= (left * (1.0 - 1e-12))) ? length : (done + h);
-        if (has_edges) {
-            corner = drive_corner_of(state, drive_value_of(push, DRIVE, done), p);
+        if (p[HAS_SHAPE] != 0.0) {
+            drive_remember(state[X], memory, p);
         }
         if (is_leaving) {
-            memory[WAY] = sign_of(drive_excess(state, memory, push, done, p).m0);
+            way = sign_of(drive_excess(state, memory, push, done, p).m0);
+            drive_set_off(state, memory, way, p);
         }
         if (is_turned && is_wild) {
             memory[WAY] = sign_of(state[V]);
@@ -2008,6 +2617,12 @@ static void drive_move_piece(double *state, double *trial, double *memory, doubl
             if (is_turned) {
                 drive_stop(state, memory, push, done, p);
             }
+        }
+        if (p[HAS_ZERO_EDGE] != 0.0) {
+            drive_pass_zero(state, memory, push, done, p);
+        }
+        if (has_edges) {
+            corner = drive_corner_of(state, drive_value_of(push, DRIVE, done), p);
         }
     }
 }

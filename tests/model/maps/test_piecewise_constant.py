@@ -100,9 +100,18 @@ def test_the_steps_of_a_straight_line_are_equal(values):
     np.testing.assert_array_equal(nearest_steps(values, 5), [12, 24, 36, 48])
 
 
-def test_more_levels_than_a_plant_has_are_no_obstacle():
+@pytest.mark.parametrize(
+    ("seeds", "sizes"),
+    [
+        ((20, 22), (5, 7, 12)),
+        pytest.param(
+            (20, 21, 22, 23), (5, 6, 7, 9, 12), marks=pytest.mark.slow, id="many"
+        ),
+    ],
+)
+def test_more_levels_than_a_plant_has_are_no_obstacle(seeds, sizes):
     reached = []
-    for seed, units in product((20, 21, 22, 23), (5, 6, 7, 9, 12)):
+    for seed, units in product(seeds, sizes):
         rng = np.random.default_rng(seed)
         u = np.repeat(rng.uniform(-2.4, 2.4, 70), rng.integers(3, 25, 70))
         y = lfilter([0.0, 0.05, 0.03], [1.0, -1.6, 0.68], np.round(u))
@@ -114,7 +123,7 @@ def test_more_levels_than_a_plant_has_are_no_obstacle():
         found = fit([recording], Orders(2, 2, 1), asked)
         reached.append(found.rmsd < 1.1 * noise)
     # Edges at equal distances that move by themselves reach it in half of them.
-    assert sum(reached) >= 19
+    assert sum(reached) >= len(reached) - 1
 
 
 def test_new_edges_lie_between_samples():

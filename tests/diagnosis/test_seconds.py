@@ -1,0 +1,58 @@
+"""Sets of effects with two of a kind: which may stand together."""
+
+import pytest
+
+from hwid_cli.diagnosis.rounds import _is_nested, _may_stand, _moved_up
+
+STOP, SECOND = "one_sided_stop", "one_sided_stop:second"
+
+
+@pytest.mark.parametrize(
+    ("effect", "others"),
+    [
+        (SECOND, (STOP,)),
+        (SECOND, ("one_sided_stop:contact",)),
+        ("one_sided_stop:second_contact", (STOP,)),
+        ("cogging:second", ("cogging", "gravity")),
+    ],
+)
+def test_a_second_one_stands_beside_its_first(effect, others):
+    assert not _is_nested(effect, others)
+    assert _may_stand((*others, effect), ())
+
+
+@pytest.mark.parametrize(
+    ("effect", "others"),
+    [
+        (SECOND, ()),
+        (SECOND, ("cogging",)),
+        (SECOND, (STOP, "one_sided_stop:second_contact")),
+        ("one_sided_stop:contact", (STOP,)),
+        ("one_sided_stop:contact", (STOP, SECOND)),
+        ("hysteresis:bouc_wen", ("hysteresis",)),
+        ("load_friction:spring", ("load_friction:drive",)),
+        ("elastic_coupling:motor", ("elastic_coupling:load",)),
+        ("parameter_change:damping", ("parameter_change:stiffness",)),
+        ("coulomb_friction", ("hysteresis:bouc_wen",)),
+    ],
+)
+def test_what_is_nested_or_lacks_its_first_stands_alone(effect, others):
+    assert _is_nested(effect, others)
+    assert not _may_stand((*others, effect), ())
+
+
+def test_the_first_one_may_be_of_the_simulation():
+    assert not _is_nested(SECOND, ("gravity",), (STOP,))
+    assert _may_stand((SECOND, "gravity"), (STOP,))
+
+
+def test_a_second_one_without_its_first_becomes_the_first():
+    stop = {"position_m": 0.01, "stiffness_N_per_m": 1e4}
+    values = {"gravity": {"torque_N_m": 1.0}, SECOND: stop}
+    ids, moved = _moved_up(("gravity", SECOND), values, ())
+    assert ids == ("gravity", STOP)
+    assert moved == {"gravity": {"torque_N_m": 1.0}, STOP: stop}
+    assert _moved_up(("gravity", SECOND), values, (STOP,)) == (
+        ("gravity", SECOND),
+        values,
+    )
