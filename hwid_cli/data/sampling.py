@@ -75,7 +75,9 @@ def sample_uniformly(
     _check_against_options(path, median, options)
     jumps = np.abs(steps - median) > options.sampling_tolerance * median
     if not jumps.any():
-        return columns, options.sample_time_s or _simplest_step(time.values)
+        return columns, options.sample_time_s or _simplest_step(
+            time.values, np.arange(time.values.size)
+        )
     if not options.resample:
         index = int(np.argmax(jumps))
         raise MeasurementError(
@@ -99,13 +101,17 @@ def sample_uniformly(
 def _grid_step(time: np.ndarray, median: float) -> float:
     """Step to resample by: that of the clock which the stamps scatter around.
 
-    On the clock's own grid a reading moves by the jitter alone. Where samples are
-    missing, the mean step is no step of the clock.
+    On the clock's own grid a reading moves by the jitter alone. Samples may be missing:
+    ticks are counted with them where the stamps fit better so.
     """
-    mean = (time[-1] - time[0]) / (time.size - 1)
+    missing = np.maximum(np.round(np.diff(time) / median), 1.0) - 1.0
+    every = np.arange(time.size, dtype=np.float64)
+    counted = every + np.concatenate([[0.0], np.cumsum(missing)])
+    ticks = min((every, counted), key=lambda one: _misfit(time, one))
+    mean = float(time[-1] - time[0]) / ticks[-1]
     regular = np.abs(np.diff(time) - median) <= _REGULAR * median
     if np.mean(regular) < _MOSTLY and abs(mean - median) <= _SCATTER * median:
-        return _simplest_step(time)
+        return _simplest_step(time, ticks)
     return float(f"{median:.{_STEP_DIGITS}g}")
 
 
@@ -153,17 +159,21 @@ def _check_against_options(
         )
 
 
-def _simplest_step(time: np.ndarray) -> float:
+def _simplest_step(time: np.ndarray, ticks: np.ndarray) -> float:
     """Shortest decimal number that fits the stamps as well as their mean step does."""
-    count = time.size - 1
-    step = float(time[-1] - time[0]) / count
-    misfit = float(np.max(np.abs(time - time[0] - step * np.arange(count + 1))))
-    allowed = max(misfit / count, _ROUNDING * step)
+    step = float(time[-1] - time[0]) / ticks[-1]
+    allowed = max(_misfit(time, ticks) / ticks[-1], _ROUNDING * step)
     for digits in range(1, 17):
         simple = float(f"{step:.{digits}g}")
         if abs(simple - step) <= allowed:
             return simple
     return step
+
+
+def _misfit(time: np.ndarray, ticks: np.ndarray) -> float:
+    """Largest distance of the stamps from ticks of their mean step."""
+    step = float(time[-1] - time[0]) / ticks[-1]
+    return float(np.max(np.abs(time - time[0] - step * ticks)))
 
 
 def _check_gaps(

@@ -179,6 +179,8 @@ def test_jittering_clock_is_resampled_where_asked_for(tiny, write_csv, signals):
     )
     grid = time[0] + 0.01 * np.arange(recording.input.size)
     # Linear interpolation over h = 0.014 s at most: h^2 / 8 times a curvature of 1.
+    np.testing.assert_allclose(recording.output, np.cos(grid), atol=3e-5)
+    # The mean over a step of the input adds a 24th of h^2.
     np.testing.assert_allclose(recording.input, np.sin(grid), atol=3e-5)
 
 

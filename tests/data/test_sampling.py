@@ -134,7 +134,8 @@ def test_resampling_interpolates_linearly_and_is_logged(caplog):
     with caplog.at_level(logging.INFO):
         found, step = sample_uniformly(PATH, columns(time), options(resample=True))
     assert step == 1.0
-    # The columns are linear in time, so interpolation gives them exactly.
+    # The columns are linear in time, so interpolation gives them exactly, and so do
+    # means over a step.
     np.testing.assert_allclose(found.input.values, 2 * np.arange(8), rtol=1e-15)
     np.testing.assert_allclose(found.output.values, -np.arange(8.0), rtol=1e-15)
     assert "data/run07.csv: resampled to 1 s, because 2 of 7 steps" in caplog.text
@@ -145,6 +146,67 @@ def test_a_resampling_step_has_six_digits():
     time = np.cumsum([0, 0.012345678, 0.012345678, 0.02, 0.012345678, 0.012345678])
     _, step = sample_uniformly(PATH, columns(time), options(resample=True))
     assert step == 0.0123457
+
+
+@given(st.integers(0, 2**32 - 1), st.sampled_from([0.05, 0.1]))
+def test_resampling_a_jittering_clock_keeps_its_own_step(seed, jitter):
+    rng = np.random.default_rng(seed)
+    time = np.arange(1000) + rng.uniform(-jitter, jitter, 1000)
+    _, step = sample_uniformly(PATH, columns(1e-3 * time), options(resample=True))
+    # A step that is off by more than both ends scatter leaves the stamps on its way; a
+    # shorter number may cost as much once more. The median of the steps is off by ten
+    # times that.
+    assert step == pytest.approx(1e-3, rel=4 * jitter / 999)
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(1, 20))
+def test_resampling_over_missing_samples_keeps_the_step_of_the_clock(seed, missing):
+    rng = np.random.default_rng(seed)
+    kept = np.sort(rng.choice(np.arange(1, 1000), 999 - missing, replace=False))
+    time = 1e-3 * np.r_[0, kept]
+    found, step = sample_uniformly(PATH, columns(time), options(resample=True))
+    assert step == 1e-3
+    assert found.output.values.size == kept[-1] + 1
+
+
+def test_resampling_over_missing_samples_and_jitter_keeps_the_step_of_the_clock():
+    rng = np.random.default_rng(4)
+    kept = np.delete(np.arange(1000), [3, 400, 401, 402, 950])
+    time = 1e-3 * (kept + rng.uniform(-0.1, 0.1, kept.size))
+    _, step = sample_uniformly(PATH, columns(time), options(resample=True))
+    assert step == pytest.approx(1e-3, rel=2e-4)
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_resampling_keeps_the_integral_of_the_input(seed):
+    rng = np.random.default_rng(seed)
+    time = np.r_[0.0, np.arange(1, 60) + rng.uniform(-0.3, 0.3, 59), 60.0]
+    data, pulse = columns(time), rng.standard_normal(61)
+    data = FileColumns(array_column("u", pulse), data.output, data.time)
+    stated = options(resample=True, sample_time_s=1.0, sampling_tolerance=0.2)
+    values = sample_uniformly(PATH, data, stated)[0].input.values
+    # Each sample but the two at the ends stands for the step around it.
+    fine = np.linspace(0.5, 59.5, 590001)
+    line = np.interp(fine, time, pulse)
+    area = np.sum(line[1:] + line[:-1]) * 0.5e-4
+    # The corners lie between steps of 1e-4: a 12th of its square for each, times slopes.
+    assert np.sum(values[1:-1]) == pytest.approx(area, abs=1e-6)
+    assert (values[0], values[-1]) == (pulse[0], pulse[-1])
+
+
+def test_resampling_keeps_the_time_of_a_corner_of_the_input():
+    time = np.r_[0.0, 1.0, 2.0, 2.6, 4.0, 5.0, 6.0, 7.0]
+    data = columns(time)
+    step_up = np.r_[0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 1.0]
+    data = FileColumns(array_column("u", step_up), data.output, data.time)
+    found, _ = sample_uniformly(PATH, data, options(resample=True))
+    # A ramp from 2 to 2.6, so 0.5 / 0.6 is reached at 2.5: a triangle before it, and
+    # behind it what is left of the ramp and 0.9 of full height.
+    first = 0.5 * 0.5 * (0.5 / 0.6)
+    second = 0.5 * 0.1 * (0.5 / 0.6 + 1.0) + 0.9
+    np.testing.assert_allclose(
+        found.input.values, [0, 0, first, second, 1, 1, 1, 1], atol=1e-15
+    )
 
 
 def test_resampling_keeps_each_column_to_its_own_end():
@@ -159,6 +221,7 @@ def test_resampling_uses_the_stated_sample_time():
     stated = options(resample=True, sample_time_s=1.005)
     found, step = sample_uniformly(PATH, columns(time), stated)
     assert step == 1.005
+    np.testing.assert_allclose(found.output.values, -1.005 * np.arange(7), rtol=1e-14)
     np.testing.assert_allclose(found.input.values, 2.01 * np.arange(7), rtol=1e-14)
 
 

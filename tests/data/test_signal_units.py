@@ -252,7 +252,7 @@ def test_a_reference_has_the_unit_of_the_output_or_its_own(tiny, write_csv, sign
 
 def test_resampling_keeps_the_unit(tiny, write_csv, signals):
     time = signals[0].copy()
-    time[10:] += 0.004
+    time[10:] += 0.01
     write_csv("a.csv", columns=(1000 * time, *signals[1:]), header="t_ms,u_mA,y_mm")
     columns = "{time: t_ms, input: u_mA, output: y_mm}"
     (recording,) = read(tiny(columns=columns, more="resample: true", sections=DRIVE))
