@@ -87,14 +87,19 @@ def test_no_larger_set_is_tried_once_nothing_remains(of_all):
     assert len(found.best) == 1
 
 
-def test_a_pair_is_found_although_neither_effect_explains_much_alone():
-    allowed = (
-        "coulomb_friction",
-        "cubic_stiffness",
-        "input_dead_zone",
-        "quadratic_drag",
-        "stribeck_friction",
-    )
+@pytest.mark.parametrize(
+    "more",
+    [
+        ("input_dead_zone",),
+        pytest.param(
+            ("input_dead_zone", "quadratic_drag", "stribeck_friction"),
+            marks=pytest.mark.slow,
+        ),
+    ],
+    ids=["few", "many"],
+)
+def test_a_pair_is_found_although_neither_effect_explains_much_alone(more):
+    allowed = ("coulomb_friction", "cubic_stiffness", *more)
     announced = []
     found = run_rounds(
         rounds_of(
