@@ -39,10 +39,10 @@ run: $(RUN)  ## the main job on the virtual gun: raw measurements in, tables out
 	$(HWID) run configs/demo.yaml
 
 test: $(DEV)  ## fast tests
-	$(BIN)/python -m pytest --quiet --numprocesses auto
+	$(BIN)/python -m pytest --quiet --numprocesses auto --dist worksteal
 
 test-all: $(DEV)  ## all tests, also the slow ones
-	$(BIN)/python -m pytest --quiet --numprocesses auto -m ''
+	$(BIN)/python -m pytest --quiet --numprocesses auto --dist worksteal -m ''
 
 reliability: $(DEV)  ## kills, full disks, torn files, errors at every write: half an hour
 	$(BIN)/python -m pytest --quiet -s -m '' tests/reliability

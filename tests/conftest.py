@@ -1,5 +1,6 @@
 """Settings that hold for every test."""
 
+import gc
 import logging
 import os
 from pathlib import Path
@@ -23,6 +24,13 @@ def pytest_configure(config):
     """Try fewer examples where slow tests are left out."""
     is_fast = "not slow" in config.getoption("markexpr")
     settings.load_profile("hwid-fast" if is_fast else "hwid")
+    gc.disable()
+
+
+def pytest_collection_finish():
+    """Look for garbage among what the tests make, not among what is collected."""
+    gc.freeze()
+    gc.enable()
 
 
 TINY_CONFIG = """\

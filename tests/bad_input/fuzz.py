@@ -170,7 +170,9 @@ def tried(kinds: str, seed: int, count: int, folder: Path) -> tuple[Counter, lis
         if done.returncode != 0:
             assert done.returncode < 0, done.stderr
             outcomes["died"] += 1
-            broken.append(f"{first} died of signal {-done.returncode}")
+            turn, place = divmod(first, len(kinds.split(",")))
+            name = f"{kinds.split(',')[place]}:{turn}"
+            broken.append(f"{name} died of signal {-done.returncode}")
             first += 1
     return outcomes, broken
 

@@ -110,7 +110,7 @@ def loaded(folder, content):
 
 
 @given(st.dictionaries(KEYS, VALUES, max_size=5) | nearly_good())
-@hypothesis_settings(max_examples=60)
+@hypothesis_settings(max_examples=30)
 def test_any_mapping_is_an_experiment_or_an_error_to_mend(content):
     with tempfile.TemporaryDirectory() as folder:
         found = loaded(folder, content)
@@ -181,7 +181,7 @@ ANY = arrays.arrays(
 
 @pytest.mark.parametrize("ending", [".npz", ".mat"])
 @given(time=ANY | st.just(np.arange(80.0)), current=ANY, output=ANY)
-@hypothesis_settings(max_examples=40)
+@hypothesis_settings(max_examples=25)
 def test_any_arrays_are_recordings_or_an_error_to_mend(ending, time, current, output):
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / f"run{ending}"

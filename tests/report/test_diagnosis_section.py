@@ -7,6 +7,7 @@ from hwid_cli.report.diagnosis import diagnosis_blocks
 from hwid_cli.report.page import Collapsible, images_of
 from hwid_cli.report.sections.diagnose import diagnosis_section
 from hwid_cli.report.table import Heading, Table, Text
+from tests.conftest import leave_figures_blank
 from tests.report.diagnosis_examples import NAN, named, nothing_missing, unknown
 from tests.report.report_examples import DIAGNOSIS
 
@@ -38,8 +39,10 @@ def tables(section):
 
 @pytest.fixture(scope="module")
 def of_nine():
-    """Dry friction found in nine recordings, with its figures."""
-    return section_of(named())
+    """Dry friction found in nine recordings."""
+    with pytest.MonkeyPatch.context() as monkeypatch:
+        leave_figures_blank(monkeypatch)
+        return section_of(named())
 
 
 def test_the_summary_comes_first_and_the_effects_follow(of_nine):

@@ -160,7 +160,7 @@ def test_repair_can_be_switched_off():
 
 # The whole record is as quiet elsewhere; only within what is kept the lead-in stands out.
 @example(kind="random", lead_in=20, offsets=(0.0, 0.0), noise=0.0, samples=800, seed=1)
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(
     kind=st.sampled_from(["step", "sine", "random", "other"]),
     lead_in=st.integers(20, 400),

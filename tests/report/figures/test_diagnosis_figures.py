@@ -39,7 +39,7 @@ def legend_of(figure):
 
 @pytest.mark.parametrize(
     "count",
-    # Nine are rendered for their section of the report as well.
+    # Nine are rendered for the page of tests/report as well.
     [1, *(pytest.param(count, marks=pytest.mark.slow) for count in (9, 43))],
 )
 def test_any_number_of_recordings_gives_all_figures(count):
