@@ -72,7 +72,7 @@ class NoiseFloor:
     is_coloured: bool
     whitening: tuple[float, ...]
     sentence: str
-    input_rms: float = 0.0
+    input_rms: float = field(default=0.0, metadata=ADDED_LATER)
 
 
 @dataclass(frozen=True)

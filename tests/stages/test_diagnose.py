@@ -10,7 +10,7 @@ from hwid_cli.drive.simulation import simulate_drive
 from hwid_cli.records.drive import BASE_PARAMETERS
 from hwid_cli.records.experiment import DiagnoseOptions
 from hwid_cli.records.recordings import Recording
-from hwid_cli.stages.diagnose import diagnosis_key, extended_options
+from hwid_cli.stages.diagnose import STAGE_VERSION, diagnosis_key, extended_options
 from hwid_cli.tasks.cache import MemoryStore, task_key
 from tests.diagnosis.small_drive import (
     DRIVE,
@@ -340,7 +340,7 @@ def test_keys_of_diagnoses_without_known_parameters_are_those_of_before():
     ]
     settings = {"recordings": about, "simulation": model, "options": options}
     arrays = [array for one in given for array in (one.input, one.output)]
-    before = task_key("diagnose", 1, settings, arrays)
+    before = task_key("diagnose", STAGE_VERSION, settings, arrays)
     assert diagnosis_key(given, simulation(), options) == before
     held = simulation(known={"damping_N_s_per_m": 0.1})
     assert diagnosis_key(given, held, options) != before
