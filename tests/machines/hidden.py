@@ -7,7 +7,7 @@ catalogue's names where the law is the catalogue's.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.signal import lfilter
@@ -425,12 +425,17 @@ def dead_time(volts: float, resistance: float, back_emf: float) -> Hidden:
 
 def slew(rate: float) -> Hidden:
     """The amplifier's current changes no faster, in A/s."""
+    # Parts of a cell, for the instant at which the current catches up.
+    parts = 16
 
     def chain(values, step_s):
-        limited = values.copy()
+        limited, most = values.copy(), rate * step_s / parts
         for k in range(1, len(values)):
-            change = np.clip(values[k] - limited[k - 1], -rate * step_s, rate * step_s)
-            limited[k] = limited[k - 1] + change
+            now, rise = limited[k - 1], (values[k] - values[k - 1]) / parts
+            for part in range(1, parts + 1):
+                target = values[k - 1] + part * rise
+                now = now + np.clip(target - now, -most, most)
+            limited[k] = now
         return limited
 
     return Hidden("rate_limit", {"rate_A_per_s": rate}, chain=chain)
@@ -552,26 +557,31 @@ def shaft(
 def gear(
     base: Base, half_gap: float, stiffness: float, motor_share: float, at: str
 ) -> Hidden:
-    """Motor and load with play between them; spring and damper are on the load."""
+    """Motor and load with play between them, sensor at the `motor` or at the `load`.
+
+    The spring is on the load; so is the damper where the sensor is, else it is shared.
+    """
     load = base.mass * (1.0 - motor_share)
     damping = 0.3 * np.sqrt(stiffness * load)
+    own = base.damping if at == "load" else 0.5 * base.damping
     part = SecondMass(
         load,
         stiffness,
         damping,
         half_gap,
-        own_damping=base.damping,
+        own_damping=own,
         own_stiffness=base.stiffness,
     )
-    numbers = {"half_gap_m": half_gap} if at == "load" else {}
-    effect = "gear_backlash" if at == "load" else "gear backlash seen from the motor"
-    return Hidden(
-        effect,
-        numbers,
-        part=part,
-        base=_split(motor_share),
-        sensor_on_load=at == "load",
-    )
+
+    def split(whole):
+        return replace(_split(motor_share)(whole), damping=whole.damping - own)
+
+    if at == "load":
+        numbers = {"half_gap_m": half_gap}
+        return Hidden(
+            "gear_backlash", numbers, part=part, base=split, sensor_on_load=True
+        )
+    return Hidden("gear backlash seen from the motor", part=part, base=split)
 
 
 def changed(name: str, factors: np.ndarray) -> Hidden:

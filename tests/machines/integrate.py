@@ -33,6 +33,9 @@ class Moving(Protocol):
     def grip(self, t, state, command) -> tuple[np.ndarray, np.ndarray]:
         """Force on the slider without friction, and the friction that can hold it."""
 
+    def settle(self, state) -> None:
+        """Put back what overshot a limit in a cell, in place."""
+
     def output(self, state) -> np.ndarray:
         """What a perfect sensor would read."""
 
@@ -81,6 +84,12 @@ class Cell:
 
     def advance(self, plant, state, mode) -> tuple[np.ndarray, np.ndarray]:
         """State and modes at the end of the cell."""
+        state, mode = self._to_end(plant, state, mode)
+        plant.settle(state)
+        return state, mode
+
+    def _to_end(self, plant, state, mode):
+        """State and modes at the end of the cell, events located."""
         begin, end = np.zeros_like(mode), np.ones_like(mode)
         arrived = self.step(plant, state, mode, (begin, end))
         if plant.slider is None:

@@ -43,6 +43,9 @@ class Part:
         """Force on the driven mass, and time derivatives of the part's states."""
         raise NotImplementedError
 
+    def settle(self, z: np.ndarray) -> None:
+        """Put states that overshot a limit back on it, at the end of a cell."""
+
 
 @dataclass
 class Force(Part):
@@ -88,8 +91,12 @@ class MaxwellSlip(Part):
         self.reach = (self.limit / self.stiffness)[:, None]
 
     def act(self, t, x, v, z):
+        bend = np.clip(z, -self.reach, self.reach)
         slips = (np.abs(z) >= self.reach) & (z * v > 0)
-        return -(self.stiffness[:, None] * z).sum(axis=0), np.where(slips, 0.0, v)
+        return -(self.stiffness[:, None] * bend).sum(axis=0), np.where(slips, 0.0, v)
+
+    def settle(self, z):
+        np.clip(z, -self.reach, self.reach, out=z)
 
 
 @dataclass
@@ -339,6 +346,11 @@ class Plant:
                 return 0.0
         other = reach if force(reach) * at_zero <= 0 else -reach
         return brentq(force, 0.0, other, xtol=1e-15)
+
+    def settle(self, state):
+        """Let the parts put back what overshot in a cell."""
+        for part, rows in zip(self.parts, self.rows, strict=True):
+            part.settle(state[rows])
 
     def output(self, state):
         """Position of the place that is measured."""

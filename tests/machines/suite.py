@@ -1065,7 +1065,7 @@ def gearbox_motor_sensor(draw):
         "triangles sine steps levels",
         mass=0.5,
         pace=4.0,
-        damping=0.15,
+        damping=0.25,
         force_constant=5.0,
         top=4.0,
         sample_s=2e-3,
@@ -1084,7 +1084,7 @@ def gearbox_motor_sensor(draw):
         "gearbox with play, encoder at the motor",
         [gear],
         answers=answers,
-        cells=16,
+        cells=48,
         output_unit=("angle_rad", 1.0),
     )
 

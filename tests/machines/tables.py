@@ -40,6 +40,11 @@ def share(hits: int, total: int) -> str:
     return f"{100 * hits / total:.0f} % ({hits} of {total}; {100 * low:.0f} to {100 * high:.0f} %)"
 
 
+def covered(rows: list[dict]) -> str:
+    """Share of the intervals that hold the true value."""
+    return share(sum(r["covered"] for r in rows), sum(r["intervals"] for r in rows))
+
+
 def number(value: float | None) -> str:
     """Three digits, or a dash."""
     return "-" if value is None else f"{value:.3g}"
@@ -51,10 +56,8 @@ def summary(rows: list[dict]) -> list[str]:
     clean = [row for row in rows if row["family"] == "clean"]
     counts = Counter(row["outcome"] for row in hidden)
     named = [row for row in hidden if row["verdict"] == "named"]
-    covered, checked = (
-        sum(r["covered"] for r in rows),
-        sum(r["intervals"] for r in rows),
-    )
+    whole = [row for row in rows if row["complete"]]
+    part = [row for row in rows if not row["complete"]]
     invisible = sum(row["gap_over_noise"] < INVISIBLE for row in hidden)
     seconds = sorted(row["seconds"] for row in rows if row["seconds"] is not None)
     lines = [
@@ -75,7 +78,8 @@ def summary(rows: list[dict]) -> list[str]:
         f"| false alarm | {share(sum(r['outcome'] == 'false alarm' for r in clean), len(clean))} |",
         f"| failed | {share(sum(r['outcome'] == 'failed' for r in clean), len(clean))} |",
         "",
-        f"True parameters inside their 95 % intervals: {share(covered, checked)}.",
+        f"True parameters inside their 95 % intervals: {covered(whole)} where the diagnosis says it",
+        f"is complete, {covered(part)} where it says it is not.",
     ]
     if seconds:
         lines.append(
