@@ -273,13 +273,11 @@ def test_the_top_level_holds_what_it_should_and_nothing_else():
     assert {name.split("/")[0] for name in names} == TOP_LEVEL
 
 
-@pytest.mark.parametrize("name", list(COMMANDS))
-def test_every_command_has_help(name):
-    command = COMMANDS[name]
-
-    for parameter in command.params:
-        if parameter.param_type_name == "option":
-            assert parameter.help, parameter.name
+def test_every_command_has_help():
+    for name, command in COMMANDS.items():
+        for parameter in command.params:
+            if parameter.param_type_name == "option":
+                assert parameter.help, f"{name} {parameter.name}"
 
 
 def test_the_readme_has_a_row_for_every_command_and_no_other():

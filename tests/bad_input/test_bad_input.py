@@ -67,8 +67,8 @@ def cross_validated(tmp_path_factory):
 
 
 def params(cases):
-    """Packing a bomb takes seconds: those are slow."""
-    slow = ("npz: bomb", "mat: bomb")
+    """Packing a bomb takes seconds, and a crash new processes: those are slow."""
+    slow = ("npz: bomb", "mat: bomb", "mat: complex by its flags")
     return [
         pytest.param(
             case, id=case.name, marks=pytest.mark.slow if case.name in slow else ()

@@ -8,13 +8,8 @@ from tests.blind.run_blind import score_of
 # Ten recordings at 0.5 % noise hold less than the full plan; the standard errors of
 # these parameters stay below 3 % there.
 LARGEST_ERROR = 0.10
-NAMED = (
-    "coulomb_friction",
-    pytest.param("cubic_stiffness", marks=pytest.mark.slow),
-    pytest.param("input_dead_zone", marks=pytest.mark.slow),
-    # The shapes of the effect are simulated one after the other in each of its fits.
-    pytest.param("output_backlash", marks=pytest.mark.slow),
-)
+# The shapes of the last are simulated one after the other in each of its fits.
+NAMED = ("coulomb_friction", "cubic_stiffness", "input_dead_zone", "output_backlash")
 
 
 def short_case(*effects, suite="full", **fields):
@@ -28,6 +23,7 @@ def only_outcome(case, folder, **options):
 
 
 # The case outside the catalogue has its figures rendered.
+@pytest.mark.slow
 @pytest.mark.usefixtures("blank_figures")
 @pytest.mark.parametrize("effect", NAMED)
 def test_a_hidden_effect_is_named_measured_and_removed(effect, tmp_path):

@@ -9,6 +9,7 @@ from hwid_cli.cli.main import main
 from hwid_cli.config.load import load_experiment
 from hwid_cli.store.diagnosis_results import read_diagnosis_record
 from tests.cli.drive_examples import CONFIG, FRICTION, write_measurements
+from tests.conftest import leave_figures_blank
 
 FILES = (
     "diagnosis.json",
@@ -17,8 +18,6 @@ FILES = (
     "gaps.csv",
     "extended_simulation.yaml",
 )
-# The first run and its report have their figures rendered.
-blank = pytest.mark.usefixtures("blank_figures")
 SECTION = "diagnose: {effects: [coulomb_friction, quadratic_drag], max_effects: 1}\n"
 
 
@@ -29,7 +28,9 @@ def first_run(tmp_path_factory):
     write_measurements(folder / "data")
     (folder / "drive.yaml").write_text(CONFIG)
     arguments = ["diagnose", str(folder / "drive.yaml"), "--jobs", "1"]
-    result = CliRunner().invoke(main, [*arguments, "--out", str(folder / "out")])
+    with pytest.MonkeyPatch.context() as monkeypatch:
+        leave_figures_blank(monkeypatch)
+        result = CliRunner().invoke(main, [*arguments, "--out", str(folder / "out")])
     assert result.exit_code == 0, result.output
     return folder, result.stdout
 
@@ -111,7 +112,6 @@ def test_an_unchanged_run_answers_from_the_results_with_the_same_files(
     assert shown == then != ""
 
 
-@blank
 def test_a_lost_figure_is_drawn_again(again, out):
     (path, *_) = sorted((out / "figures").glob("diagnosis_*.png"))
     path.unlink()
@@ -120,7 +120,6 @@ def test_a_lost_figure_is_drawn_again(again, out):
     assert path.is_file()
 
 
-@blank
 def test_lost_results_are_made_from_the_cache(again, out):
     before = found_in(out)
     (out / "results.h5").unlink()
@@ -131,12 +130,10 @@ def test_lost_results_are_made_from_the_cache(again, out):
     assert found_in(out)["effects"] == before["effects"]
 
 
-@blank
 def test_force_diagnoses_again(again):
     assert "diagnose: 0 tasks from the cache" in again("--force").stdout
 
 
-@blank
 def test_another_simulation_is_another_diagnosis(again, edit, out):
     key = found_in(out)["provenance"]["key"]
     figure = out / "figures" / found_in(out)["figures"][0]
@@ -149,7 +146,6 @@ def test_another_simulation_is_another_diagnosis(again, edit, out):
     assert figure.stat().st_mtime_ns > drawn
 
 
-@blank
 def test_chosen_recordings_are_used_and_held_out_ones_judge(again, edit, out):
     names = "step_01, step_02, step_03, sine_01, sine_02, sine_03"
     edit(
@@ -164,7 +160,6 @@ def test_chosen_recordings_are_used_and_held_out_ones_judge(again, edit, out):
     assert sorted(recordings["train"]) == ["sine_01", "sine_03", "step_01", "step_03"]
 
 
-@blank
 def test_the_extended_simulation_is_a_configuration_that_lies_closer(hwid, config, out):
     extended = out / "extended_simulation.yaml"
     held = load_experiment(extended).simulation
@@ -226,7 +221,6 @@ def test_holding_everything_out_is_one_line(again, edit, config):
     )
 
 
-@blank
 def test_run_diagnoses_where_the_section_is_given_and_the_report_shows_it(
     config, hwid, out
 ):
@@ -239,7 +233,6 @@ def test_run_diagnoses_where_the_section_is_given_and_the_report_shows_it(
     assert found_in(out)["summary"] in html
 
 
-@blank
 def test_a_diagnosis_of_an_older_configuration_is_called_so(config, hwid, edit, out):
     edit("stiffness_N_per_m: 1150.0", "stiffness_N_per_m: 1160.0")
     hwid("report")
@@ -254,7 +247,6 @@ def test_quiet_says_nothing(again):
     assert (result.exit_code, result.stdout, result.stderr) == (0, "", "")
 
 
-@blank
 def test_a_start_away_from_equilibrium_is_one_line_of_warning(config, edit, again):
     for path in (config.parent / "data").glob("sine_*.csv"):
         head, *rows = path.read_text().splitlines()

@@ -36,22 +36,24 @@ def written(values):
     return ", ".join(f"{name}: {value}" for name, value in values.items())
 
 
-@pytest.mark.parametrize("identifier", EFFECTS)
-def test_every_effect_is_accepted_with_all_of_its_parameters(load_effect, identifier):
-    values = {one.name: some_value(one) for one in EFFECTS[identifier]}
-    assert load_effect(f"{identifier}: {{{written(values)}}}") == {identifier: values}
+def test_every_effect_is_accepted_with_all_of_its_parameters(load_effect):
+    for identifier, parameters in EFFECTS.items():
+        values = {one.name: some_value(one) for one in parameters}
+        found = load_effect(f"{identifier}: {{{written(values)}}}")
+        assert found == {identifier: values}
 
 
-@pytest.mark.parametrize("identifier", EFFECTS)
-def test_what_an_effect_needs_is_required_and_the_rest_is_not(load_effect, identifier):
-    needed = {one.name: some_value(one) for one in EFFECTS[identifier] if one.is_needed}
-    assert load_effect(f"{identifier}: {{{written(needed)}}}") == {identifier: needed}
-    for left_out in needed:
-        others = {name: one for name, one in needed.items() if name != left_out}
-        with pytest.raises(
-            ConfigError, match=rf"effects\.{identifier}\.{left_out}: missing; exp"
-        ):
-            load_effect(f"{identifier}: {{{written(others)}}}")
+def test_what_an_effect_needs_is_required_and_the_rest_is_not(load_effect):
+    for identifier, parameters in EFFECTS.items():
+        needed = {one.name: some_value(one) for one in parameters if one.is_needed}
+        found = load_effect(f"{identifier}: {{{written(needed)}}}")
+        assert found == {identifier: needed}
+        for left_out in needed:
+            others = {name: one for name, one in needed.items() if name != left_out}
+            with pytest.raises(
+                ConfigError, match=rf"effects\.{identifier}\.{left_out}: missing; exp"
+            ):
+                load_effect(f"{identifier}: {{{written(others)}}}")
 
 
 def test_an_inductance_needs_a_circuit(load):

@@ -105,7 +105,11 @@ def test_effects_of_many_events_together_follow_the_oracle(effects):
 # More damping with friction makes the oracle's events follow each other without end.
 @pytest.mark.parametrize(
     ("ratio", "other"),
-    [pytest.param(0.02, {}, marks=pytest.mark.slow), (0.3, {}), (0.02, COULOMB)],
+    [
+        pytest.param(0.02, {}, marks=pytest.mark.slow),
+        pytest.param(0.3, {}, marks=pytest.mark.slow),
+        (0.02, COULOMB),
+    ],
 )
 def test_teeth_that_are_damped_push_and_never_pull(ratio, other):
     effects = {

@@ -172,22 +172,23 @@ def test_a_narrow_stribeck_excess_is_a_break_away_force():
     assert rms(tool(COULOMB, slow).position - expected) > 1e-5
 
 
-@pytest.mark.parametrize("effect", [*SINGLE, "sensor_quadratic"])
-def test_the_mirrored_drive_moves_the_other_way(effect):
-    values = SINGLE.get(effect, {"coefficient": 0.1})
-    mirrored = MIRRORED.get(effect, values)
-    if effect == "sensor_quadratic":
-        mirrored = {"coefficient": -0.1}
-    one = tool({effect: values}, sine()).output
-    other = tool({effect: mirrored}, -sine()).output
-    # Events are located to 1e-12 of a step, and rattling amplifies that.
-    assert np.max(abs(one + other)) < 1e-11
+def test_the_mirrored_drive_moves_the_other_way():
+    quadratic = {"sensor_quadratic": {"coefficient": 0.1}}
+    for effect, values in (SINGLE | quadratic).items():
+        mirrored = MIRRORED.get(effect, values)
+        if effect == "sensor_quadratic":
+            mirrored = {"coefficient": -0.1}
+        one = tool({effect: values}, sine()).output
+        other = tool({effect: mirrored}, -sine()).output
+        # Events are located to 1e-12 of a step, and rattling amplifies that.
+        assert np.max(abs(one + other)) < 1e-11, effect
 
 
-@pytest.mark.parametrize("effect", NEUTRAL)
-def test_an_effect_at_its_neutral_value_leaves_the_base(effect):
-    found = tool({effect: NEUTRAL[effect]}, sine()).output
-    assert rms(found - tool({}, sine()).output) < ROUNDING_M
+def test_an_effect_at_its_neutral_value_leaves_the_base():
+    base = tool({}, sine()).output
+    for effect, values in NEUTRAL.items():
+        found = tool({effect: values}, sine()).output
+        assert rms(found - base) < ROUNDING_M, effect
 
 
 @pytest.mark.parametrize("effects", [COULOMB, STRIBECK], ids="+".join)
@@ -242,13 +243,13 @@ def test_a_free_axis_starts_where_it_rests_and_stays_there():
     assert np.all(motion.position == 0.7)
 
 
-@pytest.mark.parametrize("effect", SINGLE)
-def test_shorter_samples_of_the_same_command_change_nothing(effect):
-    coarse = tool({effect: SINGLE[effect]}).position
-    fine = tool({effect: SINGLE[effect]}, sample_time=SAMPLE_TIME_S / 8).position[::8]
-    # Runge-Kutta steps leave up to 1e-7 m, see test_drive_oracle; a rattling gear
-    # amplifies rounding.
-    assert rms(coarse - fine) < 1e-7
+def test_shorter_samples_of_the_same_command_change_nothing():
+    for effect, values in SINGLE.items():
+        coarse = tool({effect: values}).position
+        fine = tool({effect: values}, sample_time=SAMPLE_TIME_S / 8).position[::8]
+        # Runge-Kutta steps leave up to 1e-7 m, see test_drive_oracle; a rattling gear
+        # amplifies rounding.
+        assert rms(coarse - fine) < 1e-7, effect
 
 
 @pytest.mark.parametrize("effect", sorted(set(SINGLE) - {"gear_backlash"}))
@@ -328,27 +329,29 @@ def test_a_change_between_recordings_scales_its_parameter():
     assert rms(found - tool({}, sine(), **stiffer).output) < ROUNDING_M
 
 
-@pytest.mark.parametrize("effect", EVERY)
-def test_every_effect_of_the_catalogue_is_seen_in_the_output(effect):
-    machine = machine_of(effect)
-    change = tool({effect: EVERY[effect]}, **machine).output
-    change = change - tool({}, **machine).output
-    # A ten-thousandth of the motion of 12 mm rms; drift is the smallest.
-    assert 1e-6 < rms(change) < 0.1
+def test_every_effect_of_the_catalogue_is_seen_in_the_output():
+    for effect, values in EVERY.items():
+        machine = machine_of(effect)
+        change = tool({effect: values}, **machine).output
+        change = change - tool({}, **machine).output
+        # A ten-thousandth of the motion of 12 mm rms; drift is the smallest.
+        assert 1e-6 < rms(change) < 0.1, effect
 
 
-@pytest.mark.parametrize("effect", EVERY)
-def test_what_may_be_left_out_has_the_default_of_its_declaration(effect):
-    parameters = CATALOGUE[effect].parameters
-    needed = {
-        one.name: EVERY[effect][one.name] for one in parameters if one.default is None
-    }
-    defaults = {one.name: one.default for one in parameters if one.default is not None}
-    short, full = (
-        parameter_vector(Drive(), {effect: values})
-        for values in (needed, needed | defaults)
-    )
-    np.testing.assert_array_equal(short, full)
+def test_what_may_be_left_out_has_the_default_of_its_declaration():
+    for effect, given in EVERY.items():
+        parameters = CATALOGUE[effect].parameters
+        defaults = {
+            one.name: one.default for one in parameters if one.default is not None
+        }
+        needed = {
+            one.name: given[one.name] for one in parameters if one.default is None
+        }
+        short, full = (
+            parameter_vector(Drive(), {effect: values})
+            for values in (needed, needed | defaults)
+        )
+        np.testing.assert_array_equal(short, full, err_msg=effect)
 
 
 def test_every_place_that_an_effect_fills_is_read_by_a_kernel():

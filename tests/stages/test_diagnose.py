@@ -181,6 +181,7 @@ def test_the_order_of_the_recordings_does_not_change_the_verdict(
     assert set(turned.held_out) == set(friction_found.held_out)
 
 
+@pytest.mark.slow
 def test_several_processes_find_the_same(with_friction, friction_found):
     spread = diagnosed(with_friction, run=settings(jobs=2))
     assert_same(spread, friction_found)
@@ -284,7 +285,7 @@ def test_with_a_wrong_law_in_the_catalogue_the_right_name_is_not_found(monkeypat
             {"cogging": {"amplitude_N": 0.5, "period_m": 5e-3}},
             ["amplitude_N", "period_m", "phase_rad"],
         ),
-        (
+        pytest.param(
             {"gear_backlash": {"half_gap_m": 1e-4, "stiffness_N_per_m": 5e4}},
             [
                 "half_gap_m",
@@ -292,6 +293,7 @@ def test_with_a_wrong_law_in_the_catalogue_the_right_name_is_not_found(monkeypat
                 "motor_share",
                 "contact_damping_ratio",
             ],
+            marks=pytest.mark.slow,
         ),
     ],
     ids=["cogging", "gear_backlash"],

@@ -22,6 +22,12 @@ UNITS = {
 # Edges can be found to within the distance of samples only.
 SAMPLES = {"piecewise_constant": 10_000}
 
+LONG = (
+    ("sigmoid_network", "output"),
+    ("wavelet_network", "input"),
+    ("piecewise_constant", "input"),
+)
+
 
 def fitted(kind, side, *, noise=0.0, **others):
     maps = (kind, "none") if side == "input" else ("none", kind)
@@ -38,8 +44,15 @@ def fitted(kind, side, *, noise=0.0, **others):
     return fit([recording], ORDERS, options), measured(plant(*maps), seed=2)
 
 
-@pytest.mark.parametrize("side", ["input", "output"])
-@pytest.mark.parametrize("kind", UNITS)
+@pytest.mark.parametrize(
+    ("kind", "side"),
+    [
+        # Each kind on one side, and the cheap ones on both.
+        pytest.param(kind, side, marks=pytest.mark.slow if (kind, side) in LONG else ())
+        for kind in UNITS
+        for side in ("input", "output")
+    ],
+)
 def test_plant_with_a_map_of_its_kind_is_recovered(kind, side):
     result, other = fitted(kind, side)
     simulated = simulate(result.model, other.input)
