@@ -2,6 +2,7 @@
 
 import errno
 import logging
+from pathlib import Path
 
 import click
 
@@ -42,6 +43,7 @@ class _Commands(click.Group):
         """
         try:
             with stop_signals(ctx):
+                _require_current_folder()
                 return super().invoke(ctx)
         except NothingToDo as reason:
             click.echo(f"skipped: {reason}")
@@ -62,6 +64,15 @@ class _Commands(click.Group):
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002
         """Name the commands in the order in which they work."""
         return list(self.commands)
+
+
+def _require_current_folder() -> None:
+    """Raise HwidError where the current folder was deleted: many an import asks for it."""
+    try:
+        Path.cwd()
+    except FileNotFoundError:
+        message = "the current folder is gone; change to one that exists and run again"
+        raise HwidError(message) from None
 
 
 def _complain(message: str) -> None:
