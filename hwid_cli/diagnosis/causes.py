@@ -28,6 +28,8 @@ from hwid_cli.records.drive import Drive
 # Single repeats are damage where they are between these shares of the samples: more are
 # a hold, fewer may be chance.
 _LEAST_REPEATED, _MOST_REPEATED = 2e-3, 0.25
+# Repeats are damage where they are so many times those that a signal in steps has.
+_BY_CHANCE = 2.0
 # The input's noise may be so many times what its differences show.
 _LESS_NOISE, _MORE_NOISE = 0.7, 1.3
 # Innovations may be so far from white where the noise's size is right.
@@ -71,9 +73,24 @@ def _repeats(values: np.ndarray) -> np.ndarray:
     single = same[1:-1] & ~same[:-2] & ~same[2:]
     share = np.count_nonzero(single) / values.size
     moving = np.count_nonzero(~same) / values.size
-    if _LEAST_REPEATED <= share <= _MOST_REPEATED and moving > 1 - _MOST_REPEATED:
+    is_damage = np.count_nonzero(single) > _BY_CHANCE * max(_one_step(values), 1.0)
+    if (
+        is_damage
+        and _LEAST_REPEATED <= share <= _MOST_REPEATED
+        and moving > 1 - _MOST_REPEATED
+    ):
         found[2:-1] = single
     return found
+
+
+def _one_step(values: np.ndarray) -> float:
+    """How many samples repeat the one before where a signal is read in steps.
+
+    As many as move by one step up, or by one step down.
+    """
+    moves = np.abs(np.diff(values))
+    moves = moves[moves > 0]
+    return 0.5 * np.count_nonzero(moves < 1.5 * moves.min()) if moves.size else 0.0
 
 
 def whiteness_with_input_noise(
@@ -126,11 +143,7 @@ def _strength(
 ) -> float:
     """Variance of the input's noise that makes up what is left."""
     gains = [
-        float(
-            np.sum(
-                np.square(_impulse(*_discrete(drive, signals.sample_time_s), one.size))
-            )
-        )
+        _gain(drive, signals, one.size)
         for one, signals in zip(parts, problem.signals, strict=True)
     ]
     return excess / max(float(np.mean(gains)), 1e-300)
@@ -145,12 +158,17 @@ def fit_with_input_noise(
     """Fit again with the noise of the input taken into account.
 
     A fit to the output alone makes the drive too sluggish, because a smaller answer to
-    the input's noise leaves less. The innovations have no such bias.
+    the input's noise leaves less. Innovations in units of their own deviation, with the
+    size of both noises held, have no such bias.
 
     Parameters
     ----------
     point : ParameterPoint
         Where the fit to the output ended.
+
+    References
+    ----------
+    docs/method_diagnosis.md, eq. (D27).
     """
     n_shared = len(fit_layout.shared)
 
@@ -163,26 +181,27 @@ def fit_with_input_noise(
         drive = drive_at(problem, fit_layout, point)
         parts = residuals_at(problem, fit_layout, point)
         excess = _mean_square(parts) - noise.rms**2
+        if excess <= 0:
+            return point
+        strength = _strength(parts, problem, drive, excess) / noise.rms**2
 
-        def whitened(
-            coordinates: np.ndarray, drive: Drive = drive, excess: float = excess
-        ) -> np.ndarray:
-            filtered = [
-                _innovations(one, signals, drive, noise.rms, excess, np.inf)
-                for one, signals in zip(
-                    residuals_at(problem, fit_layout, at(coordinates)),
-                    problem.signals,
-                    strict=True,
-                )
-            ]
-            return np.concatenate(
-                [np.zeros(0) if one is None else one for one in filtered]
-            )
+        def scaled(coordinates: np.ndarray, strength: float = strength) -> np.ndarray:
+            drive = drive_at(problem, fit_layout, at(coordinates))
+            found = []
+            for one, signals in zip(
+                residuals_at(problem, fit_layout, at(coordinates)),
+                problem.signals,
+                strict=True,
+            ):
+                white = _whitened(one, signals, drive, strength)
+                # Where the filter does not exist, the residual as it is.
+                found.append(one if white is None else white[0] / np.sqrt(white[1]))
+            return np.concatenate(found)
 
         start = np.concatenate([point.shared, point.own.ravel()])
-        if whitened(start).size < start.size:
+        if scaled(start).size < start.size:
             return point
-        found = least_squares(whitened, start, method="lm", x_scale=1.0)
+        found = least_squares(scaled, start, method="lm", x_scale=1.0)
         point = at(found.x)
     return point
 
@@ -201,16 +220,25 @@ def _innovations(
     input_rms: float,
 ) -> np.ndarray | None:
     """Residual through the whitening filter of input and output noise."""
-    a, b, through = _discrete(drive, signals.sample_time_s)
-    impulse = _impulse(a, b, through, residual.size)
-    gain = float(impulse @ impulse)
+    gain = _gain(drive, signals, residual.size)
     if gain <= 0:
         return None
     limit = (_MORE_NOISE * input_rms) ** 2
     if excess <= 0 or excess / gain > limit:
         return None
-    # In units of the output's noise; the input's noise moves the reading at once, too.
-    strength = excess / gain / rms**2
+    white = _whitened(residual, signals, drive, excess / gain / rms**2)
+    return None if white is None else white[0]
+
+
+def _whitened(
+    residual: np.ndarray, signals: Signals, drive: Drive, strength: float
+) -> tuple[np.ndarray, float] | None:
+    """Innovations, and their variance in units of the output's noise.
+
+    ``strength`` is the variance of the input's noise in the same unit.
+    """
+    a, b, through = _discrete(drive, signals.sample_time_s)
+    # The input's noise moves the reading at once, too.
     reading = np.array([[1.0, 0.0]])
     moved = strength * np.outer(b, b)
     both = strength * through * b[:, None]
@@ -219,11 +247,18 @@ def _innovations(
         covariance = solve_discrete_are(a.T, reading.T, moved, read, s=both)
     except (np.linalg.LinAlgError, ValueError):
         return None
-    innovation = float((reading @ covariance @ reading.T)[0, 0]) + float(read[0, 0])
-    correct = ((a @ covariance @ reading.T + both) / innovation).ravel()
+    variance = float((reading @ covariance @ reading.T)[0, 0]) + float(read[0, 0])
+    correct = ((a @ covariance @ reading.T + both) / variance).ravel()
     top = np.poly(a)
     bottom = np.poly(a - np.outer(correct, reading))
-    return np.asarray(lfilter(top, bottom, residual))
+    return np.asarray(lfilter(top, bottom, residual)), variance
+
+
+def _gain(drive: Drive, signals: Signals, size: int) -> float:
+    """Mean square of the position that the input's noise of variance 1 moves from rest."""
+    impulse = _impulse(*_discrete(drive, signals.sample_time_s), size)
+    # A sample of the input moves the samples behind it only.
+    return float(np.square(impulse) @ (1.0 - np.arange(impulse.size) / impulse.size))
 
 
 def _discrete(

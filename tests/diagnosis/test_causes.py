@@ -1,0 +1,306 @@
+"""Causes of a gap in the measuring chain: repeats, noise of the input, interpolation."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.linalg import solve_triangular, toeplitz
+from scipy.optimize import least_squares
+from scipy.signal import cont2discrete, dlsim, lfilter
+
+from hwid_cli.diagnosis.causes import (
+    fit_with_input_noise,
+    left_over,
+    whiteness_but_for_neighbours,
+    whiteness_with_input_noise,
+    without_repeats,
+)
+from hwid_cli.diagnosis.noise import portmanteau, whiteness
+from hwid_cli.diagnosis.parameters import (
+    drive_at,
+    first_point,
+    parameter_layout,
+    residuals_at,
+)
+from hwid_cli.records.drive import Controller
+from tests.diagnosis.small_drive import (
+    DRIVE,
+    NOISE,
+    STEP_S,
+    N,
+    fit,
+    problem,
+    recordings,
+    sizes,
+    white,
+)
+
+
+def repeated(values, rows):
+    """Values in which some samples repeat the one before."""
+    found = values.copy()
+    found[rows] = found[rows - 1]
+    return found
+
+
+# Far enough apart that none follows another.
+ROWS = np.arange(57, 380, 37)
+
+
+def test_single_repeats_of_the_output_are_not_evaluated():
+    (given, *_) = recordings()
+    of = problem([replace(given, output=repeated(given.output, ROWS))])
+    (found,) = without_repeats(of).signals
+    assert found.n_evaluated == N - ROWS.size
+    np.testing.assert_array_equal(np.setdiff1d(np.arange(N), found.evaluated), ROWS)
+    np.testing.assert_array_equal(found.driven_by, given.input)
+
+
+def test_single_repeats_of_the_input_are_the_middle_of_their_neighbours():
+    given = recordings()[5]
+    of = problem([replace(given, input=repeated(given.input, ROWS))])
+    (found,) = without_repeats(of).signals
+    assert found.n_evaluated == N
+    expected = given.input.copy()
+    expected[ROWS] = 0.5 * (given.input[ROWS - 1] + given.input[ROWS + 1])
+    np.testing.assert_array_equal(found.driven_by, expected)
+
+
+def moving():
+    """A recording whose input and output change with every sample."""
+    time = STEP_S * np.arange(N)
+    (given, *_) = recordings()
+    return replace(given, input=np.sin(40 * time + 0.1), output=np.cos(31 * time + 0.2))
+
+
+@pytest.mark.parametrize("hold", [2, 3, 10])
+def test_an_input_that_is_held_over_samples_is_left_alone(hold):
+    given = moving()
+    held = np.repeat(given.input[::hold], hold)[:N]
+    of = problem([replace(given, input=held)])
+    assert without_repeats(of).signals == of.signals
+
+
+@pytest.mark.parametrize("levels", [20, 60, 150])
+def test_a_quantised_output_is_left_alone(levels):
+    given = moving()
+    steps = np.round(given.output * levels) / levels
+    assert np.count_nonzero(np.diff(steps) == 0) > 10
+    of = problem([replace(given, output=steps)])
+    assert without_repeats(of).signals == of.signals
+
+
+def test_a_rest_of_the_input_is_no_damage():
+    of = problem(recordings())
+    assert without_repeats(of).signals == of.signals
+
+
+def test_one_repeat_in_thousands_of_samples_may_be_chance():
+    rng = np.random.default_rng(1)
+    long = replace(moving(), input=rng.random(5000), output=rng.random(5000))
+    of = problem([replace(long, output=repeated(long.output, np.array([2500])))])
+    assert without_repeats(of).signals == of.signals
+
+
+# Noise of the input that moves the drive by about twice the noise of its sensor.
+INPUT_NOISE = 0.05
+
+
+def answer_to_a_pulse(drive=DRIVE):
+    """Of the drive to one sample of the input, by another route: a textbook's model."""
+    k, c, m = drive.stiffness_N_per_m, drive.damping_N_s_per_m, drive.mass_kg
+    model = (
+        np.array([[0.0, 1.0], [-k / m, -c / m]]),
+        np.array([[0.0], [drive.force_constant_N_per_A / m]]),
+        np.array([[1.0, 0.0]]),
+        np.array([[0.0]]),
+    )
+    found = cont2discrete(model, STEP_S, "foh")
+    pulse = np.zeros(N)
+    pulse[0] = 1.0
+    return dlsim((*found[:4], STEP_S), pulse)[1][:, 0]
+
+
+PULSE = answer_to_a_pulse()
+
+
+def factor_of_the_noise(pulse, input_noise):
+    """Lower factor of the covariance of a residual of N samples."""
+    transfer = toeplitz(pulse, np.zeros(N))
+    return np.linalg.cholesky(
+        NOISE**2 * np.eye(N) + input_noise**2 * transfer @ transfer.T
+    )
+
+
+def moved_by_input_noise(seed, count=9):
+    """What noise of the input leaves, by convolution, with that of the sensor."""
+    rng = np.random.default_rng(seed)
+    return [
+        np.convolve(PULSE, INPUT_NOISE * rng.standard_normal(N))[:N]
+        + NOISE * rng.standard_normal(N)
+        for _ in range(count)
+    ]
+
+
+def floor(input_rms=INPUT_NOISE):
+    return replace(white(), input_rms=input_rms)
+
+
+@pytest.fixture(scope="module")
+def of():
+    return problem()
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_what_noise_of_the_input_leaves_is_white_behind_the_filter(of, seed):
+    parts = moved_by_input_noise(seed)
+    found = whiteness_with_input_noise(parts, of, of.drive, floor())
+    # By another route: the covariance of the residual, inverted by its factors.
+    moved = np.mean(np.sum(np.square(toeplitz(PULSE, np.zeros(N))), axis=1))
+    size = np.sqrt((np.mean(np.square(parts)) - NOISE**2) / moved)
+    factor = factor_of_the_noise(PULSE, size)
+    free = [solve_triangular(factor, one, lower=True) for one in parts]
+    expected = portmanteau(free, (1.0,), n_lags=30)
+
+    assert whiteness(parts, floor()) > 100
+    assert expected < 1
+    # The same size by two routes makes the limit six times as wide. The filter is that of
+    # a noise that has lasted for ever, the covariance that of one from the first sample.
+    assert 6 * found == pytest.approx(expected, abs=0.02)
+
+
+@pytest.mark.parametrize("share", [0.5, 0.0])
+def test_an_input_that_shows_less_noise_is_not_the_cause(of, share):
+    parts = moved_by_input_noise(1)
+    noise = floor(share * INPUT_NOISE)
+    assert whiteness_with_input_noise(parts, of, of.drive, noise) == np.inf
+
+
+def test_an_input_that_shows_more_noise_has_to_leave_white_noise_by_itself(of):
+    parts = moved_by_input_noise(1)
+    alike = whiteness_with_input_noise(parts, of, of.drive, floor())
+    # A fast command looks like noise as well: the size is no evidence then.
+    louder = whiteness_with_input_noise(parts, of, of.drive, floor(2 * INPUT_NOISE))
+    assert louder == pytest.approx(6 * alike)
+
+
+def test_under_a_controller_the_input_is_not_the_cause(of):
+    held = replace(of, drive=replace(of.drive, controller=Controller(20.0, 30.0)))
+    parts = moved_by_input_noise(1)
+    assert whiteness_with_input_noise(parts, held, held.drive, floor()) == np.inf
+
+
+def test_the_cause_is_told_with_what_is_left(of):
+    assert left_over(moved_by_input_noise(2), of, of.drive, floor())[1] == "input_noise"
+    rng = np.random.default_rng(2)
+    alone = [NOISE * rng.standard_normal(N) for _ in range(9)]
+    assert left_over(alone, of, of.drive, floor())[1] == ""
+
+
+@pytest.mark.parametrize("force", [0.3, 0.8])
+def test_missing_friction_is_no_noise_of_the_input(force):
+    given = recordings({"coulomb_friction": {"force_N": force}})
+    rng = np.random.default_rng(5)
+    noisy = [
+        replace(one, input=one.input + 0.01 * np.r_[0, rng.standard_normal(N - 1)])
+        for one in given
+    ]
+    of = problem(noisy)
+    layout, point, parts = at(of, fit(of))
+    for input_rms in (0.01, 0.1):
+        left, cause = left_over(
+            parts, of, drive_at(of, layout, point), floor(input_rms)
+        )
+        assert (cause, left > 1) == ("", True)
+
+
+def at(of, found):
+    """Layout, point and residuals of a fit of the base."""
+    layout = parameter_layout(of, (), {}, sizes(of))
+    point = first_point(of, layout, replace(of.drive, **base_of(found)), {})
+    return layout, point, residuals_at(of, layout, point)
+
+
+def base_of(found):
+    return {
+        one.parameter: value
+        for one, value in zip(found.names, found.values, strict=True)
+    }
+
+
+def test_a_fit_that_knows_of_the_noise_of_the_input_is_the_weighted_one():
+    rng = np.random.default_rng(3)
+    # It rests under its first sample, which is read without noise.
+    given = [
+        replace(one, input=one.input + 0.3 * np.r_[0, rng.standard_normal(N - 1)])
+        for one in recordings(noise=NOISE)
+    ]
+    of = problem(given)
+    layout, plain, _ = at(of, fit(of))
+    found = fit_with_input_noise(of, layout, plain, floor(0.3))
+    weighted = fit_by_factors(of, layout, plain, 0.3)
+    expected, started, ended = (
+        np.array([drive.damping_N_s_per_m, drive.stiffness_N_per_m])
+        for drive in (drive_at(of, layout, one) for one in (weighted, plain, found))
+    )
+    # It takes the size of the noise from the residuals, 2 % off.
+    assert np.all(np.abs(ended - expected) < 0.1 * np.abs(started - expected))
+
+
+def fit_by_factors(of, layout, point, input_noise):
+    """Weighted with the covariance of the noise at each trial of the parameters."""
+
+    def errors(shared):
+        trial = replace(point, shared=shared)
+        pulse = answer_to_a_pulse(drive_at(of, layout, trial))
+        parts = np.column_stack(residuals_at(of, layout, trial))
+        factor = factor_of_the_noise(pulse, input_noise)
+        return solve_triangular(factor, parts, lower=True).ravel()
+
+    return replace(point, shared=least_squares(errors, point.shared).x)
+
+
+def linked(seed, share=1.0):
+    """White noise, read between uneven samples by straight lines."""
+    rng = np.random.default_rng(seed)
+    parts = []
+    for _ in range(9):
+        noise = NOISE * rng.standard_normal(N + 2)
+        late = share * rng.uniform(-0.5, 0.5, N)
+        beside = np.where(late > 0, noise[2:], noise[:-2])
+        parts.append((1 - np.abs(late)) * noise[1:-1] + np.abs(late) * beside)
+    return parts
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_noise_that_interpolation_has_linked_is_noise(of, seed):
+    parts = linked(seed)
+    noise = white()
+    assert whiteness(parts, noise) > 1
+    left, cause = left_over(parts, of, of.drive, noise)
+    assert (left < 1, cause) == (True, "interpolation")
+
+
+@pytest.mark.parametrize(
+    "taps",
+    [
+        # Neighbours go together more than interpolation makes them.
+        [1.0, 1.0],
+        # Differences: neighbours go apart.
+        [1.0, -0.3],
+        # Slow noise: so do samples further apart.
+        [1.0, 0.3, 0.3],
+        # Nothing between neighbours, but between others.
+        [1.0, 0, 0, 0, 0.3],
+    ],
+)
+def test_noise_that_is_linked_otherwise_is_something(of, taps):
+    rng = np.random.default_rng(7)
+    parts = [lfilter(taps, [1.0], NOISE * rng.standard_normal(N)) for _ in range(9)]
+    left, cause = left_over(parts, of, of.drive, white())
+    assert (left > 1, cause) == (True, "")
+
+
+def test_where_the_noise_is_coloured_already_nothing_is_linked():
+    coloured = replace(white(), is_coloured=True, whitening=(1.0, -0.3))
+    assert whiteness_but_for_neighbours(linked(1), coloured) == np.inf
