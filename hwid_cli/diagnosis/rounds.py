@@ -63,6 +63,8 @@ STANDS_OUT = 0.5
 # so many times.
 WORTH_MORE = 2.0
 MOST_TURNS = 3
+# A set is searched on again if it left at most this share of what it left before.
+LEAST_TURN = 0.95
 # Sets that the next larger ones are built on, each of which explains this share.
 MOST_PARENTS = 2
 LEAST_OF_PARENT = 0.1
@@ -469,11 +471,21 @@ class _Search:
     def _go_on(self, size: int) -> None:
         """Search on where the best sets stopped at the limit of iterations."""
         present = drive_effects(self.rounds.problem.drive)
+        excess = self.rounds.criteria.excess
+        before: dict[Effects, float] = {}
         for _ in range(MOST_TURNS):
             best = self.best_of_size(size)
             if best is None:
                 return
-            least = WORTH_MORE * self.rounds.criteria.excess(best)
+            unfinished = [
+                one
+                for one in self._of_size(size)
+                if not one.has_converged
+                and one.is_usable
+                and excess(one) <= WORTH_MORE * excess(best)
+                and excess(one) <= LEAST_TURN * before.get(one.effects, np.inf)
+            ]
+            before = {one.effects: excess(one) for one in unfinished}
             sets = {
                 one.effects: self._unless_tried(
                     one.effects,
@@ -483,10 +495,7 @@ class _Search:
                         )
                     ],
                 )
-                for one in self._of_size(size)
-                if not one.has_converged
-                and one.is_usable
-                and self.rounds.criteria.excess(one) <= least
+                for one in unfinished
             }
             sets = {ids: starts for ids, starts in sets.items() if starts}
             if not sets:
