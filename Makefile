@@ -14,7 +14,7 @@ DEV := $(VENV)/installed-dev
         bench bench-beyond bench-campaign bench-growth bench-maps bench-rounds bench-search bench-starts bench-wide \
         bench-real scale \
         simulate calibrate identify crossval group test-stage steps model1 model2 \
-        reproduction thesis chapter2 hsm150 diagnose gun real effects drive-source model-schema golden export-check blind
+        reproduction thesis chapter2 hsm150 diagnose gun real effects drive-source model-schema golden export-check blind machines
 
 help:  ## show these targets
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / {printf "  make %-14s %s\n", $$1, $$2}' Makefile
@@ -185,6 +185,11 @@ blind: $(DEV)  ## blind test with effects hidden by a separate generator, and do
 	$(BIN)/python tests/blind/run_blind.py --suite full --suite poor --suite clean --suite nuisance \
 	  --suite outside --suite near --suite pairs --suite small --seeds reporting \
 	  --number $(BLIND_NUMBER) --jobs 2 --work $(BLIND) --write docs/blind_test.md
+
+# Independent equations and integrators. Seeds `reporting` are for reports only.
+machines: $(DEV)  ## diagnosis of machines of independent making, and docs/independent_machines.md: an hour
+	$(BIN)/python -m tests.machines.run_machines --seeds reporting --jobs 2 \
+	  --work results/machines --write results/machines/table.md
 
 hsm150: $(RUN)  ## all stages on measurements of a real servo motor, and linear models of them
 	$(HWID) run configs/hsm150_linear.yaml
