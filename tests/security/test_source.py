@@ -33,7 +33,7 @@ _OWN_FUNCTION = "hwid_cli/model/maps/own_function.py"
 ALLOWED_MODULES = {
     ("hwid_cli/tasks/workers.py", "pickle"),
     ("hwid_cli/tasks/cluster.py", "pickle"),
-    ("hwid_cli/data/isolated_reading.py", "subprocess"),
+    ("hwid_cli/files/isolated_process.py", "subprocess"),
     ("hwid_cli/export/fmu.py", "subprocess"),
     ("hwid_cli/export/fmu.py", "xml.sax.saxutils"),
 }
