@@ -8,20 +8,30 @@ until both agree: only then is it confirmed. docs/method_diagnosis.md, eq. (D30)
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 from scipy.optimize import least_squares
+from scipy.signal import butter, sosfiltfilt
 
 from hwid_cli.diagnosis.candidate import at_point, rebuilt
 from hwid_cli.diagnosis.causes import without_repeats
 from hwid_cli.diagnosis.diagnose import find, held_out_of
 from hwid_cli.diagnosis.findings import Findings, describe
-from hwid_cli.diagnosis.parameters import ParameterPoint, simulate_at
+from hwid_cli.diagnosis.parameters import (
+    BASE,
+    ParameterLayout,
+    ParameterPoint,
+    each_sum_of_squares,
+    residuals_at,
+    simulate_at,
+)
 from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals, prepare
 from hwid_cli.diagnosis.rounds import DiagnosisTask, OnRound, RunTasks
 from hwid_cli.diagnosis.search import fit_own, fit_point
 from hwid_cli.diagnosis.stand_in import (
+    Moved,
     derived,
     fit_stand_in,
     force_along,
@@ -31,10 +41,10 @@ from hwid_cli.diagnosis.stand_in import (
     standing_for,
 )
 from hwid_cli.drive.catalogue import CATALOGUE
-from hwid_cli.drive.simulation import NO_FORCE
-from hwid_cli.records.candidates import CandidateFit
+from hwid_cli.drive.simulation import NO_FORCE, Motion
+from hwid_cli.records.candidates import CandidateFit, ParameterRef
 from hwid_cli.records.diagnosis import BaseParameter, Diagnosis
-from hwid_cli.records.drive import Drive
+from hwid_cli.records.drive import BASE_PARAMETERS, Drive
 from hwid_cli.records.experiment import DiagnoseOptions, SimulationOptions
 from hwid_cli.records.programs import (
     Capabilities,
@@ -48,6 +58,8 @@ from hwid_cli.records.recordings import Recording
 # may be no more exact than a millionth.
 _DIFFERENCE = 1e-3
 _MOST_EVALUATIONS = 8
+# The same by parameters of effects, in their coordinates: across corners of thresholds.
+_EFFECT_DIFFERENCE = 3e-4
 # Recordings that its parameters are fitted to.
 _MOST_FITTED = 6
 # The force of the test push moves the simulation by this share of its motion.
@@ -56,9 +68,19 @@ _PUSH_LIMITS = (0.005, 0.3)
 _MOST_PUSHES = 4
 # Runs with the effect, and the share of what remains (or of the noise) by which loop and
 # simulation may differ.
-_MOST_TURNS = 6
+_MOST_TURNS = 8
 _AGREEMENT = 0.1
 _TURN_ITERATIONS = 10
+# Searches, each from where the last one has moved the parameters by more than this.
+_MOST_SEARCHES = 3
+_MOVED = 0.01
+# What is confirmed leaves at most so many times the squares that the stand-in left.
+_NO_WORSE = 1.2
+# The simulation's own parameters rather than further forces, if no more squares are left.
+_PREFERRED = 2.0
+# Filter of the forces that correct the stand-in, to a twentieth of the sampling rate.
+_SLOW_ONES = butter(2, 0.1, output="sos")
+_FEWEST = 30
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,14 +185,30 @@ def diagnose_foreign(
         on_round("its parameters", 0)
         values = _fit_parameters(runs, problem, values)
         given = runs.of(problem.signals, values)
-    drive = replace(problem.drive, **_base(fit_stand_in(problem.signals, given)))
-    drive = _in_newtons(runs, problem.signals, given, values, drive)
-    drive = replace(drive, effects={k: dict(v) for k, v in simulator.effects.items()})
-    problem = _with_stand_in(problem, drive, given)
-    found = find(problem, options, run_tasks, on_round, given_sse)
-    on_round("the effect in the simulation", 0)
-    after, is_confirmed = _confirmed(found, runs, values)
-    return _told(after, simulator, values, is_confirmed=is_confirmed)
+    refitted = values
+    for _ in range(_MOST_SEARCHES):
+        drive = replace(problem.drive, **_base(fit_stand_in(problem.signals, given)))
+        drive = _in_newtons(runs, problem.signals, given, values, drive)
+        drive = replace(
+            drive, effects={k: dict(v) for k, v in simulator.effects.items()}
+        )
+        standing = _with_stand_in(problem, drive, given)
+        found = find(standing, options, run_tasks, on_round, given_sse)
+        on_round("the effect in the simulation", 0)
+        found, moved, is_confirmed = _confirmed(found, runs, values)
+        is_done = is_confirmed and found.verdict.is_complete
+        has_moved = any(
+            abs(moved[one] - values[one]) > _MOVED * abs(values[one])
+            for one in simulator.free
+        )
+        values = moved
+        if is_done or not has_moved:
+            break
+        # Parameters that imitated what is missing have led elsewhere.
+        given = runs.of(problem.signals, values)
+    told = _told(found, simulator, (refitted, values))
+    confirmed = "simulation" if is_confirmed else "surrogate"
+    return replace(told, confirmed=confirmed)
 
 
 def _base(drive: Drive) -> dict[str, Any]:
@@ -291,53 +329,93 @@ def _test_push(signals: Signals) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class _Turn:
-    """A fit of the chosen set, and the simulation's own run with it."""
+    """A fit of the chosen set, and how the simulation's own run with it differs.
+
+    Parameters
+    ----------
+    problem : DiagnosisProblem
+        Of the stand-in as it was corrected last.
+    fit : CandidateFit
+        To it.
+    values : dict of str to float
+        Parameters of the simulation that go with it.
+    tried : tuple of CandidateFit and dict of str to float, or None
+        What the simulation itself was run with.
+    sse : ndarray, shape (n_recordings,), [output unit squared]
+        That it left then.
+    disagreement : float, [output unit]
+        RMS between that run and what the stand-in had said.
+    """
 
     problem: DiagnosisProblem
     fit: CandidateFit
-    outputs: tuple[np.ndarray, ...]
-    disagreement: float
+    values: dict[str, float]
+    tried: tuple[CandidateFit, dict[str, float]] | None = None
+    sse: np.ndarray = field(default_factory=lambda: np.array([np.inf]))
+    disagreement: float = np.inf
 
 
 def _confirmed(
-    findings: Findings, runs: _Runs, values: Mapping[str, float]
-) -> tuple[Findings, bool]:
+    findings: Findings, runs: _Runs, values: dict[str, float]
+) -> tuple[Findings, dict[str, float], bool]:
     """Put what was found into the simulation, and fit it again to what that gives."""
     chosen, verdict = findings.verdict.chosen, findings.verdict
     if runs.simulator.run is None:
-        return findings, False
+        return findings, values, False
     if not chosen.effects and verdict.word in ("none", "unknown"):
-        return findings, True
-    turn = _Turn(findings.problem, chosen, (), np.inf)
-    best = None
+        return findings, values, True
+    # The simulation's own parameters do what the stand-in's base did; where they cannot,
+    # forces that go with displacement, velocity and input do it.
+    first = _Turn(findings.problem, chosen, values)
+    ways = (
+        [replace(first, problem=_held(findings.problem))] if runs.simulator.free else []
+    )
+    turns = [_best_turn(findings, start, runs) for start in [*ways, first]]
+    least = min(float(one.sse.sum()) for one in turns)
+    best = next(one for one in turns if float(one.sse.sum()) <= _PREFERRED * least)
+    if best.tried is None:
+        return findings, values, False
+    fit, values = best.tried
+    found = _with_fit(findings, replace(best, fit=replace(fit, sse=best.sse)))
+    return found, values, _is_as_good(findings, best)
+
+
+def _held(problem: DiagnosisProblem) -> DiagnosisProblem:
+    """The same with a base that no fit moves."""
+    return replace(problem, known=dict.fromkeys(BASE_PARAMETERS, 0.0))
+
+
+def _best_turn(findings: Findings, turn: _Turn, runs: _Runs) -> _Turn:
+    """Turn after turn until stand-in and simulation agree; the best of the runs."""
+    best = turn
     for _ in range(_MOST_TURNS):
-        following = _next_turn(findings, turn, runs, values)
+        following = _next_turn(findings, turn, runs)
         if following is None:
             break
-        if best is None or following.disagreement < best.disagreement:
-            best = following
-        if _agrees(findings, following):
-            break
         turn = following
-    if best is None or not _agrees(findings, best):
-        return findings, False
-    return _with_outputs(findings, best), True
+        if turn.sse.sum() < best.sse.sum():
+            best = turn
+        if _agrees(findings, turn) and _is_as_good(findings, turn):
+            break
+    return best
 
 
 def _agrees(findings: Findings, turn: _Turn) -> bool:
-    noise = findings.criteria.noise.rms
+    """Whether the run is what the stand-in had said, but for a part of what remains."""
     n = sum(one.n_evaluated for one in turn.problem.signals)
-    remains = float(np.sqrt(turn.fit.sse.sum() / n))
-    return turn.disagreement <= _AGREEMENT * max(remains, noise)
+    remains = float(np.sqrt(turn.sse.sum() / n))
+    return turn.disagreement <= _AGREEMENT * max(remains, findings.criteria.noise.rms)
 
 
-def _next_turn(
-    findings: Findings, turn: _Turn, runs: _Runs, values: Mapping[str, float]
-) -> _Turn | None:
+def _is_as_good(findings: Findings, turn: _Turn) -> bool:
+    """Whether the run leaves no more than the stand-in alone did."""
+    return float(turn.sse.sum()) <= _NO_WORSE * float(findings.verdict.chosen.sse.sum())
+
+
+def _next_turn(findings: Findings, turn: _Turn, runs: _Runs) -> _Turn | None:
     """Run the simulation with the effect's force; correct the stand-in; fit again."""
-    problem, scales = turn.problem, findings.scales
-    fit_layout, point = rebuilt(problem, turn.fit, scales)
-    motions = simulate_at(problem, fit_layout, point)
+    problem = turn.problem
+    motions = simulate_at(problem, *rebuilt(problem, turn.fit, findings.scales))
     drive = replace(problem.drive, effects={})
     forces = [
         force_of_motion(drive, one, motion)
@@ -345,26 +423,214 @@ def _next_turn(
     ]
     if not all(np.isfinite(one).all() for one in forces):
         return None
-    found = _pushed(runs, problem, turn.fit, forces, values)
-    signals, outputs, errors = [], [], []
-    for one, motion, force, run in zip(
-        problem.signals, motions, forces, found, strict=True
+    push = partial(_pushed, runs, problem, turn.fit, forces)
+    found = push(turn.values)
+    late = [
+        run.output - motion.position - (0.0 if one.offset is None else one.offset)
+        for one, motion, run in zip(problem.signals, motions, found, strict=True)
+    ]
+    corrected = _corrected(problem, late, [run.output for run in found], forces)
+    following = _Turn(
+        problem=corrected,
+        fit=turn.fit,
+        values=turn.values,
+        tried=(turn.fit, turn.values),
+        sse=_left(problem, motions, found),
+        disagreement=_rms_of(problem, late),
+    )
+    if not problem.known:
+        return replace(following, fit=_fitted_again(corrected, turn.fit, findings))
+    slopes = _slopes(runs, push, turn.values, found)
+    return _with_values(following, slopes, (found, forces), runs, findings)
+
+
+def _left(
+    problem: DiagnosisProblem, motions: Sequence[Motion], found: Sequence[SimulatorRun]
+) -> np.ndarray:
+    """Sum of squares of each recording; a sensor's effect is on top of the run."""
+    return each_sum_of_squares(
+        [
+            (one.compared - run.output - (motion.output - motion.position))[
+                one.evaluated
+            ]
+            for one, motion, run in zip(problem.signals, motions, found, strict=True)
+        ]
+    )
+
+
+def _rms_of(problem: DiagnosisProblem, late: Sequence[np.ndarray]) -> float:
+    parts = [
+        error[one.evaluated] for one, error in zip(problem.signals, late, strict=True)
+    ]
+    return float(np.sqrt(np.mean(np.concatenate(parts) ** 2)))
+
+
+def _with_values(
+    turn: _Turn,
+    slopes: Sequence[np.ndarray],
+    run_with: tuple[Sequence[SimulatorRun], Sequence[np.ndarray]],
+    runs: _Runs,
+    findings: Findings,
+) -> _Turn:
+    """Fit effects and the simulation's parameters together; move both.
+
+    Parameters
+    ----------
+    slopes : sequence of ndarray, shape (n_samples, n_free)
+    run_with : tuple
+        The last runs, and the forces that they were made with.
+    """
+    found, forces = run_with
+    fit, change = _fitted_together(turn.problem, turn.fit, slopes, findings)
+    values = dict(turn.values)
+    for column, (name, one) in enumerate(runs.simulator.free.items()):
+        low, high = one.bounds or (-np.inf, np.inf)
+        values[name] = float(np.clip(values[name] + change[column], low, high))
+    # What the change of the parameters should do, until the next run shows it.
+    more = [one @ change for one in slopes]
+    targets = [run.output + add for run, add in zip(found, more, strict=True)]
+    problem = _corrected(turn.problem, more, targets, forces)
+    return replace(turn, problem=problem, fit=fit, values=values)
+
+
+def _corrected(
+    problem: DiagnosisProblem,
+    late: Sequence[np.ndarray],
+    targets: Sequence[np.ndarray],
+    forces: Sequence[np.ndarray],
+) -> DiagnosisProblem:
+    """The stand-in with a further force that moves it by what it was late.
+
+    Parameters
+    ----------
+    late, targets : sequence of ndarray, shape (n_samples,), [output unit]
+        What is added to its motion, and where that has to lead.
+    forces : sequence of ndarray, [N]
+        Of the effect, with which it has to lead there.
+    """
+    drive = replace(problem.drive, effects={})
+    signals = []
+    for one, change, target, force in zip(
+        problem.signals, late, targets, forces, strict=True
     ):
-        offset = np.zeros(1) if one.offset is None else one.offset
-        late = run.output - (motion.position + offset)
-        errors.append(late[one.evaluated])
-        outputs.append(motion.output + offset + late)
-        change = SimulatorRun(late, np.zeros(0))
-        more = force_along(drive, derived(change, one.sample_time_s), 0 * late)
-        better = replace(one, force=one.force + more)
-        moved = derived(run, one.sample_time_s)
-        plain = moved_plainly(drive, better, better.force + force, moved)
-        signals.append(replace(better, offset=run.output - plain.position))
-    whole = np.concatenate(errors)
-    disagreement = float(np.sqrt(np.mean(whole**2)))
-    corrected = replace(problem, signals=tuple(signals))
-    fit = _fitted_again(corrected, turn.fit, findings)
-    return _Turn(corrected, fit, tuple(outputs), disagreement)
+        moved = _moved_by(change, one)
+        more = one.force + _slow(force_along(drive, moved, np.zeros(change.size)))
+        there = _moved_by(target, one)
+        plain = moved_plainly(drive, one, more + force, there)
+        signals.append(replace(one, force=more, offset=target - plain.position))
+    return replace(problem, signals=tuple(signals))
+
+
+def _slow(force: np.ndarray) -> np.ndarray:
+    """A force without what changes from sample to sample, which adds up in the turns."""
+    if force.size <= _FEWEST:
+        return force
+    return np.asarray(sosfiltfilt(_SLOW_ONES, force))
+
+
+def _slopes(
+    runs: _Runs,
+    push: Callable[[dict[str, float]], list[SimulatorRun]],
+    values: dict[str, float],
+    found: Sequence[SimulatorRun],
+) -> list[np.ndarray]:
+    """Derivatives of each recording's output by the simulation's free parameters.
+
+    Returns
+    -------
+    list of ndarray, shape (n_samples, n_free)
+    """
+    columns: list[list[np.ndarray]] = [[] for _ in found]
+    for name, one in runs.simulator.free.items():
+        step = _DIFFERENCE * (abs(values[name]) or abs(one.value) or 1.0)
+        if one.bounds and values[name] + step > one.bounds[1]:
+            step = -step
+        there = push({**values, name: values[name] + step})
+        for row, (after, before) in enumerate(zip(there, found, strict=True)):
+            columns[row].append((after.output - before.output) / step)
+    return [np.column_stack(one) for one in columns]
+
+
+def _fitted_together(
+    problem: DiagnosisProblem,
+    before: CandidateFit,
+    slopes: Sequence[np.ndarray],
+    findings: Findings,
+) -> tuple[CandidateFit, np.ndarray]:
+    """Fit of effects and of the simulation's parameters, which act along straight lines.
+
+    Returns
+    -------
+    CandidateFit
+        As if the parameters had been changed.
+    change : ndarray, shape (n_free,)
+    """
+    rows = [row for row, one in enumerate(problem.signals) if not one.is_held_out]
+    fit_layout, point = rebuilt(problem, before, findings.scales)
+    # A change of the output is one of the force, to which the effect reacts.
+    drive = replace(problem.drive, effects={})
+    lengths = np.sqrt(sum(np.sum(slopes[row] ** 2, axis=0) for row in rows))
+    sizes = (
+        findings.criteria.noise.rms
+        * np.sqrt(sum(one.n_evaluated for one in problem.signals))
+        / np.where(lengths > 0, lengths, 1.0)
+    )
+    pushes = [
+        np.column_stack(
+            [
+                force_along(drive, _moved_by(column, one), np.zeros(column.size))
+                for column in slope.T
+            ]
+        )
+        for one, slope in zip(problem.signals, slopes, strict=True)
+    ]
+    n_free, n_shared = sizes.size, len(fit_layout.shared)
+
+    def changed(coordinates: np.ndarray) -> DiagnosisProblem:
+        change = coordinates[:n_free] * sizes
+        signals = tuple(
+            replace(one, force=one.force + push @ change)
+            for one, push in zip(problem.signals, pushes, strict=True)
+        )
+        return replace(problem, signals=signals)
+
+    def at(coordinates: np.ndarray) -> ParameterPoint:
+        shared = coordinates[n_free : n_free + n_shared]
+        own = coordinates[n_free + n_shared :].reshape(len(rows), -1)
+        inside = [
+            one.coordinate(one.value(q))
+            for one, q in zip(fit_layout.shared, shared, strict=True)
+        ]
+        return ParameterPoint(np.array(inside), own)
+
+    def errors(coordinates: np.ndarray) -> np.ndarray:
+        train = changed(coordinates).part(held_out=False)
+        return np.concatenate(residuals_at(train, fit_layout, at(coordinates)))
+
+    start = np.r_[np.zeros(n_free), point.shared, point.own[rows].ravel()]
+    found = least_squares(
+        errors, start, lambda at_point: _derivatives(errors, at_point), method="lm"
+    )
+    moved = changed(found.x)
+    fit = _evaluated(moved, before, fit_layout, at(found.x), findings)
+    return fit, found.x[:n_free] * sizes
+
+
+def _moved_by(change: np.ndarray, signals: Signals) -> Moved:
+    return derived(SimulatorRun(change, np.zeros(0)), signals.sample_time_s)
+
+
+def _derivatives(
+    errors: Callable[[np.ndarray], np.ndarray], point: np.ndarray
+) -> np.ndarray:
+    """Derivatives by coordinates, by differences that look across corners."""
+    before = errors(point)
+    columns = []
+    for column in range(point.size):
+        moved = point.copy()
+        moved[column] += _EFFECT_DIFFERENCE
+        columns.append((errors(moved) - before) / _EFFECT_DIFFERENCE)
+    return np.column_stack(columns)
 
 
 def _pushed(
@@ -390,45 +656,64 @@ def _fitted_again(
     problem: DiagnosisProblem, before: CandidateFit, findings: Findings
 ) -> CandidateFit:
     """The same set, from where it was."""
-    train = problem.part(held_out=False)
     fit_layout, point = rebuilt(problem, before, findings.scales)
     rows = [row for row, one in enumerate(problem.signals) if not one.is_held_out]
-    held = [row for row, one in enumerate(problem.signals) if one.is_held_out]
-    start = ParameterPoint(point.shared, point.own[rows])
-    found = fit_point(train, fit_layout, start, max_iterations=_TURN_ITERATIONS)
-    own = point.own.copy()
-    own[rows] = found.point.own
-    if held:
+    found = fit_point(
+        problem.part(held_out=False),
+        fit_layout,
+        ParameterPoint(point.shared, point.own[rows]),
+        max_iterations=_TURN_ITERATIONS,
+    )
+    return _evaluated(problem, before, fit_layout, found.point, findings)
+
+
+def _evaluated(
+    problem: DiagnosisProblem,
+    before: CandidateFit,
+    fit_layout: ParameterLayout,
+    of_train: ParameterPoint,
+    findings: Findings,
+) -> CandidateFit:
+    """The fit with what belongs to each held-out recording alone found from it."""
+    own = np.zeros((len(problem.signals), of_train.own.shape[1]))
+    held = np.array([one.is_held_out for one in problem.signals])
+    own[~held] = of_train.own
+    if held.any():
         part = problem.part(held_out=True)
-        own[held] = fit_own(part, fit_layout, found.point.shared).own
-    return at_point(
-        problem, before, fit_layout, ParameterPoint(found.point.shared, own),
-        findings.criteria.noise,
-    )  # fmt: skip
+        own[held] = fit_own(part, fit_layout, of_train.shared).own
+    point = ParameterPoint(of_train.shared, own)
+    return at_point(problem, before, fit_layout, point, findings.criteria.noise)
 
 
-def _with_outputs(findings: Findings, turn: _Turn) -> Findings:
-    """Findings with the fit that the simulation itself has confirmed."""
-    verdict = replace(findings.verdict, chosen=turn.fit)
-    return replace(findings, problem=turn.problem, verdict=verdict)
+def _with_fit(findings: Findings, turn: _Turn) -> Findings:
+    """Findings with the fit that the simulation itself has confirmed.
+
+    Its base is free again, so that intervals count what it could take over.
+    """
+    problem, fit = replace(turn.problem, known={}), turn.fit
+    told = {one.owner for one in fit.names}
+    if BASE not in told:
+        drive = problem.drive
+        names = [name for name in BASE_PARAMETERS if getattr(drive, name) != 0]
+        fit = replace(
+            fit,
+            names=(*(ParameterRef(BASE, name) for name in names), *fit.names),
+            values=np.r_[[getattr(drive, name) for name in names], fit.values],
+        )
+    return replace(
+        findings, problem=problem, verdict=replace(findings.verdict, chosen=fit)
+    )
 
 
 def _told(
-    after: Findings,
+    findings: Findings,
     simulator: Simulator,
-    values: Mapping[str, float],
-    *,
-    is_confirmed: bool,
+    values: tuple[Mapping[str, float], Mapping[str, float]],
 ) -> Diagnosis:
-    """The diagnosis in the simulation's own words."""
-    told = describe(after)
+    """The diagnosis with the simulation's own parameters, re-fitted and at last."""
+    told = describe(findings)
     base = tuple(
-        BaseParameter(name, one.value, values[name], values[name])
+        BaseParameter(name, one.value, *(of[name] for of in values))
         for name, one in simulator.free.items()
     )
-    return replace(
-        told,
-        base=base or told.base,
-        confirmed="simulation" if is_confirmed else "surrogate",
-        capabilities=simulator.capabilities,
-    )
+    return replace(told, base=base or told.base, capabilities=simulator.capabilities)

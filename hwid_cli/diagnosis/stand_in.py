@@ -10,8 +10,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy import sparse
 from scipy.interpolate import make_interp_spline
 from scipy.optimize import nnls
+from scipy.sparse.linalg import spsolve
 
 from hwid_cli.diagnosis.parameters import drive_at, first_point, parameter_layout
 from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals
@@ -28,6 +30,8 @@ _LEAST_MASS = 1e-12
 _ITERATIONS = 20
 # A first velocity below this share of the largest is rest.
 _STILL = 1e-3
+# Weight of the bends of a force against its means.
+_SMOOTHNESS = 1e-2
 
 
 @dataclass(frozen=True, eq=False)
@@ -218,8 +222,8 @@ def moved_plainly(
 def force_of_motion(drive: Drive, signals: Signals, motion: Motion) -> np.ndarray:
     """Force beside input and stand-in force that a motion needs: what an effect makes.
 
-    Impulses between samples are exact, so that a jump of the force within a sample is
-    spread over it.
+    Between samples it is a straight line with the impulse that the motion needs, so that
+    a jump of the force within a sample is spread over it.
 
     Returns
     -------
@@ -234,5 +238,19 @@ def force_of_motion(drive: Drive, signals: Signals, motion: Motion) -> np.ndarra
         + drive.stiffness_N_per_m * area
     )
     given = drive.force_constant_N_per_A * signals.driven_by + signals.force
-    mean = impulse / dt - 0.5 * (given[1:] + given[:-1])
-    return np.r_[mean[0], 0.5 * (mean[1:] + mean[:-1]), mean[-1]]
+    return _with_means(impulse / dt - 0.5 * (given[1:] + given[:-1]))
+
+
+def _with_means(means: np.ndarray) -> np.ndarray:
+    """Corners of straight lines that have given means, without going up and down.
+
+    Corners that go up and down from sample to sample change no mean: the smoothest ones
+    are taken.
+    """
+    size = means.size + 1
+    if size < 4 or not np.isfinite(means).all():
+        return np.r_[means[:1], 0.5 * (means[1:] + means[:-1]), means[-1:]]
+    pairs = sparse.diags([0.5, 0.5], [0, 1], shape=(size - 1, size))
+    bends = sparse.diags([1.0, -2.0, 1.0], [0, 1, 2], shape=(size - 2, size))
+    matrix = pairs.T @ pairs + _SMOOTHNESS * (bends.T @ bends)
+    return np.asarray(spsolve(matrix.tocsc(), pairs.T @ means))
