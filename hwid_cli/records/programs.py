@@ -10,6 +10,7 @@ from typing import Annotated
 
 import numpy as np
 
+from hwid_cli.records.drive import Repeatable
 from hwid_cli.records.model import HammersteinWiener
 from hwid_cli.records.rules import (
     NO_KEY,
@@ -66,6 +67,8 @@ class _Program:
         A plain number is handed over and stays as it is.
     time_limit_s : float, [s]
         Of one run.
+    effects : dict of str to dict of str to float or str
+        Put into the simulation beside what it has.
     """
 
     input: Annotated[str, Filled("the name of an input")]
@@ -74,6 +77,9 @@ class _Program:
     velocity: str | None = None
     parameters: dict[str, float | FreeParameter] = field(default_factory=dict)
     time_limit_s: Annotated[float, _TIME_LIMIT] = 60.0
+    effects: Annotated[dict[str, dict[str, float | str]], Repeatable()] = field(
+        default_factory=dict
+    )
 
     @property
     def free(self) -> dict[str, FreeParameter]:
@@ -147,6 +153,9 @@ class ModelSimulation:
     file: Annotated[str, Filled("a model's JSON file")]
     model: HammersteinWiener | None = field(default=None, metadata=NO_KEY)
     model_sample_time_s: float = field(default=0.0, metadata=NO_KEY)
+    effects: Annotated[dict[str, dict[str, float | str]], Repeatable()] = field(
+        default_factory=dict
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -154,6 +163,9 @@ class OutputsSimulation:
     """What a simulation has given: ``recordings.columns.simulated``."""
 
     kind: Annotated[str, OneOf(["outputs"])] = "outputs"
+    effects: Annotated[dict[str, dict[str, float | str]], Repeatable()] = field(
+        default_factory=dict
+    )
 
 
 Program = PythonSimulation | FmuSimulation | CommandSimulation

@@ -7,6 +7,7 @@ own for them; the program starts in the folder of the configuration.
 
 import hashlib
 import json
+import os
 import shutil
 import signal
 import subprocess
@@ -76,8 +77,8 @@ def _call(
             said = process.communicate(timeout=options.time_limit_s)[1]
         except subprocess.TimeoutExpired:
             _end(process)
-            said = f"{command[0]} did not end within {options.time_limit_s:g} s"
-            raise failed(request, said) from None
+            late = f"{command[0]} did not end within {options.time_limit_s:g} s"
+            raise failed(request, late) from None
         except BaseException:
             _end(process)
             raise
@@ -90,9 +91,8 @@ def _call(
 
 
 def _end(process: "subprocess.Popen[bytes]") -> None:
+    """End a program and what it has started."""
     try:
-        import os
-
         os.killpg(process.pid, signal.SIGKILL)
     except (AttributeError, OSError):
         process.kill()

@@ -50,4 +50,4 @@ def _capabilities(simulation: SimulationOptions) -> Capabilities:  # noqa: ARG00
     return Capabilities(run=True, parameters=True, force=True)
 
 
-KIND = SimulationKind(_capabilities, simulate=simulate_recordings)
+KIND = SimulationKind(_capabilities)

@@ -1,13 +1,12 @@
 """What a kind of simulation must offer."""
 
 import hashlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from hwid_cli.errors import SimulationError
-from hwid_cli.records.drive import DriveResponse
 from hwid_cli.records.programs import Capabilities, RunRequest, SimulatorRun
 
 
@@ -25,17 +24,11 @@ class SimulationKind:
     content : callable or None
         From the section to a hash of all that decides what it gives; raises
         ``SimulationError`` where a file is missing.
-    simulate : callable or None
-        From recordings, the section and how recordings start to each recording beside
-        what the simulation makes of its input, where that is not one run each.
     """
 
     capabilities: Callable[[Any], Capabilities]
     run: Callable[[Any, RunRequest], SimulatorRun] | None = None
     content: Callable[[Any], str] | None = None
-    simulate: Callable[[Sequence[Any], Any, Any], tuple[DriveResponse, ...]] | None = (
-        None
-    )
 
 
 def hash_of_file(path: str) -> str:

@@ -156,6 +156,10 @@ def _content(diagnosis: Diagnosis) -> dict[str, Any]:
     return {
         "verdict": diagnosis.verdict,
         "complete": diagnosis.complete,
+        "confirmed": diagnosis.confirmed,
+        "capabilities": [
+            name for name, is_so in asdict(diagnosis.capabilities).items() if is_so
+        ],
         "judged_on": diagnosis.judged_on,
         "summary": diagnosis.summary,
         "effects": [_effect(effect) for effect in diagnosis.effects],
