@@ -180,9 +180,11 @@ def diagnose_foreign(
     runs = _Runs(simulator, run_tasks)
     on_round("the simulation as given", len(problem.signals))
     given = runs.of(problem.signals, simulator.values)
-    given_sse = _sse(problem.signals, given)
+    # With effects of its own the stand-in says what the whole simulation leaves, and the
+    # parameters are fitted with them.
+    given_sse = None if simulator.effects else _sse(problem.signals, given)
     values = dict(simulator.values)
-    if simulator.free:
+    if simulator.free and not simulator.effects:
         on_round("its parameters", 0)
         values = _fit_parameters(runs, problem, values)
         given = runs.of(problem.signals, values)
