@@ -561,7 +561,7 @@ def _fitted_together(
     slopes: Sequence[np.ndarray],
     findings: Findings,
 ) -> tuple[CandidateFit, np.ndarray]:
-    """Fit of effects and of the simulation's parameters, which act along straight lines.
+    """Fit of effects and of the simulation's parameters.
 
     Returns
     -------
@@ -571,23 +571,8 @@ def _fitted_together(
     """
     rows = [row for row, one in enumerate(problem.signals) if not one.is_held_out]
     fit_layout, point = rebuilt(problem, before, findings.scales)
-    # A change of the output is one of the force, to which the effect reacts.
-    drive = replace(problem.drive, effects={})
-    lengths = np.sqrt(sum(np.sum(slopes[row] ** 2, axis=0) for row in rows))
-    sizes = (
-        findings.criteria.noise.rms
-        * np.sqrt(sum(one.n_evaluated for one in problem.signals))
-        / np.where(lengths > 0, lengths, 1.0)
-    )
-    pushes = [
-        np.column_stack(
-            [
-                force_along(drive, _moved_by(column, one), np.zeros(column.size))
-                for column in slope.T
-            ]
-        )
-        for one, slope in zip(problem.signals, slopes, strict=True)
-    ]
+    sizes = _sizes(problem, slopes, findings.criteria.noise.rms)
+    pushes = _pushes(problem, slopes)
     n_free, n_shared = sizes.size, len(fit_layout.shared)
 
     def changed(coordinates: np.ndarray) -> DiagnosisProblem:
@@ -612,12 +597,37 @@ def _fitted_together(
         return np.concatenate(residuals_at(train, fit_layout, at(coordinates)))
 
     start = np.r_[np.zeros(n_free), point.shared, point.own[rows].ravel()]
-    found = least_squares(
-        errors, start, lambda at_point: _derivatives(errors, at_point), method="lm"
-    )
-    moved = changed(found.x)
-    fit = _evaluated(moved, before, fit_layout, at(found.x), findings)
+    found = least_squares(errors, start, partial(_derivatives, errors), method="lm")
+    fit = _evaluated(changed(found.x), before, fit_layout, at(found.x), findings)
     return fit, found.x[:n_free] * sizes
+
+
+def _sizes(
+    problem: DiagnosisProblem, slopes: Sequence[np.ndarray], noise_rms: float
+) -> np.ndarray:
+    """Changes of the simulation's parameters that move it by about the noise."""
+    lengths = np.sqrt(sum(np.sum(one**2, axis=0) for one in slopes))
+    n = sum(one.n_evaluated for one in problem.signals)
+    return np.asarray(noise_rms * np.sqrt(n) / np.where(lengths > 0, lengths, 1.0))
+
+
+def _pushes(
+    problem: DiagnosisProblem, slopes: Sequence[np.ndarray]
+) -> list[np.ndarray]:
+    """Forces that move the stand-in as the simulation's parameters do.
+
+    A change of the output is taken for one of the force, to which the effect reacts.
+    """
+    drive = replace(problem.drive, effects={})
+    return [
+        np.column_stack(
+            [
+                force_along(drive, _moved_by(column, one), np.zeros(column.size))
+                for column in slope.T
+            ]
+        )
+        for one, slope in zip(problem.signals, slopes, strict=True)
+    ]
 
 
 def _moved_by(change: np.ndarray, signals: Signals) -> Moved:

@@ -160,6 +160,10 @@ def in_newtons(drive: Drive, force_gain: float) -> Drive:
 def force_along(drive: Drive, moved: Moved, driven_by: np.ndarray) -> np.ndarray:
     """Force that a drive needs beside its input to move in a given way.
 
+    Parameters
+    ----------
+    driven_by : ndarray, shape (n_samples,), [input unit]
+
     Returns
     -------
     ndarray, shape (n_samples,), [N]
@@ -209,7 +213,14 @@ def start_of(moved: Moved) -> tuple[float, float] | None:
 def moved_plainly(
     drive: Drive, signals: Signals, force: np.ndarray, moved: Moved
 ) -> Motion:
-    """Motion of the stand-in without effects."""
+    """Motion of the stand-in without effects.
+
+    Parameters
+    ----------
+    force : ndarray, shape (n_samples,), [N]
+    moved : Moved
+        Of the simulation, which starts there.
+    """
     vector = parameter_vector(drive, {})
     start = start_of(moved)
     if start is None and drive.stiffness_N_per_m == 0:
@@ -237,7 +248,9 @@ def force_of_motion(drive: Drive, signals: Signals, motion: Motion) -> np.ndarra
         + drive.damping_N_s_per_m * way
         + drive.stiffness_N_per_m * area
     )
-    given = drive.force_constant_N_per_A * signals.driven_by + signals.force
+    given = drive.force_constant_N_per_A * signals.driven_by
+    if signals.force.size:
+        given = given + signals.force
     return _with_means(impulse / dt - 0.5 * (given[1:] + given[:-1]))
 
 

@@ -152,6 +152,17 @@ def write_diagnosis_json(
     replace_file(path, f"{text}\n".encode())
 
 
+def _gap(diagnosis: Diagnosis) -> dict[str, Any]:
+    return {
+        "noise_rms": diagnosis.noise.rms,
+        "given": asdict(diagnosis.given),
+        "before": asdict(diagnosis.before),
+        "after": asdict(diagnosis.after),
+        "explained_share": diagnosis.explained_share,
+        "unit": diagnosis.output_unit,
+    }
+
+
 def _content(diagnosis: Diagnosis) -> dict[str, Any]:
     return {
         "verdict": diagnosis.verdict,
@@ -165,14 +176,7 @@ def _content(diagnosis: Diagnosis) -> dict[str, Any]:
         "effects": [_effect(effect) for effect in diagnosis.effects],
         "present": [_effect(effect) for effect in diagnosis.present],
         "ambiguous_with": [_ids(one) for one in diagnosis.ambiguous_with],
-        "gap": {
-            "noise_rms": diagnosis.noise.rms,
-            "given": asdict(diagnosis.given),
-            "before": asdict(diagnosis.before),
-            "after": asdict(diagnosis.after),
-            "explained_share": diagnosis.explained_share,
-            "unit": diagnosis.output_unit,
-        },
+        "gap": _gap(diagnosis),
         "noise": asdict(diagnosis.noise),
         "reference": {
             "current_A": diagnosis.reference_current_A,

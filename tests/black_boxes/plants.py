@@ -86,8 +86,11 @@ class Plant:
         head, rest = FUNCTION.split("def acceleration", 1)
         rest = "def simulate" + rest.split("def simulate", 1)[1]
         return (head + rest).format(
-            steps=self.steps, size=self.n_states, input=self.input,
-            output=self.output, rates=self.rates,
+            steps=self.steps,
+            size=self.n_states,
+            input=self.input,
+            output=self.output,
+            rates=self.rates,
         )
 
     def function(self):
@@ -103,7 +106,12 @@ LINEAR = Plant(
     x, v = y
     return np.array([v, (p["kt"] * u + push - p["c"] * v - p["k"] * x) / p["m"]])
 """,
-    2, {"m": 0.8, "c": 11.0, "k": 2100.0, "kt": 9.0}, ("c", "k", "kt"), 3.0, 0.8, 0.012,
+    2,
+    {"m": 0.8, "c": 11.0, "k": 2100.0, "kt": 9.0},
+    ("c", "k", "kt"),
+    3.0,
+    0.8,
+    0.012,
 )
 PENDULUM = Plant(
     "pendulum",
@@ -112,7 +120,12 @@ PENDULUM = Plant(
     torque = p["kt"] * u + push - p["c"] * v - p["g"] * np.sin(x)
     return np.array([v, torque / p["J"]])
 """,
-    2, {"J": 0.02, "c": 0.05, "g": 0.9, "kt": 0.35}, ("c", "g", "kt"), 2.0, 0.02, 0.8,
+    2,
+    {"J": 0.02, "c": 0.05, "g": 0.9, "kt": 0.35},
+    ("c", "g", "kt"),
+    2.0,
+    0.02,
+    0.8,
     output="angle_rad",
 )
 HARDENING = Plant(
@@ -122,7 +135,12 @@ HARDENING = Plant(
     spring = p["k"] * x + p["k3"] * x**3
     return np.array([v, (p["kt"] * u + push - p["c"] * v - spring) / p["m"]])
 """,
-    2, {"m": 0.3, "c": 8.0, "k": 900.0, "k3": 4e6, "kt": 5.0}, ("c", "k", "kt"), 4.0, 0.3, 0.014,
+    2,
+    {"m": 0.3, "c": 8.0, "k": 900.0, "k3": 4e6, "kt": 5.0},
+    ("c", "k", "kt"),
+    4.0,
+    0.3,
+    0.014,
 )
 TWO_MASSES = Plant(
     "two_masses",
@@ -135,7 +153,11 @@ TWO_MASSES = Plant(
 """,
     4,
     {"m": 0.5, "mm": 0.2, "ks": 4e4, "cs": 8.0, "c": 10.0, "k": 1500.0, "kt": 6.0},
-    ("c", "k", "kt"), 3.0, 0.5, 0.012, steps=8,
+    ("c", "k", "kt"),
+    3.0,
+    0.5,
+    0.012,
+    steps=8,
 )
 MOTOR = Plant(
     "dc_motor",
@@ -144,8 +166,14 @@ MOTOR = Plant(
     current = (u - p["R"] * i - p["ke"] * v) / p["L"]
     return np.array([v, (p["ke"] * i + push - p["c"] * v - p["k"] * x) / p["m"], current])
 """,
-    3, {"m": 0.4, "c": 4.0, "k": 800.0, "R": 1.5, "L": 0.004, "ke": 4.0},
-    ("c", "k", "R"), 4.0, 0.4, 0.012, input="voltage_V", steps=8,
+    3,
+    {"m": 0.4, "c": 4.0, "k": 800.0, "R": 1.5, "L": 0.004, "ke": 4.0},
+    ("c", "k", "R"),
+    4.0,
+    0.4,
+    0.012,
+    input="voltage_V",
+    steps=8,
 )
 PLANTS = {one.name: one for one in (LINEAR, PENDULUM, HARDENING, TWO_MASSES, MOTOR)}
 
@@ -185,35 +213,45 @@ def hidden_in(plant, load, x_max):
         "none": Hidden("none", ((),)),
         "coulomb": Hidden("coulomb", (("coulomb_friction",),), dry=0.12 * load),
         "stop": Hidden(
-            "stop", (("one_sided_stop",),),
+            "stop",
+            (("one_sided_stop",),),
             force=lambda x, v, t: -60 * stiff * max(x - 0.55 * x_max, 0.0),
         ),
         "drag": Hidden(
-            "drag", (("quadratic_drag",),),
+            "drag",
+            (("quadratic_drag",),),
             force=lambda x, v, t: -0.8 * load / speed**2 * v * abs(v) * 4,
         ),
         "cubic": Hidden(
-            "cubic", (("cubic_stiffness",),),
+            "cubic",
+            (("cubic_stiffness",),),
             force=lambda x, v, t: -3 * stiff * x_max * (x / x_max) ** 3,
         ),
         "cogging": Hidden(
-            "cogging", (("cogging",),),
+            "cogging",
+            (("cogging",),),
             force=lambda x, v, t: 0.3 * load * np.sin(2 * np.pi * x / (0.4 * x_max)),
         ),
         "dead_zone": Hidden(
-            "dead_zone", (("input_dead_zone",),),
-            command=lambda u, t: np.sign(u) * np.maximum(np.abs(u) - 0.1 * plant.size, 0),
+            "dead_zone",
+            (("input_dead_zone",),),
+            command=lambda u, t: (
+                np.sign(u) * np.maximum(np.abs(u) - 0.1 * plant.size, 0)
+            ),
         ),
         "delay": Hidden(
-            "delay", (("input_delay",),),
+            "delay",
+            (("input_delay",),),
             command=lambda u, t: np.interp(t - 0.0032, t, u),
         ),
         "saturation": Hidden(
-            "saturation", (("input_saturation",),),
+            "saturation",
+            (("input_saturation",),),
             command=lambda u, t: np.clip(u, -0.6 * plant.size, 0.6 * plant.size),
         ),
         "sensor": Hidden(
-            "sensor", (("sensor_quadratic",),),
+            "sensor",
+            (("sensor_quadratic",),),
             output=lambda x: x + 0.08 * x**2 / x_max,
         ),
     }

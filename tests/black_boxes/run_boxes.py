@@ -28,9 +28,14 @@ def inputs(plant, rng):
     for share in (0.4, -0.7, 1.0):
         yield f"step_{share}", plant.size * share * (on & (t < 0.65))
     for frequency, share in ((1.5, 0.9), (3, 0.5), (4, 1.0), (7, 0.8)):
-        yield f"sine_{frequency}", plant.size * share * np.sin(2 * np.pi * frequency * (t - 0.1)) * on
+        yield (
+            f"sine_{frequency}",
+            plant.size * share * np.sin(2 * np.pi * frequency * (t - 0.1)) * on,
+        )
     for count in (1, 2):
-        waves = sum(np.sin(2 * np.pi * f * t + rng.uniform(0, 6)) for f in (1, 2, 4, 6, 9))
+        waves = sum(
+            np.sin(2 * np.pi * f * t + rng.uniform(0, 6)) for f in (1, 2, 4, 6, 9)
+        )
         yield f"multi_{count}", 0.35 * plant.size * waves * on
 
 
@@ -61,8 +66,14 @@ def write_case(folder, plant, effect, *, access, noise, seed):
             found = scope["simulate"](t, {plant.input: u}, given)
             columns.append(found[plant.output])
             head += ",simulated"
-        np.savetxt(folder / "raw" / f"{name}.csv", np.column_stack(columns),
-                   delimiter=",", header=head, comments="", fmt="%.10g")
+        np.savetxt(
+            folder / "raw" / f"{name}.csv",
+            np.column_stack(columns),
+            delimiter=",",
+            header=head,
+            comments="",
+            fmt="%.10g",
+        )
     (folder / "plant.py").write_text(plant.text)
     (folder / "config.yaml").write_text(_config(plant, given, access))
     (folder / "truth.json").write_text(json.dumps({"accepted": hidden.accepted}))
@@ -105,12 +116,30 @@ def diagnose(folder, jobs):
     """Run the command; its result and processor seconds."""
     began = time.process_time()
     done = subprocess.run(
-        [sys.executable, "-m", "hwid_cli", "diagnose", "config.yaml", "--out", "out", "--jobs", str(jobs), "-q"],
-        cwd=folder, capture_output=True, text=True, check=False, timeout=1800,
+        [
+            sys.executable,
+            "-m",
+            "hwid_cli",
+            "diagnose",
+            "config.yaml",
+            "--out",
+            "out",
+            "--jobs",
+            str(jobs),
+            "-q",
+        ],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=1800,
     )
     found = folder / "out" / "diagnosis.json"
     if done.returncode or not found.is_file():
-        return {"verdict": "failed", "said": done.stderr[-300:]}, time.process_time() - began
+        return {
+            "verdict": "failed",
+            "said": done.stderr[-300:],
+        }, time.process_time() - began
     return json.loads(found.read_text()), time.process_time() - began
 
 
@@ -120,11 +149,23 @@ def score(found, truth):
     named = tuple(sorted(one["id"] for one in found.get("effects", [])))
     verdict = found["verdict"]
     if () in accepted:
-        return "right" if verdict in ("none", "parameters") else "false alarm" if verdict == "named" else verdict
+        return (
+            "right"
+            if verdict in ("none", "parameters")
+            else "false alarm"
+            if verdict == "named"
+            else verdict
+        )
     if verdict == "named":
         return "right" if named in accepted else "wrong"
     if verdict == "ambiguous":
-        sets = [named, *[tuple(sorted([one] if isinstance(one, str) else one)) for one in found["ambiguous_with"]]]
+        sets = [
+            named,
+            *[
+                tuple(sorted([one] if isinstance(one, str) else one))
+                for one in found["ambiguous_with"]
+            ],
+        ]
         return "right" if any(one in accepted for one in sets) else "wrong"
     return "refused" if verdict != "failed" else "failed"
 
@@ -146,17 +187,31 @@ def main():
             if options.only and not any(one in label for one in options.only):
                 continue
             folder = options.work / name / effect
-            write_case(folder, plant, effect, access=options.access, noise=options.noise, seed=options.seed)
+            write_case(
+                folder,
+                plant,
+                effect,
+                access=options.access,
+                noise=options.noise,
+                seed=options.seed,
+            )
             began = time.time()
             found, _ = diagnose(folder, 1)
             truth = json.loads((folder / "truth.json").read_text())
             gap = found.get("gap", {})
             row = (
-                label, score(found, truth), found["verdict"],
+                label,
+                score(found, truth),
+                found["verdict"],
                 "+".join(one["id"] for one in found.get("effects", [])),
-                found.get("complete", ""), found.get("confirmed", ""),
-                *(f"{gap[one]['ratio_to_noise']:.3g}" if gap else "" for one in ("given", "before", "after")),
-                f"{time.time() - began:.0f} s", str(found.get("ambiguous_with", found.get("said", ""))),
+                found.get("complete", ""),
+                found.get("confirmed", ""),
+                *(
+                    f"{gap[one]['ratio_to_noise']:.3g}" if gap else ""
+                    for one in ("given", "before", "after")
+                ),
+                f"{time.time() - began:.0f} s",
+                str(found.get("ambiguous_with", found.get("said", ""))),
             )
             rows.append(row)
             print(*row, sep=" | ", flush=True)
@@ -164,7 +219,11 @@ def main():
     print({word: words.count(word) for word in sorted(set(words))})
     if options.write:
         head = "| case | score | verdict | effects | complete | confirmed | given | re-fitted | after | time | |"
-        lines = [head, "|" + "---|" * 11, *("| " + " | ".join(map(str, row)) + " |" for row in rows)]
+        lines = [
+            head,
+            "|" + "---|" * 11,
+            *("| " + " | ".join(map(str, row)) + " |" for row in rows),
+        ]
         options.write.write_text("\n".join(lines) + "\n")
 
 

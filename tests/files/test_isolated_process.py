@@ -13,8 +13,8 @@ import scipy.io
 
 from hwid_cli.data import formats
 from hwid_cli.data.formats import Reader, list_columns, read_columns
-from hwid_cli.files.isolated_process import IsolatedReader
 from hwid_cli.errors import MeasurementError
+from hwid_cli.files.isolated_process import IsolatedReader
 from hwid_cli.records.experiment import Columns
 
 COLUMNS = Columns(input="u", output="y", time="t")

@@ -34,6 +34,7 @@ ALLOWED_MODULES = {
     ("hwid_cli/tasks/workers.py", "pickle"),
     ("hwid_cli/tasks/cluster.py", "pickle"),
     ("hwid_cli/files/isolated_process.py", "subprocess"),
+    ("hwid_cli/simulations/command.py", "subprocess"),
     ("hwid_cli/export/fmu.py", "subprocess"),
     ("hwid_cli/export/fmu.py", "xml.sax.saxutils"),
 }
