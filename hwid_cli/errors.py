@@ -29,5 +29,9 @@ class ModelFileError(HwidError):
     """An exported model cannot be used as it is."""
 
 
+class SimulationError(HwidError):
+    """A simulation of the user's does not run, or gives what is no answer."""
+
+
 class NothingToDo(HwidError):
     """What was asked for cannot be done yet, and that is no fault: measurements lack."""

@@ -4,8 +4,7 @@ from hwid_cli.cli.driver import context_of, result_of, show_blocks
 from hwid_cli.cli.options import Choices
 from hwid_cli.cli.session import Session, Timer, open_session
 from hwid_cli.report.diagnosis import simulated_table
-from hwid_cli.simulations.kinds import kind_named
-from hwid_cli.stages.diagnose import choose
+from hwid_cli.stages.diagnose import choose, simulated_recordings
 from hwid_cli.store.diagnosis_results import write_simulated_csv
 
 
@@ -33,15 +32,15 @@ def _simulate_drive(session: Session) -> None:
     """Simulate the recordings by the physics model and show how far off it is."""
     result_of(session, "calibrate")
     given, timer = choose(context_of(session)), Timer()
-    kind = kind_named(given.simulation.kind)
-    curves = kind.simulate(given.recordings, given.simulation, given.options)
+    curves = simulated_recordings(given)
     folder = session.out / "simulated"
     for one in curves:
         columns = (one.time_s, one.input, one.measured, one.simulated)
         write_simulated_csv(folder / f"{one.name}.csv", columns)
     session.say(f"simulate: {len(curves)} recordings simulated, {timer}")
     # In a closed loop it is the controller's command that the two are compared by.
-    side = "output" if given.simulation.controller is None else "input"
+    has_controller = getattr(given.simulation, "controller", None) is not None
+    side = "input" if has_controller else "output"
     unit = getattr(given.recordings[0], f"{side}_unit")
     show_blocks(session, [simulated_table(curves, side, unit)])
     session.say(f"\nresults: {folder}")

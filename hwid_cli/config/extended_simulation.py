@@ -16,10 +16,13 @@ from hwid_cli.records.experiment import (
     RecordingsOptions,
     SimulationOptions,
 )
+from hwid_cli.records.programs import ForeignSimulation
 
 
 def write_extended_simulation(
-    path: Path, experiment: Experiment, simulation: SimulationOptions
+    path: Path,
+    experiment: Experiment,
+    simulation: SimulationOptions | ForeignSimulation,
 ) -> None:
     """Write a configuration that holds the extended simulation and the same recordings.
 
@@ -88,6 +91,8 @@ def _without_defaults(record: Any) -> dict[str, Any]:
     """Fields of a record that differ from their defaults, as YAML can hold them."""
     content = {}
     for field in fields(record):
+        if not field.metadata.get("is_key", True):
+            continue
         value = getattr(record, field.name)
         if not _is_default(field, value):
             content[field.name] = _plain(value)

@@ -243,6 +243,9 @@ def _of_kind(value: Any, records: list[Any]) -> Any:
     found = value.get("kind") if isinstance(value, dict) else None
     if isinstance(found, str) and found in kinds:
         return kinds[found]
+    usual = [record for record in records if getattr(record, "IS_USUAL", False)]
+    if usual and (value is None or (isinstance(value, dict) and "kind" not in value)):
+        return usual[0]
     said = "missing" if found is None else "found {}"
     expected = f"one of {', '.join(kinds)}" if found is None else ""
     raise Refused(Refusal(found, expected, ("kind",), said=said, known=tuple(kinds)))

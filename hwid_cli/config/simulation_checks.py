@@ -22,7 +22,7 @@ from hwid_cli.drive.catalogue import (
 from hwid_cli.drive.effect import Stated
 from hwid_cli.records.drive import BASE_PARAMETERS
 from hwid_cli.records.experiment import DiagnoseOptions, Experiment
-from hwid_cli.simulations.kinds import KINDS
+from hwid_cli.records.programs import OutputsSimulation
 
 # What the electrical circuit has besides its resistance.
 _OF_CIRCUIT = ("inductance_H", "back_emf_V_s_per_m", "back_emf_V_s_per_rad")
@@ -32,7 +32,7 @@ _LARGEST_TOLERANCE = 1.0
 
 def circuit_faults(experiment: Experiment) -> Iterator[Fault]:
     """Parts of an electrical circuit that has no resistance."""
-    options = experiment.simulation
+    options = experiment.drive_simulation
     if options is None or options.resistance_ohm is not None:
         return
     for name in _OF_CIRCUIT:
@@ -49,7 +49,7 @@ def circuit_faults(experiment: Experiment) -> Iterator[Fault]:
 
 def effect_circuit_faults(experiment: Experiment) -> Iterator[Fault]:
     """Effects of an electrical circuit that has no resistance."""
-    options = experiment.simulation
+    options = experiment.drive_simulation
     if options is None or options.resistance_ohm is not None:
         return
     needs = {public_id(one.id) for one in CATALOGUE.values() if one.needs_circuit}
@@ -66,7 +66,7 @@ def effect_circuit_faults(experiment: Experiment) -> Iterator[Fault]:
 
 def controller_faults(experiment: Experiment) -> Iterator[Fault]:
     """A controller without the column that it follows."""
-    simulation, recordings = experiment.simulation, experiment.recordings
+    simulation, recordings = experiment.drive_simulation, experiment.recordings
     if simulation is None or simulation.controller is None or recordings is None:
         return
     if recordings.columns.reference is None:
@@ -80,7 +80,7 @@ def controller_faults(experiment: Experiment) -> Iterator[Fault]:
 
 def known_faults(experiment: Experiment) -> Iterator[Fault]:
     """Known parameters that no re-fit moves, and tolerances that are none."""
-    options = experiment.simulation
+    options = experiment.drive_simulation
     for name, tolerance in (options.known if options else {}).items():
         place = ("simulation", "known")
         if name not in BASE_PARAMETERS:
@@ -91,7 +91,7 @@ def known_faults(experiment: Experiment) -> Iterator[Fault]:
 
 def cascade_faults(experiment: Experiment) -> Iterator[Fault]:
     """A cascade around a position that nobody measures."""
-    options = experiment.simulation
+    options = experiment.drive_simulation
     if options is None or options.controller is None or options.output == "position":
         return
     gain = options.controller.position_gain_per_s
@@ -164,11 +164,27 @@ def _parameter(one: Stated, value: float | str, place: Place) -> Iterator[Fault]
                 return
 
 
-def kind_faults(experiment: Experiment) -> Iterator[Fault]:
-    """A kind of simulation that there is not."""
-    options = experiment.simulation
-    if options is not None and options.kind not in KINDS:
-        yield wrong_word(("simulation", "kind"), options.kind, KINDS)
+def simulated_faults(experiment: Experiment) -> Iterator[Fault]:
+    """Outputs of a simulation that no column holds, and a column that nobody asked for."""
+    recordings = experiment.recordings
+    if recordings is None:
+        return
+    is_asked = isinstance(experiment.simulation, OutputsSimulation)
+    place = ("recordings", "columns", "simulated")
+    if is_asked and recordings.columns.simulated is None:
+        yield missing(
+            place,
+            "the column with what the simulation gave",
+            "name it, or choose another simulation.kind",
+            without=("simulation",),
+        )
+    elif recordings.columns.simulated is not None and not is_asked:
+        yield wrong(
+            place,
+            recordings.columns.simulated,
+            "simulation.kind: outputs too, which compares it with the output",
+            "add that section or remove this key",
+        )
 
 
 def simulation_faults(experiment: Experiment) -> Iterator[Fault]:

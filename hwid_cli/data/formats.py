@@ -14,10 +14,10 @@ from hwid_cli.data.array_columns import Variables, list_variables, pick_columns
 from hwid_cli.data.columns import FileColumns, MeasuredColumn, array_column
 from hwid_cli.data.csv_files import list_csv_columns, read_csv_columns
 from hwid_cli.data.hdf5_files import open_hdf5
-from hwid_cli.data.isolated_reading import IsolatedReader, Labelled, serve
 from hwid_cli.data.mat_files import open_mat
 from hwid_cli.data.npz_files import open_npz
 from hwid_cli.errors import MeasurementError
+from hwid_cli.files.isolated_process import IsolatedReader, Labelled, serve
 from hwid_cli.files.messages import escaped
 from hwid_cli.records.experiment import Columns
 from hwid_cli.records.starter import FoundColumn

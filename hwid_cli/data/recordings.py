@@ -37,7 +37,12 @@ from hwid_cli.data.signal_units import (
     time_in_seconds,
 )
 from hwid_cli.errors import HwidError, MeasurementError
-from hwid_cli.records.experiment import CalibrateOptions, Experiment, RecordingsOptions
+from hwid_cli.records.experiment import (
+    CalibrateOptions,
+    Columns,
+    Experiment,
+    RecordingsOptions,
+)
 from hwid_cli.records.recordings import KINDS, RawRecording
 
 _log = logging.getLogger(__name__)
@@ -75,7 +80,7 @@ def read_recordings(experiment: Experiment, out: Path) -> list[RawRecording]:
     recordings = []
     for path in paths:
         digest = file_sha256(path)
-        columns = read_columns(path, options.columns)
+        columns = read_columns(path, _as_read(options.columns))
         if file_sha256(path) != digest:
             raise MeasurementError(
                 f"{path}: changed while it was read; expected a finished recording; "
@@ -140,6 +145,13 @@ def _read_part(
         ),
         units=(*of_time, *units),
     )
+
+
+def _as_read(columns: Columns) -> Columns:
+    """What a simulation gave goes with the input, as a reference does."""
+    if columns.simulated is None:
+        return columns
+    return replace(columns, reference=columns.simulated)
 
 
 def check_unchanged(digests: Mapping[str, str]) -> None:
@@ -238,7 +250,9 @@ def survey_recordings(experiment: Experiment, out: Path) -> Survey:
     for path in paths:
         columns = plan = None
         with _noting(problems):
-            columns = read_columns(path, recordings_options(experiment).columns)
+            columns = read_columns(
+                path, _as_read(recordings_options(experiment).columns)
+            )
         with _noting(problems):
             plan = read_plan(path.parent)
         if columns is None or plan is None:

@@ -19,9 +19,16 @@ from hwid_cli.data.units import (
     in_unit,
     is_unitless,
     quantity_of,
+    unit_in_name,
 )
 from hwid_cli.errors import MeasurementError
-from hwid_cli.records.experiment import Experiment, FileUnits, RecordingsOptions
+from hwid_cli.records.experiment import (
+    Experiment,
+    FileUnits,
+    RecordingsOptions,
+    SimulationOptions,
+)
+from hwid_cli.records.programs import ForeignSimulation
 from hwid_cli.records.recordings import CalibrationLog, SignalUnit
 
 # Of recordings where nothing says more.
@@ -90,12 +97,22 @@ def signal_unit(
         return SignalUnit(role, given, said_by, label or given or _USUAL[role])
     target = label
     if target is None and simulation is not None:
-        target = getattr(simulation, f"{role}_unit")
+        target = _unit_of(simulation, role)
     target = target or QUANTITIES.get(quantity_of(given), given)
     factor = factor_between(given, target) if given else 1.0
     if factor is None:
         return SignalUnit(role, given, said_by, given)
     return SignalUnit(role, given, said_by, target, factor)
+
+
+def _unit_of(
+    simulation: SimulationOptions | ForeignSimulation, role: str
+) -> str | None:
+    """Unit of a simulation's numbers: its own, or what a name like ``current_A`` says."""
+    if isinstance(simulation, SimulationOptions):
+        return str(getattr(simulation, f"{role}_unit"))
+    name = getattr(simulation, role, None)
+    return (unit_in_name(name, role) or None) if name is not None else None
 
 
 def _given(

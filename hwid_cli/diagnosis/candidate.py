@@ -354,6 +354,8 @@ def at_point(
 
     Parameters
     ----------
+    fit_layout : ParameterLayout
+        May have fewer parameters of the base.
     point : ParameterPoint
         With own values of all recordings.
     """
@@ -371,6 +373,7 @@ def at_point(
     ]
     return replace(
         found,
+        names=tuple(one.ref for one in fit_layout.shared),
         values=np.array([one.value(q) for one, q in shared]),
         own=np.array(own).reshape(point.own.shape),
         sse=sse,

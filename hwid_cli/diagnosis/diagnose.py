@@ -90,10 +90,34 @@ def diagnose(
     on_round : callable
         Called with what begins and its number of tasks.
     """
+    problem = prepare(recordings, simulation, options, held_out_of(recordings, options))
+    problem = without_repeats(problem)
+    return describe(find(problem, options, run_tasks, on_round))
+
+
+def held_out_of(
+    recordings: Sequence[Recording], options: DiagnoseOptions
+) -> tuple[str, ...]:
+    """Names of the recordings that are held out: as asked for, or chosen."""
     held_out = options.hold_out
-    if isinstance(held_out, str):
-        held_out = held_out_names(recordings)
-    problem = without_repeats(prepare(recordings, simulation, options, held_out))
+    return held_out_names(recordings) if isinstance(held_out, str) else held_out
+
+
+def find(
+    problem: DiagnosisProblem,
+    options: DiagnoseOptions,
+    run_tasks: RunTasks,
+    on_round: OnRound,
+    given_sse: np.ndarray | None = None,
+) -> Findings:
+    """Find what the drive of a problem lacks.
+
+    Parameters
+    ----------
+    given_sse : ndarray, shape (n_recordings,), or None, [output unit squared]
+        What the simulation leaves with the parameters that the configuration gives; None
+        where that is the problem's own drive.
+    """
     noise = noise_floor(problem)
 
     on_round("base", 0)
@@ -113,7 +137,8 @@ def diagnose(
     where = places(before, noise, drive, force)
 
     criteria = SelectionCriteria.of(problem, noise)
-    given_sse = each_sum_of_squares([one.residual for one in given])
+    if given_sse is None:
+        given_sse = each_sum_of_squares([one.residual for one in given])
     rounds = Rounds(
         problem,
         Baseline(drive, scales, noise, problem.drive),
@@ -126,12 +151,10 @@ def diagnose(
     found = _search(rounds, given_sse, force, options.max_effects)
     on_round("verdict", 0)
     verdict = _decided(rounds, given_sse, found)
-    return describe(
-        Findings(
-            problem=problem, criteria=criteria, scales=scales, given_sse=given_sse,
-            base=base, before=before, force=force, where=where,
-            found=found, verdict=verdict,
-        )
+    return Findings(
+        problem=problem, criteria=criteria, scales=scales, given_sse=given_sse,
+        base=base, before=before, force=force, where=where,
+        found=found, verdict=verdict,
     )  # fmt: skip
 
 

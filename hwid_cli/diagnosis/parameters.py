@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from hwid_cli.diagnosis.problem import Compared, DiagnosisProblem
+from hwid_cli.diagnosis.problem import Compared, DiagnosisProblem, Signals
 from hwid_cli.drive import slots
 from hwid_cli.drive.catalogue import CATALOGUE
 from hwid_cli.drive.effect import Parameter, Scales
@@ -372,11 +372,12 @@ def simulate_at(
                 vector,
                 signals.sample_time_s,
                 refinement=REFINEMENT,
+                force=signals.force,
             )
             for signals, vector in pairs
         ]
     return [
-        run(signals.driven_by, vector, signals.sample_time_s)
+        run(signals.driven_by, vector, signals.sample_time_s, force=signals.force)
         for signals, vector in pairs
     ]
 
@@ -389,12 +390,19 @@ def compare_at(
     return [
         Compared(
             signals,
-            motion.command if problem.compares_command else motion.output,
+            _read(problem, signals, motion),
             motion.position,
             motion.velocity,
         )
         for signals, motion in zip(problem.signals, motions, strict=True)
     ]
+
+
+def _read(problem: DiagnosisProblem, signals: Signals, motion: Motion) -> np.ndarray:
+    """What is compared of a motion."""
+    if problem.compares_command:
+        return motion.command
+    return motion.output if signals.offset is None else motion.output + signals.offset
 
 
 def residuals_at(

@@ -61,6 +61,8 @@ def _piece(
         compared=signals.compared[rows].copy(),
         input=signals.input[rows].copy(),
         output=signals.output[rows].copy(),
+        force=signals.force[rows].copy(),
+        offset=None if signals.offset is None else signals.offset[rows].copy(),
         skip=min(max(signals.skip - first, 0), last - first - 1),
         used=used,
         start=(float(motion.position[first]), float(motion.velocity[first])),

@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
-from hwid_cli.drive.simulation import refined
+from hwid_cli.drive.simulation import NO_FORCE, refined
 from hwid_cli.records.axis import base_of
 from hwid_cli.records.drive import Drive
 from hwid_cli.records.experiment import DiagnoseOptions, SimulationOptions
@@ -54,6 +54,11 @@ class Signals:
     is_velocity : bool
         Whether the output is a velocity. What needs one or the other asks ``position``
         and ``velocity``.
+    force : ndarray, shape (n_samples,) or (0,), [N]
+        That acts on the mass beside the drive's own, for a drive that stands for another
+        simulation.
+    offset : ndarray, shape (n_samples,), or None
+        What is added to the simulated output.
     """
 
     name: str
@@ -68,6 +73,8 @@ class Signals:
     used: np.ndarray | None = None
     start: tuple[float, float] | None = None
     is_velocity: bool = False
+    force: np.ndarray = field(default_factory=lambda: NO_FORCE)
+    offset: np.ndarray | None = None
 
     @cached_property
     def position(self) -> np.ndarray:

@@ -23,6 +23,7 @@ from hwid_cli.records.drive import Drive
 # over a quarter of it 0.8 %.
 REFINEMENT = 4
 _SPLINE_DEGREE = 5
+NO_FORCE = np.zeros(0)
 # Places that are not 0 where their effect is switched off.
 _OFF = {
     getattr(slots, place): one.off
@@ -141,6 +142,7 @@ def run(
     sample_time_s: float,
     *,
     refinement: int = 1,
+    force: np.ndarray = NO_FORCE,
 ) -> Motion:
     """Motion for a vector of parameters.
 
@@ -152,6 +154,8 @@ def run(
         Of the motion that is returned.
     refinement : int
         Samples of the input for one of the motion.
+    force : ndarray, shape (n_samples,) or (0,), [N]
+        That acts on the mass beside the drive's own, a straight line between samples.
     """
     gain = vector[slots.CLOCK_GAIN]
     n = (driven_by.size - 1) // refinement + 1
@@ -159,8 +163,11 @@ def run(
         # What the other clock reads last: the input stays as it is until then.
         more = int(np.ceil(gain * driven_by.size)) + 1
         driven_by = np.concatenate([driven_by, np.full(more, driven_by[-1])])
+    if force.size > 0:
+        at = np.arange(driven_by.size) / refinement
+        force = np.interp(at, np.arange(force.size), force)
     fine_time = sample_time_s / refinement
-    columns = move(driven_by, fine_time, vector)
+    columns = move(driven_by, force, fine_time, vector)
     position, velocity, command = (column[::refinement][:n] for column in columns)
     if gain == 0.0 or driven_by.size < 2:
         output = read(position, velocity, sample_time_s, vector)

@@ -141,7 +141,7 @@ def _drive(path: Path, given: Mapping[str, Any]) -> Drive:
     faults = faults or list(disagreements(experiment))
     if faults:
         raise ModelFileError(faults[0].message(path))
-    read = experiment.simulation
+    read = experiment.drive_simulation
     base = base_of(read)
     for name in ROTARY_NAMES:
         if name_on(base["axis"], name) not in given:

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from hwid_cli.records.candidates import RankedCandidate
+from hwid_cli.records.programs import OF_DRIVE, Capabilities
 from hwid_cli.records.stored import ADDED_LATER
 
 VERDICTS = ("named", "ambiguous", "parameters", "unknown", "none")
@@ -237,6 +238,11 @@ class Diagnosis:
         What a reader must check before believing the rest.
     axis, output : str
         One of ``axis.AXES`` and of ``drive.OUTPUTS``: in which units parameters are.
+    confirmed : str
+        ``simulation`` where the simulation itself was run with the effect, ``surrogate``
+        where only a stand-in was.
+    capabilities : Capabilities
+        What the simulation can do.
     """
 
     verdict: str
@@ -266,6 +272,8 @@ class Diagnosis:
     warnings: tuple[str, ...] = field(default=(), metadata=ADDED_LATER)
     axis: str = field(default="linear", metadata=ADDED_LATER)
     output: str = field(default="position", metadata=ADDED_LATER)
+    confirmed: str = field(default="simulation", metadata=ADDED_LATER)
+    capabilities: Capabilities = field(default=OF_DRIVE, metadata=ADDED_LATER)
 
     @property
     def judged_on(self) -> str:

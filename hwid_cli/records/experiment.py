@@ -4,13 +4,21 @@ Every key of a configuration file is a field here. ``configs/README.md`` explain
 """
 
 from dataclasses import dataclass, field
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from hwid_cli.records.axis import ROTARY_NAMES, check_axis
 from hwid_cli.records.drive import HOLDS, OUTPUTS, STARTS, Controller, Repeatable
 from hwid_cli.records.machines import GunMachine, ServoMachine
 from hwid_cli.records.maps import MAP_KINDS
 from hwid_cli.records.model import FitOptions
+from hwid_cli.records.programs import (
+    CommandSimulation,
+    FmuSimulation,
+    ForeignSimulation,
+    ModelSimulation,
+    OutputsSimulation,
+    PythonSimulation,
+)
 from hwid_cli.records.recordings import KINDS
 from hwid_cli.records.rules import (
     NO_KEY,
@@ -59,6 +67,7 @@ class Columns:
     output: Annotated[str | int, _COLUMN]
     time: Annotated[str | int | None, _COLUMN] = None
     reference: Annotated[str | int | None, _COLUMN] = None
+    simulated: Annotated[str | int | None, _COLUMN] = None
     variable: str | None = None
 
 
@@ -209,7 +218,10 @@ class SimulationOptions:
         holds one fixed.
     """
 
-    kind: str = "drive"
+    # A section without a kind is one of these.
+    IS_USUAL: ClassVar[bool] = True
+
+    kind: Annotated[str, OneOf(["drive"])] = "drive"
     mass_kg: Annotated[float, POSITIVE] = 1.0
     damping_N_s_per_m: Annotated[float, NOT_NEGATIVE] = 0.0
     stiffness_N_per_m: Annotated[float, NOT_NEGATIVE] = 0.0
@@ -302,6 +314,26 @@ class Experiment:
     order: OrderOptions | None = None
     group: GroupOptions | None = None
     test: FinalTestOptions | None = None
-    simulation: SimulationOptions | None = None
+    simulation: (
+        SimulationOptions
+        | PythonSimulation
+        | FmuSimulation
+        | CommandSimulation
+        | OutputsSimulation
+        | ModelSimulation
+        | None
+    ) = None
     diagnose: DiagnoseOptions | None = None
     thesis_names: bool = False
+
+    @property
+    def drive_simulation(self) -> SimulationOptions | None:
+        """The simulation where it is the program's own drive."""
+        found = self.simulation
+        return found if isinstance(found, SimulationOptions) else None
+
+    @property
+    def foreign_simulation(self) -> ForeignSimulation | None:
+        """The simulation where it is one of the user's own."""
+        found = self.simulation
+        return None if isinstance(found, SimulationOptions) else found

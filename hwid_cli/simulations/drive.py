@@ -8,6 +8,7 @@ from hwid_cli.diagnosis.diagnose import compared_as_given
 from hwid_cli.diagnosis.problem import prepare
 from hwid_cli.records.drive import DriveResponse
 from hwid_cli.records.experiment import DiagnoseOptions, SimulationOptions
+from hwid_cli.records.programs import Capabilities
 from hwid_cli.records.recordings import Recording
 from hwid_cli.simulations.simulation import SimulationKind
 
@@ -45,4 +46,8 @@ def simulate_recordings(
     )
 
 
-KIND = SimulationKind(simulate_recordings)
+def _capabilities(simulation: SimulationOptions) -> Capabilities:  # noqa: ARG001
+    return Capabilities(run=True, parameters=True, force=True)
+
+
+KIND = SimulationKind(_capabilities)

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from hwid_cli.simulations.simulation import SimulationKind
 
 # What ``simulation.kind`` may say.
-KINDS = ("drive",)
+KINDS = ("drive", "python", "fmu", "command", "outputs", "model")
 
 
 def kind_named(name: str) -> "SimulationKind":

@@ -4,7 +4,7 @@ What a diagnosis does is in ``hwid_cli.diagnosis.diagnose``. Here as well: a dia
 in memory, for programs that hold recordings and write no results.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from math import nan
 from pathlib import Path
@@ -12,19 +12,30 @@ from typing import Any
 
 from hwid_cli.config.extended_simulation import write_extended_simulation
 from hwid_cli.diagnosis import diagnose as pipeline
+from hwid_cli.diagnosis.foreign import diagnose_foreign
 from hwid_cli.diagnosis.rounds import DiagnosisTask, OnRound, RunTasks
 from hwid_cli.errors import CacheError, ConfigError
 from hwid_cli.files.atomic import replace_file
 from hwid_cli.records.check import StagePlan
 from hwid_cli.records.diagnosis import Diagnosis
-from hwid_cli.records.drive import told_apart
+from hwid_cli.records.drive import DriveResponse, told_apart
 from hwid_cli.records.experiment import DiagnoseOptions, Experiment, SimulationOptions
+from hwid_cli.records.programs import ForeignSimulation
 from hwid_cli.records.recordings import CalibrationLog, Recording
 from hwid_cli.report import plots
 from hwid_cli.report.diagnosis import diagnosis_blocks
 from hwid_cli.report.figures.diagnosis import diagnosis_figures
+from hwid_cli.simulations.drive import simulate_recordings
+from hwid_cli.simulations.kinds import kind_named
 from hwid_cli.stages.diagnosis_starts import starts_sentence, unsettled_starts
 from hwid_cli.stages.fit_seconds import counted
+from hwid_cli.stages.foreign_simulation import (
+    content_of,
+    extended_foreign,
+    placed,
+    simulated,
+    simulator_of,
+)
 from hwid_cli.stages.selection import select_recordings
 from hwid_cli.stages.simulation_units import (
     assumed_units,
@@ -55,16 +66,22 @@ def diagnosis_key(
     options: DiagnoseOptions,
 ) -> str:
     """Content key of a diagnosis: everything that its result depends on."""
+    model = asdict(simulation)
+    # Said only where there is something: keys without it stay as they were.
+    if not model["known"]:
+        del model["known"]
+    return _key_of(recordings, model, options)
+
+
+def _key_of(
+    recordings: Sequence[Recording], model: dict[str, Any], options: DiagnoseOptions
+) -> str:
     about = [
         {"name": one.name, "kind": one.kind, "sample_time_s": one.sample_time_s}
         for one in recordings
     ]
     arrays = [array for one in recordings for array in (one.input, one.output)]
     arrays += [one.reference for one in recordings if one.reference is not None]
-    model = asdict(simulation)
-    # Said only where there is something: keys without it stay as they were.
-    if not model["known"]:
-        del model["known"]
     settings = {"recordings": about, "simulation": model, "options": options}
     return task_key(NAME, STAGE_VERSION, settings, arrays)
 
@@ -232,9 +249,25 @@ class ToDiagnose:
 
     experiment: Experiment
     recordings: tuple[Recording, ...]
-    simulation: SimulationOptions
+    simulation: SimulationOptions | ForeignSimulation
     options: DiagnoseOptions
     logs: tuple[CalibrationLog, ...] = ()
+
+    @property
+    def key(self) -> str:
+        """Content key of the diagnosis: everything that its result depends on."""
+        if isinstance(self.simulation, SimulationOptions):
+            return diagnosis_key(self.recordings, self.simulation, self.options)
+        content = content_of(self.simulation, self.experiment.source)
+        return _key_of(self.recordings, content, self.options)
+
+    @property
+    def extended(self) -> Callable[[Diagnosis], SimulationOptions | ForeignSimulation]:
+        """From a diagnosis to the simulation with what was found."""
+        given = self.simulation
+        if isinstance(given, SimulationOptions):
+            return lambda diagnosis: extended_options(diagnosis, given)
+        return lambda diagnosis: extended_foreign(diagnosis, given)
 
 
 def choose(context: Context) -> ToDiagnose:
@@ -270,19 +303,24 @@ def choose(context: Context) -> ToDiagnose:
     return ToDiagnose(experiment, recordings, simulation, options, logs)
 
 
-def _simulation(experiment: Experiment) -> SimulationOptions:
+def _simulation(experiment: Experiment) -> SimulationOptions | ForeignSimulation:
     if experiment.simulation is None:
         raise ConfigError(
             f"{experiment.source}: simulation: missing; expected the physics model that "
             "is compared with the recordings; add the section (configs/README.md "
             "explains it)"
         )
-    return experiment.simulation
+    foreign = experiment.foreign_simulation
+    return (
+        experiment.simulation if foreign is None else placed(foreign, experiment.source)
+    )
 
 
 def _warnings(context: Context, given: ToDiagnose) -> list[str]:
     """What the units are taken for, and which recordings cannot start in equilibrium."""
     recordings, simulation, options = given.recordings, given.simulation, given.options
+    if not isinstance(simulation, SimulationOptions):
+        return [_announcement(simulation)]
     said = [
         assumed_units(given.experiment, recordings, given.logs),
         doubtful_sizes(given.experiment, recordings, simulation, options, given.logs),
@@ -294,11 +332,51 @@ def _warnings(context: Context, given: ToDiagnose) -> list[str]:
     return [one for one in said if one]
 
 
-def _compute(given: ToDiagnose, runner: Runner) -> Diagnosis:
-    with runner.rounds("tasks") as (settings, begin_round):
-        return diagnose_all(
-            given.recordings, given.simulation, given.options, settings, begin_round
+def simulated_recordings(given: ToDiagnose) -> tuple[DriveResponse, ...]:
+    """What the simulation makes of the recordings, with the given parameters."""
+    simulation = given.simulation
+    if not isinstance(simulation, SimulationOptions):
+        return simulated(simulation, given.recordings, given.logs)
+    return simulate_recordings(given.recordings, simulation, given.options)
+
+
+def _announcement(simulation: ForeignSimulation) -> str:
+    """What is going to run, and what a diagnosis may do with it."""
+    able = kind_named(simulation.kind).capabilities(simulation)
+    can = [
+        word
+        for word, is_so in (
+            ("other inputs", able.run),
+            ("other parameters", able.parameters),
+            ("a force input", able.force),
+            ("single steps", able.step),
         )
+        if is_so
+    ]
+    words = ", ".join(can) or "nothing: only its outputs are compared"
+    what = getattr(simulation, "file", "") or " ".join(
+        getattr(simulation, "command", ())
+    )
+    runs = f"runs {what}" if able.run and what else "runs nothing of yours"
+    return f"simulation.kind {simulation.kind}: {runs}; it can be given {words}"
+
+
+def _compute(given: ToDiagnose, runner: Runner) -> Diagnosis:
+    simulation, options = given.simulation, given.options
+    with runner.rounds("tasks") as (settings, begin_round):
+        if isinstance(simulation, SimulationOptions):
+            return diagnose_all(
+                given.recordings, simulation, options, settings, begin_round
+            )
+        simulator = simulator_of(simulation, given.recordings, given.logs)
+        with one_thread():
+            return diagnose_foreign(
+                given.recordings,
+                simulator,
+                options,
+                _runner(given.key, settings),
+                begin_round,
+            )
 
 
 def _write_files(
@@ -323,7 +401,7 @@ def _write_files(
     write_extended_simulation(
         out / "extended_simulation.yaml",
         given.experiment,
-        extended_options(diagnosis, given.simulation),
+        given.extended(diagnosis),
     )
 
 
@@ -364,7 +442,7 @@ STAGE = Stage(
     sections=("simulation", "diagnose"),
     require=_simulation,
     choose=choose,
-    key=lambda given: diagnosis_key(given.recordings, given.simulation, given.options),
+    key=lambda given: given.key,
     compute=_compute,
     storage=in_results(
         "diagnose",

@@ -68,7 +68,7 @@ def refused_units(
     tuple of str
         A line for each side at most; empty without a simulation.
     """
-    simulation, options = experiment.simulation, experiment.recordings
+    simulation, options = experiment.drive_simulation, experiment.recordings
     if simulation is None or options is None:
         return ()
     found = {}
@@ -165,7 +165,7 @@ def assumed_units(
     str
         One line; empty where all units are known.
     """
-    simulation, names = experiment.simulation, {one.name for one in recordings}
+    simulation, names = experiment.drive_simulation, {one.name for one in recordings}
     if simulation is None:
         return ""
     si = {"time": "s", **{side: getattr(simulation, f"{side}_unit") for side in _SIDES}}

@@ -152,23 +152,31 @@ def write_diagnosis_json(
     replace_file(path, f"{text}\n".encode())
 
 
+def _gap(diagnosis: Diagnosis) -> dict[str, Any]:
+    return {
+        "noise_rms": diagnosis.noise.rms,
+        "given": asdict(diagnosis.given),
+        "before": asdict(diagnosis.before),
+        "after": asdict(diagnosis.after),
+        "explained_share": diagnosis.explained_share,
+        "unit": diagnosis.output_unit,
+    }
+
+
 def _content(diagnosis: Diagnosis) -> dict[str, Any]:
     return {
         "verdict": diagnosis.verdict,
         "complete": diagnosis.complete,
+        "confirmed": diagnosis.confirmed,
+        "capabilities": [
+            name for name, is_so in asdict(diagnosis.capabilities).items() if is_so
+        ],
         "judged_on": diagnosis.judged_on,
         "summary": diagnosis.summary,
         "effects": [_effect(effect) for effect in diagnosis.effects],
         "present": [_effect(effect) for effect in diagnosis.present],
         "ambiguous_with": [_ids(one) for one in diagnosis.ambiguous_with],
-        "gap": {
-            "noise_rms": diagnosis.noise.rms,
-            "given": asdict(diagnosis.given),
-            "before": asdict(diagnosis.before),
-            "after": asdict(diagnosis.after),
-            "explained_share": diagnosis.explained_share,
-            "unit": diagnosis.output_unit,
-        },
+        "gap": _gap(diagnosis),
         "noise": asdict(diagnosis.noise),
         "reference": {
             "current_A": diagnosis.reference_current_A,

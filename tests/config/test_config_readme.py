@@ -35,10 +35,9 @@ def keys_of(record_type, prefix="", kind=""):
         key, hint = prefix + field.name, hints[field.name]
         members = [m for m in get_args(hint) or (hint,) if is_dataclass(m)]
         for member in members:
-            is_one_of_many = len(members) > 1
-            inner = (
-                member.__dataclass_fields__["kind"].default if is_one_of_many else kind
-            )
+            own = member.__dataclass_fields__.get("kind")
+            is_one_of_many = len(members) > 1 and not getattr(member, "IS_USUAL", False)
+            inner = own.default if own is not None and is_one_of_many else kind
             yield from keys_of(member, f"{key}.", inner)
         if not members:
             yield kind, key, type_in_words(hint), default_in_yaml(field)
@@ -47,6 +46,8 @@ def keys_of(record_type, prefix="", kind=""):
 def type_in_words(hint):
     if get_origin(hint) is Literal:
         return "text"
+    if is_dataclass(hint):
+        return "section"
     members = [part for part in get_args(hint) if part is not NoneType]
     if get_origin(hint) is tuple:
         return f"list of {type_in_words(members[0])}"

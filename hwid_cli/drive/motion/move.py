@@ -73,13 +73,15 @@ CAPTURE_SHARE = 0.02
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def move(
-    command: np.ndarray, sample_time: float, given_p: np.ndarray
+    command: np.ndarray, force: np.ndarray, sample_time: float, given_p: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return position and velocity of the measured place, and command, at every sample.
 
     Parameters
     ----------
     command : ndarray, shape (n,), [A] or [V]; the reference [m] under a controller
+    force : ndarray, shape (n,) or (0,), [N]
+        That acts on the mass beside the drive's own; empty where there is none.
     sample_time : float, [s]
     given_p : ndarray, shape (N_SLOTS,)
     """
@@ -89,7 +91,10 @@ def move(
     has_controller, control = is_closed(p), np.zeros(N_CONTROL)
     before = 0.0 if has_controller else command[0]
     state, memory = np.zeros(N_STATE), np.zeros(N_MEMORY)
+    at_start = force[0] if force.size > 0 else 0.0
+    p[slots.LOAD] += at_start
     followed = _start(state, memory, before, sample_time, p)
+    p[slots.LOAD] -= at_start
     trial, inputs, active = state.copy(), np.zeros(N_INPUT), active_states(p)
     kind = _kind_of(p)
     step = _longest_step(sample_time, kind)
@@ -114,8 +119,8 @@ def move(
             )  # fmt: skip
         now = drawn_current(given[sample], state, p) if is_single else 0.0
         count, followed, sample = list_pieces(
-            sample, sample_time, given, ends, before, followed, now, pieces, pushes,
-            room, memory, p,
+            sample, sample_time, given, force, ends, before, followed, now, pieces,
+            pushes, room, memory, p,
         )  # fmt: skip
         j = np.int64(0)
         while j < count:

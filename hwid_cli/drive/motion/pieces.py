@@ -27,6 +27,7 @@ def list_pieces(
     sample: int,
     sample_time: float,
     given: np.ndarray,
+    force: np.ndarray,
     ends: np.ndarray,
     before: float,
     followed: float,
@@ -45,6 +46,8 @@ def list_pieces(
         First sample.
     sample_time : float, [s]
     given : ndarray, shape (n_samples,), [A] or [V]
+    force : ndarray, shape (n_samples,) or (0,), [N]
+        Beside the drive's own, a straight line between samples.
     ends : ndarray, shape (2, n_samples)
         Filled with the command at both ends of each interval.
     before : float
@@ -95,6 +98,11 @@ def list_pieces(
                 push[DRIVE + 1] = gain * (last - first) / length
             else:
                 set_push(push, room, memory, (time, length, first, last), now, p)
+            if force.size > 0:
+                slope = (force[sample + 1] - force[sample]) / sample_time
+                here = force[sample] + (time - sample * sample_time) * slope
+                push[OTHER] = here + (p[slots.LOAD] if is_plain else push[OTHER])
+                push[OTHER + 1] = slope + (0.0 if is_plain else push[OTHER + 1])
             time += length
             count += 1
         sample += 1

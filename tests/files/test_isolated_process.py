@@ -13,8 +13,8 @@ import scipy.io
 
 from hwid_cli.data import formats
 from hwid_cli.data.formats import Reader, list_columns, read_columns
-from hwid_cli.data.isolated_reading import IsolatedReader
 from hwid_cli.errors import MeasurementError
+from hwid_cli.files.isolated_process import IsolatedReader
 from hwid_cli.records.experiment import Columns
 
 COLUMNS = Columns(input="u", output="y", time="t")
@@ -144,7 +144,7 @@ def test_messages_name_the_path_as_it_was_given(good, tmp_path, monkeypatch):
 # Reads a file, then waits, for input or for a file without an end.
 PROGRAM = """
 import json, sys
-from hwid_cli.data.isolated_reading import IsolatedReader
+from hwid_cli.files.isolated_process import IsolatedReader
 reader = IsolatedReader("hwid_cli.data.formats")
 reader.ask(json.loads(sys.argv[1]))
 print(reader._process.pid, flush=True)

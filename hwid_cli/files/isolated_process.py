@@ -58,10 +58,12 @@ class IsolatedReader:
     ----------
     module : str
         What runs there; it hands its answers to ``serve``.
+    word : str
+        What it is called in messages.
     """
 
-    def __init__(self, module: str) -> None:
-        self._module = module
+    def __init__(self, module: str, word: str = "its reader") -> None:
+        self._module, self._word = module, word
         self._process: Any = None
         self._lock = threading.Lock()
         atexit.register(self.end)
@@ -139,10 +141,10 @@ class IsolatedReader:
             is_late = time.monotonic() - begin >= most_seconds
             code = self.end(_DYING_S)
             if is_late:
-                said = f"its reader did not come back within {most_seconds:g} s"
+                said = f"{self._word} did not come back within {most_seconds:g} s"
                 raise ValueError(said) from None
             name = signal.Signals(-code).name if code < 0 else f"code {code}"
-            raise _CrashError(f"its reader crashes on it, {name}") from None
+            raise _CrashError(f"{self._word} crashes on it, {name}") from None
         except BaseException:
             # Interrupted in the middle of an answer.
             self.end()
@@ -183,19 +185,26 @@ def _hear(replies: IO[bytes]) -> tuple[list[Labelled], dict[str, Any]]:
         found.append((said["label"], values))
 
 
-def serve(answer: Callable[[dict[str, Any]], Iterable[Labelled]]) -> None:
+def serve(
+    answer: Callable[[dict[str, Any]], Iterable[Labelled]],
+    *,
+    most_memory: int | None = _MOST_MEMORY,
+) -> None:
     """Answer requests until there are no more: the life of the process.
 
     Parameters
     ----------
     answer : callable
         From a request to its arrays, which are sent one by one.
+    most_memory : int or None, [bytes]
+        Of address space; None for no bound.
     """
     # Ctrl-C reaches the whole group of processes, and nobody reads a traceback.
     if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.SIG_DFL)
     if resource is not None:
-        _bound("RLIMIT_AS", _MOST_MEMORY)
+        if most_memory is not None:
+            _bound("RLIMIT_AS", most_memory)
         _bound("RLIMIT_CORE", 0)
     replies = os.fdopen(os.dup(1), "wb")
     # What a library prints is no answer.
@@ -210,7 +219,8 @@ def serve(answer: Callable[[dict[str, Any]], Iterable[Labelled]]) -> None:
                 _say(replies, {"label": label, "size": numbers.size})
                 replies.write(numbers.data)
         except MemoryError:
-            end = {"error": f"needs more than {_MOST_MEMORY // 2**30} GB of memory"}
+            bound = "" if most_memory is None else f" than {most_memory // 2**30} GB"
+            end = {"error": f"needs more{bound} of memory"}
         except Exception as error:
             # Readers of foreign formats raise whatever their parser stumbles on.
             end = {"error": str(error) or type(error).__name__}

@@ -1,0 +1,269 @@
+"""A linear drive that stands for a simulation which cannot be opened.
+
+A mass, a damper and a spring are fitted to what the simulation makes of the recordings'
+inputs. What they do not reproduce becomes a force along each recording, so that the
+stand-in moves as the simulation does; its own equation is only used for what an effect
+changes around that motion. docs/method_diagnosis.md, eq. (D30), (D31).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import sparse
+from scipy.interpolate import make_interp_spline
+from scipy.optimize import nnls
+from scipy.sparse.linalg import spsolve
+
+from hwid_cli.diagnosis.parameters import drive_at, first_point, parameter_layout
+from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals
+from hwid_cli.diagnosis.scales import scales_of_recordings
+from hwid_cli.diagnosis.search import fit_point
+from hwid_cli.drive.simulation import Motion, parameter_vector, run, set_start
+from hwid_cli.records.drive import Drive
+from hwid_cli.records.programs import SimulatorRun
+
+_DEGREE = 5
+# A spring or a damper that gives less of the force than this share is none.
+_LEAST_SHARE = 1e-4
+_LEAST_MASS = 1e-12
+_ITERATIONS = 20
+# A first velocity below this share of the largest is rest.
+_STILL = 1e-3
+# Weight of the bends of a force against its means.
+_SMOOTHNESS = 1e-2
+
+
+@dataclass(frozen=True, eq=False)
+class Moved:
+    """Position, velocity and acceleration of a simulation at every sample.
+
+    Parameters
+    ----------
+    position, velocity, acceleration : ndarray, shape (n_samples,), [m], [m/s], [m/s^2]
+    """
+
+    position: np.ndarray
+    velocity: np.ndarray
+    acceleration: np.ndarray
+
+
+def derived(found: SimulatorRun, sample_time_s: float) -> Moved:
+    """Motion of a run, with derivatives from a spline through its samples."""
+    size = found.output.size
+    time = sample_time_s * np.arange(size)
+    degree = min(_DEGREE, size - 1)
+    spline = make_interp_spline(time, found.output, k=degree)
+    if found.velocity.size:
+        slope = make_interp_spline(time, found.velocity, k=degree).derivative()
+        return Moved(found.output, found.velocity, slope(time))
+    return Moved(found.output, spline.derivative()(time), spline.derivative(2)(time))
+
+
+def fit_stand_in(signals: Sequence[Signals], runs: Sequence[SimulatorRun]) -> Drive:
+    """Linear drive that moves most nearly as a simulation does.
+
+    Its force constant is 1: forces count in the unit of the input.
+
+    Parameters
+    ----------
+    signals : sequence of Signals
+        With the inputs.
+    runs : sequence of SimulatorRun
+        What the simulation made of them.
+
+    References
+    ----------
+    docs/method_diagnosis.md, eq. (D30).
+    """
+    drive = _by_regression(signals, runs)
+    return _in_free_run(drive, signals, runs)
+
+
+def _by_regression(signals: Sequence[Signals], runs: Sequence[SimulatorRun]) -> Drive:
+    """Mass, damping and stiffness that balance the input along the motion."""
+    rows, right = [], []
+    for one, found in zip(signals, runs, strict=True):
+        moved = derived(found, one.sample_time_s)
+        size = float(np.std(one.driven_by)) or 1.0
+        # An offset of either sign is two columns that are not negative.
+        constant = np.ones(one.driven_by.size)
+        columns = (moved.acceleration, moved.velocity, moved.position)
+        rows.append(np.column_stack([*columns, constant, -constant]) / size)
+        right.append(one.driven_by / size)
+    matrix, vector = np.concatenate(rows), np.concatenate(right)
+    lengths = np.sqrt(np.sum(matrix**2, axis=0))
+    lengths[lengths == 0] = 1.0
+    values = nnls(matrix / lengths, vector)[0] / lengths
+    shares = values * lengths / np.sqrt(np.sum(vector**2))
+    mass, damping, stiffness = values[:3]
+    if shares[0] < _LEAST_SHARE:
+        # Hardly any inertia: as much as a sampled motion can show.
+        mass = max(_LEAST_SHARE * np.sqrt(np.sum(vector**2)) / lengths[0], _LEAST_MASS)
+    return Drive(
+        mass_kg=float(mass),
+        damping_N_s_per_m=float(damping if shares[1] > _LEAST_SHARE else 0.0),
+        stiffness_N_per_m=float(stiffness if shares[2] > _LEAST_SHARE else 0.0),
+        force_constant_N_per_A=1.0,
+    )
+
+
+def _in_free_run(
+    drive: Drive, signals: Sequence[Signals], runs: Sequence[SimulatorRun]
+) -> Drive:
+    """The same, nearer in a free run, where that can be found."""
+    compared = tuple(
+        replace(
+            one,
+            output=found.output,
+            compared=found.output,
+            is_held_out=False,
+            used=None,
+        )
+        for one, found in zip(signals, runs, strict=True)
+    )
+    problem = DiagnosisProblem(compared, drive)
+    scales = scales_of_recordings(problem, [one.velocity for one in compared])
+    fit_layout = parameter_layout(problem, (), {}, scales)
+    point = first_point(problem, fit_layout, drive, {})
+    found = fit_point(problem, fit_layout, point, max_iterations=_ITERATIONS)
+    if not np.isfinite(found.sse):
+        return drive
+    better = drive_at(problem, fit_layout, found.point)
+    gain = better.force_constant_N_per_A
+    return replace(
+        better,
+        mass_kg=better.mass_kg / gain,
+        damping_N_s_per_m=better.damping_N_s_per_m / gain,
+        stiffness_N_per_m=better.stiffness_N_per_m / gain,
+        force_constant_N_per_A=1.0,
+    )
+
+
+def in_newtons(drive: Drive, force_gain: float) -> Drive:
+    """The same drive with forces in another unit.
+
+    Parameters
+    ----------
+    force_gain : float, [unit of the input/N]
+        By how much of the input a force of 1 N can be replaced.
+    """
+    return replace(
+        drive,
+        mass_kg=drive.mass_kg / force_gain,
+        damping_N_s_per_m=drive.damping_N_s_per_m / force_gain,
+        stiffness_N_per_m=drive.stiffness_N_per_m / force_gain,
+        force_constant_N_per_A=drive.force_constant_N_per_A / force_gain,
+    )
+
+
+def force_along(drive: Drive, moved: Moved, driven_by: np.ndarray) -> np.ndarray:
+    """Force that a drive needs beside its input to move in a given way.
+
+    Parameters
+    ----------
+    driven_by : ndarray, shape (n_samples,), [input unit]
+
+    Returns
+    -------
+    ndarray, shape (n_samples,), [N]
+
+    References
+    ----------
+    docs/method_diagnosis.md, eq. (D31).
+    """
+    return np.asarray(
+        drive.mass_kg * moved.acceleration
+        + drive.damping_N_s_per_m * moved.velocity
+        + drive.stiffness_N_per_m * moved.position
+        - drive.force_constant_N_per_A * driven_by
+    )
+
+
+def standing_for(
+    signals: Signals, found: SimulatorRun, drive: Drive, force: np.ndarray
+) -> Signals:
+    """Signals with what makes the stand-in move as the simulation did.
+
+    Parameters
+    ----------
+    force : ndarray, shape (n_samples,), [N]
+        With it, and without any effect, the stand-in's output and that of the run differ
+        by an offset that is small.
+    """
+    moved = derived(found, signals.sample_time_s)
+    start = start_of(moved)
+    plain = moved_plainly(drive, signals, force, moved)
+    return replace(
+        signals,
+        force=force,
+        offset=found.output - plain.position,
+        start=start if drive.stiffness_N_per_m > 0 else signals.start,
+    )
+
+
+def start_of(moved: Moved) -> tuple[float, float] | None:
+    """Where a run starts; None for one that rests at first."""
+    fastest = float(np.max(np.abs(moved.velocity)))
+    if abs(float(moved.velocity[0])) <= _STILL * fastest:
+        return None
+    return float(moved.position[0]), float(moved.velocity[0])
+
+
+def moved_plainly(
+    drive: Drive, signals: Signals, force: np.ndarray, moved: Moved
+) -> Motion:
+    """Motion of the stand-in without effects.
+
+    Parameters
+    ----------
+    force : ndarray, shape (n_samples,), [N]
+    moved : Moved
+        Of the simulation, which starts there.
+    """
+    vector = parameter_vector(drive, {})
+    start = start_of(moved)
+    if start is None and drive.stiffness_N_per_m == 0:
+        start = float(moved.position[0]), 0.0
+    if start is not None:
+        set_start(vector, *start)
+    return run(signals.driven_by, vector, signals.sample_time_s, force=force)
+
+
+def force_of_motion(drive: Drive, signals: Signals, motion: Motion) -> np.ndarray:
+    """Force beside input and stand-in force that a motion needs: what an effect makes.
+
+    Between samples it is a straight line with the impulse that the motion needs, so that
+    a jump of the force within a sample is spread over it.
+
+    Returns
+    -------
+    ndarray, shape (n_samples,), [N]
+    """
+    dt, x, v = signals.sample_time_s, motion.position, motion.velocity
+    way = np.diff(x)
+    area = 0.5 * dt * (x[1:] + x[:-1]) - dt**2 / 12 * np.diff(v)
+    impulse = (
+        drive.mass_kg * np.diff(v)
+        + drive.damping_N_s_per_m * way
+        + drive.stiffness_N_per_m * area
+    )
+    given = drive.force_constant_N_per_A * signals.driven_by
+    if signals.force.size:
+        given = given + signals.force
+    return _with_means(impulse / dt - 0.5 * (given[1:] + given[:-1]))
+
+
+def _with_means(means: np.ndarray) -> np.ndarray:
+    """Corners of straight lines that have given means, without going up and down.
+
+    Corners that go up and down from sample to sample change no mean: the smoothest ones
+    are taken.
+    """
+    size = means.size + 1
+    if size < 4 or not np.isfinite(means).all():
+        return np.r_[means[:1], 0.5 * (means[1:] + means[:-1]), means[-1:]]
+    pairs = sparse.diags([0.5, 0.5], [0, 1], shape=(size - 1, size))
+    bends = sparse.diags([1.0, -2.0, 1.0], [0, 1, 2], shape=(size - 2, size))
+    matrix = pairs.T @ pairs + _SMOOTHNESS * (bends.T @ bends)
+    return np.asarray(spsolve(matrix.tocsc(), pairs.T @ means))

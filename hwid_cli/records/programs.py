@@ -1,0 +1,232 @@
+"""Simulations of the user's own, as a configuration names them.
+
+A function, a program, an FMU, a model that was exported, or only what some simulation has
+given. What each of them can do decides what a diagnosis may claim.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Annotated
+
+import numpy as np
+
+from hwid_cli.records.drive import Repeatable
+from hwid_cli.records.model import HammersteinWiener
+from hwid_cli.records.rules import (
+    NO_KEY,
+    POSITIVE,
+    Filled,
+    Number,
+    OneOf,
+    Refusal,
+    Refused,
+)
+
+_TIME_LIMIT = Number(above=0, words="a number of seconds > 0")
+
+
+@dataclass(frozen=True)
+class FreeParameter:
+    """A parameter of a simulation that may be fitted again.
+
+    Parameters
+    ----------
+    bounds : tuple of float
+        Lowest and highest value; empty for none.
+    """
+
+    value: float
+    bounds: tuple[float, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not self.bounds:
+            return
+        if len(self.bounds) != 2 or not self.bounds[0] < self.bounds[1]:
+            expected = "two numbers, the lower one first"
+            raise Refused(Refusal(list(self.bounds), expected, ("bounds",)))
+        if not self.bounds[0] <= self.value <= self.bounds[1]:
+            low, high = self.bounds
+            expected = f"a number within its bounds, {low:g} to {high:g}"
+            raise Refused(Refusal(self.value, expected, ("value",)))
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Program:
+    """What all simulations that can be run have in common.
+
+    Parameters
+    ----------
+    input, output : str
+        Which of its inputs the recordings' input drives, and which of its outputs they
+        measure.
+    force_input : str or None
+        An input at which a missing force may act.
+    velocity : str or None
+        An output.
+    parameters : dict of str to float or FreeParameter
+        A plain number is handed over and stays as it is.
+    time_limit_s : float, [s]
+        Of one run.
+    effects : dict of str to dict of str to float or str
+        Put into the simulation beside what it has.
+    """
+
+    input: Annotated[str, Filled("the name of an input")]
+    output: Annotated[str, Filled("the name of an output")]
+    force_input: str | None = None
+    velocity: str | None = None
+    parameters: dict[str, float | FreeParameter] = field(default_factory=dict)
+    time_limit_s: Annotated[float, _TIME_LIMIT] = 60.0
+    effects: Annotated[dict[str, dict[str, float | str]], Repeatable()] = field(
+        default_factory=dict
+    )
+
+    @property
+    def free(self) -> dict[str, FreeParameter]:
+        """Parameters that may be fitted again, by name."""
+        return {
+            name: one
+            for name, one in self.parameters.items()
+            if isinstance(one, FreeParameter)
+        }
+
+    @property
+    def values(self) -> dict[str, float]:
+        """All parameters as given, by name."""
+        return {
+            name: one.value if isinstance(one, FreeParameter) else float(one)
+            for name, one in self.parameters.items()
+        }
+
+
+@dataclass(frozen=True, kw_only=True)
+class PythonSimulation(_Program):
+    """A function ``simulate(time_s, inputs, parameters)`` that returns outputs by name.
+
+    Parameters
+    ----------
+    file : str
+        Relative to the configuration.
+    """
+
+    kind: Annotated[str, OneOf(["python"])] = "python"
+    file: Annotated[str, Filled("a Python file")]
+    function: Annotated[str, Filled("the name of a function")] = "simulate"
+
+
+@dataclass(frozen=True, kw_only=True)
+class FmuSimulation(_Program):
+    """An FMU for co-simulation, FMI 2 or 3.
+
+    Parameters
+    ----------
+    file : str
+        Relative to the configuration.
+    step_s : float or None, [s]
+        Communication step; None for the sample time.
+    """
+
+    kind: Annotated[str, OneOf(["fmu"])] = "fmu"
+    file: Annotated[str, Filled("a file")]
+    step_s: Annotated[float | None, POSITIVE] = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class CommandSimulation(_Program):
+    """A program that reads ``{inputs}`` and ``{parameters}`` and writes ``{outputs}``."""
+
+    kind: Annotated[str, OneOf(["command"])] = "command"
+    command: Annotated[tuple[str, ...], Filled("a program and its arguments")]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ModelSimulation:
+    """A model that was exported as JSON; it has one input and one output.
+
+    Parameters
+    ----------
+    model : HammersteinWiener or None
+        That the file holds; None until it is read.
+    """
+
+    kind: Annotated[str, OneOf(["model"])] = "model"
+    file: Annotated[str, Filled("a model's JSON file")]
+    model: HammersteinWiener | None = field(default=None, metadata=NO_KEY)
+    model_sample_time_s: float = field(default=0.0, metadata=NO_KEY)
+    effects: Annotated[dict[str, dict[str, float | str]], Repeatable()] = field(
+        default_factory=dict
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class OutputsSimulation:
+    """What a simulation has given: ``recordings.columns.simulated``."""
+
+    kind: Annotated[str, OneOf(["outputs"])] = "outputs"
+    effects: Annotated[dict[str, dict[str, float | str]], Repeatable()] = field(
+        default_factory=dict
+    )
+
+
+Program = PythonSimulation | FmuSimulation | CommandSimulation
+ForeignSimulation = Program | ModelSimulation | OutputsSimulation
+
+
+@dataclass(frozen=True)
+class Capabilities:
+    """What a simulation can do.
+
+    Parameters
+    ----------
+    run : bool
+        It can be run with other inputs.
+    parameters : bool
+        Some of its parameters may be changed.
+    force : bool
+        A force can act on it beside its input.
+    step : bool
+        It can be run step by step.
+    """
+
+    run: bool
+    parameters: bool = False
+    force: bool = False
+    step: bool = False
+
+
+OF_DRIVE = Capabilities(run=True, parameters=True, force=True)
+
+
+@dataclass(frozen=True, eq=False)
+class RunRequest:
+    """One run of a simulation.
+
+    Parameters
+    ----------
+    name : str
+        Of the recording.
+    input : ndarray, shape (n_samples,)
+    force : ndarray, shape (n_samples,) or (0,), [N]
+        At the simulation's force input; empty for none.
+    """
+
+    name: str
+    sample_time_s: float
+    input: np.ndarray
+    force: np.ndarray
+    parameters: Mapping[str, float]
+
+
+@dataclass(frozen=True, eq=False)
+class SimulatorRun:
+    """What a run has given.
+
+    Parameters
+    ----------
+    output : ndarray, shape (n_samples,)
+    velocity : ndarray, shape (n_samples,) or (0,)
+        Empty where the simulation does not give it.
+    """
+
+    output: np.ndarray
+    velocity: np.ndarray

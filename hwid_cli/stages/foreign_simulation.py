@@ -1,0 +1,166 @@
+"""A simulation of the user's own, from its section to what the diagnosis works with."""
+
+from collections.abc import Sequence
+from dataclasses import asdict, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hwid_cli.diagnosis.foreign import Simulator
+from hwid_cli.errors import ConfigError, ModelFileError, SimulationError
+from hwid_cli.export.json_reader import read_exported
+from hwid_cli.records.diagnosis import Diagnosis
+from hwid_cli.records.drive import DriveResponse, told_apart
+from hwid_cli.records.exported import ExportedModel
+from hwid_cli.records.programs import (
+    CommandSimulation,
+    ForeignSimulation,
+    FreeParameter,
+    ModelSimulation,
+    OutputsSimulation,
+    RunRequest,
+)
+from hwid_cli.records.recordings import CalibrationLog, Recording
+from hwid_cli.simulations.kinds import kind_named
+
+
+def placed(options: ForeignSimulation, source: str) -> ForeignSimulation:
+    """The section with absolute paths, and with the model that it names.
+
+    Parameters
+    ----------
+    source : str
+        The configuration.
+
+    Raises
+    ------
+    ConfigError
+        If a file is missing or holds no model.
+    """
+    folder = Path(source).parent
+    if isinstance(options, OutputsSimulation):
+        return options
+    if isinstance(options, CommandSimulation):
+        there = [
+            str((folder / one).resolve()) if (folder / one).is_file() else one
+            for one in options.command
+        ]
+        return replace(options, command=tuple(there))
+    options = replace(options, file=str((folder / options.file).resolve()))
+    return (
+        _with_model(options, source)
+        if isinstance(options, ModelSimulation)
+        else options
+    )
+
+
+def _with_model(options: ModelSimulation, source: str) -> ModelSimulation:
+    try:
+        found = read_exported(Path(options.file))
+    except ModelFileError as error:
+        raise ConfigError(f"{source}: simulation.file: {error}") from error
+    if not isinstance(found, ExportedModel):
+        raise ConfigError(
+            f"{source}: simulation.file: {options.file} is a physics simulation; "
+            "expected a Hammerstein-Wiener model; write its section with kind: drive"
+        )
+    return replace(options, model=found.model, model_sample_time_s=found.sample_time_s)
+
+
+def content_of(options: ForeignSimulation, source: str) -> dict[str, Any]:
+    """Everything that a simulation's answers depend on, as plain data.
+
+    Raises
+    ------
+    ConfigError
+        If it cannot be found.
+    """
+    about = asdict(options)
+    for name in ("file", "model", "time_limit_s"):
+        about.pop(name, None)
+    kind = kind_named(options.kind)
+    if kind.content is not None:
+        try:
+            about["sha256"] = kind.content(options)
+        except SimulationError as error:
+            raise ConfigError(f"{source}: {error}") from error
+    return about
+
+
+def simulator_of(
+    options: ForeignSimulation,
+    recordings: Sequence[Recording],
+    logs: Sequence[CalibrationLog],
+) -> Simulator:
+    """What the diagnosis works with."""
+    kind = kind_named(options.kind)
+    given = {}
+    if isinstance(options, OutputsSimulation):
+        given = _given_outputs(recordings, logs)
+    return Simulator(
+        capabilities=kind.capabilities(options),
+        run=None if kind.run is None else partial(kind.run, options),
+        given=given,
+        free=getattr(options, "free", {}),
+        values=getattr(options, "values", {}),
+        effects=options.effects,
+    )
+
+
+def _given_outputs(
+    recordings: Sequence[Recording], logs: Sequence[CalibrationLog]
+) -> dict[str, np.ndarray]:
+    """What the simulation gave; the offset of the sensor is none of its own."""
+    offsets = {one.name: one.output_offset for one in logs}
+    return {
+        one.name: np.array(one.reference) + offsets.get(one.name, 0.0)
+        for one in recordings
+        if one.reference is not None
+    }
+
+
+def simulated(
+    options: ForeignSimulation,
+    recordings: Sequence[Recording],
+    logs: Sequence[CalibrationLog],
+) -> tuple[DriveResponse, ...]:
+    """What a simulation makes of the recordings' inputs, beside what was measured."""
+    simulator = simulator_of(options, recordings, logs)
+    found = []
+    for one in recordings:
+        if simulator.run is None:
+            output = simulator.given[one.name]
+        else:
+            request = RunRequest(
+                one.name, one.sample_time_s, np.array(one.input), np.zeros(0),
+                simulator.values,
+            )  # fmt: skip
+            output = simulator.run(request).output
+        rms = float(np.sqrt(np.mean(np.square(one.output - output))))
+        time_s = one.sample_time_s * np.arange(one.n_samples)
+        found.append(
+            DriveResponse(one.name, time_s, one.input, one.output, output, rms)
+        )
+    return tuple(found)
+
+
+def extended_foreign(
+    diagnosis: Diagnosis, options: ForeignSimulation
+) -> ForeignSimulation:
+    """The section with the effects that were found and the fitted parameters."""
+    effects = [
+        (effect.id, {one.name: one.text or one.value for one in effect.parameters})
+        for effect in (*diagnosis.present, *diagnosis.effects)
+    ]
+    changes: dict[str, Any] = {"effects": told_apart(effects)}
+    fitted = {one.name: one.after for one in diagnosis.base}
+    if not isinstance(options, ModelSimulation | OutputsSimulation):
+        changes["parameters"] = {
+            name: replace(one, value=fitted[name])
+            if isinstance(one, FreeParameter) and name in fitted
+            else one
+            for name, one in options.parameters.items()
+        }
+    return replace(options, **changes)

@@ -1,0 +1,298 @@
+"""Simulations that somebody else has written: text of Python files, with a truth beside.
+
+A plant is a right-hand side in a file of its own, which the diagnosis only runs. The truth is
+the same right-hand side with an effect, integrated here in much shorter steps, with friction
+that holds (Karnopp, 1985). Nothing of the program is used.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+FUNCTION = '''
+"""A simulation of a machine."""
+
+import numpy as np
+
+
+def acceleration(x, v, force, state, parameters):
+{body}
+
+
+def simulate(time_s, inputs, parameters):
+    """Runge-Kutta in {steps} steps a sample; inputs are straight lines between samples."""
+    u, push = inputs["{input}"], inputs.get("force", np.zeros(time_s.size))
+    dt = time_s[1] - time_s[0]
+    h = dt / {steps}
+    y = np.zeros({size})
+    out = np.empty((time_s.size, {size}))
+    for n in range(time_s.size):
+        out[n] = y
+        if n + 1 == time_s.size:
+            break
+        for j in range({steps}):
+            a, b = j / {steps}, (j + 1) / {steps}
+            c = 0.5 * (a + b)
+            at = [
+                (u[n] + s * (u[n + 1] - u[n]), push[n] + s * (push[n + 1] - push[n]))
+                for s in (a, c, b)
+            ]
+            k1 = rates(y, *at[0], parameters)
+            k2 = rates(y + 0.5 * h * k1, *at[1], parameters)
+            k3 = rates(y + 0.5 * h * k2, *at[1], parameters)
+            k4 = rates(y + h * k3, *at[2], parameters)
+            y = y + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+    return {{"{output}": out[:, 0], "speed": out[:, 1]}}
+
+
+{rates}
+'''
+
+
+@dataclass(frozen=True)
+class Plant:
+    """A machine: the change of its states, position and speed first.
+
+    Parameters
+    ----------
+    rates : str
+        Text of ``rates(y, u, push, p)``.
+    values : dict of str to float
+        True parameters; all are handed over.
+    free : tuple of str
+        Those that the user lets be fitted.
+    size : float
+        Of the input.
+    mass : float
+        That an effect's force acts on, of state 1.
+    """
+
+    name: str
+    rates: str
+    n_states: int
+    values: dict
+    free: tuple
+    size: float
+    mass: float
+    stroke: float
+    input: str = "current_A"
+    output: str = "displacement_m"
+    steps: int = 4
+    has_force: bool = True
+
+    @property
+    def text(self):
+        """The user's file."""
+        head, rest = FUNCTION.split("def acceleration", 1)
+        rest = "def simulate" + rest.split("def simulate", 1)[1]
+        return (head + rest).format(
+            steps=self.steps,
+            size=self.n_states,
+            input=self.input,
+            output=self.output,
+            rates=self.rates,
+        )
+
+    def function(self):
+        """``rates`` as a function."""
+        scope = {"np": np}
+        exec(self.rates, scope)
+        return scope["rates"]
+
+
+LINEAR = Plant(
+    "stage",
+    """def rates(y, u, push, p):
+    x, v = y
+    return np.array([v, (p["kt"] * u + push - p["c"] * v - p["k"] * x) / p["m"]])
+""",
+    2,
+    {"m": 0.8, "c": 11.0, "k": 2100.0, "kt": 9.0},
+    ("c", "k", "kt"),
+    3.0,
+    0.8,
+    0.012,
+)
+PENDULUM = Plant(
+    "pendulum",
+    """def rates(y, u, push, p):
+    x, v = y
+    torque = p["kt"] * u + push - p["c"] * v - p["g"] * np.sin(x)
+    return np.array([v, torque / p["J"]])
+""",
+    2,
+    {"J": 0.02, "c": 0.05, "g": 0.9, "kt": 0.35},
+    ("c", "g", "kt"),
+    2.0,
+    0.02,
+    0.8,
+    output="angle_rad",
+)
+HARDENING = Plant(
+    "hardening",
+    """def rates(y, u, push, p):
+    x, v = y
+    spring = p["k"] * x + p["k3"] * x**3
+    return np.array([v, (p["kt"] * u + push - p["c"] * v - spring) / p["m"]])
+""",
+    2,
+    {"m": 0.3, "c": 8.0, "k": 900.0, "k3": 4e6, "kt": 5.0},
+    ("c", "k", "kt"),
+    4.0,
+    0.3,
+    0.014,
+)
+TWO_MASSES = Plant(
+    "two_masses",
+    """def rates(y, u, push, p):
+    x, v, xm, vm = y
+    link = p["ks"] * (xm - x) + p["cs"] * (vm - v)
+    load = (link + push - p["c"] * v - p["k"] * x) / p["m"]
+    motor = (p["kt"] * u - link) / p["mm"]
+    return np.array([v, load, vm, motor])
+""",
+    4,
+    {"m": 0.5, "mm": 0.2, "ks": 4e4, "cs": 8.0, "c": 10.0, "k": 1500.0, "kt": 6.0},
+    ("c", "k", "kt"),
+    3.0,
+    0.5,
+    0.012,
+    steps=8,
+)
+MOTOR = Plant(
+    "dc_motor",
+    """def rates(y, u, push, p):
+    x, v, i = y
+    current = (u - p["R"] * i - p["ke"] * v) / p["L"]
+    return np.array([v, (p["ke"] * i + push - p["c"] * v - p["k"] * x) / p["m"], current])
+""",
+    3,
+    {"m": 0.4, "c": 4.0, "k": 800.0, "R": 1.5, "L": 0.004, "ke": 4.0},
+    ("c", "k", "R"),
+    4.0,
+    0.4,
+    0.012,
+    input="voltage_V",
+    steps=8,
+)
+PLANTS = {one.name: one for one in (LINEAR, PENDULUM, HARDENING, TWO_MASSES, MOTOR)}
+
+
+@dataclass(frozen=True)
+class Hidden:
+    """What the machine has and the simulation lacks.
+
+    Parameters
+    ----------
+    accepted : tuple of tuple of str
+        Names of the catalogue that do it justice.
+    """
+
+    name: str
+    accepted: tuple
+    dry: float = 0.0
+    force: object = None
+    command: object = None
+    output: object = None
+    values: dict = field(default_factory=dict)
+
+
+def hidden_in(plant, load, x_max):
+    """Effects of a size that the machine shows.
+
+    Parameters
+    ----------
+    load : float
+        RMS of the force of the input on the mass.
+    x_max : float
+        Largest position without any effect.
+    """
+    stiff = load / x_max
+    speed = x_max * np.sqrt(8 * stiff / plant.mass)
+    return {
+        "none": Hidden("none", ((),)),
+        "coulomb": Hidden("coulomb", (("coulomb_friction",),), dry=0.12 * load),
+        "stop": Hidden(
+            "stop",
+            (("one_sided_stop",),),
+            force=lambda x, v, t: -60 * stiff * max(x - 0.55 * x_max, 0.0),
+        ),
+        "drag": Hidden(
+            "drag",
+            (("quadratic_drag",),),
+            force=lambda x, v, t: -0.8 * load / speed**2 * v * abs(v) * 4,
+        ),
+        "cubic": Hidden(
+            "cubic",
+            (("cubic_stiffness",),),
+            force=lambda x, v, t: -3 * stiff * x_max * (x / x_max) ** 3,
+        ),
+        "cogging": Hidden(
+            "cogging",
+            (("cogging",),),
+            force=lambda x, v, t: 0.3 * load * np.sin(2 * np.pi * x / (0.4 * x_max)),
+        ),
+        "dead_zone": Hidden(
+            "dead_zone",
+            (("input_dead_zone",),),
+            command=lambda u, t: (
+                np.sign(u) * np.maximum(np.abs(u) - 0.1 * plant.size, 0)
+            ),
+        ),
+        "delay": Hidden(
+            "delay",
+            (("input_delay",),),
+            command=lambda u, t: np.interp(t - 0.0032, t, u),
+        ),
+        "saturation": Hidden(
+            "saturation",
+            (("input_saturation",),),
+            command=lambda u, t: np.clip(u, -0.6 * plant.size, 0.6 * plant.size),
+        ),
+        "sensor": Hidden(
+            "sensor",
+            (("sensor_quadratic",),),
+            output=lambda x: x + 0.08 * x**2 / x_max,
+        ),
+    }
+
+
+def integrate(plant, values, u, dt, hidden=None, finer=10):
+    """The truth: semi-implicit midpoint in short steps, with friction that holds."""
+    rates, hidden = plant.function(), hidden or Hidden("none", ())
+    time = dt * np.arange(u.size)
+    if hidden.command is not None:
+        fine_time = np.linspace(0, time[-1], 40 * (u.size - 1) + 1)
+        fine = hidden.command(np.interp(fine_time, time, u), fine_time)
+    count = plant.steps * finer
+    h = dt / count
+    y, out = np.zeros(plant.n_states), np.empty(u.size)
+    for n in range(u.size):
+        out[n] = y[0]
+        if n + 1 == u.size:
+            break
+        for j in range(count):
+            at = (j + 0.5) / count
+            if hidden.command is None:
+                now = u[n] + at * (u[n + 1] - u[n])
+            else:
+                now = fine[40 * n + int(at * 40)]
+            y = _step(rates, y, now, h, time[n] + at * dt, values, hidden, plant.mass)
+    return hidden.output(out) if hidden.output is not None else out
+
+
+def _step(rates, y, u, h, t, values, hidden, mass):
+    push = hidden.force(y[0], y[1], t) if hidden.force is not None else 0.0
+    if hidden.dry == 0.0:
+        half = y + 0.5 * h * rates(y, u, push, values)
+        push = hidden.force(half[0], half[1], t) if hidden.force is not None else 0.0
+        return y + h * rates(half, u, push, values)
+    # Held where friction can; else it takes its share of the impulse.
+    free = rates(y, u, push, values)
+    speed = y[1] + h * free[1]
+    most = hidden.dry * h / mass
+    half = y + 0.5 * h * free
+    new = y + h * rates(half, u, push, values)
+    new[1] = 0.0 if abs(speed) <= most else speed - np.sign(speed) * most
+    new[0] = y[0] + 0.5 * h * (y[1] + new[1])
+    return new

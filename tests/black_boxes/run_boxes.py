@@ -1,0 +1,231 @@
+"""Diagnoses every black box and scores the verdicts.
+
+``python -m tests.black_boxes.run_boxes --work DIR [--only PLANT/EFFECT ...] [--access python|outputs]
+[--noise 0.005] [--write FILE.md]``.
+"""
+
+import argparse
+import json
+import subprocess
+import sys
+import time
+import zlib
+from pathlib import Path
+
+import numpy as np
+
+from tests.black_boxes.plants import PLANTS, hidden_in, integrate
+
+DT, N = 1e-3, 1200
+# By how much the given parameters are off.
+OFF = 0.15
+
+
+def inputs(plant, rng):
+    """Steps, sines and sums of sines after a rest."""
+    t = DT * np.arange(N)
+    on = t > 0.1
+    for share in (0.4, -0.7, 1.0):
+        yield f"step_{share}", plant.size * share * (on & (t < 0.65))
+    for frequency, share in ((1.5, 0.9), (3, 0.5), (4, 1.0), (7, 0.8)):
+        yield (
+            f"sine_{frequency}",
+            plant.size * share * np.sin(2 * np.pi * frequency * (t - 0.1)) * on,
+        )
+    for count in (1, 2):
+        waves = sum(
+            np.sin(2 * np.pi * f * t + rng.uniform(0, 6)) for f in (1, 2, 4, 6, 9)
+        )
+        yield f"multi_{count}", 0.35 * plant.size * waves * on
+
+
+def write_case(folder, plant, effect, *, access, noise, seed):
+    """Write recordings, the simulation and the configuration of a case."""
+    rng = np.random.default_rng([seed, zlib.crc32(f"{plant.name}/{effect}".encode())])
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "raw").mkdir(exist_ok=True)
+    signals = list(inputs(plant, rng))
+    plain = [integrate(plant, plant.values, u, DT, finer=1) for _, u in signals]
+    x_max = max(float(np.max(np.abs(one))) for one in plain)
+    rates, zero = plant.function(), np.zeros(plant.n_states)
+    gain = _force_gain(rates, zero, plant)
+    load = gain * float(np.sqrt(np.mean([np.mean(u**2) for _, u in signals])))
+    hidden = hidden_in(plant, load, x_max)[effect]
+    given = {
+        name: value * (1 + OFF * rng.choice([-1, 1])) if name in plant.free else value
+        for name, value in plant.values.items()
+    }
+    scope = {}
+    exec(plant.text, scope)
+    t = DT * np.arange(N)
+    for name, u in signals:
+        y = integrate(plant, plant.values, u, DT, hidden)
+        y = y + noise * x_max * rng.standard_normal(N)
+        columns, head = [t, u, y], f"time_s,{plant.input},{plant.output}"
+        if access == "outputs":
+            found = scope["simulate"](t, {plant.input: u}, given)
+            columns.append(found[plant.output])
+            head += ",simulated"
+        np.savetxt(
+            folder / "raw" / f"{name}.csv",
+            np.column_stack(columns),
+            delimiter=",",
+            header=head,
+            comments="",
+            fmt="%.10g",
+        )
+    (folder / "plant.py").write_text(plant.text)
+    (folder / "config.yaml").write_text(_config(plant, given, access))
+    (folder / "truth.json").write_text(json.dumps({"accepted": hidden.accepted}))
+
+
+def _force_gain(rates, zero, plant):
+    """Force on the mass by a unit of the input, where it has settled."""
+    if plant.name == "dc_motor":
+        return plant.values["ke"] / plant.values["R"]
+    if plant.name == "two_masses":
+        return plant.values["kt"]
+    return plant.mass * float(rates(zero, 1.0, 0.0, plant.values)[1])
+
+
+def _config(plant, given, access):
+    simulated = ", simulated: simulated" if access == "outputs" else ""
+    text = f"""name: box
+recordings:
+  files: raw/*.csv
+  columns: {{time: time_s, input: {plant.input}, output: {plant.output}{simulated}}}
+  kind: {{step: "step_*", sine: "sine_*", random: "multi_*"}}
+simulation:
+  kind: {access}
+"""
+    if access == "python":
+        text += f"""  file: plant.py
+  input: {plant.input}
+  output: {plant.output}
+"""
+        if plant.has_force:
+            text += "  force_input: force\n"
+        text += "  parameters:\n"
+        for name, value in given.items():
+            shown = f"{{value: {value:.6g}}}" if name in plant.free else f"{value:.6g}"
+            text += f"    {name}: {shown}\n"
+    return text + "diagnose: {}\n"
+
+
+def diagnose(folder, jobs):
+    """Run the command; its result and processor seconds."""
+    began = time.process_time()
+    done = subprocess.run(
+        [
+            sys.executable,
+            "-m",
+            "hwid_cli",
+            "diagnose",
+            "config.yaml",
+            "--out",
+            "out",
+            "--jobs",
+            str(jobs),
+            "-q",
+        ],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=1800,
+    )
+    found = folder / "out" / "diagnosis.json"
+    if done.returncode or not found.is_file():
+        return {
+            "verdict": "failed",
+            "said": done.stderr[-300:],
+        }, time.process_time() - began
+    return json.loads(found.read_text()), time.process_time() - began
+
+
+def score(found, truth):
+    """One word for what a verdict is worth."""
+    accepted = [tuple(one) for one in truth["accepted"]]
+    named = tuple(sorted(one["id"] for one in found.get("effects", [])))
+    verdict = found["verdict"]
+    if () in accepted:
+        return (
+            "right"
+            if verdict in ("none", "parameters")
+            else "false alarm"
+            if verdict == "named"
+            else verdict
+        )
+    if verdict == "named":
+        return "right" if named in accepted else "wrong"
+    if verdict == "ambiguous":
+        sets = [
+            named,
+            *[
+                tuple(sorted([one] if isinstance(one, str) else one))
+                for one in found["ambiguous_with"]
+            ],
+        ]
+        return "right" if any(one in accepted for one in sets) else "wrong"
+    return "refused" if verdict != "failed" else "failed"
+
+
+def main():
+    """Run all that was asked for."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--work", type=Path, required=True)
+    parser.add_argument("--only", nargs="+", default=[])
+    parser.add_argument("--access", default="python", choices=["python", "outputs"])
+    parser.add_argument("--noise", type=float, default=0.005)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--write", type=Path)
+    options = parser.parse_args()
+    rows = []
+    for name, plant in PLANTS.items():
+        for effect in hidden_in(plant, 1.0, 1.0):
+            label = f"{name}/{effect}"
+            if options.only and not any(one in label for one in options.only):
+                continue
+            folder = options.work / name / effect
+            write_case(
+                folder,
+                plant,
+                effect,
+                access=options.access,
+                noise=options.noise,
+                seed=options.seed,
+            )
+            began = time.time()
+            found, _ = diagnose(folder, 1)
+            truth = json.loads((folder / "truth.json").read_text())
+            gap = found.get("gap", {})
+            row = (
+                label,
+                score(found, truth),
+                found["verdict"],
+                "+".join(one["id"] for one in found.get("effects", [])),
+                found.get("complete", ""),
+                found.get("confirmed", ""),
+                *(
+                    f"{gap[one]['ratio_to_noise']:.3g}" if gap else ""
+                    for one in ("given", "before", "after")
+                ),
+                f"{time.time() - began:.0f} s",
+                str(found.get("ambiguous_with", found.get("said", ""))),
+            )
+            rows.append(row)
+            print(*row, sep=" | ", flush=True)
+    words = [row[1] for row in rows]
+    print({word: words.count(word) for word in sorted(set(words))})
+    if options.write:
+        head = "| case | score | verdict | effects | complete | confirmed | given | re-fitted | after | time | |"
+        lines = [
+            head,
+            "|" + "---|" * 11,
+            *("| " + " | ".join(map(str, row)) + " |" for row in rows),
+        ]
+        options.write.write_text("\n".join(lines) + "\n")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,135 @@
+"""Diagnosis of simulations that cannot be opened, against machines of their own making."""
+
+import numpy as np
+import pytest
+from scipy.signal import lsim
+
+from hwid_cli import Recording
+from hwid_cli.diagnosis.foreign import Simulator, diagnose_foreign
+from hwid_cli.records.experiment import DiagnoseOptions
+from hwid_cli.records.programs import Capabilities, FreeParameter, SimulatorRun
+from tests.black_boxes.plants import LINEAR, Hidden, integrate
+
+STEP_S, N = 1e-3, 500
+TIME = STEP_S * np.arange(N)
+NOISE = 2e-5
+TRUE = LINEAR.values
+FRICTION = Hidden("coulomb", (), dry=2.0)
+
+
+def inputs():
+    on = TIME > 0.05
+    for size in (1.5, -2.5, 3.0):
+        yield f"step_{size}", size * (on & (TIME < 0.3))
+    for frequency, size in ((4.0, 3.0), (7.0, 2.0), (9.0, 3.0)):
+        yield (
+            f"sine_{frequency}",
+            size * np.sin(2 * np.pi * frequency * (TIME - 0.05)) * on,
+        )
+
+
+def recordings(hidden=None):
+    rng = np.random.default_rng(3)
+    return [
+        Recording(
+            name, u,
+            integrate(LINEAR, TRUE, u, STEP_S, hidden, finer=4) + NOISE * rng.standard_normal(N),
+            STEP_S, kind=name.split("_", maxsplit=1)[0],
+        )
+        for name, u in inputs()
+    ]  # fmt: skip
+
+
+class Count:
+    """Runs what it is handed, and counts the runs of the simulation."""
+
+    def __init__(self):
+        self.runs = 0
+
+    def __call__(self, tasks, *, keep):  # noqa: ARG002
+        self.runs += sum(one.result_type is SimulatorRun for one in tasks)
+        return [one.function(*one.arguments) for one in tasks]
+
+
+def simulate(request):
+    """The user's simulation, by a transfer function."""
+    p = request.parameters
+    force = p["kt"] * request.input
+    if request.force.size:
+        force = force + request.force
+    output = lsim(([1.0], [p["m"], p["c"], p["k"]]), force, TIME)[1]
+    return SimulatorRun(output, np.zeros(0))
+
+
+GIVEN = {"m": 0.8, "c": 14.0, "k": 2300.0, "kt": 8.0}
+FREE = {name: FreeParameter(GIVEN[name], (0.1, 1e4)) for name in ("c", "k", "kt")}
+
+
+def diagnosis(simulator, hidden=FRICTION, effects=None):
+    options = DiagnoseOptions(effects=effects)
+    run = Count()
+    found = diagnose_foreign(
+        recordings(hidden), simulator, options, run, lambda what, total: None
+    )
+    return found, run.runs
+
+
+FEW = ("coulomb_friction", "quadratic_drag", "cubic_stiffness", "input_delay")
+
+
+def test_friction_is_named_and_confirmed_in_the_simulation_with_its_parameters():
+    able = Capabilities(run=True, parameters=True, force=True)
+    found, runs = diagnosis(Simulator(able, simulate, {}, FREE, GIVEN), effects=FEW)
+    assert (found.verdict, found.complete) == ("named", True)
+    assert found.confirmed == "simulation"
+    (effect,) = found.effects
+    (force,) = effect.parameters
+    assert effect.id == "coulomb_friction"
+    assert force.value == pytest.approx(2.0, rel=0.01)
+    # The noise allows a hundredth; the given ones are up to a quarter off.
+    for one in found.base:
+        assert one.after == pytest.approx(TRUE[one.name], rel=0.01)
+    assert found.after.ratio_to_noise < 1.1 < found.before.ratio_to_noise
+    assert runs <= 800
+
+
+def test_without_a_force_input_a_force_acts_through_the_input():
+    able = Capabilities(run=True, parameters=True)
+    found, _ = diagnosis(Simulator(able, simulate, {}, FREE, GIVEN), effects=FEW)
+    assert (found.verdict, found.confirmed) == ("named", "simulation")
+    # In the unit of the input: 9 N an ampere.
+    assert found.effects[0].parameters[0].value == pytest.approx(2.0 / 9.0, rel=0.02)
+
+
+def test_of_outputs_alone_the_name_is_found_and_not_confirmed():
+    given = {
+        name: lsim(([GIVEN["kt"]], [0.8, GIVEN["c"], GIVEN["k"]]), u, TIME)[1]
+        for name, u in inputs()
+    }
+    simulator = Simulator(Capabilities(run=False), None, given)
+    found, runs = diagnosis(simulator, effects=FEW)
+    assert (found.verdict, found.effects[0].id) == ("named", "coulomb_friction")
+    assert (found.confirmed, runs) == ("surrogate", 0)
+
+
+def test_where_nothing_is_hidden_the_parameters_are_all():
+    able = Capabilities(run=True, parameters=True, force=True)
+    simulator = Simulator(able, simulate, {}, FREE, GIVEN)
+    found, _ = diagnosis(simulator, hidden=None, effects=FEW)
+    assert (found.verdict, found.effects) == ("parameters", ())
+    for one in found.base:
+        assert one.after == pytest.approx(TRUE[one.name], rel=0.01)
+
+
+def test_bounds_of_parameters_are_kept():
+    able = Capabilities(run=True, parameters=True, force=True)
+    seen = []
+
+    def watched(request):
+        seen.append(request.parameters["c"])
+        return simulate(request)
+
+    free = {**FREE, "c": FreeParameter(14.0, (13.0, 15.0))}
+    diagnosis(Simulator(able, watched, {}, free, GIVEN), effects=FEW)
+    assert min(seen) >= 13.0
+    assert max(seen) <= 15.0 + 1e-9

@@ -1,0 +1,112 @@
+"""The drive that stands for another simulation, and the force that makes it move so."""
+
+import numpy as np
+import pytest
+from scipy.signal import lsim
+
+from hwid_cli.diagnosis.problem import Signals
+from hwid_cli.diagnosis.stand_in import (
+    derived,
+    fit_stand_in,
+    force_along,
+    force_of_motion,
+    in_newtons,
+    moved_plainly,
+    standing_for,
+)
+from hwid_cli.drive.simulation import parameter_vector, run
+from hwid_cli.records.drive import Drive
+from hwid_cli.records.programs import SimulatorRun
+from tests.black_boxes.plants import HARDENING, integrate
+
+STEP_S, N = 1e-3, 600
+TIME = STEP_S * np.arange(N)
+INPUTS = [
+    size * np.sin(2 * np.pi * frequency * (TIME - 0.05)) * (TIME > 0.05)
+    for size, frequency in ((2.0, 3.0), (1.0, 8.0))
+]
+MASS, DAMPING, STIFFNESS, GAIN = 0.8, 11.0, 2100.0, 9.0
+NOTHING = np.zeros(0)
+
+
+def signals(command):
+    return Signals("r", "sine", command, 0 * command, command, 0 * command, STEP_S)
+
+
+def linear(force):
+    return lsim(([1.0], [MASS, DAMPING, STIFFNESS]), force, TIME)[1]
+
+
+@pytest.fixture(scope="module")
+def given():
+    return [signals(one) for one in INPUTS]
+
+
+def test_the_stand_in_of_a_linear_drive_is_this_drive(given):
+    runs = [SimulatorRun(linear(GAIN * one), NOTHING) for one in INPUTS]
+    found = fit_stand_in(given, runs)
+    # Forces count in the unit of the input.
+    expected = [MASS / GAIN, DAMPING / GAIN, STIFFNESS / GAIN, 1.0]
+    values = [
+        found.mass_kg, found.damping_N_s_per_m, found.stiffness_N_per_m,
+        found.force_constant_N_per_A,
+    ]  # fmt: skip
+    np.testing.assert_allclose(values, expected, rtol=1e-4)
+    same = in_newtons(found, 1 / GAIN)
+    assert same.mass_kg == pytest.approx(MASS, rel=1e-4)
+    assert same.force_constant_N_per_A == pytest.approx(GAIN, rel=1e-9)
+
+
+def test_a_free_axis_has_a_stand_in_without_a_spring(given):
+    runs = [
+        SimulatorRun(lsim(([GAIN], [MASS, DAMPING, 0.0]), one, TIME)[1], NOTHING)
+        for one in INPUTS
+    ]
+    found = fit_stand_in(given, runs)
+    assert found.stiffness_N_per_m == 0.0
+    assert found.damping_N_s_per_m == pytest.approx(DAMPING / GAIN, rel=1e-3)
+
+
+# A drive that is not the simulation, which bends.
+ROUGH = Drive(
+    mass_kg=0.3, damping_N_s_per_m=8.0, stiffness_N_per_m=1200.0,
+    force_constant_N_per_A=5.0,
+)  # fmt: skip
+
+
+def test_with_its_force_the_stand_in_moves_as_a_nonlinear_simulation(given):
+    output = integrate(HARDENING, HARDENING.values, INPUTS[0], STEP_S)
+    found = SimulatorRun(output, NOTHING)
+    moved = derived(found, STEP_S)
+    force = force_along(ROUGH, moved, INPUTS[0])
+    one = standing_for(given[0], found, ROUGH, force)
+    plain = moved_plainly(ROUGH, one, force, moved)
+    # By straight lines of the force between samples.
+    assert np.max(np.abs(one.offset)) < 1e-4 * np.max(np.abs(output))
+    np.testing.assert_allclose(plain.position + one.offset, output, atol=1e-15)
+
+
+def test_the_force_of_a_motion_is_what_an_effect_made(given):
+    drive = Drive(
+        mass_kg=MASS, damping_N_s_per_m=DAMPING, stiffness_N_per_m=STIFFNESS,
+        force_constant_N_per_A=GAIN,
+    )  # fmt: skip
+    vector = parameter_vector(drive, {"quadratic_drag": {"drag_N_s2_per_m2": 40.0}})
+    motion = run(INPUTS[0], vector, STEP_S)
+    found = force_of_motion(drive, given[0], motion)
+    law = -40.0 * motion.velocity * np.abs(motion.velocity)
+    assert np.max(np.abs(found - law)) < 2e-3 * np.max(np.abs(law))
+
+
+def test_the_force_of_friction_leads_the_plain_drive_the_same_way(given):
+    drive = Drive(
+        mass_kg=MASS, damping_N_s_per_m=DAMPING, stiffness_N_per_m=STIFFNESS,
+        force_constant_N_per_A=GAIN,
+    )  # fmt: skip
+    vector = parameter_vector(drive, {"coulomb_friction": {"force_N": 3.0}})
+    motion = run(INPUTS[0], vector, STEP_S)
+    force = force_of_motion(drive, given[0], motion)
+    without = linear(GAIN * INPUTS[0])
+    again = linear(GAIN * INPUTS[0] + force)
+    # Jumps within a sample are spread over it.
+    assert np.std(again - motion.position) < 2e-3 * np.std(motion.position - without)
