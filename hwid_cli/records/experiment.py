@@ -60,6 +60,7 @@ class Columns:
     time: Annotated[str | int | None, _COLUMN] = None
     reference: Annotated[str | int | None, _COLUMN] = None
     variable: str | None = None
+    output_time: Annotated[str | int | None, _COLUMN] = None
 
 
 @dataclass(frozen=True)

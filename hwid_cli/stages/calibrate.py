@@ -148,6 +148,8 @@ def _calibrate(
             n_samples=raw.input.size,
             n_raw_input=raw.input.size,
             n_raw_output=raw.output.size,
+            repaired_input=raw.bridged_input,
+            repaired_output=raw.bridged_output,
             units=raw.units,
         ),
     )
