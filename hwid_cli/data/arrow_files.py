@@ -10,6 +10,9 @@ import numpy as np
 
 from hwid_cli.data.array_columns import UNIT_MARK, Variables, check_size
 
+# How the names of types begin.
+_NUMBERS = ("int", "uint", "float", "double", "half", "bool", "decimal")
+_TIMES = ("timestamp", "duration", "time")
 _UNITS = (b"unit", b"units", b"Unit")
 
 
@@ -59,12 +62,9 @@ def _variables(rows: int, schema: Any, load: Any) -> Variables:
             raise ValueError(f"holds {entry.name!r} twice")
         check_size(entry.name, 8 * rows)
         kind = str(entry.type)
-        if not kind.startswith(
-            ("int", "uint", "float", "double", "half", "bool", "decimal")
-            + ("timestamp", "duration", "time")
-        ):
+        is_time = kind.startswith(_TIMES)
+        if not is_time and not kind.startswith(_NUMBERS):
             continue
-        is_time = kind.startswith(("timestamp", "duration", "time"))
         found[entry.name] = partial(_values, load, entry.name, is_time)
         unit = _unit(entry.metadata or {})
         if is_time or unit:

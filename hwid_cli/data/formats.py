@@ -6,7 +6,7 @@ A new format is a file with its reader, and a line in ``READERS``.
 import os
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager, contextmanager
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -208,9 +208,7 @@ def _answer(request: dict[str, Any]) -> Iterator[Labelled]:
             yield [one.title, one.key, one.variable, one.unit], one.values
     else:
         for role, column in reader.read(path, Columns(**request["columns"])):
-            about = asdict(
-                replace(column, values=None, rows=None, texts=dict(column.texts))
-            )
+            about = {name: getattr(column, name) for name in (*_TOLD, "texts")}
             yield [role, about], column.values
             yield [], column.rows
 
@@ -222,7 +220,7 @@ def _with_rows(replies: Iterable[Labelled]) -> dict[str, MeasuredColumn]:
     for (role, about), values in every:
         rows = next(every)[1].astype(np.int64)
         texts = {int(row): str(text) for row, text in about["texts"].items()}
-        about = {name: about[name] for name in _TOLD if name in about}
+        about = {name: about[name] for name in _TOLD}
         found[role] = MeasuredColumn(values=values, rows=rows, texts=texts, **about)
     return found
 

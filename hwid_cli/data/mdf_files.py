@@ -65,7 +65,7 @@ def _is_alone(file: Any, number: int, name: str) -> bool:
 
 
 def _values(file: Any, group: int, index: int) -> Any:
-    signal = file.get(group=group, index=index, ignore_value2text_conversions=True)
+    signal = file.get(group=group, index=index)
     samples = np.asarray(signal.samples)
     if samples.dtype.kind not in "fiub":
         return samples

@@ -15,46 +15,43 @@ from hwid_cli.data.units import bare_unit, factor_between, looks_like_unit, spli
 
 # Words in front of a row of names, of units; letters only, in lower case.
 _NAME_WORDS = frozenset(
-    ("name", "names", "channelname", "channel", "channels", "path", "signal", "signals")
-    + (
-        "signalname",
-        "variable",
-        "kanal",
-        "kanalname",
-        "spurname",
-        "label",
-        "symbolname",
-    )
+    [
+        *("name", "names", "channelname", "channel", "channels", "path", "signal"),
+        *("signals", "signalname", "variable", "kanal", "kanalname", "spurname"),
+        *("label", "symbolname"),
+    ]
 )
 _UNIT_WORDS = frozenset(
-    ("unit", "units", "einheit", "einheiten", "verticalunits", "yunitlabel", "yunit")
+    [
+        *("unit", "units", "einheit", "einheiten", "verticalunits", "yunitlabel"),
+        "yunit",
+    ]
 )
 # Words in front of rows that say something else about each column.
 _OTHER_WORDS = frozenset(
-    ("datatype", "type", "description", "quantity", "mode", "variablesize", "comment")
-    + ("symbolbased", "symbolcomment", "indexgroup", "indexoffset", "netid", "port")
-    + ("offset", "scalefactor", "bitmask", "source", "coupling", "samples", "date")
+    [
+        *("datatype", "type", "description", "quantity", "mode", "variablesize"),
+        *("comment", "symbolbased", "symbolcomment", "indexgroup", "indexoffset"),
+        *("netid", "port", "offset", "scalefactor", "bitmask", "source", "coupling"),
+        *("samples", "date"),
+    ]
 )
 _TIME_WORDS = frozenset(("time", "zeit", "timestamp", "t", "x"))
 _INTERVAL_WORDS = frozenset(
-    (
-        "ts",
-        "dt",
-        "h",
-        "tsamp",
-        "sampletime",
-        "samplingtime",
-        "samplingperiod",
-        "interval",
-    )
-    + ("abtastzeit", "tvz", "tabtast", "sampleinterval", "samplinginterval", "deltax")
-    + ("samplingtimeinterval", "increment", "xincr", "xincrement", "sampleperiod")
-    + ("abtastintervall", "abtastperiode", "deltat", "wfincrement", "timestep")
-    + ("zykluszeit", "cycletime", "timeinterval", "timeincrement", "stepsize")
+    [
+        *("ts", "dt", "h", "tsamp", "sampletime", "samplingtime", "samplingperiod"),
+        *("interval", "abtastzeit", "tvz", "tabtast", "sampleinterval", "deltax"),
+        *("samplinginterval", "samplingtimeinterval", "increment", "xincr"),
+        *("xincrement", "sampleperiod", "abtastintervall", "abtastperiode", "deltat"),
+        *("timestep", "zykluszeit", "cycletime", "timeinterval", "timeincrement"),
+        *("wfincrement", "stepsize"),
+    ]
 )
 _RATE_WORDS = frozenset(
-    ("fs", "samplerate", "samplingrate", "samplingfrequency", "samplefrequency")
-    + ("abtastrate", "abtastfrequenz", "fabtast", "scanrate", "datarate")
+    [
+        *("fs", "samplerate", "samplingrate", "samplingfrequency", "samplefrequency"),
+        *("abtastrate", "abtastfrequenz", "fabtast", "scanrate", "datarate"),
+    ]
 )
 _RATE_UNITS = {
     **dict.fromkeys(("hz", "s/s", "sa/s", "1/s"), 1.0),
