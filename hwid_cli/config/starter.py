@@ -10,6 +10,7 @@ import yaml
 from hwid_cli.config.load import experiment_of
 from hwid_cli.data.units import QUANTITIES, quantity_of
 from hwid_cli.errors import ConfigError
+from hwid_cli.files.messages import escaped, is_plain
 from hwid_cli.records.experiment import Experiment
 from hwid_cli.records.starter import FolderLayout, Proposal, Role
 
@@ -77,11 +78,12 @@ def starter_text(
     own = _relative(folder, path)
     blocks = [
         [
-            f"# Written by 'hwid init {folder}': every line is a guess to be checked.",
-            f"# 'hwid check {path.name}' says what would run; configs/README.md of the",
-            "# project explains every key.",
+            f"# Written by 'hwid init {escaped(str(folder))}': every line is a guess to be",
+            f"# checked. 'hwid check {escaped(path.name)}' says what would run;",
+            "# configs/README.md of the project explains every key.",
             f"name: {_flow(starter_name(folder))}",
         ],
+        _file_lines(layout, proposal),
         _recordings_lines(layout, proposal, own),
         _calibrate_lines(proposal),
         _fit_lines(proposal),
@@ -89,7 +91,27 @@ def starter_text(
         _group_lines(proposal),
         _diagnose_lines(layout, proposal),
     ]
-    return "\n\n".join("\n".join(lines) for lines in blocks if lines) + "\n"
+    # No name of a file or column may end its line: the rest of it would be a key.
+    return (
+        "\n\n".join("\n".join(map(escaped, lines)) for lines in blocks if lines) + "\n"
+    )
+
+
+def _file_lines(layout: FolderLayout, proposal: Proposal) -> list[str]:
+    """What became of each file of the folder."""
+    test = () if proposal.parts else proposal.held_out
+    fates = [
+        ("used", ", ".join(name for name in proposal.names if name not in test)),
+        ("test", f"{', '.join(test)} ({proposal.held_out_reason})" if test else ""),
+        *(("skipped", f"{name}: {why}") for name, why in layout.left),
+        *(("skipped", problem) for problem in proposal.problems),
+    ]
+    return [
+        f"# {line}"
+        for fate, what in fates
+        if what
+        for line in _wrapped(f"{fate}: {what}")
+    ]
 
 
 def refuse_existing(path: Path, *, force: bool) -> None:
@@ -189,6 +211,8 @@ def _columns(layout: FolderLayout) -> dict[str, str | int]:
     if layout.time is not None:
         columns["time"] = layout.time.key
     columns |= {"input": layout.input.key, "output": layout.output.key}
+    if layout.output_time is not None:
+        columns["output_time"] = layout.output_time.key
     return columns
 
 
@@ -218,7 +242,10 @@ def _recordings_lines(layout: FolderLayout, proposal: Proposal, own: str) -> lis
             "true would allow one that jitters."
         ]
     if layout.resample:
-        lines += ["  resample: true   # the time column jitters"]
+        why = "the time column jitters"
+        if layout.output_time is not None:
+            why = "input and output are sampled at their own times"
+        lines += [f"  resample: true   # {why}"]
     lines += _unit_lines(layout)
     if proposal.parts:
         lines += ["  # One file only: its first two thirds identify, the rest judges."]
@@ -338,7 +365,18 @@ def _wrapped(text: str) -> list[str]:
 
 def _flow(value: Any) -> str:
     """Value as YAML on one line, quoted where it must be."""
+    text = _dumped(value)
+    # What would end the line stands as an escape between quotes.
+    return text if is_plain(text) else _dumped(value, default_style='"')
+
+
+def _dumped(value: Any, default_style: str | None = None) -> str:
     text = yaml.safe_dump(
-        value, default_flow_style=True, allow_unicode=True, width=10**6, sort_keys=False
+        value,
+        default_flow_style=True,
+        default_style=default_style,
+        allow_unicode=True,
+        width=10**6,
+        sort_keys=False,
     )
     return text.removesuffix("\n").removesuffix("\n...").strip()

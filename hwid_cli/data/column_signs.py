@@ -16,7 +16,11 @@ MOST_GAPS = 0.02
 # Two columns are multiples of each other beyond this correlation, [-].
 SAME = 0.99999
 # Samples looked at: more tell nothing new.
-_LONGEST = 20_000
+_LONGEST = 10_000
+# Past values that predict the next one, and of how many samples means are looked at.
+_LAGS = 4
+_MEANS_OF = (1, 2, 5, 10, 25, 50)
+_FEWEST_MEANS = 300
 # Share of the largest that a spectral line must hold to be alone, [-].
 _LINE_SHARE = 0.85
 # A step's levels hold for this share of all samples at least, [-].
@@ -125,10 +129,11 @@ def are_same(one: np.ndarray, other: np.ndarray, *, least: float = SAME) -> bool
 
 
 def answers(first: np.ndarray, second: np.ndarray) -> float:
-    """How much better the first column's past explains the second than the reverse.
+    """How clearly the second column answers to the first, and not the reverse.
 
-    Each column is predicted from two of its own past values and the other's value one
-    sample before; the gain is the logarithm of the error's fall by the other column.
+    Each column is predicted from its own past and from that of the other (models with
+    an exogenous input, both ways); the gain is the logarithm of the error's fall by the
+    other column. Means of more and more samples show what the sampling hides.
 
     Parameters
     ----------
@@ -137,11 +142,26 @@ def answers(first: np.ndarray, second: np.ndarray) -> float:
     Returns
     -------
     float, [-]
-        Positive where the second column answers to the first.
+        From 1, where only the second answers to the first, to -1, where only the first
+        answers to the second; near 0 where the numbers do not tell.
     """
-    n = min(first.size, second.size, _LONGEST)
-    one, other = _standard(first[:n]), _standard(second[:n])
-    return _gain(other, one) - _gain(one, other)
+    known = np.isfinite(first[: second.size]) & np.isfinite(second[: first.size])
+    one = first[: known.size][known][:_LONGEST]
+    other = second[: known.size][known][:_LONGEST]
+    forward = backward = 0.0
+    for n in _MEANS_OF:
+        count = one.size // n
+        if count < _FEWEST_MEANS and n > 1:
+            break
+        a, b = (
+            _standard(values[: count * n].reshape(-1, n).mean(axis=1))
+            for values in (one, other)
+        )
+        forward += _gain(b, a)
+        backward += _gain(a, b)
+    # What chance alone gives.
+    chance = 4.0 * _LAGS / max(one.size, 1)
+    return (forward - backward) / (forward + backward + chance)
 
 
 def is_stepwise(values: np.ndarray) -> bool:
@@ -216,10 +236,17 @@ def _standard(values: np.ndarray) -> np.ndarray:
 
 def _gain(target: np.ndarray, other: np.ndarray) -> float:
     """Fall of the error's logarithm when the other column's past is known too."""
-    own = np.column_stack([target[1:-1], target[:-2], np.ones(target.size - 2)])
-    both = np.column_stack([own, other[1:-1], other[:-2]])
-    alone, together = (_misfit(columns, target[2:]) for columns in (own, both))
-    return float(np.log(alone) - np.log(together))
+    n = target.size
+    if n < 4 * _LAGS:
+        return 0.0
+    own = [target[_LAGS - lag : n - lag] for lag in range(1, _LAGS + 1)]
+    past = [other[_LAGS - lag : n - lag] for lag in range(1, _LAGS + 1)]
+    own.append(np.ones(n - _LAGS))
+    alone, together = (
+        _misfit(np.column_stack(columns), target[_LAGS:])
+        for columns in (own, own + past)
+    )
+    return max(float(np.log(alone) - np.log(together)), 0.0)
 
 
 def _misfit(columns: np.ndarray, target: np.ndarray) -> float:

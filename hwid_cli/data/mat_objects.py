@@ -5,6 +5,7 @@ time; of any other object the arrays in its properties are taken, by names witho
 the trailing underscores of stored properties.
 """
 
+import warnings
 from collections.abc import Iterator, Mapping
 from functools import partial
 from pathlib import Path
@@ -42,9 +43,11 @@ def object_variables(path: Path, classes: Mapping[str, str]) -> dict[str, Any]:
     except ImportError:
         return unread
     try:
-        content = load_from_mat(
-            str(path), add_table_attrs=True, variable_names=list(classes)
-        )
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            content = load_from_mat(
+                str(path), add_table_attrs=True, variable_names=list(classes)
+            )
     # The library raises whatever it stumbles on; plain arrays may still be read.
     except Exception:
         return unread

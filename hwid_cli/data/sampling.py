@@ -223,7 +223,8 @@ def _grid_step(time: np.ndarray, median: float) -> float:
 
 
 def _check_length(path: Path, columns: FileColumns, time: MeasuredColumn) -> None:
-    others = (columns.input, columns.output, columns.reference)
+    has_own = columns.output_time is not None
+    others = (columns.input, None if has_own else columns.output, columns.reference)
     longest = max(one.values.size for one in others if one is not None)
     if time.values.size < longest:
         raise MeasurementError(

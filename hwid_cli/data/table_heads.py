@@ -59,6 +59,8 @@ _RATE_UNITS = {
     **dict.fromkeys(("mhz", "ms/s", "msa/s"), 1e6),
 }
 _SETTING = re.compile(r"\s*(.{1,60}?)\s*[:=]\s*([-+0-9.,eE]+)\s*([A-Za-zµμ/]{0,6})\s*")
+# Rows below the first one of a table, and how many of them may be damaged.
+_ROWS_BELOW, _MOST_DAMAGED = 5, 1
 # Rows of a table's beginning in which settings may stand beside the numbers.
 _MOST_ROWS_BESIDE = 40
 
@@ -213,7 +215,21 @@ def _first_row(
 ) -> int:
     """First row whose columns of numbers hold numbers."""
     plain = [number for number in range(len(rows)) if number not in comments]
-    first = next((n for n in plain if _is_of_table(rows[n], numeric)), len(rows))
+    of_table = [_is_of_table(rows[number], numeric) for number in plain]
+    others = [
+        any(rows[number]) and not is_of
+        for number, is_of in zip(plain, of_table, strict=True)
+    ]
+    # A row of a preamble may look like one of the table; those below it do not.
+    first = next(
+        (
+            number
+            for place, number in enumerate(plain)
+            if of_table[place]
+            and sum(others[place + 1 :][:_ROWS_BELOW]) <= _MOST_DAMAGED
+        ),
+        len(rows),
+    )
     if not numeric or first == len(rows):
         return len(rows)
     # A damaged row at the beginning is no preamble: words alone stand above it, or
@@ -269,10 +285,23 @@ def _name_row(
         if (is_named or number != above[0]) and _is_unit_row(cells):
             units = {**_units_of(row, numeric), **units}
         elif not is_about or key in _NAME_WORDS:
-            return number, units
+            upper = above[: above.index(number)]
+            return number, {**_stated_units(rows, upper, numeric), **units}
         fallback = number if fallback < 0 else fallback
     # A lone row of units is one of names too, unless others stand elsewhere.
     return -1 if is_named and units else fallback, units
+
+
+def _stated_units(
+    rows: Sequence[Sequence[str]], above: Sequence[int], numeric: Sequence[int]
+) -> dict[int, str]:
+    """Units of rows that begin with a word for units."""
+    found: dict[int, str] = {}
+    for number in above:
+        row = rows[number]
+        if _letters(next((cell for cell in row if cell), "")) in _UNIT_WORDS:
+            found |= _units_of(row, numeric)
+    return found
 
 
 def _named(
