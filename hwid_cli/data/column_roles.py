@@ -31,6 +31,8 @@ FEWEST_SAMPLES = 60
 _CLEAR = 0.3
 # Beyond this the numbers speak against the names, [-].
 _AGAINST = -0.6
+# How much being smoother than the input counts beside the answer to it, [-].
+_SMOOTHER = 0.25
 # Columns that are compared with each other: more are no measurement of one drive.
 _MOST_COMPARED = 8
 # Clocks that agree within this share tick alike, [-].
@@ -354,18 +356,13 @@ def _along_chain(
 def _by_content(named: list[_Named]) -> tuple[_Named, _Named, dict[str, str]]:
     """The column that others answer to, and the one that answers most clearly."""
     pairs = list(permutations(named[:_MOST_COMPARED], 2))
-    answer = {(id(one), id(other)): _answer(one, other) for one, other in pairs}
 
-    def leads(one: _Named) -> float:
-        found = [answer[id(a), id(b)] for a, b in pairs if a is one]
-        return max(found) + 0.5 * signs.roughness(one.values)
+    def worth(pair: tuple[_Named, _Named]) -> float:
+        # What answers to a force is smoother than the force.
+        smoother = signs.roughness(pair[0].values) - signs.roughness(pair[1].values)
+        return _answer(*pair) + _SMOOTHER * smoother
 
-    first = max(named[:_MOST_COMPARED], key=leads)
-    others = [one for one in named[:_MOST_COMPARED] if one is not first]
-    last = max(
-        others,
-        key=lambda one: answer[id(first), id(one)] - 0.5 * signs.roughness(one.values),
-    )
+    first, last = max(pairs, key=worth)
     reasons = {
         "input": "by its content: other columns answer to it",
         "output": "by its content: it answers to the input",

@@ -16,7 +16,7 @@ MOST_GAPS = 0.02
 # Two columns are multiples of each other beyond this correlation, [-].
 SAME = 0.99999
 # Samples looked at: more tell nothing new.
-_LONGEST = 10_000
+_LONGEST = 16_000
 # Past values that predict the next one, and of how many samples means are looked at.
 _LAGS = 4
 _MEANS_OF = (1, 2, 5, 10, 25, 50)
@@ -146,17 +146,17 @@ def answers(first: np.ndarray, second: np.ndarray) -> float:
         answers to the second; near 0 where the numbers do not tell.
     """
     known = np.isfinite(first[: second.size]) & np.isfinite(second[: first.size])
-    one = first[: known.size][known][:_LONGEST]
-    other = second[: known.size][known][:_LONGEST]
+    # Of a long record means: the signals may begin to move late.
+    block = -(-int(known.sum()) // _LONGEST)
+    one, other = (
+        _means(values[: known.size][known], max(block, 1)) for values in (first, second)
+    )
     forward = backward = 0.0
     for n in _MEANS_OF:
         count = one.size // n
         if count < _FEWEST_MEANS and n > 1:
             break
-        a, b = (
-            _standard(values[: count * n].reshape(-1, n).mean(axis=1))
-            for values in (one, other)
-        )
+        a, b = (_standard(_means(values, n)) for values in (one, other))
         forward += _gain(b, a)
         backward += _gain(a, b)
     # What chance alone gives.
@@ -239,20 +239,22 @@ def _gain(target: np.ndarray, other: np.ndarray) -> float:
     n = target.size
     if n < 4 * _LAGS:
         return 0.0
-    own = [target[_LAGS - lag : n - lag] for lag in range(1, _LAGS + 1)]
-    past = [other[_LAGS - lag : n - lag] for lag in range(1, _LAGS + 1)]
-    own.append(np.ones(n - _LAGS))
-    alone, together = (
-        _misfit(np.column_stack(columns), target[_LAGS:])
-        for columns in (own, own + past)
-    )
-    return max(float(np.log(alone) - np.log(together)), 0.0)
-
-
-def _misfit(columns: np.ndarray, target: np.ndarray) -> float:
-    found = np.linalg.lstsq(columns, target, rcond=None)[0]
+    columns: list[np.ndarray] = [
+        np.ones(n - _LAGS),
+        *(target[_LAGS - lag : n - lag] for lag in range(1, _LAGS + 1)),
+        *(other[_LAGS - lag : n - lag] for lag in range(1, _LAGS + 1)),
+        target[_LAGS:],
+    ]
+    # What each column leaves of the last one stands in its row.
+    left = np.linalg.qr(np.column_stack(columns), mode="r")[:, -1] ** 2 / n
     # The least that rounding leaves keeps the logarithm finite.
-    return float(np.mean((target - columns @ found) ** 2)) + 1e-12
+    alone, together = left[_LAGS + 1 :].sum() + 1e-12, left[-1] + 1e-12
+    return float(np.log(alone / together))
+
+
+def _means(values: np.ndarray, n: int) -> np.ndarray:
+    """Means of n samples each; an incomplete last block goes."""
+    return values[: values.size // n * n].reshape(-1, n).mean(axis=1)
 
 
 def _correlation(one: np.ndarray, other: np.ndarray) -> float:

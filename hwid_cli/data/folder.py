@@ -5,12 +5,14 @@ For ``hwid init``.
 
 import glob
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path, PurePosixPath
 
 import numpy as np
 
+from hwid_cli.data import column_signs as signs
 from hwid_cli.data.column_roles import (
+    SignalGuess,
     TimeGuess,
     clocks_of,
     guess_signals,
@@ -109,15 +111,7 @@ def guess_layout(files: Sequence[FoundFile]) -> FolderLayout:
     """
     alike = _alike(files)
     if not alike:
-        readable = [one for one in files if not one.problem]
-        damaged = [one for one in files if one.problem]
-        first = (readable or damaged)[0]
-        said = first.problem or "holds no two columns of the same table"
-        raise MeasurementError(
-            f"{escaped(first.name)}: {said}; expected a file with an input and an "
-            "output; export it again, or write a configuration by hand "
-            "(configs/README.md)"
-        )
+        raise MeasurementError(_no_signals(files))
     typical = alike[0]
     long_ones = _table(typical)
     scalars = [one for one in typical.columns if one.values.size == 1]
@@ -128,20 +122,51 @@ def guess_layout(files: Sequence[FoundFile]) -> FolderLayout:
             f"{escaped(typical.name)}: {error}; name the columns in a configuration by "
             "hand (configs/README.md)"
         ) from error
-    time, other = _clocks(signals.input, signals.output, long_ones, scalars)
-    roles = {"input": signals.input, "output": signals.output}
-    clocks = {
-        "time": time.column,
-        "output_time": None if other is None else other.column,
+    clocks = _clocks(signals.input, signals.output, long_ones, scalars)
+    roles = {
+        "input": signals.input,
+        "output": signals.output,
+        "time": clocks[0].column,
+        "output_time": None if clocks[1] is None else clocks[1].column,
     }
-    roles |= {role: one for role, one in clocks.items() if one is not None}
-    used = [one for one in files if not _why_not(one, roles, typical)]
+    return _layout(signals, clocks, _sorted_out(files, roles, typical))
+
+
+def _no_signals(files: Sequence[FoundFile]) -> str:
+    """What to say of a folder in which no file holds two signals."""
+    first = next((one for one in files if not one.problem), files[0])
+    said = first.problem or "holds no two columns of the same table"
+    return (
+        f"{escaped(first.name)}: {said}; expected a file with an input and an output; "
+        "export it again, or write a configuration by hand (configs/README.md)"
+    )
+
+
+def _sorted_out(
+    files: Sequence[FoundFile],
+    roles: Mapping[str, FoundColumn | None],
+    typical: FoundFile,
+) -> tuple[tuple[str, ...], tuple[tuple[str, str], ...]]:
+    """Patterns of the files that are used, and the others, each with its reason."""
+    there = {role: one for role, one in roles.items() if one is not None}
+    why = {one.name: _why_not(one, there, typical) for one in files}
+    used = [one for one in files if not why[one.name]]
+    left = tuple((name, reason) for name, reason in why.items() if reason)
+    return _patterns(used, files), left
+
+
+def _layout(
+    signals: SignalGuess,
+    clocks: tuple[TimeGuess, TimeGuess | None],
+    files: tuple[tuple[str, ...], tuple[tuple[str, str], ...]],
+) -> FolderLayout:
+    time, other = clocks
     sample_time_s = time.sample_time_s
     if time.role is None and sample_time_s is None:
         sample_time_s = UNKNOWN_SAMPLE_TIME_S
     reference = signals.reference
     return FolderLayout(
-        patterns=_patterns(used, files),
+        patterns=files[0],
         input=_role(signals.input, "input", signals.reasons["input"]),
         output=_role(signals.output, "output", signals.reasons["output"]),
         time=time.role,
@@ -154,9 +179,7 @@ def guess_layout(files: Sequence[FoundFile]) -> FolderLayout:
         clock_reason=time.reason,
         resample=time.resample or other is not None,
         notes=(*time.notes, *signals.notes, *_notes(time, other)),
-        left=tuple(
-            (one.name, why) for one in files if (why := _why_not(one, roles, typical))
-        ),
+        left=files[1],
     )
 
 
@@ -207,7 +230,7 @@ def _table(file: FoundFile) -> list[FoundColumn]:
             [
                 one
                 for one in columns
-                if one.values.size == size and one.variable in (None, variable)
+                if one.values.size == size and _belongs(one, variable)
             ]
             for variable, size in sorted(kinds, key=lambda one: (one[0] or "", one[1]))
         ]
@@ -219,6 +242,13 @@ def _table(file: FoundFile) -> list[FoundColumn]:
     if plain and len(usable) > 1 and _worth(both)[0] > _worth(best)[0]:
         return both
     return best
+
+
+def _belongs(column: FoundColumn, variable: str | None) -> bool:
+    """Whether a column is of a table, or a clock that stands beside it."""
+    if column.variable == variable:
+        return True
+    return column.variable is None and signs.clock_of(column.values) is not None
 
 
 def _worth(found: Sequence[FoundColumn]) -> tuple[bool, int]:

@@ -272,7 +272,7 @@ def _repeats(raws: Sequence[RawRecording]) -> tuple[str, ...]:
     """The last recording of each input that occurs more than once."""
     families: list[list[RawRecording]] = []
     for raw in raws:
-        own = next((one for one in families if _same_input(one[0], raw)), None)
+        own = next((one for one in families if _is_repeat(one[0], raw)), None)
         if own is None:
             families.append([raw])
         else:
@@ -280,15 +280,29 @@ def _repeats(raws: Sequence[RawRecording]) -> tuple[str, ...]:
     return tuple(one[-1].name for one in families if len(one) > 1)
 
 
-def _same_input(one: RawRecording, other: RawRecording) -> bool:
-    """Whether two recordings have one input, noise and a cut end apart."""
+def _is_repeat(one: RawRecording, other: RawRecording) -> bool:
+    """Whether two recordings have one input, noise and a cut end apart.
+
+    Names that differ in their last number alone may be repeats of an input that is
+    measured, and so never the same: then its level, size and memory must be alike.
+    """
     n = min(one.input.size, other.input.size)
     if n < _ALIKE_LENGTH * max(one.input.size, other.input.size):
         return False
-    spread = float(np.std(one.input[:n]))
-    gap = float(np.std(one.input[:n] - other.input[:n]))
-    shift = abs(float(np.mean(one.input[:n] - other.input[:n])))
-    return gap <= _ALIKE * spread and shift <= _ALIKE * spread
+    a, b = one.input[:n], other.input[:n]
+    spread = max(float(np.std(a)), float(np.std(b)))
+    if abs(float(np.mean(a) - np.mean(b))) > _ALIKE * spread:
+        return False
+    if float(np.std(a - b)) <= _ALIKE * spread:
+        return True
+    stems = {re.sub(r"\d+$", "", raw.name) for raw in (one, other)}
+    sizes = sorted((float(np.std(a)), float(np.std(b))))
+    memories = sorted((signs.memory_samples(a), signs.memory_samples(b)))
+    return (
+        len(stems) == 1
+        and sizes[0] >= (1.0 - _ALIKE) * sizes[1]
+        and memories[0] >= 0.5 * memories[1]
+    )
 
 
 def _parts(raws: Sequence[RawRecording]) -> dict[str, tuple[int, ...]]:

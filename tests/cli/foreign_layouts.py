@@ -6,7 +6,7 @@ integrated here, with other equations than the package's: a mass on a spring wit
 friction, stepped by hand.
 """
 
-import datetime
+import datetime as dt
 import warnings
 from dataclasses import dataclass
 
@@ -159,7 +159,12 @@ def twincat(folder):
             "SymbolBased": ("True", "True"),
             "Unit": ("A", "mm"),
         }
-        head = ["Name\tScope", "File\tC:\\scope.csv", "StartRecord\t12878309322\tMo", ""]
+        head = [
+            "Name\tScope",
+            "File\tC:\\scope.csv",
+            "StartRecord\t12878309322\tMo",
+            "",
+        ]
         head += [f"{key}\t{a}\t{key}\t{b}" for key, (a, b) in keys.items()]
         rows = [
             "\t".join([_comma(1e3 * t), _comma(u), _comma(1e3 * t), _comma(y)])
@@ -218,14 +223,18 @@ def dspace(folder):
 
 def logger_of_a_plc(folder):
     """ISO stamps, quotes, a lost sample, a blank column, text below; Latin-1."""
-    begin = datetime.datetime(2024, 5, 1, 23, 59, 59, 800_000)
+    begin = dt.datetime(2024, 5, 1, 23, 59, 59, 800_000)
     for one in drives():
         rows = []
-        for k, (t, u, y) in enumerate(zip(one.time, one.current, one.position, strict=True)):
-            stamp = begin + datetime.timedelta(microseconds=round(1e6 * t))
+        for k, (t, u, y) in enumerate(
+            zip(one.time, one.current, one.position, strict=True)
+        ):
+            stamp = begin + dt.timedelta(microseconds=round(1e6 * t))
             cell = "" if k == 123 else f"{1e3 * y:.6f}"
-            rows.append(f'"{stamp.isoformat(sep=" ", timespec="microseconds")}";'
-                        f'"{u:.9f}";;"{cell}"')
+            rows.append(
+                f'"{stamp.isoformat(sep=" ", timespec="microseconds")}";'
+                f'"{u:.9f}";;"{cell}"'
+            )
         head = ['"Zeitstempel";"Motorstrom [A]";"frei";"Stößelweg [µm]"']
         _lines(folder, f"{one.name}.csv", [*head, *rows, "Ende der Messung"], "latin-1")
 
@@ -287,14 +296,16 @@ def excel_with_dates(folder):
     """xlsxwriter: time as date cells, a lost cell."""
     import xlsxwriter
 
-    begin = datetime.datetime(2024, 5, 1, 12, 0, 0)
+    begin = dt.datetime(2024, 5, 1, 12, 0, 0)
     for one in drives():
         book = xlsxwriter.Workbook(str(folder / f"{one.name}.xlsx"))
         sheet = book.add_worksheet("Log")
         style = book.add_format({"num_format": "yyyy-mm-dd hh:mm:ss.000"})
         sheet.write_row(0, 0, ["Zeitstempel", "I_q [A]", "pos [mm]"])
-        for k, (t, u, y) in enumerate(zip(one.time, one.current, one.position, strict=True)):
-            stamp = begin + datetime.timedelta(microseconds=round(1e6 * t))
+        for k, (t, u, y) in enumerate(
+            zip(one.time, one.current, one.position, strict=True)
+        ):
+            stamp = begin + dt.timedelta(microseconds=round(1e6 * t))
             sheet.write_datetime(k + 1, 0, stamp, style)
             sheet.write_number(k + 1, 1, u)
             if k != 200:
@@ -306,7 +317,11 @@ def _frame(one):
     import pandas as pd
 
     return pd.DataFrame(
-        {"t [s]": one.time, "cmd_current [A]": one.current, "act_pos [mm]": one.position}
+        {
+            "t [s]": one.time,
+            "cmd_current [A]": one.current,
+            "act_pos [mm]": one.position,
+        }
     )
 
 
@@ -372,7 +387,9 @@ def parquet(folder):
     import pandas as pd
 
     for one in drives():
-        index = pd.to_datetime("2024-05-01") + pd.to_timedelta(1e3 * one.time, unit="ms")
+        index = pd.to_datetime("2024-05-01") + pd.to_timedelta(
+            1e3 * one.time, unit="ms"
+        )
         frame = _frame(one).drop(columns="t [s]").set_index(index.rename("when"))
         frame.to_parquet(folder / f"{one.name}.parquet")
 
@@ -403,7 +420,11 @@ def simulink(folder):
         pairs = ((one.current, "u_cmd"), (one.position, "y_act"))
         for place, (values, label) in enumerate(pairs):
             signals[0, place] = (values[:, None], 1.0, label)
-        content = {"time": one.time[:, None], "signals": signals, "blockName": "m/Scope"}
+        content = {
+            "time": one.time[:, None],
+            "signals": signals,
+            "blockName": "m/Scope",
+        }
         scipy.io.savemat(folder / f"{one.name}.mat", {"ScopeData": content})
 
 
@@ -474,7 +495,9 @@ LAYOUTS = {
         exact=1e-7,
     ),
     "excel": Layout(excel, "Zeit", "Strom", "Weg", ("ms", "A", "mm")),
-    "excel with dates": Layout(excel_with_dates, "Zeitstempel", "I_q [A]", "pos [mm]", _SI),
+    "excel with dates": Layout(
+        excel_with_dates, "Zeitstempel", "I_q [A]", "pos [mm]", _SI
+    ),
     "ods": Layout(ods, "t [s]", "cmd_current [A]", "act_pos [mm]", _SI),
     "xls": Layout(xls, "t [s]", "cmd_current [A]", "act_pos [mm]", _SI),
     "tdms": Layout(tdms, "time", "Motorstrom", "Weg", _SI),
