@@ -4,7 +4,7 @@ Numbers may have a decimal comma and marks between thousands. A column keeps to 
 of writing; a cell that could be read in two ways is refused, not guessed.
 """
 
-import datetime
+import datetime as dt
 import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
@@ -247,7 +247,7 @@ def _day(part: dict[str, str | None]) -> int:
     else:
         return 0
     try:
-        return datetime.date(*fields).toordinal()
+        return dt.date(*fields).toordinal()
     except ValueError:
         return 0
 

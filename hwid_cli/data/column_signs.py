@@ -246,7 +246,8 @@ def _gain(target: np.ndarray, other: np.ndarray) -> float:
         target[_LAGS:],
     ]
     # What each column leaves of the last one stands in its row.
-    left = np.linalg.qr(np.column_stack(columns), mode="r")[:, -1] ** 2 / n
+    triangle = np.asarray(np.linalg.qr(np.column_stack(columns), mode="r"))
+    left = triangle[:, -1] ** 2 / n
     # The least that rounding leaves keeps the logarithm finite.
     alone, together = left[_LAGS + 1 :].sum() + 1e-12, left[-1] + 1e-12
     return float(np.log(alone / together))

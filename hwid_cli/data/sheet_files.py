@@ -4,11 +4,13 @@ A sheet is a table like a text file: names, units and settings may stand above t
 numbers. Of several sheets ``recordings.columns.variable`` names one.
 """
 
-import datetime
+import datetime as dt
+import zipfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
+from hwid_cli.data.array_columns import check_size
 from hwid_cli.data.cells import is_stamp
 from hwid_cli.data.columns import ROLES, MeasuredColumn
 from hwid_cli.data.table_columns import (
@@ -127,6 +129,9 @@ def _sheet_of(path: Path, name: str | None) -> tuple[str, list[list[Any]]]:
 def _names(path: Path) -> list[str]:
     from python_calamine import CalamineWorkbook
 
+    if zipfile.is_zipfile(path):
+        with zipfile.ZipFile(path) as archive:
+            check_size("the file", sum(one.file_size for one in archive.infolist()))
     with CalamineWorkbook.from_path(str(path)) as book:
         return list(book.sheet_names)
 
@@ -149,11 +154,11 @@ def _rows(path: Path, name: str) -> list[list[Any]]:
 def _cell(cell: Any) -> float | str:
     if isinstance(cell, bool | int | float):
         return float(cell)
-    if isinstance(cell, datetime.datetime):
+    if isinstance(cell, dt.datetime):
         return cell.isoformat(sep=" ")
-    if isinstance(cell, datetime.time):
+    if isinstance(cell, dt.time):
         return cell.isoformat()
-    if isinstance(cell, datetime.timedelta):
+    if isinstance(cell, dt.timedelta):
         return cell.total_seconds()
     return str(cell).strip()
 
