@@ -103,7 +103,7 @@ def _file_lines(layout: FolderLayout, proposal: Proposal) -> list[str]:
     fates = [
         ("used", ", ".join(name for name in proposal.names if name not in test)),
         ("test", f"{', '.join(test)} ({proposal.held_out_reason})" if test else ""),
-        *(("skipped", f"{name}: {why}") for name, why in layout.left),
+        *(("skipped", f"{escaped(name)}: {why}") for name, why in layout.left),
         *(("skipped", problem) for problem in proposal.problems),
     ]
     return [
@@ -161,12 +161,24 @@ def write_starter(path: Path, text: str, *, force: bool) -> None:
 
 
 def _relative(folder: Path, path: Path) -> str:
-    """Folder as seen from the configuration, ready for a pattern; empty if its own."""
+    """Folder as seen from the configuration, ready for a pattern; empty if its own.
+
+    Raises
+    ------
+    ConfigError
+        If its name cannot stand in a configuration.
+    """
     try:
         relative = os.path.relpath(folder, path.parent)
     except ValueError:
         # Another drive of Windows.
         relative = str(folder.resolve())
+    if not is_plain(relative):
+        raise ConfigError(
+            f"{escaped(str(folder))}: has control characters in its path; expected plain "
+            "text, as a configuration takes; rename the folder, or write the "
+            "configuration into it with --out"
+        )
     return "" if relative == "." else glob.escape(relative.replace(os.sep, "/")) + "/"
 
 

@@ -17,7 +17,7 @@ import numpy as np
 from hwid_cli.data.columns import ROLES, MeasuredColumn, array_column
 from hwid_cli.data.units import bare_unit, unit_in_name
 from hwid_cli.errors import MeasurementError
-from hwid_cli.files.messages import did_you_mean
+from hwid_cli.files.messages import did_you_mean, is_plain
 from hwid_cli.records.experiment import Columns
 from hwid_cli.records.starter import FoundColumn
 
@@ -139,7 +139,8 @@ def list_variables(variables: Variables) -> Iterator[FoundColumn]:
     """
     has_columns = False
     for name, load in variables.items():
-        if name.endswith(_MARKS):
+        # A configuration takes no text with control characters.
+        if name.endswith(_MARKS) or not is_plain(name):
             continue
         values = np.asarray(_checked(name, load()))
         if values.dtype.kind not in "fiub" or values.size == 0:

@@ -151,7 +151,7 @@ def answers(first: np.ndarray, second: np.ndarray) -> float:
     one, other = (
         _means(values[: known.size][known], max(block, 1)) for values in (first, second)
     )
-    forward = backward = 0.0
+    forward = backward = chance = 0.0
     for n in _MEANS_OF:
         count = one.size // n
         if count < _FEWEST_MEANS and n > 1:
@@ -159,8 +159,8 @@ def answers(first: np.ndarray, second: np.ndarray) -> float:
         a, b = (_standard(_means(values, n)) for values in (one, other))
         forward += _gain(b, a)
         backward += _gain(a, b)
-    # What chance alone gives.
-    chance = 4.0 * _LAGS / max(one.size, 1)
+        # Past values without any meaning give a quarter of this.
+        chance += 4.0 * _LAGS / max(count, 1)
     return (forward - backward) / (forward + backward + chance)
 
 

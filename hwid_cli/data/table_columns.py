@@ -17,7 +17,7 @@ from hwid_cli.data.columns import MeasuredColumn
 from hwid_cli.data.table_heads import TableHead
 from hwid_cli.data.units import unit_in_name
 from hwid_cli.errors import MeasurementError
-from hwid_cli.files.messages import did_you_mean, shown
+from hwid_cli.files.messages import did_you_mean, is_plain, shown
 from hwid_cli.records.starter import FoundColumn
 
 # Rows of text below the numbers that are no part of them; more are a fault.
@@ -239,7 +239,9 @@ def found_columns(
     for place, column in sorted(read.items()):
         title = head.names[place] if place < len(head.names) else ""
         if np.isfinite(column.values).any():
-            key = title if title and head.names.count(title) == 1 else place
+            # A configuration takes no text with control characters.
+            is_name = bool(title) and head.names.count(title) == 1 and is_plain(title)
+            key = title if is_name else place
             unit = head.units.get(place, column.unit)
             found.append(FoundColumn(title, key, column.values, variable, unit))
     for title, step_s in head.settings.items():

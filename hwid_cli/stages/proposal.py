@@ -249,7 +249,8 @@ def _held_out(
     named = tuple(name for name in names if _is_word_in(name, _TEST_WORDS))
     if named and len(named) < len(names):
         return named, "named so"
-    repeats = _repeats(raws)
+    free = [name for name in names if not _is_word_in(name, _TRAIN_WORDS)]
+    repeats = tuple(name for name in _repeats(raws) if name in free)
     if repeats:
         return repeats, "the last repeat of each input"
     # About a quarter of each kind, neither the first nor the last: often extremes.
@@ -259,7 +260,6 @@ def _held_out(
         for number, name in enumerate([n for n in names if kinds[n] == kind])
         if number % 4 == 2
     ]
-    free = [name for name in names if not _is_word_in(name, _TRAIN_WORDS)]
     allowed = [name for name in chosen if name in free] or free[-1:] or names[-1:]
     return tuple(allowed), "about a quarter of each kind, not the first"
 

@@ -99,7 +99,7 @@ def _sheet_bomb(path):
             if entry.filename == "xl/worksheets/sheet1.xml":
                 content = (
                     f'<worksheet xmlns="{_MAIN}"><sheetData>'.encode()
-                    + row * 2000
+                    + row * 2500
                     + b"</sheetData></worksheet>"
                 )
             new.writestr(entry.filename, content, zipfile.ZIP_DEFLATED)

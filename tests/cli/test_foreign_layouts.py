@@ -70,7 +70,9 @@ def compare(raw, written, layout):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", LAYOUTS)
-def test_a_foreign_folder_goes_through_the_first_stages_unedited(folder, tmp_path, name):
+def test_a_foreign_folder_goes_through_the_first_stages_unedited(
+    folder, tmp_path, name
+):
     LAYOUTS[name].write(folder)
     out = tmp_path / "mine.yaml"
     assert invoke("init", folder, "--out", out).exit_code == 0
