@@ -1,5 +1,6 @@
 """Signals of an MDF file (version 3 and 4), by the library asammdf."""
 
+import re
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -22,13 +23,22 @@ def open_mdf(path: Path) -> Iterator[Variables]:
     mapping of str to callable
         Signals with numbers, and the clock of each group.
     """
-    from asammdf import MDF
-
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        # Without its own folder of temporary files; nothing is written beside the file.
-        with MDF(str(path), raise_on_multiple_occurrences=False) as file:
+        with _opened(path) as file:
             yield as_variables(_signals(file))
+
+
+def _opened(path: Path) -> Any:
+    from asammdf import MDF
+    from asammdf.blocks.utils import MdfException
+
+    try:
+        return MDF(str(path), raise_on_multiple_occurrences=False)
+    except MdfException as error:
+        # It names its own buffer in place of the file.
+        said = re.sub(r"'<.*?>'", "it", str(error))
+        raise ValueError(said) from None
 
 
 def _signals(file: Any) -> Iterator[GroupedSignal]:

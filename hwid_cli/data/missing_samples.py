@@ -59,7 +59,7 @@ def bridge_missing(
         if places.size == 0:
             continue
         values = column.values.copy()
-        values[places] = 0.5 * (values[places - 1] + values[places + 1])
+        values[places] = 0.5 * values[places - 1] + 0.5 * values[places + 1]
         changed[role] = replace(column, values=values)
         bridged[role] = tuple(int(place) for place in places)
         more = f" (and {places.size - 1} more)" if places.size > 1 else ""
