@@ -197,6 +197,8 @@ def _recordings(layout: FolderLayout, own: str) -> dict[str, Any]:
         section["sample_time_s"] = layout.sample_time_s
     if layout.resample:
         section["resample"] = True
+    if layout.first_sample:
+        section["first_sample"] = layout.first_sample
     return section
 
 
@@ -254,14 +256,20 @@ def _recordings_lines(layout: FolderLayout, proposal: Proposal, own: str) -> lis
             "true would allow one that jitters."
         ]
     if layout.resample:
-        why = "the time column jitters"
+        why = "the time column jitters, or a signal has no number in every row"
         if layout.output_time is not None:
             why = "input and output are sampled at their own times"
         lines += [f"  resample: true   # {why}"]
     lines += _unit_lines(layout)
+    if layout.first_sample and not proposal.parts:
+        lines += [
+            f"  first_sample: {layout.first_sample}   # a signal has no number before"
+        ]
     if proposal.parts:
         lines += ["  # One file only: its first two thirds identify, the rest judges."]
-        lines += [f"  parts: {_flow({k: list(v) for k, v in proposal.parts.items()})}"]
+        first = layout.first_sample
+        parts = {k: [first + n for n in v] for k, v in proposal.parts.items()}
+        lines += [f"  parts: {_flow(parts)}"]
     if proposal.average > 1:
         lines += [
             f"  # average: {proposal.average}   # the output changes slowly: means of "

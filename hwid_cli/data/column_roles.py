@@ -93,8 +93,13 @@ class _Named:
 
     @property
     def values(self) -> np.ndarray:
-        """Its numbers."""
-        return self.column.values
+        """Its numbers, with straight lines over those that are missing."""
+        values = self.column.values
+        known = np.isfinite(values)
+        if known.all():
+            return values
+        every = np.arange(values.size)
+        return np.interp(every, every[known], values[known])
 
 
 def long_columns(columns: Sequence[FoundColumn]) -> list[FoundColumn]:
@@ -121,9 +126,9 @@ def guess_time(columns: Sequence[FoundColumn]) -> TimeGuess:
     columns : sequence of FoundColumn
         All of the file, single numbers too.
     """
-    stated_s, stated_by = _stated_sample_time(columns)
+    stated = _stated_sample_times(columns)
     for column, meaning, clock in clocks_of(columns):
-        unit, why, notes = _unit_of_clock(column, clock, stated_s, stated_by)
+        unit, why, notes = _unit_of_clock(column, clock, stated)
         is_counter = clock.step == 1.0 and clock.jitter == 0.0 and not unit
         is_other = meaning.role != "time" and (meaning.role or is_counter)
         if unit is None or (is_other and not _is_in_time(column)):
@@ -132,8 +137,8 @@ def guess_time(columns: Sequence[FoundColumn]) -> TimeGuess:
         role = Role(column.key, column.title, unit, named + why)
         is_rough = clock.jitter > _ROUND_STAMPS
         return TimeGuess(role, None, is_rough, named + why, notes, column)
-    if stated_s is not None:
-        return TimeGuess(None, stated_s, False, f"the file's {stated_by}")
+    for title, step_s in stated:
+        return TimeGuess(None, step_s, False, f"the file's {title}")
     return TimeGuess(None, None, False, "nothing in the file tells the time")
 
 
@@ -156,23 +161,17 @@ def _is_in_time(column: FoundColumn) -> bool:
     return bool(unit) and factor_between(unit, "s") is not None
 
 
-def _stated_sample_time(
-    columns: Sequence[FoundColumn],
-) -> tuple[float | None, str]:
-    for column in columns:
-        if column.values.size == 1:
-            value = float(column.values[0])
-            step_s = sample_time_named(column.title, value, column.unit)
-            if step_s is not None:
-                return step_s, column.title
-    return None, ""
+def _stated_sample_times(columns: Sequence[FoundColumn]) -> list[tuple[str, float]]:
+    named = [
+        (one.title, sample_time_named(one.title, float(one.values[0]), one.unit))
+        for one in columns
+        if one.values.size == 1
+    ]
+    return [(title, step_s) for title, step_s in named if step_s is not None]
 
 
 def _unit_of_clock(
-    column: FoundColumn,
-    clock: signs.Clock,
-    stated_s: float | None,
-    stated_by: str,
+    column: FoundColumn, clock: signs.Clock, stated: Sequence[tuple[str, float]]
 ) -> tuple[str | None, str, tuple[str, ...]]:
     """Unit of a clock (None for a mere counter), why, and what is not sure."""
     unit = unit_of_column(column, "time")
@@ -181,13 +180,13 @@ def _unit_of_clock(
     since = unit_since_1970(column.values)
     if since:
         return since, f"; its size says {since} since 1970", ()
-    if stated_s is not None:
+    for title, stated_s in stated:
         for unit in ("s", "ms", "us", "ns"):
             step_s = clock.step * (factor_between(unit, "s") or 1.0)
             if abs(step_s - stated_s) <= _SAME_STEP * stated_s:
-                return unit, f"; {stated_by} says its unit", ()
-        if clock.step == 1.0:
-            return None, "", ()
+                return unit, f"; {title} says its unit", ()
+    if stated and clock.step == 1.0:
+        return None, "", ()
     is_whole = bool((column.values == np.round(column.values)).all())
     if clock.step < 1.0 or not is_whole:
         return "", "", _slow_note(clock.step)

@@ -231,10 +231,13 @@ def _rows(
     if separator == " " and rows:
         width = len(rows[-1])
         for number, end in enumerate(ends):
-            # Names with single blanks inside stand further apart.
-            apart = re.split(r"\s{2,}", lines[end - 1].strip().lstrip(_COMMENT).strip())
-            if len(rows[number]) != width == len(apart):
-                rows[number] = apart
+            line = lines[end - 1].strip().lstrip(_COMMENT).strip()
+            # Names with single blanks inside stand further apart; units in brackets
+            # belong to the name in front.
+            for blanks in (r"\s{2,}", r"\s+(?![\[(])"):
+                apart = re.split(blanks, line)
+                if len(rows[number]) != width == len(apart):
+                    rows[number] = apart
     return rows, ends, comments
 
 

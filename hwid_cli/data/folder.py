@@ -6,6 +6,7 @@ For ``hwid init``.
 import glob
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path, PurePosixPath
 
 import numpy as np
@@ -27,6 +28,9 @@ from hwid_cli.errors import ConfigError, MeasurementError
 from hwid_cli.files.messages import escaped
 from hwid_cli.records.starter import FolderLayout, FoundColumn, FoundFile, Role
 
+# Beyond this share of samples that are missing a signal is slower than its rows, [-].
+_MOST_LOST = 0.05
+_SLOW = -1
 # What spreadsheets and systems leave beside data.
 _SYSTEM_NAMES = ("~$", "._", "Thumbs", "desktop")
 
@@ -129,7 +133,29 @@ def guess_layout(files: Sequence[FoundFile]) -> FolderLayout:
         "time": clocks[0].column,
         "output_time": None if clocks[1] is None else clocks[1].column,
     }
-    return _layout(signals, clocks, _sorted_out(files, roles, typical))
+    lacks = _lacking(alike, (signals.input, signals.output))
+    layout = _layout(signals, clocks, _sorted_out(files, roles, typical))
+    if lacks == _SLOW and layout.time is not None:
+        note = (
+            "a signal has no number in every row: all are put on one grid, that of the "
+            "slower one"
+        )
+        return replace(layout, resample=True, notes=(*layout.notes, note))
+    return layout if lacks == _SLOW else replace(layout, first_sample=lacks)
+
+
+def _lacking(files: Sequence[FoundFile], signals: Sequence[FoundColumn]) -> int:
+    """Rows at the beginning without a number in a signal, or that one is slow."""
+    first = 0
+    for file in files:
+        own = {column.place: column.values for column in file.columns}
+        for column in signals:
+            known = np.isfinite(own[column.place])
+            begin = int(np.argmax(known))
+            if np.mean(known[begin:]) < 1.0 - _MOST_LOST:
+                return _SLOW
+            first = max(first, begin)
+    return first
 
 
 def _no_signals(files: Sequence[FoundFile]) -> str:

@@ -244,6 +244,6 @@ def found_columns(
             key = title if is_name else place
             unit = head.units.get(place, column.unit)
             found.append(FoundColumn(title, key, column.values, variable, unit))
-    for title, step_s in head.settings.items():
+    for title, step_s in head.settings:
         found.append(FoundColumn(title, title, np.array([step_s]), variable, "s"))
     return tuple(found)

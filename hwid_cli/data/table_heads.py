@@ -83,8 +83,8 @@ class TableHead:
         Row that they stand in; -1 if there are none.
     units : dict of int to str
         By column, where a row of units says one.
-    settings : dict of str to float, [s]
-        Sample times that the rows state, by the words in front of them.
+    settings : tuple of (str, float), [s]
+        Sample times that the rows state, with the words in front of them.
     """
 
     body: int
@@ -93,7 +93,7 @@ class TableHead:
     names: tuple[str, ...] = ()
     name_row: int = -1
     units: dict[int, str] = field(default_factory=dict)
-    settings: dict[str, float] = field(default_factory=dict)
+    settings: tuple[tuple[str, float], ...] = ()
 
 
 def sample_time_named(title: str, value: float, unit: str = "") -> float | None:
@@ -350,9 +350,9 @@ def _letters(cell: str) -> str:
 
 def _settings(
     rows: Sequence[Sequence[str]], body: int, numeric: Sequence[int]
-) -> dict[str, float]:
+) -> tuple[tuple[str, float], ...]:
     """Sample times that stand above the table or beside it."""
-    found: dict[str, float] = {}
+    found: list[tuple[str, float]] = []
     for number, row in enumerate(rows[: max(body, _MOST_ROWS_BESIDE)]):
         below = rows[number + 1] if number + 1 < len(rows) else []
         for place, cell in enumerate(row):
@@ -360,7 +360,7 @@ def _settings(
                 continue
             written = _SETTING.fullmatch(cell)
             if written:
-                found |= _setting(written[1], written[2], written[3])
+                found += _setting(written[1], written[2], written[3])
             elif plain_number(cell) is None:
                 behind = row[place + 1] if place + 1 < len(row) else ""
                 under = below[place] if place < len(below) else ""
@@ -368,13 +368,13 @@ def _settings(
                 unit = after if factor_between(after, "s") is not None else ""
                 is_under = number + 1 >= body or place in numeric
                 value = behind if is_quantity(behind) or is_under else under
-                found |= _setting(cell, value, unit)
-    return found
+                found += _setting(cell, value, unit)
+    return tuple(dict.fromkeys(found))
 
 
-def _setting(title: str, cell: str, unit: str) -> dict[str, float]:
+def _setting(title: str, cell: str, unit: str) -> list[tuple[str, float]]:
     value = plain_number(cell.replace(",", "."))
     if value is None or len(title) > 60:
-        return {}
+        return []
     step_s = sample_time_named(title, value, unit)
-    return {} if step_s is None else {title: step_s}
+    return [] if step_s is None else [(title, step_s)]

@@ -90,6 +90,8 @@ class FolderLayout:
         Where the output has a clock of its own.
     left : tuple of (str, str)
         Files that are not used, and why.
+    first_sample : int, [samples]
+        Rows at the beginning of the files in which a signal has no number.
     """
 
     patterns: tuple[str, ...]
@@ -104,6 +106,7 @@ class FolderLayout:
     notes: tuple[str, ...] = ()
     output_time: Role | None = None
     left: tuple[tuple[str, str], ...] = ()
+    first_sample: int = 0
 
 
 @dataclass(frozen=True)

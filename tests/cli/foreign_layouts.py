@@ -457,6 +457,63 @@ def timetable(folder):
             save_to_mat(str(folder / f"{one.name}.mat"), {"log": frame}, version="v7")
 
 
+def lecroy(folder):
+    """A preamble with a line that looks like a comment; two columns of one name."""
+    for one in drives():
+        head = [
+            "LECROYHDO,4711,Waveform",
+            f"Segments,1,SegmentSize,{N}",
+            "Segment,TrigTime,TimeSinceSegment1",
+            "#1,01-May-2024 12:00:00,0",
+            "Time,Ampl,Ampl",
+        ]
+        rows = [
+            f"{t:.6f},{u:.9f},{y:.9f}"
+            for t, u, y in zip(one.time, one.current, one.position, strict=True)
+        ]
+        _lines(folder, f"{one.name}.csv", head + rows)
+
+
+def beside(folder):
+    """An older oscilloscope: the preamble stands in the rows of the numbers."""
+    settings = ["Record Length,400", "Sample Interval,1.0e-03", ",", "Source,CH1"]
+    for one in drives():
+        rows = []
+        for k, (t, u, y) in enumerate(
+            zip(one.time, one.current, one.position, strict=True)
+        ):
+            left = settings[k] if k < len(settings) else ","
+            rows.append(f"{left},,{t:.6f},{u:.9f},{y:.9f},")
+        _lines(folder, f"{one.name}.csv", rows)
+
+
+def twincat_of_two_rates(folder):
+    """Each channel with its time; the slow one ends early, EOF below."""
+    for one in drives():
+        rows = ["Name\tAxis.SetTorque\tName\tAxis.ActPos"]
+        rows += ["SampleTime[ms]\t1\tSampleTime[ms]\t2", "Unit\tA\tUnit\tmm", ""]
+        for k in range(N):
+            slow = f"{2 * k}\t{one.position[2 * k]:.9f}" if 2 * k < N else "\t"
+            rows.append(f"{k}\t{one.current[k]:.9f}\t{slow}")
+        _lines(folder, f"{one.name}.csv", [*rows, "EOF"])
+
+
+def rows_of_two_rates(folder):
+    """pandas: a number of the slow signal in every second row."""
+    for one in drives():
+        frame = _frame(one)
+        frame.loc[np.arange(N) % 2 != 0, "act_pos [mm]"] = np.nan
+        frame.to_csv(folder / f"{one.name}.csv", index=False)
+
+
+def blanks_in_brackets(folder):
+    """numpy: a comment with names and units, blanks between all of them."""
+    for one in drives():
+        table = np.column_stack([one.time, one.current, one.position])
+        path = folder / f"{one.name}.asc"
+        np.savetxt(path, table, header="t [s] i [A] x [mm]", fmt="%.12g")
+
+
 _SI = ("s", "A", "mm")
 LAYOUTS = {
     "tektronix": Layout(tektronix, "TIME", "CH1", "CH2", _SI),
@@ -471,6 +528,17 @@ LAYOUTS = {
         exact=1e-7,
     ),
     "twincat": Layout(twincat, 0, "I_ist", "x_ist", ("ms", "A", "mm"), exact=1e-7),
+    "lecroy": Layout(lecroy, "Time", 1, 2, (None, None, None)),
+    "beside": Layout(beside, 3, 4, 5, ("s", None, None)),
+    "twincat of two rates": Layout(
+        *(twincat_of_two_rates, 0, "Axis.SetTorque", "Axis.ActPos", ("ms", "A", "mm")),
+        step_s=2 * STEP_S,
+    ),
+    "rows of two rates": Layout(
+        *(rows_of_two_rates, "t [s]", "cmd_current [A]", "act_pos [mm]", _SI),
+        step_s=2 * STEP_S,
+    ),
+    "blanks in brackets": Layout(blanks_in_brackets, "t [s]", "i [A]", "x [mm]", _SI),
     "labview": Layout(labview, None, "Current", "Position", (None, "A", "mm")),
     "dspace": Layout(
         dspace, "Time", "Model Root/i_act", "Model Root/x_act", _SI, exact=1e-7

@@ -79,3 +79,24 @@ def test_a_foreign_folder_goes_through_the_first_stages_unedited(
     for command in ("check", "calibrate", "identify"):
         result = invoke(command, out, "--out", tmp_path / "results", "--jobs", "1")
         assert result.exit_code == 0, (command, result.output)
+
+
+@pytest.mark.parametrize(("lost", "kept"), [((0,), 399), ((0, 1, 2), 397)])
+def test_rows_before_a_signal_begins_are_left_out(folder, tmp_path, lost, kept):
+    for one in drives():
+        rows = [
+            f"{t:.6f},{u:.9f},{'' if k in lost else f'{y:.9f}'}"
+            for k, (t, u, y) in enumerate(
+                zip(one.time, one.current, one.position, strict=True)
+            )
+        ]
+        head = "time_s,current_A,position_mm"
+        (folder / f"{one.name}.csv").write_text("\n".join([head, *rows]))
+    out = tmp_path / "mine.yaml"
+    result = invoke("init", folder, "--out", out)
+
+    assert result.exit_code == 0, result.output
+    experiment = load_experiment(out)
+    assert experiment.recordings.first_sample == len(lost)
+    for raw, one in zip(read_recordings(experiment, tmp_path), drives(), strict=True):
+        np.testing.assert_allclose(raw.input, one.current[-kept:], atol=1e-8)

@@ -36,7 +36,7 @@ def test_settings_of_a_preamble_are_no_rows_of_the_table():
     assert found.body == 5
     assert found.names == ("TIME", "CH1", "CH2")
     assert found.units == {1: "V", 2: "mm"}
-    assert found.settings == {"Sample Interval": 0.002}
+    assert found.settings == (("Sample Interval", 0.002),)
 
 
 def test_settings_may_stand_beside_the_numbers():
@@ -44,7 +44,7 @@ def test_settings_may_stand_beside_the_numbers():
     rows += [["", "", "", *row[:2]] for row in BODY[1:]]
     found = read_head(rows)
     assert (found.body, found.numeric) == (0, (3, 4))
-    assert found.settings == {"Sample Interval": 0.004}
+    assert found.settings == (("Sample Interval", 0.004),)
 
 
 def test_a_unit_of_time_below_the_word_time_is_no_name():
@@ -104,4 +104,4 @@ def test_sample_times_are_told_by_their_words(title, value, unit, step_s):
 
 def test_a_setting_may_stand_in_one_cell():
     found = head(["Sampling rate: 250 Hz"], ["t", "u", "y"])
-    assert found.settings == {"Sampling rate": 0.004}
+    assert found.settings == (("Sampling rate", 0.004),)
