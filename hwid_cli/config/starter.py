@@ -78,8 +78,8 @@ def starter_text(
     own = _relative(folder, path)
     blocks = [
         [
-            f"# Written by 'hwid init {escaped(str(folder))}': every line is a guess to be",
-            f"# checked. 'hwid check {escaped(path.name)}' says what would run;",
+            f"# Written by 'hwid init {folder}': every line is a guess to be checked.",
+            f"# 'hwid check {path.name}' says what would run;",
             "# configs/README.md of the project explains every key.",
             f"name: {_flow(starter_name(folder))}",
         ],

@@ -12,7 +12,7 @@ from hwid_cli.data.array_columns import UNIT_MARK, Variables, check_size
 
 # How the names of types begin.
 _NUMBERS = ("int", "uint", "float", "double", "half", "bool", "decimal")
-_TIMES = ("timestamp", "duration", "time")
+_TIMES = ("duration", "time")
 _UNITS = (b"unit", b"units", b"Unit")
 
 

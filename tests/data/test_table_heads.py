@@ -67,6 +67,11 @@ def test_words_in_front_of_pairs_of_columns_are_no_names():
     assert found.units == {1: "A", 3: "mm"}
 
 
+def test_behind_a_word_for_units_any_text_is_one():
+    found = head(["Units", "inc", "ticks"], body=[["", *row[:2]] for row in BODY])
+    assert found.units == {1: "inc", 2: "ticks"}
+
+
 def test_a_damaged_first_row_belongs_to_the_table():
     for body in ([["0", "off", "1"], *BODY], [["0", "", ""], *BODY]):
         assert head(["t", "u", "y"], body=body).body == 1

@@ -42,6 +42,15 @@ def test_two_clocks_become_that_of_the_slower_signal_over_their_common_time(t, t
     assert found.output.unit == "mm"
 
 
+def test_a_fast_input_is_averaged_over_the_steps_of_the_slow_clock():
+    """Else a carrier of the sampling rate would become a level."""
+    carrier = signals(FAST, FAST[::4], u=lambda t: np.cos(np.pi * t / 0.001))
+    found, step = sample_uniformly("run.csv", carrier, options(resample=True))
+
+    assert step == 0.004
+    assert np.abs(found.input.values[1:-1]).max() < 1e-9
+
+
 def test_two_clocks_are_refused_unless_the_configuration_resamples():
     with pytest.raises(
         MeasurementError,
