@@ -109,6 +109,7 @@ class ColumnParts:
     def columns(self) -> dict[int, MeasuredColumn]:
         """Give the columns; blank cells and rows of text at their ends are left out."""
         rows = np.concatenate([np.zeros(0, np.int64), *self._rows])
+        self._rows.clear()
         is_text_below = self._count - self._last_value <= _MOST_TEXT_BELOW
         last = self._last_value if is_text_below and self._last_value else self._count
         found = {}
