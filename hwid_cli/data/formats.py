@@ -17,7 +17,12 @@ from hwid_cli.data.arrow_files import open_arrow
 from hwid_cli.data.columns import FileColumns, MeasuredColumn
 from hwid_cli.data.csv_files import list_csv_columns, read_csv_columns
 from hwid_cli.data.hdf5_files import open_hdf5
-from hwid_cli.data.isolated_reading import IsolatedReader, Labelled, serve
+from hwid_cli.data.isolated_reading import (
+    MOST_SECONDS,
+    IsolatedReader,
+    Labelled,
+    serve,
+)
 from hwid_cli.data.mat_files import open_mat
 from hwid_cli.data.mdf_files import open_mdf
 from hwid_cli.data.npz_files import open_npz
@@ -99,6 +104,8 @@ READERS = (
 )
 SUFFIXES = tuple(suffix for reader in READERS for suffix in reader.suffixes)
 
+# A library of a second takes this long where many programs want the processor.
+_MOST_SECONDS_TO_LOAD = 20.0
 # What else the process that reads says of a column.
 _TOLD = ("title", "rows_from_zero", "unit", "unit_said_by")
 _ISOLATED = IsolatedReader("hwid_cli.data.formats")
@@ -144,7 +151,7 @@ def read_columns(path: Path, columns: Columns) -> FileColumns:
         with _importing(reader, path):
             if not reader.is_isolated:
                 return FileColumns(**dict(reader.read(path, columns)))
-            replies = _ISOLATED.ask(_request(path, columns))
+            replies = _asked(reader, path, columns)
         return FileColumns(**_with_rows(replies))
     except MeasurementError:
         raise
@@ -169,7 +176,7 @@ def list_columns(path: Path) -> tuple[FoundColumn, ...]:
     with _importing(reader, path):
         if not reader.is_isolated:
             return tuple(reader.list_columns(path))
-        replies = _ISOLATED.ask(_request(path))
+        replies = _asked(reader, path)
     return tuple(
         FoundColumn(title, key, values, variable, unit)
         for (title, key, variable, unit), values in replies
@@ -189,6 +196,14 @@ def _importing(reader: Reader, path: Path) -> Iterator[None]:
             f"to be installed; run: pip install 'hwid[formats]' (or {reader.needs} alone), "
             "or convert the file"
         ) from error
+
+
+def _asked(
+    reader: Reader, path: Path, columns: Columns | None = None
+) -> list[Labelled]:
+    """Have the process of its own read, which may have to load a library first."""
+    seconds = _MOST_SECONDS_TO_LOAD if reader.needs else 0.0
+    return _ISOLATED.ask(_request(path, columns), most_seconds=MOST_SECONDS + seconds)
 
 
 def _request(path: Path, columns: Columns | None = None) -> dict[str, Any]:
