@@ -246,20 +246,7 @@ def _recordings_lines(layout: FolderLayout, proposal: Proposal, own: str) -> lis
             f"  # add it to columns: reference: {_flow(layout.reference.key)}",
         ]
     lines += [f"  # {line}" for note in layout.notes for line in _wrapped(note)]
-    if layout.sample_time_s is not None:
-        lines += [
-            f"  sample_time_s: {layout.sample_time_s!r}   # {layout.clock_reason}"
-        ]
-    else:
-        lines += [
-            f"  # The time column ticks every {proposal.sample_time_s:g} s; resample: "
-            "true would allow one that jitters."
-        ]
-    if layout.resample:
-        why = "the time column jitters, or a signal has no number in every row"
-        if layout.output_time is not None:
-            why = "input and output are sampled at their own times"
-        lines += [f"  resample: true   # {why}"]
+    lines += _clock_lines(layout, proposal)
     lines += _unit_lines(layout)
     if layout.first_sample and not proposal.parts:
         lines += [
@@ -279,6 +266,25 @@ def _recordings_lines(layout: FolderLayout, proposal: Proposal, own: str) -> lis
         lines += [f"  # Kinds have recipes of their own; {proposal.kind_reason}."]
         lines += ["  kind:"]
         lines += [f"    {k}: {_flow(list(v))}" for k, v in proposal.kinds.items()]
+    return lines
+
+
+def _clock_lines(layout: FolderLayout, proposal: Proposal) -> list[str]:
+    lines = []
+    if layout.sample_time_s is not None:
+        lines += [
+            f"  sample_time_s: {layout.sample_time_s!r}   # {layout.clock_reason}"
+        ]
+    else:
+        lines += [
+            f"  # The time column ticks every {proposal.sample_time_s:g} s; resample: "
+            "true would allow one that jitters."
+        ]
+    if layout.resample:
+        why = "the time column jitters, or a signal has no number in every row"
+        if layout.output_time is not None:
+            why = "input and output are sampled at their own times"
+        lines += [f"  resample: true   # {why}"]
     return lines
 
 
