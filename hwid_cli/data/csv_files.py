@@ -26,6 +26,7 @@ from hwid_cli.data.table_columns import (
     ColumnParts,
     column_named,
     found_columns,
+    titles_of,
     with_unit,
 )
 from hwid_cli.data.table_heads import TableHead, is_quantity, read_head
@@ -102,7 +103,7 @@ def read_csv_columns(path: Path, columns: Columns) -> list[tuple[str, MeasuredCo
             f"{path}: holds a header and no rows; expected rows of numbers; "
             "export the measurement again or leave the file out"
         )
-    titles = {place: f"{role} {wanted[role]!r}" for role, place in places.items()}
+    titles = titles_of(wanted, places)
     read = _read_body(sheet, titles)
     return [
         (role, with_unit(path, read[place], role, sheet.head, place))

@@ -17,6 +17,7 @@ from hwid_cli.data.table_columns import (
     ColumnParts,
     column_named,
     found_columns,
+    titles_of,
     with_unit,
 )
 from hwid_cli.data.table_heads import TableHead, read_head
@@ -65,7 +66,7 @@ def read_sheet_columns(
         places[role] = (
             key if is_number else column_named(key, head.names, role, place_of_names)
         )
-    titles = {place: f"{role} {wanted[role]!r}" for role, place in places.items()}
+    titles = titles_of(wanted, places)
     read = _read_body(path, rows, head, titles)
     for role, place in places.items():
         yield role, with_unit(path, read[place], role, head, place)

@@ -206,6 +206,16 @@ def column_named(key: str, header: Sequence[str], role: str, place: str) -> int:
     return header.index(key)
 
 
+def titles_of(
+    wanted: Mapping[str, str | int], places: Mapping[str, int]
+) -> dict[int, str]:
+    """How messages call columns; one with several roles goes by the first."""
+    titles: dict[int, str] = {}
+    for role, place in places.items():
+        titles.setdefault(place, f"{role} {wanted[role]!r}")
+    return titles
+
+
 def with_unit(
     path: Path, column: MeasuredColumn, role: str, head: TableHead, place: int
 ) -> MeasuredColumn:
