@@ -29,15 +29,12 @@ def write_starter_configuration(
     survey = survey_recordings(draft_experiment(layout, folder), folder)
     if not survey.recordings:
         raise MeasurementError(survey.problems[0])
-    proposal = propose(survey.recordings, survey.unusable)
+    proposal = propose(survey.recordings, survey.unusable, survey.problems)
     write_starter(out, starter_text(layout, proposal, folder, out), force=force)
     load_experiment(out)
     if not quiet:
-        _show(out, layout, proposal, survey.problems)
+        _show(out, layout, proposal)
 
 
-def _show(
-    out: Path, layout: FolderLayout, proposal: Proposal, problems: tuple[str, ...]
-) -> None:
-
-    click.echo(as_text([starter_summary(str(out), layout, proposal, problems)]))
+def _show(out: Path, layout: FolderLayout, proposal: Proposal) -> None:
+    click.echo(as_text([starter_summary(str(out), layout, proposal)]))

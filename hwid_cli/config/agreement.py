@@ -80,7 +80,7 @@ def _columns(experiment: Experiment) -> Iterator[Fault]:
     if options is None:
         return
     taken: dict[object, str] = {}
-    for name in ("time", "input", "output", "reference"):
+    for name in ("time", "input", "output", "reference", "output_time"):
         column = getattr(options.columns, name)
         if column is None:
             continue
@@ -103,6 +103,13 @@ def _clock(experiment: Experiment) -> Iterator[Fault]:
             "missing, and columns.time too",
             "one of them",
             "name the time column or give the sample time",
+        )
+    if options.columns.output_time is not None:
+        yield Fault(
+            ("recordings", "columns", "output_time"),
+            f"found {options.columns.output_time!r}",
+            "columns.time too, the clock of the input",
+            "name it, or call this one time",
         )
     if options.resample:
         yield Fault(

@@ -10,6 +10,7 @@ import yaml
 from hwid_cli.config.load import experiment_of
 from hwid_cli.data.units import QUANTITIES, quantity_of
 from hwid_cli.errors import ConfigError
+from hwid_cli.files.messages import escaped, is_plain
 from hwid_cli.records.experiment import Experiment
 from hwid_cli.records.starter import FolderLayout, Proposal, Role
 
@@ -78,10 +79,11 @@ def starter_text(
     blocks = [
         [
             f"# Written by 'hwid init {folder}': every line is a guess to be checked.",
-            f"# 'hwid check {path.name}' says what would run; configs/README.md of the",
-            "# project explains every key.",
+            f"# 'hwid check {path.name}' says what would run;",
+            "# configs/README.md of the project explains every key.",
             f"name: {_flow(starter_name(folder))}",
         ],
+        _file_lines(layout, proposal),
         _recordings_lines(layout, proposal, own),
         _calibrate_lines(proposal),
         _fit_lines(proposal),
@@ -89,7 +91,27 @@ def starter_text(
         _group_lines(proposal),
         _diagnose_lines(layout, proposal),
     ]
-    return "\n\n".join("\n".join(lines) for lines in blocks if lines) + "\n"
+    # No name of a file or column may end its line: the rest of it would be a key.
+    return (
+        "\n\n".join("\n".join(map(escaped, lines)) for lines in blocks if lines) + "\n"
+    )
+
+
+def _file_lines(layout: FolderLayout, proposal: Proposal) -> list[str]:
+    """What became of each file of the folder."""
+    test = () if proposal.parts else proposal.held_out
+    fates = [
+        ("used", ", ".join(name for name in proposal.names if name not in test)),
+        ("test", f"{', '.join(test)} ({proposal.held_out_reason})" if test else ""),
+        *(("skipped", f"{escaped(name)}: {why}") for name, why in layout.left),
+        *(("skipped", problem) for problem in proposal.problems),
+    ]
+    return [
+        f"# {line}"
+        for fate, what in fates
+        if what
+        for line in _wrapped(f"{fate}: {what}")
+    ]
 
 
 def refuse_existing(path: Path, *, force: bool) -> None:
@@ -139,12 +161,24 @@ def write_starter(path: Path, text: str, *, force: bool) -> None:
 
 
 def _relative(folder: Path, path: Path) -> str:
-    """Folder as seen from the configuration, ready for a pattern; empty if its own."""
+    """Folder as seen from the configuration, ready for a pattern; empty if its own.
+
+    Raises
+    ------
+    ConfigError
+        If its name cannot stand in a configuration.
+    """
     try:
         relative = os.path.relpath(folder, path.parent)
     except ValueError:
         # Another drive of Windows.
         relative = str(folder.resolve())
+    if not is_plain(relative):
+        raise ConfigError(
+            f"{escaped(str(folder))}: has control characters in its path; expected plain "
+            "text, as a configuration takes; rename the folder, or write the "
+            "configuration into it with --out"
+        )
     return "" if relative == "." else glob.escape(relative.replace(os.sep, "/")) + "/"
 
 
@@ -163,6 +197,8 @@ def _recordings(layout: FolderLayout, own: str) -> dict[str, Any]:
         section["sample_time_s"] = layout.sample_time_s
     if layout.resample:
         section["resample"] = True
+    if layout.first_sample:
+        section["first_sample"] = layout.first_sample
     return section
 
 
@@ -189,6 +225,8 @@ def _columns(layout: FolderLayout) -> dict[str, str | int]:
     if layout.time is not None:
         columns["time"] = layout.time.key
     columns |= {"input": layout.input.key, "output": layout.output.key}
+    if layout.output_time is not None:
+        columns["output_time"] = layout.output_time.key
     return columns
 
 
@@ -208,6 +246,31 @@ def _recordings_lines(layout: FolderLayout, proposal: Proposal, own: str) -> lis
             f"  # add it to columns: reference: {_flow(layout.reference.key)}",
         ]
     lines += [f"  # {line}" for note in layout.notes for line in _wrapped(note)]
+    lines += _clock_lines(layout, proposal)
+    lines += _unit_lines(layout)
+    if layout.first_sample and not proposal.parts:
+        lines += [
+            f"  first_sample: {layout.first_sample}   # a signal has no number before"
+        ]
+    if proposal.parts:
+        lines += ["  # One file only: its first two thirds identify, the rest judges."]
+        first = layout.first_sample
+        parts = {k: [first + n for n in v] for k, v in proposal.parts.items()}
+        lines += [f"  parts: {_flow(parts)}"]
+    if proposal.average > 1:
+        lines += [
+            f"  # average: {proposal.average}   # the output changes slowly: means of "
+            f"{proposal.average} samples would do"
+        ]
+    if proposal.kinds and not proposal.parts:
+        lines += [f"  # Kinds have recipes of their own; {proposal.kind_reason}."]
+        lines += ["  kind:"]
+        lines += [f"    {k}: {_flow(list(v))}" for k, v in proposal.kinds.items()]
+    return lines
+
+
+def _clock_lines(layout: FolderLayout, proposal: Proposal) -> list[str]:
+    lines = []
     if layout.sample_time_s is not None:
         lines += [
             f"  sample_time_s: {layout.sample_time_s!r}   # {layout.clock_reason}"
@@ -218,20 +281,10 @@ def _recordings_lines(layout: FolderLayout, proposal: Proposal, own: str) -> lis
             "true would allow one that jitters."
         ]
     if layout.resample:
-        lines += ["  resample: true   # the time column jitters"]
-    lines += _unit_lines(layout)
-    if proposal.parts:
-        lines += ["  # One file only: its first two thirds identify, the rest judges."]
-        lines += [f"  parts: {_flow({k: list(v) for k, v in proposal.parts.items()})}"]
-    if proposal.average > 1:
-        lines += [
-            f"  # average: {proposal.average}   # the output changes slowly: means of "
-            f"{proposal.average} samples would do"
-        ]
-    if proposal.kinds and not proposal.parts:
-        lines += [f"  # Kinds have recipes of their own; {proposal.kind_reason}."]
-        lines += ["  kind:"]
-        lines += [f"    {k}: {_flow(list(v))}" for k, v in proposal.kinds.items()]
+        why = "the time column jitters, or a signal has no number in every row"
+        if layout.output_time is not None:
+            why = "input and output are sampled at their own times"
+        lines += [f"  resample: true   # {why}"]
     return lines
 
 
@@ -338,7 +391,18 @@ def _wrapped(text: str) -> list[str]:
 
 def _flow(value: Any) -> str:
     """Value as YAML on one line, quoted where it must be."""
+    text = _dumped(value)
+    # What would end the line stands as an escape between quotes.
+    return text if is_plain(text) else _dumped(value, default_style='"')
+
+
+def _dumped(value: Any, default_style: str | None = None) -> str:
     text = yaml.safe_dump(
-        value, default_flow_style=True, allow_unicode=True, width=10**6, sort_keys=False
+        value,
+        default_flow_style=True,
+        default_style=default_style,
+        allow_unicode=True,
+        width=10**6,
+        sort_keys=False,
     )
     return text.removesuffix("\n").removesuffix("\n...").strip()

@@ -17,7 +17,7 @@ import numpy as np
 from hwid_cli.data.columns import ROLES, MeasuredColumn, array_column
 from hwid_cli.data.units import bare_unit, unit_in_name
 from hwid_cli.errors import MeasurementError
-from hwid_cli.files.messages import did_you_mean
+from hwid_cli.files.messages import did_you_mean, is_plain
 from hwid_cli.records.experiment import Columns
 from hwid_cli.records.starter import FoundColumn
 
@@ -25,10 +25,12 @@ from hwid_cli.records.starter import FoundColumn
 # samples.
 _MOST_BYTES = 2**29
 
-# A file's variables by name; each is loaded when it is asked for. Behind the mark stand
-# attributes that say a unit.
+# A file's variables by name; each is loaded when it is asked for. Behind marks stand
+# attributes that say a unit or what a signal is called, and classes of objects that
+# cannot be read.
 Variables = Mapping[str, Callable[[], Any]]
-UNIT_MARK = "@unit"
+UNIT_MARK, TITLE_MARK, OBJECT_MARK = "@unit", "@title", "@object"
+_MARKS = (UNIT_MARK, TITLE_MARK, OBJECT_MARK)
 # Members that hold the numbers of a signal whose unit stands beside them.
 _VALUES = ("value", "values", "data", "Value", "Values", "Data")
 
@@ -133,24 +135,54 @@ def list_variables(variables: Variables) -> Iterator[FoundColumn]:
     Raises
     ------
     ValueError
-        If a variable is too large.
+        If a variable is too large, or there are only objects that cannot be read.
     """
+    has_columns = False
     for name, load in variables.items():
-        if name.endswith(UNIT_MARK):
+        # A configuration takes no text with control characters.
+        if name.endswith(_MARKS) or not is_plain(name):
             continue
         values = np.asarray(_checked(name, load()))
         if values.dtype.kind not in "fiub" or values.size == 0:
             continue
         vector = np.squeeze(values)
+        title = _title(variables, name)
         if vector.ndim <= 1:
+            has_columns = True
             unit = _stated_unit(variables, None, name) or ("", "")
             numbers = np.atleast_1d(vector).astype(float)
-            yield FoundColumn(name, name, numbers, unit=unit[0])
+            yield FoundColumn(title or name, name, numbers, unit=unit[0])
         elif values.ndim == 2 and values.shape[0] > values.shape[1]:
+            has_columns = True
             for number in range(values.shape[1]):
                 unit = _stated_unit(variables, name, number) or ("", "")
                 numbers = values[:, number].astype(float)
-                yield FoundColumn("", number, numbers, name, unit[0])
+                called = f"{title}({number + 1})" if title else ""
+                yield FoundColumn(called, number, numbers, name, unit[0])
+    if not has_columns and (said := _unread_objects(variables)):
+        raise ValueError(f"holds no plain arrays{said}")
+
+
+def _title(variables: Variables, name: str) -> str:
+    load = variables.get(name + TITLE_MARK)
+    return "" if load is None else text_of(load())
+
+
+def text_of(value: Any) -> str:
+    """First text of an array, a cell array or an attribute; empty where it is none."""
+    return next((text for text in _texts(value) if text), "")
+
+
+def _unread_objects(variables: Variables) -> str:
+    """What to say of objects of MATLAB that cannot be read; empty without any."""
+    names = [name for name in variables if name.endswith(OBJECT_MARK)]
+    if not names:
+        return ""
+    name, kind = names[0].removesuffix(OBJECT_MARK), str(variables[names[0]]())
+    return (
+        f"; {name} is an object ({kind}), which mat-io may read (pip install "
+        "'hwid[formats]'), or save plain vectors: t = seconds(T.Time), u = T.u, y = T.y"
+    )
 
 
 def member_of(value: np.ndarray, member: str) -> Any:
@@ -196,7 +228,7 @@ def _variable(path: Path, name: str, variables: Variables, role: str) -> Any:
     if name not in variables:
         raise MeasurementError(
             f"{path}: has no variable {name!r} for recordings.columns.{role}; "
-            f"{did_you_mean(name, _names(variables))}"
+            f"{did_you_mean(name, _names(variables))}{_unread_objects(variables)}"
         )
     return _checked(name, variables[name]())
 

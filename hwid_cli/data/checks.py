@@ -5,7 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from hwid_cli.data.columns import FileColumns, MeasuredColumn, place_of
+from hwid_cli.data.columns import ROLES, FileColumns, MeasuredColumn, place_of
+from hwid_cli.data.missing_samples import missing
 from hwid_cli.errors import MeasurementError
 from hwid_cli.files.messages import name_fault, shown
 from hwid_cli.records.experiment import (
@@ -23,9 +24,16 @@ _SMALLEST, _LARGEST = 1e-60, 1e60
 _SHORTEST_S, _LONGEST_S = 1e-12, 1e9
 
 
-def check_numbers(path: Path, columns: FileColumns) -> None:
-    """Refuse cells that hold no finite number."""
-    for column in (columns.time, columns.input, columns.output, columns.reference):
+def check_numbers(path: Path, columns: FileColumns, *, may_miss: bool = False) -> None:
+    """Refuse cells that hold no finite number.
+
+    Parameters
+    ----------
+    may_miss : bool
+        Whether a signal may lack samples, as one that is resampled.
+    """
+    for role in ROLES:
+        column = getattr(columns, role)
         if column is None:
             continue
         if column.values.size == 0:
@@ -34,14 +42,29 @@ def check_numbers(path: Path, columns: FileColumns) -> None:
                 "row; name another column or leave the file out"
             )
         is_bad = ~np.isfinite(column.values)
+        if may_miss and role not in ("time", "output_time"):
+            is_bad &= ~missing(column)
         if is_bad.any():
             index = int(np.argmax(is_bad))
             raise MeasurementError(
                 f"{place_of(path, column, index)}: {column.title} is "
-                f"{_what_stands_there(column, index)}; expected a finite number; "
-                "correct the row, or choose rows with recordings.first_sample and "
-                "last_sample"
+                f"{_what_stands_there(column, index)}{_run_of(column, index)}; expected "
+                "a finite number; correct the row, or choose rows with "
+                "recordings.first_sample and last_sample"
             )
+
+
+def _run_of(column: MeasuredColumn, index: int) -> str:
+    """What to say of more than one missing sample; one alone is bridged."""
+    lost = missing(column)
+    if not lost[index]:
+        return ""
+    run = int(np.argmin(np.append(lost[index:], False)))
+    if run > 1:
+        return f", as are {run} rows together (one alone is bridged)"
+    if lost.sum() > 1:
+        return f", as are {int(lost.sum())} rows in all (up to 1 % are bridged)"
+    return ""
 
 
 def check_excitation(path: Path, columns: FileColumns) -> None:

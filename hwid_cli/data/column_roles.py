@@ -1,272 +1,22 @@
-"""Which column of a file is the time, the input, the output: by name, else by content.
+"""Which column of a file is the time, the input, the output: a guess that says why.
 
-A guess that says why, for a person to check.
-
-What the name of a column says: its role, how good a choice it is, its unit.
-
-German and English, abbreviations and symbols of control engineering. Words of four and
-more letters are also found inside longer ones (``Motorstrom``).
+Names come first, then units, then content: which signal answers to which. Where names
+and content do not agree, or nothing tells, a note says so and what to write instead;
+nothing is exchanged in silence.
 """
 
-import re
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import permutations
+
+import numpy as np
 
 from hwid_cli.data import column_signs as signs
-from hwid_cli.data.units import split_unit, unit_in_name
+from hwid_cli.data.column_words import Meaning, meaning_of, place_in_chain
+from hwid_cli.data.table_heads import sample_time_named
+from hwid_cli.data.units import factor_between, unit_in_name, unit_since_1970
 from hwid_cli.errors import MeasurementError
 from hwid_cli.records.starter import FoundColumn, Role
-
-# The better choices first: current before command before voltage, and so on.
-_INPUT = [
-    "current",
-    "strom",
-    "amp",
-    "amps",
-    "ampere",
-    "i",
-    "iq",
-    "im",
-    "iz",
-    "input",
-    "eingang",
-    "in",
-    "u",
-    "command",
-    "cmd",
-    "stell",
-    "stellgroesse",
-    "stellgröße",
-    "stellwert",
-    "excitation",
-    "anregung",
-    "drive",
-    "pwm",
-    "duty",
-    "voltage",
-    "spannung",
-    "volt",
-    "vir",
-    "torque",
-    "drehmoment",
-    "moment",
-    "force",
-    "kraft",
-    "pump",
-    "valve",
-    "ventil",
-]
-_OUTPUT = [
-    "displacement",
-    "position",
-    "pos",
-    "weg",
-    "auslenkung",
-    "hub",
-    "stroke",
-    "deflection",
-    "lage",
-    "y",
-    "output",
-    "ausgang",
-    "out",
-    "x",
-    "z",
-    "angle",
-    "winkel",
-    "phi",
-    "theta",
-    "rad",
-    "distance",
-    "abstand",
-    "speed",
-    "velocity",
-    "vel",
-    "geschwindigkeit",
-    "drehzahl",
-    "omega",
-    "rpm",
-    "qm",
-    "q",
-    "level",
-    "fuellstand",
-    "füllstand",
-    "pressure",
-    "druck",
-    "temperature",
-    "temperatur",
-    "acceleration",
-    "beschleunigung",
-    "acc",
-    "measured",
-    "measurement",
-]
-_TIME = ["time", "zeit", "t", "timestamp", "tijd", "secs", "seconds", "sekunden", "sec"]
-_REFERENCE = [
-    "ref",
-    "reference",
-    "soll",
-    "sollwert",
-    "setpoint",
-    "target",
-    "desired",
-    "demand",
-    "qg",
-    "qd",
-    "führungsgrösse",
-]
-_COUNTER = [
-    "index",
-    "idx",
-    "no",
-    "nr",
-    "number",
-    "nummer",
-    "sample",
-    "samples",
-    "count",
-    "counter",
-    "row",
-    "id",
-]
-_SAMPLE_TIME = [
-    "ts",
-    "dt",
-    "h",
-    "tsamp",
-    "sampletime",
-    "samplingtime",
-    "samplingperiod",
-    "abtastzeit",
-    "tvz",
-    "tabtast",
-]
-_SAMPLE_RATE = [
-    "fs",
-    "samplerate",
-    "samplingrate",
-    "samplingfrequency",
-    "samplefrequency",
-    "abtastrate",
-    "abtastfrequenz",
-    "fabtast",
-]
-
-# What a unit in brackets says of the role, by its first word.
-_INPUT_UNITS = {"a", "ma", "ka", "v", "mv", "kv", "n", "kn", "nm", "n m", "mnm", "%"}
-_OUTPUT_UNITS = {
-    *("m", "mm", "cm", "um", "µm", "rad", "deg", "°", "grad", "rad/s", "m/s", "mm/s"),
-    *("rpm", "1/min", "u/min", "min^-1", "deg/s", "°/s", "inc", "ticks/s"),
-}
-# The same of a time.
-_TIME_UNITS = {"s", "sec", "sek", "ms", "us", "µs"}
-
-ROLES = ("time", "input", "output", "reference", "counter")
-_SHORTEST_INSIDE = 4
-
-
-@dataclass(frozen=True)
-class Meaning:
-    """What a name says.
-
-    Parameters
-    ----------
-    role : str
-        One of ``ROLES``; empty where it says nothing.
-    rank : int, [-]
-        0 for the most usual word of that role.
-    unit : str
-        Empty where none is named.
-    rest : str
-        What is left of the name without the word: columns that belong together share it.
-    """
-
-    role: str
-    rank: int
-    unit: str
-    rest: str
-
-
-def meaning_of(title: str) -> Meaning:
-    """What the name of a column says.
-
-    Examples
-    --------
-    >>> meaning_of("Motorstrom [A]")
-    Meaning(role='input', rank=1, unit='A', rest='')
-    >>> meaning_of("position_mm").role, meaning_of("position_mm").unit
-    ('output', 'mm')
-    >>> meaning_of("pos_ref_rad").role, meaning_of("u2").rest
-    ('reference', '2')
-    """
-    bare, unit = split_unit(title)
-    words = _words(bare)
-    is_reference = any(_rank(word, _REFERENCE) is not None for word in words)
-    role, rank, used = "", 99, ""
-    for name, known in (
-        ("time", _TIME),
-        ("output", _OUTPUT),
-        ("input", _INPUT),
-        ("counter", _COUNTER),
-    ):
-        for word in words:
-            found = _rank(word, known)
-            if found is not None and not role:
-                role, rank, used = name, found, word
-    if not role and unit:
-        role = _role_of_unit(unit)
-    if is_reference:
-        # A wanted current is what drives the machine; a wanted position is no output.
-        role, rank = ("input", rank + 50) if role == "input" else ("reference", rank)
-    numbers = "".join(re.findall(r"\d+", bare))
-    others = [word for word in words if word != used and not word.isdecimal()]
-    return Meaning(role, rank, unit, " ".join([*others, numbers]).strip())
-
-
-def sample_time_named(title: str, value: float) -> float | None:
-    """Sample time that a single number of a file states.
-
-    Returns
-    -------
-    float or None, [s]
-        None where the name means something else.
-
-    Examples
-    --------
-    >>> sample_time_named("fs", 200.0), sample_time_named("kp", 200.0)
-    (0.005, None)
-    """
-    word = re.sub(r"[^a-zäöü]", "", title.split(".")[-1].lower())
-    if not value > 0:
-        return None
-    if word in _SAMPLE_TIME:
-        return value
-    # A rate has fewer digits than its reciprocal.
-    return float(f"{1.0 / value:.9g}") if word in _SAMPLE_RATE else None
-
-
-def _role_of_unit(unit: str) -> str:
-    plain = unit.lower()
-    if plain in _TIME_UNITS:
-        return "time"
-    if plain in _INPUT_UNITS and unit != "nm":
-        return "input"
-    return "output" if plain in _OUTPUT_UNITS else ""
-
-
-def _words(title: str) -> list[str]:
-    """Lower-case words of a name, split at marks, digits and capitals."""
-    member = title.replace("/", ".").split(".")[-1]
-    spaced = re.sub(r"([a-zäöü])([A-ZÄÖÜ])", r"\1 \2", member)
-    return [word.lower() for word in re.findall(r"[^\W\d_]+|\d+", spaced)]
-
-
-def _rank(word: str, known: list[str]) -> int | None:
-    for rank, one in enumerate(known):
-        if word == one or (len(one) >= _SHORTEST_INSIDE and one in word):
-            return rank
-    return None
-
 
 # Jitter up to here is rounding of time stamps; more needs resampling, [-].
 _ROUND_STAMPS = 0.009
@@ -277,6 +27,18 @@ _CURRENT_UNITS = ("a", "ma", "ka")
 _LAST_CURRENT_RANK = meaning_of("iz").rank
 # A measurement has more samples than this; shorter columns are settings, [samples].
 FEWEST_SAMPLES = 60
+# Which of two signals answers to the other is clear beyond this share, [-].
+_CLEAR = 0.3
+# Beyond this the numbers speak against the names, [-].
+_AGAINST = -0.6
+# How much being smoother than the input counts beside the answer to it, [-].
+_SMOOTHER = 0.25
+# Columns that are compared with each other: more are no measurement of one drive.
+_MOST_COMPARED = 8
+# Clocks that agree within this share tick alike, [-].
+_SAME_STEP = 0.01
+# Whole-numbered stamps without a unit: a step from so many on is in the next smaller one.
+_WHOLE_STEPS = ((1.0, "ms"), (200.0, "us"), (2e5, "ns"))
 
 
 @dataclass(frozen=True)
@@ -286,23 +48,58 @@ class TimeGuess:
     Parameters
     ----------
     role : Role or None
-        The column, where it counts seconds.
+        The column.
     sample_time_s : float or None, [s]
         Where there is no such column.
+    notes : tuple of str
+        What is not sure.
+    column : FoundColumn or None
+        The same as the role, with its numbers.
     """
 
     role: Role | None
     sample_time_s: float | None
     resample: bool
     reason: str
+    notes: tuple[str, ...] = ()
+    column: FoundColumn | None = None
+
+
+@dataclass(frozen=True)
+class SignalGuess:
+    """Which columns are the signals.
+
+    Parameters
+    ----------
+    reasons : dict of str to str
+        For ``input`` and ``output``.
+    notes : tuple of str
+        What is not sure, and which other columns might have been meant.
+    """
+
+    input: FoundColumn
+    output: FoundColumn
+    reference: FoundColumn | None
+    reasons: dict[str, str]
+    notes: tuple[str, ...]
 
 
 @dataclass(frozen=True)
 class _Named:
-    """A column with what its name says."""
+    """A column with what its name and unit say."""
 
     column: FoundColumn
     meaning: Meaning
+
+    @property
+    def values(self) -> np.ndarray:
+        """Its numbers, with straight lines over those that are missing."""
+        values = self.column.values
+        known = np.isfinite(values)
+        if known.all():
+            return values
+        every = np.arange(values.size)
+        return np.interp(every, every[known], values[known])
 
 
 def long_columns(columns: Sequence[FoundColumn]) -> list[FoundColumn]:
@@ -311,7 +108,7 @@ def long_columns(columns: Sequence[FoundColumn]) -> list[FoundColumn]:
     Returns
     -------
     list of FoundColumn
-        In their order, the most usual length only, apart from columns that end early.
+        In their order, apart from columns that end early.
     """
     return [one for one in columns if one.values.size > FEWEST_SAMPLES]
 
@@ -329,31 +126,91 @@ def guess_time(columns: Sequence[FoundColumn]) -> TimeGuess:
     columns : sequence of FoundColumn
         All of the file, single numbers too.
     """
-    clocks = [
-        (one, meaning_of(one.title), clock)
-        for one in long_columns(columns)
-        if (clock := signs.clock_of(one.values)) is not None
-    ]
-    clocks.sort(key=lambda found: found[1].role != "time")
-    for column, meaning, clock in clocks:
-        is_counter = clock.step == 1.0 and clock.jitter == 0.0
-        if meaning.role != "time" and (meaning.role or is_counter):
+    stated = _stated_sample_times(columns)
+    for column, meaning, clock in clocks_of(columns):
+        unit, why, notes = _unit_of_clock(column, clock, stated)
+        is_counter = clock.step == 1.0 and clock.jitter == 0.0 and not unit
+        is_other = meaning.role != "time" and (meaning.role or is_counter)
+        if unit is None or (is_other and not _is_in_time(column)):
             continue
-        why = "named so, and it grows evenly" if meaning.role else "it grows evenly"
-        unit = unit_of_column(column, "time")
-        role = Role(column.key, column.title, unit, why)
-        return TimeGuess(role, None, clock.jitter > _ROUND_STAMPS, why)
-    for column in columns:
-        if column.values.size <= 1:
-            step_s = sample_time_named(column.title, float(column.values[0]))
-            if step_s is not None:
-                return TimeGuess(None, step_s, False, f"the file's {column.title}")
+        named = "named so, and it grows evenly" if meaning.role else "it grows evenly"
+        role = Role(column.key, column.title, unit, named + why)
+        is_rough = clock.jitter > _ROUND_STAMPS
+        return TimeGuess(role, None, is_rough, named + why, notes, column)
+    for title, step_s in stated:
+        return TimeGuess(None, step_s, False, f"the file's {title}")
     return TimeGuess(None, None, False, "nothing in the file tells the time")
 
 
-def guess_signals(
+def clocks_of(
     columns: Sequence[FoundColumn],
-) -> tuple[FoundColumn, FoundColumn, FoundColumn | None, dict[str, str], list[str]]:
+) -> list[tuple[FoundColumn, Meaning, signs.Clock]]:
+    """Columns that grow evenly, those that are named after time first."""
+    found = [
+        (one, meaning_of(one.title, one.unit), clock)
+        for one in long_columns(columns)
+        if (clock := signs.clock_of(one.values)) is not None
+    ]
+    return sorted(
+        found, key=lambda one: one[1].role != "time" and not _is_in_time(one[0])
+    )
+
+
+def _is_in_time(column: FoundColumn) -> bool:
+    unit = unit_of_column(column, "time")
+    return bool(unit) and factor_between(unit, "s") is not None
+
+
+def _stated_sample_times(columns: Sequence[FoundColumn]) -> list[tuple[str, float]]:
+    named = [
+        (one.title, sample_time_named(one.title, float(one.values[0]), one.unit))
+        for one in columns
+        if one.values.size == 1
+    ]
+    return [(title, step_s) for title, step_s in named if step_s is not None]
+
+
+def _unit_of_clock(
+    column: FoundColumn, clock: signs.Clock, stated: Sequence[tuple[str, float]]
+) -> tuple[str | None, str, tuple[str, ...]]:
+    """Unit of a clock (None for a mere counter), why, and what is not sure."""
+    unit = unit_of_column(column, "time")
+    if unit:
+        return unit, "", ()
+    since = unit_since_1970(column.values)
+    if since:
+        return since, f"; its size says {since} since 1970", ()
+    for title, stated_s in stated:
+        for unit in ("s", "ms", "us", "ns"):
+            step_s = clock.step * (factor_between(unit, "s") or 1.0)
+            if abs(step_s - stated_s) <= _SAME_STEP * stated_s:
+                return unit, f"; {title} says its unit", ()
+    if stated and clock.step == 1.0:
+        return None, "", ()
+    is_whole = bool((column.values == np.round(column.values)).all())
+    if clock.step < 1.0 or not is_whole:
+        return "", "", _slow_note(clock.step)
+    if meaning_of(column.title).role != "time":
+        # A counter of samples.
+        return "", "", ()
+    unit = next(unit for least, unit in reversed(_WHOLE_STEPS) if clock.step >= least)
+    note = (
+        f"NOT SURE: the time has whole numbers, {clock.step:g} apart, and no unit; taken "
+        f"for {unit}; if it is seconds, write units: {{time: s}}"
+    )
+    return unit, f"; whole numbers look like {unit}", (note,)
+
+
+def _slow_note(step_s: float) -> tuple[str, ...]:
+    if step_s < 0.1:
+        return ()
+    return (
+        f"NOT SURE: the time has no unit and is taken for seconds, a sample every "
+        f"{step_s:g} s; if it is milliseconds, write units: {{time: ms}}",
+    )
+
+
+def guess_signals(columns: Sequence[FoundColumn]) -> SignalGuess:
     """Find input, output and, where there is one, the reference.
 
     Parameters
@@ -361,50 +218,70 @@ def guess_signals(
     columns : sequence of FoundColumn
         All of the file.
 
-    Returns
-    -------
-    reasons : dict of str to str
-        For ``input`` and ``output``.
-    notes : list of str
-        About columns that might have been meant too.
-
     Raises
     ------
     MeasurementError
         If fewer than two columns change.
     """
-    named = [
-        _Named(one, meaning_of(one.title))
-        for one in long_columns(columns)
-        if signs.changes(one.values) and signs.clock_of(one.values) is None
-    ]
+    named = _with_meanings(
+        [
+            one
+            for one in long_columns(columns)
+            if signs.changes(one.values) and signs.clock_of(one.values) is None
+        ]
+    )
     if len(named) < 2:
         raise MeasurementError(
             f"has {len(named)} columns of more than {FEWEST_SAMPLES} numbers that "
             "change; expected at least an input and an output"
         )
-    inputs, outputs = _of_role(named, "input"), _of_role(named, "output")
-    unnamed = [one for one in named if not one.meaning.role] or [
-        one for one in named if one not in (*inputs, *outputs)
-    ]
-    reasons: dict[str, str] = {}
-    first = _chosen_input(inputs, outputs, unnamed or named, reasons)
+    first, last, reasons = _pair(named)
     first, twins = _current_of_twins(first, named, reasons)
-    last = _chosen_output(first, outputs, [one for one in named if one != first])
-    reasons["output"] = last[1]
+    if last == first:
+        last = next(one for one in named if one != first)
     notes = [
-        *_twin_notes(first, [one for one in twins if one != last[0]]),
-        *_other_columns(named, first, last[0]),
+        *_order_notes(first, last, reasons),
+        *_twin_notes(first, [one for one in twins if one != last]),
+        *_other_columns(named, first, last),
     ]
-    reference = next(
-        (
-            one.column
-            for one in _of_role(named, "reference")
-            if one not in (first, last[0])
-        ),
-        None,
+    wanted = (one for one in _of_role(named, "reference") if one not in (first, last))
+    reference = next(wanted, None)
+    return SignalGuess(
+        first.column,
+        last.column,
+        None if reference is None else reference.column,
+        reasons,
+        tuple(notes),
     )
-    return first.column, last[0].column, reference, reasons, notes
+
+
+def _with_meanings(columns: Sequence[FoundColumn]) -> list[_Named]:
+    """Columns with their meanings; a role that all of them have tells nothing."""
+    named = [_Named(one, meaning_of(one.title, one.unit)) for one in columns]
+    by_unit = [one for one in named if one.meaning.role and not _is_worded(one)]
+    roles = {one.meaning.role for one in by_unit}
+    if len(by_unit) > 1 and len(roles) == 1 and len(by_unit) == len(named):
+        return [replace(one, meaning=replace(one.meaning, role="")) for one in named]
+    if any(one.meaning.role == "output" for one in named):
+        return named
+    # "Input 1" is the plug of an instrument, beside a column that says what it is.
+    inputs = [one for one in named if one.meaning.role == "input"]
+    plugs = [one for one in inputs if one.meaning.rest.isdecimal() and _is_plug(one)]
+    if not plugs or len(plugs) == len(inputs):
+        return named
+    return [
+        replace(one, meaning=replace(one.meaning, role="")) if one in plugs else one
+        for one in named
+    ]
+
+
+def _is_worded(one: _Named) -> bool:
+    """Whether a word of the name says the role, and not the unit alone."""
+    return one.meaning.rank < 99
+
+
+def _is_plug(one: _Named) -> bool:
+    return one.column.title.lower().startswith(("input", "in", "eingang"))
 
 
 def _of_role(named: Sequence[_Named], role: str) -> list[_Named]:
@@ -412,32 +289,84 @@ def _of_role(named: Sequence[_Named], role: str) -> list[_Named]:
     return sorted(found, key=lambda one: one.meaning.rank)
 
 
-def _chosen_input(
-    inputs: list[_Named],
-    outputs: list[_Named],
-    others: list[_Named],
-    reasons: dict[str, str],
-) -> _Named:
-    if inputs:
-        reasons["input"] = "by its name"
-        return inputs[0]
+def _pair(named: list[_Named]) -> tuple[_Named, _Named, dict[str, str]]:
+    """Input, output, and why."""
+    inputs, outputs = _of_role(named, "input"), _of_role(named, "output")
+    if inputs and outputs:
+        last, why = _chosen_output(inputs[0], outputs)
+        return inputs[0], last, {"input": _by(inputs[0]), "output": why}
+    free = [one for one in named if not one.meaning.role]
+    if inputs and free:
+        last = max(free, key=lambda one: _answer(inputs[0], one))
+        why = "by its content: it answers to the input"
+        return inputs[0], last, {"input": _by(inputs[0]), "output": why}
     if outputs:
-        candidates = [one for one in others if one not in outputs[:1]]
-        score = _score(lambda one: signs.answers(one, outputs[0].column.values))
-        reasons["input"] = "by its content: the output answers to it"
-        return max(candidates or outputs[1:], key=score)
-    reasons["input"] = "by its content: other columns answer to it"
+        others = free or [one for one in named if one not in outputs] or outputs[1:]
+        first = max(others, key=lambda one: _answer(one, outputs[0]))
+        last, why = _chosen_output(first, [one for one in outputs if one != first])
+        what = "by its content: the output answers to it"
+        return first, last, {"input": what, "output": why}
+    if inputs:
+        found = _along_chain(inputs)
+        if found is not None:
+            return found
+    return _by_content(free or named)
 
-    def leads(one: _Named) -> float:
-        gains = [
-            signs.answers(one.column.values, other.column.values)
-            for other in others
-            if other is not one
-            and not signs.are_same(one.column.values, other.column.values)
-        ]
-        return max(gains, default=0.0) + signs.roughness(one.column.values)
 
-    return max(others, key=leads)
+def _by(one: _Named) -> str:
+    return "by its name" if _is_worded(one) else f"by its unit, {one.meaning.unit}"
+
+
+def _answer(first: _Named, last: _Named) -> float:
+    """How clearly one answers to another; multiples of each other do not."""
+    if signs.are_same(first.values, last.values):
+        return -2.0
+    return signs.answers(first.values, last.values)
+
+
+def _chosen_output(first: _Named, outputs: list[_Named]) -> tuple[_Named, str]:
+    # Columns that share the rest of their names belong together: u2 and y2.
+    together = [one for one in outputs if one.meaning.rest == first.meaning.rest]
+    chosen = together or outputs
+    settled = [one for one in chosen if not signs.runs_away(one.values)]
+    if settled and settled[0] is not chosen[0]:
+        title = chosen[0].column.title
+        return settled[0], f"by its name; {title!r} runs away in one direction"
+    return chosen[0], _by(chosen[0])
+
+
+def _along_chain(
+    inputs: list[_Named],
+) -> tuple[_Named, _Named, dict[str, str]] | None:
+    """What is furthest from the motion drives what is nearest; None if nothing tells."""
+    places = {
+        number: place_in_chain(one.column.title, one.column.unit)
+        for number, one in enumerate(inputs)
+    }
+    known = {number: place for number, place in places.items() if place >= 0}
+    if len(set(known.values())) < 2:
+        return None
+    first = inputs[min(known, key=lambda number: known[number])]
+    last = inputs[max(known, key=lambda number: known[number])]
+    why = {"input": _by(first), "output": f"{_by(last)}: nearer to the motion"}
+    return first, last, why
+
+
+def _by_content(named: list[_Named]) -> tuple[_Named, _Named, dict[str, str]]:
+    """The column that others answer to, and the one that answers most clearly."""
+    pairs = list(permutations(named[:_MOST_COMPARED], 2))
+
+    def worth(pair: tuple[_Named, _Named]) -> float:
+        # What answers to a force is smoother than the force.
+        smoother = signs.roughness(pair[0].values) - signs.roughness(pair[1].values)
+        return _answer(*pair) + _SMOOTHER * smoother
+
+    first, last = max(pairs, key=worth)
+    reasons = {
+        "input": "by its content: other columns answer to it",
+        "output": "by its content: it answers to the input",
+    }
+    return first, last, reasons
 
 
 def _current_of_twins(
@@ -450,7 +379,7 @@ def _current_of_twins(
         if one == first
         or (
             one.meaning.role in ("", "input")
-            and signs.are_same(one.column.values, first.column.values, least=_TWINS)
+            and signs.are_same(one.values, first.values, least=_TWINS)
         )
     ]
     currents = [one for one in alike if _is_current(one.meaning)]
@@ -467,41 +396,36 @@ def _is_current(meaning: Meaning) -> bool:
     return meaning.role == "input" and meaning.rank <= _LAST_CURRENT_RANK
 
 
+def _order_notes(first: _Named, last: _Named, reasons: dict[str, str]) -> list[str]:
+    """Say where it is not sure which of the two drives the other."""
+    found = _answer(first, last)
+    one, other = _called(first.column), _called(last.column)
+    swap = f"columns: {{input: {_key(last)}, output: {_key(first)}}}"
+    by_name = all(why.startswith("by its name") for why in reasons.values())
+    if by_name and found < _AGAINST:
+        return [
+            f"NOT SURE: by their names {one} drives {other}; in the numbers {one} "
+            f"answers to {other} (a controller between them, or exchanged names); if "
+            f"it is the other way round, write {swap}"
+        ]
+    if by_name or found > _CLEAR:
+        return []
+    return [
+        f"NOT SURE whether {one} drives {other}: the numbers do not tell; if it is the "
+        f"other way round, write {swap}"
+    ]
+
+
+def _key(one: _Named) -> str:
+    return repr(one.column.key)
+
+
 def _twin_notes(first: _Named, twins: list[_Named]) -> list[str]:
     return [
         f"{_called(one.column)} is a multiple of {_called(first.column)}; either may be "
         "the input"
         for one in twins
     ]
-
-
-def _chosen_output(
-    first: _Named, outputs: list[_Named], others: list[_Named]
-) -> tuple[_Named, str]:
-    outputs = [one for one in outputs if one != first]
-    # Columns that share the rest of their names belong together: u2 and y2.
-    together = [one for one in outputs if one.meaning.rest == first.meaning.rest]
-    chosen = together or outputs
-    if chosen:
-        settled = [one for one in chosen if not signs.runs_away(one.column.values)]
-        if settled and settled[0] is not chosen[0]:
-            title = chosen[0].column.title
-            return settled[0], f"by its name; {title!r} runs away in one direction"
-        return chosen[0], "by its name"
-    apart = [
-        one
-        for one in others
-        if not signs.are_same(one.column.values, first.column.values)
-        and one.meaning.role not in ("reference", "counter")
-    ]
-    score = _score(
-        lambda one: signs.answers(first.column.values, one) - signs.roughness(one)
-    )
-    return max(apart or others, key=score), "by its content: it answers to the input"
-
-
-def _score(of_values: Callable) -> Callable[[_Named], float]:
-    return lambda one: float(of_values(one.column.values))
 
 
 def _other_columns(named: list[_Named], first: _Named, last: _Named) -> list[str]:

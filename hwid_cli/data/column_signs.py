@@ -16,7 +16,11 @@ MOST_GAPS = 0.02
 # Two columns are multiples of each other beyond this correlation, [-].
 SAME = 0.99999
 # Samples looked at: more tell nothing new.
-_LONGEST = 20_000
+_LONGEST = 16_000
+# Past values that predict the next one, and of how many samples means are looked at.
+_LAGS = 4
+_MEANS_OF = (1, 2, 5, 10, 25, 50)
+_FEWEST_MEANS = 300
 # Share of the largest that a spectral line must hold to be alone, [-].
 _LINE_SHARE = 0.85
 # A step's levels hold for this share of all samples at least, [-].
@@ -125,10 +129,11 @@ def are_same(one: np.ndarray, other: np.ndarray, *, least: float = SAME) -> bool
 
 
 def answers(first: np.ndarray, second: np.ndarray) -> float:
-    """How much better the first column's past explains the second than the reverse.
+    """How clearly the second column answers to the first, and not the reverse.
 
-    Each column is predicted from two of its own past values and the other's value one
-    sample before; the gain is the logarithm of the error's fall by the other column.
+    Each column is predicted from its own past and from that of the other (models with
+    an exogenous input, both ways); the gain is the logarithm of the error's fall by the
+    other column. Means of more and more samples show what the sampling hides.
 
     Parameters
     ----------
@@ -137,11 +142,26 @@ def answers(first: np.ndarray, second: np.ndarray) -> float:
     Returns
     -------
     float, [-]
-        Positive where the second column answers to the first.
+        From 1, where only the second answers to the first, to -1, where only the first
+        answers to the second; near 0 where the numbers do not tell.
     """
-    n = min(first.size, second.size, _LONGEST)
-    one, other = _standard(first[:n]), _standard(second[:n])
-    return _gain(other, one) - _gain(one, other)
+    known = np.isfinite(first[: second.size]) & np.isfinite(second[: first.size])
+    # Of a long record means: the signals may begin to move late.
+    block = -(-int(known.sum()) // _LONGEST)
+    one, other = (
+        _means(values[: known.size][known], max(block, 1)) for values in (first, second)
+    )
+    forward = backward = chance = 0.0
+    for n in _MEANS_OF:
+        count = one.size // n
+        if count < _FEWEST_MEANS and n > 1:
+            break
+        a, b = (_standard(_means(values, n)) for values in (one, other))
+        forward += _gain(b, a)
+        backward += _gain(a, b)
+        # Past values without any meaning give a quarter of this.
+        chance += 4.0 * _LAGS / max(count, 1)
+    return (forward - backward) / (forward + backward + chance)
 
 
 def is_stepwise(values: np.ndarray) -> bool:
@@ -216,16 +236,26 @@ def _standard(values: np.ndarray) -> np.ndarray:
 
 def _gain(target: np.ndarray, other: np.ndarray) -> float:
     """Fall of the error's logarithm when the other column's past is known too."""
-    own = np.column_stack([target[1:-1], target[:-2], np.ones(target.size - 2)])
-    both = np.column_stack([own, other[1:-1], other[:-2]])
-    alone, together = (_misfit(columns, target[2:]) for columns in (own, both))
-    return float(np.log(alone) - np.log(together))
-
-
-def _misfit(columns: np.ndarray, target: np.ndarray) -> float:
-    found = np.linalg.lstsq(columns, target, rcond=None)[0]
+    n = target.size
+    if n < 4 * _LAGS:
+        return 0.0
+    columns: list[np.ndarray] = [
+        np.ones(n - _LAGS),
+        *(target[_LAGS - lag : n - lag] for lag in range(1, _LAGS + 1)),
+        *(other[_LAGS - lag : n - lag] for lag in range(1, _LAGS + 1)),
+        target[_LAGS:],
+    ]
+    # What each column leaves of the last one stands in its row.
+    triangle = np.asarray(np.linalg.qr(np.column_stack(columns), mode="r"))
+    left = triangle[:, -1] ** 2 / n
     # The least that rounding leaves keeps the logarithm finite.
-    return float(np.mean((target - columns @ found) ** 2)) + 1e-12
+    alone, together = left[_LAGS + 1 :].sum() + 1e-12, left[-1] + 1e-12
+    return float(np.log(alone / together))
+
+
+def _means(values: np.ndarray, n: int) -> np.ndarray:
+    """Means of n samples each; an incomplete last block goes."""
+    return values[: values.size // n * n].reshape(-1, n).mean(axis=1)
 
 
 def _correlation(one: np.ndarray, other: np.ndarray) -> float:

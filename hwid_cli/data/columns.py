@@ -48,16 +48,19 @@ class FileColumns:
         May differ in length.
     reference : Column or None
         What a controller was told to follow.
+    output_time : Column or None
+        Where the output has a clock of its own.
     """
 
     input: MeasuredColumn
     output: MeasuredColumn
     time: MeasuredColumn | None = None
     reference: MeasuredColumn | None = None
+    output_time: MeasuredColumn | None = None
 
 
 # Names of the columns in ``FileColumns`` and in ``records.experiment.Columns``.
-ROLES = ("input", "output", "time", "reference")
+ROLES = ("input", "output", "time", "reference", "output_time")
 
 
 def with_each(

@@ -1,42 +1,82 @@
-"""Columns of a CSV file, as laboratories and spreadsheets write them.
+"""Columns of a text file, as laboratories, instruments and spreadsheets write them.
 
-Comma, semicolon or tab; decimal point or decimal comma; with or without a byte order
-mark, header, quotes and comment lines. A row of units may stand below the header. Columns
-may end early in blank cells.
+Comma, semicolon, tab, bar or blanks; decimal point or decimal comma, marks between
+thousands; with or without a byte order mark, preamble, header, quotes and comment lines.
+A row of units may stand above the numbers, rows of text below them. Columns may end early
+in blank cells. Times may be dates.
+
+The file is read block by block: memory grows with the columns that are wanted, not with
+the text.
 """
 
+import codecs
 import csv
-import io
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import chain, islice
 from pathlib import Path
+from typing import TextIO
 
 import numpy as np
 
+from hwid_cli.data.cells import is_stamp
 from hwid_cli.data.columns import ROLES, MeasuredColumn
-from hwid_cli.data.units import bare_unit, looks_like_unit, unit_in_name
+from hwid_cli.data.table_columns import (
+    ColumnParts,
+    column_named,
+    found_columns,
+    titles_of,
+    with_unit,
+)
+from hwid_cli.data.table_heads import TableHead, is_quantity, read_head
 from hwid_cli.errors import MeasurementError
-from hwid_cli.files.messages import did_you_mean
 from hwid_cli.records.experiment import Columns
 from hwid_cli.records.starter import FoundColumn
 
-# Semicolons and tabs come first: with decimal commas a comma is no separator.
-_SEPARATORS = ("\t", ";", ",")
+# Semicolons and tabs come first: with decimal commas a comma is no separator. The blank
+# stands for any number of them.
+_SEPARATORS = ("\t", ";", ",", "|", " ")
 _COMMENT = "#"
+# Lines from which the form of a file is told: no preamble that was met has more.
+_HEAD_LINES = 1000
+# Lines that are taken at once.
+_BLOCK_LINES = 4096
+# The csv module reads no longer cell, and says so.
+_LONGEST_LINE = 2**16
+_READ_BYTES = 2**20
 
 
 @dataclass(frozen=True)
 class _Sheet:
-    """Rows of cells with the lines they stand in; ``comment`` is the last one above."""
+    """The form of a file, told from its beginning.
 
-    lines: list[int]
-    rows: list[list[str]]
-    comment: list[str]
+    Parameters
+    ----------
+    rows : list of list of str
+        Of the beginning.
+    lines : list of int
+        Line in which each of them ends.
+    width : int
+        Cells in the row of names, else in the first row of numbers.
+    """
+
+    path: Path
+    encoding: str
     separator: str
+    rows: list[list[str]]
+    lines: list[int]
+    head: TableHead
+    width: int
+
+    @property
+    def first_line(self) -> int:
+        """Lines in front of the numbers."""
+        return self.lines[self.head.body - 1] if self.head.body else 0
 
 
 def read_csv_columns(path: Path, columns: Columns) -> list[tuple[str, MeasuredColumn]]:
-    """Read input, output, time and reference from a CSV file.
+    """Read the columns that are wanted from a text file.
 
     Parameters
     ----------
@@ -53,62 +93,26 @@ def read_csv_columns(path: Path, columns: Columns) -> list[tuple[str, MeasuredCo
     MeasurementError
         If the file holds no rows, a column is missing, or a row has too many cells.
     """
-    sheet = _read_sheet(path)
     wanted = {
         role: key for role in ROLES if (key := getattr(columns, role)) is not None
     }
-    header, body = _split_header(sheet, list(wanted.values()))
-    places = {
-        role: _find(path, key, header, sheet, role) for role, key in wanted.items()
-    }
-    units = _unit_row(sheet, body)
-    body += bool(units)
-    if body == len(sheet.rows):
+    sheet = _read_sheet(path, [key for key in wanted.values() if isinstance(key, str)])
+    places = {role: _find(sheet, key, role) for role, key in wanted.items()}
+    if sheet.head.body == len(sheet.rows):
         raise MeasurementError(
             f"{path}: holds a header and no rows; expected rows of numbers; "
             "export the measurement again or leave the file out"
         )
-    _check_widths(path, sheet, body)
-    found = []
-    for role, place in places.items():
-        column = _column(path, f"{role} {wanted[role]!r}", sheet, body, place)
-        title = header[place] if place < len(header) else ""
-        found.append((role, _with_unit(path, column, role, title, units.get(place))))
-    return found
-
-
-def _unit_row(sheet: _Sheet, body: int) -> dict[int, str]:
-    """Units by column, where the row above the numbers holds units and no number."""
-    if body == len(sheet.rows):
-        return {}
-    cells = {place: cell for place, cell in enumerate(sheet.rows[body]) if cell}
-    if any(_number(cell.replace(",", ".")) is not None for cell in cells.values()):
-        return {}
-    # 'second' is a unit and a word: most of the cells have to be units.
-    known = [looks_like_unit(cell) for cell in cells.values()]
-    if sum(known) * 2 < len(known) or not any(known):
-        return {}
-    return {place: bare_unit(cell) for place, cell in cells.items()}
-
-
-def _with_unit(
-    path: Path, column: MeasuredColumn, role: str, title: str, in_row: str | None
-) -> MeasuredColumn:
-    """Column with the unit that the row of units or its name says."""
-    named = unit_in_name(title, "output" if role == "reference" else role)
-    if in_row and named and in_row != named:
-        raise MeasurementError(
-            f"{path}: the name {title!r} says {named!r} and the row of units {in_row!r}; "
-            f"expected one unit; say recordings.units.{role}, and mend the file"
-        )
-    if in_row:
-        return replace(column, unit=in_row, unit_said_by="the row of units")
-    said_by = f"the name {title!r}" if named else ""
-    return replace(column, unit=named, unit_said_by=said_by)
+    titles = titles_of(wanted, places)
+    read = _read_body(sheet, titles)
+    return [
+        (role, with_unit(path, read[place], role, sheet.head, place))
+        for role, place in places.items()
+    ]
 
 
 def list_csv_columns(path: Path) -> tuple[FoundColumn, ...]:
-    """List the columns of numbers in a CSV file.
+    """List the columns of numbers in a text file, and the sample times that it states.
 
     Returns
     -------
@@ -120,170 +124,274 @@ def list_csv_columns(path: Path) -> tuple[FoundColumn, ...]:
     MeasurementError
         If the file holds no rows that can be told apart.
     """
-    sheet = _read_sheet(path)
-    cells = [cell for cell in sheet.rows[0] if cell]
-    has_header = not any(_number(cell.replace(",", ".")) is not None for cell in cells)
-    header = sheet.rows[0] if has_header else sheet.comment
-    body = int(has_header)
-    units = _unit_row(sheet, body)
-    body += bool(units)
-    found = []
-    for place in range(len(sheet.rows[0])):
-        column = _column(path, f"column {place}", sheet, body, place)
-        title = header[place] if place < len(header) else ""
-        is_name = bool(title) and header.count(title) == 1
-        if np.isfinite(column.values).any():
-            key = title if is_name else place
-            unit = units.get(place, "")
-            found.append(FoundColumn(title, key, column.values, unit=unit))
-    return tuple(found)
+    sheet = _read_sheet(path, [])
+    head = sheet.head
+    if head.body == len(sheet.rows):
+        return ()
+    width = max(map(len, sheet.rows[head.body :]))
+    places = [place for place in range(width) if place not in head.texts]
+    read = _read_body(sheet, {place: f"column {place}" for place in places})
+    return found_columns(read, head)
 
 
-def _read_sheet(path: Path) -> _Sheet:
-    text = _decode(path.read_bytes())
-    kept: list[str] = []
-    comment = ""
-    for line in io.StringIO(text, newline=""):
-        is_comment = line.lstrip().startswith(_COMMENT)
-        if is_comment and not any(part.strip() for part in kept):
-            comment = line.lstrip().lstrip(_COMMENT).strip()
-        kept.append("\n" if is_comment else line)
-    separator = _separator(kept)
-    reader = csv.reader(kept, delimiter=separator, skipinitialspace=True)
-    lines, rows = [], []
-    try:
-        for cells in reader:
-            row = [cell.strip() for cell in cells]
-            if len(row) > 1 or any(row):
-                lines.append(reader.line_num)
-                rows.append(row)
-    except csv.Error as error:
-        raise MeasurementError(
-            f"{path}, row {reader.line_num}: {error}; expected rows of numbers; "
-            "look for a quote that is not closed"
-        ) from None
-    if not any(any(row) for row in rows):
+def _read_sheet(path: Path, wanted: Sequence[str]) -> _Sheet:
+    """Find out the form of a file."""
+    encoding = _encoding(path)
+    with path.open(encoding=encoding, errors="replace", newline="") as file:
+        lines = list(islice(file, _HEAD_LINES))
+    separator = _separator(lines)
+    rows, ends, comments = _rows(path, lines, separator)
+    if not any(any(row) for number, row in enumerate(rows) if number not in comments):
         raise MeasurementError(
             f"{path}: holds no rows; expected rows of numbers; "
             "export the measurement again or leave the file out"
         )
-    named = next(csv.reader([comment], delimiter=_separator([comment])), [])
-    return _Sheet(lines, rows, [cell.strip() for cell in named], separator)
+    head = read_head(rows, wanted=wanted, comments=comments)
+    place = head.name_row if head.name_row >= 0 else min(head.body, len(rows) - 1)
+    return _Sheet(path, encoding, separator, rows, ends, head, len(rows[place]))
 
 
-def _decode(content: bytes) -> str:
-    if content.startswith((b"\xff\xfe", b"\xfe\xff")):
-        return content.decode("utf-16", errors="replace")
-    try:
-        return content.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        # Old spreadsheets: only header names and units are affected.
-        return content.decode("latin-1")
+def _encoding(path: Path) -> str:
+    """Encoding of a file: its mark, else UTF-8 where it is, else that of old Windows."""
+    decoder = codecs.getincrementaldecoder("utf-8")()
+    with path.open("rb") as file:
+        begin = file.read(4)
+        if begin.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+            return "utf-16"
+        # Text of the West in two bytes a character, without its mark.
+        if len(begin) == 4 and begin[1::2] == b"\0\0":
+            return "utf-16-le"
+        block = begin
+        try:
+            while block:
+                decoder.decode(block)
+                block = file.read(_READ_BYTES)
+            decoder.decode(b"", final=True)
+        except UnicodeDecodeError:
+            # Only names of columns and units are affected.
+            return "latin-1"
+    return "utf-8-sig"
 
 
 def _separator(lines: Sequence[str]) -> str:
-    """Separator that occurs outside quotes in the first two lines with content."""
-    bare = []
-    for line in lines:
-        if line.strip():
-            bare.append("".join(line.split('"')[::2]))
-        if len(bare) == 2:
-            break
-    for separator in _SEPARATORS:
+    """Separator by which most cells of the last half of some lines are numbers."""
+    plain = [line for line in lines if line.strip() and not _is_comment(line)]
+    lower = plain[len(plain) // 2 :]
+
+    def share(separator: str) -> float:
+        cells = [cell for line in lower for cell in _split(line, separator)]
+        filled = [cell for cell in cells if cell]
+        if len(cells) < 2 * len(lower) or not filled:
+            return 0.0
+        return sum(map(is_quantity, filled)) / len(filled)
+
+    # The first of those that are equally good.
+    best = max(_SEPARATORS, key=share)
+    if share(best) > 0.0:
+        return best
+    bare = ["".join(line.split('"')[::2]) for line in plain[:2]]
+    for separator in _SEPARATORS[:3]:
         if bare and all(separator in line for line in bare):
             return separator
     return ","
 
 
-def _split_header(sheet: _Sheet, keys: list[str | int]) -> tuple[list[str], int]:
-    """Header cells (empty if there are none) and the position of the first row."""
-    first = sheet.rows[0]
-    names = {key for key in keys if isinstance(key, str)}
-    if names:
-        if not names <= set(first) and names <= set(sheet.comment):
-            return sheet.comment, 0
-        return first, 1
-    cells = [first[key] for key in keys if isinstance(key, int) and key < len(first)]
-    has_header = all(_number(cell.replace(",", ".")) is None for cell in cells)
-    return (first, 1) if cells and has_header else ([], 0)
+def _split(line: str, separator: str) -> list[str]:
+    if separator == " ":
+        return line.split()
+    # A quote that is not closed, or a cell of any length, is told when it is read.
+    if '"' not in line or len(line) > _LONGEST_LINE:
+        return [cell.strip() for cell in line.split(separator)]
+    row = next(csv.reader([line], delimiter=separator, skipinitialspace=True), [])
+    return [cell.strip() for cell in row]
 
 
-def _find(
-    path: Path, key: str | int, header: list[str], sheet: _Sheet, role: str
-) -> int:
+def _is_comment(line: str) -> bool:
+    return line.lstrip().startswith(_COMMENT)
+
+
+def _rows(
+    path: Path, lines: Sequence[str], separator: str
+) -> tuple[list[list[str]], list[int], set[int]]:
+    """Rows that are not blank, the line in which each ends, and which are comments.
+
+    Comments count where they stand in front of everything else.
+    """
+    rows: list[list[str]] = []
+    ends: list[int] = []
+    for number, line in enumerate(lines, 1):
+        if line.strip() and not _is_comment(line):
+            break
+        if _is_comment(line):
+            rows.append(_split(line.strip().lstrip(_COMMENT).strip(), separator))
+            ends.append(number)
+    comments = set(range(len(rows)))
+    for end, row in _cells_of(path, lines, separator, 0):
+        rows.append(row)
+        ends.append(end)
+    if separator == " " and rows:
+        width = len(rows[-1])
+        for number, end in enumerate(ends):
+            line = lines[end - 1].strip().lstrip(_COMMENT).strip()
+            # Names with single blanks inside stand further apart; units in brackets
+            # belong to the name in front.
+            for blanks in (r"\s{2,}", r"\s+(?![\[(])"):
+                apart = re.split(blanks, line)
+                if len(rows[number]) != width == len(apart):
+                    rows[number] = apart
+    return rows, ends, comments
+
+
+def _cells_of(
+    path: Path, lines: Iterable[str], separator: str, before: int
+) -> Iterator[tuple[int, list[str]]]:
+    """Rows of cells that are not blank, with the line in which each ends.
+
+    Parameters
+    ----------
+    before : int
+        Lines of the file in front of these.
+    """
+    if separator == " ":
+        for number, line in enumerate(lines, before + 1):
+            if line.strip() and not _is_comment(line):
+                yield number, line.split()
+        return
+    kept = ("\n" if _is_comment(line) else line for line in lines)
+    reader = csv.reader(kept, delimiter=separator, skipinitialspace=True)
+    try:
+        for cells in reader:
+            row = [cell.strip() for cell in cells]
+            if len(row) > 1 or any(row):
+                yield before + reader.line_num, row
+    except csv.Error as error:
+        raise MeasurementError(
+            f"{path}, row {before + reader.line_num}: {error}; expected rows of numbers; "
+            "look for a quote that is not closed"
+        ) from None
+
+
+def _find(sheet: _Sheet, key: str | int, role: str) -> int:
+    """Number of the column that a key names."""
+    header = list(sheet.head.names) or sheet.rows[0]
     if isinstance(key, int):
-        width = max(len(sheet.rows[0]), len(header))
+        width = max(
+            len(sheet.rows[min(sheet.head.body, len(sheet.rows) - 1)]), sheet.width
+        )
         if key >= width:
             raise MeasurementError(
-                f"{path}: has no column {key} for the {role}; expected a number from 0 "
-                f"to {width - 1}; correct recordings.columns.{role}"
+                f"{sheet.path}: has no column {key} for the {role}; expected a number "
+                f"from 0 to {width - 1}; correct recordings.columns.{role}"
             )
         return key
-    if header.count(key) > 1:
-        raise MeasurementError(
-            f"{path}, row {sheet.lines[0]}: column {key!r} occurs "
-            f"{header.count(key)} times; expected it once; rename the others or give "
-            f"its number in recordings.columns.{role}"
-        )
-    if key not in header:
-        raise MeasurementError(
-            f"{path}, row {sheet.lines[0]}: has no column {key!r} for the {role}; "
-            f"{did_you_mean(key, [name for name in header if name])}"
-        )
-    return header.index(key)
+    line = sheet.lines[max(sheet.head.name_row, 0)]
+    return column_named(key, header, role, f"{sheet.path}, row {line}")
 
 
-def _check_widths(path: Path, sheet: _Sheet, body: int) -> None:
-    width = len(sheet.rows[0])
-    for line, row in zip(sheet.lines[body:], sheet.rows[body:], strict=True):
-        if len(row) > width and any(row[width:]):
-            raise MeasurementError(
-                f"{path}, row {line}: has {len(row)} cells; expected {width} as in "
-                f"row {sheet.lines[0]}; if commas are decimal, separate the columns "
-                "by semicolons"
-            )
+def _read_body(sheet: _Sheet, titles: dict[int, str]) -> dict[int, MeasuredColumn]:
+    """Read some columns of the numbers.
+
+    Parameters
+    ----------
+    titles : dict of int to str
+        How messages call each of them.
+    """
+    parts = ColumnParts(sheet.path, titles, _stamped(sheet, titles))
+    number = sheet.first_line
+    with sheet.path.open(encoding=sheet.encoding, errors="replace", newline="") as file:
+        for _ in islice(file, number):
+            pass
+        while lines := list(islice(file, _BLOCK_LINES)):
+            table = _plain_table(sheet, lines, parts)
+            if table is not None:
+                parts.add_numbers(number + 1, *table)
+                number += len(lines)
+                continue
+            source = _Counted(lines, file)
+            rows = _cells_of(sheet.path, source, sheet.separator, number)
+            block = list(_while_inside(rows, number + len(lines)))
+            _check_widths(sheet, block)
+            parts.add_cells(block)
+            number += source.count
+    return parts.columns()
 
 
-def _column(
-    path: Path, title: str, sheet: _Sheet, body: int, place: int
-) -> MeasuredColumn:
-    cells = [row[place] if place < len(row) else "" for row in sheet.rows[body:]]
-    length = len(cells)
-    while length and not cells[length - 1]:
-        length -= 1
-    del cells[length:]
-    lines = np.array(sheet.lines[body : body + length], dtype=np.int64)
-    if sheet.separator != ",":
-        cells = _with_points(path, title, cells, lines)
-    texts = {}
-    values = np.empty(length)
-    for index, cell in enumerate(cells):
-        number = _number(cell)
-        values[index] = np.nan if number is None else number
-        if number is None:
-            texts[int(lines[index])] = cell
-    return MeasuredColumn(title, values, lines, rows_from_zero=False, texts=texts)
+def _stamped(sheet: _Sheet, places: Iterable[int]) -> set[int]:
+    """Columns of times of day."""
+    body = sheet.rows[sheet.head.body :]
+
+    def is_stamped(place: int) -> bool:
+        cells = [row[place] for row in body if place < len(row) and row[place]]
+        return 2 * sum(map(is_stamp, cells)) > len(cells)
+
+    return {place for place in places if is_stamped(place)}
 
 
-def _with_points(
-    path: Path, title: str, cells: list[str], lines: np.ndarray
-) -> list[str]:
-    """Turn decimal commas into points; refuse a column that uses both."""
-    commas = [index for index, cell in enumerate(cells) if "," in cell]
-    points = [index for index, cell in enumerate(cells) if "." in cell]
-    if commas and points:
-        index = max(commas[0], points[0])
-        raise MeasurementError(
-            f"{path}, row {lines[index]}: {title} is {cells[index]!r}, while other "
-            "rows use the other decimal mark; expected points or commas throughout; "
-            "export without thousands separators"
-        )
-    return [cell.replace(",", ".") for cell in cells] if commas else cells
+class _Counted:
+    """Lines of a block, then those behind it as far as a quoted cell goes on."""
+
+    def __init__(self, lines: Sequence[str], rest: TextIO) -> None:
+        self._lines, self._rest = lines, rest
+        self.count = 0
+
+    def __iter__(self) -> Iterator[str]:
+        for line in chain(self._lines, self._rest):
+            self.count += 1
+            yield line
 
 
-def _number(cell: str) -> float | None:
-    """Read the number in a cell, or None; Python's own 1_000 is none in a file."""
+def _while_inside(
+    rows: Iterator[tuple[int, list[str]]], last: int
+) -> Iterator[tuple[int, list[str]]]:
+    """Rows up to the one that ends in a line or behind it."""
+    for end, row in rows:
+        yield end, row
+        if end >= last:
+            return
+
+
+def _plain_table(
+    sheet: _Sheet, lines: Sequence[str], parts: ColumnParts
+) -> tuple[np.ndarray, str] | None:
+    """Numbers of lines that hold nothing else, fast, and their decimal mark."""
+    if parts.stamped or any(map(_is_long, lines)):
+        return None
+    text = "".join(lines)
+    if '"' in text or _COMMENT in text or not all(map(str.strip, lines)):
+        return None
+    mark = sheet.separator
+    if mark != " " and max(line.count(mark) for line in lines) >= max(sheet.width, 1):
+        return None
+    decimal = "," if mark != "," and "," in text else "." if "." in text else ""
+    if decimal and not parts.are_decimal(decimal):
+        return None
+    if decimal == ",":
+        if "." in text:
+            return None
+        lines = text.replace(",", ".").splitlines()
     try:
-        return None if "_" in cell else float(cell)
+        table = np.loadtxt(
+            lines,
+            delimiter=None if mark == " " else mark,
+            usecols=parts.places,
+            comments=None,
+            ndmin=2,
+        )
     except ValueError:
         return None
+    return table, decimal
+
+
+def _is_long(line: str) -> bool:
+    return len(line) > _LONGEST_LINE
+
+
+def _check_widths(sheet: _Sheet, block: Sequence[tuple[int, list[str]]]) -> None:
+    for line, row in block:
+        if len(row) > sheet.width and any(row[sheet.width :]):
+            place = sheet.head.name_row if sheet.head.name_row >= 0 else sheet.head.body
+            raise MeasurementError(
+                f"{sheet.path}, row {line}: has {len(row)} cells; expected "
+                f"{sheet.width} as in row {sheet.lines[place]}; if commas are decimal, "
+                "separate the columns by semicolons"
+            )

@@ -4,22 +4,33 @@ For ``hwid init``.
 """
 
 import glob
-from collections.abc import Sequence
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path, PurePosixPath
 
+import numpy as np
+
+from hwid_cli.data import column_signs as signs
 from hwid_cli.data.column_roles import (
+    SignalGuess,
     TimeGuess,
+    clocks_of,
     guess_signals,
     guess_time,
     long_columns,
-    meaning_of,
     unit_of_column,
 )
+from hwid_cli.data.column_words import meaning_of
 from hwid_cli.data.formats import SUFFIXES, list_columns, reader_of
 from hwid_cli.data.recording_files import PLAN_NAME
 from hwid_cli.errors import ConfigError, MeasurementError
+from hwid_cli.files.messages import escaped
 from hwid_cli.records.starter import FolderLayout, FoundColumn, FoundFile, Role
 
+# Beyond this share of samples that are missing a signal is slower than its rows, [-].
+_MOST_LOST = 0.05
+_SLOW = -1
 # What spreadsheets and systems leave beside data.
 _SYSTEM_NAMES = ("~$", "._", "Thumbs", "desktop")
 
@@ -36,7 +47,7 @@ def list_measurements(folder: Path) -> tuple[FoundFile, ...]:
     Returns
     -------
     tuple of FoundFile
-        By name.
+        By name; files that no reader knows are among them, and say so.
 
     Raises
     ------
@@ -60,26 +71,29 @@ def list_measurements(folder: Path) -> tuple[FoundFile, ...]:
 
 
 def _candidates(folder: Path, pattern: str) -> list[Path]:
-    return sorted(
+    """Files that may hold measurements, and those beside them; none without the first."""
+    found = sorted(
         path
         for path in folder.glob(pattern)
-        if path.suffix.lower() in SUFFIXES
-        and path.name != PLAN_NAME
+        if path.name != PLAN_NAME
         and not path.name.startswith(_SYSTEM_NAMES)
         and not any(part.startswith(".") for part in path.relative_to(folder).parts)
         and path.is_file()
     )
+    return found if any(one.suffix.lower() in SUFFIXES for one in found) else []
 
 
 def _listed(path: Path, folder: Path) -> FoundFile:
     name = path.relative_to(folder).as_posix()
+    if path.suffix.lower() not in SUFFIXES:
+        return FoundFile(name, problem=f"no reader for files named *{path.suffix}")
     try:
         columns = list_columns(path)
     # The readers of foreign formats raise whatever their parser stumbles on.
     except Exception as error:
-        said = " ".join(str(error).split())[:120] or type(error).__name__
-        return FoundFile(name, problem=said)
-    return FoundFile(name, columns, "" if columns else "no column of numbers")
+        said = " ".join(str(error).removeprefix(f"{path}: ").split())
+        return FoundFile(name, problem=escaped(said[:160]) or type(error).__name__)
+    return FoundFile(name, columns, "" if columns else "no table of numbers")
 
 
 # Where nothing tells the time, [s]: wrong, and said to be.
@@ -101,43 +115,97 @@ def guess_layout(files: Sequence[FoundFile]) -> FolderLayout:
     """
     alike = _alike(files)
     if not alike:
-        first = files[0]
-        said = first.problem or "holds no two columns of the same table"
-        raise MeasurementError(
-            f"{first.name}: {said}; expected a file with an input and an output; "
-            "export it again, or write a configuration by hand (configs/README.md)"
-        )
+        raise MeasurementError(_no_signals(files))
     typical = alike[0]
     long_ones = _table(typical)
     scalars = [one for one in typical.columns if one.values.size == 1]
-    time = guess_time([*long_ones, *scalars])
     try:
-        input_, output, reference, reasons, notes = guess_signals(long_ones)
+        signals = guess_signals(long_ones)
     except MeasurementError as error:
         raise MeasurementError(
-            f"{typical.name}: {error}; name the columns in a configuration by hand "
-            "(configs/README.md)"
+            f"{escaped(typical.name)}: {error}; name the columns in a configuration by "
+            "hand (configs/README.md)"
         ) from error
-    keys = [column.place for column in (input_, output)]
-    if time.role is not None:
-        keys.append((input_.variable, time.role.key))
-    alike = [one for one in files if _has(one, keys, alike[0])]
+    clocks = _clocks(signals.input, signals.output, long_ones, scalars)
+    roles = {
+        "input": signals.input,
+        "output": signals.output,
+        "time": clocks[0].column,
+        "output_time": None if clocks[1] is None else clocks[1].column,
+    }
+    lacks = _lacking(alike, (signals.input, signals.output))
+    layout = _layout(signals, clocks, _sorted_out(files, roles, typical))
+    if lacks == _SLOW and layout.time is not None:
+        note = (
+            "a signal has no number in every row: all are put on one grid, that of the "
+            "slower one"
+        )
+        return replace(layout, resample=True, notes=(*layout.notes, note))
+    return layout if lacks == _SLOW else replace(layout, first_sample=lacks)
+
+
+def _lacking(files: Sequence[FoundFile], signals: Sequence[FoundColumn]) -> int:
+    """Rows at the beginning without a number in a signal, or that one is slow."""
+    first = 0
+    for file in files:
+        own = {column.place: column.values for column in file.columns}
+        for column in signals:
+            known = np.isfinite(own[column.place])
+            begin = int(np.argmax(known))
+            if np.mean(known[begin:]) < 1.0 - _MOST_LOST:
+                return _SLOW
+            first = max(first, begin)
+    return first
+
+
+def _no_signals(files: Sequence[FoundFile]) -> str:
+    """What to say of a folder in which no file holds two signals."""
+    first = next((one for one in files if not one.problem), files[0])
+    said = first.problem or "holds no two columns of the same table"
+    return (
+        f"{escaped(first.name)}: {said}; expected a file with an input and an output; "
+        "export it again, or write a configuration by hand (configs/README.md)"
+    )
+
+
+def _sorted_out(
+    files: Sequence[FoundFile],
+    roles: Mapping[str, FoundColumn | None],
+    typical: FoundFile,
+) -> tuple[tuple[str, ...], tuple[tuple[str, str], ...]]:
+    """Patterns of the files that are used, and the others, each with its reason."""
+    there = {role: one for role, one in roles.items() if one is not None}
+    why = {one.name: _why_not(one, there, typical) for one in files}
+    used = [one for one in files if not why[one.name]]
+    left = tuple((name, reason) for name, reason in why.items() if reason)
+    return _patterns(used, files), left
+
+
+def _layout(
+    signals: SignalGuess,
+    clocks: tuple[TimeGuess, TimeGuess | None],
+    files: tuple[tuple[str, ...], tuple[tuple[str, str], ...]],
+) -> FolderLayout:
+    time, other = clocks
     sample_time_s = time.sample_time_s
     if time.role is None and sample_time_s is None:
         sample_time_s = UNKNOWN_SAMPLE_TIME_S
+    reference = signals.reference
     return FolderLayout(
-        patterns=_patterns(alike, files),
-        input=_role(input_, "input", reasons["input"]),
-        output=_role(output, "output", reasons["output"]),
+        patterns=files[0],
+        input=_role(signals.input, "input", signals.reasons["input"]),
+        output=_role(signals.output, "output", signals.reasons["output"]),
         time=time.role,
+        output_time=None if other is None else other.role,
         reference=(
             None if reference is None else _role(reference, "output", "by its name")
         ),
-        variable=input_.variable,
+        variable=signals.input.variable or signals.output.variable,
         sample_time_s=sample_time_s,
         clock_reason=time.reason,
-        resample=time.resample,
-        notes=(*notes, *_notes(alike, files, time)),
+        resample=time.resample or other is not None,
+        notes=(*time.notes, *signals.notes, *_notes(time, other)),
+        left=files[1],
     )
 
 
@@ -145,7 +213,7 @@ def _alike(files: Sequence[FoundFile]) -> list[FoundFile]:
     """The largest set of files with the same columns."""
     sets: dict[tuple[object, ...], list[FoundFile]] = {}
     for one in files:
-        table = _table(one)
+        table = _table(one) if one.columns else []
         if len(table) > 1:
             ending = PurePosixPath(one.name).suffix.lower()
             places = (ending, *(column.place for column in table))
@@ -154,33 +222,108 @@ def _alike(files: Sequence[FoundFile]) -> list[FoundFile]:
     return max(sets.values(), key=len, default=[])
 
 
-def _has(
-    file: FoundFile, keys: Sequence[tuple[str | None, str | int]], typical: FoundFile
-) -> bool:
-    """Whether a file has the chosen columns, whatever else it has."""
+def _why_not(file: FoundFile, roles: dict[str, FoundColumn], typical: FoundFile) -> str:
+    """Why a file is not used; empty if it has the chosen columns in the same units."""
+    if file.problem:
+        return file.problem
     ending, usual = (PurePosixPath(one.name).suffix for one in (file, typical))
-    places = {column.place for column in long_columns(file.columns)}
-    return ending.lower() == usual.lower() and places >= set(keys)
+    if ending.lower() != usual.lower():
+        return f"another kind of file than {escaped(typical.name)}"
+    own = {column.place: column for column in long_columns(file.columns)}
+    for role, column in roles.items():
+        if column.place not in own:
+            return f"has no column {column.title or column.key!r} for the {role}"
+        of_role = "time" if role == "output_time" else role
+        units = [unit_of_column(one, of_role) for one in (own[column.place], column)]
+        if units[0] != units[1]:
+            return f"its {role} is in {units[0]!r}, not in {units[1]!r}"
+    return ""
 
 
 def _table(file: FoundFile) -> list[FoundColumn]:
     """Long columns that belong together: one table, or vectors of one length.
 
-    Columns of a text file may end early and stay together.
+    Columns of a text file may end early and stay together. Signals of several lengths
+    belong together where each has a clock, and no set of one length has both signals.
     """
     columns = long_columns(file.columns)
     if reader_of(Path(file.name)).is_one_table:
-        return columns
-    sets: dict[tuple[str | None, int], list[FoundColumn]] = {}
-    for one in columns:
-        sets.setdefault((one.variable, one.values.size), []).append(one)
-    usable = [found for found in sets.values() if len(found) > 1]
+        tables = sorted({one.variable or "" for one in columns})
+        sets = [[c for c in columns if (c.variable or "") == name] for name in tables]
+    else:
+        kinds = {(one.variable, one.values.size) for one in columns}
+        sets = [
+            [
+                one
+                for one in columns
+                if one.values.size == size and _belongs(one, variable)
+            ]
+            for variable, size in sorted(kinds, key=lambda one: (one[0] or "", one[1]))
+        ]
+    usable = [found for found in sets if len(found) > 1]
+    best = max(usable, key=_worth, default=[])
+    timed = [one for found in usable if clocks_of(found) for one in found]
+    both = [one for one in columns if any(one is other for other in timed)]
+    plain = all(one.variable is None for one in both)
+    if plain and len(usable) > 1 and _worth(both)[0] > _worth(best)[0]:
+        return both
+    return best
 
-    def worth(found: list[FoundColumn]) -> tuple[bool, int]:
-        roles = {meaning_of(one.title).role for one in found}
-        return {"input", "output"} <= roles, len(found)
 
-    return max(usable, key=worth, default=[])
+def _belongs(column: FoundColumn, variable: str | None) -> bool:
+    """Whether a column is of a table, or a clock that stands beside it."""
+    if column.variable == variable:
+        return True
+    return column.variable is None and signs.clock_of(column.values) is not None
+
+
+def _worth(found: Sequence[FoundColumn]) -> tuple[bool, int]:
+    roles = {meaning_of(one.title, one.unit).role for one in found}
+    return {"input", "output"} <= roles, len(found)
+
+
+def _clocks(
+    first: FoundColumn,
+    last: FoundColumn,
+    columns: Sequence[FoundColumn],
+    scalars: Sequence[FoundColumn],
+) -> tuple[TimeGuess, TimeGuess | None]:
+    """Clock of the input, and that of the output where it is another one."""
+    time = guess_time([*_beside(first, columns), *scalars])
+    own = guess_time([*_beside(last, columns), *scalars])
+    if own.column is None or time.column is None or own.column is time.column:
+        return (time if time.column is not None else own), None
+    one, other = time.column.values, own.column.values
+    step = float(np.median(np.diff(one)))
+    n = min(one.size, other.size, first.values.size, last.values.size)
+    is_same = first.values.size == last.values.size and bool(
+        np.max(np.abs(one[:n] - other[:n])) <= 0.01 * step
+    )
+    return time, None if is_same else own
+
+
+def _beside(column: FoundColumn, columns: Sequence[FoundColumn]) -> list[FoundColumn]:
+    """Columns among which the clock of a signal is: those of its group, or to its left."""
+    number = next(n for n, one in enumerate(columns) if one is column)
+    clocks = [one for one, _, _ in clocks_of(columns)]
+    alike = [one for one in clocks if one.values.size == column.values.size]
+    group = _group_of(column)
+    own = [one for one in alike if group and _group_of(one) == group]
+    if own:
+        return own
+    named = [one for one in alike if meaning_of(one.title, one.unit).role == "time"]
+    chosen = named or alike or clocks
+    numbers = [n for n, one in enumerate(columns) if any(one is c for c in chosen)]
+    left = [n for n in numbers if n < number]
+    # A table with pairs of columns has the time of each signal to its left.
+    is_paired = len(left) > 0 and len(numbers) > 1 and isinstance(column.key, str | int)
+    return [columns[left[-1]]] if is_paired else chosen
+
+
+def _group_of(column: FoundColumn) -> str:
+    """Struct or group of a named variable; empty without one."""
+    found = re.fullmatch(r"(.+)[./][^./]*", str(column.key))
+    return found[1] if found and isinstance(column.key, str) else ""
 
 
 def _role(column: FoundColumn, side: str, reason: str) -> Role:
@@ -199,17 +342,13 @@ def _patterns(
     return tuple(glob.escape(one.name) for one in alike)
 
 
-def _notes(
-    alike: Sequence[FoundFile], files: Sequence[FoundFile], time: TimeGuess
-) -> list[str]:
+def _notes(time: TimeGuess, other: TimeGuess | None) -> list[str]:
     notes = []
-    left = [one for one in files if one not in alike]
-    if left:
-        shown = ", ".join(
-            f"{one.name} ({one.problem or 'other columns'})" for one in left[:5]
+    if other is not None:
+        notes.append(
+            "input and output have clocks of their own: both are resampled on one grid, "
+            "that of the slower one"
         )
-        more = f" and {len(left) - 5} more" if len(left) > 5 else ""
-        notes.append(f"files left out: {shown}{more}")
     if time.role is None and time.sample_time_s is None:
         notes.append(
             "THE SAMPLE TIME IS NOT KNOWN: 1 s stands for it; correct sample_time_s "

@@ -10,14 +10,25 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from hwid_cli.data.array_columns import Variables, list_variables, pick_columns
-from hwid_cli.data.columns import FileColumns, MeasuredColumn, array_column
+from hwid_cli.data.arrow_files import open_arrow
+from hwid_cli.data.columns import FileColumns, MeasuredColumn
 from hwid_cli.data.csv_files import list_csv_columns, read_csv_columns
 from hwid_cli.data.hdf5_files import open_hdf5
 from hwid_cli.data.mat_files import open_mat
+from hwid_cli.data.mdf_files import open_mdf
 from hwid_cli.data.npz_files import open_npz
+from hwid_cli.data.sheet_files import list_sheet_columns, read_sheet_columns
+from hwid_cli.data.tdms_files import open_tdms
 from hwid_cli.errors import MeasurementError
-from hwid_cli.files.isolated_process import IsolatedReader, Labelled, serve
+from hwid_cli.files.isolated_process import (
+    MOST_SECONDS,
+    IsolatedReader,
+    Labelled,
+    serve,
+)
 from hwid_cli.files.messages import escaped
 from hwid_cli.records.experiment import Columns
 from hwid_cli.records.starter import FoundColumn
@@ -38,8 +49,7 @@ class Reader:
     needs : str
         Library to install beside hwid; empty for none.
     is_isolated : bool
-        Whether a process of its own reads: for what a damaged file may crash. Its rows
-        are counted from 0.
+        Whether a process of its own reads: for what a damaged file may crash.
     is_one_table : bool
         Whether columns of different length belong together.
     """
@@ -71,13 +81,33 @@ def _of_arrays(
 
 
 READERS = (
-    Reader((".csv",), read_csv_columns, list_csv_columns, is_one_table=True),
+    Reader(
+        (".csv", ".txt", ".tsv", ".dat", ".asc", ".lvm"),
+        read_csv_columns,
+        list_csv_columns,
+        is_one_table=True,
+    ),
     _of_arrays(".mat", opened=open_mat),
     _of_arrays(".npz", opened=open_npz),
-    _of_arrays(".h5", opened=open_hdf5),
+    _of_arrays(".h5", ".hdf5", opened=open_hdf5),
+    Reader(
+        (".xlsx", ".xlsm", ".xls", ".ods"),
+        read_sheet_columns,
+        list_sheet_columns,
+        needs="python-calamine",
+        is_isolated=True,
+        is_one_table=True,
+    ),
+    _of_arrays(".tdms", opened=open_tdms, needs="npTDMS"),
+    _of_arrays(".mf4", ".mdf", opened=open_mdf, needs="asammdf"),
+    _of_arrays(".parquet", ".feather", ".arrow", opened=open_arrow, needs="pyarrow"),
 )
 SUFFIXES = tuple(suffix for reader in READERS for suffix in reader.suffixes)
 
+# A library of a second takes this long where many programs want the processor.
+_MOST_SECONDS_TO_LOAD = 20.0
+# What else the process that reads says of a column.
+_TOLD = ("title", "rows_from_zero", "unit", "unit_said_by")
 _ISOLATED = IsolatedReader("hwid_cli.data.formats")
 
 
@@ -121,12 +151,8 @@ def read_columns(path: Path, columns: Columns) -> FileColumns:
         with _importing(reader, path):
             if not reader.is_isolated:
                 return FileColumns(**dict(reader.read(path, columns)))
-            replies = _ISOLATED.ask(_request(path, columns))
-        found = {
-            role: array_column(title, one, unit=unit, unit_said_by=said_by)
-            for (role, title, unit, said_by), one in replies
-        }
-        return FileColumns(**found)
+            replies = _asked(reader, path, columns)
+        return FileColumns(**_with_rows(replies))
     except MeasurementError:
         raise
     except Exception as error:
@@ -150,7 +176,7 @@ def list_columns(path: Path) -> tuple[FoundColumn, ...]:
     with _importing(reader, path):
         if not reader.is_isolated:
             return tuple(reader.list_columns(path))
-        replies = _ISOLATED.ask(_request(path))
+        replies = _asked(reader, path)
     return tuple(
         FoundColumn(title, key, values, variable, unit)
         for (title, key, variable, unit), values in replies
@@ -167,8 +193,17 @@ def _importing(reader: Reader, path: Path) -> Iterator[None]:
             raise
         raise MeasurementError(
             f"{path}: is read by {reader.needs}, which is missing ({error}); expected it "
-            f"to be installed; run: pip install {reader.needs}, or convert the file"
+            f"to be installed; run: pip install 'hwid[formats]' (or {reader.needs} alone), "
+            "or convert the file"
         ) from error
+
+
+def _asked(
+    reader: Reader, path: Path, columns: Columns | None = None
+) -> list[Labelled]:
+    """Have the process of its own read, which may have to load a library first."""
+    seconds = _MOST_SECONDS_TO_LOAD if reader.needs else 0.0
+    return _ISOLATED.ask(_request(path, columns), most_seconds=MOST_SECONDS + seconds)
 
 
 def _request(path: Path, columns: Columns | None = None) -> dict[str, Any]:
@@ -188,8 +223,21 @@ def _answer(request: dict[str, Any]) -> Iterator[Labelled]:
             yield [one.title, one.key, one.variable, one.unit], one.values
     else:
         for role, column in reader.read(path, Columns(**request["columns"])):
-            label = [role, column.title, column.unit, column.unit_said_by]
-            yield label, column.values
+            about = {name: getattr(column, name) for name in (*_TOLD, "texts")}
+            yield [role, about], column.values
+            yield [], column.rows
+
+
+def _with_rows(replies: Iterable[Labelled]) -> dict[str, MeasuredColumn]:
+    """Columns by role; behind the numbers of each stand their rows."""
+    found = {}
+    every = iter(replies)
+    for (role, about), values in every:
+        rows = next(every)[1].astype(np.int64)
+        texts = {int(row): str(text) for row, text in about["texts"].items()}
+        about = {name: about[name] for name in _TOLD}
+        found[role] = MeasuredColumn(values=values, rows=rows, texts=texts, **about)
+    return found
 
 
 if __name__ == "__main__":

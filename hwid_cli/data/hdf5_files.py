@@ -11,7 +11,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hwid_cli.data.array_columns import UNIT_MARK, Variables, check_size
+from hwid_cli.data.array_columns import (
+    TITLE_MARK,
+    UNIT_MARK,
+    Variables,
+    check_size,
+)
 
 if TYPE_CHECKING:
     import h5py
@@ -22,6 +27,8 @@ _MATLAB_NUMBERS = {
     *(b"uint8", b"uint16", b"uint32", b"uint64"),
 }
 _UNIT_ATTRIBUTES = ("unit", "units")
+# Elements of a struct array that are looked at: Simulink has one for each signal.
+_MOST_ELEMENTS = 1000
 
 
 @contextmanager
@@ -45,6 +52,9 @@ def open_hdf5(path: Path, *, is_matlab: bool = False) -> Iterator[Variables]:
     def note(name: str, item: Any) -> None:
         if isinstance(item, h5py.Dataset) and not name.startswith("#"):
             key = name.replace("/", ".") if is_matlab else name
+            if is_matlab and item.dtype == h5py.ref_dtype:
+                variables.update(_elements(file, key, item))
+                return
             variables[key] = partial(_from_matlab if is_matlab else _values, item)
             for attribute in item.attrs:
                 if attribute.lower() in _UNIT_ATTRIBUTES:
@@ -53,6 +63,18 @@ def open_hdf5(path: Path, *, is_matlab: bool = False) -> Iterator[Variables]:
     with h5py.File(path, "r") as file:
         file.visititems(note)
         yield variables
+
+
+def matlab_classes(path: Path) -> dict[str, str]:
+    """Class of each object that MATLAB stored in a file of version 7.3, by its name."""
+    import h5py
+
+    with h5py.File(path, "r") as file:
+        return {
+            name: item.attrs["MATLAB_class"].decode("utf-8", errors="replace")
+            for name, item in file.items()
+            if "MATLAB_object_decode" in item.attrs and "MATLAB_class" in item.attrs
+        }
 
 
 def _values(dataset: "h5py.Dataset") -> Any:
@@ -73,6 +95,30 @@ def _from_matlab(dataset: "h5py.Dataset") -> Any:
     if "MATLAB_empty" in dataset.attrs:
         return np.zeros(0)
     return values.T if values.dtype.names is None else values
+
+
+def _elements(file: "h5py.File", key: str, item: "h5py.Dataset") -> dict[str, Any]:
+    """Members of the elements of a struct array, which are stored as references."""
+    import h5py
+
+    parent, _, member = key.rpartition(".")
+    found: dict[str, Any] = {}
+    if not parent or not 1 <= item.size <= _MOST_ELEMENTS:
+        return found
+    for number, reference in enumerate(np.asarray(item[()]).ravel(), 1):
+        element = file[reference] if reference else None
+        if isinstance(element, h5py.Dataset) and element.dtype != h5py.ref_dtype:
+            place = f"{parent}({number}).{member}" if item.size > 1 else key
+            found[place] = partial(_from_matlab, element)
+            if member == "values" and f"{parent.replace('.', '/')}/label" in file:
+                label = file[f"{parent.replace('.', '/')}/label"]
+                found[place + TITLE_MARK] = partial(_label, file, label, number)
+    return found
+
+
+def _label(file: "h5py.File", labels: "h5py.Dataset", number: int) -> Any:
+    reference = np.asarray(labels[()]).ravel()[number - 1]
+    return _from_matlab(file[reference])
 
 
 def _characters(dataset: "h5py.Dataset") -> np.ndarray:

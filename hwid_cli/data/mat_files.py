@@ -7,8 +7,20 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from hwid_cli.data.array_columns import Variables, check_size, member_of
-from hwid_cli.data.hdf5_files import open_hdf5
+from hwid_cli.data.array_columns import (
+    TITLE_MARK,
+    Variables,
+    check_size,
+    member_of,
+    text_of,
+)
+from hwid_cli.data.hdf5_files import matlab_classes, open_hdf5
+from hwid_cli.data.mat_objects import object_variables
+
+# Elements of a struct array that are looked at: Simulink has one for each signal.
+_MOST_ELEMENTS = 1000
+# What scipy calls every object.
+_UNNAMED = "None"
 
 
 @contextmanager
@@ -18,7 +30,8 @@ def open_mat(path: Path) -> Iterator[Variables]:
     Yields
     ------
     mapping of str to callable
-        Variables, members of structs included (``run.current``); each gives its array.
+        Variables, members of structs included (``run.current``, ``run(2).current``);
+        each gives its array.
 
     Raises
     ------
@@ -29,24 +42,55 @@ def open_mat(path: Path) -> Iterator[Variables]:
     import scipy.io
 
     if h5py.is_hdf5(path):
+        objects = object_variables(path, matlab_classes(path))
         with open_hdf5(path, is_matlab=True) as variables:
-            yield variables
+            yield {**variables, **objects}
         return
     with warnings.catch_warnings():
         # Such as two variables of one name: which one was meant?
         warnings.simplefilter("error")
+        warnings.filterwarnings("ignore", f'Duplicate variable name "{_UNNAMED}"')
         content = scipy.io.loadmat(path)
     check_size("variables", sum(getattr(v, "nbytes", 0) for v in content.values()))
+    has_objects = content.pop(_UNNAMED, None) is not None
+    objects = object_variables(path, _classes(path) if has_objects else {})
     found: dict[str, Any] = {}
     for name, value in content.items():
         if not name.startswith("__"):
             found.update(_with_members(name, value))
-    yield {name: partial(found.get, name) for name in found}
+    yield {**{name: partial(found.get, name) for name in found}, **objects}
+
+
+def _classes(path: Path) -> dict[str, str]:
+    """Class of each object of a file of version 7."""
+    try:
+        from matio import whosmat
+    except ImportError:
+        return {"an object": "a class of MATLAB"}
+    plain = ("double", "single", "logical", "char", "cell", "struct", "int", "uint")
+    return {
+        name: kind
+        for name, (_, kind) in whosmat(str(path)).items()
+        if not kind.startswith(plain)
+    }
 
 
 def _with_members(name: str, value: Any) -> dict[str, Any]:
-    """A variable, and all that lies inside if it is a struct."""
+    """A variable, and all that lies inside if it is a struct or an array of them."""
     found = {name: value}
-    for member in getattr(getattr(value, "dtype", None), "names", None) or ():
-        found.update(_with_members(f"{name}.{member}", member_of(value, member)))
+    members = getattr(getattr(value, "dtype", None), "names", None) or ()
+    if members and 1 < value.size <= _MOST_ELEMENTS:
+        for number, element in enumerate(value.ravel(), 1):
+            for member in members:
+                place = f"{name}({number}).{member}"
+                found.update(_with_members(place, element[member]))
+    else:
+        for member in members:
+            found.update(_with_members(f"{name}.{member}", member_of(value, member)))
+    # Simulink names each signal of a structure by a label beside its values.
+    if {"values", "label"} <= set(members):
+        for key in [one for one in found if one.endswith(".values")]:
+            label = found.get(key.removesuffix("values") + "label")
+            if label is not None and text_of(label):
+                found[key + TITLE_MARK] = label
     return found

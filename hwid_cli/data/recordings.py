@@ -19,6 +19,7 @@ from hwid_cli.data.columns import (
     with_each,
 )
 from hwid_cli.data.formats import read_columns
+from hwid_cli.data.missing_samples import bridge_missing
 from hwid_cli.data.recording_files import (
     FilePart,
     cut_part,
@@ -112,7 +113,8 @@ def _read_part(
     place = part.place
     kind = kind_of(part.path, options.kind, plan, name=part.name)
     columns = cut_part(columns, part)
-    checks.check_numbers(place, columns)
+    columns, bridged = bridge_missing(place, columns)
+    checks.check_numbers(place, columns, may_miss=options.resample)
     columns, of_time = time_in_seconds(place, columns, options)
     units = [signal_unit(getattr(columns, side), side, experiment) for side in _SIDES]
     columns, step = sample_uniformly(place, columns, options)
@@ -144,6 +146,8 @@ def _read_part(
             None if reference is None else reference.values * options.output_scale
         ),
         units=(*of_time, *units),
+        bridged_input=_in_means(bridged.get("input", ()), options),
+        bridged_output=_in_means(bridged.get("output", ()), options),
     )
 
 
@@ -152,6 +156,13 @@ def _as_read(columns: Columns) -> Columns:
     if columns.simulated is None:
         return columns
     return replace(columns, reference=columns.simulated)
+
+
+def _in_means(places: tuple[int, ...], options: RecordingsOptions) -> tuple[int, ...]:
+    """Samples that bridged ones went into; after resampling nobody can say."""
+    if options.resample:
+        return ()
+    return tuple(sorted({place // options.average for place in places}))
 
 
 def check_unchanged(digests: Mapping[str, str]) -> None:
@@ -273,7 +284,7 @@ def survey_recordings(experiment: Experiment, out: Path) -> Survey:
 
 def _jitter(stamps: np.ndarray) -> float:
     """Largest deviation of a step from the median one, as a share of it."""
-    steps = np.diff(stamps)
+    steps = np.diff(stamps[np.isfinite(stamps)])
     median = float(np.median(steps))
     return float(np.max(np.abs(steps - median))) / median
 

@@ -1,7 +1,8 @@
 """The time column: is it a clock, what does it tick, and a uniform grid where not.
 
 Models are discrete, so a recording must be sampled uniformly. Small jitter passes;
-larger jitter is refused, or resampled where the configuration says so.
+larger jitter is refused, or resampled where the configuration says so. So are signals
+that have clocks of their own, or not a sample in every row.
 """
 
 import logging
@@ -33,6 +34,12 @@ _ROUNDING = 1e-9
 _STEP_DIGITS = 6
 # Resampling fills gaps by straight lines; beyond this growth it would invent data.
 _MOST_GROWTH = 2
+# Clocks that differ by less than this share of their step are one, [-].
+_SAME_CLOCK = 0.01
+# Longest stretch without a sample that a straight line may cross, [steps].
+_LONGEST_GAP = 10.0
+_SIGNALS = ("input", "output", "reference")
+_FEWEST_SAMPLES = 20
 # Two time stamps make one step; one makes none.
 _FEWEST_STAMPS = 2
 
@@ -68,10 +75,13 @@ def sample_uniformly(
         if options.sample_time_s is None:
             raise ValueError("neither a time column nor sample_time_s")
         return columns, options.sample_time_s
+    columns = _without_second_clock(columns)
     _check_length(path, columns, time)
     steps = np.diff(time.values)
     _check_order(path, time, steps)
     median = float(np.median(steps))
+    if columns.output_time is not None or _lacks_samples(columns):
+        return _on_common_clock(path, columns, options)
     _check_against_options(path, median, options)
     jumps = np.abs(steps - median) > options.sampling_tolerance * median
     if not jumps.any():
@@ -98,6 +108,103 @@ def sample_uniformly(
     return _resample(columns, time.values, step), step
 
 
+def _without_second_clock(columns: FileColumns) -> FileColumns:
+    """Drop a second clock that ticks as the first does."""
+    time, other = columns.time, columns.output_time
+    if time is None or other is None:
+        return columns
+    n = min(time.values.size, other.values.size)
+    if n < _FEWEST_STAMPS or columns.output.values.size > time.values.size:
+        return columns
+    step = abs(float(time.values[n - 1] - time.values[0])) / (n - 1)
+    far = np.max(np.abs(time.values[:n] - other.values[:n]))
+    return replace(columns, output_time=None) if far <= _SAME_CLOCK * step else columns
+
+
+def _lacks_samples(columns: FileColumns) -> bool:
+    signals = (columns.input, columns.output, columns.reference)
+    return any(one is not None and np.isnan(one.values).any() for one in signals)
+
+
+def _on_common_clock(
+    path: Path, columns: FileColumns, options: RecordingsOptions
+) -> tuple[FileColumns, float]:
+    """Put signals that tick differently on one grid, that of the slowest of them."""
+    stamps = {
+        role: _stamps_of(path, columns, role)
+        for role in _SIGNALS
+        if getattr(columns, role) is not None
+    }
+    steps = {role: float(np.median(np.diff(one))) for role, one in stamps.items()}
+    slowest = max(steps, key=lambda role: steps[role])
+    step = options.sample_time_s or _grid_step(stamps[slowest], steps[slowest])
+    if not options.resample:
+        raise MeasurementError(
+            f"{path}: the input has a sample every {steps['input']:.6g} s and the output "
+            f"every {steps['output']:.6g} s, each at its own times; expected one clock; "
+            "set recordings.resample: true, which puts them on one grid"
+        )
+    begin = max(float(one[0]) for one in stamps.values())
+    end = min(float(one[-1]) for one in stamps.values())
+    count = int((end - begin) / step * (1 + _ROUNDING)) + 1
+    if count < _FEWEST_STAMPS:
+        raise MeasurementError(
+            f"{path}: input and output have no stretch of time in common; expected two "
+            "signals of one measurement; name other columns or leave the file out"
+        )
+    grid = begin + step * np.arange(count)
+    made = {}
+    for role, known in stamps.items():
+        column = getattr(columns, role)
+        _check_own_gaps(path, column, known, steps[role])
+        values = column.values[~np.isnan(column.values)]
+        # What is slower than the grid holds nothing to average.
+        is_fast = role != "output" and steps[role] < step
+        put = _averaged if is_fast else np.interp
+        made[role] = replace(
+            array_column(column.title, put(grid, known, values)),
+            unit=column.unit,
+            unit_said_by=column.unit_said_by,
+        )
+    _log.info("%s: %s put on one grid of %.9g s", path, " and ".join(made), step)
+    return replace(columns, **made, time=None, output_time=None), step
+
+
+def _stamps_of(path: Path, columns: FileColumns, role: str) -> np.ndarray:
+    """Times of the samples that a signal has."""
+    column = getattr(columns, role)
+    time = columns.time if role != "output" else columns.output_time or columns.time
+    there = ~np.isnan(column.values)
+    if time is None or time.values.size < there.size:
+        raise MeasurementError(
+            f"{path}: {column.title} has {there.size} values and its time "
+            f"{0 if time is None else time.values.size}; expected a time for each; "
+            "correct recordings.columns"
+        )
+    known = time.values[: there.size][there]
+    if known.size < _FEWEST_SAMPLES:
+        raise MeasurementError(
+            f"{path}: {column.title} has {known.size} samples; expected a whole "
+            "measurement; name another column or leave the file out"
+        )
+    _check_order(path, time, np.diff(time.values))
+    return known
+
+
+def _check_own_gaps(
+    path: Path, column: MeasuredColumn, known: np.ndarray, step: float
+) -> None:
+    """Refuse to draw a line over a long stretch without samples."""
+    gaps = np.diff(known)
+    index = int(np.argmax(gaps))
+    if gaps[index] > _LONGEST_GAP * step:
+        raise MeasurementError(
+            f"{path}: {column.title} has no sample from {known[index]:.9g} s to "
+            f"{known[index + 1]:.9g} s; expected one every {step:.6g} s or so; cut the "
+            "file at the gap, or name rows with recordings.first_sample and last_sample"
+        )
+
+
 def _grid_step(time: np.ndarray, median: float) -> float:
     """Step to resample by: that of the clock which the stamps scatter around.
 
@@ -116,7 +223,8 @@ def _grid_step(time: np.ndarray, median: float) -> float:
 
 
 def _check_length(path: Path, columns: FileColumns, time: MeasuredColumn) -> None:
-    others = (columns.input, columns.output, columns.reference)
+    has_own = columns.output_time is not None
+    others = (columns.input, None if has_own else columns.output, columns.reference)
     longest = max(one.values.size for one in others if one is not None)
     if time.values.size < longest:
         raise MeasurementError(

@@ -12,6 +12,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from hwid_cli.data.columns import FileColumns, MeasuredColumn
 from hwid_cli.data.units import (
     QUANTITIES,
@@ -20,6 +22,7 @@ from hwid_cli.data.units import (
     is_unitless,
     quantity_of,
     unit_in_name,
+    unit_since_1970,
 )
 from hwid_cli.errors import MeasurementError
 from hwid_cli.records.experiment import (
@@ -31,6 +34,7 @@ from hwid_cli.records.experiment import (
 from hwid_cli.records.programs import ForeignSimulation
 from hwid_cli.records.recordings import CalibrationLog, SignalUnit
 
+_DAY_S = 86_400.0
 # Of recordings where nothing says more.
 _USUAL = {"input": "A", "output": "m"}
 
@@ -56,23 +60,41 @@ def time_in_seconds(
     MeasurementError
         If the unit is none of time.
     """
-    time = columns.time
-    if time is None:
+    if columns.time is None:
         return columns, ()
+    stated = options.units.time
+    seconds, unit = _in_seconds(path, columns.time, stated)
+    columns = replace(columns, time=seconds)
+    if columns.output_time is not None:
+        other = _in_seconds(path, columns.output_time, stated)[0]
+        columns = replace(columns, output_time=other)
+    return columns, (unit,)
+
+
+def _in_seconds(
+    path: Path, time: MeasuredColumn, stated: str | None
+) -> tuple[MeasuredColumn, SignalUnit]:
     given, said_by = time.unit, time.unit_said_by
-    if options.units.time is not None:
-        given, said_by = options.units.time, "recordings.units.time"
-    if not given or is_unitless(given):
-        return columns, (SignalUnit("time", "", "", "s"),)
+    if stated is not None:
+        given, said_by = stated, "recordings.units.time"
+    elif not given or is_unitless(given):
+        given = unit_since_1970(time.values)
+        said_by = "its size, a time since 1970"
+    if not given:
+        return time, SignalUnit("time", "", "", "s")
     factor = factor_between(given, "s")
     if factor is None:
         raise MeasurementError(
             f"{path}: {said_by} says that {time.title} is in {given!r}; expected a unit "
             "of time, such as s, ms or us; correct it, or say recordings.units.time"
         )
-    seconds = replace(time, values=in_unit(time.values, given, "s"))
-    unit = SignalUnit("time", given, said_by, "s", factor)
-    return replace(columns, time=seconds), (unit,)
+    values = time.values
+    if values.size and unit_since_1970(values):
+        # Days since 1970 hold nothing but digits that are lost in a conversion.
+        day = _DAY_S / factor
+        values = values - np.floor(values[0] / day) * day
+    seconds = replace(time, values=in_unit(values, given, "s"))
+    return seconds, SignalUnit("time", given, said_by, "s", factor)
 
 
 def signal_unit(

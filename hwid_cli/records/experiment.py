@@ -69,6 +69,7 @@ class Columns:
     reference: Annotated[str | int | None, _COLUMN] = None
     simulated: Annotated[str | int | None, _COLUMN] = None
     variable: str | None = None
+    output_time: Annotated[str | int | None, _COLUMN] = None
 
 
 @dataclass(frozen=True)

@@ -81,6 +81,8 @@ class RawRecording:
         What a controller was told to follow; as long as the input.
     units : tuple of SignalUnit
         Where the units come from.
+    bridged_input, bridged_output : tuple of int, [samples]
+        Where a straight line stands for a sample that the file does not have.
     """
 
     name: str
@@ -94,6 +96,8 @@ class RawRecording:
     output_unit: str = "m"
     reference: np.ndarray | None = None
     units: tuple[SignalUnit, ...] = ()
+    bridged_input: tuple[int, ...] = ()
+    bridged_output: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "input", frozen_vector(self.input, "input"))
@@ -182,7 +186,8 @@ class CalibrationLog:
     period_samples : float, [samples]
         Period found in a sine's input; 0 where the recipe needs none.
     repaired_input, repaired_output : tuple of int
-        Indices in the raw record of single damaged samples that were replaced.
+        Indices in the raw record of single damaged or missing samples that were
+        replaced.
     units : tuple of SignalUnit
         Where the units come from, and what was converted.
     """

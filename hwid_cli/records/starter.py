@@ -86,6 +86,12 @@ class FolderLayout:
         Where the sample time comes from.
     notes : tuple of str
         What else a reader of the configuration must know.
+    output_time : Role or None
+        Where the output has a clock of its own.
+    left : tuple of (str, str)
+        Files that are not used, and why.
+    first_sample : int, [samples]
+        Rows at the beginning of the files in which a signal has no number.
     """
 
     patterns: tuple[str, ...]
@@ -98,6 +104,9 @@ class FolderLayout:
     clock_reason: str = ""
     resample: bool = False
     notes: tuple[str, ...] = ()
+    output_time: Role | None = None
+    left: tuple[tuple[str, str], ...] = ()
+    first_sample: int = 0
 
 
 @dataclass(frozen=True)
@@ -117,11 +126,17 @@ class Proposal:
         Empty for all.
     held_out : tuple of str
         Recordings that only judge; empty for none.
+    held_out_reason : str
+        Why these.
     average : int, [samples]
         1 for no advice.
     initial_state : str
         How a diagnosis takes the recordings to start.
     sample_time_s : float, [s]
+    names : tuple of str
+        Of the recordings that can be used.
+    problems : tuple of str
+        Why the others cannot.
     """
 
     kinds: dict[str, tuple[str, ...]]
@@ -138,6 +153,9 @@ class Proposal:
     parts: dict[str, tuple[int, ...]] = field(default_factory=dict)
     identify: tuple[str, ...] = ()
     held_out: tuple[str, ...] = ()
+    held_out_reason: str = ""
     average: int = 1
     initial_state: str = "rest"
     notes: tuple[str, ...] = ()
+    names: tuple[str, ...] = ()
+    problems: tuple[str, ...] = ()

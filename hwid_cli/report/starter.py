@@ -1,36 +1,34 @@
 """What ``hwid init`` guessed."""
 
-from collections.abc import Sequence
-
+from hwid_cli.files.messages import escaped
 from hwid_cli.records.starter import FolderLayout, Proposal, Role
 from hwid_cli.report.table import Code
 
 
-def starter_summary(
-    path: str, layout: FolderLayout, proposal: Proposal, problems: Sequence[str]
-) -> Code:
+def starter_summary(path: str, layout: FolderLayout, proposal: Proposal) -> Code:
     """Say what was guessed, why, and what to check.
 
     Parameters
     ----------
     path : str
         Of the configuration that was written.
-    problems : sequence of str
-        About files that are left out.
     """
     lines = [
-        f"files: {', '.join(layout.patterns)}",
+        f"files: {', '.join(map(escaped, layout.patterns))}",
+        f"used: {', '.join(_trained(proposal))}",
         f"time: {_time(layout, proposal)}",
         f"input: {_role(layout.input)}",
         f"output: {_role(layout.output)}",
         *(f"note: {note}" for note in layout.notes),
-        *(f"left out: {problem}" for problem in problems),
+        *(f"skipped: {escaped(name)}: {why}" for name, why in layout.left),
+        *(f"left out: {problem}" for problem in proposal.problems),
         f"kinds: {_kinds(proposal)}",
         f"calibrate: {proposal.recipe_reason}",
         f"threshold: {proposal.threshold:g}, {proposal.threshold_reason}",
     ]
     if proposal.held_out:
-        lines.append(f"held out for the test: {', '.join(proposal.held_out)}")
+        held_out = ", ".join(proposal.held_out)
+        lines.append(f"held out for the test: {held_out} ({proposal.held_out_reason})")
     lines += [
         "",
         f"{path} is written; check columns, units, threshold and recipes in it. Then:",
@@ -38,6 +36,12 @@ def starter_summary(
         f"  hwid run {path}",
     ]
     return Code("\n".join(lines))
+
+
+def _trained(proposal: Proposal) -> list[str]:
+    if proposal.parts:
+        return [*proposal.names]
+    return [name for name in proposal.names if name not in proposal.held_out]
 
 
 def _role(role: Role) -> str:

@@ -92,9 +92,11 @@ def calibration_key(
     ]
     arrays = [one.pop(side) for one in about for side in ("input", "output")]
     for one in about:
-        # The log holds what is known of units; without that, keys stay as they were.
-        if not one["units"]:
-            del one["units"]
+        # The log holds what is known of units and of samples that were bridged; without
+        # these, keys stay as they were.
+        for name in ("units", "bridged_input", "bridged_output"):
+            if not one[name]:
+                del one[name]
         reference = one.pop("reference")
         # Said only where there is one: keys of recordings without one stay as they were.
         if reference is not None:
@@ -148,6 +150,8 @@ def _calibrate(
             n_samples=raw.input.size,
             n_raw_input=raw.input.size,
             n_raw_output=raw.output.size,
+            repaired_input=raw.bridged_input,
+            repaired_output=raw.bridged_output,
             units=raw.units,
         ),
     )

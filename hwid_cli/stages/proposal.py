@@ -30,6 +30,16 @@ _RECIPES: dict[str, tuple[tuple[str, ...], ...]] = {
     "random": (("cut",),),
     "other": (),
 }
+# Words of file names that say what a recording is for.
+_TEST_WORDS = (
+    *("test", "val", "valid", "validation", "validate", "pruef", "prüf", "pruefung"),
+    *("prüfung", "verify", "verification", "holdout", "check"),
+)
+_TRAIN_WORDS = ("train", "training", "est", "estimation", "ident", "learn")
+# Inputs that differ by less than this share of their spread are one, [-].
+_ALIKE = 0.2
+# The same of their lengths.
+_ALIKE_LENGTH = 0.8
 # A recipe that keeps less than this share of a recording has misjudged it, [-].
 _LEAST_KEPT = 0.5
 # Fits that a first run may take without asking, [-].
@@ -43,7 +53,11 @@ _ENOUGH_SAMPLES = 50
 _LEAST_TO_CUT = 600
 
 
-def propose(raws: Sequence[RawRecording], excluded: Sequence[str] = ()) -> Proposal:
+def propose(
+    raws: Sequence[RawRecording],
+    excluded: Sequence[str] = (),
+    problems: Sequence[str] = (),
+) -> Proposal:
     """Propose what to do with recordings.
 
     Parameters
@@ -52,12 +66,16 @@ def propose(raws: Sequence[RawRecording], excluded: Sequence[str] = ()) -> Propo
         At least one.
     excluded : sequence of str
         Names of files that cannot be used.
+    problems : sequence of str
+        Why so.
     """
     kinds, kind_reason = _kinds(raws)
     recipes, recipe_reason = _recipes(raws, kinds)
     names = [raw.name for raw in raws]
     parts = _parts(raws)
-    held_out = ("last",) if parts else _held_out(names, kinds)
+    held_out, held_out_reason = _held_out(raws, kinds)
+    if parts:
+        held_out, held_out_reason = ("last",), "the end of the only recording"
     identify = ("first",) if parts else tuple(n for n in names if n not in held_out)
     is_large = len(identify) * 12 > _MOST_FITS
     swing = float(
@@ -84,6 +102,9 @@ def propose(raws: Sequence[RawRecording], excluded: Sequence[str] = ()) -> Propo
         parts=parts,
         identify=identify if held_out else (),
         held_out=held_out,
+        held_out_reason=held_out_reason,
+        names=tuple(names),
+        problems=tuple(problems),
         average=max(1, memory // _ENOUGH_SAMPLES),
         initial_state=_initial_state(raws, kinds, recipes, is_cut=bool(parts)),
     )
@@ -218,17 +239,70 @@ def _begins_at_rest(raw: RawRecording, kind: str) -> bool:
     return onset is None or onset >= LEAST_QUIET
 
 
-def _held_out(names: Sequence[str], kinds: dict[str, str]) -> tuple[str, ...]:
-    """About a quarter of each kind, neither the first nor the last: often extremes."""
+def _held_out(
+    raws: Sequence[RawRecording], kinds: dict[str, str]
+) -> tuple[tuple[str, ...], str]:
+    """Recordings that only judge, and why these."""
+    names = [raw.name for raw in raws]
     if len(names) < 2:
-        return ()
+        return (), ""
+    named = tuple(name for name in names if _is_word_in(name, _TEST_WORDS))
+    if named and len(named) < len(names):
+        return named, "named so"
+    free = [name for name in names if not _is_word_in(name, _TRAIN_WORDS)]
+    repeats = tuple(name for name in _repeats(raws) if name in free)
+    if repeats:
+        return repeats, "the last repeat of each input"
+    # About a quarter of each kind, neither the first nor the last: often extremes.
     chosen = [
         name
         for kind in KINDS
         for number, name in enumerate([n for n in names if kinds[n] == kind])
         if number % 4 == 2
     ]
-    return tuple(chosen) or (names[-1],)
+    allowed = [name for name in chosen if name in free] or free[-1:] or names[-1:]
+    return tuple(allowed), "about a quarter of each kind, not the first"
+
+
+def _is_word_in(name: str, known: Sequence[str]) -> bool:
+    return any(word in known for word in re.findall(r"[a-zäöü]+", name.lower()))
+
+
+def _repeats(raws: Sequence[RawRecording]) -> tuple[str, ...]:
+    """The last recording of each input that occurs more than once."""
+    families: list[list[RawRecording]] = []
+    for raw in raws:
+        own = next((one for one in families if _is_repeat(one[0], raw)), None)
+        if own is None:
+            families.append([raw])
+        else:
+            own.append(raw)
+    return tuple(one[-1].name for one in families if len(one) > 1)
+
+
+def _is_repeat(one: RawRecording, other: RawRecording) -> bool:
+    """Whether two recordings have one input, noise and a cut end apart.
+
+    Names that differ in their last number alone may be repeats of an input that is
+    measured, and so never the same: then its level, size and memory must be alike.
+    """
+    n = min(one.input.size, other.input.size)
+    if n < _ALIKE_LENGTH * max(one.input.size, other.input.size):
+        return False
+    a, b = one.input[:n], other.input[:n]
+    spread = max(float(np.std(a)), float(np.std(b)))
+    if abs(float(np.mean(a) - np.mean(b))) > _ALIKE * spread:
+        return False
+    if float(np.std(a - b)) <= _ALIKE * spread:
+        return True
+    stems = {re.sub(r"\d+$", "", raw.name) for raw in (one, other)}
+    sizes = sorted((float(np.std(a)), float(np.std(b))))
+    memories = sorted((signs.memory_samples(a), signs.memory_samples(b)))
+    return (
+        len(stems) == 1
+        and sizes[0] >= (1.0 - _ALIKE) * sizes[1]
+        and memories[0] >= 0.5 * memories[1]
+    )
 
 
 def _parts(raws: Sequence[RawRecording]) -> dict[str, tuple[int, ...]]:

@@ -69,12 +69,18 @@ CONTENTS = [
     _case(
         "text", row(5, "0.03,abc,1"), "row 5", "input 'u' is 'abc'", "correct the row"
     ),
-    _case("NaN", row(5, "0.03,nan,1"), "row 5", "nan", "a finite number"),
+    _case("NaN at the begin", row(2, "0,nan,1"), "row 2", "nan", "a finite number"),
     _case("infinite", row(5, "0.03,1,inf"), "row 5", "output 'y' is inf", "finite"),
     _case("1e400", row(5, "0.03,1e400,1"), "row 5", "infinite", "correct the row"),
-    _case("blank cell", row(5, "0.03,,1"), "row 5", "input 'u' is empty", "finite"),
+    _case(
+        "blank cells",
+        row(5, "0.03,,1\n0.04,,1"),
+        "row 5",
+        "input 'u' is empty",
+        "2 rows",
+    ),
     _case("too many cells", row(5, "0.03,1,2,3"), "row 5", "4 cells", "expected 3"),
-    _case("too few cells", row(5, "0.03,1"), "row 5", "output 'y' is empty"),
+    _case("too few cells", row(2, "0,1"), "row 2", "output 'y' is empty"),
     _case("1_000", row(5, "0.03,1_000,1"), "row 5", "'1_000'", "a finite number"),
     _case("hexadecimal", row(5, "0.03,0x1F,1"), "row 5", "'0x1F'"),
     _case("formula", row(5, "0.03,=1+1,1"), "row 5", "'=1+1'", "not a number"),
@@ -101,9 +107,6 @@ CONTENTS = [
     _case("column twice", text(csv_text(header="u,u,y")), "occurs 2 times", "rename"),
     _case("no header", text(csv_text().split("\n", 1)[1]), "row 1", "no column 'u'"),
     _case(
-        "UTF-16, no mark", text(csv_text().encode("utf-16-le")), "row 1", "no column"
-    ),
-    _case(
         "UTF-16, cut", text(csv_text().encode("utf-16")[:-5]), "output 'y'", "finite"
     ),
     _case(
@@ -114,7 +117,6 @@ CONTENTS = [
         text(csv_text().replace(",", ";").replace(".", ",", 3)),
         *("row 3", "the other decimal mark", "throughout"),
     ),
-    _case("blanks between", text(csv_text().replace(",", "  ")), "row 1", "no column"),
 ]
 PLACES = [
     _case("folder", _instead(lambda path: path.mkdir()), "no file matches"),
@@ -123,7 +125,7 @@ PLACES = [
     _case("pipe", _instead(os.mkfifo), "no file matches", "put the files there"),
     _case("/dev/zero", _instead(lambda path: path.symlink_to("/dev/zero")), "no file"),
     Case(
-        "ending", named("run.xlsx", "run.xlsx"), ("run.xlsx", "one of .csv", "convert")
+        "ending", named("run.docx", "run.docx"), ("run.docx", "one of .csv", "convert")
     ),
     Case(
         "plan: kind",
@@ -177,6 +179,11 @@ GOOD = {
         csv_text().replace(",", ";").replace(".", ",")
     ),
     "tabs": text(csv_text().replace(",", "\t")),
+    "blanks": text(csv_text().replace(",", "  ")),
+    "UTF-16, no mark": text(csv_text().encode("utf-16-le")),
+    "one NaN": row(5, "0.03,nan,1"),
+    "one blank cell": row(5, "0.03,,1"),
+    "one cell less": row(5, "0.03,1"),
     "Latin-1": text(csv_text(header="t,u,y,\xb5").encode("latin-1")),
     "brackets in a name": named("[red]x[x].csv"),
     "mathematics in a name": named("a$\\frac{$b.csv".replace("\\", "")),

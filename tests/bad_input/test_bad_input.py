@@ -9,12 +9,21 @@ from tests.bad_input import (
     array_cases,
     config_cases,
     csv_cases,
+    foreign_cases,
     result_cases,
     trial,
 )
 
-MEASURED = [*config_cases.CASES, *csv_cases.CASES, *array_cases.CASES]
-GOOD = {**config_cases.GOOD, **csv_cases.GOOD, **array_cases.GOOD}
+MEASURED = [
+    *(*config_cases.CASES, *csv_cases.CASES),
+    *(*array_cases.CASES, *foreign_cases.CASES),
+]
+GOOD = {
+    **config_cases.GOOD,
+    **csv_cases.GOOD,
+    **array_cases.GOOD,
+    **foreign_cases.GOOD,
+}
 # Every stage that leaves results, on two recordings of 400 samples.
 WHOLE = """
 name: tiny
@@ -68,7 +77,10 @@ def cross_validated(tmp_path_factory):
 
 def params(cases):
     """Packing a bomb takes seconds, and a crash new processes: those are slow."""
-    slow = ("npz: bomb", "mat: bomb", "mat: complex by its flags")
+    slow = (
+        *("npz: bomb", "mat: bomb", "mat: complex by its flags"),
+        *("xlsx: bomb", "parquet: bomb"),
+    )
     return [
         pytest.param(
             case, id=case.name, marks=pytest.mark.slow if case.name in slow else ()

@@ -5,7 +5,18 @@ import pytest
 from tests.bad_input.fuzz import tried
 
 # About half a minute each on two busy cores.
-COUNTS = {"csv": 4000, "yaml": 3000, "npz": 8000, "mat": 8000, "h5": 1000}
+COUNTS = {
+    "csv": 4000,
+    "yaml": 3000,
+    "npz": 8000,
+    "mat": 8000,
+    "h5": 1000,
+    "xlsx": 4000,
+    "tdms": 4000,
+    "mf4": 1000,
+    "parquet": 2000,
+    "feather": 2000,
+}
 
 
 @pytest.mark.slow

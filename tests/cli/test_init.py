@@ -4,9 +4,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from hwid_cli.data.isolated_reading import IsolatedReader
 
 from hwid_cli.cli.main import main
 from hwid_cli.config.load import load_experiment
+from hwid_cli.data import formats
 from hwid_cli.data.recordings import read_recordings
 from tests.cli.measured_folders import (
     EXPECTED,
@@ -189,6 +191,15 @@ def test_a_folder_that_cannot_be_used_is_one_line(tmp_path, folder, make, words)
         ("emps", {"time": "t", "input": "vir"}),
         ("ffwheel_motor", {"input": "data.input", "output": "data.output"}),
         ("hsm150_motor", {"variable": "data", "time": 0}),
+        ("pick_place", {"time": "t", "input": "u", "output": "y"}),
+        (
+            "rack_drive",
+            {"time": "Time", "input": "Torque", "output": "Servo motor speed"},
+        ),
+        (
+            "shaking_table",
+            {"time": "time_s", "input": "command_clipped", "output": "position_mm"},
+        ),
         ("silverbox", {"input": "u", "output": "y"}),
     ],
 )
@@ -284,3 +295,92 @@ def test_steps_that_keep_their_rest_start_in_equilibrium(folder, tmp_path):
 
     assert invoke("init", folder, "--out", out).exit_code == 0
     assert "# diagnose: {max_effects: 2}\n" in out.read_text()
+
+
+def test_no_name_of_a_file_folder_or_column_begins_a_key(tmp_path):
+    """Line ends in names would put keys of their choice into the configuration."""
+    evil = "x\nexport: {}\nidentify: {recordings: [evil]}\n# "
+    folder = tmp_path / evil.replace("/", "")
+    folder.mkdir()
+    write_english_csv(folder)
+    for path in list(folder.glob("*.csv")):
+        text = path.read_text().replace("current_A", '"current\nname: evil\n[A]"')
+        path.write_text(text)
+    (folder / "notes\nname: evil.csv").write_text("nothing")
+    (folder / "more\u2028name: evil.docx").write_text("nothing")
+    outside = invoke("init", folder, "--out", tmp_path / "mine.yaml")
+    assert (outside.exit_code, outside.stderr.count("\n")) == (1, 1)
+    assert "has control characters in its path" in outside.stderr
+    assert not (tmp_path / "mine.yaml").exists()
+
+    out = folder / "mine.yaml"
+    result = invoke("init", folder, "--out", out)
+
+    assert result.exit_code == 0, result.output
+    lines = out.read_text().splitlines()
+    keys = [line.partition(":")[0] for line in lines if line[:1] not in ("", " ", "#")]
+    expected = ["name", "recordings", "calibrate", "orders", "fit", "identify"]
+    assert keys == [*expected, "crossval", "order", "test"]
+    assert "notes\\nname: evil.csv: no table of numbers" in " ".join(
+        line.lstrip("# ") for line in lines
+    )
+    experiment = load_experiment(out)
+    assert "evil" not in (experiment.identify.recordings or ())
+    # Text with line ends is no key either.
+    assert experiment.recordings.columns.input == 1
+    assert len(read_recordings(experiment, tmp_path)) == 6
+
+
+def test_every_file_is_named_with_what_became_of_it(folder, tmp_path):
+    write_english_csv(folder)
+    (folder / "photo.jpg").write_bytes(b"\xff\xd8")
+    (folder / "README.txt").write_text("Measured on Monday.\nAll is well.\n")
+    (folder / "damaged.mat").write_text("no")
+    text = (folder / "step_1.csv").read_text()
+    (folder / "in_A.csv").write_text(text.replace("current_A", "current_mA"))
+    (folder / "in_um.csv").write_text(text.replace("position_m,", "position [um],"))
+    out = tmp_path / "mine.yaml"
+    result = invoke("init", folder, "--out", out)
+
+    assert result.exit_code == 0, result.output
+    for said in (result.stdout, " ".join(out.read_text().replace("#", " ").split())):
+        assert "photo.jpg: no reader for files named *.jpg" in said
+        assert "README.txt: no table of numbers" in said
+        assert "damaged.mat: " in said
+        assert "in_A.csv: has no column 'current_A' for the input" in said
+    assert "# test: step_2 (about a quarter" in out.read_text()
+    used = load_experiment(out).recordings.files
+    assert len(used) == 6
+
+
+def test_files_in_other_units_are_not_read_in_the_first_ones(folder, tmp_path):
+    for name, unit, scale in (("a", "A", 1), ("b", "A", 1), ("c", "mA", 1000)):
+        time, u, y = measurements()["Rauschen_1"]
+        rows = [f"{t:.4f},{scale * a},{b}" for t, a, b in zip(time, u, y, strict=True)]
+        head = ["t,current,pos", f"s,{unit},mm"]
+        (folder / f"{name}.csv").write_text("\n".join([*head, *rows]))
+    out = tmp_path / "mine.yaml"
+    result = invoke("init", folder, "--out", out)
+
+    assert result.exit_code == 0, result.output
+    assert "skipped: c.csv: its input is in 'mA', not in 'A'" in result.stdout
+    assert len(load_experiment(out).recordings.files) == 2
+
+
+def test_a_missing_library_is_one_line_with_the_command(folder, tmp_path, monkeypatch):
+    """As in a process without the extra: the module cannot be imported there."""
+    hidden = tmp_path / "hidden"
+    (hidden / "nptdms").mkdir(parents=True)
+    (hidden / "nptdms" / "__init__.py").write_text(
+        "raise ImportError(\"No module named 'nptdms'\")"
+    )
+    monkeypatch.syspath_prepend(str(hidden))
+    monkeypatch.setattr(formats, "_ISOLATED", IsolatedReader("hwid_cli.data.formats"))
+    (folder / "run.tdms").write_bytes(b"TDSm")
+    result = invoke("init", folder, "--out", tmp_path / "mine.yaml")
+
+    assert result.exit_code == 1
+    assert result.stderr.count("\n") == 1
+    assert "is read by npTDMS, which is missing" in result.stderr
+    assert "pip install 'hwid[formats]'" in result.stderr
+    formats._ISOLATED.end()

@@ -43,6 +43,14 @@ def test_impossible_reading_option_is_refused(load, text, message):
             r"recordings.sample_time_s: missing, and columns.time too; .*name the time",
         ),
         (
+            "{files: a.csv, sample_time_s: 1, columns: {input: u, output: y, output_time: s}}",
+            r"columns.output_time: found 's'; expected columns.time too, the clock",
+        ),
+        (
+            "{files: a.csv, columns: {time: t, input: u, output: y, output_time: t}}",
+            r"recordings.columns.output_time: found 't', which is the time too",
+        ),
+        (
             "{files: a.csv, columns: {time: u, input: u, output: y}}",
             r"recordings.columns.input: found 'u', which is the time too",
         ),

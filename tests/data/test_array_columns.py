@@ -238,9 +238,9 @@ def test_noise_is_no_mat_file(tmp_path):
 
 
 def test_unknown_ending_is_refused(tmp_path):
-    path = tmp_path / "run.xlsx"
+    path = tmp_path / "run.docx"
     path.write_text("x")
     with pytest.raises(
-        MeasurementError, match=r"ending '.xlsx'; expected one of .csv,"
+        MeasurementError, match=r"ending '.docx'; expected one of .csv,"
     ):
         read_columns(path, BY_NAME)

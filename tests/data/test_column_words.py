@@ -1,6 +1,7 @@
 import pytest
 
-from hwid_cli.data.column_roles import meaning_of, sample_time_named
+from hwid_cli.data.column_words import meaning_of
+from hwid_cli.data.table_heads import sample_time_named
 
 
 @pytest.mark.parametrize(

@@ -116,9 +116,14 @@ def test_cell_without_a_number_is_kept_as_text_of_its_row(tmp_path):
             r"run.csv, row 3: input 'u' is '1.5', while other rows use the other",
         ),
         (
-            "t;u;y\n0;1.234,5;2\n",
+            "t;u;y\n0;1.234,5;2\n1;1,234.5;2\n",
             BY_NAME,
-            r"run.csv, row 2: input 'u' is '1.234,5'",
+            r"run.csv, row 3: input 'u' is '1,234.5'",
+        ),
+        (
+            "t;u;y\n0;1,234;2\n1;999;2\n",
+            BY_NAME,
+            r"run.csv, row 2: input 'u' is '1,234', .* read in two ways; .*thousands",
         ),
         ('t,u,y\n0,"1' + "2" * 200_000, BY_NAME, r"row 2: field larger .*a quote"),
     ],

@@ -117,12 +117,16 @@ def test_recordings_get_one_clock(tiny, write_csv, signals):
     ("cells", "message"),
     [
         (
-            {(5, 1): "nan"},
-            r"a.csv, row 5: input 'u' is nan, which is not a number; exp",
+            {(5, 1): "nan", (6, 1): ""},
+            r"a.csv, row 5: input 'u' is nan, which is not a number, as are 2 rows tog",
         ),
         ({(5, 2): "inf"}, r"a.csv, row 5: output 'y' is inf \(infinite\); expected a"),
-        ({(9, 2): "n/a"}, r"a.csv, row 9: output 'y' is 'n/a', which is not a number"),
-        ({(9, 1): ""}, r"a.csv, row 9: input 'u' is empty; expected a finite number"),
+        ({(9, 2): "n/b"}, r"a.csv, row 9: output 'y' is 'n/b', which is not a number"),
+        ({(2, 1): ""}, r"a.csv, row 2: input 'u' is empty; expected a finite number"),
+        (
+            {(9, 1): "", (19, 1): "-"},
+            r"a.csv, row 9: input 'u' is empty, as are 2 rows in all \(up to 1 %",
+        ),
         ({(9, 0): "0.06"}, r"a.csv, row 9: time 0.06 s is repeated"),
         ({(9, 0): "0.01"}, r"a.csv, row 9: time goes back from 0.06 s to 0.01 s; exp"),
         ({(9, 0): "0.075"}, r"a.csv, row 9: time steps by 0.015 s, from 0.06 s to"),

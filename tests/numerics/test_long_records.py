@@ -41,8 +41,8 @@ print(u.size, *(
     if line.startswith("VmHWM")
 ))
 """
-# Measured 527, 156 and 568 MB on Linux with Python 3.11 and numpy 2.4.
-MOST_MB = {"csv": 800, "npz": 300, "fit": 900}
+# Measured 152, 156 and 568 MB on Linux with Python 3.11 and numpy 2.4.
+MOST_MB = {"csv": 250, "npz": 300, "fit": 900}
 
 
 def peak_mb(code, *arguments):

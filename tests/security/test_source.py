@@ -40,7 +40,12 @@ ALLOWED_MODULES = {
     ("hwid_cli/simulations/fmu_unit.py", "ctypes"),
     ("hwid_cli/export/fmu.py", "xml.sax.saxutils"),
 }
-ALLOWED_CALLS = {(_OWN_FUNCTION, "exec"), (_OWN_FUNCTION, "compile")}
+# Of a list of lines np.loadtxt opens no file.
+ALLOWED_CALLS = {
+    (_OWN_FUNCTION, "exec"),
+    (_OWN_FUNCTION, "compile"),
+    ("hwid_cli/data/csv_files.py", "np.loadtxt"),
+}
 
 
 def dotted(function):

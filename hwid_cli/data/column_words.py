@@ -1,0 +1,285 @@
+"""What the name of a column says: its role, how good a choice it is, its unit.
+
+German and English, abbreviations and symbols of control engineering. Words of four and
+more letters are also found inside longer ones (``Motorstrom``).
+"""
+
+import re
+from dataclasses import dataclass
+
+from hwid_cli.data.units import split_unit
+
+# The better choices first: current before command before voltage, and so on.
+_INPUT = [
+    "current",
+    "strom",
+    "amp",
+    "amps",
+    "ampere",
+    "i",
+    "iq",
+    "im",
+    "iz",
+    "input",
+    "eingang",
+    "in",
+    "u",
+    "command",
+    "cmd",
+    "stell",
+    "stellgroesse",
+    "stellgröße",
+    "stellwert",
+    "excitation",
+    "anregung",
+    "drive",
+    "pwm",
+    "duty",
+    "voltage",
+    "spannung",
+    "volt",
+    "vir",
+    "torque",
+    "drehmoment",
+    "moment",
+    "force",
+    "kraft",
+    "pump",
+    "valve",
+    "ventil",
+    "trq",
+    "strm",
+    "uq",
+    "ua",
+    "ia",
+]
+_OUTPUT = [
+    "displacement",
+    "position",
+    "pos",
+    "weg",
+    "auslenkung",
+    "hub",
+    "stroke",
+    "deflection",
+    "lage",
+    "y",
+    "output",
+    "ausgang",
+    "out",
+    "x",
+    "z",
+    "angle",
+    "winkel",
+    "phi",
+    "theta",
+    "rad",
+    "distance",
+    "abstand",
+    "speed",
+    "velocity",
+    "vel",
+    "geschwindigkeit",
+    "drehzahl",
+    "omega",
+    "rpm",
+    "qm",
+    "q",
+    "level",
+    "fuellstand",
+    "füllstand",
+    "pressure",
+    "druck",
+    "temperature",
+    "temperatur",
+    "acceleration",
+    "beschleunigung",
+    "acc",
+    "measured",
+    "measurement",
+    "istwert",
+    "velo",
+    "fb",
+    "feedback",
+    "n",
+]
+_TIME = ["time", "zeit", "t", "timestamp", "tijd", "secs", "seconds", "sekunden", "sec"]
+_REFERENCE = [
+    "ref",
+    "reference",
+    "soll",
+    "sollwert",
+    "setpoint",
+    "target",
+    "desired",
+    "demand",
+    "qg",
+    "qd",
+    "führungsgrösse",
+    "führungsgröße",
+]
+# Words of what is wanted, where another word says of what: position command.
+_WANTED = ["cmd", "command", "commanded", "set", "sp", "dem", "cmnd", "vorgabe"]
+_COUNTER = [
+    "index",
+    "idx",
+    "no",
+    "nr",
+    "number",
+    "nummer",
+    "sample",
+    "samples",
+    "count",
+    "counter",
+    "row",
+    "id",
+]
+# What a unit in brackets says of the role, by its first word.
+_INPUT_UNITS = {"a", "ma", "ka", "v", "mv", "kv", "n", "kn", "nm", "n m", "mnm", "%"}
+_OUTPUT_UNITS = {
+    *("m", "mm", "cm", "um", "µm", "rad", "deg", "°", "grad", "rad/s", "m/s", "mm/s"),
+    *("rpm", "1/min", "u/min", "min^-1", "deg/s", "°/s", "inc", "ticks/s"),
+}
+# The same of a time.
+_TIME_UNITS = {"s", "sec", "sek", "ms", "us", "µs"}
+
+ROLES = ("time", "input", "output", "reference", "counter")
+_SHORTEST_INSIDE = 4
+# What drives what in a drive, by words of an input: further down is nearer to the motion.
+_CHAIN = (
+    (
+        "command",
+        "cmd",
+        "stell",
+        "stellgroesse",
+        "stellgröße",
+        "stellwert",
+        "pwm",
+        "duty",
+    ),
+    ("voltage", "spannung", "volt", "vir", "u", "uq", "ua"),
+    ("current", "strom", "strm", "amp", "amps", "ampere", "i", "iq", "im", "iz", "ia"),
+    ("torque", "drehmoment", "moment", "trq", "force", "kraft"),
+)
+# The same of units.
+_CHAIN_UNITS = (
+    (),
+    ("v", "mv", "kv"),
+    ("a", "ma", "ka"),
+    ("n", "kn", "nm", "n m", "mnm"),
+)
+
+
+@dataclass(frozen=True)
+class Meaning:
+    """What a name says.
+
+    Parameters
+    ----------
+    role : str
+        One of ``ROLES``; empty where it says nothing.
+    rank : int, [-]
+        0 for the most usual word of that role.
+    unit : str
+        Empty where none is named.
+    rest : str
+        What is left of the name without the word: columns that belong together share it.
+    """
+
+    role: str
+    rank: int
+    unit: str
+    rest: str
+
+
+def meaning_of(title: str, stated: str = "") -> Meaning:
+    """What the name of a column says.
+
+    Parameters
+    ----------
+    stated : str
+        Unit that the file states beside the name.
+
+    Examples
+    --------
+    >>> meaning_of("Motorstrom [A]")
+    Meaning(role='input', rank=1, unit='A', rest='')
+    >>> meaning_of("position_mm").role, meaning_of("position_mm").unit
+    ('output', 'mm')
+    >>> meaning_of("pos_ref_rad").role, meaning_of("u2").rest
+    ('reference', '2')
+    """
+    bare, unit = split_unit(title)
+    words = _words(bare)
+    unit = stated or unit
+    is_reference = any(_rank(word, _REFERENCE) is not None for word in words)
+    role, rank, used = "", 99, ""
+    for name, known in (
+        ("time", _TIME),
+        ("output", _OUTPUT),
+        ("input", _INPUT),
+        ("counter", _COUNTER),
+    ):
+        for word in words:
+            found = _rank(word, known)
+            if found is not None and not role:
+                role, rank, used = name, found, word
+    if not role and unit:
+        role = _role_of_unit(unit)
+    is_wanted = any(word in _WANTED and word != used for word in words)
+    if is_reference or is_wanted:
+        # A wanted current is what drives the machine; a wanted position is no output.
+        role, rank = ("input", rank + 50) if role == "input" else ("reference", rank)
+    numbers = "".join(re.findall(r"\d+", bare))
+    others = [word for word in words if word != used and not word.isdecimal()]
+    return Meaning(role, rank, unit, " ".join([*others, numbers]).strip())
+
+
+def _role_of_unit(unit: str) -> str:
+    plain = unit.lower()
+    if plain in _TIME_UNITS:
+        return "time"
+    if plain in _INPUT_UNITS and unit != "nm":
+        return "input"
+    return "output" if plain in _OUTPUT_UNITS else ""
+
+
+def _words(title: str) -> list[str]:
+    """Lower-case words of a name, split at marks, digits and capitals."""
+    member = title.replace("/", ".").split(".")[-1]
+    spaced = re.sub(r"([a-zäöü])([A-ZÄÖÜ])", r"\1 \2", member)
+    return [word.lower() for word in re.findall(r"[^\W\d_]+|\d+", spaced)]
+
+
+def _rank(word: str, known: list[str]) -> int | None:
+    for rank, one in enumerate(known):
+        if word == one or (len(one) >= _SHORTEST_INSIDE and one in word):
+            return rank
+    return None
+
+
+def place_in_chain(title: str, stated: str = "") -> int:
+    """Say how near to the motion an input acts.
+
+    Parameters
+    ----------
+    stated : str
+        Unit that the file states beside the name.
+
+    Returns
+    -------
+    int, [-]
+        From 0, a command, to 3, a force; -1 where nothing says it.
+
+    Examples
+    --------
+    >>> place_in_chain("U_motor"), place_in_chain("Motorstrom"), place_in_chain("CH1")
+    (1, 2, -1)
+    """
+    bare, unit = split_unit(title)
+    words = _words(bare)
+    for place, known in enumerate(_CHAIN):
+        if any(_rank(word, list(known)) is not None for word in words):
+            return place
+    plain = (stated or unit).lower()
+    return next((n for n, units in enumerate(_CHAIN_UNITS) if plain in units), -1)

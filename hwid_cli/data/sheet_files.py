@@ -1,0 +1,168 @@
+"""Columns of a spreadsheet: XLSX, XLS and ODS, by the library calamine.
+
+A sheet is a table like a text file: names, units and settings may stand above the
+numbers. Of several sheets ``recordings.columns.variable`` names one.
+"""
+
+import datetime as dt
+import zipfile
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from hwid_cli.data.array_columns import check_size
+from hwid_cli.data.cells import is_stamp
+from hwid_cli.data.columns import ROLES, MeasuredColumn
+from hwid_cli.data.table_columns import (
+    ColumnParts,
+    column_named,
+    found_columns,
+    titles_of,
+    with_unit,
+)
+from hwid_cli.data.table_heads import TableHead, read_head
+from hwid_cli.errors import MeasurementError
+from hwid_cli.files.messages import did_you_mean
+from hwid_cli.records.experiment import Columns
+from hwid_cli.records.starter import FoundColumn
+
+# Rows from which the form of a sheet is told.
+_HEAD_ROWS = 1000
+# Cells of the largest sheet: a spreadsheet has a million rows, a measurement few columns.
+_MOST_CELLS = 30_000_000
+
+
+def read_sheet_columns(
+    path: Path, columns: Columns
+) -> Iterator[tuple[str, MeasuredColumn]]:
+    """Read the columns that are wanted from a spreadsheet.
+
+    Raises
+    ------
+    MeasurementError
+        If a sheet or column is missing, or a row has a number in two ways of writing.
+    """
+    wanted = {
+        role: key for role in ROLES if (key := getattr(columns, role)) is not None
+    }
+    texts = [key for key in wanted.values() if isinstance(key, str)]
+    name, rows = _sheet_of(path, columns.variable)
+    head = read_head(_as_texts(rows[:_HEAD_ROWS]), wanted=texts)
+    if head.body == min(len(rows), _HEAD_ROWS):
+        raise MeasurementError(
+            f"{path}: sheet {name!r} holds no rows of numbers; expected some; name "
+            "another sheet in recordings.columns.variable, or leave the file out"
+        )
+    width = max(map(len, rows))
+    place_of_names = f"{path}, row {max(head.name_row, 0) + 1}"
+    places = {}
+    for role, key in wanted.items():
+        if isinstance(key, int) and key >= width:
+            raise MeasurementError(
+                f"{path}: has no column {key} for the {role}; expected a number from 0 "
+                f"to {width - 1}; correct recordings.columns.{role}"
+            )
+        is_number = isinstance(key, int)
+        places[role] = (
+            key if is_number else column_named(key, head.names, role, place_of_names)
+        )
+    titles = titles_of(wanted, places)
+    read = _read_body(path, rows, head, titles)
+    for role, place in places.items():
+        yield role, with_unit(path, read[place], role, head, place)
+
+
+def list_sheet_columns(path: Path) -> Iterator[FoundColumn]:
+    """List the columns of numbers of every sheet; of one sheet alone without its name."""
+    found = {}
+    for name in _names(path):
+        rows = _rows(path, name)
+        head = read_head(_as_texts(rows[:_HEAD_ROWS]))
+        if not rows or head.body == min(len(rows), _HEAD_ROWS):
+            continue
+        places = [one for one in range(max(map(len, rows))) if one not in head.texts]
+        titles = {place: f"column {place}" for place in places}
+        found[name] = (_read_body(path, rows, head, titles), head)
+    for name, (read, head) in found.items():
+        yield from found_columns(read, head, variable=name if len(found) > 1 else None)
+
+
+def _read_body(
+    path: Path, rows: Sequence[Sequence[Any]], head: TableHead, titles: dict[int, str]
+) -> dict[int, MeasuredColumn]:
+    body = rows[head.body :]
+    stamped = {
+        place
+        for place in titles
+        if _mostly(is_stamp(str(row[place])) for row in body if place < len(row))
+    }
+    parts = ColumnParts(path, titles, stamped)
+    kept = [(head.body + number, row) for number, row in enumerate(body, 1)]
+    parts.add_cells(
+        [(number, row) for number, row in kept if any(c != "" for c in row)]
+    )
+    return parts.columns()
+
+
+def _mostly(flags: Iterator[bool]) -> bool:
+    known = list(flags)
+    return 2 * sum(known) > len(known)
+
+
+def _sheet_of(path: Path, name: str | None) -> tuple[str, list[list[Any]]]:
+    """The sheet that is asked for, else the first one that holds numbers."""
+    names = _names(path)
+    if name is not None and name not in names:
+        raise MeasurementError(
+            f"{path}: has no sheet {name!r} for recordings.columns.variable; "
+            f"{did_you_mean(name, names)}"
+        )
+    for one in names if name is None else [name]:
+        rows = _rows(path, one)
+        if name is not None or any(isinstance(c, float) for row in rows for c in row):
+            return one, rows
+    raise MeasurementError(
+        f"{path}: holds no sheet with numbers; expected one; export the measurement "
+        "again or leave the file out"
+    )
+
+
+def _names(path: Path) -> list[str]:
+    from python_calamine import CalamineWorkbook
+
+    if zipfile.is_zipfile(path):
+        with zipfile.ZipFile(path) as archive:
+            check_size("the file", sum(one.file_size for one in archive.infolist()))
+    with CalamineWorkbook.from_path(str(path)) as book:
+        return list(book.sheet_names)
+
+
+def _rows(path: Path, name: str) -> list[list[Any]]:
+    """Cells of a sheet: numbers, and all else as text."""
+    from python_calamine import CalamineWorkbook
+
+    with CalamineWorkbook.from_path(str(path)) as book:
+        sheet = book.get_sheet_by_name(name)
+        if sheet.total_height * sheet.total_width > _MOST_CELLS:
+            raise ValueError(
+                f"sheet {name!r} has {sheet.total_height} rows of {sheet.total_width} "
+                f"cells; at most {_MOST_CELLS} cells are read"
+            )
+        rows = sheet.to_python(skip_empty_area=False)
+    return [[_cell(cell) for cell in row] for row in rows]
+
+
+def _cell(cell: Any) -> float | str:
+    if isinstance(cell, bool | int | float):
+        return float(cell)
+    if isinstance(cell, dt.datetime):
+        return cell.isoformat(sep=" ")
+    if isinstance(cell, dt.time):
+        return cell.isoformat()
+    if isinstance(cell, dt.timedelta):
+        return cell.total_seconds()
+    return str(cell).strip()
+
+
+def _as_texts(rows: Sequence[Sequence[Any]]) -> list[list[str]]:
+    return [[str(cell) for cell in row] for row in rows]

@@ -1,0 +1,380 @@
+"""Where the numbers of a table begin, and what stands above them: names, units, settings.
+
+Instruments write preambles: what was measured, with which range, at which interval. Some
+write them above the columns, some beside them, some in pairs of columns. The columns
+that hold numbers further down tell where the table begins; the rows above are read by
+their words.
+"""
+
+import re
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, field
+
+from hwid_cli.data.cells import MISSING_WORDS, is_grouped, is_stamp, plain_number
+from hwid_cli.data.units import bare_unit, factor_between, looks_like_unit, split_unit
+
+# Words in front of a row of names, of units; letters only, in lower case.
+_NAME_WORDS = frozenset(
+    [
+        *("name", "names", "channelname", "channel", "channels", "path", "signal"),
+        *("signals", "signalname", "variable", "kanal", "kanalname", "spurname"),
+        *("label", "symbolname"),
+    ]
+)
+_UNIT_WORDS = frozenset(
+    [
+        *("unit", "units", "einheit", "einheiten", "verticalunits", "yunitlabel"),
+        "yunit",
+    ]
+)
+# Words in front of rows that say something else about each column.
+_OTHER_WORDS = frozenset(
+    [
+        *("datatype", "type", "description", "quantity", "mode", "variablesize"),
+        *("comment", "symbolbased", "symbolcomment", "indexgroup", "indexoffset"),
+        *("netid", "port", "offset", "scalefactor", "bitmask", "source", "coupling"),
+        *("samples", "date"),
+    ]
+)
+_TIME_WORDS = frozenset(("time", "zeit", "timestamp", "t", "x"))
+_INTERVAL_WORDS = frozenset(
+    [
+        *("ts", "dt", "h", "tsamp", "sampletime", "samplingtime", "samplingperiod"),
+        *("interval", "abtastzeit", "tvz", "tabtast", "sampleinterval", "deltax"),
+        *("samplinginterval", "samplingtimeinterval", "increment", "xincr"),
+        *("xincrement", "sampleperiod", "abtastintervall", "abtastperiode", "deltat"),
+        *("timestep", "zykluszeit", "cycletime", "timeinterval", "timeincrement"),
+        *("wfincrement", "stepsize"),
+    ]
+)
+_RATE_WORDS = frozenset(
+    [
+        *("fs", "samplerate", "samplingrate", "samplingfrequency", "samplefrequency"),
+        *("abtastrate", "abtastfrequenz", "fabtast", "scanrate", "datarate"),
+    ]
+)
+_RATE_UNITS = {
+    **dict.fromkeys(("hz", "s/s", "sa/s", "1/s"), 1.0),
+    **dict.fromkeys(("khz", "ks/s", "ksa/s"), 1e3),
+    **dict.fromkeys(("mhz", "ms/s", "msa/s"), 1e6),
+}
+_SETTING = re.compile(r"\s*(.{1,60}?)\s*[:=]\s*([-+0-9.,eE]+)\s*([A-Za-zµμ/]{0,6})\s*")
+# Rows below the first one of a table, and how many of them may be damaged.
+_ROWS_BELOW, _MOST_DAMAGED = 5, 1
+# Rows of a table's beginning in which settings may stand beside the numbers.
+_MOST_ROWS_BESIDE = 40
+
+
+@dataclass(frozen=True)
+class TableHead:
+    """What stands above the numbers.
+
+    Parameters
+    ----------
+    body : int
+        First of the rows that holds numbers; as many as there are rows if none does.
+    numeric : tuple of int
+        Columns that hold numbers or times.
+    texts : tuple of int
+        Columns that hold words.
+    names : tuple of str
+        By column; empty where it has none.
+    name_row : int
+        Row that they stand in; -1 if there are none.
+    units : dict of int to str
+        By column, where a row of units says one.
+    settings : tuple of (str, float), [s]
+        Sample times that the rows state, with the words in front of them.
+    """
+
+    body: int
+    numeric: tuple[int, ...] = ()
+    texts: tuple[int, ...] = ()
+    names: tuple[str, ...] = ()
+    name_row: int = -1
+    units: dict[int, str] = field(default_factory=dict)
+    settings: tuple[tuple[str, float], ...] = ()
+
+
+def sample_time_named(title: str, value: float, unit: str = "") -> float | None:
+    """Sample time that a single number states.
+
+    Parameters
+    ----------
+    title : str
+        What stands in front of it.
+    unit : str
+        What stands behind it; empty for one in brackets in the title, else seconds or
+        hertz.
+
+    Returns
+    -------
+    float or None, [s]
+        None where the words mean something else.
+
+    Examples
+    --------
+    >>> sample_time_named("fs", 200.0), sample_time_named("kp", 200.0)
+    (0.005, None)
+    >>> sample_time_named("Sampling time interval(ms)", 0.5)
+    0.0005
+    """
+    bare, in_title = split_unit(title.split(".")[-1])
+    word = re.sub(r"[^a-zäöü]", "", bare.lower())
+    said = (unit or in_title).strip()
+    if not 0 < value < float("inf"):
+        return None
+    if word in _INTERVAL_WORDS:
+        factor = factor_between(said, "s") if said else 1.0
+        return None if factor is None else float(f"{value * factor:.12g}")
+    if word in _RATE_WORDS:
+        factor = _RATE_UNITS.get(said.lower(), 1.0)
+        # A rate has fewer digits than its reciprocal.
+        return float(f"{1.0 / (value * factor):.9g}")
+    return None
+
+
+def is_value(cell: str) -> bool:
+    """Whether a cell may stand in a column of numbers: a number, a time, a missing one."""
+    return cell.lower() in MISSING_WORDS or is_quantity(cell)
+
+
+def is_quantity(cell: str) -> bool:
+    """Whether a cell holds a number in any way of writing, or a time.
+
+    Examples
+    --------
+    >>> [is_quantity(one) for one in ("1.5", "1,5", "1.234,5", "12:00:00.5", "CH1", "")]
+    [True, True, True, True, False, False]
+    """
+    if not cell or cell.lower() in MISSING_WORDS:
+        return False
+    if plain_number(cell) is not None or is_stamp(cell):
+        return True
+    return is_grouped(cell)
+
+
+def read_head(
+    rows: Sequence[Sequence[str]],
+    *,
+    wanted: Collection[str] = (),
+    comments: Collection[int] = (),
+) -> TableHead:
+    """Read what stands above the numbers of a table.
+
+    Parameters
+    ----------
+    rows : sequence of sequence of str
+        The first rows of a file, without blanks around the cells.
+    wanted : collection of str
+        Names of columns that somebody asks for: the row that has them all is the row of
+        names.
+    comments : collection of int
+        Rows that are marked as comments: they name columns only where nothing else does.
+    """
+    numeric, texts = _kinds_of_columns(rows, comments)
+    body = _first_row(rows, numeric, comments)
+    plain = [number for number in range(body) if number not in comments]
+    noted = [number for number in range(body) if number in comments]
+    asked = [n for n in (*plain[::-1], *noted[::-1]) if set(wanted) <= set(rows[n])]
+    units: dict[int, str] = {}
+    name_row, names = -1, []
+    for above in (plain, noted):
+        name_row, found = _name_row(rows, above, numeric, is_named=bool(noted))
+        units = {**found, **units}
+        if name_row >= 0:
+            break
+    if wanted and asked:
+        name_row = asked[0]
+    if name_row >= 0:
+        names = _named(rows, name_row, numeric, units)
+    settings = _settings(rows, body, numeric)
+    return TableHead(body, numeric, texts, tuple(names), name_row, units, settings)
+
+
+def _kinds_of_columns(
+    rows: Sequence[Sequence[str]], comments: Collection[int]
+) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """Columns of numbers and columns of words, told from the last half of the rows."""
+    kept = [row for number, row in enumerate(rows) if number not in comments]
+    lower = kept[len(kept) // 2 :]
+    numeric, texts = [], []
+    for place in range(max((len(row) for row in lower), default=0)):
+        cells = [row[place] for row in lower if place < len(row) and row[place]]
+        values = sum(is_quantity(cell) for cell in cells)
+        missing = sum(cell.lower() in MISSING_WORDS for cell in cells)
+        if values and 2 * (values + missing) >= len(cells):
+            numeric.append(place)
+        elif len(cells) > missing:
+            texts.append(place)
+    return tuple(numeric), tuple(texts)
+
+
+def _first_row(
+    rows: Sequence[Sequence[str]], numeric: Sequence[int], comments: Collection[int]
+) -> int:
+    """First row whose columns of numbers hold numbers."""
+    plain = [number for number in range(len(rows)) if number not in comments]
+    of_table = [_is_of_table(rows[number], numeric) for number in plain]
+    others = [
+        any(rows[number]) and not is_of
+        for number, is_of in zip(plain, of_table, strict=True)
+    ]
+    # A row of a preamble may look like one of the table; those below it do not.
+    first = next(
+        (
+            number
+            for place, number in enumerate(plain)
+            if of_table[place]
+            and sum(others[place + 1 :][:_ROWS_BELOW]) <= _MOST_DAMAGED
+        ),
+        len(rows),
+    )
+    if not numeric or first == len(rows):
+        return len(rows)
+    # A damaged row at the beginning is no preamble: words alone stand above it, or
+    # nothing at all.
+    begin = first
+    for number in [n for n in plain if n < first][::-1]:
+        cells = [cell for cell in _cells(rows[number], numeric) if cell]
+        if not any(map(is_quantity, cells)):
+            return begin if 2 * len(cells) >= len(numeric) else first
+        if not is_quantity(_cells(rows[number], numeric)[0]):
+            return first
+        begin = number
+    return begin
+
+
+def _is_of_table(row: Sequence[str], numeric: Sequence[int]) -> bool:
+    cells = _cells(row, numeric)
+    return all(map(is_value, cells)) and any(map(is_quantity, cells))
+
+
+def _cells(row: Sequence[str], places: Sequence[int]) -> list[str]:
+    return [row[place] if place < len(row) else "" for place in places]
+
+
+def _name_row(
+    rows: Sequence[Sequence[str]],
+    above: Sequence[int],
+    numeric: Sequence[int],
+    *,
+    is_named: bool,
+) -> tuple[int, dict[int, str]]:
+    """Row of names (-1 if there is none), and units by column.
+
+    Parameters
+    ----------
+    is_named : bool
+        Whether the names may stand elsewhere: then a lone row may hold units.
+    """
+    units: dict[int, str] = {}
+    fallback = -1
+    for number in reversed(above):
+        row = rows[number]
+        cells = [cell for cell in _cells(row, numeric) if cell]
+        if 2 * len(cells) < len(numeric) or all(map(is_quantity, cells)):
+            continue
+        key = _letters(next(cell for cell in row if cell))
+        # In front of the columns, or of each pair of them, stands what a row is about.
+        is_about = bool(row[0]) and (0 not in numeric or row.count(row[0]) > 1)
+        is_about |= key in _OTHER_WORDS
+        if key in _UNIT_WORDS:
+            units = {**_units_of(row, numeric), **units}
+            continue
+        if (is_named or number != above[0]) and _is_unit_row(cells):
+            units = {**_units_of(row, numeric), **units}
+        elif not is_about or key in _NAME_WORDS:
+            upper = above[: above.index(number)]
+            return number, {**_stated_units(rows, upper, numeric), **units}
+        fallback = number if fallback < 0 else fallback
+    # A lone row of units is one of names too, unless others stand elsewhere.
+    return -1 if is_named and units else fallback, units
+
+
+def _stated_units(
+    rows: Sequence[Sequence[str]], above: Sequence[int], numeric: Sequence[int]
+) -> dict[int, str]:
+    """Units of rows that begin with a word for units."""
+    found: dict[int, str] = {}
+    for number in above:
+        row = rows[number]
+        if _letters(next((cell for cell in row if cell), "")) in _UNIT_WORDS:
+            found |= _units_of(row, numeric)
+    return found
+
+
+def _named(
+    rows: Sequence[Sequence[str]],
+    number: int,
+    numeric: Sequence[int],
+    units: dict[int, str],
+) -> list[str]:
+    """Names of a row; a key in front of pairs of columns is none, nor is a unit of time.
+
+    Some loggers write the unit of time into the row of the names, below the word time.
+    """
+    row = list(rows[number])
+    key = _letters(next((cell for cell in row if cell), ""))
+    is_key = key in _NAME_WORDS and (0 not in numeric or row.count(row[0]) > 1)
+    names = ["" if is_key and _letters(cell) == key else cell for cell in row]
+    over = rows[number - 1] if number else []
+    for place in numeric[:1]:
+        word = over[place] if place < len(over) else ""
+        own = bare_unit(names[place]) if place < len(names) else ""
+        if _letters(word) in _TIME_WORDS and factor_between(own, "s") is not None:
+            units.setdefault(place, own)
+            names[place] = word
+    return names
+
+
+def _is_unit_row(cells: Sequence[str]) -> bool:
+    """Whether most cells are units: 'second' is a unit and a word."""
+    known = sum(map(looks_like_unit, cells))
+    numbers = any(plain_number(cell) is not None for cell in cells)
+    return known > 0 and 2 * known >= len(cells) and not numbers
+
+
+def _units_of(row: Sequence[str], numeric: Sequence[int]) -> dict[int, str]:
+    cells = dict(zip(numeric, _cells(row, numeric), strict=True))
+    return {
+        place: bare_unit(cell)
+        for place, cell in cells.items()
+        if cell and _letters(cell) not in _UNIT_WORDS
+    }
+
+
+def _letters(cell: str) -> str:
+    return re.sub(r"[^a-zäöü]", "", split_unit(cell)[0].lower())
+
+
+def _settings(
+    rows: Sequence[Sequence[str]], body: int, numeric: Sequence[int]
+) -> tuple[tuple[str, float], ...]:
+    """Sample times that stand above the table or beside it."""
+    found: list[tuple[str, float]] = []
+    for number, row in enumerate(rows[: max(body, _MOST_ROWS_BESIDE)]):
+        below = rows[number + 1] if number + 1 < len(rows) else []
+        for place, cell in enumerate(row):
+            if not cell or (number >= body and place in numeric):
+                continue
+            written = _SETTING.fullmatch(cell)
+            if written:
+                found += _setting(written[1], written[2], written[3])
+            elif plain_number(cell) is None:
+                behind = row[place + 1] if place + 1 < len(row) else ""
+                under = below[place] if place < len(below) else ""
+                after = row[place + 2] if place + 2 < len(row) else ""
+                unit = after if factor_between(after, "s") is not None else ""
+                is_under = number + 1 >= body or place in numeric
+                value = behind if is_quantity(behind) or is_under else under
+                found += _setting(cell, value, unit)
+    return tuple(dict.fromkeys(found))
+
+
+def _setting(title: str, cell: str, unit: str) -> list[tuple[str, float]]:
+    value = plain_number(cell.replace(",", "."))
+    if value is None or len(title) > 60:
+        return []
+    step_s = sample_time_named(title, value, unit)
+    return [] if step_s is None else [(title, step_s)]

@@ -1,0 +1,128 @@
+import numpy as np
+import pytest
+
+from hwid_cli.data.column_roles import guess_signals, guess_time
+from hwid_cli.records.starter import FoundColumn
+
+N = 800
+
+
+def plant(seed=0):
+    """An input that holds its levels and, from it, a current, a speed and a position."""
+    rng = np.random.default_rng(seed)
+    u = np.repeat(rng.uniform(-1, 1, N // 20), 20) + 1e-3 * rng.standard_normal(N)
+    i, v, x = np.zeros(N), np.zeros(N), np.zeros(N)
+    for k in range(1, N):
+        i[k] = 0.6 * i[k - 1] + 0.4 * u[k - 1]
+        v[k] = 0.95 * v[k - 1] + 0.05 * i[k - 1] - 0.02 * x[k - 1]
+        x[k] = x[k - 1] + v[k - 1]
+    noise = 1e-4 * rng.standard_normal((3, N))
+    return u, i + noise[0], v + noise[1], x + noise[2]
+
+
+def column(title, values, unit="", key=None):
+    return FoundColumn(title, key if key is not None else title, values, None, unit)
+
+
+def guessed(*columns):
+    found = guess_signals([column(*one) for one in columns])
+    return found.input.key, found.output.key, found
+
+
+VOLTAGE, CURRENT, SPEED, POSITION = plant()
+
+
+@pytest.mark.parametrize(
+    ("titles", "first", "last"),
+    [
+        (("U_mot", "I_ist", "n_ist", "pos_ist"), "I_ist", "pos_ist"),
+        (("cmd", "foo", "vel_fb", "pos_fb"), "cmd", "pos_fb"),
+        (("Spannung", "Strom", "Drehzahl", "Lage"), "Strom", "Lage"),
+        (("SetVoltage", "ActCurrent", "ActVelo", "ActPos"), "ActCurrent", "ActPos"),
+        (("u", "i_meas", "omega", "phi"), "i_meas", "phi"),
+    ],
+)
+def test_names_of_two_languages_say_the_roles(titles, first, last):
+    found = guessed(*zip(titles, (VOLTAGE, CURRENT, SPEED, POSITION), strict=True))
+    assert found[:2] == (first, last)
+    assert not any("NOT SURE" in note for note in found[2].notes)
+
+
+def test_a_wanted_position_is_a_reference_and_a_wanted_current_an_input():
+    *_, found = guessed(
+        ("pos_cmd", np.roll(POSITION, -9)), ("I_soll", VOLTAGE), ("pos_act", POSITION)
+    )
+    assert found.reference.key == "pos_cmd"
+    assert (found.input.key, found.output.key) == ("I_soll", "pos_act")
+
+
+def test_of_a_voltage_and_a_current_the_voltage_drives():
+    """Both are inputs of a drive by their names."""
+    for columns in ((("I", CURRENT), ("U", VOLTAGE)), (("U", VOLTAGE), ("I", CURRENT))):
+        assert guessed(*columns)[:2] == ("U", "I")
+
+
+def test_units_say_the_roles_of_channels():
+    found = guessed(("CH1", POSITION, "mm"), ("CH2", CURRENT, "A"))
+    assert found[:2] == ("CH2", "CH1")
+    assert found[2].reasons["input"] == "by its unit, A"
+
+
+@pytest.mark.parametrize("order", [(0, 1), (1, 0)])
+def test_content_says_what_drives_what_where_no_name_does(order):
+    columns = [("AI0", VOLTAGE, "V"), ("AI1", SPEED, "V")]
+    found = guessed(*(columns[number] for number in order))
+    assert found[:2] == ("AI0", "AI1")
+    assert not any("NOT SURE" in note for note in found[2].notes)
+
+
+def test_a_doubtful_choice_is_said_with_what_to_write_instead():
+    rng = np.random.default_rng(3)
+    first, last, found = guessed(
+        ("a", rng.standard_normal(N)), ("b", rng.standard_normal(N))
+    )
+    (note,) = [note for note in found.notes if "NOT SURE" in note]
+    assert f"columns: {{input: {last!r}, output: {first!r}}}" in note
+
+
+def test_names_that_the_numbers_contradict_are_kept_and_said():
+    first, last, found = guessed(("current_A", SPEED), ("position_mm", VOLTAGE))
+    assert (first, last) == ("current_A", "position_mm")
+    (note,) = [note for note in found.notes if "NOT SURE" in note]
+    assert "in the numbers 'current_A' answers to 'position_mm'" in note
+    assert "input: 'position_mm', output: 'current_A'" in note
+
+
+@pytest.mark.parametrize(
+    ("values", "unit", "wanted", "is_sure"),
+    [
+        (np.arange(N), "", "ms", False),
+        (1000.0 * np.arange(N), "", "us", False),
+        (np.arange(N), "s", "s", True),
+        (0.001 * np.arange(N), "", "", True),
+        (0.5 * np.arange(N), "", "", False),
+        (1.7e9 + 0.01 * np.arange(N), "", "s", True),
+        (1.7e12 + 10 * np.arange(N), "", "ms", True),
+        (1.7e15 + 10 * np.arange(N), "", "us", True),
+    ],
+)
+def test_the_unit_of_a_time_is_told_from_its_size_and_doubts_are_said(
+    values, unit, wanted, is_sure
+):
+    found = guess_time([column("time", np.asarray(values, float), unit)])
+    assert found.role.unit == wanted
+    assert (found.notes == ()) is is_sure
+    assert all("NOT SURE" in note and "units: {time:" in note for note in found.notes)
+
+
+def test_a_stated_interval_says_the_unit_of_the_time():
+    interval = FoundColumn("Sample time [ms]", "x", np.array([2e-3]), None, "s")
+    found = guess_time([column("time", 2.0 * np.arange(N)), interval])
+    assert (found.role.unit, found.notes) == ("ms", ())
+    assert "Sample time [ms] says its unit" in found.reason
+
+
+def test_a_counter_of_samples_is_no_time_where_an_interval_is_stated():
+    interval = FoundColumn("Increment", "x", np.array([0.37]), None, "s")
+    found = guess_time([column("time", 1.0 * np.arange(N)), interval])
+    assert (found.role, found.sample_time_s) == (None, 0.37)

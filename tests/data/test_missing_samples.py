@@ -1,0 +1,63 @@
+import logging
+
+import numpy as np
+import pytest
+
+from hwid_cli.data.columns import FileColumns, MeasuredColumn, array_column
+from hwid_cli.data.formats import read_columns
+from hwid_cli.data.missing_samples import bridge_missing, missing
+from hwid_cli.records.experiment import Columns
+
+
+def columns(output, texts=None):
+    rows = np.arange(output.size)
+    return FileColumns(
+        array_column("input 'u'", np.sin(rows)),
+        MeasuredColumn("output 'y'", output, rows, texts=texts or {}),
+    )
+
+
+def line(size, *lost):
+    values = np.arange(float(size))
+    values[list(lost)] = np.nan
+    return values
+
+
+def test_single_samples_are_bridged_and_said(caplog):
+    with caplog.at_level(logging.WARNING):
+        found, places = bridge_missing("run.csv", columns(line(400, 7, 90)))
+
+    np.testing.assert_array_equal(found.output.values, np.arange(400.0))
+    assert places == {"output": (7, 90)}
+    assert "run.csv, row 7" in caplog.text
+    assert "output 'y' has no number (and 1 more); a straight line" in caplog.text
+
+
+@pytest.mark.parametrize(
+    "lost",
+    [(7, 8), (0,), (399,), tuple(range(10, 300, 50))],
+    ids=["two together", "the first", "the last", "more than 1 %"],
+)
+def test_more_than_single_samples_are_left_as_they_are(lost):
+    found, places = bridge_missing("run.csv", columns(line(400, *lost)))
+
+    assert places == {}
+    assert np.isnan(found.output.values).sum() == len(lost)
+
+
+def test_text_that_means_something_else_is_not_bridged():
+    for text, is_lost in (("", True), ("n/a", True), ("NaN", True), ("off", False)):
+        found = columns(line(400, 7), {7: text})
+        assert missing(found.output)[7] == is_lost
+        assert bool(bridge_missing("run.csv", found)[1]) == is_lost
+
+
+def test_a_file_says_where_samples_are_missing(tmp_path):
+    rows = [f"{k},{k},{k * k}" for k in range(50)]
+    rows[20] = "20,#N/A,400"
+    (tmp_path / "run.csv").write_text("\n".join(["t,u,y", *rows]))
+    found = read_columns(tmp_path / "run.csv", Columns(time="t", input="u", output="y"))
+    bridged, places = bridge_missing(tmp_path / "run.csv", found)
+
+    assert places == {"input": (20,)}
+    assert bridged.input.values[20] == 20.0

@@ -1,0 +1,62 @@
+import numpy as np
+
+from hwid_cli.records.recordings import RawRecording
+from hwid_cli.stages.proposal import propose
+
+
+def raw(name, input_):
+    output = np.convolve(input_, np.ones(8) / 8)[: input_.size]
+    return RawRecording(name, input_, output, 1e-3)
+
+
+def levels(seed, size=600):
+    return np.repeat(np.random.default_rng(seed).uniform(-1, 1, size // 20), 20)
+
+
+def held_out(*recordings):
+    found = propose(recordings)
+    return found.held_out, found.held_out_reason
+
+
+def test_names_say_what_is_for_the_test():
+    names = ("train_1", "train_2", "val_1", "run_test")
+    recordings = [raw(name, levels(seed)) for seed, name in enumerate(names)]
+    assert held_out(*recordings) == (("val_1", "run_test"), "named so")
+
+
+def test_words_inside_of_other_words_are_no_names_of_tests():
+    names = ("fastest_1", "interval_2", "slow_3", "slow_4")
+    recordings = [raw(name, levels(seed)) for seed, name in enumerate(names)]
+    assert held_out(*recordings)[1] != "named so"
+
+
+def test_of_repeats_of_an_input_the_last_one_is_for_the_test():
+    recordings = [
+        raw(f"{name}{number}", levels(seed))
+        for seed, name in enumerate(("a", "b"))
+        for number in (1, 2, 3)
+    ]
+    assert held_out(*recordings) == (("a3", "b3"), "the last repeat of each input")
+
+
+def test_a_measured_input_is_never_the_same_and_its_repeats_are_known():
+    rng = np.random.default_rng(1)
+    recordings = [
+        raw(f"{name}_{number}", level + 0.02 * rng.standard_normal(600))
+        for name, level in (("low", 0.1), ("high", 0.3))
+        for number in (1, 2)
+    ]
+    assert held_out(*recordings)[0] == ("low_2", "high_2")
+
+
+def test_steps_of_other_sizes_are_no_repeats():
+    step = np.where(np.arange(600) > 100, 1.0, 0.0)
+    recordings = [raw(f"step_{size}", size * step) for size in (1, 2, 3, 4)]
+    found = held_out(*recordings)
+    assert found == (("step_3",), "about a quarter of each kind, not the first")
+
+
+def test_what_is_named_for_training_is_not_held_out():
+    names = ("train_1", "train_2", "train_3", "other")
+    recordings = [raw(name, levels(seed)) for seed, name in enumerate(names)]
+    assert held_out(*recordings)[0] == ("other",)
