@@ -1,57 +1,212 @@
-"""How piecewise linear maps go on where the data end.
+"""How static maps go on where their fit had no samples: in gaps and beyond the data.
 
-A fit puts break-points close to the ends of the data where it serves the fit, and a
-segment as narrow as that says nothing about the way ahead. Beyond the data a map goes on
-with its mean slope over the outer eighth of them.
+A recording of a step visits two levels of a map. What a search leaves between and
+beyond them is chance, and a polynomial or a network may be anywhere there. So every
+map gets the simplest continuation that the samples do not contradict. Arguments that
+samples visited form stretches; in a stretch the law of the map's kind holds. Two
+neighbouring stretches are joined by a straight line. Beyond the outermost ones the
+local slope goes on for twice the distance over which it was seen, and then the map
+returns to the straight line through all samples.
 
 References
 ----------
 docs/method.md, section "Beyond the data".
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hwid_cli.model.static_map import evaluate, outlined
-from hwid_cli.records.maps import MAP_KINDS, StaticMap
+from hwid_cli.model.static_map import RULES, evaluate, outlined
+from hwid_cli.records.maps import MAP_KINDS, Continuation, StaticMap
 from hwid_cli.records.model import HammersteinWiener
 
-# Share of the domain over which the mean slope is taken.
+# Share of the range: a distance between neighbouring samples above it is a gap.
+_GAP = 0.05
+# Share of the range over which a local slope is taken, where samples reach so far.
 _OUTER = 1.0 / 8.0
+# Share of the range below which a stretch is a single level and tells no slope.
+_LEVEL = 1e-6
 
 
-def continued(model: HammersteinWiener, *, outer: float = _OUTER) -> HammersteinWiener:
-    """Same model on the data of its fit, its maps going on straight beyond them.
+@dataclass(frozen=True)
+class ContinuationRule:
+    """Distances of the rule by which maps go on.
 
     Parameters
     ----------
-    outer : float, [-]
-        Share of the domain over which the mean slope is taken.
+    trust : float, [-]
+        How far a local slope goes on, over the distance on which it was seen.
+    back : float, [-]
+        Share of the range over which a map returns to the line through its samples.
+    """
 
-    Returns
-    -------
-    HammersteinWiener
-        Maps of kinds other than piecewise linear stay as they are.
+    trust: float = 2.0
+    back: float = 1.0 / 8.0
+
+
+_RULE = ContinuationRule()
+
+
+def continued(
+    model: HammersteinWiener,
+    u: np.ndarray,
+    x: np.ndarray,
+    *,
+    rule: ContinuationRule = _RULE,
+) -> HammersteinWiener:
+    """Same model on the data of its fit, with maps that go on simply elsewhere.
+
+    Parameters
+    ----------
+    u, x : ndarray, shape (n,)
+        What reached the input map and the output map in the fit.
     """
     return replace(
         model,
-        input_map=_continued(model.input_map, outer),
-        output_map=_continued(model.output_map, outer),
+        input_map=continued_map(model.input_map, u, rule=rule),
+        output_map=continued_map(model.output_map, x, rule=rule),
     )
+
+
+def continued_map(
+    one: StaticMap, argument: np.ndarray, *, rule: ContinuationRule = _RULE
+) -> StaticMap:
+    """Same map where samples were, the simplest lines elsewhere.
+
+    Parameters
+    ----------
+    argument : ndarray, shape (n,)
+        What reached the map.
+
+    Returns
+    -------
+    StaticMap
+        Itself where its law is the user's own or there is none.
+
+    References
+    ----------
+    docs/method.md, eqs. (15d)-(15f).
+
+    Examples
+    --------
+    >>> steep = StaticMap("polynomial", np.array([0.0, 1.0, 0.0, 9.0]), (-1.0, 1.0))
+    >>> one = continued_map(steep, np.array([-1.0, 1.0]))
+    >>> evaluate(one, np.array([-3.0, 0.5, 3.0]))
+    array([-30.,   5.,  30.])
+    """
+    kind = RULES[one.kind]
+    if kind.is_identity or MAP_KINDS[one.kind].has_function:
+        return one
+    plain = replace(one, continuation=None)
+    if not np.isfinite(argument).all() or np.ptp(argument) == 0.0:
+        return plain
+    visited = stretches(argument)
+    if not np.isfinite(evaluate(plain, visited.ravel())).all():
+        return plain
+    below, above = kind.holds_beyond(plain, visited[0], visited[-1])
+    line = _line(argument, evaluate(plain, argument))
+    between = np.unique(visited)
+    points = [between, evaluate(plain, between)]
+    for is_known, side in ((below, -1.0), (above, 1.0)):
+        ahead = (
+            _law_ahead(plain, visited, side)
+            if is_known
+            else _line_ahead(plain, visited, side, line, rule)
+        )
+        pair = (ahead, points) if side < 0.0 else (points, ahead)
+        points = [np.concatenate(parts) for parts in zip(*pair, strict=True)]
+    return replace(plain, continuation=Continuation(visited.ravel(), *points))
+
+
+def stretches(argument: np.ndarray) -> np.ndarray:
+    """Ranges of an argument that samples visited without a gap.
+
+    Parameters
+    ----------
+    argument : ndarray, shape (n,)
+
+    Returns
+    -------
+    ndarray, shape (n_stretches, 2)
+        First and last argument of each.
+
+    Examples
+    --------
+    >>> stretches(np.array([0.0, 5.0, 0.1, 5.2]))
+    array([[0. , 0.1],
+           [5. , 5.2]])
+    """
+    ordered = np.sort(argument)
+    width = ordered[-1] - ordered[0]
+    ends = np.flatnonzero(np.diff(ordered) > _GAP * width)
+    first = ordered[np.concatenate([[0], ends + 1])]
+    last = ordered[np.concatenate([ends, [ordered.size - 1]])]
+    # Rounding is no width.
+    last = np.where(last - first < _LEVEL * width, first, last)
+    return np.column_stack([first, last])
+
+
+def _line(argument: np.ndarray, value: np.ndarray) -> tuple[float, float]:
+    """Slope and offset of the straight line through a map's samples."""
+    centre, level = float(argument.mean()), float(value.mean())
+    away = argument - centre
+    slope = float(away @ (value - level)) / float(away @ away)
+    return slope, level - slope * centre
+
+
+def _line_ahead(
+    one: StaticMap,
+    visited: np.ndarray,
+    side: float,
+    line: tuple[float, float],
+    rule: ContinuationRule,
+) -> list[np.ndarray]:
+    """Points beyond one end: local slope first, then back to the line.
+
+    Parameters
+    ----------
+    side : float, [-]
+        -1 below, 1 above.
+    """
+    width = visited[-1, 1] - visited[0, 0]
+    end, other = visited[0] if side < 0.0 else visited[-1, ::-1]
+    seen = min(_OUTER * width, abs(end - other))
+    points, values = [], []
+    here, value = end, float(evaluate(one, np.array([end]))[0])
+    if seen > 0.0:
+        before = float(evaluate(one, np.array([end - side * seen]))[0])
+        here = end + side * rule.trust * seen
+        value += rule.trust * (value - before)
+        points.append(here)
+        values.append(value)
+    slope, offset = line
+    for distance in (rule.back, rule.back + 1.0):
+        at = here + side * distance * width
+        points.append(at)
+        values.append(slope * at + offset)
+    order = slice(None, None, int(side))
+    return [np.array(points)[order], np.array(values)[order]]
+
+
+def _law_ahead(one: StaticMap, visited: np.ndarray, side: float) -> list[np.ndarray]:
+    """A point on the law, which is straight from the last sample on."""
+    width = visited[-1, 1] - visited[0, 0]
+    at = np.array([visited[0, 0] - width if side < 0.0 else visited[-1, 1] + width])
+    return [at, evaluate(one, at)]
 
 
 def for_search(model: HammersteinWiener) -> HammersteinWiener:
     """Same model on the data of its fit, nothing but parameters in its maps."""
     return replace(
         model,
-        input_map=replace(model.input_map, slopes_beyond=None),
-        output_map=replace(model.output_map, slopes_beyond=None),
+        input_map=replace(model.input_map, continuation=None),
+        output_map=replace(model.output_map, continuation=None),
     )
 
 
 def outlined_model(model: HammersteinWiener) -> HammersteinWiener:
-    """Same model for every input, its maps given by break-points and values alone.
+    """Same model for every input, piecewise linear maps being nothing but break-points.
 
     Returns
     -------
@@ -59,21 +214,10 @@ def outlined_model(model: HammersteinWiener) -> HammersteinWiener:
         Values to the last bit as before.
     """
     maps = (model.input_map, model.output_map)
-    if all(one.slopes_beyond is None for one in maps):
+    if all(one.continuation is None for one in maps):
         return model
     return replace(
         model,
         input_map=outlined(model.input_map),
         output_map=outlined(model.output_map),
     )
-
-
-def _continued(one: StaticMap, share: float) -> StaticMap:
-    if not MAP_KINDS[one.kind].goes_on:
-        return one
-    plain = replace(one, slopes_beyond=None)
-    low, high = one.domain
-    outer = share * (high - low)
-    at = evaluate(plain, np.array([low, low + outer, high - outer, high]))
-    slopes = (float(at[1] - at[0]) / outer, float(at[3] - at[2]) / outer)
-    return replace(plain, slopes_beyond=slopes)
