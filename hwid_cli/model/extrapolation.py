@@ -5,8 +5,8 @@ beyond them is chance, and a polynomial or a network may be anywhere there. So e
 map gets the simplest continuation that the samples do not contradict. Arguments that
 samples visited form stretches; in a stretch the law of the map's kind holds. Two
 neighbouring stretches are joined by a straight line. Beyond the outermost ones the
-local slope goes on for twice the distance over which it was seen, and then the map
-returns to the straight line through all samples.
+local slope goes on as far as the samples tell it, and then the map returns to the
+straight line through all samples.
 
 References
 ----------
@@ -23,9 +23,10 @@ from hwid_cli.records.model import HammersteinWiener
 
 # Share of the range: a distance between neighbouring samples above it is a gap.
 _GAP = 0.05
-# Share of the range over which a local slope is taken, where samples reach so far.
-_OUTER = 1.0 / 8.0
-# Share of the range below which a stretch is a single level and tells no slope.
+# Share of the range over which a local slope is taken: an outermost segment alone may be
+# a hundredth of it. Deeper, up to half, where fewer samples than these lie in it.
+_OUTER, _DEEPEST, _ENOUGH = 1.0 / 8.0, 0.5, 20
+# Share of the range below which a distance is none.
 _LEVEL = 1e-6
 
 
@@ -36,7 +37,8 @@ class ContinuationRule:
     Parameters
     ----------
     trust : float, [-]
-        How far a local slope goes on, over the distance on which it was seen.
+        Ranges over which a local slope goes on where samples spread evenly over the part
+        in which it is taken.
     back : float, [-]
         Share of the range over which a map returns to the line through its samples.
     """
@@ -108,11 +110,12 @@ def continued_map(
     line = _line(argument, evaluate(plain, argument))
     between = np.unique(visited)
     points = [between, evaluate(plain, between)]
+    bridged = replace(plain, continuation=Continuation(visited.ravel(), *points))
     for is_known, side in ((below, -1.0), (above, 1.0)):
         ahead = (
             _law_ahead(plain, visited, side)
             if is_known
-            else _line_ahead(plain, visited, side, line, rule)
+            else _line_ahead(bridged, argument, side, line, rule)
         )
         pair = (ahead, points) if side < 0.0 else (points, ahead)
         points = [np.concatenate(parts) for parts in zip(*pair, strict=True)]
@@ -157,29 +160,28 @@ def _line(argument: np.ndarray, value: np.ndarray) -> tuple[float, float]:
 
 def _line_ahead(
     one: StaticMap,
-    visited: np.ndarray,
+    argument: np.ndarray,
     side: float,
     line: tuple[float, float],
     rule: ContinuationRule,
 ) -> list[np.ndarray]:
-    """Points beyond one end: local slope first, then back to the line.
+    """Points beyond one end: the local slope goes on, then back to the line.
 
     Parameters
     ----------
     side : float, [-]
         -1 below, 1 above.
     """
-    width = visited[-1, 1] - visited[0, 0]
-    end, other = visited[0] if side < 0.0 else visited[-1, ::-1]
-    seen = min(_OUTER * width, abs(end - other))
+    end = float(side * (side * argument).max())
+    width = float(np.ptp(argument))
     points, values = [], []
-    here, value = end, float(evaluate(one, np.array([end]))[0])
-    if seen > 0.0:
-        before = float(evaluate(one, np.array([end - side * seen]))[0])
-        here = end + side * rule.trust * seen
-        value += rule.trust * (value - before)
+    depth, evenness = _outer_part(side * (end - argument))
+    reach = rule.trust * evenness * width
+    here, (value, before) = end, evaluate(one, np.array([end, end - side * depth]))
+    if reach > _LEVEL * width:
+        here, value = end + side * reach, value + (value - before) / depth * reach
         points.append(here)
-        values.append(value)
+        values.append(float(value))
     slope, offset = line
     for distance in (rule.back, rule.back + 1.0):
         at = here + side * distance * width
@@ -187,6 +189,29 @@ def _line_ahead(
         values.append(slope * at + offset)
     order = slice(None, None, int(side))
     return [np.array(points)[order], np.array(values)[order]]
+
+
+def _outer_part(inward: np.ndarray) -> tuple[float, float]:
+    """Depth of the part that tells the slope at an end, and how its samples spread.
+
+    Parameters
+    ----------
+    inward : ndarray, shape (n,)
+        Distance of each sample from that end.
+
+    Returns
+    -------
+    depth : float
+    evenness : float, [-]
+        Variance of the samples' places over that of an even spread; 1 at most. 0 for
+        samples on one level.
+    """
+    width = float(inward.max())
+    ordered = np.sort(inward)
+    enough = float(ordered[min(_ENOUGH, ordered.size) - 1])
+    depth = max(_OUTER * width, min(enough, _DEEPEST * width))
+    part = ordered[ordered <= depth]
+    return depth, min(1.0, 12.0 * float(np.var(part)) / depth**2)
 
 
 def _law_ahead(one: StaticMap, visited: np.ndarray, side: float) -> list[np.ndarray]:

@@ -90,7 +90,7 @@ def test_far_beyond_the_data_every_kind_is_the_line_through_its_samples(kind):
     domain = (argument.min(), argument.max())
     one = static_map.RULES[kind].with_domain(MAPS[kind], domain)
     found = continued_map(one, argument)
-    at = np.array([-100.0, -10.0, 10.0, 100.0])
+    at = np.array([-100.0, -30.0, 30.0, 100.0])
 
     slope, offset = np.polyfit(argument, static_map.evaluate(one, argument), 1)
     np.testing.assert_allclose(
@@ -98,17 +98,31 @@ def test_far_beyond_the_data_every_kind_is_the_line_through_its_samples(kind):
     )
 
 
-def test_a_slope_is_trusted_twice_as_far_as_it_was_seen():
-    # Slope 1 to the left of 1, slope 3 to the right of it, samples from 0 to 8.
-    one = StaticMap("piecewise_linear", np.array([0.0, 1, 8, 0, 1, 22]), (0.0, 8.0))
-    found = continued_map(one, np.linspace(0.0, 8.0, 801))
+# Slope 1 to the left of 1, slope 3 to the right of it.
+BENT = StaticMap("piecewise_linear", np.array([0.0, 1, 8, 0, 1, 22]), (0.0, 8.0))
 
-    # An eighth of 8 is 1: slopes go on over 2, then the line is met over another 1.
-    assert value(found, 9.0, 10.0) == pytest.approx([25.0, 28.0])
-    assert value(found, -1.0, -2.0) == pytest.approx([-1.0, -2.0])
-    line = np.polyfit(np.linspace(0, 8, 801), value(one, *np.linspace(0, 8, 801)), 1)
-    assert value(found, 11.0) == pytest.approx([np.polyval(line, 11.0)])
-    assert value(found, 10.5) == pytest.approx([0.5 * (28.0 + np.polyval(line, 11.0))])
+
+def test_a_slope_that_even_samples_tell_goes_on_for_twice_their_range():
+    argument = np.linspace(0.0, 8.0, 8001)
+    found = continued_map(BENT, argument)
+    line = np.polyfit(argument, static_map.evaluate(BENT, argument), 1)
+
+    # To 8 + 16, then to the line over another 1; by hand 22 + 3 * 16 = 70.
+    assert value(found, 9.0, 24.0) == pytest.approx([25.0, 70.0], rel=1e-3)
+    assert value(found, -1.0, -16.0) == pytest.approx([-1.0, -16.0], rel=1e-3)
+    assert value(found, 25.0) == pytest.approx([np.polyval(line, 25.0)], rel=1e-3)
+    middle = 0.5 * (70.0 + np.polyval(line, 25.0))
+    assert value(found, 24.5) == pytest.approx([middle], rel=1e-2)
+
+
+def test_a_slope_is_trusted_less_the_less_samples_spread():
+    # Nine of ten samples above 7 rest on 8. Variance of the mixture, over that of an
+    # even spread, 1/12: 12 (0.1 * 0.9 * 0.5**2 + 0.1 / 12) = 0.37.
+    moving = np.linspace(0.0, 8.0, 8001)
+    argument = np.concatenate([moving, np.full(9000, 8.0)])
+    last = continued_map(BENT, argument).continuation.arguments[-3]
+
+    assert last == pytest.approx(8.0 + 16.0 * (12 * 0.0225 + 0.1), rel=1e-3)
 
 
 def test_a_limit_that_samples_crossed_stays_a_limit():
