@@ -136,9 +136,9 @@ def numbers(values: Iterable[float]) -> str:
 
 def _map(side: str, one: StaticMap) -> str:
     text = language_text(side, one, "C", portable(one.kind).c)
-    if one.continuation is None:
+    if one.extrapolation is None:
         return _law(side, one, text)
-    lines = one.continuation
+    lines = one.extrapolation
     # The straight lines are a map of another kind.
     straight = StaticMap(
         "piecewise_linear", np.concatenate([lines.arguments, lines.values])
@@ -149,7 +149,7 @@ def _map(side: str, one: StaticMap) -> str:
             _law(side, one, law),
             _law(f"{side}_beyond", straight, portable(straight.kind).c or ""),
             filled(
-                "continued.c",
+                "extrapolated.c",
                 {
                     "side": side,
                     "visited": numbers(lines.visited),

@@ -94,13 +94,16 @@ def _schema_of(kind: str) -> dict[str, Any]:
         "Range of the argument in the fit; outside it the map extrapolates.", 2, 2
     )
     return {
-        "properties": {**properties, "continuation": {"$ref": "#/$defs/continuation"}},
+        "properties": {
+            **properties,
+            "extrapolation": {"$ref": "#/$defs/extrapolation"},
+        },
         "required": list(properties),
         "additionalProperties": False,
     }
 
 
-def continuation_schema() -> dict[str, Any]:
+def extrapolation_schema() -> dict[str, Any]:
     """What a file says of a map where its fit had no samples, as JSON Schema."""
     properties = {
         "visited": _array(

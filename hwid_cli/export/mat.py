@@ -93,8 +93,8 @@ def _variables(exported: ExportedModel) -> dict[str, Any]:
 def _map(side: str, one: StaticMap) -> dict[str, Any]:
     language_text(side, one, "MATLAB", RULES[one.kind].portable.matlab)
     content = {"kind": one.kind, **numbers_of(one), "domain": np.array(one.domain)}
-    if one.continuation is not None:
-        content["continuation"] = vars(one.continuation)
+    if one.extrapolation is not None:
+        content["extrapolation"] = vars(one.extrapolation)
     return content
 
 

@@ -21,7 +21,7 @@ import numpy as np
 
 from hwid_cli.model import scores, sensitivities, static_map
 from hwid_cli.model.candidates import Candidate
-from hwid_cli.model.extrapolation import continued
+from hwid_cli.model.extrapolation import extrapolated
 from hwid_cli.model.levenberg_marquardt import Search
 from hwid_cli.model.linear_block import poles
 from hwid_cli.model.map_curve import map_curve
@@ -142,7 +142,7 @@ def described(
         )
     deviation = scores.rmsd(measured, simulated)
     u, x = reaching(candidate, experiments)
-    model = continued(replace(candidate.model, free_response=first), u, x)
+    model = extrapolated(replace(candidate.model, free_response=first), u, x)
     turns = turning_points(
         model.output_map, least=_TOLD * deviation, between=_usual_range(x)
     )

@@ -2,7 +2,7 @@
 
 A recording of a step visits two levels of a map. What a search leaves between and
 beyond them is chance, and a polynomial or a network may be anywhere there. So every
-map gets the simplest continuation that the samples do not contradict. Arguments that
+map gets the simplest extrapolation that the samples do not contradict. Arguments that
 samples visited form stretches; in a stretch the law of the map's kind holds. Two
 neighbouring stretches are joined by a straight line. Beyond the outermost ones the
 local slope goes on as far as the samples tell it, and then the map returns to the
@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hwid_cli.model.static_map import RULES, evaluate, outlined
-from hwid_cli.records.maps import MAP_KINDS, Continuation, StaticMap
+from hwid_cli.records.maps import MAP_KINDS, Extrapolation, StaticMap
 from hwid_cli.records.model import HammersteinWiener
 
 # Share of the range: a distance between neighbouring samples above it is a gap.
@@ -31,7 +31,7 @@ _LEVEL = 1e-6
 
 
 @dataclass(frozen=True)
-class ContinuationRule:
+class ExtrapolationRule:
     """Distances of the rule by which maps go on.
 
     Parameters
@@ -47,15 +47,15 @@ class ContinuationRule:
     back: float = 1.0 / 8.0
 
 
-_RULE = ContinuationRule()
+_RULE = ExtrapolationRule()
 
 
-def continued(
+def extrapolated(
     model: HammersteinWiener,
     u: np.ndarray,
     x: np.ndarray,
     *,
-    rule: ContinuationRule = _RULE,
+    rule: ExtrapolationRule = _RULE,
 ) -> HammersteinWiener:
     """Same model on the data of its fit, with maps that go on simply elsewhere.
 
@@ -66,13 +66,13 @@ def continued(
     """
     return replace(
         model,
-        input_map=continued_map(model.input_map, u, rule=rule),
-        output_map=continued_map(model.output_map, x, rule=rule),
+        input_map=extrapolated_map(model.input_map, u, rule=rule),
+        output_map=extrapolated_map(model.output_map, x, rule=rule),
     )
 
 
-def continued_map(
-    one: StaticMap, argument: np.ndarray, *, rule: ContinuationRule = _RULE
+def extrapolated_map(
+    one: StaticMap, argument: np.ndarray, *, rule: ExtrapolationRule = _RULE
 ) -> StaticMap:
     """Same map where samples were, the simplest lines elsewhere.
 
@@ -93,14 +93,14 @@ def continued_map(
     Examples
     --------
     >>> steep = StaticMap("polynomial", np.array([0.0, 1.0, 0.0, 9.0]), (-1.0, 1.0))
-    >>> one = continued_map(steep, np.array([-1.0, 1.0]))
+    >>> one = extrapolated_map(steep, np.array([-1.0, 1.0]))
     >>> evaluate(one, np.array([-3.0, 0.5, 3.0]))
     array([-30.,   5.,  30.])
     """
     kind = RULES[one.kind]
     if kind.is_identity or MAP_KINDS[one.kind].has_function:
         return one
-    plain = replace(one, continuation=None)
+    plain = replace(one, extrapolation=None)
     if not np.isfinite(argument).all() or np.ptp(argument) == 0.0:
         return plain
     visited = stretches(argument)
@@ -110,7 +110,7 @@ def continued_map(
     line = _line(argument, evaluate(plain, argument))
     between = np.unique(visited)
     points = [between, evaluate(plain, between)]
-    bridged = replace(plain, continuation=Continuation(visited.ravel(), *points))
+    bridged = replace(plain, extrapolation=Extrapolation(visited.ravel(), *points))
     for is_known, side in ((below, -1.0), (above, 1.0)):
         ahead = (
             _law_ahead(plain, visited, side)
@@ -119,7 +119,7 @@ def continued_map(
         )
         pair = (ahead, points) if side < 0.0 else (points, ahead)
         points = [np.concatenate(parts) for parts in zip(*pair, strict=True)]
-    return replace(plain, continuation=Continuation(visited.ravel(), *points))
+    return replace(plain, extrapolation=Extrapolation(visited.ravel(), *points))
 
 
 def stretches(argument: np.ndarray) -> np.ndarray:
@@ -163,7 +163,7 @@ def _line_ahead(
     argument: np.ndarray,
     side: float,
     line: tuple[float, float],
-    rule: ContinuationRule,
+    rule: ExtrapolationRule,
 ) -> list[np.ndarray]:
     """Points beyond one end: the local slope goes on, then back to the line.
 
@@ -225,8 +225,8 @@ def for_search(model: HammersteinWiener) -> HammersteinWiener:
     """Same model on the data of its fit, nothing but parameters in its maps."""
     return replace(
         model,
-        input_map=replace(model.input_map, continuation=None),
-        output_map=replace(model.output_map, continuation=None),
+        input_map=replace(model.input_map, extrapolation=None),
+        output_map=replace(model.output_map, extrapolation=None),
     )
 
 
@@ -239,7 +239,7 @@ def outlined_model(model: HammersteinWiener) -> HammersteinWiener:
         Values to the last bit as before.
     """
     maps = (model.input_map, model.output_map)
-    if all(one.continuation is None for one in maps):
+    if all(one.extrapolation is None for one in maps):
         return model
     return replace(
         model,

@@ -19,7 +19,7 @@ from hwid_cli.model.maps.piecewise_linear import (
     piecewise_linear_value,
 )
 from hwid_cli.model.maps.rule import Derivatives, MapRule, Shape
-from hwid_cli.records.maps import MAP_KINDS, Continuation, MapOptions, StaticMap
+from hwid_cli.records.maps import MAP_KINDS, Extrapolation, MapOptions, StaticMap
 
 RULES: dict[str, MapRule] = {
     kind: import_module(f"hwid_cli.model.maps.{kind}").RULE for kind in MAP_KINDS
@@ -47,8 +47,8 @@ def evaluate(static_map: StaticMap, argument: np.ndarray) -> np.ndarray:
     array([-2.,  0.,  3.])
     """
     rule = RULES[static_map.kind]
-    if static_map.continuation is not None:
-        return _continued(static_map, argument, rule.evaluate)
+    if static_map.extrapolation is not None:
+        return _extrapolated(static_map, argument, rule.evaluate)
     return rule.evaluate(static_map, argument)
 
 
@@ -75,20 +75,20 @@ def evaluate_repeatably(static_map: StaticMap, argument: np.ndarray) -> np.ndarr
     """
     rule = RULES[static_map.kind]
     law = rule.repeatable or rule.evaluate
-    if static_map.continuation is not None:
-        return _continued(static_map, argument, law)
+    if static_map.extrapolation is not None:
+        return _extrapolated(static_map, argument, law)
     return law(static_map, argument)
 
 
-def _continued(
+def _extrapolated(
     one: StaticMap, argument: np.ndarray, law: Callable[..., np.ndarray]
 ) -> np.ndarray:
     """Value by the law where samples were, by straight lines elsewhere."""
     one = RULES[one.kind].outlined(one)
     argument = np.ascontiguousarray(argument, dtype=float)
-    if one.continuation is None:
+    if one.extrapolation is None:
         return law(one, argument)
-    lines = one.continuation
+    lines = one.extrapolation
     value = piecewise_linear_value(argument, lines.arguments, lines.values)
     inside = is_visited(one, argument)
     value[inside] = law(one, argument[inside])
@@ -105,12 +105,12 @@ def is_visited(one: StaticMap, argument: np.ndarray) -> np.ndarray:
     Returns
     -------
     ndarray of bool, shape (n,)
-        True everywhere for a map without a continuation.
+        True everywhere for a map without an extrapolation.
     """
-    if one.continuation is None:
+    if one.extrapolation is None:
         return np.ones(argument.shape, dtype=bool)
     inside = np.zeros(argument.shape, dtype=bool)
-    for low, high in one.continuation.stretches:
+    for low, high in one.extrapolation.stretches:
         inside |= (argument >= low) & (argument <= high)
     return inside
 
@@ -158,12 +158,12 @@ def derivatives(
     Returns
     -------
     Derivatives
-        Value and slope are also right where a map is continued; the parameters' columns
+        Value and slope are also right where a map is extrapolated; the parameters' columns
         are those of the law.
     """
     rule = RULES[static_map.kind]
-    if static_map.continuation is not None:
-        return _continued_derivatives(static_map, argument, with_positions)
+    if static_map.extrapolation is not None:
+        return _extrapolated_derivatives(static_map, argument, with_positions)
     if rule.derivatives is not None:
         return rule.derivatives(static_map, argument, with_positions)
     active = active_parameters(static_map, with_positions=with_positions)
@@ -174,13 +174,13 @@ def derivatives(
     return Derivatives(value, slope, first, shares, count)
 
 
-def _continued_derivatives(
+def _extrapolated_derivatives(
     one: StaticMap, argument: np.ndarray, with_positions: bool
 ) -> Derivatives:
     one = RULES[one.kind].outlined(one)
-    law = replace(one, continuation=None)
+    law = replace(one, extrapolation=None)
     found = derivatives(law, argument, with_positions=with_positions)
-    lines = one.continuation
+    lines = one.extrapolation
     if lines is None:
         return found
     value, slope, _ = piecewise_linear(argument, lines.arguments, lines.values)
@@ -288,7 +288,7 @@ def stretch(static_map: StaticMap, factor: float) -> StaticMap:
     """
     low, high = static_map.domain
     domain = (low * factor, high * factor)
-    function, lines = static_map.function, static_map.continuation
+    function, lines = static_map.function, static_map.extrapolation
     if function is not None:
         # Nobody knows the units of its parameters: the function keeps its own.
         kept = replace(function, unit=function.unit * factor)
@@ -298,8 +298,8 @@ def stretch(static_map: StaticMap, factor: float) -> StaticMap:
         static_map,
         parameters=static_map.parameters * factor,
         domain=domain,
-        continuation=lines
-        and Continuation(
+        extrapolation=lines
+        and Extrapolation(
             lines.visited * factor, lines.arguments * factor, lines.values * factor
         ),
     )
@@ -311,7 +311,7 @@ def outlined(static_map: StaticMap) -> StaticMap:
     Returns
     -------
     StaticMap
-        A piecewise linear map has the lines of its continuation as segments; other kinds
+        A piecewise linear map has the lines of its extrapolation as segments; other kinds
         come back as they are.
     """
     return RULES[static_map.kind].outlined(static_map)

@@ -144,7 +144,7 @@ class MapOptions:
 
 
 @dataclass(frozen=True, eq=False)
-class Continuation:
+class Extrapolation:
     """What a map does where its fit had no samples: straight lines from point to point.
 
     Parameters
@@ -172,7 +172,7 @@ class Continuation:
             raise ValueError(f"visited must be pairs, got {self.visited.size} numbers")
         if self.arguments.size < 2 or self.values.size != self.arguments.size:
             raise ValueError(
-                f"a continuation needs as many values as arguments, at least two, got "
+                f"an extrapolation needs as many values as arguments, at least two, got "
                 f"{self.values.size} and {self.arguments.size}"
             )
         falls = (np.diff(self.visited) < 0.0).any()
@@ -207,7 +207,7 @@ class StaticMap:
         Range of the argument in the fit; outside it the map extrapolates.
     function : OwnFunction or None
         Only with ``own_function``.
-    continuation : Continuation or None
+    extrapolation : Extrapolation or None
         What the map does where its fit had no samples; None where the law of its kind
         holds everywhere.
     """
@@ -216,7 +216,7 @@ class StaticMap:
     parameters: np.ndarray
     domain: tuple[float, float] = (-1.0, 1.0)
     function: OwnFunction | None = None
-    continuation: Continuation | None = None
+    extrapolation: Extrapolation | None = None
 
     def __post_init__(self) -> None:
         if self.kind not in MAP_KINDS:

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.signal import lfilter
 
-from hwid_cli.model.extrapolation import ContinuationRule, continued, for_search
+from hwid_cli.model.extrapolation import ExtrapolationRule, extrapolated, for_search
 from hwid_cli.model.fit import fit, fit_without_standard_errors
 from hwid_cli.model.linear_block import filtered, free_response
 from hwid_cli.model.scores import rmsd
@@ -47,7 +47,7 @@ def by_rule(trust: float, back: float) -> Way:
         steady = bare.initial_state == "steady"
         x = filtered(w, bare.numerator, bare.denominator, bare.delay, steady=steady)
         x = x + free_response(estimated_state(bare, own), bare.denominator, x.size)
-        return continued(bare, own.input, x, rule=ContinuationRule(trust, back))
+        return extrapolated(bare, own.input, x, rule=ExtrapolationRule(trust, back))
 
     return way
 
@@ -217,7 +217,7 @@ def larger(plant: WidePlant, gain: float, seed: int) -> Recording:
 
 
 def of_larger_inputs(count: int) -> None:
-    """Error beyond the data of plants whose continuation is known."""
+    """Error beyond the data of plants whose extrapolation is known."""
     errors: dict[float, list[list[float]]] = {gain: [] for gain in GAINS}
     for seed in range(count):
         plant = wide_plant(seed)

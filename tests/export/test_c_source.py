@@ -37,10 +37,13 @@ def check(folder, model, seed):
 
 
 @pytest.mark.parametrize("place", range(0, len(KINDS), 2))
-@pytest.mark.parametrize("is_continued", [False, True])
-def test_the_program_predicts_as_hwid_does(place, is_continued, tmp_path):
+@pytest.mark.parametrize("is_extrapolated", [False, True])
+def test_the_program_predicts_as_hwid_does(place, is_extrapolated, tmp_path):
     kinds = (KINDS[place], KINDS[place - 1])
-    rule, seed = ("zero", "steady", "estimated")[place // 2 % 3], place + is_continued
+    rule, seed = (
+        ("zero", "steady", "estimated")[place // 2 % 3],
+        place + is_extrapolated,
+    )
     model = example_model(seed, kinds=kinds, nb=3, nf=4, nk=place // 2, rule=rule)
 
     check(tmp_path, model, place)

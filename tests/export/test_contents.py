@@ -86,8 +86,8 @@ def test_an_exported_map_needs_nothing_but_its_break_points_and_values():
     card = ModelCard("a/2/2", "A", Columns("u", "y"), (low, high))
     exported = completed(card, model)
 
-    assert model.input_map.continuation is not None
-    assert exported.model.input_map.continuation is None
+    assert model.input_map.extrapolation is not None
+    assert exported.model.input_map.extrapolation is None
     assert simulate(exported.model, u).tolist() == simulate(model, u).tolist()
 
 

@@ -216,20 +216,20 @@ FAULTS = {
     "lengths": (change("input_map.values", [1.0] * 9), "expected as many values"),
     "domain": (change("input_map.domain", [1.0, 1.0]), "domain: found [1.0, 1.0]"),
     "widths": (change("output_map.widths", [0.0]), "numbers above 0"),
-    "continuation": (
-        change("output_map.continuation.arguments", [1.0, 0.0]),
-        "output_map.continuation.arguments: found [1.0, 0.0]; expected numbers that rise",
+    "extrapolation": (
+        change("output_map.extrapolation.arguments", [1.0, 0.0]),
+        "output_map.extrapolation.arguments: found [1.0, 0.0]; expected numbers that rise",
     ),
-    "continued values": (
-        change("output_map.continuation.values", [1.0, 0.0]),
-        "output_map.continuation.values: found 2 numbers; expected 10, one an argument",
+    "extrapolated values": (
+        change("output_map.extrapolation.values", [1.0, 0.0]),
+        "output_map.extrapolation.values: found 2 numbers; expected 10, one an argument",
     ),
     "visited": (
-        change("output_map.continuation.visited", [1.0, 0.0]),
+        change("output_map.extrapolation.visited", [1.0, 0.0]),
         "visited: found [1.0, 0.0]; expected pairs of rising numbers",
     ),
     "half a stretch": (
-        change("output_map.continuation.visited", [1.0, 2.0, 3.0]),
+        change("output_map.extrapolation.visited", [1.0, 2.0, 3.0]),
         "visited: found [1.0, 2.0, 3.0]; expected pairs of rising numbers",
     ),
     "range": (change("input_range", [1.0]), "input_range: found [1.0]"),

@@ -83,5 +83,5 @@ def test_break_points_and_values_alone_give_the_same_to_the_last_bit(fitted):
     u = np.linspace(-4.0, 4.0, 200)
     plain = outlined_model(fitted.model)
 
-    assert plain.input_map.continuation is None
+    assert plain.input_map.extrapolation is None
     assert simulate(plain, u).tolist() == simulate(fitted.model, u).tolist()

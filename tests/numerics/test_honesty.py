@@ -37,7 +37,7 @@ def output_by_hand(model, current):
 
     def through(table, values):
         law = np.split(table.parameters, 2)
-        lines = table.continuation
+        lines = table.extrapolation
         beyond = (lines.arguments, lines.values)
         inside = np.any(
             [(values >= low) & (values <= high) for low, high in lines.stretches],
@@ -84,11 +84,11 @@ def test_a_bias_in_the_scoring_is_seen(fits, data, bias, monkeypatch):
 def test_an_offset_of_the_model_shows_with_its_closed_form(fits, data, bias):
     model = fits[0].model
     xs, ys = np.split(model.output_map.parameters, 2)
-    lines = model.output_map.continuation
+    lines = model.output_map.extrapolation
     table = replace(
         model.output_map,
         parameters=np.r_[xs, ys + bias],
-        continuation=replace(lines, values=lines.values + bias),
+        extrapolation=replace(lines, values=lines.values + bias),
     )
     biased = replace(fits[0], model=replace(model, output_map=table))
     found = validated([biased, *fits[1:]], data).rmsd[0, 0, 0]

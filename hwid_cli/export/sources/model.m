@@ -41,13 +41,13 @@ end
 
 function v = evaluate(map, v)
 % Value of a static map for a column v.
-if ~isfield(map, 'continuation')
+if ~isfield(map, 'extrapolation')
     v = law(map, v);
     return
 end
 % The law holds where the data of the fit were, straight lines elsewhere.
 at = v;
-lines = map.continuation;
+lines = map.extrapolation;
 v = interp1(lines.arguments(:), lines.values(:), at, 'linear', 'extrap');
 inside = false(size(at));
 for i = 1:2:numel(lines.visited)

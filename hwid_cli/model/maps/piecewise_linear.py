@@ -53,7 +53,7 @@ def break_points_and_values(static_map: StaticMap) -> tuple[np.ndarray, np.ndarr
 
 
 def outlined(static_map: StaticMap) -> StaticMap:
-    """Same map with nothing but break-points and values, also where it is continued.
+    """Same map with nothing but break-points and values, also where it is extrapolated.
 
     Parameters
     ----------
@@ -63,16 +63,16 @@ def outlined(static_map: StaticMap) -> StaticMap:
     Returns
     -------
     StaticMap
-        Itself where it is not continued.
+        Itself where it is not extrapolated.
 
     Examples
     --------
     >>> one = StaticMap("piecewise_linear", np.array([0.0, 1, 2, 0, 5, 2]), (0.0, 2.0))
-    >>> lines = Continuation([0.0, 0.5], [0.0, 0.5, 2.0], [0.0, 2.5, 2.0])
-    >>> outlined(replace(one, continuation=lines)).parameters
+    >>> lines = Extrapolation([0.0, 0.5], [0.0, 0.5, 2.0], [0.0, 2.5, 2.0])
+    >>> outlined(replace(one, extrapolation=lines)).parameters
     array([0. , 0.5, 2. , 0. , 2.5, 2. ])
     """
-    lines = static_map.continuation
+    lines = static_map.extrapolation
     if lines is None:
         return static_map
     points, values = break_points_and_values(static_map)
@@ -88,7 +88,7 @@ def outlined(static_map: StaticMap) -> StaticMap:
     return replace(
         static_map,
         parameters=np.concatenate([points[order], values[order]]),
-        continuation=None,
+        extrapolation=None,
     )
 
 

@@ -3,12 +3,12 @@ import pytest
 from scipy.signal import lfilter
 
 from hwid_cli.model import static_map
-from hwid_cli.model.extrapolation import continued_map, for_search
+from hwid_cli.model.extrapolation import extrapolated_map, for_search
 from hwid_cli.model.fit import fit
 from hwid_cli.model.normalise import normalise
 from hwid_cli.model.scores import rmsd
 from hwid_cli.model.simulate import simulate, validation_output
-from hwid_cli.records.maps import Continuation
+from hwid_cli.records.maps import Extrapolation
 from hwid_cli.records.model import FitOptions, HammersteinWiener, Orders, StaticMap
 from hwid_cli.records.recordings import Recording
 from tests.model.plants import MAPS
@@ -33,7 +33,7 @@ def test_a_step_on_a_line_gives_the_line_whatever_the_search_left_between_the_le
     one = StaticMap("piecewise_linear", np.r_[points, left], (-0.01, 2.01))
     at = np.linspace(-4.0, 6.0, 301)
 
-    found = static_map.evaluate(continued_map(one, levels(0.0, 2.0)), at)
+    found = static_map.evaluate(extrapolated_map(one, levels(0.0, 2.0)), at)
 
     np.testing.assert_allclose(found, 3.0 * at, rtol=1e-9, atol=1e-9)
 
@@ -44,7 +44,7 @@ def test_a_slope_inside_a_cluster_of_samples_is_not_carried_through_a_gap():
     one = StaticMap(
         "piecewise_linear", np.r_[points, -0.01, 0.01, 2.4, 1.6], (-0.01, 2.01)
     )
-    found = continued_map(one, levels(0.0, 2.0))
+    found = extrapolated_map(one, levels(0.0, 2.0))
 
     # By hand: from (0.01, 0.01) to (1.99, 2.4).
     assert value(found, 1.0) == pytest.approx([0.01 + 0.5 * 2.39])
@@ -60,7 +60,7 @@ def test_nothing_changes_where_samples_are(kind):
     domain = (argument.min(), argument.max())
     one = static_map.RULES[kind].with_domain(one, domain)
 
-    found = continued_map(one, argument)
+    found = extrapolated_map(one, argument)
 
     np.testing.assert_allclose(
         static_map.evaluate(found, argument),
@@ -74,7 +74,7 @@ def test_nothing_changes_where_samples_are(kind):
 def test_between_stretches_of_samples_every_kind_is_a_straight_line(kind):
     argument = levels(-2.0, 0.5, 2.2)
     one = static_map.RULES[kind].with_domain(MAPS[kind], (-2.01, 2.21))
-    found = continued_map(one, argument)
+    found = extrapolated_map(one, argument)
     at = np.linspace(-1.99, 0.49, 50)
 
     ends = value(one, argument[:200].max(), argument[200:400].min())
@@ -89,7 +89,7 @@ def test_far_beyond_the_data_every_kind_is_the_line_through_its_samples(kind):
     argument = np.random.default_rng(4).normal(0.0, 1.0, 500)
     domain = (argument.min(), argument.max())
     one = static_map.RULES[kind].with_domain(MAPS[kind], domain)
-    found = continued_map(one, argument)
+    found = extrapolated_map(one, argument)
     at = np.array([-100.0, -30.0, 30.0, 100.0])
 
     slope, offset = np.polyfit(argument, static_map.evaluate(one, argument), 1)
@@ -104,7 +104,7 @@ BENT = StaticMap("piecewise_linear", np.array([0.0, 1, 8, 0, 1, 22]), (0.0, 8.0)
 
 def test_a_slope_that_even_samples_tell_goes_on_for_twice_their_range():
     argument = np.linspace(0.0, 8.0, 8001)
-    found = continued_map(BENT, argument)
+    found = extrapolated_map(BENT, argument)
     line = np.polyfit(argument, static_map.evaluate(BENT, argument), 1)
 
     # To 8 + 16, then to the line over another 1; by hand 22 + 3 * 16 = 70.
@@ -120,14 +120,14 @@ def test_a_slope_is_trusted_less_the_less_samples_spread():
     # even spread, 1/12: 12 (0.1 * 0.9 * 0.5**2 + 0.1 / 12) = 0.37.
     moving = np.linspace(0.0, 8.0, 8001)
     argument = np.concatenate([moving, np.full(9000, 8.0)])
-    last = continued_map(BENT, argument).continuation.arguments[-3]
+    last = extrapolated_map(BENT, argument).extrapolation.arguments[-3]
 
     assert last == pytest.approx(8.0 + 16.0 * (12 * 0.0225 + 0.1), rel=1e-3)
 
 
 def test_a_limit_that_samples_crossed_stays_a_limit():
     one = StaticMap("saturation", np.array([-1.2, 1.5]), (-1.0, 2.0))
-    found = continued_map(one, np.linspace(-1.0, 2.0, 301))
+    found = extrapolated_map(one, np.linspace(-1.0, 2.0, 301))
 
     assert value(found, 1.6, 2.0, 50.0) == pytest.approx([1.5, 1.5, 1.5])
     # Nothing was seen of the lower limit: slope one goes on where it would clip.
@@ -137,7 +137,7 @@ def test_a_limit_that_samples_crossed_stays_a_limit():
 
 def test_a_dead_zone_left_on_both_sides_stays_what_it_is_everywhere():
     one = StaticMap("dead_zone", np.array([-0.6, 0.4]), (-2.0, 2.0))
-    found = continued_map(one, np.linspace(-2.0, 2.0, 301))
+    found = extrapolated_map(one, np.linspace(-2.0, 2.0, 301))
     at = np.linspace(-90.0, 90.0, 181)
 
     np.testing.assert_allclose(
@@ -147,14 +147,14 @@ def test_a_dead_zone_left_on_both_sides_stays_what_it_is_everywhere():
 
 @pytest.mark.parametrize("kind", ["none", "own_function"])
 def test_laws_of_the_user_stay(kind):
-    assert continued_map(MAPS[kind], levels(0.0, 2.0)) is MAPS[kind]
+    assert extrapolated_map(MAPS[kind], levels(0.0, 2.0)) is MAPS[kind]
 
 
 @pytest.mark.parametrize("kind", SHAPED)
 def test_slope_and_value_of_the_derivatives_are_those_of_the_continued_map(kind):
     argument = levels(-2.0, 0.5, 2.2)
     one = static_map.RULES[kind].with_domain(MAPS[kind], (-2.01, 2.21))
-    found = static_map.outlined(continued_map(one, argument))
+    found = static_map.outlined(extrapolated_map(one, argument))
     at, step = np.array([-9.0, -1.0, 1.5, 2.8, 7.0]), 1e-6
 
     seen = static_map.derivatives(found, at, with_positions=False)
@@ -169,7 +169,7 @@ def test_slope_and_value_of_the_derivatives_are_those_of_the_continued_map(kind)
 @pytest.mark.parametrize("kind", SHAPED)
 def test_a_continued_map_in_another_unit_is_the_same_map(kind):
     argument = levels(-2.0, 0.5, 2.2)
-    one = continued_map(MAPS[kind], argument)
+    one = extrapolated_map(MAPS[kind], argument)
     at = np.linspace(-9.0, 9.0, 101)
 
     np.testing.assert_allclose(
@@ -181,11 +181,11 @@ def test_a_continued_map_in_another_unit_is_the_same_map(kind):
 
 
 def test_a_search_sees_nothing_of_it():
-    one = continued_map(MAPS["polynomial"], levels(-2.0, 0.5, 2.2))
+    one = extrapolated_map(MAPS["polynomial"], levels(-2.0, 0.5, 2.2))
     plain = static_map.move(one, np.zeros(one.parameters.size))
 
-    assert one.continuation is not None
-    assert plain.continuation is None
+    assert one.extrapolation is not None
+    assert plain.extrapolation is None
 
 
 @pytest.mark.parametrize(
@@ -197,9 +197,9 @@ def test_a_search_sees_nothing_of_it():
         ([0.0, 1.0], [0.0, 1.0], [0.0], "as many values"),
     ],
 )
-def test_a_continuation_checks_itself(visited, arguments, values, match):
+def test_a_extrapolation_checks_itself(visited, arguments, values, match):
     with pytest.raises(ValueError, match=match):
-        Continuation(np.array(visited), np.array(arguments), np.array(values))
+        Extrapolation(np.array(visited), np.array(arguments), np.array(values))
 
 
 # A second-order servo with a dead zone at its input.
@@ -238,9 +238,9 @@ def test_models_of_a_step_stay_near_their_linear_model_on_other_steps(kind):
     assert np.isfinite(simulate(found.model, np.linspace(-9.0, 9.0, 50))).all()
 
 
-def test_a_model_is_normalised_before_it_is_continued():
-    one = continued_map(MAPS["polynomial"], levels(-2.0, 0.5, 2.2))
+def test_a_model_is_normalised_before_it_is_extrapolated():
+    one = extrapolated_map(MAPS["polynomial"], levels(-2.0, 0.5, 2.2))
     model = HammersteinWiener(one, np.ones(1), np.ones(1), 0, one, 1e-3)
 
-    with pytest.raises(ValueError, match="before its maps are continued"):
+    with pytest.raises(ValueError, match="before its maps are extrapolated"):
         normalise(model)
