@@ -10,7 +10,7 @@ straight line through all samples.
 
 References
 ----------
-docs/method.md, section "Beyond the data".
+docs/method.md, section "Extrapolation (beyond the data)".
 """
 
 from dataclasses import dataclass, replace
