@@ -90,7 +90,7 @@ bench-starts: $(DEV)  ## the search without each of its parts in turn: two minut
 bench-search: $(DEV)  ## the whole search for groups of the thesis: half an hour
 	@$(BENCH).bench_search
 
-bench-beyond: $(DEV)  ## extrapolation of maps beyond the data of their fit: two minutes
+bench-beyond: $(DEV)  ## how far models hold beyond the recording of their fit: ten minutes
 	@$(BENCH).bench_beyond
 
 bench-maps: $(DEV)  ## maps of the default size against maps chosen by the data: seven minutes

@@ -136,6 +136,32 @@ def numbers(values: Iterable[float]) -> str:
 
 def _map(side: str, one: StaticMap) -> str:
     text = language_text(side, one, "C", portable(one.kind).c)
+    if one.extrapolation is None:
+        return _law(side, one, text)
+    lines = one.extrapolation
+    # The straight lines are a map of another kind.
+    straight = StaticMap(
+        "piecewise_linear", np.concatenate([lines.arguments, lines.values])
+    )
+    law = text.replace("@side@_map(", "@side@_law(")
+    return "\n".join(
+        [
+            _law(side, one, law),
+            _law(f"{side}_beyond", straight, portable(straight.kind).c or ""),
+            filled(
+                "extrapolated.c",
+                {
+                    "side": side,
+                    "visited": numbers(lines.visited),
+                    "count": len(lines.stretches),
+                },
+            ),
+        ]
+    )
+
+
+def _law(side: str, one: StaticMap, text: str) -> str:
+    """A map by the law of its kind alone."""
     parts = numbers_of(one)
     return _filled(
         text,

@@ -26,7 +26,7 @@ from hwid_cli.records.exported import (
     ExportedSimulation,
     ModelCard,
 )
-from hwid_cli.records.maps import OwnFunction, StaticMap
+from hwid_cli.records.maps import Extrapolation, OwnFunction, StaticMap
 from hwid_cli.records.model import HammersteinWiener
 
 
@@ -99,6 +99,7 @@ def _map(path: Path, content: Mapping[str, Any], key: str) -> StaticMap:
         np.concatenate(numbers) if numbers else np.zeros(0),
         (float(domain[0]), float(domain[1])),
         function and OwnFunction(**{**function, "unit": float(function["unit"])}),
+        _extrapolation(path, given.get("extrapolation"), key),
     )
     _check_sizes(path, key, one, numbers)
     for part in form.derived_parts:
@@ -107,6 +108,24 @@ def _map(path: Path, content: Mapping[str, Any], key: str) -> StaticMap:
             expected = f"{size}, one a value"
             refuse(path, (key, part.name), f"{found} numbers", expected)
     return one
+
+
+def _extrapolation(
+    path: Path, given: Mapping[str, Any] | None, key: str
+) -> Extrapolation | None:
+    """What a map does where its fit had no samples; None where the law holds."""
+    if given is None:
+        return None
+    visited, arguments = _vector(given["visited"]), _vector(given["arguments"])
+    values, place = _vector(given["values"]), (key, "extrapolation")
+    if visited.size % 2 or (np.diff(visited) < 0.0).any():
+        refuse(path, (*place, "visited"), visited.tolist(), "pairs of rising numbers")
+    if not (np.diff(arguments) > 0.0).all():
+        refuse(path, (*place, "arguments"), arguments.tolist(), "numbers that rise")
+    if values.size != arguments.size:
+        expected = f"{arguments.size}, one an argument"
+        refuse(path, (*place, "values"), f"{values.size} numbers", expected)
+    return Extrapolation(visited, arguments, values)
 
 
 def _part(path: Path, given: Mapping[str, Any], key: str, part: Part) -> np.ndarray:

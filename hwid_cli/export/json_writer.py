@@ -89,6 +89,9 @@ def _map(one: StaticMap) -> dict[str, Any]:
     content["domain"] = [float(edge) for edge in one.domain]
     if one.function is not None:
         content["function"] = asdict(one.function)
+    if one.extrapolation is not None:
+        lines = vars(one.extrapolation)
+        content["extrapolation"] = {name: part.tolist() for name, part in lines.items()}
     return content
 
 

@@ -94,6 +94,34 @@ def _schema_of(kind: str) -> dict[str, Any]:
         "Range of the argument in the fit; outside it the map extrapolates.", 2, 2
     )
     return {
+        "properties": {
+            **properties,
+            "extrapolation": {"$ref": "#/$defs/extrapolation"},
+        },
+        "required": list(properties),
+        "additionalProperties": False,
+    }
+
+
+def extrapolation_schema() -> dict[str, Any]:
+    """What a file says of a map where its fit had no samples, as JSON Schema."""
+    properties = {
+        "visited": _array(
+            "First and last argument of each stretch that samples visited, one after the "
+            "other, rising: there the law of the kind holds.",
+            2,
+        ),
+        "arguments": _array("Rising arguments of the points.", 2),
+        "values": _array(
+            "Value at each of them. Elsewhere the map is the straight lines between the "
+            "points; the first and the last line go on.",
+            2,
+        ),
+    }
+    return {
+        "type": "object",
+        "description": "What a map does where its fit had no samples; without it the law "
+        "of its kind holds everywhere.",
         "properties": properties,
         "required": list(properties),
         "additionalProperties": False,

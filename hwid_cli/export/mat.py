@@ -92,7 +92,10 @@ def _variables(exported: ExportedModel) -> dict[str, Any]:
 
 def _map(side: str, one: StaticMap) -> dict[str, Any]:
     language_text(side, one, "MATLAB", RULES[one.kind].portable.matlab)
-    return {"kind": one.kind, **numbers_of(one), "domain": np.array(one.domain)}
+    content = {"kind": one.kind, **numbers_of(one), "domain": np.array(one.domain)}
+    if one.extrapolation is not None:
+        content["extrapolation"] = vars(one.extrapolation)
+    return content
 
 
 def _map_text() -> dict[str, str]:

@@ -21,13 +21,12 @@ import numpy as np
 
 from hwid_cli.model import scores, sensitivities, static_map
 from hwid_cli.model.candidates import Candidate
-from hwid_cli.model.extrapolation import continued
+from hwid_cli.model.extrapolation import extrapolated
 from hwid_cli.model.levenberg_marquardt import Search
 from hwid_cli.model.linear_block import poles
 from hwid_cli.model.map_curve import map_curve
 from hwid_cli.model.normalise import normalise, rescaled
-from hwid_cli.model.placing import with_maps
-from hwid_cli.model.points import before_output_map, point_of
+from hwid_cli.model.placing import reaching, with_maps
 from hwid_cli.model.problem import FitProblem, joined
 from hwid_cli.model.uncertainty import NOT_WORKED_OUT, parameter_statistics
 from hwid_cli.records.model import Fit, FitOptions, StaticMap
@@ -142,14 +141,15 @@ def described(
             free_break_points=blank.options.free_break_points,
         )
     deviation = scores.rmsd(measured, simulated)
-    x = before_output_map(point_of(candidate), experiments)
+    u, x = reaching(candidate, experiments)
+    model = extrapolated(replace(candidate.model, free_response=first), u, x)
     turns = turning_points(
-        candidate.model.output_map, least=_TOLD * deviation, between=_usual_range(x)
+        model.output_map, least=_TOLD * deviation, between=_usual_range(x)
     )
     return replace(
         blank,
         orders=candidate.model.orders,
-        model=continued(replace(candidate.model, free_response=first)),
+        model=model,
         status=search.status,
         message=search.message,
         iterations=search.iterations,

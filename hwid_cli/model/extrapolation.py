@@ -1,57 +1,237 @@
-"""How piecewise linear maps go on where the data end.
+"""How static maps go on where their fit had no samples: in gaps and beyond the data.
 
-A fit puts break-points close to the ends of the data where it serves the fit, and a
-segment as narrow as that says nothing about the way ahead. Beyond the data a map goes on
-with its mean slope over the outer eighth of them.
+A recording of a step visits two levels of a map. What a search leaves between and
+beyond them is chance, and a polynomial or a network may be anywhere there. So every
+map gets the simplest extrapolation that the samples do not contradict. Arguments that
+samples visited form stretches; in a stretch the law of the map's kind holds. Two
+neighbouring stretches are joined by a straight line. Beyond the outermost ones the
+local slope goes on as far as the samples tell it, and then the map returns to the
+straight line through all samples.
 
 References
 ----------
-docs/method.md, section "Beyond the data".
+docs/method.md, section "Extrapolation (beyond the data)".
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hwid_cli.model.static_map import evaluate, outlined
-from hwid_cli.records.maps import MAP_KINDS, StaticMap
+from hwid_cli.model.static_map import RULES, evaluate, outlined
+from hwid_cli.records.maps import MAP_KINDS, Extrapolation, StaticMap
 from hwid_cli.records.model import HammersteinWiener
 
-# Share of the domain over which the mean slope is taken.
-_OUTER = 1.0 / 8.0
+# Share of the range: a distance between neighbouring samples above it is a gap.
+_GAP = 0.05
+# Share of the range over which a local slope is taken: an outermost segment alone may be
+# a hundredth of it. Deeper, up to half, where fewer samples than these lie in it.
+_OUTER, _DEEPEST, _ENOUGH = 1.0 / 8.0, 0.5, 20
+# Share of the range below which a distance is none.
+_LEVEL = 1e-6
 
 
-def continued(model: HammersteinWiener, *, outer: float = _OUTER) -> HammersteinWiener:
-    """Same model on the data of its fit, its maps going on straight beyond them.
+@dataclass(frozen=True)
+class ExtrapolationRule:
+    """Distances of the rule by which maps go on.
 
     Parameters
     ----------
-    outer : float, [-]
-        Share of the domain over which the mean slope is taken.
+    trust : float, [-]
+        Ranges over which a local slope goes on where samples spread evenly over the part
+        in which it is taken.
+    back : float, [-]
+        Share of the range over which a map returns to the line through its samples.
+    """
 
-    Returns
-    -------
-    HammersteinWiener
-        Maps of kinds other than piecewise linear stay as they are.
+    trust: float = 2.0
+    back: float = 1.0 / 8.0
+
+
+_RULE = ExtrapolationRule()
+
+
+def extrapolated(
+    model: HammersteinWiener,
+    u: np.ndarray,
+    x: np.ndarray,
+    *,
+    rule: ExtrapolationRule = _RULE,
+) -> HammersteinWiener:
+    """Same model on the data of its fit, with maps that go on simply elsewhere.
+
+    Parameters
+    ----------
+    u, x : ndarray, shape (n,)
+        What reached the input map and the output map in the fit.
     """
     return replace(
         model,
-        input_map=_continued(model.input_map, outer),
-        output_map=_continued(model.output_map, outer),
+        input_map=extrapolated_map(model.input_map, u, rule=rule),
+        output_map=extrapolated_map(model.output_map, x, rule=rule),
     )
+
+
+def extrapolated_map(
+    one: StaticMap, argument: np.ndarray, *, rule: ExtrapolationRule = _RULE
+) -> StaticMap:
+    """Same map where samples were, the simplest lines elsewhere.
+
+    Parameters
+    ----------
+    argument : ndarray, shape (n,)
+        What reached the map.
+
+    Returns
+    -------
+    StaticMap
+        Itself where its law is the user's own or there is none.
+
+    References
+    ----------
+    docs/method.md, eqs. (15d)-(15f).
+
+    Examples
+    --------
+    >>> steep = StaticMap("polynomial", np.array([0.0, 1.0, 0.0, 9.0]), (-1.0, 1.0))
+    >>> one = extrapolated_map(steep, np.array([-1.0, 1.0]))
+    >>> evaluate(one, np.array([-3.0, 0.5, 3.0]))
+    array([-30.,   5.,  30.])
+    """
+    kind = RULES[one.kind]
+    if kind.is_identity or MAP_KINDS[one.kind].has_function:
+        return one
+    plain = replace(one, extrapolation=None)
+    if not np.isfinite(argument).all() or np.ptp(argument) == 0.0:
+        return plain
+    visited = stretches(argument)
+    if not np.isfinite(evaluate(plain, visited.ravel())).all():
+        return plain
+    below, above = kind.holds_beyond(plain, visited[0], visited[-1])
+    line = _line(argument, evaluate(plain, argument))
+    between = np.unique(visited)
+    points = [between, evaluate(plain, between)]
+    bridged = replace(plain, extrapolation=Extrapolation(visited.ravel(), *points))
+    for is_known, side in ((below, -1.0), (above, 1.0)):
+        ahead = (
+            _law_ahead(plain, visited, side)
+            if is_known
+            else _line_ahead(bridged, argument, side, line, rule)
+        )
+        pair = (ahead, points) if side < 0.0 else (points, ahead)
+        points = [np.concatenate(parts) for parts in zip(*pair, strict=True)]
+    return replace(plain, extrapolation=Extrapolation(visited.ravel(), *points))
+
+
+def stretches(argument: np.ndarray) -> np.ndarray:
+    """Ranges of an argument that samples visited without a gap.
+
+    Parameters
+    ----------
+    argument : ndarray, shape (n,)
+
+    Returns
+    -------
+    ndarray, shape (n_stretches, 2)
+        First and last argument of each.
+
+    Examples
+    --------
+    >>> stretches(np.array([0.0, 5.0, 0.1, 5.2]))
+    array([[0. , 0.1],
+           [5. , 5.2]])
+    """
+    ordered = np.sort(argument)
+    width = ordered[-1] - ordered[0]
+    ends = np.flatnonzero(np.diff(ordered) > _GAP * width)
+    first = ordered[np.concatenate([[0], ends + 1])]
+    last = ordered[np.concatenate([ends, [ordered.size - 1]])]
+    # Rounding is no width.
+    last = np.where(last - first < _LEVEL * width, first, last)
+    return np.column_stack([first, last])
+
+
+def _line(argument: np.ndarray, value: np.ndarray) -> tuple[float, float]:
+    """Slope and offset of the straight line through a map's samples."""
+    centre, level = float(argument.mean()), float(value.mean())
+    away = argument - centre
+    slope = float(away @ (value - level)) / float(away @ away)
+    return slope, level - slope * centre
+
+
+def _line_ahead(
+    one: StaticMap,
+    argument: np.ndarray,
+    side: float,
+    line: tuple[float, float],
+    rule: ExtrapolationRule,
+) -> list[np.ndarray]:
+    """Points beyond one end: the local slope goes on, then back to the line.
+
+    Parameters
+    ----------
+    side : float, [-]
+        -1 below, 1 above.
+    """
+    end = float(side * (side * argument).max())
+    width = float(np.ptp(argument))
+    points, values = [], []
+    depth, evenness = _outer_part(side * (end - argument))
+    reach = rule.trust * evenness * width
+    here, (value, before) = end, evaluate(one, np.array([end, end - side * depth]))
+    if reach > _LEVEL * width:
+        here, value = end + side * reach, value + (value - before) / depth * reach
+        points.append(here)
+        values.append(float(value))
+    slope, offset = line
+    for distance in (rule.back, rule.back + 1.0):
+        at = here + side * distance * width
+        points.append(at)
+        values.append(slope * at + offset)
+    order = slice(None, None, int(side))
+    return [np.array(points)[order], np.array(values)[order]]
+
+
+def _outer_part(inward: np.ndarray) -> tuple[float, float]:
+    """Depth of the part that tells the slope at an end, and how its samples spread.
+
+    Parameters
+    ----------
+    inward : ndarray, shape (n,)
+        Distance of each sample from that end.
+
+    Returns
+    -------
+    depth : float
+    evenness : float, [-]
+        Variance of the samples' places over that of an even spread; 1 at most. 0 for
+        samples on one level.
+    """
+    width = float(inward.max())
+    ordered = np.sort(inward)
+    enough = float(ordered[min(_ENOUGH, ordered.size) - 1])
+    depth = max(_OUTER * width, min(enough, _DEEPEST * width))
+    part = ordered[ordered <= depth]
+    return depth, min(1.0, 12.0 * float(np.var(part)) / depth**2)
+
+
+def _law_ahead(one: StaticMap, visited: np.ndarray, side: float) -> list[np.ndarray]:
+    """A point on the law, which is straight from the last sample on."""
+    width = visited[-1, 1] - visited[0, 0]
+    at = np.array([visited[0, 0] - width if side < 0.0 else visited[-1, 1] + width])
+    return [at, evaluate(one, at)]
 
 
 def for_search(model: HammersteinWiener) -> HammersteinWiener:
     """Same model on the data of its fit, nothing but parameters in its maps."""
     return replace(
         model,
-        input_map=replace(model.input_map, slopes_beyond=None),
-        output_map=replace(model.output_map, slopes_beyond=None),
+        input_map=replace(model.input_map, extrapolation=None),
+        output_map=replace(model.output_map, extrapolation=None),
     )
 
 
 def outlined_model(model: HammersteinWiener) -> HammersteinWiener:
-    """Same model for every input, its maps given by break-points and values alone.
+    """Same model for every input, piecewise linear maps being nothing but break-points.
 
     Returns
     -------
@@ -59,21 +239,10 @@ def outlined_model(model: HammersteinWiener) -> HammersteinWiener:
         Values to the last bit as before.
     """
     maps = (model.input_map, model.output_map)
-    if all(one.slopes_beyond is None for one in maps):
+    if all(one.extrapolation is None for one in maps):
         return model
     return replace(
         model,
         input_map=outlined(model.input_map),
         output_map=outlined(model.output_map),
     )
-
-
-def _continued(one: StaticMap, share: float) -> StaticMap:
-    if not MAP_KINDS[one.kind].goes_on:
-        return one
-    plain = replace(one, slopes_beyond=None)
-    low, high = one.domain
-    outer = share * (high - low)
-    at = evaluate(plain, np.array([low, low + outer, high - outer, high]))
-    slopes = (float(at[1] - at[0]) / outer, float(at[3] - at[2]) / outer)
-    return replace(plain, slopes_beyond=slopes)

@@ -39,7 +39,15 @@ def normalise(
     -------
     HammersteinWiener
         Gives the same output for every input.
+
+    Raises
+    ------
+    ValueError
+        If a map is extrapolated already: that comes last.
     """
+    maps = (model.input_map, model.output_map)
+    if any(one.extrapolation is not None for one in maps):
+        raise ValueError("a model is normalised before its maps are extrapolated")
     if keeps_block:
         return _around_block(model)
     model = _with_unit_input_map(model)

@@ -8,13 +8,18 @@ References
 docs/method.md, eqs. (2)-(4f).
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 from importlib import import_module
 
 import numpy as np
 
+from hwid_cli.model.maps.piecewise_linear import (
+    piecewise_linear,
+    piecewise_linear_value,
+)
 from hwid_cli.model.maps.rule import Derivatives, MapRule, Shape
-from hwid_cli.records.maps import MAP_KINDS, MapOptions, StaticMap
+from hwid_cli.records.maps import MAP_KINDS, Extrapolation, MapOptions, StaticMap
 
 RULES: dict[str, MapRule] = {
     kind: import_module(f"hwid_cli.model.maps.{kind}").RULE for kind in MAP_KINDS
@@ -41,7 +46,10 @@ def evaluate(static_map: StaticMap, argument: np.ndarray) -> np.ndarray:
     >>> evaluate(StaticMap("dead_zone", np.array([-1.0, 2.0])), np.array([-3.0, 0, 5]))
     array([-2.,  0.,  3.])
     """
-    return RULES[static_map.kind].evaluate(static_map, argument)
+    rule = RULES[static_map.kind]
+    if static_map.extrapolation is not None:
+        return _extrapolated(static_map, argument, rule.evaluate)
+    return rule.evaluate(static_map, argument)
 
 
 def evaluate_repeatably(static_map: StaticMap, argument: np.ndarray) -> np.ndarray:
@@ -66,7 +74,45 @@ def evaluate_repeatably(static_map: StaticMap, argument: np.ndarray) -> np.ndarr
     array([-2. ,  0.5])
     """
     rule = RULES[static_map.kind]
-    return (rule.repeatable or rule.evaluate)(static_map, argument)
+    law = rule.repeatable or rule.evaluate
+    if static_map.extrapolation is not None:
+        return _extrapolated(static_map, argument, law)
+    return law(static_map, argument)
+
+
+def _extrapolated(
+    one: StaticMap, argument: np.ndarray, law: Callable[..., np.ndarray]
+) -> np.ndarray:
+    """Value by the law where samples were, by straight lines elsewhere."""
+    one = RULES[one.kind].outlined(one)
+    argument = np.ascontiguousarray(argument, dtype=float)
+    if one.extrapolation is None:
+        return law(one, argument)
+    lines = one.extrapolation
+    value = piecewise_linear_value(argument, lines.arguments, lines.values)
+    inside = is_visited(one, argument)
+    value[inside] = law(one, argument[inside])
+    return value
+
+
+def is_visited(one: StaticMap, argument: np.ndarray) -> np.ndarray:
+    """Tell at which arguments the law of a map's kind holds.
+
+    Parameters
+    ----------
+    argument : ndarray, shape (n,)
+
+    Returns
+    -------
+    ndarray of bool, shape (n,)
+        True everywhere for a map without an extrapolation.
+    """
+    if one.extrapolation is None:
+        return np.ones(argument.shape, dtype=bool)
+    inside = np.zeros(argument.shape, dtype=bool)
+    for low, high in one.extrapolation.stretches:
+        inside |= (argument >= low) & (argument <= high)
+    return inside
 
 
 def differentiate(
@@ -108,8 +154,16 @@ def derivatives(
     argument : ndarray, shape (n,)
     with_positions : bool
         Whether the break-points of a piecewise linear map count as parameters.
+
+    Returns
+    -------
+    Derivatives
+        Value and slope are also right where a map is extrapolated; the parameters' columns
+        are those of the law.
     """
     rule = RULES[static_map.kind]
+    if static_map.extrapolation is not None:
+        return _extrapolated_derivatives(static_map, argument, with_positions)
     if rule.derivatives is not None:
         return rule.derivatives(static_map, argument, with_positions)
     active = active_parameters(static_map, with_positions=with_positions)
@@ -118,6 +172,24 @@ def derivatives(
     value, slope = rule.differentiate(static_map, argument, with_positions, shares, 0)
     first = np.zeros(argument.size, dtype=np.int64)
     return Derivatives(value, slope, first, shares, count)
+
+
+def _extrapolated_derivatives(
+    one: StaticMap, argument: np.ndarray, with_positions: bool
+) -> Derivatives:
+    one = RULES[one.kind].outlined(one)
+    law = replace(one, extrapolation=None)
+    found = derivatives(law, argument, with_positions=with_positions)
+    lines = one.extrapolation
+    if lines is None:
+        return found
+    value, slope, _ = piecewise_linear(argument, lines.arguments, lines.values)
+    inside = is_visited(one, argument)
+    return replace(
+        found,
+        value=np.where(inside, found.value, value),
+        slope=np.where(inside, found.slope, slope),
+    )
 
 
 def starting_maps(
@@ -216,13 +288,21 @@ def stretch(static_map: StaticMap, factor: float) -> StaticMap:
     """
     low, high = static_map.domain
     domain = (low * factor, high * factor)
-    function = static_map.function
+    function, lines = static_map.function, static_map.extrapolation
     if function is not None:
         # Nobody knows the units of its parameters: the function keeps its own.
         kept = replace(function, unit=function.unit * factor)
         return replace(static_map, function=kept, domain=domain)
     # Every other parameter has the unit of argument or value, whatever the kind.
-    return replace(static_map, parameters=static_map.parameters * factor, domain=domain)
+    return replace(
+        static_map,
+        parameters=static_map.parameters * factor,
+        domain=domain,
+        extrapolation=lines
+        and Extrapolation(
+            lines.visited * factor, lines.arguments * factor, lines.values * factor
+        ),
+    )
 
 
 def outlined(static_map: StaticMap) -> StaticMap:
@@ -231,8 +311,8 @@ def outlined(static_map: StaticMap) -> StaticMap:
     Returns
     -------
     StaticMap
-        A piecewise linear map that goes on beyond its domain with slopes of its own has
-        them as segments.
+        A piecewise linear map has the lines of its extrapolation as segments; other kinds
+        come back as they are.
     """
     return RULES[static_map.kind].outlined(static_map)
 

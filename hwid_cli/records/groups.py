@@ -1,10 +1,11 @@
 """Results of the search for groups of recordings, and of the final test."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from hwid_cli.records.model import Fit
+from hwid_cli.records.stored import ADDED_LATER
 
 
 @dataclass(frozen=True)
@@ -55,6 +56,11 @@ class Group:
         Of these, models that cover at least one validation recording.
     is_kept : bool
         Whether the next level grows from it.
+    unseen_coverage : int, [-]
+        Of the validation recordings that no group may hold, those that its best model
+        covers; 0 where there are none.
+    unseen_rmsd : float, [output unit]
+        Of the best model over these; NaN where there are none.
     """
 
     recordings: tuple[str, ...]
@@ -67,6 +73,8 @@ class Group:
     n_self_passed: int
     n_cross_passed: int
     is_kept: bool
+    unseen_coverage: int = field(default=0, metadata=ADDED_LATER)
+    unseen_rmsd: float = field(default=float("nan"), metadata=ADDED_LATER)
 
     @property
     def name(self) -> str:
@@ -252,12 +260,19 @@ class ChainTrend:
         Kinds of recordings, in the order of the recordings.
     coverage : ndarray of int, shape (n, k), [-]
         Recordings of each kind below the threshold, a model's own ones included.
+    best_single : str
+        Of the models of single recordings the best on recordings that are neither its
+        own nor for the test; empty where there is none.
+    single_rmsd : float, [output unit]
+        Its mean RMSD over the test recordings.
     """
 
     models: tuple[str, ...]
     tested_rmsd: tuple[float, ...]
     kinds: tuple[str, ...]
     coverage: np.ndarray
+    best_single: str = ""
+    single_rmsd: float = float("nan")
 
     @property
     def total(self) -> tuple[int, ...]:

@@ -19,19 +19,16 @@ class MapKind:
         Fewest units; None where their number does not set the size of the map.
     has_function : bool
         Whether the map is a function of the user's own.
-    goes_on : bool
-        Whether it may have slopes of its own beyond its domain.
     """
 
     least_units: int | None = None
     has_function: bool = False
-    goes_on: bool = False
 
 
 # The table of kinds, by name: each is the module of this name in ``model.maps``. Networks
 # have a linear part beside their units; other kinds need two to have a slope.
 MAP_KINDS = {
-    "piecewise_linear": MapKind(least_units=2, goes_on=True),
+    "piecewise_linear": MapKind(least_units=2),
     "saturation": MapKind(),
     "dead_zone": MapKind(),
     "polynomial": MapKind(),
@@ -147,6 +144,48 @@ class MapOptions:
 
 
 @dataclass(frozen=True, eq=False)
+class Extrapolation:
+    """What a map does where its fit had no samples: straight lines from point to point.
+
+    Parameters
+    ----------
+    visited : ndarray, shape (2 n_stretches,)
+        First and last argument of each stretch that samples visited, rising: there the
+        law of the map's kind holds.
+    arguments, values : ndarray, shape (n_points,)
+        Points that straight lines join elsewhere; the first and the last line go on.
+
+    Raises
+    ------
+    ValueError
+        If the shapes do not fit together or arguments do not rise.
+    """
+
+    visited: np.ndarray
+    arguments: np.ndarray
+    values: np.ndarray
+
+    def __post_init__(self) -> None:
+        for name in ("visited", "arguments", "values"):
+            object.__setattr__(self, name, frozen_vector(getattr(self, name), name))
+        if self.visited.size % 2 or not self.visited.size:
+            raise ValueError(f"visited must be pairs, got {self.visited.size} numbers")
+        if self.arguments.size < 2 or self.values.size != self.arguments.size:
+            raise ValueError(
+                f"an extrapolation needs as many values as arguments, at least two, got "
+                f"{self.values.size} and {self.arguments.size}"
+            )
+        falls = (np.diff(self.visited) < 0.0).any()
+        if falls or not (np.diff(self.arguments) > 0.0).all():
+            raise ValueError("visited and arguments must rise")
+
+    @property
+    def stretches(self) -> np.ndarray:
+        """First and last argument of each stretch, shape (n_stretches, 2)."""
+        return self.visited.reshape(-1, 2)
+
+
+@dataclass(frozen=True, eq=False)
 class StaticMap:
     """A static nonlinearity: its kind and the numbers that fix it.
 
@@ -168,16 +207,16 @@ class StaticMap:
         Range of the argument in the fit; outside it the map extrapolates.
     function : OwnFunction or None
         Only with ``own_function``.
-    slopes_beyond : tuple of float, or None
-        Slopes below and above ``domain`` of a piecewise linear map, value over argument;
-        None where its outermost segments go on.
+    extrapolation : Extrapolation or None
+        What the map does where its fit had no samples; None where the law of its kind
+        holds everywhere.
     """
 
     kind: str
     parameters: np.ndarray
     domain: tuple[float, float] = (-1.0, 1.0)
     function: OwnFunction | None = None
-    slopes_beyond: tuple[float, float] | None = None
+    extrapolation: Extrapolation | None = None
 
     def __post_init__(self) -> None:
         if self.kind not in MAP_KINDS:
@@ -187,8 +226,6 @@ class StaticMap:
         kind = MAP_KINDS[self.kind]
         if kind.has_function != (self.function is not None):
             raise ValueError("a map has a function exactly with kind own_function")
-        if self.slopes_beyond is not None and not kind.goes_on:
-            raise ValueError(f"a {self.kind} map has no slopes beyond its domain")
         object.__setattr__(
             self, "parameters", frozen_vector(self.parameters, "parameters")
         )

@@ -1,6 +1,7 @@
 """The final test as tables: the chain of groups, what covers what, what serves what."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -25,12 +26,17 @@ def chain_on_tests_table(final: FinalTest, trend: ChainTrend) -> Table:
         Beneath it stands whether the RMSD falls along the chain.
     """
     last = list(map(number, trend.tested_rmsd))
+    rows = _chain_rows(final, final.tested_on, last)
+    if trend.best_single and trend.best_single not in final.chain:
+        alone = replace(final, chain=(trend.best_single,))
+        mean = [number(trend.single_rmsd)]
+        rows = (*_chain_rows(alone, final.tested_on, mean), *rows)
     return Table(
         f"The chain on the test recordings: RMSD [{final.unit}], * below "
         f"{final.threshold:g}",
         _chain_columns(final.tested_on, "mean"),
-        _chain_rows(final, final.tested_on, last),
-        (trend_sentence(trend),),
+        rows,
+        (trend_sentence(trend), *joining_sentence(trend)),
         is_validation=True,
         published="T3.3.3.4-1",
     )
@@ -57,6 +63,32 @@ def trend_sentence(trend: ChainTrend) -> str:
     if values[-1] < values[0]:
         return f"{start} falls, but not at every level."
     return f"{start} does not fall."
+
+
+def joining_sentence(trend: ChainTrend) -> tuple[str, ...]:
+    """Say whether joining recordings helped on those that nothing has used.
+
+    Returns
+    -------
+    tuple of str
+        Empty where the winner is no group, or there is no single model beside it.
+
+    Examples
+    --------
+    >>> trend = ChainTrend(("a/1/1", "a+b/1/1"), (0.3, 0.1), ("step",), np.ones((2, 1)))
+    >>> joining_sentence(replace(trend, best_single="b/1/2", single_rmsd=0.2))[0]
+    'Joining helps here: 0.1 on average, the best single model, b/1/2, 0.2.'
+    """
+    if not trend.models or "+" not in trend.models[-1] or not trend.best_single:
+        return ()
+    group, single = trend.tested_rmsd[-1], trend.single_rmsd
+    if not (np.isfinite(group) and np.isfinite(single)):
+        return ()
+    says = "helps here" if group < single else "does not help here"
+    return (
+        f"Joining {says}: {group:.3g} on average, the best single model, "
+        f"{trend.best_single}, {single:.3g}.",
+    )
 
 
 def chain_coverage_table(

@@ -1,5 +1,7 @@
 """The search for groups as tables."""
 
+import numpy as np
+
 from hwid_cli.records.groups import Group, GroupSearch
 from hwid_cli.records.units import behind
 from hwid_cli.report.formats import MISSING, number, with_unit
@@ -107,23 +109,31 @@ def chain_table(search: GroupSearch) -> Table | Text:
     """Show the winner and what it grew from, level by level: the chain of groups."""
     if not search.chain:
         return Text(f"No group covers anything: {search.reason}.")
+    has_unseen = any(np.isfinite(one.unseen_rmsd) for one in search.groups)
     rows = tuple(
         (
             one.model_name,
             f"{one.coverage} of {len(search.validated_on)}",
             number(one.rmsd),
             number(one.validation_rmsd),
+            *((number(one.unseen_rmsd),) if has_unseen else ()),
         )
         for one in search.chain_groups
     )
-    columns = (*texts("model"), *numbers("covers", "own RMSD", "validation RMSD"))
+    heads = ("covers", "own RMSD", "validation RMSD")
+    unseen = ("RMSD of no member",) if has_unseen else ()
+    columns = (*texts("model"), *numbers(*heads, *unseen))
     rules = dict.fromkeys(one.options.initial_state for one in search.fits if one)
     how = tuple(joined_note(rule, search.join) for rule in rules)
     note = (
         "What a model covers, and its validation RMSD, which pools all samples, include "
         f"the recordings of its own fit. The search stopped: {search.reason}."
     )
+    chosen = (
+        "The winner is the best on validation recordings that no group may hold.",
+    )
     caption = (
         f"The chain of groups, from one recording to the winner: RMSD [{search.unit}]"
     )
-    return Table(caption, columns, rows, (note,), how, is_validation=True)
+    notes = (note, *(chosen if has_unseen else ()))
+    return Table(caption, columns, rows, notes, how, is_validation=True)

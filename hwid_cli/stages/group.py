@@ -65,7 +65,7 @@ from hwid_cli.tasks.cache import model_key, recording_key, task_key
 from hwid_cli.tasks.runner import Task, TaskDone, run_tasks
 
 NAME = "group"
-STAGE_VERSION = 10
+STAGE_VERSION = 11
 
 # Does the work of a level with what runs its tasks. The text says what they are, "fits",
 # "pairs" or "models", the second number how many there will be.
@@ -95,6 +95,12 @@ class GroupPlan:
     fit_options: FitOptions
     options: GroupOptions
     threshold: float
+
+    @property
+    def is_unseen(self) -> np.ndarray:
+        """Which validation recordings no group may hold, ndarray of bool, shape (m,)."""
+        held = {*self.candidates, *(self.start or ())}
+        return np.array([name not in held for name in self.validate], dtype=bool)
 
 
 # From the recordings of groups to the groups with their coverage, in the same order.
@@ -298,7 +304,7 @@ def _place(name: str, candidates: Sequence[str]) -> tuple[int, str]:
 def _chain(groups: Sequence[Group], joins: Sequence[Join]) -> tuple[str, ...]:
     """The winner and what it grew from; of several bases always the widest."""
     by_name = {one.name: one for one in groups}
-    winner = min(groups, key=_widest_first)
+    winner = min(groups, key=_best_first)
     if winner.coverage == 0:
         return ()
     chain = [winner.name]
@@ -306,6 +312,15 @@ def _chain(groups: Sequence[Group], joins: Sequence[Join]) -> tuple[str, ...]:
         bases = [by_name[join.base] for join in joins if join.group == chain[0]]
         chain.insert(0, min(bases, key=_widest_first).name)
     return tuple(chain)
+
+
+def _best_first(one: Group) -> tuple[bool, int, float, tuple[int, float]]:
+    """Order of groups by recordings that none of them holds, where there are such.
+
+    A group that covers more because it holds more says nothing about the next recording.
+    """
+    rmsd = one.unseen_rmsd if np.isfinite(one.unseen_rmsd) else np.inf
+    return one.coverage == 0, -one.unseen_coverage, rmsd, _widest_first(one)
 
 
 def _widest_first(one: Group) -> tuple[int, float]:
@@ -624,6 +639,7 @@ def _score_group(
     """Cross filter, and the best of the models that are left."""
     covered = coverage(deviations, plan.threshold)
     pooled = np.sqrt(np.mean(deviations**2, axis=1))
+    unseen = deviations[:, plan.is_unseen]
     # A model that diverges somewhere may still be the widest, but wins no tie.
     order = np.lexsort((np.where(np.isfinite(pooled), pooled, np.inf), -covered))
     best = int(order[0])
@@ -649,6 +665,12 @@ def _score_group(
         rmsd=fits[best].rmsd,
         validation_rmsd=float(pooled[best]),
     )
+    if plan.is_unseen.any():
+        chosen = replace(
+            chosen,
+            unseen_coverage=int(coverage(unseen, plan.threshold)[best]),
+            unseen_rmsd=float(np.sqrt(np.mean(unseen[best] ** 2))),
+        )
     return _Scored(chosen, fits[best], deviations[best])
 
 

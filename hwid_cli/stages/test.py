@@ -457,6 +457,7 @@ def chain_trend(final: FinalTest, kinds: Mapping[str, str]) -> ChainTrend:
     of_recording = np.array([kinds[name] for name in final.recordings])
     present = tuple(dict.fromkeys(of_recording.tolist()))
     covered = rmsd < final.threshold
+    single = best_single(final)
     return ChainTrend(
         models=final.chain,
         tested_rmsd=tuple(np.mean(rmsd[:, is_tested], axis=1).tolist()),
@@ -464,7 +465,31 @@ def chain_trend(final: FinalTest, kinds: Mapping[str, str]) -> ChainTrend:
         coverage=np.array(
             [np.sum(covered[:, of_recording == kind], axis=1) for kind in present]
         ).T,
+        best_single="" if single < 0 else final.models[single],
+        single_rmsd=float("nan")
+        if single < 0
+        else float(np.mean(final.rmsd[single, is_tested])),
     )
+
+
+def best_single(final: FinalTest) -> int:
+    """Find the best model of a single recording without a look at the test.
+
+    Returns
+    -------
+    int
+        Place among the models: the one that covers the largest share of the recordings
+        that are neither its own nor for the test; of these the lowest mean logarithm of
+        the RMSD there. -1 where there is none.
+    """
+    is_known = ~np.isin(final.recordings, final.tested_on)
+    found = []
+    for place in np.flatnonzero(final.is_own.sum(axis=1) == 1):
+        others = final.rmsd[place, is_known & ~final.is_own[place]]
+        if others.size and np.isfinite(others).all():
+            share = float(np.mean(others < final.threshold))
+            found.append((-share, float(np.mean(np.log(others))), int(place)))
+    return min(found)[-1] if found else -1
 
 
 def _named(names: Sequence[str], chosen: np.ndarray) -> tuple[str, ...]:

@@ -30,6 +30,8 @@ GROUP_COLUMNS = (
     "models",
     "self_passed",
     "cross_passed",
+    "unseen_coverage",
+    "unseen_rmsd",
 )
 
 _TEXTS = ("reason", "join", "unit")
@@ -113,4 +115,6 @@ def _rows(search: GroupSearch) -> Iterator[tuple[object, ...]]:
             group.n_models,
             group.n_self_passed,
             group.n_cross_passed,
+            group.unseen_coverage,
+            float(group.unseen_rmsd),
         )

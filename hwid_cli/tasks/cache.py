@@ -15,6 +15,7 @@ from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
+from hwid_cli.records.maps import Extrapolation
 from hwid_cli.records.model import HammersteinWiener, StaticMap
 from hwid_cli.records.recordings import Recording
 
@@ -173,13 +174,13 @@ def model_key(model: HammersteinWiener) -> str:
 
 
 def _content(
-    part: HammersteinWiener | StaticMap, prefix: str
+    part: HammersteinWiener | StaticMap | Extrapolation, prefix: str
 ) -> tuple[dict[str, object], list[np.ndarray]]:
     settings: dict[str, object] = {}
     arrays: list[np.ndarray] = []
     for item in fields(part):
         value, name = getattr(part, item.name), prefix + item.name
-        if isinstance(value, StaticMap):
+        if isinstance(value, StaticMap | Extrapolation):
             inner_settings, inner_arrays = _content(value, f"{name}.")
             settings |= inner_settings
             arrays += inner_arrays

@@ -8,6 +8,7 @@ import pytest
 from hwid_cli.export.c_source import c_source
 from hwid_cli.export.contents import completed
 from hwid_cli.model import static_map
+from hwid_cli.model.extrapolation import extrapolated_map
 from hwid_cli.model.static_map import RULES
 from hwid_cli.records.experiment import Columns
 from hwid_cli.records.exported import ModelCard
@@ -72,8 +73,15 @@ def example_map(kind, rng, scale=1.0):
     return StaticMap(kind, parameters, (-scale, scale))
 
 
+def extrapolated_example(one):
+    """Map that is extrapolated across a gap and beyond what samples visited."""
+    width = one.domain[1]
+    visited = np.r_[np.linspace(-0.7, -0.2, 30), np.linspace(0.05, 0.8, 30)]
+    return extrapolated_map(one, width * visited)
+
+
 def example_model(seed, *, kinds=None, nb=2, nf=2, nk=1, rule="estimated"):
-    """Stable model with random numbers."""
+    """Stable model with random numbers; maps of odd seeds are extrapolated."""
     rng = np.random.default_rng(seed)
     kinds = kinds or ("piecewise_linear", "sigmoid_network")
     radius, angle = rng.uniform(0.3, 0.9, nf), rng.uniform(0, np.pi, nf)
@@ -85,12 +93,16 @@ def example_model(seed, *, kinds=None, nb=2, nf=2, nk=1, rule="estimated"):
     found = [*pairs, *radius[nf // 2 :][: nf % 2]]
     denominator = np.real(np.poly(found)) if found else np.ones(1)
     n_state = max(nf, nb + nk - 1)
+    first, numerator = example_map(kinds[0], rng), rng.normal(0, 1, nb)
+    maps = (first, example_map(kinds[1], rng, 3.0))
+    if seed % 2:
+        maps = tuple(extrapolated_example(one) for one in maps)
     return HammersteinWiener(
-        example_map(kinds[0], rng),
-        rng.normal(0, 1, nb),
+        maps[0],
+        numerator,
         denominator,
         nk,
-        example_map(kinds[1], rng, 3.0),
+        maps[1],
         1e-3,
         rule,
         rng.normal(0, 1, n_state) if rule == "estimated" else np.zeros(0),

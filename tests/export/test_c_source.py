@@ -37,10 +37,14 @@ def check(folder, model, seed):
 
 
 @pytest.mark.parametrize("place", range(0, len(KINDS), 2))
-def test_the_program_predicts_as_hwid_does(place, tmp_path):
+@pytest.mark.parametrize("is_extrapolated", [False, True])
+def test_the_program_predicts_as_hwid_does(place, is_extrapolated, tmp_path):
     kinds = (KINDS[place], KINDS[place - 1])
-    rule = ("zero", "steady", "estimated")[place // 2 % 3]
-    model = example_model(place, kinds=kinds, nb=3, nf=4, nk=place // 2, rule=rule)
+    rule, seed = (
+        ("zero", "steady", "estimated")[place // 2 % 3],
+        place + is_extrapolated,
+    )
+    model = example_model(seed, kinds=kinds, nb=3, nf=4, nk=place // 2, rule=rule)
 
     check(tmp_path, model, place)
 

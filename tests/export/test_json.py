@@ -216,6 +216,22 @@ FAULTS = {
     "lengths": (change("input_map.values", [1.0] * 9), "expected as many values"),
     "domain": (change("input_map.domain", [1.0, 1.0]), "domain: found [1.0, 1.0]"),
     "widths": (change("output_map.widths", [0.0]), "numbers above 0"),
+    "extrapolation": (
+        change("output_map.extrapolation.arguments", [1.0, 0.0]),
+        "output_map.extrapolation.arguments: found [1.0, 0.0]; expected numbers that rise",
+    ),
+    "extrapolated values": (
+        change("output_map.extrapolation.values", [1.0, 0.0]),
+        "output_map.extrapolation.values: found 2 numbers; expected 10, one an argument",
+    ),
+    "visited": (
+        change("output_map.extrapolation.visited", [1.0, 0.0]),
+        "visited: found [1.0, 0.0]; expected pairs of rising numbers",
+    ),
+    "half a stretch": (
+        change("output_map.extrapolation.visited", [1.0, 2.0, 3.0]),
+        "visited: found [1.0, 2.0, 3.0]; expected pairs of rising numbers",
+    ),
     "range": (change("input_range", [1.0]), "input_range: found [1.0]"),
     "column": (change("columns.input", -1), "columns.input: found -1"),
     "unit": (change("units.input", 3), "units.input: found 3; expected text"),

@@ -1,35 +1,19 @@
-from dataclasses import replace
-from functools import partial
-
 import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from hwid_cli.model import static_map
-from hwid_cli.model.extrapolation import continued, for_search, outlined_model
+from hwid_cli.model.extrapolation import for_search, outlined_model
 from hwid_cli.model.fit import fit
 from hwid_cli.model.simulate import simulate, validation_output
 from hwid_cli.model.uncertainty import with_standard_errors
-from hwid_cli.records.model import FitOptions, HammersteinWiener, Orders, StaticMap
+from hwid_cli.records.model import FitOptions, Orders
 from hwid_cli.records.recordings import Recording
-
-# A line of slope two whose last hundredth is flat, as a fit makes it of a rest level.
-POINTS = np.array([-0.1, 0.3, 0.99, 1.0])
-FLAT_END = StaticMap(
-    "piecewise_linear",
-    np.concatenate([POINTS, [-0.2, 0.6, 1.98, 1.98]]),
-    (0.0, 1.0),
-)
 
 
 def recording(u, *, noise=0.0, seed=0):
     y = lfilter([0.0, 0.5], [1.0, -0.5], u)
     rng = np.random.default_rng(seed)
     return Recording("a", u, y + noise * rng.standard_normal(u.size), 1e-3)
-
-
-def model_of(one):
-    return HammersteinWiener(one, np.ones(1), np.ones(1), 0, one, 1e-3, "rest")
 
 
 @pytest.fixture(scope="module")
@@ -41,55 +25,6 @@ def noisy_line():
 @pytest.fixture(scope="module")
 def fitted(noisy_line):
     return fit([noisy_line], Orders(1, 1, 1))
-
-
-def test_a_map_goes_on_with_its_mean_slope_over_the_outer_eighth():
-    one = continued(model_of(FLAT_END)).input_map
-
-    # It rises by 2 * 0.125 below; by 1.98 - 1.75 above.
-    assert one.slopes_beyond == pytest.approx((2.0, 0.23 / 0.125))
-    at = np.array([-3.0, 5.0])
-    assert static_map.evaluate(one, at) == pytest.approx([-6.0, 1.98 + 4 * 1.84])
-
-
-def test_nothing_changes_where_data_were():
-    one = continued(model_of(FLAT_END)).input_map
-    at = np.linspace(0.0, 1.0, 500)
-
-    np.testing.assert_allclose(
-        static_map.evaluate(one, at), static_map.evaluate(FLAT_END, at), atol=1e-15
-    )
-
-
-@pytest.mark.parametrize("factor", [3.0, -0.5])
-def test_a_map_in_other_units_goes_on_likewise(factor):
-    rule, one = static_map.RULES["piecewise_linear"], continued(model_of(FLAT_END))
-    one, at = one.input_map, np.linspace(-4.0, 4.0, 101)
-
-    amplified, compressed = rule.amplify(one, factor), rule.compress(one, factor)
-
-    values = static_map.evaluate
-    close = partial(np.testing.assert_allclose, atol=1e-12)
-    close(values(amplified, at), factor * values(one, at))
-    close(values(compressed, at), values(one, factor * at))
-    close(values(static_map.stretch(one, 3.0), at), 3.0 * values(one, at / 3.0))
-
-
-def test_the_slope_beyond_is_the_one_that_steps_of_a_state_see():
-    one = continued(model_of(FLAT_END)).output_map
-    found = static_map.derivatives(
-        static_map.outlined(one), np.array([-1.0, 0.5, 2.0]), with_positions=False
-    )
-
-    np.testing.assert_allclose(found.slope, [2.0, 2.0, 1.84])
-
-
-def test_maps_of_other_kinds_stay():
-    cubic = StaticMap("polynomial", np.array([0.0, 1.0, 0.2]), (-1.0, 1.0))
-
-    assert continued(model_of(cubic)).input_map is cubic
-    with pytest.raises(ValueError, match="polynomial map has no slopes beyond"):
-        replace(cubic, slopes_beyond=(1.0, 1.0))
 
 
 def test_fits_of_noisy_lines_go_on_as_lines():
@@ -148,5 +83,5 @@ def test_break_points_and_values_alone_give_the_same_to_the_last_bit(fitted):
     u = np.linspace(-4.0, 4.0, 200)
     plain = outlined_model(fitted.model)
 
-    assert plain.input_map.slopes_beyond is None
+    assert plain.input_map.extrapolation is None
     assert simulate(plain, u).tolist() == simulate(fitted.model, u).tolist()

@@ -25,18 +25,25 @@ def fits(data):
     return identified(data)
 
 
+def along(xs, ys, values):
+    """Straight lines from point to point, the outer ones going on."""
+    slopes = np.diff(ys) / np.diff(xs)
+    place = np.clip(np.searchsorted(xs, values) - 1, 0, slopes.size - 1)
+    return ys[place] + slopes[place] * (values - xs[place])
+
+
 def output_by_hand(model, current):
     """Free-run output from the numbers of a model, without the package's code."""
 
     def through(table, values):
-        xs, ys = np.split(table.parameters, 2)
-        slopes = np.diff(ys) / np.diff(xs)
-        low, high = table.domain
-        within = np.clip(values, low, high)
-        place = np.clip(np.searchsorted(xs, within) - 1, 0, slopes.size - 1)
-        inside = ys[place] + slopes[place] * (within - xs[place])
-        below, above = table.slopes_beyond
-        return inside + np.where(values < low, below, above) * (values - within)
+        law = np.split(table.parameters, 2)
+        lines = table.extrapolation
+        beyond = (lines.arguments, lines.values)
+        inside = np.any(
+            [(values >= low) & (values <= high) for low, high in lines.stretches],
+            axis=0,
+        )
+        return np.where(inside, *(along(*one, values) for one in (law, beyond)))
 
     numerator = np.r_[np.zeros(model.delay), model.numerator]
     inner = lfilter(numerator, model.denominator, through(model.input_map, current))
@@ -77,7 +84,12 @@ def test_a_bias_in_the_scoring_is_seen(fits, data, bias, monkeypatch):
 def test_an_offset_of_the_model_shows_with_its_closed_form(fits, data, bias):
     model = fits[0].model
     xs, ys = np.split(model.output_map.parameters, 2)
-    table = replace(model.output_map, parameters=np.r_[xs, ys + bias])
+    lines = model.output_map.extrapolation
+    table = replace(
+        model.output_map,
+        parameters=np.r_[xs, ys + bias],
+        extrapolation=replace(lines, values=lines.values + bias),
+    )
     biased = replace(fits[0], model=replace(model, output_map=table))
     found = validated([biased, *fits[1:]], data).rmsd[0, 0, 0]
 

@@ -11,6 +11,7 @@ from hwid_cli.report.final_test import (
     chain_tables,
     coverage_matrix_table,
     gap_sentences,
+    joining_sentence,
     trend_sentence,
 )
 from hwid_cli.report.table import as_text
@@ -35,7 +36,10 @@ def test_the_chain_on_the_tests_shows_each_rmsd_and_the_mean():
     values = FINAL.rmsd[-1][[FINAL.recordings.index(n) for n in FINAL.tested_on]]
     shown = last.replace("*", "").split()
     assert shown == [WINNER, *(f"{v:.2e}" for v in [*values, np.mean(values)])]
-    assert " ".join(text.split()).endswith(trend_sentence(TREND))
+    said = " ".join([trend_sentence(TREND), *joining_sentence(TREND)])
+    assert " ".join(text.split()).endswith(said)
+    alone = next(line for line in text.splitlines() if line.startswith("step_11/4/7"))
+    assert alone.split()[-1] == f"{TREND.single_rmsd:.2e}"
     assert "form of T3.3.3.4-1" in text
     assert widest_line(text) <= 80
 
@@ -212,3 +216,15 @@ def test_long_names_of_groups_stand_beneath_the_table_once():
     assert "\nC1 " in as_text(tables)
     # A page has room for the names themselves.
     assert tables[0].rows[0][0].text == final.chain[0]
+
+
+def test_joining_is_said_to_help_only_where_it_does():
+    group = replace(TREND, models=("a", "a+b"), tested_rmsd=(0.3, 0.1))
+    better = replace(group, best_single="c/1/1", single_rmsd=0.2)
+
+    assert joining_sentence(better)[0].startswith("Joining helps here: 0.1 ")
+    worse = replace(better, single_rmsd=0.05)
+    assert joining_sentence(worse)[0].startswith("Joining does not help here: 0.1 ")
+    assert joining_sentence(replace(better, models=("a",), tested_rmsd=(0.3,))) == ()
+    assert joining_sentence(replace(better, best_single="")) == ()
+    assert joining_sentence(replace(better, single_rmsd=float("nan"))) == ()

@@ -121,6 +121,20 @@ def test_a_group_is_scored_by_simulating_its_best_model(search):
         assert fit.name == group.name
 
 
+def test_what_no_group_may_hold_is_scored_apart(search):
+    validated = replace(plan(), candidates=("a", "b", "c"))
+    place = validated.validate.index("d")
+    scored = search_all(validated, Bench())
+
+    assert validated.is_unseen.tolist() == [name == "d" for name in validated.validate]
+    assert not plan().is_unseen.any()
+    assert all(np.isnan(one.unseen_rmsd) for one in search.groups)
+    for group, values in zip(scored.groups, scored.rmsd, strict=True):
+        if group.coverage:
+            assert group.unseen_rmsd == pytest.approx(values[place], rel=1e-12)
+            assert group.unseen_coverage == int(values[place] < 0.05)
+
+
 def test_the_best_model_of_every_group_has_standard_errors(search):
     by_name = {one.name: one for one in RECORDINGS}
     groups = [one for one in search.fits if one is not None and "+" in one.name]

@@ -2,6 +2,7 @@
 
 import csv
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -61,6 +62,41 @@ def replay(options):
         n_validate=12,
         is_ordered=True,
     )
+
+
+def unseen(name, coverage, unseen_coverage, unseen_rmsd):
+    one = group(name, coverage, rmsd=0.01)
+    return replace(one, unseen_coverage=unseen_coverage, unseen_rmsd=unseen_rmsd)
+
+
+def winner(scores):
+    """Search over two recordings with these results of the three groups."""
+    options = GroupOptions(candidates=("a", "b"), keep={"best": True}, max_level=2)
+    return search_groups(
+        None,
+        ("a", "b"),
+        options,
+        lambda names: [unseen(one, *scores["".join(one)]) for one in names],
+        n_validate=5,
+        is_ordered=False,
+    ).chain[-1]
+
+
+def test_the_winner_is_told_by_recordings_that_no_group_holds():
+    # The group covers most, because it holds two; of the others it covers fewest.
+    scores = {"a": (2, 1, 0.02), "b": (2, 2, 0.03), "ab": (3, 1, 0.01)}
+    assert winner(scores) == "b"
+    # Equally wide there: the lower RMSD, whatever the rest says.
+    assert winner({**scores, "a": (2, 2, 0.02)}) == "a"
+    # A group that covers nothing never wins.
+    scores = {"a": (2, 0, 0.9), "b": (2, 0, 0.8), "ab": (0, 0, 0.001)}
+    assert winner(scores) == "b"
+
+
+def test_where_groups_may_hold_everything_the_widest_wins():
+    none = (0, np.nan)
+    scores = {"a": (2, *none), "b": (2, *none), "ab": (3, *none)}
+    assert winner(scores) == "a+b"
 
 
 def at_level(result, level):

@@ -242,6 +242,28 @@ def test_the_trend_follows_the_chain_on_tests_and_kinds():
     assert trend.total == tuple(below.sum(axis=1).tolist())
 
 
+def test_the_best_single_model_is_chosen_without_the_test_and_its_own_recording():
+    final = example_final_test()
+    trend = chain_trend(final, KINDS)
+
+    found = {}
+    for model, row in zip(final.models, final.rmsd, strict=True):
+        own = model.split("/")[0].split("+")
+        others = [
+            value
+            for name, value in zip(final.recordings, row, strict=True)
+            if name not in (*own, *final.tested_on)
+        ]
+        if len(own) == 1 and np.isfinite(others).all():
+            covered = sum(value < 0.01 for value in others) / len(others)
+            found[model] = (-covered, np.mean(np.log(others)))
+    best = min(found, key=found.get)
+    row = final.rmsd[final.models.index(best)]
+    tested = [row[final.recordings.index(name)] for name in final.tested_on]
+    assert trend.best_single == best
+    assert trend.single_rmsd == pytest.approx(np.mean(tested), rel=1e-12)
+
+
 def test_without_a_chain_the_trend_is_empty():
     trend = chain_trend(example_final_test(n_chain=0), KINDS)
 

@@ -41,6 +41,24 @@ end
 
 function v = evaluate(map, v)
 % Value of a static map for a column v.
+if ~isfield(map, 'extrapolation')
+    v = law(map, v);
+    return
+end
+% The law holds where the data of the fit were, straight lines elsewhere.
+at = v;
+lines = map.extrapolation;
+v = interp1(lines.arguments(:), lines.values(:), at, 'linear', 'extrap');
+inside = false(size(at));
+for i = 1:2:numel(lines.visited)
+    inside = inside | (at >= lines.visited(i) & at <= lines.visited(i + 1));
+end
+v(inside) = law(map, at(inside));
+end
+
+
+function v = law(map, v)
+% Value of a static map by the law of its kind.
 switch map.kind
 @cases@
     otherwise

@@ -53,6 +53,7 @@ RULE = MapRule(
     names=lambda one: limits.NAMES,
     settle=limits.settle,
     corners=lambda one: one.parameters,
+    holds_beyond=limits.crossed,
     portable=Portable(
         (
             Part(

@@ -78,6 +78,18 @@ def starts_at(
     return starts
 
 
+def crossed(one: StaticMap, low: np.ndarray, high: np.ndarray) -> tuple[bool, bool]:
+    """Tell which limits the samples of the outermost stretches saw from both sides.
+
+    Parameters
+    ----------
+    low, high : ndarray, shape (2,)
+        First and last argument of the lowest and the highest stretch.
+    """
+    lower, upper = one.parameters
+    return bool(low[0] < lower < low[1]), bool(high[0] < upper < high[1])
+
+
 def settle(old: StaticMap, parameters: np.ndarray) -> None:  # noqa: ARG001
     """Keep the lower limit below the upper one.
 

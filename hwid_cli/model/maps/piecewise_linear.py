@@ -37,7 +37,7 @@ N_ENDS = 2
 _LEAST_SHRINK = 0.2
 # Segments narrower than this share of the whole would be jumps, not slopes.
 _LEAST_WIDTH = 1e-4
-# Share of the domain: break-points closer to its ends are taken for them.
+# Share of the range: break-points closer to the ends of a stretch are taken for them.
 _EDGE = 1e-9
 
 
@@ -53,7 +53,7 @@ def break_points_and_values(static_map: StaticMap) -> tuple[np.ndarray, np.ndarr
 
 
 def outlined(static_map: StaticMap) -> StaticMap:
-    """Same map with nothing but break-points and values, also beyond its domain.
+    """Same map with nothing but break-points and values, also where it is extrapolated.
 
     Parameters
     ----------
@@ -63,42 +63,38 @@ def outlined(static_map: StaticMap) -> StaticMap:
     Returns
     -------
     StaticMap
-        Itself where its outermost segments go on. Else the domain's ends are break-points,
-        and what lies beyond them is one straight line on each side.
+        Itself where it is not extrapolated.
 
     Examples
     --------
-    >>> one = StaticMap("piecewise_linear", np.array([0.0, 1, 0, 5]), (0.0, 1.0))
-    >>> outlined(replace(one, slopes_beyond=(1.0, 2.0))).parameters
-    array([-1.,  0.,  1.,  2., -1.,  0.,  5.,  7.])
+    >>> one = StaticMap("piecewise_linear", np.array([0.0, 1, 2, 0, 5, 2]), (0.0, 2.0))
+    >>> lines = Extrapolation([0.0, 0.5], [0.0, 0.5, 2.0], [0.0, 2.5, 2.0])
+    >>> outlined(replace(one, extrapolation=lines)).parameters
+    array([0. , 0.5, 2. , 0. , 2.5, 2. ])
     """
-    if static_map.slopes_beyond is None:
+    lines = static_map.extrapolation
+    if lines is None:
         return static_map
-    (low, high), (below, above) = static_map.domain, static_map.slopes_beyond
-    width = high - low
     points, values = break_points_and_values(static_map)
-    at_ends = piecewise_linear_value(np.array([low, high]), points, values)
-    near = _EDGE * width
-    inside = (points > low + near) & (points < high - near)
+    near = _EDGE * (lines.arguments[-1] - lines.arguments[0])
+    inside = np.zeros(points.size, dtype=bool)
+    for low, high in lines.stretches:
+        inside |= (points > low + near) & (points < high - near)
     # The ends of a map in a fit are no break-points.
     inside[[0, -1]] = False
-    points = np.concatenate([[low - width, low], points[inside], [high, high + width]])
-    values = np.concatenate(
-        [
-            [at_ends[0] - below * width, at_ends[0]],
-            values[inside],
-            [at_ends[1], at_ends[1] + above * width],
-        ]
-    )
+    points = np.concatenate([points[inside], lines.arguments])
+    values = np.concatenate([values[inside], lines.values])
+    order = np.argsort(points)
     return replace(
-        static_map, parameters=np.concatenate([points, values]), slopes_beyond=None
+        static_map,
+        parameters=np.concatenate([points[order], values[order]]),
+        extrapolation=None,
     )
 
 
 def _evaluate(static_map: StaticMap, argument: np.ndarray) -> np.ndarray:
     argument = np.ascontiguousarray(argument, dtype=float)
-    plain = outlined(static_map)
-    return piecewise_linear_value(argument, *break_points_and_values(plain))
+    return piecewise_linear_value(argument, *break_points_and_values(static_map))
 
 
 def _differentiate(
@@ -348,7 +344,7 @@ def _with_domain(one: StaticMap, domain: tuple[float, float]) -> StaticMap:
         ends[0] = domain[0]
     if points[-2] < domain[1] < points[-1]:
         ends[-1] = domain[1]
-    values = _evaluate(replace(one, slopes_beyond=None), ends)
+    values = _evaluate(one, ends)
     return replace(one, parameters=np.concatenate([ends, values]), domain=domain)
 
 

@@ -13,7 +13,6 @@ def amplified(one: StaticMap, n_positions: int, factor: float) -> StaticMap:
     return replace(
         one,
         parameters=np.concatenate([positions, values * factor]),
-        slopes_beyond=_steeper(one, factor),
     )
 
 
@@ -34,18 +33,7 @@ def compressed(one: StaticMap, n_positions: int, factor: float) -> StaticMap:
         one,
         parameters=np.concatenate([positions, values]),
         domain=(low, high),
-        slopes_beyond=_steeper(one, factor, turned=factor < 0),
     )
-
-
-def _steeper(
-    one: StaticMap, factor: float, *, turned: bool = False
-) -> tuple[float, float] | None:
-    """Slopes beyond a map's domain times a factor, in turned order where it is turned."""
-    if one.slopes_beyond is None:
-        return None
-    below, above = (factor * slope for slope in one.slopes_beyond)
-    return (above, below) if turned else (below, above)
 
 
 def mean_slope(one: StaticMap, n_positions: int) -> tuple[float, np.ndarray]:

@@ -197,6 +197,10 @@ class MapRule:
         None where `evaluate` does that.
     outlined : callable (StaticMap) -> StaticMap
         The same map, its parameters alone giving its values everywhere.
+    holds_beyond : callable (StaticMap, low, high) -> (bool, bool)
+        Whether the law holds below and above everything that samples visited, their
+        outermost stretches being ``low`` and ``high``, each from its first to its last
+        argument.
     straightened : callable (StaticMap, v) -> StaticMap
         The map where samples have been, as straight as they allow elsewhere.
     placing : Placing or None
@@ -231,6 +235,9 @@ class MapRule:
     portable: Portable = Portable()
     repeatable: Callable[[StaticMap, np.ndarray], np.ndarray] | None = None
     outlined: Callable[[StaticMap], StaticMap] = lambda one: one
+    holds_beyond: Callable[[StaticMap, np.ndarray, np.ndarray], tuple[bool, bool]] = (
+        lambda one, low, high: (False, False)
+    )
     straightened: Callable[[StaticMap, np.ndarray], StaticMap] = lambda one, v: one
     placing: Placing | None = None
     prior: Prior | None = None

@@ -46,6 +46,7 @@ RULE = MapRule(
     names=lambda one: limits.NAMES,
     settle=limits.settle,
     corners=lambda one: one.parameters,
+    holds_beyond=limits.crossed,
     why_flat=_limit_not_reached,
     portable=Portable(
         (
