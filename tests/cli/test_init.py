@@ -4,7 +4,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from hwid_cli.data.isolated_reading import IsolatedReader
+from hwid_cli.files.isolated_process import IsolatedReader
 
 from hwid_cli.cli.main import main
 from hwid_cli.config.load import load_experiment
