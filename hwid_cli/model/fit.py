@@ -40,6 +40,7 @@ from hwid_cli.model.linear_block import is_stable
 from hwid_cli.model.linear_search import linear_from_nested
 from hwid_cli.model.phases import converge, finish, place, standing
 from hwid_cli.model.placing import coarser, finer, with_maps
+from hwid_cli.model.pole_bound import is_within
 from hwid_cli.model.problem import FitProblem, rmsd, scaled
 from hwid_cli.model.robust import renewed, rescored, settled, winsorised
 from hwid_cli.model.search import (
@@ -426,7 +427,7 @@ def _is_usable(search: Search) -> bool:
     """Tell whether a search ended with a model whose poles are where they may be."""
     candidate = search.candidate
     radius = candidate.limits.largest_pole_radius
-    return bool(np.isfinite(search.cost)) and is_stable(
+    return bool(np.isfinite(search.cost)) and is_within(
         candidate.model.denominator, radius
     )
 

@@ -32,7 +32,7 @@ from scipy.linalg import qr
 from hwid_cli.model import sensitivities, static_map
 from hwid_cli.model.candidates import Candidate, FitData, JacobianColumns, columns
 from hwid_cli.model.linear_block import difference_basis
-from hwid_cli.model.normalise import uses_static_gain
+from hwid_cli.model.normalise import integrates, uses_static_gain
 from hwid_cli.model.static_map import RULES
 from hwid_cli.records.model import StaticMap
 
@@ -87,8 +87,8 @@ def _held_positions(
 def _offset_is_shared(candidate: Candidate, place: JacobianColumns) -> bool:
     """Tell whether a constant can move from one map to the other unnoticed.
 
-    A block that starts empty answers a constant with a transient, so there it cannot;
-    nor can break-points that are fixed take up the shift.
+    A block that starts empty answers a constant with a transient, and one that integrates
+    with a ramp, so there it cannot; nor can break-points that are fixed take up the shift.
     """
     model = candidate.model
     both_free = all(
@@ -97,7 +97,8 @@ def _offset_is_shared(candidate: Candidate, place: JacobianColumns) -> bool:
     rule = RULES[model.output_map.kind]
     has_positions = rule.n_positions(model.output_map) > 0
     can_shift = rule.shifts or (place.with_positions and has_positions)
-    return both_free and can_shift and model.initial_state != "zero"
+    rests = model.initial_state != "zero" and not integrates(model)
+    return both_free and can_shift and rests
 
 
 def _value_gradient(one: StaticMap) -> np.ndarray:

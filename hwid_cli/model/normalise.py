@@ -19,8 +19,9 @@ from hwid_cli.model.linear_block import static_gain
 from hwid_cli.model.static_map import RULES
 from hwid_cli.records.model import HammersteinWiener
 
-# A block whose static gain is below this share of its largest gain is a differentiator;
-# its numerator's norm is fixed instead.
+# A block whose static gain is below this share of its largest gain is a differentiator, and
+# one whose other gains are all below it an integrator, whose static gain no recording
+# tells; their numerator's norm is fixed instead.
 _LEAST_STATIC_SHARE = 1e-3
 _FREQUENCIES = np.linspace(0.0, np.pi, 128)
 
@@ -61,7 +62,8 @@ def block_gain(model: HammersteinWiener) -> float:
     Returns
     -------
     float, [-]
-        The static gain, or the norm of B for a block that hardly passes constants.
+        The static gain, or the norm of B for a block that hardly passes constants or
+        integrates them.
     """
     if uses_static_gain(model):
         return static_gain(model.numerator, model.denominator)
@@ -69,14 +71,26 @@ def block_gain(model: HammersteinWiener) -> float:
 
 
 def uses_static_gain(model: HammersteinWiener) -> bool:
-    """Tell whether the block passes constants well enough to be measured by them."""
+    """Tell whether the block can be measured by what it makes of constants."""
+    response = _gains(model)
+    return bool(
+        response[0] >= _LEAST_STATIC_SHARE * np.max(response)
+    ) and not integrates(model)
+
+
+def integrates(model: HammersteinWiener) -> bool:
+    """Tell whether the block sums up constants, or all but does."""
+    response = _gains(model)
+    return bool(np.max(response[1:]) < _LEAST_STATIC_SHARE * response[0])
+
+
+def _gains(model: HammersteinWiener) -> np.ndarray:
+    """Gains of the block from zero frequency on; infinite at a pole."""
     delay_b = np.exp(-1j * np.outer(_FREQUENCIES, np.arange(model.numerator.size)))
     delay_f = np.exp(-1j * np.outer(_FREQUENCIES, np.arange(model.denominator.size)))
-    below = delay_f @ model.denominator
-    if below[0] == 0.0:
-        return False
-    response = np.abs((delay_b @ model.numerator) / below)
-    return bool(response[0] >= _LEAST_STATIC_SHARE * np.max(response))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        gains = np.abs((delay_b @ model.numerator) / (delay_f @ model.denominator))
+    return np.asarray(np.where(np.isnan(gains), np.inf, gains))
 
 
 def rescaled(

@@ -24,6 +24,7 @@ import numpy as np
 
 from hwid_cli.model import static_map
 from hwid_cli.model.candidates import Candidate, FitData
+from hwid_cli.model.circle_starts import circle_starts, lasting_poles
 from hwid_cli.model.delays import reestimated_blocks
 from hwid_cli.model.distinct import WHEN_FREE, borne_residuals, distinct
 from hwid_cli.model.levenberg_marquardt import Search, minimise
@@ -169,6 +170,11 @@ def reestimate_block(
         count=_REESTIMATED_BLOCKS,
         denominator=model.denominator,
     )
+    if options.largest_pole_radius >= 1.0:
+        blocks = [model.denominator, *(one.denominator for one in starts)]
+        lasting = lasting_poles(blocks, experiments)
+        known = replace(options, input_map="none", output_map="none")
+        starts += circle_starts(between, model.orders, known, lasting)
     entered = [
         standing(
             Candidate(
