@@ -25,7 +25,7 @@ from hwid_cli.model.extrapolation import continued
 from hwid_cli.model.levenberg_marquardt import Search
 from hwid_cli.model.linear_block import poles
 from hwid_cli.model.map_curve import map_curve
-from hwid_cli.model.normalise import normalise, rescaled
+from hwid_cli.model.normalise import normalise
 from hwid_cli.model.placing import with_maps
 from hwid_cli.model.points import before_output_map, point_of
 from hwid_cli.model.problem import FitProblem, joined
@@ -183,10 +183,10 @@ def _in_units(
         input_unit=like.input_unit,
         output_unit=like.output_unit,
     )
-    model = normalise(
-        rescaled(scaled, problem.input_scale, problem.output_scale),
-        keeps_block=options.keeps_block,
-    )
+    in_units = problem.of_data(scaled)
+    if in_units is None:
+        raise ValueError("no model of these maps has the offsets of the recordings")
+    model = normalise(in_units, keeps_block=options.keeps_block)
     if options.keeps_block and options.linear_block is not None:
         # Scaling to and fro rounds; what is given stays bit by bit.
         model = replace(

@@ -23,7 +23,7 @@ from hwid_cli.model.extrapolation import for_search
 from hwid_cli.model.levenberg_marquardt import Search
 from hwid_cli.model.linear_block import filtered
 from hwid_cli.model.linear_search import linear_search
-from hwid_cli.model.normalise import normalise, rescaled
+from hwid_cli.model.normalise import normalise
 from hwid_cli.model.pole_bound import drawn_in, is_within
 from hwid_cli.model.problem import FitProblem
 from hwid_cli.model.regression import LARGEST_RADIUS
@@ -196,18 +196,12 @@ def nested_candidates(
         at = next((one for one in tried if one.contains(model.orders)), None)
         if at is None:
             continue
+        centred = problem.of_experiments(for_search(model))
+        if centred is None:
+            continue
         # The gain that the blocks share is fixed anew: in the units of the recordings it
         # would make the search's steps depend on those units.
-        larger = enlarged(
-            normalise(
-                rescaled(
-                    for_search(model),
-                    1.0 / problem.input_scale,
-                    1.0 / problem.output_scale,
-                )
-            ),
-            at,
-        )
+        larger = enlarged(normalise(centred), at)
         n_state = at.n_state if options.initial_state == "estimated" else 0
         states = np.zeros((count, n_state))
         states[0] = larger.free_response[:n_state] if n_state else 0.0
@@ -238,9 +232,9 @@ def member_models(
     for model in models:
         if not is_within(model.denominator, 1.0):
             continue
-        one = rescaled(
-            for_search(model), 1.0 / problem.input_scale, 1.0 / problem.output_scale
-        )
+        one = problem.of_experiments(for_search(model))
+        if one is None:
+            continue
         if not options.keeps_block:
             one = normalise(one)
         numerator, denominator = one.numerator, one.denominator

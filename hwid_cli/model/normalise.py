@@ -114,6 +114,89 @@ def rescaled(
     )
 
 
+def displaced(
+    model: HammersteinWiener, input_by: float, output_by: float
+) -> HammersteinWiener | None:
+    """Model for signals with other zeros.
+
+    Parameters
+    ----------
+    model : HammersteinWiener
+        Its free response may be those of several experiments, one after the other.
+    input_by, output_by : float
+        What is added to both signals.
+
+    Returns
+    -------
+    HammersteinWiener or None
+        Gives the same output, plus `output_by`, for every input plus `input_by`; None
+        where no model of the same kinds of maps does.
+
+    References
+    ----------
+    docs/method.md, eqs. (15e)-(15f).
+    """
+    before, after = RULES[model.input_map.kind], RULES[model.output_map.kind]
+    if input_by != 0.0:
+        if before.displaced is None:
+            return None
+        model = replace(model, input_map=before.displaced(model.input_map, input_by))
+        if before.passes_constants:
+            gain = static_gain(model.numerator, model.denominator)
+            if after.displaced is None or not uses_static_gain(model):
+                return None
+            output_map = after.displaced(model.output_map, gain * input_by)
+            shifted = _with_constant(replace(model, output_map=output_map), input_by)
+            if shifted is None:
+                return None
+            model = shifted
+            output_by -= gain * input_by if after.passes_constants else 0.0
+    if output_by == 0.0:
+        return model
+    if after.raised is not None:
+        return replace(model, output_map=after.raised(model.output_map, output_by))
+    return _raised_before(model, output_by)
+
+
+def _raised_before(
+    model: HammersteinWiener, output_by: float
+) -> HammersteinWiener | None:
+    """Model whose input map brings a constant to the output."""
+    before, after = RULES[model.input_map.kind], RULES[model.output_map.kind]
+    if not (after.passes_constants and after.displaced is not None):
+        return None
+    if before.raised is None or not uses_static_gain(model):
+        return None
+    constant = output_by / static_gain(model.numerator, model.denominator)
+    return _with_constant(
+        replace(
+            model,
+            input_map=before.raised(model.input_map, constant),
+            output_map=after.displaced(model.output_map, output_by),
+        ),
+        constant,
+    )
+
+
+def _with_constant(
+    model: HammersteinWiener, constant: float
+) -> HammersteinWiener | None:
+    """Model whose block is in equilibrium with a constant that its input has gained."""
+    if model.initial_state == "zero":
+        return None
+    count = model.orders.n_state
+    if model.initial_state == "steady" or count == 0:
+        return model
+    # Both polynomials, with as many coefficients as there are states, or one more.
+    below, above = np.zeros(count + 1), np.zeros(count + 1)
+    below[: model.denominator.size] = model.denominator
+    above[model.delay : model.delay + model.numerator.size] = model.numerator
+    gain = static_gain(model.numerator, model.denominator)
+    start = constant * np.cumsum(gain * below - above)[:count]
+    states = model.free_response.reshape(-1, count) + start
+    return replace(model, free_response=states.ravel())
+
+
 def _around_block(model: HammersteinWiener) -> HammersteinWiener:
     """Input map of mean slope one where the output map can take up its gain."""
     rule, factor = RULES[model.output_map.kind], _unit_factor(model)
