@@ -43,7 +43,7 @@ from hwid_cli.model.phases import converge, finish, place, standing
 from hwid_cli.model.placing import coarser, finer, with_maps
 from hwid_cli.model.pole_bound import is_within
 from hwid_cli.model.problem import FitProblem, offset_left, rmsd, scaled
-from hwid_cli.model.robust import renewed, rescored, settled, winsorised
+from hwid_cli.model.robust import renewed, rescored, settled, unhidden, winsorised
 from hwid_cli.model.search import (
     continue_nested,
     nonlinear_search,
@@ -376,8 +376,8 @@ def _fitted(
         found.problem,
         standard_errors=standard_errors,
     )
-    left = offset_left(recordings, options)
-    return replace(fitted, message=f"{fitted.message}; {left}") if left else fitted
+    said = [fitted.message, offset_left(recordings, options), found.outliers_said]
+    return replace(fitted, message="; ".join(one for one in said if one))
 
 
 @dataclass(frozen=True, eq=False)
@@ -387,11 +387,20 @@ class _Searched:
     search: Search
     problem: FitProblem
     linear_rmsd: float
+    hidden_outliers: int
 
     @property
     def rmsd(self) -> float:
         """RMSD in the unit of the recordings."""
         return rmsd(self.search, self.problem)
+
+    @property
+    def outliers_said(self) -> str:
+        """What is said of outliers that only the initial state would explain."""
+        count = self.hidden_outliers
+        if count == 0:
+            return ""
+        return f"{count} of the first samples taken for outliers, not for the start"
 
     @property
     def may_integrate_an_offset(self) -> bool:
@@ -419,7 +428,7 @@ def _searched(
 ) -> _Searched:
     """Search for the model of a problem, with what is given to begin with."""
     options = options.in_units(problem.input_scale, problem.output_scale)
-    linear_rmsd = float("nan")
+    linear_rmsd, hidden = float("nan"), 0
     known = nested_candidates(problem, orders, options, given.contained)
     anew = given.search_anew or not known
     search = _warm_search(problem, options, given.starts, known, anew)
@@ -434,12 +443,21 @@ def _searched(
         found = (starts_found, linear, known)
         if anew or _is_linear(options):
             search = _search(problem, options, found)
+            search, problem, hidden = _settled(search, problem, options)
             search = _again(search, problem, orders, options, found)
         else:
             search = continue_nested(known, problem.experiments, options, linear)
+    search, problem, others = _settled(search, problem, options)
+    return _Searched(search, problem, linear_rmsd, hidden + others)
+
+
+def _settled(
+    search: Search, problem: FitProblem, options: FitOptions
+) -> tuple[Search, FitProblem, int]:
+    """Search with the last threshold, and how many outliers its first samples hid."""
     search, experiments = settled(search, problem.experiments, options)
-    problem = replace(problem, experiments=tuple(experiments))
-    return _Searched(search, problem, linear_rmsd)
+    search, experiments, hidden = unhidden(search, experiments, options)
+    return search, replace(problem, experiments=tuple(experiments)), hidden
 
 
 def _yardstick(
