@@ -16,12 +16,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg.lapack import dposv
 
 from hwid_cli.model.candidates import Candidate, FitData, JacobianColumns, columns
 from hwid_cli.model.linear_block import is_stable
 from hwid_cli.model.maps.rule import Prior
-from hwid_cli.model.normal_equations import scaled_equations
+from hwid_cli.model.normal_equations import scaled_equations, solved
 from hwid_cli.model.points import ModelPoint, candidate_at, moved, point_of
 from hwid_cli.model.pole_bound import sections_of, step_within
 from hwid_cli.model.sensitivities import (
@@ -196,28 +195,21 @@ def _step_from(
     None where rounding made the equations indefinite.
     """
     matrix, vector, scale, damping = equations
-    step = _solve(matrix, vector, damping)
+    place = descent.place
+    states = (place.free_responses, place.n_state)
+    step = solved(matrix, vector, damping, states)
     if step is None:
         return None
-    proposed = moved(point, scale * step, descent.place)
+    proposed = moved(point, scale * step, place)
     if is_stable(proposed.denominator, descent.largest_pole_radius):
         return step, proposed
     sections = sections_of(point.denominator, descent.largest_pole_radius)
-    within = step_within(equations, sections, descent.place.denominator)
+    within = step_within(equations, sections, place.denominator)
     if within is None:
         return None
     step, reached = within
-    proposed = moved(point, scale * step, descent.place)
+    proposed = moved(point, scale * step, place)
     return step, replace(proposed, denominator=reached.denominator)
-
-
-def _solve(matrix: np.ndarray, vector: np.ndarray, damping: float) -> np.ndarray | None:
-    """Damped step, or None where rounding made the matrix indefinite."""
-    damped = matrix.copy()
-    damped.flat[:: vector.size + 1] += damping
-    # The transpose of a symmetric matrix lies in memory as LAPACK takes it.
-    _, step, info = dposv(damped.T, vector, lower=1, overwrite_a=1)
-    return step if info == 0 and np.isfinite(step @ step) else None
 
 
 def _squared_bends(point: ModelPoint, before: ModelPoint) -> float:

@@ -33,9 +33,10 @@ from hwid_cli.model.points import block_signals, point_of
 from hwid_cli.model.starts import Start
 from hwid_cli.records.model import FitOptions
 
-# Correlation of neighbouring residuals, and mean fourth power over squared mean square
-# (3 for normal noise), from which on residuals are not taken for noise.
-_COLOURED, _PEAKED = 0.5, 4.0
+# Correlation of residuals at some of the first lags, the same in standard deviations of
+# what noise shows by chance, and mean fourth power over squared mean square (3 for normal
+# noise), from which on residuals are not taken for noise.
+_COLOURED, _BY_CHANCE, _LAGS, _PEAKED = 0.1, 4.0, 10, 4.0
 # Deviation, as a share of the output's own, below which peaks are let be. Models of too
 # few poles can come closer still, by maps that bend for this one record.
 _CLOSE = 0.005
@@ -54,18 +55,22 @@ def leaves_structure(candidate: Candidate, experiments: Sequence[FitData]) -> bo
     Returns
     -------
     bool
-        Whether they follow their neighbours, are half as large as the output, or are not
+        Whether they follow one another more than by chance, are half as large as the output, or are not
         small and large at few moments.
     """
     # Outliers, where they are to be borne, are no error of the model.
     residuals = borne_residuals(candidate, experiments)
-    following = sum(float(one[1:] @ one[:-1]) for one in residuals)
+    following = max(
+        abs(sum(float(one[lag:] @ one[:-lag]) for one in residuals))
+        for lag in range(1, _LAGS + 1)
+    )
     joined = np.concatenate(residuals)
     power = float(joined @ joined)
     spread = sum(
         float(np.sum((one.output - np.mean(one.output)) ** 2)) for one in experiments
     )
-    if following > _COLOURED * power or power > _FAR**2 * spread:
+    coloured = max(_COLOURED, _BY_CHANCE / np.sqrt(joined.size))
+    if following > coloured * power or power > _FAR**2 * spread:
         return True
     squares = joined * joined
     peaks = joined.size * float(squares @ squares)

@@ -16,6 +16,7 @@ from dataclasses import replace
 
 from hwid_cli.model import static_map
 from hwid_cli.model.candidates import Candidate, FitData
+from hwid_cli.model.initial_candidates import block_starts
 from hwid_cli.model.levenberg_marquardt import Search
 from hwid_cli.model.phases import converge, finish, place, refine, standing
 from hwid_cli.model.placing import reaching
@@ -38,6 +39,8 @@ _WORTH_GOING_ON = 0.995
 # Restarts that follow a search whose residuals are not noise, and the share of the cost that
 # one must reach for another to follow it.
 _MOST_RESTARTS, _WORTH_RESTARTING = 3, 0.9
+# Linear starts of such a search: more than least squares pass on the way.
+_MORE_STARTS = 30
 # Share of the cost that a step must gain where larger models go on from the result.
 _SMALL_GAIN = 1e-3
 
@@ -91,6 +94,12 @@ def _restarted(
 ) -> Search:
     """The best so far, or what longer screenings find where its residuals are not noise."""
     best = _refined(best, experiments, options)
+    if not leaves_structure(best.candidate, experiments):
+        return best
+    if not options.keeps_block:
+        at = best.candidate.model.orders
+        more = replace(options, starts=_MORE_STARTS)
+        starts = [*starts, *block_starts(experiments, at, more)]
     entered = [*starts, *starts_without_input_maps(starts, experiments)]
     for _ in range(_MOST_RESTARTS):
         if not leaves_structure(best.candidate, experiments):

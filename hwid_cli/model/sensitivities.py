@@ -198,8 +198,35 @@ def normal_equations(
                 rows = np.hstack([after.shares, rows])
             part = rows.T @ rows
         part *= one.output.size / one.counted.size
-        total = part if index == 0 else total + part
+        if len(experiments) == 1:
+            return _by_parameters(part, place, before, after)
+        total = _added(total, part, place, (index, before.count + after.count))
     return _by_parameters(total, place, before, after)
+
+
+def _added(
+    total: np.ndarray, part: np.ndarray, place: JacobianColumns, where: tuple[int, int]
+) -> np.ndarray:
+    """Sum of products, after those of one experiment with its own initial state.
+
+    Columns of the other initial states would be zero: with many experiments they would be
+    nearly all columns there are.
+    """
+    index, of_maps = where
+    n_states = place.free_responses.stop - place.free_responses.start
+    size = part.shape[0] + n_states - place.n_state
+    if index == 0:
+        total = np.zeros((size, size))
+    own = of_maps + index * place.n_state
+    kept = np.concatenate(
+        [
+            np.arange(of_maps),
+            np.arange(own, own + place.n_state),
+            np.arange(of_maps + n_states, size),
+        ]
+    )
+    total[kept[:, None], kept] += part
+    return total
 
 
 def _rows(
@@ -210,7 +237,7 @@ def _rows(
 ) -> np.ndarray:
     """Dense columns of one experiment; the last is left for its residual."""
     (before, after), (index, found, counted) = maps, where
-    n_states = place.free_responses.stop - place.free_responses.start
+    n_states = place.n_state
     nb, nf = point.numerator.size, point.denominator.size - 1
     rows = np.empty(
         (found.residuals[index].size, n_states + before.count + nb + nf + 1)
@@ -219,7 +246,7 @@ def _rows(
         found.signals[index],
         (point.numerator, point.denominator, point.delay),
         (before.first, before.shares, before.count),
-        (point.is_steady, place.n_state, index * place.n_state, n_states),
+        (point.is_steady, n_states, 0, n_states),
         after.slope,
         counted,
         rows,
