@@ -114,6 +114,35 @@ def rescaled(
     )
 
 
+def with_zero_at_zero(model: HammersteinWiener) -> HammersteinWiener:
+    """Same model whose input map is zero at zero, or at the nearest end of its domain.
+
+    Returns
+    -------
+    HammersteinWiener
+        As it was where its kinds of maps cannot move the constant on.
+
+    References
+    ----------
+    docs/method.md, eq. (15).
+    """
+    before, after = RULES[model.input_map.kind], RULES[model.output_map.kind]
+    if before.raised is None or after.displaced is None or after.passes_constants:
+        return model
+    at = np.clip(np.zeros(1), *model.input_map.domain)
+    constant = -float(static_map.evaluate(model.input_map, at)[0])
+    gain = static_gain(model.numerator, model.denominator)
+    moved = _with_constant(
+        replace(
+            model,
+            input_map=before.raised(model.input_map, constant),
+            output_map=after.displaced(model.output_map, gain * constant),
+        ),
+        constant,
+    )
+    return model if moved is None else moved
+
+
 def displaced(
     model: HammersteinWiener, input_by: float, output_by: float
 ) -> HammersteinWiener | None:

@@ -36,12 +36,14 @@ from hwid_cli.records.model import FitOptions
 # Correlation of residuals at some of the first lags, the same in standard deviations of
 # what noise shows by chance, and mean fourth power over squared mean square (3 for normal
 # noise), from which on residuals are not taken for noise.
-_COLOURED, _BY_CHANCE, _LAGS, _PEAKED = 0.1, 4.0, 10, 4.0
+_COLOURED, _BY_CHANCE, _LAGS, _PEAKED = 0.25, 4.0, 10, 4.0
 # Deviation, as a share of the output's own, below which peaks are let be. Models of too
 # few poles can come closer still, by maps that bend for this one record.
 _CLOSE = 0.005
 # The same share from which on next to nothing has been found, whatever the error's shape.
 _FAR = 0.5
+# And from which on more blocks are tried than least squares rank first.
+_FAR_OFF = 0.01
 # Break-points of maps whose shape other kinds take over.
 _BREAK_POINTS = 15
 _STAND_IN = "piecewise_linear"
@@ -75,6 +77,21 @@ def leaves_structure(candidate: Candidate, experiments: Sequence[FitData]) -> bo
     squares = joined * joined
     peaks = joined.size * float(squares @ squares)
     return power > _CLOSE**2 * spread and peaks > _PEAKED * power**2
+
+
+def is_far(candidate: Candidate, experiments: Sequence[FitData]) -> bool:
+    """Tell whether residuals are larger than those of maps that are slightly wrong.
+
+    Returns
+    -------
+    bool
+        Whether the deviation is more than 1 % of the output's own.
+    """
+    joined = np.concatenate(borne_residuals(candidate, experiments))
+    spread = sum(
+        float(np.sum((one.output - np.mean(one.output)) ** 2)) for one in experiments
+    )
+    return bool(joined @ joined > _FAR_OFF**2 * spread)
 
 
 def starts_without_input_maps(

@@ -22,6 +22,7 @@ from hwid_cli.model.phases import converge, finish, place, refine, standing
 from hwid_cli.model.placing import reaching
 from hwid_cli.model.restart import (
     FINE_MAP_POINTS,
+    is_far,
     leaves_structure,
     reestimate_block,
     starts_with_new_maps,
@@ -96,7 +97,7 @@ def _restarted(
     best = _refined(best, experiments, options)
     if not leaves_structure(best.candidate, experiments):
         return best
-    if not options.keeps_block:
+    if not options.keeps_block and is_far(best.candidate, experiments):
         at = best.candidate.model.orders
         more = replace(options, starts=_MORE_STARTS)
         starts = [*starts, *block_starts(experiments, at, more)]

@@ -340,15 +340,15 @@ def _settle(old: StaticMap, parameters: np.ndarray) -> None:
 
 
 def _with_domain(one: StaticMap, domain: tuple[float, float]) -> StaticMap:
-    """Outermost break-points beyond the domain come back to its ends.
+    """Outermost break-points come to the ends of the domain.
 
     They may slide along their line while a search runs, as far as a hundred ranges away.
     """
     points, _ = break_points_and_values(one)
     ends = points.copy()
-    if points[0] < domain[0] < points[1]:
+    if domain[0] < points[1]:
         ends[0] = domain[0]
-    if points[-2] < domain[1] < points[-1]:
+    if points[-2] < domain[1]:
         ends[-1] = domain[1]
     values = _evaluate(replace(one, slopes_beyond=None), ends)
     return replace(one, parameters=np.concatenate([ends, values]), domain=domain)
