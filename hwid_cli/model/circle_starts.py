@@ -18,6 +18,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg.lapack import dpotrf, dpotrs
 from scipy.signal import lfilter
 
 from hwid_cli.model.candidates import FitData, thinned
@@ -31,8 +32,10 @@ from hwid_cli.records.model import FitOptions, Orders
 # circle.
 _LASTS = 5.0
 # Iterations, equations of the least squares, and knots of an expanded input.
-_ITERATIONS, _ROWS, _HATS = 4, 1000, 12
-# Singular values below this share of the largest count as zero.
+_ITERATIONS, _ROWS, _HATS = 3, 1000, 10
+# Added to the diagonal of the scaled products: directions weaker than this are noise.
+_RIDGE = 1e-10
+# Sum of D's coefficients below which it holds an integrator.
 _SINGULAR = 1e-10
 # Starts of each family that are returned.
 _KEPT = 3
@@ -113,7 +116,7 @@ def _factors(lasting: np.ndarray, experiments: Sequence[FitData]) -> list[np.nda
             modes.append(complex(pole))
     integrator = np.array([1.0, -1.0])
     of_modes = [np.ones(1)]
-    for pole in modes[:2]:
+    for pole in modes[:1]:
         pair = np.array([1.0, -2.0 * pole.real, 1.0])
         of_modes += [np.convolve(one, pair) for one in of_modes]
     return [
@@ -271,6 +274,18 @@ def _solved(columns: np.ndarray, target: np.ndarray) -> tuple[np.ndarray, float]
     scale[~(scale > 0.0)] = 1.0
     if not np.isfinite(scale).all():
         return np.zeros(scale.size), float("inf")
-    solution = np.linalg.lstsq(columns / scale, target, rcond=_SINGULAR)[0] / scale
-    residual = target - columns @ solution
+    scaled = columns / scale
+    # Products of columns are several times faster than their decomposition; what the first
+    # solution leaves is solved for once more.
+    matrix = scaled.T @ scaled
+    matrix.flat[:: scale.size + 1] += _RIDGE
+    factor, info = dpotrf(matrix, lower=1)
+    if info != 0:
+        return np.zeros(scale.size), float("inf")
+    solution = np.zeros(scale.size)
+    for _ in range(2):
+        rest = scaled.T @ (target - scaled @ solution)
+        solution += dpotrs(factor, rest, lower=1)[0]
+    residual = target - scaled @ solution
+    solution /= scale
     return solution, float(residual @ residual)

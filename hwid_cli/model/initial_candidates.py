@@ -123,8 +123,7 @@ def _found_linear(
     linear = linear_search(experiments, options, starts)
     if options.keeps_block or options.largest_pole_radius < 1.0:
         return starts, linear
-    known = [linear.candidate.model.denominator, *(one.denominator for one in starts)]
-    lasting = lasting_poles(known, experiments)
+    lasting = lasting_poles([linear.candidate.model.denominator], experiments)
     if lasting.size == 0:
         return starts, linear
     at = replace(orders, nk=linear.candidate.model.delay)

@@ -193,8 +193,7 @@ def reestimate_block(
         denominator=model.denominator,
     )
     if options.largest_pole_radius >= 1.0:
-        blocks = [model.denominator, *(one.denominator for one in starts)]
-        lasting = lasting_poles(blocks, experiments)
+        lasting = lasting_poles([model.denominator], experiments)
         known = replace(options, input_map="none", output_map="none")
         starts += circle_starts(between, model.orders, known, lasting)
     entered = [
