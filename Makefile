@@ -72,8 +72,8 @@ smoke: $(DEV)  ## every stage on tiny recordings, twice
 
 # As modules, from here, so that they find each other; one thread of linear algebra.
 BENCH := OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.benchmarks
-bench: $(DEV)  ## speed and accuracy against what a user would write: about four minutes
-	@for name in fit grid warm_start limit growth startup; do $(BENCH).bench_$$name || exit 1; done
+bench: $(DEV)  ## speed and accuracy against what a user would write: about five minutes
+	@for name in fit grid warm_start limit integrators first_outliers joint growth startup; do $(BENCH).bench_$$name || exit 1; done
 
 bench-campaign: $(DEV)  ## 15 recordings with 100 orders each from an empty cache
 	@$(BENCH).bench_campaign

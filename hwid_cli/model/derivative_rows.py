@@ -63,7 +63,9 @@ def derivative_rows(
     chunk = min(n, _CHUNK)
     lines = np.zeros((pad + chunk, wide))
     if steady:
-        gain = 1.0 / denominator.sum()
+        below = denominator.sum()
+        # A block that integrates rests at zero only, whatever moves.
+        gain = 1.0 / below if below != 0.0 else 0.0
         level = numerator.sum() * gain
         for t in range(pad):
             for m in range(width):

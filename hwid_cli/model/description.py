@@ -20,12 +20,13 @@ from dataclasses import replace
 import numpy as np
 
 from hwid_cli.model import scores, sensitivities, static_map
-from hwid_cli.model.candidates import Candidate
+from hwid_cli.model.candidates import Candidate, columns
 from hwid_cli.model.extrapolation import extrapolated
+from hwid_cli.model.identifiability import offset_is_shared
 from hwid_cli.model.levenberg_marquardt import Search
 from hwid_cli.model.linear_block import poles
 from hwid_cli.model.map_curve import map_curve
-from hwid_cli.model.normalise import normalise, rescaled
+from hwid_cli.model.normalise import normalise, with_zero_at_zero
 from hwid_cli.model.placing import reaching, with_maps
 from hwid_cli.model.problem import FitProblem, joined
 from hwid_cli.model.uncertainty import NOT_WORKED_OUT, parameter_statistics
@@ -183,10 +184,13 @@ def _in_units(
         input_unit=like.input_unit,
         output_unit=like.output_unit,
     )
-    model = normalise(
-        rescaled(scaled, problem.input_scale, problem.output_scale),
-        keeps_block=options.keeps_block,
-    )
+    in_units = problem.of_data(scaled)
+    if in_units is None:
+        raise ValueError("no model of these maps has the offsets of the recordings")
+    model = normalise(in_units, keeps_block=options.keeps_block)
+    place = columns(candidate, with_positions=options.free_break_points)
+    if offset_is_shared(replace(candidate, model=model), place):
+        model = with_zero_at_zero(model)
     if options.keeps_block and options.linear_block is not None:
         # Scaling to and fro rounds; what is given stays bit by bit.
         model = replace(

@@ -28,6 +28,7 @@ import numpy as np
 
 from hwid_cli.model import static_map
 from hwid_cli.model.candidates import Candidate, FitData, limits_of, thinned
+from hwid_cli.model.circle_starts import lasting_poles
 from hwid_cli.model.description import described
 from hwid_cli.model.initial_candidates import (
     block_starts,
@@ -40,8 +41,9 @@ from hwid_cli.model.linear_block import is_stable
 from hwid_cli.model.linear_search import linear_from_nested
 from hwid_cli.model.phases import converge, finish, place, standing
 from hwid_cli.model.placing import coarser, finer, with_maps
-from hwid_cli.model.problem import FitProblem, rmsd, scaled
-from hwid_cli.model.robust import renewed, rescored, settled, winsorised
+from hwid_cli.model.pole_bound import is_within
+from hwid_cli.model.problem import FitProblem, offset_left, rmsd, scaled
+from hwid_cli.model.robust import renewed, rescored, settled, unhidden, winsorised
 from hwid_cli.model.search import (
     continue_nested,
     nonlinear_search,
@@ -355,41 +357,107 @@ def _fitted(
     reason = reason_not_to_fit(recordings, orders, options)
     if reason:
         return replace(blank, message=reason)
-    problem = scaled(recordings, options)
-    options = options.in_units(problem.input_scale, problem.output_scale)
-    linear_rmsd = float("nan")
     try:
-        known = nested_candidates(problem, orders, options, given.contained)
-        anew = given.search_anew or not known
-        search = _warm_search(problem, options, given.starts, known, anew)
-        if search is None:
-            starts_found, linear = linear_initial_candidates(
-                problem, orders, options, sees_input_map=anew
-            )
-            linear_rmsd = rmsd(_yardstick(linear, problem, orders, options), problem)
-            problem = _with_threshold(problem, linear)
-            orders = replace(orders, nk=starts_found[0].delay)
-            known = nested_candidates(problem, orders, options, given.contained)
-            found = (starts_found, linear, known)
-            if anew or _is_linear(options):
-                search = _search(problem, options, found)
-                search = _again(search, problem, orders, options, found)
-            else:
-                search = continue_nested(known, problem.experiments, options, linear)
-        search, experiments = settled(search, problem.experiments, options)
+        found = _searched(scaled(recordings, options), orders, options, given)
+        if found.may_integrate_an_offset:
+            uncentred = scaled(recordings, options, centred=False)
+            other = _searched(uncentred, orders, options, given)
+            if not found.has_model_of_data or other.rmsd < found.rmsd:
+                found = other
     except np.linalg.LinAlgError as error:
         return replace(blank, message=f"linear algebra failed: {error}")
-    if not _is_usable(search):
-        return replace(
-            blank, message="no start gave a stable model", linear_rmsd=linear_rmsd
-        )
-    return described(
-        replace(blank, linear_rmsd=linear_rmsd),
-        search,
+    blank = replace(blank, linear_rmsd=found.linear_rmsd)
+    if not _is_usable(found.search):
+        return replace(blank, message="no start gave a stable model")
+    fitted = described(
+        blank,
+        found.search,
         recordings,
-        replace(problem, experiments=tuple(experiments)),
+        found.problem,
         standard_errors=standard_errors,
     )
+    said = [fitted.message, offset_left(recordings, options), found.outliers_said]
+    return replace(fitted, message="; ".join(one for one in said if one))
+
+
+@dataclass(frozen=True, eq=False)
+class _Searched:
+    """What a search found, and the problem with its last threshold for outliers."""
+
+    search: Search
+    problem: FitProblem
+    linear_rmsd: float
+    hidden_outliers: int
+
+    @property
+    def rmsd(self) -> float:
+        """RMSD in the unit of the recordings."""
+        return rmsd(self.search, self.problem)
+
+    @property
+    def outliers_said(self) -> str:
+        """What is said of outliers that only the initial state would explain."""
+        count = self.hidden_outliers
+        if count == 0:
+            return ""
+        return f"{count} of the first samples taken for outliers, not for the start"
+
+    @property
+    def may_integrate_an_offset(self) -> bool:
+        """Whether a block that hardly settles saw its input without its offset.
+
+        What it makes of an offset is a ramp, which is no constant of any map.
+        """
+        if not self.problem.is_centred:
+            return False
+        model = self.search.candidate.model
+        lasting = lasting_poles([model.denominator], self.problem.experiments)
+        passes = static_map.RULES[model.input_map.kind].passes_constants
+        return not self.has_model_of_data or (passes and lasting.size > 0)
+
+    @property
+    def has_model_of_data(self) -> bool:
+        """Whether the model can be written for the recordings as they are."""
+        if not (self.problem.is_centred and _is_usable(self.search)):
+            return True
+        return self.problem.of_data(self.search.candidate.model) is not None
+
+
+def _searched(
+    problem: FitProblem, orders: Orders, options: FitOptions, given: _Given
+) -> _Searched:
+    """Search for the model of a problem, with what is given to begin with."""
+    options = options.in_units(problem.input_scale, problem.output_scale)
+    linear_rmsd, hidden = float("nan"), 0
+    known = nested_candidates(problem, orders, options, given.contained)
+    anew = given.search_anew or not known
+    search = _warm_search(problem, options, given.starts, known, anew)
+    if search is None:
+        starts_found, linear = linear_initial_candidates(
+            problem, orders, options, sees_input_map=anew
+        )
+        linear_rmsd = rmsd(_yardstick(linear, problem, orders, options), problem)
+        problem = _with_threshold(problem, linear)
+        orders = replace(orders, nk=starts_found[0].delay)
+        known = nested_candidates(problem, orders, options, given.contained)
+        found = (starts_found, linear, known)
+        if anew or _is_linear(options):
+            search = _search(problem, options, found)
+            search, problem, hidden = _settled(search, problem, options)
+            search = _again(search, problem, orders, options, found)
+        else:
+            search = continue_nested(known, problem.experiments, options, linear)
+    search, problem, others = _settled(search, problem, options)
+    return _Searched(search, problem, linear_rmsd, hidden + others)
+
+
+def _settled(
+    search: Search, problem: FitProblem, options: FitOptions
+) -> tuple[Search, FitProblem, int]:
+    """Search with the last threshold, and how many outliers its first samples hid."""
+    search, experiments = settled(search, problem.experiments, options)
+    search, experiments, hidden = unhidden(search, experiments, options)
+    return search, replace(problem, experiments=tuple(experiments)), hidden
 
 
 def _yardstick(
@@ -426,7 +494,7 @@ def _is_usable(search: Search) -> bool:
     """Tell whether a search ended with a model whose poles are where they may be."""
     candidate = search.candidate
     radius = candidate.limits.largest_pole_radius
-    return bool(np.isfinite(search.cost)) and is_stable(
+    return bool(np.isfinite(search.cost)) and is_within(
         candidate.model.denominator, radius
     )
 

@@ -17,6 +17,7 @@ import numpy as np
 from hwid_cli.model import sensitivities
 from hwid_cli.model.candidates import Candidate, FitData, JacobianColumns
 from hwid_cli.model.identifiability import Directions, listed, parameter_names
+from hwid_cli.model.normalise import integrates
 from hwid_cli.model.static_map import RULES
 from hwid_cli.records.model import HammersteinWiener, StaticMap
 
@@ -31,6 +32,10 @@ _CANCELS = 0.05
 _SAME_LEVEL = 1e-9
 _NO_MAP = StaticMap("none", np.zeros(0))
 _SAME_OUTPUT = "that hardly changes the simulated output"
+_DRIFTS = (
+    "the block integrates: where it starts and how it drifts looks like a constant of the "
+    "maps"
+)
 
 
 def flat_sentences(
@@ -140,6 +145,10 @@ def _why(
             reason = _why_of_map(getattr(model, label), moved, signals[label], part)
             if reason:
                 return reason.format(what=what)
+    starts_anywhere = model.initial_state == "estimated" and integrates(model)
+    with_start = np.abs(np.r_[parts[place.free_responses], parts[place.output_map]])
+    if starts_anywhere and with_start.max(initial=0.0) >= largest:
+        return _DRIFTS
     if not _moves_listed(parts, place):
         return _SAME_OUTPUT
     in_block = [

@@ -32,7 +32,8 @@ from scipy.linalg import qr
 from hwid_cli.model import sensitivities, static_map
 from hwid_cli.model.candidates import Candidate, FitData, JacobianColumns, columns
 from hwid_cli.model.linear_block import difference_basis
-from hwid_cli.model.normalise import uses_static_gain
+from hwid_cli.model.normalise import integrates, uses_static_gain
+from hwid_cli.model.sensitivities import end_gradients
 from hwid_cli.model.static_map import RULES
 from hwid_cli.records.model import StaticMap
 
@@ -65,7 +66,7 @@ def held_gradients(candidate: Candidate, place: JacobianColumns) -> list[np.ndar
         else:
             row[place.numerator] = model.numerator
         held.append(row)
-    if _offset_is_shared(candidate, place):
+    if offset_is_shared(candidate, place):
         gradient = _value_gradient(model.input_map)
         held.append(_row(place, place.input_map, gradient))
     if place.with_positions:
@@ -84,11 +85,11 @@ def _held_positions(
     return list(rows)
 
 
-def _offset_is_shared(candidate: Candidate, place: JacobianColumns) -> bool:
+def offset_is_shared(candidate: Candidate, place: JacobianColumns) -> bool:
     """Tell whether a constant can move from one map to the other unnoticed.
 
-    A block that starts empty answers a constant with a transient, so there it cannot;
-    nor can break-points that are fixed take up the shift.
+    A block that starts empty answers a constant with a transient, and one that integrates
+    with a ramp, so there it cannot; nor can break-points that are fixed take up the shift.
     """
     model = candidate.model
     both_free = all(
@@ -97,7 +98,8 @@ def _offset_is_shared(candidate: Candidate, place: JacobianColumns) -> bool:
     rule = RULES[model.output_map.kind]
     has_positions = rule.n_positions(model.output_map) > 0
     can_shift = rule.shifts or (place.with_positions and has_positions)
-    return both_free and can_shift and model.initial_state != "zero"
+    rests = model.initial_state != "zero" and not integrates(model)
+    return both_free and can_shift and rests
 
 
 def _value_gradient(one: StaticMap) -> np.ndarray:
@@ -117,6 +119,8 @@ def _row(place: JacobianColumns, part: slice, gradient: np.ndarray) -> np.ndarra
 # Eigenvalues of the scaled equations below this share of the largest are zero within
 # rounding.
 _SINGULAR = 1e-11
+# Shift of a domain's ends by which derivatives are taken, as a share of it.
+_SHIFT_OF_ENDS = 1e-6
 # A parameter with this share of a flat direction's largest part is not determined.
 _LEAST_SHARE = 1e-3
 
@@ -229,12 +233,33 @@ def directions(
     strength, parts = np.linalg.eigh(
         free.T @ (system.matrix / scale / scale[:, None]) @ free
     )
-    return Directions(
-        place,
-        change @ ((free @ parts) / scale[:, None]),
-        strength,
-        _sizes(candidate, place),
+    steps = change @ ((free @ parts) / scale[:, None])
+    ends = end_gradients(candidate, experiments, place)
+    steps[place.output_map] += _change_of_ends(candidate, place) @ (
+        ends @ ((free @ parts) / scale[:, None])
     )
+    return Directions(place, steps, strength, _sizes(candidate, place))
+
+
+def _change_of_ends(candidate: Candidate, place: JacobianColumns) -> np.ndarray:
+    """Derivatives of the output map's parameters by the ends of its domain.
+
+    The ends are those of the signal that reaches the map, so they move with the block.
+    Parameters that lie at the ends, or count from them, move along.
+    """
+    one = candidate.model.output_map
+    low, high = one.domain
+    count = place.output_map.stop - place.output_map.start
+    if not low < high:
+        return np.zeros((count, 2))
+    by = _SHIFT_OF_ENDS * (high - low)
+    rule = RULES[one.kind]
+    # Inwards at either end: outwards a map goes on with slopes of its own.
+    moved = [
+        (rule.with_domain(one, domain).parameters - one.parameters) / signed
+        for domain, signed in (((low + by, high), by), ((low, high - by), -by))
+    ]
+    return np.column_stack(moved)[one.parameters.size - count :]
 
 
 def n_free(candidate: Candidate, *, free_break_points: bool) -> int:

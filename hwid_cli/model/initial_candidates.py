@@ -17,13 +17,14 @@ from dataclasses import replace
 import numpy as np
 
 from hwid_cli.model.candidates import Candidate, FitData, limits_of
+from hwid_cli.model.circle_starts import circle_starts, lasting_poles
 from hwid_cli.model.delays import starts_of_delays
 from hwid_cli.model.extrapolation import for_search
 from hwid_cli.model.levenberg_marquardt import Search
-from hwid_cli.model.linear_block import filtered, is_stable
+from hwid_cli.model.linear_block import filtered
 from hwid_cli.model.linear_search import linear_search
-from hwid_cli.model.normalise import normalise, rescaled
-from hwid_cli.model.pole_bound import drawn_in
+from hwid_cli.model.normalise import normalise
+from hwid_cli.model.pole_bound import drawn_in, is_within
 from hwid_cli.model.problem import FitProblem
 from hwid_cli.model.regression import LARGEST_RADIUS
 from hwid_cli.model.robust import renewed, rescored, winsorised
@@ -92,8 +93,7 @@ def linear_initial_candidates(
     """
     experiments: Sequence[FitData] = problem.experiments
     kinds = options if sees_input_map else replace(options, input_map="none")
-    starts = block_starts(experiments, orders, kinds)
-    linear = linear_search(experiments, options, starts)
+    starts, linear = _found_linear(experiments, experiments, orders, options, kinds)
     if options.loss == "squared":
         return starts, linear
     asked = 0.0
@@ -101,10 +101,38 @@ def linear_initial_candidates(
         asked = renewed(experiments, [linear.candidate])[0].threshold
         slowly = max(asked, _FALL * experiments[0].threshold)
         experiments = [replace(one, threshold=slowly) for one in experiments]
-        starts = block_starts(winsorised(linear, experiments), orders, kinds)
-        again = linear_search(experiments, options, starts)
+        cut = winsorised(linear, experiments)
+        starts, again = _found_linear(experiments, cut, orders, options, kinds)
         linear = min(rescored(linear, experiments), again, key=lambda one: one.cost)
     return starts, linear
+
+
+def _found_linear(
+    experiments: Sequence[FitData],
+    cut: Sequence[FitData],
+    orders: Orders,
+    options: FitOptions,
+    kinds: FitOptions,
+) -> tuple[tuple[Start, ...], Search]:
+    """Linear starts from experiments without outliers, and the linear model of all.
+
+    Where poles hardly settle within the recordings, blocks with poles on the unit circle
+    are starts too.
+    """
+    starts = block_starts(cut, orders, kinds)
+    linear = linear_search(experiments, options, starts)
+    if options.keeps_block or options.largest_pole_radius < 1.0:
+        return starts, linear
+    lasting = lasting_poles([linear.candidate.model.denominator], experiments)
+    if lasting.size == 0:
+        return starts, linear
+    at = replace(orders, nk=linear.candidate.model.delay)
+    on_circle = circle_starts(cut, at, kinds, lasting)
+    for one in on_circle:
+        if not one.is_expanded:
+            tried = linear_search(experiments, options, [one])
+            linear = min(linear, tried, key=lambda search: search.cost)
+    return (*starts, *on_circle), linear
 
 
 def block_starts(
@@ -167,18 +195,12 @@ def nested_candidates(
         at = next((one for one in tried if one.contains(model.orders)), None)
         if at is None:
             continue
+        centred = problem.of_experiments(for_search(model))
+        if centred is None:
+            continue
         # The gain that the blocks share is fixed anew: in the units of the recordings it
         # would make the search's steps depend on those units.
-        larger = enlarged(
-            normalise(
-                rescaled(
-                    for_search(model),
-                    1.0 / problem.input_scale,
-                    1.0 / problem.output_scale,
-                )
-            ),
-            at,
-        )
+        larger = enlarged(normalise(centred), at)
         n_state = at.n_state if options.initial_state == "estimated" else 0
         states = np.zeros((count, n_state))
         states[0] = larger.free_response[:n_state] if n_state else 0.0
@@ -207,11 +229,11 @@ def member_models(
     """
     found = []
     for model in models:
-        if not is_stable(model.denominator):
+        if not is_within(model.denominator, 1.0):
             continue
-        one = rescaled(
-            for_search(model), 1.0 / problem.input_scale, 1.0 / problem.output_scale
-        )
+        one = problem.of_experiments(for_search(model))
+        if one is None:
+            continue
         if not options.keeps_block:
             one = normalise(one)
         numerator, denominator = one.numerator, one.denominator

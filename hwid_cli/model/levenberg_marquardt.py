@@ -16,15 +16,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import null_space
-from scipy.linalg.lapack import dposv
 
 from hwid_cli.model.candidates import Candidate, FitData, JacobianColumns, columns
-from hwid_cli.model.linear_block import difference_basis, is_stable
+from hwid_cli.model.linear_block import is_stable
 from hwid_cli.model.maps.rule import Prior
-from hwid_cli.model.normal_equations import scaled_equations
+from hwid_cli.model.normal_equations import scaled_equations, solved
 from hwid_cli.model.points import ModelPoint, candidate_at, moved, point_of
-from hwid_cli.model.pole_bound import drawn_in, radii_held
+from hwid_cli.model.pole_bound import sections_of, step_within
 from hwid_cli.model.sensitivities import (
     Equations,
     Simulated,
@@ -91,11 +89,6 @@ class _Descent:
     experiments: Sequence[FitData]
     place: JacobianColumns
     largest_pole_radius: float
-
-    @property
-    def is_bounded(self) -> bool:
-        """Whether poles have to lie inside a circle that the user gave."""
-        return self.largest_pole_radius < 1.0
 
     @property
     def samples(self) -> int:
@@ -175,60 +168,48 @@ def _accepted_step(
     )
     growth, promised = 2.0, None
     while damping < _LARGEST_DAMPING:
-        step = _solve(matrix, vector, damping)
-        if step is not None:
-            proposed = moved(point, scale * step, place)
-            if descent.is_bounded:
-                along = (matrix, vector, scale, damping)
-                step, proposed = _within_bound(point, step, proposed, along, descent)
-            predicted = float(step @ (damping * step + vector))
+        found_step = _step_from(point, (matrix, vector, scale, damping), descent)
+        if found_step is not None:
+            step, proposed = found_step
+            predicted = float(step @ (2.0 * vector - matrix @ step))
             promised = predicted if promised is None else promised
-            if is_stable(proposed.denominator, descent.largest_pole_radius):
-                tried = simulated(proposed, descent.experiments)
-                lowered = total - tried.cost - weight * _squared_bends(proposed, point)
-                if lowered > 0.0:
-                    ratio = lowered / predicted
-                    easing = min(2.0, max(0.1, 1.0 - (2.0 * ratio - 1.0) ** 3))
-                    damping = max(_LEAST_DAMPING, damping * easing)
-                    return _Step(proposed, tried, lowered / total, damping)
+            tried = simulated(proposed, descent.experiments)
+            lowered = total - tried.cost - weight * _squared_bends(proposed, point)
+            if lowered > 0.0:
+                ratio = lowered / predicted
+                easing = min(2.0, max(0.1, 1.0 - (2.0 * ratio - 1.0) ** 3))
+                damping = max(_LEAST_DAMPING, damping * easing)
+                return _Step(proposed, tried, lowered / total, damping)
         damping, growth = damping * growth, growth * 2.0
     gain = float("inf") if promised is None else promised / total
     return _Step(None, found, gain, damping)
 
 
-def _within_bound(
+def _step_from(
     point: ModelPoint,
-    step: np.ndarray,
-    proposed: ModelPoint,
     equations: tuple[np.ndarray, np.ndarray, np.ndarray, float],
     descent: _Descent,
-) -> tuple[np.ndarray, ModelPoint]:
-    """The same step, or one along the bound on the poles where it would cross it."""
-    radius = descent.largest_pole_radius
-    if is_stable(proposed.denominator, radius):
-        return step, proposed
+) -> tuple[np.ndarray, ModelPoint] | None:
+    """Damped step and where it leads; along the circle of the poles if it crosses that.
+
+    None where rounding made the equations indefinite.
+    """
     matrix, vector, scale, damping = equations
-    change = (proposed.denominator - point.denominator)[1:]
-    held = radii_held(point.denominator, change, radius)
-    if held.size:
-        at = descent.place.denominator
-        rows = np.zeros((len(held), step.size))
-        rows[:, at] = held @ difference_basis(change.size) * scale[at]
-        free = null_space(rows)
-        along = _solve(free.T @ matrix @ free, free.T @ vector, damping)
-        step = step if along is None else free @ along
-        proposed = moved(point, scale * step, descent.place)
-    inside = drawn_in(proposed.denominator, radius)
-    return step, replace(proposed, denominator=inside)
-
-
-def _solve(matrix: np.ndarray, vector: np.ndarray, damping: float) -> np.ndarray | None:
-    """Damped step, or None where rounding made the matrix indefinite."""
-    damped = matrix.copy()
-    damped.flat[:: vector.size + 1] += damping
-    # The transpose of a symmetric matrix lies in memory as LAPACK takes it.
-    _, step, info = dposv(damped.T, vector, lower=1, overwrite_a=1)
-    return step if info == 0 and np.isfinite(step @ step) else None
+    place = descent.place
+    states = (place.free_responses, place.n_state)
+    step = solved(matrix, vector, damping, states)
+    if step is None:
+        return None
+    proposed = moved(point, scale * step, place)
+    if is_stable(proposed.denominator, descent.largest_pole_radius):
+        return step, proposed
+    sections = sections_of(point.denominator, descent.largest_pole_radius)
+    within = step_within(equations, sections, place.denominator)
+    if within is None:
+        return None
+    step, reached = within
+    proposed = moved(point, scale * step, place)
+    return step, replace(proposed, denominator=reached.denominator)
 
 
 def _squared_bends(point: ModelPoint, before: ModelPoint) -> float:

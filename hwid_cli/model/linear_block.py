@@ -62,7 +62,9 @@ def block_output(
     if steady:
         past = signal[0]
         below = denominator.sum()
-        rest = past * (numerator.sum() / below if below != 0.0 else np.inf)
+        # A block that integrates has no other equilibrium than that of zero.
+        if past != 0.0:
+            rest = past * (numerator.sum() / below if below != 0.0 else np.inf)
     # What does not depend on the result first: that loop runs on vectors.
     lead = min(n, nb - 1 + delay)
     passed = np.empty(n)

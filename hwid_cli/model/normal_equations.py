@@ -1,7 +1,72 @@
-"""Compiled arithmetic on normal equations; nothing else compiles here."""
+"""Arithmetic on normal equations, compiled where it is by loops; the solution of them."""
 
 import numpy as np
 from numba import njit
+from scipy.linalg.lapack import dposv
+
+# Initial states of fewer experiments are solved for together with all else.
+_FEW = 3
+
+
+def solved(
+    matrix: np.ndarray, vector: np.ndarray, damping: float, states: tuple[slice, int]
+) -> np.ndarray | None:
+    """Solution of damped normal equations.
+
+    Initial states of different experiments do not meet in any equation, so those of many
+    are eliminated one experiment after the other, which takes time in proportion to their
+    number instead of to its third power.
+
+    Parameters
+    ----------
+    matrix : ndarray, shape (n, n)
+    vector : ndarray, shape (n,)
+    damping : float
+        Added to the diagonal.
+    states : tuple of slice and int
+        Where the initial states stand, and how many each experiment has.
+
+    Returns
+    -------
+    ndarray, shape (n,), or None
+        None where rounding made the matrix indefinite.
+
+    References
+    ----------
+    docs/method.md, eq. (14a).
+    """
+    damped = matrix.copy()
+    damped.flat[:: vector.size + 1] += damping
+    part, n_state = states
+    if n_state == 0 or part.stop - part.start < _FEW * n_state:
+        return _positive(damped, vector)
+    count = (part.stop - part.start) // n_state
+    shared = np.r_[0 : part.start, part.stop : vector.size]
+    each = np.arange(count)
+    blocks = damped[part, part].reshape(count, n_state, count, n_state)
+    own = blocks[each, :, each, :]
+    right = np.concatenate([damped[part][:, shared], vector[part, None]], axis=1)
+    try:
+        np.linalg.cholesky(own)
+    except np.linalg.LinAlgError:
+        return None
+    ratio = np.linalg.solve(own, right.reshape(count, n_state, -1))
+    ratio = ratio.reshape(count * n_state, -1)
+    reduced = damped[np.ix_(shared, shared)] - right[:, :-1].T @ ratio[:, :-1]
+    step = _positive(reduced, vector[shared] - right[:, :-1].T @ ratio[:, -1])
+    if step is None:
+        return None
+    result = np.empty(vector.size)
+    result[shared] = step
+    result[part] = ratio[:, -1] - ratio[:, :-1] @ step
+    return result if np.isfinite(result @ result) else None
+
+
+def _positive(matrix: np.ndarray, vector: np.ndarray) -> np.ndarray | None:
+    """Solution with a positive definite matrix, which is overwritten; None without."""
+    # The transpose of a symmetric matrix lies in memory as LAPACK takes it.
+    _, step, info = dposv(matrix.T, vector, lower=1, overwrite_a=1)
+    return step if info == 0 and np.isfinite(step @ step) else None
 
 
 @njit(cache=True)

@@ -24,6 +24,7 @@ import numpy as np
 
 from hwid_cli.model import static_map
 from hwid_cli.model.candidates import Candidate, FitData
+from hwid_cli.model.circle_starts import circle_starts, lasting_poles
 from hwid_cli.model.delays import reestimated_blocks
 from hwid_cli.model.distinct import WHEN_FREE, borne_residuals, distinct
 from hwid_cli.model.levenberg_marquardt import Search, minimise
@@ -32,14 +33,17 @@ from hwid_cli.model.points import block_signals, point_of
 from hwid_cli.model.starts import Start
 from hwid_cli.records.model import FitOptions
 
-# Correlation of neighbouring residuals, and mean fourth power over squared mean square
-# (3 for normal noise), from which on residuals are not taken for noise.
-_COLOURED, _PEAKED = 0.5, 4.0
+# Correlation of residuals at some of the first lags, the same in standard deviations of
+# what noise shows by chance, and mean fourth power over squared mean square (3 for normal
+# noise), from which on residuals are not taken for noise.
+_COLOURED, _BY_CHANCE, _LAGS, _PEAKED = 0.25, 4.0, 10, 4.0
 # Deviation, as a share of the output's own, below which peaks are let be. Models of too
 # few poles can come closer still, by maps that bend for this one record.
 _CLOSE = 0.005
 # The same share from which on next to nothing has been found, whatever the error's shape.
 _FAR = 0.5
+# And from which on more blocks are tried than least squares rank first.
+_FAR_OFF = 0.01
 # Break-points of maps whose shape other kinds take over.
 _BREAK_POINTS = 15
 _STAND_IN = "piecewise_linear"
@@ -53,22 +57,41 @@ def leaves_structure(candidate: Candidate, experiments: Sequence[FitData]) -> bo
     Returns
     -------
     bool
-        Whether they follow their neighbours, are half as large as the output, or are not
+        Whether they follow one another more than by chance, are half as large as the output, or are not
         small and large at few moments.
     """
     # Outliers, where they are to be borne, are no error of the model.
     residuals = borne_residuals(candidate, experiments)
-    following = sum(float(one[1:] @ one[:-1]) for one in residuals)
+    following = max(
+        abs(sum(float(one[lag:] @ one[:-lag]) for one in residuals))
+        for lag in range(1, _LAGS + 1)
+    )
     joined = np.concatenate(residuals)
     power = float(joined @ joined)
     spread = sum(
         float(np.sum((one.output - np.mean(one.output)) ** 2)) for one in experiments
     )
-    if following > _COLOURED * power or power > _FAR**2 * spread:
+    coloured = max(_COLOURED, _BY_CHANCE / np.sqrt(joined.size))
+    if following > coloured * power or power > _FAR**2 * spread:
         return True
     squares = joined * joined
     peaks = joined.size * float(squares @ squares)
     return power > _CLOSE**2 * spread and peaks > _PEAKED * power**2
+
+
+def is_far(candidate: Candidate, experiments: Sequence[FitData]) -> bool:
+    """Tell whether residuals are larger than those of maps that are slightly wrong.
+
+    Returns
+    -------
+    bool
+        Whether the deviation is more than 1 % of the output's own.
+    """
+    joined = np.concatenate(borne_residuals(candidate, experiments))
+    spread = sum(
+        float(np.sum((one.output - np.mean(one.output)) ** 2)) for one in experiments
+    )
+    return bool(joined @ joined > _FAR_OFF**2 * spread)
 
 
 def starts_without_input_maps(
@@ -169,6 +192,10 @@ def reestimate_block(
         count=_REESTIMATED_BLOCKS,
         denominator=model.denominator,
     )
+    if options.largest_pole_radius >= 1.0:
+        lasting = lasting_poles([model.denominator], experiments)
+        known = replace(options, input_map="none", output_map="none")
+        starts += circle_starts(between, model.orders, known, lasting)
     entered = [
         standing(
             Candidate(

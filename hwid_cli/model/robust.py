@@ -17,6 +17,7 @@ import numpy as np
 
 from hwid_cli.model import sensitivities
 from hwid_cli.model.candidates import Candidate, FitData
+from hwid_cli.model.hidden_outliers import without_hidden_outliers
 from hwid_cli.model.levenberg_marquardt import Search
 from hwid_cli.model.outliers import tells_errors
 from hwid_cli.model.phases import finish
@@ -126,6 +127,31 @@ def settled(
             break
         search = finish(search, experiments, options)
     return search, experiments
+
+
+def unhidden(
+    search: Search, experiments: Sequence[FitData], options: FitOptions
+) -> tuple[Search, Sequence[FitData], int]:
+    """Go on without outliers that only an initial state explains.
+
+    Returns
+    -------
+    search, experiments
+        As they were where all residuals count squared, or there are none.
+    count : int
+        How many there are.
+    """
+    if experiments[0].threshold == np.inf or not np.isfinite(search.cost):
+        return search, experiments, 0
+    scale = experiments[0].threshold / _CORNER
+    candidate, mended, count = without_hidden_outliers(
+        search.candidate, experiments, scale
+    )
+    if count == 0:
+        return search, experiments, 0
+    begun = rescored(replace(search, candidate=candidate), mended)
+    search, experiments = settled(finish(begun, mended, options), mended, options)
+    return search, experiments, count
 
 
 def plain(experiments: Sequence[FitData]) -> tuple[FitData, ...]:

@@ -16,11 +16,13 @@ from dataclasses import replace
 
 from hwid_cli.model import static_map
 from hwid_cli.model.candidates import Candidate, FitData
+from hwid_cli.model.initial_candidates import block_starts
 from hwid_cli.model.levenberg_marquardt import Search
 from hwid_cli.model.phases import converge, finish, place, refine, standing
 from hwid_cli.model.placing import reaching
 from hwid_cli.model.restart import (
     FINE_MAP_POINTS,
+    is_far,
     leaves_structure,
     reestimate_block,
     starts_with_new_maps,
@@ -38,6 +40,8 @@ _WORTH_GOING_ON = 0.995
 # Restarts that follow a search whose residuals are not noise, and the share of the cost that
 # one must reach for another to follow it.
 _MOST_RESTARTS, _WORTH_RESTARTING = 3, 0.9
+# Linear starts of such a search: more than least squares pass on the way.
+_MORE_STARTS = 30
 # Share of the cost that a step must gain where larger models go on from the result.
 _SMALL_GAIN = 1e-3
 
@@ -91,6 +95,12 @@ def _restarted(
 ) -> Search:
     """The best so far, or what longer screenings find where its residuals are not noise."""
     best = _refined(best, experiments, options)
+    if not leaves_structure(best.candidate, experiments):
+        return best
+    if not options.keeps_block and is_far(best.candidate, experiments):
+        at = best.candidate.model.orders
+        more = replace(options, starts=_MORE_STARTS)
+        starts = [*starts, *block_starts(experiments, at, more)]
     entered = [*starts, *starts_without_input_maps(starts, experiments)]
     for _ in range(_MOST_RESTARTS):
         if not leaves_structure(best.candidate, experiments):

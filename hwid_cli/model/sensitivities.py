@@ -198,8 +198,79 @@ def normal_equations(
                 rows = np.hstack([after.shares, rows])
             part = rows.T @ rows
         part *= one.output.size / one.counted.size
-        total = part if index == 0 else total + part
+        if len(experiments) == 1:
+            return _by_parameters(part, place, before, after)
+        total = _added(total, part, place, (index, before.count + after.count))
     return _by_parameters(total, place, before, after)
+
+
+def end_gradients(
+    candidate: Candidate, experiments: Sequence[FitData], place: JacobianColumns
+) -> np.ndarray:
+    """Derivatives of the lowest and the highest signal that reaches the output map.
+
+    Returns
+    -------
+    ndarray, shape (2, n_parameters)
+        By the parameters of a step.
+    """
+    point = point_of(candidate)
+    signals = all_signals(point, experiments)
+    result = np.zeros((2, place.total))
+    for row, find in enumerate((np.argmin, np.argmax)):
+        at = [int(find(x)) for _, x in signals]
+        index = int(find([x[t] for (_, x), t in zip(signals, at, strict=True)]))
+        before = static_map.derivatives(
+            point.input_map,
+            experiments[index].input,
+            with_positions=place.with_positions,
+        )
+        counts = (before.count, place.n_state, point.numerator.size)
+        cuts = np.cumsum([*counts, point.denominator.size - 1])
+        rows = np.empty((1, cuts[-1]))
+        derivative_rows(
+            signals[index],
+            (point.numerator, point.denominator, point.delay),
+            (before.first, before.shares, before.count),
+            (point.is_steady, place.n_state, 0, place.n_state),
+            np.ones(1),
+            np.array([at[index]]),
+            rows,
+        )
+        of_map, of_states, of_b, of_f = np.split(rows[0], cuts[:-1])
+        own = place.free_responses.start + index * place.n_state
+        result[row, own : own + place.n_state] = of_states
+        change = before.change
+        result[row, place.input_map] = of_map if change is None else change @ of_map
+        if place.numerator.stop > place.numerator.start:
+            result[row, place.numerator] = of_b
+            result[row, place.denominator] = of_f
+    return result
+
+
+def _added(
+    total: np.ndarray, part: np.ndarray, place: JacobianColumns, where: tuple[int, int]
+) -> np.ndarray:
+    """Sum of products, after those of one experiment with its own initial state.
+
+    Columns of the other initial states would be zero: with many experiments they would be
+    nearly all columns there are.
+    """
+    index, of_maps = where
+    n_states = place.free_responses.stop - place.free_responses.start
+    size = part.shape[0] + n_states - place.n_state
+    if index == 0:
+        total = np.zeros((size, size))
+    own = of_maps + index * place.n_state
+    kept = np.concatenate(
+        [
+            np.arange(of_maps),
+            np.arange(own, own + place.n_state),
+            np.arange(of_maps + n_states, size),
+        ]
+    )
+    total[kept[:, None], kept] += part
+    return total
 
 
 def _rows(
@@ -210,7 +281,7 @@ def _rows(
 ) -> np.ndarray:
     """Dense columns of one experiment; the last is left for its residual."""
     (before, after), (index, found, counted) = maps, where
-    n_states = place.free_responses.stop - place.free_responses.start
+    n_states = place.n_state
     nb, nf = point.numerator.size, point.denominator.size - 1
     rows = np.empty(
         (found.residuals[index].size, n_states + before.count + nb + nf + 1)
@@ -219,7 +290,7 @@ def _rows(
         found.signals[index],
         (point.numerator, point.denominator, point.delay),
         (before.first, before.shares, before.count),
-        (point.is_steady, place.n_state, index * place.n_state, n_states),
+        (point.is_steady, n_states, 0, n_states),
         after.slope,
         counted,
         rows,

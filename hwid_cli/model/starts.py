@@ -41,6 +41,7 @@ _FEWER_POLES = 2
 _MOST_FREE_RESPONSES = 3
 # Equations of a start's least squares; enough for a few dozen unknowns.
 _ROWS = 1000
+_TINY = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -225,7 +226,9 @@ def _distinct(solutions: Sequence[Solution], count: int) -> list[Solution]:
 
 def _response(solution: Solution) -> np.ndarray:
     """Frequency response of 1/F, scaled to norm one: what tells two starts apart."""
-    response = 1.0 / (_delays(solution.denominator.size) @ solution.denominator)
+    below = _delays(solution.denominator.size) @ solution.denominator
+    # A pole on the unit circle may stand at one of the frequencies.
+    response = 1.0 / np.where(below == 0.0, _TINY, below)
     return response / np.linalg.norm(response)
 
 

@@ -17,7 +17,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from hwid_cli.model.candidates import Candidate, FitData, limits_of
+from hwid_cli.model.candidates import (
+    Candidate,
+    FitData,
+    JacobianColumns,
+    limits_of,
+)
 from hwid_cli.model.extrapolation import for_search
 from hwid_cli.model.flat_directions import flat_sentences
 from hwid_cli.model.identifiability import (
@@ -73,7 +78,7 @@ def parameter_statistics(
         return Uncertainty(reason="the data are too few to tell"), Information()
     error = squared_error(candidate, experiments)
     variance = error / (n_samples - found.n_effective)
-    covariance = _covariance(found, variance)
+    covariance = _covariance(candidate, found, variance)
     order = listed(found.place)
     every = parameter_names(candidate, found.place)
     names = tuple(every[place] for place in order)
@@ -82,7 +87,9 @@ def parameter_statistics(
         Uncertainty(
             names,
             errors,
-            _reason(names, errors),
+            _reason(
+                names, errors, {every[k] for k in _conventional(candidate, found.place)}
+            ),
             flat_sentences(candidate, squared, found, variance),
         ),
         information(error, n_samples, found.n_effective),
@@ -149,7 +156,7 @@ def parameter_covariance(
     every = parameter_names(candidate, found.place)
     return ParameterCovariance(
         tuple(every[place] for place in order),
-        _covariance(found, variance)[np.ix_(order, order)],
+        _covariance(candidate, found, variance)[np.ix_(order, order)],
     )
 
 
@@ -184,21 +191,53 @@ def _as_fitted(
     return candidate, experiments
 
 
-def _covariance(found: Directions, variance: float) -> np.ndarray:
-    """Covariance of all parameters; NaN for those that a flat direction moves."""
+def _covariance(candidate: Candidate, found: Directions, variance: float) -> np.ndarray:
+    """Covariance of all parameters; NaN for those that the data do not tell.
+
+    These are what a flat direction moves, and positions that are no parameters but
+    conventions.
+    """
     covariance = found.covariance(variance)
     is_lost = found.is_moved_by_flat
+    is_lost[_conventional(candidate, found.place)] = True
     covariance[is_lost, :] = np.nan
     covariance[:, is_lost] = np.nan
     return covariance
 
 
-def _reason(names: tuple[str, ...], errors: np.ndarray) -> str:
+def _conventional(candidate: Candidate, place: JacobianColumns) -> list[int]:
+    """Positions that count as known, such as the ends of a line."""
+    if not place.with_positions:
+        return []
+    model = candidate.model
+    return [
+        part.start + number
+        for one, part in (
+            (model.input_map, place.input_map),
+            (model.output_map, place.output_map),
+        )
+        for number in RULES[one.kind].held(one)
+    ]
+
+
+def _reason(names: tuple[str, ...], errors: np.ndarray, conventions: set[str]) -> str:
+    """Say why errors are missing."""
     missing = [
         name for name, error in zip(names, errors, strict=True) if error != error
     ]
-    if not missing:
-        return ""
-    shown = ", ".join(missing[:_MOST_NAMES])
-    more = f" and {len(missing) - _MOST_NAMES} more" * (len(missing) > _MOST_NAMES)
-    return f"the data do not determine {shown}{more}"
+    undetermined = [name for name in missing if name not in conventions]
+    reasons = []
+    if undetermined:
+        reasons.append(f"the data do not determine {_shown(undetermined)}")
+    known = [name for name in missing if name in conventions]
+    if known:
+        verb = "are" if len(known) > 1 else "is"
+        reasons.append(
+            f"{_shown(known)} {verb} no parameter: ends of the data, or edges"
+        )
+    return "; ".join(reasons)
+
+
+def _shown(names: Sequence[str]) -> str:
+    more = f" and {len(names) - _MOST_NAMES} more" * (len(names) > _MOST_NAMES)
+    return ", ".join(names[:_MOST_NAMES]) + more

@@ -263,7 +263,7 @@ class FitOptions:
         One that is known. Frozen it stays bit by bit, and only maps and initial states
         are fitted; else it is one more start for all orders that contain it.
     largest_pole_radius : float, [-]
-        No pole lies further from zero; 1 asks for stability only.
+        No pole lies further from zero; with 1 poles may stand on the unit circle.
     delays : tuple of int, [samples]
         Delays that are tried; the one of the orders where there are none. The result's
         orders say which one was found.
@@ -434,7 +434,7 @@ class Fit:
         NaN where the fit began with models and needed none.
     poles : ndarray of complex, shape (nf,), [-]
     is_stable : bool
-        Whether every pole lies inside the unit circle.
+        Whether no pole lies outside the unit circle; a free axis has one on it.
     information : Information
         AIC, BIC and FPE; NaN if failed.
     output_folds : tuple of float, [x]

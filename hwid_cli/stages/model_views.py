@@ -8,8 +8,9 @@ from hwid_cli.model.frequency_response import (
     response_frequencies,
     zeros,
 )
-from hwid_cli.model.linear_block import is_stable, poles
+from hwid_cli.model.linear_block import poles
 from hwid_cli.model.map_curve import map_curve
+from hwid_cli.model.pole_bound import is_within
 from hwid_cli.records.model import Fit
 from hwid_cli.records.recordings import Recording
 from hwid_cli.records.report import ModelView, StoredResults
@@ -95,7 +96,7 @@ def _view(shown: _Shown, recordings: Sequence[Recording]) -> ModelView:
         poles=poles(model.denominator),
         zeros=zeros(model.numerator),
         delay=model.delay,
-        is_stable=is_stable(model.denominator),
+        is_stable=is_within(model.denominator, 1.0),
         rmsd=shown.fit.rmsd,
         coverage=shown.coverage,
         covers_of=shown.of,

@@ -1,6 +1,6 @@
 """Fits of many kinds of plants against fits that begin at the true plant.
 
-``python -m tests.benchmarks.bench_wide [--plants N]``: orders to 6, delays 1 to 3, 0.1 to
+``python -m tests.benchmarks.bench_wide [--plants N] [--first SEED]``: orders to 6, delays 1 to 3, 0.1 to
 5 % noise, 200 to 20 000 samples, held levels, few levels, coloured noise and multisines,
 maps with dead zones, limits, roots, folds and exponentials, half of them not at rest at
 the start. A fit that begins with the true plant, its maps cut to as many break-points,
@@ -114,12 +114,14 @@ def main() -> None:
     """Fit every plant twice and count."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--plants", type=int, default=150)
-    count = parser.parse_args().plants
+    parser.add_argument("--first", type=int, default=0)
+    asked = parser.parse_args()
+    count = asked.plants
     short, seconds = [], 0.0
     print(
         "plants whose training fit stays more than 0.3 points below what is possible:"
     )
-    for seed in range(count):
+    for seed in range(asked.first, asked.first + count):
         plant = wide_plant(seed)
         start = [true_model(plant)]
         possible = fit([plant.recording], plant.orders, starts=start).fit_percent

@@ -4,12 +4,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from hwid_cli.files.isolated_process import IsolatedReader
 
 from hwid_cli.cli.main import main
 from hwid_cli.config.load import load_experiment
 from hwid_cli.data import formats
 from hwid_cli.data.recordings import read_recordings
+from hwid_cli.files.isolated_process import IsolatedReader
 from tests.cli.measured_folders import (
     EXPECTED,
     LAYOUTS,

@@ -222,15 +222,16 @@ def test_ends_that_slid_away_along_their_line_come_back_to_the_data():
     )
 
 
-def test_ends_within_the_data_stay():
+def test_ends_within_the_data_come_to_its_ends():
     near = StaticMap(
         "piecewise_linear", np.array([-1.0, 0.0, 1.0, 0.0, 2.0, 3.0]), (0.0, 1.0)
     )
-    one = static_map.with_domain(near, np.array([-2.0, 0.5]))
-
-    # The last two lie beyond, but then the last segment would have no width.
-    assert one.parameters[:3].tolist() == [-1.0, 0.0, 0.5]
-    assert static_map.with_domain(near, np.array([-2.0, 2.0])).parameters is not None
-    np.testing.assert_array_equal(
-        static_map.with_domain(near, np.array([-2.0, 2.0])).parameters, near.parameters
+    one = static_map.with_domain(near, np.array([-2.0, 2.0]))
+    assert one.parameters.tolist() == [-2.0, 0.0, 2.0, -2.0, 2.0, 4.0]
+    at = np.linspace(-3.0, 3.0, 25)
+    np.testing.assert_allclose(
+        static_map.evaluate(one, at), static_map.evaluate(near, at), atol=1e-14
     )
+    # Below the second break-point the first segment would have no width.
+    above = static_map.with_domain(near, np.array([0.5, 2.0]))
+    assert above.parameters[:3].tolist() == [-1.0, 0.0, 2.0]

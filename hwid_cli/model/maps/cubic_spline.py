@@ -16,7 +16,14 @@ from numba import njit
 from scipy.interpolate import CubicSpline
 
 from hwid_cli.model.maps.positions_and_values import amplified, compressed, mean_slope
-from hwid_cli.model.maps.rule import MapRule, Part, Portable, Shape
+from hwid_cli.model.maps.rule import (
+    MapRule,
+    Part,
+    Portable,
+    Shape,
+    displaces,
+    raises,
+)
 from hwid_cli.records.maps import MapOptions, StaticMap
 
 # A step of the fit may change the distance of the outer knots by this factor at most.
@@ -234,6 +241,8 @@ RULE = MapRule(
     names=_names,
     amplify=lambda one, factor: amplified(one, 2, factor),
     compress=lambda one, factor: compressed(one, 2, factor),
+    displaced=displaces(lambda one: slice(0, 2)),
+    raised=raises(lambda one: slice(2, None)),
     size=lambda one: mean_slope(one, 2),
     n_positions=lambda one: 2,
     settle=_settle,

@@ -8,7 +8,12 @@ docs/method.md, eq. (4).
 import numpy as np
 
 from hwid_cli.model.maps import limits
-from hwid_cli.model.maps.rule import MapRule, Part, Portable
+from hwid_cli.model.maps.rule import (
+    MapRule,
+    Part,
+    Portable,
+    displaces,
+)
 from hwid_cli.records.maps import StaticMap
 
 # Shares of the signal's range at which the edges start; several, as for a saturation.
@@ -50,6 +55,7 @@ RULE = MapRule(
     identity=lambda options, low, high: StaticMap(
         "dead_zone", np.zeros(2), (low, high)
     ),
+    displaced=displaces(lambda one: slice(0, 2)),
     names=lambda one: limits.NAMES,
     settle=limits.settle,
     corners=lambda one: one.parameters,

@@ -14,7 +14,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hwid_cli.model.maps.rule import Differentiate, MapRule, Part, Portable, Shape
+from hwid_cli.model.maps.rule import (
+    Differentiate,
+    MapRule,
+    Part,
+    Portable,
+    Shape,
+    displaces,
+    raises,
+)
 from hwid_cli.records.maps import MapOptions, StaticMap
 
 # Points over the domain at which the mean slope is taken, [-]; units narrower than their
@@ -88,6 +96,8 @@ def network_rule(kind: str, unit: Unit) -> MapRule:
         names=_names,
         amplify=_amplify,
         compress=lambda one, factor: _compress(unit, one, factor),
+        displaced=displaces(lambda one: slice(0, _count(one))),
+        raised=raises(lambda one: slice(-2, None)),
         size=lambda one: _mean_slope(one, differentiate),
         n_positions=lambda one: 2 * _count(one),
         settle=_settle,

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from hwid_cli.model.maps.rule import MapRule, Portable
+from hwid_cli.model.maps.rule import MapRule, Portable, displaces
 from hwid_cli.records.maps import StaticMap
 
 
@@ -30,6 +30,8 @@ RULE = MapRule(
         StaticMap("none", np.zeros(0), (low, high)),
     ),
     names=lambda one: (),
+    displaced=displaces(lambda one: slice(0, 0)),
+    passes_constants=True,
     is_identity=True,
     portable=Portable(c=_C, matlab=""),
 )

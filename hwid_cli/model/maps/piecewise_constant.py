@@ -18,7 +18,15 @@ import numpy as np
 
 from hwid_cli.model.maps.piecewise_linear import WEIGHT_OF_SHAPE, put_in_order
 from hwid_cli.model.maps.positions_and_values import amplified, compressed, mean_slope
-from hwid_cli.model.maps.rule import MapRule, Part, Placing, Portable, Shape
+from hwid_cli.model.maps.rule import (
+    MapRule,
+    Part,
+    Placing,
+    Portable,
+    Shape,
+    displaces,
+    raises,
+)
 from hwid_cli.records.maps import MapOptions, StaticMap
 
 # Half width of a ramp as a share of the narrower cell beside it. Wide ramps blur where an
@@ -237,6 +245,8 @@ RULE = MapRule(
     names=_names,
     amplify=lambda one, factor: amplified(one, one.parameters.size // 2, factor),
     compress=lambda one, factor: compressed(one, one.parameters.size // 2, factor),
+    displaced=displaces(lambda one: slice(0, one.parameters.size // 2)),
+    raised=raises(lambda one: slice(one.parameters.size // 2, None)),
     size=lambda one: mean_slope(one, one.parameters.size // 2),
     n_positions=lambda one: one.parameters.size // 2,
     settle=_settle,

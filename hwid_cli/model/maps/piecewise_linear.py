@@ -22,6 +22,8 @@ from hwid_cli.model.maps.rule import (
     Portable,
     Prior,
     Shape,
+    displaces,
+    raises,
 )
 from hwid_cli.records.maps import MapOptions, StaticMap
 
@@ -334,15 +336,15 @@ def _settle(old: StaticMap, parameters: np.ndarray) -> None:
 
 
 def _with_domain(one: StaticMap, domain: tuple[float, float]) -> StaticMap:
-    """Outermost break-points beyond the domain come back to its ends.
+    """Outermost break-points come to the ends of the domain.
 
     They may slide along their line while a search runs, as far as a hundred ranges away.
     """
     points, _ = break_points_and_values(one)
     ends = points.copy()
-    if points[0] < domain[0] < points[1]:
+    if domain[0] < points[1]:
         ends[0] = domain[0]
-    if points[-2] < domain[1] < points[-1]:
+    if points[-2] < domain[1]:
         ends[-1] = domain[1]
     values = _evaluate(one, ends)
     return replace(one, parameters=np.concatenate([ends, values]), domain=domain)
@@ -521,7 +523,7 @@ def _shares(points: np.ndarray, argument: np.ndarray) -> np.ndarray:
     return rows
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _mean_slope(break_points: np.ndarray, values: np.ndarray) -> float:
     """Range of the values over that of the break-points; 1 for a constant map.
 
@@ -536,7 +538,7 @@ def _mean_slope(break_points: np.ndarray, values: np.ndarray) -> float:
     return size if size != 0.0 else 1.0
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def bends(
     break_points: np.ndarray, values: np.ndarray, with_positions: bool
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -576,7 +578,7 @@ def bends(
     return bend, jacobian
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def add_bends(
     break_points: np.ndarray,
     values: np.ndarray,
@@ -637,7 +639,7 @@ def add_bends(
     return total
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _relative_growth(
     break_points: np.ndarray, values: np.ndarray, with_positions: bool
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -672,7 +674,7 @@ def _inner_ends(units: int) -> tuple[int, int]:
     return (1, units - 2) if units > 3 else (0, units - 1)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def growth(
     break_points: np.ndarray,
     values: np.ndarray,
@@ -701,7 +703,7 @@ def growth(
     return size / size_before * (before[last] - before[first]) / width
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def squared_bends_after(
     break_points: np.ndarray,
     values: np.ndarray,
@@ -801,6 +803,8 @@ RULE = MapRule(
     names=_names,
     amplify=lambda one, factor: amplified(one, one.parameters.size // 2, factor),
     compress=lambda one, factor: compressed(one, one.parameters.size // 2, factor),
+    displaced=displaces(lambda one: slice(0, one.parameters.size // 2)),
+    raised=raises(lambda one: slice(one.parameters.size // 2, None)),
     size=lambda one: mean_slope(one, one.parameters.size // 2),
     n_positions=lambda static_map: static_map.parameters.size // 2,
     settle=_settle,

@@ -13,7 +13,14 @@ from dataclasses import replace
 import numpy as np
 from numpy.polynomial import chebyshev
 
-from hwid_cli.model.maps.rule import MapRule, Part, Portable, Shape
+from hwid_cli.model.maps.rule import (
+    MapRule,
+    Part,
+    Portable,
+    Shape,
+    displaces,
+    raises,
+)
 from hwid_cli.records.maps import MapOptions, StaticMap
 
 
@@ -135,6 +142,9 @@ RULE = MapRule(
     names=_names,
     amplify=_amplify,
     compress=_compress,
+    # The coefficients are those of the argument's place in the domain.
+    displaced=displaces(lambda one: slice(0, 0)),
+    raised=raises(lambda one: slice(0, 1)),
     size=_size,
     shifts=True,
     portable=Portable(

@@ -7,6 +7,7 @@ import numpy as np
 
 from hwid_cli.records.maps import MapOptions, StaticMap
 
+Displace = Callable[[StaticMap, float], StaticMap]
 Shape = Callable[[np.ndarray], np.ndarray]
 Differentiate = Callable[
     [StaticMap, np.ndarray, bool, np.ndarray, int], tuple[np.ndarray, np.ndarray]
@@ -15,6 +16,43 @@ Differentiate = Callable[
 
 def _over(one: StaticMap, domain: tuple[float, float]) -> StaticMap:
     return replace(one, domain=domain)
+
+
+def displaces(places: Callable[[StaticMap], slice]) -> Displace:
+    """What a kind does for another zero of its argument, if parameters move with it.
+
+    Parameters
+    ----------
+    places : callable (StaticMap) -> slice
+        Of the parameters that lie along the argument.
+    """
+
+    def displaced(one: StaticMap, by: float) -> StaticMap:
+        low, high = one.domain
+        parameters = one.parameters.copy()
+        parameters[places(one)] += by
+        return replace(one, parameters=parameters, domain=(low + by, high + by))
+
+    return displaced
+
+
+def raises(
+    places: Callable[[StaticMap], slice],
+) -> Callable[[StaticMap, float], StaticMap]:
+    """What a kind does for another zero of its value, if parameters move with it.
+
+    Parameters
+    ----------
+    places : callable (StaticMap) -> slice
+        Of the parameters to which a constant is added.
+    """
+
+    def raised(one: StaticMap, by: float) -> StaticMap:
+        parameters = one.parameters.copy()
+        parameters[places(one)] += by
+        return replace(one, parameters=parameters)
+
+    return raised
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,6 +210,13 @@ class MapRule:
         The map v -> factor * map(v); None where the kind has no free gain.
     compress : callable (StaticMap, factor) -> StaticMap, or None
         The map v -> map(factor * v); None where the kind has no free gain.
+    displaced : callable (StaticMap, by) -> StaticMap, or None
+        The map v -> map(v - by), plus `by` where the kind passes constants; None where
+        the kind has no such map.
+    passes_constants : bool
+        Whether another zero of the argument is one of the value too.
+    raised : callable (StaticMap, by) -> StaticMap, or None
+        The map v -> map(v) + by; None where the kind has no constant.
     size : callable (StaticMap) -> (float, ndarray), or None
         A mean slope that grows in proportion to the values, and its gradient by the
         parameters; None where the kind has no free gain.
@@ -224,6 +269,9 @@ class MapRule:
     with_domain: Callable[[StaticMap, tuple[float, float]], StaticMap] = _over
     amplify: Callable[[StaticMap, float], StaticMap] | None = None
     compress: Callable[[StaticMap, float], StaticMap] | None = None
+    displaced: Displace | None = None
+    passes_constants: bool = False
+    raised: Callable[[StaticMap, float], StaticMap] | None = None
     size: Callable[[StaticMap], tuple[float, np.ndarray]] | None = None
     n_positions: Callable[[StaticMap], int] = lambda one: 0
     settle: Callable[[StaticMap, np.ndarray], None] = lambda old, parameters: None

@@ -1,0 +1,101 @@
+"""Free axes and undamped modes: poles on the unit circle."""
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from hwid_cli.model.fit import fit
+from hwid_cli.model.normalise import integrates, normalise
+from hwid_cli.model.simulate import simulate
+from hwid_cli.records.model import FitOptions, HammersteinWiener, Orders, StaticMap
+from hwid_cli.records.recordings import Recording
+from tests.benchmarks.bench_integrators import (
+    LINEAR,
+    WITH_MAP,
+    by_scipy,
+    integrating_plant,
+)
+
+NONE = StaticMap("none", np.zeros(0))
+# Two of each kind of plant, where fits ended up to 90 times above the noise.
+SEEDS = range(1000, 1012)
+
+
+def test_poles_on_the_circle_are_fitted_as_well_as_from_the_truth():
+    for seed in SEEDS:
+        plant = integrating_plant(seed)
+        found = fit([plant.recording], plant.orders, LINEAR)
+        # Scipy may leave the circle, and ends within a percent of its minimum.
+        assert found.rmsd < 1.03 * by_scipy(plant), (seed, plant.kind, found.poles)
+        assert found.is_stable
+
+
+def test_an_integrator_behind_a_dead_zone_is_fitted_to_the_noise():
+    for seed in (1000, 1008, 1020, 1026, 1032):
+        plant = integrating_plant(seed, bent=True)
+        found = fit([plant.recording], plant.orders, WITH_MAP)
+        # The fit follows some of the noise with its two dozen parameters.
+        assert found.rmsd < 1.05 * plant.noise, (seed, plant.kind, found.poles)
+
+
+@pytest.mark.parametrize("poles", [[1.0], [1.0, 1.0], [1.0, 0.5, 0.2]])
+def test_larger_orders_keep_an_integrator(poles):
+    rng = np.random.default_rng(4)
+    u = np.repeat(rng.uniform(-1.0, 1.0, 60), 10)
+    y = lfilter([0.0, 0.1], np.poly(poles), u)
+    y = y + 0.01 * np.std(y) * rng.standard_normal(y.size)
+    recording, count = Recording("r", u, y, 1.0), len(poles)
+    small = fit([recording], Orders(1, count, 1), LINEAR)
+    large = fit(
+        [recording],
+        Orders(2, count + 1, 1),
+        LINEAR,
+        contained=[small.model],
+        search_anew=False,
+    )
+    # A larger order is never worse, but for the rounding of its sums.
+    assert large.rmsd <= small.rmsd * (1.0 + 1e-9)
+
+
+def test_normalising_an_integrator_keeps_its_output():
+    line = StaticMap("piecewise_linear", np.array([-3.0, 3.0, -2.0, 2.5]), (-3.0, 3.0))
+    model = HammersteinWiener(line, [0.3, 0.1], [1.0, -1.5, 0.5], 1, line, 1.0)
+    assert integrates(model)
+    u = np.random.default_rng(0).standard_normal(200)
+    found = normalise(model)
+    # Multiplied to and fro: rounding, which the integrator sums up.
+    np.testing.assert_allclose(simulate(found, u), simulate(model, u), rtol=1e-10)
+    assert np.isclose(np.linalg.norm(found.numerator), 1.0)
+
+
+def test_an_integrator_rests_where_its_first_input_is_zero():
+    model = HammersteinWiener(NONE, [0.5], [1.0, -1.0], 1, NONE, 1.0, "steady")
+    u = np.array([0.0, 1.0, 1.0, 0.0])
+    np.testing.assert_array_equal(simulate(model, u), [0.0, 0.0, 0.5, 1.0])
+
+
+def test_a_steady_integrator_is_fitted():
+    rng = np.random.default_rng(2)
+    u = np.r_[np.zeros(5), np.repeat(rng.uniform(-1.0, 1.0, 60), 10)]
+    y = lfilter([0.0, 0.1], [1.0, -1.0], u)
+    size = 0.01 * np.std(y)
+    y = y + size * rng.standard_normal(y.size)
+    steady = FitOptions(input_map="none", output_map="none", initial_state="steady")
+    found = fit([Recording("r", u, y, 1.0)], Orders(1, 1, 1), steady)
+    # Two parameters and 605 samples: the deviation is that of the noise within 3 sigma.
+    assert found.rmsd < 1.1 * size
+
+
+def test_where_an_integrator_starts_is_said_to_look_like_a_constant():
+    rng = np.random.default_rng(5)
+    u = np.repeat(rng.uniform(-1.0, 1.0, 150), 10)
+    x = lfilter([0.0, 0.1], np.poly([1.0, 0.7]), u)
+    y = np.tanh(x) + 0.5 * x + 0.3
+    y = y + 0.005 * np.std(y) * rng.standard_normal(y.size)
+    found = fit(
+        [Recording("r", u, y, 1.0)],
+        Orders(1, 2, 1),
+        FitOptions(input_map="none", units=4),
+    )
+    assert any("the block integrates" in one for one in found.uncertainty.flat)
+    assert found.fit_percent > 99.0
