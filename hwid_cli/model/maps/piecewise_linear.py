@@ -69,6 +69,7 @@ def outlined(static_map: StaticMap) -> StaticMap:
 
     Examples
     --------
+    >>> from hwid_cli.records.maps import Extrapolation
     >>> one = StaticMap("piecewise_linear", np.array([0.0, 1, 2, 0, 5, 2]), (0.0, 2.0))
     >>> lines = Extrapolation([0.0, 0.5], [0.0, 0.5, 2.0], [0.0, 2.5, 2.0])
     >>> outlined(replace(one, extrapolation=lines)).parameters
