@@ -373,3 +373,50 @@ def test_a_drive_is_told_with_the_defaults_of_what_it_leaves_out():
     assert drive_effects(Drive(effects={"periodic_force": own})) == {
         "periodic_force": own
     }
+
+
+def test_a_force_beside_the_input_is_as_much_input():
+    drive = Drive(
+        mass_kg=0.3, damping_N_s_per_m=15.0, stiffness_N_per_m=1184.0,
+        force_constant_N_per_A=5.0,
+    )  # fmt: skip
+    time = SAMPLE_TIME_S * np.arange(600)
+    command, force = np.sin(20.0 * time), np.cos(33.0 * time) + np.sin(90.0 * time)
+    for effects in (
+        {},
+        {"coulomb_friction": {"force_N": 0.5}},
+        {"hysteresis": {"force_N": 0.5, "yield_m": 1e-3}},
+        {
+            "periodic_force": {
+                "amplitude_N": 0.2,
+                "frequency_Hz": 12.0,
+                "phase_rad": 0.0,
+            }
+        },
+    ):
+        vector = parameter_vector(drive, effects)
+        beside = run(command, vector, SAMPLE_TIME_S, force=force)
+        assert rms(beside.output) > 1e-4
+        as_input = run(command + force / 5.0, vector, SAMPLE_TIME_S)
+        assert rms(beside.output - as_input.output) < ROUNDING_M, effects
+
+
+def test_a_force_beside_the_input_does_not_pass_the_command():
+    drive = Drive(
+        mass_kg=0.3, damping_N_s_per_m=15.0, stiffness_N_per_m=1184.0,
+        force_constant_N_per_A=5.0,
+    )  # fmt: skip
+    force = np.sin(30.0 * SAMPLE_TIME_S * np.arange(600))
+    nothing = np.zeros(600)
+    plain = run(force / 5.0, parameter_vector(drive, {}), SAMPLE_TIME_S)
+    for effects in (
+        {"input_delay": {"delay_s": 0.02}},
+        {"input_dead_zone": {"threshold_A": 3.0}},
+        {"input_saturation": {"limit_A": 0.01}},
+        {"actuator_lag": {"time_constant_s": 0.05}},
+        {"force_constant_saturation": {"loss_at_reference": 0.5}},
+    ):
+        found = run(
+            nothing, parameter_vector(drive, effects), SAMPLE_TIME_S, force=force
+        )
+        assert rms(found.output - plain.output) < ROUNDING_M, effects
