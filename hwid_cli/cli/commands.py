@@ -147,17 +147,21 @@ def compare(*values: Any, **options: Any) -> None:
     _run("compare.compare", *values, **options)
 
 
-FORMATS = ("json", "mat", "c", "fmu")
+FORMATS = ("json", "mat", "c", "fmu", "python")
 
 
 @click.command("export")
 @click.option(
     "--model",
-    required=True,
     metavar="NAME",
     help="The model: step_06/3/7, a group step_06+step_09/3/7, a published name "
     "NLHW-Step-6-3-7-1, or 'simulation' for the physics simulation that 'hwid "
     "diagnose' extended.",
+)
+@click.option(
+    "--diagnosis",
+    is_flag=True,
+    help="The simulation that 'hwid diagnose' extended; the same as --model simulation.",
 )
 @click.option(
     "--format",
@@ -165,14 +169,15 @@ FORMATS = ("json", "mat", "c", "fmu")
     type=click.Choice(FORMATS),
     default="json",
     show_default=True,
-    help="json for 'hwid predict', mat with a script for MATLAB, C source, or an FMU.",
+    help="json for 'hwid predict', mat with a script for MATLAB, C source, an FMU, or "
+    "(for a simulation that is a Python function or an FMU) a Python module.",
 )
 @stage_options
 def export(*values: Any, **options: Any) -> None:
     """Write a model as a file that runs elsewhere.
 
-    Writes models/NAME.json, .mat (and .m), .c or .fmu below the folder of the results,
-    and prints the path; docs/export.md describes the formats.
+    Writes models/NAME.json, .mat (and .m), .c, .fmu or .py below the folder of the
+    results, and prints the path; docs/export.md describes the formats.
     """
     _run("export.export", *values, **options)
 

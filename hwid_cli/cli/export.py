@@ -1,5 +1,7 @@
 """``hwid export``: a model as a file that runs elsewhere."""
 
+from pathlib import Path
+
 import click
 
 from hwid_cli.cli.driver import result_of
@@ -7,6 +9,7 @@ from hwid_cli.cli.options import Choices
 from hwid_cli.cli.session import Session, open_session
 from hwid_cli.data.recording_files import recordings_options
 from hwid_cli.data.signal_units import as_files_are
+from hwid_cli.errors import ConfigError
 from hwid_cli.export.contents import (
     SIMULATION,
     export_model,
@@ -14,24 +17,63 @@ from hwid_cli.export.contents import (
     find_fit,
 )
 from hwid_cli.export.formats import write_exported
+from hwid_cli.export.python_module import write_module
 from hwid_cli.records.experiment import RecordingsOptions
 from hwid_cli.records.exported import Exported
 from hwid_cli.records.model import Fit
 from hwid_cli.records.report import StoredResults
 from hwid_cli.report.thesis_names import thesis_name_of
 from hwid_cli.stages.diagnose import extended_options
+from hwid_cli.stages.extended_program import extended_program
 from hwid_cli.stages.model_views import named_fits
 from hwid_cli.store.result_files import has_left_results, read_provenance, results_file
 
 _FOLDER = "models"
 
 
-def export(choices: Choices, model: str, file_format: str) -> None:
+def export(
+    choices: Choices, model: str | None, diagnosis: bool, file_format: str
+) -> None:
     """Write a model as a file that runs elsewhere."""
+    if diagnosis == (model is not None):
+        raise click.UsageError("expected one of --model NAME and --diagnosis")
     session = open_session(choices, "export")
-    exported = chosen_model(session, model)
-    for path in write_exported(session.out / _FOLDER, exported, file_format):
+    asked = SIMULATION if model is None else model
+    foreign = session.experiment.foreign_simulation if asked == SIMULATION else None
+    if foreign is not None:
+        written = _export_program(session, foreign.kind, file_format)
+    elif file_format == "python":
+        raise ConfigError(
+            f"--format python: {asked} is no program of your own; expected one of "
+            "json, mat, c, fmu; choose one of them"
+        )
+    else:
+        exported = chosen_model(session, asked)
+        written = write_exported(session.out / _FOLDER, exported, file_format)
+    for path in written:
         click.echo(path)
+
+
+def _export_program(session: Session, kind: str, file_format: str) -> list[Path]:
+    """The user's own simulation with what a diagnosis added, as a module."""
+    if kind not in ("python", "fmu"):
+        raise ConfigError(
+            f"--diagnosis: simulation.kind is {kind}; expected python or fmu, whose files "
+            "an export can hold; use extended_simulation.yaml"
+        )
+    if file_format != "python":
+        raise ConfigError(
+            f"--format {file_format}: simulation.kind is {kind}; expected --format python"
+        )
+    diagnosis = result_of(session, "diagnose")
+    given = session.given["diagnose"]
+    extended, exactness = extended_program(diagnosis, given, given.simulation)
+    title = (
+        f"The simulation of {session.experiment.name!r} as 'hwid diagnose' extended it."
+    )
+    return write_module(
+        session.out / _FOLDER, extended, title=title, exactness=exactness
+    )
 
 
 def chosen_model(session: Session, asked: str) -> Exported:

@@ -322,6 +322,29 @@ def _in_newtons(
     return in_newtons(drive, gain) if gain > 0 else drive
 
 
+def stand_in_for(
+    recordings: Sequence[Recording],
+    simulator: Simulator,
+    options: DiagnoseOptions,
+    run_tasks: RunTasks,
+) -> tuple[Drive, tuple[Signals, ...]]:
+    """Linear drive that stands for a simulation that can be run, and what it was fitted to.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+        At least one.
+    """
+    problem = prepare(recordings, SimulationOptions(), options, ())
+    runs = _Runs(simulator, run_tasks)
+    given = runs.of(problem.signals, simulator.values)
+    drive = replace(problem.drive, **_base(fit_stand_in(problem.signals, given)))
+    return (
+        _in_newtons(runs, problem.signals, given, simulator.values, drive),
+        problem.signals,
+    )
+
+
 def _test_push(signals: Signals) -> np.ndarray:
     """A force that goes to and fro, slowly and fast, from rest to rest."""
     n = signals.driven_by.size
@@ -518,15 +541,20 @@ def _corrected(
         problem.signals, late, targets, forces, strict=True
     ):
         moved = _moved_by(change, one)
-        more = one.force + _slow(force_along(drive, moved, np.zeros(change.size)))
+        more = one.force + slow_part(force_along(drive, moved, np.zeros(change.size)))
         there = _moved_by(target, one)
         plain = moved_plainly(drive, one, more + force, there)
         signals.append(replace(one, force=more, offset=target - plain.position))
     return replace(problem, signals=tuple(signals))
 
 
-def _slow(force: np.ndarray) -> np.ndarray:
-    """A force without what changes from sample to sample, which adds up in the turns."""
+def slow_part(force: np.ndarray) -> np.ndarray:
+    """A force without what changes from sample to sample, which adds up in the turns.
+
+    Parameters
+    ----------
+    force : ndarray, shape (n_samples,), [N]
+    """
     if force.size <= _FEWEST:
         return force
     return np.asarray(sosfiltfilt(_SLOW_ONES, force))

@@ -79,6 +79,14 @@ def test_a_model_that_is_not_there_is_one_line(after_run, hwid):
 def test_an_unknown_format_is_wrong_usage(hwid):
     assert hwid("export", "--model", "x", "--format", "xml").exit_code == 2
     assert hwid("export").exit_code == 2
+    assert hwid("export", "--model", "x", "--diagnosis").exit_code == 2
+
+
+def test_a_model_is_no_python_module(after_run, hwid):
+    result = hwid("export", "--model", "step_06/3/7", "--format", "python", "-q")
+
+    assert result.exit_code == 1
+    assert "--format python: step_06/3/7 is no program" in result.stderr
 
 
 def test_a_simulation_needs_its_section(after_run, hwid):

@@ -1,0 +1,154 @@
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+import pytest
+
+from hwid_cli.errors import SimulationError
+from hwid_cli.records.drive import Drive
+from hwid_cli.records.programs import PythonSimulation, RunRequest
+from hwid_cli.simulations import fmu
+from hwid_cli.simulations.extended import (
+    ExtendedSimulation,
+    run_extended,
+    simulate_extended,
+)
+from tests.simulations.fmu_examples import make_fmu, needs_compiler
+from tests.simulations.test_fmu import section
+
+STEP_S, FRICTION_N = 1e-3, 0.8
+TIMES = STEP_S * np.arange(1000)
+CURRENTS = {
+    "slow": 2 * np.sin(2 * np.pi * 4 * TIMES),
+    "fast": 4 * np.sin(2 * np.pi * 11 * TIMES),
+    "to and fro": np.interp(TIMES, [0.05, 0.08, 0.5, 0.55], [0, 2, 2, 0]),
+    "mostly stuck": 0.3 * np.sin(2 * np.pi * 4 * TIMES),
+}
+EXACT = Drive(0.3, 15.0, 1184.0, 5.0)
+# A stand-in may be this wrong.
+ROUGH = Drive(0.33, 12.0, 1000.0, 5.0)
+FRICTION = {"coulomb_friction": {"force_N": FRICTION_N}}
+
+
+@pytest.fixture(scope="module")
+def plants(tmp_path_factory):
+    """The plant, and the same with friction inside its own C code, in steps of 1 us."""
+    folder = tmp_path_factory.mktemp("plants")
+    rubbing = make_fmu(folder, name="rub", coulomb_N=FRICTION_N, internal_step_s=1e-6)
+    yield section(make_fmu(folder)), section(rubbing)
+    fmu._PROCESS.end()
+
+
+def request_of(current):
+    return RunRequest("a", STEP_S, current, np.zeros(0), {})
+
+
+@needs_compiler
+@pytest.mark.parametrize("name", CURRENTS)
+@pytest.mark.parametrize("plain", [EXACT, ROUGH])
+@pytest.mark.parametrize("has_force", [True, False])
+def test_friction_is_inside_within_one_percent(plants, name, plain, has_force):
+    given, rubbing = plants
+    request = request_of(CURRENTS[name])
+    truth = fmu.KIND.run(rubbing, request).output
+    before = fmu.KIND.run(given, request).output
+
+    found = run_extended(
+        partial(fmu.KIND.run, given),
+        request,
+        (plain, replace(plain, effects=FRICTION)),
+        has_force=has_force,
+    )
+
+    assert np.std(found.output - truth) < 0.01 * np.std(before - truth)
+
+
+@needs_compiler
+def test_a_force_of_the_users_own_acts_beside_the_effects(plants):
+    given, rubbing = plants
+    request = replace(request_of(CURRENTS["slow"]), force=3 * np.sin(40 * TIMES))
+    truth = fmu.KIND.run(rubbing, request).output
+    before = fmu.KIND.run(given, request).output
+
+    found = run_extended(
+        partial(fmu.KIND.run, given),
+        request,
+        (EXACT, replace(EXACT, effects=FRICTION)),
+        has_force=True,
+    )
+
+    assert np.std(found.output - truth) < 0.01 * np.std(before - truth)
+
+
+FUNCTION = """\
+from scipy.signal import lsim
+import numpy as np
+
+def simulate(time_s, inputs, parameters):
+    d, k = parameters["damping"], 1184.0
+    system = ([[0, 1], [-k / 0.3, -d / 0.3]], [[0], [5 / 0.3]], np.eye(2), [[0], [0]])
+    y = lsim(system, inputs["u"], time_s)[1]
+    return {"x": y[:, 0], "v": y[:, 1]}
+"""
+
+
+@pytest.fixture
+def extended(tmp_path):
+    (tmp_path / "plant.py").write_text(FUNCTION)
+    base = PythonSimulation(
+        file=str(tmp_path / "plant.py"),
+        input="u",
+        output="x",
+        velocity="v",
+        parameters={"damping": 12.0},
+    )
+    drag = {"quadratic_drag": {"drag_N_s2_per_m2": 40.0}}
+    plain = replace(EXACT, damping_N_s_per_m=12.0)
+    return ExtendedSimulation(base, plain, replace(plain, effects=drag))
+
+
+def test_a_function_with_drag(extended):
+    from scipy.integrate import solve_ivp
+
+    current = CURRENTS["slow"]
+
+    found = simulate_extended(extended, TIMES, {"u": current}, {"damping": 15.0})
+
+    def motion(t, state):
+        x, v = state
+        push = 5 * np.interp(t, TIMES, current) - 15 * v - 1184 * x - 40 * v * abs(v)
+        return [v, push / 0.3]
+
+    truth = solve_ivp(
+        motion,
+        (0, TIMES[-1]),
+        [0, 0],
+        t_eval=TIMES,
+        rtol=1e-9,
+        atol=1e-12,
+        max_step=1e-3,
+    ).y
+    bare = simulate_extended(
+        replace(extended, stand_in=extended.plain),
+        TIMES,
+        {"u": current},
+        {"damping": 15.0},
+    )
+    assert np.std(found["x"] - truth[0]) < 0.01 * np.std(bare["x"] - truth[0])
+    assert np.std(found["v"] - truth[1]) < 0.01 * np.std(bare["v"] - truth[1])
+
+
+def test_one_that_does_not_settle_is_no_answer(extended):
+    # A stop that the stand-in meets and that the function, far too stiff, does not.
+    wrong = replace(extended.plain, mass_kg=3000.0, force_constant_N_per_A=-5.0)
+    strange = {"coulomb_friction": {"force_N": 3.0}}
+    extended = replace(extended, plain=wrong, stand_in=replace(wrong, effects=strange))
+
+    with pytest.raises(SimulationError, match="does not settle"):
+        simulate_extended(extended, TIMES, {"u": CURRENTS["slow"]}, {})
+
+
+@pytest.mark.parametrize("time_s", [[0.0], [0.0, 0.1, 0.3], [0.0, 0.0, 0.0]])
+def test_times_in_unequal_steps(extended, time_s):
+    with pytest.raises(SimulationError, match="steps that are not equal"):
+        simulate_extended(extended, np.array(time_s), {"u": np.zeros(len(time_s))}, {})
