@@ -8,8 +8,16 @@ import pytest
 from scipy.signal import lsim
 
 from hwid_cli.errors import SimulationError
+from hwid_cli.export.formats import write_exported
+from hwid_cli.export.predict import predict
 from hwid_cli.records.programs import FmuSimulation, FreeParameter, RunRequest
 from hwid_cli.simulations import fmu
+from tests.export.model_examples import (
+    deviation,
+    example_input,
+    example_model,
+    exported_of,
+)
 from tests.simulations.fmu_examples import (
     MASS_KG,
     STARTS,
@@ -124,6 +132,45 @@ def test_a_run_leaves_nothing_for_the_next_one(plant):
 
     assert np.array_equal(again.output, first.output)
     assert np.array_equal(again.velocity, first.velocity)
+
+
+@pytest.mark.parametrize(
+    ("reset", "expected"), [("begin(u); return 0;", 1), ("return 3;", 3)]
+)
+def test_an_instance_is_used_again_where_it_can_be_reset(tmp_path, reset, expected):
+    from hwid_cli.simulations.fmu_unit import FmuNames, FmuRequest, FmuUnit
+
+    made = []
+
+    class Counted(FmuUnit):
+        def _instance(self):
+            made.append(1)
+            return super()._instance()
+
+    path = make_fmu(tmp_path, reset=reset, name="counted")
+    unit = Counted(fmpy.extract(str(path), tmp_path / "unpacked"))
+    names = FmuNames("current_A", "displacement_m", None, None, ())
+    request = FmuRequest(names, CURRENT[:50, np.newaxis], {}, STEP_S, 1)
+
+    for _ in range(2):
+        unit.run(request)
+
+    # A refused reset shows in the run that tries it, and each run begins anew.
+    assert len(made) == expected
+
+
+@pytest.mark.parametrize("delay", [0, 2])
+def test_an_fmu_of_hwids_own_gives_what_its_model_does(tmp_path, delay):
+    exported = exported_of(example_model(2, nb=2, nf=3, nk=delay))
+    (path,) = write_exported(tmp_path, exported, "fmu")
+    options = FmuSimulation(file=str(path), input="u", output="y")
+    signal = example_input(1, 200)
+
+    found = [run(options, current=signal).output for _ in range(2)]
+
+    expected = predict(exported, signal)
+    assert deviation(found[0], expected) <= 1e-12
+    assert np.array_equal(found[1], found[0])
 
 
 @pytest.mark.parametrize("reset", ["return 3;", "return 0;"])
