@@ -9,14 +9,17 @@ import numpy as np
 
 from hwid_cli.diagnosis.foreign import stand_in_for
 from hwid_cli.diagnosis.problem import Signals
-from hwid_cli.diagnosis.rounds import DiagnosisTask
 from hwid_cli.records.diagnosis import Diagnosis
 from hwid_cli.records.drive import Drive
 from hwid_cli.records.programs import Program, RunRequest
 from hwid_cli.simulations.extended import ExtendedSimulation, run_extended
 from hwid_cli.simulations.kinds import kind_named
 from hwid_cli.stages.diagnose import ToDiagnose
-from hwid_cli.stages.foreign_simulation import extended_foreign, simulator_of
+from hwid_cli.stages.foreign_simulation import (
+    extended_foreign,
+    in_turn,
+    simulator_of,
+)
 
 
 def extended_program(
@@ -31,7 +34,7 @@ def extended_program(
     """
     section: Any = extended_foreign(diagnosis, program)
     simulator = simulator_of(section, given.recordings, given.logs)
-    plain, signals = stand_in_for(given.recordings, simulator, given.options, _done)
+    plain, signals = stand_in_for(given.recordings, simulator, given.options, in_turn)
     base: dict[str, Any] = {} if program.free else _changed(plain, diagnosis)
     stand_in = replace(
         plain,
@@ -42,10 +45,6 @@ def extended_program(
     )
     extended = ExtendedSimulation(section, plain, stand_in)
     return extended, _exactness(extended, signals, diagnosis)
-
-
-def _done(tasks: Sequence[DiagnosisTask], *, keep: bool) -> list[Any]:  # noqa: ARG001
-    return [one.function(*one.arguments) for one in tasks]
 
 
 def _changed(plain: Drive, diagnosis: Diagnosis) -> dict[str, float]:

@@ -1,6 +1,6 @@
 """A simulation of the user's own, from its section to what the diagnosis works with."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
@@ -8,11 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from hwid_cli.diagnosis.foreign import Simulator
+from hwid_cli.diagnosis.foreign import Simulator, stand_in_for
+from hwid_cli.diagnosis.rounds import DiagnosisTask
 from hwid_cli.errors import ConfigError, ModelFileError, SimulationError
 from hwid_cli.export.json_reader import read_exported
 from hwid_cli.records.diagnosis import Diagnosis
 from hwid_cli.records.drive import DriveResponse, told_apart
+from hwid_cli.records.experiment import DiagnoseOptions
 from hwid_cli.records.exported import ExportedModel
 from hwid_cli.records.programs import (
     CommandSimulation,
@@ -23,6 +25,7 @@ from hwid_cli.records.programs import (
     RunRequest,
 )
 from hwid_cli.records.recordings import CalibrationLog, Recording
+from hwid_cli.simulations.extended import run_extended
 from hwid_cli.simulations.kinds import kind_named
 
 
@@ -126,24 +129,51 @@ def simulated(
     recordings: Sequence[Recording],
     logs: Sequence[CalibrationLog],
 ) -> tuple[DriveResponse, ...]:
-    """What a simulation makes of the recordings' inputs, beside what was measured."""
+    """What a simulation makes of the recordings' inputs, beside what was measured.
+
+    Effects of its section are put into it.
+    """
     simulator = simulator_of(options, recordings, logs)
+    answer = _answers(simulator, recordings)
     found = []
     for one in recordings:
-        if simulator.run is None:
-            output = simulator.given[one.name]
-        else:
-            request = RunRequest(
-                one.name, one.sample_time_s, np.array(one.input), np.zeros(0),
-                simulator.values,
-            )  # fmt: skip
-            output = simulator.run(request).output
+        output = answer(one)
         rms = float(np.sqrt(np.mean(np.square(one.output - output))))
         time_s = one.sample_time_s * np.arange(one.n_samples)
         found.append(
             DriveResponse(one.name, time_s, one.input, one.output, output, rms)
         )
     return tuple(found)
+
+
+def _answers(
+    simulator: Simulator, recordings: Sequence[Recording]
+) -> Callable[[Recording], np.ndarray]:
+    """From a recording to what the simulation makes of its input."""
+    run = simulator.run
+    if run is None:
+        return lambda one: simulator.given[one.name]
+
+    def request(one: Recording) -> RunRequest:
+        nothing, values = np.zeros(0), simulator.values
+        return RunRequest(
+            one.name, one.sample_time_s, np.array(one.input), nothing, values
+        )
+
+    if not simulator.effects:
+        return lambda one: run(request(one)).output
+    plain, _ = stand_in_for(recordings, simulator, DiagnoseOptions(), in_turn)
+    effects = {name: dict(values) for name, values in simulator.effects.items()}
+    drives = (plain, replace(plain, effects=effects))
+    has_force = simulator.capabilities.force
+    return lambda one: (
+        run_extended(run, request(one), drives, has_force=has_force).output
+    )
+
+
+def in_turn(tasks: Sequence[DiagnosisTask], *, keep: bool) -> list[Any]:  # noqa: ARG001
+    """Results of tasks, computed here and kept nowhere."""
+    return [one.function(*one.arguments) for one in tasks]
 
 
 def extended_foreign(

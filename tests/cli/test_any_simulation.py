@@ -94,6 +94,11 @@ def test_the_page_leads_to_the_name_of_what_is_hidden(folder):
     assert "from the cache" in again.output
     # The extended simulation lacks nothing.
     extended = str(folder / "out" / "extended_simulation.yaml")
+    hwid(folder, "simulate", extended)
+    with (folder / "out" / "simulated" / "step_2.csv").open() as file:
+        table = np.genfromtxt(file, delimiter=",", names=True)
+    left = np.std(table["measured"] - table["simulated"])
+    assert left < 1.2 * 2e-5
     done = CliRunner().invoke(
         main, ["diagnose", extended, "--out", str(folder / "out2"), "--jobs", "1"]
     )
