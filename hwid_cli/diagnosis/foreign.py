@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 from scipy.optimize import least_squares
-from scipy.signal import butter, sosfiltfilt
 
 from hwid_cli.diagnosis.candidate import at_point, fitted_drive, rebuilt
 from hwid_cli.diagnosis.causes import left_over, without_repeats
@@ -32,6 +31,7 @@ from hwid_cli.diagnosis.rounds import DiagnosisTask, OnRound, RunTasks
 from hwid_cli.diagnosis.search import fit_own, fit_point
 from hwid_cli.diagnosis.stand_in import (
     Moved,
+    corrected,
     derived,
     fit_stand_in,
     force_along,
@@ -78,10 +78,6 @@ _MOVED = 0.01
 _NO_WORSE = 1.2
 # The simulation's own parameters rather than further forces, if no more squares are left.
 _PREFERRED = 2.0
-# Filter of the forces that correct the stand-in, to a quarter of the sampling rate: lower
-# ones leave edges of contacts to the offset, which the effect does not see.
-_SLOW_ONES = butter(2, 0.5, output="sos")
-_FEWEST = 30
 
 
 @dataclass(frozen=True, eq=False)
@@ -540,24 +536,8 @@ def _corrected(
     for one, change, target, force in zip(
         problem.signals, late, targets, forces, strict=True
     ):
-        moved = _moved_by(change, one)
-        more = one.force + slow_part(force_along(drive, moved, np.zeros(change.size)))
-        there = _moved_by(target, one)
-        plain = moved_plainly(drive, one, more + force, there)
-        signals.append(replace(one, force=more, offset=target - plain.position))
+        signals.append(corrected(one, drive, change, target, force))
     return replace(problem, signals=tuple(signals))
-
-
-def slow_part(force: np.ndarray) -> np.ndarray:
-    """A force without what changes from sample to sample, which adds up in the turns.
-
-    Parameters
-    ----------
-    force : ndarray, shape (n_samples,), [N]
-    """
-    if force.size <= _FEWEST:
-        return force
-    return np.asarray(sosfiltfilt(_SLOW_ONES, force))
 
 
 def _slopes(

@@ -13,6 +13,7 @@ import numpy as np
 from scipy import sparse
 from scipy.interpolate import make_interp_spline
 from scipy.optimize import nnls
+from scipy.signal import butter, sosfiltfilt
 from scipy.sparse.linalg import spsolve
 
 from hwid_cli.diagnosis.parameters import drive_at, first_point, parameter_layout
@@ -30,6 +31,10 @@ _LEAST_MASS = 1e-12
 _ITERATIONS = 20
 # A first velocity below this share of the largest is rest.
 _STILL = 1e-3
+# Filter of the forces that correct the stand-in, to a quarter of the sampling rate: lower
+# ones leave edges of contacts to the offset, which the effect does not see.
+_SLOW_ONES = butter(2, 0.5, output="sos")
+_FEWEST = 30
 # Weight of the bends of a force against its means.
 _SMOOTHNESS = 1e-2
 
@@ -228,6 +233,37 @@ def moved_plainly(
     if start is not None:
         set_start(vector, *start)
     return run(signals.driven_by, vector, signals.sample_time_s, force=force)
+
+
+def corrected(
+    signals: Signals,
+    drive: Drive,
+    late: np.ndarray,
+    target: np.ndarray,
+    force: np.ndarray,
+) -> Signals:
+    """The stand-in with a further force that moves it by what it was late.
+
+    Parameters
+    ----------
+    late, target : ndarray, shape (n_samples,), [output unit]
+        What is added to its motion, and where that has to lead.
+    force : ndarray, shape (n_samples,), [N]
+        Of the effect, with which it has to lead there.
+    """
+    step, nothing = signals.sample_time_s, np.zeros(0)
+    change = derived(SimulatorRun(late, nothing), step)
+    more = signals.force + _slow(force_along(drive, change, np.zeros(late.size)))
+    there = derived(SimulatorRun(target, nothing), step)
+    plain = moved_plainly(drive, signals, more + force, there)
+    return replace(signals, force=more, offset=target - plain.position)
+
+
+def _slow(force: np.ndarray) -> np.ndarray:
+    """A force without what changes from sample to sample, which adds up in the turns."""
+    if force.size <= _FEWEST:
+        return force
+    return np.asarray(sosfiltfilt(_SLOW_ONES, force))
 
 
 def force_of_motion(drive: Drive, signals: Signals, motion: Motion) -> np.ndarray:

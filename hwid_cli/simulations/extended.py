@@ -12,10 +12,9 @@ from functools import partial
 
 import numpy as np
 
-from hwid_cli.diagnosis.foreign import slow_part
 from hwid_cli.diagnosis.problem import Signals
 from hwid_cli.diagnosis.stand_in import (
-    Moved,
+    corrected,
     derived,
     force_along,
     force_of_motion,
@@ -121,7 +120,7 @@ def run_extended(
             best = ExtendedRun(found.output + read, found.velocity, disagreement)
         if disagreement <= _AGREEMENT:
             break
-        signals = _corrected(plain, signals, late, found, force)
+        signals = corrected(signals, plain, late, found.output, force)
     return best
 
 
@@ -151,22 +150,6 @@ def _pushed(
         own = request.force if request.force.size else 0.0
         return replace(request, force=own + force)
     return replace(request, input=request.input + force / plain.force_constant_N_per_A)
-
-
-def _corrected(
-    plain: Drive,
-    signals: Signals,
-    late: np.ndarray,
-    found: SimulatorRun,
-    force: np.ndarray,
-) -> Signals:
-    """The stand-in with a further force that moves it by what it was late."""
-    step = signals.sample_time_s
-    change: Moved = derived(SimulatorRun(late, np.zeros(0)), step)
-    more = signals.force + slow_part(force_along(plain, change, np.zeros(late.size)))
-    there = derived(SimulatorRun(found.output, np.zeros(0)), step)
-    moved = moved_plainly(plain, signals, more + force, there)
-    return replace(signals, force=more, offset=found.output - moved.position)
 
 
 def simulate_extended(
