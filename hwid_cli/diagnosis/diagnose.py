@@ -21,6 +21,7 @@ from hwid_cli.diagnosis.candidate import (
     rebuilt,
 )
 from hwid_cli.diagnosis.causes import fit_with_input_noise, without_repeats
+from hwid_cli.diagnosis.direction import find_reversal, reversal_sentence
 from hwid_cli.diagnosis.findings import Findings, describe
 from hwid_cli.diagnosis.intervals import unclear_effects
 from hwid_cli.diagnosis.latent_force import Smoothed, latent_force
@@ -63,6 +64,7 @@ from hwid_cli.diagnosis.where import places
 from hwid_cli.drive.catalogue import CATALOGUE, may_be_added, public_id
 from hwid_cli.drive.effect import Scales
 from hwid_cli.drive.simulation import drive_effects
+from hwid_cli.errors import ConfigError
 from hwid_cli.records.candidates import CandidateFit
 from hwid_cli.records.diagnosis import Diagnosis, NoiseFloor
 from hwid_cli.records.experiment import DiagnoseOptions, SimulationOptions
@@ -117,6 +119,11 @@ def find(
     given_sse : ndarray, shape (n_recordings,), or None, [output unit squared]
         What the simulation leaves with the parameters that the configuration gives; None
         where that is the problem's own drive.
+
+    Raises
+    ------
+    ConfigError
+        If the output clearly moves against the input.
     """
     noise = noise_floor(problem)
 
@@ -127,6 +134,9 @@ def find(
     if _shakes_at_rest(problem, base, scales, noise):
         noise = noise_floor(problem, rests=False)
         base = _refit_base(problem, scales, noise)
+    reversal = find_reversal(problem, base, scales, noise)
+    if reversal is not None:
+        raise ConfigError(reversal_sentence(reversal))
     base = _with_input_noise(problem, base, scales, noise)
     if base.is_usable:
         scales = scales_of_fit(problem, base, scales, noise)

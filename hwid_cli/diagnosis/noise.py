@@ -40,6 +40,8 @@ _JUMP = 5.0
 # the other noise moves the reading over several steps, and the error of rounding is
 # noise like any other.
 _GRID_SHARE = 0.5
+# A piece in which this much more happens than in the quietest one is no rest.
+_MORE_THAN_QUIETEST = 3.0
 # Repeats that differ this much more in motion than at rest differ by more than noise.
 # Slow noise reads a little less in a short rest.
 _MORE_IN_MOTION = 2.0
@@ -66,7 +68,8 @@ def noise_floor(problem: DiagnosisProblem, *, rests: bool = True) -> NoiseFloor:
     differences = _from_differences(pieces, step)
     is_limited = grid > 0 and step >= _GRID_SHARE * max(differences, step)
     repeats = _from_repeats(problem.signals, differences)
-    rest = None if is_limited or not rests else _from_rest(problem.signals)
+    may_move = problem.start == "estimated"
+    rest = None if is_limited or not rests else _from_rest(problem.signals, may_move)
     if repeats is not None and not (is_limited and repeats.rms < step):
         found, method = repeats, "repeats"
     elif rest is not None and rest.is_coloured:
@@ -392,14 +395,25 @@ def _is_same_input(one: Signals, other: Signals) -> bool:
     return float(np.max(np.abs(a - b))) < _SAME_INPUT * float(np.max(np.abs(a)))
 
 
-def _from_rest(all_signals: Sequence[Signals]) -> _Stretch | None:
-    """Noise before the input first moves; None where too little is seen of it."""
+def _from_rest(all_signals: Sequence[Signals], may_move: bool) -> _Stretch | None:
+    """Noise before the input first moves; None where too little is seen of it.
+
+    Parameters
+    ----------
+    may_move : bool
+        Whether a recording may begin in the middle of a motion. Such a one is told by
+        the quietest: noise is alike in all.
+    """
     pieces = [
         one.compared[one.skip : rest_length(one.driven_by)]
         for one in all_signals
         if rest_length(one.driven_by) < one.driven_by.size
     ]
     pieces = [piece for piece in pieces if piece.size >= _FEWEST_AT_REST]
+    if may_move:
+        sizes = [_rms([piece - piece.mean()]) for piece in pieces]
+        most = _MORE_THAN_QUIETEST * min(sizes, default=0.0)
+        pieces = [one for one, size in zip(pieces, sizes, strict=True) if size <= most]
     if len(pieces) < _FEWEST_RESTS:
         return None
     own = [piece - piece.mean() for piece in pieces]

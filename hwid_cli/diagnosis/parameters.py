@@ -408,8 +408,24 @@ def _read(problem: DiagnosisProblem, signals: Signals, motion: Motion) -> np.nda
 def residuals_at(
     problem: DiagnosisProblem, fit_layout: ParameterLayout, point: ParameterPoint
 ) -> list[np.ndarray]:
-    """Measured minus simulated of each recording, where it is evaluated."""
+    """Measured minus simulated of each recording, where it is evaluated.
+
+    NaN where values of an effect do not make sense together.
+    """
+    if not _is_possible(fit_layout, point):
+        return [np.full(one.n_evaluated, np.nan) for one in problem.signals]
     return [one.residual for one in compare_at(problem, fit_layout, point)]
+
+
+def _is_possible(fit_layout: ParameterLayout, point: ParameterPoint) -> bool:
+    values = None
+    for one in fit_layout.effects:
+        test = CATALOGUE[one].is_possible
+        if test is not None:
+            values = values or effects_at(fit_layout, point)
+            if not test(values[one]):
+                return False
+    return True
 
 
 def sum_of_squares(parts: list[np.ndarray]) -> float:

@@ -245,6 +245,8 @@ class Effect:
         or for a limit beyond all that it limits. Empty means the first one.
     words : mapping of str to str
         What it states in words for this one of several entries with one public id.
+    is_possible : callable or None
+        Whether values make sense together, where bounds of each alone do not say it.
     beside : str
         Id of the entry of which this is the second one; without that it means nothing.
     """
@@ -264,6 +266,7 @@ class Effect:
     moves_at_rest: bool = False
     strength: str = ""
     words: Mapping[str, str] = field(default_factory=dict)
+    is_possible: Callable[[Values], bool] | None = None
     beside: str = ""
 
     @property

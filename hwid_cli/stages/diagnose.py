@@ -365,9 +365,13 @@ def _compute(given: ToDiagnose, runner: Runner) -> Diagnosis:
     simulation, options = given.simulation, given.options
     with runner.rounds("tasks") as (settings, begin_round):
         if isinstance(simulation, SimulationOptions):
-            return diagnose_all(
-                given.recordings, simulation, options, settings, begin_round
-            )
+            try:
+                return diagnose_all(
+                    given.recordings, simulation, options, settings, begin_round
+                )
+            except ConfigError as error:
+                source = given.experiment.source
+                raise ConfigError(f"{source}: {error}") from None
         simulator = simulator_of(simulation, given.recordings, given.logs)
         with one_thread():
             return diagnose_foreign(

@@ -1,5 +1,7 @@
 """Noise floor and whiteness without a model, against noise that is known."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.signal import lfilter
@@ -196,6 +198,24 @@ def test_a_periodic_force_at_rest_is_no_noise(motions, driven_by):
 
     assert not noise.is_coloured
     assert noise.rms == pytest.approx(1e-4, rel=0.02)
+
+
+def test_a_swing_while_the_input_stands_is_no_noise(motions, driven_by):
+    rng = np.random.default_rng(8)
+    t = SAMPLE_TIME_S * np.arange(motions[0].size)
+    swing = 1e-3 * np.exp(-5 * t) * np.cos(60 * t)
+    measured = [
+        y + (swing if number % 3 else 0.0) + rng.normal(0, 1e-5, y.size)
+        for number, y in enumerate(motions)
+    ]
+    given = problem_of(measured, driven_by)
+
+    noise = noise_floor(replace(given, start="estimated"))
+
+    assert not noise.is_coloured
+    assert noise.rms == pytest.approx(1e-5, rel=0.05)
+    # A user who says that all is at rest is believed.
+    assert noise_floor(given).rms > 1e-4
 
 
 @pytest.mark.parametrize(

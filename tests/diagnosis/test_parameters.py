@@ -13,6 +13,8 @@ from hwid_cli.diagnosis.parameters import (
     effects_at,
     first_point,
     parameter_layout,
+    residuals_at,
+    sum_of_squares,
     vectors_at,
 )
 from hwid_cli.drive import slots
@@ -278,3 +280,17 @@ def test_what_cannot_move_is_no_coordinate(name, changes):
     of, found, first = laid_out(**changes)
     assert name not in {one.name for one in found.shared}
     assert getattr(drive_at(of, found, first), name) == getattr(of.drive, name)
+
+
+@pytest.mark.parametrize(("amplitude_m", "is_possible"), [(1e-4, True), (2e-4, False)])
+def test_a_scale_that_reads_backwards_leaves_no_number(amplitude_m, is_possible):
+    # The slope of the reading is at least 1 - 2 pi A / l: it turns back from 0.16 mm on.
+    values = {"amplitude_m": amplitude_m, "period_m": 1e-3, "phase_rad": 0.0}
+    of, found, point = laid_out(
+        ("sensor_eccentricity",), {"sensor_eccentricity": values}
+    )
+
+    parts = residuals_at(of, found, point)
+
+    assert all(np.isfinite(part).all() == is_possible for part in parts)
+    assert np.isfinite(sum_of_squares(parts)) == is_possible

@@ -57,7 +57,8 @@ SATURATION = Effect(
     parameters=(
         Parameter(
             "limit_A",
-            shares_of("current_A", 0.5, 0.7, 0.88),
+            # Recordings may be of several sizes, the largest far beyond the limit.
+            shares_of("current_A", 0.15, 0.3, 0.5, 0.7, 0.88),
             span_of("current_A", 0.05, 1.0),
             places=("SATURATION",),
             limits=(POSITIVE,),

@@ -181,6 +181,8 @@ ECCENTRICITY = Effect(
             default=0.0,
         ),
     ),
+    # A reading that turns back while the drive goes on would be another sensor.
+    is_possible=lambda values: 2 * pi * abs(values["amplitude_m"]) < values["period_m"],
     confused_with={
         "cogging": "the same way slowly and fast: the error of a sensor stays",
         "sensor_cubic": "motion over the whole stroke",
