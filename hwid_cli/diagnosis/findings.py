@@ -85,7 +85,7 @@ def describe(findings: Findings) -> Diagnosis:
     return Diagnosis(
         verdict=verdict.word,
         complete=verdict.is_complete,
-        summary=summarise(problem, criteria, base, verdict, effects),
+        summary=summarise(problem, criteria, base, verdict, effects, fits),
         effects=effects,
         ambiguous_with=tuple(
             "+".join(public_id(name) for name in one.effects) for one in verdict.rivals

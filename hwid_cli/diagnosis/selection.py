@@ -7,7 +7,7 @@ the recordings cannot tell apart are all given.
 docs/method_diagnosis.md, eq. (D21) to (D25).
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -60,6 +60,8 @@ TIE = 6.0
 WITHIN_REACH = 1.25
 # Share that each of several rivals explains of what none of them explains for the most.
 LEAST_OF_RIVALS = 0.35
+# Share of what a verdict leaves that makes a set worth following.
+LEAST_LEAD = 0.25
 # An effect that includes another one must add this share of what both gain.
 LEAST_ADDED = 0.03
 
@@ -442,6 +444,34 @@ def rivals(
             )
         )
     ]
+
+
+def lead(
+    criteria: SelectionCriteria,
+    found: Iterable[CandidateFit],
+    verdict: "DiagnosisVerdict",
+) -> CandidateFit | None:
+    """Set of effects that explains most of what the verdict leaves, without a proof.
+
+    Returns
+    -------
+    CandidateFit or None
+        For people to follow; None where nothing remains, or nothing explains a good
+        part of it in most of the held-out recordings.
+    """
+    chosen = verdict.chosen
+    if verdict.is_complete or verdict.word not in ("named", "unknown"):
+        return None
+    best, most = None, LEAST_LEAD
+    for one in found:
+        adds = set(chosen.effects) < set(one.effects)
+        if not (adds and one.is_usable and has_size(one)):
+            continue
+        against = criteria.evidence(one, chosen)
+        is_clear = against.gain >= LEAST_GAIN and against.improved >= LEAST_IMPROVED
+        if is_clear and against.explained > most:
+            best, most = one, against.explained
+    return best
 
 
 def title_of(found: CandidateFit) -> str:

@@ -1,6 +1,6 @@
 """What a diagnosis says in words: the summary, and what recordings cannot show."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -9,8 +9,10 @@ from hwid_cli.diagnosis.selection import (
     STILL_LARGE,
     DiagnosisVerdict,
     SelectionCriteria,
+    lead,
     title_of,
 )
+from hwid_cli.drive.catalogue import public_id
 from hwid_cli.records.candidates import CAUSES, CandidateFit
 from hwid_cli.records.diagnosis import BaseParameter, FittedEffect, NoiseFloor
 
@@ -33,8 +35,9 @@ def summarise(
     base: CandidateFit,
     verdict: DiagnosisVerdict,
     effects: tuple[FittedEffect, ...],
+    fits: Iterable[CandidateFit],
 ) -> str:
-    """Say the verdict in one or two sentences.
+    """Say the verdict in one or two sentences, and the best lead where some remains.
 
     Parameters
     ----------
@@ -42,7 +45,36 @@ def summarise(
         Re-fitted, without further effects.
     effects : tuple of FittedEffect
         Those that are named.
+    fits : iterable of CandidateFit
+        Of all sets of effects.
     """
+    best = lead(criteria, fits, verdict)
+    text = _verdict_in_words(problem, criteria, base, verdict, effects)
+    return text if best is None else f"{text} {_lead_in_words(criteria, best, verdict)}"
+
+
+def _lead_in_words(
+    criteria: SelectionCriteria, best: CandidateFit, verdict: DiagnosisVerdict
+) -> str:
+    """Say which set would go on from here, and why it is not named."""
+    share = criteria.evidence(best, verdict.chosen).explained
+    added = [one for one in best.effects if one not in verdict.chosen.effects]
+    names = " and ".join(public_id(one) for one in added)
+    what = "of what remains" if verdict.chosen.effects else "of it"
+    return (
+        f"Best lead: {names} would explain {100 * share:.3g} % {what}, down to "
+        f"{criteria.ratio(best):.3g} times the noise; it is not named, because another "
+        "law may do as well."
+    )
+
+
+def _verdict_in_words(
+    problem: DiagnosisProblem,
+    criteria: SelectionCriteria,
+    base: CandidateFit,
+    verdict: DiagnosisVerdict,
+    effects: tuple[FittedEffect, ...],
+) -> str:
     before = criteria.ratio(base)
     after = criteria.ratio(verdict.chosen)
     if verdict.word == "none":

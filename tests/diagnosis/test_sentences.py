@@ -177,3 +177,26 @@ def test_motion_to_both_sides_shows_friction():
     way = np.linspace(0.0, 1.0, 200)
     assert ONE_WAY not in said(ways(way, -way))
     assert ONE_WAY not in said(ways(np.sin(3 * way)))
+
+
+@pytest.mark.parametrize(
+    ("friction_N", "stiffness_N_per_m", "leads"),
+    [
+        (1.0, 3e3, "coulomb_friction"),
+        (1.5, 5e3, "coulomb_friction and cubic_stiffness"),
+    ],
+)
+def test_what_remains_comes_with_a_lead(friction_N, stiffness_N_per_m, leads):
+    # A cubic spring imitates a stop only in part, so that no set comes near the noise.
+    stop = {"position_m": 0.008, "stiffness_N_per_m": stiffness_N_per_m}
+    given = {"coulomb_friction": {"force_N": friction_N}, "end_stop": stop}
+    allowed = ("coulomb_friction", "cubic_stiffness")
+    found = diagnosed(recordings(given), effects=allowed, max_effects=2)
+
+    assert not found.complete
+    assert f"Best lead: {leads} would explain" in found.summary
+    assert len(found.effects) + leads.count("and") + 1 == len(allowed)
+
+
+def test_nothing_is_added_to_a_complete_verdict():
+    assert "lead" not in diagnosed(recordings(FRICTION)).summary
