@@ -151,7 +151,7 @@ gun: $(RUN)  ## the same at full size, and docs/gun_diagnosis.md
 	$(HWID) diagnose configs/diagnose_gun.yaml
 	$(BIN)/python tools/gun_diagnosis.py results/diagnose_gun > docs/gun_diagnosis.tmp && mv docs/gun_diagnosis.tmp docs/gun_diagnosis.md
 
-REAL := emps silverbox hsm150 ffwheel
+REAL := emps silverbox hsm150 ffwheel shaking_table pick_place rack_drive
 real: $(RUN)  ## diagnose real machines (data in HWID_REALDATA), and docs/real_diagnosis.md
 	@for name in $(REAL); do $(HWID) diagnose configs/diagnose_$$name.yaml || exit 1; done
 	$(BIN)/python tools/real_diagnosis.py results > docs/real_diagnosis.tmp && mv docs/real_diagnosis.tmp docs/real_diagnosis.md

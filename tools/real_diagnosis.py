@@ -2,9 +2,8 @@
 
     python tools/real_diagnosis.py results > docs/real_diagnosis.md
 
-reads ``results/diagnose_emps``, ``diagnose_silverbox``, ``diagnose_ffwheel`` and
-``diagnose_hsm150``; ``make real`` runs all of it. The force-level errors of the EMPS need
-its files below ``HWID_REALDATA``.
+reads ``results/diagnose_NAME`` of the names below; ``make real`` runs all of it. The
+force-level errors of the EMPS need its files below ``HWID_REALDATA``.
 """
 
 import csv
@@ -16,7 +15,9 @@ from pathlib import Path
 import numpy as np
 from scipy import io, signal
 
-NAMES = ("emps", "silverbox", "ffwheel", "hsm150")
+NAMES = (
+    "emps", "silverbox", "ffwheel", "hsm150", "shaking_table", "pick_place", "rack_drive"
+)  # fmt: skip
 PUBLISHED_MV = {
     "test_multisine": ("6.96", "0.36"),
     "test_arrow_full": ("14.4", "0.26"),
@@ -43,6 +44,12 @@ def main() -> None:
         out.append(recordings("HSM150", results / "diagnose_hsm150", "rad"))
     if found["ffwheel"] is not None:
         out.append(recordings("ffwheel", results / "diagnose_ffwheel", "-"))
+    for name, title in (
+        ("shaking_table", "Shaking table"),
+        ("pick_place", "Pick and place"),
+    ):
+        if found[name] is not None:
+            out.append(recordings(title, results / f"diagnose_{name}", "m"))
     sys.stdout.write("\n".join(out))
 
 

@@ -129,7 +129,9 @@ class Screened:
 def fewer_recordings(problem: DiagnosisProblem, most_samples: int) -> DiagnosisProblem:
     """Problem with so few recordings that they have about ``most_samples``.
 
-    Takes the recordings in turn from each kind, the largest outputs first.
+    Takes the recordings in turn from each kind, the largest outputs first, and those
+    with the largest and the smallest inputs however long they are: what acts on the
+    command shows only beside inputs of other sizes.
     """
     if problem.n_evaluated <= most_samples:
         return problem
@@ -139,15 +141,33 @@ def fewer_recordings(problem: DiagnosisProblem, most_samples: int) -> DiagnosisP
         kinds.setdefault(problem.signals[row].kind, []).append(int(row))
     # Every second one first, so that small and large ones are both there.
     queues = [rows[::2] + rows[1::2] for rows in kinds.values()]
-    chosen: list[int] = []
-    n_samples = 0
+    chosen = _of_extreme_inputs(problem)
+    n_samples = sum(problem.signals[row].n_evaluated for row in chosen)
     for turn in range(max(len(queue) for queue in queues)):
         for queue in queues:
-            if turn < len(queue) and n_samples < most_samples:
+            if (
+                turn < len(queue)
+                and n_samples < most_samples
+                and queue[turn] not in chosen
+            ):
                 chosen.append(queue[turn])
                 n_samples += problem.signals[queue[turn]].n_evaluated
     signals = tuple(problem.signals[row] for row in sorted(chosen))
     return replace(problem, signals=signals)
+
+
+def _of_extreme_inputs(problem: DiagnosisProblem) -> list[int]:
+    """Rows of the recordings whose inputs are the largest and the smallest."""
+    sizes = [
+        float(np.max(np.abs(one.driven_by - one.driven_by[0])))
+        for one in problem.signals
+    ]
+    moving = [row for row, size in enumerate(sizes) if size > 0]
+    if not moving:
+        return []
+    largest = max(moving, key=lambda row: sizes[row])
+    smallest = min(moving, key=lambda row: sizes[row])
+    return list(dict.fromkeys((largest, smallest)))
 
 
 def screen(

@@ -20,19 +20,21 @@ REAL_DATA = Path(
 def diagnosed(tmp_path, monkeypatch, request):
     """Diagnosis of one of ``configs/diagnose_*.yaml``, perhaps with other options."""
 
-    def diagnose(name, folder, **options):
+    def diagnose(name, folder, recordings=None, **options):
         if not (REAL_DATA / folder).is_dir():
             pytest.skip(
                 f"no real data: put {folder} into {REAL_DATA} or set HWID_REALDATA"
             )
         monkeypatch.setenv("HWID_REALDATA", str(REAL_DATA))
         given = yaml.safe_load((PROJECT / f"configs/diagnose_{name}.yaml").read_text())
-        given["diagnose"] = (given["diagnose"] or {}) | options
+        given["diagnose"] = (given.get("diagnose") or {}) | options
+        given["recordings"] |= recordings or {}
         config = tmp_path / f"{name}.yaml"
         config.write_text(yaml.safe_dump(given))
         arguments = ["diagnose", str(config), "--out", str(tmp_path / "out"), "-q"]
         done = CliRunner().invoke(main, arguments)
-        assert done.exit_code == 0, done.output
+        if done.exit_code:
+            return done.output
         return json.loads((tmp_path / "out" / "diagnosis.json").read_text())
 
     return diagnose
@@ -92,3 +94,35 @@ def test_the_silverbox_lacks_a_cubic_spring(diagnosed):
     assert [one["id"] for one in found["effects"]] == ["cubic_stiffness"]
     gap = found["gap"]
     assert gap["after"]["held_out_rms"] < 0.05 * gap["before"]["held_out_rms"]
+
+
+QUARTERS = {name: [256 * n, 256 * (n + 1)] for n, name in enumerate("abcd")}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("is_cut", [False, True], ids=["whole", "in_quarters"])
+def test_the_rack_drive_lacks_dry_friction_however_its_stroke_is_cut(diagnosed, is_cut):
+    # Three of the quarters begin in motion.
+    cut = {"recordings": {"parts": QUARTERS}, "initial_state": "estimated"}
+    found = diagnosed("rack_drive", "rack_drive", **(cut if is_cut else {}))
+    assert found["verdict"] == "named"
+    assert [one["id"] for one in found["effects"]] == ["coulomb_friction"]
+    # Of a regression of torque on smoothed acceleration, speed and direction above 50/min,
+    # for a mass of 1 kg.
+    friction = values(found, "coulomb_friction")["force_N"]
+    assert friction == pytest.approx(4132, rel=0.03)
+
+
+@pytest.mark.slow
+def test_a_head_that_counts_against_its_command_is_told(diagnosed):
+    said = diagnosed("pick_place", "pick_place", recordings={"input_scale": 1.0})
+    assert "recordings.input_scale: the output moves against the input" in said
+    assert said.count("\n") == 1
+
+
+@pytest.mark.slow
+def test_the_shaking_table_is_led_to_the_limit_of_its_reference(diagnosed):
+    # The logger has reference and command: one is the other, cut at 0.5.
+    found = diagnosed("shaking_table", "shaking_table")
+    assert [one["id"] for one in found["effects"]] == ["sensor_drift"]
+    assert "Best lead: input_saturation" in found["summary"]

@@ -248,6 +248,23 @@ def test_few_samples_are_taken_from_every_kind_and_the_largest_first():
     assert names == [one.name for one in of.signals if one.name in names]
 
 
+def test_inputs_of_every_size_are_screened_however_long_they_are():
+    # The output of the smallest input drifts furthest, as that of a free axis does.
+    drifting = [
+        replace(one, output=one.output + 0.05 / np.max(np.abs(one.input)))
+        for one in recordings()
+    ]
+    of = problem(drifting)
+    sizes = {one.name: np.max(np.abs(one.driven_by)) for one in of.signals}
+
+    few = fewer_recordings(of, 400)
+    chosen = [sizes[one.name] for one in few.signals]
+
+    assert min(chosen) == min(sizes.values())
+    assert max(chosen) == max(sizes.values())
+    assert few.n_evaluated < of.n_evaluated / 3
+
+
 def test_recordings_that_are_few_anyway_are_all_taken():
     of = problem(recordings())
     assert fewer_recordings(of, SCREENING_SAMPLES) is of
