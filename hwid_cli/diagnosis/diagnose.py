@@ -61,6 +61,7 @@ from hwid_cli.diagnosis.selection import (
     decide,
 )
 from hwid_cli.diagnosis.where import places
+from hwid_cli.diagnosis.zeros import with_zeros
 from hwid_cli.drive.catalogue import CATALOGUE, may_be_added, public_id
 from hwid_cli.drive.effect import Scales
 from hwid_cli.drive.simulation import drive_effects
@@ -138,6 +139,9 @@ def find(
     if reversal is not None:
         raise ConfigError(reversal_sentence(reversal))
     base = _with_input_noise(problem, base, scales, noise)
+    problem, base = with_zeros(problem, base, scales, noise)
+    if base.cause == "zeros":
+        given = compared_as_given(problem)
     if base.is_usable:
         scales = scales_of_fit(problem, base, scales, noise)
     drive = fitted_drive(problem.drive, base)

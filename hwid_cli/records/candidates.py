@@ -7,6 +7,7 @@ import numpy as np
 # What the measuring chain may add to the noise of the output, in words.
 CAUSES = {
     "input_noise": "noise of the measured input, seen through the drive",
+    "zeros": "the sensor's zero, which differs between recordings",
     "interpolation": "noise that interpolation between uneven samples has linked",
 }
 
