@@ -9,6 +9,7 @@ docs/method_diagnosis.md, eq. (D21) to (D25).
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import combinations
 
 import numpy as np
 from scipy.stats import f as f_distribution
@@ -217,6 +218,7 @@ class SelectionCriteria:
             and against.improved >= LEAST_IMPROVED
             and has_size(found)
             and not self.is_systematic(found)
+            and (self.is_complete(found) or not holds_look_alikes(found))
         )
 
     def is_systematic(self, found: CandidateFit) -> bool:
@@ -284,6 +286,19 @@ def has_size(found: CandidateFit) -> bool:
         one.parameter.startswith("log_")
         and float(np.std(found.own[:, column])) < LEAST_SPREAD
         for column, one in enumerate(found.own_names)
+    )
+
+
+def holds_look_alikes(found: CandidateFit) -> bool:
+    """Whether two effects of a set look like each other.
+
+    Where something remains beside both, they imitate one law that is neither.
+    """
+    return any(
+        public_id(one) in CATALOGUE[two].confused_with
+        and public_id(two) in CATALOGUE[one].confused_with
+        for one, two in combinations(found.effects, 2)
+        if public_id(one) != public_id(two)
     )
 
 

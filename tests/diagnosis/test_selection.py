@@ -168,6 +168,23 @@ def test_what_leaves_white_noise_need_not_explain_half():
     assert CRITERIA.may_be_named(made_up(GOOD, 300.0, whiteness=0.9), base())
 
 
+@pytest.mark.parametrize(
+    ("effects", "whiteness", "is_named"),
+    [
+        (("force_constant_saturation", "supply_sag"), 3.0, False),
+        (("force_constant_saturation", "supply_sag"), 0.9, True),
+        (("coulomb_friction", "supply_sag"), 3.0, True),
+        # Two of one kind are two places, not one law.
+        (("one_sided_stop", "one_sided_stop:second"), 3.0, True),
+    ],
+)
+def test_two_that_look_alike_are_one_law_while_something_remains(
+    effects, whiteness, is_named
+):
+    both = made_up(effects, 110.0, whiteness=whiteness)
+    assert CRITERIA.may_be_named(both, base()) == is_named
+
+
 def test_factors_beyond_scatter_have_a_size():
     assert has_size(made_up(GOOD, 1.0, own=[0.05, -0.05] * 3))
     assert has_size(made_up(GOOD, 1.0))
