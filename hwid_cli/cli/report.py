@@ -1,7 +1,7 @@
 """``hwid report``: one page that shows whatever stages have run."""
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from hwid_cli.cli.options import Choices
@@ -12,9 +12,12 @@ from hwid_cli.files.atomic import replace_file
 from hwid_cli.records.recordings import Calibrated
 from hwid_cli.records.report import StageRun, StoredResults
 from hwid_cli.report.html import report_page
+from hwid_cli.report.page import Drawing
+from hwid_cli.report.progress import StageProgress
 from hwid_cli.stages.report import changed_sections, report_contents, report_key
 from hwid_cli.stages.table import STAGES, stage_named
 from hwid_cli.store.diagnosis_results import read_diagnosis
+from hwid_cli.store.order_results import read_chosen_maps
 from hwid_cli.store.result_files import has_left_results, read_provenance
 
 FILE = "report.html"
@@ -58,13 +61,26 @@ def write_report(session: Session) -> Path:
         session.say(f"report: {path} shows {stages} already, {timer}")
         return path
     page = report_page(report_contents(stored), STAGES)
-    for name, png in page.figures.items():
-        place = session.out / FIGURES / name
-        if not (place.is_file() and place.read_bytes() == png):
-            replace_file(place, png)
-    replace_file(path, (page.html + _last_line(key, page.figures)).encode())
+    names = [one.file for one in page.drawings]
+    # The page first: it is what people wait for.
+    replace_file(path, (page.html + _last_line(key, names)).encode())
     session.say(f"report: {path} shows {stages}, {timer}")
+    _draw(session, page.drawings)
     return path
+
+
+def _draw(session: Session, drawings: Sequence[Drawing]) -> None:
+    """Write the figures beside the page."""
+    if not drawings:
+        return
+    with StageProgress(
+        "figures", len(drawings), "figures", is_silent=session.is_quiet
+    ) as progress:
+        for one in drawings:
+            place, png = session.out / FIGURES / one.file, one.png
+            if not (place.is_file() and place.read_bytes() == png):
+                replace_file(place, png)
+            progress.advance(from_cache=False)
 
 
 def _last_line(key: str, figures: Iterable[str]) -> str:
@@ -123,6 +139,9 @@ def read_stored(session: Session) -> StoredResults:
         calibration_figures={}
         if calibrated is None
         else _calibration_figures(session.out, calibrated),
+        orders=experiment.orders,
+        order=experiment.order,
+        chosen_maps=read_chosen_maps(session.out),
     )
 
 

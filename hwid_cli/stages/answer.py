@@ -1,0 +1,219 @@
+"""Which model of the results to take, and how it does beside a linear one.
+
+The choice never looks at the recordings of the final test: those say how good it is.
+"""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from hwid_cli.model.fit import fit
+from hwid_cli.model.scores import fit_percent, rmsd
+from hwid_cli.model.simulate import validation_output
+from hwid_cli.records.answer import ModelAnswer
+from hwid_cli.records.experiment import OrderOptions
+from hwid_cli.records.groups import FinalTest
+from hwid_cli.records.model import Fit, HammersteinWiener
+from hwid_cli.records.order import OrderAdvice
+from hwid_cli.records.recordings import Recording
+from hwid_cli.records.report import StoredResults
+from hwid_cli.records.results import CrossValidation
+from hwid_cli.stages.compare import linear_options
+from hwid_cli.stages.model_views import named_fits
+from hwid_cli.stages.order import recommend_orders
+from hwid_cli.stages.test import best_single
+from hwid_cli.tasks.task import one_thread
+
+
+def model_answer(
+    stored: StoredResults, crossval: CrossValidation | None
+) -> ModelAnswer | None:
+    """Choose a model, and simulate it and a linear one where it was not fitted.
+
+    Parameters
+    ----------
+    crossval : CrossValidation or None
+        Of the stored models; None where there is none.
+
+    Returns
+    -------
+    ModelAnswer or None
+        None without any model.
+    """
+    named = {name: one for name, one in named_fits(stored).items() if one.model}
+    advice = _advice(stored, crossval)
+    name, chosen_on = _chosen(stored, crossval, advice, named)
+    if not name or not stored.recordings:
+        return None
+    found = named[name]
+    assert found.model is not None
+    own = found.identified_on
+    linear = _linear(found, stored.recordings)
+    final = stored.final_test
+    tested = () if final is None else final.tested_on
+    unseen = [
+        one
+        for one in stored.recordings
+        if one.name not in own and (not tested or one.name in tested)
+    ]
+    threshold = np.nan
+    if crossval is not None or final is not None:
+        threshold = (crossval or final).threshold  # type: ignore[union-attr]
+    deviation, percent = _scores(found.model, unseen)
+    linear_deviation, linear_percent = _scores(linear, unseen)
+    visited = _visited(found, stored.recordings)
+    maps = stored.chosen_maps
+    if advice is None or maps is None or (maps.nb, maps.nk) != _place(advice):
+        maps = None
+    return ModelAnswer(
+        name=name,
+        model=found.model,
+        linear=linear,
+        own=own,
+        chosen_on=chosen_on,
+        recordings=tuple(one.name for one in unseen),
+        is_unused=bool(tested),
+        rmsd=deviation,
+        linear_rmsd=linear_deviation,
+        fit_percent=percent,
+        linear_fit_percent=linear_percent,
+        input_range=visited,
+        beyond=np.array([_beyond(visited, one) for one in unseen]),
+        unit=stored.recordings[0].output_unit,
+        threshold=threshold,
+        advice=advice,
+        maps=maps,
+    )
+
+
+def _place(advice: OrderAdvice) -> tuple[int, int]:
+    return advice.overall.nb, advice.overall.nk
+
+
+def _advice(
+    stored: StoredResults, crossval: CrossValidation | None
+) -> OrderAdvice | None:
+    """Recommended orders; None where outliers count, which ``hwid order`` leaves out first."""
+    if crossval is None or stored.orders is None:
+        return None
+    if any(one.options.loss != "squared" for one in stored.fits):
+        return None
+    options = stored.order or OrderOptions()
+    return recommend_orders(
+        stored.fits, crossval, stored.recordings, stored.orders, options
+    )
+
+
+def _chosen(
+    stored: StoredResults,
+    crossval: CrossValidation | None,
+    advice: OrderAdvice | None,
+    named: Mapping[str, Fit],
+) -> tuple[str, tuple[str, ...]]:
+    """Name of the model to take, and the recordings that chose it."""
+    final, search = stored.final_test, stored.search
+    if final is not None:
+        name, chosen_on = _of_final_test(final)
+        if name in named:
+            return name, chosen_on
+    if search is not None and search.chain:
+        last = search.chain_groups[-1]
+        if last.model_name in named:
+            return last.model_name, search.validated_on
+    if crossval is not None:
+        name, chosen_on = _of_crossval(crossval, advice)
+        if name in named:
+            return name, chosen_on
+    usable = {name: one for name, one in named.items() if np.isfinite(one.fit_percent)}
+    if not usable:
+        return "", ()
+    return max(usable, key=lambda name: usable[name].fit_percent), ()
+
+
+def _of_final_test(final: FinalTest) -> tuple[str, tuple[str, ...]]:
+    """The chain's last model, or the best one of a single recording where that is better."""
+    single = best_single(final)
+    known = ~np.isin(final.recordings, final.tested_on)
+    if not final.chain:
+        if single < 0:
+            return "", ()
+        return final.models[single], _names(final, known & ~final.is_own[single])
+    last = final.models.index(final.chain[-1])
+    if single < 0 or single == last:
+        return final.models[last], _names(final, known & ~final.is_own[last])
+    common = known & ~final.is_own[last] & ~final.is_own[single]
+    values = final.rmsd[np.ix_([last, single], np.flatnonzero(common))]
+    if not values.size or not np.isfinite(values).all():
+        return final.models[last], _names(final, known & ~final.is_own[last])
+    joined, alone = np.mean(np.log(values), axis=1)
+    return final.models[last if joined <= alone else single], _names(final, common)
+
+
+def _names(final: FinalTest, chosen: np.ndarray) -> tuple[str, ...]:
+    return tuple(np.array(final.recordings)[chosen].tolist())
+
+
+def _of_crossval(
+    crossval: CrossValidation, advice: OrderAdvice | None
+) -> tuple[str, tuple[str, ...]]:
+    """Of the models with the recommended orders that of the lowest RMSD elsewhere."""
+    is_own = np.equal.outer(crossval.identified_on, crossval.validated_on)
+    foreign = np.where(is_own[:, None, None, :], np.nan, crossval.rmsd)
+    is_known = np.isfinite(foreign) | is_own[:, None, None, :]
+    usable = is_known.all(axis=3) & np.isfinite(foreign).any(axis=3)
+    if advice is not None:
+        nb, nk = _place(advice)
+        advised = np.zeros_like(usable)
+        advised[:, crossval.nb.index(nb), crossval.nk.index(nk)] = True
+        usable = usable & advised if (usable & advised).any() else usable
+    if not usable.any():
+        return "", ()
+    with np.errstate(all="ignore"):
+        error = np.nansum(np.log(foreign), axis=3) / np.isfinite(foreign).sum(axis=3)
+    best = np.unravel_index(np.argmin(np.where(usable, error, np.inf)), error.shape)
+    n, b, k = (int(one) for one in best)
+    who = crossval.identified_on[n]
+    others = tuple(one for one in crossval.validated_on if one != who)
+    return f"{who}/{crossval.nb[b]}/{crossval.nk[k]}", others
+
+
+def _linear(found: Fit, recordings: Sequence[Recording]) -> HammersteinWiener | None:
+    """Linear model of the same orders and recordings; None where there is no such thing."""
+    options = found.options
+    if options.input_map == options.output_map == "none" or found.model is None:
+        return None
+    by_name = {one.name: one for one in recordings}
+    if not set(found.identified_on) <= set(by_name):
+        return None
+    own = [by_name[name] for name in found.identified_on]
+    with one_thread():
+        return fit(own, found.model.orders, linear_options(options)).model
+
+
+def _scores(
+    model: HammersteinWiener | None, recordings: Sequence[Recording]
+) -> tuple[np.ndarray, np.ndarray]:
+    """RMSD and fit percent on each recording; NaN without a model."""
+    if model is None:
+        missing = np.full(len(recordings), np.nan)
+        return missing, missing
+    outputs = [validation_output(model, one) for one in recordings]
+    both = [
+        (rmsd(one.output, simulated), fit_percent(one.output, simulated))
+        for one, simulated in zip(recordings, outputs, strict=True)
+    ]
+    values = np.array(both).reshape(-1, 2)
+    return values[:, 0], values[:, 1]
+
+
+def _visited(found: Fit, recordings: Sequence[Recording]) -> tuple[float, float]:
+    """Lowest and highest input of the fit."""
+    own = [one.input for one in recordings if one.name in found.identified_on]
+    if not own and found.model is not None:
+        return found.model.input_map.domain
+    return min(float(one.min()) for one in own), max(float(one.max()) for one in own)
+
+
+def _beyond(visited: tuple[float, float], recording: Recording) -> float:
+    low, high = visited
+    return float(np.mean((recording.input < low) | (recording.input > high)))
