@@ -4,6 +4,7 @@ templates/report.js draws them with uPlot: panels above each other share their h
 axis, its zoom and its cursor. Colours and dashes of a curve come from its role.
 """
 
+import itertools
 import json
 from dataclasses import dataclass
 from typing import Any, ClassVar
@@ -25,6 +26,8 @@ _SHORT, _DIGITS = 64, 6
 # Samples of a curve that a page holds, and of all curves of a chart that has many of
 # them; see ``points_of_each``.
 MOST_POINTS, LEAST_POINTS, _ALL_POINTS = 4000, 800, 600_000
+# The horizontal axis and a double line of text; the room that the style knows, [pixels].
+_AXIS, _DOUBLE_LINE, _LEAST_ROOM, _MOST_ROOM = 40, 32, 4, 21
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,6 +130,14 @@ class Chart:
     has_gaps_closed: bool = False
     is_square: bool = False
     has_model_menu: bool = False
+
+    @property
+    def room(self) -> int:
+        """Room that the page keeps for it before it is drawn, in double lines."""
+        if self.is_square:
+            return 12
+        tall = sum(one.height_px for one in self.panels) + _AXIS
+        return min(_MOST_ROOM, max(_LEAST_ROOM, int(tall / _DOUBLE_LINE)))
 
 
 def points_of_each(n_curves: int) -> int:
@@ -315,17 +326,17 @@ def chart_data(chart: Chart) -> Markup:
 
 
 def as_data(value: object) -> Markup:
-    """Write a value as JSON that may stand inside an element of a page.
+    r"""Write a value as JSON that may stand inside an element of a page.
 
     Examples
     --------
-    >>> as_data({"name": "</script>&"})
-    Markup('{"name":"\\\\u003c/script\\\\u003e\\\\u0026"}')
+    >>> "<" in as_data({"name": "</script>"})
+    False
     """
     text = json.dumps(value, separators=(",", ":"), allow_nan=False)
     for sign in "<>&":
         text = text.replace(sign, f"\\u{ord(sign):04x}")
-    return Markup(text)  # noqa: S704 - no sign of HTML is left
+    return Markup(text)
 
 
 def _panel(panel: Panel) -> dict[str, Any]:
@@ -358,6 +369,10 @@ def _curve(curve: Curve) -> dict[str, Any]:
 
 def packed(values: np.ndarray) -> list[float | None] | dict[str, Any]:
     """Write numbers in few characters: rounded, and as steps from one to the next.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,), [any]
 
     Returns
     -------
@@ -408,7 +423,7 @@ def _runs(at: np.ndarray) -> list[list[float]]:
         if 8 * len(starts) > at.size + 16:
             break
     found = []
-    for first, end in zip(starts[:-1], starts[1:], strict=True):
+    for first, end in itertools.pairwise(starts):
         part = at[first:end]
         step = (part[-1] - part[0]) / (part.size - 1) if part.size > 1 else 0.0
         found.append([float(f"{part[0]:.12g}"), float(f"{step:.12g}"), int(part.size)])

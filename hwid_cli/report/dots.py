@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 # Widths of the drawing, heights of a row, of a title, of the axis below, [pixels].
-_WIDTH, _NARROW, _ROW, _TITLE, _AXIS = 720, 400, 20, 26, 40
+_WIDTH, _NARROW, _ROW, _TITLE, _AXIS = 720, 340, 20, 26, 40
 # Room of a character of a name and of a number, of which a narrow drawing has less.
 _CHARACTER, _MOST_NAME = 6.4, 240
 # A logarithmic axis reaches at least so far, [-].
@@ -141,7 +141,7 @@ def dot_drawing(dots: Dots) -> DotDrawing:
     """
     rows = [row for group in dots.groups for row in group.rows]
     width = _NARROW if dots.is_narrow else _WIDTH
-    most = int((0.36 * width if dots.is_narrow else _MOST_NAME) / _CHARACTER)
+    most = int((0.44 * width if dots.is_narrow else _MOST_NAME) / _CHARACTER)
     left = _CHARACTER * min(most, max(len(row.name) for row in rows)) + 14
     beside = _CHARACTER * max(len(row.text) for row in rows)
     right = width - 14 - beside

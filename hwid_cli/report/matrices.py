@@ -8,8 +8,15 @@ import numpy as np
 from hwid_cli.records.report import OrderGrid, RmsdMatrix
 from hwid_cli.records.units import behind
 from hwid_cli.report.formats import MISSING
-from hwid_cli.report.table import Cell, Column, Table
+from hwid_cli.report.table import Cell, Column, Row, Table
 
+# Digits of a power of ten.
+_RAISED = str.maketrans(
+    "-0123456789",
+    "\N{SUPERSCRIPT MINUS}\N{SUPERSCRIPT ZERO}\N{SUPERSCRIPT ONE}\N{SUPERSCRIPT TWO}"
+    "\N{SUPERSCRIPT THREE}\N{SUPERSCRIPT FOUR}\N{SUPERSCRIPT FIVE}\N{SUPERSCRIPT SIX}"
+    "\N{SUPERSCRIPT SEVEN}\N{SUPERSCRIPT EIGHT}\N{SUPERSCRIPT NINE}",
+)
 # A number of a cell has so many digits at least.
 _DIGITS = 2
 
@@ -25,7 +32,7 @@ def rmsd_matrix_table(matrix: RmsdMatrix) -> Table:
     """
     factor, unit = _scale(matrix.rmsd, matrix.unit)
     depth = _depths(matrix.rmsd)
-    rows = []
+    rows: list[Row] = []
     for row, model in enumerate(matrix.models):
         cells = [
             _cell(
@@ -63,7 +70,7 @@ def order_grid_table(grid: OrderGrid, place: int) -> Table:
     factor, unit = _scale(values, grid.unit)
     depth = _depths(values)
     lowest = np.nanmin(values) if np.isfinite(values).any() else math.nan
-    rows = tuple(
+    rows: tuple[Row, ...] = tuple(
         (
             f"nb = {nb}",
             *(_cell(value, factor, depth, is_best=value == lowest) for value in row),
@@ -91,7 +98,8 @@ def _scale(values: np.ndarray, unit: str) -> tuple[float, str]:
     power = 3 * math.floor(math.log10(float(np.median(usable))) / 3)
     if power == 0:
         return 1.0, f" [{unit}]"
-    return 10.0**-power, f" [10^{power}{behind(unit)}]"
+    raised = f"10{str(power).translate(_RAISED)}"
+    return 10.0**-power, f" [{raised}{behind(unit)}]"
 
 
 def _depths(values: np.ndarray) -> Callable[[float], float]:

@@ -124,6 +124,8 @@ class Answer:
         Up to three, beside each other.
     next_steps : tuple of (str, str)
         What to do next, and the command for it; empty for none.
+    is_small : bool
+        Whether another answer needs room on the same screen.
     """
 
     kind: ClassVar[str] = "answer"
@@ -133,6 +135,7 @@ class Answer:
     details: tuple[str, ...] = ()
     blocks: "tuple[PageBlock, ...]" = ()
     next_steps: tuple[tuple[str, str], ...] = ()
+    is_small: bool = False
 
 
 PageBlock = Block | Figures | Pairs | Collapsible | Chart | Dots | Picker | Row | Answer

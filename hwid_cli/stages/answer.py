@@ -10,7 +10,7 @@ import numpy as np
 from hwid_cli.model.fit import fit
 from hwid_cli.model.scores import fit_percent, rmsd
 from hwid_cli.model.simulate import validation_output
-from hwid_cli.records.answer import ModelAnswer
+from hwid_cli.records.answer import ChosenMaps, ModelAnswer
 from hwid_cli.records.experiment import OrderOptions
 from hwid_cli.records.groups import FinalTest
 from hwid_cli.records.model import Fit, HammersteinWiener
@@ -40,13 +40,16 @@ def model_answer(
     ModelAnswer or None
         None without any model.
     """
-    named = {name: one for name, one in named_fits(stored).items() if one.model}
+    named = {
+        name: one for name, one in named_fits(stored).items() if one.model is not None
+    }
     advice = _advice(stored, crossval)
     name, chosen_on = _chosen(stored, crossval, advice, named)
     if not name or not stored.recordings:
         return None
     found = named[name]
-    assert found.model is not None
+    if found.model is None:
+        return None
     own = found.identified_on
     linear = _linear(found, stored.recordings)
     final = stored.final_test
@@ -56,15 +59,11 @@ def model_answer(
         for one in stored.recordings
         if one.name not in own and (not tested or one.name in tested)
     ]
-    threshold = np.nan
-    if crossval is not None or final is not None:
-        threshold = (crossval or final).threshold  # type: ignore[union-attr]
+    judged = crossval or final
+    threshold = np.nan if judged is None else judged.threshold
     deviation, percent = _scores(found.model, unseen)
     linear_deviation, linear_percent = _scores(linear, unseen)
     visited = _visited(found, stored.recordings)
-    maps = stored.chosen_maps
-    if advice is None or maps is None or (maps.nb, maps.nk) != _place(advice):
-        maps = None
     return ModelAnswer(
         name=name,
         model=found.model,
@@ -82,8 +81,16 @@ def model_answer(
         unit=stored.recordings[0].output_unit,
         threshold=threshold,
         advice=advice,
-        maps=maps,
+        maps=_maps(stored, advice),
     )
+
+
+def _maps(stored: StoredResults, advice: OrderAdvice | None) -> ChosenMaps | None:
+    """What ``hwid order`` recommended, if it did so for the orders of today."""
+    maps = stored.chosen_maps
+    if advice is None or maps is None or (maps.nb, maps.nk) != _place(advice):
+        return None
+    return maps
 
 
 def _place(advice: OrderAdvice) -> tuple[int, int]:
@@ -142,7 +149,7 @@ def _of_final_test(final: FinalTest) -> tuple[str, tuple[str, ...]]:
     if single < 0 or single == last:
         return final.models[last], _names(final, known & ~final.is_own[last])
     common = known & ~final.is_own[last] & ~final.is_own[single]
-    values = final.rmsd[np.ix_([last, single], np.flatnonzero(common))]
+    values = final.rmsd[[last, single]][:, common]
     if not values.size or not np.isfinite(values).all():
         return final.models[last], _names(final, known & ~final.is_own[last])
     joined, alone = np.mean(np.log(values), axis=1)

@@ -124,9 +124,8 @@ def _record_blocks(diagnosis: Diagnosis) -> list[PageBlock]:
 
 def _place_blocks(diagnosis: Diagnosis) -> list[PageBlock]:
     """Where the error sits: in words, as bars, and the force over what it follows."""
-    blocks: list[PageBlock] = [
-        Text(one.sentence) for one in diagnosis.places if one.sentence
-    ][:_MOST_PLACES]
+    said = [Text(one.sentence) for one in diagnosis.places if one.sentence]
+    blocks: list[PageBlock] = [*said[:_MOST_PLACES]]
     sorts = shown_places(diagnosis)
     if sorts:
         blocks.append(_where_bars(sorts))

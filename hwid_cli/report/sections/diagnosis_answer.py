@@ -116,8 +116,8 @@ def value_with_interval(one: FittedParameter, unit: str) -> str:
 
     Examples
     --------
-    >>> value_with_interval(FittedParameter("force_N", 0.79894, 0.79737, 0.80052), "N")
-    '0.7989\\xa0N [0.7974, 0.8005]'
+    >>> value_with_interval(FittedParameter("ratio", 0.79894, 0.79737, 0.80052), "-")
+    '0.799 [0.797, 0.801]'
     >>> value_with_interval(FittedParameter("which", float("nan"), text="stiffness"), "-")
     'stiffness'
     """
@@ -127,9 +127,9 @@ def value_with_interval(one: FittedParameter, unit: str) -> str:
     if not (isfinite(one.low) and isfinite(one.high) and one.high > one.low):
         value = shown_value(one.value, one.name) if isfinite(one.value) else "unknown"
         return f"{value}{behind}"
-    # Two digits of half the interval are digits enough of all three.
+    # The first digit of half the interval is the last one of all three that says something.
     half = 0.5 * (one.high - one.low)
-    digits = 1 - floor(log10(half))
+    digits = -floor(log10(half))
     largest = max(abs(one.value), abs(one.low), abs(one.high))
     if digits > 6 or largest >= 1e6:
         shown = [f"{number:.4g}" for number in (one.value, one.low, one.high)]
@@ -186,23 +186,20 @@ def _gap_in_words(diagnosis: Diagnosis) -> str:
     on = (
         f"{counted(len(diagnosis.held_out), 'recording')} that were never trained on"
         if diagnosis.held_out
-        else "the recordings of the fit; none was held out"
+        else "the recordings of the fit (none was held out)"
     )
-    steps = _steps(diagnosis)
+    arrow = " \N{RIGHTWARDS ARROW} "
+    gaps = [gap for _, _, gap in _steps(diagnosis)]
     if _has_noise(diagnosis):
-        way = " \N{RIGHTWARDS ARROW} ".join(
-            f"{gap.ratio_to_noise:.3g}" for _, _, gap in steps
-        )
+        way = arrow.join(f"{gap.ratio_to_noise:.3g}" for gap in gaps)
         text = f"Gap on {on}: {way} times the noise"
     else:
         unit = diagnosis.output_unit
-        way = " \N{RIGHTWARDS ARROW} ".join(
-            with_unit(_rms(gap, diagnosis), unit) for _, _, gap in steps
-        )
+        way = arrow.join(with_unit(_rms(gap, diagnosis), unit) for gap in gaps)
         text = f"Gap on {on}: {way}"
-    text += f" ({', '.join(name for name, _, _ in steps)})."
     if diagnosis.effects and isfinite(diagnosis.explained_share):
-        text += f" Explained: {percent(100 * diagnosis.explained_share)} of the excess over the noise."
+        text += f"; explained: {percent(100 * diagnosis.explained_share)} of the excess"
+    text += "."
     if diagnosis.effects and diagnosis.confirmed == "surrogate":
         text += " A linear stand-in was run with the effect, not the simulation itself."
     return text
@@ -227,8 +224,7 @@ def _gaps(diagnosis: Diagnosis) -> Dots:
     return Dots(
         label="RMS gap over noise [-]" if has_noise else f"RMS gap [{unit}]",
         groups=(DotGroup("", tuple(rows)),),
-        sentence=f"Gap on {on}"
-        + (f"; the dashed line is the noise, {noise}." if has_noise else "."),
+        sentence=f"Gap on {on}" + (f"; dashed: noise, {noise}." if has_noise else "."),
         alt=f"Gap on {on}: {'; '.join(f'{row.name} {row.text}' for row in rows)}",
         reference=(1.0, f"noise {noise}") if has_noise else None,
         is_log=True,
@@ -250,7 +246,7 @@ def force_chart(
     law = ""
     if force.law.size == force.at.size:
         curves.append(Curve("with the effects", force.law, "law"))
-        law = ", and what the simulation with the effects gives"
+        law = " with its law"
     return Chart(
         name=f"missing force over {force.variable}",
         at=force.at,
@@ -258,7 +254,7 @@ def force_chart(
         panels=(
             Panel(f"missing {what} [{unit}]", tuple(curves), height_px, lines=(0.0,)),
         ),
-        sentence=f"The missing {what.split()[0]} over the {force.variable}, from the measurements{law}.",
+        sentence=f"Missing {what.split()[0]} over the {force.variable}{law}.",
         alt=f"Missing {what.split()[0]} over the {force.variable} with its law",
         has_gaps_closed=True,
     )
@@ -299,7 +295,7 @@ def overlay_chart(
     ]
     window = (float(one.time_s[first]), float(one.time_s[end - 1]))
     whole = end - first >= size
-    where = "" if whole else ", where the simulation fails most; All shows the rest"
+    where = "" if whole else ", where the simulation fails most (All: the rest)"
     kind = "held out" if one.name in diagnosis.held_out else "trained on"
     return Chart(
         name=one.name,
@@ -323,7 +319,10 @@ def _next(diagnosis: Diagnosis) -> tuple[tuple[str, str], ...]:
         )
     if diagnosis.verdict in ("named", "parameters", "ambiguous"):
         steps.append(
-            ("Go on with the corrected simulation:", "extended_simulation.yaml")
+            (
+                "Go on with the corrected simulation, written beside this page:",
+                "extended_simulation.yaml",
+            )
         )
     if diagnosis.verdict == "unknown":
         steps.append(

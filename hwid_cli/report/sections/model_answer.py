@@ -14,8 +14,9 @@ from hwid_cli.report.charts import (
     thinning,
 )
 from hwid_cli.report.dots import Dot, DotGroup, DotRow, Dots
-from hwid_cli.report.formats import counted, listed, percent, with_unit
+from hwid_cli.report.formats import counted, listed, with_unit
 from hwid_cli.report.page import Answer, PageBlock
+from hwid_cli.report.simulation_note import simulation_note
 
 # Recordings that the answer draws, and points of its curves.
 _MOST_ROWS, _MOST_POINTS = 9, 2000
@@ -35,9 +36,7 @@ def model_answer(contents: ReportContents) -> Answer | None:
         "Which model describes the drive, and how well where it was not fitted?",
         _verdict(found),
         is_settled=_is_settled(found),
-        details=tuple(
-            one for one in (_model(found), _orders(found), _trust(found)) if one
-        ),
+        details=(_model(found), f"{_orders(found)} {_trust(found)}".strip()),
         blocks=tuple(blocks),
         next_steps=_next(found, contents),
     )
@@ -57,25 +56,36 @@ def _verdict(found: ModelAnswer) -> str:
             "how good it is elsewhere."
         )
     where = counted(len(found.recordings), "recording")
-    unused = (
-        "that nothing else has used" if found.is_unused else "that its fit has not seen"
+    unused = "nothing else has used" if found.is_unused else "its fit has not seen"
+    sentence = (
+        f"Take {found.name}: fit {_median(found.fit_percent)} on {where} that {unused}"
     )
-    sentence = f"Take {found.name}: {_fits(found.fit_percent)} on {where} {unused}"
     if np.isfinite(found.linear_fit_percent).any():
-        sentence += f"; a linear model of the same orders reaches {_fits(found.linear_fit_percent, is_short=True)}"
+        sentence += f" (linear: {_median(found.linear_fit_percent)})"
     return f"{sentence}."
 
 
-def _fits(values: np.ndarray, *, is_short: bool = False) -> str:
-    """``fit 93.1 % (90.2 to 95.0 %)``."""
+def _median(values: np.ndarray) -> str:
+    """``93.1 %``, over what is finite."""
     known = values[np.isfinite(values)]
     if not known.size:
-        return "no finite output"
-    word = "" if is_short else "fit "
-    middle = f"{word}{float(np.median(known)):.1f}\N{NO-BREAK SPACE}%"
-    if known.size == 1:
-        return middle
-    return f"{middle} ({known.min():.1f} to {known.max():.1f}\N{NO-BREAK SPACE}%)"
+        return "without a finite output"
+    return f"{float(np.median(known)):.1f}\N{NO-BREAK SPACE}%"
+
+
+def _spread(found: ModelAnswer) -> str:
+    """From where to where the fit goes, beside that of the linear model."""
+    ranges = []
+    for name, values in (
+        ("this model", found.fit_percent),
+        ("linear, same orders", found.linear_fit_percent),
+    ):
+        known = values[np.isfinite(values)]
+        if known.size > 1:
+            ranges.append(
+                f"{name} {known.min():.1f} to {known.max():.1f}\N{NO-BREAK SPACE}%"
+            )
+    return f" Fit: {'; '.join(ranges)}." if ranges else ""
 
 
 def _model(found: ModelAnswer) -> str:
@@ -95,7 +105,7 @@ def _model(found: ModelAnswer) -> str:
             f" {below} of {found.rmsd.size} below the threshold of "
             f"{with_unit(found.threshold, found.unit)}."
         )
-    return text
+    return text + _spread(found)
 
 
 def _orders(found: ModelAnswer) -> str:
@@ -110,7 +120,10 @@ def _orders(found: ModelAnswer) -> str:
             f"{one.best_nb}/{one.best_nk})"
         )
     if found.maps is not None:
-        text += f"; maps: {found.maps.input_map} and {found.maps.output_map}"
+        pair = (found.maps.input_map, found.maps.output_map)
+        text += (
+            "; no maps" if set(pair) == {"none"} else f"; maps: {pair[0]} and {pair[1]}"
+        )
     return f"{text}."
 
 
@@ -125,7 +138,7 @@ def _trust(found: ModelAnswer) -> str:
         worst = int(np.argmax(found.beyond))
         text += (
             f"; {found.recordings[worst]} leaves that range for "
-            f"{percent(100 * float(found.beyond[worst]))} of its samples"
+            f"{100 * float(found.beyond[worst]):.0f}\N{NO-BREAK SPACE}% of its samples"
         )
     return f"{text}."
 
@@ -176,11 +189,14 @@ def _errors(found: ModelAnswer) -> Dots | None:
     if np.isfinite(found.threshold):
         threshold = with_unit(found.threshold, found.unit)
         reference = (found.threshold, f"threshold {threshold}")
-        said = f" The dashed line is the threshold, {threshold}."
+        said = f" Dashed: the threshold, {threshold}."
     return Dots(
         label=f"RMSD [{found.unit}]",
         groups=(DotGroup("", tuple(rows)),),
-        sentence=f"Error on recordings that the fit has not seen.{worst}{said}",
+        sentence=(
+            f"Error on recordings that the fit has not seen.{worst}{said} "
+            + simulation_note(found.model.initial_state, is_validation=True)
+        ),
         alt="RMSD of the model and of a linear one on recordings that the fit has not seen",
         legend=tuple(legend),
         reference=reference,

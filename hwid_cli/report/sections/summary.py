@@ -1,6 +1,7 @@
 """What stands first on the page: one answer for each question that the results settle."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from hwid_cli.records.report import ReportContents
 from hwid_cli.report.formats import counted
@@ -9,7 +10,8 @@ from hwid_cli.report.page import Answer, Section
 
 def summary_section(contents: ReportContents, answers: Sequence[Answer]) -> Section:
     """Show the answers, or say what is there while nothing is answered yet."""
-    blocks = tuple(answers) or (_open_question(contents),)
+    shown = tuple(replace(one, is_small=len(answers) > 1) for one in answers)
+    blocks = shown or (_open_question(contents),)
     return Section("summary", "", "Answer", blocks)
 
 

@@ -107,7 +107,6 @@ def _trend_dots(trend: ChainOnTests) -> Dots:
         alt="RMSD of the chain's models on the test recordings, with the threshold",
         reference=(trend.threshold, f"threshold {threshold}"),
         is_log=True,
-        is_bar=True,
     )
 
 

@@ -166,10 +166,12 @@ class Chart {
     svg.setAttribute("class", `swatch r-${style.colour}`);
     svg.setAttribute("viewBox", "0 0 24 10");
     svg.setAttribute("aria-hidden", "true");
-    const line = document.createElementNS(space, curve.k === "points" ? "circle" : "line");
-    const shape = curve.k === "points" ? { cx: 12, cy: 5, r: 3.5 }
+    const tag = curve.k === "points" ? "circle" : curve.k === "cross" ? "path" : "line";
+    const line = document.createElementNS(space, tag);
+    const shape = tag === "circle" ? { cx: 12, cy: 5, r: 3.5 }
+      : tag === "path" ? { d: "M8 1L16 9M8 9L16 1", "stroke-width": 2 }
       : { x1: 0, x2: 24, y1: 5, y2: 5, "stroke-width": curve.k === "band" ? 9 : style.width + 0.6 };
-    if (style.dash && curve.k !== "points") shape["stroke-dasharray"] = style.dash.join(" ");
+    if (style.dash && tag === "line") shape["stroke-dasharray"] = style.dash.join(" ");
     if (curve.k === "band") shape.class = "faint";
     for (const [name, value] of Object.entries(shape)) line.setAttribute(name, value);
     svg.append(line);
@@ -228,7 +230,7 @@ class Chart {
         y: { distr: panel.log ? 3 : 1, ...(range ? { range: () => range } : {}) },
       },
       axes: [
-        { ...axis, size: isLast ? 30 : 8, label: isLast ? this.spec.xl : undefined, labelSize: 18,
+        { ...axis, size: isLast ? 24 : 8, label: isLast ? this.spec.xl : undefined, labelSize: 16,
           values: isLast ? this.numbers : (u, splits) => splits.map(() => ""), space: 60 },
         { ...axis, size: 62, label: panel.yl, labelSize: 18, values: this.numbers, space: 26 },
       ],
@@ -270,8 +272,11 @@ class Chart {
 
   size(panel, isLast) {
     const width = Math.max(200, this.place.clientWidth || 600);
-    const height = this.spec.square ? Math.min(width, 420) : panel.h + (isLast ? 40 : 0);
-    return { width: this.spec.square ? Math.min(width, 420) : width, height };
+    // What the axes and the padding below take from a square.
+    if (this.spec.square) return { width: Math.min(width, 420), height: Math.min(width, 420) - 42 };
+    // Two answers share the first screen.
+    const height = this.figure.closest(".answer.small") ? Math.min(panel.h, 108) : panel.h;
+    return { width, height: height + (isLast ? 40 : 0) };
   }
 
   fit() {
