@@ -235,7 +235,12 @@ class Chart {
         { ...axis, size: 62, label: panel.yl, labelSize: 18, values: this.numbers, space: 26 },
       ],
       hooks: {
-        setScale: [(u, key) => key === "x" && this.follow(u)],
+        setScale: [(u, key) => {
+          if (key !== "x") return;
+          // For those who look at the page with a program: what is shown.
+          Object.assign(box.dataset, { from: u.scales.x.min, to: u.scales.x.max });
+          this.follow(u);
+        }],
         setCursor: [u => this.read(u)],
         drawClear: [u => this.frame(u, panel)],
       },
