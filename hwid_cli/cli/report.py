@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Iterable, Sequence
+from contextlib import closing
 from pathlib import Path
 
 from hwid_cli.cli.options import Choices
@@ -19,9 +20,13 @@ from hwid_cli.stages.table import STAGES, stage_named
 from hwid_cli.store.diagnosis_results import read_diagnosis
 from hwid_cli.store.order_results import read_chosen_maps
 from hwid_cli.store.result_files import has_left_results, read_provenance
+from hwid_cli.tasks.task import Task
+from hwid_cli.tasks.workers import Workers, compute
 
 FILE = "report.html"
 FIGURES = "figures"
+# Fewer figures than this are drawn before workers have started, [-].
+_FEW_FIGURES = 48
 _KEY_MARK, _KEY_END = "<!-- drawn from ", " -->\n"
 
 
@@ -73,14 +78,24 @@ def _draw(session: Session, drawings: Sequence[Drawing]) -> None:
     """Write the figures beside the page."""
     if not drawings:
         return
-    with StageProgress(
-        "figures", len(drawings), "figures", is_silent=session.is_quiet
-    ) as progress:
-        for one in drawings:
-            place, png = session.out / FIGURES / one.file, one.png
+    tasks = [Task(one.file, one.file, _png, (one,), bytes) for one in drawings]
+    is_few = len(tasks) < _FEW_FIGURES
+    workers = Workers(1 if is_few else session.workers.jobs)
+    with (
+        StageProgress(
+            "figures", len(tasks), "figures", is_silent=session.is_quiet
+        ) as bar,
+        closing(compute(tasks, workers)) as results,
+    ):
+        for file, (png, _) in results:
+            place = session.out / FIGURES / file
             if not (place.is_file() and place.read_bytes() == png):
                 replace_file(place, png)
-            progress.advance(from_cache=False)
+            bar.advance(from_cache=False)
+
+
+def _png(drawing: Drawing) -> bytes:
+    return drawing.png
 
 
 def _last_line(key: str, figures: Iterable[str]) -> str:
@@ -139,7 +154,6 @@ def read_stored(session: Session) -> StoredResults:
         calibration_figures={}
         if calibrated is None
         else _calibration_figures(session.out, calibrated),
-        orders=experiment.orders,
         order=experiment.order,
         chosen_maps=read_chosen_maps(session.out),
     )

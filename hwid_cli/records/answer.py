@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hwid_cli.records.model import HammersteinWiener
-from hwid_cli.records.order import OrderAdvice
+from hwid_cli.records.order import OrderChoice
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class ModelAnswer:
         Share of the samples whose input lies outside of that.
     threshold : float, [unit]
         NaN where there is none.
-    advice : OrderAdvice or None
+    advice : OrderChoice or None
         Recommended orders; None without a cross-validation.
     maps : ChosenMaps or None
         Recommended maps; None where nobody has compared any at the recommended orders.
@@ -71,7 +71,7 @@ class ModelAnswer:
     beyond: np.ndarray
     unit: str
     threshold: float
-    advice: OrderAdvice | None = None
+    advice: OrderChoice | None = None
     maps: ChosenMaps | None = None
 
     @property

@@ -8,7 +8,7 @@ import numpy as np
 
 from hwid_cli.records.answer import ChosenMaps, ModelAnswer
 from hwid_cli.records.diagnosis import Diagnosis
-from hwid_cli.records.experiment import OrderOptions, OrdersOptions
+from hwid_cli.records.experiment import OrderOptions
 from hwid_cli.records.groups import ChainTrend, FinalTest, GroupSearch
 from hwid_cli.records.model import Fit, Information
 from hwid_cli.records.recordings import Calibrated, CalibrationLog, Recording
@@ -65,8 +65,8 @@ class StoredResults:
         Whether the configuration asks for the thesis's names of models and tables.
     calibration_figures : mapping of str to bytes
         PNG files of ``hwid calibrate`` by the names of the recordings.
-    orders, order : OrdersOptions and OrderOptions, or None
-        Sections of the configuration; None recommends no orders.
+    order : OrderOptions or None
+        Section of the configuration; None takes its defaults.
     chosen_maps : ChosenMaps or None
         What ``hwid order`` has left.
     """
@@ -79,7 +79,6 @@ class StoredResults:
     diagnosis: Mapping[str, Any] | None = None
     thesis_names: bool = False
     calibration_figures: Mapping[str, bytes] = field(default_factory=dict)
-    orders: OrdersOptions | None = None
     order: OrderOptions | None = None
     chosen_maps: ChosenMaps | None = None
 

@@ -225,11 +225,10 @@ def _axis(
         low, high = (min(values), max(values)) if values else (1.0, 1.0)
         room = max((high / low) ** _MARGIN, (_LEAST_RANGE * low / high) ** 0.5, 1.2)
         low, high = low / room, high * room
-        wide = math.log10(high / low) > (1.2 if is_narrow else 2.3)
-        tall = math.log10(high / low) > (4.0 if is_narrow else 8.0)
-        leading = (1.0,) if wide else (1.0, 2.0, 5.0)
+        decades, most = math.log10(high / low), 4 if is_narrow else 8
+        leading = (1.0,) if decades > (1.2 if is_narrow else 2.3) else (1.0, 2.0, 5.0)
         first, last = math.floor(math.log10(low)), math.ceil(math.log10(high))
-        powers = range(first, last + 1, 2 if tall else 1)
+        powers = range(first, last + 1, math.ceil(decades / most))
         marks = [lead * 10.0**power for power in powers for lead in leading]
         return low, high, [(one, f"{one:.3g}") for one in marks if low <= one <= high]
     low, high = min([0.0, *values]), max([0.0, *values])

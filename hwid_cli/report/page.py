@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from hwid_cli.records.report import ReportContents
 from hwid_cli.report.charts import Chart
 from hwid_cli.report.dots import Dots
-from hwid_cli.report.figures.style import DOTS, as_png
+from hwid_cli.report.figures.style import DOTS, as_png, report_style
 from hwid_cli.report.simulation_note import HUBER_NOTE, simulation_note
 from hwid_cli.report.table import Block, Table, Text
 
@@ -180,7 +180,8 @@ class Drawing:
     @property
     def png(self) -> bytes:
         """The drawn file."""
-        return as_png(self.draw())
+        with report_style():
+            return as_png(self.draw())
 
 
 def images_of(blocks: tuple[PageBlock, ...]) -> tuple[Image, ...]:

@@ -14,13 +14,13 @@ from hwid_cli.records.answer import ChosenMaps, ModelAnswer
 from hwid_cli.records.experiment import OrderOptions
 from hwid_cli.records.groups import FinalTest
 from hwid_cli.records.model import Fit, HammersteinWiener
-from hwid_cli.records.order import OrderAdvice
+from hwid_cli.records.order import OrderChoice
 from hwid_cli.records.recordings import Recording
 from hwid_cli.records.report import StoredResults
 from hwid_cli.records.results import CrossValidation
 from hwid_cli.stages.compare import linear_options
 from hwid_cli.stages.model_views import named_fits
-from hwid_cli.stages.order import recommend_orders
+from hwid_cli.stages.order import recommend_overall
 from hwid_cli.stages.test import best_single
 from hwid_cli.tasks.task import one_thread
 
@@ -85,7 +85,7 @@ def model_answer(
     )
 
 
-def _maps(stored: StoredResults, advice: OrderAdvice | None) -> ChosenMaps | None:
+def _maps(stored: StoredResults, advice: OrderChoice | None) -> ChosenMaps | None:
     """What ``hwid order`` recommended, if it did so for the orders of today."""
     maps = stored.chosen_maps
     if advice is None or maps is None or (maps.nb, maps.nk) != _place(advice):
@@ -93,28 +93,26 @@ def _maps(stored: StoredResults, advice: OrderAdvice | None) -> ChosenMaps | Non
     return maps
 
 
-def _place(advice: OrderAdvice) -> tuple[int, int]:
-    return advice.overall.nb, advice.overall.nk
+def _place(advice: OrderChoice) -> tuple[int, int]:
+    return advice.nb, advice.nk
 
 
 def _advice(
     stored: StoredResults, crossval: CrossValidation | None
-) -> OrderAdvice | None:
+) -> OrderChoice | None:
     """Recommended orders; None where outliers count, which ``hwid order`` leaves out first."""
-    if crossval is None or stored.orders is None:
+    if crossval is None:
         return None
     if any(one.options.loss != "squared" for one in stored.fits):
         return None
     options = stored.order or OrderOptions()
-    return recommend_orders(
-        stored.fits, crossval, stored.recordings, stored.orders, options
-    )
+    return recommend_overall(stored.fits, crossval, stored.recordings, options)
 
 
 def _chosen(
     stored: StoredResults,
     crossval: CrossValidation | None,
-    advice: OrderAdvice | None,
+    advice: OrderChoice | None,
     named: Mapping[str, Fit],
 ) -> tuple[str, tuple[str, ...]]:
     """Name of the model to take, and the recordings that chose it."""
@@ -161,7 +159,7 @@ def _names(final: FinalTest, chosen: np.ndarray) -> tuple[str, ...]:
 
 
 def _of_crossval(
-    crossval: CrossValidation, advice: OrderAdvice | None
+    crossval: CrossValidation, advice: OrderChoice | None
 ) -> tuple[str, tuple[str, ...]]:
     """Of the models with the recommended orders that of the lowest RMSD elsewhere."""
     is_own = np.equal.outer(crossval.identified_on, crossval.validated_on)

@@ -112,7 +112,7 @@ def _orders(found: ModelAnswer) -> str:
     """Recommended orders and maps."""
     if found.advice is None:
         return ""
-    one = found.advice.overall
+    one = found.advice
     text = f"Recommended for new fits: nb = {one.nb}, nk = {one.nk}"
     if (one.best_nb, one.best_nk) != (one.nb, one.nk):
         text += (
