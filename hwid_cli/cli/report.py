@@ -66,9 +66,10 @@ def write_report(session: Session) -> Path:
         session.say(f"report: {path} shows {stages} already, {timer}")
         return path
     page = report_page(report_contents(stored), STAGES)
-    names = [one.file for one in page.drawings]
-    # The page first: it is what people wait for.
-    replace_file(path, (page.html + _last_line(key, names)).encode())
+    for name, png in page.figures.items():
+        _write_figure(session.out / FIGURES / name, png)
+    # The page before the figures beside it: it is what people wait for.
+    replace_file(path, (page.html + _last_line(key, page.files)).encode())
     session.say(f"report: {path} shows {stages}, {timer}")
     _draw(session, page.drawings)
     return path
@@ -88,10 +89,14 @@ def _draw(session: Session, drawings: Sequence[Drawing]) -> None:
         closing(compute(tasks, workers)) as results,
     ):
         for file, (png, _) in results:
-            place = session.out / FIGURES / file
-            if not (place.is_file() and place.read_bytes() == png):
-                replace_file(place, png)
+            _write_figure(session.out / FIGURES / file, png)
             bar.advance(from_cache=False)
+
+
+def _write_figure(place: Path, png: bytes) -> None:
+    """Write a figure, unless it is there already."""
+    if not (place.is_file() and place.read_bytes() == png):
+        replace_file(place, png)
 
 
 def _png(drawing: Drawing) -> bytes:

@@ -8,7 +8,7 @@ templates/uplot.LICENSE).
 
 import base64
 import hashlib
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
@@ -23,7 +23,7 @@ from markupsafe import Markup
 from hwid_cli.records.report import ReportContents
 from hwid_cli.report.charts import chart_data
 from hwid_cli.report.dots import dot_drawing
-from hwid_cli.report.page import Answer, Drawing, Section
+from hwid_cli.report.page import Answer, Drawing, Section, images_of
 from hwid_cli.report.sections.about import about_section
 from hwid_cli.report.sections.summary import summary_section
 from hwid_cli.report.table import shown_part
@@ -41,12 +41,20 @@ class Page:
 
     Parameters
     ----------
+    figures : mapping of str to bytes
+        PNG files that are part of it, by their place below ``figures/``.
     drawings : tuple of Drawing
-        Figures that lie beside it as files; none is drawn yet.
+        Figures that lie beside it as files only; none is drawn yet.
     """
 
     html: str
+    figures: Mapping[str, bytes]
     drawings: tuple[Drawing, ...]
+
+    @property
+    def files(self) -> tuple[str, ...]:
+        """All files below ``figures/`` that belong to it."""
+        return (*self.figures, *(one.file for one in self.drawings))
 
 
 def report_page(contents: ReportContents, stages: Iterable[str]) -> Page:
@@ -74,7 +82,9 @@ def report_page(contents: ReportContents, stages: Iterable[str]) -> Page:
         about_section(contents, [one for one in made if one.missing]),
     )
     drawings = [one for make in _all_of(modules, "DRAWINGS") for one in make(contents)]
-    return Page(_html(contents, sections), tuple(drawings))
+    images = images_of(tuple(block for one in sections for block in one.blocks))
+    figures = {one.file: one.png for one in images}
+    return Page(_html(contents, sections), figures, tuple(drawings))
 
 
 def _html(contents: ReportContents, sections: Iterable[Section]) -> str:
