@@ -27,7 +27,7 @@ _SHORT, _DIGITS = 64, 6
 # them; see ``points_of_each``.
 MOST_POINTS, LEAST_POINTS, _ALL_POINTS = 4000, 800, 600_000
 # The horizontal axis and a double line of text; the room that the style knows, [pixels].
-_AXIS, _DOUBLE_LINE, _LEAST_ROOM, _MOST_ROOM = 40, 32, 4, 21
+_AXIS, _DOUBLE_LINE, _LEAST_ROOM, _MOST_ROOM, _SQUARE_ROOM = 40, 32, 4, 21, 11
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,7 +135,7 @@ class Chart:
     def room(self) -> int:
         """Room that the page keeps for it before it is drawn, in double lines."""
         if self.is_square:
-            return 12
+            return _SQUARE_ROOM
         tall = sum(one.height_px for one in self.panels) + _AXIS
         return min(_MOST_ROOM, max(_LEAST_ROOM, int(tall / _DOUBLE_LINE)))
 

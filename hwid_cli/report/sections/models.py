@@ -110,7 +110,7 @@ def _step_chart(view: ModelView) -> Chart:
         name=f"{view.model}, step response",
         at=step.time_s,
         label="time t [s]",
-        panels=(Panel("x for a unit step of w [-]", (curve,), lines=(final,)),),
+        panels=(Panel("step response x [-]", (curve,), lines=(final,)),),
         sentence=f"Step response of the linear block; it ends at {final:.3g}.",
         alt=f"Step response of the linear block of {view.model} over time",
     )

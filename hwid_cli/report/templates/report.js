@@ -530,7 +530,7 @@ const hint = box => {
   box.parentElement.classList.toggle("more", rest > 4);
 };
 const wide = new ResizeObserver(seen => seen.forEach(one => hint(one.target)));
-all(".scroll").forEach(box => {
+all(".scroll, .dots .image").forEach(box => {
   box.addEventListener("scroll", () => hint(box), { passive: true });
   wide.observe(box);
 });
