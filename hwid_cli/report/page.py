@@ -78,14 +78,6 @@ class Collapsible:
 
 
 @dataclass(frozen=True)
-class Pairs:
-    """Small figures, two in a row where there is room."""
-
-    kind: ClassVar[str] = "pairs"
-    figures: tuple[Figures, ...]
-
-
-@dataclass(frozen=True)
 class Picker:
     """Blocks of several recordings or models, of which the page shows one at a time.
 
@@ -138,7 +130,7 @@ class Answer:
     is_small: bool = False
 
 
-PageBlock = Block | Figures | Pairs | Collapsible | Chart | Dots | Picker | Row | Answer
+PageBlock = Block | Figures | Collapsible | Chart | Dots | Picker | Row | Answer
 
 
 @dataclass(frozen=True)
@@ -196,11 +188,7 @@ def images_of(blocks: tuple[PageBlock, ...]) -> tuple[Image, ...]:
     for block in blocks:
         if isinstance(block, Figures):
             found += block.images
-        elif isinstance(block, Collapsible):
-            found += images_of(block.blocks)
-        elif isinstance(block, Pairs):
-            found += images_of(block.figures)
-        elif isinstance(block, Row | Answer):
+        elif isinstance(block, Collapsible) or isinstance(block, Row | Answer):
             found += images_of(block.blocks)
         elif isinstance(block, Picker):
             found += [one for _, inner in block.items for one in images_of(inner)]
