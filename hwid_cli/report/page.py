@@ -188,7 +188,7 @@ def images_of(blocks: tuple[PageBlock, ...]) -> tuple[Image, ...]:
     for block in blocks:
         if isinstance(block, Figures):
             found += block.images
-        elif isinstance(block, Collapsible) or isinstance(block, Row | Answer):
+        elif isinstance(block, Collapsible | Row | Answer):
             found += images_of(block.blocks)
         elif isinstance(block, Picker):
             found += [one for _, inner in block.items for one in images_of(inner)]
