@@ -44,7 +44,7 @@ def model_answer(
         name: one for name, one in named_fits(stored).items() if one.model is not None
     }
     advice = _advice(stored, crossval)
-    name, chosen_on = _chosen(stored, crossval, advice, named)
+    name, chosen_on = _chosen(stored, crossval, named)
     if not name or not stored.recordings:
         return None
     found = named[name]
@@ -112,7 +112,6 @@ def _advice(
 def _chosen(
     stored: StoredResults,
     crossval: CrossValidation | None,
-    advice: OrderChoice | None,
     named: Mapping[str, Fit],
 ) -> tuple[str, tuple[str, ...]]:
     """Name of the model to take, and the recordings that chose it."""
@@ -126,7 +125,7 @@ def _chosen(
         if last.model_name in named:
             return last.model_name, search.validated_on
     if crossval is not None:
-        name, chosen_on = _of_crossval(crossval, advice)
+        name, chosen_on = _of_crossval(crossval)
         if name in named:
             return name, chosen_on
     usable = {name: one for name, one in named.items() if np.isfinite(one.fit_percent)}
@@ -136,47 +135,27 @@ def _chosen(
 
 
 def _of_final_test(final: FinalTest) -> tuple[str, tuple[str, ...]]:
-    """The chain's last model, or the best one of a single recording where that is better."""
-    single = best_single(final)
+    """The chain's last model, else the best one of a single recording."""
     known = ~np.isin(final.recordings, final.tested_on)
-    if not final.chain:
-        if single < 0:
-            return "", ()
-        return final.models[single], _names(final, known & ~final.is_own[single])
-    last = final.models.index(final.chain[-1])
-    if single < 0 or single == last:
-        return final.models[last], _names(final, known & ~final.is_own[last])
-    common = known & ~final.is_own[last] & ~final.is_own[single]
-    values = final.rmsd[[last, single]][:, common]
-    if not values.size or not np.isfinite(values).all():
-        return final.models[last], _names(final, known & ~final.is_own[last])
-    joined, alone = np.mean(np.log(values), axis=1)
-    return final.models[last if joined <= alone else single], _names(final, common)
-
-
-def _names(final: FinalTest, chosen: np.ndarray) -> tuple[str, ...]:
-    return tuple(np.array(final.recordings)[chosen].tolist())
-
-
-def _of_crossval(
-    crossval: CrossValidation, advice: OrderChoice | None
-) -> tuple[str, tuple[str, ...]]:
-    """Of the models with the recommended orders that of the lowest RMSD elsewhere."""
-    is_own = np.equal.outer(crossval.identified_on, crossval.validated_on)
-    foreign = np.where(is_own[:, None, None, :], np.nan, crossval.rmsd)
-    is_known = np.isfinite(foreign) | is_own[:, None, None, :]
-    usable = is_known.all(axis=3) & np.isfinite(foreign).any(axis=3)
-    if advice is not None:
-        nb, nk = _place(advice)
-        advised = np.zeros_like(usable)
-        advised[:, crossval.nb.index(nb), crossval.nk.index(nk)] = True
-        usable = usable & advised if (usable & advised).any() else usable
-    if not usable.any():
+    place = final.models.index(final.chain[-1]) if final.chain else best_single(final)
+    if place < 0:
         return "", ()
-    with np.errstate(all="ignore"):
-        error = np.nansum(np.log(foreign), axis=3) / np.isfinite(foreign).sum(axis=3)
-    best = np.unravel_index(np.argmin(np.where(usable, error, np.inf)), error.shape)
-    n, b, k = (int(one) for one in best)
+    names = np.array(final.recordings)[known & ~final.is_own[place]]
+    return final.models[place], tuple(names.tolist())
+
+
+def _of_crossval(crossval: CrossValidation) -> tuple[str, tuple[str, ...]]:
+    """The model that covers the largest share of other recordings, of these the best."""
+    names = np.array(crossval.validated_on)
+    found = []
+    for place in np.ndindex(crossval.rmsd.shape[:3]):
+        values = crossval.rmsd[place][names != crossval.identified_on[place[0]]]
+        if values.size and np.isfinite(values).all():
+            share = float(np.mean(values < crossval.threshold))
+            found.append((-share, float(np.mean(np.log(values))), place))
+    if not found:
+        return "", ()
+    n, b, k = min(found)[-1]
     who = crossval.identified_on[n]
     others = tuple(one for one in crossval.validated_on if one != who)
     return f"{who}/{crossval.nb[b]}/{crossval.nk[k]}", others
