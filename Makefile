@@ -11,7 +11,7 @@ DEV := $(VENV)/installed-dev
 
 .DEFAULT_GOAL := help
 .PHONY: help install run test test-all check audit format smoke clean reliability \
-        bench bench-beyond bench-campaign bench-growth bench-maps bench-rounds bench-search bench-starts bench-wide \
+        bench bench-beyond bench-campaign bench-growth bench-maps bench-page bench-rounds bench-search bench-starts bench-wide \
         bench-real scale \
         simulate calibrate identify crossval group test-stage steps model1 model2 \
         reproduction thesis chapter2 hsm150 diagnose gun real effects drive-source model-schema golden export-check blind machines
@@ -95,6 +95,9 @@ bench-beyond: $(DEV)  ## how far models hold beyond the recording of their fit: 
 
 bench-maps: $(DEV)  ## maps of the default size against maps chosen by the data: seven minutes
 	@$(BENCH).bench_maps
+
+bench-page: $(DEV)  ## the page of 43 recordings: seconds, bytes, first paint: two minutes
+	@$(BENCH).bench_page
 
 bench-wide: $(DEV)  ## many kinds of plants against fits that start at the true parameters
 	@$(BENCH).bench_wide

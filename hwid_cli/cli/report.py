@@ -1,7 +1,8 @@
 """``hwid report``: one page that shows whatever stages have run."""
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from contextlib import closing
 from pathlib import Path
 
 from hwid_cli.cli.options import Choices
@@ -12,13 +13,20 @@ from hwid_cli.files.atomic import replace_file
 from hwid_cli.records.recordings import Calibrated
 from hwid_cli.records.report import StageRun, StoredResults
 from hwid_cli.report.html import report_page
+from hwid_cli.report.page import Drawing
+from hwid_cli.report.progress import StageProgress
 from hwid_cli.stages.report import changed_sections, report_contents, report_key
 from hwid_cli.stages.table import STAGES, stage_named
 from hwid_cli.store.diagnosis_results import read_diagnosis
+from hwid_cli.store.order_results import read_chosen_maps
 from hwid_cli.store.result_files import has_left_results, read_provenance
+from hwid_cli.tasks.task import Task
+from hwid_cli.tasks.workers import Workers, compute
 
 FILE = "report.html"
 FIGURES = "figures"
+# Fewer figures than this are drawn before workers have started, [-].
+_FEW_FIGURES = 48
 _KEY_MARK, _KEY_END = "<!-- drawn from ", " -->\n"
 
 
@@ -59,12 +67,40 @@ def write_report(session: Session) -> Path:
         return path
     page = report_page(report_contents(stored), STAGES)
     for name, png in page.figures.items():
-        place = session.out / FIGURES / name
-        if not (place.is_file() and place.read_bytes() == png):
-            replace_file(place, png)
-    replace_file(path, (page.html + _last_line(key, page.figures)).encode())
+        _write_figure(session.out / FIGURES / name, png)
+    # The page before the figures beside it: it is what people wait for.
+    replace_file(path, (page.html + _last_line(key, page.files)).encode())
     session.say(f"report: {path} shows {stages}, {timer}")
+    _draw(session, page.drawings)
     return path
+
+
+def _draw(session: Session, drawings: Sequence[Drawing]) -> None:
+    """Write the figures beside the page."""
+    if not drawings:
+        return
+    tasks = [Task(one.file, one.file, _png, (one,), bytes) for one in drawings]
+    is_few = len(tasks) < _FEW_FIGURES
+    workers = Workers(1 if is_few else session.workers.jobs)
+    with (
+        StageProgress(
+            "figures", len(tasks), "figures", is_silent=session.is_quiet
+        ) as bar,
+        closing(compute(tasks, workers)) as results,
+    ):
+        for file, (png, _) in results:
+            _write_figure(session.out / FIGURES / file, png)
+            bar.advance(from_cache=False)
+
+
+def _write_figure(place: Path, png: bytes) -> None:
+    """Write a figure, unless it is there already."""
+    if not (place.is_file() and place.read_bytes() == png):
+        replace_file(place, png)
+
+
+def _png(drawing: Drawing) -> bytes:
+    return drawing.png
 
 
 def _last_line(key: str, figures: Iterable[str]) -> str:
@@ -123,6 +159,8 @@ def read_stored(session: Session) -> StoredResults:
         calibration_figures={}
         if calibrated is None
         else _calibration_figures(session.out, calibrated),
+        order=experiment.order,
+        chosen_maps=read_chosen_maps(session.out),
     )
 
 

@@ -1,4 +1,4 @@
-"""Frequency response, poles and zeros of the linear block.
+"""Frequency response, step response, poles and zeros of the linear block.
 
 References
 ----------
@@ -7,12 +7,15 @@ docs/method.md, eq. (23).
 
 import numpy as np
 
-from hwid_cli.model.linear_block import poles
+from hwid_cli.model.linear_block import filtered, poles
 from hwid_cli.records.model import HammersteinWiener
-from hwid_cli.records.report import FrequencyResponse
+from hwid_cli.records.report import FrequencyResponse, StepResponse
 
 # Frequencies spread evenly on a logarithmic axis, [-]: a curve without corners.
 _COUNT = 300
+# A step response is shown until its slowest part has fallen to this share, and so much
+# longer; and over so many samples at least and at most, [-], [samples].
+_SETTLED, _LONGER, _LEAST_SAMPLES, _MOST_SAMPLES = 0.01, 1.3, 20, 4000
 
 
 def frequency_response(
@@ -70,6 +73,29 @@ def response_frequencies(model: HammersteinWiener, lowest_Hz: float) -> np.ndarr
     around = peaks[:, None] + widths[:, None] * np.linspace(-3.0, 3.0, 13)
     every = np.concatenate([np.geomspace(lowest, nyquist, _COUNT), around.ravel()])
     return np.unique(every[(every >= lowest) & (every <= nyquist)])
+
+
+def step_response(model: HammersteinWiener) -> StepResponse:
+    """Response of the linear block to a unit step, from w to x, until it has settled.
+
+    Examples
+    --------
+    >>> from hwid_cli.records.model import StaticMap
+    >>> none = StaticMap("none", np.zeros(0))
+    >>> model = HammersteinWiener(none, [0.5], [1.0, -0.5], 1, none, 1e-3)
+    >>> step_response(model).value[:4]
+    array([0.   , 0.5  , 0.75 , 0.875])
+    """
+    radius = max((abs(one) for one in poles(model.denominator)), default=0.0)
+    count = float(_MOST_SAMPLES)
+    if radius < 1.0:
+        count = _LONGER * np.log(_SETTLED) / np.log(max(radius, _SETTLED))
+    n_samples = int(np.clip(count, _LEAST_SAMPLES, _MOST_SAMPLES))
+    n_samples += model.delay + model.numerator.size
+    value = filtered(
+        np.ones(n_samples), model.numerator, model.denominator, model.delay
+    )
+    return StepResponse(model.sample_time_s * np.arange(n_samples), value)
 
 
 def zeros(numerator: np.ndarray) -> np.ndarray:

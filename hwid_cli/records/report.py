@@ -6,7 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from hwid_cli.records.answer import ChosenMaps, ModelAnswer
 from hwid_cli.records.diagnosis import Diagnosis
+from hwid_cli.records.experiment import OrderOptions
 from hwid_cli.records.groups import ChainTrend, FinalTest, GroupSearch
 from hwid_cli.records.model import Fit, Information
 from hwid_cli.records.recordings import Calibrated, CalibrationLog, Recording
@@ -63,6 +65,10 @@ class StoredResults:
         Whether the configuration asks for the thesis's names of models and tables.
     calibration_figures : mapping of str to bytes
         PNG files of ``hwid calibrate`` by the names of the recordings.
+    order : OrderOptions or None
+        Section of the configuration; None takes its defaults.
+    chosen_maps : ChosenMaps or None
+        What ``hwid order`` has left.
     """
 
     name: str
@@ -73,6 +79,8 @@ class StoredResults:
     diagnosis: Mapping[str, Any] | None = None
     thesis_names: bool = False
     calibration_figures: Mapping[str, bytes] = field(default_factory=dict)
+    order: OrderOptions | None = None
+    chosen_maps: ChosenMaps | None = None
 
     @property
     def recordings(self) -> tuple[Recording, ...]:
@@ -114,6 +122,26 @@ class StoredResults:
 
 
 @dataclass(frozen=True, eq=False)
+class ModelOutput:
+    """What one more model makes of a recording's input.
+
+    Parameters
+    ----------
+    is_linear : bool
+        Whether it is the linear one beside the model to take, or that model itself.
+    output : ndarray, shape (n_samples,), [output unit]
+    rmsd : float, [output unit]
+    fit_percent : float, [%]
+    """
+
+    model: str
+    is_linear: bool
+    output: np.ndarray
+    rmsd: float
+    fit_percent: float
+
+
+@dataclass(frozen=True, eq=False)
 class SimulatedRecording:
     """A recording and what a model makes of its input.
 
@@ -133,6 +161,8 @@ class SimulatedRecording:
         First sample of the stretch worth a closer look, and the one after its last.
     tests : ResidualTests or None
         None where the output is not finite or nobody asked.
+    others : tuple of ModelOutput
+        The model to take and the linear one beside it, as far as they are others.
     """
 
     recording: Recording
@@ -144,6 +174,7 @@ class SimulatedRecording:
     fit_percent: float
     detail: tuple[int, int]
     tests: ResidualTests | None = None
+    others: tuple[ModelOutput, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -228,6 +259,21 @@ class FrequencyResponse:
 
 
 @dataclass(frozen=True, eq=False)
+class StepResponse:
+    """Response of a linear block to a unit step at time zero.
+
+    Parameters
+    ----------
+    time_s : ndarray, shape (n,), [s]
+    value : ndarray, shape (n,), [-]
+        Both sides of the block are in the input's unit.
+    """
+
+    time_s: np.ndarray
+    value: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
 class ModelView:
     """One model, seen from all sides.
 
@@ -242,6 +288,8 @@ class ModelView:
     coverage : int, [-]
         Recordings that it covers, of ``covers_of``.
     covers_of : int, [-]
+    input_range, block_range : tuple of float, [input unit]
+        What the arguments of the input map and of the output map have visited in the fit.
     """
 
     model: str
@@ -258,6 +306,9 @@ class ModelView:
     input_unit: str
     output_unit: str
     information: Information
+    step: StepResponse
+    input_range: tuple[float, float]
+    block_range: tuple[float, float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -326,6 +377,8 @@ class ReportContents:
         The chain, and all models of the final test, on all recordings.
     chain : ChainTrend or None
         What happens along that chain; None without one.
+    answer : ModelAnswer or None
+        The model to take; None without any.
     outdated : tuple of str
         Stages whose stored results do not belong to the models that are stored now.
     """
@@ -344,4 +397,5 @@ class ReportContents:
     chain_matrix: RmsdMatrix | None = None
     full_matrix: RmsdMatrix | None = None
     predictions: PredictionCounts | None = None
+    answer: ModelAnswer | None = None
     outdated: tuple[str, ...] = ()

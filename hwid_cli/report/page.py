@@ -2,14 +2,16 @@
 
 import re
 import struct
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import ClassVar
 
 from matplotlib.figure import Figure
 
 from hwid_cli.records.report import ReportContents
-from hwid_cli.report.figures.style import DOTS, as_png
+from hwid_cli.report.charts import Chart
+from hwid_cli.report.dots import Dots
+from hwid_cli.report.figures.style import DOTS, as_png, report_style
 from hwid_cli.report.simulation_note import HUBER_NOTE, simulation_note
 from hwid_cli.report.table import Block, Table, Text
 
@@ -37,9 +39,9 @@ class Image:
     dots_per_inch: int
 
     @property
-    def width_in(self) -> float:
-        """Width that the text was sized for, in inches."""
-        return self.width_px / self.dots_per_inch
+    def width_in(self) -> int:
+        """Width that the text was sized for, in whole inches."""
+        return max(3, min(12, round(self.width_px / self.dots_per_inch)))
 
 
 @dataclass(frozen=True)
@@ -76,14 +78,59 @@ class Collapsible:
 
 
 @dataclass(frozen=True)
-class Pairs:
-    """Small figures, two in a row where there is room."""
+class Picker:
+    """Blocks of several recordings or models, of which the page shows one at a time.
 
-    kind: ClassVar[str] = "pairs"
-    figures: tuple[Figures, ...]
+    Parameters
+    ----------
+    what : str
+        What they are of; pickers of one thing change together.
+    items : tuple of (str, tuple of block)
+        By their names, in their order.
+    """
+
+    kind: ClassVar[str] = "picker"
+    what: str
+    items: "tuple[tuple[str, tuple[PageBlock, ...]], ...]"
 
 
-PageBlock = Block | Figures | Pairs | Collapsible
+@dataclass(frozen=True)
+class Row:
+    """Blocks beside each other where there is room."""
+
+    kind: ClassVar[str] = "row"
+    blocks: "tuple[PageBlock, ...]"
+
+
+@dataclass(frozen=True)
+class Answer:
+    """One question, its answer in a sentence, and what shows it; stands first on the page.
+
+    Parameters
+    ----------
+    is_settled : bool
+        Whether nothing stays open.
+    details : tuple of str
+        Sentences beneath the verdict.
+    blocks : tuple of block
+        Up to three, beside each other.
+    next_steps : tuple of (str, str)
+        What to do next, and the command for it; empty for none.
+    is_small : bool
+        Whether another answer needs room on the same screen.
+    """
+
+    kind: ClassVar[str] = "answer"
+    question: str
+    verdict: str
+    is_settled: bool
+    details: tuple[str, ...] = ()
+    blocks: "tuple[PageBlock, ...]" = ()
+    next_steps: tuple[tuple[str, str], ...] = ()
+    is_small: bool = False
+
+
+PageBlock = Block | Figures | Collapsible | Chart | Dots | Picker | Row | Answer
 
 
 @dataclass(frozen=True)
@@ -96,12 +143,37 @@ class Section:
         Where links lead.
     short : str
         Its name in the navigation.
+    missing : str
+        Why there is nothing to show; such a section is one line at the end of the page.
     """
 
     id: str
     title: str
     short: str
     blocks: tuple[PageBlock, ...] = field(default_factory=tuple)
+    missing: str = ""
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """A figure that lies beside the page as a file, for other documents.
+
+    Parameters
+    ----------
+    file : str
+        Where it lies below ``figures/``.
+    draw : callable
+        Gives the figure; nothing is drawn before.
+    """
+
+    file: str
+    draw: Callable[[], Figure]
+
+    @property
+    def png(self) -> bytes:
+        """The drawn file."""
+        with report_style():
+            return as_png(self.draw())
 
 
 def images_of(blocks: tuple[PageBlock, ...]) -> tuple[Image, ...]:
@@ -116,10 +188,10 @@ def images_of(blocks: tuple[PageBlock, ...]) -> tuple[Image, ...]:
     for block in blocks:
         if isinstance(block, Figures):
             found += block.images
-        elif isinstance(block, Collapsible):
+        elif isinstance(block, Collapsible | Row | Answer):
             found += images_of(block.blocks)
-        elif isinstance(block, Pairs):
-            found += images_of(block.figures)
+        elif isinstance(block, Picker):
+            found += [one for _, inner in block.items for one in images_of(inner)]
     return tuple(found)
 
 

@@ -106,6 +106,9 @@ class Cell:
         Whether it stands out.
     short : str
         Stands for it on the screen and is explained beneath; empty for the text itself.
+    look : str
+        How a page sets it apart: ``own``, ``below`` a threshold, both, or ``best``; empty
+        for nothing.
     """
 
     text: str
@@ -113,6 +116,7 @@ class Cell:
     share: float | None = None
     is_marked: bool = False
     short: str = ""
+    look: str = ""
 
 
 Row = tuple[Cell | str, ...]
@@ -138,6 +142,9 @@ class Table:
         The thesis's table whose form it has, if any.
     mark : str
         One character behind marked cells on the screen.
+    is_matrix : bool
+        Whether all columns but the first are of one kind: the page reads its cells aloud by
+        row and column, and keeps their order.
     """
 
     kind: ClassVar[str] = "table"
@@ -149,6 +156,7 @@ class Table:
     is_validation: bool | None = None
     published: str = ""
     mark: str = "*"
+    is_matrix: bool = False
 
     @property
     def heads(self) -> tuple[str, ...]:

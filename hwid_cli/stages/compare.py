@@ -70,6 +70,18 @@ def compare_models(
     )
 
 
+def linear_options(options: FitOptions) -> FitOptions:
+    """Give the options of a linear model beside a nonlinear one: the same, without maps."""
+    return replace(
+        options,
+        input_map="none",
+        output_map="none",
+        input_function=None,
+        output_function=None,
+        linear_block=None,
+    )
+
+
 def fit_linear(
     recordings: Sequence[Recording],
     orders: Orders,
@@ -83,14 +95,7 @@ def fit_linear(
     settings : RunSettings
         A model of one recording is kept in the store, as ``identify`` keeps it.
     """
-    linear = replace(
-        options,
-        input_map="none",
-        output_map="none",
-        input_function=None,
-        output_function=None,
-        linear_block=None,
-    )
+    linear = linear_options(options)
     if len(recordings) > 1:
         with one_thread():
             return fit(recordings, orders, linear)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from hwid_cli.model.frequency_response import (
     frequency_response,
     response_frequencies,
+    step_response,
     zeros,
 )
 from hwid_cli.model.linear_block import poles
@@ -103,4 +104,7 @@ def _view(shown: _Shown, recordings: Sequence[Recording]) -> ModelView:
         input_unit=model.input_unit,
         output_unit=model.output_unit,
         information=shown.fit.information,
+        step=step_response(model),
+        input_range=model.input_map.domain,
+        block_range=model.output_map.domain,
     )

@@ -97,6 +97,27 @@ def recommend_orders(
     )
 
 
+def recommend_overall(
+    fits: Sequence[Fit],
+    crossval: CrossValidation,
+    recordings: Sequence[Recording],
+    options: OrderOptions,
+) -> OrderChoice | None:
+    """Recommend orders for all recordings together, without a look at their responses.
+
+    Returns
+    -------
+    OrderChoice or None
+        As ``overall`` of ``recommend_orders``, where no recording has outliers.
+    """
+    places = range(len(crossval.identified_on))
+    total = _scored_by(crossval, places, recordings, ())
+    if total is None:
+        return None
+    criteria = {name: _criterion(fits, crossval, name) for name in ("aic", "bic")}
+    return _choice("", total, _summed(criteria), crossval, options)
+
+
 def _quantile(values: list[int], share: float, missing: int) -> int:
     """The value that this share of all does not exceed, a value that occurs."""
     if not values:

@@ -7,6 +7,7 @@ RMSDs arranged as the report's figures show them.
 
 import json
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,11 +15,13 @@ import numpy as np
 from hwid_cli.data.calibration import find_period
 from hwid_cli.model.scores import coverage, fit_percent, rmsd
 from hwid_cli.model.simulate import validation_output
+from hwid_cli.records.answer import ModelAnswer
 from hwid_cli.records.groups import FinalTest
-from hwid_cli.records.model import Fit
+from hwid_cli.records.model import Fit, HammersteinWiener
 from hwid_cli.records.recordings import Recording
 from hwid_cli.records.report import (
     ChainOnTests,
+    ModelOutput,
     OrderGrid,
     PredictionCounts,
     ReportContents,
@@ -27,6 +30,7 @@ from hwid_cli.records.report import (
     StoredResults,
 )
 from hwid_cli.records.results import CrossValidation, ModelScore
+from hwid_cli.stages.answer import model_answer
 from hwid_cli.stages.crossval import cross_matrix
 from hwid_cli.stages.model_views import model_views, named_fits
 from hwid_cli.stages.order_grid import grid_place
@@ -163,7 +167,7 @@ def chain_on_tests(final: FinalTest) -> ChainOnTests:
 
 
 # Raised when the page or a figure changes, so that pages are drawn again.
-REPORT_VERSION = 4
+REPORT_VERSION = 5
 
 
 def report_key(stored: StoredResults) -> str:
@@ -175,6 +179,7 @@ def report_key(stored: StoredResults) -> str:
         "stages": [str(run) for run in stored.stages],
         "diagnosis": json.dumps(stored.diagnosis, sort_keys=True),
         "figures": sorted(figures),
+        "maps": str(stored.chosen_maps),
     }
     arrays = [np.frombuffer(figures[name], np.uint8) for name in sorted(figures)]
     return task_key("report", REPORT_VERSION, settings, arrays)
@@ -223,7 +228,9 @@ def report_contents(stored: StoredResults) -> ReportContents:
     if crossval is not None and is_fresh:
         scores = tuple(score_models(stored.fits, crossval))
         widest = best_of_each(scores, crossval.identified_on)
-    simulated = _simulated(stored, crossval if is_fresh else None)
+    fresh = crossval if is_fresh else None
+    answer = model_answer(stored, fresh)
+    simulated = _simulated(stored, fresh, answer)
     covered = {one.recording.name for one in simulated}
     kinds = {recording.name: recording.kind for recording in stored.recordings}
     return ReportContents(
@@ -241,6 +248,7 @@ def report_contents(stored: StoredResults) -> ReportContents:
         chain_matrix=None if final is None else final_matrix(final, final.chain),
         full_matrix=None if final is None else final_matrix(final, final.models),
         predictions=None if final is None else _count_predictions(final),
+        answer=answer,
         outdated=() if is_fresh else ("crossval",),
     )
 
@@ -253,7 +261,9 @@ def _belongs(fits: Sequence[Fit], crossval: CrossValidation) -> bool:
 
 
 def _simulated(
-    stored: StoredResults, crossval: CrossValidation | None
+    stored: StoredResults,
+    crossval: CrossValidation | None,
+    answer: ModelAnswer | None,
 ) -> tuple[SimulatedRecording, ...]:
     named = named_fits(stored)
     own = {group[0].name: group[0] for group in best_fits(stored.fits, 1) if group}
@@ -264,7 +274,8 @@ def _simulated(
             continue
         name, choice = chosen
         if named[name].model is not None:
-            found.append(_simulate(recording, named[name], name, choice))
+            one = _simulate(recording, named[name], name, choice)
+            found.append(replace(one, others=_others(recording, name, answer)))
     return tuple(found)
 
 
@@ -309,6 +320,25 @@ def _simulate(
         ),
         tests=examined_residual(recording, fit),
     )
+
+
+def _others(
+    recording: Recording, name: str, answer: ModelAnswer | None
+) -> tuple[ModelOutput, ...]:
+    """Outputs of the model to take and of the linear one beside it."""
+    if answer is None:
+        return ()
+    found: list[tuple[str, bool, HammersteinWiener]] = []
+    if answer.name != name:
+        found.append((answer.name, False, answer.model))
+    if answer.linear is not None:
+        found.append((f"linear:{answer.name}", True, answer.linear))
+    outputs = []
+    for model, is_linear, one in found:
+        output = validation_output(one, recording)
+        scores = (rmsd(recording.output, output), fit_percent(recording.output, output))
+        outputs.append(ModelOutput(model, is_linear, output, *scores))
+    return tuple(outputs)
 
 
 def _count_predictions(final: FinalTest) -> PredictionCounts:

@@ -1,8 +1,10 @@
 """``order.csv`` and ``maps.csv``: recommended orders and maps."""
 
+import csv
 from pathlib import Path
 
 from hwid_cli.files.csv_tables import write_table_csv
+from hwid_cli.records.answer import ChosenMaps
 from hwid_cli.records.order import MapAdvice, OrderAdvice, OrderChoice
 
 ORDER_COLUMNS = (
@@ -84,6 +86,35 @@ def write_maps_csv(path: Path, advice: MapAdvice) -> None:
         for one in advice.candidates
     ]
     write_table_csv(path, MAP_COLUMNS, rows)
+
+
+def read_chosen_maps(folder: Path) -> ChosenMaps | None:
+    """Read which maps ``order.csv`` and ``maps.csv`` of a folder recommend.
+
+    Returns
+    -------
+    ChosenMaps or None
+        None where nothing was compared, or the files are not what was written.
+    """
+    try:
+        orders = _rows(folder / "order.csv")
+        maps = _rows(folder / "maps.csv")
+        (taken,) = (row for row in maps if row["take"] == "1")
+        sides = [
+            f"{taken[side].replace('_', ' ')} {taken[units]}".strip()
+            for side, units in (
+                ("input_map", "input_units"),
+                ("output_map", "output_units"),
+            )
+        ]
+        return ChosenMaps(int(orders[0]["nb"]), int(orders[0]["nk"]), *sides)
+    except (OSError, ValueError, KeyError, IndexError, csv.Error):
+        return None
+
+
+def _rows(path: Path) -> list[dict[str, str]]:
+    with path.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
 
 
 def _cells(one: OrderChoice) -> tuple[object, ...]:

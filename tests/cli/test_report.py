@@ -1,3 +1,4 @@
+import json
 import re
 
 import h5py
@@ -35,8 +36,10 @@ def test_a_report_of_all_stages(after_run, hwid, out):
     assert (out / "results.h5").read_bytes() == before
     html = (out / "report.html").read_text()
     figures = files_below(out / "figures")
-    assert html.count("<img") == len(figures)
     assert {"calibrate/step_02.png", "recordings/step_02_detail.png"} <= set(figures)
+    names = json.loads(html.rpartition("<!-- drawn from ")[2].split(" ", 1)[1][:-5])
+    assert names
+    assert set(names) <= set(figures)
     assert "hwid group CONFIG" in html
     # Seconds and versions come from the results.
     row = re.search(r"<td class=\"text\">identify</td>(.*?)</tr>", html, re.DOTALL)

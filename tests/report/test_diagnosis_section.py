@@ -5,7 +5,7 @@ import pytest
 from hwid_cli.records.report import ReportContents, StoredResults
 from hwid_cli.report.diagnosis import diagnosis_blocks
 from hwid_cli.report.page import Collapsible, images_of
-from hwid_cli.report.sections.diagnose import diagnosis_section
+from hwid_cli.report.sections.diagnose import diagnosis_drawings, diagnosis_section
 from hwid_cli.report.table import Heading, Table, Text
 from tests.conftest import leave_figures_blank
 from tests.report.diagnosis_examples import NAN, named, nothing_missing, unknown
@@ -15,10 +15,14 @@ from tests.report.report_examples import DIAGNOSIS
 blank = pytest.mark.usefixtures("blank_figures")
 
 
-def section_of(record=None, diagnosis=None):
+def contents_of(record=None, diagnosis=None):
     results = {"diagnose": record}
     stored = StoredResults("a", "{}", "poles", results=results, diagnosis=diagnosis)
-    return diagnosis_section(ReportContents(stored))
+    return ReportContents(stored)
+
+
+def section_of(record=None, diagnosis=None):
+    return diagnosis_section(contents_of(record, diagnosis))
 
 
 def texts(section):
@@ -30,7 +34,7 @@ def headings(section):
 
 
 def sentences(section):
-    return [one.sentence for one in section.blocks if one.kind == "figures"]
+    return [one.sentence for one in section.blocks if one.kind == "dots"]
 
 
 def tables(section):
@@ -54,19 +58,28 @@ def test_the_summary_comes_first_and_the_effects_follow(of_nine):
     assert tables(found)[0].rows[0][0] == "coulomb_friction"
     assert headings(found) == [
         "The gap",
+        "Measured and simulated",
         "Where the error sits",
         "Parameters of the simulation",
         "Candidates",
     ]
 
 
-def test_every_figure_lies_in_its_folder(of_nine):
-    files = [one.file for one in images_of(of_nine.blocks)]
+def test_every_figure_lies_in_its_folder():
+    files = [one.file for one in diagnosis_drawings(contents_of(named()))]
 
     assert files == [
         f"diagnosis/{name}.png"
-        for name in ("gap", "overlay", "where", "force", "ranking")
+        for name in ("gap", "overlay", "force", "ranking", "where")
     ]
+
+
+def test_each_recording_of_the_overlay_can_be_picked(of_nine):
+    (picker,) = [one for one in of_nine.blocks if one.kind == "picker"]
+
+    assert [name for name, _ in picker.items] == [one.name for one in named().overlays]
+    chart = picker.items[0][1][0]
+    assert [one.label for one in chart.panels] == ["output y [m]", "residual e [m]"]
 
 
 def with_gaps_alone(**changes):
@@ -117,16 +130,17 @@ def test_where_nothing_is_missing_the_section_is_short():
 
     assert texts(found)[0] == "Nothing is missing."
     assert headings(found) == ["The gap", "Parameters of the simulation"]
-    assert len(images_of(found.blocks)) == 1
+    assert len(diagnosis_drawings(contents_of(nothing_missing()))) == 1
 
 
 @blank
 def test_an_unknown_gap_shows_the_force_without_a_law():
     found = section_of(unknown())
 
-    assert "The force that the simulation lacks follows velocity most." in sentences(
-        found
-    )
+    assert "The force that the simulation lacks follows velocity most." in texts(found)
+    (row,) = [one for one in found.blocks if one.kind == "row"]
+    labels = [curve.label for curve in row.blocks[0].panels[0].curves]
+    assert labels == ["spread, \N{PLUS-MINUS SIGN}1 sd", "from measurements"]
     assert "coulomb_friction" not in str(tables(found))
 
 

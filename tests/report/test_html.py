@@ -1,3 +1,6 @@
+import base64
+import hashlib
+import json
 import re
 from dataclasses import replace
 from html.parser import HTMLParser
@@ -17,22 +20,27 @@ from tests.report.report_examples import (
     with_results,
 )
 
+# The answers first, then the stages from the last to the first, then what was run.
 SECTIONS = [
     "summary",
-    "calibration",
-    "recordings",
-    "residuals",
-    "orders",
-    "crossval",
-    "models",
-    "groups",
+    "diagnosis",
     "test",
     "coverage",
     "assignment",
-    "diagnosis",
+    "groups",
+    "models",
+    "crossval",
+    "recordings",
+    "residuals",
+    "orders",
+    "calibration",
+    "about",
 ]
+# Sections of results that only calibration has given.
+OF_CALIBRATION = ["summary", "recordings", "calibration", "about"]
 # Elements of HTML that have no end.
 VOID = {"meta", "img", "wbr"}
+JSON = "application/json"
 
 
 class Reader(HTMLParser):
@@ -40,7 +48,7 @@ class Reader(HTMLParser):
 
     def __init__(self, html):
         super().__init__()
-        self.elements, self.open, self.text = [], [], ""
+        self.elements, self.open, self.text, self.data = [], [], "", []
         self.feed(html)
 
     def handle_starttag(self, tag, attrs):
@@ -52,7 +60,10 @@ class Reader(HTMLParser):
         assert self.open.pop() == tag
 
     def handle_data(self, data):
-        self.text += data
+        if self.open and self.open[-1] in ("script", "style"):
+            self.data.append((self.open[-1], self.elements[-1][1], data))
+        else:
+            self.text += data
 
     def all(self, tag):
         return [attributes for name, attributes in self.elements if name == tag]
@@ -94,38 +105,118 @@ def test_the_page_says_its_language_and_fits_a_phone(read):
 
 
 def test_the_page_needs_nothing_but_itself(page, read):
+    assert read.all("link") == read.all("iframe") == read.all("object") == []
     assert all(one["src"].startswith("data:image/png;") for one in read.all("img"))
-    assert not re.search(r"https?:|@import|url\(|<link|src=\"(?!data:)", page.html)
+    assert [one for one in read.all("script") if "src" in one] == []
+    texts = [data for tag, _, data in read.data if tag == "style"]
+    assert not re.search(r"@import|url\(", "".join(texts))
+    beside = page.html
+    for _, _, data in read.data:
+        beside = beside.replace(data, "")
+    assert not re.search(r"https?:|src=\"(?!data:)", beside)
 
 
-def test_every_image_has_a_text_and_its_size(read):
-    assert len(read.all("img")) > 20
-    for one in read.all("img"):
-        assert len(one["alt"]) > 10
-        assert int(one["width"]) > 100
-        assert int(one["height"]) > 100
+def policy_of(read):
+    (text,) = [
+        one["content"]
+        for one in read.all("meta")
+        if one.get("http-equiv") == "Content-Security-Policy"
+    ]
+    return dict(part.strip().split(" ", 1) for part in text.split(";"))
 
 
-def test_every_figure_is_a_png_file_too(page, read):
-    assert len(page.figures) == len(read.all("img"))
-    for name, png in page.figures.items():
-        assert re.fullmatch(r"[a-z]+/[\w+. -]+\.png", name)
-        assert png.startswith(b"\x89PNG")
+def test_the_policy_allows_the_script_and_the_style_of_the_page_and_no_others(read):
+    policy = policy_of(read)
+
+    def allowed(tag, attributes):
+        texts = [
+            data for name, of, data in read.data if name == tag and of == attributes
+        ]
+        digest = hashlib.sha256("".join(texts).encode()).digest()
+        return f"'sha256-{base64.b64encode(digest).decode()}'"
+
+    assert policy["default-src"] == "'none'"
+    assert policy["script-src"] == allowed("script", {})
+    assert policy["style-src"] == allowed("style", {})
+    assert policy["img-src"] == "data: blob:"
 
 
-def test_every_figure_has_one_sentence_of_its_own(page):
+def test_nothing_on_the_page_needs_what_the_policy_forbids(read):
+    for _, attributes in read.elements:
+        assert "style" not in attributes
+        assert not [name for name in attributes if name.startswith("on")]
+
+
+def test_the_licence_of_the_plotting_library_is_in_the_page(read):
+    (script,) = [data for _, of, data in read.data if not of and "uPlot=" in data]
+
+    assert "The MIT License" in script
+    assert "Copyright (c) 2022 Leon Sorokin" in script
+
+
+def charts_of(read):
+    return [json.loads(data) for _, of, data in read.data if of.get("class") == "data"]
+
+
+def test_every_chart_has_data_of_one_length_and_a_text_for_those_who_do_not_see_it(
+    read,
+):
+    charts = charts_of(read)
+    figures = [one for one in read.all("figure") if "chart" in one.get("class", "")]
+
+    assert len(charts) == len(figures) > 20
+    assert all(len(one["data-alt"]) > 20 for one in figures)
+    for chart in charts:
+        n_points = sum(run[2] for run in chart.get("runs", [])) or size(chart["x"])
+        for panel in chart["panels"]:
+            assert re.search(r"\[.+\]$", panel["yl"])
+            for curve in panel["curves"]:
+                for name in {"y", "low", "high"} & set(curve):
+                    assert size(curve[name]) == n_points
+
+
+def size(packed):
+    return len(packed if isinstance(packed, list) else packed["d"])
+
+
+def test_every_drawing_has_a_text_for_those_who_do_not_see_it(read):
+    drawings = [one for one in read.all("svg") if one.get("role") == "img"]
+
+    assert len(drawings) > 3
+    assert all(len(one["aria-label"]) > 20 for one in drawings)
+
+
+def test_figures_are_png_files_beside_the_page(page):
+    names = [one.file for one in page.drawings]
+
+    assert len(set(names)) == len(names) > 20
+    for one in page.drawings:
+        assert re.fullmatch(r"[a-z]+/[\w+. -]+\.png", one.file)
+    assert page.drawings[-1].png.startswith(b"\x89PNG")
+
+
+def test_every_chart_has_one_sentence_of_its_own(page):
     captions = re.findall(r"<figcaption>(.*?)</figcaption>", page.html)
 
-    assert len(captions) == page.html.count("<figure>")
-    assert all(caption.endswith(".") for caption in captions)
-    assert len(set(captions)) == len(captions)
+    assert len(captions) == page.html.count("<figure")
+    assert all(caption.rstrip().endswith(".") for caption in captions)
 
 
-def test_the_summary_says_what_came_out(read, contents):
-    winner = contents.stored.search.chain_groups[-1]
+def test_the_answers_come_first_the_diagnosis_before_the_model(read, page):
+    first = page.html[page.html.index("<main>") :]
+
+    assert first.index("What does the simulation lack?") < first.index(
+        "Which model describes the drive"
+    )
+    assert first.index("The simulation lacks Coulomb friction") < first.index("Take ")
+    # Hashes, versions and the configuration are folded at the end.
+    for word in ("SHA-256", "Computed with", "&#34;name&#34;"):
+        assert first.index(word) > first.index('<section id="about"')
+        assert first.index(word) > first.rindex("<details", 0, first.index(word))
+
+
+def test_the_end_says_how_much_was_fitted(read):
     assert "6 recordings and 20 fitted models (20 converged)." in read.text
-    assert f"the group {winner.name} covers {winner.coverage} of 5" in read.text
-    assert "On 1 test recording that nothing else has used" in read.text
 
 
 def test_hashes_and_keys_are_short_and_whole_in_the_title(read, contents):
@@ -136,9 +227,11 @@ def test_hashes_and_keys_are_short_and_whole_in_the_title(read, contents):
 
 
 def test_a_missing_stage_is_one_line_with_the_command(bare):
-    assert [one["id"] for one in bare.all("section")] == SECTIONS
-    for stage in ("crossval", "group", "test"):
-        assert f"run 'hwid {stage} CONFIG'" in bare.text
+    assert [one["id"] for one in bare.all("section")] == OF_CALIBRATION
+    before, _, after = bare.text.partition("About these results")
+    for stage in ("identify", "crossval", "group", "test", "diagnose"):
+        assert f"run 'hwid {stage} CONFIG'" in after
+    assert "not run yet" not in before
     assert bare.all("img") == []
 
 
@@ -188,21 +281,28 @@ def test_names_cannot_become_elements_of_the_page(page):
         name=name,
         config='{"name": "<b>"}',
         diagnosis={"verdict": "<i>none</i>"},
-        calibration_figures={name: next(iter(page.figures.values()))},
+        calibration_figures={name: page.drawings[-1].png},
     )
     hostile = report_page(report_contents(stored), STAGES)
     read = Reader(hostile.html)
 
-    assert len(read.all("script")) == 1
+    # One program, and data that are no program.
+    assert [one for one in read.all("script") if one.get("type") != JSON] == [{}]
     assert read.all("b") == []
     assert read.all("i") == []
     assert name in read.text
+    assert name in {one.get("data-name") for one in read.all("figure")}
 
 
-def test_recordings_are_folded_after_the_first_four(page):
-    folded = page.html[page.html.index("2 more recordings with their best models") :]
+def test_each_recording_can_be_picked_where_recordings_differ(read, contents):
+    pickers = [one for one in read.all("div") if one.get("class") == "picker"]
+    kinds = [one["data-kind"] for one in pickers]
+    names = [one["value"] for one in read.all("option")]
 
-    assert folded[: folded.index("</details>")].count("<img") == 4
+    assert kinds.count("recording") == 3
+    assert kinds.count("model") == 1
+    for one in contents.stored.recordings:
+        assert names.count(one.name) >= 2
 
 
 @pytest.mark.parametrize(

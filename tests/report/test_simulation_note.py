@@ -58,7 +58,7 @@ def test_every_table_of_validations_says_how_models_start(rule):
             assert simulation_note(other, is_validation=True) not in text, name
 
 
-def test_every_section_of_the_report_says_how_models_start(page):
+def test_every_section_of_the_report_says_how_models_start(page, contents):
     _, *rest = page.html.split('<section id="')
     sections = {text.partition('"')[0]: text for text in rest}
     fitted, validated = (
@@ -66,17 +66,19 @@ def test_every_section_of_the_report_says_how_models_start(page):
     )
 
     assert [name for name, text in sections.items() if validated in text] == [
-        "summary",
-        "recordings",
-        "residuals",
-        "crossval",
-        "models",
-        "groups",
         "test",
         "coverage",
         "assignment",
+        "groups",
+        "models",
+        "crossval",
+        "recordings",
+        "residuals",
     ]
     assert [name for name, text in sections.items() if fitted in text] == ["orders"]
+    # The answer's model starts by its own rule.
+    rule = contents.answer.model.initial_state
+    assert simulation_note(rule, is_validation=True) in sections["summary"]
 
 
 @pytest.mark.parametrize("rule", RULES)

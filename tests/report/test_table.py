@@ -1,7 +1,7 @@
 import pytest
 
 from hwid_cli.report.formats import number
-from hwid_cli.report.page import Pairs
+from hwid_cli.report.page import Row
 from hwid_cli.report.table import (
     Cell,
     Code,
@@ -62,8 +62,8 @@ def test_paragraphs_follow_each_other_and_tables_are_set_off():
 
 
 def test_what_only_a_page_can_show_is_refused():
-    with pytest.raises(TypeError, match="Pairs cannot be shown on a screen"):
-        as_text([Pairs(())])
+    with pytest.raises(TypeError, match="Row cannot be shown on a screen"):
+        as_text([Row(())])
 
 
 def wide(count, *, rows=1):

@@ -136,6 +136,13 @@ def test_the_page_escapes_by_itself():
     # The only text that is taken as it is: a place where a long name may break.
     assert re.findall(r"'([^']*)' \| safe", template) == ["+<wbr>"]
     assert template.count("safe") == 1
+    # In Python: the shipped style and script, their licence, and JSON without any sign of HTML.
+    marked = {
+        path.name: path.read_text().count("Markup(")
+        for path in (PROJECT / "hwid_cli").rglob("*.py")
+        if "Markup(" in path.read_text()
+    }
+    assert marked == {"html.py": 2, "charts.py": 1}
 
 
 def test_every_dependency_has_a_lowest_version():

@@ -6,7 +6,8 @@ Figures of a diagnosis that show curves: simulations over measurements, missing 
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -46,7 +47,8 @@ _ROW, _ABOVE, _BELOW, _RIGHT = 0.24, 0.55, 0.5, 0.2
 _LOWEST_SHARE = -0.1
 # Between its ends a logarithmic axis has two numbers at least, [-].
 _LEAST_RANGE = 6.0
-_SORTS = {
+# Sorts of places, and what they are of.
+PLACES = {
     "variable": "what the missing force follows",
     "segment": "segments of the steps",
     "harmonic": "harmonics of the sines",
@@ -209,7 +211,7 @@ def shown_places(diagnosis: Diagnosis) -> dict[str, list[Place]]:
         The largest of each sort that has any share.
     """
     found: dict[str, list[Place]] = {}
-    for sort in _SORTS:
+    for sort in PLACES:
         usable = [
             one
             for one in diagnosis.places
@@ -279,7 +281,7 @@ def _draw_places(
             va="center",
             size=8.0,
         )
-    axes.set_title(_SORTS[sort])
+    axes.set_title(PLACES[sort])
     axes.set_yticks(rows, names)
     axes.set_ylim(len(places) - 0.5, -0.5)
     # Room for the number behind the longest bar.
@@ -530,18 +532,23 @@ def diagnosis_figures(diagnosis: Diagnosis) -> dict[str, Figure]:
         ``diagnosis_gap``, ``_overlay``, ``_force``, ``_ranking`` and ``_where``, without
         those that there is nothing for.
     """
-    found = {}
-    if diagnosis.gaps:
-        found["diagnosis_gap"] = gap_figure(diagnosis)
-    if any(one.measured.size for one in diagnosis.overlays):
-        found["diagnosis_overlay"] = overlay_figure(diagnosis)
-    if any(one.at.size for one in diagnosis.latent_force):
-        found["diagnosis_force"] = force_figure(diagnosis)
-    if shown_candidates(diagnosis):
-        found["diagnosis_ranking"] = ranking_figure(diagnosis)
-    if shown_places(diagnosis):
-        found["diagnosis_where"] = where_figure(diagnosis)
-    return found
+    return {name: draw() for name, draw in figure_makers(diagnosis).items()}
+
+
+def figure_makers(diagnosis: Diagnosis) -> dict[str, Callable[[], Figure]]:
+    """Give what draws each figure that there is something for, none of them drawn yet."""
+    is_there = {
+        gap_figure: bool(diagnosis.gaps),
+        overlay_figure: any(one.measured.size for one in diagnosis.overlays),
+        force_figure: any(one.at.size for one in diagnosis.latent_force),
+        ranking_figure: bool(shown_candidates(diagnosis)),
+        where_figure: bool(shown_places(diagnosis)),
+    }
+    return {
+        f"diagnosis_{draw.__name__.removesuffix('_figure')}": partial(draw, diagnosis)
+        for draw, is_it in is_there.items()
+        if is_it
+    }
 
 
 @styled

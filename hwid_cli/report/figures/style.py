@@ -1,7 +1,9 @@
 """How all figures of the report look: sizes, colours that everybody can tell apart."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from functools import wraps
 from typing import Any, ParamSpec, TypeVar
 
@@ -69,6 +71,10 @@ _SETTINGS: Any = {
 }
 
 
+# Whether the style is set already.
+_has_style: ContextVar[bool] = ContextVar("has_style", default=False)
+
+
 def styled(
     draw: Callable[Arguments, Drawn],
 ) -> Callable[Arguments, Drawn]:
@@ -76,12 +82,26 @@ def styled(
 
     @wraps(draw)
     def with_style(*args: Arguments.args, **kwargs: Arguments.kwargs) -> Drawn:
-        with mpl.rc_context():
-            mpl.rcdefaults()
-            mpl.rcParams.update(_SETTINGS)
+        with report_style():
             return draw(*args, **kwargs)
 
     return with_style
+
+
+@contextmanager
+def report_style() -> Iterator[None]:
+    """Draw in the report's style until the end; setting it anew takes milliseconds."""
+    if _has_style.get():
+        yield
+        return
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        mpl.rcParams.update(_SETTINGS)
+        token = _has_style.set(True)
+        try:
+            yield
+        finally:
+            _has_style.reset(token)
 
 
 def new_figure(width: float, height: float) -> Figure:

@@ -10,15 +10,13 @@ from hwid_cli.report.page import (
     Figures,
     Image,
     PageBlock,
-    Pairs,
+    Picker,
     Section,
     collapsed_beyond,
     image,
 )
 from hwid_cli.report.table import Text
 
-# Figures that are shown open; all others are folded.
-_MOST_OPEN = 4
 # Rows of a table that stands open before the first figure.
 _MOST_ROWS = 12
 
@@ -27,9 +25,8 @@ def calibration_section(contents: ReportContents) -> Section:
     """Show what calibration did."""
     logs, figures = contents.stored.logs, contents.stored.calibration_figures
     blocks: list[PageBlock] = []
-    if not logs:
-        blocks.append(Text("Not run yet: run 'hwid calibrate CONFIG'.", is_note=True))
-    else:
+    missing = "" if logs else "not run yet: run 'hwid calibrate CONFIG'."
+    if logs:
         summary = f"The table of all {counted(len(logs), 'recording')}"
         blocks.append(collapsed_beyond(_MOST_ROWS, calibration_table(logs), summary))
         shown = [
@@ -38,16 +35,19 @@ def calibration_section(contents: ReportContents) -> Section:
             if log.name in figures
         ]
         if shown:
-            blocks.append(Pairs(tuple(shown[:_MOST_OPEN])))
-        if shown[_MOST_OPEN:]:
-            more = counted(len(shown) - _MOST_OPEN, "more recording")
-            rest = Pairs(tuple(shown[_MOST_OPEN:]))
-            blocks.append(Collapsible(f"{more} before and after calibration", (rest,)))
+            names = [log.name for log in logs if log.name in figures]
+            items = zip(names, ((one,) for one in shown), strict=True)
+            about = "Before and after calibration: what was cut, moved and repaired"
+            blocks.append(
+                Collapsible(
+                    about, (Picker("recording", tuple(items)),), is_printed=False
+                )
+            )
         if not shown:
             text = "No figures: the configuration leaves the recordings as they are."
             blocks.append(Text(text, is_note=True))
     title = "Calibration: what was kept of each recording"
-    return Section("calibration", title, "Calibration", tuple(blocks))
+    return Section("calibration", title, "Calibration", tuple(blocks), missing)
 
 
 def _calibration_image(log: CalibrationLog, png: bytes) -> Image:

@@ -1,20 +1,22 @@
 """Section about cross-validation: what the models of single recordings cover."""
 
+from functools import partial
+
 import numpy as np
 
 from hwid_cli.records.report import ReportContents, RmsdMatrix
 from hwid_cli.report.crossval import coverage_table, cross_table
 from hwid_cli.report.figures.matrices import rmsd_matrix_figure
-from hwid_cli.report.formats import counted, listed, with_unit
+from hwid_cli.report.formats import counted, listed
+from hwid_cli.report.matrices import rmsd_matrix_table
 from hwid_cli.report.page import (
     Collapsible,
-    Figures,
+    Drawing,
     PageBlock,
     Section,
-    drawn,
     section_notes,
 )
-from hwid_cli.report.sections.models import models_section
+from hwid_cli.report.sections.models import model_drawings, models_section
 from hwid_cli.report.table import Text
 
 
@@ -22,21 +24,16 @@ def crossval_section(contents: ReportContents) -> Section:
     """Show the widest model of each recording on all recordings."""
     matrix = contents.cross
     blocks: list[PageBlock] = []
+    missing = ""
     if "crossval" in contents.outdated:
-        text = "The stored tensor belongs to other models: run 'hwid crossval CONFIG'."
-        blocks.append(Text(text, is_note=True))
+        missing = (
+            "the stored tensor belongs to other models: run 'hwid crossval CONFIG'."
+        )
     elif matrix is None:
-        blocks.append(Text("Not run yet: run 'hwid crossval CONFIG'.", is_note=True))
+        missing = "not run yet: run 'hwid crossval CONFIG'."
     else:
         blocks += section_notes(contents, is_validation=True)
-        alt = "Heat map of the RMSD of each recording's widest model on all recordings"
-        figure = drawn("crossval/matrix", rmsd_matrix_figure(matrix), alt)
-        sentence = (
-            f"{_coverage_sentence(matrix)} A dot marks an RMSD below "
-            f"{with_unit(matrix.threshold, matrix.unit)}, a square the recording "
-            "of the fit, the line in the colour bar the threshold."
-        )
-        blocks.append(Figures((figure,), sentence))
+        blocks += [Text(_coverage_sentence(matrix)), rmsd_matrix_table(matrix)]
         widest = cross_table(matrix)
         blocks.append(
             Collapsible("The widest model of each recording as a table", (widest,))
@@ -48,7 +45,7 @@ def crossval_section(contents: ReportContents) -> Section:
                 Collapsible("The models that cover the most recordings", (table,))
             )
     title = "Cross-validation: the widest model of each recording"
-    return Section("crossval", title, "Cross-validation", tuple(blocks))
+    return Section("crossval", title, "Cross-validation", tuple(blocks), missing)
 
 
 def _coverage_sentence(matrix: RmsdMatrix) -> str:
@@ -69,5 +66,14 @@ def _coverage_sentence(matrix: RmsdMatrix) -> str:
     )
 
 
-# Sections of the page, in their order.
-SECTIONS = (crossval_section, models_section)
+def crossval_drawings(contents: ReportContents) -> tuple[Drawing, ...]:
+    """The heat map as a file."""
+    if contents.cross is None:
+        return ()
+    draw = partial(rmsd_matrix_figure, contents.cross)
+    return (Drawing("crossval/matrix.png", draw),)
+
+
+# Sections of the page, in their order, and figures beside it.
+SECTIONS = (models_section, crossval_section)
+DRAWINGS = (crossval_drawings, model_drawings)

@@ -6,35 +6,50 @@ from typing import Any
 import numpy as np
 
 from hwid_cli.records.axis import units_note
-from hwid_cli.records.diagnosis import Diagnosis, RecordingGap
+from hwid_cli.records.diagnosis import Diagnosis, Place, RecordingGap
 from hwid_cli.records.report import ReportContents
 from hwid_cli.report.diagnosis import (
     INTERVALS_OF_A_PART,
     base_table,
+    candidate_name,
     closing_sentences,
     effect_sentences,
     effects_table,
     gap_table,
+    is_chosen,
     ranking_table,
     recordings_table,
     shown_value,
     used_sentence,
     warning_sentences,
 )
-from hwid_cli.report.figures.diagnosis import diagnosis_figures
+from hwid_cli.report.dots import Dot, DotGroup, DotRow, Dots
+from hwid_cli.report.figures.diagnosis import (
+    PLACES,
+    figure_makers,
+    shown_candidates,
+    shown_places,
+)
 from hwid_cli.report.formats import MISSING, counted, listed, with_unit
-from hwid_cli.report.page import Collapsible, Figures, PageBlock, Section, drawn
+from hwid_cli.report.page import (
+    Collapsible,
+    Drawing,
+    PageBlock,
+    Picker,
+    Row,
+    Section,
+)
+from hwid_cli.report.sections.diagnosis_answer import (
+    diagnosis_answer,
+    force_chart,
+    overlay_chart,
+)
 from hwid_cli.report.table import Heading, Table, Text, numbers, texts
 
 # Places that are told in words, and recordings that are called the worst.
 _MOST_PLACES, _MOST_NAMED = 5, 3
-_ALTS = {
-    "diagnosis_gap": "RMS of the residual of every recording, with the noise",
-    "diagnosis_overlay": "Measurement and simulations of the worst held-out recordings",
-    "diagnosis_force": "The missing force against what it follows",
-    "diagnosis_ranking": "Held-out RMS and explained share of the candidates",
-    "diagnosis_where": "Shares of the error by variable, segment and recording",
-}
+# Variables whose forces are drawn, and the lowest share that has room on the axis, [%].
+_MOST_FORCES, _LOWEST = 3, -20.0
 _VERDICTS = {
     "named": "The gap between simulation and measurement has a name.",
     "ambiguous": "Several effects explain the gap equally well.",
@@ -50,9 +65,7 @@ def diagnosis_section(contents: ReportContents) -> Section:
     blocks: list[PageBlock] = []
     if record is not None:
         blocks += _record_blocks(record)
-    elif found is None:
-        blocks.append(Text("There is no diagnosis among these results.", is_note=True))
-    else:
+    elif found is not None:
         blocks += [Text(line) for line in _sentences(found)]
         effects = _effects_table(
             _items(found, "effects"),
@@ -73,19 +86,14 @@ def diagnosis_section(contents: ReportContents) -> Section:
             reason = following.get("reason")
             blocks.append(Text(f"{text} - {reason}" if reason else text))
     title = "Diagnosis of the simulation"
-    return Section("diagnosis", title, "Diagnosis", tuple(blocks))
+    missing = (
+        "" if blocks else "no simulation was diagnosed: run 'hwid diagnose CONFIG'."
+    )
+    return Section("diagnosis", title, "Diagnosis", tuple(blocks), missing)
 
 
 def _record_blocks(diagnosis: Diagnosis) -> list[PageBlock]:
     """The verdict first, then the gap, where it is, the parameters and the candidates."""
-    figures = {
-        name: drawn(name.replace("_", "/", 1), figure, _ALTS[name])
-        for name, figure in diagnosis_figures(diagnosis).items()
-    }
-
-    def figure(name: str, sentence: str) -> list[PageBlock]:
-        return [Figures((figures[name],), sentence)] if name in figures else []
-
     blocks: list[PageBlock] = [Text(diagnosis.summary)]
     blocks += map(Text, warning_sentences(diagnosis.warnings))
     blocks += map(Text, effect_sentences(diagnosis))
@@ -93,28 +101,132 @@ def _record_blocks(diagnosis: Diagnosis) -> list[PageBlock]:
         blocks.append(effects_table(diagnosis))
     blocks += [Text(line) for line in closing_sentences(diagnosis)]
     blocks += [Heading("The gap"), gap_table(diagnosis), Text(used_sentence(diagnosis))]
-    blocks += figure("diagnosis_gap", _worst(diagnosis))
     if diagnosis.gaps:
         about = f"The gap in {counted(len(diagnosis.gaps), 'recording')} as a table"
+        blocks.append(_gap_dots(diagnosis))
         blocks.append(Collapsible(about, (recordings_table(diagnosis),)))
-    blocks += figure("diagnosis_overlay", _overlay_sentence(diagnosis))
-    where = [Text(one.sentence) for one in diagnosis.places if one.sentence]
-    where_figure = "Shares of the error that parameters of the base cannot take away."
-    places: list[PageBlock] = [
-        *where[:_MOST_PLACES],
-        *figure("diagnosis_where", where_figure),
-    ]
-    places += figure("diagnosis_force", _force_sentence(diagnosis))
-    blocks += [Heading("Where the error sits"), *places] if places else []
+    overlays = [one for one in diagnosis.overlays if one.measured.size]
+    if overlays:
+        items = [(one.name, (overlay_chart(one, diagnosis),)) for one in overlays]
+        blocks += [Heading("Measured and simulated"), Picker("diagnosed", tuple(items))]
+    blocks += _place_blocks(diagnosis)
     if diagnosis.base:
         blocks += [Heading("Parameters of the simulation"), base_table(diagnosis)]
     if diagnosis.candidates:
         about = f"{counted(len(diagnosis.candidates), 'candidate')} as a table"
         table = ranking_table(diagnosis)
-        sentence = "The best candidates that were fitted, and the simulation alone."
         blocks.append(Heading("Candidates"))
-        blocks += [*figure("diagnosis_ranking", sentence), Collapsible(about, (table,))]
+        if shown_candidates(diagnosis):
+            blocks.append(_candidate_dots(diagnosis))
+        blocks.append(Collapsible(about, (table,)))
     return blocks
+
+
+def _place_blocks(diagnosis: Diagnosis) -> list[PageBlock]:
+    """Where the error sits: in words, as bars, and the force over what it follows."""
+    said = [Text(one.sentence) for one in diagnosis.places if one.sentence]
+    blocks: list[PageBlock] = [*said[:_MOST_PLACES]]
+    sorts = shown_places(diagnosis)
+    if sorts:
+        blocks.append(_where_bars(sorts))
+    forces = [one for one in diagnosis.latent_force if one.at.size][:_MOST_FORCES]
+    if forces:
+        charts = tuple(force_chart(one, diagnosis) for one in forces)
+        blocks += [Text(_force_sentence(diagnosis)), Row(charts)]
+    return [Heading("Where the error sits"), *blocks] if blocks else []
+
+
+def _gap_dots(diagnosis: Diagnosis) -> Dots:
+    """The gap of every recording: as given, re-fitted, with the effects."""
+    unit = diagnosis.output_unit
+    steps = [
+        ("as given", "given", "rms_given"),
+        ("re-fitted", "refitted", "rms_before"),
+    ]
+    if diagnosis.effects:
+        steps.append(("with the effects", "extended", "rms_after"))
+    groups = []
+    for title, is_held_out in (("held out", True), ("trained on", False)):
+        rows = []
+        for one in diagnosis.gaps:
+            if one.is_held_out != is_held_out:
+                continue
+            values = [
+                (label, role, getattr(one, field)) for label, role, field in steps
+            ]
+            dots = [
+                Dot(value, role, f"{label} {with_unit(value, unit)}")
+                for label, role, value in values
+                if value > 0.0
+            ]
+            rows.append(DotRow(one.name, tuple(dots)))
+        if rows:
+            groups.append(DotGroup(f"{title}: {len(rows)}", tuple(rows)))
+    noise = diagnosis.noise.rms
+    has_noise = np.isfinite(noise) and noise > 0.0
+    return Dots(
+        label=f"RMS of the residual [{unit}]",
+        groups=tuple(groups),
+        sentence=_worst(diagnosis),
+        alt="RMS of the residual of every recording, with the noise",
+        legend=tuple((role, label) for label, role, _ in steps),
+        reference=(noise, f"noise {with_unit(noise, unit)}") if has_noise else None,
+        is_log=True,
+    )
+
+
+def _where_bars(sorts: Mapping[str, Sequence[Place]]) -> Dots:
+    groups = []
+    for sort, places in sorts.items():
+        rows = []
+        for one in places:
+            share = max(0.0, 100.0 * one.share)
+            text = f"{share:.0f} %"
+            rows.append(DotRow(one.variable, (Dot(share, "extended", text),), text))
+        groups.append(DotGroup(PLACES[sort], tuple(rows)))
+    return Dots(
+        label="share [%]",
+        groups=tuple(groups),
+        sentence=(
+            "Shares of the error that parameters of the base cannot take away; for "
+            "variables, of the variance of the missing force."
+        ),
+        alt="Shares of the error by variable, segment, harmonic and recording",
+        is_bar=True,
+    )
+
+
+def _candidate_dots(diagnosis: Diagnosis) -> Dots:
+    """The best candidates by the share of the gap that they explain on held-out data."""
+    rivals = [set(one.split("+")) for one in diagnosis.ambiguous_with]
+    noise = diagnosis.noise.rms
+    rows = []
+    for one in shown_candidates(diagnosis):
+        is_it = is_chosen(one, diagnosis)
+        role = (
+            "extended"
+            if is_it
+            else "refitted"
+            if set(one.effects) in rivals
+            else "given"
+        )
+        share = 100.0 * one.explained_share
+        told = f"{share:.1f} %"
+        if np.isfinite(noise) and noise > 0.0 and np.isfinite(one.held_out_rms):
+            told += f", {one.held_out_rms / noise:.3g} \N{MULTIPLICATION SIGN} noise"
+        dots = (Dot(max(share, _LOWEST), role, told),)
+        rows.append(DotRow(candidate_name(one.effects), dots, told, is_bold=is_it))
+    keys = [("extended", "chosen"), ("given", "others")]
+    if rivals:
+        keys.insert(1, ("refitted", "cannot be told from it"))
+    return Dots(
+        label="share of the excess error explained on held-out recordings [%]",
+        groups=(DotGroup("", tuple(rows)),),
+        sentence="The best candidates that were fitted, and the simulation alone.",
+        alt="Explained share and held-out error of the candidates",
+        legend=tuple(keys),
+        is_bar=True,
+    )
 
 
 def _worst(diagnosis: Diagnosis) -> str:
@@ -135,21 +247,11 @@ def _worst(diagnosis: Diagnosis) -> str:
     return f"{start} In the end {most} left in {names}."
 
 
-def _overlay_sentence(diagnosis: Diagnosis) -> str:
-    names = listed([one.name for one in diagnosis.overlays])
-    below = (
-        "beneath them both residuals, and those with the effects in their own scale"
-        if diagnosis.effects
-        else "beneath them the residuals"
-    )
-    return f"Where the simulation fails most: {names}; {below}. Grey is the noise."
-
-
 def _force_sentence(diagnosis: Diagnosis) -> str:
     if not diagnosis.latent_force:
         return ""
     law = (
-        " The dashed line is what the simulation with the effects gives instead."
+        " The blue line is what the simulation with the effects gives instead."
         if diagnosis.latent_force[0].law.size
         else ""
     )
@@ -241,5 +343,18 @@ def _text(value: object, name: str = "") -> str:
     return shown_value(value, name)
 
 
-# Sections of the page, in their order.
+def diagnosis_drawings(contents: ReportContents) -> tuple[Drawing, ...]:
+    """Figures of the diagnosis as files."""
+    record = contents.stored.diagnosis_record
+    if record is None:
+        return ()
+    return tuple(
+        Drawing(f"{name.replace('_', '/', 1)}.png", draw)
+        for name, draw in figure_makers(record).items()
+    )
+
+
+# Answers, sections of the page, and figures beside it.
+ANSWERS = (diagnosis_answer,)
 SECTIONS = (diagnosis_section,)
+DRAWINGS = (diagnosis_drawings,)

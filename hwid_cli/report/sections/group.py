@@ -1,5 +1,7 @@
 """Section about the search for groups of recordings."""
 
+from functools import partial
+
 from hwid_cli.records.groups import GroupSearch
 from hwid_cli.records.report import ReportContents
 from hwid_cli.report.figures.groups import coverage_histogram_figure, tree_figure
@@ -12,10 +14,9 @@ from hwid_cli.report.groups import (
 )
 from hwid_cli.report.page import (
     Collapsible,
-    Figures,
+    Drawing,
     PageBlock,
     Section,
-    drawn,
     section_notes,
 )
 from hwid_cli.report.table import Text
@@ -30,34 +31,27 @@ def groups_section(contents: ReportContents) -> Section:
     """Show the search as a tree, as tables, and why it stopped."""
     search = contents.stored.search
     blocks: list[PageBlock] = []
+    missing = ""
     if search is None or not search.groups:
-        blocks.append(Text("Not run yet: run 'hwid group CONFIG'.", is_note=True))
+        missing = "not run yet: run 'hwid group CONFIG'."
     else:
         joined = _JOINS.get(search.join, search.join)
         blocks.append(Text(f"Recordings are joined {joined}. {_stop(search)}"))
         blocks += section_notes(contents, is_validation=True)
-        blocks += [_tree(search), chain_table(search)]
-        blocks += [_histogram(search), levels_table(search)]
+        blocks += [Text(_chain(search)), chain_table(search)]
+        blocks += [Text(_best_of_levels(search)), levels_table(search)]
         for level in search.levels[1:]:
             table = join_table(search, level)
             blocks.append(
                 Collapsible(f"Coverage on level {level}: base and add-on", (table,))
             )
     title = "Grouping: recordings that share a model"
-    return Section("groups", title, "Grouping", tuple(blocks))
+    return Section("groups", title, "Grouping", tuple(blocks), missing)
 
 
 def _stop(search: GroupSearch) -> str:
     reason = search.reason.strip().rstrip(".")
     return f"The search stopped: {reason}." if reason else ""
-
-
-def _tree(search: GroupSearch) -> Figures:
-    alt = "Tree of the kept groups, level by level, with their coverage"
-    sentence = (
-        f"{_chain(search)} The number in each box and its filled part are the coverage."
-    )
-    return Figures((drawn("groups/tree", tree_figure(search), alt),), sentence)
 
 
 def _chain(search: GroupSearch) -> str:
@@ -67,17 +61,17 @@ def _chain(search: GroupSearch) -> str:
         return f"There is no chain: {NOTHING_COVERED}"
     winner = search.chain[-1]
     if len(covers) == 1:
-        return f"The winner, {winner} (bold, blue), covers {covers[0]} of {of}."
+        return f"The winner, {winner}, covers {covers[0]} of {of}."
     if len(set(covers)) == 1:
         how = f"keeps the coverage at {covers[0]}"
     else:
         verb = "raises" if covers[-1] > covers[0] else "moves"
         how = f"{verb} the coverage from {' to '.join(map(str, covers))}"
-    return f"The chain to {winner} (bold, blue) {how} of {of}."
+    return f"The chain to {winner} {how} of {of}."
 
 
-def _histogram(search: GroupSearch) -> Figures:
-    alt = "Number of groups by coverage, one histogram for each level"
+def _best_of_levels(search: GroupSearch) -> str:
+    """The best coverage of each level."""
     best = [
         max(group.coverage for group in search.groups if group.level == level)
         for level in search.levels
@@ -88,17 +82,24 @@ def _histogram(search: GroupSearch) -> Figures:
     )
     reach = f"{counted(at_best, 'group')} {'reaches' if at_best == 1 else 'reach'} it"
     if not any(best):
-        sentence = "No group covers any recording, on any level."
-    elif len(best) == 1:
-        sentence = f"The best coverage is {best[0]}; {reach}."
-    else:
-        ways = ", ".join(map(str, best))
-        sentence = (
-            f"The best coverage of the levels is {ways}; on the last one {reach}."
-        )
-    figure = coverage_histogram_figure(search)
-    return Figures((drawn("groups/coverage", figure, alt),), sentence)
+        return "No group covers any recording, on any level."
+    if len(best) == 1:
+        return f"The best coverage is {best[0]}; {reach}."
+    ways = ", ".join(map(str, best))
+    return f"The best coverage of the levels is {ways}; on the last one {reach}."
 
 
-# Sections of the page, in their order.
+def group_drawings(contents: ReportContents) -> tuple[Drawing, ...]:
+    """The tree of groups and their coverage as files."""
+    search = contents.stored.search
+    if search is None or not search.groups:
+        return ()
+    return (
+        Drawing("groups/tree.png", partial(tree_figure, search)),
+        Drawing("groups/coverage.png", partial(coverage_histogram_figure, search)),
+    )
+
+
+# Sections of the page, in their order, and figures beside it.
 SECTIONS = (groups_section,)
+DRAWINGS = (group_drawings,)

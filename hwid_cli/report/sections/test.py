@@ -1,8 +1,11 @@
 """Sections about the final test: the chain, the coverage matrix, the assignment."""
 
+from functools import partial
+
 import numpy as np
 
 from hwid_cli.records.report import ChainOnTests, ReportContents, RmsdMatrix
+from hwid_cli.report.dots import Dot, DotGroup, DotRow, Dots
 from hwid_cli.report.figures.final_test import trend_figure
 from hwid_cli.report.figures.matrices import rmsd_matrix_figure
 from hwid_cli.report.final_test import (
@@ -16,19 +19,19 @@ from hwid_cli.report.final_test import (
     smallest_set_table,
 )
 from hwid_cli.report.formats import counted, listed, with_unit
+from hwid_cli.report.matrices import rmsd_matrix_table
 from hwid_cli.report.page import (
     Collapsible,
-    Figures,
+    Drawing,
     PageBlock,
     Section,
     collapsed_beyond,
-    drawn,
     section_notes,
 )
 from hwid_cli.report.table import Text
 from hwid_cli.report.thesis_names import names_of_groups
 
-_NOT_RUN = Text("Not run yet: run 'hwid test CONFIG'.", is_note=True)
+_NOT_RUN = "not run yet: run 'hwid test CONFIG'."
 # Rows of a table that is shown open.
 _MOST_OPEN = 15
 
@@ -37,18 +40,15 @@ def final_test_section(contents: ReportContents) -> Section:
     """Show the chain of groups on the test recordings and on all recordings."""
     trend, matrix = contents.trend, contents.chain_matrix
     blocks: list[PageBlock] = []
+    missing = ""
     if trend is None or matrix is None:
-        blocks.append(_NOT_RUN)
+        missing = _NOT_RUN
     elif not trend.models:
-        blocks.append(Text("There is no chain of groups to test.", is_note=True))
+        missing = "there is no chain of groups to test."
     else:
         blocks += section_notes(contents, is_validation=True)
         if trend.recordings:
-            alt = "RMSD on the test recordings along the chain of groups"
-            figure = drawn("test/trend", trend_figure(trend), alt)
-            blocks.append(Figures((figure,), _trend_sentence(trend)))
-        alt = "Heat map of the RMSD of the chain's models on all recordings"
-        figure = drawn("test/chain", rmsd_matrix_figure(matrix), alt)
+            blocks += [Text(_trend_sentence(trend)), _trend_dots(trend)]
         covers = ", ".join(map(str, matrix.covers))
         is_one = len(matrix.models) == 1
         ways = ("model covers", "its") if is_one else ("models cover", "their")
@@ -56,9 +56,9 @@ def final_test_section(contents: ReportContents) -> Section:
             f"On all {len(matrix.recordings)} recordings the chain's {ways[0]} "
             f"{covers}, {ways[1]} own left out."
         )
-        blocks += [Figures((figure,), sentence), *_chain(contents)]
+        blocks += [Text(sentence), rmsd_matrix_table(matrix), *_chain(contents)]
     title = "Test: the chain of groups on recordings that nothing else has used"
-    return Section("test", title, "Test", tuple(blocks))
+    return Section("test", title, "Test", tuple(blocks), missing)
 
 
 def _chain(contents: ReportContents) -> list[PageBlock]:
@@ -90,36 +90,50 @@ def _trend_sentence(trend: ChainOnTests) -> str:
     )
 
 
+def _trend_dots(trend: ChainOnTests) -> Dots:
+    """The chain's models on the test recordings, beside the threshold."""
+    groups = []
+    for row, model in enumerate(trend.models):
+        rows = [
+            DotRow(name, (Dot(float(value), "taken", with_unit(value, trend.unit)),))
+            for name, value in zip(trend.recordings, trend.rmsd[row], strict=True)
+        ]
+        groups.append(DotGroup(model, tuple(rows)))
+    threshold = with_unit(trend.threshold, trend.unit)
+    return Dots(
+        label=f"RMSD [{trend.unit}]",
+        groups=tuple(groups),
+        sentence=f"RMSD of each model on each test recording; the dashed line is the threshold, {threshold}.",
+        alt="RMSD of the chain's models on the test recordings, with the threshold",
+        reference=(trend.threshold, f"threshold {threshold}"),
+        is_log=True,
+    )
+
+
 def coverage_section(contents: ReportContents) -> Section:
     """Show all models of the final test on all recordings."""
     final, matrix = contents.stored.final_test, contents.full_matrix
     blocks: list[PageBlock] = []
+    missing = ""
     if final is None or matrix is None:
-        blocks.append(_NOT_RUN)
+        missing = _NOT_RUN
     else:
         blocks += section_notes(contents, is_validation=True)
-        alt = "Heat map of the RMSD of all models on all recordings"
-        figure = drawn("coverage/matrix", rmsd_matrix_figure(matrix), alt)
-        blocks.append(Figures((figure,), _matrix_sentence(matrix)))
+        blocks += [Text(_matrix_sentence(matrix)), rmsd_matrix_table(matrix)]
         blocks += gap_sentences(final)
         table = coverage_matrix_table(final)
         blocks.append(Collapsible("The coverage as a table", (table,)))
     title = "Coverage: all models on all recordings"
-    return Section("coverage", title, "Coverage", tuple(blocks))
+    return Section("coverage", title, "Coverage", tuple(blocks), missing)
 
 
 def _matrix_sentence(matrix: RmsdMatrix) -> str:
     row = int(np.argmax(matrix.covers))
-    most = (
+    return (
         f"{matrix.models[row]} covers the most foreign recordings, "
         f"{matrix.covers[row]} of {len(matrix.recordings)}."
         if matrix.covers[row]
         else "No model covers a foreign recording."
-    )
-    return (
-        f"{most} A dot marks an RMSD below "
-        f"{with_unit(matrix.threshold, matrix.unit)}, a square the recordings of the "
-        "fit, which the counts leave out."
     )
 
 
@@ -127,9 +141,8 @@ def assignment_section(contents: ReportContents) -> Section:
     """Show which model serves which recording, and how well inputs tell it."""
     final = contents.stored.final_test
     blocks: list[PageBlock] = []
-    if final is None:
-        blocks.append(_NOT_RUN)
-    else:
+    missing = _NOT_RUN if final is None else ""
+    if final is not None:
         if final.smallest_set:
             blocks += section_notes(contents, is_validation=True)
         blocks.append(smallest_set_table(final))
@@ -150,8 +163,24 @@ def assignment_section(contents: ReportContents) -> Section:
                 collapsed_beyond(_MOST_OPEN, table, f"The predictions of {of}")
             )
     title = "Assignment: which model for which recording"
-    return Section("assignment", title, "Assignment", tuple(blocks))
+    return Section("assignment", title, "Assignment", tuple(blocks), missing)
 
 
-# Sections of the page, in their order.
+def final_drawings(contents: ReportContents) -> tuple[Drawing, ...]:
+    """Figures of the final test as files."""
+    trend, matrix = contents.trend, contents.chain_matrix
+    found = []
+    if trend is not None and matrix is not None and trend.models:
+        if trend.recordings:
+            found.append(Drawing("test/trend.png", partial(trend_figure, trend)))
+        found.append(Drawing("test/chain.png", partial(rmsd_matrix_figure, matrix)))
+    full = contents.full_matrix
+    if contents.stored.final_test is not None and full is not None:
+        draw = partial(rmsd_matrix_figure, full)
+        found.append(Drawing("coverage/matrix.png", draw))
+    return tuple(found)
+
+
+# Sections of the page, in their order, and figures beside it.
 SECTIONS = (final_test_section, coverage_section, assignment_section)
+DRAWINGS = (final_drawings,)

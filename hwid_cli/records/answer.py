@@ -1,0 +1,81 @@
+"""What a report answers first: which model to take, and how good it is where it was not fitted."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hwid_cli.records.model import HammersteinWiener
+from hwid_cli.records.order import OrderChoice
+
+
+@dataclass(frozen=True)
+class ChosenMaps:
+    """Maps that ``hwid order`` has recommended, and the orders at which it compared them.
+
+    Parameters
+    ----------
+    nb, nk : int, [-]
+        Place in the order grid.
+    """
+
+    nb: int
+    nk: int
+    input_map: str
+    output_map: str
+
+
+@dataclass(frozen=True, eq=False)
+class ModelAnswer:
+    """The model to take, beside a linear one, on recordings that it was not fitted to.
+
+    Parameters
+    ----------
+    name : str
+        ``step_06+step_09/3/7``.
+    linear : HammersteinWiener or None
+        Linear output-error model of the same orders and recordings; None where the model
+        itself is linear or the fit failed.
+    chosen_on : tuple of str
+        Recordings that chose it among others; empty where its own fit did.
+    recordings : tuple of str, length m
+        Recordings of which its fit has seen nothing.
+    is_unused : bool
+        Whether nothing else has used them either.
+    rmsd, linear_rmsd : ndarray, shape (m,), [unit]
+        NaN where there is no such model or its output is not finite.
+    fit_percent, linear_fit_percent : ndarray, shape (m,), [%]
+    input_range : tuple of float, [input unit]
+        What the input has visited in the fit.
+    beyond : ndarray, shape (m,), [-]
+        Share of the samples whose input lies outside of that.
+    threshold : float, [unit]
+        NaN where there is none.
+    advice : OrderChoice or None
+        Recommended orders; None without a cross-validation.
+    maps : ChosenMaps or None
+        Recommended maps; None where nobody has compared any at the recommended orders.
+    """
+
+    name: str
+    model: HammersteinWiener
+    linear: HammersteinWiener | None
+    own: tuple[str, ...]
+    chosen_on: tuple[str, ...]
+    recordings: tuple[str, ...]
+    is_unused: bool
+    rmsd: np.ndarray
+    linear_rmsd: np.ndarray
+    fit_percent: np.ndarray
+    linear_fit_percent: np.ndarray
+    input_range: tuple[float, float]
+    beyond: np.ndarray
+    unit: str
+    threshold: float
+    advice: OrderChoice | None = None
+    maps: ChosenMaps | None = None
+
+    @property
+    def median_place(self) -> int:
+        """Place of the recording whose fit is the median: one to show."""
+        values = np.where(np.isfinite(self.fit_percent), self.fit_percent, -np.inf)
+        return int(np.argsort(values)[values.size // 2])

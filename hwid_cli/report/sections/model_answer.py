@@ -1,0 +1,245 @@
+"""The answer of an identification: which model to take, and how good it is elsewhere."""
+
+import numpy as np
+
+from hwid_cli.records.answer import ModelAnswer
+from hwid_cli.records.report import ReportContents, SimulatedRecording
+from hwid_cli.report.charts import (
+    Chart,
+    Curve,
+    Panel,
+    thinned,
+    thinned_note,
+    thinned_places,
+    thinning,
+)
+from hwid_cli.report.dots import Dot, DotGroup, DotRow, Dots
+from hwid_cli.report.formats import counted, listed, with_unit
+from hwid_cli.report.page import Answer, PageBlock
+from hwid_cli.report.simulation_note import simulation_note
+
+# Recordings that the answer draws, and points of its curves.
+_MOST_ROWS, _MOST_POINTS = 9, 2000
+# Height of its charts, [pixels].
+_HEIGHT = 170
+# Shares of samples beyond what the fit has visited that need no word, [-].
+_FEW = 0.005
+
+
+def model_answer(contents: ReportContents) -> Answer | None:
+    """Name the model to take, with its error on recordings that its fit has not seen."""
+    found = contents.answer
+    if found is None:
+        return None
+    blocks = [one for one in (_errors(found), _overlay(contents, found)) if one]
+    return Answer(
+        "Which model describes the drive, and how well where it was not fitted?",
+        _verdict(found),
+        is_settled=_is_settled(found),
+        details=(_model(found), f"{_orders(found)} {_trust(found)}".strip()),
+        blocks=tuple(blocks),
+        next_steps=_next(found, contents),
+    )
+
+
+def _is_settled(found: ModelAnswer) -> bool:
+    """Whether the model stays below the threshold wherever it was validated."""
+    if not found.rmsd.size or not np.isfinite(found.rmsd).all():
+        return False
+    return bool(np.isnan(found.threshold) or (found.rmsd < found.threshold).all())
+
+
+def _verdict(found: ModelAnswer) -> str:
+    if not found.recordings:
+        return (
+            f"Take {found.name}. All recordings were needed to fit it, so nothing says yet "
+            "how good it is elsewhere."
+        )
+    where = counted(len(found.recordings), "recording")
+    unused = "nothing else has used" if found.is_unused else "its fit has not seen"
+    sentence = (
+        f"Take {found.name}: fit {_median(found.fit_percent)} on {where} that {unused}"
+    )
+    if np.isfinite(found.linear_fit_percent).any():
+        sentence += f" (linear: {_median(found.linear_fit_percent)})"
+    return f"{sentence}."
+
+
+def _median(values: np.ndarray) -> str:
+    """``93.1 %``, over what is finite."""
+    known = values[np.isfinite(values)]
+    if not known.size:
+        return "without a finite output"
+    return f"{float(np.median(known)):.1f}\N{NO-BREAK SPACE}%"
+
+
+def _spread(found: ModelAnswer) -> str:
+    """From where to where the fit goes, beside that of the linear model."""
+    ranges = []
+    for name, values in (
+        ("this model", found.fit_percent),
+        ("linear, same orders", found.linear_fit_percent),
+    ):
+        known = values[np.isfinite(values)]
+        if known.size > 1:
+            ranges.append(
+                f"{name} {known.min():.1f} to {known.max():.1f}\N{NO-BREAK SPACE}%"
+            )
+    return f" Fit: {'; '.join(ranges)}." if ranges else ""
+
+
+def _model(found: ModelAnswer) -> str:
+    """What the model is, and how its error stands to the threshold."""
+    orders = found.model.orders
+    maps = [
+        one.kind.replace("_", " ")
+        for one in (found.model.input_map, found.model.output_map)
+    ]
+    text = (
+        f"Orders [nb nf nk] = [{orders.nb} {orders.nf} {orders.nk}], input map {maps[0]}, "
+        f"output map {maps[1]}, fitted to {listed(found.own)}."
+    )
+    if found.rmsd.size and np.isfinite(found.threshold):
+        below = int(np.sum(found.rmsd < found.threshold))
+        text += (
+            f" {below} of {found.rmsd.size} below the threshold of "
+            f"{with_unit(found.threshold, found.unit)}."
+        )
+    return text + _spread(found)
+
+
+def _orders(found: ModelAnswer) -> str:
+    """Recommended orders and maps."""
+    if found.advice is None:
+        return ""
+    one = found.advice
+    text = f"Recommended for new fits: nb = {one.nb}, nk = {one.nk}"
+    if (one.best_nb, one.best_nk) != (one.nb, one.nk):
+        text += (
+            f" (the smallest within {100 * (one.evidence.factor - 1):.2g} % of the best, "
+            f"{one.best_nb}/{one.best_nk})"
+        )
+    if found.maps is not None:
+        pair = (found.maps.input_map, found.maps.output_map)
+        text += (
+            "; no maps" if set(pair) == {"none"} else f"; maps: {pair[0]} and {pair[1]}"
+        )
+    return f"{text}."
+
+
+def _trust(found: ModelAnswer) -> str:
+    low, high = found.input_range
+    unit = found.model.input_unit
+    text = (
+        f"Trust it for inputs from {with_unit(low, unit)} to {with_unit(high, unit)}, which "
+        "its fit has visited"
+    )
+    if found.beyond.size and float(found.beyond.max()) > _FEW:
+        worst = int(np.argmax(found.beyond))
+        text += (
+            f"; {found.recordings[worst]} leaves that range for "
+            f"{100 * float(found.beyond[worst]):.0f}\N{NO-BREAK SPACE}% of its samples"
+        )
+    return f"{text}."
+
+
+def _next(found: ModelAnswer, contents: ReportContents) -> tuple[tuple[str, str], ...]:
+    steps = []
+    if contents.stored.crossval is None:
+        steps.append(
+            ("Validate every model on every recording:", "hwid crossval CONFIG")
+        )
+    elif found.maps is None:
+        steps.append(("Which maps and orders to take, and why:", "hwid order CONFIG"))
+    steps.append(
+        (
+            "Take it elsewhere (json, mat, c, fmu):",
+            f"hwid export CONFIG --model {found.name} --format json",
+        )
+    )
+    if contents.stored.diagnosis is None:
+        steps.append(
+            (
+                "Ask what a physics simulation of the drive lacks: add simulation: to the configuration, then",
+                "hwid diagnose CONFIG",
+            )
+        )
+    return tuple(steps)
+
+
+def _errors(found: ModelAnswer) -> Dots | None:
+    """RMSD of the model and of the linear one on recordings that they have not seen."""
+    if not found.recordings:
+        return None
+    order = np.argsort(-np.nan_to_num(found.rmsd, nan=np.inf), kind="stable")
+    rows = []
+    for place in order[:_MOST_ROWS]:
+        pairs = ((found.linear_rmsd, "linear"), (found.rmsd, "taken"))
+        dots = tuple(
+            Dot(float(values[place]), role, with_unit(values[place], found.unit))
+            for values, role in pairs
+        )
+        rows.append(DotRow(found.recordings[place], dots))
+    left_out = len(order) - len(rows)
+    worst = f" The {_MOST_ROWS} worst; {left_out} more lie below." if left_out else ""
+    legend = [("taken", "this model")]
+    if np.isfinite(found.linear_rmsd).any():
+        legend.append(("linear", "linear, same orders"))
+    reference, said = None, ""
+    if np.isfinite(found.threshold):
+        threshold = with_unit(found.threshold, found.unit)
+        reference = (found.threshold, f"threshold {threshold}")
+        said = f" Dashed: the threshold, {threshold}."
+    return Dots(
+        label=f"RMSD [{found.unit}]",
+        groups=(DotGroup("", tuple(rows)),),
+        sentence=(
+            f"Error on recordings that the fit has not seen.{worst}{said} "
+            + simulation_note(found.model.initial_state, is_validation=True)
+        ),
+        alt="RMSD of the model and of a linear one on recordings that the fit has not seen",
+        legend=tuple(legend),
+        reference=reference,
+        is_log=True,
+        is_narrow=True,
+    )
+
+
+def _overlay(contents: ReportContents, found: ModelAnswer) -> PageBlock | None:
+    """The recording of median fit, measured and simulated."""
+    name = found.recordings[found.median_place] if found.recordings else found.own[0]
+    for one in contents.simulated:
+        if one.recording.name == name:
+            return _overlay_chart(one, found)
+    return None
+
+
+def _overlay_chart(one: SimulatedRecording, found: ModelAnswer) -> Chart | None:
+    recording = one.recording
+    chosen = thinning(recording.n_samples, _MOST_POINTS, one.detail)
+    outputs = {other.model: other.output for other in one.others} | {
+        one.model: one.output
+    }
+    curves = [Curve("measured", thinned(recording.output, chosen), "measured")]
+    for model, role, label in (
+        (f"linear:{found.name}", "linear", "linear"),
+        (found.name, "taken", "this model"),
+    ):
+        if model in outputs and np.isfinite(outputs[model]).all():
+            curves.append(Curve(label, thinned(outputs[model], chosen), role))
+    what = "of median fit" if len(found.recordings) > 2 else "not seen by the fit"
+    if not found.recordings:
+        what = "of the fit itself"
+    panel = Panel(f"output y [{recording.output_unit}]", tuple(curves), _HEIGHT)
+    return Chart(
+        name=recording.name,
+        at=recording.sample_time_s * thinned_places(chosen),
+        label="time t [s]",
+        panels=(panel,),
+        sentence=f"{recording.name}, {what}: measured and simulated.{thinned_note(chosen)}",
+        alt=f"Measured and simulated output of {recording.name} over time",
+        detail=(
+            recording.sample_time_s * one.detail[0],
+            recording.sample_time_s * one.detail[1],
+        ),
+    )

@@ -1,0 +1,203 @@
+"""Which model of the results to take, and how it does beside a linear one.
+
+The choice never looks at the recordings of the final test: those say how good it is.
+"""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from hwid_cli.model.fit import fit
+from hwid_cli.model.scores import fit_percent, rmsd
+from hwid_cli.model.simulate import validation_output
+from hwid_cli.records.answer import ChosenMaps, ModelAnswer
+from hwid_cli.records.experiment import OrderOptions
+from hwid_cli.records.groups import FinalTest
+from hwid_cli.records.model import Fit, HammersteinWiener
+from hwid_cli.records.order import OrderChoice
+from hwid_cli.records.recordings import Recording
+from hwid_cli.records.report import StoredResults
+from hwid_cli.records.results import CrossValidation
+from hwid_cli.stages.compare import linear_options
+from hwid_cli.stages.model_views import named_fits
+from hwid_cli.stages.order import recommend_overall
+from hwid_cli.stages.test import best_single
+from hwid_cli.tasks.task import one_thread
+
+
+def model_answer(
+    stored: StoredResults, crossval: CrossValidation | None
+) -> ModelAnswer | None:
+    """Choose a model, and simulate it and a linear one where it was not fitted.
+
+    Parameters
+    ----------
+    crossval : CrossValidation or None
+        Of the stored models; None where there is none.
+
+    Returns
+    -------
+    ModelAnswer or None
+        None without any model.
+    """
+    named = {
+        name: one for name, one in named_fits(stored).items() if one.model is not None
+    }
+    advice = _advice(stored, crossval)
+    name, chosen_on = _chosen(stored, crossval, named)
+    if not name or not stored.recordings:
+        return None
+    found = named[name]
+    if found.model is None:
+        return None
+    own = found.identified_on
+    linear = _linear(found, stored.recordings)
+    final = stored.final_test
+    tested = () if final is None else final.tested_on
+    unseen = [
+        one
+        for one in stored.recordings
+        if one.name not in own and (not tested or one.name in tested)
+    ]
+    judged = crossval or final
+    threshold = np.nan if judged is None else judged.threshold
+    deviation, percent = _scores(found.model, unseen)
+    linear_deviation, linear_percent = _scores(linear, unseen)
+    visited = _visited(found, stored.recordings)
+    return ModelAnswer(
+        name=name,
+        model=found.model,
+        linear=linear,
+        own=own,
+        chosen_on=chosen_on,
+        recordings=tuple(one.name for one in unseen),
+        is_unused=bool(tested),
+        rmsd=deviation,
+        linear_rmsd=linear_deviation,
+        fit_percent=percent,
+        linear_fit_percent=linear_percent,
+        input_range=visited,
+        beyond=np.array([_beyond(visited, one) for one in unseen]),
+        unit=stored.recordings[0].output_unit,
+        threshold=threshold,
+        advice=advice,
+        maps=_maps(stored, advice),
+    )
+
+
+def _maps(stored: StoredResults, advice: OrderChoice | None) -> ChosenMaps | None:
+    """What ``hwid order`` recommended, if it did so for the orders of today."""
+    maps = stored.chosen_maps
+    if advice is None or maps is None or (maps.nb, maps.nk) != _place(advice):
+        return None
+    return maps
+
+
+def _place(advice: OrderChoice) -> tuple[int, int]:
+    return advice.nb, advice.nk
+
+
+def _advice(
+    stored: StoredResults, crossval: CrossValidation | None
+) -> OrderChoice | None:
+    """Recommended orders; None where outliers count, which ``hwid order`` leaves out first."""
+    if crossval is None:
+        return None
+    if any(one.options.loss != "squared" for one in stored.fits):
+        return None
+    options = stored.order or OrderOptions()
+    return recommend_overall(stored.fits, crossval, stored.recordings, options)
+
+
+def _chosen(
+    stored: StoredResults,
+    crossval: CrossValidation | None,
+    named: Mapping[str, Fit],
+) -> tuple[str, tuple[str, ...]]:
+    """Name of the model to take, and the recordings that chose it."""
+    final, search = stored.final_test, stored.search
+    if final is not None:
+        name, chosen_on = _of_final_test(final)
+        if name in named:
+            return name, chosen_on
+    if search is not None and search.chain:
+        last = search.chain_groups[-1]
+        if last.model_name in named:
+            return last.model_name, search.validated_on
+    if crossval is not None:
+        name, chosen_on = _of_crossval(crossval)
+        if name in named:
+            return name, chosen_on
+    usable = {name: one for name, one in named.items() if np.isfinite(one.fit_percent)}
+    if not usable:
+        return "", ()
+    return max(usable, key=lambda name: usable[name].fit_percent), ()
+
+
+def _of_final_test(final: FinalTest) -> tuple[str, tuple[str, ...]]:
+    """The chain's last model, else the best one of a single recording."""
+    known = ~np.isin(final.recordings, final.tested_on)
+    place = final.models.index(final.chain[-1]) if final.chain else best_single(final)
+    if place < 0:
+        return "", ()
+    names = np.array(final.recordings)[known & ~final.is_own[place]]
+    return final.models[place], tuple(names.tolist())
+
+
+def _of_crossval(crossval: CrossValidation) -> tuple[str, tuple[str, ...]]:
+    """The model that covers the largest share of other recordings, of these the best."""
+    names = np.array(crossval.validated_on)
+    found = []
+    for place in np.ndindex(crossval.rmsd.shape[:3]):
+        values = crossval.rmsd[place][names != crossval.identified_on[place[0]]]
+        if values.size and np.isfinite(values).all():
+            share = float(np.mean(values < crossval.threshold))
+            found.append((-share, float(np.mean(np.log(values))), place))
+    if not found:
+        return "", ()
+    n, b, k = min(found)[-1]
+    who = crossval.identified_on[n]
+    others = tuple(one for one in crossval.validated_on if one != who)
+    return f"{who}/{crossval.nb[b]}/{crossval.nk[k]}", others
+
+
+def _linear(found: Fit, recordings: Sequence[Recording]) -> HammersteinWiener | None:
+    """Linear model of the same orders and recordings; None where there is no such thing."""
+    options = found.options
+    if options.input_map == options.output_map == "none" or found.model is None:
+        return None
+    by_name = {one.name: one for one in recordings}
+    if not set(found.identified_on) <= set(by_name):
+        return None
+    own = [by_name[name] for name in found.identified_on]
+    with one_thread():
+        return fit(own, found.model.orders, linear_options(options)).model
+
+
+def _scores(
+    model: HammersteinWiener | None, recordings: Sequence[Recording]
+) -> tuple[np.ndarray, np.ndarray]:
+    """RMSD and fit percent on each recording; NaN without a model."""
+    if model is None:
+        missing = np.full(len(recordings), np.nan)
+        return missing, missing
+    outputs = [validation_output(model, one) for one in recordings]
+    both = [
+        (rmsd(one.output, simulated), fit_percent(one.output, simulated))
+        for one, simulated in zip(recordings, outputs, strict=True)
+    ]
+    values = np.array(both).reshape(-1, 2)
+    return values[:, 0], values[:, 1]
+
+
+def _visited(found: Fit, recordings: Sequence[Recording]) -> tuple[float, float]:
+    """Lowest and highest input of the fit."""
+    own = [one.input for one in recordings if one.name in found.identified_on]
+    if not own and found.model is not None:
+        return found.model.input_map.domain
+    return min(float(one.min()) for one in own), max(float(one.max()) for one in own)
+
+
+def _beyond(visited: tuple[float, float], recording: Recording) -> float:
+    low, high = visited
+    return float(np.mean((recording.input < low) | (recording.input > high)))

@@ -1,0 +1,220 @@
+"""The first sentences of the page: what they say of every verdict and model."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hwid_cli.records.answer import ChosenMaps
+from hwid_cli.records.diagnosis import BaseParameter, FittedParameter
+from hwid_cli.records.report import ReportContents, StoredResults
+from hwid_cli.report.sections.diagnosis_answer import (
+    diagnosis_answer,
+    value_with_interval,
+    verdict_in_words,
+)
+from hwid_cli.report.sections.model_answer import model_answer
+from hwid_cli.report.sections.summary import summary_section
+from hwid_cli.stages.report import report_contents
+from tests.report.diagnosis_examples import named, nothing_missing, unknown
+from tests.report.report_examples import DIAGNOSIS, calibrated_only
+
+NAN = float("nan")
+
+
+def plain(text):
+    return text.replace("\N{NO-BREAK SPACE}", " ")
+
+
+def answer_to(record):
+    stored = StoredResults("a", "{}", "poles", results={"diagnose": record})
+    return diagnosis_answer(ReportContents(stored))
+
+
+@pytest.mark.parametrize(
+    ("value", "low", "high", "expected"),
+    [
+        (0.79894, 0.79737, 0.80052, "0.799 N [0.797, 0.801]"),
+        (0.8012, 0.7911, 0.8113, "0.80 N [0.79, 0.81]"),
+        (1234.6, 1190.0, 1280.0, "1230 N [1190, 1280]"),
+        (1.2e-7, 1.1e-7, 1.3e-7, "1.2e-07 N [1.1e-07, 1.3e-07]"),
+        (2.5, NAN, NAN, "2.5 N"),
+        (2.5, 2.5, 2.5, "2.5 N"),
+        (NAN, NAN, NAN, "unknown N"),
+    ],
+)
+def test_a_value_has_the_digits_that_its_interval_allows(value, low, high, expected):
+    found = value_with_interval(FittedParameter("force_N", value, low, high), "N")
+
+    assert plain(found) == expected
+
+
+def test_a_named_effect_is_said_with_its_size_and_interval():
+    found = answer_to(named())
+
+    # force_N of the example is 0.81 with 0.79 to 0.83.
+    assert plain(found.verdict).startswith("The simulation lacks Coulomb friction: ")
+    assert " N [" in plain(found.verdict)
+    assert found.is_settled
+    assert "were never trained on" in found.details[0]
+    assert "times the noise" in found.details[0]
+
+
+def test_the_picture_before_and_after_stands_beside_the_noise():
+    record = named()
+    gaps = answer_to(record).blocks[0]
+
+    assert [row.name for row in gaps.groups[0].rows] == [
+        *("as given", "re-fitted", "with Coulomb friction"),
+    ]
+    told = [row.dots[0].value for row in gaps.groups[0].rows]
+    steps = (record.given, record.before, record.after)
+    assert told == [one.ratio_to_noise for one in steps]
+    assert gaps.reference[0] == 1.0
+
+
+def test_force_and_overlay_stand_beside_it():
+    _, force, overlay = answer_to(named()).blocks
+
+    assert [one.label for one in force.panels[0].curves][-1] == "with the effects"
+    assert "held out" in overlay.sentence
+    assert len(overlay.panels) == 1
+
+
+@pytest.mark.parametrize(
+    ("changes", "words", "is_settled"),
+    [
+        ({"complete": False}, "A part of the gap stays unexplained.", False),
+        (
+            {"verdict": "ambiguous", "ambiguous_with": ("stribeck_friction",)},
+            "or instead Stribeck friction: these recordings cannot tell them apart",
+            False,
+        ),
+    ],
+)
+def test_what_stays_open_is_said(changes, words, is_settled):
+    found = answer_to(replace(named(), **changes))
+
+    assert words in found.verdict
+    assert found.is_settled == is_settled
+
+
+def test_verdicts_without_an_effect():
+    assert verdict_in_words(nothing_missing()).startswith("Nothing is missing")
+    assert answer_to(nothing_missing()).is_settled
+    assert "no known effect explains" in verdict_in_words(unknown())
+    assert not answer_to(unknown()).is_settled
+    base = (
+        BaseParameter("stiffness_N_per_m", 1000.0, 1200.0, 1200.0),
+        BaseParameter("damping_N_s_per_m", 10.0, 10.1, 10.1),
+    )
+    moved = replace(nothing_missing(), verdict="parameters", base=base)
+    assert "most of all the stiffness: 1000 given, 1200 N/m fitted (+20.0 %)" in plain(
+        verdict_in_words(moved)
+    )
+
+
+def test_a_stand_in_is_called_one():
+    assert "A linear stand-in was run" in " ".join(
+        answer_to(replace(named(), confirmed="surrogate")).details
+    )
+
+
+def test_without_held_out_recordings_the_gap_is_that_of_the_fit():
+    found = answer_to(replace(named(), held_out=()))
+
+    assert "none was held out" in found.details[0]
+
+
+def test_without_noise_the_gap_has_a_unit():
+    record = named()
+    found = answer_to(replace(record, noise=replace(record.noise, rms=0.0)))
+
+    assert "times the noise" not in found.details[0]
+    assert plain(found.details[0]).split(":")[1].count(" m") == 3
+    assert found.blocks[0].reference is None
+
+
+def test_results_that_left_a_file_only_have_an_answer_too():
+    stored = StoredResults("a", "{}", "poles", diagnosis=DIAGNOSIS)
+
+    assert diagnosis_answer(ReportContents(stored)).verdict == "Verdict: named."
+    assert diagnosis_answer(ReportContents(StoredResults("a", "{}", "poles"))) is None
+
+
+def test_the_model_is_named_with_its_fit_beside_the_linear_one(contents):
+    found, record = model_answer(contents), contents.answer
+
+    assert found.verdict.startswith(f"Take {record.name}: fit ")
+    assert f"{np.median(record.fit_percent):.1f} %" in plain(found.verdict)
+    assert f"(linear: {np.median(record.linear_fit_percent):.1f} %)" in plain(
+        found.verdict
+    )
+    assert "1 recording that nothing else has used" in found.verdict
+    assert any(record.name in command for _, command in found.next_steps)
+
+
+def answered(contents, **changes):
+    return model_answer(replace(contents, answer=replace(contents.answer, **changes)))
+
+
+def test_where_to_trust_it_is_said(contents):
+    inside = answered(contents, input_range=(-1.5, 2.0), beyond=np.array([0.0]))
+    assert plain(inside.details[1]).endswith(
+        "Trust it for inputs from -1.5 A to 2 A, which its fit has visited."
+    )
+    outside = answered(contents, beyond=np.array([0.25]))
+    assert "leaves that range for 25 % of its samples" in plain(outside.details[1])
+
+
+def test_recommended_orders_and_maps_are_said(contents):
+    advice = contents.answer.advice
+    maps = ChosenMaps(advice.nb, advice.nk, "saturation", "none")
+    told = plain(answered(contents, maps=maps).details[1])
+
+    assert f"Recommended for new fits: nb = {advice.nb}, nk = {advice.nk}" in told
+    assert "maps: saturation and none" in told
+    none = ChosenMaps(advice.nb, advice.nk, "none", "none")
+    assert "; no maps." in plain(answered(contents, maps=none).details[1])
+
+
+def test_a_model_above_the_threshold_is_not_settled(contents):
+    low = answered(contents, rmsd=np.array([1e-3]), threshold=0.01)
+    high = answered(contents, rmsd=np.array([2e-2]), threshold=0.01)
+
+    assert low.is_settled
+    assert not high.is_settled
+    assert "0 of 1 below the threshold" in high.details[0]
+
+
+def test_a_model_of_all_recordings_says_that_nothing_validates_it(contents):
+    none = np.zeros(0)
+    found = answered(
+        contents,
+        recordings=(),
+        rmsd=none,
+        linear_rmsd=none,
+        fit_percent=none,
+        linear_fit_percent=none,
+        beyond=none,
+    )
+
+    assert "nothing says yet how good it is elsewhere" in found.verdict
+    assert not found.is_settled
+
+
+def test_two_answers_share_the_first_screen(contents):
+    answers = [diagnosis_answer(contents), model_answer(contents)]
+    shown = summary_section(contents, answers).blocks
+
+    assert [one.is_small for one in shown] == [True, True]
+    assert [one.is_small for one in summary_section(contents, answers[:1]).blocks] == [
+        False
+    ]
+
+
+def test_results_of_calibration_alone_say_what_to_run():
+    (found,) = summary_section(report_contents(calibrated_only()), []).blocks
+
+    assert found.verdict.startswith("No model yet")
+    assert ("Fit models to them:", "hwid identify CONFIG") in found.next_steps
