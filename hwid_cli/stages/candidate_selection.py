@@ -20,8 +20,7 @@ from hwid_cli.records.recordings import Recording
 # A model that is this many times worse than the best, or missing, is just bad: how bad
 # must not decide between the others.
 _MOST_FACTOR = 10.0
-# Share of a recording's input that may lie beyond what a model has seen for the recording
-# to score it: beyond, a map extrapolates, however it was fitted.
+# Share of a recording's input beyond what a model has seen above which the pair is named.
 _MOST_UNEXCITED = 0.1
 
 
@@ -37,7 +36,7 @@ class ScoredCandidates:
     validation : ndarray of int, shape (n_pairs,)
         Number of the validation recording; -1 where it is the model's own.
     n_unexcited : int, [-]
-        Pairs that do not count, because the input goes beyond what the model has seen.
+        Pairs in which the input goes beyond what the model has seen.
     n_outliers : int, [samples]
         In the validation recordings, that do not count.
     """
@@ -91,16 +90,14 @@ def scored(
     Returns
     -------
     ScoredCandidates or None
-        None where there is no RMSD at all. Where every recording's input goes beyond what
-        the models have seen, all count.
+        None where there is no RMSD at all.
     """
     inputs = {one.name: one.input for one in recordings}
-    others = _known_pairs(rmsd, identified_on, validated_on, is_own=False)
-    pairs = [
-        (place, other)
-        for place, other in others
-        if _is_within(inputs[identified_on[place]], inputs[validated_on[other]])
-    ] or others
+    pairs = _known_pairs(rmsd, identified_on, validated_on, is_own=False)
+    n_unexcited = sum(
+        not _is_within(inputs[identified_on[place]], inputs[validated_on[other]])
+        for place, other in pairs
+    )
     is_alone = not pairs
     if is_alone:
         pairs = _known_pairs(rmsd, identified_on, validated_on, is_own=True)
@@ -112,7 +109,6 @@ def scored(
     factors = logs - np.nanmin(logs, axis=1, keepdims=True)
     factors = np.minimum(np.nan_to_num(factors, nan=np.inf), np.log(_MOST_FACTOR))
     validation = np.array([-1 if is_alone else other for _, other in pairs])
-    n_unexcited = max(len(others) - len(pairs), 0)
     counts = [n_outliers[one] for one in {other for _, other in pairs} if n_outliers]
     return ScoredCandidates(factors, values, validation, n_unexcited, sum(counts))
 
@@ -127,7 +123,8 @@ def smallest_good(
     sizes : ndarray, shape (n_candidates,)
         What small means; of equally small ones the best is chosen.
     tolerance : float, [-]
-        Share by which it may be worse than the best; one standard error is allowed too.
+        Share by which it may be worse than the best. Standard errors decide nothing: of
+        few recordings they are so large that the candidates taken would be too small.
 
     References
     ----------
@@ -139,20 +136,18 @@ def smallest_good(
     )
     mean = by_recording.mean(axis=0)
     best = int(np.argmin(mean))
-    error = np.full(mean.shape, np.nan)
-    if len(by_recording) > 1:
-        worse = by_recording - by_recording[:, [best]]
-        error = worse.std(axis=0, ddof=1) / np.sqrt(len(by_recording))
-    is_good = mean - mean[best] <= np.maximum(np.log1p(tolerance), np.nan_to_num(error))
+    is_good = mean - mean[best] <= np.log1p(tolerance)
     smallest = is_good & (sizes == sizes[is_good].min())
     chosen = int(np.argmin(np.where(smallest, mean, np.inf)))
+    worse = by_recording[:, chosen] - by_recording[:, best]
+    error = worse.std(ddof=1) / np.sqrt(worse.size) if worse.size > 1 else np.nan
     factors = np.exp(mean - mean[best])
     rmsd = np.array([_typical(column) for column in found.rmsd.T])
     evidence = SelectionEvidence(
         rmsd=float(rmsd[chosen]),
         best_rmsd=float(rmsd[best]),
         factor=float(factors[chosen]),
-        standard_error=float(error[chosen]),
+        standard_error=float(error),
         n_validation=int(np.sum(names >= 0)),
         n_unexcited=found.n_unexcited,
         n_outliers=found.n_outliers,
