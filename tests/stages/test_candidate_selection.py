@@ -21,15 +21,17 @@ def tensor(values):
     return np.stack([np.ones_like(second), second], axis=1)
 
 
-def test_inputs_beyond_what_a_model_has_seen_do_not_judge():
+def test_inputs_beyond_what_a_model_has_seen_judge_too_and_are_told():
     # The second candidate goes astray on "large" only, where the others never were.
     rmsd = tensor([[0.1, 0.5, 8.0], [0.5, 0.1, 8.0]])
     found = scored(rmsd, NAMES[:2], NAMES, (SMALL, ALIKE, LARGE))
 
     # "alike" has not seen the level 0, at which "small" stands half of the time.
     assert found.n_unexcited == 3
-    assert found.validation.tolist() == [1]
-    assert smallest_good(found, np.array([1, 2]), 0.05).chosen == 1
+    assert sorted(found.validation.tolist()) == [0, 1, 2, 2]
+    verdict = smallest_good(found, np.array([2, 1]), 0.05)
+    # 2 and 1 on two recordings, 1 and 8 on the third.
+    assert (verdict.chosen, verdict.factors[1]) == (0, pytest.approx(2.0 ** (1 / 3)))
 
 
 def test_a_few_samples_beyond_do_not_matter():
@@ -41,14 +43,14 @@ def test_a_few_samples_beyond_do_not_matter():
     assert (found.n_unexcited, len(found.validation)) == (0, 1)
 
 
-def test_where_all_inputs_go_beyond_all_judge():
+def test_where_all_inputs_go_beyond_it_is_told():
     found = scored(tensor([[0.1, 8.0]]), ("small",), ("small", "large"), (SMALL, LARGE))
 
     assert found.validation.tolist() == [1]
-    assert found.n_unexcited == 0
+    assert found.n_unexcited == 1
 
 
-def test_where_those_within_have_no_number_the_others_judge():
+def test_recordings_without_a_number_do_not_judge():
     rmsd = tensor([[0.1, 0.5, 8.0]])
     rmsd[0, :, 1] = np.nan
     found = scored(rmsd, ("small",), NAMES, (SMALL, ALIKE, LARGE))

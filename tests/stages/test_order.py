@@ -6,7 +6,6 @@ from hwid_cli.records.experiment import CrossvalOptions, OrderOptions, OrdersOpt
 from hwid_cli.records.model import Fit, FitOptions, Information, Orders
 from hwid_cli.records.recordings import Recording
 from hwid_cli.records.results import CrossValidation
-from hwid_cli.stages.candidate_selection import scored, smallest_good
 from hwid_cli.stages.crossval import cross_validate
 from hwid_cli.stages.identify import identify_all
 from hwid_cli.stages.order import recommend_orders
@@ -128,20 +127,6 @@ def test_where_validation_recordings_disagree_their_mean_decides():
     # On average 7 % worse, within a standard error of 11 %.
     rmsd[:, 0, 0] = np.array([1.3, 0.88, 1.3, 0.88])
     assert made_up(rmsd).overall.nk == 2
-
-
-def test_recordings_beyond_what_a_model_has_seen_count_and_are_told():
-    """Both candidates agree where the input stays in its range, one fails beyond it."""
-    inputs = {"a": 1.0, "b": 1.0, "c": 3.0}
-    chosen = [
-        Recording(name, np.array([0.0, 0.5, top]), np.zeros(3), 1.0)
-        for name, top in inputs.items()
-    ]
-    rmsd = np.array([[[1.0, 1.0, 2.0], [1.01, 1.01, 1.0]]])
-    found = scored(rmsd, ["a"], ["a", "b", "c"], chosen)
-
-    assert found.n_unexcited == 1
-    assert smallest_good(found, np.array([1, 2]), 0.02).chosen == 1
 
 
 def test_a_model_that_goes_astray_does_not_decide_alone():
