@@ -57,9 +57,9 @@ def _left_out(evidence: SelectionEvidence) -> tuple[str, ...]:
     found = []
     if count := evidence.n_unexcited:
         found.append(
-            f"In {counted(count, 'pair')} of model and recording the input leaves the range "
-            f"that the model was fitted in: {'they count' if count != 1 else 'it counts'} "
-            "too, because that is what new recordings do."
+            f"{counted(count, 'pair')} of model and recording {'do' if count != 1 else 'does'} "
+            "not count: there more than three quarters of the input lie beyond the range that "
+            "the model was fitted in, and its maps are extrapolated."
         )
     if count := evidence.n_outliers:
         found.append(

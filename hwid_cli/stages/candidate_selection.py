@@ -20,8 +20,10 @@ from hwid_cli.records.recordings import Recording
 # A model that is this many times worse than the best, or missing, is just bad: how bad
 # must not decide between the others.
 _MOST_FACTOR = 10.0
-# Share of a recording's input beyond what a model has seen above which the pair is named.
-_MOST_UNEXCITED = 0.1
+# Share of a recording's input that may lie beyond what a model has seen for the recording
+# to score it. New recordings go beyond too, so that much of it may; but one that has next
+# to nothing in common with the model's own says nothing of candidates.
+_MOST_UNEXCITED = 0.75
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +38,7 @@ class ScoredCandidates:
     validation : ndarray of int, shape (n_pairs,)
         Number of the validation recording; -1 where it is the model's own.
     n_unexcited : int, [-]
-        Pairs in which the input goes beyond what the model has seen.
+        Pairs that do not count, because most of the input is beyond what the model has seen.
     n_outliers : int, [samples]
         In the validation recordings, that do not count.
     """
@@ -90,14 +92,16 @@ def scored(
     Returns
     -------
     ScoredCandidates or None
-        None where there is no RMSD at all.
+        None where there is no RMSD at all. Where most of every recording's input is beyond
+        what the models have seen, all count.
     """
     inputs = {one.name: one.input for one in recordings}
-    pairs = _known_pairs(rmsd, identified_on, validated_on, is_own=False)
-    n_unexcited = sum(
-        not _is_within(inputs[identified_on[place]], inputs[validated_on[other]])
-        for place, other in pairs
-    )
+    others = _known_pairs(rmsd, identified_on, validated_on, is_own=False)
+    pairs = [
+        (place, other)
+        for place, other in others
+        if _is_within(inputs[identified_on[place]], inputs[validated_on[other]])
+    ] or others
     is_alone = not pairs
     if is_alone:
         pairs = _known_pairs(rmsd, identified_on, validated_on, is_own=True)
@@ -109,6 +113,7 @@ def scored(
     factors = logs - np.nanmin(logs, axis=1, keepdims=True)
     factors = np.minimum(np.nan_to_num(factors, nan=np.inf), np.log(_MOST_FACTOR))
     validation = np.array([-1 if is_alone else other for _, other in pairs])
+    n_unexcited = max(len(others) - len(pairs), 0)
     counts = [n_outliers[one] for one in {other for _, other in pairs} if n_outliers]
     return ScoredCandidates(factors, values, validation, n_unexcited, sum(counts))
 
@@ -172,7 +177,7 @@ def _known_pairs(
 
 
 def _is_within(seen: np.ndarray, validating: np.ndarray) -> bool:
-    """Whether a validation recording's input stays in what a model has seen."""
+    """Whether enough of a validation recording's input is what a model has seen."""
     share, *_ = outside_share(validating, (float(seen.min()), float(seen.max())))
     return share <= _MOST_UNEXCITED
 
