@@ -11,7 +11,7 @@ DEV := $(VENV)/installed-dev
 
 .DEFAULT_GOAL := help
 .PHONY: help install run test test-all check audit format smoke clean reliability \
-        bench bench-beyond bench-campaign bench-growth bench-maps bench-page bench-rounds bench-search bench-starts bench-wide \
+        bench bench-beyond bench-campaign bench-growth bench-maps bench-page bench-rounds bench-search bench-starts bench-wide bench-advice \
         bench-real scale \
         simulate calibrate identify crossval group test-stage steps model1 model2 \
         reproduction thesis chapter2 hsm150 diagnose gun real effects drive-source model-schema golden export-check blind machines
@@ -92,6 +92,9 @@ bench-search: $(DEV)  ## the whole search for groups of the thesis: half an hour
 
 bench-beyond: $(DEV)  ## how far models hold beyond the recording of their fit: ten minutes
 	@$(BENCH).bench_beyond
+
+bench-advice: $(DEV)  ## recommended orders and maps against the best ones on fresh recordings: three minutes
+	@$(BENCH).bench_advice
 
 bench-maps: $(DEV)  ## maps of the default size against maps chosen by the data: seven minutes
 	@$(BENCH).bench_maps

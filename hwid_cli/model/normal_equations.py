@@ -127,8 +127,12 @@ def combined(total: np.ndarray, change: np.ndarray, first: int) -> np.ndarray:
     """
     n, (new, old) = total.shape[0], change.shape
     rows = np.zeros((n - old + new, n))
-    rows[:first] = total[:first]
-    rows[first + new :] = total[first + old :]
+    # By loops: assignments of arrays bring a second of compiling with them.
+    for r in range(n):
+        if r < first or r >= first + old:
+            at = r if r < first else r - old + new
+            for k in range(n):
+                rows[at, k] = total[r, k]
     for i in range(new):
         for j in range(old):
             share = change[i, j]
@@ -136,8 +140,11 @@ def combined(total: np.ndarray, change: np.ndarray, first: int) -> np.ndarray:
                 for k in range(n):
                     rows[first + i, k] += share * total[first + j, k]
     result = np.zeros((n - old + new, n - old + new))
-    result[:, :first] = rows[:, :first]
-    result[:, first + new :] = rows[:, first + old :]
+    for r in range(result.shape[0]):
+        for k in range(first):
+            result[r, k] = rows[r, k]
+        for k in range(first + old, n):
+            result[r, k - old + new] = rows[r, k]
     for i in range(new):
         for j in range(old):
             share = change[i, j]

@@ -26,7 +26,7 @@ from hwid_cli.model.linear_block import (
     is_stable,
     reflected,
 )
-from hwid_cli.model.maps.piecewise_linear import piecewise_linear_shares
+from hwid_cli.model.maps.piecewise_linear import hat_functions
 from hwid_cli.records.model import Orders
 
 
@@ -201,7 +201,7 @@ def regression(
     bases = []
     for one in experiments:
         if points.size > 2:
-            _, _, first, shares = piecewise_linear_shares(one.input, points, points, 1)
+            first, shares = hat_functions(one.input, points)
         else:
             first = np.zeros(one.input.size, dtype=np.int64)
             shares = np.ascontiguousarray(one.input)[:, None]

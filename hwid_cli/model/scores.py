@@ -1,5 +1,7 @@
 """How good a simulated output is: RMSD, fit percent, coverage."""
 
+import math
+
 import numpy as np
 
 
@@ -31,13 +33,15 @@ def rmsd(measured: np.ndarray, simulated: np.ndarray) -> float:
     1.0
     """
     difference = _difference(measured, simulated)
-    if not np.isfinite(difference).all():
-        return float("nan")
     # Factoring out the largest value keeps the squares of a diverging model finite.
     largest = float(np.max(np.abs(difference), initial=0.0))
+    if not math.isfinite(largest):
+        return float("nan")
     if largest == 0.0:
         return 0.0
-    return largest * float(np.sqrt(np.mean((difference / largest) ** 2)))
+    difference /= largest
+    difference *= difference
+    return largest * math.sqrt(difference.mean())
 
 
 def fit_percent(measured: np.ndarray, simulated: np.ndarray) -> float:

@@ -20,7 +20,7 @@ from hwid_cli.model.derivative_rows import local_sums
 from hwid_cli.model.distinct import WHILE_FIXED, distinct
 from hwid_cli.model.levenberg_marquardt import Search, minimise
 from hwid_cli.model.linear_block import as_loops_take_it
-from hwid_cli.model.maps.piecewise_linear import piecewise_linear_shares
+from hwid_cli.model.maps.piecewise_linear import hat_functions
 from hwid_cli.model.points import ModelPoint, Signals, all_signals
 from hwid_cli.model.sensitivities import compared
 from hwid_cli.model.starts import Start
@@ -160,7 +160,7 @@ def _with_output_curve(
     points = np.linspace(x.min(), x.max(), _CURVE_POINTS)
     if not points[0] < points[-1]:
         return candidate
-    _, _, first, shares = piecewise_linear_shares(x, points, points, 1)
+    first, shares = hat_functions(x, points)
     matrix, vector = local_sums(first, shares, measured[:, None], points.size)
     matrix += _STIFFNESS * x.size / points.size * _BENDING
     values = np.linalg.solve(matrix, vector[:, 0])

@@ -214,8 +214,10 @@ def _free_responses(model: HammersteinWiener, n_samples: int) -> np.ndarray:
     """Differences of the impulse response of 1/F, shape (n, n_state), while they last."""
     n_state = model.orders.n_state
     impulse = free_response(np.ones(1), model.denominator, n_samples)
-    lasting = np.flatnonzero(np.abs(impulse) > _DIED_AWAY * np.abs(impulse).max())
-    n = min(n_samples, int(lasting[-1]) + 1 + n_state) if lasting.size else n_samples
+    size = np.abs(impulse)
+    lasting = size > _DIED_AWAY * size.max()
+    dead = int(lasting[::-1].argmax()) if lasting.any() else 0
+    n = min(n_samples, n_samples - dead + n_state)
     columns = np.empty((n, n_state))
     padded = padded_signal(impulse[:n], n_state + 1, 0.0)
     difference_columns(padded, n_state + 1, 0, np.ones(n), 0, n_state, columns)
@@ -232,9 +234,11 @@ def _state_step(
     found = static_map.derivatives(model.output_map, x, with_positions=False)
     jacobian = found.slope[:, None] * responses
     matrix, vector = jacobian.T @ jacobian, jacobian.T @ (output - found.value)
-    scale = np.sqrt(np.diag(matrix))
+    scale = np.sqrt(matrix.diagonal())
     scale[scale == 0.0] = 1.0
-    matrix = matrix / scale / scale[:, None] + _DAMPING * np.eye(scale.size)
+    matrix /= scale
+    matrix /= scale[:, None]
+    matrix.flat[:: scale.size + 1] += _DAMPING
     step = np.linalg.solve(matrix, vector / scale) / scale
     return step, float(step @ vector)
 

@@ -173,7 +173,7 @@ class CrossvalOptions:
 class OrderOptions:
     """When smaller ones count as good as the best, and which maps to compare."""
 
-    tolerance: Annotated[float, NOT_NEGATIVE] = 0.05
+    tolerance: Annotated[float, NOT_NEGATIVE] = 0.02
     # A function of the user's own needs a file beside it.
     maps: Annotated[
         tuple[str, ...],

@@ -42,8 +42,8 @@ class SelectionEvidence:
     n_validation : int, [-]
         Validation recordings; 0 where only the own one is there.
     n_unexcited : int, [-]
-        Pairs of model and recording that do not count, because the recording's input goes
-        beyond what the model has seen.
+        Pairs of model and recording that do not count, because most of the recording's
+        input is beyond what the model has seen.
     n_outliers : int, [samples]
         Of the validation recordings, that do not count because the fits bear outliers too.
     """

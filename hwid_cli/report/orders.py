@@ -43,14 +43,12 @@ def _reason_to_take(
     if best is None:
         return (
             f"they have the lowest RMSD on {on}, and no smaller ones come within "
-            f"{100 * tolerance:g} % or one standard error of it."
+            f"{100 * tolerance:g} % of it."
         )
-    within = f"the tolerance of {100 * tolerance:g} %"
-    if evidence.factor > 1.0 + tolerance:
-        within = f"one standard error ({evidence.standard_error:.2g}) of the difference"
     return (
         f"on {on} they are on average {100 * (evidence.factor - 1):.3g} % further off than "
-        f"the best {best}; that is within {within}, and no smaller {things} are."
+        f"the best {best}; that is within the tolerance of {100 * tolerance:g} %, and no "
+        f"smaller {things} are."
     )
 
 
@@ -60,8 +58,8 @@ def _left_out(evidence: SelectionEvidence) -> tuple[str, ...]:
     if count := evidence.n_unexcited:
         found.append(
             f"{counted(count, 'pair')} of model and recording {'do' if count != 1 else 'does'} "
-            "not count: there the input leaves the range that the model was fitted in, and "
-            "its maps extrapolate."
+            "not count: there more than three quarters of the input lie beyond the range that "
+            "the model was fitted in, and its maps are extrapolated."
         )
     if count := evidence.n_outliers:
         found.append(

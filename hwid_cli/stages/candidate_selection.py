@@ -21,8 +21,9 @@ from hwid_cli.records.recordings import Recording
 # must not decide between the others.
 _MOST_FACTOR = 10.0
 # Share of a recording's input that may lie beyond what a model has seen for the recording
-# to score it: beyond, a map extrapolates, however it was fitted.
-_MOST_UNEXCITED = 0.1
+# to score it. New recordings go beyond too, so that much of it may; but one that has next
+# to nothing in common with the model's own says nothing of candidates.
+_MOST_UNEXCITED = 0.75
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +38,7 @@ class ScoredCandidates:
     validation : ndarray of int, shape (n_pairs,)
         Number of the validation recording; -1 where it is the model's own.
     n_unexcited : int, [-]
-        Pairs that do not count, because the input goes beyond what the model has seen.
+        Pairs that do not count, because most of the input is beyond what the model has seen.
     n_outliers : int, [samples]
         In the validation recordings, that do not count.
     """
@@ -91,8 +92,8 @@ def scored(
     Returns
     -------
     ScoredCandidates or None
-        None where there is no RMSD at all. Where every recording's input goes beyond what
-        the models have seen, all count.
+        None where there is no RMSD at all. Where most of every recording's input is beyond
+        what the models have seen, all count.
     """
     inputs = {one.name: one.input for one in recordings}
     others = _known_pairs(rmsd, identified_on, validated_on, is_own=False)
@@ -127,7 +128,8 @@ def smallest_good(
     sizes : ndarray, shape (n_candidates,)
         What small means; of equally small ones the best is chosen.
     tolerance : float, [-]
-        Share by which it may be worse than the best; one standard error is allowed too.
+        Share by which it may be worse than the best. Standard errors decide nothing: of
+        few recordings they are so large that the candidates taken would be too small.
 
     References
     ----------
@@ -139,20 +141,18 @@ def smallest_good(
     )
     mean = by_recording.mean(axis=0)
     best = int(np.argmin(mean))
-    error = np.full(mean.shape, np.nan)
-    if len(by_recording) > 1:
-        worse = by_recording - by_recording[:, [best]]
-        error = worse.std(axis=0, ddof=1) / np.sqrt(len(by_recording))
-    is_good = mean - mean[best] <= np.maximum(np.log1p(tolerance), np.nan_to_num(error))
+    is_good = mean - mean[best] <= np.log1p(tolerance)
     smallest = is_good & (sizes == sizes[is_good].min())
     chosen = int(np.argmin(np.where(smallest, mean, np.inf)))
+    worse = by_recording[:, chosen] - by_recording[:, best]
+    error = worse.std(ddof=1) / np.sqrt(worse.size) if worse.size > 1 else np.nan
     factors = np.exp(mean - mean[best])
     rmsd = np.array([_typical(column) for column in found.rmsd.T])
     evidence = SelectionEvidence(
         rmsd=float(rmsd[chosen]),
         best_rmsd=float(rmsd[best]),
         factor=float(factors[chosen]),
-        standard_error=float(error[chosen]),
+        standard_error=float(error),
         n_validation=int(np.sum(names >= 0)),
         n_unexcited=found.n_unexcited,
         n_outliers=found.n_outliers,
@@ -177,7 +177,7 @@ def _known_pairs(
 
 
 def _is_within(seen: np.ndarray, validating: np.ndarray) -> bool:
-    """Whether a validation recording's input stays in what a model has seen."""
+    """Whether enough of a validation recording's input is what a model has seen."""
     share, *_ = outside_share(validating, (float(seen.min()), float(seen.max())))
     return share <= _MOST_UNEXCITED
 

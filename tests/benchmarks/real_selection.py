@@ -3,22 +3,24 @@
 Rule: the second, third and last quarter of the training recordings are held out in turn.
 Every candidate is fitted to the rest, each piece with an initial state of its own, and
 simulated free run from the beginning of the recording; the held-out quarter judges it.
-Its score is the mean logarithm of these errors. Of the candidates whose score is within
-5 % of the best (the tolerance of ``hwid order``) the one with the fewest parameters is
-taken. Orders are chosen with the default maps, then maps with these orders, then orders
-with these maps, and so on until nothing changes or three rounds have passed. The winner
-is fitted anew to all training data. AIC and BIC do not serve here: residuals of a wrong
-structure are far from white, and both then ask for too many parameters.
+Its score is the mean logarithm of these errors. Orders are chosen with given maps, then
+maps with these orders, then orders with these maps, and so on until nothing changes or
+three rounds have passed: each time the fewest parameters whose score is within 5 % of the
+best. This is done from the linear model and from the default maps, because the orders
+that suit the one may be poor for the other. Of all candidates seen, the one with the
+fewest parameters is taken whose score is within 5 % or half a standard error of the best:
+what a few quarters of one recording cannot tell apart is not better for being larger.
+The winner is fitted anew to all training data. AIC and BIC do not serve here: residuals of
+a wrong structure are far from white, and both then ask for too many parameters.
 """
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from hwid_cli.model.fit import fit
-from hwid_cli.records.experiment import OrderOptions
 from hwid_cli.records.model import FitOptions, Orders
 from hwid_cli.records.recordings import Recording
 from tests.benchmarks.real_data import Exam, error, part
@@ -27,7 +29,10 @@ from tests.benchmarks.real_data import Exam, error, part
 # begins with a state that training data give.
 HELD_OUT = (1, 2, 3)
 MOST_ROUNDS = 3
-TOLERANCE = OrderOptions().tolerance
+# Share by which a score may be worse than the best.
+TOLERANCE = 0.05
+# Standard errors of a difference within which two settings count as equal.
+ERRORS = 0.5
 
 
 @dataclass(frozen=True)
@@ -40,11 +45,16 @@ class Setting:
 
 @dataclass(frozen=True)
 class Judged:
-    """A setting, the mean logarithm of its errors, and its number of parameters."""
+    """A setting, the logarithms of its errors, and its number of parameters."""
 
     setting: Setting
-    score: float
+    logs: tuple[float, ...]
     n_parameters: int
+
+    @property
+    def score(self) -> float:
+        """Mean logarithm of the errors."""
+        return float(np.mean(self.logs))
 
 
 def folds(
@@ -69,19 +79,29 @@ def judge(recordings: Sequence[Recording], setting: Setting) -> Judged:
     for train, exams in folds(recordings):
         result = fit(train, setting.orders, setting.options)
         if result.model is None:
-            return Judged(setting, math.inf, 0)
+            return Judged(setting, (math.inf,), 0)
         errors = [error(result.model, exam) for exam in exams]
         logs += [math.log(max(one, 1e-300)) for one in errors]
         count = max(count, result.information.n_parameters)
-    return Judged(setting, float(np.mean(logs)), count)
+    return Judged(setting, tuple(logs), count)
 
 
-def smallest_good(judged: Sequence[Judged], tolerance: float = TOLERANCE) -> Judged:
-    """The fewest parameters within the tolerance of the best score."""
-    best = min(one.score for one in judged)
-    if math.isinf(best):
+def smallest_good(
+    judged: Sequence[Judged], tolerance: float = TOLERANCE, *, errors: float = 0.0
+) -> Judged:
+    """The fewest parameters within a tolerance, or some standard errors, of the best."""
+    best = min(judged, key=lambda one: one.score)
+    if math.isinf(best.score):
         return judged[0]
-    good = [one for one in judged if one.score <= best + math.log1p(tolerance)]
+
+    def is_good(one: Judged) -> bool:
+        if math.isinf(one.score):
+            return False
+        worse = np.subtract(one.logs, best.logs)
+        spread = worse.std(ddof=1) / math.sqrt(worse.size) if worse.size > 1 else 0.0
+        return bool(worse.mean() <= max(math.log1p(tolerance), errors * spread))
+
+    good = [one for one in judged if is_good(one)]
     return min(good, key=lambda one: (one.n_parameters, one.score))
 
 
@@ -99,11 +119,13 @@ def select(
                 known[one] = judge_one(one)
         return smallest_good([known[one] for one in settings])
 
-    best = chosen([Setting(one, options[0]) for one in orders])
-    for _ in range(MOST_ROUNDS):
-        before = best.setting
-        best = chosen([Setting(before.orders, one) for one in options])
-        best = chosen([Setting(one, best.setting.options) for one in orders])
-        if best.setting == before:
-            break
-    return best, len(known)
+    linear = replace(options[0], input_map="none", output_map="none")
+    for begun in dict.fromkeys((linear, options[0])):
+        best = chosen([Setting(one, begun) for one in orders])
+        for _ in range(MOST_ROUNDS):
+            before = best.setting
+            best = chosen([Setting(before.orders, one) for one in options])
+            best = chosen([Setting(one, best.setting.options) for one in orders])
+            if best.setting == before:
+                break
+    return smallest_good(list(known.values()), errors=ERRORS), len(known)

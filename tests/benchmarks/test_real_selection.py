@@ -44,17 +44,28 @@ def test_folds_cover_all_but_the_first_quarter_and_never_fit_to_what_judges():
 
 def test_the_smallest_within_the_tolerance_wins():
     judged = [
-        Judged(SMALL, math.log(1.06), 1),
-        Judged(MIDDLE, math.log(1.04), 2),
-        Judged(LARGE, 0.0, 3),
+        Judged(SMALL, (math.log(1.06),), 1),
+        Judged(MIDDLE, (math.log(1.04),), 2),
+        Judged(LARGE, (0.0,), 3),
     ]
     assert smallest_good(judged, 0.05).setting == MIDDLE
     assert smallest_good(judged, 0.0).setting == LARGE
     assert smallest_good(judged, 0.1).setting == SMALL
 
 
+def test_what_the_quarters_cannot_tell_apart_is_no_reason_for_more_parameters():
+    # 8 % worse on average, by 40 % worse and 13 % better quarters.
+    doubtful = Judged(SMALL, tuple(np.log([1.4, 0.87, 1.04])), 1)
+    certain = Judged(MIDDLE, tuple(np.log([1.09, 1.07, 1.08])), 2)
+    best = Judged(LARGE, (0.0, 0.0, 0.0), 3)
+
+    assert smallest_good([doubtful, best], errors=1.0).setting == SMALL
+    assert smallest_good([certain, best], errors=1.0).setting == LARGE
+    assert smallest_good([doubtful, best]).setting == LARGE
+
+
 def test_a_candidate_without_a_model_never_wins():
-    judged = [Judged(SMALL, math.inf, 0), Judged(LARGE, 0.0, 3)]
+    judged = [Judged(SMALL, (math.inf,), 0), Judged(LARGE, (0.0,), 3)]
     assert smallest_good(judged).setting == LARGE
 
 
@@ -66,7 +77,7 @@ def test_orders_and_options_are_chosen_in_turn_and_judged_once():
     def judge_one(setting):
         seen.append(setting)
         far = (setting.orders != wanted.orders) + (setting.options != wanted.options)
-        return Judged(setting, float(far), 1)
+        return Judged(setting, (float(far),), 1)
 
     best, count = select(
         [one.orders for one in (SMALL, MIDDLE, LARGE)], options, judge_one
@@ -74,6 +85,27 @@ def test_orders_and_options_are_chosen_in_turn_and_judged_once():
 
     assert best.setting == wanted
     assert len(seen) == len(set(seen)) == count == 6
+
+
+def test_a_pair_that_only_linear_orders_lead_to_is_found():
+    """Orders and maps that suit each other: one change at a time is worse."""
+    large = replace(LINEAR, output_map="polynomial")
+    default = replace(LINEAR, output_map="piecewise_linear")
+    scores = {
+        (SMALL.orders, default): 1.0,
+        (SMALL.orders, LINEAR): 3.0,
+        (SMALL.orders, large): 2.0,
+        (LARGE.orders, default): 2.0,
+        (LARGE.orders, LINEAR): 2.5,
+        (LARGE.orders, large): 0.0,
+    }
+
+    def judge_one(setting):
+        return Judged(setting, (scores[setting.orders, setting.options],), 1)
+
+    best, _ = select([SMALL.orders, LARGE.orders], [default, LINEAR, large], judge_one)
+
+    assert best.setting == Setting(LARGE.orders, large)
 
 
 def test_an_exam_takes_nothing_from_the_outputs_that_it_scores():

@@ -68,7 +68,6 @@ def test_the_recommendation_says_why():
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"factor": 1.09, "standard_error": 0.1}, "within one standard error (0.1)"),
         ({"best_nb": 2, "best_nk": 3}, "they have the lowest RMSD on recordings"),
         (
             {"n_validation": 0, "standard_error": NAN},

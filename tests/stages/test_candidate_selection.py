@@ -21,15 +21,27 @@ def tensor(values):
     return np.stack([np.ones_like(second), second], axis=1)
 
 
-def test_inputs_beyond_what_a_model_has_seen_do_not_judge():
-    # The second candidate goes astray on "large" only, where the others never were.
-    rmsd = tensor([[0.1, 0.5, 8.0], [0.5, 0.1, 8.0]])
-    found = scored(rmsd, NAMES[:2], NAMES, (SMALL, ALIKE, LARGE))
+FAR = recording("far", 3.0, 3.0, 3.0, 3.0, 0.5)
 
-    # "alike" has not seen the level 0, at which "small" stands half of the time.
-    assert found.n_unexcited == 3
+
+def test_inputs_that_a_model_has_hardly_seen_do_not_judge():
+    # The second candidate goes astray on "far" only, of which a fifth is known to "small".
+    rmsd = tensor([[0.1, 0.5, 8.0]])
+    found = scored(rmsd, ("small",), ("small", "alike", "far"), (SMALL, ALIKE, FAR))
+
+    assert found.n_unexcited == 1
     assert found.validation.tolist() == [1]
     assert smallest_good(found, np.array([1, 2]), 0.05).chosen == 1
+
+
+def test_inputs_that_go_beyond_in_part_judge():
+    # The second is better on "alike" and goes astray on "large", of which half is known.
+    rmsd = tensor([[0.1, 0.5, 8.0]])
+    found = scored(rmsd, ("small",), NAMES, (SMALL, ALIKE, LARGE))
+
+    assert found.n_unexcited == 0
+    assert found.validation.tolist() == [1, 2]
+    assert smallest_good(found, np.array([2, 1]), 0.05).chosen == 0
 
 
 def test_a_few_samples_beyond_do_not_matter():
@@ -42,7 +54,7 @@ def test_a_few_samples_beyond_do_not_matter():
 
 
 def test_where_all_inputs_go_beyond_all_judge():
-    found = scored(tensor([[0.1, 8.0]]), ("small",), ("small", "large"), (SMALL, LARGE))
+    found = scored(tensor([[0.1, 8.0]]), ("small",), ("small", "far"), (SMALL, FAR))
 
     assert found.validation.tolist() == [1]
     assert found.n_unexcited == 0
@@ -51,7 +63,7 @@ def test_where_all_inputs_go_beyond_all_judge():
 def test_where_those_within_have_no_number_the_others_judge():
     rmsd = tensor([[0.1, 0.5, 8.0]])
     rmsd[0, :, 1] = np.nan
-    found = scored(rmsd, ("small",), NAMES, (SMALL, ALIKE, LARGE))
+    found = scored(rmsd, ("small",), ("small", "alike", "far"), (SMALL, ALIKE, FAR))
 
     assert found.validation.tolist() == [2]
 

@@ -80,9 +80,8 @@ def outlined(static_map: StaticMap) -> StaticMap:
         return static_map
     points, values = break_points_and_values(static_map)
     near = _EDGE * (lines.arguments[-1] - lines.arguments[0])
-    inside = np.zeros(points.size, dtype=bool)
-    for low, high in lines.stretches:
-        inside |= (points > low + near) & (points < high - near)
+    low, high = lines.visited[0::2, None], lines.visited[1::2, None]
+    inside = ((points > low + near) & (points < high - near)).any(axis=0)
     # The ends of a map in a fit are no break-points.
     inside[[0, -1]] = False
     points = np.concatenate([points[inside], lines.arguments])
@@ -128,6 +127,17 @@ def _derivatives(
     )
 
 
+@njit(cache=True, error_model="numpy")
+def _slopes(break_points: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Slope of each segment; by a loop, because expressions of arrays compile slowly."""
+    slopes = np.empty(values.size - 1)
+    for i in range(slopes.size):
+        slopes[i] = (values[i + 1] - values[i]) / (
+            break_points[i + 1] - break_points[i]
+        )
+    return slopes
+
+
 @njit(cache=True)
 def piecewise_linear(
     argument: np.ndarray, break_points: np.ndarray, values: np.ndarray
@@ -150,7 +160,7 @@ def piecewise_linear(
     result = np.empty(n)
     slope = np.empty(n)
     segment = np.empty(n, dtype=np.int64)
-    slopes = (values[1:] - values[:-1]) / (break_points[1:] - break_points[:-1])
+    slopes = _slopes(break_points, values)
     k = 0
     for t in range(n):
         v = argument[t]
@@ -221,7 +231,7 @@ def piecewise_linear_value(
     """
     last = break_points.size - 2
     result = np.empty(argument.size)
-    slopes = (values[1:] - values[:-1]) / (break_points[1:] - break_points[:-1])
+    slopes = _slopes(break_points, values)
     k = 0
     for t in range(argument.size):
         v = argument[t]
@@ -234,7 +244,7 @@ def piecewise_linear_value(
     return result
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def piecewise_linear_shares(
     argument: np.ndarray, break_points: np.ndarray, values: np.ndarray, spacing: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
@@ -259,8 +269,10 @@ def piecewise_linear_shares(
     n, last = argument.size, break_points.size - 2
     value, slope = np.empty(n), np.empty(n)
     first, shares = np.empty(n, dtype=np.int64), np.empty((n, 2))
-    widths = 1.0 / (break_points[1:] - break_points[:-1])
-    slopes = (values[1:] - values[:-1]) * widths
+    widths, slopes = np.empty(last + 1), np.empty(last + 1)
+    for i in range(last + 1):
+        widths[i] = 1.0 / (break_points[i + 1] - break_points[i])
+        slopes[i] = (values[i + 1] - values[i]) * widths[i]
     k = 0
     for t in range(n):
         v = argument[t]
@@ -275,6 +287,31 @@ def piecewise_linear_shares(
         shares[t, 1] = past * widths[k]
         shares[t, 0] = 1.0 - shares[t, 1]
     return value, slope, first, shares
+
+
+def hat_functions(
+    argument: np.ndarray, points: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """An argument expanded into the hat functions of some points.
+
+    Parameters
+    ----------
+    argument : ndarray, shape (n,)
+    points : ndarray, shape (n_points,)
+        Rising.
+
+    Returns
+    -------
+    first : ndarray of int, shape (n,)
+        First of the two functions that are not zero.
+    shares : ndarray, shape (n, 2)
+        Their values.
+    """
+    # Read-only, as the parameters of a map are: the loop compiles once for both.
+    fixed = points.view()
+    fixed.flags.writeable = False
+    _, _, first, shares = piecewise_linear_shares(argument, fixed, fixed, 1)
+    return first, shares
 
 
 @njit(cache=True)
@@ -647,8 +684,7 @@ def _relative_growth(
     """Derivatives of the logarithm of `growth`, and the columns that have any."""
     units = break_points.size
     first, last = _inner_ends(units)
-    low = first + np.argmin(values[first : last + 1])
-    high = first + np.argmax(values[first : last + 1])
+    low, high = _extremes(values, first, last)
     size = values[high] - values[low]
     if size == 0.0:
         return np.empty(0), np.empty(0, dtype=np.int64)
@@ -663,6 +699,18 @@ def _relative_growth(
         np.array([-1.0 / size, 1.0 / size, 1.0 / width, -1.0 / width]),
         np.array([offset + low, offset + high, first, last]),
     )
+
+
+@njit(cache=True)
+def _extremes(values: np.ndarray, first: int, last: int) -> tuple[int, int]:
+    """Places of the first lowest and the first highest value from one place to another."""
+    low = high = first
+    for i in range(first + 1, last + 1):
+        if values[i] < values[low]:
+            low = i
+        if values[i] > values[high]:
+            high = i
+    return low, high
 
 
 @njit(cache=True)
@@ -696,8 +744,10 @@ def growth(
         1 where one of the two is constant.
     """
     first, last = _inner_ends(values.size)
-    size = np.ptp(values[first : last + 1])
-    size_before = np.ptp(values_before[first : last + 1])
+    low, high = _extremes(values, first, last)
+    size = values[high] - values[low]
+    low, high = _extremes(values_before, first, last)
+    size_before = values_before[high] - values_before[low]
     if size == 0.0 or size_before == 0.0:
         return 1.0
     width = break_points[last] - break_points[first]
