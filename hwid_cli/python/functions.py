@@ -31,6 +31,8 @@ from hwid_cli.tasks.workers import Workers
 # Called with what is being done, how much of it is done, and how much there is.
 OnProgress = Callable[[str, int, int], None]
 Progress = bool | OnProgress
+# So wide that a line hides the one that it is written over, [characters].
+_LINE = 60
 
 
 def fit_grid(
@@ -225,13 +227,16 @@ def diagnose(
         If two recordings have one name.
     """
     tell = _teller(progress)
-    return diagnosing.diagnose(
+    found = diagnosing.diagnose(
         recordings,
         simulation,
         options,
         jobs=jobs,
         on_stage=lambda what, total: tell(what, 0, total),
     )
+    if progress is True:
+        sys.stderr.write("\n")
+    return found
 
 
 @contextmanager
@@ -263,7 +268,8 @@ def _teller(progress: Progress) -> OnProgress:
 
 def _tell(what: str, done: int, total: int) -> None:
     """One line that is written anew, in a terminal and in a notebook."""
-    sys.stderr.write(f"\r{done} of {total} {what}  ")
+    counted = f"{done} of {total} " if total else ""
+    sys.stderr.write("\r" + f"{counted}{what}".ljust(_LINE))
     sys.stderr.flush()
 
 

@@ -71,7 +71,7 @@ def test_progress_is_shown_on_stderr(grid, capsys):
     said = capsys.readouterr()
 
     assert said.out == ""
-    assert said.err.endswith("6 of 6 pairs  \n")
+    assert said.err.endswith("6 of 6 pairs".ljust(60) + "\n")
 
 
 def test_a_cross_validation_is_a_simulation_of_every_model(grid):
