@@ -11,7 +11,7 @@ DEV := $(VENV)/installed-dev
 
 .DEFAULT_GOAL := help
 .PHONY: help install run test test-all check audit format smoke clean reliability \
-        bench bench-beyond bench-campaign bench-growth bench-maps bench-page bench-rounds bench-search bench-starts bench-wide bench-advice \
+        bench bench-beyond bench-campaign bench-growth bench-maps bench-page bench-rounds bench-search bench-starts bench-wide bench-advice docs \
         bench-real scale \
         simulate calibrate identify crossval group test-stage steps model1 model2 \
         reproduction thesis chapter2 hsm150 diagnose gun real effects drive-source model-schema golden export-check blind machines
@@ -161,6 +161,9 @@ REAL := emps silverbox hsm150 ffwheel shaking_table pick_place rack_drive
 real: $(RUN)  ## diagnose real machines (data in HWID_REALDATA), and docs/real_diagnosis.md
 	@for name in $(REAL); do $(HWID) diagnose configs/diagnose_$$name.yaml || exit 1; done
 	$(BIN)/python tools/real_diagnosis.py results > docs/real_diagnosis.tmp && mv docs/real_diagnosis.tmp docs/real_diagnosis.md
+
+docs: $(DEV)  ## the documents as a site: results/site/index.html
+	$(BIN)/mkdocs build --quiet --config-file tools/mkdocs.yml
 
 effects: $(RUN)  ## docs/effects.md from the catalogue
 	$(BIN)/python tools/effects_document.py

@@ -2,13 +2,14 @@
 
 The rooms, and the only direction in which they import each other::
 
-    cli -> stages -> export | report | tasks -> config | store -> data | simulations
+    cli | python -> stages -> export | report | tasks -> config | store -> data | simulations
         -> files -> diagnosis -> drive | model -> records -> errors
 
 ``records`` holds the data handed between rooms; ``model``, ``drive`` and ``diagnosis``
 are pure functions on it; ``files`` to ``export`` turn bytes into records and back;
 ``tasks`` runs and memoises work; ``stages`` say what is needed, computed, stored and
-shown; ``report`` makes tables, figures and the page; ``cli`` joins them behind ``hwid``.
+shown; ``report`` makes tables, figures and the page; ``cli`` joins them behind ``hwid``,
+``python`` behind ``from hwid_cli import ...``.
 
 From Python, the names below do on records in memory what the commands do on files.
 
@@ -42,16 +43,24 @@ _PUBLIC = {
     "Diagnosis": "hwid_cli.records.diagnosis",
     "Fit": "hwid_cli.records.model",
     "FitOptions": "hwid_cli.records.model",
+    "FitGrid": "hwid_cli.records.fit_grid",
+    "GroupOptions": "hwid_cli.records.experiment",
     "HammersteinWiener": "hwid_cli.records.model",
+    "HammersteinWienerRegressor": "hwid_cli.python.estimator",
     "HwidError": "hwid_cli.errors",
     "MapFunction": "hwid_cli.records.maps",
     "Orders": "hwid_cli.records.model",
+    "OrdersOptions": "hwid_cli.records.experiment",
     "OwnFunction": "hwid_cli.records.maps",
     "Recording": "hwid_cli.records.recordings",
     "SimulationOptions": "hwid_cli.records.experiment",
-    "diagnose": "hwid_cli.stages.diagnose",
+    "crossval": "hwid_cli.python.functions",
+    "diagnose": "hwid_cli.python.functions",
     "fit": "hwid_cli.model.fit",
+    "fit_grid": "hwid_cli.python.functions",
     "fit_percent": "hwid_cli.model.scores",
+    "group": "hwid_cli.python.functions",
+    "identify": "hwid_cli.python.functions",
     "load_recording": "hwid_cli.stages.single_recording",
     "load_model": "hwid_cli.export.loading",
     "parameter_covariance": "hwid_cli.model.uncertainty",
@@ -64,17 +73,25 @@ __all__ = [
     "DiagnoseOptions",
     "Diagnosis",
     "Fit",
+    "FitGrid",
     "FitOptions",
+    "GroupOptions",
     "HammersteinWiener",
+    "HammersteinWienerRegressor",
     "HwidError",
     "MapFunction",
     "Orders",
+    "OrdersOptions",
     "OwnFunction",
     "Recording",
     "SimulationOptions",
+    "crossval",
     "diagnose",
     "fit",
+    "fit_grid",
     "fit_percent",
+    "group",
+    "identify",
     "load_model",
     "load_recording",
     "parameter_covariance",

@@ -21,7 +21,7 @@ def run(out: Path) -> str:
         raise SystemExit(
             f"hwid run ended with {done.returncode}:\n{done.stdout}{done.stderr}"
         )
-    return done.stdout
+    return done.stderr + done.stdout
 
 
 def read_tensor(out: Path):

@@ -9,10 +9,11 @@ from hwid_cli.config.load import load_experiment
 
 PROJECT = Path(__file__).parents[1]
 TEXT = (PROJECT / "README.md").read_text()
+OWN = (PROJECT / "docs" / "own_measurements.md").read_text()
 
 
-def block(language):
-    found = re.search(rf"^( *)```{language}\n(.*?)^ *```", TEXT, re.DOTALL | re.M)
+def block(language, text=TEXT):
+    found = re.search(rf"^( *)```{language}\n(.*?)^ *```", text, re.DOTALL | re.M)
     indent = len(found[1])
     return "\n".join(line[indent:] for line in found[2].splitlines())
 
@@ -28,7 +29,7 @@ def test_the_python_example_runs_and_fits():
 
 def test_the_configuration_example_loads(tmp_path):
     path = tmp_path / "mine.yaml"
-    path.write_text(block("yaml"))
+    path.write_text(block("yaml", OWN))
     experiment = load_experiment(path)
 
     assert experiment.name == "mine"
@@ -37,7 +38,7 @@ def test_the_configuration_example_loads(tmp_path):
 
 def test_every_link_leads_to_a_file():
     targets = re.findall(r"\]\(([^)#]+)\)", TEXT)
-    assert targets
+    assert "docs/figures/gap.png" in targets
     assert [one for one in targets if not (PROJECT / one).exists()] == []
 
 
@@ -45,3 +46,8 @@ def test_every_make_target_named_exists():
     makefile = (PROJECT / "Makefile").read_text()
     for target in re.findall(r"(?:^|`)make ([a-z0-9-]+)", TEXT, re.M):
         assert re.search(rf"^{target}:", makefile, re.M), target
+
+
+def test_it_is_read_in_a_minute_and_a_half():
+    assert len(TEXT.splitlines()) <= 95
+    assert len(TEXT.split()) <= 900

@@ -19,7 +19,7 @@ from hwid_cli.records.experiment import Experiment
 from hwid_cli.records.recordings import Calibrated
 from hwid_cli.report.check import recordings_table, stages_table
 from hwid_cli.report.table import as_text
-from hwid_cli.stages.fit_seconds import MEASURED, compiled_loops_place, time_one_fit
+from hwid_cli.stages.fit_seconds import MEASURED, compiled_loops_place, time_fits
 from hwid_cli.stages.own_functions import check_own_functions
 from hwid_cli.stages.recording_facts import Checked, check_recordings
 from hwid_cli.stages.selection import named_recordings
@@ -127,7 +127,9 @@ def _show_plan(
         cost = _cost(experiment, checked, timing=timing)
         store = Hdf5Store(cache, sets_aside=False)
         workers = Workers(jobs).count
-        planning = Planning(experiment, checked.recordings, cost, store, workers)
+        planning = Planning(
+            experiment, checked.recordings, cost, store, workers, checked.logs
+        )
         plans = [
             plan
             for name in to_run(experiment)
@@ -145,7 +147,7 @@ def _cost(experiment: Experiment, checked: Checked, *, timing: bool) -> FitCost:
     ):
         click.echo("\nThe first run compiles its loops: about 20 s more, once.")
         return MEASURED
-    return time_one_fit(checked.recordings, experiment.orders, experiment.fit)
+    return time_fits(checked.recordings, experiment.orders, experiment.fit)
 
 
 def _end_with(problems: tuple[str, ...]) -> NoReturn:

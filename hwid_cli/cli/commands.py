@@ -99,7 +99,21 @@ def report(*values: Any, **options: Any) -> None:
     _run("report.report", *values, **options)
 
 
-@click.command("compare")
+# The mark keeps click from joining the lines; a docstring could not hold it.
+_COMPARED = """Compare models on the same recordings: fit percent and RMSD.
+
+\b
+A MODEL is
+  step_06/3/7           one of CONFIG's own models (identified first if need be)
+  results/old:step_06/3/7   one of another folder of results
+  linear:step_06/3/7    a linear model of that recording, fitted for the comparison
+  models/step_06.json   an exported model
+
+Writes compare.csv and figures/compare.png.
+"""
+
+
+@click.command("compare", help=_COMPARED)
 @click.argument("models", nargs=-1, required=True, metavar="MODEL [MODEL]...")
 @click.option(
     "--on",
@@ -133,17 +147,7 @@ def report(*values: Any, **options: Any) -> None:
 )
 @click.option("-q", "--quiet", is_flag=True, help="Say errors only.")
 def compare(*values: Any, **options: Any) -> None:
-    r"""Compare models on the same recordings: fit percent and RMSD.
-
-    \b
-    A MODEL is
-      step_06/3/7           one of CONFIG's own models (identified first if need be)
-      results/old:step_06/3/7   one of another folder of results
-      linear:step_06/3/7    a linear model of that recording, fitted for the comparison
-      models/step_06.json   an exported model
-
-    Writes compare.csv and figures/compare.png.
-    """
+    """Compare models on the same recordings."""
     _run("compare.compare", *values, **options)
 
 
@@ -228,6 +232,14 @@ def _of_stage(name: str) -> click.Command:
     run = stage_options(partial(_run, place, name))
     return click.command(name, help=STAGES[name])(run)
 
+
+# How `hwid --help` lists them: every command once.
+GROUPS = {
+    "Start here": ("init", "check", "run"),
+    "Stages, each after those that it needs": tuple(STAGES),
+    "Models": ("compare", "export", "predict"),
+    "More": ("report",),
+}
 
 # In the order in which they work.
 COMMANDS = {

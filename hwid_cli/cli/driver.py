@@ -3,16 +3,18 @@
 import logging
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
+from hwid_cli.cli.closing import say_end
 from hwid_cli.cli.options import Choices
+from hwid_cli.cli.report import FILE, write_report
 from hwid_cli.cli.session import Session, Timer, open_session, screen_width
 from hwid_cli.config.load import describe_experiment
 from hwid_cli.data.recordings import check_unchanged
-from hwid_cli.errors import CacheError
+from hwid_cli.errors import CacheError, HwidError
 from hwid_cli.report.progress import StageProgress
-from hwid_cli.report.table import Block, as_text
+from hwid_cli.report.table import WIDTH, Block, as_text
 from hwid_cli.stages.stage import Context, Stage
 from hwid_cli.stages.table import needed, stage_named
 from hwid_cli.store.cache import Hdf5Store
@@ -51,39 +53,57 @@ def run_command(name: str, choices: Choices) -> None:
         One of ``STAGES``.
     """
     stage, session = stage_named(name), open_session(choices, name)
+    has_page = (session.out / FILE).is_file()
+    session.plan(*needed(name, session.experiment), name)
+    if has_page:
+        session.plan("report")
     result_of(session, name)
     for shown in (*stage.shows_before, name):
-        show(session, shown)
-    there = [file for file in stage.files if (session.out / file).exists()]
-    first, *others = there or [""]
-    session.say("\n" + ", ".join([f"results: {session.out / first}", *others]))
+        show_blocks(session, blocks_of(session, shown))
+    if has_page:
+        refresh_report(session)
+    say_end(session, name)
 
 
-def show(session: Session, name: str) -> None:
-    """Show the tables of a stage that has run."""
-    if session.is_quiet:
-        return
-    stage = stage_named(name)
-    show_blocks(session, stage.tables(context_of(session), session.results[name]))
+def refresh_report(session: Session) -> None:
+    """Draw the page anew that shows older results; one that cannot be stays."""
+    try:
+        write_report(session)
+    except HwidError as error:
+        _log.warning("%s stays as it was: %s", session.out / FILE, error)
+
+
+def blocks_of(session: Session, name: str) -> Sequence[Block]:
+    """Tables and paragraphs of a stage that has run."""
+    return stage_named(name).tables(context_of(session), session.results[name])
 
 
 def show_blocks(session: Session, blocks: Sequence[Block]) -> None:
     """Show tables and paragraphs to people, set off by a line; nothing where none are."""
-    if not blocks:
-        return
+    if blocks and not session.is_quiet:
+        session.say(f"\n{text_of(session, blocks, screen_width())}")
+
+
+def text_of(session: Session, blocks: Sequence[Block], width: int = WIDTH) -> str:
+    """Tables and paragraphs of the session as plain text.
+
+    Parameters
+    ----------
+    width : int, [characters]
+        Of a line.
+    """
     experiment = session.experiment
-    text = as_text(
+    return as_text(
         blocks,
-        width=screen_width(),
+        width=width,
         initial_state=experiment.fit.initial_state,
         thesis_names=experiment.thesis_names,
     )
-    session.say(f"\n{text}")
 
 
 def context_of(session: Session) -> Context:
     """What stages may know of a session."""
-    return Context(session.experiment, session.out, session.results, session.say)
+    return Context(session.experiment, session.out, session.results, session.note)
 
 
 def _run(session: Session, stage: Stage) -> Any:
@@ -95,8 +115,9 @@ def _run(session: Session, stage: Stage) -> Any:
     key = "" if stage.key is None else stage.key(given)
     is_stored, result = _stored(session, stage, key)
     origin = None
+    runner = StageRunner(session, stage.name)
     if not is_stored:
-        result = stage.compute(given, StageRunner(session, stage.name))
+        result = stage.compute(given, runner)
         if stage.storage is not None:
             origin = _origin(session, given, key, timer.seconds)
             stage.storage.write(session.out / stage.storage.file, given, result, origin)
@@ -104,8 +125,9 @@ def _run(session: Session, stage: Stage) -> Any:
         origin = read_provenance(session.out / stage.storage.file, stage.name)
     stage.write_files(session.out, given, result, origin, not is_stored)
     summary = stage.summary(given, result, is_stored)
-    if summary:
-        session.say(f"{stage.name}: {summary}, {timer}")
+    said = [one for one in (runner.counted, summary) if one]
+    if said:
+        session.note_end(stage.name, ", ".join(said), timer)
     return result
 
 
@@ -145,10 +167,26 @@ class StageRunner:
     ----------
     name : str
         Of the stage, for the progress bar and ``--force``.
+    parts : list
+        What was done so far, filled by the runner.
     """
 
     session: Session
     name: str
+    parts: list["_Part"] = field(default_factory=list)
+
+    @property
+    def counted(self) -> str:
+        """Tasks of all parts together; empty before any."""
+        if not self.parts:
+            return ""
+        units = {one.unit for one in self.parts}
+        whole = _Part(
+            units.pop() if len(units) == 1 else "tasks",
+            sum(one.from_cache for one in self.parts),
+            sum(one.computed for one in self.parts),
+        )
+        return str(whole)
 
     @contextmanager
     def tasks(self, total: int, unit: str, *, part: str = "") -> Iterator[RunSettings]:
@@ -183,18 +221,21 @@ class StageRunner:
         callable
             Takes what the next round does and how many tasks it has.
         """
+        label = f"{self.session.place(self.name)} {self.name}".lstrip()
         with self._progress(0, unit, "") as (settings, progress):
             yield (
                 settings,
-                lambda text, total: progress.begin_round(f"{self.name}: {text}", total),
+                lambda text, total: progress.begin_round(f"{label}: {text}", total),
             )
 
     @contextmanager
     def _progress(
         self, total: int, unit: str, part: str
     ) -> Iterator[tuple[RunSettings, StageProgress]]:
-        session, timer, label = self.session, Timer(), f"{self.name} {part}".rstrip()
-        with StageProgress(label, total, unit, is_silent=session.is_quiet) as progress:
+        session, timer = self.session, Timer()
+        label = f"{self.name} {part}".rstrip()
+        shown = f"{session.place(self.name)} {label}".lstrip()
+        with StageProgress(shown, total, unit, is_silent=session.is_quiet) as progress:
 
             def on_done(item: TaskDone) -> None:
                 progress.advance(from_cache=item.from_cache)
@@ -211,7 +252,18 @@ class StageRunner:
                 len(store.unusable),
                 store.unusable[0],
             )
-        session.say(
-            f"{label}: {progress.from_cache} {unit} from the cache, "
-            f"{progress.computed} computed, {timer}"
-        )
+        self.parts.append(_Part(unit, progress.from_cache, progress.computed))
+        if part and session.is_verbose:
+            session.note(f"{label}: {self.parts[-1]}, {timer}")
+
+
+@dataclass(frozen=True)
+class _Part:
+    """Tasks of one kind that a stage has run."""
+
+    unit: str
+    from_cache: int
+    computed: int
+
+    def __str__(self) -> str:
+        return f"{self.from_cache} {self.unit} from the cache, {self.computed} computed"

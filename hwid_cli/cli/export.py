@@ -50,6 +50,7 @@ def export(
     else:
         exported = chosen_model(session, asked)
         written = write_exported(session.out / _FOLDER, exported, file_format)
+    session.show_notes()
     for path in written:
         click.echo(path)
 

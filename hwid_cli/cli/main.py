@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from hwid_cli import __version__
-from hwid_cli.cli.commands import COMMANDS
+from hwid_cli.cli.commands import COMMANDS, GROUPS
 from hwid_cli.cli.examples import add_examples
 from hwid_cli.cli.stopping import Stopped, stop_signals
 from hwid_cli.errors import HwidError, NothingToDo
@@ -61,6 +61,22 @@ class _Commands(click.Group):
             _complain(stopped.sentence)
             ctx.exit(stopped.exit_code)
 
+    def format_commands(
+        self,
+        ctx: click.Context,  # noqa: ARG002
+        formatter: click.HelpFormatter,
+    ) -> None:
+        """Write the commands in groups, so that a newcomer sees where to begin."""
+        widest = max(map(len, self.commands))
+        for title, names in GROUPS.items():
+            with formatter.section(title):
+                room = formatter.width - widest - 6
+                rows = [
+                    (name.ljust(widest), self.commands[name].get_short_help_str(room))
+                    for name in names
+                ]
+                formatter.write_dl(rows)
+
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002
         """Name the commands in the order in which they work."""
         return list(self.commands)
@@ -111,9 +127,10 @@ class _ToStderr(logging.Handler):
 def main(ctx: click.Context) -> None:
     """Identify models of servo drives from few measurements, and diagnose simulations.
 
-    Commands take one configuration file; configs/README.md explains its keys. A stage
-    runs the stages before it where they are missing, and answers from the cache what it
-    has computed before.
+    Measurements of your own: 'hwid init FOLDER' writes a configuration, 'hwid run' runs
+    it and ends with the answer. Commands take that one file; configs/README.md explains
+    its keys. A stage runs the stages before it where they are missing, and answers from
+    the cache what it has computed before. Results go to stdout, progress to stderr.
     """
     ctx.obj = set_log_levels
 

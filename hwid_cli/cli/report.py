@@ -33,7 +33,7 @@ _KEY_MARK, _KEY_END = "<!-- drawn from ", " -->\n"
 def report(choices: Choices) -> None:
     """Show whatever stages have run on one page."""
     session = open_session(choices, "report", is_alone=False)
-    write_report(session)
+    session.say(str(write_report(session)))
 
 
 def write_report(session: Session) -> Path:
@@ -63,14 +63,14 @@ def write_report(session: Session) -> Path:
     path = session.out / FILE
     stages = ", ".join(run.stage for run in stored.stages) or "the diagnosis"
     if "report" not in session.forced and _is_complete(session.out, path, key):
-        session.say(f"report: {path} shows {stages} already, {timer}")
+        session.note_end("report", f"{path} shows {stages} already", timer)
         return path
     page = report_page(report_contents(stored), STAGES)
     for name, png in page.figures.items():
         _write_figure(session.out / FIGURES / name, png)
     # The page before the figures beside it: it is what people wait for.
     replace_file(path, (page.html + _last_line(key, page.files)).encode())
-    session.say(f"report: {path} shows {stages}, {timer}")
+    session.note_end("report", f"{path} shows {stages}", timer)
     _draw(session, page.drawings)
     return path
 

@@ -17,6 +17,9 @@ from hwid_cli.records.experiment import Experiment
 from hwid_cli.stages.own_functions import check_own_functions
 from hwid_cli.tasks.workers import Workers
 
+# So long a command says nothing of its progress, [s].
+_HELD_S = 5.0
+
 
 @dataclass(frozen=True, eq=False)
 class Session:
@@ -30,6 +33,14 @@ class Session:
         Folder of what was computed before.
     forced : tuple of str
         Stages that ignore their cached results.
+    arguments : tuple of str
+        What a command needs to find the same experiment and folders again.
+    timer : Timer
+        Runs since the session was opened.
+    planned : list of str
+        Stages that the command works through, in their order; empty where nobody knows.
+    notes : list of str
+        How far the work is, as far as nobody was told yet.
     given, results : dict
         What each stage that ran worked on, and what it gave.
     """
@@ -40,13 +51,50 @@ class Session:
     workers: Workers
     forced: tuple[str, ...]
     is_quiet: bool
+    is_verbose: bool
+    arguments: tuple[str, ...]
+    timer: "Timer" = field(default_factory=lambda: Timer())
+    planned: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
     given: dict[str, Any] = field(default_factory=dict)
     results: dict[str, Any] = field(default_factory=dict)
 
     def say(self, text: str) -> None:
-        """Show text to people, unless they asked for quiet."""
+        """Show a result to people, unless they asked for quiet."""
+        self.show_notes()
         if not self.is_quiet:
             click.echo(text)
+
+    def note(self, text: str) -> None:
+        """Say how far the work is, on stderr, apart from the results.
+
+        Held back for the first seconds: a command that fails at once says one line.
+        """
+        self.notes.append(text)
+        if self.timer.seconds > _HELD_S:
+            self.show_notes()
+
+    def show_notes(self) -> None:
+        """Show what was held back."""
+        if not self.is_quiet:
+            for text in self.notes:
+                click.echo(text, err=True)
+        self.notes.clear()
+
+    def plan(self, *stages: str) -> None:
+        """Add stages to those that the command works through, each once."""
+        self.planned.extend(one for one in stages if one not in self.planned)
+
+    def place(self, name: str) -> str:
+        """Place of a stage among those of the command, ``stage 3 of 6``; or nothing."""
+        if name not in self.planned:
+            return ""
+        return f"stage {self.planned.index(name) + 1} of {len(self.planned)}"
+
+    def note_end(self, name: str, text: str, timer: "Timer") -> None:
+        """Say that a stage is done, what it did, and how long that took."""
+        place = self.place(name)
+        self.note(f"{name}: {text}, {timer}{f' ({place})' if place else ''}")
 
 
 @dataclass(frozen=True)
@@ -106,7 +154,16 @@ def open_session(choices: Choices, *stages: str, is_alone: bool = True) -> Sessi
         workers=Workers(choices.jobs, choices.backend, choices.scheduler),
         forced=stages if choices.force else (),
         is_quiet=choices.quiet,
+        is_verbose=choices.verbose,
+        arguments=_arguments(choices),
     )
+
+
+def _arguments(choices: Choices) -> tuple[str, ...]:
+    """The configuration and the folders as they were given."""
+    folders = (("--out", choices.out), ("--cache", choices.cache))
+    given = [word for option, path in folders if path for word in (option, str(path))]
+    return (str(choices.config), *given)
 
 
 def _lock(out: Path, cache: Path, *, is_alone: bool) -> None:

@@ -1,5 +1,6 @@
 """``hwid simulate``: virtual measurements, and a physics model beside the recordings."""
 
+from hwid_cli.cli.closing import say_end
 from hwid_cli.cli.driver import context_of, result_of, show_blocks
 from hwid_cli.cli.options import Choices
 from hwid_cli.cli.session import Session, Timer, open_session
@@ -21,11 +22,14 @@ def simulate(name: str, choices: Choices) -> None:
     is_drive = experiment.simulation is not None
     # Virtual measurements need no recordings section as long as nothing reads them.
     is_read = experiment.simulate is None or experiment.recordings is not None
-    if experiment.simulate is not None or not is_drive:
+    is_made = experiment.simulate is not None or not is_drive
+    if is_made:
+        session.plan(name)
         result_of(session, name)
-        session.say(f"results: {session.out / 'raw'}")
     if is_drive and is_read:
+        session.plan("calibrate")
         _simulate_drive(session)
+    say_end(session, name, ("raw", "simulated"))
 
 
 def _simulate_drive(session: Session) -> None:
@@ -37,10 +41,9 @@ def _simulate_drive(session: Session) -> None:
     for one in curves:
         columns = (one.time_s, one.input, one.measured, one.simulated)
         write_simulated_csv(folder / f"{one.name}.csv", columns)
-    session.say(f"simulate: {len(curves)} recordings simulated, {timer}")
+    session.note(f"simulate: {len(curves)} recordings simulated, {timer}")
     # In a closed loop it is the controller's command that the two are compared by.
     has_controller = getattr(given.simulation, "controller", None) is not None
     side = "input" if has_controller else "output"
     unit = getattr(given.recordings[0], f"{side}_unit")
     show_blocks(session, [simulated_table(curves, side, unit)])
-    session.say(f"\nresults: {folder}")

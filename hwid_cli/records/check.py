@@ -73,6 +73,9 @@ class FitCost:
     units : int, [-]
     source : str
         Where the time comes from, in words.
+    rounds : tuple of float, [s]
+        Of a fit in the grid's first round, in a round that is searched anew, and in a
+        later one, timed on the recordings themselves; empty where they were not.
     """
 
     seconds: float
@@ -80,3 +83,4 @@ class FitCost:
     order: float
     units: int
     source: str
+    rounds: tuple[float, ...] = ()

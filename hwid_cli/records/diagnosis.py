@@ -6,6 +6,7 @@ import numpy as np
 
 from hwid_cli.records.candidates import RankedCandidate
 from hwid_cli.records.programs import OF_DRIVE, Capabilities
+from hwid_cli.records.shown import Shown
 from hwid_cli.records.stored import ADDED_LATER
 
 VERDICTS = ("named", "ambiguous", "parameters", "unknown", "none")
@@ -203,8 +204,8 @@ class NextExperiment:
     reason: str
 
 
-@dataclass(frozen=True, eq=False)
-class Diagnosis:
+@dataclass(frozen=True, eq=False, repr=False)
+class Diagnosis(Shown):
     """Everything that ``hwid diagnose`` found.
 
     Parameters
@@ -285,3 +286,15 @@ class Diagnosis:
             raise ValueError(
                 f"verdict {self.verdict!r} is none of {', '.join(VERDICTS)}"
             )
+
+    def facts(self) -> tuple[tuple[str, str], ...]:
+        """Name and what there is of it."""
+        return (
+            ("verdict", self.verdict),
+            ("effects", ", ".join(one.id for one in self.effects) or "none"),
+            (
+                "gap",
+                f"{self.before.ratio_to_noise:.3g} -> "
+                f"{self.after.ratio_to_noise:.3g} times the noise",
+            ),
+        )

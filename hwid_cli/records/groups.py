@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from hwid_cli.records.model import Fit
+from hwid_cli.records.shown import Shown
 from hwid_cli.records.stored import ADDED_LATER
 
 
@@ -92,8 +93,8 @@ class Group:
         return f"{self.name}/{self.nb}/{self.nk}" if self.nb else ""
 
 
-@dataclass(frozen=True, eq=False)
-class GroupSearch:
+@dataclass(frozen=True, eq=False, repr=False)
+class GroupSearch(Shown):
     """A whole search: every group, level by level, and the winner.
 
     Parameters
@@ -146,6 +147,15 @@ class GroupSearch:
         """Levels that were searched."""
         return tuple(sorted({group.level for group in self.groups}))
 
+    def facts(self) -> tuple[tuple[str, str], ...]:
+        """Name and what there is of it."""
+        return (
+            ("groups", str(len(self.groups))),
+            ("levels", str(len(self.levels))),
+            ("chain", " -> ".join(self.chain) or "none"),
+            ("stopped because", self.reason),
+        )
+
 
 @dataclass(frozen=True)
 class Prediction:
@@ -181,8 +191,8 @@ class Prediction:
     is_possible: bool
 
 
-@dataclass(frozen=True, eq=False)
-class FinalTest:
+@dataclass(frozen=True, eq=False, repr=False)
+class FinalTest(Shown):
     """Models of single recordings and of the chain of groups on all recordings.
 
     Parameters
@@ -244,6 +254,15 @@ class FinalTest:
                 f"rmsd {self.rmsd.shape} and is_own {self.is_own.shape} must have "
                 f"shape {shape}"
             )
+
+    def facts(self) -> tuple[tuple[str, str], ...]:
+        """Name and what there is of it."""
+        return (
+            ("models", str(len(self.models))),
+            ("on recordings", str(len(self.recordings))),
+            ("never used", str(len(self.tested_on))),
+            ("threshold", f"{self.threshold:g} {self.unit}"),
+        )
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,6 +24,7 @@ from hwid_cli.records.rules import (
     Refused,
     check_fields,
 )
+from hwid_cli.records.shown import Shown
 from hwid_cli.records.stored import ADDED_LATER
 
 
@@ -360,8 +361,8 @@ def _in_unit(function: OwnFunction | None, unit: float) -> OwnFunction | None:
     return None if function is None else replace(function, unit=function.unit / unit)
 
 
-@dataclass(frozen=True, eq=False)
-class HammersteinWiener:
+@dataclass(frozen=True, eq=False, repr=False)
+class HammersteinWiener(Shown):
     """``w = f(u)``, ``x = B(q)/F(q) w``, ``y = g(x)``.
 
     Parameters
@@ -406,9 +407,21 @@ class HammersteinWiener:
         """Orders ``[nb nf nk]`` of the linear block."""
         return Orders(self.numerator.size, self.denominator.size - 1, self.delay)
 
+    def facts(self) -> tuple[tuple[str, str], ...]:
+        """Name and what there is of it."""
+        return (
+            (
+                "orders",
+                f"{self.numerator.size} {self.denominator.size - 1} {self.delay}",
+            ),
+            ("input map", f"{self.input_map.kind}"),
+            ("output map", f"{self.output_map.kind}"),
+            ("sample time", f"{self.sample_time_s:g} s"),
+        )
 
-@dataclass(frozen=True, eq=False)
-class Fit:
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Fit(Shown):
     """The result of one fit, successful or not.
 
     Parameters
@@ -470,3 +483,13 @@ class Fit:
     def name(self) -> str:
         """Name of the recordings that were joined, ``step_06+step_09``."""
         return "+".join(self.identified_on)
+
+    def facts(self) -> tuple[tuple[str, str], ...]:
+        """Name and what there is of it."""
+        return (
+            ("name", repr(self.name)),
+            ("orders", f"{self.orders.nb} {self.orders.nf} {self.orders.nk}"),
+            ("status", self.status),
+            ("RMSD", f"{self.rmsd:.3g}"),
+            ("fit", f"{self.fit_percent:.2f} %"),
+        )

@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from hwid_cli.records.shown import Shown
 from hwid_cli.records.stored import ADDED_LATER
 
 KINDS = ("step", "sine", "random", "other")
@@ -59,8 +60,8 @@ class SignalUnit:
     factor: float = 1.0
 
 
-@dataclass(frozen=True, eq=False)
-class RawRecording:
+@dataclass(frozen=True, eq=False, repr=False)
+class RawRecording(Shown):
     """A measurement as the file holds it, before calibration.
 
     Parameters
@@ -105,9 +106,19 @@ class RawRecording:
         _freeze_reference(self)
         _check_common(self.kind, self.sample_time_s)
 
+    def facts(self) -> tuple[tuple[str, str], ...]:
+        """Name and what there is of it."""
+        return (
+            ("name", repr(self.name)),
+            ("kind", self.kind),
+            ("samples", f"{self.input.size} every {self.sample_time_s:g} s"),
+            ("input in", self.input_unit),
+            ("output in", self.output_unit),
+        )
 
-@dataclass(frozen=True, eq=False)
-class Recording:
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Recording(Shown):
     """A calibrated measurement: input and output of equal length, all finite.
 
     Parameters
@@ -165,6 +176,16 @@ class Recording:
     def n_samples(self) -> int:
         """Number of samples."""
         return int(self.input.size)
+
+    def facts(self) -> tuple[tuple[str, str], ...]:
+        """Name and what there is of it."""
+        return (
+            ("name", repr(self.name)),
+            ("kind", self.kind),
+            ("samples", f"{self.n_samples} every {self.sample_time_s:g} s"),
+            ("input in", self.input_unit),
+            ("output in", self.output_unit),
+        )
 
 
 @dataclass(frozen=True)
@@ -225,8 +246,8 @@ def _check_common(kind: str, sample_time_s: float) -> None:
         raise ValueError(f"sample_time_s must be positive, got {sample_time_s!r}")
 
 
-@dataclass(frozen=True, eq=False)
-class Calibrated:
+@dataclass(frozen=True, eq=False, repr=False)
+class Calibrated(Shown):
     """Calibrated recordings, and what was done to each.
 
     Parameters
@@ -240,3 +261,10 @@ class Calibrated:
     recordings: tuple[Recording, ...]
     logs: tuple[CalibrationLog, ...]
     key: str
+
+    def facts(self) -> tuple[tuple[str, str], ...]:
+        """Name and what there is of it."""
+        return (
+            ("recordings", str(len(self.recordings))),
+            ("samples", str(sum(one.n_samples for one in self.recordings))),
+        )

@@ -5,10 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from hwid_cli.records.model import Orders
+from hwid_cli.records.shown import Shown
 
 
-@dataclass(frozen=True, eq=False)
-class CrossValidation:
+@dataclass(frozen=True, eq=False, repr=False)
+class CrossValidation(Shown):
     """RMSD of every model on every recording.
 
     Parameters
@@ -49,6 +50,15 @@ class CrossValidation:
                 f"rmsd {self.rmsd.shape} and status {self.status.shape} must have "
                 f"shape {shape}"
             )
+
+    def facts(self) -> tuple[tuple[str, str], ...]:
+        """Name and what there is of it."""
+        return (
+            ("models", str(self.rmsd[..., 0].size)),
+            ("of recordings", str(len(self.identified_on))),
+            ("on recordings", str(len(self.validated_on))),
+            ("threshold", f"{self.threshold:g} {self.unit}"),
+        )
 
 
 @dataclass(frozen=True)

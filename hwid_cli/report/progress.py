@@ -11,10 +11,12 @@ from rich.progress import (
     ProgressColumn,
     Task,
     TextColumn,
-    TimeElapsedColumn,
-    TimeRemainingColumn,
 )
 from rich.text import Text
+
+# Short, so that all of it stands in one line of 80 characters.
+_BAR = 12
+_MINUTE, _HOUR = 60, 3600
 
 
 class StageProgress:
@@ -43,12 +45,10 @@ class StageProgress:
         self._is_shown = console.is_terminal and not is_silent
         self._bar = Progress(
             TextColumn("{task.description}"),
-            BarColumn(),
+            BarColumn(bar_width=_BAR),
             MofNCompleteColumn(),
             _Rate(unit),
-            TimeElapsedColumn(),
-            TextColumn("left"),
-            TimeRemainingColumn(),
+            _Times(),
             console=console,
             disable=not self._is_shown,
             transient=True,
@@ -118,3 +118,34 @@ class _Rate(ProgressColumn):
         if not task.elapsed or not task.fields["computed"]:
             return Text("")
         return Text(f"{task.fields['computed'] / task.elapsed:.1f} {self._unit}/s")
+
+
+class _Times(ProgressColumn):
+    """What has passed and what is left, each with its word."""
+
+    def render(self, task: Task) -> Text:
+        """Write both; only what has passed where nobody knows what is left."""
+        passed = f"{clock(task.elapsed or 0.0)} passed"
+        if task.time_remaining is None or task.finished:
+            return Text(passed)
+        return Text(f"{passed}, {clock(task.time_remaining)} left")
+
+
+def clock(seconds: float) -> str:
+    """Write a time that runs, with its units.
+
+    Parameters
+    ----------
+    seconds : float, [s]
+
+    Examples
+    --------
+    >>> [clock(value) for value in (7.4, 190.0, 7260.0)]
+    ['7 s', '3 min 10 s', '2 h 01 min']
+    """
+    whole = int(seconds)
+    if whole < _MINUTE:
+        return f"{whole} s"
+    if whole < _HOUR:
+        return f"{whole // _MINUTE} min {whole % _MINUTE:02d} s"
+    return f"{whole // _HOUR} h {whole % _HOUR // _MINUTE:02d} min"

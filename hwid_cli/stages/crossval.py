@@ -24,6 +24,7 @@ from hwid_cli.report.table import Block
 from hwid_cli.stages.fit_seconds import (
     PAIR_BYTES,
     SECONDS_PER_SIMULATED_SAMPLE,
+    TASK_SECONDS,
     counted,
 )
 from hwid_cli.stages.identify import recordings_with_models, stored_fits
@@ -301,7 +302,8 @@ def _plan(planning: Planning) -> tuple[StagePlan, ...]:
         f"{counted(n_models, 'model')} on {counted(len(validation), 'recording')} = "
         f"{counted(n_models * len(validation), 'validation')} in {counted(pairs, 'task')}"
     )
-    seconds = SECONDS_PER_SIMULATED_SAMPLE * samples / min(planning.workers, pairs)
+    seconds = SECONDS_PER_SIMULATED_SAMPLE * samples + TASK_SECONDS * (pairs - done)
+    seconds /= min(planning.workers, pairs)
     return (StagePlan(NAME, what, pairs, done, seconds, PAIR_BYTES * pairs),)
 
 

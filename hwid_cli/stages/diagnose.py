@@ -27,6 +27,7 @@ from hwid_cli.report.diagnosis import diagnosis_blocks
 from hwid_cli.report.figures.diagnosis import diagnosis_figures
 from hwid_cli.simulations.drive import simulate_recordings
 from hwid_cli.simulations.kinds import kind_named
+from hwid_cli.stages.diagnosis_seconds import time_diagnosis
 from hwid_cli.stages.diagnosis_starts import starts_sentence, unsettled_starts
 from hwid_cli.stages.fit_seconds import counted
 from hwid_cli.stages.foreign_simulation import (
@@ -169,6 +170,7 @@ def diagnose(
     options: DiagnoseOptions | None = None,
     *,
     jobs: int | None = 1,
+    on_stage: OnRound = lambda what, total: None,
 ) -> Diagnosis:
     """Find what a simulation of a drive lacks, beside recordings of it.
 
@@ -183,6 +185,8 @@ def diagnose(
         Which recordings take part and are held out, which effects may be named.
     jobs : int or None, [-]
         Processes; None means one for each core.
+    on_stage : callable
+        Called with what begins and its number of tasks.
 
     Returns
     -------
@@ -240,7 +244,7 @@ def diagnose(
                 "left to train on; take one out, or give 'auto'"
             )
     settings = RunSettings(MemoryStore(), Workers(jobs))
-    return diagnose_all(chosen, simulation, options, settings, lambda what, total: None)
+    return diagnose_all(chosen, simulation, options, settings, on_stage)
 
 
 @dataclass(frozen=True, eq=False)
@@ -279,14 +283,21 @@ def choose(context: Context) -> ToDiagnose:
         If the configuration has no simulation, names unknown recordings, leaves none to
         train on, or a signal is in a unit that contradicts the simulation.
     """
-    experiment = context.experiment
+    calibrated = context.results["calibrate"]
+    return given_by(context.experiment, calibrated.recordings, calibrated.logs)
+
+
+def given_by(
+    experiment: Experiment,
+    recordings: Sequence[Recording],
+    logs: tuple[CalibrationLog, ...],
+) -> ToDiagnose:
+    """The same of calibrated recordings."""
     simulation = _simulation(experiment)
     options = experiment.diagnose or DiagnoseOptions()
     place = f"{experiment.source}: diagnose"
     recordings = select_recordings(
-        context.results["calibrate"].recordings,
-        options.recordings,
-        key=f"{place}.recordings",
+        recordings, options.recordings, key=f"{place}.recordings"
     )
     if not isinstance(options.hold_out, str):
         held_out = select_recordings(
@@ -297,7 +308,6 @@ def choose(context: Context) -> ToDiagnose:
                 f"{place}.hold_out: names all {len(recordings)} recordings; expected "
                 "at least one left to train on; take one out, or write 'auto'"
             )
-    logs = context.results["calibrate"].logs
     for refused in refused_units(experiment, recordings, logs):
         raise ConfigError(refused)
     return ToDiagnose(experiment, recordings, simulation, options, logs)
@@ -362,25 +372,20 @@ def _announcement(simulation: ForeignSimulation) -> str:
 
 
 def _compute(given: ToDiagnose, runner: Runner) -> Diagnosis:
-    simulation, options = given.simulation, given.options
-    with runner.rounds("tasks") as (settings, begin_round):
-        if isinstance(simulation, SimulationOptions):
-            try:
-                return diagnose_all(
-                    given.recordings, simulation, options, settings, begin_round
-                )
-            except ConfigError as error:
-                source = given.experiment.source
-                raise ConfigError(f"{source}: {error}") from None
-        simulator = simulator_of(simulation, given.recordings, given.logs)
-        with one_thread():
-            return diagnose_foreign(
-                given.recordings,
-                simulator,
-                options,
-                _runner(given.key, settings),
-                begin_round,
-            )
+    with runner.rounds("tasks") as (settings, begin_round), one_thread():
+        return _diagnosed(given, _runner(given.key, settings), begin_round)
+
+
+def _diagnosed(given: ToDiagnose, run: RunTasks, on_round: OnRound) -> Diagnosis:
+    recordings, simulation, options = given.recordings, given.simulation, given.options
+    if isinstance(simulation, SimulationOptions):
+        try:
+            return pipeline.diagnose(recordings, simulation, options, run, on_round)
+        except ConfigError as error:
+            source = given.experiment.source
+            raise ConfigError(f"{source}: {error}") from None
+    simulator = simulator_of(simulation, recordings, given.logs)
+    return diagnose_foreign(recordings, simulator, options, run, on_round)
 
 
 def _write_files(
@@ -435,9 +440,21 @@ def _draw(folder: Path, diagnosis: Diagnosis) -> list[str]:
 
 
 def _plan(planning: Planning) -> tuple[StagePlan, ...]:
-    n = len(planning.recordings)
-    what = f"up to {counted(n, 'recording')}; time depends on what is missing"
-    return (StagePlan("diagnose", what, n, None, nan, 1e6),)
+    """What a diagnosis takes while single effects explain what is missing."""
+    given = given_by(planning.experiment, planning.recordings, planning.logs)
+    n = len(given.recordings)
+    what = f"{counted(n, 'recording')}, as many effects as diagnose.effects allows"
+    if not planning.cost.rounds:
+        return (StagePlan(NAME, what, n, None, nan, 1e6),)
+    seconds, n_tasks = time_diagnosis(
+        lambda run, on_round: _diagnosed(given, run, on_round), n
+    )
+    what = f"{counted(n, 'recording')} x {counted(n_tasks, 'effect')}"
+    if n_tasks and given.options.max_effects > 1:
+        what += "; up to ten times as long where one is not all"
+    if not n_tasks:
+        what = f"{counted(n, 'recording')}; no effect is looked for"
+    return (StagePlan(NAME, what, n_tasks, None, seconds / planning.workers, 1e6),)
 
 
 STAGE = Stage(

@@ -13,7 +13,7 @@ from hwid_cli.model.derivative_rows import derivative_rows
 from hwid_cli.model.fit import fit
 from hwid_cli.records.check import FitCost
 from hwid_cli.records.experiment import Experiment, GroupOptions, OrdersOptions
-from hwid_cli.records.model import FitOptions, Orders
+from hwid_cli.records.model import FitOptions, HammersteinWiener, Orders
 from hwid_cli.records.recordings import Recording
 from hwid_cli.stages.order_grid import (
     SEARCHED_ROUNDS,
@@ -36,6 +36,11 @@ _MOST_TIMED = 10_000
 # are searched for too, in the later ones, and both for groups that begin with the models
 # of their members (docs/benchmarks.md, "A campaign" and "Groups of recordings"), [-].
 _SEARCHED, _CONTINUED, _WARM_SEARCHED, _WARM_CONTINUED = 0.5, 0.2, 0.25, 0.1
+# Time of a fit of maps that are compared against one with middle orders and the usual
+# maps: the recommended orders and most of the maps are smaller (docs/benchmarks.md), [-].
+_MAP_SHARE = 0.65
+# Keeping the result of a task, [s].
+TASK_SECONDS = 0.005
 # Simulating one model on one sample, its initial state included (docs/benchmarks.md: 1 ms
 # for 7500 samples on two cores), [s].
 SECONDS_PER_SIMULATED_SAMPLE = 2.7e-7
@@ -70,39 +75,86 @@ def compiled_loops_place() -> str:
     return str(derivative_rows.stats.cache_path)
 
 
-def time_one_fit(
+def time_fits(
     recordings: Sequence[Recording], orders: OrdersOptions, options: FitOptions
 ) -> FitCost:
-    """Time a fit of middle orders on the recording of middle length.
+    """Time a fit of middle orders, and some of the fits that a grid begins with.
+
+    What a fit takes depends on the recording more than on anything else, so one of each
+    kind is timed. Processor time: a busy machine would be taken for slow recordings.
 
     Parameters
     ----------
     recordings : sequence of Recording
         At least one.
     """
-    by_length = sorted(recordings, key=lambda one: one.n_samples)
-    whole = by_length[len(by_length) // 2]
-    n = min(whole.n_samples, _MOST_TIMED)
-    cut = replace(
-        whole,
-        input=whole.input[:n],
-        output=whole.output[:n],
-        reference=None if whole.reference is None else whole.reference[:n],
-    )
+    alone = replace(options, join=FitOptions().join)
     middle = middle_orders(orders)
-    short = replace(options, starts=1, max_iterations=1, join=FitOptions().join)
+    chosen = _one_of_each_kind(recordings)
     # The first call loads the compiled loops, which no later fit does.
-    fit([cut], middle, short)
-    start = time.perf_counter()
-    fit([cut], middle, replace(options, join=FitOptions().join))
+    fit(chosen[:1], middle, replace(alone, starts=1, max_iterations=1))
+    start = time.process_time()
+    fit(chosen[:1], middle, alone)
+    seconds = time.process_time() - start
+    each = [_round_seconds(one, orders, alone) for one in chosen]
     return FitCost(
-        seconds=time.perf_counter() - start,
-        n_samples=n,
+        seconds=seconds,
+        n_samples=round(sum(one.n_samples for one in chosen) / len(chosen)),
         order=(middle.nb + middle.nf) / 2,
         units=options.units,
-        source=f"one fit of {whole.name} with orders {middle.nb} {middle.nf} "
+        source=f"one fit of {chosen[0].name} with orders {middle.nb} {middle.nf} "
         f"{middle.nk}",
+        rounds=tuple(sum(times) / len(each) for times in zip(*each, strict=True)),
     )
+
+
+def _one_of_each_kind(recordings: Sequence[Recording]) -> list[Recording]:
+    """The recording of middle length of each kind, at most so long as is worth timing."""
+    by_length = sorted(recordings, key=lambda one: one.n_samples)
+    kinds = dict.fromkeys(one.kind for one in by_length)
+    groups = [[one for one in by_length if one.kind == kind] for kind in kinds]
+    # The most frequent kind first: it stands for fits of any orders.
+    groups.sort(key=len, reverse=True)
+    found = []
+    for group in groups:
+        whole = group[len(group) // 2]
+        n = min(whole.n_samples, _MOST_TIMED)
+        reference = None if whole.reference is None else whole.reference[:n]
+        found.append(
+            replace(
+                whole,
+                input=whole.input[:n],
+                output=whole.output[:n],
+                reference=reference,
+            )
+        )
+    return found
+
+
+def _round_seconds(
+    recording: Recording, orders: OrdersOptions, options: FitOptions
+) -> tuple[float, float, float]:
+    """Times of fits of the grid's first round, of the second, and of a later one."""
+    grid = [one for _, _, one in candidate_orders(orders)]
+    rounds = growth(orders)
+    later = rounds[SEARCHED_ROUNDS:]
+    places = [rounds[0][0][0], rounds[min(1, len(rounds) - 1)][0][0]]
+    places.append(later[len(later) // 2][0][0] if later else places[-1])
+    times: list[float] = []
+    models: list[HammersteinWiener] = []
+    for number, place in enumerate(places):
+        start = time.process_time()
+        found = fit(
+            [recording],
+            grid[place],
+            options,
+            contained=[one for one in models if grid[place].contains(one.orders)][-1:],
+            search_anew=number < len(places) - 1,
+        )
+        times.append(time.process_time() - start)
+        models += [] if found.model is None else [found.model]
+    first, searched, continued = times
+    return first, searched, continued
 
 
 def fit_seconds(
@@ -195,12 +247,19 @@ def grid_seconds(
     """
     cost, workers = speed
     grid = [orders for _, _, orders in candidate_orders(experiment.orders)]
+
+    def seconds(number: int, place: int, n_samples: int) -> float:
+        if cost.rounds:
+            kind = 0 if number == 0 else 1 if number < SEARCHED_ROUNDS else 2
+            return cost.rounds[kind] * _work(n_samples) / _work(cost.n_samples)
+        units = experiment.fit.units
+        alone = fit_seconds(cost, grid[place], n_samples, units=units)
+        return share_of_round(number) * alone
+
     total = 0.0
     for number, places in enumerate(growth(experiment.orders)):
-        share = share_of_round(number)
         each = [
-            share
-            * fit_seconds(cost, grid[place], one.n_samples, units=experiment.fit.units)
+            seconds(number, place, one.n_samples) + TASK_SECONDS
             for one in recordings
             for place, _ in places
         ]
@@ -248,7 +307,7 @@ def map_seconds(
     float, [s]
     """
     middle = middle_orders(orders)
-    return sum(
+    return _MAP_SHARE * sum(
         fit_seconds(
             cost,
             middle,

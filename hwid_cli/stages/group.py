@@ -50,6 +50,7 @@ from hwid_cli.stages.fit_seconds import (
     FIT_BYTES,
     PAIR_BYTES,
     SECONDS_PER_SIMULATED_SAMPLE,
+    TASK_SECONDS,
     group_grid_seconds,
 )
 from hwid_cli.stages.identify import Run, fit_grid
@@ -777,6 +778,7 @@ def _plan(planning: Planning) -> tuple[StagePlan, ...]:
             for level, count in enumerate(bounds, start=2)
         )
         + SECONDS_PER_SIMULATED_SAMPLE * n * n_validate * fits
+        + TASK_SECONDS * (fits + sum(bounds) * n_validate)
     )
     plan = StagePlan(
         NAME,

@@ -15,7 +15,7 @@ from typing import Any, Protocol
 
 from hwid_cli.records.check import FitCost, StagePlan
 from hwid_cli.records.experiment import Experiment
-from hwid_cli.records.recordings import Recording
+from hwid_cli.records.recordings import CalibrationLog, Recording
 from hwid_cli.report.table import Block
 from hwid_cli.store.result_files import Provenance, read_stage_key, results_file
 from hwid_cli.tasks.cache import Store
@@ -106,6 +106,8 @@ class Planning:
         What was computed before.
     workers : int, [-]
         Processes that share the work.
+    logs : tuple of CalibrationLog
+        In the order of the recordings.
     """
 
     experiment: Experiment
@@ -113,6 +115,7 @@ class Planning:
     cost: FitCost
     store: Store
     workers: int = 1
+    logs: tuple[CalibrationLog, ...] = ()
 
 
 def _nothing(*_: Any) -> tuple[Any, ...]:

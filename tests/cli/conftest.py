@@ -67,7 +67,7 @@ def finished(tmp_path_factory):
         leave_figures_blank(monkeypatch)
         result = CliRunner().invoke(main, arguments)
     assert result.exit_code == 0, result.output
-    (folder / "out" / "said.txt").write_text(result.stdout)
+    (folder / "out" / "said.txt").write_text(result.output)
     return folder / "out"
 
 

@@ -43,7 +43,9 @@ def test_stages_before_run(hwid, out):
     result = hwid("export", "--model", "step_02/1/1")
 
     assert result.exit_code == 0, result.output
-    assert "6 computed" in result.stdout
+    assert "6 computed" in result.stderr
+    # What a script captures is the path, and nothing else.
+    assert result.stdout == f"{out / 'models' / 'step_02_1_1.json'}\n"
     assert (out / "models" / "step_02_1_1.json").is_file()
 
 

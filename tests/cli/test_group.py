@@ -22,10 +22,10 @@ def first_search(finished, tmp_path_factory):
     path, out = folder / "tiny.yaml", folder / "out"
     path.write_text(GROUPED)
     shutil.copytree(finished, out)
-    arguments = ["group", str(path), "--out", str(out), "--jobs", "1"]
+    arguments = ["group", str(path), "--out", str(out), "--jobs", "1", "-v"]
     result = CliRunner().invoke(main, arguments)
     assert result.exit_code == 0, result.output
-    return out, result.stdout
+    return out, result.stdout + result.stderr
 
 
 @pytest.fixture
@@ -57,23 +57,23 @@ def test_a_second_run_answers_from_the_cache_with_the_same_table(grouped, hwid, 
     before = (out / "groups.csv").read_bytes()
     result = hwid("group")
 
-    assert "groups from the cache, 0 computed" in result.stdout
+    assert "groups from the cache, 0 computed" in result.stderr
     assert (out / "groups.csv").read_bytes() == before
 
 
 def test_force_searches_again_but_keeps_the_models_of_single_recordings(grouped, hwid):
-    result = hwid("group", "--force")
+    result = hwid("group", "--force", "-v")
 
-    assert "group level 1: 6 fits from the cache, 0 computed" in result.stdout
-    assert "group level 2: 0 fits from the cache" in result.stdout
+    assert "group level 1: 6 fits from the cache, 0 computed" in result.stderr
+    assert "group level 2: 0 fits from the cache" in result.stderr
 
 
 def test_another_threshold_fits_nothing_again(grouped, hwid, edit):
     edit("crossval: {threshold: 0.004}", "crossval: {threshold: 0.005}")
-    result = hwid("group")
+    result = hwid("group", "-v")
 
     assert result.exit_code == 0, result.output
-    fits = [line for line in result.stdout.splitlines() if " fits from" in line]
+    fits = [line for line in result.stderr.splitlines() if " fits from" in line]
     assert fits
     assert all(", 0 computed" in line for line in fits if "level 1" in line)
 
@@ -92,11 +92,11 @@ def test_results_that_lack_a_part_come_back_from_the_cache(grouped, hwid, out):
         del file["group/rmsd"]
         # As of a version without checksums: with one, nothing in the file is believed.
         del file.attrs["sealed"]
-    result = hwid("group")
+    result = hwid("group", "-v")
 
     assert result.exit_code == 0, result.output
     assert "group comes back from the cache" in result.stderr
-    fits = [line for line in result.stdout.splitlines() if "level 2" in line]
+    fits = [line for line in result.stderr.splitlines() if "level 2" in line]
     assert fits
     assert all(", 0 computed" in line for line in fits)
     assert (out / "groups.csv").read_bytes() == before

@@ -11,28 +11,28 @@ def test_models_are_written_and_the_best_are_shown(hwid, out):
     assert result.exit_code == 0, result.output
     names = [fit.name for fit in read_fits(out / "results.h5")]
     assert names == 2 * ["step_02"] + 2 * ["step_12"] + 2 * ["sine_12"]
-    assert "identify: 0 fits from the cache, 6 computed" in result.stdout
+    assert "identify: 0 fits from the cache, 6 computed" in result.stderr
     assert "\nstep_02/1/2  " in result.stdout
 
 
 def test_a_second_run_answers_from_the_cache(after_run, hwid):
     result = hwid("identify")
 
-    assert "identify: 6 fits from the cache, 0 computed" in result.stdout
+    assert "identify: 6 fits from the cache, 0 computed" in result.stderr
 
 
 def test_force_computes_this_stage_again_and_no_other(after_run, hwid):
     result = hwid("identify", "--force")
 
-    assert "calibrate: 3 recordings from the cache" in result.stdout
-    assert "identify: 0 fits from the cache, 6 computed" in result.stdout
+    assert "calibrate: 3 recordings from the cache" in result.stderr
+    assert "identify: 0 fits from the cache, 6 computed" in result.stderr
 
 
 def test_another_order_is_fitted_and_the_others_are_not(after_run, hwid, edit):
     edit("nk: [1, 2]", "nk: [1, 3]")
     result = hwid("identify")
 
-    assert "identify: 6 fits from the cache, 3 computed" in result.stdout
+    assert "identify: 6 fits from the cache, 3 computed" in result.stderr
 
 
 def test_one_changed_recording_is_fitted_again_and_the_others_are_not(
@@ -42,7 +42,7 @@ def test_one_changed_recording_is_fitted_again_and_the_others_are_not(
     result = hwid("identify")
 
     # Only the steps of 4 A feel the limit; the sine of 2 A stays as it was.
-    assert "identify: 2 fits from the cache, 4 computed" in result.stdout
+    assert "identify: 2 fits from the cache, 4 computed" in result.stderr
 
 
 def test_an_unknown_recording_is_refused(after_run, hwid, edit):
@@ -87,7 +87,7 @@ def test_a_map_of_ones_own_is_fitted_and_kept(own_map, hwid, edit, out):
     assert fit.model.input_map.function.source == OWN_MAP
     assert "input_map.loss" in fit.uncertainty.names
     own_map.write_text(OWN_MAP.replace("start=[0.3", "start=[0.4"), encoding="utf-8")
-    assert "0 fits from the cache, 3 computed" in hwid("identify").stdout
+    assert "0 fits from the cache, 3 computed" in hwid("identify").stderr
 
 
 def test_a_map_of_ones_own_that_contradicts_itself_is_one_line(own_map, hwid):

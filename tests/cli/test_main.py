@@ -8,6 +8,7 @@ from click.testing import CliRunner
 
 from hwid_cli import __version__
 from hwid_cli.cli import main as main_module
+from hwid_cli.cli.commands import COMMANDS, GROUPS
 from hwid_cli.cli.main import main
 from hwid_cli.errors import MeasurementError
 
@@ -124,3 +125,24 @@ def test_verbose_and_quiet_choose_the_log_level(options, level):
     main_module.set_log_levels(**{"verbose": False, "quiet": False, **options})
 
     assert logging.getLogger("hwid_cli").level == level
+
+
+def test_help_lists_every_command_in_one_group():
+    text = CliRunner().invoke(main, ["--help"]).output
+
+    listed = [name for names in GROUPS.values() for name in names]
+    assert sorted(listed) == sorted(COMMANDS)
+    assert [text.index(f"\n{title}:") for title in GROUPS] == sorted(
+        text.index(f"\n{title}:") for title in GROUPS
+    )
+    for name in listed:
+        assert text.count(f"\n  {name} ") == 1
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_no_help_shows_a_mark_of_its_layout(name):
+    text = CliRunner().invoke(main, [name, "--help"]).output
+
+    assert text.startswith("Usage:")
+    assert "\\b" not in text
+    assert "\b" not in text

@@ -31,7 +31,7 @@ def test_a_report_of_all_stages(after_run, hwid, out):
     result = hwid("report")
 
     assert result.exit_code == 0, result.output
-    assert "shows calibrate, identify, crossval" in result.stdout
+    assert "shows calibrate, identify, crossval" in result.stderr
     # No stage is run.
     assert (out / "results.h5").read_bytes() == before
     html = (out / "report.html").read_text()
@@ -81,7 +81,7 @@ def test_calibration_alone_can_be_reported(hwid, out):
     result = hwid("report")
 
     assert result.exit_code == 0, result.output
-    assert "shows calibrate," in result.stdout
+    assert "shows calibrate," in result.stderr
 
 
 def test_a_broken_diagnosis_is_one_line(after_run, hwid, out):
@@ -98,7 +98,7 @@ def test_a_page_is_drawn_again_only_when_its_results_have_changed(
 ):
     hwid("report")
 
-    assert "shows calibrate, identify, crossval already" in hwid("report").stdout
+    assert "shows calibrate, identify, crossval already" in hwid("report").stderr
     assert "already" not in hwid("report", "--force").stdout
     edit("crossval: {threshold: 0.01}", "crossval: {threshold: 0.02}")
     assert hwid("crossval").exit_code == 0

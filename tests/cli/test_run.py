@@ -1,25 +1,78 @@
+import re
+
 import pytest
 
+STAGES = ["simulate", "calibrate", "identify", "crossval", "report"]
 
-def test_all_stages_run_in_order_and_the_results_are_named(finished):
+
+def test_all_stages_run_in_order_and_the_answer_stands_last(finished):
     lines = (finished / "said.txt").read_text().splitlines()
 
+    assert len(lines) <= 25
     said = [line.split(":")[0] for line in lines]
-    stages = ["simulate", "calibrate", "identify", "crossval", "report"]
-    assert [one for one in said if one in stages] == stages
-    assert lines[-1] == f"results: {finished}"
-    # A stage without tables leaves no gap.
-    assert "\n\n\n" not in "\n".join(lines)
+    assert said[:5] == STAGES
+    for number, line in enumerate(lines[:5], start=1):
+        assert line.endswith(f" s (stage {number} of 5)")
+    text = "\n".join(lines[5:])
+    (name,) = re.findall(r"best model  (\w+/\d+/\d+): ", text)
+    assert re.search(r"linear model of the same orders: [\d.e-]+\sm", text)
+    assert f"page        {finished / 'report.html'}" in lines[-5:][1]
+    assert re.fullmatch(rf"  next  +hwid export .* --model {name}", lines[-1])
+    # Tables are in their file.
+    assert "Best models of each recording" in (finished / "tables.txt").read_text()
+    assert "Best models of each recording" not in text
+
+
+def test_tables_are_shown_where_more_is_asked_for(after_run, hwid, out):
+    said = hwid("run", "-v").stdout
+
+    for line in (out / "tables.txt").read_text().splitlines():
+        assert line in said
+    assert said.count("Best models of each recording") == 1
+
+
+def test_progress_is_apart_from_the_results(after_run, hwid):
+    done = hwid("run")
+
+    assert re.findall(r"^(\w+): .* of 5", done.stderr, re.M) == STAGES
+    assert "stage" not in done.stdout
+    assert done.stdout.startswith("\ntiny: run done in ")
+
+
+def test_a_stage_draws_a_page_anew_that_is_there(after_run, hwid, out, edit):
+    (out / "report.html").unlink()
+    edit("threshold: 0.01", "threshold: 0.02")
+    hwid("crossval")
+    assert not (out / "report.html").exists()
+
+    (out / "report.html").write_text("an older page")
+    edit("threshold: 0.02", "threshold: 0.03")
+    assert (
+        "report.html shows calibrate, identify, crossval, " in hwid("crossval").stderr
+    )
+    assert "0.03" in (out / "report.html").read_text()
+
+
+def test_a_page_that_cannot_be_drawn_stays_and_fails_nothing(after_run, hwid, out):
+    (out / "report.html").write_text("an older page")
+    (out / "diagnosis.json").write_text("{")
+    done = hwid("crossval")
+
+    assert done.exit_code == 0
+    assert "report.html stays as it was: " in done.stderr
+    assert (out / "report.html").read_text() == "an older page"
 
 
 def test_a_second_run_computes_nothing_and_force_computes_all(after_run, hwid, edit):
-    assert hwid("run").stdout.count("from the cache, 0 computed") == 2
+    assert hwid("run").stderr.count("from the cache, 0 computed") == 2
 
     # Orders and maps are recommended where the configuration names them.
     edit("identify: {}", "identify: {}\norder: {maps: [none]}")
-    text = hwid("run", "--force").stdout
+    done = hwid("run", "--force", "-v")
+    text = done.stdout
     assert "Take nb = 1" in text
     assert "Take fit: {input_map: " in text
+    text = done.stderr
     # All stages that the table lists are forced, not only some of them.
     assert "order maps: 0 fits from the cache, 12 computed" in text
     assert "simulate: 3 measurements computed" in text
@@ -113,5 +166,4 @@ def test_a_stage_that_fails_still_leaves_a_report_of_those_before(
     result = hwid("run")
 
     assert result.exit_code != 0
-    assert "shows calibrate, identify, crossval" in result.stdout
     assert (out / "report.html").is_file()

@@ -16,22 +16,22 @@ def test_virtual_measurements_and_their_plan_are_written(hwid, out):
         "step_02.csv",
         "step_12.csv",
     ]
-    assert result.stdout.startswith("simulate: 3 measurements computed")
+    assert result.stderr.startswith("simulate: 3 measurements computed")
 
 
 def test_an_unchanged_simulation_is_not_repeated(after_run, hwid, out):
     before = (out / "raw" / "step_02.csv").stat().st_mtime_ns
     result = hwid("simulate")
 
-    assert result.stdout.startswith("simulate: measurements from the cache")
+    assert result.stderr.startswith("simulate: measurements from the cache")
     assert (out / "raw" / "step_02.csv").stat().st_mtime_ns == before
-    assert hwid("simulate", "--force").stdout.startswith("simulate: 3 measurements")
+    assert hwid("simulate", "--force").stderr.startswith("simulate: 3 measurements")
 
 
 def test_another_option_simulates_again(after_run, hwid, edit):
     edit("kind: gun", "kind: gun\n  seed: 5")
 
-    assert "3 measurements computed" in hwid("simulate").stdout
+    assert "3 measurements computed" in hwid("simulate").stderr
 
 
 def test_a_configuration_without_a_machine_is_refused(hwid, edit):
@@ -94,8 +94,8 @@ def test_with_both_sections_it_does_both(hwid, config, out):
     result = hwid("simulate")
 
     assert result.exit_code == 0, result.output
-    assert result.stdout.startswith("simulate: 3 measurements computed")
-    assert "simulate: 3 recordings simulated" in result.stdout
+    assert result.stderr.startswith("simulate: 3 measurements computed")
+    assert "simulate: 3 recordings simulated" in result.stderr
     assert len(list((out / "simulated").glob("*.csv"))) == 3
 
 

@@ -31,7 +31,7 @@ def first_run(tmp_path_factory):
         leave_figures_blank(monkeypatch)
         result = CliRunner().invoke(main, arguments)
     assert result.exit_code == 0, result.output
-    return folder / "out", result.stdout
+    return folder / "out", result.stdout + result.stderr
 
 
 @pytest.fixture
@@ -114,7 +114,7 @@ def test_without_groups_the_single_models_are_judged(again, edit, out):
     result = again()
 
     assert result.exit_code == 0, result.output
-    assert "no group: section, so there is no chain of groups to test" in result.stdout
+    assert "no group: section, so there is no chain of groups to test" in result.stderr
     assert "The chain" not in result.stdout
     # Three models of their own; the test recordings have none.
     rows = rows_of(out / "test.csv")
@@ -131,10 +131,10 @@ def test_a_second_run_answers_from_the_results_with_the_same_tables(
     shutil.rmtree(out / "cache")
     result = again()
 
-    assert "test: 5 recordings from the cache, 0 computed" in result.stdout
+    assert "test: 5 recordings from the cache, 0 computed" in result.stderr
     assert tables_of(out) == tables_of(first_run[0])
     shown, before = (
-        said.split("Coverage of all")[1].split("results:")[0]
+        said.split("Coverage of all")[1].split("tiny: test done in")[0]
         for said in (result.stdout, first_run[1])
     )
     assert shown == before
@@ -144,12 +144,12 @@ def test_a_lost_results_file_is_made_from_the_cache(again, out, first_run):
     (out / "results.h5").unlink()
     result = again()
 
-    assert "test: 5 recordings from the cache, 0 computed" in result.stdout
+    assert "test: 5 recordings from the cache, 0 computed" in result.stderr
     assert tables_of(out) == tables_of(first_run[0])
 
 
 def test_force_judges_again(again):
-    said = again("--force").stdout
+    said = again("--force").stderr
 
     assert "test: 0 recordings from the cache, 5 computed" in said
     assert "crossval: 9 pairs from the cache, 0 computed" in said

@@ -17,7 +17,7 @@ def undisturbed(tmp_path_factory):
     with pytest.MonkeyPatch.context() as monkeypatch:
         leave_figures_blank(monkeypatch)
         done = harness.run_here(harness.write_config(folder), out)
-    assert harness.count_computed(done.stdout) == len(harness.entries(out))
+    assert harness.count_computed(done.stderr) == len(harness.entries(out))
     return out
 
 

@@ -64,7 +64,7 @@ def test_results_are_not_stored_for_a_file_that_is_no_longer_there(
     # The fits of what had been read are kept.
     path.write_bytes(before)
     again = harness.run_here(config, out)
-    assert "identify: 18 fits from the cache, 0 computed" in again.stdout
+    assert "identify: 18 fits from the cache, 0 computed" in again.stderr
     assert harness.results(out) == harness.results(undisturbed)
 
 

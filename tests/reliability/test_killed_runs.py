@@ -68,7 +68,7 @@ def test_a_hundred_kills_at_random_moments(config, out, undisturbed):
         else:
             assert process.returncode == 0, complaint
         assert "Traceback" not in said + complaint
-        assert_whole(out, before if longest else {}, said, undisturbed)
+        assert_whole(out, before if longest else {}, said + complaint, undisturbed)
         campaigns, longest = campaigns + 1, 0
         shutil.rmtree(out)
     sys.stdout.write(f"\n{kills} kills in {campaigns} campaigns, nothing lost\n")

@@ -39,3 +39,18 @@ def test_a_round_has_its_own_name_and_total():
     )
     # The rate is that of the round.
     assert task.fields["computed"] == 1
+
+
+def test_what_has_passed_and_what_is_left_each_have_their_word():
+    progress = StageProgress("identify", 10, "fits", is_silent=True)
+    (task,) = progress._bar.tasks
+    now = [100.0]
+    progress._bar.get_time = lambda: now[0]
+    task._get_time = lambda: now[0]
+    task.start_time = 100.0
+    for _ in range(5):
+        now[0] += 8.0
+        progress.advance(from_cache=False)
+
+    column = progress._bar.columns[-1]
+    assert str(column.render(task)) == "40 s passed, 40 s left"

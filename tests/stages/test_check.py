@@ -12,7 +12,7 @@ from hwid_cli.stages.fit_seconds import (
     MEASURED,
     fit_seconds,
     share_of_round,
-    time_one_fit,
+    time_fits,
 )
 from hwid_cli.stages.group import group_bound, search_groups
 
@@ -95,8 +95,9 @@ def test_a_fit_that_keeps_a_block_is_timed_with_the_orders_of_that_block():
     u = np.repeat(rng.uniform(-1.0, 1.0, 30), 10)
     recording = Recording("r", u, lfilter([0.0, 0.1, 0.05], [1.0, -1.5, 0.6], u), 1e-3)
     block = LinearBlock((0.1, 0.05), (1.0, -1.5, 0.6), frozen=True)
-    cost = time_one_fit(
+    cost = time_fits(
         [recording], OrdersOptions(nb=(2,), nk=(2,)), FitOptions(linear_block=block)
     )
     assert cost.seconds > 0.0
+    assert all(one > 0.0 for one in cost.rounds)
     assert "orders 2 2 1" in cost.source

@@ -1,0 +1,131 @@
+"""What a command says last, from what has run."""
+
+import shlex
+from collections.abc import Sequence
+
+from hwid_cli.cli.session import Session, screen_width
+from hwid_cli.records.best_model import BestModel
+from hwid_cli.records.diagnosis import Diagnosis
+from hwid_cli.records.report import StoredResults
+from hwid_cli.report.closing import (
+    best_model_sentences,
+    closing_text,
+    diagnosis_sentence,
+)
+from hwid_cli.stages.best_model import beside_linear, best_model
+from hwid_cli.stages.compare import fit_linear
+from hwid_cli.stages.model_views import named_fits
+from hwid_cli.stages.table import is_named, stage_named
+from hwid_cli.tasks.cache import MemoryStore
+from hwid_cli.tasks.runner import RunSettings
+
+PAGE = "report.html"
+TABLES = "tables.txt"
+_RUN = "run"
+# What follows a stage, unless its results say more.
+_NEXT = {
+    "simulate": "run",
+    "calibrate": "identify",
+    "identify": "crossval",
+    "crossval": "order",
+    "group": "test",
+}
+# Kinds of simulations of the user's own that an export can hold.
+_EXPORTED = ("python", "fmu")
+
+
+def say_end(session: Session, name: str, files: Sequence[str] = ()) -> None:
+    """Show the block that ends the command of a stage, or ``run``.
+
+    Parameters
+    ----------
+    name : str
+        One of ``STAGES``, or ``run``.
+    files : sequence of str
+        What it may have written; what the stage names, where empty.
+    """
+    if session.is_quiet:
+        return
+    diagnosis = session.results.get("diagnose")
+    best = None if name in ("diagnose", "calibrate") else _best(session)
+    rows = []
+    if best is not None:
+        rows += [("best model", one) for one in best_model_sentences(best)]
+    if diagnosis is not None:
+        rows.append(("simulation", diagnosis_sentence(diagnosis)))
+    rows += _places(session, name, files)
+    rows.append(("next", _next(session, name, best)))
+    title = f"{session.experiment.name}: {name} done in {session.timer}"
+    session.say(closing_text(f"\n{title}", rows, screen_width()))
+
+
+def _best(session: Session) -> BestModel | None:
+    """The model to take, beside the linear one."""
+    experiment, results = session.experiment, session.results
+    best = best_model(experiment, results)
+    if best is None:
+        return None
+    stored = StoredResults(
+        experiment.name,
+        config="",
+        nk_role=experiment.orders.nk_role,
+        results={one: results.get(one) for one in ("group",)}
+        | {"identify": results["identify"]},
+    )
+    settings = RunSettings(MemoryStore(), session.workers)
+    return beside_linear(
+        best,
+        named_fits(stored),
+        results["calibrate"].recordings,
+        lambda recordings, orders: fit_linear(
+            recordings, orders, experiment.fit, settings
+        ),
+    )
+
+
+def _places(session: Session, name: str, files: Sequence[str]) -> list[tuple[str, str]]:
+    """Where to look: the page, and files of the stage."""
+    out, rows = session.out, []
+    if (out / PAGE).is_file():
+        rows.append(("page", str(out / PAGE)))
+    if name == _RUN and (out / TABLES).is_file():
+        rows.append(("tables", str(out / TABLES)))
+    known = files or (() if name == _RUN else stage_named(name).files)
+    there = [file for file in known if (out / file).exists()]
+    first, *others = there or [""]
+    return [*rows, ("results", ", ".join([str(out / first), *others]))]
+
+
+def _next(session: Session, name: str, best: BestModel | None) -> str:
+    """The command that a user would give next."""
+    diagnosis = session.results.get("diagnose")
+    if diagnosis is not None and (best is None or name == "diagnose"):
+        return _after_diagnosis(session, diagnosis)
+    follows = _NEXT.get(name)
+    if follows == "test" and not is_named("test", session.experiment):
+        follows = None
+    if follows is not None:
+        return command_line(session, follows)
+    if best is not None:
+        return command_line(session, "export", "--model", best.name)
+    return command_line(session, "run" if name != _RUN else "identify")
+
+
+def _after_diagnosis(session: Session, diagnosis: Diagnosis) -> str:
+    foreign = session.experiment.foreign_simulation
+    wanted = diagnosis.next_experiment.input
+    if diagnosis.verdict in ("ambiguous", "unknown") and wanted:
+        return f"measure: {wanted}"
+    if diagnosis.verdict == "none":
+        return command_line(session, "report")
+    if foreign is None:
+        return command_line(session, "export", "--diagnosis", "--format", "fmu")
+    if foreign.kind in _EXPORTED:
+        return command_line(session, "export", "--diagnosis", "--format", "python")
+    return f"look at {session.out / 'extended_simulation.yaml'}"
+
+
+def command_line(session: Session, command: str, *options: str) -> str:
+    """Write a command for the same configuration and folders, as a shell takes it."""
+    words = ["hwid", command, *session.arguments]
+    return shlex.join([*words, *options])

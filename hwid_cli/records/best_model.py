@@ -1,0 +1,53 @@
+"""The model to take, and how good it is on recordings that it has not seen."""
+
+from dataclasses import dataclass
+
+# What judged a model, the strictest first: recordings that nothing has used; recordings
+# that no group may hold; all but its own; its own, for want of others.
+JUDGES = ("test", "unseen", "others", "own")
+
+
+@dataclass(frozen=True)
+class BestModel:
+    """The model to take.
+
+    Parameters
+    ----------
+    name : str
+        ``step_06/3/7``; recordings of a group are joined with ``+``.
+    judge : str
+        One of ``JUDGES``: which recordings ``rmsd`` is of.
+    judged_on : tuple of str
+        Their names.
+    rmsd, linear_rmsd : float, [unit]
+        Mean over these recordings: of the model, and of the linear output-error model of
+        the same orders and recordings; NaN where that is not known.
+    unit : str
+        Of the output.
+    threshold : float, [unit]
+        Largest RMSD that is accepted.
+    single : str
+        Of a group: the best model of a single recording, told without ``judged_on``;
+        empty where there is none.
+    single_rmsd : float, [unit]
+        Its mean over the same recordings.
+    """
+
+    name: str
+    judge: str
+    judged_on: tuple[str, ...]
+    rmsd: float
+    unit: str
+    threshold: float
+    linear_rmsd: float = float("nan")
+    single: str = ""
+    single_rmsd: float = float("nan")
+
+    def __post_init__(self) -> None:
+        if self.judge not in JUDGES:
+            raise ValueError(f"judge {self.judge!r} is none of {', '.join(JUDGES)}")
+
+    @property
+    def is_accepted(self) -> bool:
+        """Whether its mean RMSD lies below the threshold."""
+        return self.rmsd < self.threshold

@@ -1,0 +1,95 @@
+"""What a command says last: the answer, where to look, and what to do next."""
+
+import textwrap
+from collections.abc import Sequence
+
+import numpy as np
+
+from hwid_cli.records.best_model import BestModel
+from hwid_cli.records.diagnosis import Diagnosis
+from hwid_cli.report.formats import counted, listed, with_unit
+
+# Room for the words on the left, [characters].
+_LABELS = 12
+_FEW = 3
+# Rows that people copy: a line break would spoil them.
+_WHOLE = ("page", "tables", "results", "next")
+
+
+def closing_text(title: str, rows: Sequence[tuple[str, str]], width: int) -> str:
+    """Write the block that ends a command.
+
+    Parameters
+    ----------
+    rows : sequence of (str, str)
+        What is said, and a word that says what it is about; rows of one word follow each
+        other. Commands and paths are never broken.
+    width : int, [characters]
+        Of a line.
+
+    Examples
+    --------
+    >>> print(closing_text("gun: done", [("page", "report.html")], 80))
+    gun: done
+      page        report.html
+    """
+    lines = [title]
+    before = ""
+    for label, text in rows:
+        shown = "" if label == before else label
+        before = label
+        start = f"  {shown:<{_LABELS - 2}}  "
+        lines += (
+            [start + text]
+            if label in _WHOLE
+            else textwrap.wrap(
+                text,
+                width,
+                initial_indent=start,
+                subsequent_indent=" " * len(start),
+                break_long_words=False,
+                break_on_hyphens=False,
+            )
+        )
+    return "\n".join(lines)
+
+
+def best_model_sentences(best: BestModel) -> list[str]:
+    """Say which model to take, how good it is on recordings that it has not seen.
+
+    Examples
+    --------
+    >>> found = BestModel("a/2/3", "test", ("c",), 0.002, "m", 0.01, linear_rmsd=0.03)
+    >>> for said in best_model_sentences(found):
+    ...     print(*said.split())
+    a/2/3: RMSD 0.002 m on 1 recording never used (c)
+    linear model of the same orders: 0.03 m
+    below the 0.01 m of crossval.threshold
+    """
+    which = listed(best.judged_on, most=_FEW)
+    many = counted(len(best.judged_on), "recording")
+    on = {
+        "test": f"{many} never used ({which})",
+        "unseen": f"{many} that no group may hold ({which})",
+        "others": f"{many} besides its own ({which})",
+        "own": f"its own {many} ({which}); no other has judged it",
+    }[best.judge]
+    mean = "mean RMSD" if len(best.judged_on) > 1 else "RMSD"
+    said = [f"{best.name}: {mean} {with_unit(best.rmsd, best.unit)} on {on}"]
+    if np.isfinite(best.linear_rmsd):
+        linear = with_unit(best.linear_rmsd, best.unit)
+        said.append(f"linear model of the same orders: {linear}")
+    limit = with_unit(best.threshold, best.unit)
+    if np.isfinite(best.threshold):
+        side = "below" if best.is_accepted else "NOT below"
+        said.append(f"{side} the {limit} of crossval.threshold")
+    if best.single and np.isfinite(best.single_rmsd):
+        helps = "helps" if best.rmsd < best.single_rmsd else "does not help"
+        single = with_unit(best.single_rmsd, best.unit)
+        said.append(f"joining recordings {helps} here: {best.single} alone {single}")
+    return said
+
+
+def diagnosis_sentence(diagnosis: Diagnosis) -> str:
+    """The verdict and its sentence."""
+    return f"{diagnosis.verdict}: {diagnosis.summary}"

@@ -1,0 +1,82 @@
+import math
+from types import SimpleNamespace
+
+import pytest
+
+from hwid_cli.records.programs import SimulatorRun
+from hwid_cli.stages import diagnosis_seconds
+from hwid_cli.stages.diagnosis_seconds import time_diagnosis
+
+
+class Clock:
+    """Both clocks of a machine on which every task takes its own time."""
+
+    def __init__(self):
+        self.now = 100.0
+
+    def process_time(self):
+        return self.now
+
+    perf_counter = process_time
+
+
+@pytest.fixture
+def clock(monkeypatch):
+    made = Clock()
+    monkeypatch.setattr(diagnosis_seconds, "time", made)
+    return made
+
+
+def task(clock, seconds, kind=dict):
+    def work():
+        clock.now += seconds
+
+    return SimpleNamespace(function=work, arguments=(), result_type=kind)
+
+
+def test_a_search_is_scaled_from_some_of_its_tasks(clock):
+    ended = []
+
+    def diagnose(run, on_round):
+        on_round("base", 0)
+        clock.now += 2.0
+        on_round("single effects, screening", 40)
+        run([task(clock, 0.5) for _ in range(40)], keep=True)
+        ended.append(True)
+
+    seconds, n_tasks = time_diagnosis(diagnose, 6)
+    # 2 s of the base, 40 tasks with a fifth for what is finished, figures.
+    assert seconds == pytest.approx(2.0 + 1.2 * 20.0 + 0.7)
+    assert clock.now == pytest.approx(100.0 + 2.0 + 11 * 0.5)
+    assert (n_tasks, ended) == (40, [])
+
+
+def test_nothing_to_search_for_takes_what_the_beginning_took(clock):
+    def diagnose(run, on_round):
+        on_round("base", 0)
+        clock.now += 2.0
+
+    assert time_diagnosis(diagnose, 6) == (pytest.approx(2.7), 0)
+
+
+def test_runs_of_the_users_simulation_come_again_at_the_end(clock):
+    def diagnose(run, on_round):
+        on_round("the simulation as given", 3)
+        run([task(clock, 1.0, SimulatorRun) for _ in range(3)], keep=True)
+        on_round("single effects, screening", 4)
+        run([task(clock, 0.0) for _ in range(4)], keep=True)
+
+    seconds, _ = time_diagnosis(diagnose, 3)
+    # The fake clock counts a run on both clocks.
+    assert seconds == pytest.approx(3.0 + 3.0 + 9 * 3 * 1.0 + 0.7)
+
+
+def test_a_slow_simulation_is_not_run_to_the_end_for_a_forecast(clock):
+    def diagnose(run, on_round):
+        on_round("the simulation as given", 9)
+        run([task(clock, 20.0, SimulatorRun) for _ in range(9)], keep=True)
+
+    seconds, n_tasks = time_diagnosis(diagnose, 9)
+    assert math.isnan(seconds)
+    assert n_tasks == 0
+    assert clock.now == 100.0 + 2 * 20.0
