@@ -132,6 +132,12 @@ def report(*values: Any, **options: Any) -> None:
     "--jobs", type=click.IntRange(min=1), metavar="N", help="Processes that compute."
 )
 @click.option("-q", "--quiet", is_flag=True, help="Say errors only.")
+@click.option(
+    "--run-own-functions",
+    is_flag=True,
+    help="Run Python that models of other folders or files carry; only where you trust "
+    "them.",
+)
 def compare(*values: Any, **options: Any) -> None:
     r"""Compare models on the same recordings: fit percent and RMSD.
 

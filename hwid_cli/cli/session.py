@@ -1,5 +1,6 @@
 """One run of the program: its experiment, its folders, and who computes."""
 
+import logging
 import shutil
 import time
 from dataclasses import dataclass, field
@@ -16,6 +17,8 @@ from hwid_cli.files.locks import claim_folder, share_folder
 from hwid_cli.records.experiment import Experiment
 from hwid_cli.stages.own_functions import check_own_functions
 from hwid_cli.tasks.workers import Workers
+
+_log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +91,7 @@ def open_session(choices: Choices, *stages: str, is_alone: bool = True) -> Sessi
         If another run works in the folder.
     """
     experiment = load_experiment(choices.config)
-    check_own_functions(experiment)
+    check_own_functions(experiment, _announce)
     out = choices.out or Path("results") / experiment.name
     try:
         out.mkdir(parents=True, exist_ok=True)
@@ -122,6 +125,10 @@ def _lock(out: Path, cache: Path, *, is_alone: bool) -> None:
     for lock in locks:
         context.call_on_close(lock.close)
     context.find_root().meta[KEPT_IN] = cache
+
+
+def _announce(said: str) -> None:
+    _log.warning("%s", said)
 
 
 def screen_width() -> int:

@@ -23,6 +23,8 @@ import numpy as np
 from h5py import h5a, h5d, h5s, h5t
 
 from hwid_cli.data.array_columns import check_size
+from hwid_cli.records.maps import OwnFunction
+from hwid_cli.store.trusted_functions import check_function
 
 Scalar = str | bool | int | float
 
@@ -242,7 +244,21 @@ def read_record(group: h5py.Group, record_type: type[Record]) -> Record:
             values[field.name] = field.default()
         else:
             values[field.name] = _read_field(group, field)
-    return record_type(**values)
+    return built(record_type, values)
+
+
+def built(record_type: type[Record], values: dict[str, Any]) -> Record:
+    """Build a record out of what was stored; Python in it must be trusted.
+
+    Raises
+    ------
+    UntrustedFunctionError
+        If it is a function that the configuration at hand does not name.
+    """
+    record = record_type(**values)
+    if isinstance(record, OwnFunction):
+        check_function(record)
+    return record
 
 
 def _read_field(group: h5py.Group, field: StoredField) -> Any:

@@ -18,7 +18,7 @@ import h5py
 import numpy as np
 
 from hwid_cli import __version__
-from hwid_cli.errors import CacheError
+from hwid_cli.errors import CacheError, UntrustedFunctionError
 from hwid_cli.files.atomic import check_format, replaced_hdf5
 from hwid_cli.files.checksums import has_checksum, with_checksum, without_checksum
 from hwid_cli.store.hdf5_records import read_array, write_array
@@ -283,6 +283,8 @@ def _opened(path: Path, stage: str) -> Iterator[h5py.File]:
                 raise ValueError("its checksum is gone: cut off, or changed since")
             del content
             yield file
+    except UntrustedFunctionError as error:
+        raise UntrustedFunctionError(f"{path}: {stage}: {error}") from error
     except (LookupError, OSError, RuntimeError, TypeError, ValueError) as error:
         said = " ".join(str(error).split())
         raise CacheError(
