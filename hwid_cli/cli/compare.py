@@ -1,6 +1,5 @@
 """``hwid compare``: several models side by side on the same recordings."""
 
-import logging
 from pathlib import Path
 from typing import Any
 
@@ -28,8 +27,6 @@ from hwid_cli.stages.own_functions import (
     functions_of,
 )
 from hwid_cli.stages.selection import select_recordings
-
-_log = logging.getLogger(__name__)
 
 _LINEAR = "linear:"
 # Exported models that say less than their JSON.
@@ -66,7 +63,7 @@ def _compared(
     found = [_model(session, text) for text in models]
     for one in found:
         for function in functions_of(one.model):
-            _log.warning("%s: runs %s", one.name, described(function))
+            session.say(f"{one.name}: runs {described(function)}")
     return compare_models(found, chosen)
 
 

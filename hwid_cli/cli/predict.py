@@ -36,7 +36,7 @@ def predict_file(
     exported = read_exported(model)
     check_trust(exported, model, is_trusted=run_own_functions)
     for function in _functions(exported):
-        click.echo(f"hwid: {escaped(str(model))}: runs {described(function)}", err=True)
+        click.echo(f"{escaped(str(model))}: runs {described(function)}")
     time, values = read_input(input_file, exported)
     check_target(out, (model, input_file), is_forced=force)
     card = exported.card

@@ -1,6 +1,5 @@
 """One run of the program: its experiment, its folders, and who computes."""
 
-import logging
 import shutil
 import time
 from collections.abc import Iterator
@@ -20,8 +19,6 @@ from hwid_cli.files.plain_files import folders_below, refuse_linked_folders
 from hwid_cli.records.experiment import Experiment
 from hwid_cli.stages.own_functions import check_own_functions
 from hwid_cli.tasks.workers import Workers
-
-_log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,7 +91,7 @@ def open_session(choices: Choices, *stages: str, is_alone: bool = True) -> Sessi
         If another run works in the folder.
     """
     experiment = load_experiment(choices.config)
-    check_own_functions(experiment, _announce)
+    check_own_functions(experiment, _say_nothing if choices.quiet else click.echo)
     out = choices.out or Path("results") / experiment.name
     try:
         out.mkdir(parents=True, exist_ok=True)
@@ -140,8 +137,8 @@ def _written(out: Path, cache: Path) -> Iterator[Path]:
     yield from cache.glob("[0-9a-f][0-9a-f]")
 
 
-def _announce(said: str) -> None:
-    _log.warning("%s", said)
+def _say_nothing(_: str) -> None:
+    return None
 
 
 def screen_width() -> int:

@@ -17,7 +17,6 @@ _NO_LINK = getattr(os, "O_NOFOLLOW", 0)
 _NO_WAITING = getattr(os, "O_NONBLOCK", 0)
 _KINDS = (
     (stat.S_ISLNK, "a link"),
-    (stat.S_ISDIR, "a folder"),
     (stat.S_ISFIFO, "a pipe"),
     (stat.S_ISSOCK, "a socket"),
 )
@@ -56,7 +55,8 @@ def refuse_unless_plain(path: Path) -> None:
     except OSError:
         # Absent, or what opening it will complain of.
         return
-    if not stat.S_ISREG(mode):
+    # A folder cannot be replaced by a file, which the system says itself.
+    if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
         kinds = (word for is_kind, word in _KINDS if is_kind(mode))
         raise _refusal(path, next(kinds, "a device"))
 

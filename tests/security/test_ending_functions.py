@@ -51,9 +51,8 @@ def hwid(folder, at_start="", in_value="pass", jobs="1"):
 
 def assert_one_line(done, *words):
     assert done.returncode == 1, (done.stdout, done.stderr)
-    # Before it stands the line that says what runs.
-    announced, complaint = done.stderr.splitlines()
-    assert "runs the Python function 'curve'" in announced
+    assert done.stdout.count("runs the Python function 'curve'") == 1
+    (complaint,) = done.stderr.splitlines()
     assert all(word in complaint for word in ("curve", *words)), complaint
 
 

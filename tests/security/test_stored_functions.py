@@ -83,7 +83,7 @@ def test_each_run_of_a_function_is_announced_in_one_line(after_own, command):
 
     assert done.exit_code == 0, done.output
     assert has_run(after_own)
-    said = [line for line in done.stderr.splitlines() if "runs" in line]
+    said = [line for line in done.stdout.splitlines() if " runs " in line]
     assert len(said) == 1
     assert "fit.input_map" in said[0]
     assert "'curve'" in said[0]
@@ -157,7 +157,7 @@ def test_compare_runs_functions_of_another_folder_only_when_told(after_own):
 
     assert done.exit_code == 0, done.output
     assert has_run(after_own)
-    assert sum("runs" in line for line in done.stderr.splitlines()) == 1
+    assert done.stdout.count(": runs the Python function") == 1
 
 
 def test_model_that_is_a_simulation_runs_no_function_that_is_not_named(after_own):
@@ -187,4 +187,4 @@ def test_predict_announces_the_function_that_it_runs(after_own):
 
     assert done.exit_code == 0, done.output
     assert has_run(after_own)
-    assert sum("runs" in line for line in done.stderr.splitlines()) == 1
+    assert done.stdout.count(": runs the Python function") == 1
