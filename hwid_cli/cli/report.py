@@ -26,6 +26,8 @@ _log = logging.getLogger(__name__)
 
 FILE = "report.html"
 FIGURES = "figures"
+# Figures that are read, not drawn: they are part of what a page is drawn from.
+_OF_CALIBRATION = "calibrate/"
 _KEY_MARK, _KEY_END = "<!-- drawn from ", " -->\n"
 
 
@@ -66,7 +68,8 @@ def write_report(session: Session) -> Path:
         return path
     page = report_page(report_contents(stored), STAGES)
     for name, png in page.figures.items():
-        write_figure(session.out / FIGURES / name, png, f"{key} {name}")
+        if not name.startswith(_OF_CALIBRATION):
+            write_figure(session.out / FIGURES / name, png, f"{key} {name}")
     replace_file(path, _signed(page.html + _last_line(key, page.figures)))
     session.say(f"report: {path} shows {stages}, {timer}")
     return path
@@ -100,6 +103,7 @@ def _is_complete(out: Path, path: Path, key: str) -> bool:
     return all(
         read_figure(out / FIGURES / name, f"{key} {name}") is not None
         for name in figures
+        if not name.startswith(_OF_CALIBRATION)
     )
 
 

@@ -146,7 +146,7 @@ def test_a_figure_that_was_deleted_is_written_again(after_run, hwid, out):
 
 
 def test_the_last_line_stays_one_comment_whatever_figures_are_called(tmp_path):
-    figures = ["calibrate/a-->b.png", "recordings/\u00e4\n.png"]
+    figures = ["models/a-->b.png", "recordings/\u00e4\n.png"]
     line = _last_line("key", figures)
     for name in figures:
         write_figure(tmp_path / "figures" / name, b"PNG" + bytes(12), f"key {name}")

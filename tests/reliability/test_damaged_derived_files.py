@@ -90,6 +90,16 @@ def test_run_makes_damaged_files_again(config, out, reported, name, damage):
     assert derived(out) == derived(reported)
 
 
+def test_a_page_leaves_the_figures_of_calibration_alone(config, out, undisturbed):
+    shutil.copytree(undisturbed, out)
+    before = {path: path.read_bytes() for path in out.rglob("calibrate/*.png")}
+    assert before
+    harness.run_here(config, out, command="report")
+    harness.run_here(config, out, command="calibrate")
+
+    assert {path: path.read_bytes() for path in before} == before
+
+
 def test_figure_of_another_recording_is_not_shown(config, out, reported):
     shutil.copytree(reported, out)
     folder = out / "figures" / "calibrate"
