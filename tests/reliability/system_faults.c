@@ -1,6 +1,7 @@
 /* Calls to the system that fail on request, in a program and all that it starts.
  *
  * HWID_FAULT_LOCKS=ERRNO      every flock() fails with it, as on a file system without locks
+ * HWID_FAULT_CLOCK=SECONDS    the clock of the day jumps by so much after a hundred looks
  * HWID_FAULT_FOLDER=DIR       what is below it may fail:
  * HWID_FAULT_KIND=write|read  calls that change something there, or reads of files there
  * HWID_FAULT_AT=N             the N-th such call of a process fails, and all later ones
@@ -19,6 +20,7 @@
 #include <string.h>
 #include <sys/stat.h>
 #include <sys/types.h>
+#include <time.h>
 #include <unistd.h>
 
 static long calls;
@@ -69,6 +71,15 @@ int flock(int file, int operation) {
   if (!getenv("HWID_FAULT_LOCKS")) return real(file, operation);
   errno = (int)number("HWID_FAULT_LOCKS");
   return -1;
+}
+
+int clock_gettime(clockid_t clock, struct timespec *found) {
+  static long looks;
+  REAL(clock_gettime);
+  int answer = real(clock, found);
+  if (clock == CLOCK_REALTIME && getenv("HWID_FAULT_CLOCK") && ++looks > 100)
+    found->tv_sec += number("HWID_FAULT_CLOCK");
+  return answer;
 }
 
 static int fails_at_open(const char *path, int flags) {
