@@ -13,7 +13,7 @@ DEV := $(VENV)/installed-dev
 .PHONY: help install run test test-all check audit format smoke clean reliability \
         bench bench-beyond bench-campaign bench-growth bench-maps bench-rounds bench-search bench-starts bench-wide \
         bench-real scale \
-        simulate calibrate identify crossval group test-stage steps model1 model2 \
+        wheel lowest away-run sbom licences simulate calibrate identify crossval group test-stage steps model1 model2 \
         reproduction thesis chapter2 hsm150 diagnose gun real effects drive-source model-schema golden export-check blind machines
 
 help:  ## show these targets
@@ -62,6 +62,36 @@ audit: $(DEV)  ## known faults of installed packages and of the lowest allowed v
 	  print(*(one.replace(">=", "==") for one in project["project"]["dependencies"]), sep="\n")' \
 	  > $(VENV)/lowest.txt
 	$(BIN)/pip-audit --no-deps --disable-pip --requirement $(VENV)/lowest.txt
+
+# Each in an environment of its own, away from the sources: what is missing in the wheel
+# shows. PYTHON names another version: make wheel PYTHON=python3.13.
+AWAY := $(VENV)/away
+wheel: $(RUN)  ## build the wheel, install it without the sources and run a campaign with it
+	rm -rf dist $(AWAY) && $(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps --wheel-dir dist .
+	$(PYTHON) -m venv $(AWAY) && $(AWAY)/bin/python -m pip install --quiet --disable-pip-version-check dist/*.whl
+	@$(MAKE) --no-print-directory away-run
+
+lowest: $(RUN)  ## the same with the lowest versions that pyproject.toml allows (Python 3.11)
+	rm -rf dist $(AWAY) && $(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps --wheel-dir dist .
+	$(BIN)/python -c 'import tomllib; project = tomllib.load(open("pyproject.toml", "rb")); \
+	  print(*(one.replace(">=", "==") for one in project["project"]["dependencies"]), sep="\n")' \
+	  > $(VENV)/lowest.txt
+	$(PYTHON) -m venv $(AWAY) && $(AWAY)/bin/python -m pip install --quiet --disable-pip-version-check \
+	  --requirement $(VENV)/lowest.txt
+	$(AWAY)/bin/python -m pip install --quiet --disable-pip-version-check --no-deps dist/*.whl
+	@$(MAKE) --no-print-directory away-run
+
+away-run:
+	cp configs/smoke.yaml $(AWAY)/ && cd $(AWAY) && bin/python -P -m hwid_cli run smoke.yaml --out results --jobs 1
+	cd $(AWAY) && bin/python -P -c 'import hwid_cli; assert "site-packages" in hwid_cli.__file__, hwid_cli.__file__'
+
+sbom: $(RUN)  ## what is installed, as a CycloneDX document: sbom.json
+	$(PYTHON) -m venv $(VENV)/sbom
+	$(VENV)/sbom/bin/python -m pip install --quiet --disable-pip-version-check 'cyclonedx-bom>=7'
+	$(VENV)/sbom/bin/cyclonedx-py environment --output-reproducible --pyproject pyproject.toml --of JSON -o sbom.json $(BIN)/python
+
+licences: $(DEV)  ## docs/licences.md from what is installed
+	$(BIN)/python tools/licences.py > docs/licences.tmp && mv docs/licences.tmp docs/licences.md
 
 format: $(DEV)  ## format the code
 	$(BIN)/ruff check --fix

@@ -63,13 +63,14 @@ def write_report(session: Session) -> Path:
     key = report_key(stored)
     path = session.out / FILE
     stages = ", ".join(run.stage for run in stored.stages) or "the diagnosis"
-    if "report" not in session.forced and _is_complete(session.out, path, key):
+    about = _figures_key(stored)
+    if "report" not in session.forced and _is_complete(session.out, path, key, about):
         session.say(f"report: {path} shows {stages} already, {timer}")
         return path
     page = report_page(report_contents(stored), STAGES)
     for name, png in page.figures.items():
         if not name.startswith(_OF_CALIBRATION):
-            write_figure(session.out / FIGURES / name, png, f"{key} {name}")
+            write_figure(session.out / FIGURES / name, png, f"{about} {name}")
     replace_file(path, _signed(page.html + _last_line(key, page.figures)))
     session.say(f"report: {path} shows {stages}, {timer}")
     return path
@@ -88,7 +89,14 @@ def _signed(page: str) -> bytes:
     return content + f"<!-- sha256 {sha256(content).hexdigest()} -->\n".encode()
 
 
-def _is_complete(out: Path, path: Path, key: str) -> bool:
+def _figures_key(stored: StoredResults) -> str:
+    """What figures are drawn from; unlike the page they say nothing of how long it took."""
+    diagnosis = (stored.diagnosis or {}).get("provenance") or {}
+    keys = [*(run.key for run in stored.stages), str(diagnosis.get("key"))]
+    return sha256(" ".join(keys).encode()).hexdigest()
+
+
+def _is_complete(out: Path, path: Path, key: str, about: str) -> bool:
     """Whether a page was drawn from the same, and it and all its figures are whole."""
     if not path.is_file():
         return False
@@ -101,7 +109,7 @@ def _is_complete(out: Path, path: Path, key: str) -> bool:
         return False
     figures = json.loads(names.removesuffix(_KEY_END))
     return all(
-        read_figure(out / FIGURES / name, f"{key} {name}") is not None
+        read_figure(out / FIGURES / name, f"{about} {name}") is not None
         for name in figures
         if not name.startswith(_OF_CALIBRATION)
     )

@@ -392,7 +392,7 @@ def _write_files(
     path = out / "diagnosis.json"
     figures = None if is_new else _drawn_before(out, origin)
     if figures is None:
-        figures = _draw(out / "figures", diagnosis, _about(origin))
+        figures = _draw(out / "figures", diagnosis, origin.key)
     units = dict.fromkeys(one for log in given.logs for one in log.units)
     write_diagnosis_json(
         path, diagnosis, origin.seconds, origin, figures=figures, units=list(units)
@@ -414,14 +414,9 @@ def _drawn_before(out: Path, origin: Provenance) -> list[str] | None:
     about, names = found.get("provenance") or {}, found.get("figures") or []
     # Seconds tell one run from another one with the same key (--force).
     is_same = about.get("key") == origin.key and found.get("seconds") == origin.seconds
-    folder, told = out / "figures", _about(origin)
+    folder, told = out / "figures", origin.key
     is_there = all(read_figure(folder / name, told) is not None for name in names)
     return names if is_same and names and is_there else None
-
-
-def _about(origin: Provenance) -> str:
-    """Which run a figure shows."""
-    return f"{origin.key} {origin.seconds}"
 
 
 def _draw(folder: Path, diagnosis: Diagnosis, about: str) -> list[str]:

@@ -20,7 +20,7 @@ from typing import Any, NamedTuple, TypeVar, Union, get_args, get_origin, get_ty
 
 import h5py
 import numpy as np
-from h5py import h5a, h5d, h5s, h5t
+from h5py import h5a, h5d, h5p, h5s, h5t
 
 from hwid_cli.data.array_columns import check_size
 from hwid_cli.records.maps import OwnFunction
@@ -40,6 +40,11 @@ _MEMORY = {kind: h5t.py_create(dtype) for kind, dtype in _DTYPES.items()}
 _STORED = {kind: h5t.py_create(dtype, logical=True) for kind, dtype in _DTYPES.items()}
 # HDF5 refuses attributes above 64 KiB; text counts as 16 bytes of reference plus itself.
 LONGEST_ATTRIBUTE = 30_000
+
+
+# Equal content gives equal files: HDF5 notes when a data set was made unless told not to.
+_WITHOUT_TIMES = h5p.create(h5p.DATASET_CREATE)
+_WITHOUT_TIMES.set_obj_track_times(False)
 
 
 def write_small(group: h5py.Group, name: str, value: object, kind: type) -> None:
@@ -125,9 +130,8 @@ def write_array(group: h5py.Group, name: str, values: np.ndarray) -> None:
         return
     values = np.require(values, requirements="C")
     stored = h5t.py_create(values.dtype, logical=True)
-    dataset = h5d.create(
-        group.id, name.encode(), stored, h5s.create_simple(values.shape)
-    )
+    space = h5s.create_simple(values.shape)
+    dataset = h5d.create(group.id, name.encode(), stored, space, dcpl=_WITHOUT_TIMES)
     if values.size:
         dataset.write(h5s.ALL, h5s.ALL, values)
 

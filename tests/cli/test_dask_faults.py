@@ -89,7 +89,11 @@ def server(answer):
 
 @pytest.mark.parametrize(
     "answer",
-    [b"", b"HTTP/1.1 400 Bad Request\r\n\r\n" + b"x" * 4000, os.urandom(4096)],
+    [
+        b"",
+        pytest.param(b"HTTP/1.1 400 No\r\n\r\n" + b"x" * 4000, marks=pytest.mark.slow),
+        pytest.param(os.urandom(4096), marks=pytest.mark.slow),
+    ],
     ids=["silent", "http", "garbage"],
 )
 def test_a_server_that_is_no_scheduler_is_one_line(config, answer):
@@ -97,6 +101,7 @@ def test_a_server_that_is_no_scheduler_is_one_line(config, answer):
         assert_one_line(start(config, address), address, "dask scheduler")
 
 
+@pytest.mark.slow
 def test_nobody_there_is_one_line(config):
     assert_one_line(start(config, "tcp://127.0.0.1:1"), "tcp://127.0.0.1:1")
 
@@ -107,12 +112,13 @@ def test_tls_without_settings_is_one_line(config):
     assert_one_line(process, "tls://127.0.0.1:8786", "distributed.comm.tls")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("number", "most_s"),
     # One that is stopped may only be busy.
     [
         (signal.SIGKILL, MOST_S),
-        pytest.param(signal.SIGSTOP, 30, marks=pytest.mark.slow),
+        (signal.SIGSTOP, 30),
     ],
 )
 def test_a_scheduler_that_goes_away_in_mid_run_is_one_line(
@@ -130,6 +136,7 @@ def test_a_scheduler_that_goes_away_in_mid_run_is_one_line(
         )
 
 
+@pytest.mark.slow
 def test_a_worker_without_the_package_is_one_line(config, tmp_path):
     with dask_processes.scheduler(tmp_path) as (address, _):
         words = [address, "--no-nanny", "--nthreads", "1", "--no-dashboard"]
@@ -158,6 +165,7 @@ def certificates(folder):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(shutil.which("openssl") is None, reason="needs openssl")
 def test_a_cluster_with_certificates_computes_and_refuses_others(config, tmp_path):
     """As docs/security.md says: its commands, and its settings."""

@@ -149,12 +149,12 @@ def test_the_last_line_stays_one_comment_whatever_figures_are_called(tmp_path):
     figures = ["models/a-->b.png", "recordings/\u00e4\n.png"]
     line = _last_line("key", figures)
     for name in figures:
-        write_figure(tmp_path / "figures" / name, b"PNG" + bytes(12), f"key {name}")
+        write_figure(tmp_path / "figures" / name, b"PNG" + bytes(12), f"drawn {name}")
     page = tmp_path / "report.html"
     page.write_bytes(_signed(f"<html>\n{line}"))
 
     assert line.count("-->") == line.count("\n") == 1
-    assert _is_complete(tmp_path, page, "key")
-    assert not _is_complete(tmp_path, page, "other")
+    assert _is_complete(tmp_path, page, "key", "drawn")
+    assert not _is_complete(tmp_path, page, "other", "drawn")
     (tmp_path / "figures" / figures[0]).unlink()
-    assert not _is_complete(tmp_path, page, "key")
+    assert not _is_complete(tmp_path, page, "key", "drawn")

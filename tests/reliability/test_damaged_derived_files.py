@@ -79,6 +79,7 @@ def test_report_draws_damaged_files_again(config, out, reported, name, damage):
     assert derived(out) == derived(reported)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "damage"), [CASES[0], CASES[4], CASES[8], *TABLES])
 def test_run_makes_damaged_files_again(config, out, reported, name, damage):
     shutil.copytree(reported, out)

@@ -60,10 +60,10 @@ def assert_one_line(done, *words):
     ("at_start", "in_value", "says"),
     [
         ("sys.exit(0)", "pass", "exit(0)"),
-        ("os._exit(0)", "pass", "exit(0)"),
+        pytest.param("os._exit(0)", "pass", "exit(0)", marks=pytest.mark.slow),
         ("os.kill(os.getpid(), signal.SIGKILL)", "pass", "SIGKILL"),
-        ("", "sys.exit(0)", "exit(0)"),
-        ("", f"{LATER}sys.exit(0)", "exit(0)"),
+        pytest.param("", "sys.exit(0)", "exit(0)", marks=pytest.mark.slow),
+        pytest.param("", f"{LATER}sys.exit(0)", "exit(0)", marks=pytest.mark.slow),
         ("", f"{LATER}os._exit(0)", "exit(0)"),
         ("", f"{LATER}raise KeyError('gone')", "KeyError: 'gone'"),
     ],
