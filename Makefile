@@ -9,11 +9,16 @@ THESIS := --cache results/cache
 RUN := $(VENV)/installed-run
 DEV := $(VENV)/installed-dev
 
+# make run LOCKED=yes, make test LOCKED=yes: the versions and checksums of locks/, nothing else.
+LOCKS := locks
+PLATFORM ?= linux-x86_64-py311
+LOCKED_INSTALL = $(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes --requirement
+
 .DEFAULT_GOAL := help
 .PHONY: help install run test test-all check audit format smoke clean reliability \
         bench bench-beyond bench-campaign bench-growth bench-maps bench-page bench-rounds bench-search bench-starts bench-wide bench-advice docs \
         bench-real scale \
-        simulate calibrate identify crossval group test-stage steps model1 model2 \
+        wheel lowest away-run lock sbom licences simulate calibrate identify crossval group test-stage steps model1 model2 \
         reproduction thesis chapter2 hsm150 diagnose gun real effects drive-source model-schema golden export-check blind machines
 
 help:  ## show these targets
@@ -24,13 +29,22 @@ $(RUN): pyproject.toml
 	  echo "$(PYTHON) is older than Python 3.11 or missing; name a newer one:" \
 	       "make PYTHON=python3.12" >&2; exit 1; }
 	$(PYTHON) -m venv $(VENV)
+ifdef LOCKED
+	$(LOCKED_INSTALL) $(LOCKS)/run-$(PLATFORM).txt
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
+else
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable .
+endif
 	@touch $@
 
 # pip knows dependency groups since 25.1.
 $(DEV): $(RUN)
+ifdef LOCKED
+	$(LOCKED_INSTALL) $(LOCKS)/test-$(PLATFORM).txt
+else
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check 'pip>=25.1'
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --group dev
+endif
 	@touch $@
 
 install: $(DEV)  ## make .venv with everything that tests and checks need
@@ -62,6 +76,48 @@ audit: $(DEV)  ## known faults of installed packages and of the lowest allowed v
 	  print(*(one.replace(">=", "==") for one in project["project"]["dependencies"]), sep="\n")' \
 	  > $(VENV)/lowest.txt
 	$(BIN)/pip-audit --no-deps --disable-pip --requirement $(VENV)/lowest.txt
+
+# Each in an environment of its own, away from the sources: what is missing in the wheel
+# shows. PYTHON names another version: make wheel PYTHON=python3.13.
+AWAY := $(VENV)/away
+wheel: $(RUN)  ## build the wheel, install it without the sources and run a campaign with it
+	rm -rf dist $(AWAY) && $(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps --wheel-dir dist .
+	$(PYTHON) -m venv $(AWAY) && $(AWAY)/bin/python -m pip install --quiet --disable-pip-version-check dist/*.whl
+	@$(MAKE) --no-print-directory away-run
+
+lowest: $(RUN)  ## the same with the lowest versions that pyproject.toml allows (Python 3.11)
+	rm -rf dist $(AWAY) && $(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps --wheel-dir dist .
+	$(BIN)/python -c 'import tomllib; project = tomllib.load(open("pyproject.toml", "rb")); \
+	  print(*(one.replace(">=", "==") for one in project["project"]["dependencies"]), sep="\n")' \
+	  > $(VENV)/lowest.txt
+	$(PYTHON) -m venv $(AWAY) && $(AWAY)/bin/python -m pip install --quiet --disable-pip-version-check \
+	  --requirement $(VENV)/lowest.txt
+	$(AWAY)/bin/python -m pip install --quiet --disable-pip-version-check --no-deps dist/*.whl
+	@$(MAKE) --no-print-directory away-run
+
+away-run:
+	cp configs/smoke.yaml $(AWAY)/ && cd $(AWAY) && bin/python -P -m hwid_cli run smoke.yaml --out results --jobs 1
+	cd $(AWAY) && bin/python -P -c 'import hwid_cli; assert "site-packages" in hwid_cli.__file__, hwid_cli.__file__'
+
+# Asks the index for what is newest and allowed; look at the difference before it is kept.
+lock: $(RUN)  ## locks/: versions and checksums of everything that run and test install here
+	mkdir -p $(LOCKS)
+	$(BIN)/python -c 'import tomllib; project = tomllib.load(open("pyproject.toml", "rb")); \
+	  print(*project["project"]["dependencies"], *project["build-system"]["requires"], "editables", sep="\n")' \
+	  > $(VENV)/lock.txt
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check 'pip>=25.1'
+	$(BIN)/python -m pip install --quiet --dry-run --ignore-installed --report $(VENV)/run.json -r $(VENV)/lock.txt
+	$(BIN)/python -m pip install --quiet --dry-run --ignore-installed --report $(VENV)/test.json -r $(VENV)/lock.txt --group dev
+	$(BIN)/python tools/lock.py $(VENV)/run.json > $(LOCKS)/run-$(PLATFORM).txt
+	$(BIN)/python tools/lock.py $(VENV)/test.json > $(LOCKS)/test-$(PLATFORM).txt
+
+sbom: $(RUN)  ## what is installed, as a CycloneDX document: sbom.json
+	$(PYTHON) -m venv $(VENV)/sbom
+	$(VENV)/sbom/bin/python -m pip install --quiet --disable-pip-version-check 'cyclonedx-bom>=7'
+	$(VENV)/sbom/bin/cyclonedx-py environment --output-reproducible --pyproject pyproject.toml --of JSON -o sbom.json $(BIN)/python
+
+licences: $(DEV)  ## docs/licences.md from what is installed
+	$(BIN)/python tools/licences.py > docs/licences.tmp && mv docs/licences.tmp docs/licences.md
 
 format: $(DEV)  ## format the code
 	$(BIN)/ruff check --fix

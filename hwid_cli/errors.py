@@ -21,6 +21,10 @@ class CacheError(HwidError):
     """The cache or a results file cannot be read or written."""
 
 
+class UntrustedFunctionError(CacheError):
+    """Stored results hold Python that the user has not named."""
+
+
 class WorkerError(HwidError):
     """A process that computes was killed, and killed again."""
 

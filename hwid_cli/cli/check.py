@@ -78,7 +78,7 @@ def _data(experiment: Experiment, folder: Path) -> tuple[Checked, tuple[str, ...
     """Show the recordings, and collect what is wrong with them or their names."""
     problems: list[str] = []
     try:
-        check_own_functions(experiment)
+        check_own_functions(experiment, click.echo)
     except HwidError as error:
         problems.append(str(error))
     survey = survey_recordings(experiment, folder)

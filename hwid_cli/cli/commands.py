@@ -146,6 +146,12 @@ Writes compare.csv and figures/compare.png.
     "--jobs", type=click.IntRange(min=1), metavar="N", help="Processes that compute."
 )
 @click.option("-q", "--quiet", is_flag=True, help="Say errors only.")
+@click.option(
+    "--run-own-functions",
+    is_flag=True,
+    help="Run Python that models of other folders or files carry; only where you trust "
+    "them.",
+)
 def compare(*values: Any, **options: Any) -> None:
     """Compare models on the same recordings."""
     _run("compare.compare", *values, **options)

@@ -6,7 +6,7 @@ from typing import Any
 from hwid_cli.cli.driver import StageRunner, result_of, show_blocks
 from hwid_cli.cli.options import Choices
 from hwid_cli.cli.session import Session, open_session
-from hwid_cli.errors import ConfigError
+from hwid_cli.errors import ConfigError, UntrustedFunctionError
 from hwid_cli.export.stored_models import (
     chosen_model,
     fit_name,
@@ -21,6 +21,11 @@ from hwid_cli.report.comparison import comparison_tables
 from hwid_cli.report.figures.comparison import comparison_figure
 from hwid_cli.report.figures.style import as_png
 from hwid_cli.stages.compare import compare_models, fit_linear
+from hwid_cli.stages.own_functions import (
+    allow_all_functions,
+    described,
+    functions_of,
+)
 from hwid_cli.stages.selection import select_recordings
 
 _LINEAR = "linear:"
@@ -29,10 +34,15 @@ _OTHER_FORMATS = (".c", ".m", ".mat", ".fmu")
 
 
 def compare(
-    models: tuple[str, ...], recordings: tuple[str, ...], **values: Any
+    models: tuple[str, ...],
+    recordings: tuple[str, ...],
+    run_own_functions: bool,
+    **values: Any,
 ) -> None:
     """Compare models on the same recordings: fit percent and RMSD."""
     session = open_session(Choices(**values), "compare")
+    if run_own_functions:
+        allow_all_functions(session.experiment)
     comparison = _compared(session, models, recordings)
     had_results = (session.out / "compare.csv").exists()
     _write(session, comparison)
@@ -51,6 +61,9 @@ def _compared(
     calibrated = result_of(session, "calibrate").recordings
     chosen = select_recordings(calibrated, names or None, key="--recording")
     found = [_model(session, text) for text in models]
+    for one in found:
+        for function in functions_of(one.model):
+            session.say(f"{one.name}: runs {described(function)}")
     return compare_models(found, chosen)
 
 
@@ -68,8 +81,17 @@ def _model(session: Session, text: str) -> NamedModel:
     # The last colon: a folder of Windows has one of its own.
     folder, colon, name = text.rpartition(":")
     if colon:
-        return read_stored_model(Path(folder), name)
+        return _stored_model(Path(folder), name)
     return chosen_model(_own_fits(session, name), name, name)
+
+
+def _stored_model(folder: Path, name: str) -> NamedModel:
+    """Model of another folder of results."""
+    try:
+        return read_stored_model(folder, name)
+    except UntrustedFunctionError as error:
+        step = "or leave to run what you have read: add --run-own-functions"
+        raise UntrustedFunctionError(f"{error}, {step}") from error
 
 
 def _own_fits(session: Session, name: str) -> dict[str, Fit]:

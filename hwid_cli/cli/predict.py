@@ -8,9 +8,20 @@ from hwid_cli.export.json_reader import read_exported
 from hwid_cli.export.loading import check_trust
 from hwid_cli.export.predict import predict
 from hwid_cli.export.prediction import check_target, read_input, write_prediction
+from hwid_cli.files.messages import escaped
 from hwid_cli.model.input_range import outside_share
+from hwid_cli.records.exported import Exported, ExportedModel
+from hwid_cli.records.maps import OwnFunction
 from hwid_cli.records.units import behind
 from hwid_cli.report.simulation_note import prediction_note
+from hwid_cli.stages.own_functions import described, functions_of
+
+
+def _functions(exported: Exported) -> tuple[OwnFunction, ...]:
+    """Python that a prediction with a model runs."""
+    if not isinstance(exported, ExportedModel):
+        return ()
+    return functions_of(exported.model)
 
 
 def predict_file(
@@ -24,6 +35,8 @@ def predict_file(
     """Predict the output for an input, with an exported model."""
     exported = read_exported(model)
     check_trust(exported, model, is_trusted=run_own_functions)
+    for function in _functions(exported):
+        click.echo(f"{escaped(str(model))}: runs {described(function)}")
     time, values = read_input(input_file, exported)
     check_target(out, (model, input_file), is_forced=force)
     card = exported.card

@@ -2,6 +2,8 @@
 
 import shutil
 import time
+from collections.abc import Iterator
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -12,7 +14,8 @@ from hwid_cli.cli.options import Choices
 from hwid_cli.cli.stopping import KEPT_IN
 from hwid_cli.config.load import load_experiment
 from hwid_cli.errors import ConfigError
-from hwid_cli.files.locks import claim_folder, share_folder
+from hwid_cli.files.locks import WRITTEN, claim_folder, share_folder
+from hwid_cli.files.plain_files import folders_below, refuse_linked_folders
 from hwid_cli.records.experiment import Experiment
 from hwid_cli.stages.own_functions import check_own_functions
 from hwid_cli.tasks.workers import Workers
@@ -136,7 +139,7 @@ def open_session(choices: Choices, *stages: str, is_alone: bool = True) -> Sessi
         If another run works in the folder.
     """
     experiment = load_experiment(choices.config)
-    check_own_functions(experiment)
+    check_own_functions(experiment, _say_nothing if choices.quiet else click.echo)
     out = choices.out or Path("results") / experiment.name
     try:
         out.mkdir(parents=True, exist_ok=True)
@@ -169,16 +172,30 @@ def _arguments(choices: Choices) -> tuple[str, ...]:
 def _lock(out: Path, cache: Path, *, is_alone: bool) -> None:
     """Lock the folders until the command ends, and note where its results are kept."""
     context = click.get_current_context(silent=True)
-    locks = [claim_folder(out)] if is_alone else []
-    locks += [lock for lock in map(share_folder, (out, cache)) if lock is not None]
-    if context is None:
-        # A session outside of a command, whose end nobody tells.
-        for lock in locks:
-            lock.close()
-        return
-    for lock in locks:
-        context.call_on_close(lock.close)
-    context.find_root().meta[KEPT_IN] = cache
+    refuse_linked_folders(_written(out, cache))
+    with ExitStack() as locks:
+        if is_alone:
+            locks.enter_context(claim_folder(out))
+        for folder in (out, cache):
+            lock = share_folder(folder)
+            if lock is not None:
+                locks.enter_context(lock)
+        # A session outside of a command is one whose end nobody tells.
+        if context is not None:
+            context.call_on_close(locks.pop_all().close)
+            context.find_root().meta[KEPT_IN] = cache
+
+
+def _written(out: Path, cache: Path) -> Iterator[Path]:
+    """Folders that are written; those that the user names may be links themselves."""
+    for name in WRITTEN:
+        yield from folders_below(out / name)
+    yield out / "cache"
+    yield from cache.glob("[0-9a-f][0-9a-f]")
+
+
+def _say_nothing(_: str) -> None:
+    return None
 
 
 def screen_width() -> int:

@@ -1,12 +1,17 @@
 """``hwid simulate``: virtual measurements, and a physics model beside the recordings."""
 
+import logging
+
 from hwid_cli.cli.closing import say_end
 from hwid_cli.cli.driver import context_of, result_of, show_blocks
 from hwid_cli.cli.options import Choices
 from hwid_cli.cli.session import Session, Timer, open_session
 from hwid_cli.report.diagnosis import simulated_table
 from hwid_cli.stages.diagnose import choose, simulated_recordings
+from hwid_cli.stages.table import stage_named
 from hwid_cli.store.diagnosis_results import write_simulated_csv
+
+_log = logging.getLogger(__name__)
 
 
 def simulate(name: str, choices: Choices) -> None:
@@ -36,6 +41,9 @@ def _simulate_drive(session: Session) -> None:
     """Simulate the recordings by the physics model and show how far off it is."""
     result_of(session, "calibrate")
     given, timer = choose(context_of(session)), Timer()
+    if session.experiment.foreign_simulation is not None:
+        for said in stage_named("diagnose").warnings(context_of(session), given):
+            _log.warning("%s", said)
     curves = simulated_recordings(given)
     folder = session.out / "simulated"
     for one in curves:

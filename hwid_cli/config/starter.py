@@ -10,6 +10,7 @@ import yaml
 from hwid_cli.config.load import experiment_of
 from hwid_cli.data.units import QUANTITIES, quantity_of
 from hwid_cli.errors import ConfigError
+from hwid_cli.files.atomic import replace_file
 from hwid_cli.files.messages import escaped, is_plain
 from hwid_cli.records.experiment import Experiment
 from hwid_cli.records.starter import FolderLayout, Proposal, Role
@@ -148,8 +149,11 @@ def write_starter(path: Path, text: str, *, force: bool) -> None:
     """
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
+        if force:
+            replace_file(path, text.encode())
+            return
         # "x" refuses a file that came into being a moment ago, too.
-        with path.open("w" if force else "x", encoding="utf-8") as file:
+        with path.open("x", encoding="utf-8") as file:
             file.write(text)
     except FileExistsError:
         refuse_existing(path, force=force)

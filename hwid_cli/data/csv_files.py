@@ -185,9 +185,15 @@ def _separator(lines: Sequence[str]) -> str:
             return 0.0
         return sum(map(is_quantity, filled)) / len(filled)
 
-    # The first of those that are equally good.
-    best = max(_SEPARATORS, key=share)
-    if share(best) > 0.0:
+    # The first of those that are equally good; none is better than all cells.
+    best, most = ",", 0.0
+    for separator in _SEPARATORS:
+        found = share(separator)
+        if found > most:
+            best, most = separator, found
+        if most == 1.0:
+            break
+    if most > 0.0:
         return best
     bare = ["".join(line.split('"')[::2]) for line in plain[:2]]
     for separator in _SEPARATORS[:3]:

@@ -60,7 +60,7 @@ def open_hdf5(path: Path, *, is_matlab: bool = False) -> Iterator[Variables]:
                 if attribute.lower() in _UNIT_ATTRIBUTES:
                     variables[key + UNIT_MARK] = partial(item.attrs.get, attribute)
 
-    with h5py.File(path, "r") as file:
+    with h5py.File(path, "r", locking=False) as file:
         file.visititems(note)
         yield variables
 
@@ -69,7 +69,7 @@ def matlab_classes(path: Path) -> dict[str, str]:
     """Class of each object that MATLAB stored in a file of version 7.3, by its name."""
     import h5py
 
-    with h5py.File(path, "r") as file:
+    with h5py.File(path, "r", locking=False) as file:
         return {
             name: item.attrs["MATLAB_class"].decode("utf-8", errors="replace")
             for name, item in file.items()

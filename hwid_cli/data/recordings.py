@@ -79,6 +79,9 @@ def read_recordings(experiment: Experiment, out: Path) -> list[RawRecording]:
     checks.check_names([(part.path, part.name) for part in parts])
     plans = {folder: read_plan(folder) for folder in {path.parent for path in paths}}
     recordings = []
+    by_path: dict[Path, list[FilePart]] = {}
+    for part in parts:
+        by_path.setdefault(part.path, []).append(part)
     for path in paths:
         digest = file_sha256(path)
         columns = read_columns(path, _as_read(options.columns))
@@ -87,10 +90,9 @@ def read_recordings(experiment: Experiment, out: Path) -> list[RawRecording]:
                 f"{path}: changed while it was read; expected a finished recording; "
                 "run again when it is written"
             )
-        for part in parts:
-            if part.path == path:
-                raw = _read_part(part, columns, plans[path.parent], experiment)
-                recordings.append(replace(raw, sha256=digest))
+        for part in by_path.get(path, []):
+            raw = _read_part(part, columns, plans[path.parent], experiment)
+            recordings.append(replace(raw, sha256=digest))
     _warn_of_unused_kinds(recordings, experiment.source, options)
     recordings.sort(key=lambda recording: KINDS.index(recording.kind))
     checks.check_sample_times(recordings, options.sampling_tolerance)

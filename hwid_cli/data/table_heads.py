@@ -9,6 +9,7 @@ their words.
 import re
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
+from functools import cache, lru_cache
 
 from hwid_cli.data.cells import MISSING_WORDS, is_grouped, is_stamp, plain_number
 from hwid_cli.data.units import bare_unit, factor_between, looks_like_unit, split_unit
@@ -147,11 +148,20 @@ def is_quantity(cell: str) -> bool:
     >>> [is_quantity(one) for one in ("1.5", "1,5", "1.234,5", "12:00:00.5", "CH1", "")]
     [True, True, True, True, False, False]
     """
+    # A head asks the same of a cell several times; long ones are no numbers.
+    return _holds_quantity(cell) if len(cell) <= _LONGEST_KEPT else _is_quantity(cell)
+
+
+def _is_quantity(cell: str) -> bool:
     if not cell or cell.lower() in MISSING_WORDS:
         return False
     if plain_number(cell) is not None or is_stamp(cell):
         return True
     return is_grouped(cell)
+
+
+_LONGEST_KEPT = 40
+_holds_quantity = lru_cache(maxsize=8192)(_is_quantity)
 
 
 def read_head(
@@ -215,18 +225,22 @@ def _first_row(
 ) -> int:
     """First row whose columns of numbers hold numbers."""
     plain = [number for number in range(len(rows)) if number not in comments]
-    of_table = [_is_of_table(rows[number], numeric) for number in plain]
-    others = [
-        any(rows[number]) and not is_of
-        for number, is_of in zip(plain, of_table, strict=True)
-    ]
+
+    @cache
+    def is_of_table(number: int) -> bool:
+        return _is_of_table(rows[number], numeric)
+
+    def is_other(number: int) -> bool:
+        return any(rows[number]) and not is_of_table(number)
+
     # A row of a preamble may look like one of the table; those below it do not.
     first = next(
         (
             number
             for place, number in enumerate(plain)
-            if of_table[place]
-            and sum(others[place + 1 :][:_ROWS_BELOW]) <= _MOST_DAMAGED
+            if is_of_table(number)
+            and sum(map(is_other, plain[place + 1 : place + 1 + _ROWS_BELOW]))
+            <= _MOST_DAMAGED
         ),
         len(rows),
     )

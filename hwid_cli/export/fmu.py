@@ -7,6 +7,7 @@ platform by its own compiler.
 import io
 import os
 import platform
+import re
 import shutil
 import subprocess
 import tempfile
@@ -39,6 +40,8 @@ _SYSTEMS = {
 }
 # Archives of equal content are equal: their files have no times of their own.
 _DATE = (1980, 1, 1, 0, 0, 0)
+# Signs that no XML document may hold, not even as references.
+_NO_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 # What a simulation lasts that asks for nothing else, [samples].
 _USUAL_SAMPLES = 1000
 
@@ -113,6 +116,11 @@ def _compiled(sources: dict[str, str], name: str) -> bytes:
         return (Path(folder) / name).read_bytes()
 
 
+def _attribute(text: str) -> str:
+    """Text in quotes; what XML has no place for, however it is written, is replaced."""
+    return quoteattr(_NO_XML.sub("\ufffd", text))
+
+
 def _description(exported: Exported, name: str, guid: str) -> str:
     """Content of ``modelDescription.xml``."""
     card, step = exported.card, exported.sample_time_s
@@ -122,13 +130,13 @@ def _description(exported: Exported, name: str, guid: str) -> str:
         "" if isinstance(exported, ExportedModel) and exported.model.delay else "1"
     )
     units = "".join(
-        f"    <Unit name={quoteattr(unit)}/>\n"
+        f"    <Unit name={_attribute(unit)}/>\n"
         for unit in dict.fromkeys((card.input_unit, card.output_unit))
     )
-    title = quoteattr(f"{card.title} ({card.name})")
+    title = _attribute(f"{card.title} ({card.name})")
     stop = repr(_USUAL_SAMPLES * step)
     return f"""<?xml version="1.0" encoding="UTF-8"?>
-<fmiModelDescription fmiVersion="2.0" modelName={quoteattr(name)} guid="{guid}"
+<fmiModelDescription fmiVersion="2.0" modelName={_attribute(name)} guid="{guid}"
   description={title} generationTool="hwid {__version__}" variableNamingConvention="flat"
   numberOfEventIndicators="0">
   <CoSimulation modelIdentifier="{name}" canHandleVariableCommunicationStepSize="false"
@@ -142,11 +150,11 @@ def _description(exported: Exported, name: str, guid: str) -> str:
   <ModelVariables>
     <ScalarVariable name="u" valueReference="0" causality="input" variability="continuous"
       description="input">
-      <Real unit={quoteattr(card.input_unit)} start="0"/>
+      <Real unit={_attribute(card.input_unit)} start="0"/>
     </ScalarVariable>
     <ScalarVariable name="y" valueReference="1" causality="output"
       variability="continuous" initial="calculated" description="output">
-      <Real unit={quoteattr(card.output_unit)}/>
+      <Real unit={_attribute(card.output_unit)}/>
     </ScalarVariable>
 {_START_VARIABLE if is_model else ""}  </ModelVariables>
   <ModelStructure>

@@ -16,6 +16,7 @@ from hwid_cli.errors import ModelFileError
 from hwid_cli.export.json_writer import SIMULATION
 from hwid_cli.export.map_parts import parts_of, portable
 from hwid_cli.export.model_file import read_model_file, refuse
+from hwid_cli.files.messages import is_plain
 from hwid_cli.model.maps.rule import Part
 from hwid_cli.records.axis import ROTARY_NAMES, base_of, name_on
 from hwid_cli.records.drive import Drive
@@ -170,8 +171,20 @@ def _drive(path: Path, given: Mapping[str, Any]) -> Drive:
     return Drive(**base, **{name: getattr(read, name) for name in others})
 
 
+def _check_plain(path: Path, content: Mapping[str, Any], keys: tuple[str, ...]) -> None:
+    """Refuse texts that a screen would obey: they go into messages and tables."""
+    for key in keys:
+        value = content.get(key)
+        texts = value if isinstance(value, dict) else {"": value}
+        for name, text in texts.items():
+            if isinstance(text, str) and not is_plain(text):
+                place = (key, name) if name else (key,)
+                refuse(path, place, text, "text without control characters")
+
+
 def _card(path: Path, content: Mapping[str, Any]) -> ModelCard:
     units, scales, limits = content["units"], content["scales"], content["input_range"]
+    _check_plain(path, content, ("name", "title", "units", "columns", "file_units"))
     if limits[0] > limits[1]:
         refuse(path, ("input_range",), limits, "two numbers, the lower one first")
     return ModelCard(

@@ -6,15 +6,22 @@ from hwid_cli.errors import ModelFileError
 from hwid_cli.export.json_reader import read_exported
 from hwid_cli.records.exported import Exported, ExportedModel
 from hwid_cli.records.model import HammersteinWiener
+from hwid_cli.store.trusted_functions import is_allowed
+
+_LEAVE = "add --run-own-functions (in Python: run_own_functions=True)"
 
 
-def check_trust(exported: Exported, path: Path, *, is_trusted: bool) -> None:
+def check_trust(
+    exported: Exported, path: Path, *, is_trusted: bool, step: str = _LEAVE
+) -> None:
     """Refuse to run Python out of a model's file unless the user trusts it.
 
     Parameters
     ----------
     path : Path
         For the message.
+    step : str
+        How to give leave, for the message.
 
     Raises
     ------
@@ -24,11 +31,10 @@ def check_trust(exported: Exported, path: Path, *, is_trusted: bool) -> None:
         return
     for key in ("input_map", "output_map"):
         one = getattr(exported.model, key)
-        if one.function is not None:
+        if one.function is not None and not is_allowed(one.function):
             raise ModelFileError(
                 f"{path}: {key}: carries the Python function {one.function.name!r}; "
-                "expected leave to run it; read its text in the file, then add "
-                "--run-own-functions (in Python: run_own_functions=True)"
+                f"expected leave to run it; read its text in the file, then {step}"
             )
 
 

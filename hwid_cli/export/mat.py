@@ -14,6 +14,7 @@ from hwid_cli.export.json_writer import described
 from hwid_cli.export.map_parts import language_text, numbers_of
 from hwid_cli.export.names import identifier
 from hwid_cli.files.atomic import replace_file
+from hwid_cli.files.small_files import read_small_file
 from hwid_cli.model.static_map import RULES
 from hwid_cli.records.exported import ExportedModel
 from hwid_cli.records.maps import StaticMap
@@ -39,7 +40,10 @@ def write_mat(path: Path, exported: ExportedModel) -> Path:
     CacheError
         If a file cannot be written.
     """
+    mat_file = path.name.replace("'", "''")
     name = identifier(exported.card.name)
+    if _is_of_another(path.with_name(f"{name}.m"), mat_file):
+        name = identifier(exported.card.name, is_taken=True)
     content = io.BytesIO()
     savemat(content, _variables(exported), long_field_names=True, oned_as="row")
     words = card_text(exported.card, exported.sample_time_s)
@@ -51,13 +55,23 @@ def write_mat(path: Path, exported: ExportedModel) -> Path:
             "about": words["about"].replace("\n *", "\n%  "),
             "identifier": name,
             "IDENTIFIER": name.upper(),
-            "mat_file": path.name.replace("'", "''"),
+            "mat_file": mat_file,
         },
     )
     replace_file(path, content.getvalue())
     beside = path.with_name(f"{name}.m")
     replace_file(beside, script.encode("utf-8"))
     return beside
+
+
+def _is_of_another(path: Path, mat_file: str) -> bool:
+    """Whether a function is there that loads the numbers of another model."""
+    try:
+        return f"'{mat_file}'" not in read_small_file(path).decode(errors="replace")
+    except FileNotFoundError:
+        return False
+    except OSError:
+        return True
 
 
 def _variables(exported: ExportedModel) -> dict[str, Any]:

@@ -14,8 +14,11 @@ from typing import Any, NoReturn
 from hwid_cli.config.faults import Fault, unknown_key
 from hwid_cli.errors import ModelFileError
 from hwid_cli.files.messages import escaped
+from hwid_cli.files.small_files import read_small_file
 
 _LONGEST_SHOWN = 60
+# The largest that hwid writes, a model of 1000 units at either side, has 1 MB.
+_MOST_BYTES = 32 * 2**20
 _STEP = "export the model again or correct the file"
 _KINDS = {dict: "an object", list: "a list", str: "text", type(None): "nothing"}
 _TYPES = {
@@ -87,7 +90,7 @@ def _keys(place: Iterable[str | int]) -> tuple[str, ...]:
 def _read_json(path: Path) -> dict[str, Any]:
     wanted = "expected a model that 'hwid export"
     try:
-        text = path.read_bytes().decode("utf-8-sig")
+        text = read_small_file(path, most_bytes=_MOST_BYTES).decode("utf-8-sig")
         values = json.loads(
             text, parse_constant=_no_constant, object_pairs_hook=_without_repeats
         )

@@ -37,8 +37,24 @@ def predict(
     Raises
     ------
     ModelFileError
-        If the model is not stable, or a simulation is asked to start otherwise.
+        If the model is not stable, its output is not finite, or a simulation is asked
+        to start otherwise.
     """
+    with np.errstate(over="ignore", invalid="ignore"):
+        output = _output(exported, signal, initial_state, place)
+    wrong = np.flatnonzero(~np.isfinite(output))
+    if wrong.size:
+        raise ModelFileError(
+            f"{place}: the predicted output is {output[wrong[0]]} at sample {wrong[0]}; "
+            "expected finite numbers; export the model again, or predict an input "
+            "within its range"
+        )
+    return output
+
+
+def _output(
+    exported: Exported, signal: np.ndarray, initial_state: str, place: str
+) -> np.ndarray:
     if isinstance(exported, ExportedSimulation):
         if initial_state == "empty":
             raise ModelFileError(

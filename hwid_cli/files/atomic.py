@@ -14,6 +14,7 @@ import h5py
 
 from hwid_cli import __version__
 from hwid_cli.errors import CacheError
+from hwid_cli.files.plain_files import refuse_unless_plain
 
 _CREATED_BY = f"hwid {__version__}"
 # H5LT_FILE_IMAGE_OPEN_RW; h5py has no name for it.
@@ -33,12 +34,16 @@ def replace_file(path: Path, content: bytes, *, is_lasting: bool = False) -> Non
     Raises
     ------
     CacheError
-        If the disk or the folder refuses; the old file is untouched then.
+        If the disk or the folder refuses, or what is there is no plain file; it is
+        untouched then.
     """
     temporary = path.with_name(f".{path.name}.{uuid4().hex}.tmp")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        temporary.write_bytes(content)
+        refuse_unless_plain(path)
+        # "x" follows no link.
+        with temporary.open("xb") as file:
+            file.write(content)
         if is_lasting:
             _wait_for_disk(temporary)
         temporary.replace(path)

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import IO
 
 from hwid_cli.errors import CacheError
+from hwid_cli.files.plain_files import open_plain
 
 if sys.platform != "win32":
     import fcntl
@@ -28,7 +29,7 @@ _NO_LOCKS = (errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOSYS, errno.EINVAL)
 # Names of files that are being written, see ``replaced_files``.
 _TEMPORARY = re.compile(r"\..+\.[0-9a-f]{32}\.tmp")
 # Folders of results in which files are written; others are the user's.
-_WRITTEN = ("raw", "simulated", "models", "figures")
+WRITTEN = ("raw", "simulated", "models", "figures")
 
 _log = logging.getLogger(__name__)
 
@@ -53,7 +54,7 @@ def claim_folder(folder: Path) -> IO[str]:
     """
     path = folder / RUN_LOCK
     try:
-        file = path.open("a+", encoding="utf-8")
+        file = open_plain(path)
     except OSError as error:
         raise CacheError(
             f"{folder}: cannot be written ({error.strerror}); expected a folder with "
@@ -85,10 +86,15 @@ def share_folder(folder: Path) -> IO[str] | None:
     -------
     file or None
         To be closed at the end; None where the folder cannot be written.
+
+    Raises
+    ------
+    CacheError
+        If the lock is no plain file.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        file = (folder / USERS_LOCK).open("a+", encoding="utf-8")
+        file = open_plain(folder / USERS_LOCK)
     except OSError:
         # Who really has to write says so.
         return None
@@ -148,5 +154,5 @@ def _places(folder: Path) -> Iterator[Path]:
     """Where files are written; not all below, for it may be anybody's folder."""
     yield from folder.glob(".*.tmp")
     yield from folder.glob("[0-9a-f][0-9a-f]/.*.tmp")
-    for name in _WRITTEN:
+    for name in WRITTEN:
         yield from (folder / name).rglob(".*.tmp")

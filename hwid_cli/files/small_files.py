@@ -8,13 +8,17 @@ from pathlib import Path
 MOST_TEXT_BYTES = 256 * 1024
 
 
-def read_small_file(path: Path) -> bytes:
+def read_small_file(path: Path, *, most_bytes: int = MOST_TEXT_BYTES) -> bytes:
     """Read a file that people write: a configuration, a function, a plan.
+
+    Parameters
+    ----------
+    most_bytes : int, [bytes]
 
     Raises
     ------
     OSError
-        If it cannot be read, is no plain file, or is larger than ``MOST_TEXT_BYTES``.
+        If it cannot be read, is no plain file, or is larger.
     """
     # Before it is opened: that would wait for somebody to write into a pipe.
     if not stat.S_ISREG(path.stat().st_mode):
@@ -23,7 +27,7 @@ def read_small_file(path: Path) -> bytes:
             errno.EINVAL, "Is a directory" if is_folder else "Is no plain file"
         )
     with path.open("rb") as file:
-        content = file.read(MOST_TEXT_BYTES + 1)
-    if len(content) > MOST_TEXT_BYTES:
-        raise OSError(errno.EFBIG, f"Is larger than {MOST_TEXT_BYTES // 1024} kB")
+        content = file.read(most_bytes + 1)
+    if len(content) > most_bytes:
+        raise OSError(errno.EFBIG, f"Is larger than {most_bytes // 1024} kB")
     return content

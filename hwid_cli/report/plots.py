@@ -1,6 +1,7 @@
 """Figures of the calibration: records in, figures out; those of the report are in ``figures``."""
 
 import io
+import warnings
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -82,6 +83,9 @@ def as_png(figure: Figure) -> bytes:
         A PNG file.
     """
     buffer = io.BytesIO()
-    # No software name or date: the same figure gives the same bytes.
-    figure.savefig(buffer, format="png", metadata={"Software": None})
+    with warnings.catch_warnings():
+        # Names of recordings may be Chinese: a box in a figure, whole in page and tables.
+        warnings.filterwarnings("ignore", r"Glyph \d+ .* missing from", UserWarning)
+        # No software name or date: the same figure gives the same bytes.
+        figure.savefig(buffer, format="png", metadata={"Software": None})
     return buffer.getvalue()

@@ -1,5 +1,6 @@
 """What a kind of simulation must offer."""
 
+import errno
 import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -45,6 +46,9 @@ def hash_of_file(path: str) -> str:
         If it cannot be read.
     """
     try:
+        # A pipe would be waited for without an end.
+        if Path(path).exists() and not Path(path).is_file():
+            raise OSError(errno.EINVAL, "Is no plain file")
         with Path(path).open("rb") as file:
             return hashlib.file_digest(file, "sha256").hexdigest()
     except OSError as error:

@@ -20,7 +20,7 @@ from hwid_cli.data.recording_files import (
 )
 from hwid_cli.data.recordings import read_recordings
 from hwid_cli.errors import ConfigError, MeasurementError, NothingToDo
-from hwid_cli.files.atomic import replace_file
+from hwid_cli.files.figure_files import read_figure, write_figure
 from hwid_cli.records.check import StagePlan
 from hwid_cli.records.experiment import RECIPE_STEPS, CalibrateOptions
 from hwid_cli.records.recordings import (
@@ -235,16 +235,22 @@ def _write(path: Path, _: Measured, result: Calibrated, origin: Provenance) -> N
 def _draw(
     out: Path, given: Measured, result: Calibrated, _: Provenance | None, is_new: bool
 ) -> None:
-    """Draw each recording before and after; old figures of old results may stay."""
+    """Draw each recording before and after, unless a whole figure of it is there."""
     if given.options is None:
         return
     for raw, recording, log in zip(
         given.recordings, result.recordings, result.logs, strict=True
     ):
-        path = out / "figures" / NAME / f"{raw.name}.png"
-        if is_new or not path.is_file():
+        about = f"{result.key} {raw.name}"
+        path = figure_path(out, raw.name)
+        if is_new or read_figure(path, about) is None:
             figure = plots.calibration_figure(raw, recording, log)
-            replace_file(path, plots.as_png(figure))
+            write_figure(path, plots.as_png(figure), about)
+
+
+def figure_path(out: Path, name: str) -> Path:
+    """Where the figure of a recording lies."""
+    return out / "figures" / NAME / f"{name}.png"
 
 
 def _summary(given: Measured, result: Calibrated, is_stored: bool) -> str:

@@ -15,7 +15,7 @@ from hwid_cli.diagnosis import diagnose as pipeline
 from hwid_cli.diagnosis.foreign import diagnose_foreign
 from hwid_cli.diagnosis.rounds import DiagnosisTask, OnRound, RunTasks
 from hwid_cli.errors import CacheError, ConfigError
-from hwid_cli.files.atomic import replace_file
+from hwid_cli.files.figure_files import read_figure, write_figure
 from hwid_cli.records.check import StagePlan
 from hwid_cli.records.diagnosis import Diagnosis
 from hwid_cli.records.drive import DriveResponse, told_apart
@@ -401,7 +401,7 @@ def _write_files(
     path = out / "diagnosis.json"
     figures = None if is_new else _drawn_before(out, origin)
     if figures is None:
-        figures = _draw(out / "figures", diagnosis)
+        figures = _draw(out / "figures", diagnosis, origin.key)
     units = dict.fromkeys(one for log in given.logs for one in log.units)
     write_diagnosis_json(
         path, diagnosis, origin.seconds, origin, figures=figures, units=list(units)
@@ -423,11 +423,12 @@ def _drawn_before(out: Path, origin: Provenance) -> list[str] | None:
     about, names = found.get("provenance") or {}, found.get("figures") or []
     # Seconds tell one run from another one with the same key (--force).
     is_same = about.get("key") == origin.key and found.get("seconds") == origin.seconds
-    is_there = all((out / "figures" / name).is_file() for name in names)
+    folder, told = out / "figures", origin.key
+    is_there = all(read_figure(folder / name, told) is not None for name in names)
     return names if is_same and names and is_there else None
 
 
-def _draw(folder: Path, diagnosis: Diagnosis) -> list[str]:
+def _draw(folder: Path, diagnosis: Diagnosis, about: str) -> list[str]:
     figures = diagnosis_figures(diagnosis)
     drawn = {f"{name}.png": plots.as_png(figure) for name, figure in figures.items()}
     for path in folder.glob("diagnosis_*.png"):
@@ -435,7 +436,7 @@ def _draw(folder: Path, diagnosis: Diagnosis) -> list[str]:
         if path.name not in drawn:
             path.unlink()
     for name, png in drawn.items():
-        replace_file(folder / name, png)
+        write_figure(folder / name, png, about)
     return sorted(drawn)
 
 

@@ -12,6 +12,7 @@ from hwid_cli.diagnosis.foreign import Simulator, stand_in_for
 from hwid_cli.diagnosis.rounds import DiagnosisTask
 from hwid_cli.errors import ConfigError, ModelFileError, SimulationError
 from hwid_cli.export.json_reader import read_exported
+from hwid_cli.export.loading import check_trust
 from hwid_cli.records.diagnosis import Diagnosis
 from hwid_cli.records.drive import DriveResponse, told_apart
 from hwid_cli.records.experiment import DiagnoseOptions
@@ -62,6 +63,8 @@ def placed(options: ForeignSimulation, source: str) -> ForeignSimulation:
 def _with_model(options: ModelSimulation, source: str) -> ModelSimulation:
     try:
         found = read_exported(Path(options.file))
+        step = "name its file under fit.input_map or fit.output_map"
+        check_trust(found, Path(options.file), is_trusted=False, step=step)
     except ModelFileError as error:
         raise ConfigError(f"{source}: simulation.file: {error}") from error
     if not isinstance(found, ExportedModel):

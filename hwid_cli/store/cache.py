@@ -13,6 +13,7 @@ from typing import TypeVar
 
 import h5py
 
+from hwid_cli.errors import UntrustedFunctionError
 from hwid_cli.files.atomic import check_format, hdf5_image, replace_file
 from hwid_cli.store.hdf5_records import read_record, write_record
 
@@ -106,7 +107,7 @@ class Hdf5Store:
             TypeError,
         ) as error:
             self._set_aside(path, error)
-        except ValueError as error:
+        except (UntrustedFunctionError, ValueError) as error:
             self._set_aside(path, error)
         return None
 

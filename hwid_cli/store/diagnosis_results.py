@@ -3,11 +3,11 @@
 ``diagnosis.json``: what a diagnosis found.
 """
 
-import hashlib
 import json
 import math
 from collections.abc import Sequence
 from dataclasses import asdict
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -41,6 +41,10 @@ _WORDS: dict[type, str] = {list: "a list", dict: "an object"}
 _MOST_DIGITS = 18
 
 
+# Key of the SHA-256 of all that stands before it, written in the same way.
+_CHECKSUM = "sha256"
+
+
 def read_diagnosis(path: Path) -> dict[str, Any] | None:
     """Read a diagnosis.
 
@@ -69,6 +73,13 @@ def read_diagnosis(path: Path) -> dict[str, Any] | None:
             "results of diagnose; run 'hwid diagnose' again"
         )
     _check_forms(path, found)
+    said = found.pop(_CHECKSUM, None)
+    # Files of earlier versions have none.
+    if said is not None and said != sha256(_text(found).encode()).hexdigest():
+        raise CacheError(
+            f"{path}: content and checksum do not match; expected what 'hwid diagnose' "
+            "has written; run it again"
+        )
     return found
 
 
@@ -146,10 +157,13 @@ def write_diagnosis_json(
         "figures": list(figures),
         "provenance": {**_provenance(origin), "units": [asdict(one) for one in units]},
     }
-    text = json.dumps(
-        _without_nan(content), indent=2, ensure_ascii=False, allow_nan=False
-    )
-    replace_file(path, f"{text}\n".encode())
+    plain = _without_nan(content)
+    signed = {**plain, _CHECKSUM: sha256(_text(plain).encode()).hexdigest()}
+    replace_file(path, f"{_text(signed)}\n".encode())
+
+
+def _text(content: Any) -> str:
+    return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)
 
 
 def _gap(diagnosis: Diagnosis) -> dict[str, Any]:
@@ -235,7 +249,7 @@ def _provenance(origin: Provenance) -> dict[str, Any]:
     config = json.dumps(origin.config, sort_keys=True)
     return {
         "key": origin.key,
-        "config_sha256": hashlib.sha256(config.encode()).hexdigest(),
+        "config_sha256": sha256(config.encode()).hexdigest(),
         "inputs": dict(sorted(origin.inputs.items())),
         "versions": dict(sorted(origin.versions.items())),
     }

@@ -20,9 +20,11 @@ from typing import Any, NamedTuple, TypeVar, Union, get_args, get_origin, get_ty
 
 import h5py
 import numpy as np
-from h5py import h5a, h5d, h5s, h5t
+from h5py import h5a, h5d, h5p, h5s, h5t
 
 from hwid_cli.data.array_columns import check_size
+from hwid_cli.records.maps import OwnFunction
+from hwid_cli.store.trusted_functions import check_function
 
 Scalar = str | bool | int | float
 
@@ -38,6 +40,11 @@ _MEMORY = {kind: h5t.py_create(dtype) for kind, dtype in _DTYPES.items()}
 _STORED = {kind: h5t.py_create(dtype, logical=True) for kind, dtype in _DTYPES.items()}
 # HDF5 refuses attributes above 64 KiB; text counts as 16 bytes of reference plus itself.
 LONGEST_ATTRIBUTE = 30_000
+
+
+# Equal content gives equal files: HDF5 notes when a data set was made unless told not to.
+_WITHOUT_TIMES = h5p.create(h5p.DATASET_CREATE)
+_WITHOUT_TIMES.set_obj_track_times(False)
 
 
 def write_small(group: h5py.Group, name: str, value: object, kind: type) -> None:
@@ -123,9 +130,8 @@ def write_array(group: h5py.Group, name: str, values: np.ndarray) -> None:
         return
     values = np.require(values, requirements="C")
     stored = h5t.py_create(values.dtype, logical=True)
-    dataset = h5d.create(
-        group.id, name.encode(), stored, h5s.create_simple(values.shape)
-    )
+    space = h5s.create_simple(values.shape)
+    dataset = h5d.create(group.id, name.encode(), stored, space, dcpl=_WITHOUT_TIMES)
     if values.size:
         dataset.write(h5s.ALL, h5s.ALL, values)
 
@@ -242,7 +248,21 @@ def read_record(group: h5py.Group, record_type: type[Record]) -> Record:
             values[field.name] = field.default()
         else:
             values[field.name] = _read_field(group, field)
-    return record_type(**values)
+    return built(record_type, values)
+
+
+def built(record_type: type[Record], values: dict[str, Any]) -> Record:
+    """Build a record out of what was stored; Python in it must be trusted.
+
+    Raises
+    ------
+    UntrustedFunctionError
+        If it is a function that the configuration at hand does not name.
+    """
+    record = record_type(**values)
+    if isinstance(record, OwnFunction):
+        check_function(record)
+    return record
 
 
 def _read_field(group: h5py.Group, field: StoredField) -> Any:

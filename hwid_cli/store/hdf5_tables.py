@@ -15,6 +15,7 @@ import numpy as np
 
 from hwid_cli.store.hdf5_records import (
     StoredField,
+    built,
     has_value,
     read_array,
     schema,
@@ -98,7 +99,7 @@ def read_table(group: h5py.Group, record_type: type[Record]) -> list[Record | No
     if has_value(group, _PRESENT):
         is_present = read_array(group, _PRESENT).tolist()
     return [
-        record_type(**{name: column[row] for name, column in columns.items()})
+        built(record_type, {name: column[row] for name, column in columns.items()})
         if is_present[row]
         else None
         for row in range(count)

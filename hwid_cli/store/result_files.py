@@ -18,7 +18,7 @@ import h5py
 import numpy as np
 
 from hwid_cli import __version__
-from hwid_cli.errors import CacheError
+from hwid_cli.errors import CacheError, UntrustedFunctionError
 from hwid_cli.files.atomic import check_format, replaced_hdf5
 from hwid_cli.files.checksums import has_checksum, with_checksum, without_checksum
 from hwid_cli.store.hdf5_records import read_array, write_array
@@ -212,6 +212,14 @@ def _readable_bytes(path: Path, stage: str) -> bytes:
     if not path.exists():
         return b""
     try:
+        path.read_bytes()
+    except OSError as error:
+        # What cannot be read now may be whole: only a content that is wrong is damage.
+        raise CacheError(
+            f"{path}: cannot be read ({error.strerror}); expected a file that may be "
+            "read and replaced; mend the disk, or choose another folder with --out"
+        ) from error
+    try:
         with _opened(path, stage) as file:
             # Damage below the root shows only where it is looked at.
             file.visititems(_look_at)
@@ -277,12 +285,15 @@ def _opened(path: Path, stage: str) -> Iterator[h5py.File]:
             raise ValueError("it is no plain file")
         content = path.read_bytes()
         without_checksum(content)
-        with h5py.File(path, "r") as file:
+        # File systems without locks exist; a file that is replaced as a whole needs none.
+        with h5py.File(path, "r", locking=False) as file:
             check_format(file, format_name=format_name, version=SCHEMA_VERSION)
             if HAS_CHECKSUM in file.attrs and not has_checksum(content):
                 raise ValueError("its checksum is gone: cut off, or changed since")
             del content
             yield file
+    except UntrustedFunctionError as error:
+        raise UntrustedFunctionError(f"{path}: {stage}: {error}") from error
     except (LookupError, OSError, RuntimeError, TypeError, ValueError) as error:
         said = " ".join(str(error).split())
         raise CacheError(
@@ -311,7 +322,7 @@ def has_left_results(path: Path, stage: str) -> bool:
         return True
     try:
         without_checksum(path.read_bytes())
-        with h5py.File(path, "r") as file:
+        with h5py.File(path, "r", locking=False) as file:
             is_whole = stage in _OWN_FILES or "format" not in file.attrs
             return is_whole or stage in file
     except (KeyError, OSError, RuntimeError, ValueError):

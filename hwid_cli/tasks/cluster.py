@@ -18,12 +18,16 @@ import math
 import pickle
 import queue
 import statistics
+import threading
 import time
 from collections import Counter, deque
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import CancelledError
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache
 from hashlib import sha256
+from importlib.util import find_spec
 from typing import Any
 from uuid import uuid4
 
@@ -31,6 +35,7 @@ from threadpoolctl import threadpool_limits
 
 from hwid_cli import __version__
 from hwid_cli.errors import ConfigError, WorkerError
+from hwid_cli.files.messages import shown
 from hwid_cli.tasks.task import Computed, Task, computed
 
 # How long a chunk shall last, [s], and how many tasks it holds at most. Near the end
@@ -140,8 +145,14 @@ def _names(tasks: Sequence[Task]) -> str:
     return f"{named} and {more} more" if more > 0 else named
 
 
-# A scheduler that does not answer within this time is not there, [s].
-CONNECT_TIMEOUT_S = 10
+# A scheduler that does not answer within this time is not there, [s]; the first for the
+# library, which bounds only some of its waiting, the second for all of it.
+CONNECT_TIMEOUT_S, ANSWER_S = 5.0, 6.0
+# A scheduler that was there and is connected may be busy for so long; one whose
+# connection broke is given up after the other time, [s].
+_BUSY_S, _BROKEN_S = 20.0, 4.0
+# Time for giving up what is under way, and for leaving a cluster, [s].
+_LEAVE_S = 1.0
 # Arguments with a longer pickle are sent once, [bytes].
 LARGE = 8192
 # Time between two looks at the workers, and after which a message says there are none.
@@ -251,6 +262,7 @@ class _Cluster:
         self.client, self.address = client, address
         self._sent: dict[int, tuple[Any, Any]] = {}
         self._threads, self._looked_at = 0, -_LOOK_S
+        self._checked: set[str] = set()
         self._recent: dict[Callable[..., Any], deque[float]] = {}
 
     def recent(self, tasks: Sequence[Task]) -> deque[float]:
@@ -261,7 +273,9 @@ class _Cluster:
         """Threads of all workers; looked up every few seconds."""
         if time.monotonic() - self._looked_at >= _LOOK_S:
             before = self._threads
-            self._threads = sum(self.client.nthreads().values())
+            found = self.ask(self.client.nthreads)
+            self._threads = sum(found.values())
+            self._check_workers(found.keys() - self._checked)
             self._looked_at = time.monotonic()
             if self._threads < before:
                 _log.warning(
@@ -269,6 +283,53 @@ class _Cluster:
                     self.address,
                 )
         return self._threads
+
+    def ask(self, call: Callable[..., Any], *arguments: Any, **options: Any) -> Any:
+        """What the scheduler answers, if it does so in time.
+
+        Raises
+        ------
+        ConfigError
+            If it is gone, or silent.
+        """
+        begin = time.monotonic()
+        connected, answer = begin, _begun(call, *arguments, **options)
+        while True:
+            try:
+                return _taken(answer, _BROKEN_S / 4)
+            except (CancelledError, OSError, RuntimeError) as error:
+                now = time.monotonic()
+                if self.client.status == "running":
+                    connected = now
+                if now - connected > _BROKEN_S or now - begin > _BUSY_S:
+                    raise self._gone(error) from error
+                if not isinstance(error, _NoAnswerError):
+                    # A new connection was refused or took long: the machine is busy.
+                    time.sleep(_BROKEN_S / 4)
+                    answer = _begun(call, *arguments, **options)
+
+    def _gone(self, error: BaseException) -> ConfigError:
+        said = " ".join(str(error).split()) or type(error).__name__
+        return ConfigError(
+            f"--scheduler {self.address}: went away while computing ({shown(said)}); "
+            "expected a running dask scheduler; start it and give the same command again"
+        )
+
+    def _check_workers(self, new: set[str]) -> None:
+        """Refuse workers without this package: they would die over every task."""
+        if not new:
+            return
+        found = self.ask(
+            self.client.run, find_spec, "hwid_cli", workers=list(new), on_error="return"
+        )
+        lacking = sorted(one for one, spec in found.items() if spec is None)
+        if lacking:
+            raise ConfigError(
+                f"--scheduler {self.address}: the worker {lacking[0]} has no package "
+                f"hwid; expected {__version__} on every worker; install it there (pip "
+                "install 'hwid[dask]') and give the same command again"
+            )
+        self._checked |= new
 
     def submit(self, chunk: Sequence[Task]) -> Any:
         """Hand a chunk to the scheduler; gives dask's future."""
@@ -291,7 +352,8 @@ class _Cluster:
         finished = [one for one in futures if one.status == "finished"]
         try:
             # All in one message: each alone would cost milliseconds.
-            found = dict(zip(finished, self.client.gather(finished), strict=True))
+            gathered = self._wait_for(self.client.gather, finished)
+            found = dict(zip(finished, gathered, strict=True))
         except KilledWorker:
             # What had finished was lost with its worker, and killed those after it.
             found = {}
@@ -303,12 +365,9 @@ class _Cluster:
         from distributed.scheduler import KilledWorker
 
         if future.status == "cancelled":
-            raise ConfigError(
-                f"--scheduler {self.address}: went away while computing; expected a "
-                "running dask scheduler; start it and give the same command again"
-            )
+            raise self._gone(CancelledError())
         try:
-            return future.result()
+            return self._wait_for(future.result)
         except KilledWorker:
             return None
         except ImportError as error:
@@ -317,10 +376,22 @@ class _Cluster:
                 f"expected hwid {__version__} there too; install it on all workers"
             ) from error
 
+    def _wait_for(self, call: Callable[..., Any], *arguments: Any) -> Any:
+        """What may take as long as it takes, while the scheduler is there."""
+        answer = _begun(call, *arguments)
+        while True:
+            try:
+                return _taken(answer, _LOOK_S)
+            except _NoAnswerError:
+                self.ask(self.client.nthreads)
+            except (CancelledError, OSError) as error:
+                raise self._gone(error) from error
+
     def forget(self, futures: Sequence[Any]) -> None:
         """Give up what is still on its way."""
         if futures and self.client.status == "running":
-            self.client.cancel(futures)
+            with suppress(CancelledError, OSError, RuntimeError):
+                _within(_LEAVE_S, self.client.cancel, futures)
 
     def _reference(self, argument: Any) -> Any:
         """Argument, or what stands for it where it is large."""
@@ -343,6 +414,51 @@ class _Cluster:
         return future
 
 
+class _NoAnswerError(TimeoutError):
+    """A call has not come back yet."""
+
+
+def _begun(
+    call: Callable[..., Any], *arguments: Any, **options: Any
+) -> queue.Queue[tuple[Any, BaseException | None]]:
+    """Begin a call in a thread; gives where its result, or its error, will be."""
+    answer: queue.Queue[tuple[Any, BaseException | None]] = queue.Queue()
+
+    def run() -> None:
+        try:
+            answer.put((call(*arguments, **options), None))
+        except BaseException as error:
+            answer.put((None, error))
+
+    threading.Thread(target=run, daemon=True).start()
+    return answer
+
+
+def _taken(
+    answer: queue.Queue[tuple[Any, BaseException | None]], seconds: float
+) -> Any:
+    try:
+        result, error = answer.get(timeout=seconds)
+    except queue.Empty:
+        raise _NoAnswerError(f"no answer within {seconds:g} s") from None
+    if error is not None:
+        raise error
+    return result
+
+
+def _within(
+    seconds: float, call: Callable[..., Any], *arguments: Any, **options: Any
+) -> Any:
+    """What a call gives; the library waits without an end for a silent scheduler.
+
+    Raises
+    ------
+    _NoAnswerError
+        If it gives nothing within the time; it goes on in its thread.
+    """
+    return _taken(_begun(call, *arguments, **options), seconds)
+
+
 def _arrived(arrived: queue.Queue[Any], cluster: _Cluster) -> list[Any]:
     """Futures that are done: at least one, and all others that have come meanwhile."""
     futures: list[Any] = []
@@ -351,8 +467,8 @@ def _arrived(arrived: queue.Queue[Any], cluster: _Cluster) -> list[Any]:
         try:
             futures.append(arrived.get(timeout=_LOOK_S))
         except queue.Empty:
-            is_late = time.monotonic() - since > _PATIENCE_S
-            if is_late and not told and cluster.threads() == 0:
+            has_none = cluster.threads() == 0
+            if time.monotonic() - since > _PATIENCE_S and has_none and not told:
                 _log.warning("%s has no workers; waiting for one", cluster.address)
                 told = True
     while not arrived.empty():
@@ -380,15 +496,35 @@ def _cluster(scheduler: str | None, count: int) -> _Cluster:
     _quieten("distributed")
     try:
         if scheduler is None:
+            # This machine only, whatever dask's configuration says.
             client = Client(
-                n_workers=count, threads_per_worker=1, dashboard_address=None
+                n_workers=count,
+                threads_per_worker=1,
+                dashboard_address=None,
+                host="127.0.0.1",
             )
         else:
-            client = Client(scheduler, timeout=CONNECT_TIMEOUT_S)
-    except (OSError, ValueError) as error:
+            client = _within(ANSWER_S, Client, scheduler, timeout=CONNECT_TIMEOUT_S)
+    # A server that is no scheduler may answer anything.
+    except Exception as error:
+        said = " ".join(str(error).split()) or type(error).__name__
         raise ConfigError(
-            f"--scheduler {scheduler}: {error}; expected the address of a "
-            "running dask scheduler, such as tcp://127.0.0.1:8786"
+            f"--scheduler {scheduler}: {shown(said)}; expected the address of a "
+            f"running dask scheduler, such as tcp://127.0.0.1:8786{_on_tls(scheduler)}"
         ) from error
-    atexit.register(client.close)
+    atexit.register(_leave, client)
     return _Cluster(client, scheduler or "the cluster on this machine")
+
+
+def _on_tls(scheduler: str | None) -> str:
+    if scheduler is None or not scheduler.startswith("tls://"):
+        return ""
+    return (
+        "; tls:// needs distributed.comm.tls in dask's configuration, with certificates "
+        "that the scheduler accepts (docs/security.md)"
+    )
+
+
+def _leave(client: Any) -> None:
+    with suppress(Exception):
+        _within(_LEAVE_S, client.close)

@@ -1,4 +1,10 @@
 import csv
+import json
+import os
+import resource
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -156,3 +162,64 @@ def test_a_missing_folder_is_said_and_not_made(model, tmp_path):
     assert f"there is no folder {tmp_path / 'deep'};" in result.stderr
     assert result.stderr.count("\n") == 1
     assert not (tmp_path / "deep").exists()
+
+
+HOSTILE = [
+    ("name", "step\x1b[2J\x1b[1;31mall is lost/1/2", "text without control characters"),
+    ("units.output", "m\r\nhwid: done", "text without control characters"),
+    ("units.input", "A\u202e", "text without control characters"),
+    ("columns.input", "current\x07", "text without control characters"),
+    ("linear_block.numerator.0", 1e308, "expected finite numbers"),
+]
+
+
+@pytest.mark.parametrize(("place", "value", "says"), HOSTILE)
+def test_a_hostile_model_is_one_plain_line(model, tmp_path, place, value, says):
+    content = json.loads(model.read_text())
+    *keys, last = [int(key) if key.isdigit() else key for key in place.split(".")]
+    part = content
+    for key in keys:
+        part = part[key]
+    part[last] = value
+    model.write_text(json.dumps(content))
+    out = tmp_path / "p.csv"
+    given = write_input(tmp_path / "u.csv", np.linspace(-8.0, 8.0, 400))
+    result = predict(model, given, "--out", out)
+
+    assert result.exit_code == 1, result.output
+    (line,) = result.stderr.splitlines()
+    assert line.isprintable()
+    assert says in line
+    assert str(model) in line
+    assert "\x1b" not in result.stdout
+    assert not out.exists()
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="a system without pipes")
+@pytest.mark.parametrize("kind", ["pipe", "/dev/zero", "large", "pipe as input"])
+def test_a_file_without_an_end_is_one_line(model, tmp_path, kind):
+    place, given = model, write_input(tmp_path / "u.csv", example_input(1))
+    if kind == "pipe":
+        place = tmp_path / "pipe"
+        os.mkfifo(place)
+    elif kind == "/dev/zero":
+        place = Path(kind)
+    elif kind == "large":
+        with place.open("r+b") as file:
+            file.truncate(2**36)
+    else:
+        given = tmp_path / "pipe"
+        os.mkfifo(given)
+    command = [sys.executable, "-m", "hwid_cli", "predict", place, given]
+    done = subprocess.run(
+        [*command, "--out", tmp_path / "p.csv"],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (2**32, 2**32)),
+    )
+
+    assert done.returncode == 1
+    assert len(done.stderr.splitlines()) == 1, done.stderr
+    assert str(given if "input" in kind else place) in done.stderr

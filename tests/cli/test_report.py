@@ -5,8 +5,9 @@ import h5py
 import pytest
 
 from hwid_cli.cli.options import Choices
-from hwid_cli.cli.report import _is_complete, _last_line, read_stored
+from hwid_cli.cli.report import _is_complete, _last_line, _signed, read_stored
 from hwid_cli.cli.session import open_session
+from hwid_cli.files.figure_files import write_figure
 
 
 def files_below(folder):
@@ -148,17 +149,15 @@ def test_a_figure_that_was_deleted_is_written_again(after_run, hwid, out):
 
 
 def test_the_last_line_stays_one_comment_whatever_figures_are_called(tmp_path):
-    figures = ["calibrate/a-->b.png", "recordings/\u00e4\n.png"]
+    figures = ["models/a-->b.png", "recordings/\u00e4\n.png"]
     line = _last_line("key", figures)
     for name in figures:
-        path = tmp_path / "figures" / name
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(b"")
+        write_figure(tmp_path / "figures" / name, b"PNG" + bytes(12), f"drawn {name}")
     page = tmp_path / "report.html"
-    page.write_text(f"<html>\n{line}")
+    page.write_bytes(_signed(f"<html>\n{line}"))
 
     assert line.count("-->") == line.count("\n") == 1
-    assert _is_complete(tmp_path, page, "key")
-    assert not _is_complete(tmp_path, page, "other")
+    assert _is_complete(tmp_path, page, "key", "drawn")
+    assert not _is_complete(tmp_path, page, "other", "drawn")
     (tmp_path / "figures" / figures[0]).unlink()
-    assert not _is_complete(tmp_path, page, "key")
+    assert not _is_complete(tmp_path, page, "key", "drawn")

@@ -1,4 +1,5 @@
 import zipfile
+from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
@@ -84,3 +85,14 @@ def test_without_a_compiler_there_is_one_line(
     with pytest.raises(ConfigError, match=f"--format fmu: {said}.*use --format c"):
         write_exported(tmp_path, exported, "fmu")
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("sign", ["\uffff", "\ufffe", "\U0001f600", "\x0b", "é"])
+def test_a_name_that_xml_has_no_place_for_leaves_a_document(tmp_path, sign):
+    exported = exported_of(example_model(5), name=f"a{sign}b/1/2", output_unit=sign)
+    path = write_exported(tmp_path, exported, "fmu")[0]
+    with zipfile.ZipFile(path) as archive:
+        root = ET.fromstring(archive.read("modelDescription.xml"))
+
+    found = root.get("description")
+    assert f"a{sign}b" in found or "a\ufffdb" in found

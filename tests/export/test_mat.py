@@ -1,6 +1,7 @@
 """The MAT file, rebuilt with what MATLAB and Octave have: filter and interp1."""
 
 import json
+import re
 import shutil
 import subprocess
 
@@ -112,3 +113,43 @@ def test_octave_predicts_as_hwid_does(place, tmp_path):
     for start, y in zip(STARTS, found, strict=True):
         expected = predict(exported, u, initial_state=start)
         assert deviation(y, expected) < ROUNDING, start
+
+
+def test_models_of_like_names_have_functions_of_their_own(tmp_path):
+    """Each function loads the numbers beside it, whatever was exported before."""
+    long = "x" * 70
+    names = [
+        "a-b",
+        "a_b",
+        "a+b",
+        "a b",
+        "ä_b",
+        "ü_b",
+        f"{long}1{long}",
+        f"{long}2{long}",
+    ]
+    written = []
+    for name in names:
+        exported = exported_of(example_model(4), name=f"{name}/1/2")
+        written += write_exported(tmp_path, exported, "mat")
+
+    functions = [path for path in written if path.suffix == ".m"]
+    assert len(set(functions)) == len(names)
+    for function in functions:
+        text = function.read_text(encoding="utf-8")
+        # MATLAB finds a function by the name of its file.
+        assert f" {function.stem}(" in text.splitlines()[0]
+        assert len(function.stem) <= 63
+        (loaded,) = re.findall(r"load\(.*'(.*)'\)\);", text)
+        assert (tmp_path / loaded).is_file()
+    loads = [
+        re.findall(r"load\(.*'(.*)'\)\);", one.read_text("utf-8")) for one in functions
+    ]
+    assert len({one for (one,) in loads}) == len(names)
+
+
+def test_exporting_again_keeps_the_name_of_the_function(tmp_path):
+    exported = exported_of(example_model(4), name="a+b/1/2")
+    first = write_exported(tmp_path, exported, "mat")
+
+    assert write_exported(tmp_path, exported, "mat") == first

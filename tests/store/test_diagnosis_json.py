@@ -185,3 +185,14 @@ def test_the_same_diagnosis_gives_the_same_bytes(written, tmp_path):
     written(named())
 
     assert (tmp_path / "diagnosis.json").read_bytes() == before
+
+
+def test_a_changed_number_is_not_believed(tmp_path, written):
+    written(named())
+    path = tmp_path / "diagnosis.json"
+    assert "sha256" not in read_diagnosis(path)
+    text = path.read_text()
+    path.write_text(text.replace('"seconds": ', '"seconds": 1'))
+
+    with pytest.raises(CacheError, match="content and checksum do not match"):
+        read_diagnosis(path)

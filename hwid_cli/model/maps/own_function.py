@@ -9,10 +9,15 @@ References
 docs/method.md, eq. (4f).
 """
 
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import lru_cache
+from typing import NoReturn
 
 import numpy as np
 
+from hwid_cli.errors import ConfigError
 from hwid_cli.model.maps.rule import MapRule, Part, Portable, Shape
 from hwid_cli.records.maps import MapFunction, MapOptions, OwnFunction, StaticMap
 
@@ -38,8 +43,9 @@ def load(name: str, source: str) -> MapFunction:
     """
     scope: dict[str, object] = {"__name__": "hwid_own_function"}
     try:
-        exec(compile(source, f"<own function {name}>", "exec"), scope)
-    except Exception as error:
+        with _exits_refused():
+            exec(compile(source, f"<own function {name}>", "exec"), scope)
+    except (Exception, SystemExit) as error:
         raise ValueError(f"its text does not run: {_said(error)}") from error
     function = scope.get(name)
     if not isinstance(function, MapFunction):
@@ -51,6 +57,20 @@ def load(name: str, source: str) -> MapFunction:
     for start in starting_parameters(function):
         _check_at(function, start)
     return function
+
+
+@contextmanager
+def _exits_refused() -> Iterator[None]:
+    """Let a function's text raise where it would end the process without a word."""
+
+    def refuse(code: int = 0) -> NoReturn:
+        raise SystemExit(code)
+
+    before, os._exit = os._exit, refuse  # type: ignore[assignment]
+    try:
+        yield
+    finally:
+        os._exit = before
 
 
 def starting_parameters(function: MapFunction) -> np.ndarray:
@@ -123,7 +143,7 @@ def _called(
 ) -> np.ndarray:
     """What a part of the function gives, refused where it cannot be used."""
     try:
-        with np.errstate(all="ignore"):
+        with np.errstate(all="ignore"), _exits_refused():
             given = np.asarray(getattr(function, part)(*arguments), dtype=float)
     except (Exception, SystemExit) as error:
         raise ValueError(f"{part} does not run: {_said(error)}") from error
@@ -161,6 +181,8 @@ def _compare(
 def _said(error: BaseException) -> str:
     """An exception in one line."""
     line = " ".join(str(error).split())
+    if isinstance(error, SystemExit):
+        return f"it called exit({line})"
     return f"{type(error).__name__}: {line}" if line else type(error).__name__
 
 
@@ -179,7 +201,7 @@ def _evaluate(one: StaticMap, argument: np.ndarray) -> np.ndarray:
     function, unit = _function(one)
     argument = np.asarray(argument, dtype=float)
     try:
-        with np.errstate(all="ignore"):
+        with np.errstate(all="ignore"), _faults_named(one, "value"):
             value = np.asarray(
                 function.value(argument / unit, one.parameters), dtype=float
             )
@@ -187,6 +209,22 @@ def _evaluate(one: StaticMap, argument: np.ndarray) -> np.ndarray:
         # No value for these parameters: the search rejects the step.
         return np.full(argument.shape, np.nan)
     return unit * value
+
+
+@contextmanager
+def _faults_named(one: StaticMap, part: str) -> Iterator[None]:
+    """Turn what a function raises, or its try to end the process, into one line."""
+    try:
+        with _exits_refused():
+            yield
+    except (ArithmeticError, ValueError):
+        raise
+    except (Exception, SystemExit) as error:
+        raise ConfigError(
+            f"own function {_required(one.function).name!r}: {part} does not run: "
+            f"{_said(error)}; expected numbers, whatever the parameters; found at "
+            f"parameters {one.parameters.tolist()}; correct its file"
+        ) from error
 
 
 def _differentiate(
@@ -198,7 +236,7 @@ def _differentiate(
 ) -> tuple[np.ndarray, np.ndarray]:
     function, unit = _function(one)
     at, p = argument / unit, one.parameters
-    with np.errstate(all="ignore"):
+    with np.errstate(all="ignore"), _faults_named(one, "a derivative"):
         columns = unit * np.asarray(function.by_parameters(at, p), dtype=float)
         slope = np.array(function.by_argument(at, p), dtype=float)
     out[:, first : first + p.size] = columns

@@ -1,0 +1,287 @@
+"""Bad days drawn by chance: a stage, a fault and a moment; nothing may be lost or wrong.
+
+``python -m tests.reliability.bad_days --count 500 --seed 1`` draws them, shows what came
+of each kind of fault, and ends with 1 where a day broke a promise. A day is a first run
+that meets the fault and a second one that meets none: the first ends well, or with one
+line and a known exit code; the second finds what an undisturbed run finds, byte by byte.
+"""
+
+import argparse
+import errno
+import hashlib
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from tests.conftest import leave_figures_blank
+from tests.reliability import harness, system_faults
+
+STAGES = (
+    "simulate",
+    "calibrate",
+    "identify",
+    "crossval",
+    "group",
+    "test",
+    "report",
+    "run",
+)
+# Done, refused, and ended by the signals that are sent.
+CODES = (0, 1, 129, 130, 143, -signal.SIGKILL)
+# The first run takes this long where nothing stops it; faults come within it, [s].
+LONGEST_S, PATIENCE_S = 6.0, 300
+DAMAGES: dict[str, Callable[[bytes], bytes]] = {
+    "empty": lambda content: b"",
+    "half": lambda content: content[: len(content) // 2],
+    "bit": lambda content: (
+        content[: len(content) // 2]
+        + bytes([content[len(content) // 2] ^ 16])
+        + content[len(content) // 2 + 1 :]
+    ),
+}
+
+
+@dataclass(frozen=True)
+class Day:
+    """What was drawn.
+
+    Parameters
+    ----------
+    has_results : bool
+        Whether the folder holds those of an undisturbed run.
+    share : float, [-]
+        The moment: of the time, or of the calls, that a run takes.
+    """
+
+    number: int
+    stage: str
+    fault: str
+    share: float
+    jobs: int
+    has_results: bool
+
+
+def draw(number: int, seed: int) -> Day:
+    """The day of a number; the same for the same seed."""
+    rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(number,)))
+    return Day(
+        number,
+        stage=str(rng.choice(STAGES)),
+        # In turn, so that each has its share of the days.
+        fault=list(FAULTS)[number % len(FAULTS)],
+        share=float(rng.uniform()),
+        jobs=int(rng.integers(1, 3)),
+        has_results=bool(rng.integers(2)),
+    )
+
+
+def live(day: Day, undisturbed: Path, work: Path) -> str:
+    """Live through a day; gives what it broke, nothing where all was kept."""
+    config, out = harness.write_config(work), work / "out"
+    out.mkdir()
+    if day.has_results:
+        shutil.copytree(undisturbed, out, dirs_exist_ok=True)
+    victim = work / "victim"
+    victim.write_text("precious")
+    # Measurements that a fault changes are put back by their owner.
+    raw = {path.name: path.read_bytes() for path in (undisturbed / "raw").glob("*")}
+    code, said = FAULTS[day.fault](day, config, out)
+    faults = []
+    if code not in CODES:
+        faults.append(f"exit code {code}")
+    if "Traceback" in said or (code == 1 and "hwid: " not in said):
+        faults.append(f"said {said[-400:]!r}")
+    if victim.read_text() != "precious":
+        faults.append("a file elsewhere changed")
+    for path in [*out.rglob("*"), *out.glob(".hwid*")]:
+        if path.is_symlink():
+            path.unlink()
+    for name, content in raw.items():
+        if (out / "raw" / name).exists():
+            (out / "raw" / name).write_bytes(content)
+    return "; ".join(faults) or _compared(config, out, undisturbed)
+
+
+def _compared(config: Path, out: Path, undisturbed: Path) -> str:
+    done = harness.run_here(config, out, command="run", code=None)
+    if done.exit_code != 0:
+        return f"the second run: {done.exit_code}, {done.output[-400:]!r}"
+    if harness.results(out) != harness.results(undisturbed):
+        return "other results"
+    left = harness.temporary_files(out)
+    return f"left behind: {left}" if left else ""
+
+
+def _start(day: Day, config: Path, out: Path, **faults: object) -> subprocess.Popen:
+    words = [sys.executable, "-m", "hwid_cli", day.stage, config, "--out", out]
+    return subprocess.Popen(
+        [*words, *(("--jobs", str(day.jobs)) if day.stage != "check" else ())],
+        env=system_faults.environment(**faults) if faults else None,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+
+
+def _end(process: subprocess.Popen) -> tuple[int, str]:
+    _, said = process.communicate(timeout=PATIENCE_S)
+    return process.returncode, said
+
+
+def _by_signal(number: int) -> Callable[[Day, Path, Path], tuple[int, str]]:
+    def meet(day: Day, config: Path, out: Path) -> tuple[int, str]:
+        process = _start(day, config, out)
+        time.sleep(day.share * LONGEST_S)
+        harness.kill(process, number)
+        code, said = _end(process)
+        # Before the program listens, the system ends it as it does any other.
+        return (0 if code == -number else code), said if code != -number else ""
+
+    return meet
+
+
+def _by_system(**faults: object) -> Callable[[Day, Path, Path], tuple[int, str]]:
+    """Calls to the system fail from one moment on."""
+
+    def meet(day: Day, config: Path, out: Path) -> tuple[int, str]:
+        settings = dict(faults)
+        if "kind" in settings:
+            settings |= {"folder": out, "at": 1 + int(day.share**2 * 300)}
+        return _end(_start(day, config, out, **settings))
+
+    return meet
+
+
+def _while_running(
+    change: Callable[[Path], None],
+) -> Callable[[Day, Path, Path], tuple[int, str]]:
+    """Somebody else changes a measurement meanwhile."""
+
+    def meet(day: Day, config: Path, out: Path) -> tuple[int, str]:
+        process = _start(day, config, out)
+        time.sleep(day.share * LONGEST_S)
+        paths = sorted((out / "raw").glob("s*.csv"))
+        if paths:
+            change(paths[day.number % len(paths)])
+        return _end(process)
+
+    return meet
+
+
+def _before(
+    change: Callable[[Day, Path], None],
+) -> Callable[[Day, Path, Path], tuple[int, str]]:
+    """Something in the folder is not as it was left."""
+
+    def meet(day: Day, config: Path, out: Path) -> tuple[int, str]:
+        change(day, out)
+        return _end(_start(day, config, out))
+
+    return meet
+
+
+def _damage(pattern: str) -> Callable[[Day, Path], None]:
+    def change(day: Day, out: Path) -> None:
+        paths = sorted(path for path in out.glob(pattern) if path.is_file())
+        if paths:
+            path = paths[int(day.share * len(paths))]
+            damage = list(DAMAGES.values())[day.number % len(DAMAGES)]
+            path.write_bytes(damage(path.read_bytes()) if path.stat().st_size else b"")
+
+    return change
+
+
+def _link(day: Day, out: Path) -> None:
+    names = (".hwid-run.lock", ".hwid-users.lock", "results.h5", "calibrated.h5")
+    place = out / (*names, "crossval.csv", "report.html")[int(day.share * 6)]
+    place.unlink(missing_ok=True)
+    place.symlink_to(out.parent / "victim")
+
+
+def _other_version(_: Day, out: Path) -> None:
+    for path in (out / "cache").glob("??/*.h5"):
+        with h5py.File(h5py.h5f.open_file_image(path.read_bytes()[:-32], 1)) as file:
+            file.attrs["schema_version"] = 99
+            file.flush()
+            image = file.id.get_file_image()
+        path.write_bytes(image + hashlib.sha256(image).digest())
+    (out / "results.h5").unlink(missing_ok=True)
+
+
+def _changed(path: Path) -> None:
+    path.write_bytes(re.sub(rb"1", b"2", path.read_bytes()))
+
+
+FAULTS: dict[str, Callable[[Day, Path, Path], tuple[int, str]]] = {
+    "kill": _by_signal(signal.SIGKILL),
+    "stop": _by_signal(signal.SIGTERM),
+    "Ctrl-C": _by_signal(signal.SIGINT),
+    "full disk": _by_system(kind="write", errno=errno.ENOSPC),
+    "quota": _by_system(kind="write", errno=errno.EDQUOT),
+    "EIO at a write": _by_system(kind="write", errno=errno.EIO, once=1),
+    "EIO at a read": _by_system(kind="read", errno=errno.EIO, once=1),
+    "ENOLCK": _by_system(locks=errno.ENOLCK),
+    "clock jumps back": _by_system(clock=-400_000_000),
+    "clock jumps ahead": _by_system(clock=400_000_000),
+    "input changes": _while_running(_changed),
+    "input vanishes": _while_running(lambda path: path.unlink(missing_ok=True)),
+    "damaged figure or table": _before(_damage("**/*.[pc][ns][gv]")),
+    "damaged page": _before(_damage("report.html")),
+    "damaged results": _before(_damage("*.h5")),
+    "damaged cache": _before(_damage("cache/??/*.h5")),
+    "link": _before(_link),
+    "cache of another version": _before(_other_version),
+}
+
+
+def run_days(
+    count: int, seed: int, undisturbed: Path, tell: Callable[[str], None]
+) -> tuple[Counter, list[str]]:
+    """Live through days; gives how many of each fault there were, and what broke."""
+    tries: Counter = Counter()
+    broken = []
+    for number in range(count):
+        day = draw(number, seed)
+        with tempfile.TemporaryDirectory(prefix="hwid_day_") as work:
+            fault = live(day, undisturbed, Path(work))
+        tries[day.fault] += 1
+        if fault:
+            broken.append(f"{day}: {fault}")
+            tell(broken[-1])
+    return tries, broken
+
+
+def main() -> int:
+    """Draw days and show what came of them."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--count", type=int, default=500)
+    parser.add_argument("--seed", type=int, default=1)
+    asked = parser.parse_args()
+    with tempfile.TemporaryDirectory() as folder, pytest.MonkeyPatch.context() as patch:
+        leave_figures_blank(patch)
+        out = Path(folder) / "out"
+        harness.run_here(harness.write_config(Path(folder)), out, command="run")
+        tries, broken = run_days(
+            asked.count, asked.seed, out, lambda line: print(line, flush=True)
+        )
+    for fault, number in tries.items():
+        bad = sum(f"fault='{fault}'" in line for line in broken)
+        print(f"{fault:26} {number:4} days, {bad} broken")
+    return 1 if broken else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
