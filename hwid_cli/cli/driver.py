@@ -9,13 +9,19 @@ from typing import Any
 from hwid_cli.cli.closing import say_end
 from hwid_cli.cli.options import Choices
 from hwid_cli.cli.report import FILE, write_report
-from hwid_cli.cli.session import Session, Timer, open_session, screen_width
+from hwid_cli.cli.session import (
+    Session,
+    Timer,
+    context_of,
+    open_session,
+    screen_width,
+)
 from hwid_cli.config.load import describe_experiment
 from hwid_cli.data.recordings import check_unchanged
 from hwid_cli.errors import CacheError, HwidError
 from hwid_cli.report.progress import StageProgress
 from hwid_cli.report.table import WIDTH, Block, as_text
-from hwid_cli.stages.stage import Context, Stage
+from hwid_cli.stages.stage import Stage
 from hwid_cli.stages.table import needed, stage_named
 from hwid_cli.store.cache import Hdf5Store
 from hwid_cli.store.result_files import Provenance, current_versions, read_provenance
@@ -99,11 +105,6 @@ def text_of(session: Session, blocks: Sequence[Block], width: int = WIDTH) -> st
         initial_state=experiment.fit.initial_state,
         thesis_names=experiment.thesis_names,
     )
-
-
-def context_of(session: Session) -> Context:
-    """What stages may know of a session."""
-    return Context(session.experiment, session.out, session.results, session.note)
 
 
 def _run(session: Session, stage: Stage) -> Any:

@@ -7,9 +7,8 @@ from contextlib import closing
 from hashlib import sha256
 from pathlib import Path
 
-from hwid_cli.cli.driver import context_of
 from hwid_cli.cli.options import Choices
-from hwid_cli.cli.session import Session, Timer, open_session
+from hwid_cli.cli.session import Session, Timer, context_of, open_session
 from hwid_cli.config.load import describe_experiment
 from hwid_cli.errors import ConfigError, HwidError
 from hwid_cli.files.atomic import replace_file

@@ -18,6 +18,7 @@ from hwid_cli.files.locks import WRITTEN, claim_folder, share_folder
 from hwid_cli.files.plain_files import folders_below, refuse_linked_folders
 from hwid_cli.records.experiment import Experiment
 from hwid_cli.stages.own_functions import check_own_functions
+from hwid_cli.stages.stage import Context
 from hwid_cli.tasks.workers import Workers
 
 # So long a command says nothing of its progress, [s].
@@ -119,6 +120,11 @@ class Timer:
 
     def __str__(self) -> str:
         return f"{self.seconds:.1f} s"
+
+
+def context_of(session: Session) -> Context:
+    """What stages may know of a session."""
+    return Context(session.experiment, session.out, session.results, session.note)
 
 
 def open_session(choices: Choices, *stages: str, is_alone: bool = True) -> Session:

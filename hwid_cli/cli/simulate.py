@@ -3,9 +3,9 @@
 import logging
 
 from hwid_cli.cli.closing import say_end
-from hwid_cli.cli.driver import context_of, result_of, show_blocks
+from hwid_cli.cli.driver import result_of, show_blocks
 from hwid_cli.cli.options import Choices
-from hwid_cli.cli.session import Session, Timer, open_session
+from hwid_cli.cli.session import Session, Timer, context_of, open_session
 from hwid_cli.report.diagnosis import simulated_table
 from hwid_cli.stages.diagnose import choose, simulated_recordings
 from hwid_cli.stages.table import stage_named
