@@ -115,8 +115,8 @@ def test_results_say_what_was_converted(tmp_path):
     path = write_experiment(tmp_path, "t_ms,I (mA),position [mm]", MILLI)
     result = run("calibrate", path, "--out", str(tmp_path / "out"))
     assert "input converted from mA to A" in result.stderr
-    assert "output converted from mm to m" in result.stdout
-    assert "time converted from ms to s" in result.stdout
+    assert "output converted from mm to m" in result.stderr
+    assert "time converted from ms to s" in result.stderr
     calibrated = read_calibrated(tmp_path / "out" / "calibrated.h5")
     (time, input_, _) = calibrated.logs[0].units
     assert (time.given, time.unit, time.factor) == ("ms", "s", 0.001)
