@@ -226,7 +226,7 @@ def _axis(
         room = max((high / low) ** _MARGIN, (_LEAST_RANGE * low / high) ** 0.5, 1.2)
         low, high = low / room, high * room
         decades, most = math.log10(high / low), 4 if is_narrow else 8
-        leading = (1.0,) if decades > (1.2 if is_narrow else 2.3) else (1.0, 2.0, 5.0)
+        leading = (1.0,) if decades > (1.8 if is_narrow else 2.3) else (1.0, 2.0, 5.0)
         first, last = math.floor(math.log10(low)), math.ceil(math.log10(high))
         powers = range(first, last + 1, math.ceil(decades / most))
         marks = [lead * 10.0**power for power in powers for lead in leading]

@@ -38,7 +38,7 @@ def test_a_report_of_all_stages(after_run, hwid, out):
     html = (out / "report.html").read_text()
     figures = files_below(out / "figures")
     assert {"calibrate/step_02.png", "recordings/step_02_detail.png"} <= set(figures)
-    names = json.loads(html.rpartition("<!-- drawn from ")[2].split(" ", 1)[1][:-5])
+    names = json.loads(re.search(r"<!-- drawn from \w+ (\[.*\]) -->\n", html)[1])
     assert names
     assert set(names) <= set(figures)
     assert "hwid group CONFIG" in html

@@ -150,12 +150,33 @@ def test_the_model_is_named_with_its_fit_beside_the_linear_one(contents):
     assert f"(linear: {np.median(record.linear_fit_percent):.1f} %)" in plain(
         found.verdict
     )
-    assert "1 recording that nothing else has used" in found.verdict
+    assert "on 1 recording never used" in found.verdict
     assert any(record.name in command for _, command in found.next_steps)
 
 
 def answered(contents, **changes):
     return model_answer(replace(contents, answer=replace(contents.answer, **changes)))
+
+
+def test_many_recordings_are_those_that_are_worst(contents):
+    names = tuple(f"r{n}" for n in range(20))
+    rmsd = np.random.default_rng(3).permutation(np.arange(1.0, 21.0))
+    some = np.full(20, 50.0)
+    found = answered(
+        contents,
+        recordings=names,
+        rmsd=rmsd,
+        linear_rmsd=rmsd,
+        beyond=0 * some,
+        fit_percent=some,
+        linear_fit_percent=some,
+        threshold=NAN,
+    ).blocks[0]
+
+    shown = [row.name for row in found.groups[0].rows]
+    assert shown == [names[place] for place in np.argsort(-rmsd)[: len(shown)]]
+    assert found.sentence.startswith(f"The {len(shown)} worst; {20 - len(shown)} more")
+    assert found.reference is None
 
 
 def test_where_to_trust_it_is_said(contents):

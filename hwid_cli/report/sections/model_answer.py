@@ -19,7 +19,7 @@ from hwid_cli.report.page import Answer, PageBlock
 from hwid_cli.report.simulation_note import simulation_note
 
 # Recordings that the answer draws, and points of its curves.
-_MOST_ROWS, _MOST_POINTS = 9, 2000
+_MOST_ROWS, _MOST_POINTS = 6, 2000
 # Height of its charts, [pixels].
 _HEIGHT = 170
 # Shares of samples beyond what the fit has visited that need no word, [-].
@@ -56,9 +56,9 @@ def _verdict(found: ModelAnswer) -> str:
             "how good it is elsewhere."
         )
     where = counted(len(found.recordings), "recording")
-    unused = "nothing else has used" if found.is_unused else "its fit has not seen"
+    unused = "never used" if found.is_unused else "that its fit has not seen"
     sentence = (
-        f"Take {found.name}: fit {_median(found.fit_percent)} on {where} that {unused}"
+        f"Take {found.name}: fit {_median(found.fit_percent)} on {where} {unused}"
     )
     if np.isfinite(found.linear_fit_percent).any():
         sentence += f" (linear: {_median(found.linear_fit_percent)})"
@@ -146,14 +146,12 @@ def _trust(found: ModelAnswer) -> str:
 def _next(found: ModelAnswer, contents: ReportContents) -> tuple[tuple[str, str], ...]:
     steps = []
     if contents.stored.crossval is None:
-        steps.append(
-            ("Validate every model on every recording:", "hwid crossval CONFIG")
-        )
+        steps.append(("Validate all models:", "hwid crossval CONFIG"))
     elif found.maps is None:
-        steps.append(("Which maps and orders to take, and why:", "hwid order CONFIG"))
+        steps.append(("Maps and orders, and why:", "hwid order CONFIG"))
     steps.append(
         (
-            "Take it elsewhere (json, mat, c, fmu):",
+            "Take it elsewhere:",
             f"hwid export CONFIG --model {found.name} --format json",
         )
     )
@@ -181,22 +179,20 @@ def _errors(found: ModelAnswer) -> Dots | None:
         )
         rows.append(DotRow(found.recordings[place], dots))
     left_out = len(order) - len(rows)
-    worst = f" The {_MOST_ROWS} worst; {left_out} more lie below." if left_out else ""
+    worst = f"The {_MOST_ROWS} worst; {left_out} more lie below. " if left_out else ""
     legend = [("taken", "this model")]
     if np.isfinite(found.linear_rmsd).any():
         legend.append(("linear", "linear, same orders"))
+    note = simulation_note(found.model.initial_state, is_validation=True)
     reference, said = None, ""
     if np.isfinite(found.threshold):
         threshold = with_unit(found.threshold, found.unit)
         reference = (found.threshold, f"threshold {threshold}")
-        said = f" Dashed: the threshold, {threshold}."
+        said = f"Dashed: the threshold, {threshold}. "
     return Dots(
         label=f"RMSD [{found.unit}]",
         groups=(DotGroup("", tuple(rows)),),
-        sentence=(
-            f"Error on recordings that the fit has not seen.{worst}{said} "
-            + simulation_note(found.model.initial_state, is_validation=True)
-        ),
+        sentence=f"{worst}{said}{note}",
         alt="RMSD of the model and of a linear one on recordings that the fit has not seen",
         legend=tuple(legend),
         reference=reference,
