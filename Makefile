@@ -9,8 +9,8 @@ THESIS := --cache results/cache
 RUN := $(VENV)/installed-run
 DEV := $(VENV)/installed-dev
 
-# make run LOCKED=yes, make test LOCKED=yes: the versions and checksums of locks/, nothing else.
-LOCKS := locks
+# make run LOCKED=yes, make test LOCKED=yes: the versions and checksums of tools/locks/, nothing else.
+LOCKS := tools/locks
 PLATFORM ?= linux-x86_64-py311
 LOCKED_INSTALL = $(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes --requirement
 
@@ -100,7 +100,7 @@ away-run:
 	cd $(AWAY) && bin/python -P -c 'import hwid_cli; assert "site-packages" in hwid_cli.__file__, hwid_cli.__file__'
 
 # Asks the index for what is newest and allowed; look at the difference before it is kept.
-lock: $(RUN)  ## locks/: versions and checksums of everything that run and test install here
+lock: $(RUN)  ## tools/locks/: versions and checksums of everything that run and test install here
 	mkdir -p $(LOCKS)
 	$(BIN)/python -c 'import tomllib; project = tomllib.load(open("pyproject.toml", "rb")); \
 	  print(*project["project"]["dependencies"], *project["build-system"]["requires"], "editables", sep="\n")' \

@@ -1,7 +1,7 @@
 """Turn what pip would install into a list with versions and checksums, for this platform.
 
 Run: python -m pip install --dry-run --ignore-installed --report report.json ...
-     python tools/lock.py report.json > locks/run-linux-x86_64-py311.txt
+     python tools/lock.py report.json > tools/locks/run-linux-x86_64-py311.txt
 """
 
 import json

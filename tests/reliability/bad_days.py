@@ -105,6 +105,9 @@ def live(day: Day, undisturbed: Path, work: Path) -> str:
         faults.append(f"said {said[-400:]!r}")
     if victim.read_text() != "precious":
         faults.append("a file elsewhere changed")
+    aside = [path.name for path in out.rglob("*.bad")]
+    if aside and day.fault not in DAMAGING:
+        faults.append(f"whole files were set aside: {aside}")
     for path in [*out.rglob("*"), *out.glob(".hwid*")]:
         if path.is_symlink():
             path.unlink()
@@ -245,6 +248,10 @@ FAULTS: dict[str, Callable[[Day, Path, Path], tuple[int, str]]] = {
     "link": _before(_link),
     "cache of another version": _before(_other_version),
 }
+
+
+# After these files may be set aside.
+DAMAGING = ("damaged results", "damaged cache", "cache of another version")
 
 
 def run_days(

@@ -15,7 +15,7 @@ LINE = re.compile(r"([a-z0-9._-]+)==(\S+) --hash=sha256:[0-9a-f]{64}")
 
 
 def locked(kind):
-    (path,) = (PROJECT / "locks").glob(f"{kind}-*.txt")
+    (path,) = (PROJECT / "tools" / "locks").glob(f"{kind}-*.txt")
     lines = [one for one in path.read_text().splitlines() if not one.startswith("#")]
     found = [LINE.fullmatch(line) for line in lines]
     assert None not in found
