@@ -297,7 +297,11 @@ class _Cluster:
         while True:
             try:
                 return _taken(answer, _BROKEN_S / 4)
-            except (CancelledError, OSError, RuntimeError) as error:
+            except (AttributeError, CancelledError, OSError, RuntimeError) as error:
+                # A client that has lost its connection has no scheduler to call.
+                is_lost = self.client.scheduler is None
+                if isinstance(error, AttributeError) and not is_lost:
+                    raise
                 now = time.monotonic()
                 if self.client.status == "running":
                     connected = now
