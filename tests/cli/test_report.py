@@ -60,6 +60,23 @@ def test_the_same_results_give_the_same_bytes(after_run, hwid, out):
 
 
 @pytest.mark.slow
+def test_workers_draw_the_same_figures(after_run, hwid, out, monkeypatch):
+    # Workers know nothing of blank figures.
+    monkeypatch.undo()
+    hwid("report", "--force", "--jobs", "1")
+    alone = files_below(out)
+    assert len(alone) > 4
+    for name in alone:
+        if not name.startswith("figures/calibrate/"):
+            (out / name).unlink()
+    monkeypatch.setattr("hwid_cli.cli.report._FEW_FIGURES", 0)
+    result = hwid("report", "--force", "--jobs", "2")
+
+    assert result.exit_code == 0, result.output
+    assert files_below(out) == alone
+
+
+@pytest.mark.slow
 def test_models_newer_than_the_tensor_do_not_break_it(after_run, hwid, out, edit):
     edit("nk: [1, 2]", "nk: [2, 2]")
     hwid("identify")
