@@ -6,6 +6,7 @@ import numpy as np
 
 from hwid_cli.records.model import Fit
 from hwid_cli.records.stored import ADDED_LATER
+from hwid_cli.records.trust import TrustOnTests
 
 
 @dataclass(frozen=True)
@@ -218,6 +219,8 @@ class FinalTest:
     unit : str
         Unit of the output.
     threshold : float, [unit]
+    trust : TrustOnTests
+        How far the chain and ``smallest_set`` may be trusted on ``tested_on``.
     """
 
     models: tuple[str, ...]
@@ -236,6 +239,7 @@ class FinalTest:
     predictions: tuple[Prediction, ...]
     unit: str
     threshold: float
+    trust: TrustOnTests = field(default_factory=TrustOnTests, metadata=ADDED_LATER)
 
     def __post_init__(self) -> None:
         shape = (len(self.models), len(self.recordings))

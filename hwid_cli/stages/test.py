@@ -39,9 +39,11 @@ from hwid_cli.records.groups import ChainTrend, FinalTest, GroupSearch, Predicti
 from hwid_cli.records.model import Fit
 from hwid_cli.records.recordings import Recording
 from hwid_cli.records.results import CrossValidation
+from hwid_cli.records.trust import TrustOnTests
 from hwid_cli.report import final_test
 from hwid_cli.report.table import Block
 from hwid_cli.report.thesis_names import names_of_groups
+from hwid_cli.report.trust import trust_table
 from hwid_cli.stages.coverage_matrix import (
     ScoredModels,
     are_hard_to_cover,
@@ -56,12 +58,14 @@ from hwid_cli.stages.identify import recording_key
 from hwid_cli.stages.ranking import best_of_each, score_models
 from hwid_cli.stages.selection import select_recordings
 from hwid_cli.stages.stage import Context, Planning, Runner, Stage, in_results
+from hwid_cli.stages.trust import trust_task
 from hwid_cli.store.final_test_results import (
     read_final_test,
     write_assignment_csv,
     write_coverage_matrix_csv,
     write_final_test,
     write_test_csv,
+    write_trust_csv,
 )
 from hwid_cli.store.result_files import Provenance
 from hwid_cli.tasks.cache import task_key
@@ -242,7 +246,7 @@ def input_distances(inputs: list[np.ndarray]) -> np.ndarray:
 
 
 NAME = "test"
-STAGE_VERSION = 2
+STAGE_VERSION = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -344,13 +348,33 @@ def score_final_models(
         [[name in fit.identified_on for name in names] for fit in models.fits],
         dtype=bool,
     ).reshape(rmsd.shape)
-    return score_table(
+    final = score_table(
         ScoredModels(models.names, names, rmsd, is_own, threshold),
         chain=models.chain,
         tested_on=tested_on,
         distances=input_distances([recording.input for recording in recordings]),
         unit=recordings[0].output_unit,
     )
+    return replace(final, trust=_trust(models, final, recordings, settings))
+
+
+def _trust(
+    models: FinalModels,
+    final: FinalTest,
+    recordings: Sequence[Recording],
+    settings: RunSettings,
+) -> TrustOnTests:
+    """How far the models that the test recommends may be trusted."""
+    asked = dict.fromkeys((*final.smallest_set, *final.chain))
+    fits = dict(zip(models.names, models.fits, strict=True))
+    tasks = [
+        trust_task(name, fits[name], recordings, final.tested_on) for name in asked
+    ]
+    # The bar counts recordings, and these are models.
+    quiet = replace(settings, on_done=None)
+    found = [item.result for item in run_tasks(tasks, quiet)]
+    rows = tuple(row for one in found for row in one.rows)
+    return TrustOnTests(rows, found[-1].shown if found else None)
 
 
 def score_table(
@@ -558,6 +582,7 @@ def _write_csv(
     write_test_csv(out / "test.csv", final)
     write_assignment_csv(out / "assignment.csv", final)
     write_coverage_matrix_csv(out / "coverage_matrix.csv", final)
+    write_trust_csv(out / "trust.csv", final.trust.rows)
 
 
 def _tables(context: Context, final: FinalTest) -> list[Block]:
@@ -580,6 +605,7 @@ def _tables(context: Context, final: FinalTest) -> list[Block]:
         *final_test.gap_sentences(final),
         final_test.smallest_set_table(final),
         final_test.prediction_table(final),
+        *([trust_table(final.trust.rows)] if final.trust.rows else []),
     ]
 
 
@@ -611,6 +637,12 @@ STAGE = Stage(
     ),
     write_files=_write_csv,
     tables=_tables,
-    files=("results.h5", "test.csv", "assignment.csv", "coverage_matrix.csv"),
+    files=(
+        "results.h5",
+        "test.csv",
+        "assignment.csv",
+        "coverage_matrix.csv",
+        "trust.csv",
+    ),
     plan=_plan,
 )
