@@ -41,8 +41,11 @@ def judged(name: str, found: Fit, own, judges, tests: Sequence[Recording]) -> li
     trust = model_trust(found, own, judges)
     model, rows = outlined_model(found.model), []
     for one in tests:
-        seen, _ = recording_trust(name, model, trust, one)
         spread = float(np.std(one.output))
+        if spread == 0.0:
+            # An input that stays within a dead zone is no recording.
+            continue
+        seen, _ = recording_trust(name, model, trust, one)
         rows.append(
             (seen.coverage, seen.width / seen.rmsd, seen.width / spread, seen.inside)
         )
