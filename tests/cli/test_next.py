@@ -1,5 +1,6 @@
 import csv
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -7,6 +8,10 @@ from click.testing import CliRunner
 from scipy.signal import lfilter
 
 from hwid_cli.cli.main import main
+from hwid_cli.drive.simulation import simulate_drive
+from hwid_cli.records.recordings import Recording
+from tests.diagnosis.small_drive import DRIVE
+from tests.stages.test_diagnose import slow_ramps
 
 N, STEP_S = 400, 0.01
 LIMITS = "next: {limits: {amplitude: 2.0, rate: 100, duration_s: 4.0}}\n"
@@ -132,6 +137,56 @@ def test_parameters_ask_for_a_recording_that_excites_them(bench):
     assert result.exit_code == 0, result.output
     assert [row["name"] for row in proposals(bench)] == ["rich"]
     assert "standard errors" in proposals(bench)[0]["reason"]
+
+
+DIAGNOSIS = """name: bench
+recordings:
+  files: raw/*.csv
+  columns: {time: t, input: u, output: y}
+simulation: {kind: drive, mass_kg: 0.3, damping_N_s_per_m: 15.0,
+  stiffness_N_per_m: 1184.0, force_constant_N_per_A: 5.0}
+diagnose: {effects: [actuator_lag, input_delay], max_effects: 1}
+next: {goal: diagnosis, number: 1,
+  limits: {amplitude: 4.0, rate: 2000, duration_s: 0.4}}
+"""
+
+
+def write_recording(folder, one):
+    folder.mkdir(exist_ok=True)
+    time = one.sample_time_s * np.arange(one.n_samples)
+    rows = np.column_stack([time, one.input, one.output])
+    head = {"header": "t,u,y", "comments": ""}
+    np.savetxt(folder / f"{one.name}.csv", rows, delimiter=",", **head)
+
+
+def test_a_proposed_recording_tells_two_candidates_apart(tmp_path):
+    noise = 4e-4
+    for one in slow_ramps(noise):
+        write_recording(tmp_path / "raw", one)
+    config = tmp_path / "bench.yaml"
+    config.write_text(DIAGNOSIS)
+    asked = ["next", str(config), "--out", str(tmp_path / "out"), "--jobs", "1"]
+
+    first = CliRunner().invoke(main, asked)
+    assert first.exit_code == 0, first.output
+    (row,) = proposals(tmp_path)
+    assert "times the noise" in row["reason"]
+    assert float(row["gain"]) > 0.1
+    u = played(tmp_path, row)[:, 1]
+    lagging = replace(DRIVE, effects={"actuator_lag": {"time_constant_s": 0.002}})
+    y = simulate_drive(u, lagging, sample_time_s=1e-3).output
+    y = y + noise * np.random.default_rng(9).standard_normal(u.size)
+    write_recording(tmp_path / "raw", Recording(row["name"], u, y, 1e-3))
+    second = CliRunner().invoke(main, asked)
+
+    assert second.exit_code == 0, second.output
+    assert f"new since the last proposal: {row['name']}" in flat(second.output).lower()
+    diagnosis = json.loads((tmp_path / "out" / "diagnosis.json").read_text())
+    assert (diagnosis["verdict"], diagnosis["effects"][0]["id"]) == (
+        "named",
+        "actuator_lag",
+    )
+    assert "nough is known: the diagnosis says 'named'" in flat(second.output)
 
 
 @pytest.mark.parametrize(

@@ -30,6 +30,7 @@ SECTIONS = [
     "coverage",
     "assignment",
     "diagnosis",
+    "trust",
 ]
 # Elements of HTML that have no end.
 VOID = {"meta", "img", "wbr"}
