@@ -4,6 +4,7 @@ import json
 from dataclasses import asdict
 from pathlib import Path
 
+from hwid_cli.errors import CacheError
 from hwid_cli.files.atomic import replace_file
 from hwid_cli.files.csv_tables import write_table_csv
 from hwid_cli.records.next import NextRecordings, ProposedRecording
@@ -48,7 +49,7 @@ def read_next(path: Path) -> NextRecordings:
 
 
 def read_previous(out: Path) -> NextRecordings | None:
-    """What was proposed before; None where nothing was.
+    """What was proposed before; None where nothing was, or it cannot be read.
 
     Parameters
     ----------
@@ -56,7 +57,14 @@ def read_previous(out: Path) -> NextRecordings | None:
         Folder of the results.
     """
     path = out / results_file(_STAGE)
-    return read_next(path) if has_left_results(path, _STAGE) else None
+    if not has_left_results(path, _STAGE):
+        return None
+    try:
+        return read_next(path)
+    except CacheError:
+        # Of another version: the new proposal takes its place, and only cannot say what
+        # changed since.
+        return None
 
 
 def write_next_files(out: Path, found: NextRecordings) -> None:
