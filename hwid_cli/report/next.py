@@ -2,7 +2,7 @@
 
 from hwid_cli.records.next import NextRecordings
 from hwid_cli.report.formats import number
-from hwid_cli.report.table import Block, Column, Table, Text, numbers, texts
+from hwid_cli.report.table import Block, Table, Text, numbers, texts
 
 
 def next_blocks(found: NextRecordings) -> list[Block]:
@@ -20,16 +20,17 @@ def next_table(found: NextRecordings) -> Table:
     """Show the proposed recordings, the best one first."""
     gain = found.proposals[0].gain_words
     rows = tuple(
-        (str(rank), one.name, one.words, number(one.gain), one.reason)
+        (str(rank), one.name, number(one.gain), one.words)
         for rank, one in enumerate(found.proposals, 1)
     )
     return Table(
         f"Recordings to take next, for {found.goal}; gain: {gain}",
         (
             *numbers("rank"),
-            *texts("name", "input"),
+            *texts("name"),
             *numbers("gain"),
-            Column("reason", is_text=True),
+            *texts("input"),
         ),
         rows,
+        tuple(f"{one.name} {one.reason}." for one in found.proposals),
     )

@@ -218,7 +218,7 @@ def _for_parameters(given: ToChoose, _: Runner) -> _Choice:
         if shrink < given.options.enough:
             break
         reason = (
-            f"standard errors of the {count} parameters of {fit.name} shrink by "
+            f"lets standard errors of the {count} parameters of {fit.name} shrink by "
             f"{shrink:.0%} on (geometric) average"
         )
         one = given.offered[place]
@@ -249,7 +249,7 @@ def _for_diagnosis(given: ToChoose, runner: Runner) -> _Choice:
             given.offered[place],
             float(found.ratios[place]),
             "times the noise",
-            f"{names} then differ by at least {found.ratios[place]:.2g} times the noise "
+            f"makes {names} differ by at least {found.ratios[place]:.2g} times the noise "
             "after their parameters have been fitted again",
         )
         for place in order
