@@ -12,6 +12,7 @@ docs/trust.md.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from math import nan
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +23,7 @@ from hwid_cli.errors import ConfigError
 from hwid_cli.model.extrapolation import outlined_model
 from hwid_cli.model.scores import rmsd
 from hwid_cli.model.simulate import validation_output
+from hwid_cli.records.check import StagePlan
 from hwid_cli.records.experiment import Experiment, NextOptions, RecordingsOptions
 from hwid_cli.records.model import Fit
 from hwid_cli.records.next import (
@@ -36,8 +38,9 @@ from hwid_cli.report.next import next_blocks
 from hwid_cli.report.table import Block
 from hwid_cli.stages.diagnose import ToDiagnose, undecided
 from hwid_cli.stages.diagnose import choose as choose_diagnosis
+from hwid_cli.stages.fit_seconds import counted
 from hwid_cli.stages.ranking import best_fits
-from hwid_cli.stages.stage import Context, Runner, Stage, in_results
+from hwid_cli.stages.stage import Context, Planning, Runner, Stage, in_results
 from hwid_cli.stages.trust import kept_for_test, trust_of
 from hwid_cli.store.next_results import (
     read_next,
@@ -390,7 +393,7 @@ def _options(experiment: Experiment) -> NextOptions:
 
 
 def _needs(experiment: Experiment) -> tuple[str, ...]:
-    goal = "" if experiment.next is None else experiment.next.goal
+    goal = "" if experiment.next is None else _goal(experiment)
     return {"parameters": ("identify",), "diagnosis": ("diagnose",)}.get(goal, ())
 
 
@@ -406,6 +409,19 @@ def _write_files(
 
 def _tables(_: Context, result: NextRecordings) -> list[Block]:
     return next_blocks(result)
+
+
+def _plan(planning: Planning) -> tuple[StagePlan, ...]:
+    offered = _offered(planning.experiment, planning.recordings)
+    what = (
+        f"{counted(len(offered), 'input')} on offer, for {_goal(planning.experiment)}"
+    )
+    size = sum(8.0 * one.values.size for one in offered)
+    return (StagePlan(NAME, what, len(offered), None, nan, size),)
+
+
+def _goal(experiment: Experiment) -> str:
+    return _options(experiment).goal
 
 
 STAGE = Stage(
@@ -428,5 +444,6 @@ STAGE = Stage(
     ),
     write_files=_write_files,
     tables=_tables,
+    plan=_plan,
     files=("next.csv", "next.json", "next"),
 )

@@ -29,6 +29,9 @@ from hwid_cli.trust.choice import chosen_by_gain
 from hwid_cli.trust.content import content, joined, value_edges, visited_share
 from tests.benchmarks.real_data import folder
 
+# Combination Models 1 and 2 of the thesis (T3.4.1, T3.4.2), in its order: recordings 1 to
+# 15 are the steps, 16 to 38 the sines. Chosen with the outputs in view.
+THESIS = {"Model 1": (6, 9, 1, 8), "Model 2": (20, 16, 9, 5, 35, 7)}
 # Looked at, of 38: between them it would take too long to look.
 COUNTS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 15, 18, 22, 26, 30, 34, 38)
 REACHED = 0.9
@@ -147,6 +150,15 @@ def show(name: str, coverage: Coverage, draws: int) -> None:
         f"  it says that enough is known after {enough}; they cover {coverage.of(order[:enough])}"
     )
     print(f"the plan's own order: {coverage.needed(range(total), wanted)}", flush=True)
+    for model, chain in THESIS.items() if name == "virtual gun" else ():
+        first = [number - 1 for number in chain]
+        rest = [place for place in range(total) if place not in first]
+        print(
+            f"the thesis's {model} covers {coverage.of(first)} with {len(first)} "
+            f"recordings, as many of hwid next cover {coverage.of(order[: len(first)])}; "
+            f"with the rest of the plan behind it: {coverage.needed(first + rest, wanted)}",
+            flush=True,
+        )
     counts = []
     for seed in range(draws):
         random = np.random.default_rng([26, seed]).permutation(total)

@@ -112,6 +112,23 @@ def test_an_unchanged_folder_answers_from_the_results(bench):
     assert (bench / "out" / "next.csv").read_bytes() == before
 
 
+def test_check_counts_what_is_on_offer_and_refuses_a_bad_plan(bench):
+    config = bench / "bench.yaml"
+    config.write_text(HEAD + "next: {plan: plan.csv}\n")
+    asked = ["check", str(config), "--out", str(bench / "out"), "--no-timing"]
+    head = "name,kind,amplitude,frequency_Hz,duration_s\n"
+    (bench / "plan.csv").write_text(f"{head}a,sine,1,2,4\nb,sine,1,5,4\n")
+
+    said = CliRunner().invoke(main, asked)
+    assert said.exit_code == 0, said.output
+    assert "2 inputs on offer, for coverage" in said.output
+    (bench / "plan.csv").write_text(f"{head}a,saw,1,2,4\n")
+    refused = CliRunner().invoke(main, asked)
+
+    assert refused.exit_code == 1
+    assert "plan.csv, row 2: kind: found 'saw'" in refused.stderr
+
+
 def test_a_plan_is_chosen_from(bench):
     (bench / "plan.csv").write_text(
         "name,kind,amplitude,frequency_Hz,duration_s\n"
