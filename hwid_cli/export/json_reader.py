@@ -89,6 +89,7 @@ def _trust(path: Path, given: Mapping[str, Any], n_parameters: int) -> ModelTrus
         float(given["noise_rms"]),
         float(given["scale"]),
         tuple(given["judged_on"]),
+        float(given["scatter"]),
         given["reason"],
     )
 

@@ -97,6 +97,7 @@ def _trust(trust: ModelTrust) -> dict[str, Any]:
         "noise_rms": trust.noise_rms,
         "scale": trust.scale,
         "judged_on": list(trust.judged_on),
+        "scatter": trust.scatter,
         "reason": trust.reason,
     }
 

@@ -234,7 +234,7 @@ class NextOptions:
     plan: str | None = None
     limits: NextLimits | None = None
     number: Annotated[int, Integer(least=1), FileLimit(100)] = 3
-    enough: Annotated[float, Number(above=0, most=1)] = 0.02
+    enough: Annotated[float, Number(above=0, most=1)] = 0.01
 
 
 @dataclass(frozen=True)

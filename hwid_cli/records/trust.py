@@ -82,7 +82,9 @@ class ModelTrust:
     scale : float, [-]
         Half width of the band in standard deviations.
     judged_on : tuple of str
-        Recordings that the scale comes from.
+        Recordings that scale and scatter come from.
+    scatter : float, [output unit]
+        Half width at least: the median error on these recordings.
     reason : str
         Why there are no steps, if so.
     """
@@ -92,6 +94,7 @@ class ModelTrust:
     noise_rms: float
     scale: float
     judged_on: tuple[str, ...]
+    scatter: float = 0.0
     reason: str = ""
 
     def __post_init__(self) -> None:

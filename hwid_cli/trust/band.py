@@ -9,7 +9,9 @@ continuation: how far the output moves where the maps go on otherwise beyond the
 noise: what the model leaves of its own recordings. octaves and values: 1 where the content
 in frequency, or value and rate, lie outside what was visited. The band is a number of
 standard deviations wide that holds 90 % of the samples of recordings to which the model
-was not fitted (`trust.judged`).
+was not fitted (`trust.judged`). It is never narrower to either side than the median error
+on these: recordings differ even where the model has seen everything, and recordings that
+lie beyond what it has seen do not tell that by their scores.
 
 References
 ----------
@@ -77,7 +79,8 @@ def prediction_band(
     """
     terms = error_terms(model, trust, values, state=state)
     where = inside(trust.visited, values, terms.inner)
-    half = trust.scale * standard_deviation(terms, where, trust.noise_rms)
+    deviation = standard_deviation(terms, where, trust.noise_rms)
+    half = np.maximum(trust.scale * deviation, trust.scatter)
     return Band(terms.output, terms.output - half, terms.output + half, where)
 
 

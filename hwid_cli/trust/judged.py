@@ -50,9 +50,10 @@ _PARTS = 3
 
 @dataclass(frozen=True, eq=False)
 class _Judgement:
-    """Errors of a model on one recording, in standard deviations."""
+    """Errors of a model on one recording, in the output's unit and in deviations."""
 
     name: str
+    errors: np.ndarray
     scores: np.ndarray
 
 
@@ -81,7 +82,13 @@ def model_trust(
         found = _left_out(fit, own)
     are_recordings = bool(others) or len(own) > 1
     scale = _scale(found, are_recordings=are_recordings)
-    return replace(trust, scale=scale, judged_on=tuple(one.name for one in found))
+    errors = [one.errors for one in found]
+    return replace(
+        trust,
+        scale=scale,
+        judged_on=tuple(one.name for one in found),
+        scatter=float(np.median(np.concatenate(errors))) if errors else 0.0,
+    )
 
 
 def recording_trust(
@@ -154,8 +161,14 @@ def _judged(
     where = inside(trust.visited, recording.input, terms.inner)
     deviation = standard_deviation(terms, where, trust.noise_rms)
     with np.errstate(over="ignore", invalid="ignore"):
-        scores = np.abs(recording.output - terms.output) / deviation
-    return _Judgement(recording.name, np.nan_to_num(scores, nan=_DIVERGED))
+        errors = np.abs(recording.output - terms.output)
+        scores = errors / deviation
+    largest = _DIVERGED * trust.noise_rms
+    return _Judgement(
+        recording.name,
+        np.nan_to_num(errors, nan=largest, posinf=largest),
+        np.nan_to_num(scores, nan=_DIVERGED, posinf=_DIVERGED),
+    )
 
 
 def _left_out(fit: Fit, own: Sequence[Recording]) -> list[_Judgement]:

@@ -36,7 +36,7 @@ THESIS = {"Model 1": (6, 9, 1, 8), "Model 2": (20, 16, 9, 5, 35, 7)}
 COUNTS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 15, 18, 22, 26, 30, 34, 38)
 REACHED = 0.9
 # Below this an input on offer is not worth recording: the default of next.enough.
-ENOUGH = 0.02
+ENOUGH = 0.01
 
 
 def averaged(one: Recording, count: int) -> Recording:

@@ -27,7 +27,7 @@ from hwid_cli.trust.judged import model_trust, recording_trust
 from tests.benchmarks.real_data import ced, folder, tanks
 from tests.benchmarks.trust_plants import INPUTS, STRUCTURES, plant_recordings
 
-CHOOSING, REPORTING = 1000, 50_000
+CHOOSING, REPORTING = 1000, 60_000
 # Who judges: recordings by their place among those of a plant. The first is the model's.
 JUDGES = {"two of its kind": (1, 2), "one of each of two kinds": (1, 5), "none": ()}
 ORDERS = Orders(2, 2, 1)

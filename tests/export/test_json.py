@@ -76,6 +76,7 @@ def with_trust(exported):
         noise_rms=0.02,
         scale=1.7,
         judged_on=("a", "b"),
+        scatter=0.01,
     )
     return replace(exported, trust=trust)
 

@@ -107,6 +107,23 @@ def test_a_band_is_wider_beyond_the_recordings():
     assert widths[1] > 1.5 * widths[0]
 
 
+def test_repeats_that_differ_have_a_band_as_wide_as_the_recordings_scatter():
+    # The machine changes from recording to recording; the judge goes beyond the fit.
+    own, repeat = recording("own", 1, noise=1e-4), recording("own", 1, noise=1e-4)
+    found = fit([own], Orders(1, 1, 1), FitOptions(units=5))
+    judge = recording("judge", 2, size=3.0, noise=1e-4)
+    judge = replace(judge, output=1.1 * judge.output)
+    trust = model_trust(found, [own], [judge])
+    changed = replace(repeat, name="repeat", output=1.05 * repeat.output)
+    model = outlined_model(found.model)
+
+    row, band = recording_trust("m", model, trust, changed)
+
+    assert trust.scatter > 0.02
+    assert (band.upper - band.lower >= 2 * trust.scatter * (1 - 1e-9)).all()
+    assert row.coverage > 0.85
+
+
 def test_a_model_of_the_wrong_structure_has_a_wide_band():
     def squared(u):
         return u + 0.8 * u**2
