@@ -348,33 +348,13 @@ def score_final_models(
         [[name in fit.identified_on for name in names] for fit in models.fits],
         dtype=bool,
     ).reshape(rmsd.shape)
-    final = score_table(
+    return score_table(
         ScoredModels(models.names, names, rmsd, is_own, threshold),
         chain=models.chain,
         tested_on=tested_on,
         distances=input_distances([recording.input for recording in recordings]),
         unit=recordings[0].output_unit,
     )
-    return replace(final, trust=_trust(models, final, recordings, settings))
-
-
-def _trust(
-    models: FinalModels,
-    final: FinalTest,
-    recordings: Sequence[Recording],
-    settings: RunSettings,
-) -> TrustOnTests:
-    """How far the models that the test recommends may be trusted."""
-    asked = dict.fromkeys((*final.smallest_set, *final.chain))
-    fits = dict(zip(models.names, models.fits, strict=True))
-    tasks = [
-        trust_task(name, fits[name], recordings, final.tested_on) for name in asked
-    ]
-    # The bar counts recordings, and these are models.
-    quiet = replace(settings, on_done=None)
-    found = [item.result for item in run_tasks(tasks, quiet)]
-    rows = tuple(row for one in found for row in one.rows)
-    return TrustOnTests(rows, found[-1].shown if found else None)
 
 
 def score_table(
@@ -571,9 +551,25 @@ def _options(experiment: Experiment) -> FinalTestOptions:
 
 def _compute(given: _Given, runner: Runner) -> FinalTest:
     with runner.tasks(len(given.recordings), "recordings") as settings:
-        return score_final_models(
+        final = score_final_models(
             given.models, given.recordings, given.tested_on, given.threshold, settings
         )
+    tasks = _trust_tasks(given, final)
+    with runner.tasks(len(tasks), "models", part="bands") as settings:
+        found = [item.result for item in run_tasks(tasks, settings)]
+    rows = tuple(row for one in found for row in one.rows)
+    shown = found[-1].shown if found else None
+    return replace(final, trust=TrustOnTests(rows, shown))
+
+
+def _trust_tasks(given: _Given, final: FinalTest) -> list[Task]:
+    """List the tasks: bands of each model that the test recommends."""
+    asked = dict.fromkeys((*final.smallest_set, *final.chain))
+    fits = dict(zip(given.models.names, given.models.fits, strict=True))
+    return [
+        trust_task(name, fits[name], given.recordings, given.tested_on)
+        for name in asked
+    ]
 
 
 def _write_csv(

@@ -141,7 +141,7 @@ def _own_trust(fit: Fit, own: Sequence[Recording]) -> ModelTrust:
         ),
         _LEAST_SCALE,
         (),
-        reason,
+        reason=reason,
     )
 
 

@@ -132,8 +132,8 @@ def public(benchmark: Callable) -> list[Row]:
     return found
 
 
-def gun(is_full: bool) -> dict[str, list[Row]]:
-    """Steps and sines of the virtual gun: models of a step, judged by two steps."""
+def gun() -> dict[str, list[Row]]:
+    """Steps and sines of the virtual gun: models of a step, judged by other steps."""
     names = [f"step_{k:02d}" for k in range(1, 16)] + [
         f"sine_{k:02d}" for k in range(1, 24)
     ]
@@ -151,11 +151,10 @@ def gun(is_full: bool) -> dict[str, list[Row]]:
     )
     recordings = {one.name: one for one in calibrate_all(raws, recipe)[0]}
     rng = np.random.default_rng(26)
-    found: dict[str, list[Row]] = {"same": [], "other": []}
+    found: dict[str, list[Row]] = {}
     steps = names[:15]
-    for own in steps if is_full else steps[:3]:
+    for own in steps:
         others = [str(one) for one in rng.permutation([n for n in steps if n != own])]
-        judges = [recordings[one] for one in others[:2]]
         model = fit([recordings[own]], Orders(3, 4, 1))
         tests = {
             "same": others[2:6],
@@ -163,7 +162,12 @@ def gun(is_full: bool) -> dict[str, list[Row]]:
         }
         for kind, chosen in tests.items():
             unseen = [recordings[one] for one in chosen]
-            found[kind] += judged(own, model, [recordings[own]], judges, unseen)
+            for count in (2, 8):
+                # The four after the first two are the tests.
+                names_of_judges = [*others[:2], *others[6:]][:count]
+                judges = [recordings[one] for one in names_of_judges]
+                rows = judged(own, model, [recordings[own]], judges, unseen)
+                found.setdefault(f"{kind}, {count} judges", []).extend(rows)
     return found
 
 
@@ -189,7 +193,7 @@ def main() -> None:
             print("no data: set HWID_REALDATA")
     if chosen.only in (None, "gun"):
         print(f"\nvirtual gun\n{HEAD}")
-        for kind, rows in gun(is_full=True).items():
+        for kind, rows in gun().items():
             show(f"models of a step, {kind}", rows)
 
 

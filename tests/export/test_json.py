@@ -77,6 +77,7 @@ def with_trust(exported):
         scale=1.7,
         judged_on=("a", "b"),
         scatter=0.01,
+        reason="of an example",
     )
     return replace(exported, trust=trust)
 

@@ -170,6 +170,7 @@ def test_a_piecewise_constant_output_map_has_no_steps_and_says_why():
 
     assert steps.size == 0
     assert "no slope" in reason
+    assert model_trust(found, [own], []).reason == reason
 
 
 def test_extrapolated_maps_take_steps_too():
