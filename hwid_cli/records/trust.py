@@ -84,7 +84,7 @@ class ModelTrust:
     judged_on : tuple of str
         Recordings that scale and scatter come from.
     scatter : float, [output unit]
-        Half width at least: the median error on these recordings.
+        Between recordings: the median error on these.
     reason : str
         Why there are no steps, if so.
     """

@@ -2,16 +2,16 @@
 
 The standard deviation of the error at a sample is taken to be
 
-    s = sqrt(parameters + 0.03 continuation + noise^2) (1 + 1.5 octaves + 0.3 values)
+    s = sqrt(parameters + 0.03 continuation + noise^2 + scatter^2)
+        (1 + 1.5 octaves + 0.3 values)
 
 parameters: steps of the covariance, passed through the model on this input.
 continuation: how far the output moves where the maps go on otherwise beyond the data.
-noise: what the model leaves of its own recordings. octaves and values: 1 where the content
+noise: what the model leaves of its own recordings. scatter: the median error on recordings
+to which it was not fitted (`trust.judged`): a machine differs from recording to recording
+even where the model has seen everything. octaves and values: 1 where the content
 in frequency, or value and rate, lie outside what was visited. The band is a number of
-standard deviations wide that holds 90 % of the samples of recordings to which the model
-was not fitted (`trust.judged`). It is never narrower to either side than the median error
-on these: recordings differ even where the model has seen everything, and recordings that
-lie beyond what it has seen do not tell that by their scores.
+standard deviations wide that holds 90 % of the samples of these recordings.
 
 References
 ----------
@@ -79,8 +79,8 @@ def prediction_band(
     """
     terms = error_terms(model, trust, values, state=state)
     where = inside(trust.visited, values, terms.inner)
-    deviation = standard_deviation(terms, where, trust.noise_rms)
-    half = np.maximum(trust.scale * deviation, trust.scatter)
+    noise_rms = np.hypot(trust.noise_rms, trust.scatter)
+    half = trust.scale * standard_deviation(terms, where, noise_rms)
     return Band(terms.output, terms.output - half, terms.output + half, where)
 
 
@@ -92,6 +92,7 @@ def standard_deviation(
     Parameters
     ----------
     noise_rms : float, [output unit]
+        With the scatter between recordings, if it is to count.
 
     Returns
     -------

@@ -24,8 +24,9 @@ from hwid_cli.model.scores import rmsd
 from hwid_cli.model.simulate import estimated_state
 from hwid_cli.records.model import Fit, HammersteinWiener
 from hwid_cli.records.recordings import Recording
-from hwid_cli.records.trust import Band, ModelTrust, RecordingTrust
+from hwid_cli.records.trust import Band, Inside, ModelTrust, RecordingTrust
 from hwid_cli.trust.band import (
+    ErrorTerms,
     error_terms,
     inner_and_output,
     prediction_band,
@@ -50,11 +51,21 @@ _PARTS = 3
 
 @dataclass(frozen=True, eq=False)
 class _Judgement:
-    """Errors of a model on one recording, in the output's unit and in deviations."""
+    """Errors of a model on one recording, and what they are measured by."""
 
     name: str
     errors: np.ndarray
-    scores: np.ndarray
+    terms: ErrorTerms
+    where: Inside
+    noise_rms: float
+
+
+def _scores(one: _Judgement, scatter: float) -> np.ndarray:
+    """Errors in standard deviations, shape (n_samples,)."""
+    noise_rms = float(np.hypot(one.noise_rms, scatter))
+    with np.errstate(over="ignore", invalid="ignore"):
+        scores = one.errors / standard_deviation(one.terms, one.where, noise_rms)
+    return np.nan_to_num(scores, nan=_DIVERGED, posinf=_DIVERGED)
 
 
 def model_trust(
@@ -81,13 +92,15 @@ def model_trust(
     else:
         found = _left_out(fit, own)
     are_recordings = bool(others) or len(own) > 1
-    scale = _scale(found, are_recordings=are_recordings)
-    errors = [one.errors for one in found]
+    scatter = 0.0
+    if found:
+        scatter = float(np.median(np.concatenate([one.errors for one in found])))
+    scores = [_scores(one, scatter) for one in found]
     return replace(
         trust,
-        scale=scale,
+        scale=_scale(scores, are_recordings=are_recordings),
         judged_on=tuple(one.name for one in found),
-        scatter=float(np.median(np.concatenate(errors))) if errors else 0.0,
+        scatter=scatter,
     )
 
 
@@ -154,21 +167,16 @@ def _state(model: HammersteinWiener, recording: Recording) -> np.ndarray:
 def _judged(
     fitted: HammersteinWiener, trust: ModelTrust, recording: Recording
 ) -> _Judgement:
-    """Errors in standard deviations."""
+    """Errors on a recording, with what they are measured by."""
     model = outlined_model(fitted)
     state = _state(model, recording)
     terms = error_terms(model, trust, recording.input, state=state)
     where = inside(trust.visited, recording.input, terms.inner)
-    deviation = standard_deviation(terms, where, trust.noise_rms)
     with np.errstate(over="ignore", invalid="ignore"):
         errors = np.abs(recording.output - terms.output)
-        scores = errors / deviation
     largest = _DIVERGED * trust.noise_rms
-    return _Judgement(
-        recording.name,
-        np.nan_to_num(errors, nan=largest, posinf=largest),
-        np.nan_to_num(scores, nan=_DIVERGED, posinf=_DIVERGED),
-    )
+    errors = np.nan_to_num(errors, nan=largest, posinf=largest)
+    return _Judgement(recording.name, errors, terms, where, trust.noise_rms)
 
 
 def _left_out(fit: Fit, own: Sequence[Recording]) -> list[_Judgement]:
@@ -201,13 +209,13 @@ def _parts(whole: Recording) -> list[Recording]:
     ]
 
 
-def _scale(found: Sequence[_Judgement], *, are_recordings: bool) -> float:
+def _scale(scores: Sequence[np.ndarray], *, are_recordings: bool) -> float:
     """Half width in standard deviations; parts of one recording count together."""
-    if not found:
+    if not scores:
         return 2.0 * _LEAST_SCALE
-    pooled = np.quantile(np.concatenate([one.scores for one in found]), COVERAGE)
+    pooled = np.quantile(np.concatenate(scores), COVERAGE)
     hard = 0.0
     if are_recordings:
-        each = [np.quantile(one.scores, COVERAGE) for one in found]
+        each = [np.quantile(one, COVERAGE) for one in scores]
         hard = float(np.quantile(each, _RECORDINGS, method="higher"))
     return max(float(pooled), hard, _LEAST_SCALE)
