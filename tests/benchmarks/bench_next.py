@@ -170,7 +170,7 @@ def show(name: str, coverage: Coverage, draws: int) -> None:
         counts.append(coverage.needed(random, wanted, most))
         if seed % 5 == 4 or seed == draws - 1:
             middle = np.median(counts)
-            beyond = "at least " * (middle >= most)
+            beyond = "at least " if middle >= most else ""
             print(
                 f"{seed + 1} random orders: median {beyond}{middle:g}; "
                 f"{sum(one >= most for one in counts)} need {most} or more",
