@@ -17,7 +17,7 @@ LOCKED_INSTALL = $(BIN)/python -m pip install --quiet --disable-pip-version-chec
 .DEFAULT_GOAL := help
 .PHONY: help install run test test-all check audit format smoke clean reliability \
         bench bench-beyond bench-campaign bench-growth bench-maps bench-page bench-rounds bench-search bench-starts bench-wide bench-advice docs \
-        bench-real scale \
+        bench-real bench-trust bench-next scale \
         wheel lowest away-run lock sbom licences simulate calibrate identify crossval group test-stage steps model1 model2 \
         reproduction thesis chapter2 hsm150 diagnose gun real effects drive-source model-schema golden export-check blind machines
 
@@ -164,6 +164,12 @@ bench-wide: $(DEV)  ## many kinds of plants against fits that start at the true 
 scale: $(DEV)  ## what a cluster costs, and docs/scale.md
 	@$(BENCH).bench_dask --json docs/scale.json
 	$(BIN)/python tools/scale.py docs/scale.json > docs/scale.tmp && mv docs/scale.tmp docs/scale.md
+
+bench-trust: $(DEV)  ## coverage and width of bands on random plants, measurements and the gun: half an hour
+	@$(BENCH).bench_trust
+
+bench-next: $(DEV)  ## recordings needed, chosen by hwid next and by chance: half an hour
+	@$(BENCH).bench_next
 
 bench-real: $(DEV)  ## public benchmarks beside the published errors (data in HWID_REALDATA)
 	@$(BENCH).bench_real

@@ -222,6 +222,12 @@ _STARTS = ("fitted", "steady", "empty")
     is_flag=True,
     help="Run Python that the model's file carries; only for files that you trust.",
 )
+@click.option(
+    "--band",
+    is_flag=True,
+    help="Add the columns lower and upper: a band that holds 90 % of what would be "
+    "measured, and say how much of the prediction rests on data.",
+)
 def predict(*values: Any, **options: Any) -> None:
     """Predict the output for an input, with an exported model.
 

@@ -1,5 +1,6 @@
 """``hwid export``: a model as a file that runs elsewhere."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import click
@@ -26,6 +27,7 @@ from hwid_cli.report.thesis_names import thesis_name_of
 from hwid_cli.stages.diagnose import extended_options
 from hwid_cli.stages.extended_program import extended_program
 from hwid_cli.stages.model_views import named_fits
+from hwid_cli.stages.trust import kept_for_test, trust_of
 from hwid_cli.store.result_files import has_left_results, read_provenance, results_file
 
 _FOLDER = "models"
@@ -48,7 +50,7 @@ def export(
             "json, mat, c, fmu; choose one of them"
         )
     else:
-        exported = chosen_model(session, asked)
+        exported = chosen_model(session, asked, with_trust=file_format == "json")
         written = write_exported(session.out / _FOLDER, exported, file_format)
     session.show_notes()
     for path in written:
@@ -77,8 +79,13 @@ def _export_program(session: Session, kind: str, file_format: str) -> list[Path]
     )
 
 
-def chosen_model(session: Session, asked: str) -> Exported:
+def chosen_model(session: Session, asked: str, *, with_trust: bool = False) -> Exported:
     """The model of a name; stages that it needs run first.
+
+    Parameters
+    ----------
+    with_trust : bool
+        Whether it carries what is known of its errors.
 
     Raises
     ------
@@ -93,14 +100,19 @@ def chosen_model(session: Session, asked: str) -> Exported:
         for name, fit in named.items()
     }
     name, fit = find_fit(asked, named, titles)
-    return export_model(
+    recordings = result_of(session, "calibrate").recordings
+    exported = export_model(
         fit,
-        result_of(session, "calibrate").recordings,
+        recordings,
         _options(session),
         name=name,
         title=next(title for title, known in titles.items() if known == name),
         origin=_origin(session, stage if "+" in name else "identify"),
     )
+    if not with_trust:
+        return exported
+    kept = kept_for_test(session.experiment)
+    return replace(exported, trust=trust_of(fit, recordings, kept))
 
 
 def _named_fits(session: Session, asked: str) -> tuple[dict[str, Fit], str]:

@@ -6,7 +6,7 @@ import click
 
 from hwid_cli.export.json_reader import read_exported
 from hwid_cli.export.loading import check_trust
-from hwid_cli.export.predict import predict
+from hwid_cli.export.predict import predict, predict_band
 from hwid_cli.export.prediction import check_target, read_input, write_prediction
 from hwid_cli.files.messages import escaped
 from hwid_cli.model.input_range import outside_share
@@ -14,6 +14,7 @@ from hwid_cli.records.exported import Exported, ExportedModel
 from hwid_cli.records.maps import OwnFunction
 from hwid_cli.records.units import behind
 from hwid_cli.report.simulation_note import prediction_note
+from hwid_cli.report.trust import band_note
 from hwid_cli.stages.own_functions import described, functions_of
 
 
@@ -24,13 +25,14 @@ def _functions(exported: Exported) -> tuple[OwnFunction, ...]:
     return functions_of(exported.model)
 
 
-def predict_file(
+def predict_file(  # noqa: PLR0913 - one for each option of the command
     model: Path,
     input_file: Path,
     out: Path,
     initial_state: str,
     force: bool,
     run_own_functions: bool,
+    band: bool,
 ) -> None:
     """Predict the output for an input, with an exported model."""
     exported = read_exported(model)
@@ -51,8 +53,14 @@ def predict_file(
             f"{share:.1%} of the samples are extrapolated",
             err=True,
         )
-    write_prediction(out, exported, time, values, predicted)
+    found = None
+    if band:
+        place = str(model)
+        found = predict_band(exported, signal, initial_state=initial_state, place=place)
+    write_prediction(out, exported, time, values, predicted, found)
     click.echo(
         f"{out}: {predicted.size} samples of {card.name}; time in s, predicted in "
         f"{card.output_unit}\n{prediction_note(initial_state, exported.initial_state)}"
     )
+    if found is not None:
+        click.echo(band_note(found, card.output_unit))

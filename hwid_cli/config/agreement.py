@@ -312,6 +312,29 @@ def _test(experiment: Experiment) -> Iterator[Fault]:
             )
 
 
+# What a goal cannot do without.
+_NEEDED_BY_GOAL = {"parameters": "identify", "diagnosis": "simulation"}
+
+
+def _next(experiment: Experiment) -> Iterator[Fault]:
+    options = experiment.next
+    if options is None:
+        return
+    offers = (options.plan, options.limits)
+    if offers.count(None) != 1:
+        expected = "either plan (a table of recordings) or limits, to design them"
+        if None in offers:
+            yield missing(("next", "plan"), expected, "add one of them")
+        else:
+            yield wrong(
+                ("next", "plan"), options.plan, expected, "take one of them out"
+            )
+    section = _NEEDED_BY_GOAL.get(options.goal)
+    if section is not None and getattr(experiment, section) is None:
+        expected = f"coverage, or a section {section}: for this goal"
+        yield wrong(("next", "goal"), options.goal, expected, f"add {section}:")
+
+
 def _listed(experiment: Experiment, section: str, name: str) -> tuple[str, ...] | None:
     return getattr(getattr(experiment, section), name, None)
 
@@ -343,4 +366,5 @@ _AGREEMENTS = (
     _Agreement(named_effect_faults, "diagnose.effects"),
     _Agreement(held_out_faults, "diagnose.recordings diagnose.hold_out"),
     _Agreement(_test, "test identify crossval group"),
+    _Agreement(_next, "next identify simulation"),
 )

@@ -6,7 +6,7 @@ docs/method_diagnosis.md.
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -25,6 +25,11 @@ from hwid_cli.diagnosis.direction import find_reversal, reversal_sentence
 from hwid_cli.diagnosis.findings import Findings, describe
 from hwid_cli.diagnosis.intervals import unclear_effects
 from hwid_cli.diagnosis.latent_force import Smoothed, latent_force
+from hwid_cli.diagnosis.next_experiment import (
+    FittedCandidate,
+    separation,
+    undecided_candidates,
+)
 from hwid_cli.diagnosis.noise import noise_floor
 from hwid_cli.diagnosis.parameters import (
     compare_at,
@@ -59,6 +64,7 @@ from hwid_cli.diagnosis.selection import (
     DiagnosisVerdict,
     SelectionCriteria,
     decide,
+    title_of,
 )
 from hwid_cli.diagnosis.where import places
 from hwid_cli.diagnosis.zeros import with_zeros
@@ -96,6 +102,63 @@ def diagnose(
     problem = prepare(recordings, simulation, options, held_out_of(recordings, options))
     problem = without_repeats(problem)
     return describe(find(problem, options, run_tasks, on_round))
+
+
+@dataclass(frozen=True, eq=False)
+class Separations:
+    """How far inputs bring the candidates apart that a diagnosis cannot tell apart.
+
+    Parameters
+    ----------
+    titles : tuple of str
+        The candidates, the best one first.
+    ratios : ndarray, shape (n_inputs,), [-]
+        Least distance of a rival from the best one, over the noise; NaN where a
+        candidate cannot be simulated.
+    """
+
+    titles: tuple[str, ...]
+    ratios: np.ndarray
+
+
+def separations(
+    recordings: Sequence[Recording],
+    simulation: SimulationOptions,
+    options: DiagnoseOptions,
+    inputs: Sequence[np.ndarray],
+    run_tasks: RunTasks,
+    on_round: OnRound,
+) -> Separations:
+    """Simulate the candidates of an undecided diagnosis on inputs.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+        Of the diagnosis, whose tasks are asked for again.
+    inputs : sequence of ndarray, shape (n_samples,), [input unit]
+        That could be played, at the sample time of the recordings.
+
+    References
+    ----------
+    docs/method_diagnosis.md, eq. (D26).
+    """
+    problem = prepare(recordings, simulation, options, held_out_of(recordings, options))
+    problem = without_repeats(problem)
+    found = find(problem, options, run_tasks, on_round)
+    criteria, fits = found.criteria, list(found.found.fits.values())
+    candidates = undecided_candidates(criteria, found.verdict, fits)
+    titles = tuple(title_of(one) for one in candidates)
+    if len(candidates) < 2:
+        return Separations(titles, np.full(len(inputs), np.nan))
+    best, *rivals = (
+        FittedCandidate(*rebuilt(problem, one, found.scales)) for one in candidates
+    )
+    noise = max(criteria.noise.rms, np.finfo(float).tiny)
+    ratios = [
+        min(separation(problem, best, rival, one) for rival in rivals) / noise
+        for one in inputs
+    ]
+    return Separations(titles, np.array(ratios))
 
 
 def held_out_of(

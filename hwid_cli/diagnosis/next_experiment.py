@@ -29,6 +29,8 @@ from hwid_cli.records.candidates import CandidateFit
 from hwid_cli.records.diagnosis import NextExperiment
 from hwid_cli.records.units import behind
 
+# Verdicts after which another recording is of use.
+UNDECIDED = ("ambiguous", "unknown")
 # Samples of a proposed recording.
 _MOST_SAMPLES = 6000
 _PERIODS = 12
@@ -53,14 +55,9 @@ def propose(
     NextExperiment
         With an empty input where none is needed.
     """
-    if verdict.word == "ambiguous":
-        pair = [verdict.chosen, verdict.rivals[0]]
-    elif verdict.word == "unknown":
-        # The chosen one is the base then.
-        pair = [one for one in fits if one.is_usable]
-        pair = sorted(pair, key=lambda one: -criteria.gain(one, verdict.chosen))[:2]
-    else:
+    if verdict.word not in UNDECIDED:
         return NextExperiment("", "the recordings decide; no further one is needed")
+    pair = undecided_candidates(criteria, verdict, fits)[:2]
     if len(pair) < 2:
         return NextExperiment("", "no candidate could be simulated")
     if problem.compares_command:
@@ -78,6 +75,30 @@ def propose(
         f"({best.rms / max(criteria.noise.rms, 1e-300):.2g} times the noise) after the "
         "parameters have been fitted again",
     )
+
+
+def undecided_candidates(
+    criteria: SelectionCriteria,
+    verdict: DiagnosisVerdict,
+    fits: Sequence[CandidateFit],
+) -> list[CandidateFit]:
+    """Candidates that the recordings do not tell apart, the best one first.
+
+    Parameters
+    ----------
+    fits : sequence of CandidateFit
+        Of all sets of effects.
+
+    Returns
+    -------
+    list of CandidateFit
+        The chosen one and its rivals; where nothing is named, the best two.
+    """
+    if verdict.word == "ambiguous":
+        return [verdict.chosen, *verdict.rivals]
+    # The chosen one is the base then.
+    usable = [one for one in fits if one.is_usable]
+    return sorted(usable, key=lambda one: -criteria.gain(one, verdict.chosen))[:2]
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,22 +144,41 @@ def best_separation(
     problem : DiagnosisProblem
         For the drive.
     """
-    found = []
-    for name, command in menu(scales).items():
-        signals = Signals(
-            name, "other", command, 0 * command, command, 0 * command,
-            scales.sample_time_s,
-        )  # fmt: skip
-        is_velocity = problem.drive.output == "velocity"
-        one = replace(problem, signals=(replace(signals, is_velocity=is_velocity),))
-        (truth,) = simulate_at(one, favourite.layout, _single(favourite.point))
-        seen = Signals(
-            name, "other", command, truth.output, command, truth.output,
-            scales.sample_time_s,
-        )  # fmt: skip
-        asked = replace(problem, signals=(replace(seen, is_velocity=is_velocity),))
-        found.append(Separation(name, _left_over(asked, rival)))
+    found = [
+        Separation(name, separation(problem, favourite, rival, command))
+        for name, command in menu(scales).items()
+    ]
     return max(found, key=lambda item: item.rms)
+
+
+def separation(
+    problem: DiagnosisProblem,
+    favourite: FittedCandidate,
+    rival: FittedCandidate,
+    command: np.ndarray,
+) -> float:
+    """How far apart an input brings two candidates.
+
+    Parameters
+    ----------
+    problem : DiagnosisProblem
+        For the drive.
+    command : ndarray, shape (n_samples,), [input unit]
+
+    Returns
+    -------
+    float, [output unit]
+        Root mean square of the difference that the rival cannot absorb.
+    """
+    step = min(one.sample_time_s for one in problem.signals)
+    is_velocity = problem.drive.output == "velocity"
+    nothing = np.zeros(command.size)
+    signals = Signals("next", "other", command, nothing, command, nothing, step)
+    one = replace(problem, signals=(replace(signals, is_velocity=is_velocity),))
+    (truth,) = simulate_at(one, favourite.layout, _single(favourite.point))
+    seen = replace(signals, compared=truth.output, output=truth.output)
+    asked = replace(problem, signals=(replace(seen, is_velocity=is_velocity),))
+    return _left_over(asked, rival)
 
 
 def _single(point: ParameterPoint) -> ParameterPoint:

@@ -18,6 +18,7 @@ from hwid_cli.export.map_parts import parts_of, portable
 from hwid_cli.export.model_file import read_model_file, refuse
 from hwid_cli.files.messages import is_plain
 from hwid_cli.model.maps.rule import Part
+from hwid_cli.model.parameter_steps import parameter_vector
 from hwid_cli.records.axis import ROTARY_NAMES, base_of, name_on
 from hwid_cli.records.drive import Drive
 from hwid_cli.records.experiment import Columns, Experiment, FileUnits
@@ -29,6 +30,7 @@ from hwid_cli.records.exported import (
 )
 from hwid_cli.records.maps import Extrapolation, OwnFunction, StaticMap
 from hwid_cli.records.model import HammersteinWiener
+from hwid_cli.records.trust import ModelTrust, Visited, VisitedPlane
 
 
 def read_exported(path: Path) -> Exported:
@@ -70,7 +72,41 @@ def _model(path: Path, content: Mapping[str, Any], card: ModelCard) -> ExportedM
     )
     gain = block.get("static_gain")
     gain = math.inf if gain is None else float(gain)
-    return ExportedModel(card, model, gain)
+    trust = content.get("trust")
+    known = None if trust is None else _trust(path, trust, parameter_vector(model).size)
+    return ExportedModel(card, model, gain, known)
+
+
+def _trust(path: Path, given: Mapping[str, Any], n_parameters: int) -> ModelTrust:
+    for row, step in enumerate(given["steps"]):
+        if len(step) != n_parameters:
+            expected = f"{n_parameters}, one a parameter"
+            refuse(path, ("trust", "steps", row), f"{len(step)} numbers", expected)
+    visited = given["visited"]
+    before, after = (_plane(path, visited[side], side) for side in ("input", "inner"))
+    return ModelTrust(
+        Visited(before, after, _vector(visited["bands"])),
+        np.array(given["steps"], dtype=float).reshape(-1, n_parameters),
+        float(given["noise_rms"]),
+        float(given["scale"]),
+        tuple(given["judged_on"]),
+        float(given["scatter"]),
+        given["reason"],
+    )
+
+
+def _plane(path: Path, given: Mapping[str, Any], side: str) -> VisitedPlane:
+    edges, low, high = (
+        _vector(given[name]) for name in ("edges", "lowest_rate", "highest_rate")
+    )
+    place = ("trust", "visited", side)
+    if not (np.diff(edges) > 0.0).all():
+        refuse(path, (*place, "edges"), given["edges"], "numbers that rise")
+    for name, rates in (("lowest_rate", low), ("highest_rate", high)):
+        if rates.size != edges.size - 1:
+            expected = f"{edges.size - 1}, one a cell"
+            refuse(path, (*place, name), f"{rates.size} numbers", expected)
+    return VisitedPlane(edges, low, high)
 
 
 def _vector(values: list[float]) -> np.ndarray:

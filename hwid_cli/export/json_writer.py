@@ -18,6 +18,7 @@ from hwid_cli.records.exported import (
     ModelCard,
 )
 from hwid_cli.records.maps import StaticMap
+from hwid_cli.records.trust import ModelTrust, VisitedPlane
 
 FORMAT = "hwid-model"
 SCHEMA_VERSION = 1
@@ -80,7 +81,29 @@ def _model(exported: ExportedModel) -> dict[str, Any]:
             "rule": model.initial_state,
             "free_response": model.free_response.tolist(),
         },
+        **({} if exported.trust is None else {"trust": _trust(exported.trust)}),
     }
+
+
+def _trust(trust: ModelTrust) -> dict[str, Any]:
+    visited = trust.visited
+    return {
+        "visited": {
+            "input": _plane(visited.input),
+            "inner": _plane(visited.inner),
+            "bands": visited.bands.tolist(),
+        },
+        "steps": trust.steps.tolist(),
+        "noise_rms": trust.noise_rms,
+        "scale": trust.scale,
+        "judged_on": list(trust.judged_on),
+        "scatter": trust.scatter,
+        "reason": trust.reason,
+    }
+
+
+def _plane(plane: VisitedPlane) -> dict[str, Any]:
+    return {name: finite(part.tolist()) for name, part in vars(plane).items()}
 
 
 def _map(one: StaticMap) -> dict[str, Any]:

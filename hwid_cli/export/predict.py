@@ -10,6 +10,8 @@ from hwid_cli.export.contents import check_stability
 from hwid_cli.model.simulate import simulate
 from hwid_cli.records.exported import Exported, ExportedSimulation
 from hwid_cli.records.model import HammersteinWiener
+from hwid_cli.records.trust import Band
+from hwid_cli.trust.band import prediction_band
 
 
 def predict(
@@ -64,12 +66,49 @@ def _output(
         step = exported.sample_time_s
         return simulate_drive(signal, exported.drive, sample_time_s=step).output
     check_stability(exported.model, place)
-    if initial_state == "fitted":
-        return simulate(exported.model, signal)
-    if initial_state == "steady":
-        return simulate(exported.model, signal, initial_state="steady")
-    return simulate(_emptied(exported.model), signal)
+    return simulate(_started(exported.model, initial_state), signal)
 
 
-def _emptied(model: HammersteinWiener) -> HammersteinWiener:
-    return replace(model, initial_state="zero", free_response=np.zeros(0))
+def predict_band(
+    exported: Exported,
+    signal: np.ndarray,
+    *,
+    initial_state: str = "fitted",
+    place: str = "model",
+) -> Band:
+    """Output of an exported model for an input, with a band of 90 %.
+
+    Parameters
+    ----------
+    signal : ndarray, shape (n_samples,), [input unit]
+    initial_state : str
+        One of ``STARTS_OF_PREDICTIONS``.
+    place : str
+        File that holds the model, for messages.
+
+    Raises
+    ------
+    ModelFileError
+        If the model is not stable, is a physics simulation, or its file does not say
+        what is known of its errors.
+    """
+    if isinstance(exported, ExportedSimulation):
+        raise ModelFileError(
+            f"{place}: kind: found drive_simulation; expected hammerstein_wiener, for "
+            "which --band is made; leave the option out"
+        )
+    if exported.trust is None:
+        raise ModelFileError(
+            f"{place}: trust: found nothing; expected the covariance and errors of the "
+            "model, which --band needs; export the model again with this version of hwid"
+        )
+    check_stability(exported.model, place)
+    model = _started(exported.model, initial_state)
+    return prediction_band(model, exported.trust, signal)
+
+
+def _started(model: HammersteinWiener, word: str) -> HammersteinWiener:
+    if word == "fitted":
+        return model
+    rule = "steady" if word == "steady" else "zero"
+    return replace(model, initial_state=rule, free_response=np.zeros(0))

@@ -14,6 +14,7 @@ from hwid_cli.errors import ConfigError, MeasurementError
 from hwid_cli.files.csv_tables import write_table_csv
 from hwid_cli.records.experiment import Columns
 from hwid_cli.records.exported import Exported, ModelCard
+from hwid_cli.records.trust import Band
 
 # A time column may jitter by this share of a step, and differ so much in its mean step.
 _TOLERANCE = 0.01
@@ -186,7 +187,7 @@ def _is_prediction(path: Path) -> bool:
             names = next(csv.reader([file.readline(_LONGEST_HEADER)]), [])
     except (OSError, UnicodeDecodeError, csv.Error):
         return False
-    return len(names) == 3 and (names[0], names[2]) == ("time", "predicted")
+    return len(names) in (3, 5) and (names[0], names[2]) == ("time", "predicted")
 
 
 def write_prediction(
@@ -195,6 +196,7 @@ def write_prediction(
     time: np.ndarray,
     values: np.ndarray,
     predicted: np.ndarray,
+    band: Band | None = None,
 ) -> None:
     """Write ``prediction.csv``.
 
@@ -204,14 +206,20 @@ def write_prediction(
         Its file names the column of the input.
     time, values, predicted : ndarray, shape (n_samples,)
         Time [s], input as it was read, output [output unit].
+    band : Band, optional
+        Adds the columns ``lower`` and ``upper``.
 
     Raises
     ------
     CacheError
         If it cannot be written.
     """
-    header = ("time", prediction_column(exported), "predicted")
-    columns = (column.tolist() for column in (time, values, predicted))
+    header = ["time", prediction_column(exported), "predicted"]
+    signals = [time, values, predicted]
+    if band is not None:
+        header += ["lower", "upper"]
+        signals += [band.lower, band.upper]
+    columns = (column.tolist() for column in signals)
     write_table_csv(path, header, zip(*columns, strict=True))
 
 
@@ -224,5 +232,5 @@ def prediction_column(exported: Exported) -> str:
         ``input`` where the model's data have numbers for names.
     """
     name = exported.card.columns.input
-    is_taken = name in ("time", "predicted")
+    is_taken = name in ("time", "predicted", "lower", "upper")
     return name if isinstance(name, str) and not is_taken else "input"

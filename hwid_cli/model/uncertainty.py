@@ -111,7 +111,7 @@ def with_standard_errors(fit: Fit, recordings: Sequence[Recording]) -> Fit:
     ValueError
         If the fit failed or the recordings are others.
     """
-    candidate, experiments = _as_fitted(fit, recordings)
+    candidate, experiments = as_fitted(fit, recordings)
     uncertainty, information = parameter_statistics(
         candidate, experiments, free_break_points=fit.options.free_break_points
     )
@@ -140,7 +140,7 @@ def parameter_covariance(
     ----------
     docs/method.md, eq. (16).
     """
-    candidate, experiments = _as_fitted(fit, recordings)
+    candidate, experiments = as_fitted(fit, recordings)
     kind = candidate.model.output_map.kind
     if not RULES[kind].has_slope:
         raise ValueError(f"a {kind} output map has no slope to tell by")
@@ -160,7 +160,7 @@ def parameter_covariance(
     )
 
 
-def _as_fitted(
+def as_fitted(
     fit: Fit, recordings: Sequence[Recording]
 ) -> tuple[Candidate, tuple[FitData, ...]]:
     """A fit's model with its experiments, their initial states and their threshold."""

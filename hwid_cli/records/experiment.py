@@ -11,6 +11,7 @@ from hwid_cli.records.drive import HOLDS, OUTPUTS, STARTS, Controller, Repeatabl
 from hwid_cli.records.machines import GunMachine, ServoMachine
 from hwid_cli.records.maps import MAP_KINDS
 from hwid_cli.records.model import FitOptions
+from hwid_cli.records.next import GOALS
 from hwid_cli.records.programs import (
     CommandSimulation,
     FmuSimulation,
@@ -206,6 +207,37 @@ class FinalTestOptions:
 
 
 @dataclass(frozen=True)
+class NextLimits:
+    """What a recording that is designed may do, in the unit of the input."""
+
+    amplitude: Annotated[float, POSITIVE]
+    rate: Annotated[float, POSITIVE]
+    duration_s: Annotated[float, POSITIVE]
+
+
+@dataclass(frozen=True)
+class NextOptions:
+    """Which recordings could be taken next, and what for.
+
+    Parameters
+    ----------
+    plan : str or None
+        Table of recordings that could be taken.
+    limits : NextLimits or None
+        Within which they are designed instead.
+    enough : float, [-]
+        Gain below which a recording is not worth taking: a share of the table of
+        amplitudes and frequencies, or by which standard errors shrink.
+    """
+
+    goal: Annotated[str, OneOf(GOALS)] = "coverage"
+    plan: str | None = None
+    limits: NextLimits | None = None
+    number: Annotated[int, Integer(least=1), FileLimit(100)] = 3
+    enough: Annotated[float, Number(above=0, most=1)] = 0.01
+
+
+@dataclass(frozen=True)
 class SimulationOptions:
     """The physics model that diagnosis judges, in SI units.
 
@@ -325,6 +357,7 @@ class Experiment:
         | None
     ) = None
     diagnose: DiagnoseOptions | None = None
+    next: NextOptions | None = None
     thesis_names: bool = False
 
     @property

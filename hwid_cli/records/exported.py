@@ -10,6 +10,7 @@ from hwid_cli.records.drive import Drive
 from hwid_cli.records.experiment import Columns, FileUnits
 from hwid_cli.records.model import HammersteinWiener
 from hwid_cli.records.recordings import frozen_vector
+from hwid_cli.records.trust import ModelTrust
 
 # How a prediction may start: by the model's own rule, empty, or in equilibrium.
 STARTS_OF_PREDICTIONS = ("fitted", "empty", "steady")
@@ -58,11 +59,14 @@ class ExportedModel:
     ----------
     static_gain : float, [-]
         Of the linear block at zero frequency; infinite with a pole at 1.
+    trust : ModelTrust or None
+        What is known of its errors; None in files of earlier versions.
     """
 
     card: ModelCard
     model: HammersteinWiener
     static_gain: float
+    trust: ModelTrust | None = None
 
     @property
     def sample_time_s(self) -> float:

@@ -7,6 +7,7 @@ import numpy as np
 from hwid_cli.records.model import Fit
 from hwid_cli.records.shown import Shown
 from hwid_cli.records.stored import ADDED_LATER
+from hwid_cli.records.trust import TrustOnTests
 
 
 @dataclass(frozen=True)
@@ -228,6 +229,8 @@ class FinalTest(Shown):
     unit : str
         Unit of the output.
     threshold : float, [unit]
+    trust : TrustOnTests
+        How far the chain and ``smallest_set`` may be trusted on ``tested_on``.
     """
 
     models: tuple[str, ...]
@@ -246,6 +249,7 @@ class FinalTest(Shown):
     predictions: tuple[Prediction, ...]
     unit: str
     threshold: float
+    trust: TrustOnTests = field(default_factory=TrustOnTests, metadata=ADDED_LATER)
 
     def __post_init__(self) -> None:
         shape = (len(self.models), len(self.recordings))

@@ -10,6 +10,8 @@ from math import nan
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from hwid_cli.config.extended_simulation import write_extended_simulation
 from hwid_cli.diagnosis import diagnose as pipeline
 from hwid_cli.diagnosis.foreign import diagnose_foreign
@@ -386,6 +388,36 @@ def _diagnosed(given: ToDiagnose, run: RunTasks, on_round: OnRound) -> Diagnosis
             raise ConfigError(f"{source}: {error}") from None
     simulator = simulator_of(simulation, recordings, given.logs)
     return diagnose_foreign(recordings, simulator, options, run, on_round)
+
+
+def undecided(
+    given: ToDiagnose, runner: Runner, inputs: Sequence[np.ndarray]
+) -> pipeline.Separations:
+    """How far inputs bring the candidates apart that a diagnosis leaves undecided.
+
+    Parameters
+    ----------
+    inputs : sequence of ndarray, shape (n_samples,), [input unit]
+        At the sample time of the recordings.
+
+    Raises
+    ------
+    ConfigError
+        If the simulation is not the program's own drive.
+    """
+    simulation, options = given.simulation, given.options
+    if not isinstance(simulation, SimulationOptions):
+        raise ConfigError(
+            f"{given.experiment.source}: next.goal: diagnosis of a simulation.kind "
+            f"{simulation.kind}; expected drive, whose candidates can be simulated on "
+            "other inputs; choose the goal coverage"
+        )
+    recordings = given.recordings
+    key = diagnosis_key(given.recordings, simulation, options)
+    with runner.rounds("tasks") as (settings, begin_round), one_thread():
+        return pipeline.separations(
+            recordings, simulation, options, inputs, _runner(key, settings), begin_round
+        )
 
 
 def _write_files(

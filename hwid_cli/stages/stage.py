@@ -142,6 +142,8 @@ class Stage:
         Stages that must have run.
     needs_where_named : tuple of str
         Stages that must have run where the configuration has their section.
+    needs_for : callable
+        From an ``Experiment`` to more stages that must have run, for what it asks.
     sections : tuple of str
         Sections of the configuration that its results depend on, besides those of the
         stages before it.
@@ -184,6 +186,7 @@ class Stage:
     storage: Storage | None = None
     needs: tuple[str, ...] = ()
     needs_where_named: tuple[str, ...] = ()
+    needs_for: Callable[[Experiment], tuple[str, ...]] = _nothing
     sections: tuple[str, ...] = ()
     summary: Callable[[Any, Any, bool], str] = lambda given, result, is_stored: ""
     write_files: Callable[[Path, Any, Any, Provenance | None, bool], None] = (

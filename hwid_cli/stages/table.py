@@ -65,6 +65,13 @@ nothing is missing, or that nothing known explains the gap. Writes
 diagnosis.json, ranking.csv, where.csv, gaps.csv, extended_simulation.yaml,
 results.h5:/diagnose and figures.
 """,
+    "next": """Say which recordings to take next, or that enough is known.
+
+Chooses from a plan, or designs within limits, the recordings that teach most:
+for coverage, for the parameters of a model, or to tell the candidates of an
+ambiguous diagnosis apart. Writes next.csv, next.json and next/*.csv, inputs
+that are ready to play.
+""",
 }
 
 
@@ -95,6 +102,8 @@ def needed(name: str, experiment: "Experiment | None" = None) -> tuple[str, ...]
         for one in stage.needs_where_named
         if experiment is None or is_named(one, experiment)
     ]
+    if experiment is not None:
+        asked += stage.needs_for(experiment)
     for before in (*stage.needs, *asked):
         found |= {before, *needed(before, experiment)}
     return tuple(one for one in STAGES if one in found)

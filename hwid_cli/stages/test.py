@@ -39,9 +39,11 @@ from hwid_cli.records.groups import ChainTrend, FinalTest, GroupSearch, Predicti
 from hwid_cli.records.model import Fit
 from hwid_cli.records.recordings import Recording
 from hwid_cli.records.results import CrossValidation
+from hwid_cli.records.trust import TrustOnTests
 from hwid_cli.report import final_test
 from hwid_cli.report.table import Block
 from hwid_cli.report.thesis_names import names_of_groups
+from hwid_cli.report.trust import trust_table
 from hwid_cli.stages.coverage_matrix import (
     ScoredModels,
     are_hard_to_cover,
@@ -56,12 +58,14 @@ from hwid_cli.stages.identify import recording_key
 from hwid_cli.stages.ranking import best_of_each, score_models
 from hwid_cli.stages.selection import select_recordings
 from hwid_cli.stages.stage import Context, Planning, Runner, Stage, in_results
+from hwid_cli.stages.trust import trust_task
 from hwid_cli.store.final_test_results import (
     read_final_test,
     write_assignment_csv,
     write_coverage_matrix_csv,
     write_final_test,
     write_test_csv,
+    write_trust_csv,
 )
 from hwid_cli.store.result_files import Provenance
 from hwid_cli.tasks.cache import task_key
@@ -242,7 +246,7 @@ def input_distances(inputs: list[np.ndarray]) -> np.ndarray:
 
 
 NAME = "test"
-STAGE_VERSION = 2
+STAGE_VERSION = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -547,9 +551,25 @@ def _options(experiment: Experiment) -> FinalTestOptions:
 
 def _compute(given: _Given, runner: Runner) -> FinalTest:
     with runner.tasks(len(given.recordings), "recordings") as settings:
-        return score_final_models(
+        final = score_final_models(
             given.models, given.recordings, given.tested_on, given.threshold, settings
         )
+    tasks = _trust_tasks(given, final)
+    with runner.tasks(len(tasks), "models", part="bands") as settings:
+        found = [item.result for item in run_tasks(tasks, settings)]
+    rows = tuple(row for one in found for row in one.rows)
+    shown = found[-1].shown if found else None
+    return replace(final, trust=TrustOnTests(rows, shown))
+
+
+def _trust_tasks(given: _Given, final: FinalTest) -> list[Task]:
+    """List the tasks: bands of each model that the test recommends."""
+    asked = dict.fromkeys((*final.smallest_set, *final.chain))
+    fits = dict(zip(given.models.names, given.models.fits, strict=True))
+    return [
+        trust_task(name, fits[name], given.recordings, given.tested_on)
+        for name in asked
+    ]
 
 
 def _write_csv(
@@ -558,6 +578,7 @@ def _write_csv(
     write_test_csv(out / "test.csv", final)
     write_assignment_csv(out / "assignment.csv", final)
     write_coverage_matrix_csv(out / "coverage_matrix.csv", final)
+    write_trust_csv(out / "trust.csv", final.trust.rows)
 
 
 def _tables(context: Context, final: FinalTest) -> list[Block]:
@@ -580,6 +601,7 @@ def _tables(context: Context, final: FinalTest) -> list[Block]:
         *final_test.gap_sentences(final),
         final_test.smallest_set_table(final),
         final_test.prediction_table(final),
+        *([trust_table(final.trust.rows)] if final.trust.rows else []),
     ]
 
 
@@ -611,6 +633,12 @@ STAGE = Stage(
     ),
     write_files=_write_csv,
     tables=_tables,
-    files=("results.h5", "test.csv", "assignment.csv", "coverage_matrix.csv"),
+    files=(
+        "results.h5",
+        "test.csv",
+        "assignment.csv",
+        "coverage_matrix.csv",
+        "trust.csv",
+    ),
     plan=_plan,
 )

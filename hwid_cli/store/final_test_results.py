@@ -1,6 +1,7 @@
 """Results of the final test in and out of ``results.h5:/test``, and as CSV files."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -9,11 +10,14 @@ import numpy as np
 
 from hwid_cli.files.csv_tables import write_table_csv
 from hwid_cli.records.groups import FinalTest, Prediction
+from hwid_cli.records.trust import RecordingTrust, TrustOnTests
 from hwid_cli.store.hdf5_records import (
     read_array,
+    read_record,
     read_small,
     schema,
     write_array,
+    write_record,
     write_small,
 )
 from hwid_cli.store.hdf5_tables import read_table, write_table
@@ -33,8 +37,11 @@ ASSIGNMENT_COLUMNS = (
     "predicted_rmsd",
     "is_right",
 )
+TRUST_COLUMNS = tuple(
+    field.name for field in fields(RecordingTrust) if field.name != "unit"
+)
 _STAGE = "test"
-_PREDICTIONS = "predictions"
+_PREDICTIONS, _TRUST = "predictions", "trust"
 # Axes of the two tables, and what is written as one data set along each.
 _AXES = ("models", "recordings")
 
@@ -57,6 +64,7 @@ def write_final_test(path: Path, final: FinalTest, provenance: Provenance) -> No
             elif field.form == "scalar":
                 write_small(group, field.name, value, field.member)
         write_table(group.create_group(_PREDICTIONS), final.predictions, Prediction)
+        write_record(group.create_group(_TRUST), final.trust)
         for axis in _AXES:
             group[axis].make_scale(axis)
         for name in ("rmsd", "is_own"):
@@ -86,6 +94,8 @@ def read_final_test(path: Path) -> FinalTest:
             elif field.form == "scalar":
                 values[field.name] = read_small(group, field.name, field.member)
         values[_PREDICTIONS] = tuple(read_table(group[_PREDICTIONS], Prediction))
+        if _TRUST in group:
+            values[_TRUST] = read_record(group[_TRUST], TrustOnTests)
         return FinalTest(**values)
 
     return read_results(path, _STAGE, read)
@@ -187,3 +197,15 @@ def write_coverage_matrix_csv(path: Path, final: FinalTest) -> None:
     ]
     last = ("covered_by", *final.covered_by.tolist(), None)
     write_table_csv(path, ("model", *final.recordings, "covers"), [*rows, last])
+
+
+def write_trust_csv(path: Path, found: Sequence[RecordingTrust]) -> None:
+    """Write ``trust.csv``: one row for each model and test recording.
+
+    Raises
+    ------
+    CacheError
+        If it cannot be written.
+    """
+    rows = ([getattr(one, name) for name in TRUST_COLUMNS] for one in found)
+    write_table_csv(path, TRUST_COLUMNS, rows)

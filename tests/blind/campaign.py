@@ -33,8 +33,11 @@ class Recorded(NamedTuple):
     displacement_m: np.ndarray
 
 
-def measured_case(case):
-    """Recordings of a case and its truth as plain values."""
+def measured_case(case, further=None):
+    """Recordings of a case and its truth as plain values.
+
+    ``further`` are commands by name that are measured after those of the plan.
+    """
     rng = case.rng()
     machine = Machine()
     machine = machine._replace(**_spread(machine, MACHINE_SPREAD, rng))
@@ -44,7 +47,7 @@ def measured_case(case):
     whole = machine
     for effect, values in hidden.items():
         whole = hide(effect, values, whole)
-    commands = plan(case.plan, rng)
+    commands = {**plan(case.plan, rng), **(further or {})}
     factors = _factors(hidden, commands, rng)
     clean = {
         name: _displacement(whole, command, hidden, factors.get(name, 1.0), rng)

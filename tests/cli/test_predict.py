@@ -18,7 +18,7 @@ from tests.export.model_examples import (
     example_model,
     exported_of,
 )
-from tests.export.test_json import exported_drive
+from tests.export.test_json import exported_drive, with_trust
 
 
 @pytest.fixture
@@ -223,3 +223,51 @@ def test_a_file_without_an_end_is_one_line(model, tmp_path, kind):
     assert done.returncode == 1
     assert len(done.stderr.splitlines()) == 1, done.stderr
     assert str(given if "input" in kind else place) in done.stderr
+
+
+def test_a_band_adds_two_columns_around_the_same_prediction(tmp_path):
+    u = example_input(1)
+    path, out = tmp_path / "m.json", tmp_path / "p.csv"
+    write_json(path, with_trust(exported_of(example_model(1))))
+    given = write_input(tmp_path / "u.csv", u)
+
+    result = predict(path, given, "--out", out, "--band")
+
+    assert result.exit_code == 0, result.output
+    assert "the band of 90 % is" in result.stdout
+    assert "of the samples rest on data in every respect" in result.stdout
+    with out.open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert list(rows[0])[2:] == ["predicted", "lower", "upper"]
+    low, high = (np.array([float(row[k]) for row in rows]) for k in ("lower", "upper"))
+    # Never narrower than the noise: 1.7 standard deviations of 0.02 to either side.
+    assert (high - low >= 2 * 1.7 * 0.02 * (1 - 1e-9)).all()
+    middle = (low + high) / 2
+    assert np.allclose(middle, simulate(load_model(path), u), atol=1e-9)
+    # A prediction with a band may be replaced by the next one.
+    assert predict(path, given, "--out", out).exit_code == 0
+
+
+def test_a_model_of_an_earlier_version_has_no_band_and_says_what_to_do(model, tmp_path):
+    out = tmp_path / "p.csv"
+    given = write_input(tmp_path / "u.csv", example_input(1))
+
+    result = predict(model, given, "--out", out, "--band")
+
+    assert result.exit_code == 1
+    assert result.stderr.count("\n") == 1
+    assert f"{model}: trust: found nothing; expected the covariance" in result.stderr
+    assert "export the model again" in result.stderr
+    assert not out.exists()
+
+
+def test_a_physics_simulation_has_no_band(tmp_path):
+    path = tmp_path / "s.json"
+    write_json(path, exported_drive())
+    given = tmp_path / "u.csv"
+    given.write_text("t,u\n0,1\n0.001,1\n")
+
+    result = predict(path, given, "--out", tmp_path / "p.csv", "--band")
+
+    assert result.exit_code == 1
+    assert "kind: found drive_simulation" in result.stderr

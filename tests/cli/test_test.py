@@ -17,7 +17,7 @@ GROUP = (
     "group: {start: [step_02], keep: {best: true}, max_level: 2}\nthesis_names: true\n"
 )
 WITH_TEST = CONFIG.replace(PLAN, MORE) + SECTION
-TABLES = ("test.csv", "assignment.csv", "coverage_matrix.csv")
+TABLES = ("test.csv", "assignment.csv", "coverage_matrix.csv", "trust.csv")
 
 
 @pytest.fixture(scope="module")
@@ -73,6 +73,30 @@ def test_every_model_is_judged_on_every_recording(first_run):
     }
     assert len(rows_of(out / "assignment.csv")) == 5
     assert rows_of(out / "coverage_matrix.csv")[-1]["model"] == "covered_by"
+
+
+def test_recommended_models_get_a_band_on_every_test_recording(first_run):
+    rows = rows_of(first_run[0] / "trust.csv")
+    of_tests = {row["model"]: [] for row in rows}
+    for row in rows:
+        of_tests[row["model"]].append(row["recording"])
+        shares = [float(row[k]) for k in row if k.startswith("inside")]
+        assert all(0.0 <= share <= 1.0 for share in (*shares, float(row["coverage"])))
+        # In every respect: no more than in any of them.
+        assert float(row["inside"]) <= min(shares)
+        assert float(row["width"]) > 0.0
+    chain = [row["model"] for row in rows_of(first_run[0] / "test.csv")][-1]
+
+    assert chain in of_tests
+    assert all(names == ["step_05", "sine_03"] for names in of_tests.values())
+    rmsd = {
+        (row["model"], row["recording"]): float(row["rmsd"])
+        for row in rows_of(first_run[0] / "test.csv")
+    }
+    for row in rows:
+        # The same free run, started by the same rule.
+        found = rmsd[row["model"], row["recording"]]
+        assert float(row["rmsd"]) == pytest.approx(found, rel=1e-6)
 
 
 def test_the_chain_of_groups_comes_last(first_run):

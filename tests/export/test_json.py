@@ -1,4 +1,5 @@
 import json
+from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 
@@ -12,10 +13,13 @@ from hwid_cli.export.json_reader import read_exported
 from hwid_cli.export.json_writer import described, write_json
 from hwid_cli.export.map_parts import map_schema
 from hwid_cli.export.predict import predict
+from hwid_cli.model.parameter_steps import parameter_vector
 from hwid_cli.records.drive import Controller, Drive
 from hwid_cli.records.experiment import Columns
 from hwid_cli.records.exported import ExportedSimulation, ModelCard
 from hwid_cli.records.maps import OwnFunction, StaticMap
+from hwid_cli.records.trust import ModelTrust
+from hwid_cli.trust.visited import visited_by
 from tests.export.model_examples import (
     KINDS,
     example_input,
@@ -60,6 +64,55 @@ def test_a_model_comes_back_bit_by_bit_and_predicts_the_same(kind, tmp_path):
     assert np.array_equal(
         simulate(load_model(tmp_path / "m.json"), u), simulate(given.model, u)
     )
+
+
+def with_trust(exported):
+    u = example_input(3)
+    trust = ModelTrust(
+        visited_by([u], [np.repeat([0.0, 1.0], 200)]),
+        np.random.default_rng(1).normal(
+            0, 0.01, (3, parameter_vector(exported.model).size)
+        ),
+        noise_rms=0.02,
+        scale=1.7,
+        judged_on=("a", "b"),
+        scatter=0.01,
+        reason="of an example",
+    )
+    return replace(exported, trust=trust)
+
+
+def test_what_is_known_of_errors_comes_back_bit_by_bit(tmp_path):
+    given = with_trust(exported_of(example_model(1)))
+
+    assert_same(written(tmp_path / "m.json", given), given)
+    SCHEMA.validate(described(given))
+
+
+@pytest.mark.parametrize(
+    ("keys", "value", "said"),
+    [
+        (
+            ("steps", 1),
+            [1.0],
+            r"trust.steps\[1\]: found 1 numbers; expected .*, one a p",
+        ),
+        (("scale",), 0.0, r"trust.scale: found 0.0; expected a finite number above 0"),
+        (("visited", "inner", "edges", 1), 9e9, "inner.edges: .* numbers that rise"),
+        (("visited", "input", "lowest_rate"), [1.0], "found 1 numbers; expected 32"),
+    ],
+)
+def test_damaged_knowledge_of_errors_is_refused(keys, value, said, tmp_path):
+    path = tmp_path / "m.json"
+    content = described(with_trust(exported_of(example_model(1))))
+    place = content["trust"]
+    for key in keys[:-1]:
+        place = place[key]
+    place[keys[-1]] = value
+    path.write_text(json.dumps(content))
+
+    with pytest.raises(ModelFileError, match=said):
+        read_exported(path)
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -1,0 +1,111 @@
+"""The recordings to take next, and what was known before them."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from hwid_cli.records.recordings import frozen_vector
+
+GOALS = ("coverage", "parameters", "diagnosis")
+
+
+@dataclass(frozen=True, eq=False)
+class PlannedInput:
+    """An input that could be played.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n_samples,), [input unit]
+    words : str
+        What it is, for people.
+    """
+
+    name: str
+    values: np.ndarray
+    words: str
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "values", frozen_vector(self.values, "values"))
+
+
+@dataclass(frozen=True, eq=False)
+class ProposedRecording:
+    """A recording that teaches much.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n_samples,), [input unit]
+        Its input, ready to play.
+    gain : float
+        Expected; in the unit of `gain_words`.
+    gain_words : str
+        What the number is.
+    reason : str
+    """
+
+    name: str
+    words: str
+    values: np.ndarray
+    gain: float
+    gain_words: str
+    reason: str
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "values", frozen_vector(self.values, "values"))
+
+
+@dataclass(frozen=True, eq=False)
+class InputMap:
+    """Which amplitudes were visited at which frequencies and around which values.
+
+    Parameters
+    ----------
+    octaves_Hz : ndarray, shape (n_octaves,), [Hz]
+        Upper end of each, from Nyquist's frequency down.
+    edges : ndarray, shape (n_cells + 1,), [input unit]
+        Of the cells of the value.
+    visited, proposed, reachable : ndarray, shape (n_octaves, n_cells), [input unit]
+        Largest amplitude by the recordings, with the proposals, by all that was offered.
+    """
+
+    octaves_Hz: np.ndarray
+    edges: np.ndarray
+    visited: np.ndarray
+    proposed: np.ndarray
+    reachable: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class NextRecordings:
+    """What to record next, or that enough is known.
+
+    Parameters
+    ----------
+    goal : str
+        One of ``GOALS``.
+    recordings : tuple of str
+        That were known.
+    known : float
+        How much is known by the measure of the goal; `known_words` says what it is.
+    is_enough : bool
+        Whether no offered recording teaches more than the configuration asks for.
+    sentence : str
+        The answer in words.
+    changed : str
+        What the recordings since the last proposal changed; empty where none came.
+    n_offered : int, [-]
+        Inputs that were compared.
+    """
+
+    goal: str
+    recordings: tuple[str, ...]
+    known: float
+    known_words: str
+    is_enough: bool
+    sentence: str
+    proposals: tuple[ProposedRecording, ...]
+    map: InputMap
+    n_offered: int
+    sample_time_s: float
+    input_unit: str
+    changed: str = field(default="")

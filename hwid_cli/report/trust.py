@@ -1,0 +1,50 @@
+"""How far a prediction may be trusted, as sentences and tables."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from hwid_cli.records.trust import Band, RecordingTrust
+from hwid_cli.records.units import behind
+from hwid_cli.report.formats import number
+from hwid_cli.report.table import Table, numbers, texts
+
+
+def band_note(band: Band, unit: str) -> str:
+    """Say how wide a band is, and how much of the prediction rests on data."""
+    where = band.inside
+    width = number(float(np.mean(band.upper - band.lower)))
+    return (
+        f"the band of 90 % is {width}{behind(unit)} wide on average; "
+        f"{where.all.mean():.0%} of the samples rest on data in every respect "
+        f"(value {where.amplitude.mean():.0%}, rate {where.rate.mean():.0%}, frequency "
+        f"{where.frequency.mean():.0%})"
+    )
+
+
+def trust_table(found: Sequence[RecordingTrust]) -> Table:
+    """Show how far models may be trusted on recordings that they have not used."""
+    unit = found[0].unit if found else ""
+    rows = tuple(
+        (
+            one.model,
+            one.recording,
+            f"{one.inside_amplitude:.0%}",
+            f"{one.inside_rate:.0%}",
+            f"{one.inside_frequency:.0%}",
+            f"{one.coverage:.0%}",
+            number(one.width),
+            number(one.rmsd),
+        )
+        for one in found
+    )
+    return Table(
+        f"How far models may be trusted on the test recordings: samples inside what was "
+        f"visited, and the band of 90 % [{unit}]",
+        (
+            *texts("model", "recording"),
+            *numbers("value", "rate", "frequency", "held", "width", "RMSD"),
+        ),
+        rows,
+        is_validation=True,
+    )

@@ -1,0 +1,449 @@
+"""Stage ``next``: which recordings to take next, or that enough is known.
+
+Offered are the inputs of a plan, or inputs that are designed within limits. Of these the
+ones that teach most are chosen one after the other (`trust.choice`), each for what it adds
+to the recordings that are there and to those chosen before it. When a new recording lies
+in the folder, the same command takes it up, says what it changed, and proposes again.
+
+References
+----------
+docs/trust.md.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from math import nan
+from pathlib import Path
+
+import numpy as np
+
+from hwid_cli.data.recording_plan import read_plan
+from hwid_cli.diagnosis.next_experiment import UNDECIDED
+from hwid_cli.errors import ConfigError
+from hwid_cli.model.extrapolation import outlined_model
+from hwid_cli.model.scores import rmsd
+from hwid_cli.model.simulate import validation_output
+from hwid_cli.records.check import StagePlan
+from hwid_cli.records.experiment import Experiment, NextOptions, RecordingsOptions
+from hwid_cli.records.model import Fit
+from hwid_cli.records.next import (
+    InputMap,
+    NextRecordings,
+    PlannedInput,
+    ProposedRecording,
+)
+from hwid_cli.records.recordings import Recording
+from hwid_cli.records.units import behind
+from hwid_cli.report.next import next_blocks
+from hwid_cli.report.table import Block
+from hwid_cli.stages.diagnose import ToDiagnose, undecided
+from hwid_cli.stages.diagnose import choose as choose_diagnosis
+from hwid_cli.stages.fit_seconds import counted
+from hwid_cli.stages.ranking import best_fits
+from hwid_cli.stages.stage import Context, Planning, Runner, Stage, in_results
+from hwid_cli.stages.trust import kept_for_test, trust_of
+from hwid_cli.store.next_results import (
+    read_next,
+    read_previous,
+    write_next,
+    write_next_files,
+)
+from hwid_cli.store.result_files import Provenance
+from hwid_cli.tasks.cache import model_key, recording_key, task_key
+from hwid_cli.tasks.task import one_thread
+from hwid_cli.trust.choice import chosen_by_gain, information_gain, information_of
+from hwid_cli.trust.content import content, joined, value_edges, visited_share
+from hwid_cli.trust.designs import LEAST_SAMPLES, designs
+from hwid_cli.trust.visited import N_BANDS
+
+NAME = "next"
+STAGE_VERSION = 1
+# Separation of candidates, in standard deviations of the noise, below which a recording
+# does not tell them apart.
+LEAST_SEPARATION = 0.1
+
+
+@dataclass(frozen=True, eq=False)
+class ToChoose:
+    """What is known, what is offered, and what for."""
+
+    options: NextOptions
+    recordings: tuple[Recording, ...]
+    offered: tuple[PlannedInput, ...]
+    tested: tuple[str, ...] = ()
+    fit: Fit | None = None
+    diagnosed: ToDiagnose | None = None
+    verdict: str = ""
+    previous: NextRecordings | None = None
+
+    @property
+    def key(self) -> str:
+        """Content key of the proposal."""
+        model = None if self.fit is None else self.fit.model
+        settings = {
+            "options": self.options,
+            "recordings": [one.name for one in self.recordings],
+            "contents": [recording_key(one) for one in self.recordings],
+            "offered": [one.name for one in self.offered],
+            "model": None if model is None else model_key(model),
+            "diagnosis": None if self.diagnosed is None else self.diagnosed.key,
+            "tested": self.tested,
+        }
+        arrays = [one.values for one in self.offered]
+        return task_key(NAME, STAGE_VERSION, settings, arrays)
+
+
+def propose_next(given: ToChoose, runner: Runner) -> NextRecordings:
+    """Choose the recordings that teach most."""
+    ways: dict[str, Callable[[ToChoose, Runner], _Choice]] = {
+        "coverage": _for_coverage,
+        "parameters": _for_parameters,
+        "diagnosis": _for_diagnosis,
+    }
+    with one_thread():
+        choice = ways[given.options.goal](given, runner)
+    table = _input_map(given, [one.values for one in choice.proposals])
+    return NextRecordings(
+        goal=given.options.goal,
+        recordings=tuple(one.name for one in given.recordings),
+        known=choice.known,
+        known_words=choice.known_words,
+        is_enough=not choice.proposals,
+        sentence=choice.sentence,
+        proposals=choice.proposals,
+        map=table,
+        n_offered=len(given.offered),
+        sample_time_s=given.recordings[0].sample_time_s,
+        input_unit=given.recordings[0].input_unit,
+        changed=_changed(given, choice),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Choice:
+    """What a goal makes of the offered inputs."""
+
+    known: float
+    known_words: str
+    sentence: str
+    proposals: tuple[ProposedRecording, ...]
+
+
+def _for_coverage(given: ToChoose, _: Runner) -> _Choice:
+    inputs = [one.input for one in given.recordings]
+    edges = value_edges([*inputs, *(one.values for one in given.offered)])
+    before = joined([content(one, edges) for one in inputs])
+    tables = [content(one.values, edges) for one in given.offered]
+    reachable = joined([before, *tables])
+    share = visited_share(before, reachable)
+
+    def gain(known: np.ndarray, more: np.ndarray) -> float:
+        both = visited_share(joined([known, more]), reachable)
+        return both - visited_share(known, reachable)
+
+    found = chosen_by_gain(
+        before,
+        tables,
+        gain,
+        lambda known, more: joined([known, more]),
+        given.options.number,
+    )
+    proposals, now = [], share
+    for place, by in found:
+        if by < given.options.enough:
+            break
+        one = given.offered[place]
+        reason = (
+            f"visits {by:.0%} more of the amplitudes and frequencies on offer "
+            f"({now:.0%} to {now + by:.0%}), most of it {_where(before, tables[place])}"
+        )
+        proposals.append(_proposal(one, by, "share visited", reason))
+        now, before = now + by, joined([before, tables[place]])
+    words = "of the amplitudes and frequencies on offer are visited"
+    best = found[0][1] if found else 0.0
+    sentence = f"{share:.0%} {words}; " + _verdict(
+        len(proposals), f"the best input on offer adds {best:.1%}", given.options.enough
+    )
+    return _Choice(share, words, sentence, tuple(proposals))
+
+
+def _where(before: np.ndarray, more: np.ndarray) -> str:
+    """Where an input visits most that is new: how fast, and on which side."""
+    largest = np.maximum(before, more).max(axis=1, keepdims=True)
+    new = np.maximum(more - before, 0.0) / np.maximum(largest, 1e-300)
+    band, cell = (int(at) for at in np.unravel_index(np.argmax(new), new.shape))
+    speed = ("fast", "medium-fast", "slow")[min(2, 3 * band // N_BANDS)]
+    third = 3 * cell // new.shape[1]
+    side = ("at low values", "around the middle", "at high values")[third]
+    return f"{speed} content {side}"
+
+
+def _verdict(count: int, best: str, enough: float) -> str:
+    if count:
+        many = "one recording is" if count == 1 else f"{count} recordings are"
+        return f"{many} proposed"
+    return f"enough is known: {best}, less than {enough:.1%}"
+
+
+def _proposal(
+    one: PlannedInput, gain: float, words: str, reason: str
+) -> ProposedRecording:
+    return ProposedRecording(one.name, one.words, one.values, gain, words, reason)
+
+
+def _for_parameters(given: ToChoose, _: Runner) -> _Choice:
+    fit = given.fit
+    if fit is None or fit.model is None:
+        raise ValueError("this goal has a model")
+    trust = trust_of(fit, given.recordings, given.tested)
+    count = len(trust.steps)
+    words = "parameters that the model's recordings determine"
+    if not count:
+        sentence = (
+            f"the parameters of {fit.name} cannot be told ({trust.reason}); nothing is "
+            "proposed"
+        )
+        return _Choice(0.0, words, sentence, ())
+    model = outlined_model(fit.model)
+    more = [information_of(model, trust, one.values) for one in given.offered]
+    found = chosen_by_gain(
+        np.eye(count),
+        more,
+        information_gain,
+        lambda known, one: known + one,
+        given.options.number,
+    )
+    proposals, shrinks = [], []
+    for place, by in found:
+        # Standard errors shrink by half the gain of each parameter.
+        shrink = 1.0 - float(np.exp(-0.5 * by / count))
+        shrinks.append(shrink)
+        if shrink < given.options.enough:
+            break
+        reason = (
+            f"lets standard errors of the {count} parameters of {fit.name} shrink by "
+            f"{shrink:.0%} on (geometric) average"
+        )
+        one = given.offered[place]
+        proposals.append(_proposal(one, by, "log determinant", reason))
+    best = f"the best input on offer shrinks standard errors by {max(shrinks):.1%}"
+    sentence = f"{count} {words} of {fit.name}; " + _verdict(
+        len(proposals), best, given.options.enough
+    )
+    return _Choice(float(count), words, sentence, tuple(proposals))
+
+
+def _for_diagnosis(given: ToChoose, runner: Runner) -> _Choice:
+    words = "candidates that the recordings do not tell apart"
+    if given.diagnosed is None or given.verdict not in UNDECIDED:
+        sentence = (
+            f"enough is known: the diagnosis says {given.verdict!r}, and no candidates "
+            "are left to tell apart"
+        )
+        return _Choice(0.0, words, sentence, ())
+    found = undecided(given.diagnosed, runner, [one.values for one in given.offered])
+    if len(found.titles) < 2 or not np.isfinite(found.ratios).any():
+        sentence = "no two candidates could be simulated; nothing is proposed"
+        return _Choice(float(len(found.titles)), words, sentence, ())
+    order = np.argsort(-found.ratios, kind="stable")[: given.options.number]
+    names = " and ".join(found.titles)
+    proposals = tuple(
+        _proposal(
+            given.offered[place],
+            float(found.ratios[place]),
+            "times the noise",
+            f"makes {names} differ by at least {found.ratios[place]:.2g} times the noise "
+            "after their parameters have been fitted again",
+        )
+        for place in order
+        if found.ratios[place] >= LEAST_SEPARATION
+    )
+    best = float(np.max(found.ratios))
+    sentence = f"{len(found.titles)} {words} ({names}); " + (
+        f"{len(proposals)} recordings are proposed"
+        if proposals
+        else f"no input on offer brings them {LEAST_SEPARATION:g} of the noise apart "
+        f"(the best {best:.2g}): only other limits can tell them apart"
+    )
+    return _Choice(float(len(found.titles)), words, sentence, proposals)
+
+
+def _changed(given: ToChoose, choice: _Choice) -> str:
+    """What the recordings since the last proposal changed."""
+    before = given.previous
+    if before is None or before.goal != given.options.goal:
+        return ""
+    names = [one.name for one in given.recordings if one.name not in before.recordings]
+    if not names:
+        return before.changed
+    asked = {one.name for one in before.proposals}
+    words = ", ".join(f"{name}{' (proposed)' * (name in asked)}" for name in names)
+    form = ".0%" if given.options.goal == "coverage" else "g"
+    return (
+        f"new since the last proposal: {words}; {format(before.known, form)} before, "
+        f"{format(choice.known, form)} now {choice.known_words}"
+    )
+
+
+def _input_map(given: ToChoose, proposed: Sequence[np.ndarray]) -> InputMap:
+    inputs = [one.input for one in given.recordings]
+    offered = [one.values for one in given.offered]
+    edges = value_edges([*inputs, *offered])
+    visited = joined([content(one, edges) for one in inputs])
+    after = joined([visited, *(content(one, edges) for one in proposed)])
+    reachable = joined([visited, *(content(one, edges) for one in offered)])
+    nyquist = 0.5 / given.recordings[0].sample_time_s
+    return InputMap(
+        nyquist / 2.0 ** np.arange(N_BANDS), edges, visited, after, reachable
+    )
+
+
+def _choose(context: Context) -> ToChoose:
+    experiment, results = context.experiment, context.results
+    options = _options(experiment)
+    recordings = results["calibrate"].recordings
+    offered = _offered(experiment, recordings)
+    known = {one.name for one in recordings}
+    is_diagnosis = options.goal == "diagnosis"
+    return ToChoose(
+        options,
+        recordings,
+        tuple(one for one in offered if one.name not in known),
+        kept_for_test(experiment),
+        _model(experiment, results["identify"], recordings)
+        if options.goal == "parameters"
+        else None,
+        choose_diagnosis(context) if is_diagnosis else None,
+        results["diagnose"].verdict if is_diagnosis else "",
+        read_previous(context.out),
+    )
+
+
+def _model(
+    experiment: Experiment, fits: Sequence[Fit], recordings: Sequence[Recording]
+) -> Fit:
+    """The fit that comes closest to the recordings of others."""
+    best = [group[0] for group in best_fits(fits, 1) if group]
+    if not best:
+        raise ConfigError(
+            f"{experiment.source}: next.goal: no recording has a usable model; expected "
+            "one for the goal 'parameters'; widen the orders or change fit"
+        )
+    tested = kept_for_test(experiment)
+    judges = [one for one in recordings if one.name not in tested]
+
+    def error(fit: Fit) -> float:
+        values = [
+            rmsd(one.output, validation_output(fit.model, one))
+            for one in judges
+            if fit.model is not None and one.name not in fit.identified_on
+        ]
+        total = float(np.sum(np.log(np.maximum(values, 1e-300))))
+        return total if np.isfinite(total) else float("inf")
+
+    return min(best, key=error)
+
+
+def _offered(
+    experiment: Experiment, recordings: Sequence[Recording]
+) -> tuple[PlannedInput, ...]:
+    options, first = _options(experiment), recordings[0]
+    if options.plan is not None:
+        path = Path(experiment.source).parent / options.plan
+        return read_plan(path, _files(experiment), first.sample_time_s)
+    limits = options.limits
+    if limits is None:
+        raise ValueError("a configuration without plan and limits is refused")
+    found = designs(
+        limits.amplitude,
+        limits.rate,
+        limits.duration_s,
+        first.sample_time_s,
+        first.input_unit,
+    )
+    if not found:
+        least = LEAST_SAMPLES * first.sample_time_s
+        unit = behind(first.input_unit)
+        raise ConfigError(
+            f"{experiment.source}: next.limits: found amplitude {limits.amplitude:g}"
+            f"{unit}, rate {limits.rate:g}{unit}/s and {limits.duration_s:g} s, within "
+            "which no input fits; expected a twentieth of the amplitude to be reached "
+            f"within the duration, and at least {least:g} s; raise rate or duration_s"
+        )
+    return found
+
+
+def _files(experiment: Experiment) -> RecordingsOptions:
+    if experiment.recordings is None:
+        raise ConfigError(
+            f"{experiment.source}: recordings: missing; expected the section, which says "
+            "in which column a file has its input; add it"
+        )
+    return experiment.recordings
+
+
+def _options(experiment: Experiment) -> NextOptions:
+    if experiment.next is None:
+        raise ConfigError(
+            f"{experiment.source}: next: the section is missing; expected what could be "
+            "recorded; add it, such as 'next: {limits: {amplitude: 6.0, rate: 50, "
+            "duration_s: 7.5}}'"
+        )
+    return experiment.next
+
+
+def _needs(experiment: Experiment) -> tuple[str, ...]:
+    goal = "" if experiment.next is None else _goal(experiment)
+    return {"parameters": ("identify",), "diagnosis": ("diagnose",)}.get(goal, ())
+
+
+def _write_files(
+    out: Path,
+    _: ToChoose,
+    result: NextRecordings,
+    __: Provenance | None,
+    ___: bool,
+) -> None:
+    write_next_files(out, result)
+
+
+def _tables(_: Context, result: NextRecordings) -> list[Block]:
+    return next_blocks(result)
+
+
+def _plan(planning: Planning) -> tuple[StagePlan, ...]:
+    offered = _offered(planning.experiment, planning.recordings)
+    what = (
+        f"{counted(len(offered), 'input')} on offer, for {_goal(planning.experiment)}"
+    )
+    size = sum(8.0 * one.values.size for one in offered)
+    return (StagePlan(NAME, what, len(offered), None, nan, size),)
+
+
+def _goal(experiment: Experiment) -> str:
+    return _options(experiment).goal
+
+
+STAGE = Stage(
+    name=NAME,
+    needs=("calibrate",),
+    needs_for=_needs,
+    sections=("next",),
+    require=_options,
+    choose=_choose,
+    key=lambda given: given.key,
+    compute=propose_next,
+    storage=in_results(
+        NAME,
+        read_next,
+        lambda path, given, result, origin: write_next(path, result, origin),
+    ),
+    summary=lambda given, result, is_stored: (
+        f"{result.n_offered} inputs compared"
+        + (" (unchanged since the last run)" if is_stored else "")
+    ),
+    write_files=_write_files,
+    tables=_tables,
+    plan=_plan,
+    files=("next.csv", "next.json", "next"),
+)

@@ -1,0 +1,108 @@
+"""What is known of a model's errors, with the recordings of an experiment."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from hwid_cli.model.extrapolation import outlined_model
+from hwid_cli.records.experiment import Experiment
+from hwid_cli.records.model import Fit
+from hwid_cli.records.recordings import Recording
+from hwid_cli.records.trust import ModelTrust, ShownBand, TrustOnTests
+from hwid_cli.tasks.cache import model_key, recording_key, task_key
+from hwid_cli.tasks.runner import Task
+from hwid_cli.trust.judged import model_trust, recording_trust
+
+# Of what is known of a model's errors, whichever stage asks for it.
+TRUST_VERSION = 1
+
+
+def trust_of(
+    fit: Fit, recordings: Sequence[Recording], tested: Sequence[str]
+) -> ModelTrust:
+    """What is known of the errors of a model.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+        All of the experiment.
+    tested : sequence of str
+        Recordings for the test, which never judge.
+    """
+    by_name = {one.name: one for one in recordings}
+    kept = {*fit.identified_on, *tested}
+    others = [one for one in recordings if one.name not in kept]
+    return model_trust(fit, [by_name[name] for name in fit.identified_on], others)
+
+
+def kept_for_test(experiment: Experiment) -> tuple[str, ...]:
+    """Recordings that are kept for the test."""
+    return () if experiment.test is None else experiment.test.recordings
+
+
+def trust_task(
+    name: str, fit: Fit, recordings: Sequence[Recording], tested: Sequence[str]
+) -> Task:
+    """Task that tells how far a model may be trusted on the test recordings.
+
+    Parameters
+    ----------
+    name : str
+        Of the model.
+    fit : Fit
+        That has one.
+    recordings : sequence of Recording
+        All of the experiment.
+
+    Returns
+    -------
+    Task
+        Gives ``TrustOnTests``.
+    """
+    model = fit.model
+    settings = {
+        "model": name,
+        "numbers": None if model is None else model_key(model),
+        "identified_on": fit.identified_on,
+        "orders": fit.orders,
+        "options": fit.options,
+        "recordings": {one.name: recording_key(one) for one in recordings},
+        "tested_on": tested,
+    }
+    return Task(
+        key=task_key("trust", TRUST_VERSION, settings, []),
+        name=f"trust of {name}",
+        function=_trust_on_tests,
+        arguments=(name, fit, tuple(recordings), tuple(tested)),
+        result_type=TrustOnTests,
+    )
+
+
+def _trust_on_tests(
+    name: str, fit: Fit, recordings: Sequence[Recording], tested: Sequence[str]
+) -> TrustOnTests:
+    if fit.model is None:
+        return TrustOnTests()
+    trust, model = trust_of(fit, recordings, tested), outlined_model(fit.model)
+    found = [
+        (*recording_trust(name, model, trust, one), one)
+        for one in recordings
+        if one.name in tested
+    ]
+    if not found:
+        return TrustOnTests()
+    worst, band, shown = min(found, key=lambda item: item[0].coverage)
+    return TrustOnTests(
+        tuple(row for row, *_ in found),
+        ShownBand(
+            name,
+            worst.recording,
+            shown.sample_time_s * np.arange(shown.n_samples),
+            shown.output,
+            band.output,
+            band.lower,
+            band.upper,
+            band.inside.all,
+            shown.output_unit,
+        ),
+    )

@@ -1,0 +1,131 @@
+"""What to record next in and out of ``results.h5:/next``, and as files to look at and play."""
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+
+from hwid_cli.errors import CacheError
+from hwid_cli.files.atomic import replace_file
+from hwid_cli.files.csv_tables import write_table_csv
+from hwid_cli.records.next import NextRecordings, ProposedRecording
+from hwid_cli.store.hdf5_records import read_record, write_record
+from hwid_cli.store.result_files import (
+    Provenance,
+    has_left_results,
+    read_results,
+    replaced_stage,
+    results_file,
+)
+
+NEXT_COLUMNS = ("rank", "name", "input", "gain", "unit_of_gain", "reason", "file")
+_STAGE, _FOLDER = "next", "next"
+# Digits of a time stamp: more than any clock has, fewer than rounding errors show in.
+_TIME_DIGITS = 12
+
+
+def write_next(path: Path, found: NextRecordings, provenance: Provenance) -> None:
+    """Write ``results.h5:/next``.
+
+    Raises
+    ------
+    CacheError
+        If it cannot be written; an old file is untouched then.
+    """
+    with replaced_stage(path, _STAGE, provenance) as group:
+        write_record(group, found)
+
+
+def read_next(path: Path) -> NextRecordings:
+    """Read ``results.h5:/next``.
+
+    Raises
+    ------
+    CacheError
+        If it is missing or cannot be read.
+    """
+    return read_results(
+        path, _STAGE, lambda file: read_record(file[_STAGE], NextRecordings)
+    )
+
+
+def read_previous(out: Path) -> NextRecordings | None:
+    """What was proposed before; None where nothing was, or it cannot be read.
+
+    Parameters
+    ----------
+    out : Path
+        Folder of the results.
+    """
+    path = out / results_file(_STAGE)
+    if not has_left_results(path, _STAGE):
+        return None
+    try:
+        return read_next(path)
+    except CacheError:
+        # Of another version: the new proposal takes its place, and only cannot say what
+        # changed since.
+        return None
+
+
+def write_next_files(out: Path, found: NextRecordings) -> None:
+    """Write ``next.csv``, ``next.json`` and an input ready to play for each proposal.
+
+    Inputs of earlier proposals are removed.
+
+    Parameters
+    ----------
+    out : Path
+        Folder of the results.
+
+    Raises
+    ------
+    CacheError
+        If a file cannot be written.
+    """
+    folder = out / _FOLDER
+    files = {one.name: f"{_FOLDER}/{one.name}.csv" for one in found.proposals}
+    for path in folder.glob("*.csv"):
+        if f"{_FOLDER}/{path.name}" not in files.values():
+            path.unlink()
+    for one in found.proposals:
+        _write_input(out / files[one.name], one, found.sample_time_s)
+    write_table_csv(
+        out / "next.csv",
+        NEXT_COLUMNS,
+        (
+            (
+                rank,
+                one.name,
+                one.words,
+                one.gain,
+                one.gain_words,
+                one.reason,
+                files[one.name],
+            )
+            for rank, one in enumerate(found.proposals, 1)
+        ),
+    )
+    content = {
+        name: value
+        for name, value in asdict(found).items()
+        if name not in ("proposals", "map")
+    }
+    content["proposals"] = [
+        {
+            "name": one.name,
+            "input": one.words,
+            "gain": one.gain,
+            "unit_of_gain": one.gain_words,
+            "reason": one.reason,
+            "file": files[one.name],
+        }
+        for one in found.proposals
+    ]
+    text = json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)
+    replace_file(out / "next.json", f"{text}\n".encode())
+
+
+def _write_input(path: Path, one: ProposedRecording, sample_time_s: float) -> None:
+    times = (round(k * sample_time_s, _TIME_DIGITS) for k in range(one.values.size))
+    rows = zip(times, one.values.tolist(), strict=True)
+    write_table_csv(path, ("time_s", "input"), rows)

@@ -1,0 +1,201 @@
+"""How often the band of 90 % holds what is measured, and how wide it is.
+
+``make bench-trust`` runs this file; ``--choose`` draws the plants by which the constants of
+the band were chosen, without it others are drawn. Random plants (`trust_plants`): a model
+of one recording, judged by others or by its own rest; the band on recordings that nothing
+has used, of the same kind of input and of others, apart. Public measurements
+(``HWID_REALDATA``) and the virtual gun by the same functions.
+"""
+
+import argparse
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.io import loadmat
+
+from hwid_cli.model.extrapolation import outlined_model
+from hwid_cli.model.fit import fit
+from hwid_cli.records.experiment import CalibrateOptions
+from hwid_cli.records.machines import GunMachine, GunPlan
+from hwid_cli.records.model import Fit, FitOptions, Orders
+from hwid_cli.records.recordings import RawRecording, Recording
+from hwid_cli.stages.calibrate import calibrate_all
+from hwid_cli.stages.simulate import simulate_machine
+from hwid_cli.trust.judged import model_trust, recording_trust
+from tests.benchmarks.real_data import ced, folder, tanks
+from tests.benchmarks.trust_plants import INPUTS, STRUCTURES, plant_recordings
+
+CHOOSING, REPORTING = 1000, 60_000
+# Who judges: recordings by their place among those of a plant. The first is the model's.
+JUDGES = {"two of its kind": (1, 2), "one of each of two kinds": (1, 5), "none": ()}
+ORDERS = Orders(2, 2, 1)
+HEAD = f"{'':34}{'recordings':>11}{'coverage':>10}{'10 % below':>11}{'width/error':>12}{'width/spread':>13}{'inside':>8}"
+
+Row = tuple[float, float, float, float]
+
+
+def judged(name: str, found: Fit, own, judges, tests: Sequence[Recording]) -> list[Row]:
+    """Coverage, width over error and over the output's spread, share inside."""
+    trust = model_trust(found, own, judges)
+    model, rows = outlined_model(found.model), []
+    for one in tests:
+        spread = float(np.std(one.output))
+        if spread == 0.0:
+            # An input that stays within a dead zone is no recording.
+            continue
+        seen, _ = recording_trust(name, model, trust, one)
+        rows.append(
+            (seen.coverage, seen.width / seen.rmsd, seen.width / spread, seen.inside)
+        )
+    return rows
+
+
+def show(name: str, rows: Sequence[Row]) -> None:
+    """One line of the table."""
+    table = np.array(rows)
+    coverage, per_error, per_spread, within = table.T
+    print(
+        f"{name:34}{len(table):11d}{coverage.mean():10.3f}{np.quantile(coverage, 0.1):11.2f}"
+        f"{np.median(per_error):12.1f}{np.median(per_spread):13.3f}{within.mean():8.2f}",
+        flush=True,
+    )
+
+
+def plants(count: int, first: int, who_judges: Sequence[str]) -> None:
+    """Random plants, right and wrong structure in turn."""
+    found: dict[tuple[str, str, str], list[Row]] = {}
+    wrong = STRUCTURES[1:]
+    for number in range(count):
+        structure = "right" if number % 2 == 0 else wrong[number // 2 % len(wrong)]
+        rng = np.random.default_rng(first + number)
+        order = [str(one) for one in rng.permutation(INPUTS)]
+        kinds = [order[0]] * 5 + [order[1], order[1], order[2]]
+        recordings = plant_recordings(first + number, structure, kinds)
+        options = FitOptions(units=int(rng.choice([5, 10])))
+        model = fit(recordings[:1], ORDERS, options)
+        if model.model is None:
+            continue
+        word = "right" if structure == "right" else "wrong"
+        for who in who_judges:
+            places = JUDGES[who]
+            judges = [recordings[place] for place in places]
+            others = recordings[7:] if 5 in places else recordings[5:]
+            for kind, tests in (("same", recordings[3:5]), ("other", others)):
+                rows = judged("", model, recordings[:1], judges, tests)
+                found.setdefault((who, word, kind), []).extend(rows)
+    print(f"\n{count} random plants from seed {first}\n{HEAD}")
+    for (who, word, kind), rows in found.items():
+        show(f"{who}, {word}, {kind}", rows)
+
+
+def hsm150() -> list[Row]:
+    """The first repeat of each level is the model's, the second judges, the third tests."""
+    recordings = {}
+    for path in sorted((folder() / "hsm150_motor").glob("*.mat")):
+        rows = loadmat(path)["data"]
+        u, y = (
+            rows[: rows.shape[0] // 20 * 20, at].reshape(-1, 20).mean(axis=1)
+            for at in (6, 3)
+        )
+        step = 20 * float(np.median(np.diff(rows[:, 0])))
+        recordings[path.stem] = Recording(path.stem, u, y, step)
+    found = []
+    options = FitOptions(units=3, initial_state="steady")
+    for name, own in recordings.items():
+        if not name.endswith("_1"):
+            continue
+        sign = re.match("idf_[a-z]+", name)[0]
+        same = [k for k in recordings if k.startswith(sign) and k != name]
+        judges = [recordings[k] for k in same if k.endswith("_2")]
+        tests = [recordings[k] for k in same if k.endswith("_3")]
+        model = fit([own], Orders(1, 1, 1), options)
+        found += judged(name, model, [own], judges, tests)
+    return found
+
+
+def public(benchmark: Callable) -> list[Row]:
+    """Official splits: the training recordings are the model's, nothing else judges."""
+    data = benchmark(folder())
+    found = []
+    for place, own in enumerate(data.train):
+        options = FitOptions(units=5)
+        model = fit([own], Orders(2, 3, 1), options)
+        exam = data.exams[place]
+        whole = exam.recording
+        # Where the exam goes on from the training, its beginning has been seen.
+        unseen = replace(
+            whole, input=whole.input[exam.known :], output=whole.output[exam.known :]
+        )
+        found += judged(own.name, model, [own], [], [unseen])
+    return found
+
+
+def gun() -> dict[str, list[Row]]:
+    """Steps and sines of the virtual gun: models of a step, judged by other steps."""
+    names = [f"step_{k:02d}" for k in range(1, 16)] + [
+        f"sine_{k:02d}" for k in range(1, 24)
+    ]
+    machine = replace(GunMachine(), plan=replace(GunPlan(), only=tuple(names)))
+    raws = [
+        RawRecording(
+            one.name, one.input, one.output, machine.plan.sample_time_s, one.kind
+        )
+        for one in simulate_machine(machine)
+    ]
+    recipe = CalibrateOptions(
+        step=("cut", "output_offset"),
+        sine=("cut", "input_offset", "output_offset", "recut"),
+        samples=7500,
+    )
+    recordings = {one.name: one for one in calibrate_all(raws, recipe)[0]}
+    rng = np.random.default_rng(26)
+    found: dict[str, list[Row]] = {}
+    steps = names[:15]
+    for own in steps:
+        others = [str(one) for one in rng.permutation([n for n in steps if n != own])]
+        model = fit([recordings[own]], Orders(3, 4, 1))
+        tests = {
+            "same": others[2:6],
+            "other": [str(one) for one in rng.permutation(names[15:])[:4]],
+        }
+        for kind, chosen in tests.items():
+            unseen = [recordings[one] for one in chosen]
+            for count in (2, 8):
+                # The four after the first two are the tests.
+                names_of_judges = [*others[:2], *others[6:]][:count]
+                judges = [recordings[one] for one in names_of_judges]
+                rows = judged(own, model, [recordings[own]], judges, unseen)
+                found.setdefault(f"{kind}, {count} judges", []).extend(rows)
+    return found
+
+
+def main() -> None:
+    """Print the tables."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--plants", type=int, default=320)
+    parser.add_argument("--choose", action="store_true")
+    parser.add_argument(
+        "--judges", choices=list(JUDGES), nargs="+", default=list(JUDGES)
+    )
+    parser.add_argument("--only", choices=["plants", "real", "gun"])
+    chosen = parser.parse_args()
+    if chosen.only in (None, "plants"):
+        plants(chosen.plants, CHOOSING if chosen.choose else REPORTING, chosen.judges)
+    if chosen.only in (None, "real"):
+        print(f"\nmeasured\n{HEAD}")
+        if folder().is_dir():
+            show("HSM150", hsm150())
+            show("CED", public(ced))
+            show("cascaded tanks", public(tanks))
+        else:
+            print("no data: set HWID_REALDATA")
+    if chosen.only in (None, "gun"):
+        print(f"\nvirtual gun\n{HEAD}")
+        for kind, rows in gun().items():
+            show(f"models of a step, {kind}", rows)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,232 @@
+import csv
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from scipy.signal import lfilter
+
+from hwid_cli.cli.main import main
+from hwid_cli.drive.simulation import simulate_drive
+from hwid_cli.records.recordings import Recording
+from tests.diagnosis.small_drive import DRIVE
+from tests.stages.test_diagnose import slow_ramps
+
+N, STEP_S = 400, 0.01
+LIMITS = "next: {limits: {amplitude: 2.0, rate: 100, duration_s: 4.0}}\n"
+HEAD = (
+    "name: bench\n"
+    "recordings:\n"
+    "  files: raw/*.csv\n"
+    "  columns: {time: t, input: u, output: y}\n"
+    "orders: {nb: [1, 2, 3], nk: [1, 2, 3]}\n"
+    "fit: {input_map: none, output_map: none}\n"
+)
+
+
+def measure(folder, name, u):
+    """What a drive of the first order would answer, with noise of its own."""
+    rng = np.random.default_rng(len(name))
+    y = lfilter([0.0, 0.2], [1.0, -0.8], u) + 0.01 * rng.standard_normal(u.size)
+    folder.mkdir(exist_ok=True)
+    rows = np.column_stack([STEP_S * np.arange(u.size), u, y])
+    head = {"header": "t,u,y", "comments": ""}
+    np.savetxt(folder / f"{name}.csv", rows, delimiter=",", **head)
+
+
+@pytest.fixture
+def bench(tmp_path):
+    u = np.zeros(N)
+    u[40:] = 0.5
+    measure(tmp_path / "raw", "small_step", u)
+    return tmp_path
+
+
+def run(bench, text, *more):
+    config = bench / "bench.yaml"
+    config.write_text(HEAD + text)
+    asked = ["next", str(config), "--out", str(bench / "out"), "--jobs", "1", *more]
+    return CliRunner().invoke(main, asked)
+
+
+def proposals(bench):
+    with (bench / "out" / "next.csv").open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def played(bench, row):
+    return np.loadtxt(bench / "out" / row["file"], delimiter=",", skiprows=1)
+
+
+def test_proposed_inputs_are_ready_to_play_and_say_why(bench):
+    result = run(bench, LIMITS)
+
+    assert result.exit_code == 0, result.output
+    rows = proposals(bench)
+    assert [row["rank"] for row in rows] == ["1", "2", "3"]
+    assert float(rows[0]["gain"]) >= float(rows[1]["gain"])
+    assert "more of the amplitudes and frequencies" in rows[0]["reason"]
+    time, values = played(bench, rows[0]).T
+    assert np.allclose(np.diff(time), STEP_S)
+    assert np.abs(values).max() <= 2.0
+    content = json.loads((bench / "out" / "next.json").read_text())
+    assert content["goal"] == "coverage"
+    assert content["proposals"][0]["name"] == rows[0]["name"]
+    assert not content["is_enough"]
+
+
+def test_the_loop_takes_up_what_was_recorded_and_ends(bench):
+    said = run(bench, LIMITS.replace("next: {", "next: {enough: 0.1, "))
+    known = [json.loads((bench / "out" / "next.json").read_text())["known"]]
+    for _ in range(8):
+        rows = proposals(bench)
+        if not rows:
+            break
+        for row in rows:
+            measure(bench / "raw", row["name"], played(bench, row)[:, 1])
+        said = run(bench, LIMITS.replace("next: {", "next: {enough: 0.1, "))
+        assert said.exit_code == 0, said.output
+        assert "New since the last proposal: " in flat(said.output)
+        assert all(f"{row['name']} (proposed)" in flat(said.output) for row in rows)
+        known.append(json.loads((bench / "out" / "next.json").read_text())["known"])
+
+    assert "nough is known" in flat(said.output)
+    assert known == sorted(known)
+    assert known[-1] > known[0]
+    # The inputs of earlier proposals are gone.
+    assert list((bench / "out" / "next").glob("*.csv")) == []
+
+
+def flat(text):
+    return " ".join(text.split())
+
+
+def test_an_unchanged_folder_answers_from_the_results(bench):
+    run(bench, LIMITS)
+    before = (bench / "out" / "next.csv").read_bytes()
+
+    again = run(bench, LIMITS)
+
+    assert "unchanged since the last run" in again.output
+    assert (bench / "out" / "next.csv").read_bytes() == before
+
+
+def test_check_counts_what_is_on_offer_and_refuses_a_bad_plan(bench):
+    config = bench / "bench.yaml"
+    config.write_text(HEAD + "next: {plan: plan.csv}\n")
+    asked = ["check", str(config), "--out", str(bench / "out"), "--no-timing"]
+    head = "name,kind,amplitude,frequency_Hz,duration_s\n"
+    (bench / "plan.csv").write_text(f"{head}a,sine,1,2,4\nb,sine,1,5,4\n")
+
+    said = CliRunner().invoke(main, asked)
+    assert said.exit_code == 0, said.output
+    assert "2 inputs on offer, for coverage" in said.output
+    (bench / "plan.csv").write_text(f"{head}a,saw,1,2,4\n")
+    refused = CliRunner().invoke(main, asked)
+
+    assert refused.exit_code == 1
+    assert "plan.csv, row 2: kind: found 'saw'" in refused.stderr
+
+
+def test_a_plan_is_chosen_from(bench):
+    (bench / "plan.csv").write_text(
+        "name,kind,amplitude,frequency_Hz,duration_s\n"
+        "same,step,0.5,,4\n"
+        "small_step,step,2,,4\n"
+        "fast,sine,2,10,4\n"
+    )
+    result = run(bench, "next: {plan: plan.csv, number: 1}\n")
+
+    assert result.exit_code == 0, result.output
+    # One of the plan was recorded already; one tells what is known.
+    assert [row["name"] for row in proposals(bench)] == ["fast"]
+
+
+def test_parameters_ask_for_a_recording_that_excites_them(bench):
+    (bench / "plan.csv").write_text(
+        "name,kind,amplitude,frequency_Hz,duration_s\n"
+        "tiny,step,0.01,,4\n"
+        "rich,sine,1,3,4\n"
+    )
+    result = run(bench, "identify:\nnext: {plan: plan.csv, goal: parameters}\n")
+
+    assert result.exit_code == 0, result.output
+    assert [row["name"] for row in proposals(bench)] == ["rich"]
+    assert "standard errors" in proposals(bench)[0]["reason"]
+
+
+DIAGNOSIS = """name: bench
+recordings:
+  files: raw/*.csv
+  columns: {time: t, input: u, output: y}
+simulation: {kind: drive, mass_kg: 0.3, damping_N_s_per_m: 15.0,
+  stiffness_N_per_m: 1184.0, force_constant_N_per_A: 5.0}
+diagnose: {effects: [actuator_lag, input_delay], max_effects: 1}
+next: {goal: diagnosis, number: 1,
+  limits: {amplitude: 4.0, rate: 2000, duration_s: 0.4}}
+"""
+
+
+def write_recording(folder, one):
+    folder.mkdir(exist_ok=True)
+    time = one.sample_time_s * np.arange(one.n_samples)
+    rows = np.column_stack([time, one.input, one.output])
+    head = {"header": "t,u,y", "comments": ""}
+    np.savetxt(folder / f"{one.name}.csv", rows, delimiter=",", **head)
+
+
+def test_a_proposed_recording_tells_two_candidates_apart(tmp_path):
+    noise = 4e-4
+    for one in slow_ramps(noise):
+        write_recording(tmp_path / "raw", one)
+    config = tmp_path / "bench.yaml"
+    config.write_text(DIAGNOSIS)
+    asked = ["next", str(config), "--out", str(tmp_path / "out"), "--jobs", "1"]
+
+    first = CliRunner().invoke(main, asked)
+    assert first.exit_code == 0, first.output
+    (row,) = proposals(tmp_path)
+    assert "times the noise" in row["reason"]
+    assert float(row["gain"]) > 0.1
+    u = played(tmp_path, row)[:, 1]
+    lagging = replace(DRIVE, effects={"actuator_lag": {"time_constant_s": 0.002}})
+    y = simulate_drive(u, lagging, sample_time_s=1e-3).output
+    y = y + noise * np.random.default_rng(9).standard_normal(u.size)
+    write_recording(tmp_path / "raw", Recording(row["name"], u, y, 1e-3))
+    second = CliRunner().invoke(main, asked)
+
+    assert second.exit_code == 0, second.output
+    assert f"new since the last proposal: {row['name']}" in flat(second.output).lower()
+    diagnosis = json.loads((tmp_path / "out" / "diagnosis.json").read_text())
+    assert (diagnosis["verdict"], diagnosis["effects"][0]["id"]) == (
+        "named",
+        "actuator_lag",
+    )
+    assert "nough is known: the diagnosis says 'named'" in flat(second.output)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", "next: the section is missing; expected what could be recorded"),
+        ("next:\n", "next.plan: missing; expected either plan"),
+        ("next: {plan: p.csv, limits: {amplitude: 1, rate: 1, duration_s: 1}}\n",
+         "next.plan: found 'p.csv'; expected either plan"),
+        ("next: {plan: p.csv, goal: parameters}\n",
+         "next.goal: found 'parameters'; expected coverage, or a section identify:"),
+        ("next: {plan: p.csv, goal: diagnosis}\n",
+         "next.goal: found 'diagnosis'; expected coverage, or a section simulation:"),
+        ("next: {plan: p.csv, goal: speed}\n", "next.goal: found 'speed'"),
+        ("next: {limits: {amplitude: 6, rate: 1, duration_s: 0.1}}\n",
+         "next.limits: found amplitude 6 A, rate 1 A/s and 0.1 s"),
+        ("next: {limits: {amplitude: -6, rate: 1, duration_s: 1}}\n",
+         "next.limits.amplitude: found -6"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_proposed_is_one_line(bench, text, said):
+    result = run(bench, text, "-q")
+
+    assert result.exit_code == 1
+    assert said in result.stderr
+    assert result.stderr.count("\n") == 1

@@ -1,0 +1,107 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hwid_cli.records.next import InputMap, NextRecordings, ProposedRecording
+from hwid_cli.records.report import ReportContents, StoredResults
+from hwid_cli.records.trust import RecordingTrust, ShownBand, TrustOnTests
+from hwid_cli.report.figures.next import band_figure, visited_figure
+from hwid_cli.report.page import images_of
+from hwid_cli.report.sections.next import trust_section
+from hwid_cli.report.table import Table, Text
+from tests.report.report_examples import final_test
+
+TIME = np.linspace(0.0, 1.0, 50)
+ROW = RecordingTrust("a/1/2", "step_14", 0.9, 0.8, 0.7, 0.6, 0.93, 0.04, 0.01)
+SHOWN = ShownBand(
+    "a/1/2", "step_14", TIME, np.sin(TIME), np.sin(TIME) + 0.01, np.sin(TIME) - 0.02,
+    np.sin(TIME) + 0.04, TIME < 0.5, "m",
+)  # fmt: skip
+
+
+def input_map():
+    visited = np.outer(np.linspace(1.0, 0.1, 11), np.ones(12))
+    octaves = 500.0 / 2.0 ** np.arange(11)
+    edges = np.linspace(-1.0, 1.0, 13)
+    return InputMap(octaves, edges, visited, 1.5 * visited, 2.0 * visited)
+
+
+def found(**changes):
+    proposal = ProposedRecording(
+        "step_p100",
+        "a positive step",
+        np.ones(5),
+        0.2,
+        "share visited",
+        "visits 20% more",
+    )
+    return replace(
+        NextRecordings(
+            "coverage", ("a",), 0.5, "visited", False, "50% visited", (proposal,),
+            input_map(), 20, 0.01, "A",
+        ),
+        **changes,
+    )  # fmt: skip
+
+
+def section(final=None, proposed=None):
+    results = {"test": final, "next": proposed}
+    return trust_section(
+        ReportContents(StoredResults("a", "{}", "poles", results=results))
+    )
+
+
+def words(blocks):
+    return " ".join(one.text for one in blocks if isinstance(one, Text))
+
+
+def test_without_results_the_section_says_what_to_run():
+    text = words(section().blocks)
+
+    assert "run 'hwid test CONFIG'" in text
+    assert "run 'hwid next CONFIG'" in text
+
+
+@pytest.mark.usefixtures("blank_figures")
+def test_bands_and_proposals_are_tables_with_a_figure_each():
+    final = replace(final_test(), trust=TrustOnTests((ROW,), SHOWN))
+    blocks = section(final, found(changed="new: b")).blocks
+
+    tables = [one for one in blocks if isinstance(one, Table)]
+    assert tables[0].rows[0][:2] == ("a/1/2", "step_14")
+    assert tables[1].rows[0][1] == "step_p100"
+    assert [one.file for one in images_of(blocks)] == [
+        "next/band.png",
+        "next/visited.png",
+    ]
+    assert "New: b." in words(blocks)
+    sentence = next(one.sentence for one in blocks if one.kind == "figures")
+    assert "holds 93% of what was measured" in sentence
+    assert "60% of the samples rest on data" in sentence
+
+
+def test_enough_is_said_without_a_table():
+    blocks = section(
+        None, found(proposals=(), is_enough=True, sentence="enough")
+    ).blocks
+
+    assert "Enough." in words(blocks)
+    assert not [one for one in blocks if isinstance(one, Table)]
+
+
+def test_the_strip_is_green_where_the_prediction_rests_on_data():
+    figure = band_figure(SHOWN)
+    strip = figure.axes[1]
+    first, second = (one.get_paths()[0].get_extents() for one in strip.collections)
+
+    # Green over the first half, red over the second.
+    assert first.x1 <= 0.55
+    assert second.x0 >= 0.45
+
+
+def test_the_map_draws_visited_below_proposed_below_on_offer():
+    axes = visited_figure(input_map(), "A").axes[0]
+    heights = [line.get_ydata().max() for line in axes.lines]
+
+    assert heights == [2.0, 1.5, 1.0]

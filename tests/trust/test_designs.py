@@ -1,0 +1,58 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hwid_cli.trust.designs import designs
+
+
+@given(
+    st.floats(1e-3, 1e3),
+    st.floats(1.0, 1e4),
+    st.floats(0.1, 20.0),
+    st.sampled_from([1e-3, 5e-3, 0.02]),
+)
+def test_no_design_leaves_its_limits(amplitude, relative_rate, duration_s, step_s):
+    rate = amplitude * relative_rate
+    for one in designs(amplitude, rate, duration_s, step_s, "A"):
+        # Sums of a few thousand rounded steps.
+        assert np.abs(one.values).max() <= amplitude * (1 + 1e-9)
+        assert np.abs(np.diff(one.values)).max() <= rate * step_s * (1 + 1e-9)
+        assert one.values.size == round(duration_s / step_s)
+
+
+def test_all_kinds_are_designed_and_named_once():
+    found = designs(6.0, 50.0, 7.5, 1e-3, "A")
+    names = [one.name for one in found]
+
+    assert len(set(names)) == len(names)
+    assert {name.split("_")[0] for name in names} == {
+        "step", "levels", "multisine", "sweep"
+    }  # fmt: skip
+
+
+def test_designs_begin_and_end_at_rest():
+    for one in designs(6.0, 50.0, 7.5, 1e-3, "A"):
+        assert np.abs(one.values[[0, -1]]).max() < 1e-9
+
+
+def test_a_sweep_ends_where_its_slope_is_the_rate():
+    (sweep,) = [
+        one for one in designs(2.0, 50.0, 10.0, 1e-3, "A") if one.name == "sweep_100"
+    ]
+
+    # 50 / (2 pi 2) Hz, but for the window at its end.
+    assert "to 3.98 Hz" in sweep.words
+    assert 0.6 * 50.0 < np.abs(np.diff(sweep.values)).max() / 1e-3 <= 50.0
+
+
+@pytest.mark.parametrize("limits", [(6.0, 50.0, 0.04), (6.0, 1e-3, 5.0)])
+def test_limits_within_which_nothing_moves_have_no_designs(limits):
+    assert designs(*limits, 1e-3, "A") == ()
+
+
+def test_every_call_makes_the_same_inputs():
+    first, second = (designs(6.0, 50.0, 2.0, 1e-3, "A") for _ in range(2))
+
+    for one, other in zip(first, second, strict=True):
+        assert np.array_equal(one.values, other.values)
