@@ -13,6 +13,7 @@ from hwid_cli.config.faults import (
     wrong,
     wrong_word,
 )
+from hwid_cli.config.own_effects import own_values_faults
 from hwid_cli.drive.catalogue import (
     CATALOGUE,
     configured_effects,
@@ -110,7 +111,19 @@ def effect_faults(experiment: Experiment) -> Iterator[Fault]:
     if experiment.simulation is not None:
         place = ("simulation", "effects")
         entries: set[str] = set()
+        own = experiment.own_effects
         for name, parameters in experiment.simulation.effects.items():
+            if name in own:
+                yield from own_values_faults(name, own[name], parameters, place)
+                continue
+            if public_id(name) in own:
+                yield Fault(
+                    place, f"{public_id(name)} is listed twice", step="remove one"
+                )
+                continue
+            if public_id(name) not in configured_effects() and own:
+                yield wrong_word(place, public_id(name), [*own, *configured_effects()])
+                continue
             faults = list(_effect(name, parameters, place))
             yield from faults
             entry = None if faults else entry_of(name, parameters)
@@ -202,8 +215,9 @@ def named_effect_faults(experiment: Experiment) -> Iterator[Fault]:
     """Effects that a diagnosis may name, but that there are not."""
     options = experiment.diagnose
     for effect in (options and options.effects) or ():
-        if effect not in configured_effects():
-            yield wrong_word(("diagnose", "effects"), effect, configured_effects())
+        known = [*experiment.own_effects, *configured_effects()]
+        if effect not in known:
+            yield wrong_word(("diagnose", "effects"), effect, known)
 
 
 def held_out_faults(experiment: Experiment) -> Iterator[Fault]:

@@ -66,6 +66,7 @@ from hwid_cli.drive.simulation import drive_effects
 from hwid_cli.records.candidates import CandidateFit
 from hwid_cli.records.diagnosis import Diagnosis, NoiseFloor
 from hwid_cli.records.experiment import DiagnoseOptions, SimulationOptions
+from hwid_cli.records.own_effects import own_ids
 from hwid_cli.records.recordings import Recording
 
 # A line that takes this share of what the base leaves is no colour of noise.
@@ -266,9 +267,10 @@ def allowed_effects(
     has_spring = problem.drive.stiffness_N_per_m > 0
     has_circuit = problem.drive.resistance_ohm is not None
     several = len(problem.part(held_out=False).signals) > 2
+    own = {one: CATALOGUE[one] for one in own_ids(options.own_effects)}
     return tuple(
         name
-        for name, effect in CATALOGUE.items()
+        for name, effect in {**CATALOGUE, **own}.items()
         if (wanted is None or public_id(name) in wanted)
         # A second one waits for the first.
         and may_be_added(name, {*present, effect.beside})

@@ -36,6 +36,7 @@ from hwid_cli.records.diagnosis import (
     RecordingGap,
 )
 from hwid_cli.records.drive import BASE_PARAMETERS, Drive
+from hwid_cli.records.own_effects import is_own
 
 MOST_OVERLAYS = 4
 
@@ -231,8 +232,11 @@ def _fitted_effects_of(
     for one, value, (low, high) in zip(found.names, found.values, ends, strict=True):
         if one.owner in parameters:
             parameters[one.owner].append(
-                FittedParameter(one.parameter, float(value), float(low), float(high))
-            )
+                FittedParameter(
+                    one.parameter, float(value), float(low), float(high),
+                    unit=_unit_of(one),
+                )
+            )  # fmt: skip
     for identifier in ids:
         entry = CATALOGUE[identifier]
         for name, word in entry.words.items():
@@ -246,11 +250,17 @@ def _fitted_effects_of(
     return tuple(_described(one, parameters[one]) for one in ids)
 
 
+def _unit_of(ref: ParameterRef) -> str:
+    parameters = CATALOGUE[ref.owner].parameters
+    return next(one.unit for one in parameters if one.name == ref.parameter)
+
+
 def _described(identifier: str, parameters: Sequence[FittedParameter]) -> FittedEffect:
     entry = CATALOGUE[identifier]
     return FittedEffect(
-        public_id(identifier), entry.sentence, entry.equation, tuple(parameters)
-    )
+        public_id(identifier), entry.sentence, entry.equation, tuple(parameters),
+        own=identifier if is_own(identifier) else "",
+    )  # fmt: skip
 
 
 def _spread(factors: np.ndarray) -> FittedParameter:

@@ -23,6 +23,8 @@ class FittedParameter:
         Bounds of the interval; NaN where there is none.
     text : str
         In place of a number where the parameter is a word; else empty.
+    unit : str
+        Where the name does not say it.
     """
 
     name: str
@@ -30,6 +32,7 @@ class FittedParameter:
     low: float = float("nan")
     high: float = float("nan")
     text: str = ""
+    unit: str = field(default="", metadata=ADDED_LATER)
 
 
 @dataclass(frozen=True)
@@ -40,12 +43,15 @@ class FittedEffect:
     ----------
     sentence : str
         In plain words.
+    own : str
+        Where it is one of the user's own: the id that holds its formula.
     """
 
     id: str
     sentence: str
     equation: str
     parameters: tuple[FittedParameter, ...]
+    own: str = field(default="", metadata=ADDED_LATER)
 
 
 @dataclass(frozen=True)

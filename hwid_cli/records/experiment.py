@@ -11,6 +11,7 @@ from hwid_cli.records.drive import HOLDS, OUTPUTS, STARTS, Controller, Repeatabl
 from hwid_cli.records.machines import GunMachine, ServoMachine
 from hwid_cli.records.maps import MAP_KINDS
 from hwid_cli.records.model import FitOptions
+from hwid_cli.records.own_effects import OwnEffect
 from hwid_cli.records.programs import (
     CommandSimulation,
     FmuSimulation,
@@ -273,7 +274,13 @@ class SimulationOptions:
 
 @dataclass(frozen=True)
 class DiagnoseOptions:
-    """What diagnosis may use."""
+    """What diagnosis may use.
+
+    Parameters
+    ----------
+    own_effects : dict of str to OwnEffect
+        Formulas that are tried beside the catalogue; a section of their own in a file.
+    """
 
     recordings: _Names = None
     hold_out: Annotated[
@@ -288,6 +295,7 @@ class DiagnoseOptions:
     max_effects: Annotated[int, Integer(least=0), FileLimit(1000)] = 3
     initial_state: Annotated[str, OneOf(STARTS)] = "rest"
     skip_samples: Annotated[int, Integer(least=0)] = 0
+    own_effects: dict[str, OwnEffect] = field(default_factory=dict, metadata=NO_KEY)
 
 
 @dataclass(frozen=True)
@@ -324,6 +332,7 @@ class Experiment:
         | ModelSimulation
         | None
     ) = None
+    own_effects: dict[str, OwnEffect] = field(default_factory=dict)
     diagnose: DiagnoseOptions | None = None
     thesis_names: bool = False
 

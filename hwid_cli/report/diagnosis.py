@@ -101,7 +101,7 @@ def effects_table(diagnosis: Diagnosis) -> Table:
         name = effect.id
         for parameter in effect.parameters:
             quantity, unit = quantity_and_unit(parameter.name)
-            unit = unit_of_effect(
+            unit = parameter.unit or unit_of_effect(
                 effect.id, unit, axis=diagnosis.axis, output=diagnosis.output
             )
             value = parameter.text or _value(parameter.value, parameter.name)

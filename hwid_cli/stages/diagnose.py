@@ -57,7 +57,7 @@ from hwid_cli.tasks.runner import RunSettings, Workers, run_tasks
 from hwid_cli.tasks.task import Task, one_thread
 
 NAME = "diagnose"
-STAGE_VERSION = 3
+STAGE_VERSION = 4
 
 
 def diagnosis_key(
@@ -151,7 +151,10 @@ def extended_options(
     """
     base: dict[str, Any] = {one.name: one.after for one in diagnosis.base}
     effects = [
-        (effect.id, {one.name: one.text or one.value for one in effect.parameters})
+        (
+            effect.own or effect.id,
+            {one.name: one.text or one.value for one in effect.parameters},
+        )
         for effect in (*diagnosis.present, *diagnosis.effects)
     ]
     return replace(
@@ -282,6 +285,7 @@ def choose(context: Context) -> ToDiagnose:
     experiment = context.experiment
     simulation = _simulation(experiment)
     options = experiment.diagnose or DiagnoseOptions()
+    options = replace(options, own_effects=experiment.own_effects)
     place = f"{experiment.source}: diagnose"
     recordings = select_recordings(
         context.results["calibrate"].recordings,

@@ -181,7 +181,10 @@ def extended_foreign(
 ) -> ForeignSimulation:
     """The section with the effects that were found and the fitted parameters."""
     effects = [
-        (effect.id, {one.name: one.text or one.value for one in effect.parameters})
+        (
+            effect.own or effect.id,
+            {one.name: one.text or one.value for one in effect.parameters},
+        )
         for effect in (*diagnosis.present, *diagnosis.effects)
     ]
     changes: dict[str, Any] = {"effects": told_apart(effects)}

@@ -214,7 +214,11 @@ def _effect(effect: FittedEffect) -> dict[str, Any]:
         "sentence": effect.sentence,
         "equation": effect.equation,
         "parameters": {
-            one.name: {"value": one.text or one.value, "ci95": _interval(one)}
+            one.name: {
+                "value": one.text or one.value,
+                "ci95": _interval(one),
+                **({"unit": one.unit} if one.unit else {}),
+            }
             for one in effect.parameters
         },
     }
