@@ -40,8 +40,8 @@ def own_effect_faults(experiment: Experiment) -> Iterator[Fault]:
                 "a name of its own",
                 f"rename it, such as own_{name}",
             )
-        elif fault or not name[0].isalpha() or name == "law":
-            why = fault or "a letter first, and not the word law"
+        elif fault or not name[0].isalpha():
+            why = fault or "a letter first"
             yield wrong(place, name, f"a name of letters, digits and _: {why}")
         else:
             yield from _formula_faults(effect, units, place)

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from functools import cache
 
 from hwid_cli.data.units import base_exponents
-from hwid_cli.drive.formula import Node, as_text
+from hwid_cli.drive.formula import CONSTANTS, Node, as_text
 
 # Exponents of kg, m, s and A; None for what fits any.
 Unit = tuple[float, ...] | None
@@ -40,9 +40,10 @@ def unit_of(node: Node, units: Mapping[str, Unit]) -> Unit:
         Naming the parts that do not.
     """
     if node.is_number:
-        return PLAIN
+        # Nothing is nothing in any unit.
+        return PLAIN if node.value else None
     if node.is_name:
-        return units[node.name]
+        return PLAIN if node.name in CONSTANTS else units[node.name]
     found = [unit_of(one, units) for one in node.parts]
     if node.name in _ANY_TO_PLAIN:
         return PLAIN

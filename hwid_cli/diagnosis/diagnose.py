@@ -24,6 +24,7 @@ from hwid_cli.diagnosis.causes import fit_with_input_noise, without_repeats
 from hwid_cli.diagnosis.findings import Findings, describe
 from hwid_cli.diagnosis.intervals import unclear_effects
 from hwid_cli.diagnosis.latent_force import Smoothed, latent_force
+from hwid_cli.diagnosis.laws import find_law
 from hwid_cli.diagnosis.noise import noise_floor
 from hwid_cli.diagnosis.parameters import (
     compare_at,
@@ -152,10 +153,14 @@ def find(
     found = _search(rounds, given_sse, force, options.max_effects)
     on_round("verdict", 0)
     verdict = _decided(rounds, given_sse, found)
+    law = None
+    # Who asks for some effects only wants no formula instead.
+    if not options.effects:
+        verdict, found, law = find_law(rounds, before, force, found, verdict)
     return Findings(
         problem=problem, criteria=criteria, scales=scales, given_sse=given_sse,
         base=base, before=before, force=force, where=where,
-        found=found, verdict=verdict,
+        found=found, verdict=verdict, law=law,
     )  # fmt: skip
 
 

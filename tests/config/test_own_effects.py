@@ -51,7 +51,7 @@ def with_formula(text, **units):
         (content(with_formula("-a*x^3", a="N/m")), "force_N: found 'a \\* x \\^ 3'|found .*; expected numbers, names.*a power is written"),
         (content(with_formula("open('x')", a="N")), "own_effects.mine.force_N: found 'open'; expected one of abs, sign"),
         (content(name="coulomb_friction"), "own_effects.coulomb_friction: is an effect of the catalogue too; expected a name of its own; rename it"),
-        (content(name="law"), "expected a name of letters"),
+        (content(name="2nd"), "expected a name of letters, digits and _: a letter first"),
         (content({"force_N": "-a*x"}), "own_effects.mine.parameters: missing; expected at least one parameter"),
         (content({"parameters": {"a": {}}}), "own_effects.mine: found none; expected one of force_N, input and output"),
         (content({"force_N": "a", "output": "x", "parameters": {"a": {}}}), "found force_N and output; expected one of"),

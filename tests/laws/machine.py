@@ -158,6 +158,8 @@ def _slide(states, time, t, state, way, base, force, command, hidden):
         max_step=time[1] - time[0],
         method="RK45",
     )
+    if found.status < 0:
+        raise RuntimeError(found.message)
     if len(found.t):
         states[row : row + len(found.t)] = found.y.T
     if found.status == 1:

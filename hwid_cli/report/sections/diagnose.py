@@ -37,6 +37,7 @@ _ALTS = {
 }
 _VERDICTS = {
     "named": "The gap between simulation and measurement has a name.",
+    "law": "No effect of the catalogue is missing, but a formula describes what is.",
     "ambiguous": "Several effects explain the gap equally well.",
     "parameters": "No effect is missing: the simulation's parameters were off.",
     "unknown": "There is a gap that no known effect explains.",
