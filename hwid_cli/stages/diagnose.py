@@ -20,7 +20,7 @@ from hwid_cli.records.check import StagePlan
 from hwid_cli.records.diagnosis import Diagnosis
 from hwid_cli.records.drive import DriveResponse, told_apart
 from hwid_cli.records.experiment import DiagnoseOptions, Experiment, SimulationOptions
-from hwid_cli.records.programs import ForeignSimulation
+from hwid_cli.records.programs import ForeignSimulation, ModelSimulation
 from hwid_cli.records.recordings import CalibrationLog, Recording
 from hwid_cli.report import plots
 from hwid_cli.report.diagnosis import diagnosis_blocks
@@ -35,6 +35,7 @@ from hwid_cli.stages.foreign_simulation import (
     placed,
     simulated,
     simulator_of,
+    uncovered_by,
 )
 from hwid_cli.stages.selection import select_recordings
 from hwid_cli.stages.simulation_units import (
@@ -287,9 +288,13 @@ def choose(context: Context) -> ToDiagnose:
     options = experiment.diagnose or DiagnoseOptions()
     options = replace(options, own_effects=experiment.own_effects)
     place = f"{experiment.source}: diagnose"
+    names = options.recordings
+    if names is None:
+        known = [one.name for one in context.results["calibrate"].recordings]
+        names = uncovered_by(simulation, known)
     recordings = select_recordings(
         context.results["calibrate"].recordings,
-        options.recordings,
+        names,
         key=f"{place}.recordings",
     )
     if not isinstance(options.hold_out, str):
@@ -324,7 +329,16 @@ def _warnings(context: Context, given: ToDiagnose) -> list[str]:
     """What the units are taken for, and which recordings cannot start in equilibrium."""
     recordings, simulation, options = given.recordings, given.simulation, given.options
     if not isinstance(simulation, SimulationOptions):
-        return [_announcement(simulation)]
+        said = [_announcement(simulation)]
+        total = len(context.results["calibrate"].recordings)
+        if options.recordings is None and len(recordings) < total:
+            shown = ", ".join(one.name for one in recordings)
+            said.append(
+                f"diagnosed are the {len(recordings)} of {total} recordings that "
+                f"{getattr(simulation, 'name', '')} does not cover: {shown}; "
+                "diagnose.recordings names others"
+            )
+        return said
     said = [
         assumed_units(given.experiment, recordings, given.logs),
         doubtful_sizes(given.experiment, recordings, simulation, options, given.logs),
@@ -361,6 +375,8 @@ def _announcement(simulation: ForeignSimulation) -> str:
     what = getattr(simulation, "file", "") or " ".join(
         getattr(simulation, "command", ())
     )
+    if isinstance(simulation, ModelSimulation) and simulation.name:
+        what = f"the model {simulation.name}"
     runs = f"runs {what}" if able.run and what else "runs nothing of yours"
     return f"simulation.kind {simulation.kind}: {runs}; it can be given {words}"
 
