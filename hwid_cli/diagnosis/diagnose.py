@@ -155,7 +155,8 @@ def find(
     verdict = _decided(rounds, given_sse, found)
     law = None
     # Who asks for some effects only wants no formula instead.
-    if not options.effects:
+    is_open = options.laws == "auto" and options.effects is None
+    if is_open or options.laws == "only":
         verdict, found, law = find_law(rounds, before, force, found, verdict)
     return Findings(
         problem=problem, criteria=criteria, scales=scales, given_sse=given_sse,
@@ -267,7 +268,7 @@ def allowed_effects(
     problem: DiagnosisProblem, options: DiagnoseOptions
 ) -> tuple[str, ...]:
     """Ids that may be named: those asked for that make sense for this drive."""
-    wanted = options.effects
+    wanted = () if options.laws == "only" else options.effects
     present = drive_effects(problem.drive)
     has_spring = problem.drive.stiffness_N_per_m > 0
     has_circuit = problem.drive.resistance_ohm is not None

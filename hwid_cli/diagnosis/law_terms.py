@@ -32,6 +32,7 @@ class Term:
         Of m, s and the input's unit in it.
     shape : mapping of str to tuple of (float, str)
         Values and units of what is fitted beside the coefficient: thresholds, periods.
+        No unit stands for that of the input.
     family : str
         Terms of one family differ in their shape only.
     """
@@ -183,6 +184,8 @@ def _thresholds(scales: Scales) -> Iterator[Term]:
     for share in _SPEEDS:
         a = {"a": (share * scales.velocity_m_per_s, "m/s")}
         yield Term("Max(abs(v) - a, 0)*sign(v)", (1, -1, 0), a, "beyond a speed")
+        a = {"a": (share * scales.current_A, "")}
+        yield Term("Max(abs(u) - a, 0)*sign(u)", (0, 0, 1), a, "beyond an input")
     yield Term("Heaviside(x)*sign(v)", (0, 0, 0))
     yield Term("Heaviside(v)*v**2", (2, -2, 0))
 

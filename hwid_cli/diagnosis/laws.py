@@ -278,7 +278,8 @@ def _effect(
             # One period or threshold where two terms have the same.
             shape = shapes.setdefault((key, value), f"{key}{len(shapes) + 1}")
             text = _renamed(text, key, shape)
-            parameters[shape] = OwnParameter(shape_unit, positive=True, start=value)
+            stated = shape_unit or source
+            parameters[shape] = OwnParameter(stated, positive=True, start=value)
             values[shape] = value
         parts.append(f"{name}*{text}")
     formula = " + ".join(parts)

@@ -278,6 +278,9 @@ class DiagnoseOptions:
 
     Parameters
     ----------
+    laws : str
+        When a formula is looked for: where all effects may be named and something is
+        left, in place of the catalogue, or never.
     own_effects : dict of str to OwnEffect
         Formulas that are tried beside the catalogue; a section of their own in a file.
     """
@@ -293,6 +296,7 @@ class DiagnoseOptions:
         None
     )
     max_effects: Annotated[int, Integer(least=0), FileLimit(1000)] = 3
+    laws: Annotated[str, OneOf(("auto", "only", "never"))] = "auto"
     initial_state: Annotated[str, OneOf(STARTS)] = "rest"
     skip_samples: Annotated[int, Integer(least=0)] = 0
     own_effects: dict[str, OwnEffect] = field(default_factory=dict, metadata=NO_KEY)

@@ -121,7 +121,10 @@ def test_units_of_all_terms_fit_their_formulas():
     signals = {"x": "m", "v": "m/s", "u": "A", "t": "s"}
     units = {name: base_exponents(unit)[0] for name, unit in signals.items()}
     for term in (*TERMS, *readings(SCALES)):
-        own = {name: base_exponents(unit)[0] for name, (_, unit) in term.shape.items()}
+        own = {
+            name: base_exponents(unit or "A")[0]
+            for name, (_, unit) in term.shape.items()
+        }
         coefficient = base_exponents(coefficient_unit(term, "N", ("m", "A")))[0]
         whole = parsed(f"c*{term.formula}")
         assert names(whole) == {"c", *term.variables, *term.shape}

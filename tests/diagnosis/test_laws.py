@@ -18,7 +18,7 @@ SIMULATION = SimulationOptions(
     force_constant_N_per_A=5.4,
 )
 # The catalogue is left out: it takes a minute to say that it knows nothing of this.
-NOTHING = DiagnoseOptions(effects=())
+NOTHING = DiagnoseOptions(laws="only")
 
 
 def machine(hidden, change=None):
@@ -98,7 +98,7 @@ def test_a_law_that_held_out_recordings_do_not_share_is_refused():
     # Trained on damping that grows to one side, judged on what grows to the other.
     other = Hidden(lambda x, v, u, t, way: 700 * x * v)
     names = ("step_1", "sine_2", "sine_0")
-    options = DiagnoseOptions(effects=(), hold_out=names)
+    options = DiagnoseOptions(laws="only", hold_out=names)
     law = Hidden(lambda x, v, u, t, way: -700 * x * v)
     told = diagnose(machine(law, dict.fromkeys(names, other)), SIMULATION, options)
     assert told.verdict == "unknown"

@@ -159,7 +159,7 @@ def in_turn(tasks, *, keep):
 
 def searched(found):
     """Findings of the program with the catalogue left out."""
-    options = DiagnoseOptions(effects=())
+    options = DiagnoseOptions(laws="only")
     problem = prepare(found, GIVEN, options, held_out_of(found, options))
     return find(problem, options, in_turn, lambda what, total: None)
 
