@@ -402,7 +402,10 @@ def _confirmed(
         other = _best_turn(findings, turn, runs)
         if best is None or other.sse.sum() * _PREFERRED < best.sse.sum():
             best = other
-    if best.tried is None:
+    # A run that is worse than without the effect says nothing of it: a map of the
+    # simulation may cut off what should come through its input.
+    is_worse = float(best.sse.sum()) >= float(findings.base.sse.sum())
+    if best.tried is None or is_worse:
         return findings, values, False
     return _with_run(findings, best), best.tried[1], _is_as_good(findings, best)
 

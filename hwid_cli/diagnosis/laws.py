@@ -258,19 +258,14 @@ def _effect(
     units: tuple[str, str, str],
 ) -> tuple[OwnEffect, dict[str, float]]:
     """Formula, parameters and their values."""
-    force, length, source = units
-    of = {"force": force, "output": "1", "input": source}[acts_on]
+    source = units[2]
     parameters: dict[str, OwnParameter] = {}
     values: dict[str, float] = {}
     parts = []
     shapes: dict[tuple[str, float], str] = {}
     for number, (term, weight) in enumerate(zip(terms, weights, strict=True), start=1):
         name = f"c{number}"
-        unit = (
-            _of_reading(term, (length, source))
-            if acts_on == "output"
-            else coefficient_unit(term, of, (length, source))
-        )
+        unit = _unit(term, acts_on, units)
         parameters[name] = OwnParameter(unit, start=float(weight))
         values[name] = float(weight)
         text = term.formula
@@ -290,11 +285,19 @@ def _effect(
     return OwnEffect(output=f"x + {formula}", parameters=parameters), values
 
 
-def _of_reading(term: Term, units: tuple[str, str]) -> str:
-    """Unit of the coefficient of a term of a reading, which is a length."""
-    length, time, of_source = term.exponents
-    inner = replace(term, exponents=(length - 1, time, of_source))
-    return coefficient_unit(inner, "1", units)
+def _unit(term: Term, acts_on: str, units: tuple[str, str, str]) -> str:
+    """Unit of a coefficient: of a reading a length, of an input one of the input."""
+    force, *others = units
+    length, source = others
+    if acts_on == "force":
+        return coefficient_unit(term, force, (length, source))
+    way, time, of_source = term.exponents
+    taken = (
+        (way - 1, time, of_source)
+        if acts_on == "output"
+        else (way, time, of_source - 1)
+    )
+    return coefficient_unit(replace(term, exponents=taken), "1", (length, source))
 
 
 def _renamed(text: str, name: str, new: str) -> str:
@@ -411,7 +414,8 @@ def _refined(rounds: Rounds, one: _Tried) -> _Tried:
                 size ** (power - p),
             )
             for p in (plain, round(found, 2))
-            if p > 0
+            # The first power is the base's.
+            if p > 0 and p != 1
         ]  # fmt: skip
         done = _simulated(rounds, candidates, "the exponent")
         for other in done:

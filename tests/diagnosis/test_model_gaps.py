@@ -77,7 +77,6 @@ def play(x, half=3e-4):
     return np.array(found)
 
 
-@pytest.mark.slow
 def test_a_machine_that_is_as_it_was_lacks_nothing(model):
     assert diagnosed(model, machine()).verdict in ("none", "parameters")
 
@@ -89,7 +88,6 @@ CHANGES = {
 }
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("effect", CHANGES)
 def test_what_has_come_since_is_named_and_confirmed(model, effect):
     found = diagnosed(model, machine(**CHANGES[effect]))
@@ -111,10 +109,13 @@ def test_a_map_that_ends_too_early_is_told_as_a_law_of_the_input():
     short = model_of(StaticMap("saturation", np.array([-end, end])))
     found = diagnosed(short, machine(), effects=None, laws="only")
     assert (found.verdict, found.law.acts_on) == ("law", "input")
+    # The model's own map cuts off what should come through its input.
+    assert found.confirmed == "surrogate"
     (term,) = found.law.terms
     assert term.term.startswith("Max(abs(u) - 1.")
-    # What the map cuts off is missing as a whole.
-    assert term.value == pytest.approx(1.0, rel=0.05)
+    # Its size counts in the gain of the stand-in, which is less: the map cuts off a part.
+    assert 1.0 < term.value < 2.0
+    assert term.unit == "1"
     place = float(term.term.split("- ")[1].split(",")[0])
     assert place == pytest.approx(end, rel=0.03)
     assert found.explained_share > 0.95
