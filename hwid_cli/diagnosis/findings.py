@@ -146,7 +146,7 @@ def _law(law: LawFound, effects: Sequence[FittedEffect]) -> Law | None:
         # Term by term, the largest first.
         text = " + ".join(f"{one.value:.6g}*{one.term}" for one in terms)
         return Law(text.replace("+ -", "- "), law.acts_on, terms)
-    return Law(as_text(node), law.acts_on, terms)
+    return Law(as_text(node).replace("+ -", "- "), law.acts_on, terms)
 
 
 def _force_curves(

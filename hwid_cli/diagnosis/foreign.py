@@ -330,8 +330,11 @@ def stand_in_for(
     ----------
     recordings : sequence of Recording
         At least one.
+    options : DiagnoseOptions
+        Which of them are held out: laws that need a reference count from the others.
     """
-    problem = prepare(recordings, SimulationOptions(), options, ())
+    held_out = held_out_of(recordings, options)
+    problem = prepare(recordings, SimulationOptions(), options, held_out)
     runs = _Runs(simulator, run_tasks)
     given = runs.of(problem.signals, simulator.values)
     drive = replace(problem.drive, **_base(fit_stand_in(problem.signals, given)))

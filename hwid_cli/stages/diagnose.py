@@ -354,7 +354,7 @@ def simulated_recordings(given: ToDiagnose) -> tuple[DriveResponse, ...]:
     """What the simulation makes of the recordings, with the given parameters."""
     simulation = given.simulation
     if not isinstance(simulation, SimulationOptions):
-        return simulated(simulation, given.recordings, given.logs)
+        return simulated(simulation, given.recordings, given.logs, given.options)
     return simulate_recordings(given.recordings, simulation, given.options)
 
 

@@ -199,13 +199,19 @@ def simulated(
     options: ForeignSimulation,
     recordings: Sequence[Recording],
     logs: Sequence[CalibrationLog],
+    diagnosed: DiagnoseOptions,
 ) -> tuple[DriveResponse, ...]:
     """What a simulation makes of the recordings' inputs, beside what was measured.
 
     Effects of its section are put into it.
+
+    Parameters
+    ----------
+    diagnosed : DiagnoseOptions
+        How a diagnosis divides the recordings.
     """
     simulator = simulator_of(options, recordings, logs)
-    answer = _answers(simulator, recordings)
+    answer = _answers(simulator, recordings, diagnosed)
     found = []
     for one in recordings:
         output = answer(one)
@@ -218,7 +224,7 @@ def simulated(
 
 
 def _answers(
-    simulator: Simulator, recordings: Sequence[Recording]
+    simulator: Simulator, recordings: Sequence[Recording], diagnosed: DiagnoseOptions
 ) -> Callable[[Recording], np.ndarray]:
     """From a recording to what the simulation makes of its input."""
     run = simulator.run
@@ -233,7 +239,7 @@ def _answers(
 
     if not simulator.effects:
         return lambda one: run(request(one)).output
-    plain, _ = stand_in_for(recordings, simulator, DiagnoseOptions(), in_turn)
+    plain, _ = stand_in_for(recordings, simulator, diagnosed, in_turn)
     effects = {name: dict(values) for name, values in simulator.effects.items()}
     drives = (plain, replace(plain, effects=effects))
     has_force = simulator.capabilities.force
