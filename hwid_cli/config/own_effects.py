@@ -19,7 +19,12 @@ from hwid_cli.drive.formula import CONSTANTS, NAMED_FUNCTIONS, VARIABLES, names,
 from hwid_cli.files.messages import did_you_mean, name_fault
 from hwid_cli.records.axis import axis_of
 from hwid_cli.records.experiment import Experiment
-from hwid_cli.records.own_effects import OwnEffect, named_by_id
+from hwid_cli.records.own_effects import (
+    OwnEffect,
+    OwnParameter,
+    named_by_id,
+    own_of,
+)
 from hwid_cli.records.rules import Refused
 
 # What a formula may not call a parameter.
@@ -177,6 +182,28 @@ def own_values_faults(
             yield wrong(here, value, "a number > 0, because positive is true")
         elif not low <= value <= high:
             yield wrong(here, value, f"a number within its bounds, {low:g} to {high:g}")
+
+
+def own_id_faults(
+    identifier: str, found: Mapping[str, Any], place: Place
+) -> Iterator[Fault]:
+    """An id that holds no formula, or values that do not belong to it."""
+    try:
+        name, stated = own_of(identifier)
+        unknown = names(parsed(stated.formula)) - {*VARIABLES, *stated.parameters}
+    except (ValueError, TypeError, KeyError, AttributeError):
+        unknown, name, stated = (
+            {identifier},
+            "",
+            OwnEffect(force_N="x", parameters=_ANY),
+        )
+    if unknown:
+        yield wrong(place, identifier[:_SHOWN], "an effect with its formula")
+    else:
+        yield from own_values_faults(name, stated, found, place)
+
+
+_ANY = {"a": OwnParameter()}
 
 
 def with_own_effects(experiment: Experiment) -> Experiment:

@@ -13,7 +13,7 @@ from hwid_cli.config.faults import (
     wrong,
     wrong_word,
 )
-from hwid_cli.config.own_effects import own_values_faults
+from hwid_cli.config.own_effects import own_id_faults, own_values_faults
 from hwid_cli.drive.catalogue import (
     CATALOGUE,
     configured_effects,
@@ -23,6 +23,7 @@ from hwid_cli.drive.catalogue import (
 from hwid_cli.drive.effect import Stated
 from hwid_cli.records.drive import BASE_PARAMETERS
 from hwid_cli.records.experiment import DiagnoseOptions, Experiment
+from hwid_cli.records.own_effects import is_own
 from hwid_cli.records.programs import OutputsSimulation
 
 # What the electrical circuit has besides its resistance.
@@ -113,6 +114,10 @@ def effect_faults(experiment: Experiment) -> Iterator[Fault]:
         entries: set[str] = set()
         own = experiment.own_effects
         for name, parameters in experiment.simulation.effects.items():
+            if is_own(name):
+                # An exported simulation names the formula in the id.
+                yield from own_id_faults(name, parameters, place)
+                continue
             if name in own:
                 yield from own_values_faults(name, own[name], parameters, place)
                 continue

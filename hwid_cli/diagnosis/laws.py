@@ -48,6 +48,7 @@ from hwid_cli.records.own_effects import OwnEffect, OwnParameter, own_id, own_of
 
 # The verdict, and the name of the effect that holds a law.
 LAW = "law"
+_SENTENCE = "a law that was found in the recordings"
 # Subsets of each size that are simulated.
 _SIMULATED = 2
 # Share of the held-out excess over the noise that a law must explain.
@@ -279,10 +280,16 @@ def _effect(
         parts.append(f"{name}*{text}")
     formula = " + ".join(parts)
     if acts_on == "force":
-        return OwnEffect(force_N=formula, parameters=parameters), values
+        return OwnEffect(
+            force_N=formula, sentence=_SENTENCE, parameters=parameters
+        ), values
     if acts_on == "input":
-        return OwnEffect(input=f"u + {formula}", parameters=parameters), values
-    return OwnEffect(output=f"x + {formula}", parameters=parameters), values
+        return OwnEffect(
+            input=f"u + {formula}", sentence=_SENTENCE, parameters=parameters
+        ), values
+    return OwnEffect(
+        output=f"x + {formula}", sentence=_SENTENCE, parameters=parameters
+    ), values
 
 
 def _unit(term: Term, acts_on: str, units: tuple[str, str, str]) -> str:

@@ -75,6 +75,29 @@ def test_what_cannot_be_used_is_one_line(given, said):
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize(
+    ("identifier", "values", "said"),
+    [
+        ('a:{"force_N":"-a*x","parameters":{"a":{}}}', {"a": 1.0}, None),
+        ('a:{"force_N":"-a*x","parameters":{"a":{}}}', {"b": 1.0}, "a.b: unknown key"),
+        (
+            'a:{"force_N":"-w*x","parameters":{"a":{}}}',
+            {"a": 1.0},
+            "expected an effect",
+        ),
+        ("a:{nonsense", {"a": 1.0}, "expected an effect"),
+        ('a:{"force_N":"open(1)","parameters":{"a":{}}}', {}, "expected an effect"),
+    ],
+)
+def test_an_id_of_an_exported_simulation_holds_the_formula(identifier, values, said):
+    given = content(drive={"effects": {identifier: values}})
+    if said is None:
+        assert list(experiment_of(given, "c").simulation.effects) == [identifier]
+        return
+    with pytest.raises(ConfigError, match=said):
+        experiment_of(given, "c")
+
+
 def test_units_of_a_rotating_axis_and_of_a_voltage():
     rotating = content(
         with_formula("-a*sin(x) - b*v*abs(v)", a="N m", b="N m s^2"), drive={"inertia_kg_m2": 0.1}
