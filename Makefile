@@ -19,7 +19,7 @@ LOCKED_INSTALL = $(BIN)/python -m pip install --quiet --disable-pip-version-chec
         bench bench-beyond bench-campaign bench-growth bench-maps bench-page bench-rounds bench-search bench-starts bench-wide bench-advice docs \
         bench-real bench-trust bench-next scale \
         wheel lowest away-run lock sbom licences simulate calibrate identify crossval group test-stage steps model1 model2 \
-        reproduction thesis chapter2 hsm150 diagnose gun real effects drive-source model-schema golden export-check blind machines
+        reproduction thesis chapter2 hsm150 diagnose gun real effects drive-source model-schema golden export-check laws blind machines
 
 help:  ## show these targets
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / {printf "  make %-14s %s\n", $$1, $$2}' Makefile
@@ -252,6 +252,9 @@ export-check: $(DEV)  ## every format of hwid export against hwid predict: the t
 # The seconds in the document are valid only on a machine that does nothing else.
 BLIND ?= results/blind
 BLIND_NUMBER ?= 1
+laws: $(DEV)  ## hidden laws outside the catalogue, beside pysindy and pyoperon: half an hour
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -W ignore -m tests.laws.run_laws --write results/laws_measured.md
+
 blind: $(DEV)  ## blind test with effects hidden by a separate generator, and docs/blind_test.md: an hour and more
 	$(BIN)/python tests/blind/run_blind.py --suite full --suite poor --suite clean --suite nuisance \
 	  --suite outside --suite near --suite pairs --suite small --seeds reporting \

@@ -18,6 +18,12 @@ _CALLS = {
     "cbrt": "cbrt",
     "power": "pow",
     "sign": "sign_of",
+    "log": "log",
+    "tan": "tan",
+    "arctan": "atan",
+    "sinh": "sinh",
+    "cosh": "cosh",
+    "tanh": "tanh",
 }
 _OPERATORS = {
     ast.Add: "+",

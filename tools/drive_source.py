@@ -34,6 +34,7 @@ SLOTS = ROOT / "hwid_cli" / "drive" / "slots.py"
 _END = "    N_SLOTS,\n) = range({})\n"
 _DRIVE = "hwid_cli.drive"
 MODULES = (
+    f"{_DRIVE}.interpreter",
     f"{_DRIVE}.command",
     f"{_DRIVE}.controller",
     f"{_DRIVE}.motion.push",

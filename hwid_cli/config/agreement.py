@@ -4,6 +4,7 @@ from collections.abc import Callable, Collection, Iterator
 from typing import NamedTuple
 
 from hwid_cli.config.faults import Fault, Place, missing, wrong
+from hwid_cli.config.own_effects import own_effect_faults
 from hwid_cli.config.simulation_checks import (
     cascade_faults,
     circuit_faults,
@@ -358,12 +359,13 @@ _AGREEMENTS = (
     _Agreement(circuit_faults, "simulation.resistance_ohm"),
     _Agreement(controller_faults, "simulation.controller recordings.columns.reference"),
     _Agreement(cascade_faults, "simulation.controller simulation.output"),
-    _Agreement(effect_faults, "simulation.effects"),
+    _Agreement(effect_faults, "simulation.effects own_effects"),
+    _Agreement(own_effect_faults, "own_effects simulation.resistance_ohm"),
     _Agreement(effect_circuit_faults, "simulation.effects simulation.resistance_ohm"),
     _Agreement(known_faults, "simulation.known"),
     _Agreement(simulated_faults, "simulation recordings.columns.simulated"),
     _Agreement(simulation_faults, "simulation"),
-    _Agreement(named_effect_faults, "diagnose.effects"),
+    _Agreement(named_effect_faults, "diagnose.effects own_effects"),
     _Agreement(held_out_faults, "diagnose.recordings diagnose.hold_out"),
     _Agreement(_test, "test identify crossval group"),
     _Agreement(_next, "next identify simulation"),

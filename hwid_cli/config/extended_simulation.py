@@ -16,6 +16,7 @@ from hwid_cli.records.experiment import (
     RecordingsOptions,
     SimulationOptions,
 )
+from hwid_cli.records.own_effects import is_own, own_of, plain_name
 from hwid_cli.records.programs import ForeignSimulation
 
 
@@ -54,7 +55,23 @@ def write_extended_simulation(
         **_without_defaults(simulation),
     }
     if simulation.effects:
-        content["simulation"]["effects"] = _plain(as_written(simulation.effects))
+        written = as_written(simulation.effects)
+        if isinstance(written, dict):
+            written = {plain_name(name): one for name, one in written.items()}
+        else:
+            written = [
+                {plain_name(name): values for name, values in one.items()}
+                for one in written
+            ]
+        content["simulation"]["effects"] = _plain(written)
+    own = {
+        **experiment.own_effects,
+        **dict(own_of(one) for one in simulation.effects if is_own(one)),
+    }
+    if own:
+        content["own_effects"] = {
+            name: _without_defaults(one) for name, one in own.items()
+        }
     content["diagnose"] = _without_defaults(experiment.diagnose or DiagnoseOptions())
     title = f"# The simulation of {experiment.name!r} as 'hwid diagnose' extended it.\n"
     replace_file(path, (title + yaml_text(content)).encode("utf-8"))

@@ -6,6 +6,7 @@ from typing import Any
 
 from hwid_cli.config.agreement import disagreements
 from hwid_cli.config.faults import Fault, Place
+from hwid_cli.config.own_effects import with_own_effects
 from hwid_cli.config.sections import read_section
 from hwid_cli.config.yaml_text import read_yaml
 from hwid_cli.errors import ConfigError
@@ -68,7 +69,8 @@ def examine(
             found = list(disagreements(experiment, left_out))
         if not found:
             is_whole = all(place[0] not in _DECIDE_READING for place in left_out)
-            return faults, experiment if is_whole else None
+            whole = experiment and with_own_effects(experiment)
+            return faults, whole if is_whole else None
         # A key that is out already is missed by its section: that is no new fault.
         faults += [one for one in found if one.place not in left_out]
         for fault in found:

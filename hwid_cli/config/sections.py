@@ -359,10 +359,16 @@ def _records_of(hint: Any) -> list[Any]:
 
 def _record_at(place: tuple[Any, ...], record_type: Any, content: Any) -> Any:
     """The record whose keys stand at a place."""
+    hint: Any = record_type
     for key in place:
         content = content[key]
-        hint = get_type_hints(record_type)[key]
-        if record_type is FitOptions and key in ("input_map", "output_map"):
-            hint = OwnFunctionFile
-        record_type = _of_kind(content, _records_of(hint))
-    return record_type
+        if get_origin(hint) is dict:
+            # A section whose keys are names: what stands under each is of one type.
+            hint = get_args(hint)[1]
+        else:
+            holder, hint = hint, get_type_hints(hint)[key]
+            if holder is FitOptions and key in ("input_map", "output_map"):
+                hint = OwnFunctionFile
+        if get_origin(hint) is not dict:
+            hint = _of_kind(content, _records_of(hint))
+    return hint

@@ -13,6 +13,7 @@ from hwid_cli.config.faults import (
     wrong,
     wrong_word,
 )
+from hwid_cli.config.own_effects import own_id_faults, own_values_faults
 from hwid_cli.drive.catalogue import (
     CATALOGUE,
     configured_effects,
@@ -22,6 +23,7 @@ from hwid_cli.drive.catalogue import (
 from hwid_cli.drive.effect import Stated
 from hwid_cli.records.drive import BASE_PARAMETERS
 from hwid_cli.records.experiment import DiagnoseOptions, Experiment
+from hwid_cli.records.own_effects import is_own
 from hwid_cli.records.programs import OutputsSimulation
 
 # What the electrical circuit has besides its resistance.
@@ -110,7 +112,23 @@ def effect_faults(experiment: Experiment) -> Iterator[Fault]:
     if experiment.simulation is not None:
         place = ("simulation", "effects")
         entries: set[str] = set()
+        own = experiment.own_effects
         for name, parameters in experiment.simulation.effects.items():
+            if is_own(name):
+                # An exported simulation names the formula in the id.
+                yield from own_id_faults(name, parameters, place)
+                continue
+            if name in own:
+                yield from own_values_faults(name, own[name], parameters, place)
+                continue
+            if public_id(name) in own:
+                yield Fault(
+                    place, f"{public_id(name)} is listed twice", step="remove one"
+                )
+                continue
+            if public_id(name) not in configured_effects() and own:
+                yield wrong_word(place, public_id(name), [*own, *configured_effects()])
+                continue
             faults = list(_effect(name, parameters, place))
             yield from faults
             entry = None if faults else entry_of(name, parameters)
@@ -202,8 +220,9 @@ def named_effect_faults(experiment: Experiment) -> Iterator[Fault]:
     """Effects that a diagnosis may name, but that there are not."""
     options = experiment.diagnose
     for effect in (options and options.effects) or ():
-        if effect not in configured_effects():
-            yield wrong_word(("diagnose", "effects"), effect, configured_effects())
+        known = [*experiment.own_effects, *configured_effects()]
+        if effect not in known:
+            yield wrong_word(("diagnose", "effects"), effect, known)
 
 
 def held_out_faults(experiment: Experiment) -> Iterator[Fault]:

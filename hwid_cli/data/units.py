@@ -195,6 +195,45 @@ def _roots(unit: str) -> str | None:
     return str(base.units) if base.magnitude > 0 else None
 
 
+# What base units are made of, in the order of ``base_exponents``.
+_DIMENSIONS = ("[mass]", "[length]", "[time]", "[current]")
+
+
+@cache
+def base_exponents(unit: str) -> tuple[tuple[float, ...], float] | None:
+    """Exponents of kg, m, s and A in a unit, and the factor to these; an angle has none.
+
+    Returns
+    -------
+    exponents : tuple of float
+    factor : float
+        1 for a unit of the SI.
+    None
+        Instead of both, where the unit is not known or is of something else.
+
+    Examples
+    --------
+    >>> base_exponents("N/m"), base_exponents("mm")
+    (((1.0, 0.0, -2.0, 0.0), 1.0), ((0.0, 1.0, 0.0, 0.0), 0.001))
+    """
+    if is_unitless(unit):
+        return (0.0, 0.0, 0.0, 0.0), 1.0
+    if len(unit) > _LONGEST or unit.strip() in _AMBIGUOUS:
+        return None
+    if not re.fullmatch(r"[A-Za-z0-9µΩ°μ ./*^()-]+", unit):
+        return None
+    try:
+        base = _registry().Quantity(1.0, _spelt(unit)).to_base_units()
+    # pint raises whatever its parser stumbles on.
+    except Exception:
+        return None
+    found = dict(base.dimensionality)
+    if set(found) - set(_DIMENSIONS):
+        return None
+    exponents = tuple(float(found.get(one, 0.0)) for one in _DIMENSIONS)
+    return exponents, float(base.magnitude)
+
+
 # Units that stand behind an underscore; in brackets anything may stand.
 _SUFFIXES = {
     unit: unit

@@ -47,7 +47,7 @@ def variables(
         Evaluated samples of all recordings, one after the other.
     """
     position = evaluated_position(compared, smoothed)
-    velocity = _joined(compared, [one.velocity for one in smoothed])
+    velocity = joined(compared, [one.velocity for one in smoothed])
     inputs = [one.signals.input for one in compared]
     rates = [
         np.gradient(one.signals.input, one.signals.sample_time_s)
@@ -70,9 +70,9 @@ def variables(
         Variable("velocity", unit_on(drive.axis, "m/s"), velocity),
         Variable("direction", "", direction),
         Variable("speed", "", np.abs(velocity)),
-        Variable(source, unit, _joined(compared, inputs)),
-        Variable(f"rate of the {source}", f"{unit}/s", _joined(compared, rates)),
-        Variable("time", "s", _joined(compared, times)),
+        Variable(source, unit, joined(compared, inputs)),
+        Variable(f"rate of the {source}", f"{unit}/s", joined(compared, rates)),
+        Variable("time", "s", joined(compared, times)),
     )
 
 
@@ -85,7 +85,7 @@ def evaluated_force(
     -------
     ndarray, shape (n_samples,), [N]
     """
-    return _joined(compared, [one.force for one in smoothed])
+    return joined(compared, [one.force for one in smoothed])
 
 
 def evaluated_position(
@@ -97,7 +97,7 @@ def evaluated_position(
     -------
     ndarray, shape (n_samples,), [m]
     """
-    return _joined(compared, [one.position for one in smoothed])
+    return joined(compared, [one.position for one in smoothed])
 
 
 def shares(
@@ -200,8 +200,18 @@ def _between(force: np.ndarray, values: np.ndarray) -> float:
     return float(counts[used] @ np.square(mean[used] - force.mean()) / force.size)
 
 
-def _joined(compared: Sequence[Compared], signals: Sequence[np.ndarray]) -> np.ndarray:
-    """Evaluated samples of all recordings, one after the other."""
+def joined(compared: Sequence[Compared], signals: Sequence[np.ndarray]) -> np.ndarray:
+    """Evaluated samples of all recordings, one after the other.
+
+    Parameters
+    ----------
+    signals : sequence of ndarray, shape (n_samples,)
+        One for each recording.
+
+    Returns
+    -------
+    ndarray, shape (n_evaluated,)
+    """
     parts = [
         one[two.signals.evaluated] for one, two in zip(signals, compared, strict=True)
     ]

@@ -25,6 +25,7 @@ from hwid_cli.diagnosis.direction import find_reversal, reversal_sentence
 from hwid_cli.diagnosis.findings import Findings, describe
 from hwid_cli.diagnosis.intervals import unclear_effects
 from hwid_cli.diagnosis.latent_force import Smoothed, latent_force
+from hwid_cli.diagnosis.laws import find_law
 from hwid_cli.diagnosis.next_experiment import (
     FittedCandidate,
     separation,
@@ -75,6 +76,7 @@ from hwid_cli.errors import ConfigError
 from hwid_cli.records.candidates import CandidateFit
 from hwid_cli.records.diagnosis import Diagnosis, NoiseFloor
 from hwid_cli.records.experiment import DiagnoseOptions, SimulationOptions
+from hwid_cli.records.own_effects import own_ids
 from hwid_cli.records.recordings import Recording
 
 # A line that takes this share of what the base leaves is no colour of noise.
@@ -228,10 +230,15 @@ def find(
     found = _search(rounds, given_sse, force, options.max_effects)
     on_round("verdict", 0)
     verdict = _decided(rounds, given_sse, found)
+    law = None
+    # Who asks for some effects only wants no formula instead.
+    is_open = options.laws == "auto" and options.effects is None
+    if is_open or options.laws == "only":
+        verdict, found, law = find_law(rounds, before, force, found, verdict)
     return Findings(
         problem=problem, criteria=criteria, scales=scales, given_sse=given_sse,
         base=base, before=before, force=force, where=where,
-        found=found, verdict=verdict,
+        found=found, verdict=verdict, law=law,
     )  # fmt: skip
 
 
@@ -338,14 +345,15 @@ def allowed_effects(
     problem: DiagnosisProblem, options: DiagnoseOptions
 ) -> tuple[str, ...]:
     """Ids that may be named: those asked for that make sense for this drive."""
-    wanted = options.effects
+    wanted = () if options.laws == "only" else options.effects
     present = drive_effects(problem.drive)
     has_spring = problem.drive.stiffness_N_per_m > 0
     has_circuit = problem.drive.resistance_ohm is not None
     several = len(problem.part(held_out=False).signals) > 2
+    own = {one: CATALOGUE[one] for one in own_ids(options.own_effects)}
     return tuple(
         name
-        for name, effect in CATALOGUE.items()
+        for name, effect in {**CATALOGUE, **own}.items()
         if (wanted is None or public_id(name) in wanted)
         # A second one waits for the first.
         and may_be_added(name, {*present, effect.beside})

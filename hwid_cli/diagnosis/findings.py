@@ -12,6 +12,7 @@ import numpy as np
 from hwid_cli.diagnosis.candidate import compared_with_fit, fitted_drive
 from hwid_cli.diagnosis.intervals import intervals
 from hwid_cli.diagnosis.latent_force import Smoothed
+from hwid_cli.diagnosis.laws import LawFound
 from hwid_cli.diagnosis.next_experiment import propose
 from hwid_cli.diagnosis.problem import Compared, DiagnosisProblem
 from hwid_cli.diagnosis.rounds import RoundsResult
@@ -20,6 +21,7 @@ from hwid_cli.diagnosis.sentences import doubtful_values, hidden_from_view, summ
 from hwid_cli.diagnosis.where import latent_force_curves
 from hwid_cli.drive.catalogue import CATALOGUE, public_id
 from hwid_cli.drive.effect import Scales
+from hwid_cli.drive.formula import as_text, parsed, with_values
 from hwid_cli.drive.simulation import drive_effects
 from hwid_cli.records.axis import name_on
 from hwid_cli.records.candidates import CandidateFit, ParameterRef
@@ -30,12 +32,15 @@ from hwid_cli.records.diagnosis import (
     FittedParameter,
     Gap,
     LatentForce,
+    Law,
+    LawTerm,
     NoiseFloor,
     Overlay,
     Place,
     RecordingGap,
 )
 from hwid_cli.records.drive import BASE_PARAMETERS, Drive
+from hwid_cli.records.own_effects import is_own, own_of
 
 MOST_OVERLAYS = 4
 
@@ -66,6 +71,7 @@ class Findings:
     where: tuple[Place, ...]
     found: RoundsResult
     verdict: DiagnosisVerdict
+    law: LawFound | None = None
 
 
 def describe(findings: Findings) -> Diagnosis:
@@ -112,7 +118,35 @@ def describe(findings: Findings) -> Diagnosis:
         warnings=doubtful_values(parameters),
         axis=problem.drive.axis,
         output=problem.drive.output,
+        law=None if findings.law is None else _law(findings.law, effects),
     )  # fmt: skip
+
+
+def _law(law: LawFound, effects: Sequence[FittedEffect]) -> Law | None:
+    """The formula with the coefficients of its effect."""
+    held = [one for one in effects if one.own == law.identifier]
+    if not held:
+        return None
+    of = {one.name: one for one in held[0].parameters}
+    values = {name: float(f"{one.value:.6g}") for name, one in of.items()}
+    _, stated = own_of(law.identifier)
+    node = with_values(parsed(stated.formula), values)
+    terms = tuple(
+        LawTerm(
+            one.term.formula,
+            of[one.parameter].value,
+            of[one.parameter].low,
+            of[one.parameter].high,
+            one.unit,
+            one.inclusion,
+        )
+        for one in law.terms
+    )
+    if law.acts_on == "force":
+        # Term by term, the largest first.
+        text = " + ".join(f"{one.value:.6g}*{one.term}" for one in terms)
+        return Law(text.replace("+ -", "- "), law.acts_on, terms)
+    return Law(as_text(node).replace("+ -", "- "), law.acts_on, terms)
 
 
 def _force_curves(
@@ -231,8 +265,11 @@ def _fitted_effects_of(
     for one, value, (low, high) in zip(found.names, found.values, ends, strict=True):
         if one.owner in parameters:
             parameters[one.owner].append(
-                FittedParameter(one.parameter, float(value), float(low), float(high))
-            )
+                FittedParameter(
+                    one.parameter, float(value), float(low), float(high),
+                    unit=_unit_of(one),
+                )
+            )  # fmt: skip
     for identifier in ids:
         entry = CATALOGUE[identifier]
         for name, word in entry.words.items():
@@ -246,11 +283,17 @@ def _fitted_effects_of(
     return tuple(_described(one, parameters[one]) for one in ids)
 
 
+def _unit_of(ref: ParameterRef) -> str:
+    parameters = CATALOGUE[ref.owner].parameters
+    return next(one.unit for one in parameters if one.name == ref.parameter)
+
+
 def _described(identifier: str, parameters: Sequence[FittedParameter]) -> FittedEffect:
     entry = CATALOGUE[identifier]
     return FittedEffect(
-        public_id(identifier), entry.sentence, entry.equation, tuple(parameters)
-    )
+        public_id(identifier), entry.sentence, entry.equation, tuple(parameters),
+        own=identifier if is_own(identifier) else "",
+    )  # fmt: skip
 
 
 def _spread(factors: np.ndarray) -> FittedParameter:

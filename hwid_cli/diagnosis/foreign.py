@@ -330,8 +330,11 @@ def stand_in_for(
     ----------
     recordings : sequence of Recording
         At least one.
+    options : DiagnoseOptions
+        Which of them are held out: laws that need a reference count from the others.
     """
-    problem = prepare(recordings, SimulationOptions(), options, ())
+    held_out = held_out_of(recordings, options)
+    problem = prepare(recordings, SimulationOptions(), options, held_out)
     runs = _Runs(simulator, run_tasks)
     given = runs.of(problem.signals, simulator.values)
     drive = replace(problem.drive, **_base(fit_stand_in(problem.signals, given)))
@@ -402,7 +405,10 @@ def _confirmed(
         other = _best_turn(findings, turn, runs)
         if best is None or other.sse.sum() * _PREFERRED < best.sse.sum():
             best = other
-    if best.tried is None:
+    # A run that is worse than without the effect says nothing of it: a map of the
+    # simulation may cut off what should come through its input.
+    is_worse = float(best.sse.sum()) >= float(findings.base.sse.sum())
+    if best.tried is None or is_worse:
         return findings, values, False
     return _with_run(findings, best), best.tried[1], _is_as_good(findings, best)
 

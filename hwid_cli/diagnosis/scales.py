@@ -10,16 +10,24 @@ import numpy as np
 from scipy.signal import lfilter
 
 from hwid_cli.diagnosis.candidate import compared_with_fit, fitted_drive
-from hwid_cli.diagnosis.covariates import evaluated_force, evaluated_position
+from hwid_cli.diagnosis.covariates import (
+    evaluated_force,
+    evaluated_position,
+    joined,
+    variables,
+)
 from hwid_cli.diagnosis.latent_force import Smoothed, finite, latent_force
 from hwid_cli.diagnosis.problem import Compared, DiagnosisProblem
 from hwid_cli.diagnosis.segments import parabolic_peak
-from hwid_cli.drive.effect import Scales, Wave
+from hwid_cli.drive.effect import Missing, Scales, Wave
 from hwid_cli.records.candidates import CandidateFit
 from hwid_cli.records.diagnosis import NoiseFloor
+from hwid_cli.records.drive import Drive
 
 _MOST_LINES = 3
 _FINER = 8
+# Samples that start values of formulas are fitted to, at most.
+_MOST_OF_STARTS = 2000
 # Places along the stroke at which a force is averaged, and what bends slowly along it.
 _PLACES = 2048
 _SLOW_BENDS = 5
@@ -32,6 +40,7 @@ def scales_of_recordings(
     velocities: Sequence[np.ndarray],
     frequencies_Hz: tuple[float, ...] = (),
     waves: tuple[Wave, ...] = (),
+    missing: Missing | None = None,
 ) -> Scales:
     """Sizes of what the recordings hold.
 
@@ -43,6 +52,8 @@ def scales_of_recordings(
         Highest lines of the base's error.
     waves : tuple of Wave
         With which it repeats along the way.
+    missing : Missing or None
+        What the base lacks.
     """
     drive, all_signals = problem.drive, problem.signals
     largest = max(float(np.max(np.abs(one.position))) for one in all_signals)
@@ -74,6 +85,7 @@ def scales_of_recordings(
         waves=waves,
         resistance_ohm=drive.resistance_ohm or 1.0,
         reading=max(reading, 1e-12),
+        missing=missing,
     )
 
 
@@ -93,11 +105,44 @@ def scales_of_fit(
     """
     compared = compared_with_fit(problem, found, given)
     drive = fitted_drive(problem.drive, found)
+    force = latent_force(compared, drive, noise)
     return scales_of_recordings(
         problem,
         [one.velocity for one in compared],
         line_frequencies(compared, noise),
-        waves_along(compared, latent_force(compared, drive, noise)),
+        waves_along(compared, force),
+        missing_along(compared, force, drive),
+    )
+
+
+def missing_along(
+    compared: Sequence[Compared], smoothed: Sequence[Smoothed], drive: Drive
+) -> Missing:
+    """What a simulation lacks, with the variables that it may go with.
+
+    Training recordings only, where there are some; not more samples than starts need.
+    """
+    pairs = [
+        pair
+        for pair in zip(compared, smoothed, strict=True)
+        if not pair[0].signals.is_held_out
+    ] or list(zip(compared, smoothed, strict=True))
+    of = [one for one, _ in pairs]
+    found = {
+        one.name: one.values
+        for one in variables(of, [force for _, force in pairs], drive)
+    }
+    every = max(1, -(-found["time"].size // _MOST_OF_STARTS))
+    source = "current" if drive.resistance_ohm is None else "voltage"
+    names = {"x": "displacement", "v": "velocity", "u": source, "t": "time"}
+    reading = joined(of, [finite(one.signals.compared - one.simulated) for one in of])
+    gain = drive.force_constant_N_per_A / (drive.resistance_ohm or 1.0)
+    return Missing(
+        {key: found[name][::every] for key, name in names.items()},
+        evaluated_force(of, [force for _, force in pairs])[::every],
+        reading[::every],
+        gain,
+        "v" if drive.output == "velocity" else "x",
     )
 
 

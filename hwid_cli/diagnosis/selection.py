@@ -19,6 +19,7 @@ from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals
 from hwid_cli.drive.catalogue import CATALOGUE, public_id
 from hwid_cli.records.candidates import CandidateFit, RankedCandidate
 from hwid_cli.records.diagnosis import NoiseFloor
+from hwid_cli.records.own_effects import plain_name
 
 # A set of effects must lower the criterion by this much against the smaller one.
 LEAST_GAIN = 10.0
@@ -325,7 +326,16 @@ def ranked(
     )
     rows += [
         RankedCandidate(
-            ids, share, False, nan, nan, nan, nan, nan, nan, "not finished: far behind"
+            tuple(plain_name(one) for one in ids),
+            share,
+            False,
+            nan,
+            nan,
+            nan,
+            nan,
+            nan,
+            nan,
+            "not finished: far behind",
         )
         for ids, share in waiting
     ]
@@ -343,11 +353,12 @@ def _row(
     if not found.is_usable:
         text = "could not be simulated"
         return RankedCandidate(
-            found.effects, share, True, nan, nan, nan, nan, nan, nan, text
-        )
+            tuple(plain_name(one) for one in found.effects), share, True,
+            nan, nan, nan, nan, nan, nan, text,
+        )  # fmt: skip
     against = criteria.evidence(found, base)
     return RankedCandidate(
-        effects=found.effects,
+        effects=tuple(plain_name(one) for one in found.effects),
         forecast_share=share,
         is_fitted=True,
         train_rms=criteria.rms(found, held_out=False),

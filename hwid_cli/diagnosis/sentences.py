@@ -93,6 +93,15 @@ def _verdict_in_words(
             "noise, and no effect of the catalogue explains most of it."
             f"{_where_it_sits(problem, criteria.noise, verdict.chosen)}"
         )
+    if verdict.word == "law":
+        share = 100 * criteria.evidence(verdict.chosen, base).explained
+        rest = "" if verdict.is_complete else " Something smaller remains."
+        return (
+            "No effect of the catalogue is what the simulation lacks, but a formula holds: "
+            f"{effects[0].equation}. With it the error on held-out recordings falls from "
+            f"{before:.3g} to {after:.3g} times the noise ({share:.3g} % of what was left "
+            f"is explained).{rest}"
+        )
     text = _named(problem, criteria, base, verdict, effects)
     if verdict.word == "ambiguous":
         others = ", ".join(title_of(one) for one in verdict.rivals)

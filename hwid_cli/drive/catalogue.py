@@ -5,7 +5,8 @@ effect: its declaration there, its term in a kernel, its test; then
 ``make drive-source effects`` for what follows from the declaration.
 
 Several entries may have one public id, the part before the colon: with another word of
-the configuration, with a richer law, or a second one of its kind.
+the configuration, with a richer law, or a second one of its kind. Effects of the user's
+own are found by their ids, which hold all that they are, and are not listed.
 """
 
 from collections.abc import Collection, Mapping
@@ -20,12 +21,30 @@ from hwid_cli.drive.effects import (
     sensor,
     spring,
 )
+from hwid_cli.drive.own_effect import own_effect
+from hwid_cli.records.own_effects import is_own
 
-CATALOGUE: dict[str, Effect] = {
-    entry.id: entry
-    for family in (friction, spring, coupling, command, circuit, sensor, change)
-    for entry in family.EFFECTS
-}
+
+class Catalogue(dict[str, Effect]):
+    """Effects by their ids; those of the user's own are found and not listed."""
+
+    def __missing__(self, identifier: str) -> Effect:
+        if is_own(identifier):
+            return own_effect(identifier)
+        raise KeyError(identifier)
+
+    def __contains__(self, identifier: object) -> bool:
+        is_listed = super().__contains__(identifier)
+        return is_listed or (isinstance(identifier, str) and is_own(identifier))
+
+
+CATALOGUE = Catalogue(
+    {
+        entry.id: entry
+        for family in (friction, spring, coupling, command, circuit, sensor, change)
+        for entry in family.EFFECTS
+    }
+)
 
 
 def public_id(identifier: str) -> str:
@@ -69,6 +88,8 @@ def entry_of(identifier: str, stated: Mapping[str, float | str]) -> Effect | Non
     >>> entry_of("parameter_change", {"which": "damping", "spread": 0.1}).id
     'parameter_change:damping'
     """
+    if is_own(identifier):
+        return CATALOGUE[identifier]
     name, _, mark = identifier.partition(":")
     given = CATALOGUE.get(identifier)
     if given is not None and mark and not given.beside:

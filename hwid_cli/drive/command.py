@@ -10,14 +10,19 @@ from numba import njit
 
 from hwid_cli.drive import slots
 from hwid_cli.drive.compiled import INNER
+from hwid_cli.drive.interpreter import formula_value
 
-# Most pieces of one interval: 2 (delay) x 3 (dead zone) x 3 (saturation) x 2 (rate).
-MOST_PIECES = 40
+# Most pieces of one interval: 2 (delay) x 3 (dead zone) x 3 (saturation) x 2 (rate), with
+# room for those that a formula cuts each of the first ones into.
+MOST_PIECES = 80
+# Straight pieces that stand for a curve of the command within a sample.
+OWN_PIECES = 4
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def command_pieces(
     n: int,
+    time: float,
     sample_time: float,
     starts: np.ndarray,
     ends: np.ndarray,
@@ -32,7 +37,8 @@ def command_pieces(
     ----------
     n : int
         Number of the interval.
-    sample_time : float, [s]
+    time, sample_time : float, [s]
+        At its start, and its length.
     starts, ends : ndarray, shape (n_intervals,), [A]
         Command at both ends of each interval, filled up to the n-th one.
     before : float, [A]
@@ -55,6 +61,8 @@ def command_pieces(
         pieces[0, 1] = starts[n]
         pieces[0, 2] = ends[n]
         count = 1
+    if p[slots.OWN_INPUT] != 0.0:
+        count = _through_formula(pieces, count, time, p)
     if p[slots.DEAD_ZONE] > 0.0:
         count = _split(pieces, count, p[slots.DEAD_ZONE])
         for j in range(count):
@@ -81,6 +89,7 @@ def is_untouched(p: np.ndarray) -> bool:
     """
     return not (
         p[slots.DELAY] > 0.0
+        or p[slots.OWN_INPUT] != 0.0
         or p[slots.DEAD_ZONE] > 0.0
         or p[slots.SATURATION] < np.inf
         or p[slots.RATE] < np.inf
@@ -96,6 +105,8 @@ def static_command(value: float, p: np.ndarray) -> float:
     value : float, [A] or [V]
     p : ndarray, shape (N_SLOTS,)
     """
+    if p[slots.OWN_INPUT] != 0.0:
+        value = formula_value(p[slots.OWN_INPUT], 0.0, 0.0, value, 0.0, 0.0, p)
     if p[slots.DEAD_ZONE] > 0.0:
         value = _dead_zone(value, p[slots.DEAD_ZONE])
     limit = p[slots.SATURATION]
@@ -149,6 +160,34 @@ def _delayed(
             pieces[count, 2] = starts[at] + slope * left
         count += 1
     return count
+
+
+@njit(**INNER)
+def _through_formula(pieces: np.ndarray, count: int, time: float, p: np.ndarray) -> int:
+    """Put pieces through a formula of input and time, each cut into several.
+
+    Cut from the last one backwards, so that none is overwritten before it is read.
+    """
+    at = p[slots.OWN_INPUT]
+    end = time
+    for j in range(count):
+        end += pieces[j, 0]
+    for j in range(count - 1, -1, -1):
+        length, first, last = pieces[j, 0], pieces[j, 1], pieces[j, 2]
+        end -= length
+        for k in range(OWN_PIECES - 1, -1, -1):
+            row = OWN_PIECES * j + k
+            low, high = (k + 0.0) / OWN_PIECES, (k + 1.0) / OWN_PIECES
+            before = first + low * (last - first)
+            after = first + high * (last - first)
+            pieces[row, 0] = length / OWN_PIECES
+            pieces[row, 1] = formula_value(
+                at, 0.0, 0.0, before, end + low * length, 0.0, p
+            )
+            pieces[row, 2] = formula_value(
+                at, 0.0, 0.0, after, end + high * length, 0.0, p
+            )
+    return OWN_PIECES * count
 
 
 @njit(**INNER)

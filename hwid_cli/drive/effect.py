@@ -8,6 +8,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from itertools import product
 from math import inf
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from hwid_cli.drive.formula import Node
 
 Values = Mapping[str, float]
 
@@ -29,6 +35,63 @@ class Wave:
     period_m: float
     amplitude_N: float
     phase_rad: float
+
+
+@dataclass(frozen=True, eq=False)
+class Missing:
+    """What a simulation lacks along the recordings, for formulas of the user's own.
+
+    Parameters
+    ----------
+    variables : mapping of str to ndarray, shape (n_samples,)
+        ``x``, ``v``, ``u`` and ``t``, as measured and smoothed.
+    force, reading : ndarray, shape (n_samples,), [N], [m] or [m/s]
+        That are missing, each as if it were the only one.
+    gain : float, [N/A]
+        Force of a unit of the input.
+    read : str
+        Which of the variables the sensor reads.
+    """
+
+    variables: Mapping[str, np.ndarray]
+    force: np.ndarray
+    reading: np.ndarray
+    gain: float
+    read: str = "x"
+
+    def wanted(self, key: str) -> np.ndarray:
+        """What a formula of the configuration should add.
+
+        Parameters
+        ----------
+        key : str
+            ``force_N``, ``input`` or ``output``.
+
+        Returns
+        -------
+        ndarray, shape (n_samples,)
+        """
+        return self.reading if key == "output" else self.force
+
+    def change(self, key: str, value: np.ndarray) -> np.ndarray:
+        """What a formula of the configuration adds.
+
+        Parameters
+        ----------
+        key : str
+            ``force_N``, ``input`` or ``output``.
+        value : ndarray, shape (n_samples,)
+            Of the formula.
+
+        Returns
+        -------
+        ndarray, shape (n_samples,)
+        """
+        if key == "force_N":
+            return value
+        if key == "input":
+            return self.gain * (value - self.variables["u"])
+        return value - self.variables[self.read]
 
 
 @dataclass(frozen=True)
@@ -56,6 +119,8 @@ class Scales:
         Of the circuit; 1 where there is none and the input is the current.
     reading : float, [m] or [m/s]
         Largest magnitude of what the sensor reads; 0 stands for the displacement.
+    missing : Missing or None
+        What the simulation lacks, where it is known.
     """
 
     displacement_m: float
@@ -72,6 +137,7 @@ class Scales:
     waves: tuple[Wave, ...] = ()
     resistance_ohm: float = 1.0
     reading: float = 0.0
+    missing: Missing | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         if self.reading == 0:
@@ -196,6 +262,8 @@ class Parameter:
         What it is where nothing states it; None where it has to be stated.
     limits : tuple of Limit
         Of the value that a configuration states.
+    unit : str
+        Where the name does not say it.
     """
 
     name: str
@@ -209,6 +277,21 @@ class Parameter:
     off: float = 0.0
     default: float | None = None
     limits: tuple[Limit, ...] = ()
+    unit: str = ""
+
+
+@dataclass(frozen=True)
+class Formula:
+    """The law of an effect of the user's own.
+
+    Parameters
+    ----------
+    acts_on : str
+        ``force``, ``input`` or ``output``.
+    """
+
+    acts_on: str
+    node: "Node"
 
 
 @dataclass(frozen=True)
@@ -249,6 +332,8 @@ class Effect:
         Whether values make sense together, where bounds of each alone do not say it.
     beside : str
         Id of the entry of which this is the second one; without that it means nothing.
+    formula : Formula or None
+        Its law where it is one of the user's own.
     """
 
     id: str
@@ -268,6 +353,7 @@ class Effect:
     words: Mapping[str, str] = field(default_factory=dict)
     is_possible: Callable[[Values], bool] | None = None
     beside: str = ""
+    formula: Formula | None = None
 
     @property
     def strongest(self) -> Parameter:

@@ -8,6 +8,7 @@ from numba import njit
 
 from hwid_cli.drive import slots
 from hwid_cli.drive.compiled import INNER, MAKING
+from hwid_cli.drive.interpreter import formula_value
 from hwid_cli.drive.motion.push import TURN
 
 # Play is at its end within this share of it, for rounding.
@@ -16,13 +17,18 @@ TOUCHING = 1e-9
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def read(
-    positions: np.ndarray, velocities: np.ndarray, sample_time: float, p: np.ndarray
+    positions: np.ndarray,
+    velocities: np.ndarray,
+    command: np.ndarray,
+    sample_time: float,
+    p: np.ndarray,
 ) -> np.ndarray:
     """Return what the sensor reads at every sample.
 
     Parameters
     ----------
     positions, velocities : ndarray, shape (n,), [m], [m/s]
+    command : ndarray, shape (n,), [A] or [V]
     sample_time : float, [s]
     p : ndarray, shape (N_SLOTS,)
     """
@@ -31,7 +37,8 @@ def read(
         output = _play(positions, velocities, sample_time, p[slots.OUTPUT_GAP])
     for i in range(output.size):
         lag = positions[i] - output[i]
-        output[i] = sensed(output[i], lag, velocities[i], sample_time * i, p)
+        time = sample_time * i
+        output[i] = sensed(output[i], lag, velocities[i], command[i], time, p)
     return output
 
 
@@ -70,7 +77,9 @@ def on_other_clock(
 
 
 @njit(**INNER)
-def sensed(y: float, lag: float, speed: float, time: float, p: np.ndarray) -> float:
+def sensed(
+    y: float, lag: float, speed: float, command: float, time: float, p: np.ndarray
+) -> float:
     """Return what the sensor makes of the place that it measures.
 
     Parameters
@@ -80,6 +89,7 @@ def sensed(y: float, lag: float, speed: float, time: float, p: np.ndarray) -> fl
         By which the drive is ahead of that place, which follows it with play.
     speed : float, [m/s]
         Of the drive.
+    command : float, [A] or [V]
     time : float, [s]
     p : ndarray, shape (N_SLOTS,)
     """
@@ -94,6 +104,11 @@ def sensed(y: float, lag: float, speed: float, time: float, p: np.ndarray) -> fl
         turn = TURN / p[slots.ECCENTRIC_PERIOD]
         speed *= 1.0 + size * turn * np.cos(turn * y + phase)
         y += size * (np.sin(turn * y + phase) - np.sin(phase))
+    if p[slots.OWN_OUTPUT] != 0.0:
+        own = formula_value(
+            p[slots.OWN_OUTPUT], y, speed, command, time, np.sign(speed), p
+        )
+        y, speed = own, own
     if is_velocity:
         y = speed
     if p[slots.SENSOR_QUADRATIC] != 0.0 or p[slots.SENSOR_CUBIC] != 0.0:

@@ -16,6 +16,7 @@ from hwid_cli.drive.catalogue import CATALOGUE, entry_of
 from hwid_cli.drive.effect import Effect, Values
 from hwid_cli.drive.motion.move import move
 from hwid_cli.drive.output import on_other_clock, read
+from hwid_cli.drive.own_effect import with_formulas
 from hwid_cli.records.drive import Drive
 
 # A smooth input is followed in straight lines of a quarter of a sample: at a fifth of the
@@ -170,11 +171,14 @@ def run(
     columns = move(driven_by, force, fine_time, vector)
     position, velocity, command = (column[::refinement][:n] for column in columns)
     if gain == 0.0 or driven_by.size < 2:
-        output = read(position, velocity, sample_time_s, vector)
+        output = read(position, velocity, command, sample_time_s, vector)
     else:
         ratio = 1.0 + gain
         seen = on_other_clock(columns[0], fine_time * columns[1], ratio * refinement, n)
-        output = read(seen[0], seen[1] / fine_time, ratio * sample_time_s, vector)
+        then = np.minimum(ratio * np.arange(n), n - 1.0)
+        sent = np.interp(then, np.arange(n), command)
+        step = ratio * sample_time_s
+        output = read(seen[0], seen[1] / fine_time, sent, step, vector)
     return Motion(output, position, velocity, command)
 
 
@@ -191,6 +195,7 @@ def parameter_vector(drive: Drive, effects: Mapping[str, Values]) -> np.ndarray:
     Returns
     -------
     ndarray, shape (N_SLOTS,)
+        Longer where there are formulas of the user's own.
 
     Raises
     ------
@@ -229,7 +234,12 @@ def parameter_vector(drive: Drive, effects: Mapping[str, Values]) -> np.ndarray:
         if identifier not in CATALOGUE:
             raise ValueError(f"effect {identifier!r} is not in the catalogue")
         _fill(vector, CATALOGUE[identifier], values)
-    return vector
+    formulas = [
+        (CATALOGUE[one], values)
+        for one, values in effects.items()
+        if CATALOGUE[one].formula is not None
+    ]
+    return with_formulas(vector, formulas)
 
 
 def _fill(vector: np.ndarray, effect: Effect, given: Values) -> None:

@@ -119,5 +119,16 @@ that is switched off is 0, except where the comment says infinite.
     RIPPLE_PHASE,
     HYSTERESIS_RATIO,
     HYSTERESIS_BEND,
+    # Formulas of the user's own stand behind the places; 0 for none.
+    OWN_PILE,  # room to work in
+    OWN_FORCE,  # where the formula begins
+    OWN_INPUT,
+    OWN_OUTPUT,
+    OWN_FRICTION,  # set: the force jumps with the direction of motion
+    OWN_WAVES,  # fastest turn of the force along the way, [rad/m]
+    OWN_TURNING,  # and in time, [rad/s]
+    OWN_FINENESS,  # steps in a sample, at least
+    OWN_BENDS,  # set: the force has corners
+    SAMPLE_TIME,  # set by the simulation
     N_SLOTS,
-) = range(113)
+) = range(123)

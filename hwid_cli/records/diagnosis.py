@@ -9,7 +9,7 @@ from hwid_cli.records.programs import OF_DRIVE, Capabilities
 from hwid_cli.records.shown import Shown
 from hwid_cli.records.stored import ADDED_LATER
 
-VERDICTS = ("named", "ambiguous", "parameters", "unknown", "none")
+VERDICTS = ("named", "ambiguous", "law", "parameters", "unknown", "none")
 
 
 @dataclass(frozen=True)
@@ -24,6 +24,8 @@ class FittedParameter:
         Bounds of the interval; NaN where there is none.
     text : str
         In place of a number where the parameter is a word; else empty.
+    unit : str
+        Where the name does not say it.
     """
 
     name: str
@@ -31,6 +33,7 @@ class FittedParameter:
     low: float = float("nan")
     high: float = float("nan")
     text: str = ""
+    unit: str = field(default="", metadata=ADDED_LATER)
 
 
 @dataclass(frozen=True)
@@ -41,12 +44,57 @@ class FittedEffect:
     ----------
     sentence : str
         In plain words.
+    own : str
+        Where it is one of the user's own: the id that holds its formula.
     """
 
     id: str
     sentence: str
     equation: str
     parameters: tuple[FittedParameter, ...]
+    own: str = field(default="", metadata=ADDED_LATER)
+
+
+@dataclass(frozen=True)
+class LawTerm:
+    """One term of a law.
+
+    Parameters
+    ----------
+    term : str
+        In x, v, u and t, without its coefficient.
+    value, low, high : float, [unit]
+        Of the coefficient, with its 95 % interval.
+    inclusion : float, [-]
+        Share of resampled recordings in which such a term was chosen again.
+    """
+
+    term: str
+    value: float
+    low: float
+    high: float
+    unit: str
+    inclusion: float
+
+
+@dataclass(frozen=True)
+class Law:
+    """A formula for what no effect of the catalogue explains.
+
+    Parameters
+    ----------
+    formula : str
+        As sympy reads it.
+    acts_on : str
+        ``force``, ``input`` or ``output``: a force on the mass, what stands for the
+        input, or what the sensor reads.
+    terms : tuple of LawTerm
+        The largest share first.
+    """
+
+    formula: str
+    acts_on: str
+    terms: tuple[LawTerm, ...]
 
 
 @dataclass(frozen=True)
@@ -244,6 +292,8 @@ class Diagnosis(Shown):
         where only a stand-in was.
     capabilities : Capabilities
         What the simulation can do.
+    law : Law or None
+        The formula where the verdict is ``law``.
     """
 
     verdict: str
@@ -275,6 +325,7 @@ class Diagnosis(Shown):
     output: str = field(default="position", metadata=ADDED_LATER)
     confirmed: str = field(default="simulation", metadata=ADDED_LATER)
     capabilities: Capabilities = field(default=OF_DRIVE, metadata=ADDED_LATER)
+    law: Law | None = field(default=None, metadata=ADDED_LATER)
 
     @property
     def judged_on(self) -> str:

@@ -12,6 +12,7 @@ from hwid_cli.records.machines import GunMachine, ServoMachine
 from hwid_cli.records.maps import MAP_KINDS
 from hwid_cli.records.model import FitOptions
 from hwid_cli.records.next import GOALS
+from hwid_cli.records.own_effects import OwnEffect
 from hwid_cli.records.programs import (
     CommandSimulation,
     FmuSimulation,
@@ -305,7 +306,16 @@ class SimulationOptions:
 
 @dataclass(frozen=True)
 class DiagnoseOptions:
-    """What diagnosis may use."""
+    """What diagnosis may use.
+
+    Parameters
+    ----------
+    laws : str
+        When a formula is looked for: where all effects may be named and something is
+        left, in place of the catalogue, or never.
+    own_effects : dict of str to OwnEffect
+        Formulas that are tried beside the catalogue; a section of their own in a file.
+    """
 
     recordings: _Names = None
     hold_out: Annotated[
@@ -318,8 +328,10 @@ class DiagnoseOptions:
         None
     )
     max_effects: Annotated[int, Integer(least=0), FileLimit(1000)] = 3
+    laws: Annotated[str, OneOf(("auto", "only", "never"))] = "auto"
     initial_state: Annotated[str, OneOf(STARTS)] = "rest"
     skip_samples: Annotated[int, Integer(least=0)] = 0
+    own_effects: dict[str, OwnEffect] = field(default_factory=dict, metadata=NO_KEY)
 
 
 @dataclass(frozen=True)
@@ -356,6 +368,7 @@ class Experiment:
         | ModelSimulation
         | None
     ) = None
+    own_effects: dict[str, OwnEffect] = field(default_factory=dict)
     diagnose: DiagnoseOptions | None = None
     next: NextOptions | None = None
     thesis_names: bool = False

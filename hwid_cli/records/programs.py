@@ -141,21 +141,42 @@ class CommandSimulation(_Program):
 
 @dataclass(frozen=True, kw_only=True)
 class ModelSimulation:
-    """A model that was exported as JSON; it has one input and one output.
+    """A model that was fitted: out of a folder of results, or exported as JSON.
 
     Parameters
     ----------
+    file : str
+        Of an exported model, relative to the configuration.
+    results : str
+        Folder of results in place of a file, relative to the configuration.
+    name : str
+        Of the model in it; empty: the one that covers most recordings in the final test.
     model : HammersteinWiener or None
         That the file holds; None until it is read.
     """
 
     kind: Annotated[str, OneOf(["model"])] = "model"
-    file: Annotated[str, Filled("a model's JSON file")]
+    file: str = ""
+    results: str = ""
+    name: str = ""
     model: HammersteinWiener | None = field(default=None, metadata=NO_KEY)
     model_sample_time_s: float = field(default=0.0, metadata=NO_KEY)
     effects: Annotated[dict[str, dict[str, float | str]], Repeatable()] = field(
         default_factory=dict
     )
+
+    def __post_init__(self) -> None:
+        if bool(self.file) == bool(self.results) and self.model is None:
+            said = (
+                "found file and results"
+                if self.file
+                else "found neither file nor results"
+            )
+            expected = (
+                "file: a model's JSON file, or results: a folder of hwid's results"
+            )
+            step = "hwid test CONFIG makes such a folder"
+            raise Refused(Refusal(None, expected, said=said, step=step))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -10,6 +10,7 @@ from hwid_cli.records.diagnosis import (
     Diagnosis,
     FittedParameter,
     Gap,
+    Law,
     RankedCandidate,
 )
 from hwid_cli.records.drive import DriveResponse
@@ -101,7 +102,7 @@ def effects_table(diagnosis: Diagnosis) -> Table:
         name = effect.id
         for parameter in effect.parameters:
             quantity, unit = quantity_and_unit(parameter.name)
-            unit = unit_of_effect(
+            unit = parameter.unit or unit_of_effect(
                 effect.id, unit, axis=diagnosis.axis, output=diagnosis.output
             )
             value = parameter.text or _value(parameter.value, parameter.name)
@@ -279,6 +280,27 @@ def warning_sentences(warnings: Sequence[str]) -> list[str]:
     return [f"Warning: {one}." for one in warnings]
 
 
+def law_table(law: Law) -> Table:
+    """Show the terms of a law, the largest first."""
+    rows = tuple(
+        (
+            one.term,
+            _value(one.value),
+            _interval(FittedParameter("", one.value, one.low, one.high)),
+            one.unit,
+            percent(one.inclusion),
+        )
+        for one in law.terms
+    )
+    columns = (
+        *texts("term"),
+        *numbers("coefficient", "95 % interval"),
+        *texts("unit"),
+        *numbers("chosen again"),
+    )
+    return Table(f"Terms of the law (it acts on the {law.acts_on})", columns, rows)
+
+
 def explained_sentence(diagnosis: Diagnosis) -> str:
     """Say how much of the gap the effects explain."""
     share = percent(diagnosis.explained_share)
@@ -383,7 +405,9 @@ def diagnosis_blocks(diagnosis: Diagnosis) -> list[Text | Heading | Table]:
     blocks: list[Text | Heading | Table] = [
         Text(one) for one in sentences if one.strip()
     ]
-    if diagnosis.effects:
+    if diagnosis.law is not None:
+        blocks += [Text(f"Formula: {diagnosis.law.formula}"), law_table(diagnosis.law)]
+    elif diagnosis.effects:
         blocks.append(effects_table(diagnosis))
     blocks.append(gap_table(diagnosis))
     if not is_short and diagnosis.places:

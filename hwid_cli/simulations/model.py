@@ -1,5 +1,12 @@
 """Simulations that are a fitted Hammerstein-Wiener model."""
 
+import hashlib
+import json
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
 from hwid_cli.errors import SimulationError
 from hwid_cli.model.simulate import simulate
 from hwid_cli.records.programs import (
@@ -34,8 +41,17 @@ class _Names:
     output, velocity = "output", None
 
 
-KIND = SimulationKind(
-    lambda options: Capabilities(run=True),
-    _run,
-    lambda options: hash_of_file(options.file),
-)
+def _content(options: ModelSimulation) -> str:
+    if options.file:
+        return hash_of_file(options.file)
+    if options.model is None:
+        raise ValueError("the model was not read")
+    text = json.dumps(asdict(options.model), sort_keys=True, default=_plain)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _plain(value: Any) -> Any:
+    return value.tolist() if isinstance(value, np.ndarray) else repr(value)
+
+
+KIND = SimulationKind(lambda options: Capabilities(run=True), _run, _content)

@@ -22,7 +22,7 @@ from hwid_cli.records.check import StagePlan
 from hwid_cli.records.diagnosis import Diagnosis
 from hwid_cli.records.drive import DriveResponse, told_apart
 from hwid_cli.records.experiment import DiagnoseOptions, Experiment, SimulationOptions
-from hwid_cli.records.programs import ForeignSimulation
+from hwid_cli.records.programs import ForeignSimulation, ModelSimulation
 from hwid_cli.records.recordings import CalibrationLog, Recording
 from hwid_cli.report import plots
 from hwid_cli.report.diagnosis import diagnosis_blocks
@@ -38,6 +38,7 @@ from hwid_cli.stages.foreign_simulation import (
     placed,
     simulated,
     simulator_of,
+    uncovered_by,
 )
 from hwid_cli.stages.selection import select_recordings
 from hwid_cli.stages.simulation_units import (
@@ -154,7 +155,10 @@ def extended_options(
     """
     base: dict[str, Any] = {one.name: one.after for one in diagnosis.base}
     effects = [
-        (effect.id, {one.name: one.text or one.value for one in effect.parameters})
+        (
+            effect.own or effect.id,
+            {one.name: one.text or one.value for one in effect.parameters},
+        )
         for effect in (*diagnosis.present, *diagnosis.effects)
     ]
     return replace(
@@ -297,9 +301,15 @@ def given_by(
     """The same of calibrated recordings."""
     simulation = _simulation(experiment)
     options = experiment.diagnose or DiagnoseOptions()
+    options = replace(options, own_effects=experiment.own_effects)
     place = f"{experiment.source}: diagnose"
+    names = options.recordings
+    if names is None:
+        names = uncovered_by(simulation, [one.name for one in recordings])
     recordings = select_recordings(
-        recordings, options.recordings, key=f"{place}.recordings"
+        recordings,
+        names,
+        key=f"{place}.recordings",
     )
     if not isinstance(options.hold_out, str):
         held_out = select_recordings(
@@ -332,7 +342,16 @@ def _warnings(context: Context, given: ToDiagnose) -> list[str]:
     """What the units are taken for, and which recordings cannot start in equilibrium."""
     recordings, simulation, options = given.recordings, given.simulation, given.options
     if not isinstance(simulation, SimulationOptions):
-        return [_announcement(simulation)]
+        said = [_announcement(simulation)]
+        total = len(context.results["calibrate"].recordings)
+        if options.recordings is None and len(recordings) < total:
+            shown = ", ".join(one.name for one in recordings)
+            said.append(
+                f"diagnosed are the {len(recordings)} of {total} recordings that "
+                f"{getattr(simulation, 'name', '')} does not cover: {shown}; "
+                "diagnose.recordings names others"
+            )
+        return said
     said = [
         assumed_units(given.experiment, recordings, given.logs),
         doubtful_sizes(given.experiment, recordings, simulation, options, given.logs),
@@ -348,7 +367,7 @@ def simulated_recordings(given: ToDiagnose) -> tuple[DriveResponse, ...]:
     """What the simulation makes of the recordings, with the given parameters."""
     simulation = given.simulation
     if not isinstance(simulation, SimulationOptions):
-        return simulated(simulation, given.recordings, given.logs)
+        return simulated(simulation, given.recordings, given.logs, given.options)
     return simulate_recordings(given.recordings, simulation, given.options)
 
 
@@ -369,6 +388,8 @@ def _announcement(simulation: ForeignSimulation) -> str:
     what = getattr(simulation, "file", "") or " ".join(
         getattr(simulation, "command", ())
     )
+    if isinstance(simulation, ModelSimulation) and simulation.name:
+        what = f"the model {simulation.name}"
     runs = f"runs {what}" if able.run and what else "runs nothing of yours"
     return f"simulation.kind {simulation.kind}: {runs}; it can be given {words}"
 

@@ -13,6 +13,7 @@ from hwid_cli.diagnosis.rounds import DiagnosisTask
 from hwid_cli.errors import ConfigError, ModelFileError, SimulationError
 from hwid_cli.export.json_reader import read_exported
 from hwid_cli.export.loading import check_trust
+from hwid_cli.export.stored_models import read_stored_model
 from hwid_cli.records.diagnosis import Diagnosis
 from hwid_cli.records.drive import DriveResponse, told_apart
 from hwid_cli.records.experiment import DiagnoseOptions
@@ -28,6 +29,8 @@ from hwid_cli.records.programs import (
 from hwid_cli.records.recordings import CalibrationLog, Recording
 from hwid_cli.simulations.extended import run_extended
 from hwid_cli.simulations.kinds import kind_named
+from hwid_cli.store.final_test_results import read_final_test
+from hwid_cli.store.result_files import has_left_results
 
 
 def placed(options: ForeignSimulation, source: str) -> ForeignSimulation:
@@ -52,12 +55,41 @@ def placed(options: ForeignSimulation, source: str) -> ForeignSimulation:
             for one in options.command
         ]
         return replace(options, command=tuple(there))
+    if isinstance(options, ModelSimulation) and options.results:
+        results = (folder / options.results).resolve()
+        return _with_result(replace(options, results=str(results)), source)
     options = replace(options, file=str((folder / options.file).resolve()))
     return (
         _with_model(options, source)
         if isinstance(options, ModelSimulation)
         else options
     )
+
+
+def _with_result(options: ModelSimulation, source: str) -> ModelSimulation:
+    """With the model of a folder of results: the named one, or the widest."""
+    folder = Path(options.results)
+    name = options.name or _widest(folder, source)
+    try:
+        found = read_stored_model(folder, name)
+    except ConfigError as error:
+        raise ConfigError(f"{source}: simulation.results: {error}") from error
+    step = found.model.sample_time_s
+    return replace(options, name=name, model=found.model, model_sample_time_s=step)
+
+
+def _widest(folder: Path, source: str) -> str:
+    """The model that covers most recordings in the final test, the nearest of several."""
+    path = folder / "results.h5"
+    if not path.is_file() or not has_left_results(path, "test"):
+        raise ConfigError(
+            f"{source}: simulation.results: found no results of hwid test in {folder}; "
+            "run 'hwid test' first, or name the model with simulation.name"
+        )
+    final = read_final_test(path)
+    rmsd = np.where(np.isfinite(final.rmsd), final.rmsd, np.inf)
+    order = np.lexsort((np.median(rmsd, axis=1), -final.covers))
+    return final.models[int(order[0])]
 
 
 def _with_model(options: ModelSimulation, source: str) -> ModelSimulation:
@@ -75,6 +107,45 @@ def _with_model(options: ModelSimulation, source: str) -> ModelSimulation:
     return replace(options, model=found.model, model_sample_time_s=found.sample_time_s)
 
 
+# Fewer recordings than these say too little alone.
+_FEWEST_UNCOVERED = 3
+
+
+def uncovered_by(options: object, known: Sequence[str]) -> tuple[str, ...] | None:
+    """Recordings that the model of a folder of results does not cover.
+
+    Parameters
+    ----------
+    options : SimulationOptions or ForeignSimulation
+        Placed.
+    known : sequence of str
+        Recordings at hand.
+
+    Returns
+    -------
+    tuple of str or None
+        None where all are to be used: another kind of simulation, or hardly any that it
+        does not cover.
+    """
+    if not isinstance(options, ModelSimulation) or not options.results:
+        return None
+    path = Path(options.results) / "results.h5"
+    if not has_left_results(path, "test"):
+        return None
+    final = read_final_test(path)
+    if options.name not in final.models:
+        return None
+    row = final.models.index(options.name)
+    rmsd = np.where(np.isfinite(final.rmsd[row]), final.rmsd[row], np.inf)
+    open_ones = {
+        name
+        for name, one in zip(final.recordings, rmsd, strict=True)
+        if one > final.threshold
+    }
+    found = tuple(name for name in known if name in open_ones)
+    return found if len(found) >= _FEWEST_UNCOVERED else None
+
+
 def content_of(options: ForeignSimulation, source: str) -> dict[str, Any]:
     """Everything that a simulation's answers depend on, as plain data.
 
@@ -84,7 +155,7 @@ def content_of(options: ForeignSimulation, source: str) -> dict[str, Any]:
         If it cannot be found.
     """
     about = asdict(options)
-    for name in ("file", "model", "time_limit_s"):
+    for name in ("file", "results", "model", "time_limit_s"):
         about.pop(name, None)
     kind = kind_named(options.kind)
     if kind.content is not None:
@@ -131,13 +202,19 @@ def simulated(
     options: ForeignSimulation,
     recordings: Sequence[Recording],
     logs: Sequence[CalibrationLog],
+    diagnosed: DiagnoseOptions,
 ) -> tuple[DriveResponse, ...]:
     """What a simulation makes of the recordings' inputs, beside what was measured.
 
     Effects of its section are put into it.
+
+    Parameters
+    ----------
+    diagnosed : DiagnoseOptions
+        How a diagnosis divides the recordings.
     """
     simulator = simulator_of(options, recordings, logs)
-    answer = _answers(simulator, recordings)
+    answer = _answers(simulator, recordings, diagnosed)
     found = []
     for one in recordings:
         output = answer(one)
@@ -150,7 +227,7 @@ def simulated(
 
 
 def _answers(
-    simulator: Simulator, recordings: Sequence[Recording]
+    simulator: Simulator, recordings: Sequence[Recording], diagnosed: DiagnoseOptions
 ) -> Callable[[Recording], np.ndarray]:
     """From a recording to what the simulation makes of its input."""
     run = simulator.run
@@ -165,7 +242,7 @@ def _answers(
 
     if not simulator.effects:
         return lambda one: run(request(one)).output
-    plain, _ = stand_in_for(recordings, simulator, DiagnoseOptions(), in_turn)
+    plain, _ = stand_in_for(recordings, simulator, diagnosed, in_turn)
     effects = {name: dict(values) for name, values in simulator.effects.items()}
     drives = (plain, replace(plain, effects=effects))
     has_force = simulator.capabilities.force
@@ -184,7 +261,10 @@ def extended_foreign(
 ) -> ForeignSimulation:
     """The section with the effects that were found and the fitted parameters."""
     effects = [
-        (effect.id, {one.name: one.text or one.value for one in effect.parameters})
+        (
+            effect.own or effect.id,
+            {one.name: one.text or one.value for one in effect.parameters},
+        )
         for effect in (*diagnosis.present, *diagnosis.effects)
     ]
     changes: dict[str, Any] = {"effects": told_apart(effects)}

@@ -17,7 +17,12 @@ from hwid_cli.errors import CacheError
 from hwid_cli.files.atomic import replace_file
 from hwid_cli.files.csv_tables import write_table_csv
 from hwid_cli.files.messages import shown
-from hwid_cli.records.diagnosis import Diagnosis, FittedEffect, FittedParameter
+from hwid_cli.records.diagnosis import (
+    Diagnosis,
+    FittedEffect,
+    FittedParameter,
+    Law,
+)
 from hwid_cli.records.recordings import SignalUnit
 from hwid_cli.store.hdf5_records import read_record, write_record
 from hwid_cli.store.result_files import Provenance, read_results, replaced_stage
@@ -210,6 +215,7 @@ def _content(diagnosis: Diagnosis) -> dict[str, Any]:
             }
             for place in diagnosis.places
         ],
+        **({} if diagnosis.law is None else {"law": _law(diagnosis.law)}),
         "axis": diagnosis.axis,
         "output": diagnosis.output,
         "not_observable": list(diagnosis.not_observable),
@@ -228,9 +234,29 @@ def _effect(effect: FittedEffect) -> dict[str, Any]:
         "sentence": effect.sentence,
         "equation": effect.equation,
         "parameters": {
-            one.name: {"value": one.text or one.value, "ci95": _interval(one)}
+            one.name: {
+                "value": one.text or one.value,
+                "ci95": _interval(one),
+                **({"unit": one.unit} if one.unit else {}),
+            }
             for one in effect.parameters
         },
+    }
+
+
+def _law(law: Law) -> dict[str, Any]:
+    return {
+        "formula": law.formula,
+        "terms": [
+            {
+                "term": one.term,
+                "coefficient": {"value": one.value, "ci95": [one.low, one.high]},
+                "unit": one.unit,
+                "inclusion": one.inclusion,
+            }
+            for one in law.terms
+        ],
+        "acts_on": law.acts_on,
     }
 
 

@@ -5,7 +5,7 @@ import pytest
 from scipy.signal import lsim
 
 from hwid_cli import Recording
-from hwid_cli.diagnosis.foreign import Simulator, diagnose_foreign
+from hwid_cli.diagnosis.foreign import Simulator, diagnose_foreign, stand_in_for
 from hwid_cli.records.experiment import DiagnoseOptions
 from hwid_cli.records.programs import Capabilities, FreeParameter, SimulatorRun
 from tests.black_boxes.plants import LINEAR, Hidden, integrate
@@ -91,6 +91,18 @@ def test_friction_is_named_and_confirmed_in_the_simulation_with_its_parameters()
         assert one.after == pytest.approx(TRUE[one.name], rel=0.01)
     assert found.after.ratio_to_noise < 1.1 < found.before.ratio_to_noise
     assert runs <= 800
+
+
+def test_references_of_a_stand_in_are_those_of_the_training_recordings():
+    able = Capabilities(run=True, parameters=True, force=True)
+    found = recordings()
+    held = [one.name for one in found if np.max(np.abs(one.input)) > 2.6]
+    drive, signals = stand_in_for(
+        found, Simulator(able, simulate, {}, FREE, GIVEN),
+        DiagnoseOptions(hold_out=tuple(held)), Count(),
+    )  # fmt: skip
+    assert len(signals) == len(found) > len(held) > 0
+    assert drive.reference_current_A == 2.5
 
 
 def test_without_a_force_input_a_force_acts_through_the_input():

@@ -440,4 +440,5 @@ def test_a_small_remainder_that_goes_with_no_effect_is_none_but_not_all(sse, whi
 
 
 def test_there_is_a_word_for_every_case_and_no_other():
-    assert set(VERDICTS) == {"named", "ambiguous", "parameters", "unknown", "none"}
+    words = {"named", "ambiguous", "law", "parameters", "unknown", "none"}
+    assert set(VERDICTS) == words

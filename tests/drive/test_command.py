@@ -19,7 +19,15 @@ def path(command, effects):
     time, corners = 0.0, []
     for n in range(len(command) - 1):
         count, followed = command_pieces(
-            n, SAMPLE_TIME_S, command[:-1], command[1:], 0.0, vector, followed, pieces
+            n,
+            n * SAMPLE_TIME_S,
+            SAMPLE_TIME_S,
+            command[:-1],
+            command[1:],
+            0.0,
+            vector,
+            followed,
+            pieces,
         )
         assert sum(pieces[:count, 0]) == pytest.approx(SAMPLE_TIME_S, rel=1e-12)
         for length, first, last in pieces[:count]:

@@ -9,6 +9,7 @@ from hwid_cli.export.predict import predict
 from hwid_cli.records.drive import Controller, Drive
 from hwid_cli.records.experiment import Columns
 from hwid_cli.records.exported import ExportedSimulation, ModelCard
+from hwid_cli.records.own_effects import OwnEffect, OwnParameter, own_id
 from tests.drive import drive_cases as cases
 from tests.export.fmu_runs import answered
 from tests.export.model_examples import (
@@ -140,6 +141,20 @@ def test_the_program_simulates_as_hwid_does(effects, tmp_path):
 @pytest.mark.parametrize("place", range(len(ALONE + TOGETHER + MACHINES)))
 def test_all_effects_alone_and_together(place, tmp_path):
     check(tmp_path, *(ALONE + TOGETHER + MACHINES)[place], 4000)
+
+
+def test_formulas_of_the_users_own_are_in_the_program(tmp_path):
+    parameters = {"a": OwnParameter("N"), "b": OwnParameter("m")}
+    stated = [
+        OwnEffect(
+            force_N="-(a + 30*abs(x))*sign(v) + a*sin(x/b)*t", parameters=parameters
+        ),
+        OwnEffect(input="u - a*0.02*tanh(u)**3*b/b*cos(9*t)", parameters=parameters),
+        OwnEffect(output="x + 0.001*a*v*b*Max(t, 0.1)", parameters=parameters),
+    ]
+    values = {"a": 0.6, "b": 0.004}
+    effects = {own_id(f"own{n}", one): values for n, one in enumerate(stated)}
+    check(tmp_path, effects | cases.DELAY, {}, 1500)
 
 
 def test_a_simulation_that_runs_away_is_nan_from_there(tmp_path):

@@ -23,6 +23,7 @@ from hwid_cli.drive.motion.forces import (
     beyond_side,
     drive_now,
     is_force_curved,
+    own_force,
     resisting,
     ripple,
     spring_rate,
@@ -43,6 +44,11 @@ from hwid_cli.drive.motion.push import (
 FAST, FAR = 6.1, 37.0
 # A step is so short that no smooth force turns by more than this, [rad].
 LONGEST_PHASE = 0.3
+# Forces of formulas are differentiated over this share of the largest displacement, and
+# of the velocity that it has at this rate, [1/s].
+OWN_SHARE, OWN_RATE = 1e-4, 30.0
+# Samples that a bend of such a force is seen ahead: as many as steps go on without a look.
+OWN_AHEAD = 6.0
 # A contact's force begins with an edge in its slope: its steps are this much shorter.
 CONTACT_FINER = 2.0
 
@@ -174,11 +180,47 @@ def step_limit(
         rate += p[slots.RESISTANCE] / p[slots.INDUCTANCE]
     if p[slots.HYSTERESIS_FORCE] != 0.0:
         rate += _rate_of_yielding(state, memory, mass, p)
+    if p[slots.OWN_FORCE] != 0.0:
+        rate += _rate_of_own(state, memory, push, done, mass, p)
     slow = p[slots.STRIBECK_VELOCITY]
     if p[slots.STATIC_EXCESS] != 0.0 and memory[WAY] != 0.0 and speed < FAST * slow:
         pull = abs(acceleration(state, memory, push, done, p)[0])
         rate += abs(p[slots.STATIC_EXCESS]) / (mass * slow) + 0.5 * pull / slow
     return LONGEST_PHASE / max(rate, 1e-9)
+
+
+@njit(**INNER)
+def _rate_of_own(
+    state: np.ndarray,
+    memory: np.ndarray,
+    push: np.ndarray,
+    done: float,
+    mass: float,
+    p: np.ndarray,
+) -> float:
+    """Return how fast motion under forces of the user's own turns."""
+    x, v, way = state[X], state[V], memory[WAY]
+    dx = OWN_SHARE * p[slots.REFERENCE_DISPLACEMENT]
+    dv = OWN_SHARE * (abs(v) + OWN_RATE * p[slots.REFERENCE_DISPLACEMENT])
+    if way * v < dv and way < 0.0:
+        # The other way would be over the edge.
+        dv = -dv
+    here = own_force(x, v, way, push, done, p)
+    stiffness = abs(own_force(x + dx, v, way, push, done, p) - here) / dx
+    if p[slots.OWN_BENDS] > 0.0:
+        # A stop that is near is as stiff as if the drive were in it.
+        way_on = OWN_AHEAD * p[slots.SAMPLE_TIME] * v
+        if abs(way_on) > dx:
+            ahead = own_force(x + way_on, v, way, push, done, p)
+            edge = own_force(x + way_on + dx, v, way, push, done, p)
+            stiffness = max(stiffness, abs(edge - ahead) / dx)
+    damping = (own_force(x, v + dv, way, push, done, p) - here) / dv
+    rate = np.sqrt(stiffness / mass) + abs(damping) / mass
+    rate += 0.12 * p[slots.OWN_WAVES] * abs(v) + 0.12 * p[slots.OWN_TURNING]
+    if p[slots.OWN_FINENESS] > 0.0:
+        # The shortest time that is known here is a share of a sample.
+        rate += LONGEST_PHASE * p[slots.OWN_FINENESS] / p[slots.SAMPLE_TIME]
+    return rate
 
 
 @njit(**INNER)
@@ -257,7 +299,7 @@ def step_plain(
         Since the start of the piece, and length of the step.
     p : ndarray, shape (N_SLOTS,)
     """
-    if p[slots.DRIVE_VARIES] != 0.0:
+    if p[slots.DRIVE_VARIES] != 0.0 or p[slots.OWN_FORCE] != 0.0:
         return _step_varying(x, v, memory, push, done, h, p)
     half, inverse = 0.5 * h, 1.0 / p[slots.MASS]
     a0, b0, c0, d0 = shift(push, DRIVE, done)
@@ -288,7 +330,7 @@ def _step_varying(
     h: float,
     p: np.ndarray,
 ) -> tuple[float, float]:
-    """Step where the motor's force depends on position, or friction on that force."""
+    """Step where the motor's force depends on position, friction on it, or with formulas."""
     inverse = 1.0 / p[slots.MASS]
     xs, vs = x, v
     x1, v1 = x, v
@@ -297,6 +339,8 @@ def _step_varying(
         drive = value_of(push, DRIVE, at) * ripple(xs, p)
         net = drive + value_of(push, OTHER, at) - resisting(xs, vs, memory, p)
         net -= memory[WAY] * p[slots.DRIVE_SHARE] * abs(drive)
+        if p[slots.OWN_FORCE] != 0.0:
+            net += own_force(xs, vs, memory[WAY], push, at, p)
         slope = vs
         weight = h / 6.0 if stage in (0, 3) else h / 3.0
         x1 += weight * slope

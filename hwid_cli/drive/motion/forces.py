@@ -8,7 +8,11 @@ from numba import njit
 
 from hwid_cli.drive import slots
 from hwid_cli.drive.compiled import INNER
+from hwid_cli.drive.interpreter import formula_value
 from hwid_cli.drive.motion.push import (
+    BEGUN,
+    COMMAND,
+    COMMAND_RATE,
     DRIVE,
     OTHER,
     TURN,
@@ -72,6 +76,8 @@ def acceleration(
     net = force + value_of(push, OTHER, done) - resisting(x, v, memory, p)
     if rubbing != 0.0:
         net -= rubbing
+    if p[slots.OWN_FORCE] != 0.0:
+        net += own_force(x, v, memory[WAY], push, done, p)
     mode = 0.0
     if p[slots.MODE_MASS] > 0.0:
         pull = p[slots.MODE_STIFFNESS] * (state[PART_X] - x)
@@ -79,6 +85,73 @@ def acceleration(
         net += pull
         mode = -pull / p[slots.MODE_MASS]
     return net / mass, motor, mode, rate
+
+
+@njit(**INNER)
+def own_force(
+    x: float, v: float, way: float, push: np.ndarray, done: float, p: np.ndarray
+) -> float:
+    """Return the force of the user's own formulas; of a resting drive without friction.
+
+    Parameters
+    ----------
+    x, v : float, [m], [m/s]
+    way : float
+        Direction of sliding, 0 at rest.
+    push : ndarray, shape (N_PUSH,)
+    done : float, [s]
+        Since the start of the piece.
+    p : ndarray, shape (N_SLOTS,)
+    """
+    at = p[slots.OWN_FORCE]
+    u = push[COMMAND] + done * push[COMMAND_RATE]
+    t = push[BEGUN] + done
+    if p[slots.OWN_FRICTION] == 0.0:
+        return formula_value(at, x, v, u, t, np.sign(v), p)
+    if way != 0.0:
+        return formula_value(at, x, v, u, t, way, p)
+    forward = formula_value(at, x, 0.0, u, t, 1.0, p)
+    return 0.5 * (forward + formula_value(at, x, 0.0, u, t, -1.0, p))
+
+
+@njit(**INNER)
+def own_friction(x: float, push: np.ndarray, done: float, p: np.ndarray) -> float:
+    """Return up to which force formulas of the user's own hold a resting drive.
+
+    Half of the jump that the force makes with the direction of motion.
+
+    Parameters
+    ----------
+    x : float, [m]
+    push : ndarray, shape (N_PUSH,)
+    done : float, [s]
+        Since the start of the piece.
+    p : ndarray, shape (N_SLOTS,)
+    """
+    at = p[slots.OWN_FORCE]
+    u = push[COMMAND] + done * push[COMMAND_RATE]
+    t = push[BEGUN] + done
+    backward = formula_value(at, x, 0.0, u, t, -1.0, p)
+    return 0.5 * (backward - formula_value(at, x, 0.0, u, t, 1.0, p))
+
+
+@njit(**INNER)
+def own_force_at_rest(x: float, command: float, p: np.ndarray) -> float:
+    """Return the force of the user's own formulas on a drive that rests at first.
+
+    Of what it may be at rest, what is nearest to 0: friction holds no load at first.
+
+    Parameters
+    ----------
+    x : float, [m]
+    command : float, [A] or [V]
+    p : ndarray, shape (N_SLOTS,)
+    """
+    at = p[slots.OWN_FORCE]
+    forward = formula_value(at, x, 0.0, command, 0.0, 1.0, p)
+    backward = formula_value(at, x, 0.0, command, 0.0, -1.0, p)
+    low, high = min(forward, backward), max(forward, backward)
+    return min(max(0.0, low), high)
 
 
 @njit(**INNER)
@@ -229,6 +302,7 @@ def is_force_curved(p: np.ndarray) -> bool:
         or p[slots.WAVY_FRICTION] != 0.0
         or p[slots.SPRING_SHARE] != 0.0
         or p[slots.DRIVE_VARIES] != 0.0
+        or p[slots.OWN_FORCE] != 0.0
     )
 
 
@@ -456,6 +530,7 @@ def has_dry_friction(p: np.ndarray) -> bool:
     """
     level = max(p[slots.FRICTION_FORWARD], p[slots.FRICTION_BACKWARD])
     level += p[slots.PRELOAD] + p[slots.SPRING_SHARE] + p[slots.DRIVE_SHARE]
+    level += p[slots.OWN_FRICTION]
     return level > 0.0 or p[slots.STATIC_EXCESS] != 0.0
 
 
@@ -499,6 +574,8 @@ def held_further(
         level += p[slots.PRELOAD]
     if p[slots.DRIVE_SHARE] != 0.0:
         level += p[slots.DRIVE_SHARE] * abs(drive_now(state, push, done, p))
+    if p[slots.OWN_FRICTION] != 0.0:
+        level += own_friction(state[X], push, done, p)
     return level
 
 
@@ -597,6 +674,8 @@ def resting_point(current: float, has_cogging: bool, p: np.ndarray) -> float:
         return p[slots.START_POSITION]
     force = resting_force(0.0, current, p) + p[slots.LOAD]
     force -= p[slots.GRAVITY_TORQUE] * np.sin(p[slots.GRAVITY_ANGLE])
+    if p[slots.OWN_FORCE] != 0.0:
+        force += own_force_at_rest(0.0, _command_at(current, p), p)
     if abs(force) <= p[slots.PRELOAD]:
         return 0.0
     side = np.sign(force)
@@ -630,7 +709,15 @@ def _away(
         left -= cogging(x, p)
     if not has_cogging and p[slots.SECOND_COGGING_FORCE] != 0.0:
         left -= second_cogging(x, p)
+    if p[slots.OWN_FORCE] != 0.0:
+        left += own_force_at_rest(x, _command_at(current, p), p)
     return left
+
+
+@njit(**INNER)
+def _command_at(current: float, p: np.ndarray) -> float:
+    """Return the command that lets a current flow at rest."""
+    return current * p[slots.RESISTANCE] if p[slots.RESISTANCE] > 0.0 else current
 
 
 @njit(**INNER)

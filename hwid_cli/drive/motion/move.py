@@ -279,6 +279,7 @@ def _couple(p: np.ndarray) -> None:
 def _take_stock(sample_time: float, p: np.ndarray) -> None:
     """Note what the drive has of what few drives have, so that others need not ask."""
     p[slots.CAPTURE_TIME] = CAPTURE_SHARE * sample_time
+    p[slots.SAMPLE_TIME] = sample_time
     has_zero_edge = p[slots.PRELOAD] > 0.0 or p[slots.SPRING_SHARE] > 0.0
     p[slots.HAS_ZERO_EDGE] = 1.0 if has_zero_edge else 0.0
     has_edges = has_zero_edge or p[slots.DRIVE_SHARE] > 0.0
@@ -292,6 +293,7 @@ def _take_stock(sample_time: float, p: np.ndarray) -> None:
     has_more = has_zero_edge or has_second or contact > 0.0
     has_more = has_more or p[slots.GRAVITY_TORQUE] != 0.0
     has_more = has_more or p[slots.WAVY_FRICTION] != 0.0
+    has_more = has_more or p[slots.OWN_FRICTION] != 0.0
     p[slots.HAS_MORE] = 1.0 if has_more else 0.0
     has_shape = p[slots.HYSTERESIS_BEND] != 0.0 or p[slots.HYSTERESIS_RATIO] != 0.0
     p[slots.HAS_SHAPE] = 1.0 if has_shape else 0.0

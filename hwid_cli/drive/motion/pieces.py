@@ -15,6 +15,7 @@ from hwid_cli.drive.motion.push import (
     OTHER,
     depends_on_motion,
     is_straight,
+    set_moment,
     set_push,
 )
 
@@ -82,17 +83,18 @@ def list_pieces(
         ends[0, sample], ends[1, sample] = first, last
         rows[0, 0], rows[0, 1], rows[0, 2] = sample_time, first, last
         n_rows = 1
+        time = sample * sample_time
         if not is_simple:
             n_rows, followed = command_pieces(
-                sample, sample_time, ends[0], ends[1], before, p, followed, rows
+                sample, time, sample_time, ends[0], ends[1], before, p, followed, rows
             )
-        time = sample * sample_time
         for row in range(n_rows):
             length, first, last = rows[row, 0], rows[row, 1], rows[row, 2]
             if length <= 0.0:
                 continue
             pieces[count, LENGTH], pieces[count, SAMPLE] = length, -1.0
             push = pushes[count]
+            set_moment(push, time, length, first, last)
             if is_plain:
                 push[DRIVE], push[OTHER] = gain * first, p[slots.LOAD]
                 push[DRIVE + 1] = gain * (last - first) / length

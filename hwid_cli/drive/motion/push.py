@@ -14,8 +14,9 @@ from hwid_cli.drive.compiled import INNER
 
 TURN = 2.0 * np.pi
 # Places in the push: cubic of the drive's force (or command, where the current depends
-# on the motion), cubic of the other forces, temperature in the middle.
-DRIVE, OTHER, WARMTH, N_PUSH = 0, 4, 8, 9
+# on the motion), cubic of the other forces, temperature in the middle; of the piece the
+# command at its start, its rate, and the time.
+DRIVE, OTHER, WARMTH, COMMAND, COMMAND_RATE, BEGUN, N_PUSH = 0, 4, 8, 9, 10, 11, 12
 # Numbers that depend on the length of a piece alone.
 N_ROOM = 17
 # Gauss-Legendre points and weights on -1 to 1.
@@ -201,6 +202,23 @@ def set_push(
         scale /= length
         push[DRIVE + n] *= scale
         push[OTHER + n] *= scale
+
+
+@njit(**INNER)
+def set_moment(
+    push: np.ndarray, time: float, length: float, first: float, last: float
+) -> None:
+    """Note when a piece begins, and how its command goes on.
+
+    Parameters
+    ----------
+    push : ndarray, shape (N_PUSH,)
+    time, length : float, [s]
+    first, last : float, [A] or [V]
+        Command at both ends.
+    """
+    push[COMMAND], push[COMMAND_RATE] = first, (last - first) / length
+    push[BEGUN] = time
 
 
 @njit(**INNER)

@@ -52,7 +52,7 @@ double HWID_NAME(step)(HWID_NAME(state) *state, double u);
 enum { MANY_TOGETHER = 1000, FAR_FROM_LIMIT_PIECES = 4, N_HISTORY = @n_history@ };
 
 static const double sample_time = @sample_time@;
-static const double parameters[N_SLOTS] = {@parameters@};
+static const double parameters[@n_slots@] = {@parameters@};
 
 typedef tuple_iiiiid drive_kind;
 
@@ -232,7 +232,7 @@ static void interval(HWID_NAME(state) *s, double first, double last)
     rows[0][2] = last;
     if (!drive_is_untouched(p)) {
         const tuple_id made = drive_command_pieces(
-            N_HISTORY - 1, sample_time, s->starts, s->ends, s->before, p, s->followed,
+            N_HISTORY - 1, time, sample_time, s->starts, s->ends, s->before, p, s->followed,
             rows);
         count = made.m0;
         s->followed = made.m1;
@@ -245,6 +245,7 @@ static void interval(HWID_NAME(state) *s, double first, double last)
         if (length <= 0.0) {
             continue;
         }
+        drive_set_moment(push, time, length, rows[n][1], rows[n][2]);
         if (drive_is_straight(p)) {
             push[DRIVE] = gain * rows[n][1];
             push[OTHER] = p[LOAD];
@@ -279,7 +280,7 @@ static double played(HWID_NAME(state) *s, double x0, double v0)
 void HWID_NAME(init)(HWID_NAME(state) *state)
 {
     int n;
-    for (n = 0; n < N_SLOTS; ++n) {
+    for (n = 0; n < @n_slots@; ++n) {
         state->p[n] = parameters[n];
     }
     for (n = 0; n < N_STATE; ++n) {
@@ -337,7 +338,7 @@ double HWID_NAME(step)(HWID_NAME(state) *state, double u)
         state->played = state->position;
     }
     u = drive_sensed(state->played, state->position - state->played, state->velocity,
-                     sample_time * (double)state->sample, p);
+                     state->previous, sample_time * (double)state->sample, p);
     state->sample += 1;
     return u;
 }

@@ -113,8 +113,44 @@ enum {
     RIPPLE_PHASE = 109,
     HYSTERESIS_RATIO = 110,
     HYSTERESIS_BEND = 111,
-    N_SLOTS = 112,
-    MOST_PIECES = 40,
+    OWN_PILE = 112,
+    OWN_FORCE = 113,
+    OWN_INPUT = 114,
+    OWN_OUTPUT = 115,
+    OWN_FRICTION = 116,
+    OWN_WAVES = 117,
+    OWN_TURNING = 118,
+    OWN_FINENESS = 119,
+    OWN_BENDS = 120,
+    SAMPLE_TIME = 121,
+    N_SLOTS = 122,
+    CONSTANT = 0,
+    VARIABLE = 1,
+    ADD = 2,
+    SUBTRACT = 3,
+    MULTIPLY = 4,
+    DIVIDE = 5,
+    POWER = 6,
+    MAX = 7,
+    MIN = 8,
+    NEGATE = 9,
+    SQUARE = 10,
+    CUBE = 11,
+    ABS = 12,
+    SIGN = 13,
+    HEAVISIDE = 14,
+    SIN = 15,
+    COS = 16,
+    EXP = 17,
+    LOG = 18,
+    SQRT = 19,
+    TAN = 20,
+    ATAN = 21,
+    SINH = 22,
+    COSH = 23,
+    TANH = 24,
+    MOST_PIECES = 80,
+    OWN_PIECES = 4,
     ERROR_SUM = 0,
     LAST_ERROR = 1,
     HAS_ERROR = 2,
@@ -122,7 +158,10 @@ enum {
     DRIVE = 0,
     OTHER = 4,
     WARMTH = 8,
-    N_PUSH = 9,
+    COMMAND = 9,
+    COMMAND_RATE = 10,
+    BEGUN = 11,
+    N_PUSH = 12,
     N_ROOM = 17,
     X = 0,
     V = 1,
@@ -209,6 +248,129 @@ static double sign_of(double a)
     return a > 0.0 ? 1.0 : (a < 0.0 ? -1.0 : a);
 }
 
+static double drive_variable(int which, double x, double v, double u, double t, double way, double *p)
+{
+    if (which == 0) {
+        return x;
+    }
+    if (which == 1) {
+        return v;
+    }
+    if (which == 2) {
+        return u;
+    }
+    if (which == 3) {
+        return t;
+    }
+    return (which == 4) ? way : p[FORCE_CONSTANT];
+}
+
+static double drive_curved(int step, double a)
+{
+    if (step == EXP) {
+        return exp(a);
+    }
+    if (step == LOG) {
+        return log(a);
+    }
+    if (step == SQRT) {
+        return sqrt(a);
+    }
+    if (step == TAN) {
+        return tan(a);
+    }
+    if (step == ATAN) {
+        return atan(a);
+    }
+    if (step == SINH) {
+        return sinh(a);
+    }
+    return (step == COSH) ? cosh(a) : tanh(a);
+}
+
+static double drive_changed(int step, double a)
+{
+    if (step == NEGATE) {
+        return -a;
+    }
+    if (step == SQUARE) {
+        return a * a;
+    }
+    if (step == CUBE) {
+        return (a * a) * a;
+    }
+    if (step == ABS) {
+        return fabs(a);
+    }
+    if (step == SIGN) {
+        return sign_of(a);
+    }
+    if (step == HEAVISIDE) {
+        return 0.5 + (0.5 * sign_of(a));
+    }
+    if (step == SIN) {
+        return sin(a);
+    }
+    if (step == COS) {
+        return cos(a);
+    }
+    return drive_curved(step, a);
+}
+
+static double drive_combined(int step, double a, double b)
+{
+    if (step == ADD) {
+        return a + b;
+    }
+    if (step == SUBTRACT) {
+        return a - b;
+    }
+    if (step == MULTIPLY) {
+        return a * b;
+    }
+    if (step == DIVIDE) {
+        return a / b;
+    }
+    if (step == POWER) {
+        return pow(a, b);
+    }
+    return (step == MAX) ? most(a, b) : least(a, b);
+}
+
+static double drive_formula_value(double at, double x, double v, double u, double t, double way, double *p)
+{
+    int start = 0;
+    int bottom = 0;
+    int top = 0;
+    int n = 0;
+    int step = 0;
+    double number = 0.0;
+    start = (int)(at);
+    bottom = (int)(p[OWN_PILE]);
+    top = bottom - 1;
+    for (n = 0; n < (int)(p[start]); ++n) {
+        step = (int)(p[(start + 1) + (2 * n)]);
+        number = p[(start + 2) + (2 * n)];
+        if (step == CONSTANT) {
+            top += 1;
+            p[top] = number;
+        } else {
+            if (step == VARIABLE) {
+                top += 1;
+                p[top] = drive_variable((int)(number), x, v, u, t, way, p);
+            } else {
+                if (step >= NEGATE) {
+                    p[top] = drive_changed(step, p[top]);
+                } else {
+                    top -= 1;
+                    p[top] = drive_combined(step, p[top], p[top + 1]);
+                }
+            }
+        }
+    }
+    return p[bottom];
+}
+
 static int drive_delayed(int n, double sample_time, double *starts, double *ends, double before, double delay, double (*pieces)[3])
 {
     int whole = 0;
@@ -248,6 +410,44 @@ static int drive_delayed(int n, double sample_time, double *starts, double *ends
         count += 1;
     }
     return count;
+}
+
+static int drive_through_formula(double (*pieces)[3], int count, double time, double *p)
+{
+    double at = 0.0;
+    double end = 0.0;
+    int j = 0;
+    double length = 0.0;
+    double first = 0.0;
+    double last = 0.0;
+    int k = 0;
+    int row = 0;
+    double low = 0.0;
+    double high = 0.0;
+    double before = 0.0;
+    double after = 0.0;
+    at = p[OWN_INPUT];
+    end = time;
+    for (j = 0; j < count; ++j) {
+        end += pieces[j][0];
+    }
+    for (j = count - 1; j > -1; --j) {
+        length = pieces[j][0];
+        first = pieces[j][1];
+        last = pieces[j][2];
+        end -= length;
+        for (k = OWN_PIECES - 1; k > -1; --k) {
+            row = (OWN_PIECES * j) + k;
+            low = (k + 0.0) / OWN_PIECES;
+            high = (k + 1.0) / OWN_PIECES;
+            before = first + (low * (last - first));
+            after = first + (high * (last - first));
+            pieces[row][0] = length / OWN_PIECES;
+            pieces[row][1] = drive_formula_value(at, 0.0, 0.0, before, end + (low * length), 0.0, p);
+            pieces[row][2] = drive_formula_value(at, 0.0, 0.0, after, end + (high * length), 0.0, p);
+        }
+    }
+    return OWN_PIECES * count;
 }
 
 static int drive_split(double (*pieces)[3], int count, double level)
@@ -355,7 +555,7 @@ static double drive_dead_zone(double value, double half)
     return 0.0;
 }
 
-static tuple_id drive_command_pieces(int n, double sample_time, double *starts, double *ends, double before, double *p, double followed, double (*pieces)[3])
+static tuple_id drive_command_pieces(int n, double time, double sample_time, double *starts, double *ends, double before, double *p, double followed, double (*pieces)[3])
 {
     int count = 0;
     int j = 0;
@@ -367,6 +567,9 @@ static tuple_id drive_command_pieces(int n, double sample_time, double *starts, 
         pieces[0][1] = starts[n];
         pieces[0][2] = ends[n];
         count = 1;
+    }
+    if (p[OWN_INPUT] != 0.0) {
+        count = drive_through_formula(pieces, count, time, p);
     }
     if (p[DEAD_ZONE] > 0.0) {
         count = drive_split(pieces, count, p[DEAD_ZONE]);
@@ -391,12 +594,15 @@ static tuple_id drive_command_pieces(int n, double sample_time, double *starts, 
 
 static int drive_is_untouched(double *p)
 {
-    return !((p[DELAY] > 0.0) || (p[DEAD_ZONE] > 0.0) || (p[SATURATION] < HUGE_VAL) || (p[RATE] < HUGE_VAL));
+    return !((p[DELAY] > 0.0) || (p[OWN_INPUT] != 0.0) || (p[DEAD_ZONE] > 0.0) || (p[SATURATION] < HUGE_VAL) || (p[RATE] < HUGE_VAL));
 }
 
 static double drive_static_command(double value, double *p)
 {
     double limit = 0.0;
+    if (p[OWN_INPUT] != 0.0) {
+        value = drive_formula_value(p[OWN_INPUT], 0.0, 0.0, value, 0.0, 0.0, p);
+    }
     if (p[DEAD_ZONE] > 0.0) {
         value = drive_dead_zone(value, p[DEAD_ZONE]);
     }
@@ -608,6 +814,13 @@ static void drive_set_push(double *push, double *room, double *memory, tuple_ddd
         push[DRIVE + n] *= scale;
         push[OTHER + n] *= scale;
     }
+}
+
+static void drive_set_moment(double *push, double time, double length, double first, double last)
+{
+    push[COMMAND] = first;
+    push[COMMAND_RATE] = (last - first) / length;
+    push[BEGUN] = time;
 }
 
 static double drive_value_of(double *push, int which, double done)
@@ -890,6 +1103,25 @@ static double drive_resisting(double x, double v, double *memory, double *p)
     return force;
 }
 
+static double drive_own_force(double x, double v, double way, double *push, double done, double *p)
+{
+    double at = 0.0;
+    double u = 0.0;
+    double t = 0.0;
+    double forward = 0.0;
+    at = p[OWN_FORCE];
+    u = push[COMMAND] + (done * push[COMMAND_RATE]);
+    t = push[BEGUN] + done;
+    if (p[OWN_FRICTION] == 0.0) {
+        return drive_formula_value(at, x, v, u, t, sign_of(v), p);
+    }
+    if (way != 0.0) {
+        return drive_formula_value(at, x, v, u, t, way, p);
+    }
+    forward = drive_formula_value(at, x, 0.0, u, t, 1.0, p);
+    return 0.5 * (forward + drive_formula_value(at, x, 0.0, u, t, -1.0, p));
+}
+
 static double drive_wanted_current(double command, double *state, double *p)
 {
     double speed = 0.0;
@@ -965,6 +1197,9 @@ static tuple_dddd drive_acceleration(double *state, double *memory, double *push
     if (rubbing != 0.0) {
         net -= rubbing;
     }
+    if (p[OWN_FORCE] != 0.0) {
+        net += drive_own_force(x, v, memory[WAY], push, done, p);
+    }
     mode = 0.0;
     if (p[MODE_MASS] > 0.0) {
         pull = p[MODE_STIFFNESS] * (state[PART_X] - x);
@@ -973,6 +1208,34 @@ static tuple_dddd drive_acceleration(double *state, double *memory, double *push
         mode = (-pull) / p[MODE_MASS];
     }
     return (tuple_dddd){net / mass, motor, mode, rate};
+}
+
+static double drive_own_friction(double x, double *push, double done, double *p)
+{
+    double at = 0.0;
+    double u = 0.0;
+    double t = 0.0;
+    double backward = 0.0;
+    at = p[OWN_FORCE];
+    u = push[COMMAND] + (done * push[COMMAND_RATE]);
+    t = push[BEGUN] + done;
+    backward = drive_formula_value(at, x, 0.0, u, t, -1.0, p);
+    return 0.5 * (backward - drive_formula_value(at, x, 0.0, u, t, 1.0, p));
+}
+
+static double drive_own_force_at_rest(double x, double command, double *p)
+{
+    double at = 0.0;
+    double forward = 0.0;
+    double backward = 0.0;
+    double low = 0.0;
+    double high = 0.0;
+    at = p[OWN_FORCE];
+    forward = drive_formula_value(at, x, 0.0, command, 0.0, 1.0, p);
+    backward = drive_formula_value(at, x, 0.0, command, 0.0, -1.0, p);
+    low = least(forward, backward);
+    high = most(forward, backward);
+    return least(most(0.0, low), high);
 }
 
 static double drive_moved_mass(double *p)
@@ -1016,7 +1279,7 @@ static double drive_spring_rate(double x, double *p)
 
 static int drive_is_force_curved(double *p)
 {
-    return (p[CUBIC] != 0.0) || (p[QUADRATIC] != 0.0) || (p[COGGING_FORCE] != 0.0) || (p[DRAG] != 0.0) || (p[GRAVITY_TORQUE] != 0.0) || (p[SECOND_COGGING_FORCE] != 0.0) || (p[WAVY_FRICTION] != 0.0) || (p[SPRING_SHARE] != 0.0) || (p[DRIVE_VARIES] != 0.0);
+    return (p[CUBIC] != 0.0) || (p[QUADRATIC] != 0.0) || (p[COGGING_FORCE] != 0.0) || (p[DRAG] != 0.0) || (p[GRAVITY_TORQUE] != 0.0) || (p[SECOND_COGGING_FORCE] != 0.0) || (p[WAVY_FRICTION] != 0.0) || (p[SPRING_SHARE] != 0.0) || (p[DRIVE_VARIES] != 0.0) || (p[OWN_FORCE] != 0.0);
 }
 
 static void drive_remember(double x, double *memory, double *p)
@@ -1037,6 +1300,7 @@ static int drive_has_dry_friction(double *p)
     double level = 0.0;
     level = most(p[FRICTION_FORWARD], p[FRICTION_BACKWARD]);
     level += (p[PRELOAD] + p[SPRING_SHARE]) + p[DRIVE_SHARE];
+    level += p[OWN_FRICTION];
     return (level > 0.0) || (p[STATIC_EXCESS] != 0.0);
 }
 
@@ -1061,6 +1325,9 @@ static double drive_held_further(double *state, double *push, double done, doubl
     }
     if (p[DRIVE_SHARE] != 0.0) {
         level += p[DRIVE_SHARE] * fabs(drive_drive_now(state, push, done, p));
+    }
+    if (p[OWN_FRICTION] != 0.0) {
+        level += drive_own_friction(state[X], push, done, p);
     }
     return level;
 }
@@ -1101,6 +1368,11 @@ static double drive_resting_force(double x, double current, double *p)
     return force;
 }
 
+static double drive_command_at(double current, double *p)
+{
+    return (p[RESISTANCE] > 0.0) ? (current * p[RESISTANCE]) : current;
+}
+
 static double drive_away(double x, double side, double current, int has_cogging, double *p)
 {
     double force = 0.0;
@@ -1112,6 +1384,9 @@ static double drive_away(double x, double side, double current, int has_cogging,
     }
     if ((!has_cogging) && (p[SECOND_COGGING_FORCE] != 0.0)) {
         left -= drive_second_cogging(x, p);
+    }
+    if (p[OWN_FORCE] != 0.0) {
+        left += drive_own_force_at_rest(x, drive_command_at(current, p), p);
     }
     return left;
 }
@@ -1130,6 +1405,9 @@ static double drive_resting_point(double current, int has_cogging, double *p)
     }
     force = drive_resting_force(0.0, current, p) + p[LOAD];
     force -= p[GRAVITY_TORQUE] * sin(p[GRAVITY_ANGLE]);
+    if (p[OWN_FORCE] != 0.0) {
+        force += drive_own_force_at_rest(0.0, drive_command_at(current, p), p);
+    }
     if (fabs(force) <= p[PRELOAD]) {
         return 0.0;
     }
@@ -1518,6 +1796,47 @@ static double drive_rate_of_yielding(double *state, double *memory, double mass,
     return sqrt((stiffness * fading) / mass) + ((0.6 * speed) * sqrt(sqrt(fading)));
 }
 
+static double drive_rate_of_own(double *state, double *memory, double *push, double done, double mass, double *p)
+{
+    double x = 0.0;
+    double v = 0.0;
+    double way = 0.0;
+    double dx = 0.0;
+    double dv = 0.0;
+    double here = 0.0;
+    double stiffness = 0.0;
+    double way_on = 0.0;
+    double ahead = 0.0;
+    double edge = 0.0;
+    double damping = 0.0;
+    double rate = 0.0;
+    x = state[X];
+    v = state[V];
+    way = memory[WAY];
+    dx = 0.0001 * p[REFERENCE_DISPLACEMENT];
+    dv = 0.0001 * (fabs(v) + (30.0 * p[REFERENCE_DISPLACEMENT]));
+    if (((way * v) < dv) && (way < 0.0)) {
+        dv = -dv;
+    }
+    here = drive_own_force(x, v, way, push, done, p);
+    stiffness = fabs(drive_own_force(x + dx, v, way, push, done, p) - here) / dx;
+    if (p[OWN_BENDS] > 0.0) {
+        way_on = (6.0 * p[SAMPLE_TIME]) * v;
+        if (fabs(way_on) > dx) {
+            ahead = drive_own_force(x + way_on, v, way, push, done, p);
+            edge = drive_own_force((x + way_on) + dx, v, way, push, done, p);
+            stiffness = most(stiffness, fabs(edge - ahead) / dx);
+        }
+    }
+    damping = (drive_own_force(x, v + dv, way, push, done, p) - here) / dv;
+    rate = sqrt(stiffness / mass) + (fabs(damping) / mass);
+    rate += ((0.12 * p[OWN_WAVES]) * fabs(v)) + (0.12 * p[OWN_TURNING]);
+    if (p[OWN_FINENESS] > 0.0) {
+        rate += (0.3 * p[OWN_FINENESS]) / p[SAMPLE_TIME];
+    }
+    return rate;
+}
+
 static double drive_step_limit(double *state, double *memory, double *push, double done, double *p)
 {
     double mass = 0.0;
@@ -1582,6 +1901,9 @@ static double drive_step_limit(double *state, double *memory, double *push, doub
     if (p[HYSTERESIS_FORCE] != 0.0) {
         rate += drive_rate_of_yielding(state, memory, mass, p);
     }
+    if (p[OWN_FORCE] != 0.0) {
+        rate += drive_rate_of_own(state, memory, push, done, mass, p);
+    }
     slow = p[STRIBECK_VELOCITY];
     if ((p[STATIC_EXCESS] != 0.0) && (memory[WAY] != 0.0) && (speed < (6.1 * slow))) {
         pull = fabs(drive_acceleration(state, memory, push, done, p).m0);
@@ -1614,6 +1936,9 @@ static tuple_dd drive_step_varying(double x, double v, double *memory, double *p
         drive = drive_value_of(push, DRIVE, at) * drive_ripple(xs, p);
         net = (drive + drive_value_of(push, OTHER, at)) - drive_resisting(xs, vs, memory, p);
         net -= (memory[WAY] * p[DRIVE_SHARE]) * fabs(drive);
+        if (p[OWN_FORCE] != 0.0) {
+            net += drive_own_force(xs, vs, memory[WAY], push, at, p);
+        }
         slope = vs;
         weight = (stage == 0 || stage == 3) ? (h / 6.0) : (h / 3.0);
         x1 += weight * slope;
@@ -1653,7 +1978,7 @@ static tuple_dd drive_step_plain(double x, double v, double *memory, double *pus
     double v4 = 0.0;
     double k4 = 0.0;
     double sixth = 0.0;
-    if (p[DRIVE_VARIES] != 0.0) {
+    if ((p[DRIVE_VARIES] != 0.0) || (p[OWN_FORCE] != 0.0)) {
         return drive_step_varying(x, v, memory, push, done, h, p);
     }
     half = 0.5 * h;
@@ -2411,6 +2736,7 @@ static void drive_take_stock(double sample_time, double *p)
     int has_shape = 0;
     int varies = 0;
     p[CAPTURE_TIME] = 0.02 * sample_time;
+    p[SAMPLE_TIME] = sample_time;
     has_zero_edge = (p[PRELOAD] > 0.0) || (p[SPRING_SHARE] > 0.0);
     p[HAS_ZERO_EDGE] = has_zero_edge ? 1.0 : 0.0;
     has_edges = has_zero_edge || (p[DRIVE_SHARE] > 0.0);
@@ -2424,6 +2750,7 @@ static void drive_take_stock(double sample_time, double *p)
     has_more = has_zero_edge || has_second || (contact > 0.0);
     has_more = has_more || (p[GRAVITY_TORQUE] != 0.0);
     has_more = has_more || (p[WAVY_FRICTION] != 0.0);
+    has_more = has_more || (p[OWN_FRICTION] != 0.0);
     p[HAS_MORE] = has_more ? 1.0 : 0.0;
     has_shape = (p[HYSTERESIS_BEND] != 0.0) || (p[HYSTERESIS_RATIO] != 0.0);
     p[HAS_SHAPE] = has_shape ? 1.0 : 0.0;
@@ -2627,13 +2954,14 @@ static void drive_move_piece(double *state, double *trial, double *memory, doubl
     }
 }
 
-static double drive_sensed(double y, double lag, double speed, double time, double *p)
+static double drive_sensed(double y, double lag, double speed, double command, double time, double *p)
 {
     int is_velocity = 0;
     int is_pushed = 0;
     double phase = 0.0;
     double size = 0.0;
     double turn = 0.0;
+    double own = 0.0;
     double share = 0.0;
     double angle = 0.0;
     double limit = 0.0;
@@ -2651,6 +2979,11 @@ static double drive_sensed(double y, double lag, double speed, double time, doub
         turn = 6.283185307179586 / p[ECCENTRIC_PERIOD];
         speed *= 1.0 + ((size * turn) * cos((turn * y) + phase));
         y += size * (sin((turn * y) + phase) - sin(phase));
+    }
+    if (p[OWN_OUTPUT] != 0.0) {
+        own = drive_formula_value(p[OWN_OUTPUT], y, speed, command, time, sign_of(speed), p);
+        y = own;
+        speed = own;
     }
     if (is_velocity) {
         y = speed;

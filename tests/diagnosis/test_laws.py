@@ -1,0 +1,126 @@
+"""Laws that no catalogue holds, in a machine with an integrator of its own."""
+
+import numpy as np
+import pytest
+import sympy
+
+from hwid_cli import DiagnoseOptions, Recording, SimulationOptions, diagnose
+from hwid_cli.config.extended_simulation import write_extended_simulation
+from hwid_cli.config.load import experiment_of, load_experiment
+from hwid_cli.stages.diagnose import extended_options
+from tests.diagnosis.small_drive import NOISE, STEP_S, inputs
+from tests.laws.machine import Base, Hidden, measured
+
+SIMULATION = SimulationOptions(
+    mass_kg=0.3,
+    damping_N_s_per_m=13.0,
+    stiffness_N_per_m=1100.0,
+    force_constant_N_per_A=5.4,
+)
+# The catalogue is left out: it takes a minute to say that it knows nothing of this.
+NOTHING = DiagnoseOptions(laws="only")
+
+
+def machine(hidden, change=None):
+    """Recordings; ``change`` may give one of them, by its name, something else."""
+    rng = np.random.default_rng(4)
+    found = []
+    for name, u in inputs(500).items():
+        own = (change or {}).get(name, hidden)
+        y, _ = measured(u, STEP_S, Base(), own)
+        noise = NOISE * rng.standard_normal(y.size)
+        found.append(Recording(name, u, y + noise, STEP_S, kind=name.split("_")[0]))
+    return found
+
+
+ROOT = Hidden(lambda x, v, u, t, way: -1.0 * way - 700 * x * v, has_friction=True)
+
+
+@pytest.fixture(scope="module")
+def found():
+    recordings = machine(ROOT)
+    return recordings, diagnose(recordings, SIMULATION, NOTHING)
+
+
+def test_a_law_of_two_terms_is_found_with_units_intervals_and_inclusion(found):
+    _, diagnosis = found
+    law = diagnosis.law
+    assert (diagnosis.verdict, diagnosis.complete) == ("law", True)
+    assert law.acts_on == "force"
+    terms = {one.term: one for one in law.terms}
+    assert set(terms) == {"sign(v)", "x*v"}
+    assert law.terms[0].term == "x*v"
+    for name, value, unit in (("sign(v)", -1.0, "N"), ("x*v", -700.0, "N s/m^2")):
+        one = terms[name]
+        assert one.value == pytest.approx(value, rel=0.02)
+        assert one.low < one.value < one.high < 0
+        assert one.unit == unit
+        assert one.inclusion > 0.8
+    assert diagnosis.explained_share > 0.99
+    assert "No effect of the catalogue" in diagnosis.summary
+
+
+def test_sympy_reads_the_formula(found):
+    _, diagnosis = found
+    x, v = sympy.symbols("x v")
+    read = sympy.sympify(diagnosis.law.formula)
+    assert read.free_symbols == {x, v}
+    at = float(read.subs({x: 0.01, v: -0.2}))
+    assert at == pytest.approx(1.0 + 700 * 0.01 * 0.2, rel=0.02)
+
+
+def test_the_extended_simulation_holds_the_law_and_lacks_nothing(found, tmp_path):
+    recordings, diagnosis = found
+    extended = extended_options(diagnosis, SIMULATION)
+    columns = {"time": "t", "input": "i", "output": "x"}
+    content = {"name": "mine", "recordings": {"files": "raw/*.csv", "columns": columns}}
+    experiment = experiment_of(content, str(tmp_path / "c.yaml"))
+    path = tmp_path / "results" / "extended_simulation.yaml"
+    path.parent.mkdir()
+    write_extended_simulation(path, experiment, extended)
+    again = load_experiment(path)
+    assert "law: {c1:" in path.read_text()
+    told = diagnose(recordings, again.simulation, DiagnoseOptions(effects=("cogging",)))
+    assert told.verdict == "none"
+    assert [one.id for one in told.present] == ["law"]
+
+
+def test_a_law_that_is_an_effect_of_the_catalogue_gets_its_name():
+    friction = Hidden(lambda x, v, u, t, way: -0.9 * way, has_friction=True)
+    told = diagnose(machine(friction), SIMULATION, NOTHING)
+    assert (told.verdict, told.law) == ("named", None)
+    (effect,) = told.effects
+    assert effect.id == "coulomb_friction"
+    assert effect.parameters[0].value == pytest.approx(0.9, rel=0.02)
+
+
+def test_a_law_that_held_out_recordings_do_not_share_is_refused():
+    # Trained on damping that grows to one side, judged on what grows to the other.
+    other = Hidden(lambda x, v, u, t, way: 700 * x * v)
+    names = ("step_1", "sine_2", "sine_0")
+    options = DiagnoseOptions(laws="only", hold_out=names)
+    law = Hidden(lambda x, v, u, t, way: -700 * x * v)
+    told = diagnose(machine(law, dict.fromkeys(names, other)), SIMULATION, options)
+    assert told.verdict == "unknown"
+    assert told.law is None
+
+
+def test_a_machine_that_lacks_nothing_has_no_law():
+    told = diagnose(machine(Hidden()), SIMULATION, NOTHING)
+    assert (told.verdict, told.law) == ("parameters", None)
+
+
+def test_who_asks_for_some_effects_gets_no_law():
+    options = DiagnoseOptions(effects=("input_delay",))
+    told = diagnose(machine(ROOT), SIMULATION, options)
+    assert told.law is None
+
+
+def test_a_law_of_a_sensor_is_told_as_what_it_reads():
+    sensor = Hidden(sensor=lambda x, v, u, t: x + 0.04 * np.abs(x))
+    told = diagnose(machine(sensor), SIMULATION, NOTHING)
+    assert (told.verdict, told.law.acts_on) == ("law", "output")
+    (term,) = told.law.terms
+    assert (term.term, term.unit) == ("abs(x)", "1")
+    assert term.value == pytest.approx(0.04, rel=0.05)
+    assert told.law.formula.startswith("x + 0.0")
