@@ -253,6 +253,7 @@ export-check: $(DEV)  ## every format of hwid export against hwid predict: the t
 BLIND ?= results/blind
 BLIND_NUMBER ?= 1
 laws: $(DEV)  ## hidden laws outside the catalogue, beside pysindy and pyoperon: half an hour
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --group peers
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -W ignore -m tests.laws.run_laws --write results/laws_measured.md
 
 blind: $(DEV)  ## blind test with effects hidden by a separate generator, and docs/blind_test.md: an hour and more

@@ -191,24 +191,14 @@ def find(
     ConfigError
         If the output clearly moves against the input.
     """
-    noise = noise_floor(problem)
-
     on_round("base", 0)
-    given = compared_as_given(problem)
-    scales = scales_of_recordings(problem, [one.velocity for one in given])
-    base = _refit_base(problem, scales, noise)
-    if _shakes_at_rest(problem, base, scales, noise):
-        noise = noise_floor(problem, rests=False)
-        base = _refit_base(problem, scales, noise)
-    reversal = find_reversal(problem, base, scales, noise)
-    if reversal is not None:
-        raise ConfigError(reversal_sentence(reversal))
-    base = _with_input_noise(problem, base, scales, noise)
-    problem, base = with_zeros(problem, base, scales, noise)
-    if base.cause == "zeros":
-        given = compared_as_given(problem)
-    if base.is_usable:
-        scales = scales_of_fit(problem, base, scales, noise)
+    fitted = _fitted_base(problem)
+    problem, noise, base, scales = (
+        fitted.problem,
+        fitted.noise,
+        fitted.base,
+        fitted.scales,
+    )
     drive = fitted_drive(problem.drive, base)
 
     before = compared_with_fit(problem, base, scales)
@@ -217,7 +207,7 @@ def find(
 
     criteria = SelectionCriteria.of(problem, noise)
     if given_sse is None:
-        given_sse = each_sum_of_squares([one.residual for one in given])
+        given_sse = each_sum_of_squares([one.residual for one in fitted.given])
     rounds = Rounds(
         problem,
         Baseline(drive, scales, noise, problem.drive),
@@ -240,6 +230,46 @@ def find(
         base=base, before=before, force=force, where=where,
         found=found, verdict=verdict, law=law,
     )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class _FittedBase:
+    """The re-fitted base, and the causes beside effects that it has led to.
+
+    Parameters
+    ----------
+    problem : DiagnosisProblem
+        With the zeros of its recordings where these differ.
+    given : list of Compared
+        With the parameters that the configuration gives.
+    """
+
+    problem: DiagnosisProblem
+    noise: NoiseFloor
+    given: list[Compared]
+    scales: Scales
+    base: CandidateFit
+
+
+def _fitted_base(problem: DiagnosisProblem) -> _FittedBase:
+    """Fit the base again, with what measuring alone explains."""
+    noise = noise_floor(problem)
+    given = compared_as_given(problem)
+    scales = scales_of_recordings(problem, [one.velocity for one in given])
+    base = _refit_base(problem, scales, noise)
+    if _shakes_at_rest(problem, base, scales, noise):
+        noise = noise_floor(problem, rests=False)
+        base = _refit_base(problem, scales, noise)
+    reversal = find_reversal(problem, base, scales, noise)
+    if reversal is not None:
+        raise ConfigError(reversal_sentence(reversal))
+    base = _with_input_noise(problem, base, scales, noise)
+    problem, base = with_zeros(problem, base, scales, noise)
+    if base.cause == "zeros":
+        given = compared_as_given(problem)
+    if base.is_usable:
+        scales = scales_of_fit(problem, base, scales, noise)
+    return _FittedBase(problem, noise, given, scales, base)
 
 
 def _search(

@@ -70,7 +70,7 @@ def described(function: OwnFunction) -> str:
     Examples
     --------
     >>> described(OwnFunction("curve", "curve = 1"))
-    "the Python function 'curve' (text f2d90ef3e7e3)"
+    "the Python function 'curve' (text 6ca93a0d21a3)"
     """
     text = hashlib.sha256(function.source.encode()).hexdigest()[:_SHOWN]
     return f"the Python function {function.name!r} (text {text})"

@@ -60,7 +60,7 @@ def tables_of(folder):
 def test_every_model_is_judged_on_every_recording(first_run):
     out, said = first_run
 
-    assert "test: 0 recordings from the cache, 5 computed" in said
+    assert "test: 0 tasks from the cache, 6 computed" in said
     with h5py.File(out / "results.h5") as file:
         models = file["test/models"].asstr()[:].tolist()
         assert file["test/rmsd"].shape == (len(models), 5)
@@ -168,14 +168,14 @@ def test_a_lost_results_file_is_made_from_the_cache(again, out, first_run):
     (out / "results.h5").unlink()
     result = again()
 
-    assert "test: 5 recordings from the cache, 0 computed" in result.stderr
+    assert "test: 6 tasks from the cache, 0 computed" in result.stderr
     assert tables_of(out) == tables_of(first_run[0])
 
 
 def test_force_judges_again(again):
     said = again("--force").stderr
 
-    assert "test: 0 recordings from the cache, 5 computed" in said
+    assert "test: 0 tasks from the cache, 6 computed" in said
     assert "crossval: 9 pairs from the cache, 0 computed" in said
 
 
