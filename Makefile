@@ -35,6 +35,8 @@ ifdef LOCKED
 else
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable .
 endif
+	@echo "compiling the loops, once: about a minute"
+	$(HWID) run configs/smoke.yaml --out $(VENV)/compiled --quiet
 	@touch $@
 
 # pip knows dependency groups since 25.1.
