@@ -61,7 +61,6 @@ from hwid_cli.diagnosis.scales import (
 )
 from hwid_cli.diagnosis.search import fit_own
 from hwid_cli.diagnosis.selection import (
-    STILL_LARGE,
     DiagnosisVerdict,
     SelectionCriteria,
     decide,
@@ -74,7 +73,7 @@ from hwid_cli.drive.effect import Scales
 from hwid_cli.drive.simulation import drive_effects
 from hwid_cli.errors import ConfigError
 from hwid_cli.records.candidates import CandidateFit
-from hwid_cli.records.diagnosis import Diagnosis, NoiseFloor
+from hwid_cli.records.diagnosis import STILL_LARGE, Diagnosis, NoiseFloor
 from hwid_cli.records.experiment import DiagnoseOptions, SimulationOptions
 from hwid_cli.records.own_effects import own_ids
 from hwid_cli.records.recordings import Recording

@@ -18,15 +18,14 @@ from hwid_cli.diagnosis.parameters import START
 from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals
 from hwid_cli.drive.catalogue import CATALOGUE, public_id
 from hwid_cli.records.candidates import CandidateFit, RankedCandidate
-from hwid_cli.records.diagnosis import NoiseFloor
+from hwid_cli.records.diagnosis import STILL_LARGE, NoiseFloor
 from hwid_cli.records.own_effects import plain_name
 
 # A set of effects must lower the criterion by this much against the smaller one.
 LEAST_GAIN = 10.0
 # Share of the held-out excess over the noise that a single effect must explain ...
 LEAST_EXPLAINED = 0.5
-# ... and one that leaves more than so many times the noise ...
-STILL_LARGE = 3.0
+# ... and one that leaves much more than the noise ...
 LEAST_EXPLAINED_LARGE = 0.65
 # ... and a set of several, which imitates more, and may leave this many times ...
 LEAST_EXPLAINED_SET = 0.8

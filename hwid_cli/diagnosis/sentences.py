@@ -6,7 +6,6 @@ import numpy as np
 
 from hwid_cli.diagnosis.problem import DiagnosisProblem
 from hwid_cli.diagnosis.selection import (
-    STILL_LARGE,
     DiagnosisVerdict,
     SelectionCriteria,
     lead,
@@ -14,7 +13,12 @@ from hwid_cli.diagnosis.selection import (
 )
 from hwid_cli.drive.catalogue import public_id
 from hwid_cli.records.candidates import CAUSES, CandidateFit
-from hwid_cli.records.diagnosis import BaseParameter, FittedEffect, NoiseFloor
+from hwid_cli.records.diagnosis import (
+    STILL_LARGE,
+    BaseParameter,
+    FittedEffect,
+    NoiseFloor,
+)
 
 # Share of the largest displacement that counts as motion to one side.
 _ONE_SIDE = 0.05

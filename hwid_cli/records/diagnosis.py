@@ -9,6 +9,8 @@ from hwid_cli.records.programs import OF_DRIVE, Capabilities
 from hwid_cli.records.shown import Shown
 from hwid_cli.records.stored import ADDED_LATER
 
+# What leaves more than so many times the noise is a part of what is missing, no fact.
+STILL_LARGE = 3.0
 VERDICTS = ("named", "ambiguous", "law", "parameters", "unknown", "none")
 
 

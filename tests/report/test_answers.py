@@ -73,6 +73,17 @@ def test_the_picture_before_and_after_stands_beside_the_noise():
     assert gaps.reference[0] == 1.0
 
 
+def test_what_leaves_much_is_a_part_and_no_fact():
+    much = replace(named().after, ratio_to_noise=3.5)
+    found = answer_to(
+        replace(named(), complete=False, after=much, explained_share=0.9876)
+    )
+
+    assert "lacks" not in found.verdict
+    assert "explains 98.8 % of the gap; what remains is not explained." in found.verdict
+    assert not found.is_settled
+
+
 def test_force_and_overlay_stand_beside_it():
     _, force, overlay = answer_to(named()).blocks
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from hwid_cli.records.axis import unit_of_effect
 from hwid_cli.records.diagnosis import (
+    STILL_LARGE,
     Diagnosis,
     FittedEffect,
     FittedParameter,
@@ -79,6 +80,13 @@ def diagnosis_answer(contents: ReportContents) -> Answer | None:
 def verdict_in_words(diagnosis: Diagnosis) -> str:
     """Write the verdict as a sentence, effects with values and 95 % intervals."""
     found = [_effect_in_words(one, diagnosis) for one in diagnosis.effects]
+    if diagnosis.verdict == "named" and diagnosis.after.ratio_to_noise > STILL_LARGE:
+        verb = "explains" if len(found) == 1 else "explain"
+        share = f"{100 * diagnosis.explained_share:.3g} %"
+        text = (
+            f"{listed(found)} {verb} {share} of the gap; what remains is not explained."
+        )
+        return text[:1].upper() + text[1:]
     if diagnosis.verdict == "named" and found:
         rest = "" if diagnosis.complete else " A part of the gap stays unexplained."
         return f"The simulation lacks {listed(found)}.{rest}"
