@@ -21,6 +21,7 @@ from hwid_cli.records.results import CrossValidation
 from hwid_cli.stages.compare import linear_options
 from hwid_cli.stages.model_views import named_fits
 from hwid_cli.stages.order import recommend_overall
+from hwid_cli.stages.ranking import widest_model
 from hwid_cli.stages.test import best_single
 from hwid_cli.tasks.task import one_thread
 
@@ -146,16 +147,10 @@ def _of_final_test(final: FinalTest) -> tuple[str, tuple[str, ...]]:
 
 def _of_crossval(crossval: CrossValidation) -> tuple[str, tuple[str, ...]]:
     """The model that covers the largest share of other recordings, of these the best."""
-    names = np.array(crossval.validated_on)
-    found = []
-    for place in np.ndindex(crossval.rmsd.shape[:3]):
-        values = crossval.rmsd[place][names != crossval.identified_on[place[0]]]
-        if values.size and np.isfinite(values).all():
-            share = float(np.mean(values < crossval.threshold))
-            found.append((-share, float(np.mean(np.log(values))), place))
-    if not found:
+    place = widest_model(crossval, own_alone=False)
+    if place is None:
         return "", ()
-    n, b, k = min(found)[-1]
+    n, b, k = place
     who = crossval.identified_on[n]
     others = tuple(one for one in crossval.validated_on if one != who)
     return f"{who}/{crossval.nb[b]}/{crossval.nk[k]}", others

@@ -20,7 +20,7 @@ from hwid_cli.records.model import Fit, Orders
 from hwid_cli.records.recordings import Recording
 from hwid_cli.records.results import CrossValidation
 from hwid_cli.stages.order_grid import grid_place
-from hwid_cli.stages.ranking import best_fits
+from hwid_cli.stages.ranking import best_fits, widest_model
 from hwid_cli.stages.test import best_single
 
 # From recordings and orders to their linear model.
@@ -97,22 +97,14 @@ def _of_group(search: GroupSearch) -> BestModel:
 
 
 def _cross_validated(crossval: CrossValidation) -> BestModel | None:
-    """The model that covers most recordings besides its own, the lowest mean of equal ones."""
-    names = np.array(crossval.validated_on)
-    found = []
-    for place in np.ndindex(crossval.rmsd.shape[:3]):
-        n, b, k = place
-        is_judge = names != crossval.identified_on[n]
-        judge = "others" if is_judge.any() else "own"
-        values = crossval.rmsd[place][is_judge if is_judge.any() else ...]
-        if np.isfinite(values).all():
-            share = float(np.mean(values < crossval.threshold))
-            found.append((-share, float(np.mean(np.log(values))), place, judge))
-    if not found:
+    """The widest model besides its own recording, on the recordings that say so."""
+    place = widest_model(crossval, own_alone=True)
+    if place is None:
         return None
-    _, _, (n, b, k), judge = min(found)
+    n, b, k = place
     own = crossval.identified_on[n]
-    judges = tuple(one for one in crossval.validated_on if judge == "own" or one != own)
+    others = tuple(one for one in crossval.validated_on if one != own)
+    judge, judges = ("others", others) if others else ("own", crossval.validated_on)
     rows = [crossval.validated_on.index(one) for one in judges]
     return BestModel(
         f"{own}/{crossval.nb[b]}/{crossval.nk[k]}",
