@@ -42,4 +42,4 @@ def test_noise_has_no_direction():
         for one in recordings({})
     ]
 
-    found(noise)
+    assert found(noise).verdict in ("none", "parameters")
