@@ -13,6 +13,7 @@ from hwid_cli.errors import ConfigError
 from hwid_cli.files.atomic import replace_file
 from hwid_cli.files.messages import escaped, is_plain
 from hwid_cli.records.experiment import Experiment
+from hwid_cli.records.recordings import KINDS
 from hwid_cli.records.starter import FolderLayout, Proposal, Role
 
 # Stands for a unit that no name says.
@@ -52,7 +53,8 @@ def draft_experiment(layout: FolderLayout, folder: Path) -> Experiment:
         "recordings": _recordings(layout, ""),
         # The smallest orders and a recipe that allows columns of different length.
         "orders": {"nb": [1], "nk": [1]},
-        "calibrate": {"other": ["cut"]},
+        # A plan.csv may say kinds already.
+        "calibrate": {kind: ["cut"] for kind in KINDS},
     }
     return experiment_of(content, str(source))
 

@@ -384,3 +384,25 @@ def test_a_missing_library_is_one_line_with_the_command(folder, tmp_path, monkey
     assert "is read by npTDMS, which is missing" in result.stderr
     assert "pip install 'hwid[formats]'" in result.stderr
     formats._ISOLATED.end()
+
+
+def test_kinds_of_a_plan_do_not_ask_for_columns_of_one_length(tmp_path):
+    # A plan.csv names the kind; the loggers of input and output stopped apart.
+    time_s = np.arange(400) * 1e-3
+    folder = tmp_path / "measured"
+    folder.mkdir()
+    for number in range(2):
+        rows = ["time_s,current_A,position_m"]
+        for n, t in enumerate(time_s):
+            u = float(n >= 100) * (number + 1)
+            rows.append(
+                f"{t:.3f},{u if n < 380 else ''},{u * (1 - 0.9 ** max(n - 100, 0)):.6f}"
+            )
+        (folder / f"run_{number}.csv").write_text("\n".join(rows) + "\n")
+    (folder / "plan.csv").write_text("name,kind\nrun_0,step\nrun_1,step\n")
+    out = tmp_path / "experiment.yaml"
+
+    done = CliRunner().invoke(main, ["init", str(folder), "--out", str(out)])
+
+    assert done.exit_code == 0, done.output
+    assert out.is_file()
