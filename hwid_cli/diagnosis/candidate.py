@@ -48,11 +48,13 @@ Start = Mapping[str, Mapping[str, float]]
 SCREENING_SAMPLES = 6000
 # Iterations from every start, then from the two best. A second start is worth further
 # time only where its sum of squares is within the factor.
-SCREENING = ((2, 2.0), (4, 1.2))
+SCREENING = ((2, 2.0), (3, 1.2))
 SCREENED_STARTS = 2
 SAME_PLACE = 0.02
 MOST_ITERATIONS = 20
-
+# Of several starts, each has so many of these; those that are within the factor then go on.
+FIRST_ITERATIONS = 5
+WITHIN_BEST = 1.1
 
 # A base parameter that the re-fit changes by this factor or more is bent.
 BENT = 2.0
@@ -238,11 +240,24 @@ def fit_candidate(
     """
     train = problem.part(held_out=False)
     everything = (*drive_effects(problem.drive), *effects)
-    found = [
-        _fit_from(train, everything, start, scales, MOST_ITERATIONS) for start in starts
-    ]
+    first = MOST_ITERATIONS if len(starts) == 1 else FIRST_ITERATIONS
+    found = [_fit_from(train, everything, start, scales, first) for start in starts]
+    if len(starts) > 1:
+        least = min(one.sse for one in found)
+        found = [
+            _gone_on(train, one) for one in found if one.sse <= WITHIN_BEST * least
+        ]
     best = min(found, key=lambda one: one.sse)
     return _evaluated(problem, effects, best, noise)
+
+
+def _gone_on(problem: DiagnosisProblem, found: SearchResult) -> SearchResult:
+    """Search that has gone on from where it stopped at its limit of iterations."""
+    if found.has_converged:
+        return found
+    left = MOST_ITERATIONS - found.iterations
+    further = fit_point(problem, found.layout, found.point, max_iterations=left)
+    return replace(further, iterations=found.iterations + further.iterations)
 
 
 def _is_same(one: Start, other: Start) -> bool:

@@ -505,11 +505,11 @@ class _Search:
     def _near(
         self, screened: Sequence[Screened], best: CandidateFit | None
     ) -> dict[Effects, Sequence[SearchStart]]:
-        """Sets that come close to the best one in the screening."""
+        """Sets that come close to the best one, from where it ended, in the screening."""
         if best is None:
             return {}
         floor, reached = self._floor(), self._few_sse(best)
-        most = floor + WITHIN_REACH * max(reached - floor, LEAST_LEFT * reached)
+        most = floor + WORTH_MORE * max(reached - floor, LEAST_LEFT * reached)
         return {one.effects: one.starts for one in screened if one.sse <= most}
 
     def _again(self, size: int) -> dict[Effects, list[SearchStart]]:

@@ -5,10 +5,13 @@ to one recording only (a phase, a factor, a start) change that recording alone, 
 simulation of all recordings gives the derivatives by all of them; for given shared
 values they are found from that recording.
 
+Derivatives by differences cost one simulation for each parameter. Between two sets of
+them further steps use what the last steps have shown of the change (secant steps).
+
 References
 ----------
-Marquardt (1963); damping rule of Nielsen (1999), IMM-REP-1999-05.
-docs/method_diagnosis.md, eq. (D16) to (D18).
+Marquardt (1963); damping rule of Nielsen (1999), IMM-REP-1999-05; Broyden (1965).
+docs/method_diagnosis.md, eq. (D16) to (D18b).
 """
 
 from collections.abc import Sequence
@@ -38,6 +41,9 @@ _LARGEST_DAMPING = 1e8
 _LARGEST_STEP = 1.5
 _LEAST_DIAGONAL = 1e-14
 OWN_ITERATIONS = 12
+# A further secant step is tried while the last step gained this share of what it promised,
+# and as much for each simulation as the step before them did.
+_LEAST_RATIO = 0.1
 # Blocks of a recording whose own values are evaluated on other blocks; an even number.
 _BLOCKS = 10
 # Values that an own parameter is tried at before its search.
@@ -75,6 +81,23 @@ class _Iterate:
     sse: float
 
 
+@dataclass(frozen=True, eq=False)
+class _Taken:
+    """A step that lowered the sum of squares.
+
+    Parameters
+    ----------
+    step : ndarray, shape (n_unknowns,)
+        In coordinates, as taken within the bounds.
+    ratio : float
+        Gain over what was promised.
+    """
+
+    place: _Iterate
+    step: np.ndarray
+    ratio: float
+
+
 def fit_point(
     problem: DiagnosisProblem,
     fit_layout: ParameterLayout,
@@ -90,7 +113,7 @@ def fit_point(
     point : ParameterPoint
         Where to start.
     max_iterations : int
-        Limit on accepted steps.
+        Limit on sets of derivatives.
     own_columns : sequence of int or None
         Hold what is shared, and find these of each recording's own values; None finds
         everything.
@@ -100,9 +123,10 @@ def fit_point(
     free = _free(fit_layout, len(problem.signals), own_columns)
     if not np.isfinite(place.sse) or not free.any():
         return SearchResult(fit_layout, point, place.sse, 0, False)
-    damping, small = _FIRST_DAMPING, 0
+    descent = _Descent(problem, fit_layout, free)
+    small = 0
     for iteration in range(max_iterations):
-        better, damping = _one_step(problem, fit_layout, place, free, damping)
+        better = descent.advance(place)
         if better is None:
             return SearchResult(fit_layout, place.point, place.sse, iteration, True)
         gain = (place.sse - better.sse) / max(place.sse, 1e-300)
@@ -113,31 +137,115 @@ def fit_point(
     return SearchResult(fit_layout, place.point, place.sse, max_iterations, False)
 
 
-def _one_step(
-    problem: DiagnosisProblem,
-    fit_layout: ParameterLayout,
-    place: _Iterate,
-    free: np.ndarray,
-    damping: float,
-) -> tuple[_Iterate | None, float]:
-    """Take a step, shorter and shorter until it lowers the sum of squares."""
-    matrix, vector = _normal_equations(
-        problem, fit_layout, place.point, place.parts, free
-    )
-    growth = 2.0
-    while damping < _LARGEST_DAMPING:
-        step, predicted = _step(matrix, vector, damping, free)
-        proposed = _moved(fit_layout, place.point, step)
-        parts = residuals_at(problem, fit_layout, proposed)
+class _Descent:
+    """Damped steps of one search; keeps the damping from one to the next."""
+
+    def __init__(
+        self, problem: DiagnosisProblem, fit_layout: ParameterLayout, free: np.ndarray
+    ) -> None:
+        self.problem = problem
+        self.layout = fit_layout
+        self.free = free
+        self.damping = _FIRST_DAMPING
+
+    def advance(self, place: _Iterate) -> _Iterate | None:
+        """Take a step from fresh derivatives, and secant steps while they pay.
+
+        None where not even a short step lowers the sum of squares.
+        """
+        jacobians = derivatives(self.problem, self.layout, place.point, place.parts)
+        taken = self._damped(place, jacobians)
+        if taken is None:
+            return None
+        # Fresh derivatives take one simulation for each unknown.
+        n_unknowns = len(self.layout.shared) + len(self.layout.own)
+        worth = (place.sse - taken.place.sse) / (n_unknowns + 1)
+        for _ in range(n_unknowns):
+            gain = place.sse - taken.place.sse
+            is_poor = taken.ratio < _LEAST_RATIO or gain < LEAST_GAIN * place.sse
+            if is_poor or gain < worth:
+                break
+            jacobians = self._secant(jacobians, place, taken)
+            place = taken.place
+            further = self._once(place, jacobians)
+            if further is None:
+                return place
+            taken = further
+        return taken.place
+
+    def _damped(self, place: _Iterate, jacobians: list[np.ndarray]) -> _Taken | None:
+        """Take a step, shorter and shorter until it lowers the sum of squares."""
+        matrix, vector = self._normal_equations(place, jacobians)
+        growth = 2.0
+        while self.damping < _LARGEST_DAMPING:
+            taken, predicted = self._tried(place, matrix, vector)
+            if taken is not None:
+                return taken
+            if predicted < LEAST_PROMISE * place.sse:
+                break
+            self.damping, growth = self.damping * growth, growth * 2
+        return None
+
+    def _once(self, place: _Iterate, jacobians: list[np.ndarray]) -> _Taken | None:
+        """Take a step if it lowers the sum of squares at once."""
+        before = self.damping
+        taken, _ = self._tried(place, *self._normal_equations(place, jacobians))
+        if taken is None:
+            self.damping = before
+        return taken
+
+    def _tried(
+        self, place: _Iterate, matrix: np.ndarray, vector: np.ndarray
+    ) -> tuple[_Taken | None, float]:
+        """Step with the present damping, and the gain that was promised."""
+        step, predicted = _step(matrix, vector, self.damping, self.free)
+        proposed = _moved(self.layout, place.point, step)
+        parts = residuals_at(self.problem, self.layout, proposed)
         sse = sum_of_squares(parts)
-        if sse < place.sse:
-            ratio = (place.sse - sse) / max(predicted, 1e-300)
-            damping *= max(1 / 3, 1 - (2 * min(ratio, 1.0) - 1) ** 3)
-            return _Iterate(proposed, parts, sse), damping
-        if predicted < LEAST_PROMISE * place.sse:
-            break
-        damping, growth = damping * growth, growth * 2
-    return None, damping
+        if not sse < place.sse:
+            return None, predicted
+        ratio = (place.sse - sse) / max(predicted, 1e-300)
+        self.damping *= max(1 / 3, 1 - (2 * min(ratio, 1.0) - 1) ** 3)
+        step = _difference(proposed, place.point)
+        return _Taken(_Iterate(proposed, parts, sse), step, ratio), predicted
+
+    def _secant(
+        self, jacobians: list[np.ndarray], place: _Iterate, taken: _Taken
+    ) -> list[np.ndarray]:
+        """Derivatives that agree with what a step has changed (Broyden)."""
+        updated = []
+        for jacobian, before, after, at in zip(
+            jacobians, place.parts, taken.place.parts,
+            _columns(self.layout, len(jacobians)), strict=True,
+        ):  # fmt: skip
+            step = taken.step[at]
+            # In units in which every coordinate changes the output alike.
+            weight = np.einsum("ij,ij->j", jacobian, jacobian)
+            length = float(step @ (weight * step))
+            if length > 0.0:
+                missed = (before - after) - jacobian @ step
+                jacobian = jacobian + np.outer(missed, weight * step / length)
+            updated.append(jacobian)
+        return updated
+
+    def _normal_equations(
+        self, place: _Iterate, jacobians: list[np.ndarray]
+    ) -> tuple[np.ndarray, np.ndarray]:
+        return _normal_equations(self.layout, self.free.size, jacobians, place.parts)
+
+
+def _columns(fit_layout: ParameterLayout, recordings: int) -> list[np.ndarray]:
+    """Which coordinates each recording's simulation depends on."""
+    n_shared, n_own = len(fit_layout.shared), len(fit_layout.own)
+    return [
+        np.r_[0:n_shared, n_shared + row * n_own : n_shared + (row + 1) * n_own]
+        for row in range(recordings)
+    ]
+
+
+def _difference(one: ParameterPoint, other: ParameterPoint) -> np.ndarray:
+    """Step from another point to this one, in coordinates, shared ones first."""
+    return np.concatenate([one.shared - other.shared, (one.own - other.own).ravel()])
 
 
 def derivatives(
@@ -156,6 +264,7 @@ def derivatives(
     Returns
     -------
     list of ndarray, shape (n_samples, n_shared + n_own)
+        0 where a simulation ran away.
     """
     columns: list[list[np.ndarray]] = [[] for _ in problem.signals]
     unknowns: list[tuple[Unknown, int, bool]] = [
@@ -178,7 +287,7 @@ def derivatives(
             columns[row].append((before - after) / width)
     # All of the base may be known, so that there is nothing to derive by.
     return [
-        np.column_stack(one) if one else np.zeros((part.size, 0))
+        np.nan_to_num(np.column_stack(one)) if one else np.zeros((part.size, 0))
         for one, part in zip(columns, parts, strict=True)
     ]
 
@@ -193,27 +302,22 @@ def local_matrix(
     ndarray, shape (n_unknowns, n_unknowns)
     """
     parts = residuals_at(problem, fit_layout, point)
-    free = _free(fit_layout, len(problem.signals), None)
-    return _normal_equations(problem, fit_layout, point, parts, free)[0]
+    jacobians = derivatives(problem, fit_layout, point, parts)
+    size = fit_layout.size(len(problem.signals))
+    return _normal_equations(fit_layout, size, jacobians, parts)[0]
 
 
 def _normal_equations(
-    problem: DiagnosisProblem,
     fit_layout: ParameterLayout,
-    point: ParameterPoint,
+    size: int,
+    jacobians: list[np.ndarray],
     parts: list[np.ndarray],
-    free: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
-    jacobians = derivatives(problem, fit_layout, point, parts)
-    size = free.size
-    n_shared, n_own = len(fit_layout.shared), len(fit_layout.own)
     matrix, vector = np.zeros((size, size)), np.zeros(size)
-    for row, (jacobian, part) in enumerate(zip(jacobians, parts, strict=True)):
-        first = n_shared + row * n_own
-        at = np.r_[0:n_shared, first : first + n_own]
-        clean = np.nan_to_num(jacobian)
-        matrix[np.ix_(at, at)] += clean.T @ clean
-        vector[at] += clean.T @ part
+    columns = _columns(fit_layout, len(parts))
+    for jacobian, part, at in zip(jacobians, parts, columns, strict=True):
+        matrix[np.ix_(at, at)] += jacobian.T @ jacobian
+        vector[at] += jacobian.T @ part
     return matrix, vector
 
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from hwid_cli.diagnosis import search
 from hwid_cli.diagnosis.parameters import (
     ParameterPoint,
     drive_at,
@@ -204,6 +205,33 @@ def test_a_search_never_ends_above_its_start():
         found, point = begun(of, start)
         before = sum_of_squares(residuals_at(of, found, point))
         assert fit_point(of, found, point, max_iterations=3).sse <= before
+
+
+def test_secant_steps_save_simulations_and_end_in_the_same_place(monkeypatch):
+    # From far away, where one set of derivatives is not enough.
+    true = {"force_N": 0.5, "static_excess_N": 0.4, "velocity_m_per_s": 0.02}
+    start = {"force_N": 0.2, "static_excess_N": 1.2, "velocity_m_per_s": 0.08}
+    of = problem(recordings({"stribeck_friction": true}))
+
+    def counted(least_ratio):
+        count = 0
+        simulate = search.residuals_at
+
+        def counting(*arguments):
+            nonlocal count
+            count += 1
+            return simulate(*arguments)
+
+        with monkeypatch.context() as patch:
+            patch.setattr(search, "_LEAST_RATIO", least_ratio)
+            patch.setattr(search, "residuals_at", counting)
+            return fitted(of, {"stribeck_friction": start}, OFF), count
+
+    with_secants, few = counted(0.1)
+    without, many = counted(np.inf)
+    assert few < 0.8 * many
+    assert with_secants.iterations < without.iterations
+    assert with_secants.sse <= 1.001 * without.sse + 1e-12
 
 
 def test_a_search_says_that_it_was_stopped():

@@ -11,6 +11,7 @@ from hwid_cli.drive.compiled import INNER, MAKING
 from hwid_cli.drive.motion.forces import (
     DEFLECTION,
     MOTOR_V,
+    MOTOR_X,
     N_STATE,
     PART_V,
     TURNED_AT,
@@ -23,6 +24,7 @@ from hwid_cli.drive.motion.forces import (
     beyond_side,
     drive_now,
     is_force_curved,
+    net_forces,
     own_force,
     resisting,
     ripple,
@@ -375,6 +377,9 @@ def step_all(
         Whether position and velocity of the mass stay as they are.
     p : ndarray, shape (N_SLOTS,)
     """
+    if p[slots.MODE_MASS] == 0.0 and not depends_on_motion(p):
+        _step_coupled(state, trial, memory, push, done, h, is_held, p)
+        return
     total, slope = np.zeros(N_STATE), np.empty(N_STATE)
     for n in range(N_STATE):
         trial[n] = state[n]
@@ -393,3 +398,42 @@ def step_all(
             trial[n] = state[n] + way * slope[n]
     for n in range(N_STATE):
         trial[n] = state[n] + h / 6.0 * total[n]
+
+
+@njit(**INNER)
+def _step_coupled(
+    state: np.ndarray,
+    trial: np.ndarray,
+    memory: np.ndarray,
+    push: np.ndarray,
+    done: float,
+    h: float,
+    is_held: bool,
+    p: np.ndarray,
+) -> None:
+    """Step of mass and motor alone, without room to work in: the frequent case."""
+    load = p[slots.MASS]
+    load -= p[slots.MOTOR_SHARE] * load
+    x0, v0, xm0, vm0 = state[X], state[V], state[MOTOR_X], state[MOTOR_V]
+    x, v, xm, vm = x0, v0, xm0, vm0
+    dx = dv = dxm = dvm = 0.0
+    for stage in range(4):
+        at = done + (0.0 if stage == 0 else (h if stage == 3 else 0.5 * h))
+        force = value_of(push, DRIVE, at)
+        net, motor = net_forces(x, v, xm, vm, force, memory, push, at, p)
+        speed, gain = v, net / load
+        if is_held:
+            speed = gain = 0.0
+        weight = 1.0 if stage in (0, 3) else 2.0
+        dx += weight * speed
+        dv += weight * gain
+        dxm += weight * vm
+        dvm += weight * motor
+        way = h if stage == 2 else 0.5 * h
+        x, v = x0 + way * speed, v0 + way * gain
+        xm, vm = xm0 + way * vm, vm0 + way * motor
+    for n in range(N_STATE):
+        trial[n] = state[n]
+    sixth = h / 6.0
+    trial[X], trial[V] = x0 + sixth * dx, v0 + sixth * dv
+    trial[MOTOR_X], trial[MOTOR_V] = xm0 + sixth * dxm, vm0 + sixth * dvm

@@ -62,22 +62,12 @@ def acceleration(
             rate = voltage - p[slots.RESISTANCE] * state[CIRCUIT]
             rate /= p[slots.INDUCTANCE]
         force = force_of(drawn_current(force, state, p), push[WARMTH], p)
-    rubbing = 0.0
-    if p[slots.DRIVE_VARIES] != 0.0:
-        force *= ripple(state[MOTOR_X] if has_motor else x, p)
-        rubbing = memory[WAY] * p[slots.DRIVE_SHARE] * abs(force)
-    mass, motor = p[slots.MASS], 0.0
+    x_motor = state[MOTOR_X] if has_motor else x
+    v_motor = state[MOTOR_V] if has_motor else v
+    net, motor = net_forces(x, v, x_motor, v_motor, force, memory, push, done, p)
+    mass = p[slots.MASS]
     if has_motor:
-        inner = p[slots.MOTOR_SHARE] * mass
-        mass -= inner
-        teeth = bite(state[MOTOR_X] - x, state[MOTOR_V] - v, p)
-        motor = (force - teeth) / inner
-        force = teeth
-    net = force + value_of(push, OTHER, done) - resisting(x, v, memory, p)
-    if rubbing != 0.0:
-        net -= rubbing
-    if p[slots.OWN_FORCE] != 0.0:
-        net += own_force(x, v, memory[WAY], push, done, p)
+        mass -= p[slots.MOTOR_SHARE] * mass
     mode = 0.0
     if p[slots.MODE_MASS] > 0.0:
         pull = p[slots.MODE_STIFFNESS] * (state[PART_X] - x)
@@ -85,6 +75,48 @@ def acceleration(
         net += pull
         mode = -pull / p[slots.MODE_MASS]
     return net / mass, motor, mode, rate
+
+
+@njit(**INNER)
+def net_forces(
+    x: float,
+    v: float,
+    x_motor: float,
+    v_motor: float,
+    force: float,
+    memory: np.ndarray,
+    push: np.ndarray,
+    done: float,
+    p: np.ndarray,
+) -> tuple[float, float]:
+    """Return the force on the mass and the acceleration of a motor that has its own.
+
+    Parameters
+    ----------
+    x, v, x_motor, v_motor : float, [m], [m/s]
+        Mass and motor; the same where the motor is part of the mass.
+    force : float, [N]
+        Of the motor, without ripple.
+    memory : ndarray, shape (N_MEMORY,)
+    push : ndarray, shape (N_PUSH,)
+    done : float, [s]
+        Since the start of the piece.
+    p : ndarray, shape (N_SLOTS,)
+    """
+    rubbing = motor = 0.0
+    if p[slots.DRIVE_VARIES] != 0.0:
+        force *= ripple(x_motor, p)
+        rubbing = memory[WAY] * p[slots.DRIVE_SHARE] * abs(force)
+    if p[slots.GEAR_STIFFNESS] > 0.0:
+        teeth = bite(x_motor - x, v_motor - v, p)
+        motor = (force - teeth) / (p[slots.MOTOR_SHARE] * p[slots.MASS])
+        force = teeth
+    net = force + value_of(push, OTHER, done) - resisting(x, v, memory, p)
+    if rubbing != 0.0:
+        net -= rubbing
+    if p[slots.OWN_FORCE] != 0.0:
+        net += own_force(x, v, memory[WAY], push, done, p)
+    return net, motor
 
 
 @njit(**INNER)
