@@ -1,6 +1,6 @@
 """The frozen list of machines.
 
-A builder gives the machine of its name for one of the two sets of seeds. Sizes are of
+A builder gives the machine of its name for one of the sets of seeds. Sizes are of
 machines one can buy or has measured: coils of a gram, stages, presses, gantries of two
 tons, spindles and arms.
 """
@@ -28,7 +28,7 @@ def machine(family: str) -> Callable[[Builder], Builder]:
 
 
 def built(name: str, seeds: str) -> Machine:
-    """The machine of a name in one of the two sets of seeds."""
+    """The machine of a name in one of the sets of seeds."""
     family, build = SUITE[name]
     made = build(Draw(name, seeds))
     made.family = family
