@@ -263,10 +263,13 @@ blind: $(DEV)  ## blind test with effects hidden by a separate generator, and do
 	  --suite outside --suite near --suite pairs --suite small --seeds reporting \
 	  --number $(BLIND_NUMBER) --jobs 2 --work $(BLIND) --write docs/blind_test.md
 
-# Independent equations and integrators. Seeds `reporting` are for reports only.
-machines: $(DEV)  ## diagnosis of machines of independent making, and docs/independent_machines.md: an hour
-	$(BIN)/python -m tests.machines.run_machines --seeds reporting --jobs 2 \
+# Independent equations and integrators. Each of the seeds for reports is for one of them.
+MACHINE_SEEDS := second_reporting
+machines: $(DEV)  ## diagnosis of machines of independent making, and a simple peer on the same: an hour
+	$(BIN)/python -m tests.machines.run_machines --seeds $(MACHINE_SEEDS) --jobs 2 \
 	  --work results/machines --write results/machines/table.md
+	$(BIN)/python -m tests.machines.peer --seeds $(MACHINE_SEEDS) \
+	  --work results/machines --write results/machines/peer.md
 
 hsm150: $(RUN)  ## all stages on measurements of a real servo motor, and linear models of them
 	$(HWID) run configs/hsm150_linear.yaml
