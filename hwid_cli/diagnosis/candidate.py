@@ -226,6 +226,7 @@ def fit_candidate(
     starts: Sequence[SearchStart],
     scales: Scales,
     noise: NoiseFloor,
+    most_samples: int | None = None,
 ) -> CandidateFit:
     """Fit the base with effects from several starts, keep the best.
 
@@ -237,18 +238,31 @@ def fit_candidate(
         Ids in the catalogue, without those that the simulation has.
     starts : sequence of SearchStart
         At least one.
+    most_samples : int or None
+        Fit to so many samples of the training recordings; None fits to all of them.
     """
     train = problem.part(held_out=False)
+    if most_samples is not None:
+        train = fewer_recordings(train, most_samples)
     everything = (*drive_effects(problem.drive), *effects)
+    best = _best_from(train, everything, starts, scales)
+    return _evaluated(problem, effects, best, train, noise)
+
+
+def _best_from(
+    problem: DiagnosisProblem,
+    effects: tuple[str, ...],
+    starts: Sequence[SearchStart],
+    scales: Scales,
+) -> SearchResult:
+    """Search from several starts; those that fall behind stop early."""
     first = MOST_ITERATIONS if len(starts) == 1 else FIRST_ITERATIONS
-    found = [_fit_from(train, everything, start, scales, first) for start in starts]
+    found = [_fit_from(problem, effects, start, scales, first) for start in starts]
     if len(starts) > 1:
         least = min(one.sse for one in found)
-        found = [
-            _gone_on(train, one) for one in found if one.sse <= WITHIN_BEST * least
-        ]
-    best = min(found, key=lambda one: one.sse)
-    return _evaluated(problem, effects, best, noise)
+        near = [one for one in found if one.sse <= WITHIN_BEST * least]
+        found = [_gone_on(problem, one) for one in near]
+    return min(found, key=lambda one: one.sse)
 
 
 def _gone_on(problem: DiagnosisProblem, found: SearchResult) -> SearchResult:
@@ -288,13 +302,20 @@ def _evaluated(
     problem: DiagnosisProblem,
     effects: tuple[str, ...],
     best: SearchResult,
+    fitted_to: DiagnosisProblem,
     noise: NoiseFloor,
 ) -> CandidateFit:
-    """Simulate all recordings with what was fitted."""
-    rows = [row for row, one in enumerate(problem.signals) if not one.is_held_out]
-    held = [row for row, one in enumerate(problem.signals) if one.is_held_out]
+    """Simulate all recordings with what was fitted to some."""
+    names = [one.name for one in fitted_to.signals]
+    numbered = list(enumerate(problem.signals))
+    rows = [row for row, one in numbered if one.name in names]
+    held = [row for row, one in numbered if one.is_held_out]
+    rest = [row for row, _ in numbered if row not in rows and row not in held]
     own = np.zeros((len(problem.signals), len(best.layout.own)))
     own[rows] = best.point.own
+    if rest and best.layout.own:
+        part = replace(problem, signals=tuple(problem.signals[row] for row in rest))
+        own[rest] = fit_own(part, best.layout, best.point.shared).own
     held_parts: list[np.ndarray] = []
     if held:
         part = problem.part(held_out=True)
@@ -308,8 +329,8 @@ def _evaluated(
     sse = each_sum_of_squares(parts)
     is_usable = bool(np.isfinite(sse).all())
     neighbour = _neighbour(parts) if is_usable else 0.0
-    fitted = drive_at(problem, best.layout, best.point)
-    white, cause = left_over(parts, problem, fitted, noise)
+    drive = drive_at(problem, best.layout, best.point)
+    white, cause = left_over(parts, problem, drive, noise)
     shared = zip(best.layout.shared, best.point.shared, strict=True)
     own_values = np.array(
         [

@@ -335,9 +335,16 @@ def _seeds_of_pieces(
     base = fit_candidate(pieces, (), [start], baseline.scales, baseline.noise)
     if not base.is_usable:
         return ()
+    # Values of each recording would be values of each piece, which imitate anything.
+    shared = tuple(
+        one
+        for one in rounds.allowed
+        if not any(parameter.is_own for parameter in CATALOGUE[one].parameters)
+    )
     of_pieces = replace(
         rounds,
         problem=pieces,
+        allowed=shared,
         criteria=SelectionCriteria.of(pieces, baseline.noise),
         base=base,
         baseline=replace(baseline, drive=fitted_drive(pieces.drive, base)),

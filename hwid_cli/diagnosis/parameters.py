@@ -430,7 +430,8 @@ def _is_possible(fit_layout: ParameterLayout, point: ParameterPoint) -> bool:
 
 def sum_of_squares(parts: list[np.ndarray]) -> float:
     """Sum of squares; infinite where a simulation ran away."""
-    sse = sum(float(one @ one) for one in parts)
+    with np.errstate(over="ignore"):
+        sse = sum(float(one @ one) for one in parts)
     return sse if np.isfinite(sse) else float("inf")
 
 
@@ -441,6 +442,7 @@ def each_sum_of_squares(parts: Sequence[np.ndarray]) -> np.ndarray:
     -------
     ndarray, shape (n_recordings,), [output unit squared]
     """
-    sse = np.array([float(part @ part) for part in parts])
+    with np.errstate(over="ignore"):
+        sse = np.array([float(part @ part) for part in parts])
     sse[~np.isfinite(sse)] = np.inf
     return sse

@@ -36,6 +36,7 @@ from hwid_cli.diagnosis.forecast import (
 from hwid_cli.diagnosis.problem import DiagnosisProblem
 from hwid_cli.diagnosis.scales import scales_of_fit
 from hwid_cli.diagnosis.selection import (
+    LEAST_ADDED,
     LEAST_LAST_CONTRIBUTION,
     SelectionCriteria,
     is_part_of,
@@ -51,6 +52,8 @@ from hwid_cli.records.candidates import CandidateFit
 FEWEST_FINISHED = 4
 MOST_FINISHED = 10
 WITHIN_REACH = 4.0
+# Sets are fitted to so many samples of the training recordings; the best ones to all.
+MANY_SAMPLES = 40_000
 # Share of what a set leaves that counts as left beyond the noise, at least.
 LEAST_LEFT = 0.02
 # Candidates on top of a set, by their forecasts, that are screened.
@@ -215,8 +218,8 @@ class _Search:
         self.rounds = rounds
         self.fits: dict[Effects, CandidateFit] = {}
         self.shares: dict[Effects, float] = {}
-        train = rounds.problem.part(held_out=False)
-        self._few = fewer_recordings(train, SCREENING_SAMPLES)
+        self._train = rounds.problem.part(held_out=False)
+        self._few = fewer_recordings(self._train, SCREENING_SAMPLES)
         self._forecasts: list[Forecast] = []
         self._error = np.zeros(0)
         self._tried: set[tuple[Effects, str]] = set()
@@ -410,10 +413,59 @@ class _Search:
         return found
 
     def _finish(self, what: str, sets: Mapping[Effects, Sequence[SearchStart]]) -> None:
-        """Fit sets of effects to the end; keep what is better than before."""
+        """Fit sets of effects to the end; keep what is better than before.
+
+        Of many samples, only sets that come near the best one are fitted to all.
+        """
+        if self._train.n_evaluated <= MANY_SAMPLES:
+            self._keep(self._fitted(what, sets, None))
+            return
+        found = self._fitted(what, sets, MANY_SAMPLES)
+        self._keep(found)
+        excess = self.rounds.criteria.excess
+        sizes = {len(one.effects) for one in found}
+        least = min(
+            (excess(one) for size in sizes for one in self._of_size(size)), default=0.0
+        )
+        present = drive_effects(self.rounds.problem.drive)
+        near = {
+            one.effects: [
+                SearchStart(_base_values(one, self.rounds), fitted_values(one, present))
+            ]
+            for one in found
+            if one.is_usable
+            and excess(one) <= WORTH_MORE * least
+            and self._adds_enough(one)
+        }
+        self._keep(self._fitted(f"{what}, all recordings", near, None))
+
+    def _adds_enough(self, wide: CandidateFit) -> bool:
+        """Whether a set brings more than the sets of its size that it includes."""
+        excess, whole = self.rounds.criteria.excess, self.rounds.base
+        gained = excess(whole) - excess(wide)
+        return all(
+            excess(one) - excess(wide) >= LEAST_ADDED * gained
+            for one in self._of_size(len(wide.effects))
+            if one is not wide and is_part_of(one, wide)
+        )
+
+    def _keep(self, found: Sequence[CandidateFit]) -> None:
+        """Keep fits that are better than before."""
+        for one in found:
+            before = self.fits.get(one.effects)
+            if before is None or self._is_behind(before, one):
+                self.fits[one.effects] = one
+
+    def _fitted(
+        self,
+        what: str,
+        sets: Mapping[Effects, Sequence[SearchStart]],
+        most_samples: int | None,
+    ) -> list[CandidateFit]:
+        """Fit sets of effects to so many samples, or to all."""
         rounds = self.rounds
         if not sets:
-            return
+            return []
         rounds.on_round(what, len(sets))
         baseline = rounds.baseline
         tasks = [
@@ -422,21 +474,20 @@ class _Search:
                 function=fit_candidate,
                 arguments=(
                     rounds.problem, ids, tuple(starts), baseline.scales, baseline.noise,
+                    most_samples,
                 ),
                 result_type=CandidateFit,
                 content={
                     "effects": ids,
                     "starts": list(starts),
                     "pieces": rounds.problem.has_starts,
+                    "most_samples": most_samples,
                 },
                 arrays=(rounds.base.values,),
             )
             for ids, starts in sets.items()
         ]  # fmt: skip
-        for one in rounds.run_tasks(tasks, keep=True):
-            before = self.fits.get(one.effects)
-            if before is None or _train_sse(rounds, one) < _train_sse(rounds, before):
-                self.fits[one.effects] = one
+        return rounds.run_tasks(tasks, keep=True)
 
     def _use_again(self, size: int) -> None:
         """Start simpler effects where richer ones ended, and the other way round."""
@@ -500,7 +551,7 @@ class _Search:
             sets = {ids: starts for ids, starts in sets.items() if starts}
             if not sets:
                 return
-            self._finish(f"{_name_of(size)}, going on", sets)
+            self._keep(self._fitted(f"{_name_of(size)}, going on", sets, None))
 
     def _near(
         self, screened: Sequence[Screened], best: CandidateFit | None
@@ -535,7 +586,8 @@ class _Search:
         for effect in best.effects:
             others = tuple(one for one in best.effects if one != effect)
             kin = CATALOGUE[effect].contains if is_complete else _relatives(effect)
-            for relative in kin:
+            for one in kin:
+                relative = _second_of(one) if one in others else one
                 ids = _together(others, relative)
                 if relative not in rounds.allowed or not _may_stand(ids, present):
                     continue
@@ -660,14 +712,28 @@ def _relatives(effect: str) -> list[str]:
     return list(dict.fromkeys((*contained, *containing, *alike)))
 
 
+def _second_of(effect: str) -> str:
+    """The second one of an effect, where the catalogue has one; else the effect."""
+    seconds = [name for name, one in CATALOGUE.items() if one.beside == effect]
+    return seconds[0] if seconds else effect
+
+
 def _translated(effect: str, values: Values, scales: Any) -> list[dict[str, float]]:
-    """Start values of an effect from those of a related one: equal names, equal values."""
-    starts = CATALOGUE[effect].starts(scales)[:SCREENED_STARTS]
+    """Start values of an effect from those of a related one: equal names, equal values.
+
+    A second one of its kind starts on both sides of 0.
+    """
+    entry = CATALOGUE[effect]
+    given = [values]
+    if entry.beside:
+        signed = {one.name for one in entry.parameters if not one.is_positive}
+        given.append({k: -one if k in signed else one for k, one in values.items()})
     found = []
-    for start in starts:
-        same = {name: values.get(name, value) for name, value in start.items()}
-        if same not in found:
-            found.append(same)
+    for start in entry.starts(scales)[:SCREENED_STARTS]:
+        for one in given:
+            same = {name: one.get(name, value) for name, value in start.items()}
+            if same not in found:
+                found.append(same)
     return found
 
 

@@ -40,6 +40,7 @@ def scales_of_recordings(
     velocities: Sequence[np.ndarray],
     frequencies_Hz: tuple[float, ...] = (),
     waves: tuple[Wave, ...] = (),
+    ripples: tuple[Wave, ...] = (),
     missing: Missing | None = None,
 ) -> Scales:
     """Sizes of what the recordings hold.
@@ -50,8 +51,8 @@ def scales_of_recordings(
         Of the base's simulation, one for each recording.
     frequencies_Hz : tuple of float, [Hz]
         Highest lines of the base's error.
-    waves : tuple of Wave
-        With which it repeats along the way.
+    waves, ripples : tuple of Wave
+        With which the missing force, and its share of the motor's, repeat along the way.
     missing : Missing or None
         What the base lacks.
     """
@@ -83,6 +84,7 @@ def scales_of_recordings(
         duration_s=duration,
         frequencies_Hz=frequencies_Hz,
         waves=waves,
+        ripples=ripples,
         resistance_ohm=drive.resistance_ohm or 1.0,
         reading=max(reading, 1e-12),
         missing=missing,
@@ -111,6 +113,7 @@ def scales_of_fit(
         [one.velocity for one in compared],
         line_frequencies(compared, noise),
         waves_along(compared, force),
+        waves_along(compared, force, motor_force(compared, drive)),
         missing_along(compared, force, drive),
     )
 
@@ -226,10 +229,28 @@ def _spectrum(
     return np.interp(frequencies, own, power / whole if whole > 0 else power)
 
 
+def motor_force(compared: Sequence[Compared], drive: Drive) -> np.ndarray:
+    """Force of the motor at the evaluated samples, without back-EMF and inductance.
+
+    Returns
+    -------
+    ndarray, shape (n_samples,), [N]
+    """
+    gain = drive.force_constant_N_per_A / (drive.resistance_ohm or 1.0)
+    return gain * joined(compared, [one.signals.input for one in compared])
+
+
 def waves_along(
-    compared: Sequence[Compared], smoothed: Sequence[Smoothed]
+    compared: Sequence[Compared],
+    smoothed: Sequence[Smoothed],
+    factor: np.ndarray | None = None,
 ) -> tuple[Wave, ...]:
     """Waves with which the missing force repeats along the way.
+
+    Parameters
+    ----------
+    factor : ndarray, shape (n_samples,), or None, [N]
+        The force that the waves multiply; None where they are a force of their own.
 
     Returns
     -------
@@ -239,30 +260,41 @@ def waves_along(
     force = evaluated_force(compared, smoothed)
     position = evaluated_position(compared, smoothed)
     stroke = float(np.ptp(position)) if position.size else 0.0
-    if stroke <= 0:
+    if stroke <= 0 or (factor is not None and not factor.any()):
         return ()
     at = np.linspace(position.min(), position.max(), _PLACES)
     place = np.rint((position - at[0]) / stroke * (_PLACES - 1)).astype(int)
-    counts = np.bincount(place, minlength=_PLACES)
-    used = counts > 0
+    factor = np.ones(force.size) if factor is None else factor
+    counts = np.maximum(np.bincount(place, minlength=_PLACES), 1)
     # A mean at each place: a long hold counts for no more than a passage.
-    means = np.bincount(place, force, _PLACES) / np.maximum(counts, 1)
+    products = np.bincount(place, force * factor, _PLACES) / counts
+    squares = np.bincount(place, factor**2, _PLACES) / counts
+    sizes = np.sqrt(squares)
+    scaled = np.divide(products, sizes, out=np.zeros(_PLACES), where=sizes > 0)
+    # What bends slowly along the way is a spring, or a force constant that is wrong.
     columns = np.vander(np.linspace(-1.0, 1.0, _PLACES), _SLOW_BENDS + 1)
-    slow = columns @ np.linalg.lstsq(columns[used], means[used], rcond=None)[0]
-    rest = np.where(used, means - slow, 0.0)
-    power = np.abs(np.fft.rfft(rest, _FINER * _PLACES)) ** 2
+    columns *= sizes[:, None]
+    slow = columns @ np.linalg.lstsq(columns, scaled, rcond=None)[0]
+    power = np.abs(np.fft.rfft(sizes * (scaled - slow), _FINER * _PLACES)) ** 2
     first = int(_FINER * _FEWEST_PERIODS)
     peaks = _highest_peaks(power[first : int(_FINER * _MOST_PERIODS)])
     length = stroke * _PLACES / (_PLACES - 1)
     periods = [length * _FINER / (first + peak) for peak in peaks]
-    return tuple(_wave(one, at[used], means[used], columns[used]) for one in periods)
+    return tuple(_wave(one, at, sizes, scaled, columns) for one in periods)
 
 
-def _wave(period: float, at: np.ndarray, force: np.ndarray, slow: np.ndarray) -> Wave:
+def _wave(
+    period: float,
+    at: np.ndarray,
+    sizes: np.ndarray,
+    scaled: np.ndarray,
+    slow: np.ndarray,
+) -> Wave:
     """Size and phase of a wave beside what bends slowly."""
     angles = 2 * np.pi * at / period
-    columns = np.column_stack([np.sin(angles), np.cos(angles), slow])
-    sine, cosine = np.linalg.lstsq(columns, force, rcond=None)[0][:2]
+    waves = sizes[:, None] * np.column_stack([np.sin(angles), np.cos(angles)])
+    columns = np.column_stack([waves, slow])
+    sine, cosine = np.linalg.lstsq(columns, scaled, rcond=None)[0][:2]
     return Wave(
         float(period), float(np.hypot(sine, cosine)), float(np.arctan2(cosine, sine))
     )

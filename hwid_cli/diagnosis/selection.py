@@ -594,6 +594,17 @@ def decide(
     return DiagnosisVerdict("unknown", False, base, ())
 
 
+def _changes_freely(found: CandidateFit, effect: str) -> bool:
+    """Whether an effect has a value of its own in every recording.
+
+    Such values make up for a law that is not quite right, down to the noise.
+    """
+    return any(
+        one.owner == effect and one.parameter.startswith("log_")
+        for one in found.own_names
+    )
+
+
 def _needs_each(
     criteria: SelectionCriteria,
     whole: CandidateFit,
@@ -612,7 +623,8 @@ def _needs_each(
         explains = against.explained >= LEAST_EXPLAINED or completes
         is_clear = against.gain >= LEAST_GAIN and against.improved >= LEAST_IMPROVED
         brings = criteria.excess(fits[left]) - criteria.excess(whole)
-        least = LEAST_LAST_CONTRIBUTION if completes else LEAST_CONTRIBUTION
+        is_last = completes and not _changes_freely(whole, effect)
+        least = LEAST_LAST_CONTRIBUTION if is_last else LEAST_CONTRIBUTION
         is_clear = is_clear and brings >= least * criteria.excess(base)
         if not (is_clear and explains):
             return False

@@ -23,17 +23,17 @@ FAINT = 1e-3
 
 @dataclass(frozen=True)
 class Wave:
-    """A force that repeats along the way, ``amplitude sin(2 pi x / period + phase)``.
+    """What repeats along the way, ``amplitude sin(2 pi x / period + phase)``.
 
     Parameters
     ----------
     period_m : float, [m]
-    amplitude_N : float, [N]
+    amplitude : float, [N]; [-] where it multiplies a force
     phase_rad : float, [rad]
     """
 
     period_m: float
-    amplitude_N: float
+    amplitude: float
     phase_rad: float
 
 
@@ -115,6 +115,8 @@ class Scales:
         Where the error of the base has its highest lines.
     waves : tuple of Wave
         With which it repeats most along the way.
+    ripples : tuple of Wave
+        With which its share of the motor's force does.
     resistance_ohm : float, [ohm]
         Of the circuit; 1 where there is none and the input is the current.
     reading : float, [m] or [m/s]
@@ -135,6 +137,7 @@ class Scales:
     duration_s: float
     frequencies_Hz: tuple[float, ...] = ()
     waves: tuple[Wave, ...] = ()
+    ripples: tuple[Wave, ...] = ()
     resistance_ohm: float = 1.0
     reading: float = 0.0
     missing: Missing | None = field(default=None, compare=False, repr=False)

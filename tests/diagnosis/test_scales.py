@@ -10,11 +10,13 @@ from hwid_cli.diagnosis.problem import Compared, DiagnosisProblem, Signals
 from hwid_cli.diagnosis.scales import (
     line_frequencies,
     line_share,
+    motor_force,
     scales_of_recordings,
     waves_along,
 )
+from hwid_cli.drive.catalogue import CATALOGUE
 from hwid_cli.records.drive import Drive
-from tests.diagnosis.small_drive import STEP_S, problem, white
+from tests.diagnosis.small_drive import DRIVE, STEP_S, problem, sizes, white
 
 TIME = STEP_S * np.arange(400)
 
@@ -66,9 +68,33 @@ def test_a_force_that_repeats_along_the_way_is_read_off(period, phase):
     best = waves_along(pairs, smoothed)[0]
 
     assert best.period_m == pytest.approx(period, rel=2e-3)
-    assert best.amplitude_N == pytest.approx(0.7, rel=0.1)
+    assert best.amplitude == pytest.approx(0.7, rel=0.1)
     apart = np.angle(np.exp(1j * (best.phase_rad - phase)))
     assert abs(apart) < 0.2
+
+
+def test_a_share_of_the_motor_force_that_repeats_is_read_off():
+    pairs = compared([np.zeros(400)] * 9)
+    rng = np.random.default_rng(7)
+    motor = motor_force(pairs, DRIVE)
+    assert motor[:400] == pytest.approx(
+        DRIVE.force_constant_N_per_A * pairs[0].signals.input
+    )
+    ends = np.cumsum([one.position.size for one in pairs])[:-1]
+    smoothed = []
+    for one, push in zip(pairs, np.split(motor, ends), strict=True):
+        force = 0.2 * push * np.sin(2 * np.pi * one.position / 0.0019 + 0.4)
+        # A force constant that is wrong beside it, and noise.
+        force += 0.1 * push + 0.1 * rng.standard_normal(400)
+        smoothed.append(Smoothed(force, one.position, one.velocity, 0 * force))
+    best = waves_along(pairs, smoothed, motor)[0]
+
+    assert best.period_m == pytest.approx(0.0019, rel=2e-3)
+    assert best.amplitude == pytest.approx(0.2, rel=0.1)
+    assert abs(np.angle(np.exp(1j * (best.phase_rad - 0.4)))) < 0.2
+    starts = CATALOGUE["torque_ripple"].starts(replace(sizes(problem()), ripples=(best,)))
+    assert starts[0]["per_turn"] == pytest.approx(2 * np.pi / 0.0019, rel=2e-3)
+    assert starts[0]["share"] == pytest.approx(0.2, rel=0.1)
 
 
 def test_without_motion_nothing_repeats():

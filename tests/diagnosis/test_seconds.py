@@ -2,7 +2,14 @@
 
 import pytest
 
-from hwid_cli.diagnosis.rounds import _is_nested, _may_stand, _moved_up
+from hwid_cli.diagnosis.rounds import (
+    _is_nested,
+    _may_stand,
+    _moved_up,
+    _second_of,
+    _translated,
+)
+from tests.diagnosis.small_drive import problem, sizes
 
 STOP, SECOND = "one_sided_stop", "one_sided_stop:second"
 
@@ -56,3 +63,12 @@ def test_a_second_one_without_its_first_becomes_the_first():
         ("gravity", SECOND),
         values,
     )
+
+
+def test_in_the_place_of_a_stop_on_both_sides_a_second_one_starts_on_each():
+    assert _second_of(STOP) == SECOND
+    assert _second_of("gravity") == "gravity"
+    both_sides = {"position_m": 0.012, "stiffness_N_per_m": 1e4}
+    found = _translated(SECOND, both_sides, sizes(problem()))
+    assert [one["position_m"] for one in found] == [0.012, -0.012]
+    assert {one["stiffness_N_per_m"] for one in found} == {1e4}

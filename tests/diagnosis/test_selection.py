@@ -400,6 +400,24 @@ def test_without_evidence_for_the_set_its_part_is_named():
     assert verdict.chosen is NAMED
 
 
+@pytest.mark.parametrize(
+    ("left", "own", "chosen"),
+    [
+        # 0.3 % of what is missing: enough for a law that all recordings share ...
+        (110.0, None, "both"),
+        # ... but free values of each recording make up for a law that is not quite right.
+        (110.0, [0.05, -0.04] * 3, "one"),
+        (140.0, [0.05, -0.04] * 3, "both"),
+    ],
+)
+def test_free_values_must_bring_more_to_complete_a_set(left, own, chosen):
+    one = made_up(("coulomb_friction",), left, whiteness=9.0)
+    other = "parameter_change:damping" if own else "input_dead_zone"
+    both = made_up(("coulomb_friction", other), 100.0, whiteness=0.6, own=own)
+    verdict = decided(base(3500.0), [one, both], [one, both], given=3500.0)
+    assert verdict.chosen is (both if chosen == "both" else one)
+
+
 def test_two_that_are_as_good_are_ambiguous():
     verdict = decided(base(), [NAMED, RIVAL], [NAMED])
     assert verdict.word == "ambiguous"

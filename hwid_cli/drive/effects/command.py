@@ -159,6 +159,34 @@ SAG = Effect(
     },
 )
 
+_RIPPLES_PER_STROKE = (0.7, 1.3, 2, 3, 4.5, 6.5, 9, 13, 18)
+# Fewer than these cannot be told from what bends slowly along the way.
+_FEW_RIPPLES = tuple(count for count in _RIPPLES_PER_STROKE if count <= 3)
+_PHASES = (-0.75 * pi, -0.25 * pi, 0.25 * pi, 0.75 * pi)
+
+
+def _ripples(scales: Scales) -> tuple[dict[str, float], ...]:
+    """Waves that the missing force shows, and the slow ones that it cannot."""
+    if not scales.ripples:
+        return ()
+    found = [
+        {
+            "share": min(multiple * one.amplitude, 0.8),
+            "per_turn": 2 * pi / one.period_m,
+            "phase_rad": one.phase_rad,
+        }
+        for one in scales.ripples
+        # The smoothed force that they were read from is too small where motion is fast.
+        for multiple in (1.0, 1.6)
+    ]
+    slow = [
+        {"share": 0.1, "per_turn": 2 * pi * count / scales.stroke_m, "phase_rad": phase}
+        for count in _FEW_RIPPLES
+        for phase in _PHASES
+    ]
+    return (*found, *slow)
+
+
 RIPPLE = Effect(
     id="torque_ripple",
     sentence="the force constant varies with the position of the rotor",
@@ -175,8 +203,7 @@ RIPPLE = Effect(
         Parameter(
             "per_turn",
             lambda scales: tuple(
-                2 * pi * count / scales.stroke_m
-                for count in (0.7, 1.3, 2, 3, 4.5, 6.5, 9, 13, 18)
+                2 * pi * count / scales.stroke_m for count in _RIPPLES_PER_STROKE
             ),
             lambda scales: (
                 2 * pi * 0.4 / scales.stroke_m,
@@ -187,7 +214,7 @@ RIPPLE = Effect(
         ),
         Parameter(
             "phase_rad",
-            lambda scales: (-0.75 * pi, -0.25 * pi, 0.25 * pi, 0.75 * pi),
+            lambda scales: _PHASES,
             is_positive=False,
             places=("RIPPLE_PHASE",),
             default=0.0,
@@ -197,6 +224,7 @@ RIPPLE = Effect(
         "cogging": "the same way at small and at large current",
         "quadratic_stiffness": "motion over a large angle",
     },
+    seen=_ripples,
 )
 
 THERMAL = Effect(

@@ -27,7 +27,7 @@ def _periods(scales: Scales) -> tuple[float, ...]:
 def _waves(scales: Scales) -> tuple[dict[str, float], ...]:
     return tuple(
         {
-            "amplitude_N": multiple * one.amplitude_N,
+            "amplitude_N": multiple * one.amplitude,
             "period_m": one.period_m,
             "phase_rad": one.phase_rad,
         }
