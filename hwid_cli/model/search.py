@@ -14,6 +14,8 @@ The best candidate seen wins. docs/method.md, section "The search".
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from hwid_cli.model import static_map
 from hwid_cli.model.candidates import Candidate, FitData
 from hwid_cli.model.initial_candidates import block_starts
@@ -44,6 +46,9 @@ _MOST_RESTARTS, _WORTH_RESTARTING = 3, 0.9
 _MORE_STARTS = 30
 # Share of the cost that a step must gain where larger models go on from the result.
 _SMALL_GAIN = 1e-3
+# Factor on the cost, 1 % of the deviation, that a linear model may have where limits that
+# gain no more are taken for noise.
+_AS_GOOD = 1.01**2
 
 
 def nonlinear_search(
@@ -74,7 +79,8 @@ def nonlinear_search(
         best = _with_reestimated_block(best, experiments, options)
     best = _restarted(best, experiments, options, starts)
     best = _from_break_points(best, experiments, options, starts, linear)
-    return _not_worse_than(linear, best, experiments, options)
+    best = _not_worse_than(linear, best, experiments, options)
+    return _without_needless_limits(linear, best, experiments, options)
 
 
 def _with_reestimated_block(
@@ -170,7 +176,8 @@ def continue_nested(
     experiments = renewed(experiments, nested)
     known = _best([standing(one, experiments) for one in nested])
     near = converge(known, experiments, options, least_gain=_SMALL_GAIN)
-    return _not_worse_than(linear, _best([known, near]), experiments, options)
+    best = _not_worse_than(linear, _best([known, near]), experiments, options)
+    return _without_needless_limits(linear, best, experiments, options, known.cost)
 
 
 def search_beside_nested(
@@ -200,11 +207,10 @@ def search_beside_nested(
     anew = finish(placed, experiments, options, least_gain=_SMALL_GAIN)
     best = _best([near, anew])
     # Only between known maps are delays told apart safely.
-    return (
-        _with_reestimated_block(best, experiments, options)
-        if len(options.delays) > 1
-        else best
-    )
+    if len(options.delays) > 1:
+        best = _with_reestimated_block(best, experiments, options)
+    least = min(standing(one, experiments).cost for one in nested)
+    return _without_needless_limits(linear, best, experiments, options, least)
 
 
 def _not_worse_than(
@@ -221,6 +227,36 @@ def _not_worse_than(
     passing = standing(_passing(linear, experiments, options), experiments)
     passing = replace(passing, iterations=linear.iterations)
     return _best([best, passing, finish(passing, experiments, options)])
+
+
+def _without_needless_limits(
+    linear: Search,
+    best: Search,
+    experiments: Sequence[FitData],
+    options: FitOptions,
+    largest_cost: float = np.inf,
+) -> Search:
+    """The best so far, or the linear model where limits gain next to nothing.
+
+    Where a record rests on two levels, limits between them or inside their noise fit it
+    as well as none, and are wrong on every other record. They stay where they gain more
+    than 1 % of the deviation, or more than their model's parameters weigh, or where the
+    linear model costs more than `largest_cost`, that of a model which it would replace.
+    """
+    kinds = (options.input_map, options.output_map)
+    if not any(static_map.RULES[kind].has_limits for kind in kinds):
+        return best
+    linear = rescored(linear, experiments)
+    if linear.cost > min(_AS_GOOD * best.cost, largest_cost):
+        return best
+    passing = _passing(linear, experiments, options)
+    model = passing.model
+    added = model.input_map.parameters.size + model.output_map.parameters.size
+    n = sum(one.output.size for one in experiments)
+    # Schwarz (1978): each parameter weighs the logarithm of the number of samples.
+    if linear.cost > best.cost * np.exp(added * np.log(n) / n):
+        return best
+    return replace(standing(passing, experiments), iterations=linear.iterations)
 
 
 def _passing(

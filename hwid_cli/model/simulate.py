@@ -119,7 +119,7 @@ def _started(
         )
     model = replace(model, initial_state="estimated")
     measured = np.asarray(output, dtype=float)
-    return model, _state_from(model, _forced(model, signal), measured)
+    return model, _state_from(model, _forced(model, signal), measured)[0]
 
 
 def validation_output(model: HammersteinWiener, recording: Recording) -> np.ndarray:
@@ -140,11 +140,12 @@ def validation_output(model: HammersteinWiener, recording: Recording) -> np.ndar
         return simulate(model, recording.input, initial_state=np.zeros(0))
     model = outlined_model(model)
     with np.errstate(over="ignore", invalid="ignore"):
-        forced = _forced(model, np.ascontiguousarray(recording.input))
-        state = _state_from(model, forced, recording.output)
-        return static_map.evaluate(
-            model.output_map, forced + _free(model, state, forced)
-        )
+        x = _forced(model, np.ascontiguousarray(recording.input))
+        state, lasts = _state_from(model, x, recording.output)
+        # After twice the time that its responses last it is below the rounding of x.
+        n = min(2 * lasts, x.size)
+        x[:n] += free_response(state, model.denominator, n)
+        return static_map.evaluate(model.output_map, x)
 
 
 def estimated_state(model: HammersteinWiener, recording: Recording) -> np.ndarray:
@@ -164,16 +165,16 @@ def estimated_state(model: HammersteinWiener, recording: Recording) -> np.ndarra
     """
     model = outlined_model(model)
     forced = _forced(model, np.ascontiguousarray(recording.input))
-    return _state_from(model, forced, recording.output)
+    return _state_from(model, forced, recording.output)[0]
 
 
 def _state_from(
     model: HammersteinWiener, forced: np.ndarray, output: np.ndarray
-) -> np.ndarray:
-    """The same from the output of an empty linear block."""
+) -> tuple[np.ndarray, int]:
+    """The same from the output of an empty linear block, and for how long it counts."""
     best = np.zeros(model.orders.n_state)
     if best.size == 0 or not np.isfinite(forced).all():
-        return best
+        return best, 0
     responses = _free_responses(model, forced.size)
     # Where the free responses have died away, the initial state changes nothing.
     n = responses.shape[0]
@@ -197,17 +198,17 @@ def _state_from(
         if promised < _LEAST_GAIN * cost:
             break
         step = basis @ step
-        halvings = 0.5 ** np.arange(_MOST_HALVINGS)
-        tried = (best + share * step for share in halvings)
+        tried = (best + 0.5**halvings * step for halvings in range(_MOST_HALVINGS))
         better = ((one, deviation(one)) for one in tried)
         found = next((pair for pair in better if pair[1] < cost), None)
         if found is None:
             break
         gain = cost - found[1]
         best, cost = found
-        if gain < _LEAST_GAIN * cost:
+        # What was promised has come where the output map is straight: nothing is left.
+        if min(gain, abs(promised - gain)) < _LEAST_GAIN * cost:
             break
-    return best
+    return best, n
 
 
 def _free_responses(model: HammersteinWiener, n_samples: int) -> np.ndarray:

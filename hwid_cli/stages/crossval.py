@@ -38,7 +38,7 @@ from hwid_cli.tasks.cache import model_key, recording_key, task_key
 from hwid_cli.tasks.runner import RunSettings, Task, run_tasks
 
 NAME = "crossval"
-STAGE_VERSION = 2
+STAGE_VERSION = 3
 
 # Why an RMSD is there or missing.
 OK, NO_MODEL, NOT_FINITE = "ok", "no model", "not finite"
