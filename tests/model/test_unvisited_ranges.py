@@ -324,7 +324,7 @@ def test_limits_that_the_data_do_not_need_have_no_effect(kind):
 
 
 def test_larger_orders_need_no_limits_either_and_are_never_worse():
-    own = rests_on_two_levels([0.0, F.sum()], F, seed=5)
+    own = rests_on_two_levels([0.0, F.sum()], F, seed=7)
     options = FitOptions(input_map="saturation")
     smaller = fit([own], Orders(1, 2, 1), options)
     at = np.linspace(-6.0, 6.0, 40)
