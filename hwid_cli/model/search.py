@@ -27,6 +27,7 @@ from hwid_cli.model.restart import (
     is_far,
     leaves_structure,
     reestimate_block,
+    reestimate_lasting_block,
     starts_with_new_maps,
     starts_without_input_maps,
     with_break_points,
@@ -78,6 +79,9 @@ def nonlinear_search(
     if not options.keeps_block:
         best = _with_reestimated_block(best, experiments, options)
     best = _restarted(best, experiments, options, starts)
+    if not options.keeps_block:
+        lasting = reestimate_lasting_block(best, experiments, options)
+        best = _finished_where_better(lasting, best, experiments, options)
     best = _from_break_points(best, experiments, options, starts, linear)
     best = _not_worse_than(linear, best, experiments, options)
     return _without_needless_limits(linear, best, experiments, options)
@@ -88,9 +92,16 @@ def _with_reestimated_block(
 ) -> Search:
     """The best so far, or what comes of another block between its maps."""
     reestimated = reestimate_block(best, experiments, options)
-    if reestimated.cost >= _WORTH_GOING_ON * best.cost:
+    return _finished_where_better(reestimated, best, experiments, options)
+
+
+def _finished_where_better(
+    near: Search, best: Search, experiments: Sequence[FitData], options: FitOptions
+) -> Search:
+    """The best so far, or the end of a search that is already better."""
+    if near.cost >= _WORTH_GOING_ON * best.cost:
         return best
-    return _best([best, finish(reestimated, experiments, options)])
+    return _best([best, finish(near, experiments, options)])
 
 
 def _restarted(
@@ -249,6 +260,7 @@ def _without_needless_limits(
     linear = rescored(linear, experiments)
     if linear.cost > min(_AS_GOOD * best.cost, largest_cost):
         return best
+    linear = finish(linear, experiments, options)
     passing = _passing(linear, experiments, options)
     model = passing.model
     added = model.input_map.parameters.size + model.output_map.parameters.size
