@@ -6,7 +6,8 @@ map gets the simplest extrapolation that the samples do not contradict. Argument
 samples visited form stretches; in a stretch the law of the map's kind holds. Two
 neighbouring stretches are joined by a straight line. Beyond the outermost ones the
 local slope goes on as far as the samples tell it, and then the map returns to the
-straight line through all samples.
+straight line through all samples. A limit that samples saw from both sides holds beyond
+them too.
 
 References
 ----------
@@ -21,11 +22,14 @@ from hwid_cli.model.static_map import RULES, evaluate, outlined
 from hwid_cli.records.maps import MAP_KINDS, Extrapolation, StaticMap
 from hwid_cli.records.model import HammersteinWiener
 
-# Share of the range: a distance between neighbouring samples above it is a gap.
+# Share of the range: a distance between neighbouring samples above it is a gap, and what
+# samples saw over a shorter one is one level with its noise.
 _GAP = 0.05
 # Share of the range over which a local slope is taken: an outermost segment alone may be
 # a hundredth of it. Deeper, up to half, where fewer samples than these lie in it.
 _OUTER, _DEEPEST, _ENOUGH = 1.0 / 8.0, 0.5, 20
+# Pieces of the range, and as many of them filled alike as let a slope go on to the end.
+_PIECES, _FILLED = 8, 6
 # Share of the range below which a distance is none.
 _LEVEL = 1e-6
 
@@ -38,7 +42,7 @@ class ExtrapolationRule:
     ----------
     trust : float, [-]
         Ranges over which a local slope goes on where samples spread evenly over the part
-        in which it is taken.
+        in which it is taken, and fill the range.
     back : float, [-]
         Share of the range over which a map returns to the line through its samples.
     """
@@ -106,7 +110,7 @@ def extrapolated_map(
     visited = stretches(argument)
     if not np.isfinite(evaluate(plain, visited.ravel())).all():
         return plain
-    below, above = kind.holds_beyond(plain, visited[0], visited[-1])
+    below, above = kind.holds_beyond(plain, *_well_inside(visited))
     line = _line(argument, evaluate(plain, argument))
     between = np.unique(visited)
     points = [between, evaluate(plain, between)]
@@ -150,6 +154,12 @@ def stretches(argument: np.ndarray) -> np.ndarray:
     return np.column_stack([first, last])
 
 
+def _well_inside(visited: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The outermost stretches without the part at either end that tells no more than a level."""
+    edge = _GAP * (visited[-1, 1] - visited[0, 0]) * np.array([1.0, -1.0])
+    return visited[0] + edge, visited[-1] + edge
+
+
 def _line(argument: np.ndarray, value: np.ndarray) -> tuple[float, float]:
     """Slope and offset of the straight line through a map's samples."""
     centre, level = float(argument.mean()), float(value.mean())
@@ -175,8 +185,11 @@ def _line_ahead(
     end = float(side * (side * argument).max())
     width = float(np.ptp(argument))
     points, values = [], []
-    depth, evenness = _outer_part(side * (end - argument))
-    reach = rule.trust * evenness * width
+    inward = side * (end - argument)
+    depth, evenness = _outer_part(inward)
+    # Levels have no slope: what lies an eighth away is the same or a jump.
+    told = evenness * _filled(inward) if RULES[one.kind].has_slope else 0.0
+    reach = rule.trust * told * width
     here, (value, before) = end, evaluate(one, np.array([end, end - side * depth]))
     if reach > _LEVEL * width:
         here, value = end + side * reach, value + (value - before) / depth * reach
@@ -212,6 +225,30 @@ def _outer_part(inward: np.ndarray) -> tuple[float, float]:
     depth = max(_OUTER * width, min(enough, _DEEPEST * width))
     part = ordered[ordered <= depth]
     return depth, min(1.0, 12.0 * float(np.var(part)) / depth**2)
+
+
+def _filled(inward: np.ndarray) -> float:
+    """How much of the range samples fill: a record that rests on two levels tells no slope.
+
+    Parameters
+    ----------
+    inward : ndarray, shape (n,)
+        Distance of each sample from an end.
+
+    Returns
+    -------
+    float, [-]
+        0 for samples in one eighth of the range, 1 from as many as fill six of them alike.
+
+    References
+    ----------
+    Simpson (1949), Measurement of diversity: one over the sum of squared shares counts
+    the pieces that are filled.
+    """
+    width = float(inward.max())
+    counts, _ = np.histogram(inward, _PIECES, (0.0, width))
+    pieces = inward.size**2 / float(counts @ counts)
+    return min(1.0, (pieces - 1.0) / (_FILLED - 1.0))
 
 
 def _law_ahead(one: StaticMap, visited: np.ndarray, side: float) -> list[np.ndarray]:

@@ -27,7 +27,9 @@ from hwid_cli.model.candidates import Candidate, FitData
 from hwid_cli.model.circle_starts import circle_starts, lasting_poles
 from hwid_cli.model.delays import reestimated_blocks
 from hwid_cli.model.distinct import WHEN_FREE, borne_residuals, distinct
+from hwid_cli.model.initial_candidates import block_starts
 from hwid_cli.model.levenberg_marquardt import Search, minimise
+from hwid_cli.model.linear_search import linear_search
 from hwid_cli.model.phases import standing
 from hwid_cli.model.points import block_signals, point_of
 from hwid_cli.model.starts import Start
@@ -183,8 +185,7 @@ def reestimate_block(
         where the new blocks come to the same model.
     """
     between = _between_maps(best.candidate, experiments)
-    model, no_states = best.candidate.model, best.candidate.free_responses[:, :0]
-    has_states = options.initial_state == "estimated"
+    model = best.candidate.model
     starts = reestimated_blocks(
         between,
         model.orders,
@@ -196,6 +197,18 @@ def reestimate_block(
         lasting = lasting_poles([model.denominator], experiments)
         known = replace(options, input_map="none", output_map="none")
         starts += circle_starts(between, model.orders, known, lasting)
+    return _leader(starts, best, experiments, options)
+
+
+def _leader(
+    starts: Sequence[Start],
+    best: Search,
+    experiments: Sequence[FitData],
+    options: FitOptions,
+) -> Search:
+    """What a few iterations make of other blocks between the maps of the best model."""
+    model, no_states = best.candidate.model, best.candidate.free_responses[:, :0]
+    has_states = options.initial_state == "estimated"
     entered = [
         standing(
             Candidate(
@@ -226,6 +239,46 @@ def reestimate_block(
         return best
     leader = min(found, key=lambda one: one.cost)
     return replace(leader, iterations=best.iterations + leader.iterations)
+
+
+def reestimate_lasting_block(
+    best: Search,
+    experiments: Sequence[FitData],
+    options: FitOptions,
+) -> Search:
+    """The same where a pole hardly settles, from blocks that were fitted to the end.
+
+    A drift that is slightly wrong hides the rest of a block. Maps that may follow it
+    hold the search where it is; between maps that stay, a linear model finds both.
+
+    Returns
+    -------
+    Search
+        The best itself where no pole of its block may stand on the unit circle.
+    """
+    model = best.candidate.model
+    lasting = lasting_poles([model.denominator], experiments)
+    if lasting.size == 0 or options.largest_pole_radius < 1.0:
+        return best
+    between = _between_maps(best.candidate, experiments)
+    known = replace(options, input_map="none", output_map="none")
+    begun = [block_starts(between, model.orders, known)]
+    on_circle = circle_starts(between, model.orders, known, lasting)
+    begun += [(one,) for one in on_circle]
+    found = []
+    for starts in begun:
+        fitted = linear_search(between, known, starts).candidate
+        block = fitted.model
+        found.append(
+            replace(
+                starts[0],
+                numerator=block.numerator,
+                denominator=block.denominator,
+                free_responses=fitted.free_responses,
+                delay=block.delay,
+            )
+        )
+    return _leader(found, best, experiments, options)
 
 
 def _between_maps(

@@ -41,7 +41,7 @@ def rmsd(measured: np.ndarray, simulated: np.ndarray) -> float:
         return 0.0
     difference /= largest
     difference *= difference
-    return largest * math.sqrt(difference.mean())
+    return largest * math.sqrt(difference.sum() / difference.size)
 
 
 def fit_percent(measured: np.ndarray, simulated: np.ndarray) -> float:

@@ -14,6 +14,8 @@ The best candidate seen wins. docs/method.md, section "The search".
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from hwid_cli.model import static_map
 from hwid_cli.model.candidates import Candidate, FitData
 from hwid_cli.model.initial_candidates import block_starts
@@ -25,6 +27,7 @@ from hwid_cli.model.restart import (
     is_far,
     leaves_structure,
     reestimate_block,
+    reestimate_lasting_block,
     starts_with_new_maps,
     starts_without_input_maps,
     with_break_points,
@@ -44,6 +47,9 @@ _MOST_RESTARTS, _WORTH_RESTARTING = 3, 0.9
 _MORE_STARTS = 30
 # Share of the cost that a step must gain where larger models go on from the result.
 _SMALL_GAIN = 1e-3
+# Factor on the cost, 1 % of the deviation, that a linear model may have where limits that
+# gain no more are taken for noise.
+_AS_GOOD = 1.01**2
 
 
 def nonlinear_search(
@@ -73,8 +79,12 @@ def nonlinear_search(
     if not options.keeps_block:
         best = _with_reestimated_block(best, experiments, options)
     best = _restarted(best, experiments, options, starts)
+    if not options.keeps_block:
+        lasting = reestimate_lasting_block(best, experiments, options)
+        best = _finished_where_better(lasting, best, experiments, options)
     best = _from_break_points(best, experiments, options, starts, linear)
-    return _not_worse_than(linear, best, experiments, options)
+    best = _not_worse_than(linear, best, experiments, options)
+    return _without_needless_limits(linear, best, experiments, options)
 
 
 def _with_reestimated_block(
@@ -82,9 +92,16 @@ def _with_reestimated_block(
 ) -> Search:
     """The best so far, or what comes of another block between its maps."""
     reestimated = reestimate_block(best, experiments, options)
-    if reestimated.cost >= _WORTH_GOING_ON * best.cost:
+    return _finished_where_better(reestimated, best, experiments, options)
+
+
+def _finished_where_better(
+    near: Search, best: Search, experiments: Sequence[FitData], options: FitOptions
+) -> Search:
+    """The best so far, or the end of a search that is already better."""
+    if near.cost >= _WORTH_GOING_ON * best.cost:
         return best
-    return _best([best, finish(reestimated, experiments, options)])
+    return _best([best, finish(near, experiments, options)])
 
 
 def _restarted(
@@ -170,7 +187,8 @@ def continue_nested(
     experiments = renewed(experiments, nested)
     known = _best([standing(one, experiments) for one in nested])
     near = converge(known, experiments, options, least_gain=_SMALL_GAIN)
-    return _not_worse_than(linear, _best([known, near]), experiments, options)
+    best = _not_worse_than(linear, _best([known, near]), experiments, options)
+    return _without_needless_limits(linear, best, experiments, options, known.cost)
 
 
 def search_beside_nested(
@@ -200,11 +218,10 @@ def search_beside_nested(
     anew = finish(placed, experiments, options, least_gain=_SMALL_GAIN)
     best = _best([near, anew])
     # Only between known maps are delays told apart safely.
-    return (
-        _with_reestimated_block(best, experiments, options)
-        if len(options.delays) > 1
-        else best
-    )
+    if len(options.delays) > 1:
+        best = _with_reestimated_block(best, experiments, options)
+    least = min(standing(one, experiments).cost for one in nested)
+    return _without_needless_limits(linear, best, experiments, options, least)
 
 
 def _not_worse_than(
@@ -221,6 +238,37 @@ def _not_worse_than(
     passing = standing(_passing(linear, experiments, options), experiments)
     passing = replace(passing, iterations=linear.iterations)
     return _best([best, passing, finish(passing, experiments, options)])
+
+
+def _without_needless_limits(
+    linear: Search,
+    best: Search,
+    experiments: Sequence[FitData],
+    options: FitOptions,
+    largest_cost: float = np.inf,
+) -> Search:
+    """The best so far, or the linear model where limits gain next to nothing.
+
+    Where a record rests on two levels, limits between them or inside their noise fit it
+    as well as none, and are wrong on every other record. They stay where they gain more
+    than 1 % of the deviation, or more than their model's parameters weigh, or where the
+    linear model costs more than `largest_cost`, that of a model which it would replace.
+    """
+    kinds = (options.input_map, options.output_map)
+    if not any(static_map.RULES[kind].has_limits for kind in kinds):
+        return best
+    linear = rescored(linear, experiments)
+    if linear.cost > min(_AS_GOOD * best.cost, largest_cost):
+        return best
+    linear = finish(linear, experiments, options)
+    passing = _passing(linear, experiments, options)
+    model = passing.model
+    added = model.input_map.parameters.size + model.output_map.parameters.size
+    n = sum(one.output.size for one in experiments)
+    # Schwarz (1978): each parameter weighs the logarithm of the number of samples.
+    if linear.cost > best.cost * np.exp(added * np.log(n) / n):
+        return best
+    return replace(standing(passing, experiments), iterations=linear.iterations)
 
 
 def _passing(

@@ -29,6 +29,9 @@ _MOST_HALVINGS = 8
 _DAMPING = 1e-9
 # Share of its largest value below which an impulse response has died away.
 _DIED_AWAY = 1e-9
+# Share of a record in which it is looked for first, and the share of this that it may
+# take: what is silent for so long stays silent.
+_SHORT, _SILENT = 4, 0.75
 _LEAST_GAIN = 1e-6
 
 
@@ -119,7 +122,7 @@ def _started(
         )
     model = replace(model, initial_state="estimated")
     measured = np.asarray(output, dtype=float)
-    return model, _state_from(model, _forced(model, signal), measured)
+    return model, _state_from(model, _forced(model, signal), measured)[0]
 
 
 def validation_output(model: HammersteinWiener, recording: Recording) -> np.ndarray:
@@ -140,11 +143,12 @@ def validation_output(model: HammersteinWiener, recording: Recording) -> np.ndar
         return simulate(model, recording.input, initial_state=np.zeros(0))
     model = outlined_model(model)
     with np.errstate(over="ignore", invalid="ignore"):
-        forced = _forced(model, np.ascontiguousarray(recording.input))
-        state = _state_from(model, forced, recording.output)
-        return static_map.evaluate(
-            model.output_map, forced + _free(model, state, forced)
-        )
+        x = _forced(model, np.ascontiguousarray(recording.input))
+        state, lasts = _state_from(model, x, recording.output)
+        # After twice the time that its responses last it is below the rounding of x.
+        n = min(2 * lasts, x.size)
+        x[:n] += free_response(state, model.denominator, n)
+        return static_map.evaluate(model.output_map, x)
 
 
 def estimated_state(model: HammersteinWiener, recording: Recording) -> np.ndarray:
@@ -164,64 +168,71 @@ def estimated_state(model: HammersteinWiener, recording: Recording) -> np.ndarra
     """
     model = outlined_model(model)
     forced = _forced(model, np.ascontiguousarray(recording.input))
-    return _state_from(model, forced, recording.output)
+    return _state_from(model, forced, recording.output)[0]
 
 
 def _state_from(
     model: HammersteinWiener, forced: np.ndarray, output: np.ndarray
-) -> np.ndarray:
-    """The same from the output of an empty linear block."""
+) -> tuple[np.ndarray, int]:
+    """The same from the output of an empty linear block, and for how long it counts."""
     best = np.zeros(model.orders.n_state)
     if best.size == 0 or not np.isfinite(forced).all():
-        return best
+        return best, 0
     responses = _free_responses(model, forced.size)
     # Where the free responses have died away, the initial state changes nothing.
     n = responses.shape[0]
     forced_head, measured = forced[:n], output[:n]
     basis = difference_basis(best.size)
 
-    def deviation(coefficients: np.ndarray) -> float:
+    def compared(coefficients: np.ndarray) -> tuple[float, np.ndarray]:
         # The basis is its own inverse.
         x = forced_head + responses @ (basis @ coefficients)
         residual = measured - static_map.evaluate(model.output_map, x)
-        return float(residual @ residual)
+        return float(residual @ residual), x
 
-    cost = deviation(best)
+    cost, x = compared(best)
     if model.free_response.size == best.size:
-        of_fit = deviation(model.free_response)
+        of_fit, x_of_fit = compared(model.free_response)
         if of_fit < cost:
-            best, cost = model.free_response, of_fit
+            best, cost, x = model.free_response, of_fit, x_of_fit
     for _ in range(_ESTIMATE_ITERATIONS):
-        x = forced_head + responses @ (basis @ best)
         step, promised = _state_step(model, x, measured, responses)
         if promised < _LEAST_GAIN * cost:
             break
         step = basis @ step
-        halvings = 0.5 ** np.arange(_MOST_HALVINGS)
-        tried = (best + share * step for share in halvings)
-        better = ((one, deviation(one)) for one in tried)
-        found = next((pair for pair in better if pair[1] < cost), None)
+        tried = (best + 0.5**halvings * step for halvings in range(_MOST_HALVINGS))
+        better = ((one, *compared(one)) for one in tried)
+        found = next((each for each in better if each[1] < cost), None)
         if found is None:
             break
         gain = cost - found[1]
-        best, cost = found
-        if gain < _LEAST_GAIN * cost:
+        best, cost, x = found
+        # What was promised has come where the output map is straight: nothing is left.
+        if min(gain, abs(promised - gain)) < _LEAST_GAIN * cost:
             break
-    return best
+    return best, n
 
 
 def _free_responses(model: HammersteinWiener, n_samples: int) -> np.ndarray:
     """Differences of the impulse response of 1/F, shape (n, n_state), while they last."""
     n_state = model.orders.n_state
-    impulse = free_response(np.ones(1), model.denominator, n_samples)
-    size = np.abs(impulse)
-    lasting = size > _DIED_AWAY * size.max()
-    dead = int(lasting[::-1].argmax()) if lasting.any() else 0
-    n = min(n_samples, n_samples - dead + n_state)
+    short = max(1, n_samples // _SHORT)
+    impulse, n = _lasting_impulse(model.denominator, short)
+    if n > _SILENT * short:
+        impulse, n = _lasting_impulse(model.denominator, n_samples)
+    n = min(n_samples, n + n_state)
     columns = np.empty((n, n_state))
     padded = padded_signal(impulse[:n], n_state + 1, 0.0)
     difference_columns(padded, n_state + 1, 0, np.ones(n), 0, n_state, columns)
     return columns
+
+
+def _lasting_impulse(denominator: np.ndarray, n: int) -> tuple[np.ndarray, int]:
+    """Impulse response of 1/F, and how many samples pass until it has died away."""
+    impulse = free_response(np.ones(1), denominator, n)
+    size = np.abs(impulse)
+    lasting = np.flatnonzero(size > _DIED_AWAY * size.max(initial=0.0))
+    return impulse, int(lasting[-1]) + 1 if lasting.size else n
 
 
 def _state_step(

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from hwid_cli.files.csv_tables import write_coverage_csv, write_crossval_csv
+from hwid_cli.model.extrapolation import outlined_model
 from hwid_cli.model.scores import coverage, rmsd
 from hwid_cli.model.simulate import validation_output
 from hwid_cli.records.check import StagePlan
@@ -38,7 +39,7 @@ from hwid_cli.tasks.cache import model_key, recording_key, task_key
 from hwid_cli.tasks.runner import RunSettings, Task, run_tasks
 
 NAME = "crossval"
-STAGE_VERSION = 2
+STAGE_VERSION = 3
 
 # Why an RMSD is there or missing.
 OK, NO_MODEL, NOT_FINITE = "ok", "no model", "not finite"
@@ -141,6 +142,8 @@ def deviation_tasks(
         Each gives ``Deviations``.
     """
     model_keys = [None if model is None else model_key(model) for model in models]
+    # Once for all recordings: the outputs are the same to the last bit.
+    models = tuple(None if one is None else outlined_model(one) for one in models)
     return tuple(
         Task(
             key=task_key(
@@ -151,7 +154,7 @@ def deviation_tasks(
             ),
             name=f"{name} on {recording.name}",
             function=_deviations,
-            arguments=(tuple(models), recording),
+            arguments=(models, recording),
             result_type=Deviations,
         )
         for recording, content in zip(recordings, contents, strict=True)

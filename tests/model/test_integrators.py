@@ -99,3 +99,15 @@ def test_where_an_integrator_starts_is_said_to_look_like_a_constant():
     )
     assert any("the block integrates" in one for one in found.uncertainty.flat)
     assert found.fit_percent > 99.0
+
+
+# Of sixty plants with a dead zone before poles on, or next to, the circle: those whose
+# search stood still at 1.06 to 1.9 times the noise, in the block and not in the map.
+@pytest.mark.parametrize("seed", [2009, 2024, 2036, 2039])
+def test_a_block_behind_a_dead_zone_drifts_as_the_plant_does(seed):
+    plant = integrating_plant(seed, bent=True)
+
+    found = fit([plant.recording], plant.orders, WITH_MAP)
+
+    # A model of all parameters fits a little below the noise; 1 % is a drift.
+    assert found.rmsd < 1.01 * plant.noise

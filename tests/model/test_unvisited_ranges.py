@@ -115,14 +115,69 @@ def test_a_slope_that_even_samples_tell_goes_on_for_twice_their_range():
     assert value(found, 24.5) == pytest.approx([middle], rel=1e-2)
 
 
+def end_of_slope(argument):
+    """Where the upper local slope ends and the map begins to return to its line."""
+    return extrapolated_map(BENT, argument).extrapolation.arguments[-3]
+
+
+def filled(resting):
+    """By hand: seven eighths hold 1000 samples each, one the resting ones too.
+
+    Of n pieces filled alike, one over the sum of squared shares is n; six are enough.
+    """
+    shares = np.full(8, 1000.0)
+    shares[0] += resting
+    shares /= shares.sum()
+    return min(1.0, (1.0 / np.sum(shares**2) - 1.0) / 5.0)
+
+
 def test_a_slope_is_trusted_less_the_less_samples_spread():
     # Nine of ten samples above 7 rest on 8. Variance of the mixture, over that of an
     # even spread, 1/12: 12 (0.1 * 0.9 * 0.5**2 + 0.1 / 12) = 0.37.
-    moving = np.linspace(0.0, 8.0, 8001)
-    argument = np.concatenate([moving, np.full(9000, 8.0)])
-    last = extrapolated_map(BENT, argument).extrapolation.arguments[-3]
+    argument = np.concatenate([np.linspace(0.0, 8.0, 8000), np.full(9000, 8.0)])
+    told = (12 * 0.0225 + 0.1) * filled(9000)
 
-    assert last == pytest.approx(8.0 + 16.0 * (12 * 0.0225 + 0.1), rel=1e-3)
+    assert end_of_slope(argument) == pytest.approx(8.0 + 16.0 * told, rel=1e-3)
+
+
+@pytest.mark.parametrize("resting", [0, 2000, 9000, 90_000])
+def test_a_slope_is_trusted_less_the_more_samples_rest_on_one_level(resting):
+    # They rest in the first eighth, so that those in the last one spread as before.
+    argument = np.concatenate([np.linspace(0.0, 8.0, 8000), np.full(resting, 0.5)])
+
+    expected = 8.0 + 16.0 * filled(resting)
+    assert end_of_slope(argument) == pytest.approx(expected, rel=1e-3)
+
+
+def test_levels_have_no_slope_to_go_on_with():
+    edges, heights = np.array([0.0, 1.9]), np.array([-1.0, 1.0, 4.0])
+    one = StaticMap("piecewise_constant", np.r_[edges, heights], (-2.0, 2.0))
+    argument = np.linspace(-2.0, 2.0, 401)
+    found = extrapolated_map(one, argument)
+    line = np.polyfit(argument, static_map.evaluate(one, argument), 1)
+
+    # The jump at 1.9 would be a slope of 6 over the last eighth.
+    assert value(found, 2.5, 6.0) == pytest.approx(np.polyval(line, [2.5, 6.0]))
+
+
+@pytest.mark.parametrize(
+    ("kind", "parameters"), [("saturation", [-9.0, 2.0]), ("dead_zone", [-0.5, 0.0])]
+)
+def test_a_limit_inside_the_noise_of_a_level_is_none(kind, parameters):
+    one = StaticMap(kind, np.array(parameters), (-0.01, 2.01))
+    found = extrapolated_map(one, levels(0.0, 2.0))
+    at = np.array([-4.0, -2.0, 3.0, 6.0])
+
+    # The gain between the two levels, which is one but for the noise.
+    np.testing.assert_allclose(static_map.evaluate(found, at), at, atol=0.05)
+
+
+@pytest.mark.parametrize(("beyond", "holds"), [(0.2, True), (0.02, False)])
+def test_a_limit_that_samples_hardly_passed_is_not_known(beyond, holds):
+    one = StaticMap("saturation", np.array([-9.0, 2.0 - beyond]), (-1.0, 2.0))
+    found = extrapolated_map(one, np.linspace(-1.0, 2.0, 3001))
+
+    assert (value(found, 5.0)[0] < 2.0) == holds
 
 
 def test_a_limit_that_samples_crossed_stays_a_limit():
@@ -236,6 +291,70 @@ def test_models_of_a_step_stay_near_their_linear_model_on_other_steps(kind):
         rmsd(own.output, validation_output(plain, own)), rel=1e-9
     )
     assert np.isfinite(simulate(found.model, np.linspace(-9.0, 9.0, 50))).all()
+
+
+def rests_on_two_levels(numerator, denominator, *, seed=3):
+    """A step that shows two levels of the input, on a linear plant."""
+    rng = np.random.default_rng(seed)
+    u = np.where(np.arange(900) < 100, 0.0, 2.0)
+    y = lfilter(numerator, denominator, u)
+    y = y + 0.01 * np.std(y) * rng.standard_normal(u.size)
+    return Recording("step", u, y, 1e-3)
+
+
+@pytest.mark.parametrize("kind", ["saturation", "dead_zone"])
+def test_limits_that_the_data_do_not_need_have_no_effect(kind):
+    own = rests_on_two_levels([0.0, F.sum()], F)
+    options = FitOptions(input_map=kind)
+    found = fit([own], Orders(1, 2, 1), options)
+    linear = fit(
+        [own], Orders(1, 2, 1), FitOptions(input_map="none", output_map="none")
+    )
+    at = np.linspace(-6.0, 6.0, 40)
+    u = np.repeat(at, 50)
+
+    assert found.rmsd <= 1.01 * linear.rmsd
+    np.testing.assert_allclose(
+        static_map.evaluate(found.model.input_map, at), at, atol=1e-9
+    )
+    # A tenth of the noise, 1 % of an output of 2: where a search ends is not closer.
+    np.testing.assert_allclose(
+        simulate(found.model, u), simulate(linear.model, u), atol=2e-3
+    )
+
+
+def test_larger_orders_need_no_limits_either_and_are_never_worse():
+    own = rests_on_two_levels([0.0, F.sum()], F, seed=7)
+    options = FitOptions(input_map="saturation")
+    smaller = fit([own], Orders(1, 2, 1), options)
+    at = np.linspace(-6.0, 6.0, 40)
+    for search_anew in (False, True):
+        found = fit(
+            [own],
+            Orders(2, 2, 1),
+            options,
+            contained=[smaller.model],
+            search_anew=search_anew,
+        )
+        assert found.rmsd <= smaller.rmsd * (1.0 + 1e-9)
+        for one in (found.model.input_map, found.model.output_map):
+            slopes = np.diff(static_map.evaluate(one, at)) / np.diff(at)
+            np.testing.assert_allclose(slopes, slopes[0], rtol=1e-6)
+
+
+@pytest.mark.parametrize("kind", ["saturation", "dead_zone"])
+def test_limits_that_the_data_need_stay(kind):
+    rng = np.random.default_rng(8)
+    u = np.repeat(rng.uniform(-2.0, 2.0, 60), 15)
+    clipped = np.clip(u, -1.0, 1.2)
+    w = clipped if kind == "saturation" else u - clipped
+    y = lfilter([0.0, F.sum()], F, w)
+    own = Recording("levels", u, y + 0.01 * rng.standard_normal(u.size), 1e-3)
+
+    found = fit([own], Orders(1, 2, 1), FitOptions(input_map=kind, output_map="none"))
+
+    # Ten standard errors of a limit that hundreds of samples pass.
+    assert found.model.input_map.parameters == pytest.approx([-1.0, 1.2], abs=0.02)
 
 
 def test_a_model_is_normalised_before_it_is_extrapolated():

@@ -60,6 +60,7 @@ RULE = MapRule(
     settle=limits.settle,
     corners=lambda one: one.parameters,
     holds_beyond=limits.crossed,
+    has_limits=True,
     portable=Portable(
         (
             Part(

@@ -84,7 +84,7 @@ def crossed(one: StaticMap, low: np.ndarray, high: np.ndarray) -> tuple[bool, bo
     Parameters
     ----------
     low, high : ndarray, shape (2,)
-        First and last argument of the lowest and the highest stretch.
+        First and last argument of what the lowest and the highest stretch tell.
     """
     lower, upper = one.parameters
     return bool(low[0] < lower < low[1]), bool(high[0] < upper < high[1])

@@ -80,8 +80,9 @@ def outlined(static_map: StaticMap) -> StaticMap:
         return static_map
     points, values = break_points_and_values(static_map)
     near = _EDGE * (lines.arguments[-1] - lines.arguments[0])
-    low, high = lines.visited[0::2, None], lines.visited[1::2, None]
-    inside = ((points > low + near) & (points < high - near)).any(axis=0)
+    inside = np.zeros(points.size, dtype=bool)
+    for low, high in lines.stretches.tolist():
+        inside |= (points > low + near) & (points < high - near)
     # The ends of a map in a fit are no break-points.
     inside[[0, -1]] = False
     points = np.concatenate([points[inside], lines.arguments])

@@ -243,9 +243,12 @@ class MapRule:
     outlined : callable (StaticMap) -> StaticMap
         The same map, its parameters alone giving its values everywhere.
     holds_beyond : callable (StaticMap, low, high) -> (bool, bool)
-        Whether the law holds below and above everything that samples visited, their
-        outermost stretches being ``low`` and ``high``, each from its first to its last
-        argument.
+        Whether the law holds below and above everything that samples visited, ``low`` and
+        ``high`` being the arguments well inside their outermost stretches, each from the
+        first to the last.
+    has_limits : bool
+        Whether the kind passes its argument on, limits or edges apart, which a search
+        puts where they take up noise if no data ask for them.
     straightened : callable (StaticMap, v) -> StaticMap
         The map where samples have been, as straight as they allow elsewhere.
     placing : Placing or None
@@ -286,6 +289,7 @@ class MapRule:
     holds_beyond: Callable[[StaticMap, np.ndarray, np.ndarray], tuple[bool, bool]] = (
         lambda one, low, high: (False, False)
     )
+    has_limits: bool = False
     straightened: Callable[[StaticMap, np.ndarray], StaticMap] = lambda one, v: one
     placing: Placing | None = None
     prior: Prior | None = None

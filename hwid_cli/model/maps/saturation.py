@@ -54,6 +54,7 @@ RULE = MapRule(
     settle=limits.settle,
     corners=lambda one: one.parameters,
     holds_beyond=limits.crossed,
+    has_limits=True,
     why_flat=_limit_not_reached,
     portable=Portable(
         (
