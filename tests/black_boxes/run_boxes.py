@@ -1,10 +1,12 @@
 """Diagnoses every black box and scores the verdicts.
 
 ``python -m tests.black_boxes.run_boxes --work DIR [--only PLANT/EFFECT ...] [--access python|outputs]
-[--noise 0.005] [--write FILE.md]``.
+[--noise 0.005] [--write FILE.md]``. Rows are appended to the file as they come; boxes that it
+holds are not run again.
 """
 
 import argparse
+import csv
 import json
 import subprocess
 import sys
@@ -170,6 +172,24 @@ def score(found, truth):
     return "refused" if verdict != "failed" else "failed"
 
 
+def place_of_truth(folder, truth):
+    """Place of the truth among the single effects of the ranking, from 1; "" for none."""
+    path = folder / "out" / "ranking.csv"
+    if not path.is_file() or [] in truth["accepted"]:
+        return ""
+    with path.open() as file:
+        names = [row["effects"] for row in csv.DictReader(file)]
+    single = list(dict.fromkeys(one for one in names if one and "+" not in one))
+    accepted = ["+".join(one) for one in truth["accepted"]]
+    return next((n for n, one in enumerate(single, 1) if one in accepted), "")
+
+
+def runs_of(folder):
+    """Runs of the simulation, as the plant's own file counts them."""
+    path = folder / "runs.txt"
+    return len(path.read_bytes()) if path.is_file() else ""
+
+
 def main():
     """Run all that was asked for."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -180,51 +200,59 @@ def main():
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--write", type=Path)
     options = parser.parse_args()
-    rows = []
+    kept = options.write.read_text() if options.write and options.write.exists() else ""
+    if options.write and not kept:
+        options.write.write_text(HEAD)
+    words = []
     for name, plant in PLANTS.items():
         for effect in hidden_in(plant, 1.0, 1.0):
             label = f"{name}/{effect}"
             if options.only and not any(one in label for one in options.only):
                 continue
-            folder = options.work / name / effect
-            write_case(
-                folder,
-                plant,
-                effect,
-                access=options.access,
-                noise=options.noise,
-                seed=options.seed,
-            )
-            began = time.time()
-            found, _ = diagnose(folder, 1)
-            truth = json.loads((folder / "truth.json").read_text())
-            gap = found.get("gap", {})
-            row = (
-                label,
-                score(found, truth),
-                found["verdict"],
-                "+".join(one["id"] for one in found.get("effects", [])),
-                found.get("complete", ""),
-                found.get("confirmed", ""),
-                *(
-                    f"{gap[one]['ratio_to_noise']:.3g}" if gap else ""
-                    for one in ("given", "before", "after")
-                ),
-                f"{time.time() - began:.0f} s",
-                str(found.get("ambiguous_with", found.get("said", ""))),
-            )
-            rows.append(row)
+            if f"| {label} |" in kept:
+                continue
+            row = run_box(label, plant, effect, options)
+            words.append(row[1])
             print(*row, sep=" | ", flush=True)
-    words = [row[1] for row in rows]
+            if options.write:
+                with options.write.open("a") as file:
+                    file.write("| " + " | ".join(map(str, row)) + " |\n")
     print({word: words.count(word) for word in sorted(set(words))})
-    if options.write:
-        head = "| case | score | verdict | effects | complete | confirmed | given | re-fitted | after | time | |"
-        lines = [
-            head,
-            "|" + "---|" * 11,
-            *("| " + " | ".join(map(str, row)) + " |" for row in rows),
-        ]
-        options.write.write_text("\n".join(lines) + "\n")
+
+
+HEAD = (
+    "| case | score | verdict | effects | complete | confirmed | given | re-fitted | after "
+    "| place | runs | time | |\n" + "|" + "---|" * 13 + "\n"
+)
+
+
+def run_box(label, plant, effect, options):
+    """Make a box, have it diagnosed, and score it: a row of the table."""
+    folder = options.work / plant.name / effect
+    write_case(
+        folder, plant, effect,
+        access=options.access, noise=options.noise, seed=options.seed,
+    )  # fmt: skip
+    began = time.time()
+    found, _ = diagnose(folder, 1)
+    truth = json.loads((folder / "truth.json").read_text())
+    gap = found.get("gap", {})
+    return (
+        label,
+        score(found, truth),
+        found["verdict"],
+        "+".join(one["id"] for one in found.get("effects", [])),
+        found.get("complete", ""),
+        found.get("confirmed", ""),
+        *(
+            f"{gap[one]['ratio_to_noise']:.3g}" if gap else ""
+            for one in ("given", "before", "after")
+        ),
+        place_of_truth(folder, truth),
+        runs_of(folder),
+        f"{time.time() - began:.0f} s",
+        str(found.get("ambiguous_with", found.get("said", ""))),
+    )
 
 
 if __name__ == "__main__":

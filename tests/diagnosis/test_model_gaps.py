@@ -7,7 +7,8 @@ import pytest
 from scipy.signal import cont2discrete, lsim
 
 from hwid_cli import Recording
-from hwid_cli.diagnosis.foreign import Simulator, diagnose_foreign
+from hwid_cli.diagnosis.foreign import diagnose_foreign
+from hwid_cli.diagnosis.simulator import Simulator
 from hwid_cli.records.experiment import DiagnoseOptions
 from hwid_cli.records.maps import StaticMap
 from hwid_cli.records.model import HammersteinWiener
