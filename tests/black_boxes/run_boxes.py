@@ -41,7 +41,7 @@ def inputs(plant, rng):
         yield f"multi_{count}", 0.35 * plant.size * waves * on
 
 
-def write_case(folder, plant, effect, *, access, noise, seed):
+def write_case(folder, plant, effect, *, access, noise, seed, most=""):
     """Write recordings, the simulation and the configuration of a case."""
     rng = np.random.default_rng([seed, zlib.crc32(f"{plant.name}/{effect}".encode())])
     folder.mkdir(parents=True, exist_ok=True)
@@ -77,7 +77,7 @@ def write_case(folder, plant, effect, *, access, noise, seed):
             fmt="%.10g",
         )
     (folder / "plant.py").write_text(plant.text)
-    (folder / "config.yaml").write_text(_config(plant, given, access))
+    (folder / "config.yaml").write_text(_config(plant, given, access, most))
     (folder / "truth.json").write_text(json.dumps({"accepted": hidden.accepted}))
 
 
@@ -90,7 +90,7 @@ def _force_gain(rates, zero, plant):
     return plant.mass * float(rates(zero, 1.0, 0.0, plant.values)[1])
 
 
-def _config(plant, given, access):
+def _config(plant, given, access, most):
     simulated = ", simulated: simulated" if access == "outputs" else ""
     text = f"""name: box
 recordings:
@@ -111,7 +111,7 @@ simulation:
         for name, value in given.items():
             shown = f"{{value: {value:.6g}}}" if name in plant.free else f"{value:.6g}"
             text += f"    {name}: {shown}\n"
-    return text + "diagnose: {}\n"
+    return text + f"diagnose: {{{most}}}\n"
 
 
 def diagnose(folder, jobs):
@@ -198,6 +198,7 @@ def main():
     parser.add_argument("--access", default="python", choices=["python", "outputs"])
     parser.add_argument("--noise", type=float, default=0.005)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--singles", action="store_true", help="no sets, no laws")
     parser.add_argument("--write", type=Path)
     options = parser.parse_args()
     kept = options.write.read_text() if options.write and options.write.exists() else ""
@@ -232,6 +233,7 @@ def run_box(label, plant, effect, options):
     write_case(
         folder, plant, effect,
         access=options.access, noise=options.noise, seed=options.seed,
+        most="max_effects: 1, laws: never" if options.singles else "",
     )  # fmt: skip
     began = time.time()
     found, _ = diagnose(folder, 1)
