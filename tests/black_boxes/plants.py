@@ -14,6 +14,7 @@ FUNCTION = '''
 """A simulation of a machine."""
 
 import math
+import os
 
 import numpy as np
 
@@ -24,7 +25,7 @@ def acceleration(x, v, force, state, parameters):
 
 def simulate(time_s, inputs, parameters):
     """Runge-Kutta in {steps} steps a sample; inputs are straight lines between samples."""
-    with open(__file__.replace("plant.py", "runs.txt"), "a") as file:
+    with open(os.path.join(os.path.dirname(__file__), "runs.txt"), "a") as file:
         file.write(".")
     u, push = inputs["{input}"], inputs.get("force", np.zeros(time_s.size))
     u, push = u.tolist(), push.tolist()

@@ -57,7 +57,7 @@ def write_case(folder, plant, effect, *, access, noise, seed, most=""):
         name: value * (1 + OFF * rng.choice([-1, 1])) if name in plant.free else value
         for name, value in plant.values.items()
     }
-    scope = {}
+    scope = {"__file__": str(folder / "plant.py")}
     exec(plant.text, scope)
     t = DT * np.arange(N)
     for name, u in signals:
@@ -77,6 +77,7 @@ def write_case(folder, plant, effect, *, access, noise, seed, most=""):
             fmt="%.10g",
         )
     (folder / "plant.py").write_text(plant.text)
+    (folder / "runs.txt").unlink(missing_ok=True)
     (folder / "config.yaml").write_text(_config(plant, given, access, most))
     (folder / "truth.json").write_text(json.dumps({"accepted": hidden.accepted}))
 
