@@ -160,6 +160,9 @@ def single_in_simulation(
     """
     if runs.simulator.run is None or not findings.base.is_usable:
         return None
+    alone = _base_in_simulation(findings, runs, values)
+    if alone is not None:
+        return alone
     tried: dict[tuple[str, ...], _Turn] = {}
     fits: dict[tuple[str, ...], CandidateFit] = {}
     for one in _likely(findings):
@@ -170,6 +173,27 @@ def single_in_simulation(
         if turn is not None:
             tried[one.effects], fits[one.effects] = turn, _fit_of_run(findings, turn)
     return _decided(findings, tried, fits)
+
+
+def _base_in_simulation(
+    findings: Findings, runs: Runs, values: dict[str, float]
+) -> tuple[Findings, dict[str, float]] | None:
+    """The changed base of the stand-in, put into a simulation without parameters.
+
+    The simulation answers in its own way to a gain that has changed: what the stand-in
+    leaves then is its own error.
+    """
+    if runs.simulator.free:
+        return None
+    turn = _settled(findings, findings.base, runs, values)
+    base = None if turn is None else _fit_of_run(findings, turn)
+    if turn is None or base is None or not findings.criteria.is_complete(base):
+        return None
+    criteria = findings.criteria
+    verdict = decide(criteria, findings.given_sse, base, {}, (), lambda _: ())
+    problem = replace(turn.problem, known={})
+    told = replace(findings, problem=problem, base=base, verdict=verdict)
+    return told, turn.values_of_run
 
 
 def _likely(findings: Findings) -> list[CandidateFit]:
@@ -204,7 +228,9 @@ def _settled(
             best = other
     # A run that is worse than without the effect says nothing of it: a map of the
     # simulation may cut off what should come through its input.
-    is_worse = float(best.sse.sum()) >= float(findings.base.sse.sum())
+    is_worse = bool(fit.effects) and float(best.sse.sum()) >= float(
+        findings.base.sse.sum()
+    )
     return None if best.tried is None or is_worse else best
 
 
