@@ -157,7 +157,7 @@ def compare(*values: Any, **options: Any) -> None:
     _run("compare.compare", *values, **options)
 
 
-FORMATS = ("json", "mat", "c", "fmu", "python")
+FORMATS = ("json", "mat", "c", "fmu", "python", "simulink", "modelica")
 
 
 @click.command("export")
@@ -179,8 +179,9 @@ FORMATS = ("json", "mat", "c", "fmu", "python")
     type=click.Choice(FORMATS),
     default="json",
     show_default=True,
-    help="json for 'hwid predict', mat with a script for MATLAB, C source, an FMU, or "
-    "(for a simulation that is a Python function or an FMU) a Python module.",
+    help="json for 'hwid predict', mat with a script for MATLAB, C source or an FMU. Of a "
+    "simulation of your own with what a diagnosis added: python (a module), fmu (around "
+    "yours), or the effects alone as c, simulink (a C S-function) or modelica.",
 )
 @stage_options
 def export(*values: Any, **options: Any) -> None:

@@ -10,13 +10,16 @@ from hwid_cli.cli.options import Choices
 from hwid_cli.cli.session import Session, open_session
 from hwid_cli.data.recording_files import recordings_options
 from hwid_cli.data.signal_units import as_files_are
-from hwid_cli.errors import ConfigError
+from hwid_cli.errors import ConfigError, SimulationError
 from hwid_cli.export.contents import (
     SIMULATION,
+    card_of_program,
     export_model,
     export_simulation,
     find_fit,
 )
+from hwid_cli.export.effects_alone import write_effects
+from hwid_cli.export.extended_fmu import write_extended_fmu
 from hwid_cli.export.formats import write_exported
 from hwid_cli.export.python_module import write_module
 from hwid_cli.records.experiment import RecordingsOptions
@@ -25,12 +28,23 @@ from hwid_cli.records.model import Fit
 from hwid_cli.records.report import StoredResults
 from hwid_cli.report.thesis_names import thesis_name_of
 from hwid_cli.stages.diagnose import extended_options
-from hwid_cli.stages.extended_program import extended_program
+from hwid_cli.stages.extended_program import (
+    exactness_of,
+    extended_program,
+    told_difference,
+)
 from hwid_cli.stages.model_views import named_fits
 from hwid_cli.stages.trust import kept_for_test, trust_of
 from hwid_cli.store.result_files import has_left_results, read_provenance, results_file
 
 _FOLDER = "models"
+# The first of each holds the whole simulation, c and the others the effects alone.
+_ALONE = ("c", "simulink", "modelica")
+PROGRAM_FORMATS = {
+    "python": ("python", *_ALONE),
+    "fmu": ("fmu", "python", *_ALONE),
+    "command": _ALONE,
+}
 
 
 def export(
@@ -44,9 +58,9 @@ def export(
     foreign = session.experiment.foreign_simulation if asked == SIMULATION else None
     if foreign is not None:
         written = _export_program(session, foreign.kind, file_format)
-    elif file_format == "python":
+    elif file_format in ("python", "simulink", "modelica"):
         raise ConfigError(
-            f"--format python: {asked} is no program of your own; expected one of "
+            f"--format {file_format}: {asked} is no program of your own; expected one of "
             "json, mat, c, fmu; choose one of them"
         )
     else:
@@ -58,25 +72,41 @@ def export(
 
 
 def _export_program(session: Session, kind: str, file_format: str) -> list[Path]:
-    """The user's own simulation with what a diagnosis added, as a module."""
-    if kind not in ("python", "fmu"):
+    """The user's own simulation with what a diagnosis added, or the effects alone."""
+    formats = PROGRAM_FORMATS.get(kind)
+    if formats is None:
         raise ConfigError(
-            f"--diagnosis: simulation.kind is {kind}; expected python or fmu, whose files "
-            "an export can hold; use extended_simulation.yaml"
+            f"--diagnosis: simulation.kind is {kind}; expected one of "
+            f"{', '.join(PROGRAM_FORMATS)}, which an effect can act on step by step; use "
+            "extended_simulation.yaml"
         )
-    if file_format != "python":
+    if file_format not in formats:
         raise ConfigError(
-            f"--format {file_format}: simulation.kind is {kind}; expected --format python"
+            f"--format {file_format}: simulation.kind is {kind}; expected one of "
+            f"{', '.join(formats)}; a whole simulation needs --format {formats[0]}"
         )
     diagnosis = result_of(session, "diagnose")
     given = session.given["diagnose"]
-    extended, exactness = extended_program(diagnosis, given, given.simulation)
-    title = (
-        f"The simulation of {session.experiment.name!r} as 'hwid diagnose' extended it."
-    )
-    return write_module(
-        session.out / _FOLDER, extended, title=title, exactness=exactness
-    )
+    program = extended_program(diagnosis, given, given.simulation)
+    folder = session.out / _FOLDER
+    if file_format == "python":
+        name = session.experiment.name
+        title = f"The simulation of {name!r} as 'hwid diagnose' extended it."
+        exactness = exactness_of(program, diagnosis)
+        return write_module(folder, program.extended, title=title, exactness=exactness)
+    origin = _origin(session, "diagnose")
+    card = card_of_program(given.recordings, _options(session), origin=origin)
+    sample_time_s = given.recordings[0].sample_time_s
+    if file_format == "fmu":
+        path = folder / "simulation.fmu"
+        write_extended_fmu(path, program.extended, card, sample_time_s)
+        try:
+            session.note(told_difference(program, path))
+        except SimulationError:
+            path.unlink()
+            raise
+        return [path]
+    return write_effects(folder, file_format, program.extended, card, sample_time_s)
 
 
 def chosen_model(session: Session, asked: str, *, with_trust: bool = False) -> Exported:

@@ -160,6 +160,24 @@ def export_simulation(
     )
 
 
+def card_of_program(
+    recordings: Sequence[Recording],
+    options: RecordingsOptions,
+    *,
+    origin: Mapping[str, Any],
+) -> ModelCard:
+    """What belongs to an export of a simulation of the user's own.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+        That it was compared with; at least one.
+    """
+    inputs = [one.input for one in recordings]
+    about = {**origin, "recordings": _hashes(recordings)}
+    return _card(SIMULATION, SIMULATION, recordings, options, inputs, about)
+
+
 def _following_reference(card: ModelCard) -> ModelCard:
     """Under a controller the input is the reference, in the unit of the output."""
     reference = card.columns.reference

@@ -33,7 +33,7 @@ _FLAGS = (
     "-fvisibility=hidden",
     "-shared",
 )
-_SYSTEMS = {
+SYSTEMS = {
     "Linux": ("linux", ".so"),
     "Darwin": ("darwin", ".dylib"),
     "Windows": ("win", ".dll"),
@@ -69,29 +69,45 @@ def write_fmu(path: Path, exported: Exported, source: str) -> None:
         "has_starts": int(isinstance(exported, ExportedModel)),
     }
     sources = {"model.c": source, "fmi2.c": filled("fmi2.c", words)}
-    system, ending = _SYSTEMS.get(platform.system(), ("linux", ".so"))
+    system, ending = SYSTEMS.get(platform.system(), ("linux", ".so"))
     bits = platform.architecture()[0][:2]
     content = io.BytesIO()
     with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as archive:
-        _add(archive, "modelDescription.xml", _description(exported, name, guid))
+        add_file(archive, "modelDescription.xml", _description(exported, name, guid))
         for file_name, text in sources.items():
-            _add(archive, f"sources/{file_name}", text)
-        _add(
+            add_file(archive, f"sources/{file_name}", text)
+        add_file(
             archive,
             f"binaries/{system}{bits}/{name}{ending}",
-            _compiled(sources, f"{name}{ending}"),
+            compiled(sources, f"{name}{ending}"),
         )
     replace_file(path, content.getvalue())
 
 
-def _add(archive: zipfile.ZipFile, name: str, content: str | bytes) -> None:
+def add_file(archive: zipfile.ZipFile, name: str, content: str | bytes) -> None:
+    """Add a file to an archive whose bytes depend on its content alone."""
     info = zipfile.ZipInfo(name, _DATE)
     info.compress_type = zipfile.ZIP_DEFLATED
     archive.writestr(info, content)
 
 
-def _compiled(sources: dict[str, str], name: str) -> bytes:
-    """The binary that the system's compiler makes."""
+def compiled(sources: dict[str, str], name: str, *, main: str = "fmi2.c") -> bytes:
+    """Binary that the system's compiler makes.
+
+    Parameters
+    ----------
+    sources : dict of str to str
+        By the names of their files.
+    name : str
+        Of the binary.
+    main : str
+        The source that includes the others.
+
+    Raises
+    ------
+    ConfigError
+        If there is no C compiler, or it fails.
+    """
     asked = os.environ.get("CC", "").split()
     candidates = asked[:1] or _COMPILERS
     compiler = next((one for one in candidates if shutil.which(one)), None)
@@ -103,7 +119,8 @@ def _compiled(sources: dict[str, str], name: str) -> bytes:
     with tempfile.TemporaryDirectory() as folder:
         for file_name, text in sources.items():
             (Path(folder) / file_name).write_text(text)
-        command = [compiler, *asked[1:], *_FLAGS, "-o", name, "fmi2.c", "-lm"]
+        libraries = ["-lm", "-ldl"] if platform.system() == "Linux" else ["-lm"]
+        command = [compiler, *asked[1:], *_FLAGS, "-o", name, main, *libraries]
         done = subprocess.run(
             command, cwd=folder, capture_output=True, text=True, check=False
         )

@@ -37,7 +37,7 @@ def checked_run(
             raise failed(
                 request,
                 f"gave {_listed(outputs)}; expected {name!r} "
-                f"(simulation.{key}){did_you_mean(name, list(outputs))}",
+                f"(simulation.{key}); {did_you_mean(name, list(outputs))}",
             )
         found[key] = _checked(outputs[name], name, request)
     return SimulatorRun(found["output"], found["velocity"])

@@ -66,6 +66,13 @@ def _answer(request: dict[str, Any]) -> Iterator[Labelled]:
         found = function(time_s, inputs, dict(request["parameters"]))
     except SystemExit as error:
         raise ValueError(f"called exit({error.code!r})") from None
+    except KeyError as error:
+        given = ", ".join([*inputs, *request["parameters"]])
+        said = _said(error, request["file"])
+        raise ValueError(
+            f"{said}; it is given {given}; correct simulation.input, force_input or "
+            "parameters"
+        ) from error
     except Exception as error:
         raise ValueError(_said(error, request["file"])) from error
     if not isinstance(found, dict):
@@ -98,13 +105,16 @@ def _function(file: str, name: str) -> Any:
             for one, value in vars(module).items()
             if inspect.isfunction(value) and not one.startswith("_")
         ]
-        raise ValueError(f"defines no such function; it defines {', '.join(known)}")
+        raise ValueError(
+            f"defines no such function; it defines {', '.join(known)}; "
+            "name one of them in simulation.function"
+        )
     try:
         inspect.signature(function).bind(*range(_ARGUMENTS))
     except TypeError:
         raise ValueError(
             f"takes {inspect.signature(function)}; expected three arguments: time_s, "
-            "inputs, parameters"
+            "inputs, parameters; give it these, or name another simulation.function"
         ) from None
     return function
 

@@ -367,6 +367,8 @@ def simulated_recordings(given: ToDiagnose) -> tuple[DriveResponse, ...]:
     """What the simulation makes of the recordings, with the given parameters."""
     simulation = given.simulation
     if not isinstance(simulation, SimulationOptions):
+        # Files and programs that are missing are told before anything runs.
+        content_of(simulation, given.experiment.source)
         return simulated(simulation, given.recordings, given.logs, given.options)
     return simulate_recordings(given.recordings, simulation, given.options)
 

@@ -5,12 +5,16 @@ the same right-hand side with an effect, integrated here in much shorter steps, 
 that holds (Karnopp, 1985). Nothing of the program is used.
 """
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
 
 FUNCTION = '''
 """A simulation of a machine."""
+
+import math
+import os
 
 import numpy as np
 
@@ -21,28 +25,33 @@ def acceleration(x, v, force, state, parameters):
 
 def simulate(time_s, inputs, parameters):
     """Runge-Kutta in {steps} steps a sample; inputs are straight lines between samples."""
+    with open(os.path.join(os.path.dirname(__file__), "runs.txt"), "a") as file:
+        file.write(".")
     u, push = inputs["{input}"], inputs.get("force", np.zeros(time_s.size))
-    dt = time_s[1] - time_s[0]
-    h = dt / {steps}
-    y = np.zeros({size})
+    u, push = u.tolist(), push.tolist()
+    h = (time_s[1] - time_s[0]) / {steps}
+    y = [0.0] * {size}
     out = np.empty((time_s.size, {size}))
     for n in range(time_s.size):
         out[n] = y
         if n + 1 == time_s.size:
             break
+        du, dpush = u[n + 1] - u[n], push[n + 1] - push[n]
         for j in range({steps}):
             a, b = j / {steps}, (j + 1) / {steps}
             c = 0.5 * (a + b)
-            at = [
-                (u[n] + s * (u[n + 1] - u[n]), push[n] + s * (push[n + 1] - push[n]))
-                for s in (a, c, b)
-            ]
-            k1 = rates(y, *at[0], parameters)
-            k2 = rates(y + 0.5 * h * k1, *at[1], parameters)
-            k3 = rates(y + 0.5 * h * k2, *at[1], parameters)
-            k4 = rates(y + h * k3, *at[2], parameters)
-            y = y + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+            k1 = rates(y, u[n] + a * du, push[n] + a * dpush, parameters)
+            now = u[n] + c * du, push[n] + c * dpush
+            k2 = rates(moved(y, 0.5 * h, k1), *now, parameters)
+            k3 = rates(moved(y, 0.5 * h, k2), *now, parameters)
+            k4 = rates(moved(y, h, k3), u[n] + b * du, push[n] + b * dpush, parameters)
+            whole = [p + 2 * q + 2 * r + s for p, q, r, s in zip(k1, k2, k3, k4)]
+            y = moved(y, h / 6, whole)
     return {{"{output}": out[:, 0], "speed": out[:, 1]}}
+
+
+def moved(y, h, rate):
+    return [one + h * change for one, change in zip(y, rate)]
 
 
 {rates}
@@ -95,7 +104,7 @@ class Plant:
 
     def function(self):
         """``rates`` as a function."""
-        scope = {"np": np}
+        scope = {"math": math}
         exec(self.rates, scope)
         return scope["rates"]
 
@@ -104,7 +113,7 @@ LINEAR = Plant(
     "stage",
     """def rates(y, u, push, p):
     x, v = y
-    return np.array([v, (p["kt"] * u + push - p["c"] * v - p["k"] * x) / p["m"]])
+    return v, (p["kt"] * u + push - p["c"] * v - p["k"] * x) / p["m"]
 """,
     2,
     {"m": 0.8, "c": 11.0, "k": 2100.0, "kt": 9.0},
@@ -117,8 +126,8 @@ PENDULUM = Plant(
     "pendulum",
     """def rates(y, u, push, p):
     x, v = y
-    torque = p["kt"] * u + push - p["c"] * v - p["g"] * np.sin(x)
-    return np.array([v, torque / p["J"]])
+    torque = p["kt"] * u + push - p["c"] * v - p["g"] * math.sin(x)
+    return v, torque / p["J"]
 """,
     2,
     {"J": 0.02, "c": 0.05, "g": 0.9, "kt": 0.35},
@@ -133,7 +142,7 @@ HARDENING = Plant(
     """def rates(y, u, push, p):
     x, v = y
     spring = p["k"] * x + p["k3"] * x**3
-    return np.array([v, (p["kt"] * u + push - p["c"] * v - spring) / p["m"]])
+    return v, (p["kt"] * u + push - p["c"] * v - spring) / p["m"]
 """,
     2,
     {"m": 0.3, "c": 8.0, "k": 900.0, "k3": 4e6, "kt": 5.0},
@@ -149,7 +158,7 @@ TWO_MASSES = Plant(
     link = p["ks"] * (xm - x) + p["cs"] * (vm - v)
     load = (link + push - p["c"] * v - p["k"] * x) / p["m"]
     motor = (p["kt"] * u - link) / p["mm"]
-    return np.array([v, load, vm, motor])
+    return v, load, vm, motor
 """,
     4,
     {"m": 0.5, "mm": 0.2, "ks": 4e4, "cs": 8.0, "c": 10.0, "k": 1500.0, "kt": 6.0},
@@ -164,7 +173,7 @@ MOTOR = Plant(
     """def rates(y, u, push, p):
     x, v, i = y
     current = (u - p["R"] * i - p["ke"] * v) / p["L"]
-    return np.array([v, (p["ke"] * i + push - p["c"] * v - p["k"] * x) / p["m"], current])
+    return v, (p["ke"] * i + push - p["c"] * v - p["k"] * x) / p["m"], current
 """,
     3,
     {"m": 0.4, "c": 4.0, "k": 800.0, "R": 1.5, "L": 0.004, "ke": 4.0},
@@ -230,7 +239,7 @@ def hidden_in(plant, load, x_max):
         "cogging": Hidden(
             "cogging",
             (("cogging",),),
-            force=lambda x, v, t: 0.3 * load * np.sin(2 * np.pi * x / (0.4 * x_max)),
+            force=lambda x, v, t: 0.3 * load * math.sin(2 * np.pi * x / (0.4 * x_max)),
         ),
         "dead_zone": Hidden(
             "dead_zone",
@@ -266,7 +275,8 @@ def integrate(plant, values, u, dt, hidden=None, finer=10):
         fine = hidden.command(np.interp(fine_time, time, u), fine_time)
     count = plant.steps * finer
     h = dt / count
-    y, out = np.zeros(plant.n_states), np.empty(u.size)
+    y, out = [0.0] * plant.n_states, np.empty(u.size)
+    given = u.tolist()
     for n in range(u.size):
         out[n] = y[0]
         if n + 1 == u.size:
@@ -274,25 +284,28 @@ def integrate(plant, values, u, dt, hidden=None, finer=10):
         for j in range(count):
             at = (j + 0.5) / count
             if hidden.command is None:
-                now = u[n] + at * (u[n + 1] - u[n])
+                now = given[n] + at * (given[n + 1] - given[n])
             else:
-                now = fine[40 * n + int(at * 40)]
-            y = _step(rates, y, now, h, time[n] + at * dt, values, hidden, plant.mass)
+                now = float(fine[40 * n + int(at * 40)])
+            y = _step(rates, y, now, h, dt * n + at * dt, values, hidden, plant.mass)
     return hidden.output(out) if hidden.output is not None else out
 
 
 def _step(rates, y, u, h, t, values, hidden, mass):
     push = hidden.force(y[0], y[1], t) if hidden.force is not None else 0.0
-    if hidden.dry == 0.0:
-        half = y + 0.5 * h * rates(y, u, push, values)
-        push = hidden.force(half[0], half[1], t) if hidden.force is not None else 0.0
-        return y + h * rates(half, u, push, values)
-    # Held where friction can; else it takes its share of the impulse.
     free = rates(y, u, push, values)
+    half = _moved(y, 0.5 * h, free)
+    if hidden.dry == 0.0:
+        push = hidden.force(half[0], half[1], t) if hidden.force is not None else 0.0
+        return _moved(y, h, rates(half, u, push, values))
+    # Held where friction can; else it takes its share of the impulse.
     speed = y[1] + h * free[1]
     most = hidden.dry * h / mass
-    half = y + 0.5 * h * free
-    new = y + h * rates(half, u, push, values)
-    new[1] = 0.0 if abs(speed) <= most else speed - np.sign(speed) * most
+    new = _moved(y, h, rates(half, u, push, values))
+    new[1] = 0.0 if abs(speed) <= most else speed - math.copysign(most, speed)
     new[0] = y[0] + 0.5 * h * (y[1] + new[1])
     return new
+
+
+def _moved(y, h, rate):
+    return [one + h * change for one, change in zip(y, rate, strict=True)]

@@ -1,10 +1,12 @@
 """Diagnoses every black box and scores the verdicts.
 
 ``python -m tests.black_boxes.run_boxes --work DIR [--only PLANT/EFFECT ...] [--access python|outputs]
-[--noise 0.005] [--write FILE.md]``.
+[--noise 0.005] [--write FILE.md]``. Rows are appended to the file as they come; boxes that it
+holds are not run again.
 """
 
 import argparse
+import csv
 import json
 import subprocess
 import sys
@@ -39,7 +41,7 @@ def inputs(plant, rng):
         yield f"multi_{count}", 0.35 * plant.size * waves * on
 
 
-def write_case(folder, plant, effect, *, access, noise, seed):
+def write_case(folder, plant, effect, *, access, noise, seed, most=""):
     """Write recordings, the simulation and the configuration of a case."""
     rng = np.random.default_rng([seed, zlib.crc32(f"{plant.name}/{effect}".encode())])
     folder.mkdir(parents=True, exist_ok=True)
@@ -55,7 +57,7 @@ def write_case(folder, plant, effect, *, access, noise, seed):
         name: value * (1 + OFF * rng.choice([-1, 1])) if name in plant.free else value
         for name, value in plant.values.items()
     }
-    scope = {}
+    scope = {"__file__": str(folder / "plant.py")}
     exec(plant.text, scope)
     t = DT * np.arange(N)
     for name, u in signals:
@@ -75,7 +77,8 @@ def write_case(folder, plant, effect, *, access, noise, seed):
             fmt="%.10g",
         )
     (folder / "plant.py").write_text(plant.text)
-    (folder / "config.yaml").write_text(_config(plant, given, access))
+    (folder / "runs.txt").unlink(missing_ok=True)
+    (folder / "config.yaml").write_text(_config(plant, given, access, most))
     (folder / "truth.json").write_text(json.dumps({"accepted": hidden.accepted}))
 
 
@@ -88,7 +91,7 @@ def _force_gain(rates, zero, plant):
     return plant.mass * float(rates(zero, 1.0, 0.0, plant.values)[1])
 
 
-def _config(plant, given, access):
+def _config(plant, given, access, most):
     simulated = ", simulated: simulated" if access == "outputs" else ""
     text = f"""name: box
 recordings:
@@ -109,7 +112,7 @@ simulation:
         for name, value in given.items():
             shown = f"{{value: {value:.6g}}}" if name in plant.free else f"{value:.6g}"
             text += f"    {name}: {shown}\n"
-    return text + "diagnose: {}\n"
+    return text + f"diagnose: {{{most}}}\n"
 
 
 def diagnose(folder, jobs):
@@ -170,6 +173,24 @@ def score(found, truth):
     return "refused" if verdict != "failed" else "failed"
 
 
+def place_of_truth(folder, truth):
+    """Place of the truth among the single effects of the ranking, from 1; "" for none."""
+    path = folder / "out" / "ranking.csv"
+    if not path.is_file() or [] in truth["accepted"]:
+        return ""
+    with path.open() as file:
+        names = [row["effects"] for row in csv.DictReader(file)]
+    single = list(dict.fromkeys(one for one in names if one and "+" not in one))
+    accepted = ["+".join(one) for one in truth["accepted"]]
+    return next((n for n, one in enumerate(single, 1) if one in accepted), "")
+
+
+def runs_of(folder):
+    """Runs of the simulation, as the plant's own file counts them."""
+    path = folder / "runs.txt"
+    return len(path.read_bytes()) if path.is_file() else ""
+
+
 def main():
     """Run all that was asked for."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -178,53 +199,63 @@ def main():
     parser.add_argument("--access", default="python", choices=["python", "outputs"])
     parser.add_argument("--noise", type=float, default=0.005)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--singles", action="store_true", help="no sets, no laws")
     parser.add_argument("--write", type=Path)
     options = parser.parse_args()
-    rows = []
+    kept = options.write.read_text() if options.write and options.write.exists() else ""
+    if options.write and not kept:
+        options.write.write_text(HEAD)
+    words = []
     for name, plant in PLANTS.items():
         for effect in hidden_in(plant, 1.0, 1.0):
             label = f"{name}/{effect}"
             if options.only and not any(one in label for one in options.only):
                 continue
-            folder = options.work / name / effect
-            write_case(
-                folder,
-                plant,
-                effect,
-                access=options.access,
-                noise=options.noise,
-                seed=options.seed,
-            )
-            began = time.time()
-            found, _ = diagnose(folder, 1)
-            truth = json.loads((folder / "truth.json").read_text())
-            gap = found.get("gap", {})
-            row = (
-                label,
-                score(found, truth),
-                found["verdict"],
-                "+".join(one["id"] for one in found.get("effects", [])),
-                found.get("complete", ""),
-                found.get("confirmed", ""),
-                *(
-                    f"{gap[one]['ratio_to_noise']:.3g}" if gap else ""
-                    for one in ("given", "before", "after")
-                ),
-                f"{time.time() - began:.0f} s",
-                str(found.get("ambiguous_with", found.get("said", ""))),
-            )
-            rows.append(row)
+            if f"| {label} |" in kept:
+                continue
+            row = run_box(label, plant, effect, options)
+            words.append(row[1])
             print(*row, sep=" | ", flush=True)
-    words = [row[1] for row in rows]
+            if options.write:
+                with options.write.open("a") as file:
+                    file.write("| " + " | ".join(map(str, row)) + " |\n")
     print({word: words.count(word) for word in sorted(set(words))})
-    if options.write:
-        head = "| case | score | verdict | effects | complete | confirmed | given | re-fitted | after | time | |"
-        lines = [
-            head,
-            "|" + "---|" * 11,
-            *("| " + " | ".join(map(str, row)) + " |" for row in rows),
-        ]
-        options.write.write_text("\n".join(lines) + "\n")
+
+
+HEAD = (
+    "| case | score | verdict | effects | complete | confirmed | given | re-fitted | after "
+    "| place | runs | time | |\n" + "|" + "---|" * 13 + "\n"
+)
+
+
+def run_box(label, plant, effect, options):
+    """Make a box, have it diagnosed, and score it: a row of the table."""
+    folder = options.work / plant.name / effect
+    write_case(
+        folder, plant, effect,
+        access=options.access, noise=options.noise, seed=options.seed,
+        most="max_effects: 1, laws: never" if options.singles else "",
+    )  # fmt: skip
+    began = time.time()
+    found, _ = diagnose(folder, 1)
+    truth = json.loads((folder / "truth.json").read_text())
+    gap = found.get("gap", {})
+    return (
+        label,
+        score(found, truth),
+        found["verdict"],
+        "+".join(one["id"] for one in found.get("effects", [])),
+        found.get("complete", ""),
+        found.get("confirmed", ""),
+        *(
+            f"{gap[one]['ratio_to_noise']:.3g}" if gap else ""
+            for one in ("given", "before", "after")
+        ),
+        place_of_truth(folder, truth),
+        runs_of(folder),
+        f"{time.time() - began:.0f} s",
+        str(found.get("ambiguous_with", found.get("said", ""))),
+    )
 
 
 if __name__ == "__main__":

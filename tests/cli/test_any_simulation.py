@@ -18,7 +18,7 @@ MACHINE = Plant(
     "page",
     """def rates(y, u, push, p):
     x, v = y
-    return np.array([v, (5.0 * u + push - 15.0 * v - 1184.0 * x) / 0.3])
+    return v, (5.0 * u + push - 15.0 * v - 1184.0 * x) / 0.3
 """,
     2, {}, (), 3.0, 0.3, 0.012,
 )  # fmt: skip

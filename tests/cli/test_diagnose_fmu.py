@@ -75,7 +75,35 @@ def test_an_fmu_that_lacks_friction(folder, monkeypatch):
     assert [one["id"] for one in found["effects"]] == ["coulomb_friction"]
     force = found["effects"][0]["parameters"]["force_N"]["value"]
     assert force == pytest.approx(FRICTION, rel=0.02)
+    for ending, names in ALONE.items():
+        said = hwid(folder, "export", "--diagnosis", "--format", ending)
+        assert said.exit_code == 0, said.output
+        assert [one.split("/")[-1] for one in said.stdout.splitlines()] == names
+    _check_unit(folder, hwid(folder, "export", "--diagnosis", "--format", "fmu"))
     _check_module(folder, hwid(folder, "export", "--diagnosis", "--format", "python"))
+
+
+ALONE = {
+    "c": ["effect.c"],
+    "simulink": ["effect.c", "effect_sfun.c"],
+    "modelica": ["effects.mo"],
+}
+
+
+def _check_unit(folder, said):
+    """The FMU runs by FMPy alone, and moves as the machine does."""
+    assert said.exit_code == 0, said.output
+    assert "differs from the extended simulation by 0." in said.stderr
+    fresh = dict(currents())["sine_02"][::-1].copy()
+    given = np.zeros(fresh.size, [("time", float), ("current_A", float)])
+    given["time"], given["current_A"] = 1e-3 * np.arange(fresh.size), fresh
+    output = fmpy.simulate_fmu(
+        str(folder / "out" / "models" / "simulation.fmu"),
+        stop_time=given["time"][-1], output_interval=1e-4,
+        input=given, output=["displacement_m"],
+    )["displacement_m"][::10]  # fmt: skip
+    truth = displacement(fresh)
+    assert np.std(truth - output) < 0.01 * np.std(truth)
 
 
 def _check_module(folder, said):
@@ -129,9 +157,13 @@ def test_another_platform_is_one_line(folder):
     assert f"other platforms ({other})" in said.stderr
 
 
-@pytest.mark.parametrize("file_format", ["json", "c", "fmu", "mat"])
-def test_a_program_is_exported_as_a_module_only(folder, file_format):
+@pytest.mark.parametrize("file_format", ["json", "mat"])
+def test_a_format_for_models_is_refused_with_those_for_programs(folder, file_format):
     said = hwid(folder, "export", "--diagnosis", "--format", file_format, "-q")
 
     assert said.exit_code == 1
-    assert "simulation.kind is fmu; expected --format python" in said.stderr
+    expected = (
+        "simulation.kind is fmu; expected one of fmu, python, c, simulink, modelica"
+    )
+    assert expected in said.stderr
+    assert len(said.stderr.splitlines()) == 1

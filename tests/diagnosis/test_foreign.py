@@ -5,10 +5,11 @@ import pytest
 from scipy.signal import lsim
 
 from hwid_cli import Recording
-from hwid_cli.diagnosis.foreign import Simulator, diagnose_foreign, stand_in_for
+from hwid_cli.diagnosis.foreign import diagnose_foreign, stand_in_for
+from hwid_cli.diagnosis.simulator import Simulator
 from hwid_cli.records.experiment import DiagnoseOptions
 from hwid_cli.records.programs import Capabilities, FreeParameter, SimulatorRun
-from tests.black_boxes.plants import LINEAR, Hidden, integrate
+from tests.black_boxes.plants import LINEAR, PENDULUM, Hidden, integrate
 
 STEP_S, N = 1e-3, 500
 TIME = STEP_S * np.arange(N)
@@ -145,3 +146,81 @@ def test_bounds_of_parameters_are_kept():
     diagnosis(Simulator(able, watched, {}, free, GIVEN), effects=FEW)
     assert min(seen) >= 13.0
     assert max(seen) <= 15.0 + 1e-9
+
+
+SWING_S, SWUNG = 2e-3, 600
+PENDULUM_TIME = SWING_S * np.arange(SWUNG)
+
+
+def pendulum_inputs():
+    on = PENDULUM_TIME > 0.1
+    for size in (0.8, -1.4, 2.0):
+        yield f"step_{size}", size * (on & (PENDULUM_TIME < 0.65))
+    for frequency, size in ((1.5, 1.8), (3.0, 1.0), (4.0, 2.0)):
+        yield (
+            f"sine_{frequency}",
+            size * np.sin(2 * np.pi * frequency * (PENDULUM_TIME - 0.1)) * on,
+        )
+
+
+def swing(request):
+    """The user's pendulum, without the spring."""
+    angle = pendulum_run(request.parameters, request.input, request.force)
+    return SimulatorRun(angle, np.zeros(0))
+
+
+def pendulum_run(values, current, force, spring=0.0):
+    rates = PENDULUM.function()
+    force = force if force.size else np.zeros(SWUNG)
+
+    def change(state, u, push):
+        return np.array(rates(state, u, push - spring * state[0] ** 3, values))
+
+    state, found = np.zeros(2), np.empty(SWUNG)
+    for n in range(SWUNG):
+        found[n] = state[0]
+        if n + 1 == SWUNG:
+            break
+        for part in range(2):
+            ends = [
+                (given[n] + at * (given[n + 1] - given[n])) for given in (current, force)
+                for at in (part / 2, part / 2 + 0.25, part / 2 + 0.5)
+            ]  # fmt: skip
+            u, push, h = ends[:3], ends[3:], SWING_S / 2
+            one = change(state, u[0], push[0])
+            two = change(state + h / 2 * one, u[1], push[1])
+            three = change(state + h / 2 * two, u[1], push[1])
+            four = change(state + h * three, u[2], push[2])
+            state = state + h / 6 * (one + 2 * two + 2 * three + four)
+    return found
+
+
+def test_what_a_linear_stand_in_leaves_of_a_pendulum_becomes_no_second_effect():
+    # Angles of more than a radian: beside the sine of gravity the stand-in is wrong.
+    rng, noise, spring = np.random.default_rng(5), 4e-3, 0.4
+    measured = [
+        Recording(
+            name, u,
+            pendulum_run(PENDULUM.values, u, np.zeros(0), spring)
+            + noise * rng.standard_normal(SWUNG),
+            SWING_S, kind=name.split("_", maxsplit=1)[0],
+        )
+        for name, u in pendulum_inputs()
+    ]  # fmt: skip
+    given = {**PENDULUM.values, "c": 0.0575, "g": 0.77, "kt": 0.4}
+    free = {name: FreeParameter(given[name]) for name in PENDULUM.free}
+    able = Capabilities(run=True, parameters=True, force=True)
+    options = DiagnoseOptions(effects=("cubic_stiffness", "second_mode", "end_stop"))
+    run = Count()
+    found = diagnose_foreign(
+        measured, Simulator(able, swing, {}, free, given), options, run,
+        lambda what, total: None,
+    )  # fmt: skip
+    assert [one.id for one in found.effects] == ["cubic_stiffness"]
+    assert (found.verdict, found.complete) == ("named", True)
+    assert found.confirmed == "simulation"
+    assert found.effects[0].parameters[0].value == pytest.approx(spring, rel=0.02)
+    for one in found.base:
+        assert one.after == pytest.approx(PENDULUM.values[one.name], rel=0.02)
+    assert found.after.ratio_to_noise < 1.1
+    assert run.runs <= 800

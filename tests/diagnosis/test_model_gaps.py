@@ -7,7 +7,8 @@ import pytest
 from scipy.signal import cont2discrete, lsim
 
 from hwid_cli import Recording
-from hwid_cli.diagnosis.foreign import Simulator, diagnose_foreign
+from hwid_cli.diagnosis.foreign import diagnose_foreign
+from hwid_cli.diagnosis.simulator import Simulator
 from hwid_cli.records.experiment import DiagnoseOptions
 from hwid_cli.records.maps import StaticMap
 from hwid_cli.records.model import HammersteinWiener
@@ -44,12 +45,12 @@ def machine(*, given=lambda u: u, read=lambda x: x, gain=1.0, hidden=None, size=
     return found
 
 
-def model_of(input_map):
+def model_of(input_map, delay=0):
     """The stage as a fitted model holds it: exact for inputs that are straight lines."""
     plant = cont2discrete(([9.0], [0.8, 11.0, 2100.0]), STEP_S, method="foh")
     numerator, denominator = np.ravel(plant[0]), plant[1]
     nothing = StaticMap("none", np.zeros(0))
-    return HammersteinWiener(input_map, numerator, denominator, 0, nothing, STEP_S)
+    return HammersteinWiener(input_map, numerator, denominator, delay, nothing, STEP_S)
 
 
 @pytest.fixture(scope="module")
@@ -101,6 +102,17 @@ def test_a_gain_that_has_changed_is_a_parameter(model):
     assert found.verdict == "parameters"
     gain = next(one for one in found.base if one.name.startswith("force_constant"))
     assert gain.after / gain.before == pytest.approx(1.2, rel=0.01)
+
+
+def test_a_gain_is_a_parameter_where_no_linear_drive_is_the_model():
+    # Eight samples of delay, which the model knows and the stand-in has as a force only.
+    late = model_of(StaticMap("none", np.zeros(0)), delay=8)
+    given = partial(np.interp, TIME - 8 * STEP_S, TIME)
+    changed = machine(given=given, gain=1.2)
+    found = diagnosed(late, changed)
+    assert (found.verdict, found.effects) == ("parameters", ())
+    assert found.confirmed == "simulation"
+    assert found.after.ratio_to_noise < 1.1
 
 
 @pytest.mark.slow

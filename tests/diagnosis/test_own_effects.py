@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from hwid_cli import DiagnoseOptions, Recording, SimulationOptions, diagnose
-from hwid_cli.diagnosis.foreign import Simulator, diagnose_foreign
+from hwid_cli.diagnosis.foreign import diagnose_foreign
+from hwid_cli.diagnosis.simulator import Simulator
 from hwid_cli.records.own_effects import OwnEffect, OwnParameter, own_id
 from hwid_cli.records.programs import Capabilities
 from hwid_cli.stages.diagnose import extended_options

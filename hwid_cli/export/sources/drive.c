@@ -36,6 +36,7 @@ typedef struct {
     double played;
     double position;
     double velocity;
+    double beside; /* A force on the mass beside the drive's own, held [N]. */
     long sample;
     int listed;
     int trusted;
@@ -254,6 +255,7 @@ static void interval(HWID_NAME(state) *s, double first, double last)
             const tuple_dddd piece = {time, length, rows[n][1], rows[n][2]};
             drive_set_push(push, s->room, s->memory, piece, now, p);
         }
+        push[OTHER] += s->beside;
         time += length;
         s->listed += 1;
         move_along(s, push, length, step, kind);
@@ -295,9 +297,24 @@ void HWID_NAME(init)(HWID_NAME(state) *state)
     for (n = 0; n < N_CONTROL; ++n) {
         state->control[n] = 0.0;
     }
+    state->beside = 0.0;
     state->sample = 0;
     state->listed = 0;
     state->trusted = 0;
+}
+
+/* At rest in equilibrium with the first command. */
+static void begin(HWID_NAME(state) *state, double command)
+{
+    int n;
+    state->before = command;
+    state->followed = drive_start(state->motion, state->memory, command, sample_time,
+                                  state->p);
+    for (n = 0; n < N_HISTORY; ++n) {
+        state->starts[n] = command;
+        state->ends[n] = command;
+    }
+    state->played = state->motion[state->p[SENSOR_AT_MOTOR] > 0.0 ? MOTOR_X : X];
 }
 
 double HWID_NAME(step)(HWID_NAME(state) *state, double u)
@@ -307,15 +324,7 @@ double HWID_NAME(step)(HWID_NAME(state) *state, double u)
     const int is_held = is_closed || p[ZERO_ORDER_HOLD] > 0.0;
     const double x0 = state->position, v0 = state->velocity;
     if (state->sample == 0) {
-        int n;
-        state->before = is_closed ? 0.0 : u;
-        state->followed = drive_start(state->motion, state->memory, state->before,
-                                      sample_time, p);
-        for (n = 0; n < N_HISTORY; ++n) {
-            state->starts[n] = state->before;
-            state->ends[n] = state->before;
-        }
-        state->played = state->motion[p[SENSOR_AT_MOTOR] > 0.0 ? MOTOR_X : X];
+        begin(state, is_closed ? 0.0 : u);
     } else if (isfinite(state->position)) {
         interval(state, state->previous, is_held ? state->previous : u);
     }

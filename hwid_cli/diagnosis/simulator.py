@@ -1,0 +1,93 @@
+"""A simulation of any kind as the diagnosis sees it, and its runs on recordings."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from hwid_cli.diagnosis.problem import Signals
+from hwid_cli.diagnosis.rounds import DiagnosisTask, RunTasks
+from hwid_cli.drive.simulation import NO_FORCE
+from hwid_cli.records.programs import (
+    Capabilities,
+    FreeParameter,
+    RunRequest,
+    SimulatorRun,
+)
+
+# Derivatives by its parameters, as a share of their size: its integrator may be no more
+# exact than a millionth.
+DIFFERENCE = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Simulator:
+    """A simulation as the diagnosis sees it.
+
+    Parameters
+    ----------
+    run : callable or None
+        One run; a function at module level or a partial of one. None where only outputs
+        are at hand.
+    given : mapping of str to ndarray
+        What the simulation gave, by the names of the recordings, where it cannot be run.
+    free : mapping of str to FreeParameter
+        Parameters that may be fitted again.
+    values : mapping of str to float
+        All parameters.
+    effects : mapping
+        Effects that were added to it before.
+    """
+
+    capabilities: Capabilities
+    run: Callable[[RunRequest], SimulatorRun] | None = None
+    given: Mapping[str, np.ndarray] = field(default_factory=dict)
+    free: Mapping[str, FreeParameter] = field(default_factory=dict)
+    values: Mapping[str, float] = field(default_factory=dict)
+    effects: Mapping[str, Mapping[str, float | str]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Runs:
+    """Runs of a simulation on recordings, by whoever runs tasks."""
+
+    simulator: Simulator
+    run_tasks: RunTasks
+
+    def of(
+        self,
+        signals: Sequence[Signals],
+        values: Mapping[str, float],
+        forces: Sequence[np.ndarray] = (),
+        inputs: Sequence[np.ndarray] = (),
+    ) -> list[SimulatorRun]:
+        """Run the simulation on every recording.
+
+        Parameters
+        ----------
+        forces : sequence of ndarray, [N]
+            At its force input; empty for none.
+        inputs : sequence of ndarray
+            In place of the recordings' own; empty for these.
+        """
+        run = self.simulator.run
+        if run is None:
+            return [
+                SimulatorRun(self.simulator.given[one.name], np.zeros(0))
+                for one in signals
+            ]
+        tasks = []
+        for row, one in enumerate(signals):
+            force = forces[row] if forces else NO_FORCE
+            driven_by = inputs[row] if inputs else one.driven_by
+            request = RunRequest(
+                one.name, one.sample_time_s, driven_by, force, dict(values)
+            )
+            content = {"run": one.name, "parameters": dict(values)}
+            tasks.append(
+                DiagnosisTask(
+                    f"run {one.name}", run, (request,), SimulatorRun, content,
+                    (driven_by, force),
+                )
+            )  # fmt: skip
+        return list(self.run_tasks(tasks, keep=True))
