@@ -68,6 +68,12 @@ def init(*values: Any, **options: Any) -> None:
     default=True,
     help="Time one fit on these data for the estimate (about two seconds).",
 )
+@click.option(
+    "--json",
+    "as_json",
+    is_flag=True,
+    help="Write recordings, stages and seconds as JSON; tables go to stderr.",
+)
 def check(*values: Any, **options: Any) -> None:
     """Check a configuration and its data, and say what would run.
 

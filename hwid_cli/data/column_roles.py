@@ -433,9 +433,7 @@ def _twin_notes(first: _Named, twins: list[_Named]) -> list[str]:
     ]
 
 
-def _other_elements(
-    named: list[_Named], first: _Named, last: _Named
-) -> list[_Named]:
+def _other_elements(named: list[_Named], first: _Named, last: _Named) -> list[_Named]:
     """Columns of other elements of the array of structures that holds input and output."""
     found = {id(one): _ELEMENT.fullmatch(str(one.column.key)) for one in named}
     own, other = found[id(first)], found[id(last)]
