@@ -21,7 +21,7 @@ from hwid_cli.records.results import CrossValidation
 from hwid_cli.stages.compare import linear_beside
 from hwid_cli.stages.order_grid import grid_place
 from hwid_cli.stages.ranking import best_fits, widest_model
-from hwid_cli.stages.test import best_single
+from hwid_cli.stages.test import best_single, taken_model
 
 
 def best_model(
@@ -47,9 +47,7 @@ def best_model(
     final: FinalTest | None = results.get("test")
     crossval: CrossValidation | None = results.get("crossval")
     if final is not None:
-        place = (
-            final.models.index(final.chain[-1]) if final.chain else best_single(final)
-        )
+        place = taken_model(final)
         if place >= 0:
             return _tested(place, final)
     if search is not None and search.chain:
