@@ -34,7 +34,7 @@ def _run(place: str, *values: Any, **options: Any) -> None:
 @click.option("--force", is_flag=True, help="Replace a configuration that is there.")
 @click.option("-q", "--quiet", is_flag=True, help="Say errors only.")
 def init(*values: Any, **options: Any) -> None:
-    """Write a commented starter configuration for a folder of measurements.
+    """Write a commented starter configuration for measurements.
 
     Guesses columns, units, sample time, kinds, recipes and orders from names and content,
     says why, and asks nothing: the file runs at once, and every line of it is yours to
