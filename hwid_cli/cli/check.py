@@ -1,5 +1,9 @@
 """``hwid check``: is a configuration sound, what would it run, and for how long."""
 
+import json
+import sys
+from collections.abc import Sequence
+from contextlib import nullcontext, redirect_stdout
 from pathlib import Path
 from typing import NoReturn
 
@@ -14,10 +18,10 @@ from hwid_cli.data.recording_files import (
 from hwid_cli.data.recordings import survey_recordings
 from hwid_cli.errors import HwidError, MeasurementError
 from hwid_cli.files.messages import did_you_mean
-from hwid_cli.records.check import FitCost
+from hwid_cli.records.check import FitCost, RecordingFacts, StagePlan
 from hwid_cli.records.experiment import Experiment
 from hwid_cli.records.recordings import Calibrated
-from hwid_cli.report.check import recordings_table, stages_table
+from hwid_cli.report.check import check_document, recordings_table, stages_table
 from hwid_cli.report.table import as_text
 from hwid_cli.stages.fit_seconds import MEASURED, compiled_loops_place, time_fits
 from hwid_cli.stages.own_functions import check_own_functions
@@ -34,20 +38,42 @@ _EXIT_PROBLEMS = 1
 
 
 def check(
-    config: Path, out: Path | None, cache: Path | None, jobs: int | None, timing: bool
+    config: Path,
+    out: Path | None,
+    cache: Path | None,
+    jobs: int | None,
+    timing: bool,
+    as_json: bool,
 ) -> None:
     """Check a configuration and its data, and say what would run."""
+    # What people read is no part of a document for programs.
+    with redirect_stdout(sys.stderr) if as_json else nullcontext():
+        found = _checked(config, out, cache, jobs, timing=timing)
+    if as_json and found is not None:
+        click.echo(json.dumps(check_document(*found), indent=2, allow_nan=False))
+
+
+def _checked(
+    config: Path,
+    out: Path | None,
+    cache: Path | None,
+    jobs: int | None,
+    *,
+    timing: bool,
+) -> tuple[Sequence[RecordingFacts], Sequence[StagePlan], int] | None:
+    """Show what was found, and give it; None where there is no measurement yet."""
     problems, experiment = config_problems(config)
     if experiment is None:
         _end_with(problems)
     folder = out or Path("results") / experiment.name
     if not problems and _is_waiting(experiment, folder):
-        return
+        return None
     checked, more = _data(experiment, folder)
     if problems or more:
         _end_with((*problems, *more))
     _show_warnings(experiment, checked, folder)
-    _show_plan(experiment, checked, (cache or folder / "cache", jobs, timing))
+    how = (cache or folder / "cache", jobs, timing)
+    return checked.facts, *_show_plan(experiment, checked, how)
 
 
 def _is_waiting(experiment: Experiment, folder: Path) -> bool:
@@ -120,7 +146,7 @@ def _show_plan(
     experiment: Experiment,
     checked: Checked,
     how: tuple[Path, int | None, bool],
-) -> None:
+) -> tuple[list[StagePlan], int]:
 
     cache, jobs, timing = how
     with one_thread():
@@ -136,6 +162,7 @@ def _show_plan(
             for plan in stage_named(name).plan(planning)
         ]
     click.echo(f"\n{as_text([stages_table(plans, cost, workers)])}")
+    return plans, workers
 
 
 def _cost(experiment: Experiment, checked: Checked, *, timing: bool) -> FitCost:

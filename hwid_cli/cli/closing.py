@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from hwid_cli.cli.session import Session, screen_width
 from hwid_cli.records.best_model import BestModel
 from hwid_cli.records.diagnosis import Diagnosis
+from hwid_cli.records.experiment import CrossvalOptions
 from hwid_cli.records.report import StoredResults
 from hwid_cli.report.closing import (
     best_model_sentences,
@@ -13,11 +14,8 @@ from hwid_cli.report.closing import (
     diagnosis_sentence,
 )
 from hwid_cli.stages.best_model import beside_linear, best_model
-from hwid_cli.stages.compare import fit_linear
 from hwid_cli.stages.model_views import named_fits
 from hwid_cli.stages.table import is_named, stage_named
-from hwid_cli.tasks.cache import MemoryStore
-from hwid_cli.tasks.runner import RunSettings
 
 PAGE = "report.html"
 TABLES = "tables.txt"
@@ -62,7 +60,10 @@ def say_end(session: Session, name: str, files: Sequence[str] = ()) -> None:
 def _best(session: Session) -> BestModel | None:
     """The model to take, beside the linear one."""
     experiment, results = session.experiment, session.results
-    best = best_model(experiment, results)
+    options = experiment.crossval or CrossvalOptions()
+    best = best_model(
+        results, nk_role=experiment.orders.nk_role, threshold=options.threshold
+    )
     if best is None:
         return None
     stored = StoredResults(
@@ -72,15 +73,7 @@ def _best(session: Session) -> BestModel | None:
         results={one: results.get(one) for one in ("group",)}
         | {"identify": results["identify"]},
     )
-    settings = RunSettings(MemoryStore(), session.workers)
-    return beside_linear(
-        best,
-        named_fits(stored),
-        results["calibrate"].recordings,
-        lambda recordings, orders: fit_linear(
-            recordings, orders, experiment.fit, settings
-        ),
-    )
+    return beside_linear(best, named_fits(stored), results["calibrate"].recordings)
 
 
 def _places(session: Session, name: str, files: Sequence[str]) -> list[tuple[str, str]]:

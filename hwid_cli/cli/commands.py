@@ -34,7 +34,7 @@ def _run(place: str, *values: Any, **options: Any) -> None:
 @click.option("--force", is_flag=True, help="Replace a configuration that is there.")
 @click.option("-q", "--quiet", is_flag=True, help="Say errors only.")
 def init(*values: Any, **options: Any) -> None:
-    """Write a commented starter configuration for a folder of measurements.
+    """Write a commented starter configuration for measurements.
 
     Guesses columns, units, sample time, kinds, recipes and orders from names and content,
     says why, and asks nothing: the file runs at once, and every line of it is yours to
@@ -67,6 +67,12 @@ def init(*values: Any, **options: Any) -> None:
     "--timing/--no-timing",
     default=True,
     help="Time one fit on these data for the estimate (about two seconds).",
+)
+@click.option(
+    "--json",
+    "as_json",
+    is_flag=True,
+    help="Write recordings, stages and seconds as JSON; tables go to stderr.",
 )
 def check(*values: Any, **options: Any) -> None:
     """Check a configuration and its data, and say what would run.

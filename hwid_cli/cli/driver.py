@@ -3,7 +3,7 @@
 import logging
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from hwid_cli.cli.closing import say_end
@@ -22,7 +22,7 @@ from hwid_cli.errors import CacheError, HwidError
 from hwid_cli.report.progress import StageProgress
 from hwid_cli.report.table import WIDTH, Block, as_text
 from hwid_cli.stages.stage import Stage
-from hwid_cli.stages.table import needed, stage_named
+from hwid_cli.stages.table import named, needed, stage_named
 from hwid_cli.store.cache import Hdf5Store
 from hwid_cli.store.result_files import Provenance, current_versions, read_provenance
 from hwid_cli.tasks.runner import RunSettings, TaskDone
@@ -68,6 +68,7 @@ def run_command(name: str, choices: Choices) -> None:
         show_blocks(session, blocks_of(session, shown))
     if has_page:
         refresh_report(session)
+    session.results.update(_current(session))
     say_end(session, name)
 
 
@@ -77,6 +78,27 @@ def refresh_report(session: Session) -> None:
         write_report(session)
     except HwidError as error:
         _log.warning("%s stays as it was: %s", session.out / FILE, error)
+
+
+def _current(session: Session) -> dict[str, Any]:
+    """Results of later stages that are there and still hold, as the page shows them."""
+    found: dict[str, Any] = {}
+    for name in named(session.experiment):
+        stage = stage_named(name)
+        needs = needed(name, session.experiment)
+        if name in session.results or stage.storage is None or stage.key is None:
+            continue
+        known = {**session.results, **found}
+        if not set(needs) <= set(known):
+            continue
+        try:
+            given = stage.choose(replace(context_of(session), results=known))
+            is_stored, result = _stored(session, stage, stage.key(given))
+        except HwidError:
+            continue
+        if is_stored:
+            found[name] = result
+    return found
 
 
 def blocks_of(session: Session, name: str) -> Sequence[Block]:

@@ -5,6 +5,7 @@ and content do not agree, or nothing tells, a note says so and what to write ins
 nothing is exchanged in silence.
 """
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import permutations
@@ -23,6 +24,8 @@ _ROUND_STAMPS = 0.009
 # Columns that agree so far may both be the input, noise apart (a correlation), [-].
 _TWINS = 0.9999
 _CURRENT_UNITS = ("a", "ma", "ka")
+# A member of an element of MATLAB's array of structures: run(2).current.
+_ELEMENT = re.compile(r"(.+)\((\d+)\)\.([^()]+)")
 # Rank up to which words of an input say a current.
 _LAST_CURRENT_RANK = meaning_of("iz").rank
 # A measurement has more samples than this; shorter columns are settings, [samples].
@@ -239,10 +242,12 @@ def guess_signals(columns: Sequence[FoundColumn]) -> SignalGuess:
     first, twins = _current_of_twins(first, named, reasons)
     if last == first:
         last = next(one for one in named if one != first)
+    repeats = _other_elements(named, first, last)
     notes = [
         *_order_notes(first, last, reasons),
-        *_twin_notes(first, [one for one in twins if one != last]),
-        *_other_columns(named, first, last),
+        *_array_notes(first, repeats),
+        *_twin_notes(first, [one for one in twins if one not in (last, *repeats)]),
+        *_other_columns([one for one in named if one not in repeats], first, last),
     ]
     wanted = (one for one in _of_role(named, "reference") if one not in (first, last))
     reference = next(wanted, None)
@@ -425,6 +430,39 @@ def _twin_notes(first: _Named, twins: list[_Named]) -> list[str]:
         f"{_called(one.column)} is a multiple of {_called(first.column)}; either may be "
         "the input"
         for one in twins
+    ]
+
+
+def _other_elements(named: list[_Named], first: _Named, last: _Named) -> list[_Named]:
+    """Columns of other elements of the array of structures that holds input and output."""
+    found = {id(one): _ELEMENT.fullmatch(str(one.column.key)) for one in named}
+    own, other = found[id(first)], found[id(last)]
+    if own is None or other is None or own.group(1, 2) != other.group(1, 2):
+        return []
+    repeats = [
+        (one, place)
+        for one in named
+        if (place := found[id(one)]) is not None
+        and place.group(1) == own.group(1)
+        and place.group(2) != own.group(2)
+    ]
+    members = {place.group(3) for _, place in repeats}
+    is_whole = {own.group(3), other.group(3)} <= members
+    return [one for one, _ in repeats] if is_whole else []
+
+
+def _array_notes(first: _Named, repeats: list[_Named]) -> list[str]:
+    """Say that an array of structures is one recording here, and how to get them all."""
+    if not repeats:
+        return []
+    own = _ELEMENT.fullmatch(str(first.column.key))
+    places = [_ELEMENT.fullmatch(str(one.column.key)) for one in repeats]
+    numbers = {place.group(2) for place in places if place is not None}
+    name = "" if own is None else own.group(1)
+    return [
+        f"{name!r} is an array of {len(numbers) + 1} structures, of which this uses one; "
+        f"a file is one recording: in MATLAB, for k = 1:numel({name}), s = {name}(k); "
+        f"save(sprintf('recording_%02d.mat', k), '-struct', 's'); end"
     ]
 
 

@@ -177,7 +177,9 @@ def is_stepwise(values: np.ndarray) -> bool:
         return False
     rounded = np.round(12.0 * (values - low) / (high - low))
     counts = np.sort(np.unique(rounded, return_counts=True)[1])[::-1]
-    jumps = int(np.sum(np.abs(np.diff(rounded)) > 1))
+    moves = np.abs(np.diff(rounded)) > 1
+    # A flank of several samples is one jump.
+    jumps = int(np.sum(np.diff(moves, prepend=False) & moves))
     return bool(counts[:3].sum() >= _HELD_SHARE * values.size and jumps <= 6)
 
 

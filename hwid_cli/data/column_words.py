@@ -102,6 +102,10 @@ _OUTPUT = [
     "fb",
     "feedback",
     "n",
+    "encoder",
+    "resolver",
+    "tacho",
+    "lvdt",
 ]
 _TIME = ["time", "zeit", "t", "timestamp", "tijd", "secs", "seconds", "sekunden", "sec"]
 _REFERENCE = [
@@ -140,6 +144,9 @@ _OUTPUT_UNITS = {
     *("m", "mm", "cm", "um", "µm", "rad", "deg", "°", "grad", "rad/s", "m/s", "mm/s"),
     *("rpm", "1/min", "u/min", "min^-1", "deg/s", "°/s", "inc", "ticks/s"),
 }
+# Words that name a plug of an instrument and not a quantity, and units that do say it.
+_PLUGS = {"in", "input", "eingang", "out", "output", "ausgang", "amp"}
+_CURRENT_UNITS = {"a", "ma", "ka"}
 # The same of a time.
 _TIME_UNITS = {"s", "sec", "sek", "ms", "us", "µs"}
 
@@ -206,6 +213,8 @@ def meaning_of(title: str, stated: str = "") -> Meaning:
     Meaning(role='input', rank=1, unit='A', rest='')
     >>> meaning_of("position_mm").role, meaning_of("position_mm").unit
     ('output', 'mm')
+    >>> meaning_of("Amp Out", "mA").role, meaning_of("Encoder In", "um").role
+    ('input', 'output')
     >>> meaning_of("pos_ref_rad").role, meaning_of("u2").rest
     ('reference', '2')
     """
@@ -224,8 +233,8 @@ def meaning_of(title: str, stated: str = "") -> Meaning:
             found = _rank(word, known)
             if found is not None and not role:
                 role, rank, used = name, found, word
-    if not role and unit:
-        role = _role_of_unit(unit)
+    if unit and (not role or _is_contradicted(role, used, unit)):
+        role, rank, used = _role_of_unit(unit), 99, ""
     is_wanted = any(word in _WANTED and word != used for word in words)
     if is_reference or is_wanted:
         # A wanted current is what drives the machine; a wanted position is no output.
@@ -242,6 +251,13 @@ def _role_of_unit(unit: str) -> str:
     if plain in _INPUT_UNITS and unit != "nm":
         return "input"
     return "output" if plain in _OUTPUT_UNITS else ""
+
+
+def _is_contradicted(role: str, word: str, unit: str) -> bool:
+    """Whether a current leaves a plug ``out``, or a position comes in at one."""
+    says = "input" if unit.lower() in _CURRENT_UNITS else ""
+    says = "output" if unit.lower() in _OUTPUT_UNITS else says
+    return word in _PLUGS and says not in ("", role)
 
 
 def _words(title: str) -> list[str]:

@@ -119,12 +119,20 @@ def _sheet_of(path: Path, name: str | None) -> tuple[str, list[list[Any]]]:
         )
     for one in names if name is None else [name]:
         rows = _rows(path, one)
-        if name is not None or any(isinstance(c, float) for row in rows for c in row):
+        if name is not None or _holds_numbers(rows):
             return one, rows
     raise MeasurementError(
         f"{path}: holds no sheet with numbers; expected one; export the measurement "
         "again or leave the file out"
     )
+
+
+def _holds_numbers(rows: Sequence[Sequence[Any]]) -> bool:
+    """Whether rows of numbers follow; programs write them as text too ("0,5")."""
+    if any(isinstance(cell, float) for row in rows for cell in row):
+        return True
+    texts = _as_texts(rows[:_HEAD_ROWS])
+    return bool(texts) and read_head(texts).body < len(texts)
 
 
 def _names(path: Path) -> list[str]:

@@ -262,7 +262,8 @@ _SUFFIXES = {
     "meters": "m",
     "metres": "m",
 }
-_BRACKET = re.compile(r"([\[(])\s*([^\])]*?)\s*[\])]")
+# What is followed by a member is the place in an array: run(2).current.
+_BRACKET = re.compile(r"([\[(])\s*([^\])]*?)\s*[\])](?!\.\w)")
 _BEHIND = re.compile(r"(?:/| in )\s*([A-Za-zµ°%]{1,4})$")
 # Arguments of a function, not units: x[k], i(t).
 _ARGUMENTS = ("t", "k", "n", "i", "j", "z", "x")
@@ -290,6 +291,8 @@ def split_unit(title: str) -> tuple[str, str]:
     --------
     >>> split_unit("current [mA]"), split_unit("t_ms"), split_unit("U/V")
     (('current ', 'mA'), ('t', 'ms'), ('U', 'V'))
+    >>> split_unit("run(1).current")
+    ('run(1).current', '')
     """
     bracket = _BRACKET.search(title)
     if bracket and bracket[2]:

@@ -26,6 +26,8 @@ class BestModel:
         Of the output.
     threshold : float, [unit]
         Largest RMSD that is accepted.
+    chosen_on : tuple of str
+        Recordings that chose it among others; empty where its own fit did.
     single : str
         Of a group: the best model of a single recording, told without ``judged_on``;
         empty where there is none.
@@ -39,6 +41,7 @@ class BestModel:
     rmsd: float
     unit: str
     threshold: float
+    chosen_on: tuple[str, ...] = ()
     linear_rmsd: float = float("nan")
     single: str = ""
     single_rmsd: float = float("nan")

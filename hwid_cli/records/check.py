@@ -1,6 +1,7 @@
 """What a check of a configuration and its data found, before anything is computed."""
 
 from dataclasses import dataclass
+from math import isnan, nan
 
 
 @dataclass(frozen=True)
@@ -42,13 +43,17 @@ class StagePlan:
     what : str
         Its tasks in words, with their number.
     tasks : int, [-]
-        Of the largest kind; an upper bound where ``is_bound``.
+        Of the largest kind; an upper bound where the work depends on what is found.
     cached : int or None, [-]
         Tasks whose results are there; None where that cannot be told beforehand.
     seconds : float, [s]
-        For what is not cached; NaN where there is no estimate.
+        For what is not cached, at least; NaN where there is no estimate.
     size_bytes : float, [bytes]
         What it adds to the disk.
+    most_seconds : float, [s]
+        Where the work depends on what is found; NaN where ``seconds`` says it all.
+    most_reason : str
+        When it takes that long, in words.
     """
 
     stage: str
@@ -57,7 +62,13 @@ class StagePlan:
     cached: int | None
     seconds: float
     size_bytes: float
-    is_bound: bool = False
+    most_seconds: float = nan
+    most_reason: str = ""
+
+    @property
+    def longest_seconds(self) -> float:
+        """What it takes at most, [s]; NaN where there is no estimate."""
+        return self.seconds if isnan(self.most_seconds) else self.most_seconds
 
 
 @dataclass(frozen=True)

@@ -195,7 +195,7 @@ class TrustOnTests:
     rows : tuple of RecordingTrust
         Model by model.
     shown : ShownBand or None
-        Of the last model, on the test recording that its band holds worst.
+        Of the first model, on the test recording that its band holds worst.
     """
 
     rows: tuple[RecordingTrust, ...] = ()

@@ -2,6 +2,8 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Any
 
 from hwid_cli.records.check import FitCost, RecordingFacts, StagePlan
 from hwid_cli.records.units import behind
@@ -49,24 +51,20 @@ def stages_table(plans: Sequence[StagePlan], cost: FitCost, workers: int) -> Tab
             plan.stage,
             plan.what,
             MISSING if plan.cached is None else f"{plan.cached} of {plan.tasks}",
-            duration(plan.seconds),
+            time_range(plan.seconds, plan.longest_seconds),
         )
         for plan in plans
     )
-    known = [plan.seconds for plan in plans if math.isfinite(plan.seconds)]
-    least = sum(
-        plan.seconds
-        for plan in plans
-        if math.isfinite(plan.seconds) and not plan.is_bound
-    )
-    total = duration(sum(known))
-    if least < sum(known):
-        total = f"{duration(least)} to {total} (the search may end early)"
     apart = ["start of the program"]
     apart += [plan.stage for plan in plans if not math.isfinite(plan.seconds)]
     notes = (
-        f"Estimate, to a factor of 2: {total} on {workers} "
+        f"Estimate, to a factor of 2: {time_range(*total_seconds(plans))} on {workers} "
         f"{'process' if workers == 1 else 'processes'}, {' and '.join(apart)} apart.",
+        *(
+            f"{plan.stage}: {duration(plan.most_seconds)} if {plan.most_reason}."
+            for plan in plans
+            if "to" in time_range(plan.seconds, plan.longest_seconds)
+        ),
         f"Scaled from {cost.source}: {cost.seconds:.3f} s for {cost.n_samples} samples.",
         f"Disk: about {size(sum(plan.size_bytes for plan in plans))} more.",
     )
@@ -76,6 +74,65 @@ def stages_table(plans: Sequence[StagePlan], cost: FitCost, workers: int) -> Tab
         *numbers("cached", "time"),
     )
     return Table("What would run", columns, rows, notes)
+
+
+def total_seconds(plans: Sequence[StagePlan]) -> tuple[float, float]:
+    """Sum what is known of all stages: at least and at most, [s]."""
+    known = [one for one in plans if math.isfinite(one.seconds)]
+    least = math.fsum(one.seconds for one in known)
+    return least, math.fsum(one.longest_seconds for one in known)
+
+
+def time_range(least: float, most: float) -> str:
+    """Write how long something takes, as a range where the ends read differently.
+
+    Parameters
+    ----------
+    least, most : float, [s]
+
+    Examples
+    --------
+    >>> time_range(20.0, 180.0), time_range(0.2, 0.3), time_range(7.0, 7.0)
+    ('20 s to 3 min', '< 1 s', '7 s')
+    """
+    both = duration(least), duration(most)
+    return both[0] if both[0] == both[1] else f"{both[0]} to {both[1]}"
+
+
+def check_document(
+    facts: Sequence[RecordingFacts], plans: Sequence[StagePlan], workers: int
+) -> dict[str, Any]:
+    """Say the same for programs: times in s, sizes in bytes, null for what is not known.
+
+    Parameters
+    ----------
+    workers : int, [-]
+        Processes that share the work.
+    """
+    least, most = total_seconds(plans)
+    return {
+        "recordings": [asdict(one) for one in facts],
+        "stages": [
+            {
+                "stage": one.stage,
+                "what": one.what,
+                "tasks": one.tasks,
+                "cached": one.cached,
+                "seconds": _known(one.seconds),
+                "most_seconds": _known(one.longest_seconds),
+                "most_reason": one.most_reason,
+                "size_bytes": one.size_bytes,
+            }
+            for one in plans
+        ],
+        "processes": workers,
+        "seconds": least,
+        "most_seconds": most,
+    }
+
+
+def _known(value: float) -> float | None:
+    return value if math.isfinite(value) else None
 
 
 def duration(seconds: float) -> str:

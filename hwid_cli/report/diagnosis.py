@@ -142,7 +142,7 @@ def gap_table(diagnosis: Diagnosis) -> Table:
     unit = diagnosis.output_unit
     notes = [explained_sentence(diagnosis)] if diagnosis.effects else []
     if diagnosis.noise.sentence:
-        notes.append(diagnosis.noise.sentence)
+        notes.append(f"What counts as noise: {diagnosis.noise.sentence}.")
     return Table(
         f"Gap between simulation and measurement; noise {number(diagnosis.noise.rms)}"
         f"{behind(unit)}",
@@ -218,6 +218,8 @@ def ranking_table(diagnosis: Diagnosis, *, count: int | None = None) -> Table:
             )
         )
     mark = " (* the diagnosis)" if diagnosis.effects else ""
+    left = [one for one in diagnosis.candidates[:count] if np.isnan(one.held_out_rms)]
+    why = f"{MISSING}: left after its first iterations, where others were better."
     heads = (
         "forecast",
         "held-out/noise" if has_noise else f"RMS [{diagnosis.output_unit}]",
@@ -234,6 +236,7 @@ def ranking_table(diagnosis: Diagnosis, *, count: int | None = None) -> Table:
             Column("note", is_text=True, is_detail=True),
         ),
         tuple(rows),
+        (why,) if left else (),
     )
 
 

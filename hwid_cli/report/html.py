@@ -8,6 +8,7 @@ templates/uplot.LICENSE).
 
 import base64
 import hashlib
+import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -18,7 +19,7 @@ from types import ModuleType
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
-from markupsafe import Markup
+from markupsafe import Markup, escape
 
 from hwid_cli.records.report import ReportContents
 from hwid_cli.report.charts import chart_data
@@ -33,6 +34,8 @@ _SECTIONS = "hwid_cli.report.sections"
 _STYLES = ("uplot.min.css", "report.css")
 _SCRIPTS = ("uplot.min.js", "report.js")
 _LICENCE = "uplot.LICENSE"
+# A browser would break a line behind the sign of its power.
+_NUMBER = re.compile(r"(\d(?:\.\d+)?e[+-]\d+)")
 
 
 @dataclass(frozen=True)
@@ -98,6 +101,7 @@ def _html(contents: ReportContents, sections: Iterable[Section]) -> str:
     )
     environment.filters["base64"] = lambda png: base64.b64encode(png).decode("ascii")
     environment.filters["chart_data"] = chart_data
+    environment.filters["soft"] = soft
     environment.filters["laid_out"] = dot_drawing
     environment.filters["shown"] = lambda table: shown_part(
         table, is_screen=False, thesis_names=contents.stored.thesis_names
@@ -112,6 +116,27 @@ def _html(contents: ReportContents, sections: Iterable[Section]) -> str:
         script=script,
         policy=_policy(style, script),
     )
+
+
+def soft(text: str) -> Markup:
+    """Let long names of groups go on in the next line, and keep numbers whole.
+
+    Examples
+    --------
+    >>> print(soft("a+b <= 2e-05 m"))
+    a+<wbr>b &lt;= <span class="whole">2e-05</span> m
+    """
+    parts = _NUMBER.split(str(text))
+    if parts[::2] == ["", ""]:
+        # A cell of a table, which no line breaks.
+        return escape(text)
+    names, numbers = parts[::2], parts[1::2]
+    found = Markup("")
+    for name, number in zip(names, [*numbers, ""], strict=True):
+        found += Markup("+<wbr>").join(name.split("+"))
+        if number:
+            found += Markup('<span class="whole">{}</span>').format(number)
+    return found
 
 
 def _policy(style: str, script: str) -> str:

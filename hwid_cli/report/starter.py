@@ -65,4 +65,6 @@ def _kinds(proposal: Proposal) -> str:
     if proposal.parts:
         return "one file, cut into two recordings"
     found = [f"{kind} {', '.join(names)}" for kind, names in proposal.kinds.items()]
+    if "other" in proposal.recipes and found:
+        found.append("other the rest")
     return f"{'; '.join(found) or 'other'} ({proposal.kind_reason})"

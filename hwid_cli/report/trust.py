@@ -9,6 +9,14 @@ from hwid_cli.records.units import behind
 from hwid_cli.report.formats import number
 from hwid_cli.report.table import Table, numbers, texts
 
+_HOW = (
+    "value, rate, frequency: share of the samples at which the fit has seen the like. By "
+    "frequency the whole sample counts as new where one octave of the input is stronger than "
+    "it ever was in the fit, however little that adds: steps of another size or length often "
+    "are new throughout. The band is wider there; held: the share of what was measured that "
+    "lies in it."
+)
+
 
 def band_note(band: Band, unit: str) -> str:
     """Say how wide a band is, and how much of the prediction rests on data."""
@@ -46,5 +54,6 @@ def trust_table(found: Sequence[RecordingTrust]) -> Table:
             *numbers("value", "rate", "frequency", "held", "width", "RMSD"),
         ),
         rows,
+        (_HOW,) if rows else (),
         is_validation=True,
     )

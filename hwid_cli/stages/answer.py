@@ -7,23 +7,19 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from hwid_cli.model.fit import fit
 from hwid_cli.model.scores import fit_percent, rmsd
 from hwid_cli.model.simulate import validation_output
 from hwid_cli.records.answer import ChosenMaps, ModelAnswer
 from hwid_cli.records.experiment import OrderOptions
-from hwid_cli.records.groups import FinalTest
 from hwid_cli.records.model import Fit, HammersteinWiener
 from hwid_cli.records.order import OrderChoice
 from hwid_cli.records.recordings import Recording
 from hwid_cli.records.report import StoredResults
 from hwid_cli.records.results import CrossValidation
-from hwid_cli.stages.compare import linear_options
+from hwid_cli.stages.best_model import best_model
+from hwid_cli.stages.compare import linear_beside
 from hwid_cli.stages.model_views import named_fits
 from hwid_cli.stages.order import recommend_overall
-from hwid_cli.stages.ranking import widest_model
-from hwid_cli.stages.test import best_single
-from hwid_cli.tasks.task import one_thread
 
 
 def model_answer(
@@ -52,7 +48,7 @@ def model_answer(
     if found.model is None:
         return None
     own = found.identified_on
-    linear = _linear(found, stored.recordings)
+    linear = linear_beside(found, stored.recordings)
     final = stored.final_test
     tested = () if final is None else final.tested_on
     unseen = [
@@ -116,57 +112,14 @@ def _chosen(
     named: Mapping[str, Fit],
 ) -> tuple[str, tuple[str, ...]]:
     """Name of the model to take, and the recordings that chose it."""
-    final, search = stored.final_test, stored.search
-    if final is not None:
-        name, chosen_on = _of_final_test(final)
-        if name in named:
-            return name, chosen_on
-    if search is not None and search.chain:
-        last = search.chain_groups[-1]
-        if last.model_name in named:
-            return last.model_name, search.validated_on
-    if crossval is not None:
-        name, chosen_on = _of_crossval(crossval)
-        if name in named:
-            return name, chosen_on
-    usable = {name: one for name, one in named.items() if np.isfinite(one.fit_percent)}
-    if not usable:
-        return "", ()
-    return max(usable, key=lambda name: usable[name].fit_percent), ()
-
-
-def _of_final_test(final: FinalTest) -> tuple[str, tuple[str, ...]]:
-    """The chain's last model, else the best one of a single recording."""
-    known = ~np.isin(final.recordings, final.tested_on)
-    place = final.models.index(final.chain[-1]) if final.chain else best_single(final)
-    if place < 0:
-        return "", ()
-    names = np.array(final.recordings)[known & ~final.is_own[place]]
-    return final.models[place], tuple(names.tolist())
-
-
-def _of_crossval(crossval: CrossValidation) -> tuple[str, tuple[str, ...]]:
-    """The model that covers the largest share of other recordings, of these the best."""
-    place = widest_model(crossval, own_alone=False)
-    if place is None:
-        return "", ()
-    n, b, k = place
-    who = crossval.identified_on[n]
-    others = tuple(one for one in crossval.validated_on if one != who)
-    return f"{who}/{crossval.nb[b]}/{crossval.nk[k]}", others
-
-
-def _linear(found: Fit, recordings: Sequence[Recording]) -> HammersteinWiener | None:
-    """Linear model of the same orders and recordings; None where there is no such thing."""
-    options = found.options
-    if options.input_map == options.output_map == "none" or found.model is None:
-        return None
-    by_name = {one.name: one for one in recordings}
-    if not set(found.identified_on) <= set(by_name):
-        return None
-    own = [by_name[name] for name in found.identified_on]
-    with one_thread():
-        return fit(own, found.model.orders, linear_options(options)).model
+    results = {**stored.results, "crossval": crossval}
+    for stage in ("test", "group", "crossval", "identify"):
+        found = best_model(results, nk_role=stored.nk_role)
+        if found is not None and found.name in named:
+            return found.name, found.chosen_on
+        # Its model is gone, as after other orders: the results before it choose.
+        results.pop(stage, None)
+    return "", ()
 
 
 def _scores(

@@ -5,7 +5,7 @@ group may hold, else all recordings but the model's own. The choice never looks 
 recordings of the final test.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -14,26 +14,29 @@ import numpy as np
 from hwid_cli.model.scores import rmsd
 from hwid_cli.model.simulate import validation_output
 from hwid_cli.records.best_model import BestModel
-from hwid_cli.records.experiment import CrossvalOptions, Experiment
 from hwid_cli.records.groups import FinalTest, GroupSearch
-from hwid_cli.records.model import Fit, Orders
+from hwid_cli.records.model import Fit
 from hwid_cli.records.recordings import Recording
 from hwid_cli.records.results import CrossValidation
+from hwid_cli.stages.compare import linear_beside
 from hwid_cli.stages.order_grid import grid_place
 from hwid_cli.stages.ranking import best_fits, widest_model
-from hwid_cli.stages.test import best_single
-
-# From recordings and orders to their linear model.
-FitLinear = Callable[[Sequence[Recording], Orders], Fit]
+from hwid_cli.stages.test import best_single, taken_model
 
 
-def best_model(experiment: Experiment, results: Mapping[str, Any]) -> BestModel | None:
+def best_model(
+    results: Mapping[str, Any], *, nk_role: str, threshold: float = np.nan
+) -> BestModel | None:
     """Choose the model to take from what has run.
 
     Parameters
     ----------
     results : mapping of str to object
         Of the stages that have run, by their names.
+    nk_role : str
+        What the second axis of the order grid means.
+    threshold : float, [output unit]
+        Of a model that nothing but its own recording judges; the other results have theirs.
 
     Returns
     -------
@@ -42,34 +45,37 @@ def best_model(experiment: Experiment, results: Mapping[str, Any]) -> BestModel 
     """
     search: GroupSearch | None = results.get("group")
     final: FinalTest | None = results.get("test")
-    winner = None if search is None or not search.chain else search.chain_groups[-1]
-    if winner is not None and final is not None and winner.model_name in final.models:
-        return _tested(winner.model_name, final)
-    if final is not None and best_single(final) >= 0:
-        return _tested(final.models[best_single(final)], final)
-    if search is not None and winner is not None:
+    crossval: CrossValidation | None = results.get("crossval")
+    if final is not None:
+        place = taken_model(final)
+        if place >= 0:
+            return _tested(place, final)
+    if search is not None and search.chain:
         return _of_group(search)
-    if results.get("crossval") is not None:
-        return _cross_validated(results["crossval"])
+    if crossval is not None:
+        return _cross_validated(crossval)
     if results.get("identify"):
-        return _own(experiment, results["identify"], results["calibrate"].recordings)
+        unit = results["calibrate"].recordings[0].output_unit
+        return _own(results["identify"], nk_role, unit, threshold)
     return None
 
 
-def _tested(name: str, final: FinalTest) -> BestModel:
+def _tested(place: int, final: FinalTest) -> BestModel:
     """A model on the recordings of the final test, a single one beside a group."""
     is_tested = np.isin(final.recordings, final.tested_on)
     mean = np.mean(final.rmsd[:, is_tested], axis=1)
+    choosers = np.array(final.recordings)[~is_tested & ~final.is_own[place]]
     found = BestModel(
-        name,
+        final.models[place],
         "test",
         final.tested_on,
-        float(mean[final.models.index(name)]),
+        float(mean[place]),
         final.unit,
         final.threshold,
+        tuple(choosers.tolist()),
     )
     single = best_single(final)
-    if "+" not in name or single < 0:
+    if "+" not in found.name or single < 0:
         return found
     return replace(found, single=final.models[single], single_rmsd=float(mean[single]))
 
@@ -93,12 +99,13 @@ def _of_group(search: GroupSearch) -> BestModel:
         float(np.mean(row[is_judge])),
         search.unit,
         search.threshold,
+        search.validated_on,
     )
 
 
 def _cross_validated(crossval: CrossValidation) -> BestModel | None:
     """The widest model besides its own recording, on the recordings that say so."""
-    place = widest_model(crossval, own_alone=True)
+    place = widest_model(crossval)
     if place is None:
         return None
     n, b, k = place
@@ -113,58 +120,55 @@ def _cross_validated(crossval: CrossValidation) -> BestModel | None:
         float(np.mean(crossval.rmsd[n, b, k, rows])),
         crossval.unit,
         crossval.threshold,
+        others,
     )
 
 
 def _own(
-    experiment: Experiment, fits: Sequence[Fit], recordings: Sequence[Recording]
+    fits: Sequence[Fit], nk_role: str, unit: str, threshold: float
 ) -> BestModel | None:
     """The fit that comes closest to its own recording, in percent of what moves there."""
     best = [group[0] for group in best_fits(fits, 1) if group]
     if not best:
         return None
     chosen = max(best, key=lambda one: one.fit_percent)
-    nb, nk = grid_place(chosen, experiment.orders.nk_role)
+    nb, nk = grid_place(chosen, nk_role)
     return BestModel(
         f"{chosen.name}/{nb}/{nk}",
         "own",
         chosen.identified_on,
         chosen.rmsd,
-        recordings[0].output_unit,
-        (experiment.crossval or CrossvalOptions()).threshold,
+        unit,
+        threshold,
         linear_rmsd=chosen.linear_rmsd,
     )
 
 
 def beside_linear(
-    best: BestModel,
-    fits: Mapping[str, Fit],
-    recordings: Sequence[Recording],
-    fit_linear: FitLinear,
+    best: BestModel, fits: Mapping[str, Fit], recordings: Sequence[Recording]
 ) -> BestModel:
     """Put the linear model of the same orders and recordings beside a model.
 
     Parameters
     ----------
     fits : mapping of str to Fit
-        By the names of their models; that of ``best`` among them.
+        By the names of their models.
     recordings : sequence of Recording
         All of them.
 
     Returns
     -------
     BestModel
-        Without a linear model where its own recording judges, or its fit fails.
+        Without a linear model where its own recording judges, or there is none.
     """
     if best.judge == "own" or best.name not in fits:
         return best
-    own = fits[best.name]
-    by_name = {one.name: one for one in recordings}
-    found = fit_linear([by_name[name] for name in own.identified_on], own.orders)
-    if found.model is None:
+    found = linear_beside(fits[best.name], recordings)
+    if found is None:
         return best
+    by_name = {one.name: one for one in recordings}
     deviations = [
-        rmsd(by_name[name].output, validation_output(found.model, by_name[name]))
+        rmsd(by_name[name].output, validation_output(found, by_name[name]))
         for name in best.judged_on
     ]
     return replace(best, linear_rmsd=float(np.mean(deviations)))

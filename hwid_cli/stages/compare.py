@@ -11,7 +11,7 @@ from hwid_cli.model.scores import fit_percent, rmsd
 from hwid_cli.model.simulate import validation_output
 from hwid_cli.records.comparison import Comparison, NamedModel, ShownRecording
 from hwid_cli.records.experiment import OrdersOptions
-from hwid_cli.records.model import Fit, FitOptions, Orders
+from hwid_cli.records.model import Fit, FitOptions, HammersteinWiener, Orders
 from hwid_cli.records.recordings import Recording
 from hwid_cli.stages.identify import fit_grid
 from hwid_cli.tasks.runner import RunSettings, run_tasks
@@ -104,6 +104,30 @@ def fit_linear(
         recordings, grid, linear, lambda tasks: run_tasks(tasks, settings)
     )
     return found
+
+
+def linear_beside(
+    found: Fit, recordings: Sequence[Recording]
+) -> HammersteinWiener | None:
+    """Fit the linear model beside a nonlinear one: same orders, recordings and options.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+        Those of the fit among them.
+
+    Returns
+    -------
+    HammersteinWiener or None
+        None where the model is linear itself, a recording is gone, or the fit fails.
+    """
+    by_name = {one.name: one for one in recordings}
+    has_maps = {found.options.input_map, found.options.output_map} != {"none"}
+    if not has_maps or not set(found.identified_on) <= set(by_name):
+        return None
+    own = [by_name[name] for name in found.identified_on]
+    with one_thread():
+        return fit(own, found.orders, linear_options(found.options)).model
 
 
 def _outputs(models: Sequence[NamedModel], recording: Recording) -> list[np.ndarray]:

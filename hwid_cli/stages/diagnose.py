@@ -496,21 +496,25 @@ def _draw(folder: Path, diagnosis: Diagnosis, about: str) -> list[str]:
 
 
 def _plan(planning: Planning) -> tuple[StagePlan, ...]:
-    """What a diagnosis takes while single effects explain what is missing."""
+    """What a diagnosis takes: with a single effect, and with all rounds of its search."""
     given = given_by(planning.experiment, planning.recordings, planning.logs)
     n = len(given.recordings)
     what = f"{counted(n, 'recording')}, as many effects as diagnose.effects allows"
     if not planning.cost.rounds:
         return (StagePlan(NAME, what, n, None, nan, 1e6),)
-    seconds, n_tasks = time_diagnosis(
-        lambda run, on_round: _diagnosed(given, run, on_round), n
+    found = time_diagnosis(
+        lambda run, on_round: _diagnosed(given, run, on_round),
+        n,
+        given.options.max_effects,
     )
-    what = f"{counted(n, 'recording')} x {counted(n_tasks, 'effect')}"
-    if n_tasks and given.options.max_effects > 1:
-        what += "; up to ten times as long where one is not all"
-    if not n_tasks:
+    what = f"{counted(n, 'recording')} x {counted(found.n_tasks, 'effect')}"
+    if not found.n_tasks:
         what = f"{counted(n, 'recording')}; no effect is looked for"
-    return (StagePlan(NAME, what, n_tasks, None, seconds / planning.workers, 1e6),)
+    least, most = (
+        one / planning.workers for one in (found.seconds, found.most_seconds)
+    )
+    why = "one effect is not enough"
+    return (StagePlan(NAME, what, found.n_tasks, None, least, 1e6, most, why),)
 
 
 STAGE = Stage(

@@ -2,15 +2,26 @@
 
 What a candidate takes depends on the machine that is diagnosed: how often it sticks, hits
 a stop or is reversed. So the forecast does what the diagnosis does first, up to the
-screening of single effects, and times every fourth task of that. Whether sets of several
-effects follow is known only then: they are not part of the forecast.
+screening of single effects, and times every fourth task of that. How often they are
+screened, and whether sets of several effects follow, is known only then: the forecast is
+a range, from one screening to all rounds that the search may take.
 """
 
+import math
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
-from hwid_cli.diagnosis.rounds import DiagnosisTask, OnRound, RunTasks
+from hwid_cli.diagnosis.rounds import (
+    LIKELY_PAIRS,
+    MOST_PARENTS,
+    MOST_SCREENINGS,
+    SCREENED_ON_TOP,
+    DiagnosisTask,
+    OnRound,
+    RunTasks,
+)
 from hwid_cli.records.programs import SimulatorRun
 
 # Of the tasks of the screening, [tasks].
@@ -18,6 +29,8 @@ _EACH = 4
 # Time of all single effects against that of their screening: the promising ones are
 # fitted on whole recordings, [-].
 _SINGLE_EFFECTS = 1.2
+# A set of effects against a single one: more parameters, more of the motion, [-].
+_SET_OF_EFFECTS = 1.5
 # Runs of the user's simulation with a candidate inside, for each recording, [-].
 _CONFIRMING_RUNS = 9
 # A simulation of the user's own is not run for longer to say how long it takes, [s].
@@ -80,22 +93,38 @@ class _Sampler:
         return result
 
 
-def time_diagnosis(diagnose: Diagnose, n_recordings: int) -> tuple[float, int]:
-    """Time the beginning of a diagnosis.
+@dataclass(frozen=True)
+class DiagnosisTime:
+    """How long a diagnosis takes on one core.
+
+    Parameters
+    ----------
+    seconds : float, [s]
+        Where a single effect is enough and shows at once; NaN where a simulation of the
+        user's own takes so long that even its beginning does.
+    most_seconds : float, [s]
+        With all rounds of the search.
+    n_tasks : int, [-]
+        Candidates that are screened; 0 where nothing is searched for.
+    """
+
+    seconds: float
+    most_seconds: float
+    n_tasks: int
+
+
+def time_diagnosis(
+    diagnose: Diagnose, n_recordings: int, max_effects: int
+) -> DiagnosisTime:
+    """Time the beginning of a diagnosis, and count the rounds that may follow.
 
     Parameters
     ----------
     diagnose : callable
         Runs it with what runs its tasks and what is told of its rounds.
     n_recordings : int, [-]
-
-    Returns
-    -------
-    seconds : float, [s]
-        Of the diagnosis with single effects, on one core; NaN where a simulation of the
-        user's own takes so long that even its beginning does.
-    n_tasks : int, [-]
-        Candidates that are screened; 0 where nothing is searched for.
+    max_effects : int, [-]
+        Of the largest set that is searched for.
     """
     sampler = _Sampler()
     start = time.process_time()
@@ -103,12 +132,23 @@ def time_diagnosis(diagnose: Diagnose, n_recordings: int) -> tuple[float, int]:
         diagnose(sampler.run, sampler.on_round)
     except _Enough:
         if not sampler.n_tasks:
-            return float("nan"), 0
+            return DiagnosisTime(math.nan, math.nan, 0)
     spent = time.process_time() - start - sampler.sampling
     confirming = 0.0
     if sampler.runs and sampler.n_tasks:
         each = sampler.run_seconds / sampler.runs
         confirming = _CONFIRMING_RUNS * n_recordings * each
-    rest = _SINGLE_EFFECTS * sampler.screening
-    seconds = spent + sampler.run_seconds + rest + confirming + _FIGURES_S
-    return seconds, sampler.n_tasks
+    fixed = spent + sampler.run_seconds + confirming + _FIGURES_S
+    single = _SINGLE_EFFECTS * sampler.screening
+    rounds = 1 + MOST_SCREENINGS
+    most = rounds * single * (1.0 + _sets_for_one(sampler.n_tasks, max_effects))
+    return DiagnosisTime(fixed + single, fixed + most, sampler.n_tasks)
+
+
+def _sets_for_one(n_tasks: int, max_effects: int) -> float:
+    """Work on all sets of several effects against that on all single ones, [-]."""
+    if n_tasks == 0 or max_effects < 2:
+        return 0.0
+    on_top = MOST_PARENTS * min(SCREENED_ON_TOP, n_tasks - 1) * (max_effects - 1)
+    pairs = min(LIKELY_PAIRS, n_tasks * (n_tasks - 1) // 2)
+    return _SET_OF_EFFECTS * (on_top + pairs) / n_tasks

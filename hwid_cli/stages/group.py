@@ -771,23 +771,27 @@ def _plan(planning: Planning) -> tuple[StagePlan, ...]:
         is_ordered=experiment.fit.join == "concatenate",
     )
     n = int(np.median([one.n_samples for one in usable] or [0]))
-    fits = sum(bounds) * len(candidate_orders(experiment.orders))
-    seconds = (
-        sum(
-            count * group_grid_seconds(planning.cost, n, experiment, level)
-            for level, count in enumerate(bounds, start=2)
+    n_orders = len(candidate_orders(experiment.orders))
+    fits = sum(bounds) * n_orders
+    of_levels = [
+        count
+        * (
+            group_grid_seconds(planning.cost, n, experiment, level)
+            + SECONDS_PER_SIMULATED_SAMPLE * n * n_validate * n_orders
+            + TASK_SECONDS * (n_orders + n_validate)
         )
-        + SECONDS_PER_SIMULATED_SAMPLE * n * n_validate * fits
-        + TASK_SECONDS * (fits + sum(bounds) * n_validate)
-    )
+        / planning.workers
+        for level, count in enumerate(bounds, start=2)
+    ]
     plan = StagePlan(
         NAME,
         f"at most {sum(bounds)} groups ({' + '.join(map(str, bounds))}), {fits} fits",
         fits,
         None,
-        seconds / planning.workers,
+        sum(of_levels[:1]),
         FIT_BYTES * fits + PAIR_BYTES * sum(bounds) * n_validate,
-        is_bound=True,
+        sum(of_levels),
+        "the search goes on to the last level",
     )
     return (plan,)
 

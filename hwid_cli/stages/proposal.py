@@ -12,6 +12,7 @@ from hwid_cli.errors import HwidError
 from hwid_cli.records.experiment import CalibrateOptions
 from hwid_cli.records.recordings import KINDS, RawRecording
 from hwid_cli.records.starter import Proposal
+from hwid_cli.records.units import behind
 from hwid_cli.stages.calibrate import calibrate_all
 
 # Words in file names, German and English; the first kind that has one of them is it.
@@ -83,6 +84,7 @@ def propose(
     )
     memory = int(np.median([signs.memory_samples(raw.output) for raw in raws]))
     threshold = float(f"{_GOOD_SHARE * swing:.1g}")
+    unit = behind(raws[0].output_unit)
     return Proposal(
         kinds=_patterns(kinds, names),
         kind_reason=kind_reason,
@@ -96,7 +98,7 @@ def propose(
             else "enough for a drive with a spring; raise them after a look"
         ),
         threshold=threshold,
-        threshold_reason=f"5 % of the usual swing of the output, {swing:.3g}",
+        threshold_reason=f"5 % of the usual swing of the output, {swing:.3g}{unit}",
         sample_time_s=raws[0].sample_time_s,
         exclude=tuple(glob.escape(name) for name in excluded),
         parts=parts,

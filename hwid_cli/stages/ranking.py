@@ -105,17 +105,11 @@ def _widest_first(score: ModelScore) -> tuple[int, bool, float]:
     return -score.coverage, not np.isfinite(score.rmsd), score.rmsd
 
 
-def widest_model(
-    crossval: CrossValidation, *, own_alone: bool
-) -> tuple[int, int, int] | None:
+def widest_model(crossval: CrossValidation) -> tuple[int, int, int] | None:
     """Choose the model that covers the largest share of the recordings besides its own.
 
-    Of equal ones the one with the lowest geometric mean of its RMSD there.
-
-    Parameters
-    ----------
-    own_alone : bool
-        Whether its own recording judges a model that nothing else was validated on.
+    Of equal ones the one with the lowest geometric mean of its RMSD there. Its own
+    recording judges a model that nothing else was validated on.
 
     Returns
     -------
@@ -126,7 +120,7 @@ def widest_model(
     found = []
     for n, b, k in np.ndindex(crossval.rmsd.shape[:3]):
         is_other = names != crossval.identified_on[n]
-        judges = ~is_other if own_alone and not is_other.any() else is_other
+        judges = is_other if is_other.any() else ~is_other
         values = crossval.rmsd[n, b, k][judges]
         if values.size and np.isfinite(values).all():
             share = float(np.mean(values < crossval.threshold))

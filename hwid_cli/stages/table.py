@@ -45,7 +45,7 @@ that the data show by themselves. Writes order.csv. Where the section 'order'
 names maps or units, fits every pair of them with these orders and recommends
 one in the same way; writes maps.csv.
 """,
-    "group": """Join recordings, level by level, into models that cover more of them.
+    "group": """Join recordings into models that cover more, level by level.
 
 Writes the search to results.h5:/group and groups.csv, and shows the coverage
 of every group that was tried.

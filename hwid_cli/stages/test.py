@@ -246,7 +246,7 @@ def input_distances(inputs: list[np.ndarray]) -> np.ndarray:
 
 
 NAME = "test"
-STAGE_VERSION = 3
+STAGE_VERSION = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -558,18 +558,34 @@ def _compute(given: _Given, runner: Runner) -> FinalTest:
     with runner.tasks(len(tasks), "models", part="bands") as settings:
         found = [item.result for item in run_tasks(tasks, settings)]
     rows = tuple(row for one in found for row in one.rows)
-    shown = found[-1].shown if found else None
+    # The first one is the model to take.
+    shown = found[0].shown if found else None
     return replace(final, trust=TrustOnTests(rows, shown))
 
 
 def _trust_tasks(given: _Given, final: FinalTest) -> list[Task]:
     """List the tasks: bands of each model that the test recommends."""
-    asked = dict.fromkeys((*final.smallest_set, *final.chain))
+    taken = taken_model(final)
+    first = () if taken < 0 else (final.models[taken],)
+    asked = dict.fromkeys((*first, *final.smallest_set, *final.chain))
     fits = dict(zip(given.models.names, given.models.fits, strict=True))
     return [
         trust_task(name, fits[name], given.recordings, given.tested_on)
         for name in asked
     ]
+
+
+def taken_model(final: FinalTest) -> int:
+    """Place of the model to take: the chain's last, else the best of a single recording.
+
+    Returns
+    -------
+    int, [-]
+        -1 where there is none.
+    """
+    if final.chain:
+        return final.models.index(final.chain[-1])
+    return best_single(final)
 
 
 def _write_csv(

@@ -514,6 +514,49 @@ def blanks_in_brackets(folder):
         np.savetxt(path, table, header="t [s] i [A] x [mm]", fmt="%.12g")
 
 
+def excel_of_texts(folder):
+    """openpyxl: a sheet about the test in front, numbers as texts with a decimal comma."""
+    import openpyxl
+
+    for one in drives():
+        book = openpyxl.Workbook()
+        book.active.append(["Prüfling", "Achse 7"])
+        sheet = book.create_sheet("Daten")
+        sheet.append([f"Messung {one.name}"])
+        sheet.append([])
+        sheet.append(["Zeit", "Sollstrom", "Iststrom", "Lage"])
+        sheet.append(["ms", "A", "A", "mm"])
+        for t, u, y in zip(one.time, one.current, one.position, strict=True):
+            sheet.append([_comma(value) for value in (1e3 * t, round(u, 1), u, y)])
+        book.save(folder / f"{one.name}.xlsx")
+
+
+def tdms_of_two_groups(folder):
+    """npTDMS: plugs by their names and units, housekeeping at a tenth of the rate."""
+    from nptdms import ChannelObject, TdmsWriter
+
+    for one in drives():
+
+        def about(unit, step=STEP_S):
+            return {
+                "wf_increment": step,
+                "wf_start_offset": 0.0,
+                "wf_start_time": np.datetime64("2026-03-02T10:00:00"),
+                "unit_string": unit,
+            }
+
+        fine = 1e3 * one.position
+        warm = 23.0 + 1e-3 * np.arange(N // 10)
+        with TdmsWriter(folder / f"{one.name}.tdms") as writer:
+            writer.write_segment(
+                [
+                    ChannelObject("Fast", "Amp Out", 1e3 * one.current, about("mA")),
+                    ChannelObject("Fast", "Encoder", fine, about("um")),
+                    ChannelObject("Slow", "PT100", warm, about("degC", 10 * STEP_S)),
+                ]
+            )
+
+
 _SI = ("s", "A", "mm")
 LAYOUTS = {
     "tektronix": Layout(tektronix, "TIME", "CH1", "CH2", _SI),
@@ -565,6 +608,15 @@ LAYOUTS = {
     "excel": Layout(excel, "Zeit", "Strom", "Weg", ("ms", "A", "mm")),
     "excel with dates": Layout(
         excel_with_dates, "Zeitstempel", "I_q [A]", "pos [mm]", _SI
+    ),
+    "excel of texts": Layout(
+        excel_of_texts, "Zeit", "Iststrom", "Lage", ("ms", "A", "mm"), exact=1e-6
+    ),
+    "tdms of two groups": Layout(
+        *(tdms_of_two_groups, "Fast/time", "Fast/Amp Out", "Fast/Encoder"),
+        ("s", "mA", "um"),
+        scale=(1e-3, 1e-3),
+        exact=1e-9,
     ),
     "ods": Layout(ods, "t [s]", "cmd_current [A]", "act_pos [mm]", _SI),
     "xls": Layout(xls, "t [s]", "cmd_current [A]", "act_pos [mm]", _SI),

@@ -1,3 +1,4 @@
+import json
 import re
 
 import h5py
@@ -223,3 +224,17 @@ def test_a_start_in_equilibrium_or_fitted_gives_no_warning(tmp_path):
     later = drive_whose_sines_begin(tmp_path / "later", 5)
     later.write_text(CONFIG.replace("max_effects: 1", "initial_state: held"))
     assert check(later, "--no-timing").stderr == ""
+
+
+def test_programs_read_the_plan_from_stdout_and_people_from_stderr(simulated):
+    config, out = simulated
+    result = CliRunner().invoke(
+        main, ["check", str(config), "--out", str(out), "--no-timing", "--json"]
+    )
+    document = json.loads(result.stdout)
+
+    assert "What would run" in result.stderr
+    stages = {one["stage"]: one for one in document["stages"]}
+    assert stages["identify"]["cached"] == stages["identify"]["tasks"] > 0
+    assert all(one["seconds"] <= one["most_seconds"] for one in stages.values())
+    assert document["recordings"][0]["n_used"] > 0

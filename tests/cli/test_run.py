@@ -167,3 +167,24 @@ def test_a_stage_that_fails_still_leaves_a_report_of_those_before(
 
     assert result.exit_code != 0
     assert (out / "report.html").is_file()
+
+
+def test_a_stage_ends_with_the_same_model_as_the_whole_run(config, hwid):
+    config.write_text(
+        config.read_text().replace("identify: {}", "identify: {recordings: [step_02]}")
+        + "test: {recordings: [sine_12]}\n"
+    )
+
+    def said(result):
+        assert result.exit_code == 0, result.output
+        return re.search(
+            r"\n  best model  .*?(?=\n  (?:page|tables))", result.stdout, re.S
+        )[0]
+
+    after_run = said(hwid("run"))
+    assert "never used (sine_12)" in after_run
+    # The results of the test are there and hold: crossval says what they say.
+    assert said(hwid("crossval")) == after_run
+    # Where they do not hold any more, the recordings of crossval judge.
+    config.write_text(config.read_text().replace("threshold: 0.01", "threshold: 0.02"))
+    assert "never used" not in said(hwid("crossval"))

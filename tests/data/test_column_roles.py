@@ -126,3 +126,35 @@ def test_a_counter_of_samples_is_no_time_where_an_interval_is_stated():
     interval = FoundColumn("Increment", "x", np.array([0.37]), None, "s")
     found = guess_time([column("time", 1.0 * np.arange(N)), interval])
     assert (found.role, found.sample_time_s) == (None, 0.37)
+
+
+def test_a_unit_says_more_than_a_plug_of_an_instrument():
+    first, last, found = guessed(
+        ("Amp Out", CURRENT, "mA"), ("Encoder In", POSITION, "um")
+    )
+    assert (first, last) == ("Amp Out", "Encoder In")
+    assert found.reasons["input"] == "by its unit, mA"
+
+
+def test_an_array_of_structures_is_one_recording_and_the_way_to_all_is_said():
+    found = []
+    for number in (1, 2, 3):
+        voltage, _, _, position = plant(number)
+        found += [
+            (f"run({number}).u", voltage, ""),
+            (f"run({number}).y", position, ""),
+        ]
+    first, last, guess = guessed(*found)
+    assert (first, last) == ("run(1).u", "run(1).y")
+    (note,) = guess.notes
+    assert note.startswith("'run' is an array of 3 structures")
+    assert "for k = 1:numel(run), s = run(k); save(" in note
+
+
+def test_signals_of_one_recording_in_an_array_are_no_recordings():
+    *_, guess = guessed(
+        ("u", VOLTAGE, "", "signals(1).values"),
+        ("y", POSITION, "", "signals(2).values"),
+        ("i", CURRENT, "", "signals(3).values"),
+    )
+    assert not [note for note in guess.notes if "array" in note]

@@ -46,8 +46,10 @@ def test_a_column_in_other_units_is_the_same_one(plant):
         (lambda t: np.sin(2 * np.pi * 5 * t), False, True),
         (lambda t: np.sin(2 * np.pi * 5 * np.maximum(t - 0.2, 0.0)), False, True),
         (lambda t: np.random.default_rng(2).standard_normal(t.size), False, False),
+        (lambda t: np.interp(t, [0.1, 0.105, 0.9, 0.905], [0, 3, 3, 0]), True, False),
+        (lambda t: np.sign(np.sin(2 * np.pi * 10 * t)), False, False),
     ],
-    ids=["step", "sine", "sine after a rest", "noise"],
+    ids=["step", "sine", "sine after a rest", "noise", "slow flanks", "square wave"],
 )
 def test_kinds_of_inputs_are_told_from_their_numbers(signal, stepwise, sine):
     values = signal(np.arange(1000) / 1000)

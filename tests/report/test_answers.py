@@ -193,7 +193,7 @@ def test_many_recordings_are_those_that_are_worst(contents):
 def test_where_to_trust_it_is_said(contents):
     inside = answered(contents, input_range=(-1.5, 2.0), beyond=np.array([0.0]))
     assert plain(inside.details[1]).endswith(
-        "Trust it for inputs from -1.5 A to 2 A, which its fit has visited."
+        "Its fit has visited inputs from -1.5 A to 2 A."
     )
     outside = answered(contents, beyond=np.array([0.25]))
     assert "leaves that range for 25 % of its samples" in plain(outside.details[1])

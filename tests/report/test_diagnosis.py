@@ -1,6 +1,7 @@
 import re
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from hwid_cli.records.diagnosis import FittedEffect, FittedParameter, NextExperiment
@@ -125,6 +126,14 @@ def test_notes_are_a_column_that_a_page_has_room_for():
     assert table.heads[-1] == "note"
     assert table.rows[-1][-1] == "not fitted"
     assert "not fitted" not in as_text([table])
+
+
+def test_what_was_not_fitted_to_the_end_is_explained_where_there_is_such_a_row():
+    table = ranking_table(named())
+    (why,) = table.notes
+    assert why.startswith("-: left after its first iterations")
+    fitted = [one for one in named().candidates if np.isfinite(one.held_out_rms)]
+    assert ranking_table(replace(named(), candidates=tuple(fitted))).notes == ()
 
 
 def test_every_recording_has_its_row():

@@ -6,9 +6,10 @@ import pytest
 from hwid_cli.records.next import InputMap, NextRecordings, ProposedRecording
 from hwid_cli.records.report import ReportContents, StoredResults
 from hwid_cli.records.trust import RecordingTrust, ShownBand, TrustOnTests
+from hwid_cli.report.bands import band_chart
 from hwid_cli.report.figures.next import band_figure, visited_figure
 from hwid_cli.report.page import images_of
-from hwid_cli.report.sections.next import trust_section
+from hwid_cli.report.sections.next import trust_drawings, trust_section
 from hwid_cli.report.table import Table, Text
 from tests.report.report_examples import final_test
 
@@ -71,14 +72,55 @@ def test_bands_and_proposals_are_tables_with_a_figure_each():
     tables = [one for one in blocks if isinstance(one, Table)]
     assert tables[0].rows[0][:2] == ("a/1/2", "step_14")
     assert tables[1].rows[0][1] == "step_p100"
-    assert [one.file for one in images_of(blocks)] == [
-        "next/band.png",
-        "next/visited.png",
-    ]
+    assert [one.file for one in images_of(blocks)] == ["next/visited.png"]
     assert "New: b." in words(blocks)
-    sentence = next(one.sentence for one in blocks if one.kind == "figures")
-    assert "holds 93% of what was measured" in sentence
-    assert "60% of the samples rest on data" in sentence
+    (chart,) = [one for one in blocks if one.kind == "chart"]
+    assert "holds 93% of what was measured" in chart.sentence
+    assert "the values of 90% of the samples, the rates of 80% and" in chart.sentence
+    assert "the frequencies of 70%" in chart.sentence
+    assert "one octave of the input is stronger" in tables[0].notes[0]
+
+
+@pytest.mark.usefixtures("blank_figures")
+def test_the_band_lies_beside_the_page_as_a_file():
+    stored = StoredResults(
+        *("a", "{}", "poles"),
+        results={"test": replace(final_test(), trust=TrustOnTests((ROW,), SHOWN))},
+    )
+    (drawing,) = trust_drawings(ReportContents(stored))
+    assert drawing.file == "next/band.png"
+    assert drawing.draw().axes[0].get_title(loc="left") == "a/1/2 on step_14"
+    assert trust_drawings(ReportContents(replace(stored, results={}))) == []
+
+
+def test_the_chart_shades_what_rests_on_data_and_says_where_nothing_does():
+    chart = band_chart(SHOWN, "How it did.")
+    (panel,) = chart.panels
+    assert panel.spans == ((0.0, pytest.approx(TIME[SHOWN.is_inside][-1])),)
+    band, measured, predicted = panel.curves
+    np.testing.assert_array_equal(band.values, SHOWN.lower)
+    np.testing.assert_array_equal(band.upper, SHOWN.upper)
+    np.testing.assert_array_equal(measured.values, SHOWN.measured)
+    np.testing.assert_array_equal(predicted.values, SHOWN.output)
+    assert "Shaded: rests on data" in chart.sentence
+
+    nothing = band_chart(replace(SHOWN, is_inside=TIME < 0), "How it did.")
+    assert nothing.panels[0].spans == ()
+    assert "nothing is shaded" in nothing.sentence
+
+
+def test_many_short_stretches_are_cut_to_the_longest():
+    flags = np.arange(2000) % 4 != 0
+    flags[500:600] = True
+    many = replace(
+        SHOWN,
+        time_s=np.arange(2000.0),
+        **{name: np.zeros(2000) for name in ("measured", "output", "lower", "upper")},
+        is_inside=flags,
+    )
+    spans = band_chart(many, "").panels[0].spans
+    assert len(spans) == 60
+    assert (497.0, 599.0) in spans
 
 
 def test_enough_is_said_without_a_table():

@@ -1,18 +1,20 @@
 """The model to take, from tables whose answer is seen at a glance."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
+from scipy.optimize import least_squares
 
-from hwid_cli.records.experiment import Experiment
+from hwid_cli.model.fit import fit
 from hwid_cli.records.groups import FinalTest
-from hwid_cli.records.model import Fit, FitOptions, Orders
+from hwid_cli.records.model import FitOptions, Orders
 from hwid_cli.records.recordings import Recording
 from hwid_cli.records.results import CrossValidation
-from hwid_cli.stages.best_model import beside_linear, best_model
+from hwid_cli.stages.best_model import beside_linear
+from hwid_cli.stages.best_model import best_model as choose
 
-EXPERIMENT = Experiment(name="e", source="e.yaml")
+
+def best_model(results):
+    return choose(results, nk_role="poles")
 
 
 def crossval(rmsd, identified_on=("a", "b"), validated_on=("a", "b", "c")):
@@ -23,11 +25,11 @@ def crossval(rmsd, identified_on=("a", "b"), validated_on=("a", "b", "c")):
     )
 
 
-def final(models, rmsd, is_own):
+def final(models, rmsd, is_own, chain=()):
     n, m = len(models), 4
     return FinalTest(
         models=models,
-        chain=models[-1:],
+        chain=chain,
         recordings=("a", "b", "c", "d"),
         tested_on=("c", "d"),
         rmsd=np.array(rmsd),
@@ -48,7 +50,6 @@ def final(models, rmsd, is_own):
 def test_its_own_recording_does_not_choose_a_model():
     # a/1/1 is perfect at home and bad elsewhere; b/1/2 is below the threshold on all.
     found = best_model(
-        EXPERIMENT,
         {
             "crossval": crossval(
                 [[[0.0, 3.0, 3.0], [0.1, 3.0, 3.0]], [[2.0, 0.1, 0.2], [0.9, 0.8, 0.7]]]
@@ -63,7 +64,6 @@ def test_its_own_recording_does_not_choose_a_model():
 
 def test_a_model_without_an_rmsd_is_not_taken():
     found = best_model(
-        EXPERIMENT,
         {"crossval": crossval([[[0, np.nan, 0.1]], [[0.9, 0.0, 0.9]]])},
     )
     assert found.name == "b/1/1"
@@ -75,7 +75,7 @@ def test_test_recordings_judge_and_do_not_choose():
     table = final(
         models, [[0, 0.5, 3, 5], [0.9, 0, 1, 1]], [[1, 0, 0, 0], [0, 1, 0, 0]]
     )
-    found = best_model(EXPERIMENT, {"test": table})
+    found = best_model({"test": table})
 
     assert (found.name, found.judge) == ("a/1/1", "test")
     assert found.rmsd == pytest.approx(4.0)
@@ -85,33 +85,65 @@ def test_test_recordings_judge_and_do_not_choose():
 def test_a_group_stands_beside_the_best_single_model():
     models = ("a/1/1", "a+b/1/1")
     table = final(
-        models, [[0, 0.5, 3, 5], [0.1, 0.1, 1, 2]], [[1, 0, 0, 0], [1, 1, 0, 0]]
+        models,
+        [[0, 0.5, 3, 5], [0.1, 0.1, 1, 2]],
+        [[1, 0, 0, 0], [1, 1, 0, 0]],
+        models[1:],
     )
-    group = SimpleNamespace(model_name="a+b/1/1")
-    search = SimpleNamespace(chain=("a+b",), chain_groups=(group,))
-    found = best_model(EXPERIMENT, {"test": table, "group": search})
+    found = best_model({"test": table})
 
     assert (found.name, found.single) == ("a+b/1/1", "a/1/1")
     assert (found.rmsd, found.single_rmsd) == (1.5, 4.0)
 
 
 def test_nothing_is_recommended_where_nothing_has_run():
-    assert best_model(EXPERIMENT, {"calibrate": None}) is None
+    assert best_model({"calibrate": None}) is None
+
+
+def saturated(name, largest):
+    """A lag behind a saturation, by a loop of its own."""
+    rng = np.random.default_rng(len(name) + int(10 * largest))
+    current = np.repeat(largest * rng.uniform(-1, 1, 30), 12)
+    state, output = 0.0, []
+    for one in current:
+        output.append(state)
+        state = 0.8 * state + 0.2 * np.clip(one, -1.0, 1.0)
+    return Recording(name, current, np.array(output), 1e-3)
 
 
 def test_the_linear_model_is_of_the_same_recordings_and_judged_on_the_same():
-    u = np.sin(np.arange(50.0))
-    recordings = [Recording(name, u, k * u, 0.1) for k, name in enumerate("abc", 1)]
-    asked = []
+    recordings = [saturated("a", 2.0), saturated("b", 3.0), saturated("c", 4.0)]
+    options = FitOptions(
+        input_map="saturation", output_map="none", initial_state="zero"
+    )
+    fits = {"a/1/1": fit(recordings[:1], Orders(1, 1, 1), options)}
+    found = best_model({"crossval": crossval([[[0.0, 0.5, 0.5]]], ("a",))})
+    after = beside_linear(found, fits, recordings)
 
-    def fit_linear(chosen, orders):
-        asked.append(([one.name for one in chosen], orders))
-        return Fit(("a",), orders, FitOptions(), None, "failed", "no")
+    # y[k] = p y[k-1] + b u[k-1] by hand: the best p and b on a alone, judged on b and c.
+    def simulated(p, b, u):
+        y = np.zeros(u.size)
+        for k in range(1, u.size):
+            y[k] = p * y[k - 1] + b * u[k - 1]
+        return y
 
-    found = best_model(EXPERIMENT, {"crossval": crossval([[[0.0, 0.5, 0.5]]], ("a",))})
-    fits = {"a/1/1": Fit(("a",), Orders(1, 1, 1), FitOptions(), None, "failed", "")}
-    after = beside_linear(found, fits, recordings, fit_linear)
+    best = least_squares(
+        lambda x: simulated(*x, recordings[0].input) - recordings[0].output, [0.5, 0.1]
+    )
+    by_hand = [
+        np.sqrt(np.mean((simulated(*best.x, one.input) - one.output) ** 2))
+        for one in recordings[1:]
+    ]
+    assert after.linear_rmsd == pytest.approx(np.mean(by_hand), rel=1e-3)
 
-    assert asked == [(["a"], Orders(1, 1, 1))]
-    # A linear fit that fails is no reason to say nothing.
-    assert after == found
+
+def test_a_linear_fit_that_fails_is_no_reason_to_say_nothing():
+    recordings = [saturated("a", 2.0), saturated("b", 3.0), saturated("c", 4.0)]
+    found = best_model({"crossval": crossval([[[0.0, 0.5, 0.5]]], ("a",))})
+    linear = FitOptions(input_map="none", output_map="none")
+    fits = {"a/1/1": fit(recordings[:1], Orders(1, 1, 1), linear)}
+    gone = {"a/1/1": fit([saturated("z", 2.0)], Orders(1, 1, 1), FitOptions(units=3))}
+
+    assert beside_linear(found, fits, recordings) == found
+    assert beside_linear(found, gone, recordings) == found
+    assert beside_linear(found, {}, recordings) == found

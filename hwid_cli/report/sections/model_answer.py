@@ -130,10 +130,7 @@ def _orders(found: ModelAnswer) -> str:
 def _trust(found: ModelAnswer) -> str:
     low, high = found.input_range
     unit = found.model.input_unit
-    text = (
-        f"Trust it for inputs from {with_unit(low, unit)} to {with_unit(high, unit)}, which "
-        "its fit has visited"
-    )
+    text = f"Its fit has visited inputs from {with_unit(low, unit)} to {with_unit(high, unit)}"
     if found.beyond.size and float(found.beyond.max()) > _FEW:
         worst = int(np.argmax(found.beyond))
         text += (
