@@ -262,6 +262,7 @@ _SUFFIXES = {
     "meters": "m",
     "metres": "m",
 }
+_LONGEST_FIRST = sorted(_SUFFIXES.items(), key=lambda pair: -len(pair[0]))
 _BRACKET = re.compile(r"([\[(])\s*([^\])]*?)\s*[\])]")
 _BEHIND = re.compile(r"(?:/| in )\s*([A-Za-zµ°%]{1,4})$")
 # Arguments of a function, not units: x[k], i(t).
@@ -297,7 +298,7 @@ def split_unit(title: str) -> tuple[str, str]:
     worded = _BEHIND.search(title)
     if worded and worded[1] in _SUFFIXES:
         return title[: worded.start()], worded[1]
-    for suffix, unit in sorted(_SUFFIXES.items(), key=lambda pair: -len(pair[0])):
+    for suffix, unit in _LONGEST_FIRST:
         if title.endswith(f"_{suffix}") and len(title) > len(suffix) + 1:
             return title[: -len(suffix) - 1], unit
     return title, ""
