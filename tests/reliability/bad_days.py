@@ -49,7 +49,7 @@ CODES = (0, 1, 129, 130, 143, -signal.SIGKILL)
 # Processor time of the first run where nothing stops it, by what its folder holds at the
 # start, and of a start of Python; faults come within it, [s].
 WORK_S = {"results": 0.3, "cache": 0.5, "nothing": 1.0}
-START_S, PATIENCE_S = 3.0, 300
+START_S, PATIENCE_S = 3.0, 1800
 # What is started may still run so long after its end; how often we look, [s].
 LINGER_S, _LOOK_S = 5.0, 0.01
 TOLD_EVERY, RUNS_ON = 25, "something runs on"

@@ -91,7 +91,9 @@ class WarmStarter:
 
     def __exit__(self, *_: object) -> None:
         self._server.stdin.close()
-        self._server.wait(timeout=60)
+        # It may still wait for a run that nobody asks for any more.
+        self._server.kill()
+        self._server.wait()
         self._server.stdout.close()
 
     def start(self, words: list[str], faults: dict[str, str]) -> WarmProcess:
