@@ -16,7 +16,7 @@ LOCKED_INSTALL = $(BIN)/python -m pip install --quiet --disable-pip-version-chec
 
 .DEFAULT_GOAL := help
 .PHONY: help install run test test-all check audit format smoke clean reliability \
-        bench bench-beyond bench-campaign bench-growth bench-maps bench-page bench-rounds bench-search bench-starts bench-wide bench-advice docs \
+        bench bench-beyond bench-campaign bench-growth bench-maps bench-page bench-rounds bench-search bench-size bench-starts bench-wide bench-advice docs \
         bench-real bench-trust bench-next scale \
         wheel lowest away-run lock sbom licences simulate calibrate identify crossval group test-stage steps model1 model2 \
         reproduction thesis chapter2 hsm150 diagnose gun real effects drive-source model-schema golden export-check laws blind machines
@@ -162,6 +162,9 @@ bench-page: $(DEV)  ## the page of 43 recordings: seconds, bytes, first paint: t
 
 bench-wide: $(DEV)  ## many kinds of plants against fits that start at the true parameters
 	@$(BENCH).bench_wide
+
+bench-size: $(DEV)  ## a folder of 10 000 recordings of which two are identified: two minutes
+	@$(BENCH).bench_size
 
 scale: $(DEV)  ## what a cluster costs, and docs/scale.md
 	@$(BENCH).bench_dask --json docs/scale.json

@@ -26,6 +26,8 @@ Handler = Callable[[int, FrameType | None], None]
 KEPT_IN = "hwid_cli.kept_in"
 # Time to unwind, [s]; the promise is that the process has ended after two seconds.
 GRACE_S = 0.8
+# After a stop that was lost it is tried again, [s].
+_AGAIN_S = 0.01
 _NAMES = ("SIGINT", "SIGTERM", "SIGHUP")
 # Exit code of a process that a signal ended, as shells count it: this plus the signal.
 _BY_SIGNAL = 128
@@ -120,7 +122,10 @@ class _Stopping:
             sys.__unraisablehook__(problem)
         elif self.signal is not None and not self._is_lost:
             self._is_lost = True
-            _thread.interrupt_main(self.signal)
+            # Not from here: what is raised before this function has returned is lost too.
+            again = threading.Timer(_AGAIN_S, _thread.interrupt_main, (self.signal,))
+            again.daemon = True
+            again.start()
 
     def _end(self) -> None:
         """End the process and its workers without unwinding."""

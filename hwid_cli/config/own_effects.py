@@ -34,6 +34,9 @@ _SHOWN = 60
 
 def own_effect_faults(experiment: Experiment) -> Iterator[Fault]:
     """Formulas that cannot be read, with unknown names, or whose units do not fit."""
+    if not experiment.own_effects:
+        # Units take half a second to load.
+        return
     units = _units_of_signals(experiment)
     for name, effect in experiment.own_effects.items():
         place: Place = ("own_effects", name)

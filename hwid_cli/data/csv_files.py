@@ -14,6 +14,7 @@ import csv
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import chain, islice
 from pathlib import Path
 from typing import TextIO
@@ -40,6 +41,8 @@ _SEPARATORS = ("\t", ";", ",", "|", " ")
 _COMMENT = "#"
 # Lines from which the form of a file is told: no preamble that was met has more.
 _HEAD_LINES = 1000
+# Rows of plain numbers, at least, from which it is told where more of them follow.
+_PLAIN_LINES = 24
 # Lines that are taken at once.
 _BLOCK_LINES = 4096
 # The csv module reads no longer cell, and says so.
@@ -138,7 +141,7 @@ def _read_sheet(path: Path, wanted: Sequence[str]) -> _Sheet:
     """Find out the form of a file."""
     encoding = _encoding(path)
     with path.open(encoding=encoding, errors="replace", newline="") as file:
-        lines = list(islice(file, _HEAD_LINES))
+        lines = _telling(list(islice(file, _HEAD_LINES)))
     separator = _separator(lines)
     rows, ends, comments = _rows(path, lines, separator)
     if not any(any(row) for number, row in enumerate(rows) if number not in comments):
@@ -149,6 +152,34 @@ def _read_sheet(path: Path, wanted: Sequence[str]) -> _Sheet:
     head = read_head(rows, wanted=wanted, comments=comments)
     place = head.name_row if head.name_row >= 0 else min(head.body, len(rows) - 1)
     return _Sheet(path, encoding, separator, rows, ends, head, len(rows[place]))
+
+
+def _telling(lines: list[str]) -> list[str]:
+    """Leave out the last lines of a beginning where they only go on as those above.
+
+    What is left tells the same: its lower half, from which the form is told, consists of
+    rows of as many plain numbers too.
+    """
+    if len(lines) <= _PLAIN_LINES:
+        return lines
+    mark = next((one for one in _SEPARATORS if one in lines[-1].strip()), None)
+    if mark is None or len(lines[-1]) > _LONGEST_LINE:
+        return lines
+    row = _plain_row(mark, len(_split(lines[-1].strip(), mark)))
+    first = next((n for n, line in enumerate(lines) if row.fullmatch(line)), len(lines))
+    kept = 2 * first + _PLAIN_LINES
+    if kept >= len(lines) or not all(map(row.fullmatch, lines[first:])):
+        return lines
+    return lines[:kept]
+
+
+@lru_cache(maxsize=32)
+def _plain_row(mark: str, count: int) -> re.Pattern[str]:
+    """Lines of so many plain numbers; a comma is decimal where it separates nothing."""
+    point = "[.,]" if mark in "\t;" else "[.]"
+    number = rf"[-+]?(?:[0-9]++(?:{point}[0-9]*+)?|{point}[0-9]++)(?:[eE][-+]?[0-9]++)?"
+    between = " ++" if mark == " " else f" *+{re.escape(mark)} *+"
+    return re.compile(rf" *+{number}(?:{between}{number}){{{count - 1}}} *+\r?\n?")
 
 
 def _encoding(path: Path) -> str:
@@ -360,13 +391,13 @@ def _plain_table(
     sheet: _Sheet, lines: Sequence[str], parts: ColumnParts
 ) -> tuple[np.ndarray, str] | None:
     """Numbers of lines that hold nothing else, fast, and their decimal mark."""
-    if parts.stamped or any(map(_is_long, lines)):
+    if parts.stamped or max(map(len, lines)) > _LONGEST_LINE:
         return None
     text = "".join(lines)
     if '"' in text or _COMMENT in text or not all(map(str.strip, lines)):
         return None
     mark = sheet.separator
-    if mark != " " and max(line.count(mark) for line in lines) >= max(sheet.width, 1):
+    if mark != " " and max([line.count(mark) for line in lines]) >= max(sheet.width, 1):
         return None
     decimal = "," if mark != "," and "," in text else "." if "." in text else ""
     if decimal and not parts.are_decimal(decimal):
@@ -386,10 +417,6 @@ def _plain_table(
     except ValueError:
         return None
     return table, decimal
-
-
-def _is_long(line: str) -> bool:
-    return len(line) > _LONGEST_LINE
 
 
 def _check_widths(sheet: _Sheet, block: Sequence[tuple[int, list[str]]]) -> None:

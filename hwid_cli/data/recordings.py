@@ -5,7 +5,7 @@ A command stops at the first fault; ``hwid check`` and ``init`` survey every fil
 
 import hashlib
 import logging
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -79,9 +79,7 @@ def read_recordings(experiment: Experiment, out: Path) -> list[RawRecording]:
     checks.check_names([(part.path, part.name) for part in parts])
     plans = {folder: read_plan(folder) for folder in {path.parent for path in paths}}
     recordings = []
-    by_path: dict[Path, list[FilePart]] = {}
-    for part in parts:
-        by_path.setdefault(part.path, []).append(part)
+    by_path = _by_path(parts)
     for path in paths:
         digest = file_sha256(path)
         columns = read_columns(path, _as_read(options.columns))
@@ -102,6 +100,13 @@ def read_recordings(experiment: Experiment, out: Path) -> list[RawRecording]:
         replace(recording, sample_time_s=recordings[0].sample_time_s)
         for recording in recordings
     ]
+
+
+def _by_path(parts: Iterable[FilePart]) -> dict[Path, list[FilePart]]:
+    found: dict[Path, list[FilePart]] = {}
+    for part in parts:
+        found.setdefault(part.path, []).append(part)
+    return found
 
 
 def _read_part(
@@ -260,6 +265,7 @@ def survey_recordings(experiment: Experiment, out: Path) -> Survey:
         checks.check_names([(part.path, part.name) for part in parts])
     read: list[RawRecording] = []
     jitter: dict[str, float] = {}
+    by_path = _by_path(parts)
     for path in paths:
         columns = plan = None
         with _noting(problems):
@@ -270,13 +276,12 @@ def survey_recordings(experiment: Experiment, out: Path) -> Survey:
             plan = read_plan(path.parent)
         if columns is None or plan is None:
             continue
-        for part in parts:
-            if part.path == path:
-                with _noting(problems):
-                    raw = _read_part(part, columns, plan, experiment)
-                    read.append(replace(raw, sha256=file_sha256(path)))
-                    if (time := cut_part(columns, part).time) is not None:
-                        jitter[part.name] = _jitter(time.values)
+        for part in by_path.get(path, []):
+            with _noting(problems):
+                raw = _read_part(part, columns, plan, experiment)
+                read.append(replace(raw, sha256=file_sha256(path)))
+                if (time := cut_part(columns, part).time) is not None:
+                    jitter[part.name] = _jitter(time.values)
     common = _of_one_clock(read, experiment, problems)
     common.sort(key=lambda recording: KINDS.index(recording.kind))
     good = {recording.name for recording in common}

@@ -264,6 +264,7 @@ _SUFFIXES = {
 }
 # What is followed by a member is the place in an array: run(2).current.
 _BRACKET = re.compile(r"([\[(])\s*([^\])]*?)\s*[\])](?!\.\w)")
+_LONGEST_FIRST = sorted(_SUFFIXES.items(), key=lambda pair: -len(pair[0]))
 _BEHIND = re.compile(r"(?:/| in )\s*([A-Za-zµ°%]{1,4})$")
 # Arguments of a function, not units: x[k], i(t).
 _ARGUMENTS = ("t", "k", "n", "i", "j", "z", "x")
@@ -300,7 +301,7 @@ def split_unit(title: str) -> tuple[str, str]:
     worded = _BEHIND.search(title)
     if worded and worded[1] in _SUFFIXES:
         return title[: worded.start()], worded[1]
-    for suffix, unit in sorted(_SUFFIXES.items(), key=lambda pair: -len(pair[0])):
+    for suffix, unit in _LONGEST_FIRST:
         if title.endswith(f"_{suffix}") and len(title) > len(suffix) + 1:
             return title[: -len(suffix) - 1], unit
     return title, ""

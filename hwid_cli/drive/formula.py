@@ -126,7 +126,14 @@ def parsed(text: str) -> Node:
     try:
         tree = ast.parse(text.strip(), mode="eval").body
         found = _node(tree, 0)
-    except (SyntaxError, RecursionError, MemoryError, ValueError) as error:
+    # An integer of 400 digits is too large for a float, which is an ArithmeticError.
+    except (
+        ArithmeticError,
+        MemoryError,
+        RecursionError,
+        SyntaxError,
+        ValueError,
+    ) as error:
         if isinstance(error, Refused):
             raise
         expected = "a formula such as -(a + b * abs(x)) * sign(v)"

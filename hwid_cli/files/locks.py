@@ -29,7 +29,7 @@ _NO_LOCKS = (errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOSYS, errno.EINVAL)
 # Names of files that are being written, see ``replaced_files``.
 _TEMPORARY = re.compile(r"\..+\.[0-9a-f]{32}\.tmp")
 # Folders of results in which files are written; others are the user's.
-WRITTEN = ("raw", "simulated", "models", "figures")
+WRITTEN = ("raw", "simulated", "models", "figures", "next")
 
 _log = logging.getLogger(__name__)
 

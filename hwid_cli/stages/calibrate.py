@@ -8,6 +8,7 @@ recording.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -210,6 +211,11 @@ class Measured:
     recordings: tuple[RawRecording, ...]
     options: CalibrateOptions | None
 
+    @cached_property
+    def key(self) -> str:
+        """Content key; looked at before and after the calibration, hashed once."""
+        return calibration_key(self.recordings, self.options)
+
 
 def _choose(context: Context) -> Measured:
     experiment = context.experiment
@@ -225,9 +231,7 @@ def _choose(context: Context) -> Measured:
 
 def _compute(given: Measured, _: Runner) -> Calibrated:
     recordings, logs = calibrate_all(given.recordings, given.options)
-    return Calibrated(
-        recordings, logs, calibration_key(given.recordings, given.options)
-    )
+    return Calibrated(recordings, logs, given.key)
 
 
 def _write(path: Path, _: Measured, result: Calibrated, origin: Provenance) -> None:
@@ -301,7 +305,7 @@ STAGE = Stage(
     needs_where_named=("simulate",),
     sections=("recordings", "calibrate"),
     choose=_choose,
-    key=lambda given: calibration_key(given.recordings, given.options),
+    key=lambda given: given.key,
     compute=_compute,
     storage=in_results(NAME, read_calibrated, _write),
     summary=_summary,

@@ -12,9 +12,9 @@ times faster than ``group.attrs`` and a campaign reads thousands of records.
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import MISSING, Field, fields, is_dataclass
-from functools import cache
+from functools import cache, lru_cache
 from types import NoneType, UnionType
 from typing import Any, NamedTuple, TypeVar, Union, get_args, get_origin, get_type_hints
 
@@ -70,8 +70,8 @@ def write_small(group: h5py.Group, name: str, value: object, kind: type) -> None
     if size > LONGEST_ATTRIBUTE:
         write_array(group, name, values)
         return
-    space = h5s.create_simple(values.shape) if values.ndim else h5s.create(h5s.SCALAR)
-    attribute = h5a.create(group.id, name.encode(), _STORED[kind], space)
+    stored = _STORED[kind]
+    attribute = h5a.create(group.id, name.encode(), stored, _space(values.shape))
     if values.size:
         attribute.write(values, mtype=_MEMORY[kind])
 
@@ -129,11 +129,21 @@ def write_array(group: h5py.Group, name: str, values: np.ndarray) -> None:
         group.create_dataset(name, data=text.reshape(values.shape), dtype=text.dtype)
         return
     values = np.require(values, requirements="C")
-    stored = h5t.py_create(values.dtype, logical=True)
-    space = h5s.create_simple(values.shape)
+    stored, space = _stored_as(values.dtype), _space(values.shape)
     dataset = h5d.create(group.id, name.encode(), stored, space, dcpl=_WITHOUT_TIMES)
     if values.size:
         dataset.write(h5s.ALL, h5s.ALL, values)
+
+
+@lru_cache(maxsize=64)
+def _stored_as(dtype: np.dtype) -> h5t.TypeID:
+    return h5t.py_create(dtype, logical=True)
+
+
+@lru_cache(maxsize=64)
+def _space(shape: tuple[int, ...]) -> h5s.SpaceID:
+    """Shape of what is written; making one takes as long as writing a small array."""
+    return h5s.create_simple(shape) if shape else h5s.create(h5s.SCALAR)
 
 
 def read_array(group: h5py.Group, name: str) -> np.ndarray:
@@ -196,12 +206,16 @@ class StoredField(NamedTuple):
     default: Callable[[], Any] | None = None
 
 
-def write_record(group: h5py.Group, record: Any) -> None:
+def write_record(
+    group: h5py.Group, record: Any, *, without: Collection[str] = ()
+) -> None:
     """Write a record's fields into an empty group.
 
     Parameters
     ----------
     group : h5py.Group
+    without : collection of str
+        Fields that the caller writes.
 
     Raises
     ------
@@ -210,7 +224,7 @@ def write_record(group: h5py.Group, record: Any) -> None:
     """
     for name, form, member, *_ in schema(type(record)):
         value = getattr(record, name)
-        if value is None:
+        if value is None or name in without:
             continue
         if form == "array":
             write_array(group, name, value)

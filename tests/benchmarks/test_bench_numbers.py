@@ -5,6 +5,7 @@ import pytest
 
 from hwid_cli.records.model import Orders
 from tests.benchmarks.bench_growth import exponent
+from tests.benchmarks.bench_size import calls_each
 from tests.benchmarks.by_hand import fit_by_hand
 from tests.benchmarks.grid_scores import Scored, n_not_monotone, n_worse_than
 from tests.benchmarks.plants import random_plant
@@ -43,3 +44,12 @@ def test_the_baseline_is_a_fair_one():
         # 1 % noise; a linear model of this plant leaves far more.
         assert np.std(y_test - found.simulate(u_test)) < 0.1 * np.std(y_test)
         assert found.is_stable
+
+
+def test_a_recording_costs_few_calls_however_many_there_are(tmp_path):
+    few, many = (calls_each(tmp_path / str(count), count) for count in (10, 60))
+
+    # 4400 as this was written, 23 700 before the form of a file was told from few rows.
+    assert many < 6000
+    # What is done once for all counts less and less.
+    assert many < 1.02 * few

@@ -1,9 +1,10 @@
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from hwid_cli.data.formats import read_columns
+from hwid_cli.data import csv_files
+from hwid_cli.data.formats import list_columns, read_columns
 from hwid_cli.errors import MeasurementError
 from hwid_cli.records.experiment import Columns
 
@@ -149,3 +150,66 @@ def test_every_float_is_read_back_bit_by_bit(tmp_path_factory, values, mark, dec
     found = read_columns(path, Columns(input="u", output="y"))
     assert found.input.values.tobytes() == np.array(values).tobytes()
     assert found.output.values.tobytes() == np.array(values).tobytes()
+
+
+HEADS = (
+    "",
+    "t;u;y\n",
+    "# logger 3\n# fs = 200\nt;u;y\ns;mA;mm\n",
+    "Rate;200\nChannel;a;b\n\nt [s];u [A];y [mm]\n",
+    "1;2;3\nnotes;and;more\nt;u;y\n",
+    "word;word;1\n" * 90 + "t;u;y\n",
+)
+# What may stand among plain rows, or end them.
+ODD = ("", "nan;1;2", "1;2", "1;2;3;4", "12:00:01;2;3", "x;y;z", "1;;3", '"1";2;3', "#")
+
+
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    head=st.sampled_from(HEADS),
+    mark=st.sampled_from("\t;,| "),
+    decimal=st.sampled_from(".,"),
+    rows=st.sampled_from((0, 20, 60, 150, 1200)),
+    odd=st.sampled_from(ODD),
+    place=st.integers(0, 150),
+)
+def test_more_rows_of_the_same_kind_tell_nothing_new(
+    tmp_path, head, mark, decimal, rows, odd, place
+):
+    lines = [f"{n * 0.5:g};{n % 7};-{n}.25e-3" for n in range(rows)]
+    if odd and place < rows:
+        lines.insert(place, odd)
+    text = "\n".join(line.replace(".", decimal) for line in lines)
+    path = tmp_path / "long.csv"
+    path.write_text((head + text).replace(";", mark))
+
+    def told():
+        try:
+            found = list_columns(path)
+        except MeasurementError as error:
+            return str(error)
+        return [(one.title, one.key, one.values.tobytes(), one.unit) for one in found]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(csv_files, "_PLAIN_LINES", 10**6)
+        by_all = told()
+
+    assert told() == by_all
+
+
+def test_the_form_of_a_long_file_is_told_from_few_rows(tmp_path, monkeypatch):
+    path = tmp_path / "long.csv"
+    rows = "".join(f"{n * 1e-3:.3f},{n % 5},{n % 7}\n" for n in range(5000))
+    path.write_text(f"time_s,current_A,displacement_m\n{rows}")
+    looked_at = []
+    real = csv_files.read_head
+
+    def read_head(rows, **options):
+        looked_at.append(len(rows))
+        return real(rows, **options)
+
+    monkeypatch.setattr(csv_files, "read_head", read_head)
+    (_, time), *_ = csv_files.read_csv_columns(path, BY_NUMBER)
+
+    assert time.values.size == 5000
+    assert looked_at == [26]  # the names and 25 rows of numbers

@@ -78,6 +78,8 @@ def test_text_is_read_as_what_it_was_written_from(given_text):
         ("'x'", "must be numbers, names"),
         ("True", "must be numbers, names"),
         ("1e999", "finite"),
+        ("9" * 400, "a formula such as"),
+        ("0x" + "f" * 400, "a formula such as"),
         ("x +", "a formula such as"),
         ("", "a formula such as"),
         ("(" * 60 + "x" + ")" * 60 + "+x" * 300, "at most 500 characters"),

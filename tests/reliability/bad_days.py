@@ -9,6 +9,7 @@ line and a known exit code; the second finds what an undisturbed run finds, byte
 import argparse
 import errno
 import hashlib
+import os
 import re
 import shutil
 import signal
@@ -25,8 +26,13 @@ import h5py
 import numpy as np
 import pytest
 
-from tests.conftest import leave_figures_blank
 from tests.reliability import harness, system_faults
+from tests.reliability.warm_process import (
+    WarmProcess,
+    WarmStarter,
+    cpu_seconds,
+    draw_nothing,
+)
 
 STAGES = (
     "simulate",
@@ -40,8 +46,15 @@ STAGES = (
 )
 # Done, refused, and ended by the signals that are sent.
 CODES = (0, 1, 129, 130, 143, -signal.SIGKILL)
-# The first run takes this long where nothing stops it; faults come within it, [s].
-LONGEST_S, PATIENCE_S = 6.0, 300
+# Processor time of the first run where nothing stops it, by what its folder holds at the
+# start, and of a start of Python; faults come within it, [s].
+WORK_S = {"results": 0.3, "cache": 0.5, "nothing": 1.0}
+START_S, PATIENCE_S = 3.0, 1800
+# What is started may still run so long after its end; how often we look, [s].
+LINGER_S, _LOOK_S = 5.0, 0.01
+TOLD_EVERY, RUNS_ON = 25, "something runs on"
+# A file outside of the folder that no day may change.
+VICTIM, PRECIOUS = "victim", "precious"
 DAMAGES: dict[str, Callable[[bytes], bytes]] = {
     "empty": lambda content: b"",
     "half": lambda content: content[: len(content) // 2],
@@ -59,8 +72,10 @@ class Day:
 
     Parameters
     ----------
-    has_results : bool
-        Whether the folder holds those of an undisturbed run.
+    holds : str
+        What the folder holds of an undisturbed run: one of ``WORK_S``.
+    is_fresh : bool
+        Whether Python starts anew: faults meet its imports too.
     share : float, [-]
         The moment: of the time, or of the calls, that a run takes.
     """
@@ -70,7 +85,13 @@ class Day:
     fault: str
     share: float
     jobs: int
-    has_results: bool
+    holds: str
+    is_fresh: bool
+
+    @property
+    def moment_s(self) -> float:
+        """Processor time after which something happens, [s]."""
+        return self.share * (WORK_S[self.holds] + START_S * self.is_fresh)
 
 
 def draw(number: int, seed: int) -> Day:
@@ -83,27 +104,36 @@ def draw(number: int, seed: int) -> Day:
         fault=list(FAULTS)[number % len(FAULTS)],
         share=float(rng.uniform()),
         jobs=int(rng.integers(1, 3)),
-        has_results=bool(rng.integers(2)),
+        holds=str(rng.choice(list(WORK_S), p=[0.5, 0.35, 0.15])),
+        is_fresh=bool(rng.uniform() < 0.05),
     )
 
 
-def live(day: Day, undisturbed: Path, work: Path) -> str:
+@dataclass(frozen=True)
+class Folder:
+    """Where a day is lived through, and what starts its run."""
+
+    config: Path
+    out: Path
+    starter: WarmStarter
+
+
+Meeting = Callable[[Day, Folder], tuple[int, str]]
+
+
+def live(day: Day, undisturbed: Path, work: Path, starter: WarmStarter) -> str:
     """Live through a day; gives what it broke, nothing where all was kept."""
-    config, out = harness.write_config(work), work / "out"
-    out.mkdir()
-    if day.has_results:
-        shutil.copytree(undisturbed, out, dirs_exist_ok=True)
-    victim = work / "victim"
-    victim.write_text("precious")
+    folder = _begin(day, undisturbed, work, starter)
+    out = folder.out
     # Measurements that a fault changes are put back by their owner.
     raw = {path.name: path.read_bytes() for path in (undisturbed / "raw").glob("*")}
-    code, said = FAULTS[day.fault](day, config, out)
+    code, said = FAULTS[day.fault](day, folder)
     faults = []
     if code not in CODES:
         faults.append(f"exit code {code}")
-    if "Traceback" in said or (code == 1 and "hwid: " not in said):
+    if "Traceback" in said or RUNS_ON in said or (code == 1 and "hwid: " not in said):
         faults.append(f"said {said[-400:]!r}")
-    if victim.read_text() != "precious":
+    if (work / VICTIM).read_text() != PRECIOUS:
         faults.append("a file elsewhere changed")
     aside = [path.name for path in out.rglob("*.bad")]
     if aside and day.fault not in DAMAGING:
@@ -114,23 +144,39 @@ def live(day: Day, undisturbed: Path, work: Path) -> str:
     for name, content in raw.items():
         if (out / "raw" / name).exists():
             (out / "raw" / name).write_bytes(content)
-    return "; ".join(faults) or _compared(config, out, undisturbed)
+    return "; ".join(faults) or _compared(folder, undisturbed)
 
 
-def _compared(config: Path, out: Path, undisturbed: Path) -> str:
-    done = harness.run_here(config, out, command="run", code=None)
+def _begin(day: Day, undisturbed: Path, work: Path, starter: WarmStarter) -> Folder:
+    """The folder as the day finds it."""
+    folder = Folder(harness.write_config(work), work / "out", starter)
+    folder.out.mkdir()
+    if day.holds != "nothing":
+        shutil.copytree(undisturbed, folder.out, dirs_exist_ok=True)
+    if day.holds == "cache":
+        for name in ("results.h5", "calibrated.h5", "report.html"):
+            (folder.out / name).unlink(missing_ok=True)
+    (work / VICTIM).write_text(PRECIOUS)
+    return folder
+
+
+def _compared(folder: Folder, undisturbed: Path) -> str:
+    done = harness.run_here(folder.config, folder.out, command="run", code=None)
     if done.exit_code != 0:
         return f"the second run: {done.exit_code}, {done.output[-400:]!r}"
-    if harness.results(out) != harness.results(undisturbed):
+    if harness.results(folder.out) != harness.results(undisturbed):
         return "other results"
-    left = harness.temporary_files(out)
+    left = harness.temporary_files(folder.out)
     return f"left behind: {left}" if left else ""
 
 
-def _start(day: Day, config: Path, out: Path, **faults: object) -> subprocess.Popen:
-    words = [sys.executable, "-m", "hwid_cli", day.stage, config, "--out", out]
+def _start(day: Day, place: Folder, **faults: object) -> subprocess.Popen | WarmProcess:
+    words = [day.stage, str(place.config), "--out", str(place.out)]
+    words += ["--jobs", str(day.jobs)]
+    if not day.is_fresh:
+        return place.starter.start(words, system_faults.settings(**faults))
     return subprocess.Popen(
-        [*words, *(("--jobs", str(day.jobs)) if day.stage != "check" else ())],
+        [sys.executable, "-m", "hwid_cli", *words],
         env=system_faults.environment(**faults) if faults else None,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
@@ -139,15 +185,34 @@ def _start(day: Day, config: Path, out: Path, **faults: object) -> subprocess.Po
     )
 
 
-def _end(process: subprocess.Popen) -> tuple[int, str]:
+def _end(process: subprocess.Popen | WarmProcess) -> tuple[int, str]:
     _, said = process.communicate(timeout=PATIENCE_S)
-    return process.returncode, said
+    assert process.returncode is not None
+    limit = time.monotonic() + LINGER_S
+    while (runs_on := _has_members(process.pid)) and time.monotonic() < limit:
+        time.sleep(_LOOK_S)
+    return process.returncode, said + (RUNS_ON if runs_on else "")
 
 
-def _by_signal(number: int) -> Callable[[Day, Path, Path], tuple[int, str]]:
-    def meet(day: Day, config: Path, out: Path) -> tuple[int, str]:
-        process = _start(day, config, out)
-        time.sleep(day.share * LONGEST_S)
+def _has_members(group: int) -> bool:
+    """Whether processes of a group are left."""
+    try:
+        os.killpg(group, 0)
+    except ProcessLookupError:
+        return False
+    return True
+
+
+def _wait(day: Day, process: subprocess.Popen | WarmProcess) -> None:
+    """Until the moment of a day; of processor time, so that other work changes nothing."""
+    while process.poll() is None and cpu_seconds(process.pid) < day.moment_s:
+        time.sleep(_LOOK_S)
+
+
+def _by_signal(number: int) -> Meeting:
+    def meet(day: Day, folder: Folder) -> tuple[int, str]:
+        process = _start(day, folder)
+        _wait(day, process)
         harness.kill(process, number)
         code, said = _end(process)
         # Before the program listens, the system ends it as it does any other.
@@ -156,27 +221,26 @@ def _by_signal(number: int) -> Callable[[Day, Path, Path], tuple[int, str]]:
     return meet
 
 
-def _by_system(**faults: object) -> Callable[[Day, Path, Path], tuple[int, str]]:
+def _by_system(**faults: object) -> Meeting:
     """Calls to the system fail from one moment on."""
 
-    def meet(day: Day, config: Path, out: Path) -> tuple[int, str]:
+    def meet(day: Day, folder: Folder) -> tuple[int, str]:
         settings = dict(faults)
         if "kind" in settings:
-            settings |= {"folder": out, "at": 1 + int(day.share**2 * 300)}
-        return _end(_start(day, config, out, **settings))
+            at = 1 + int(day.share**2 * 300)
+            settings |= {"folder": folder.out, "at": at}
+        return _end(_start(day, folder, **settings))
 
     return meet
 
 
-def _while_running(
-    change: Callable[[Path], None],
-) -> Callable[[Day, Path, Path], tuple[int, str]]:
+def _while_running(change: Callable[[Path], None]) -> Meeting:
     """Somebody else changes a measurement meanwhile."""
 
-    def meet(day: Day, config: Path, out: Path) -> tuple[int, str]:
-        process = _start(day, config, out)
-        time.sleep(day.share * LONGEST_S)
-        paths = sorted((out / "raw").glob("s*.csv"))
+    def meet(day: Day, folder: Folder) -> tuple[int, str]:
+        process = _start(day, folder)
+        _wait(day, process)
+        paths = sorted((folder.out / "raw").glob("s*.csv"))
         if paths:
             change(paths[day.number % len(paths)])
         return _end(process)
@@ -184,14 +248,12 @@ def _while_running(
     return meet
 
 
-def _before(
-    change: Callable[[Day, Path], None],
-) -> Callable[[Day, Path, Path], tuple[int, str]]:
+def _before(change: Callable[[Day, Path], None]) -> Meeting:
     """Something in the folder is not as it was left."""
 
-    def meet(day: Day, config: Path, out: Path) -> tuple[int, str]:
-        change(day, out)
-        return _end(_start(day, config, out))
+    def meet(day: Day, folder: Folder) -> tuple[int, str]:
+        change(day, folder.out)
+        return _end(_start(day, folder))
 
     return meet
 
@@ -211,7 +273,7 @@ def _link(day: Day, out: Path) -> None:
     names = (".hwid-run.lock", ".hwid-users.lock", "results.h5", "calibrated.h5")
     place = out / (*names, "crossval.csv", "report.html")[int(day.share * 6)]
     place.unlink(missing_ok=True)
-    place.symlink_to(out.parent / "victim")
+    place.symlink_to(out.parent / VICTIM)
 
 
 def _other_version(_: Day, out: Path) -> None:
@@ -228,7 +290,7 @@ def _changed(path: Path) -> None:
     path.write_bytes(re.sub(rb"1", b"2", path.read_bytes()))
 
 
-FAULTS: dict[str, Callable[[Day, Path, Path], tuple[int, str]]] = {
+FAULTS: dict[str, Meeting] = {
     "kill": _by_signal(signal.SIGKILL),
     "stop": _by_signal(signal.SIGTERM),
     "Ctrl-C": _by_signal(signal.SIGINT),
@@ -255,19 +317,25 @@ DAMAGING = ("damaged results", "damaged cache", "cache of another version")
 
 
 def run_days(
-    count: int, seed: int, undisturbed: Path, tell: Callable[[str], None]
+    numbers: range, seed: int, undisturbed: Path, tell: Callable[[str], None]
 ) -> tuple[Counter, list[str]]:
     """Live through days; gives how many of each fault there were, and what broke."""
     tries: Counter = Counter()
     broken = []
-    for number in range(count):
-        day = draw(number, seed)
-        with tempfile.TemporaryDirectory(prefix="hwid_day_") as work:
-            fault = live(day, undisturbed, Path(work))
-        tries[day.fault] += 1
-        if fault:
-            broken.append(f"{day}: {fault}")
-            tell(broken[-1])
+    with (
+        tempfile.TemporaryDirectory(prefix="hwid_warm_") as warm,
+        WarmStarter(Path(warm)) as starter,
+    ):
+        for number in numbers:
+            day = draw(number, seed)
+            with tempfile.TemporaryDirectory(prefix="hwid_day_") as work:
+                fault = live(day, undisturbed, Path(work), starter)
+            tries[day.fault] += 1
+            if fault:
+                broken.append(f"{day}: {fault}")
+                tell(broken[-1])
+            if (number + 1) % TOLD_EVERY == 0:
+                tell(f"{number + 1} days, {len(broken)} broken")
     return tries, broken
 
 
@@ -275,14 +343,16 @@ def main() -> int:
     """Draw days and show what came of them."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--count", type=int, default=500)
+    parser.add_argument("--first", type=int, default=0, help="number of the first day")
     parser.add_argument("--seed", type=int, default=1)
     asked = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder, pytest.MonkeyPatch.context() as patch:
-        leave_figures_blank(patch)
+        draw_nothing(patch)
         out = Path(folder) / "out"
         harness.run_here(harness.write_config(Path(folder)), out, command="run")
+        numbers = range(asked.first, asked.first + asked.count)
         tries, broken = run_days(
-            asked.count, asked.seed, out, lambda line: print(line, flush=True)
+            numbers, asked.seed, out, lambda line: print(line, flush=True)
         )
     for fault, number in tries.items():
         bad = sum(f"fault='{fault}'" in line for line in broken)

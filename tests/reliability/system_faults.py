@@ -24,7 +24,11 @@ def library() -> str:
     return str(built)
 
 
+def settings(**faults: object) -> dict[str, str]:
+    """Variables that ask the library for faults, such as ``locks=errno.ENOLCK``."""
+    return {f"HWID_FAULT_{name.upper()}": str(one) for name, one in faults.items()}
+
+
 def environment(**faults: object) -> dict[str, str]:
-    """Environment of a program that has faults, such as ``locks=errno.ENOLCK``."""
-    named = {f"HWID_FAULT_{name.upper()}": str(one) for name, one in faults.items()}
-    return {**os.environ, "LD_PRELOAD": library(), **named}
+    """Environment of a program that has the library and faults."""
+    return {**os.environ, "LD_PRELOAD": library(), **settings(**faults)}

@@ -3,6 +3,7 @@
 import pytest
 
 from tests.reliability import bad_days
+from tests.reliability.warm_process import draw_nothing
 
 SEED = 1
 
@@ -16,8 +17,9 @@ def test_days_are_the_same_for_the_same_seed_and_meet_every_fault():
 
 
 @pytest.mark.slow
-def test_five_hundred_bad_days_lose_nothing(undisturbed):
-    tries, broken = bad_days.run_days(500, SEED, undisturbed, print)
+def test_five_hundred_bad_days_lose_nothing(undisturbed, monkeypatch):
+    draw_nothing(monkeypatch)
+    tries, broken = bad_days.run_days(range(500), SEED, undisturbed, print)
 
     assert sum(tries.values()) == 500
     assert broken == []

@@ -76,7 +76,9 @@ def test_result_that_is_no_plain_file_is_refused(out, victim, name, kind):
     assert place.is_symlink() or place.is_fifo()
 
 
-@pytest.mark.parametrize("name", ["figures", "figures/calibrate", "cache", "cache/0a"])
+@pytest.mark.parametrize(
+    "name", ["figures", "figures/calibrate", "cache", "cache/0a", "next"]
+)
 def test_folder_below_the_results_that_is_a_link_is_refused(out, victim, name):
     place = out / name
     place.parent.mkdir(parents=True, exist_ok=True)

@@ -1,4 +1,5 @@
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import h5py
@@ -8,6 +9,7 @@ import pytest
 from hwid_cli import __version__
 from hwid_cli.errors import CacheError
 from hwid_cli.records.experiment import OrdersOptions
+from hwid_cli.records.recordings import SignalUnit
 from hwid_cli.store.result_files import read_stage_key
 from hwid_cli.store.results import (
     Provenance,
@@ -47,6 +49,23 @@ def test_calibrated_columns_say_their_unit(path):
         assert file["recordings/r10/output"].attrs["unit"] == "m"
         assert file["recordings/r10/input"].shape == (9,)
         assert file["logs/r10"].attrs["repaired_input"].tolist() == [4]
+
+
+def test_what_recordings_say_of_their_units_alike_is_stored_once(path):
+    first, *_ = logs()
+    alike = SignalUnit("input", "mA", "its name", "A", 1e-3)
+    other = SignalUnit("input", "A", "its name", "A")
+    named = [replace(recordings()[0], name=name) for name in "abc"]
+    told = [
+        replace(first, name=one.name, units=(unit,))
+        for one, unit in zip(named, (alike, other, alike), strict=True)
+    ]
+    write_calibrated(path, named, told, PROVENANCE)
+
+    assert_same(read_calibrated(path).logs, tuple(told))
+    with h5py.File(path, "r") as file:
+        units = [file[f"logs/{one.name}/units"] for one in named]
+        assert [one == units[0] for one in units] == [True, False, True]
 
 
 def test_fits_come_back_in_their_order(path):
