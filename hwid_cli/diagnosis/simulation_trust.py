@@ -36,6 +36,8 @@ from hwid_cli.trust.visited import inside, visited_by
 NAME = "simulation"
 # Longest step of a coordinate, as of a model's parameters: half the size of the value.
 _LONGEST = 0.5
+# Share of the largest output below which an error is none: that of a noise-free fit.
+_ROUNDING = 1e-12
 # Share of the best determined direction below which a direction is none.
 _DIRECTION = 1e-14
 
@@ -89,8 +91,9 @@ def simulation_trust(
 
 def _rms_of(train: Sequence[Compared]) -> float:
     left = np.concatenate([one.residual for one in train])
-    # That of a fit without noise.
-    return max(float(np.sqrt(np.mean(left**2))), np.finfo(float).tiny ** 0.5)
+    largest = max(float(np.abs(one.signals.compared).max()) for one in train)
+    rms = float(np.sqrt(np.mean(left**2)))
+    return max(rms, _ROUNDING * largest, _ROUNDING)
 
 
 def _as_unseen(

@@ -142,7 +142,9 @@ def left_out_bands(
     bands = []
     for one in found:
         known = calibrated(trust, [other for other in found if other is not one])
-        bands.append((one, band_of(known, one.terms, one.where)))
+        # A model may diverge on recordings of others.
+        with np.errstate(over="ignore", invalid="ignore"):
+            bands.append((one, band_of(known, one.terms, one.where)))
     return bands
 
 
@@ -150,7 +152,8 @@ def _gain(one: Judgement) -> float:
     """Part of the error that is a share of the output, [-]."""
     level = level_of(one.terms)
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-        return float(np.nan_to_num(level @ one.errors / (level @ level), posinf=0.0))
+        gain = float(level @ one.errors / (level @ level))
+    return gain if np.isfinite(gain) else 0.0
 
 
 def _scores(one: Judgement, trust: ModelTrust) -> np.ndarray:
@@ -234,6 +237,9 @@ def trust_row(
     model, recording, unit = about
     where = band.inside
     is_held = (measured >= band.lower) & (measured <= band.upper)
+    with np.errstate(over="ignore", invalid="ignore"):
+        width = float(np.mean(band.upper - band.lower))
+        deviation = rmsd(measured, band.output)
     return RecordingTrust(
         model,
         recording,
@@ -242,8 +248,8 @@ def trust_row(
         float(where.frequency.mean()),
         float(where.all.mean()),
         float(is_held.mean()),
-        float(np.mean(band.upper - band.lower)),
-        rmsd(measured, band.output),
+        width,
+        deviation,
         unit,
     )
 

@@ -11,6 +11,7 @@ from hwid_cli.trust.judged import (
     calibrated,
     independent_errors,
     left_out_bands,
+    trust_row,
 )
 from hwid_cli.trust.visited import visited_by
 
@@ -112,3 +113,20 @@ def test_a_recording_does_not_judge_its_own_band():
     # Told by the bad one a band is wide; told by the good one it does not hold the bad.
     assert np.mean(of_good.upper - of_good.lower) > 1.0
     assert not ((bad.measured >= of_bad.lower) & (bad.measured <= of_bad.upper)).any()
+
+
+def test_a_model_that_diverges_on_one_recording_stops_nothing():
+    away = OUTPUT.copy()
+    away[200:] = np.inf
+    lost = judgement(np.full(N, 1e9), away)
+    good = judgement(0.01 * np.ones(N))
+
+    (_, of_good), (_, of_lost) = left_out_bands(trust(), [good, lost])
+    rows = [
+        trust_row(("m", "r", "m"), one.measured, band)
+        for one, band in ((good, of_good), (lost, of_lost))
+    ]
+
+    assert [one.coverage for one in rows] == [1.0, 0.0]
+    assert not np.isfinite(rows[1].rmsd)
+    assert trust_row(("m", "r", "m"), good.measured, of_good).width > 1e9
