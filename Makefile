@@ -170,7 +170,7 @@ scale: $(DEV)  ## what a cluster costs, and docs/scale.md
 	@$(BENCH).bench_dask --json docs/scale.json
 	$(BIN)/python tools/scale.py docs/scale.json > docs/scale.tmp && mv docs/scale.tmp docs/scale.md
 
-bench-trust: $(DEV)  ## coverage and width of bands on random plants, measurements and the gun: half an hour
+bench-trust: $(DEV)  ## coverage and width of bands on random plants, measurements and the gun: four minutes of processor time
 	@$(BENCH).bench_trust
 
 bench-next: $(DEV)  ## recordings needed, chosen by hwid next and by chance: half an hour

@@ -170,13 +170,14 @@ def _simulation(session: Session) -> Exported:
     """The physics simulation with what a diagnosis added."""
     diagnosis = result_of(session, "diagnose")
     given = session.given["diagnose"]
-    return export_simulation(
+    exported = export_simulation(
         extended_options(diagnosis, given.simulation),
         given.recordings,
         _options(session),
         given.options,
         origin=_origin(session, "diagnose"),
     )
+    return replace(exported, trust=diagnosis.trust)
 
 
 def _options(session: Session) -> RecordingsOptions:

@@ -18,6 +18,7 @@ from hwid_cli.diagnosis.problem import Compared, DiagnosisProblem
 from hwid_cli.diagnosis.rounds import RoundsResult
 from hwid_cli.diagnosis.selection import DiagnosisVerdict, SelectionCriteria, ranked
 from hwid_cli.diagnosis.sentences import doubtful_values, hidden_from_view, summarise
+from hwid_cli.diagnosis.simulation_trust import simulation_trust
 from hwid_cli.diagnosis.where import latent_force_curves
 from hwid_cli.drive.catalogue import CATALOGUE, public_id
 from hwid_cli.drive.effect import Scales
@@ -88,14 +89,13 @@ def describe(findings: Findings) -> Diagnosis:
     parameters = _base(problem.drive, base, chosen)
     told = _fitted_effects_of(problem, chosen, scales, (*present, *chosen.effects))
     effects = told[len(present) :]
+    trust, bands = simulation_trust(problem, chosen, scales)
     return Diagnosis(
         verdict=verdict.word,
         complete=verdict.is_complete,
         summary=summarise(problem, criteria, base, verdict, effects, fits),
         effects=effects,
-        ambiguous_with=tuple(
-            "+".join(public_id(name) for name in one.effects) for one in verdict.rivals
-        ),
+        ambiguous_with=_ids_of(verdict.rivals),
         noise=noise,
         given=_gap(criteria, given_sse),
         before=_gap(criteria, from_sse),
@@ -119,7 +119,13 @@ def describe(findings: Findings) -> Diagnosis:
         axis=problem.drive.axis,
         output=problem.drive.output,
         law=None if findings.law is None else _law(findings.law, effects),
+        trust=trust,
+        bands=bands,
     )  # fmt: skip
+
+
+def _ids_of(rivals: Sequence[CandidateFit]) -> tuple[str, ...]:
+    return tuple("+".join(public_id(name) for name in one.effects) for one in rivals)
 
 
 def _law(law: LawFound, effects: Sequence[FittedEffect]) -> Law | None:

@@ -101,20 +101,46 @@ def _standard_errors(
     point: ParameterPoint,
 ) -> np.ndarray:
     """Standard errors of the shared coordinates."""
+    covariance, scale = shared_covariance(problem, found, fit_layout, point)
+    return np.sqrt(np.maximum(np.diag(covariance), 0.0)) / scale
+
+
+def shared_covariance(
+    problem: DiagnosisProblem,
+    found: CandidateFit,
+    fit_layout: ParameterLayout,
+    point: ParameterPoint,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Covariance of the shared coordinates, scaled; the training recordings decide.
+
+    Parameters
+    ----------
+    point : ParameterPoint
+        Of the fit, with own values of all recordings.
+
+    Returns
+    -------
+    covariance : ndarray, shape (n_shared, n_shared)
+        Of the coordinates times their scales; recordings' own values vary with them.
+    scale : ndarray, shape (n_shared,)
+        Next to nothing where nothing determines a coordinate.
+    """
     rows = [row for row, one in enumerate(problem.signals) if not one.is_held_out]
     train = problem.part(held_out=False)
     at = ParameterPoint(point.shared, point.own[rows])
     matrix = local_matrix(train, fit_layout, at)
+    if not matrix.size:
+        return matrix, np.zeros(0)
     sse = sum_of_squares(residuals_at(train, fit_layout, at))
     freedom = max(train.n_evaluated - matrix.shape[0], 1)
     # Residuals that go together count as fewer samples.
     together = max(found.neighbour, 0.0)
     inflation = (1 + together) / max(1 - together, 1e-3)
     scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
-    variances = np.diag(_inverse(matrix / scale[:, None] / scale))
+    inverse = _inverse(matrix / scale[:, None] / scale)
     shared = slice(len(fit_layout.shared))
-    errors = np.sqrt(sse / freedom * inflation * variances[shared]) / scale[shared]
-    return np.asarray(errors)
+    size = sse / freedom * inflation
+    return np.asarray(size * inverse[shared, shared]), scale[shared]
 
 
 def _inverse(matrix: np.ndarray) -> np.ndarray:

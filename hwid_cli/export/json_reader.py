@@ -31,6 +31,7 @@ from hwid_cli.records.exported import (
 from hwid_cli.records.maps import Extrapolation, OwnFunction, StaticMap
 from hwid_cli.records.model import HammersteinWiener
 from hwid_cli.records.trust import ModelTrust, Visited, VisitedPlane
+from hwid_cli.trust.simulation import moved
 
 
 def read_exported(path: Path) -> Exported:
@@ -44,9 +45,25 @@ def read_exported(path: Path) -> Exported:
     content = read_model_file(path)
     card = _card(path, content)
     if content["kind"] == SIMULATION:
-        drive = _drive(path, content["simulation"])
-        return ExportedSimulation(card, drive, float(content["sample_time_s"]))
+        return _read_simulation(path, content, card)
     return _model(path, content, card)
+
+
+def _read_simulation(
+    path: Path, content: Mapping[str, Any], card: ModelCard
+) -> ExportedSimulation:
+    drive, trust = _drive(path, content["simulation"]), content.get("trust")
+    known = None
+    if trust is not None:
+        names = tuple(trust.get("parameters", ()))
+        known = _trust(path, trust, len(names))
+        try:
+            moved(drive, names, np.zeros(len(names)))
+        except ValueError as error:
+            expected = "parameters of the simulation in this file"
+            refuse(path, ("trust", "parameters"), str(error), expected)
+    step = float(content["sample_time_s"])
+    return ExportedSimulation(card, drive, step, trust=known)
 
 
 def _model(path: Path, content: Mapping[str, Any], card: ModelCard) -> ExportedModel:
@@ -86,12 +103,14 @@ def _trust(path: Path, given: Mapping[str, Any], n_parameters: int) -> ModelTrus
     before, after = (_plane(path, visited[side], side) for side in ("input", "inner"))
     return ModelTrust(
         Visited(before, after, _vector(visited["bands"])),
-        np.array(given["steps"], dtype=float).reshape(-1, n_parameters),
+        np.array(given["steps"], dtype=float).reshape(-1, max(n_parameters, 1)),
         float(given["noise_rms"]),
         float(given["scale"]),
         tuple(given["judged_on"]),
         float(given["scatter"]),
         given["reason"],
+        float(given.get("gain", 0.0)),
+        tuple(given.get("parameters", ())),
     )
 
 

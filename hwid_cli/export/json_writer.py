@@ -60,6 +60,8 @@ def described(exported: Exported) -> dict[str, Any]:
         content |= _model(exported)
     else:
         content |= _simulation(exported)
+    if exported.trust is not None:
+        content["trust"] = _trust(exported.trust)
     return content | _card(card)
 
 
@@ -81,7 +83,6 @@ def _model(exported: ExportedModel) -> dict[str, Any]:
             "rule": model.initial_state,
             "free_response": model.free_response.tolist(),
         },
-        **({} if exported.trust is None else {"trust": _trust(exported.trust)}),
     }
 
 
@@ -99,6 +100,8 @@ def _trust(trust: ModelTrust) -> dict[str, Any]:
         "judged_on": list(trust.judged_on),
         "scatter": trust.scatter,
         "reason": trust.reason,
+        "gain": trust.gain,
+        "parameters": list(trust.parameters),
     }
 
 

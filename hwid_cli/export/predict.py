@@ -12,6 +12,7 @@ from hwid_cli.records.exported import Exported, ExportedSimulation
 from hwid_cli.records.model import HammersteinWiener
 from hwid_cli.records.trust import Band
 from hwid_cli.trust.band import prediction_band
+from hwid_cli.trust.simulation import simulation_band
 
 
 def predict(
@@ -89,18 +90,24 @@ def predict_band(
     Raises
     ------
     ModelFileError
-        If the model is not stable, is a physics simulation, or its file does not say
-        what is known of its errors.
+        If the model is not stable, is a simulation under a controller, or its file does
+        not say what is known of its errors.
     """
-    if isinstance(exported, ExportedSimulation):
+    if isinstance(exported, ExportedSimulation) and exported.drive.controller:
         raise ModelFileError(
-            f"{place}: kind: found drive_simulation; expected hammerstein_wiener, for "
-            "which --band is made; leave the option out"
+            f"{place}: simulation.controller: found one, under which the command was "
+            "compared with measurements; expected none, so that errors of the output "
+            "are known; leave --band out"
         )
     if exported.trust is None:
         raise ModelFileError(
             f"{place}: trust: found nothing; expected the covariance and errors of the "
             "model, which --band needs; export the model again with this version of hwid"
+        )
+    if isinstance(exported, ExportedSimulation):
+        step = exported.sample_time_s
+        return simulation_band(
+            exported.drive, exported.trust, signal, sample_time_s=step
         )
     check_stability(exported.model, place)
     model = _started(exported.model, initial_state)

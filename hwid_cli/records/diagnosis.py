@@ -8,6 +8,7 @@ from hwid_cli.records.candidates import RankedCandidate
 from hwid_cli.records.programs import OF_DRIVE, Capabilities
 from hwid_cli.records.shown import Shown
 from hwid_cli.records.stored import ADDED_LATER
+from hwid_cli.records.trust import ModelTrust, TrustOnTests
 
 # What leaves more than so many times the noise is a part of what is missing, no fact.
 STILL_LARGE = 3.0
@@ -296,6 +297,10 @@ class Diagnosis(Shown):
         What the simulation can do.
     law : Law or None
         The formula where the verdict is ``law``.
+    trust : ModelTrust or None
+        What is known of the errors of the simulation with what was found.
+    bands : TrustOnTests
+        How its bands of 90 % did on held-out recordings, each told by the others.
     """
 
     verdict: str
@@ -328,6 +333,8 @@ class Diagnosis(Shown):
     confirmed: str = field(default="simulation", metadata=ADDED_LATER)
     capabilities: Capabilities = field(default=OF_DRIVE, metadata=ADDED_LATER)
     law: Law | None = field(default=None, metadata=ADDED_LATER)
+    trust: ModelTrust | None = field(default=None, metadata=ADDED_LATER)
+    bands: TrustOnTests = field(default=TrustOnTests(), metadata=ADDED_LATER)
 
     @property
     def judged_on(self) -> str:

@@ -89,12 +89,15 @@ class ExportedSimulation:
         Of the recordings that it was compared with.
     slots : ndarray, shape (n_slots,)
         All parameters as the compiled simulation reads them.
+    trust : ModelTrust or None
+        What is known of its errors; None in files of earlier versions.
     """
 
     card: ModelCard
     drive: Drive
     sample_time_s: float
     slots: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    trust: ModelTrust | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "slots", frozen_vector(self.slots, "slots"))

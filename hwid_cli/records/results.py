@@ -1,11 +1,13 @@
 """Results of whole stages: the cross-validation tensor and the tables read off it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from hwid_cli.records.model import Orders
 from hwid_cli.records.shown import Shown
+from hwid_cli.records.stored import ADDED_LATER
+from hwid_cli.records.trust import TrustOnTests
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -26,6 +28,8 @@ class CrossValidation(Shown):
         Unit of the output.
     threshold : float, [unit]
         A model covers a recording when its RMSD lies below.
+    bands : TrustOnTests
+        How the bands of 90 % of the widest models did, each told by the other recordings.
     """
 
     identified_on: tuple[str, ...]
@@ -37,6 +41,7 @@ class CrossValidation(Shown):
     status: np.ndarray
     unit: str
     threshold: float
+    bands: TrustOnTests = field(default=TrustOnTests(), metadata=ADDED_LATER)
 
     def __post_init__(self) -> None:
         shape = (

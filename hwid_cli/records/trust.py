@@ -87,6 +87,10 @@ class ModelTrust:
         Between recordings: the median error on these.
     reason : str
         Why there are no steps, if so.
+    gain : float, [-]
+        Between recordings: the part of the error that grows with the output.
+    parameters : tuple of str
+        Names of the parameters of a simulation, ``owner.name``; none of a model.
     """
 
     visited: Visited
@@ -96,6 +100,8 @@ class ModelTrust:
     judged_on: tuple[str, ...]
     scatter: float = 0.0
     reason: str = ""
+    gain: float = 0.0
+    parameters: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         n_columns = np.shape(self.steps)[-1] if np.size(self.steps) else 1

@@ -30,7 +30,12 @@ def band_note(band: Band, unit: str) -> str:
     )
 
 
-def trust_table(found: Sequence[RecordingTrust]) -> Table:
+TESTED = "How far models may be trusted on the test recordings"
+HELD_OUT = "How far the simulation may be trusted on recordings that were held out"
+VALIDATING = "How far models may be trusted on recordings of others"
+
+
+def trust_table(found: Sequence[RecordingTrust], about: str = TESTED) -> Table:
     """Show how far models may be trusted on recordings that they have not used."""
     unit = found[0].unit if found else ""
     rows = tuple(
@@ -47,8 +52,7 @@ def trust_table(found: Sequence[RecordingTrust]) -> Table:
         for one in found
     )
     return Table(
-        f"How far models may be trusted on the test recordings: samples inside what was "
-        f"visited, and the band of 90 % [{unit}]",
+        f"{about}: samples inside what was visited, and the band of 90 % [{unit}]",
         (
             *texts("model", "recording"),
             *numbers("value", "rate", "frequency", "held", "width", "RMSD"),

@@ -5,7 +5,7 @@ keeps the RMSDs only: simulated signals are never held for more than one model.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +20,7 @@ from hwid_cli.records.model import Fit, HammersteinWiener
 from hwid_cli.records.recordings import Recording
 from hwid_cli.records.report import RmsdMatrix
 from hwid_cli.records.results import CrossValidation, ModelScore
+from hwid_cli.records.trust import TrustOnTests
 from hwid_cli.report.crossval import coverage_table, cross_table
 from hwid_cli.report.table import Block
 from hwid_cli.stages.fit_seconds import (
@@ -33,6 +34,8 @@ from hwid_cli.stages.order_grid import candidate_orders
 from hwid_cli.stages.ranking import best_of_each, score_models
 from hwid_cli.stages.selection import select_recordings
 from hwid_cli.stages.stage import Context, Planning, Runner, Stage, in_results
+from hwid_cli.stages.trust import TRUST_VERSION, validation_bands_task
+from hwid_cli.store.final_test_results import write_trust_csv
 from hwid_cli.store.result_files import Provenance
 from hwid_cli.store.results import read_crossval, write_crossval
 from hwid_cli.tasks.cache import model_key, recording_key, task_key
@@ -41,6 +44,8 @@ from hwid_cli.tasks.runner import RunSettings, Task, run_tasks
 NAME = "crossval"
 STAGE_VERSION = 3
 
+# Widest models whose bands are told.
+_BANDS = 3
 # Why an RMSD is there or missing.
 OK, NO_MODEL, NOT_FINITE = "ok", "no model", "not finite"
 
@@ -237,15 +242,27 @@ class _Given:
     recordings: tuple[Recording, ...]
     orders: OrdersOptions
     options: CrossvalOptions
+    identified: tuple[Recording, ...]
+
+    @property
+    def key(self) -> str:
+        """Content key of the RMSDs and of the bands."""
+        rmsds = crossval_key(self.fits, self.recordings, self.orders, self.options)
+        own = [recording_key(one) for one in self.identified]
+        settings = {"rmsds": rmsds, "own": own, "bands": TRUST_VERSION}
+        return task_key(NAME, STAGE_VERSION, settings, [])
 
 
 def _choose(context: Context) -> _Given:
-    experiment = context.experiment
+    experiment, recordings = context.experiment, context.results["calibrate"].recordings
+    fits = context.results["identify"]
+    names = {fit.name for fit in fits}
     return _Given(
-        context.results["identify"],
-        _validation(context.results["calibrate"].recordings, experiment),
+        fits,
+        _validation(recordings, experiment),
         experiment.orders,
         experiment.crossval or CrossvalOptions(),
+        tuple(one for one in recordings if one.name in names),
     )
 
 
@@ -265,9 +282,33 @@ def _compute(given: _Given, runner: Runner) -> CrossValidation:
     n_grid = len(given.orders.nb) * len(given.orders.nk)
     total = len(given.fits) // n_grid * len(given.recordings)
     with runner.tasks(total, "pairs") as settings:
-        return cross_validate(
+        found = cross_validate(
             given.fits, given.recordings, given.orders, given.options, settings
         )
+        # A few seconds at most: not counted among the pairs.
+        tasks = _band_tasks(given, found)
+        done = run_tasks(tasks, replace(settings, on_done=None))
+    rows = [row for item in done for row in item.result.rows]
+    return replace(found, bands=TrustOnTests(tuple(rows)))
+
+
+def _band_tasks(given: _Given, found: CrossValidation) -> list[Task]:
+    """List the tasks: bands of the widest models, each of another recording."""
+    own = {one.name: one for one in given.identified}
+    best: dict[str, ModelScore] = {}
+    for score in score_models(given.fits, found):
+        best.setdefault(score.identified_on, score)
+    fits = {(fit.name, fit.orders): fit for fit in given.fits}
+    return [
+        validation_bands_task(
+            f"{one.identified_on}/{one.nb}/{one.nk}",
+            fits[one.identified_on, one.orders],
+            own[one.identified_on],
+            given.recordings,
+        )
+        for one in list(best.values())[:_BANDS]
+        if one.identified_on in own
+    ]
 
 
 def _summary(_: _Given, result: CrossValidation, is_stored: bool) -> str:
@@ -281,6 +322,7 @@ def _write_csv(
     scores = score_models(given.fits, result)
     write_crossval_csv(out / "crossval.csv", result)
     write_coverage_csv(out / "coverage.csv", scores, len(result.validated_on))
+    write_trust_csv(out / "crossval_trust.csv", result.bands.rows)
 
 
 def _tables(context: Context, result: CrossValidation) -> list[Block]:
@@ -315,9 +357,7 @@ STAGE = Stage(
     needs=("calibrate", "identify"),
     sections=("crossval",),
     choose=_choose,
-    key=lambda given: crossval_key(
-        given.fits, given.recordings, given.orders, given.options
-    ),
+    key=lambda given: given.key,
     compute=_compute,
     storage=in_results(
         NAME,
@@ -328,6 +368,6 @@ STAGE = Stage(
     write_files=_write_csv,
     tables=_tables,
     shows_before=("identify",),
-    files=("results.h5", "crossval.csv", "coverage.csv"),
+    files=("results.h5", "crossval.csv", "coverage.csv", "crossval_trust.csv"),
     plan=_plan,
 )

@@ -55,6 +55,7 @@ from hwid_cli.store.diagnosis_results import (
     write_diagnosis_json,
     write_diagnosis_tables,
 )
+from hwid_cli.store.final_test_results import write_trust_csv
 from hwid_cli.store.result_files import Provenance
 from hwid_cli.tasks.cache import MemoryStore, task_key
 from hwid_cli.tasks.runner import RunSettings, Workers, run_tasks
@@ -462,6 +463,7 @@ def _write_files(
         path, diagnosis, origin.seconds, origin, figures=figures, units=list(units)
     )
     write_diagnosis_tables(out, diagnosis)
+    write_trust_csv(out / "diagnosis_trust.csv", diagnosis.bands.rows)
     write_extended_simulation(
         out / "extended_simulation.yaml",
         given.experiment,
@@ -540,6 +542,7 @@ STAGE = Stage(
         "ranking.csv",
         "where.csv",
         "gaps.csv",
+        "diagnosis_trust.csv",
         "extended_simulation.yaml",
         "figures",
     ),

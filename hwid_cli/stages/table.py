@@ -35,7 +35,8 @@ recording.
     "crossval": """Validate every model on every recording.
 
 Writes the tensor of RMSDs to results.h5:/crossval, crossval.csv and
-coverage.csv, and shows the models that cover the most recordings.
+coverage.csv and crossval_trust.csv, and shows the models that cover the most
+recordings.
 """,
     "order": """Recommend orders and maps, and say why.
 
@@ -62,8 +63,8 @@ and which model serves which recording.
 Compares the simulation with the recordings, names the missing effect, adds
 it, and shows what is left on recordings that were held out; or says that
 nothing is missing, or that nothing known explains the gap. Writes
-diagnosis.json, ranking.csv, where.csv, gaps.csv, extended_simulation.yaml,
-results.h5:/diagnose and figures.
+diagnosis.json, ranking.csv, where.csv, gaps.csv, diagnosis_trust.csv,
+extended_simulation.yaml, results.h5:/diagnose and figures.
 """,
     "next": """Say which recordings to take next, or that enough is known.
 

@@ -11,10 +11,17 @@ from hwid_cli.records.recordings import Recording
 from hwid_cli.records.trust import ModelTrust, ShownBand, TrustOnTests
 from hwid_cli.tasks.cache import model_key, recording_key, task_key
 from hwid_cli.tasks.runner import Task
-from hwid_cli.trust.judged import model_trust, recording_trust
+from hwid_cli.trust.judged import (
+    judgement,
+    left_out_bands,
+    model_trust,
+    own_trust,
+    recording_trust,
+    trust_row,
+)
 
 # Of what is known of a model's errors, whichever stage asks for it.
-TRUST_VERSION = 1
+TRUST_VERSION = 2
 
 
 def trust_of(
@@ -38,6 +45,59 @@ def trust_of(
 def kept_for_test(experiment: Experiment) -> tuple[str, ...]:
     """Recordings that are kept for the test."""
     return () if experiment.test is None else experiment.test.recordings
+
+
+def validation_bands_task(
+    name: str, fit: Fit, own: Recording, recordings: Sequence[Recording]
+) -> Task:
+    """Task that tells how a model's bands do on the recordings that validate it.
+
+    Parameters
+    ----------
+    name : str
+        Of the model.
+    fit : Fit
+        That has one.
+    own : Recording
+        Of the fit.
+    recordings : sequence of Recording
+        Each band is told by the other ones; that of the fit does not count.
+
+    Returns
+    -------
+    Task
+        Gives ``TrustOnTests``.
+    """
+    settings = {
+        "model": name,
+        "numbers": None if fit.model is None else model_key(fit.model),
+        "orders": fit.orders,
+        "options": fit.options,
+        "own": recording_key(own),
+        "validated_on": {one.name: recording_key(one) for one in recordings},
+    }
+    return Task(
+        key=task_key("validation bands", TRUST_VERSION, settings, []),
+        name=f"bands of {name}",
+        function=_validation_bands,
+        arguments=(name, fit, own, tuple(recordings)),
+        result_type=TrustOnTests,
+    )
+
+
+def _validation_bands(
+    name: str, fit: Fit, own: Recording, recordings: Sequence[Recording]
+) -> TrustOnTests:
+    if fit.model is None:
+        return TrustOnTests()
+    trust, others = own_trust(fit, [own]), [r for r in recordings if r.name != own.name]
+    found = [judgement(fit.model, trust, one) for one in others]
+    return TrustOnTests(
+        tuple(
+            trust_row((name, one.name, own.output_unit), one.measured, band)
+            for one, band in left_out_bands(trust, found)
+        )
+    )
 
 
 def trust_task(

@@ -191,6 +191,7 @@ def write_crossval(
             for number, axis in enumerate(axes):
                 group[name].dims[number].label = axis
                 group[name].dims[number].attach_scale(group[axis])
+        write_record(group.create_group("bands"), crossval.bands)
         group["rmsd"].attrs["unit"] = crossval.unit
         group["rmsd"].attrs["nk_role"] = crossval.nk_role
 

@@ -2,16 +2,17 @@
 
 The standard deviation of the error at a sample is taken to be
 
-    s = sqrt(parameters + 0.03 continuation + noise^2 + scatter^2)
-        (1 + 1.5 octaves + 0.3 values)
+    s = sqrt((parameters + 0.03 continuation + noise^2 + scatter^2)
+             (1 + 1.5 octaves + 0.3 values)^2 + gain^2 (output - first output)^2)
 
 parameters: steps of the covariance, passed through the model on this input.
 continuation: how far the output moves where the maps go on otherwise beyond the data.
-noise: what the model leaves of its own recordings. scatter: the median error on recordings
-to which it was not fitted (`trust.judged`): a machine differs from recording to recording
-even where the model has seen everything. octaves and values: 1 where the content
-in frequency, or value and rate, lie outside what was visited. The band is a number of
-standard deviations wide that holds 90 % of the samples of these recordings.
+noise: what the model leaves of its own recordings. scatter and gain: the median error on
+recordings to which it was not fitted, and the part of it that grows with the output
+(`trust.judged`): a machine differs from recording to recording even where the model has
+seen everything. octaves and values: 1 where the content
+in frequency, or value and rate, lie outside what was visited. How many standard
+deviations wide the band is, these recordings say.
 
 References
 ----------
@@ -78,31 +79,41 @@ def prediction_band(
         Coefficients of the free response; the model's own unless given.
     """
     terms = error_terms(model, trust, values, state=state)
-    where = inside(trust.visited, values, terms.inner)
-    noise_rms = np.hypot(trust.noise_rms, trust.scatter)
-    half = trust.scale * standard_deviation(terms, where, noise_rms)
+    return band_of(trust, terms, inside(trust.visited, values, terms.inner))
+
+
+def band_of(trust: ModelTrust, terms: ErrorTerms, where: Inside) -> Band:
+    """Band around an output whose error terms are known."""
+    half = trust.scale * standard_deviation(trust, terms, where)
     return Band(terms.output, terms.output - half, terms.output + half, where)
 
 
 def standard_deviation(
-    terms: ErrorTerms, where: Inside, noise_rms: float
+    trust: ModelTrust, terms: ErrorTerms, where: Inside
 ) -> np.ndarray:
     """Standard deviation of the error at each sample.
 
     Parameters
     ----------
-    noise_rms : float, [output unit]
-        With the scatter between recordings, if it is to count.
+    trust : ModelTrust
+        Its scale does not count.
 
     Returns
     -------
     ndarray, shape (n_samples,), [output unit]
     """
-    variance = terms.parameters + _CONTINUATION * terms.continuation + noise_rms**2
+    variance = terms.parameters + _CONTINUATION * terms.continuation
+    variance = variance + trust.noise_rms**2 + trust.scatter**2
     outside = ~where.frequency, ~(where.amplitude & where.rate)
     shares = (_OUTSIDE_OCTAVES, _OUTSIDE_VALUES)
     grows = sum(share * is_out for share, is_out in zip(shares, outside, strict=True))
-    return np.sqrt(variance) * (1.0 + grows)
+    by_gain = (trust.gain * level_of(terms)) ** 2
+    return np.sqrt(variance * (1.0 + grows) ** 2 + by_gain)
+
+
+def level_of(terms: ErrorTerms) -> np.ndarray:
+    """How far the output is from its first sample, shape (n_samples,), [output unit]."""
+    return terms.output - terms.output[0]
 
 
 def error_terms(

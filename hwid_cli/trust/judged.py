@@ -2,13 +2,16 @@
 
 The scale of the band is told by recordings beside those of the fit. Where there are none,
 recordings of the fit are left out in turn and the model is fitted to the others; a single
-recording is cut into three, which are left out in turn. The scale
-holds 90 % of all samples, and of those of three recordings in four: with two or three
-recordings, of the one that is least like the others.
+recording is cut into three, which are left out in turn.
+
+A model whose gain is 5 % off for one recording is 5 % off at each of its samples: ten
+thousand of them are then one error, not ten thousand. So the scale is Student's quantile
+for the number of independent errors that the recordings hold.
 
 References
 ----------
-docs/trust.md.
+Bartlett, On the theoretical specification and sampling properties of autocorrelated time
+series (1946), for that number. docs/trust.md.
 """
 
 from collections.abc import Sequence
@@ -16,6 +19,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
+from scipy.stats import t as student
 
 from hwid_cli.model.extrapolation import outlined_model
 from hwid_cli.model.fit import fit_without_standard_errors
@@ -27,18 +31,20 @@ from hwid_cli.records.recordings import Recording
 from hwid_cli.records.trust import Band, Inside, ModelTrust, RecordingTrust
 from hwid_cli.trust.band import (
     ErrorTerms,
+    band_of,
     error_terms,
     inner_and_output,
+    level_of,
     prediction_band,
     standard_deviation,
 )
 from hwid_cli.trust.visited import inside, visited_by
 
 COVERAGE = 0.9
-# Of recordings, which must hold this much each.
-_RECORDINGS = 0.75
 # Standard deviations at least: a good day of two recordings proves little.
-_LEAST_SCALE = 1.1
+_LEAST_SCALE = 1.0
+# Standard deviations where nothing judges.
+_UNKNOWN_SCALE = 2.0
 # Recordings that judge; more change little and cost time.
 _MOST_JUDGES = 8
 # Standard deviations of a model that diverges.
@@ -50,8 +56,16 @@ _PARTS = 3
 
 
 @dataclass(frozen=True, eq=False)
-class _Judgement:
-    """Errors of a model on one recording, and what they are measured by."""
+class Judgement:
+    """Errors on one recording that the fit has not used, and what they are measured by.
+
+    Parameters
+    ----------
+    errors : ndarray, shape (n_samples,), [output unit]
+        Measured minus predicted.
+    noise_rms : float, [output unit]
+        What the model that is judged leaves of its own recordings.
+    """
 
     name: str
     errors: np.ndarray
@@ -59,13 +73,10 @@ class _Judgement:
     where: Inside
     noise_rms: float
 
-
-def _scores(one: _Judgement, scatter: float) -> np.ndarray:
-    """Errors in standard deviations, shape (n_samples,)."""
-    noise_rms = float(np.hypot(one.noise_rms, scatter))
-    with np.errstate(over="ignore", invalid="ignore"):
-        scores = one.errors / standard_deviation(one.terms, one.where, noise_rms)
-    return np.nan_to_num(scores, nan=_DIVERGED, posinf=_DIVERGED)
+    @property
+    def measured(self) -> np.ndarray:
+        """What was measured, shape (n_samples,), [output unit]."""
+        return self.terms.output + self.errors
 
 
 def model_trust(
@@ -85,23 +96,115 @@ def model_trust(
     ValueError
         If the fit failed or ``own`` are other recordings.
     """
-    trust = _own_trust(fit, own)
+    trust = own_trust(fit, own)
     if others and fit.model is not None:
         at = np.linspace(0, len(others) - 1, min(len(others), _MOST_JUDGES))
-        found = [_judged(fit.model, trust, others[round(place)]) for place in at]
+        found = [judgement(fit.model, trust, others[round(place)]) for place in at]
     else:
-        found = _left_out(fit, own)
-    are_recordings = bool(others) or len(own) > 1
-    scatter = 0.0
-    if found:
-        scatter = float(np.median(np.concatenate([one.errors for one in found])))
-    scores = [_scores(one, scatter) for one in found]
-    return replace(
+        found = left_out(fit, own)
+    return calibrated(trust, found)
+
+
+def calibrated(trust: ModelTrust, found: Sequence[Judgement]) -> ModelTrust:
+    """The same with scatter, gain and scale that recordings beside the fit tell.
+
+    Parameters
+    ----------
+    trust : ModelTrust
+        Of the fit alone.
+    """
+    if not found:
+        return replace(trust, scale=_UNKNOWN_SCALE)
+    errors = np.abs(np.concatenate([one.errors for one in found]))
+    gains = np.array([_gain(one) for one in found])
+    known = replace(
         trust,
-        scale=_scale(scores, are_recordings=are_recordings),
-        judged_on=tuple(one.name for one in found),
-        scatter=scatter,
+        scatter=float(np.median(errors)),
+        gain=float(np.sqrt(np.mean(gains**2))),
     )
+    return replace(
+        known,
+        scale=_scale([_scores(one, known) for one in found]),
+        judged_on=tuple(one.name for one in found),
+    )
+
+
+def left_out_bands(
+    trust: ModelTrust, found: Sequence[Judgement]
+) -> list[tuple[Judgement, Band]]:
+    """Band on each recording that judges, told by the others.
+
+    Parameters
+    ----------
+    trust : ModelTrust
+        Of the fit alone.
+    """
+    bands = []
+    for one in found:
+        known = calibrated(trust, [other for other in found if other is not one])
+        # A model may diverge on recordings of others.
+        with np.errstate(over="ignore", invalid="ignore"):
+            bands.append((one, band_of(known, one.terms, one.where)))
+    return bands
+
+
+def _gain(one: Judgement) -> float:
+    """Part of the error that is a share of the output, [-]."""
+    level = level_of(one.terms)
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        gain = float(level @ one.errors / (level @ level))
+    return gain if np.isfinite(gain) else 0.0
+
+
+def _scores(one: Judgement, trust: ModelTrust) -> np.ndarray:
+    """Errors in standard deviations, shape (n_samples,)."""
+    known = replace(trust, noise_rms=one.noise_rms)
+    with np.errstate(over="ignore", invalid="ignore"):
+        scores = one.errors / standard_deviation(known, one.terms, one.where)
+    return np.nan_to_num(scores, nan=_DIVERGED, posinf=_DIVERGED, neginf=-_DIVERGED)
+
+
+def _scale(scores: Sequence[np.ndarray]) -> float:
+    """Half width in standard deviations: Student's, for the number of errors."""
+    squares = np.array([np.mean(one**2) for one in scores])
+    number = sum(independent_errors(one) for one in scores)
+    if squares.size > 1 and np.var(squares) > 0.0:
+        # Recordings that differ more than so many errors would are fewer errors.
+        relative = np.var(squares / squares.mean(), ddof=1)
+        number = min(number, 2.0 * squares.size / relative)
+    quantile = student.ppf(0.5 + COVERAGE / 2.0, number)
+    return max(float(quantile * np.sqrt(squares.mean())), _LEAST_SCALE)
+
+
+def independent_errors(errors: np.ndarray) -> float:
+    """How many independent errors a series is worth when its mean square is taken.
+
+    Parameters
+    ----------
+    errors : ndarray, shape (n_samples,)
+
+    Returns
+    -------
+    float, [-]
+        ``n`` over the sum of squared autocorrelations on both sides; 1 of a constant. Of
+        many errors a third is found, which is on the safe side and changes little: chance
+        doubles that sum.
+
+    Examples
+    --------
+    >>> independent_errors(np.full(1000, 0.3))
+    1.0
+    """
+    n = errors.size
+    size = float(np.abs(errors).max())
+    if size == 0.0:
+        return float(n)
+    spectrum = np.abs(np.fft.rfft(errors / size, 2 * n)) ** 2
+    correlation = np.fft.irfft(spectrum)[:n]
+    correlation = correlation / correlation[0]
+    total = 2.0 * float(correlation @ correlation) - 1.0
+    # Products that the end cuts off: those of a constant sum to 2 n / 3.
+    return max(1.0, n / (1.5 * total))
 
 
 def recording_trust(
@@ -116,24 +219,54 @@ def recording_trust(
     """
     state = _state(model, recording)
     band = prediction_band(model, trust, recording.input, state=state)
-    measured, where = recording.output, band.inside
+    about = (name, recording.name, recording.output_unit)
+    return trust_row(about, recording.output, band), band
+
+
+def trust_row(
+    about: tuple[str, str, str], measured: np.ndarray, band: Band
+) -> RecordingTrust:
+    """How a band did beside what was measured.
+
+    Parameters
+    ----------
+    about : tuple of str
+        Names of model and recording, unit of the output.
+    measured : ndarray, shape (n_samples,), [output unit]
+    """
+    model, recording, unit = about
+    where = band.inside
     is_held = (measured >= band.lower) & (measured <= band.upper)
-    found = RecordingTrust(
-        name,
-        recording.name,
+    with np.errstate(over="ignore", invalid="ignore"):
+        width = float(np.mean(band.upper - band.lower))
+        deviation = rmsd(measured, band.output)
+    return RecordingTrust(
+        model,
+        recording,
         float(where.amplitude.mean()),
         float(where.rate.mean()),
         float(where.frequency.mean()),
         float(where.all.mean()),
         float(is_held.mean()),
-        float(np.mean(band.upper - band.lower)),
-        rmsd(measured, band.output),
-        recording.output_unit,
+        width,
+        deviation,
+        unit,
     )
-    return found, band
 
 
-def _own_trust(fit: Fit, own: Sequence[Recording]) -> ModelTrust:
+def own_trust(fit: Fit, own: Sequence[Recording]) -> ModelTrust:
+    """What the recordings of a fit alone tell of its errors.
+
+    Parameters
+    ----------
+    own : sequence of Recording
+        Of the fit, in the order of ``fit.identified_on``.
+
+    Raises
+    ------
+    ValueError
+        If the fit failed or ``own`` are other recordings.
+    """
     if fit.model is None:
         raise ValueError(f"the fit of {fit.name} failed: there is no model")
     steps, reason = parameter_steps(fit, own)
@@ -164,33 +297,40 @@ def _state(model: HammersteinWiener, recording: Recording) -> np.ndarray:
     return estimated_state(model, recording)
 
 
-def _judged(
+def judgement(
     fitted: HammersteinWiener, trust: ModelTrust, recording: Recording
-) -> _Judgement:
-    """Errors on a recording, with what they are measured by."""
+) -> Judgement:
+    """Errors of a model on a recording, with what they are measured by.
+
+    Parameters
+    ----------
+    trust : ModelTrust
+        Of its fit alone.
+    """
     model = outlined_model(fitted)
     state = _state(model, recording)
     terms = error_terms(model, trust, recording.input, state=state)
     where = inside(trust.visited, recording.input, terms.inner)
     with np.errstate(over="ignore", invalid="ignore"):
-        errors = np.abs(recording.output - terms.output)
-    largest = _DIVERGED * trust.noise_rms
-    errors = np.nan_to_num(errors, nan=largest, posinf=largest)
-    return _Judgement(recording.name, errors, terms, where, trust.noise_rms)
+        errors = recording.output - terms.output
+    most = _DIVERGED * trust.noise_rms
+    errors = np.nan_to_num(errors, nan=most, posinf=most, neginf=-most)
+    return Judgement(recording.name, errors, terms, where, trust.noise_rms)
 
 
-def _left_out(fit: Fit, own: Sequence[Recording]) -> list[_Judgement]:
+def left_out(fit: Fit, own: Sequence[Recording]) -> list[Judgement]:
     """Judgements of models of the others on each recording, or part, of the fit."""
     options = fit.options
     if len(own) == 1:
         own = _parts(own[0])
-        options = replace(options, join="experiments")
+        # Parts begin in the middle of a motion, whatever the recording does.
+        options = replace(options, join="experiments", initial_state="estimated")
     found = []
     for left in own[:_MOST_JUDGES]:
         kept = [one for one in own if one is not left]
         other = fit_without_standard_errors(kept, fit.orders, options)
         if other.model is not None:
-            found.append(_judged(other.model, _own_trust(other, kept), left))
+            found.append(judgement(other.model, own_trust(other, kept), left))
     return found
 
 
@@ -207,15 +347,3 @@ def _parts(whole: Recording) -> list[Recording]:
         )
         for number, (first, last) in enumerate(pairwise(edges))
     ]
-
-
-def _scale(scores: Sequence[np.ndarray], *, are_recordings: bool) -> float:
-    """Half width in standard deviations; parts of one recording count together."""
-    if not scores:
-        return 2.0 * _LEAST_SCALE
-    pooled = np.quantile(np.concatenate(scores), COVERAGE)
-    hard = 0.0
-    if are_recordings:
-        each = [np.quantile(one, COVERAGE) for one in scores]
-        hard = float(np.quantile(each, _RECORDINGS, method="higher"))
-    return max(float(pooled), hard, _LEAST_SCALE)

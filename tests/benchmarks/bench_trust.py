@@ -4,30 +4,41 @@
 the band were chosen, without it others are drawn. Random plants (`trust_plants`): a model
 of one recording, judged by others or by its own rest; the band on recordings that nothing
 has used, of the same kind of input and of others, apart. Public measurements
-(``HWID_REALDATA``) and the virtual gun by the same functions.
+(``HWID_REALDATA``) and the virtual gun by the same functions. ``--keep FILE`` writes each
+plant as it comes, and what the file has is not computed again.
 """
 
 import argparse
+import json
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 from scipy.io import loadmat
 
-from hwid_cli.model.extrapolation import outlined_model
 from hwid_cli.model.fit import fit
 from hwid_cli.records.experiment import CalibrateOptions
 from hwid_cli.records.machines import GunMachine, GunPlan
 from hwid_cli.records.model import Fit, FitOptions, Orders
 from hwid_cli.records.recordings import RawRecording, Recording
+from hwid_cli.records.trust import ModelTrust
 from hwid_cli.stages.calibrate import calibrate_all
 from hwid_cli.stages.simulate import simulate_machine
-from hwid_cli.trust.judged import model_trust, recording_trust
+from hwid_cli.trust.band import band_of
+from hwid_cli.trust.judged import (
+    Judgement,
+    calibrated,
+    judgement,
+    left_out,
+    own_trust,
+    trust_row,
+)
 from tests.benchmarks.real_data import ced, folder, tanks
 from tests.benchmarks.trust_plants import INPUTS, STRUCTURES, plant_recordings
 
-CHOOSING, REPORTING = 1000, 60_000
+CHOOSING, REPORTING = 1000, 70_000
 # Who judges: recordings by their place among those of a plant. The first is the model's.
 JUDGES = {"two of its kind": (1, 2), "one of each of two kinds": (1, 5), "none": ()}
 ORDERS = Orders(2, 2, 1)
@@ -36,20 +47,27 @@ HEAD = f"{'':34}{'recordings':>11}{'coverage':>10}{'10 % below':>11}{'width/erro
 Row = tuple[float, float, float, float]
 
 
-def judged(name: str, found: Fit, own, judges, tests: Sequence[Recording]) -> list[Row]:
+def row_of(known: ModelTrust, one: Judgement) -> list[Row]:
     """Coverage, width over error and over the output's spread, share inside."""
-    trust = model_trust(found, own, judges)
-    model, rows = outlined_model(found.model), []
-    for one in tests:
-        spread = float(np.std(one.output))
-        if spread == 0.0:
-            # An input that stays within a dead zone is no recording.
-            continue
-        seen, _ = recording_trust(name, model, trust, one)
-        rows.append(
-            (seen.coverage, seen.width / seen.rmsd, seen.width / spread, seen.inside)
-        )
-    return rows
+    spread = float(np.std(one.measured))
+    if spread == 0.0:
+        # An input that stays within a dead zone is no recording.
+        return []
+    band = band_of(known, one.terms, one.where)
+    seen = trust_row(("", one.name, ""), one.measured, band)
+    return [(seen.coverage, seen.width / seen.rmsd, seen.width / spread, seen.inside)]
+
+
+def judged(found: Fit, own, judges, tests: Sequence[Recording]) -> list[Row]:
+    """Rows of recordings that neither the fit nor its judges have used."""
+    trust = own_trust(found, own)
+    calibrating = [judgement(found.model, trust, one) for one in judges]
+    known = calibrated(trust, calibrating or left_out(found, own))
+    return [
+        row
+        for one in tests
+        for row in row_of(known, judgement(found.model, trust, one))
+    ]
 
 
 def show(name: str, rows: Sequence[Row]) -> None:
@@ -63,31 +81,52 @@ def show(name: str, rows: Sequence[Row]) -> None:
     )
 
 
-def plants(count: int, first: int, who_judges: Sequence[str]) -> None:
+def plant(seed: int, structure: str) -> dict[str, list[Row]]:
+    """Rows of one random plant, by who judges, structure and kind of input."""
+    rng = np.random.default_rng(seed)
+    order = [str(one) for one in rng.permutation(INPUTS)]
+    kinds = [order[0]] * 5 + [order[1], order[1], order[2]]
+    recordings = plant_recordings(seed, structure, kinds)
+    options = FitOptions(units=int(rng.choice([5, 10])))
+    model = fit(recordings[:1], ORDERS, options)
+    if model.model is None:
+        return {}
+    word = "right" if structure == "right" else "wrong"
+    trust = own_trust(model, recordings[:1])
+    each = [judgement(model.model, trust, one) for one in recordings[1:]]
+    found = {}
+    for who, places in JUDGES.items():
+        judges = [each[place - 1] for place in places]
+        known = calibrated(trust, judges or left_out(model, recordings[:1]))
+        others = each[6:] if 5 in places else each[4:]
+        for kind, tests in (("same", each[2:4]), ("other", others)):
+            rows = [row for one in tests for row in row_of(known, one)]
+            found[f"{who}, {word}, {kind}"] = rows
+    return found
+
+
+def plants(count: int, first: int, keep: Path | None) -> None:
     """Random plants, right and wrong structure in turn."""
-    found: dict[tuple[str, str, str], list[Row]] = {}
     wrong = STRUCTURES[1:]
+    known = {}
+    if keep is not None and keep.is_file():
+        lines = [json.loads(one) for one in keep.read_text().splitlines()]
+        known = {one["seed"]: one["rows"] for one in lines}
+    found: dict[str, list[Row]] = {}
     for number in range(count):
         structure = "right" if number % 2 == 0 else wrong[number // 2 % len(wrong)]
-        rng = np.random.default_rng(first + number)
-        order = [str(one) for one in rng.permutation(INPUTS)]
-        kinds = [order[0]] * 5 + [order[1], order[1], order[2]]
-        recordings = plant_recordings(first + number, structure, kinds)
-        options = FitOptions(units=int(rng.choice([5, 10])))
-        model = fit(recordings[:1], ORDERS, options)
-        if model.model is None:
-            continue
-        word = "right" if structure == "right" else "wrong"
-        for who in who_judges:
-            places = JUDGES[who]
-            judges = [recordings[place] for place in places]
-            others = recordings[7:] if 5 in places else recordings[5:]
-            for kind, tests in (("same", recordings[3:5]), ("other", others)):
-                rows = judged("", model, recordings[:1], judges, tests)
-                found.setdefault((who, word, kind), []).extend(rows)
+        seed = first + number
+        if seed not in known:
+            known[seed] = plant(seed, structure)
+            if keep is not None:
+                with keep.open("a") as file:
+                    file.write(json.dumps({"seed": seed, "rows": known[seed]}) + "\n")
+        for name, rows in known[seed].items():
+            found.setdefault(name, []).extend(rows)
     print(f"\n{count} random plants from seed {first}\n{HEAD}")
-    for (who, word, kind), rows in found.items():
-        show(f"{who}, {word}, {kind}", rows)
+    order = [f"{who}, {word}" for who in JUDGES for word in ("right", "wrong")]
+    for name in sorted(found, key=lambda one: order.index(one.rpartition(",")[0])):
+        show(name, found[name])
 
 
 def hsm150() -> list[Row]:
@@ -111,7 +150,7 @@ def hsm150() -> list[Row]:
         judges = [recordings[k] for k in same if k.endswith("_2")]
         tests = [recordings[k] for k in same if k.endswith("_3")]
         model = fit([own], Orders(1, 1, 1), options)
-        found += judged(name, model, [own], judges, tests)
+        found += judged(model, [own], judges, tests)
     return found
 
 
@@ -128,7 +167,7 @@ def public(benchmark: Callable) -> list[Row]:
         unseen = replace(
             whole, input=whole.input[exam.known :], output=whole.output[exam.known :]
         )
-        found += judged(own.name, model, [own], [], [unseen])
+        found += judged(model, [own], [], [unseen])
     return found
 
 
@@ -166,7 +205,7 @@ def gun() -> dict[str, list[Row]]:
                 # The four after the first two are the tests.
                 names_of_judges = [*others[:2], *others[6:]][:count]
                 judges = [recordings[one] for one in names_of_judges]
-                rows = judged(own, model, [recordings[own]], judges, unseen)
+                rows = judged(model, [recordings[own]], judges, unseen)
                 found.setdefault(f"{kind}, {count} judges", []).extend(rows)
     return found
 
@@ -176,13 +215,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--plants", type=int, default=320)
     parser.add_argument("--choose", action="store_true")
-    parser.add_argument(
-        "--judges", choices=list(JUDGES), nargs="+", default=list(JUDGES)
-    )
+    parser.add_argument("--keep", type=Path)
     parser.add_argument("--only", choices=["plants", "real", "gun"])
     chosen = parser.parse_args()
     if chosen.only in (None, "plants"):
-        plants(chosen.plants, CHOOSING if chosen.choose else REPORTING, chosen.judges)
+        plants(chosen.plants, CHOOSING if chosen.choose else REPORTING, chosen.keep)
     if chosen.only in (None, "real"):
         print(f"\nmeasured\n{HEAD}")
         if folder().is_dir():

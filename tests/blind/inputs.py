@@ -17,8 +17,14 @@ MULTISINE_HZ = (0.5, 60.0)
 
 
 def plan(name, rng):
-    """Commands by the name of the recording: ``full``, ``poor`` or ``short``."""
-    return {"full": full_plan, "poor": poor_plan, "short": short_plan}[name](rng)
+    """Commands by the name of the recording: ``full``, ``poor``, ``short`` or ``few``."""
+    plans = {
+        "full": full_plan,
+        "poor": poor_plan,
+        "short": short_plan,
+        "few": few_plan,
+    }
+    return plans[name](rng)
 
 
 def full_plan(rng):
@@ -57,6 +63,17 @@ def short_plan(rng):
         commands[f"sine_{n + 1:02}"] = sine(amplitude, frequency)[:1000]
     commands["random_01"] = multisine(rng)[:1000]
     return commands
+
+
+def few_plan(_rng):
+    """6 short steps in one direction: a tenth of the samples of the poor plan."""
+    steps = [
+        (amplitude, ramp) for ramp in (0.005, 0.1) for amplitude in (1.5, 3.0, 5.0)
+    ]
+    return {
+        f"step_{n + 1:02}": one_way_step(amplitude, ramp)[:500]
+        for n, (amplitude, ramp) in enumerate(steps)
+    }
 
 
 def returning_step(amplitude_A, ramp_s):

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from hwid_cli.store.result_files import read_provenance
+from hwid_cli.store.results import read_crossval
 
 
 def rows_of(path):
@@ -41,6 +42,21 @@ def test_the_tensor_and_the_tables_are_written(hwid, out):
     coverage = rows_of(out / "coverage.csv")
     assert len(coverage) == 6
     assert {row["of"] for row in coverage} == {"3"}
+
+
+def test_the_bands_of_the_widest_models_are_a_table(after_run, out):
+    rows = rows_of(out / "crossval_trust.csv")
+    models = {row["model"] for row in rows}
+
+    # Three recordings: a model of each, on both others.
+    assert len(rows) == 6
+    assert len({one.split("/")[0] for one in models}) == 3
+    for row in rows:
+        assert not row["model"].startswith(f"{row['recording']}/")
+        assert 0.0 <= float(row["coverage"]) <= 1.0
+        assert float(row["width"]) > 0.0
+    stored = read_crossval(out / "results.h5").bands.rows
+    assert [f"{one.width!r}" for one in stored] == [row["width"] for row in rows]
 
 
 def test_what_the_thesis_calls_things_is_shown_on_request(after_run, hwid, config):

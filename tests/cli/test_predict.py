@@ -261,7 +261,7 @@ def test_a_model_of_an_earlier_version_has_no_band_and_says_what_to_do(model, tm
     assert not out.exists()
 
 
-def test_a_physics_simulation_has_no_band(tmp_path):
+def test_a_physics_simulation_whose_errors_nobody_said_has_no_band(tmp_path):
     path = tmp_path / "s.json"
     write_json(path, exported_drive())
     given = tmp_path / "u.csv"
@@ -270,4 +270,4 @@ def test_a_physics_simulation_has_no_band(tmp_path):
     result = predict(path, given, "--out", tmp_path / "p.csv", "--band")
 
     assert result.exit_code == 1
-    assert "kind: found drive_simulation" in result.stderr
+    assert f"{path}: trust: found nothing; expected the covariance" in result.stderr

@@ -11,7 +11,8 @@ from hwid_cli.report.figures.next import band_figure, visited_figure
 from hwid_cli.report.page import images_of
 from hwid_cli.report.sections.next import trust_drawings, trust_section
 from hwid_cli.report.table import Table, Text
-from tests.report.report_examples import final_test
+from tests.report.diagnosis_examples import named
+from tests.report.report_examples import crossval, final_test
 
 TIME = np.linspace(0.0, 1.0, 50)
 ROW = RecordingTrust("a/1/2", "step_14", 0.9, 0.8, 0.7, 0.6, 0.93, 0.04, 0.01)
@@ -46,8 +47,8 @@ def found(**changes):
     )  # fmt: skip
 
 
-def section(final=None, proposed=None):
-    results = {"test": final, "next": proposed}
+def section(final=None, proposed=None, **others):
+    results = {"test": final, "next": proposed, **others}
     return trust_section(
         ReportContents(StoredResults("a", "{}", "poles", results=results))
     )
@@ -62,6 +63,25 @@ def test_without_results_the_section_says_what_to_run():
 
     assert "run 'hwid test CONFIG'" in missing
     assert "'hwid next CONFIG'" in missing
+
+
+@pytest.mark.usefixtures("blank_figures")
+def test_bands_of_a_simulation_and_of_validated_models_are_shown():
+    bands = TrustOnTests(
+        (replace(ROW, model="simulation"),), replace(SHOWN, model="simulation")
+    )
+    blocks = section(
+        diagnose=replace(named(), bands=bands),
+        crossval=replace(crossval(), bands=TrustOnTests((ROW,))),
+    ).blocks
+
+    folded, figure, table = blocks
+    assert folded.blocks[0].rows[0][0] == "a/1/2"
+    assert "recordings of others" in folded.blocks[0].caption
+    assert [one.file for one in images_of(blocks)] == ["next/simulation_band.png"]
+    assert "holds 93% of what was measured" in figure.sentence
+    assert table.rows[0][0] == "simulation"
+    assert "the simulation may be trusted" in table.caption
 
 
 @pytest.mark.usefixtures("blank_figures")

@@ -4,13 +4,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from hwid_cli.model.extrapolation import outlined_model
 from hwid_cli.model.simulate import simulate
 from hwid_cli.records.experiment import CrossvalOptions, OrdersOptions
 from hwid_cli.records.model import Fit, FitOptions, HammersteinWiener, Orders, StaticMap
 from hwid_cli.records.recordings import Recording
 from hwid_cli.stages.crossval import cross_validate, crossval_tasks
+from hwid_cli.stages.trust import validation_bands_task
 from hwid_cli.tasks.cache import MemoryStore
 from hwid_cli.tasks.runner import RunSettings, Workers
+from hwid_cli.trust.judged import (
+    calibrated,
+    judgement,
+    own_trust,
+    recording_trust,
+)
 
 NONE = StaticMap("none", np.zeros(0))
 GRID = OrdersOptions(nb=(1, 2), nk=(1, 2))
@@ -151,3 +159,19 @@ def test_simulated_signals_are_not_kept():
     # One model needs about ten signals on its way to the RMSD; to hold those of all 40
     # models would take at least 40.
     assert peak < 20 * n * 8
+
+
+def test_a_band_is_told_by_the_recordings_of_others():
+    # Its own recording is left out; each other one is held by what the others tell.
+    fit, judges = FITS[1], [recording_of(f"j{k}", 20 + k) for k in range(3)]
+    own = recording_of(fit.name, 1)
+    task = validation_bands_task("a/1/1", fit, own, [own, *judges])
+
+    rows = task.function(*task.arguments).rows
+
+    assert [one.recording for one in rows] == ["j0", "j1", "j2"]
+    trust = own_trust(fit, [own])
+    found = [judgement(fit.model, trust, one) for one in judges]
+    known = calibrated(trust, found[1:])
+    _, band = recording_trust("a/1/1", outlined_model(fit.model), known, judges[0])
+    assert rows[0].width == pytest.approx(np.mean(band.upper - band.lower))
