@@ -36,6 +36,8 @@ _LESS_NOISE, _MORE_NOISE = 0.7, 1.3
 _NEARLY_WHITE = 6.0
 # Times that the filter follows the drive that was fitted with it.
 _REWEIGHTINGS = 2
+# Coordinates of that search go no farther: a factor of exp(30).
+_FARTHEST = 30.0
 # Correlations of neighbours, and of the next but one, that interpolation makes at most.
 _MOST_LINKED = (0.35, 0.1)
 
@@ -173,8 +175,10 @@ def fit_with_input_noise(
     n_shared = len(fit_layout.shared)
 
     def at(coordinates: np.ndarray) -> ParameterPoint:
+        # The search knows no bounds, and far beyond them nothing has a value.
+        within = np.clip(coordinates, -_FARTHEST, _FARTHEST)
         return ParameterPoint(
-            coordinates[:n_shared], coordinates[n_shared:].reshape(point.own.shape)
+            within[:n_shared], within[n_shared:].reshape(point.own.shape)
         )
 
     for _ in range(_REWEIGHTINGS):

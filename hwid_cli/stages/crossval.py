@@ -285,9 +285,9 @@ def _compute(given: _Given, runner: Runner) -> CrossValidation:
         found = cross_validate(
             given.fits, given.recordings, given.orders, given.options, settings
         )
-        # A few seconds at most: not counted among the pairs.
-        tasks = _band_tasks(given, found)
-        done = run_tasks(tasks, replace(settings, on_done=None))
+    tasks = _band_tasks(given, found)
+    with runner.tasks(len(tasks), "bands") as settings:
+        done = run_tasks(tasks, settings)
     rows = [row for item in done for row in item.result.rows]
     return replace(found, bands=TrustOnTests(tuple(rows)))
 

@@ -17,7 +17,7 @@ def test_the_tensor_and_the_tables_are_written(hwid, out):
     result = hwid("crossval")
 
     assert result.exit_code == 0, result.output
-    assert "crossval: 0 pairs from the cache, 9 computed" in result.stderr
+    assert "crossval: 0 tasks from the cache, 12 computed" in result.stderr
     with h5py.File(out / "results.h5") as file:
         tensor = file["crossval/rmsd"]
         assert tensor.shape == (3, 1, 2, 3)
@@ -66,7 +66,7 @@ def test_what_the_thesis_calls_things_is_shown_on_request(after_run, hwid, confi
 
     # Names change no number: nothing is computed again.
     assert "identify: 6 fits from the cache, 0 computed" in result.stderr
-    assert "crossval: 9 pairs from the cache, 0 computed" in result.stderr
+    assert "crossval: 12 tasks from the cache, 0 computed" in result.stderr
     asked = " ".join(result.stdout.split())
     for table in ("T3.2.2-1", "T3.2.2.2-2", "T3.2.2.2-3"):
         assert f"(form of {table})" in asked
@@ -85,7 +85,7 @@ def test_a_second_run_answers_from_the_cache_with_the_same_numbers(
     result = hwid("crossval")
 
     assert "identify: 6 fits from the cache, 0 computed" in result.stderr
-    assert "crossval: 9 pairs from the cache, 0 computed" in result.stderr
+    assert "crossval: 12 tasks from the cache, 0 computed" in result.stderr
     assert (out / "crossval.csv").read_bytes() == first
 
 
@@ -104,7 +104,7 @@ def test_another_threshold_counts_anew_without_simulating(after_run, hwid, edit,
     edit("threshold: 0.01", "threshold: 1000.0")
     result = hwid("crossval")
 
-    assert "crossval: 9 pairs from the cache, 0 computed" in result.stderr
+    assert "crossval: 12 tasks from the cache, 0 computed" in result.stderr
     assert {row["coverage"] for row in rows_of(out / "coverage.csv")} == {"3"}
 
 

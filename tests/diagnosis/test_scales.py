@@ -92,7 +92,9 @@ def test_a_share_of_the_motor_force_that_repeats_is_read_off():
     assert best.period_m == pytest.approx(0.0019, rel=2e-3)
     assert best.amplitude == pytest.approx(0.2, rel=0.1)
     assert abs(np.angle(np.exp(1j * (best.phase_rad - 0.4)))) < 0.2
-    starts = CATALOGUE["torque_ripple"].starts(replace(sizes(problem()), ripples=(best,)))
+    starts = CATALOGUE["torque_ripple"].starts(
+        replace(sizes(problem()), ripples=(best,))
+    )
     assert starts[0]["per_turn"] == pytest.approx(2 * np.pi / 0.0019, rel=2e-3)
     assert starts[0]["share"] == pytest.approx(0.2, rel=0.1)
 

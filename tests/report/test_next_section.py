@@ -47,11 +47,12 @@ def found(**changes):
     )  # fmt: skip
 
 
-def section(final=None, proposed=None, **others):
-    results = {"test": final, "next": proposed, **others}
-    return trust_section(
-        ReportContents(StoredResults("a", "{}", "poles", results=results))
-    )
+def contents_of(**results):
+    return ReportContents(StoredResults("a", "{}", "poles", results=results))
+
+
+def section(final=None, proposed=None):
+    return trust_section(contents_of(test=final, next=proposed))
 
 
 def words(blocks):
@@ -70,16 +71,18 @@ def test_bands_of_a_simulation_and_of_validated_models_are_shown():
     bands = TrustOnTests(
         (replace(ROW, model="simulation"),), replace(SHOWN, model="simulation")
     )
-    blocks = section(
+    contents = contents_of(
         diagnose=replace(named(), bands=bands),
         crossval=replace(crossval(), bands=TrustOnTests((ROW,))),
-    ).blocks
+    )
 
-    folded, figure, table = blocks
+    folded, chart, table = trust_section(contents).blocks
     assert folded.blocks[0].rows[0][0] == "a/1/2"
     assert "recordings of others" in folded.blocks[0].caption
-    assert [one.file for one in images_of(blocks)] == ["next/simulation_band.png"]
-    assert "holds 93% of what was measured" in figure.sentence
+    files = [one.file for one in trust_drawings(contents)]
+    assert files == ["next/simulation_band.png"]
+    assert chart.name.startswith("simulation on ")
+    assert "holds 93% of what was measured" in chart.sentence
     assert table.rows[0][0] == "simulation"
     assert "the simulation may be trusted" in table.caption
 

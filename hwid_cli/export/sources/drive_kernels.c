@@ -1122,6 +1122,33 @@ static double drive_own_force(double x, double v, double way, double *push, doub
     return 0.5 * (forward + drive_formula_value(at, x, 0.0, u, t, -1.0, p));
 }
 
+static tuple_dd drive_net_forces(double x, double v, double x_motor, double v_motor, double force, double *memory, double *push, double done, double *p)
+{
+    double motor = 0.0;
+    double rubbing = 0.0;
+    double teeth = 0.0;
+    double net = 0.0;
+    motor = 0.0;
+    rubbing = motor;
+    if (p[DRIVE_VARIES] != 0.0) {
+        force *= drive_ripple(x_motor, p);
+        rubbing = (memory[WAY] * p[DRIVE_SHARE]) * fabs(force);
+    }
+    if (p[GEAR_STIFFNESS] > 0.0) {
+        teeth = drive_bite(x_motor - x, v_motor - v, p);
+        motor = (force - teeth) / (p[MOTOR_SHARE] * p[MASS]);
+        force = teeth;
+    }
+    net = (force + drive_value_of(push, OTHER, done)) - drive_resisting(x, v, memory, p);
+    if (rubbing != 0.0) {
+        net -= rubbing;
+    }
+    if (p[OWN_FORCE] != 0.0) {
+        net += drive_own_force(x, v, memory[WAY], push, done, p);
+    }
+    return (tuple_dd){net, motor};
+}
+
 static double drive_wanted_current(double command, double *state, double *p)
 {
     double speed = 0.0;
@@ -1157,12 +1184,12 @@ static tuple_dddd drive_acceleration(double *state, double *memory, double *push
     double rate = 0.0;
     double speed = 0.0;
     double voltage = 0.0;
-    double rubbing = 0.0;
-    double mass = 0.0;
-    double motor = 0.0;
-    double inner = 0.0;
-    double teeth = 0.0;
+    double x_motor = 0.0;
+    double v_motor = 0.0;
+    tuple_dd t1 = {0};
     double net = 0.0;
+    double motor = 0.0;
+    double mass = 0.0;
     double mode = 0.0;
     double pull = 0.0;
     x = state[X];
@@ -1179,26 +1206,14 @@ static tuple_dddd drive_acceleration(double *state, double *memory, double *push
         }
         force = drive_force_of(drive_drawn_current(force, state, p), push[WARMTH], p);
     }
-    rubbing = 0.0;
-    if (p[DRIVE_VARIES] != 0.0) {
-        force *= drive_ripple(has_motor ? state[MOTOR_X] : x, p);
-        rubbing = (memory[WAY] * p[DRIVE_SHARE]) * fabs(force);
-    }
+    x_motor = has_motor ? state[MOTOR_X] : x;
+    v_motor = has_motor ? state[MOTOR_V] : v;
+    t1 = drive_net_forces(x, v, x_motor, v_motor, force, memory, push, done, p);
+    net = t1.m0;
+    motor = t1.m1;
     mass = p[MASS];
-    motor = 0.0;
     if (has_motor) {
-        inner = p[MOTOR_SHARE] * mass;
-        mass -= inner;
-        teeth = drive_bite(state[MOTOR_X] - x, state[MOTOR_V] - v, p);
-        motor = (force - teeth) / inner;
-        force = teeth;
-    }
-    net = (force + drive_value_of(push, OTHER, done)) - drive_resisting(x, v, memory, p);
-    if (rubbing != 0.0) {
-        net -= rubbing;
-    }
-    if (p[OWN_FORCE] != 0.0) {
-        net += drive_own_force(x, v, memory[WAY], push, done, p);
+        mass -= p[MOTOR_SHARE] * mass;
     }
     mode = 0.0;
     if (p[MODE_MASS] > 0.0) {
@@ -2010,6 +2025,80 @@ static tuple_dd drive_step_plain(double x, double v, double *memory, double *pus
     return (tuple_dd){x + (sixth * ((v + (2.0 * (v2 + v3))) + v4)), v + (sixth * ((k1 + (2.0 * (k2 + k3))) + k4))};
 }
 
+static void drive_step_coupled(double *state, double *trial, double *memory, double *push, double done, double h, int is_held, double *p)
+{
+    double load = 0.0;
+    double x0 = 0.0;
+    double v0 = 0.0;
+    double xm0 = 0.0;
+    double vm0 = 0.0;
+    double x = 0.0;
+    double v = 0.0;
+    double xm = 0.0;
+    double vm = 0.0;
+    double dvm = 0.0;
+    double dx = 0.0;
+    double dv = 0.0;
+    double dxm = 0.0;
+    int stage = 0;
+    double at = 0.0;
+    double force = 0.0;
+    tuple_dd t1 = {0};
+    double net = 0.0;
+    double motor = 0.0;
+    double speed = 0.0;
+    double gain = 0.0;
+    double weight = 0.0;
+    double way = 0.0;
+    int n = 0;
+    double sixth = 0.0;
+    load = p[MASS];
+    load -= p[MOTOR_SHARE] * load;
+    x0 = state[X];
+    v0 = state[V];
+    xm0 = state[MOTOR_X];
+    vm0 = state[MOTOR_V];
+    x = x0;
+    v = v0;
+    xm = xm0;
+    vm = vm0;
+    dvm = 0.0;
+    dx = dvm;
+    dv = dvm;
+    dxm = dvm;
+    for (stage = 0; stage < 4; ++stage) {
+        at = done + ((stage == 0) ? 0.0 : ((stage == 3) ? h : (0.5 * h)));
+        force = drive_value_of(push, DRIVE, at);
+        t1 = drive_net_forces(x, v, xm, vm, force, memory, push, at, p);
+        net = t1.m0;
+        motor = t1.m1;
+        speed = v;
+        gain = net / load;
+        if (is_held) {
+            gain = 0.0;
+            speed = gain;
+        }
+        weight = (stage == 0 || stage == 3) ? 1.0 : 2.0;
+        dx += weight * speed;
+        dv += weight * gain;
+        dxm += weight * vm;
+        dvm += weight * motor;
+        way = (stage == 2) ? h : (0.5 * h);
+        x = x0 + (way * speed);
+        v = v0 + (way * gain);
+        xm = xm0 + (way * vm);
+        vm = vm0 + (way * motor);
+    }
+    for (n = 0; n < N_STATE; ++n) {
+        trial[n] = state[n];
+    }
+    sixth = h / 6.0;
+    trial[X] = x0 + (sixth * dx);
+    trial[V] = v0 + (sixth * dv);
+    trial[MOTOR_X] = xm0 + (sixth * dxm);
+    trial[MOTOR_V] = vm0 + (sixth * dvm);
+}
+
 static void drive_step_all(double *state, double *trial, double *memory, double *push, double done, double h, int is_held, double *p)
 {
     int each = 0;
@@ -2025,6 +2114,10 @@ static void drive_step_all(double *state, double *trial, double *memory, double 
     double way = 0.0;
     double total[N_STATE];
     double slope[N_STATE];
+    if ((p[MODE_MASS] == 0.0) && (!drive_depends_on_motion(p))) {
+        drive_step_coupled(state, trial, memory, push, done, h, is_held, p);
+        return;
+    }
     for (each = 0; each < N_STATE; ++each) {
         total[each] = 0.0;
     }

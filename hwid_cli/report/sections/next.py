@@ -20,10 +20,8 @@ from hwid_cli.report.page import (
 from hwid_cli.report.trust import HELD_OUT, TESTED, VALIDATING, trust_table
 
 
-
 def trust_section(contents: ReportContents) -> Section:
     """Show bands on the test recordings, and the proposed recordings."""
-    final = contents.stored.final_test
     found: NextRecordings | None = contents.stored.results.get("next")
     blocks: list[PageBlock] = []
     crossval = contents.stored.crossval
