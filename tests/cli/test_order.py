@@ -14,7 +14,7 @@ def test_stages_before_run_and_orders_are_recommended(hwid, out):
 
     assert result.exit_code == 0, result.output
     assert "identify: 0 fits from the cache, 6 computed" in result.stderr
-    assert "crossval: 0 pairs from the cache, 9 computed" in result.stderr
+    assert "crossval: 0 tasks from the cache, 12 computed" in result.stderr
     assert "order: 2 pairs of orders compared" in result.stderr
     assert "Take nb = 1, nk = " in result.stdout
     rows = rows_of(out / "order.csv")
