@@ -22,6 +22,7 @@ from hwid_cli.diagnosis.parameters import (
     residuals_at,
 )
 from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals
+from hwid_cli.diagnosis.search import within_bounds
 from hwid_cli.records.diagnosis import NoiseFloor
 from hwid_cli.records.drive import Drive
 
@@ -36,8 +37,10 @@ _LESS_NOISE, _MORE_NOISE = 0.7, 1.3
 _NEARLY_WHITE = 6.0
 # Times that the filter follows the drive that was fitted with it.
 _REWEIGHTINGS = 2
-# Coordinates of that search go no farther: a factor of exp(30).
+# Coordinates of that search go no farther, as powers of e, and it takes no more simulations
+# for each of them.
 _FARTHEST = 30.0
+_MOST_CALLS = 30
 # Correlations of neighbours, and of the next but one, that interpolation makes at most.
 _MOST_LINKED = (0.35, 0.1)
 
@@ -175,10 +178,11 @@ def fit_with_input_noise(
     n_shared = len(fit_layout.shared)
 
     def at(coordinates: np.ndarray) -> ParameterPoint:
-        # The search knows no bounds, and far beyond them nothing has a value.
-        within = np.clip(coordinates, -_FARTHEST, _FARTHEST)
-        return ParameterPoint(
-            within[:n_shared], within[n_shared:].reshape(point.own.shape)
+        # The search knows no bounds, and far beyond them a simulation has no end.
+        near = np.clip(coordinates, -_FARTHEST, _FARTHEST)
+        return within_bounds(
+            fit_layout,
+            ParameterPoint(near[:n_shared], near[n_shared:].reshape(point.own.shape)),
         )
 
     for _ in range(_REWEIGHTINGS):
@@ -205,7 +209,8 @@ def fit_with_input_noise(
         start = np.concatenate([point.shared, point.own.ravel()])
         if scaled(start).size < start.size:
             return point
-        found = least_squares(scaled, start, method="lm", x_scale=1.0)
+        most = _MOST_CALLS * (start.size + 1)
+        found = least_squares(scaled, start, method="lm", x_scale=1.0, max_nfev=most)
         point = at(found.x)
     return point
 

@@ -361,6 +361,12 @@ def _moved(
     n_shared = len(fit_layout.shared)
     shared = point.shared + step[:n_shared]
     own = point.own + step[n_shared:].reshape(point.own.shape)
+    return within_bounds(fit_layout, ParameterPoint(shared, own))
+
+
+def within_bounds(fit_layout: ParameterLayout, point: ParameterPoint) -> ParameterPoint:
+    """The point, every value of it moved into its bounds."""
+    shared, own = point.shared.copy(), point.own.copy()
     for column, one in enumerate(fit_layout.shared):
         shared[column] = _inside(one, shared[column])
     for column, one in enumerate(fit_layout.own):

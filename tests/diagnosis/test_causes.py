@@ -1,6 +1,7 @@
 """Causes of a gap in the measuring chain: repeats, noise of the input, interpolation."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ from scipy.linalg import solve_triangular, toeplitz
 from scipy.optimize import least_squares
 from scipy.signal import cont2discrete, dlsim, lfilter
 
+from hwid_cli.diagnosis import causes
 from hwid_cli.diagnosis.causes import (
     fit_with_input_noise,
     left_over,
@@ -304,3 +306,29 @@ def test_noise_that_is_linked_otherwise_is_something(of, taps):
 def test_where_the_noise_is_coloured_already_nothing_is_linked():
     coloured = replace(white(), is_coloured=True, whitening=(1.0, -0.3))
     assert whiteness_but_for_neighbours(linked(1), coloured) == np.inf
+
+
+def test_a_search_under_input_noise_stays_within_the_bounds(monkeypatch):
+    # Far beyond them a stiffness has so short a period that a simulation has no end.
+    asked = []
+
+    def far_away(scaled, start, **options):
+        assert options["max_nfev"] < 100 * start.size
+        for way in (1e3, -1e3):
+            scaled(start + way)
+        return SimpleNamespace(x=start)
+
+    def noted(of, fit_layout, point):
+        asked.append(drive_at(of, fit_layout, point).stiffness_N_per_m)
+        return residuals_at(of, fit_layout, point)
+
+    monkeypatch.setattr(causes, "least_squares", far_away)
+    monkeypatch.setattr(causes, "residuals_at", noted)
+    of = problem(recordings(noise=10 * NOISE))
+    fit_layout = parameter_layout(of, (), {}, sizes(of))
+    point = first_point(of, fit_layout, of.drive, {})
+    fit_with_input_noise(of, fit_layout, point, white(NOISE))
+
+    known = DRIVE.stiffness_N_per_m
+    assert max(asked) == pytest.approx(1e4 * known)
+    assert min(asked) == pytest.approx(1e-4 * known)

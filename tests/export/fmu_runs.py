@@ -5,7 +5,15 @@ from pathlib import Path
 
 import fmpy
 import numpy as np
-from fmpy.fmi2 import FMU2Slave
+from fmpy.fmi2 import (
+    FMU2Slave,
+    calloc,
+    fmi2CallbackAllocateMemoryTYPE,
+    fmi2CallbackFreeMemoryTYPE,
+    fmi2CallbackFunctions,
+    fmi2CallbackLoggerTYPE,
+    free,
+)
 
 
 def simulated(path, signal, step, start=0):
@@ -38,7 +46,13 @@ def answered(path, signal, step):
             modelIdentifier=description.coSimulation.modelIdentifier,
             instanceName="one",
         )
-        unit.instantiate()
+        # FMPy's own logger goes by way of the last one of the process, which may be gone.
+        callbacks = fmi2CallbackFunctions(
+            logger=fmi2CallbackLoggerTYPE(lambda *_: None),
+            allocateMemory=fmi2CallbackAllocateMemoryTYPE(calloc),
+            freeMemory=fmi2CallbackFreeMemoryTYPE(free),
+        )
+        unit.instantiate(callbacks=callbacks)
         unit.setupExperiment(startTime=0.0)
         unit.enterInitializationMode()
         unit.exitInitializationMode()
