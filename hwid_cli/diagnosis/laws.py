@@ -37,6 +37,7 @@ from hwid_cli.diagnosis.rounds import DiagnosisTask, Rounds, RoundsResult
 from hwid_cli.diagnosis.selection import (
     LEAST_GAIN,
     LEAST_IMPROVED,
+    SMALL_REMAINDER,
     TIE,
     DiagnosisVerdict,
 )
@@ -158,8 +159,14 @@ def find_law(
 
 
 def _is_wanted(rounds: Rounds, verdict: DiagnosisVerdict) -> bool:
-    """Whether something is left that a law may hold."""
-    is_open = verdict.word == "unknown" or not verdict.is_complete
+    """Whether something is left that a law may hold.
+
+    What a named effect leaves beside the noise is no reason to take its name away.
+    """
+    is_small = rounds.criteria.ratio(verdict.chosen) <= SMALL_REMAINDER
+    is_open = not verdict.is_complete
+    if verdict.word == "named" and is_small:
+        is_open = False
     return is_open and rounds.base.is_usable and not rounds.problem.compares_command
 
 

@@ -61,7 +61,8 @@ def _lead_in_words(
     criteria: SelectionCriteria, best: CandidateFit, verdict: DiagnosisVerdict
 ) -> str:
     """Say which set would go on from here, and why it is not named."""
-    share = criteria.evidence(best, verdict.chosen).explained
+    # Of little, noise alone makes it more than all.
+    share = min(criteria.evidence(best, verdict.chosen).explained, 1.0)
     added = [one for one in best.effects if one not in verdict.chosen.effects]
     names = " and ".join(public_id(one) for one in added)
     what = "of what remains" if verdict.chosen.effects else "of it"

@@ -1,5 +1,7 @@
 """Laws that no catalogue holds, in a machine with an integrator of its own."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 import sympy
@@ -7,7 +9,10 @@ import sympy
 from hwid_cli import DiagnoseOptions, Recording, SimulationOptions, diagnose
 from hwid_cli.config.extended_simulation import write_extended_simulation
 from hwid_cli.config.load import experiment_of, load_experiment
+from hwid_cli.diagnosis.laws import _is_wanted
+from hwid_cli.diagnosis.selection import DiagnosisVerdict
 from hwid_cli.stages.diagnose import extended_options
+from tests.diagnosis.made_up_fits import CRITERIA, base, made_up
 from tests.diagnosis.small_drive import NOISE, STEP_S, inputs
 from tests.laws.machine import Base, Hidden, measured
 
@@ -92,6 +97,22 @@ def test_a_law_that_is_an_effect_of_the_catalogue_gets_its_name():
     (effect,) = told.effects
     assert effect.id == "coulomb_friction"
     assert effect.parameters[0].value == pytest.approx(0.9, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("left", "is_wanted"), [(110.0, False), (300.0, True)], ids=["little", "much"]
+)
+def test_a_law_takes_no_name_away_from_what_leaves_hardly_more_than_noise(
+    left, is_wanted
+):
+    # 1.05 and 1.7 times the noise.
+    one = made_up(("stribeck_friction",), left, whiteness=20.0)
+    of = SimpleNamespace(compares_command=False)
+    rounds = SimpleNamespace(criteria=CRITERIA, base=base(3500.0), problem=of)
+    named = DiagnosisVerdict("named", False, one, ())
+    unknown = DiagnosisVerdict("unknown", False, base(3500.0), ())
+    assert _is_wanted(rounds, named) is is_wanted
+    assert _is_wanted(rounds, unknown)
 
 
 def test_a_law_that_held_out_recordings_do_not_share_is_refused():
