@@ -15,9 +15,9 @@ from xml.etree import ElementTree as ET
 
 from hwid_cli import __version__
 from hwid_cli.errors import ConfigError
-from hwid_cli.export.c_source import filled, number
+from hwid_cli.export.c_source import number
 from hwid_cli.export.effect_source import acts_at_force, effect_source
-from hwid_cli.export.fmu import SYSTEMS, add_file, compiled
+from hwid_cli.export.fmu import SYSTEMS, add_file, compiled, unit_sources
 from hwid_cli.files.atomic import replace_file
 from hwid_cli.records.exported import ModelCard
 from hwid_cli.records.programs import FmuSimulation
@@ -91,7 +91,7 @@ def write_extended_fmu(
     guid = f"{{{uuid.uuid5(uuid.NAMESPACE_URL, effect + repr(sorted(words.items())))}}}"
     sources = {
         "effect.c": effect,
-        "extended_fmi2.c": filled("extended_fmi2.c", {**words, "guid": guid}),
+        **unit_sources("extended_fmi2.c", {**words, "guid": guid}),
     }
     content = io.BytesIO()
     with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as archive:

@@ -13,6 +13,7 @@ import subprocess
 import tempfile
 import uuid
 import zipfile
+from collections.abc import Mapping
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
@@ -68,7 +69,7 @@ def write_fmu(path: Path, exported: Exported, source: str) -> None:
         "guid": guid,
         "has_starts": int(isinstance(exported, ExportedModel)),
     }
-    sources = {"model.c": source, "fmi2.c": filled("fmi2.c", words)}
+    sources = {"model.c": source, **unit_sources("fmi2.c", words)}
     system, ending = SYSTEMS.get(platform.system(), ("linux", ".so"))
     bits = platform.architecture()[0][:2]
     content = io.BytesIO()
@@ -82,6 +83,12 @@ def write_fmu(path: Path, exported: Exported, source: str) -> None:
             compiled(sources, f"{name}{ending}"),
         )
     replace_file(path, content.getvalue())
+
+
+def unit_sources(main: str, words: Mapping[str, object]) -> dict[str, str]:
+    """The source of a unit and what every unit includes, by the names of their files."""
+    shared = {name: filled(name, {}) for name in ("fmi2_types.h", "fmi2_refused.h")}
+    return {main: filled(main, words), **shared}
 
 
 def add_file(archive: zipfile.ZipFile, name: str, content: str | bytes) -> None:

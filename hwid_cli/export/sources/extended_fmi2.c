@@ -12,45 +12,18 @@
 #include <string.h>
 #if defined(_WIN32)
 #include <windows.h>
-#define FMI_EXPORT __declspec(dllexport)
 #define OPEN_LIBRARY(path) ((void *)LoadLibraryA(path))
 #define CLOSE_LIBRARY(library) FreeLibrary((HMODULE)(library))
 #define FIND_SYMBOL(library, name) ((void *)GetProcAddress((HMODULE)(library), name))
 #else
 #include <dlfcn.h>
-#define FMI_EXPORT __attribute__((visibility("default")))
 #define OPEN_LIBRARY(path) dlopen(path, RTLD_NOW | RTLD_LOCAL)
 #define CLOSE_LIBRARY(library) dlclose(library)
 #define FIND_SYMBOL(library, name) dlsym(library, name)
 #endif
 
 #include "effect.c"
-
-typedef void *fmi2Component;
-typedef void *fmi2ComponentEnvironment;
-typedef void *fmi2FMUstate;
-typedef unsigned int fmi2ValueReference;
-typedef double fmi2Real;
-typedef int fmi2Integer;
-typedef int fmi2Boolean;
-typedef char fmi2Char;
-typedef const fmi2Char *fmi2String;
-typedef char fmi2Byte;
-typedef enum {
-    fmi2OK, fmi2Warning, fmi2Discard, fmi2Error, fmi2Fatal, fmi2Pending
-} fmi2Status;
-typedef enum { fmi2ModelExchange, fmi2CoSimulation } fmi2Type;
-typedef enum {
-    fmi2DoStepStatus, fmi2PendingStatus, fmi2LastSuccessfulTime, fmi2Terminated
-} fmi2StatusKind;
-typedef struct {
-    void (*logger)(fmi2ComponentEnvironment, fmi2String, fmi2Status, fmi2String,
-                   fmi2String, ...);
-    void *(*allocateMemory)(size_t, size_t);
-    void (*freeMemory)(void *);
-    void (*stepFinished)(fmi2ComponentEnvironment, fmi2Status);
-    fmi2ComponentEnvironment componentEnvironment;
-} fmi2CallbackFunctions;
+#include "fmi2_types.h"
 
 #define UNIT_GUID "@guid@"
 #define BASE_GUID "@base_guid@"
@@ -120,6 +93,8 @@ static fmi2Status complain(Unit *unit, fmi2String message)
     tell(&unit->callbacks, unit->name, message);
     return fmi2Error;
 }
+
+#include "fmi2_refused.h"
 
 /* Folder of a file URI: percent signs are decoded, a drive's letter stays. */
 static int folder_of(char *path, fmi2String resources)
@@ -197,16 +172,6 @@ static fmi2Status begin_unit(Unit *unit)
     unit->force = 0.0;
     return N_FITTED == 0 ? fmi2OK
                          : unit->call.set_real(unit->base, fitted_at, N_FITTED, fitted);
-}
-
-FMI_EXPORT const char *fmi2GetTypesPlatform(void)
-{
-    return "default";
-}
-
-FMI_EXPORT const char *fmi2GetVersion(void)
-{
-    return "2.0";
 }
 
 FMI_EXPORT fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type,
@@ -415,62 +380,6 @@ FMI_EXPORT fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real size,
     }
     unit->time = time + size;
     return status;
-}
-
-FMI_EXPORT fmi2Status fmi2CancelStep(fmi2Component c)
-{
-    return complain((Unit *)c, "there is no step to cancel");
-}
-
-#define NO_STATUS(verb, kind) \
-    FMI_EXPORT fmi2Status verb(fmi2Component c, const fmi2StatusKind s, kind *value) \
-    { \
-        (void)c; (void)s; (void)value; \
-        return fmi2Discard; \
-    }
-NO_STATUS(fmi2GetStatus, fmi2Status)
-NO_STATUS(fmi2GetIntegerStatus, fmi2Integer)
-NO_STATUS(fmi2GetBooleanStatus, fmi2Boolean)
-NO_STATUS(fmi2GetStringStatus, fmi2String)
-
-FMI_EXPORT fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind s,
-                                        fmi2Real *value)
-{
-    if (s != fmi2LastSuccessfulTime) {
-        return fmi2Discard;
-    }
-    *value = ((Unit *)c)->time;
-    return fmi2OK;
-}
-
-FMI_EXPORT fmi2Status fmi2SetRealInputDerivatives(fmi2Component c,
-                                                  const fmi2ValueReference vr[],
-                                                  size_t n, const fmi2Integer order[],
-                                                  const fmi2Real value[])
-{
-    (void)vr; (void)order; (void)value;
-    return n == 0 ? fmi2OK : complain((Unit *)c, "inputs are held in a step");
-}
-
-FMI_EXPORT fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c,
-                                                   const fmi2ValueReference vr[],
-                                                   size_t n, const fmi2Integer order[],
-                                                   fmi2Real value[])
-{
-    (void)vr; (void)order; (void)value;
-    return n == 0 ? fmi2OK : complain((Unit *)c, "outputs have no derivatives");
-}
-
-FMI_EXPORT fmi2Status fmi2GetDirectionalDerivative(fmi2Component c,
-                                                   const fmi2ValueReference unknown[],
-                                                   size_t n_unknown,
-                                                   const fmi2ValueReference known[],
-                                                   size_t n_known,
-                                                   const fmi2Real seed[],
-                                                   fmi2Real value[])
-{
-    (void)unknown; (void)n_unknown; (void)known; (void)n_known; (void)seed; (void)value;
-    return complain((Unit *)c, "there are no directional derivatives");
 }
 
 #define NO_STATES(verb, arguments) \

@@ -8,38 +8,7 @@
 #include <string.h>
 
 #include "model.c"
-
-#if defined(_WIN32)
-#define FMI_EXPORT __declspec(dllexport)
-#else
-#define FMI_EXPORT __attribute__((visibility("default")))
-#endif
-
-typedef void *fmi2Component;
-typedef void *fmi2ComponentEnvironment;
-typedef void *fmi2FMUstate;
-typedef unsigned int fmi2ValueReference;
-typedef double fmi2Real;
-typedef int fmi2Integer;
-typedef int fmi2Boolean;
-typedef char fmi2Char;
-typedef const fmi2Char *fmi2String;
-typedef char fmi2Byte;
-typedef enum {
-    fmi2OK, fmi2Warning, fmi2Discard, fmi2Error, fmi2Fatal, fmi2Pending
-} fmi2Status;
-typedef enum { fmi2ModelExchange, fmi2CoSimulation } fmi2Type;
-typedef enum {
-    fmi2DoStepStatus, fmi2PendingStatus, fmi2LastSuccessfulTime, fmi2Terminated
-} fmi2StatusKind;
-typedef struct {
-    void (*logger)(fmi2ComponentEnvironment, fmi2String, fmi2Status, fmi2String,
-                   fmi2String, ...);
-    void *(*allocateMemory)(size_t, size_t);
-    void (*freeMemory)(void *);
-    void (*stepFinished)(fmi2ComponentEnvironment, fmi2Status);
-    fmi2ComponentEnvironment componentEnvironment;
-} fmi2CallbackFunctions;
+#include "fmi2_types.h"
 
 #define UNIT_SAMPLE_TIME @sample_time@
 #define UNIT_GUID "@guid@"
@@ -65,6 +34,8 @@ static fmi2Status complain(Unit *unit, fmi2String message)
     return fmi2Error;
 }
 
+#include "fmi2_refused.h"
+
 static void begin_unit(Unit *unit)
 {
 #if @has_starts@
@@ -78,16 +49,6 @@ static void begin_unit(Unit *unit)
     }
 #endif
     HWID_NAME(init)(&unit->model);
-}
-
-FMI_EXPORT const char *fmi2GetTypesPlatform(void)
-{
-    return "default";
-}
-
-FMI_EXPORT const char *fmi2GetVersion(void)
-{
-    return "2.0";
 }
 
 FMI_EXPORT fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean on, size_t n,
@@ -253,62 +214,6 @@ FMI_EXPORT fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real size,
     }
     unit->time = time + size;
     return fmi2OK;
-}
-
-FMI_EXPORT fmi2Status fmi2CancelStep(fmi2Component c)
-{
-    return complain((Unit *)c, "there is no step to cancel");
-}
-
-#define NO_STATUS(verb, kind) \
-    FMI_EXPORT fmi2Status verb(fmi2Component c, const fmi2StatusKind s, kind *value) \
-    { \
-        (void)c; (void)s; (void)value; \
-        return fmi2Discard; \
-    }
-NO_STATUS(fmi2GetStatus, fmi2Status)
-NO_STATUS(fmi2GetIntegerStatus, fmi2Integer)
-NO_STATUS(fmi2GetBooleanStatus, fmi2Boolean)
-NO_STATUS(fmi2GetStringStatus, fmi2String)
-
-FMI_EXPORT fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind s,
-                                        fmi2Real *value)
-{
-    if (s != fmi2LastSuccessfulTime) {
-        return fmi2Discard;
-    }
-    *value = ((Unit *)c)->time;
-    return fmi2OK;
-}
-
-FMI_EXPORT fmi2Status fmi2SetRealInputDerivatives(fmi2Component c,
-                                                  const fmi2ValueReference vr[],
-                                                  size_t n, const fmi2Integer order[],
-                                                  const fmi2Real value[])
-{
-    (void)vr; (void)order; (void)value;
-    return n == 0 ? fmi2OK : complain((Unit *)c, "inputs are held in a step");
-}
-
-FMI_EXPORT fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c,
-                                                   const fmi2ValueReference vr[],
-                                                   size_t n, const fmi2Integer order[],
-                                                   fmi2Real value[])
-{
-    (void)vr; (void)order; (void)value;
-    return n == 0 ? fmi2OK : complain((Unit *)c, "outputs have no derivatives");
-}
-
-FMI_EXPORT fmi2Status fmi2GetDirectionalDerivative(fmi2Component c,
-                                                   const fmi2ValueReference unknown[],
-                                                   size_t n_unknown,
-                                                   const fmi2ValueReference known[],
-                                                   size_t n_known,
-                                                   const fmi2Real seed[],
-                                                   fmi2Real value[])
-{
-    (void)unknown; (void)n_unknown; (void)known; (void)n_known; (void)seed; (void)value;
-    return complain((Unit *)c, "there are no directional derivatives");
 }
 
 FMI_EXPORT fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state)
