@@ -1,15 +1,12 @@
 """A physics simulation as one self-contained C99 file."""
 
 import math
-import textwrap
 
 from hwid_cli.drive import slots
 from hwid_cli.errors import ConfigError
-from hwid_cli.export.c_source import card_text, filled, numbers
-from hwid_cli.export.names import in_comment
+from hwid_cli.export.c_source import card_text, comment_lines, filled, numbers
 from hwid_cli.records.exported import ExportedSimulation
 
-_WIDTH = 84
 _HOLDS = {"linear": "a straight line", "zero": "held"}
 # A longer delay would make the state of the model unbearably large, [samples].
 _LONGEST_DELAY = 100_000
@@ -56,7 +53,7 @@ def drive_source(exported: ExportedSimulation) -> str:
         "drive.c",
         {
             **card_text(exported.card, step),
-            "effects": "\n * ".join(textwrap.wrap(in_comment(effects), _WIDTH)),
+            "effects": comment_lines(effects),
             "hold": _HOLDS[drive.hold],
             "n_slots": exported.slots.size,
             "n_history": n_history,

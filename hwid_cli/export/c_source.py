@@ -85,14 +85,18 @@ def card_text(card: ModelCard, sample_time_s: float) -> dict[str, str]:
         f"Model {card.name}, written by hwid {__version__}. Its data have inputs from "
         f"{ends}."
     )
-    lines = textwrap.wrap(in_comment(about), _WIDTH)
     return {
         "title": in_comment(card.title),
-        "about": "\n * ".join(lines),
+        "about": comment_lines(about),
         "sample_time": repr(sample_time_s),
         "input_unit": in_comment(card.input_unit),
         "output_unit": in_comment(card.output_unit),
     }
+
+
+def comment_lines(text: str) -> str:
+    """Text that goes on over several lines of a comment."""
+    return "\n * ".join(textwrap.wrap(in_comment(text), _WIDTH))
 
 
 def filled(name: str, words: Mapping[str, object]) -> str:

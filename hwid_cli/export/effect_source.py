@@ -1,17 +1,13 @@
 """What a diagnosis added to a simulation, as one C file: a force for each of its steps."""
 
-import textwrap
-
 from hwid_cli.drive.catalogue import CATALOGUE
 from hwid_cli.drive.simulation import drive_effects, parameter_vector
 from hwid_cli.errors import ConfigError
 from hwid_cli.export.c_drive import drive_source
-from hwid_cli.export.c_source import card_text, filled, number
+from hwid_cli.export.c_source import card_text, comment_lines, filled, number
 from hwid_cli.export.names import in_comment
 from hwid_cli.records.exported import ExportedSimulation, ModelCard
 from hwid_cli.simulations.extended import ExtendedSimulation
-
-_WIDTH = 84
 
 
 def acts_at_force(extended: ExtendedSimulation) -> bool:
@@ -62,7 +58,7 @@ def effect_source(
         "effect.c",
         {
             **card_text(card, sample_time_s),
-            "effects": "\n * ".join(textwrap.wrap(in_comment(effects), _WIDTH)),
+            "effects": comment_lines(effects),
             "acts_as": in_comment(acts_as),
             "in_unit": "" if at_force else " / plain_gain",
             "drive": drive_source(exported),
