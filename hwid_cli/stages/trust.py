@@ -69,10 +69,7 @@ def validation_bands_task(
         Gives ``TrustOnTests``.
     """
     settings = {
-        "model": name,
-        "numbers": None if fit.model is None else model_key(fit.model),
-        "orders": fit.orders,
-        "options": fit.options,
+        **_numbers_of(name, fit),
         "own": recording_key(own),
         "validated_on": {one.name: recording_key(one) for one in recordings},
     }
@@ -119,13 +116,9 @@ def trust_task(
     Task
         Gives ``TrustOnTests``.
     """
-    model = fit.model
     settings = {
-        "model": name,
-        "numbers": None if model is None else model_key(model),
+        **_numbers_of(name, fit),
         "identified_on": fit.identified_on,
-        "orders": fit.orders,
-        "options": fit.options,
         "recordings": {one.name: recording_key(one) for one in recordings},
         "tested_on": tested,
     }
@@ -136,6 +129,16 @@ def trust_task(
         arguments=(name, fit, tuple(recordings), tuple(tested)),
         result_type=TrustOnTests,
     )
+
+
+def _numbers_of(name: str, fit: Fit) -> dict[str, object]:
+    """What a fit is, for a key."""
+    return {
+        "model": name,
+        "numbers": None if fit.model is None else model_key(fit.model),
+        "orders": fit.orders,
+        "options": fit.options,
+    }
 
 
 def _trust_on_tests(
