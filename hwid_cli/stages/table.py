@@ -34,8 +34,8 @@ recording.
 """,
     "crossval": """Validate every model on every recording.
 
-Writes the tensor of RMSDs to results.h5:/crossval, crossval.csv and
-coverage.csv and crossval_trust.csv, and shows the models that cover the most
+Writes the tensor of RMSDs to results.h5:/crossval, and crossval.csv,
+coverage.csv and crossval_trust.csv. Shows the models that cover the most
 recordings.
 """,
     "order": """Recommend orders and maps, and say why.
