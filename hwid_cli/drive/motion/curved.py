@@ -323,6 +323,26 @@ def step_plain(
 
 
 @njit(**INNER)
+def runge_kutta_stage(stage: int, h: float) -> tuple[float, float, float]:
+    """Return a stage's time in the step, its weight, and the way to the next one.
+
+    Parameters
+    ----------
+    h : float, [s]
+        Length of the step.
+
+    Returns
+    -------
+    tuple of float, [s], [sixths of the step], [s]
+    """
+    if stage == 0:
+        return 0.0, 1.0, 0.5 * h
+    if stage == 3:
+        return h, 1.0, 0.5 * h
+    return 0.5 * h, 2.0, h if stage == 2 else 0.5 * h
+
+
+@njit(**INNER)
 def _step_varying(
     x: float,
     v: float,
@@ -337,17 +357,17 @@ def _step_varying(
     xs, vs = x, v
     x1, v1 = x, v
     for stage in range(4):
-        at = done + (0.0 if stage == 0 else (h if stage == 3 else 0.5 * h))
+        after, weight, way = runge_kutta_stage(stage, h)
+        at = done + after
         drive = value_of(push, DRIVE, at) * ripple(xs, p)
         net = drive + value_of(push, OTHER, at) - resisting(xs, vs, memory, p)
         net -= memory[WAY] * p[slots.DRIVE_SHARE] * abs(drive)
         if p[slots.OWN_FORCE] != 0.0:
             net += own_force(xs, vs, memory[WAY], push, at, p)
         slope = vs
-        weight = h / 6.0 if stage in (0, 3) else h / 3.0
+        weight *= h / 6.0
         x1 += weight * slope
         v1 += weight * net * inverse
-        way = h if stage == 2 else 0.5 * h
         xs = x + way * slope
         vs = v + way * net * inverse
     return x1, v1
@@ -384,15 +404,13 @@ def step_all(
     for n in range(N_STATE):
         trial[n] = state[n]
     for stage in range(4):
-        at = 0.0 if stage == 0 else (h if stage == 3 else 0.5 * h)
-        a, motor, part, circuit = acceleration(trial, memory, push, done + at, p)
+        after, weight, way = runge_kutta_stage(stage, h)
+        a, motor, part, circuit = acceleration(trial, memory, push, done + after, p)
         slope[0], slope[1] = trial[V], a
         if is_held:
             slope[0], slope[1] = 0.0, 0.0
         slope[2], slope[3] = trial[MOTOR_V], motor
         slope[4], slope[5], slope[6] = trial[PART_V], part, circuit
-        weight = 1.0 if stage in (0, 3) else 2.0
-        way = h if stage == 2 else 0.5 * h
         for n in range(N_STATE):
             total[n] += weight * slope[n]
             trial[n] = state[n] + way * slope[n]
@@ -418,18 +436,17 @@ def _step_coupled(
     x, v, xm, vm = x0, v0, xm0, vm0
     dx = dv = dxm = dvm = 0.0
     for stage in range(4):
-        at = done + (0.0 if stage == 0 else (h if stage == 3 else 0.5 * h))
+        after, weight, way = runge_kutta_stage(stage, h)
+        at = done + after
         force = value_of(push, DRIVE, at)
         net, motor = net_forces(x, v, xm, vm, force, memory, push, at, p)
         speed, gain = v, net / load
         if is_held:
             speed = gain = 0.0
-        weight = 1.0 if stage in (0, 3) else 2.0
         dx += weight * speed
         dv += weight * gain
         dxm += weight * vm
         dvm += weight * motor
-        way = h if stage == 2 else 0.5 * h
         x, v = x0 + way * speed, v0 + way * gain
         xm, vm = xm0 + way * vm, vm0 + way * motor
     for n in range(N_STATE):

@@ -225,6 +225,8 @@ static const double shares[5] = {
 
 typedef struct { double m0; double m1; } tuple_dd;
 
+typedef struct { double m0; double m1; double m2; } tuple_ddd;
+
 typedef struct { double m0; double m1; double m2; double m3; } tuple_dddd;
 
 typedef struct { int m0; double m1; } tuple_id;
@@ -1927,6 +1929,17 @@ static double drive_step_limit(double *state, double *memory, double *push, doub
     return 0.3 / most(rate, 1e-09);
 }
 
+static tuple_ddd drive_runge_kutta_stage(int stage, double h)
+{
+    if (stage == 0) {
+        return (tuple_ddd){0.0, 1.0, 0.5 * h};
+    }
+    if (stage == 3) {
+        return (tuple_ddd){h, 1.0, 0.5 * h};
+    }
+    return (tuple_ddd){0.5 * h, 2.0, (stage == 2) ? h : (0.5 * h)};
+}
+
 static tuple_dd drive_step_varying(double x, double v, double *memory, double *push, double done, double h, double *p)
 {
     double inverse = 0.0;
@@ -1935,19 +1948,25 @@ static tuple_dd drive_step_varying(double x, double v, double *memory, double *p
     double x1 = 0.0;
     double v1 = 0.0;
     int stage = 0;
+    tuple_ddd t1 = {0};
+    double after = 0.0;
+    double weight = 0.0;
+    double way = 0.0;
     double at = 0.0;
     double drive = 0.0;
     double net = 0.0;
     double slope = 0.0;
-    double weight = 0.0;
-    double way = 0.0;
     inverse = 1.0 / p[MASS];
     xs = x;
     vs = v;
     x1 = x;
     v1 = v;
     for (stage = 0; stage < 4; ++stage) {
-        at = done + ((stage == 0) ? 0.0 : ((stage == 3) ? h : (0.5 * h)));
+        t1 = drive_runge_kutta_stage(stage, h);
+        after = t1.m0;
+        weight = t1.m1;
+        way = t1.m2;
+        at = done + after;
         drive = drive_value_of(push, DRIVE, at) * drive_ripple(xs, p);
         net = (drive + drive_value_of(push, OTHER, at)) - drive_resisting(xs, vs, memory, p);
         net -= (memory[WAY] * p[DRIVE_SHARE]) * fabs(drive);
@@ -1955,10 +1974,9 @@ static tuple_dd drive_step_varying(double x, double v, double *memory, double *p
             net += drive_own_force(xs, vs, memory[WAY], push, at, p);
         }
         slope = vs;
-        weight = (stage == 0 || stage == 3) ? (h / 6.0) : (h / 3.0);
+        weight *= h / 6.0;
         x1 += weight * slope;
         v1 += (weight * net) * inverse;
-        way = (stage == 2) ? h : (0.5 * h);
         xs = x + (way * slope);
         vs = v + ((way * net) * inverse);
     }
@@ -2041,15 +2059,17 @@ static void drive_step_coupled(double *state, double *trial, double *memory, dou
     double dv = 0.0;
     double dxm = 0.0;
     int stage = 0;
+    tuple_ddd t1 = {0};
+    double after = 0.0;
+    double weight = 0.0;
+    double way = 0.0;
     double at = 0.0;
     double force = 0.0;
-    tuple_dd t1 = {0};
+    tuple_dd t2 = {0};
     double net = 0.0;
     double motor = 0.0;
     double speed = 0.0;
     double gain = 0.0;
-    double weight = 0.0;
-    double way = 0.0;
     int n = 0;
     double sixth = 0.0;
     load = p[MASS];
@@ -2067,23 +2087,25 @@ static void drive_step_coupled(double *state, double *trial, double *memory, dou
     dv = dvm;
     dxm = dvm;
     for (stage = 0; stage < 4; ++stage) {
-        at = done + ((stage == 0) ? 0.0 : ((stage == 3) ? h : (0.5 * h)));
+        t1 = drive_runge_kutta_stage(stage, h);
+        after = t1.m0;
+        weight = t1.m1;
+        way = t1.m2;
+        at = done + after;
         force = drive_value_of(push, DRIVE, at);
-        t1 = drive_net_forces(x, v, xm, vm, force, memory, push, at, p);
-        net = t1.m0;
-        motor = t1.m1;
+        t2 = drive_net_forces(x, v, xm, vm, force, memory, push, at, p);
+        net = t2.m0;
+        motor = t2.m1;
         speed = v;
         gain = net / load;
         if (is_held) {
             gain = 0.0;
             speed = gain;
         }
-        weight = (stage == 0 || stage == 3) ? 1.0 : 2.0;
         dx += weight * speed;
         dv += weight * gain;
         dxm += weight * vm;
         dvm += weight * motor;
-        way = (stage == 2) ? h : (0.5 * h);
         x = x0 + (way * speed);
         v = v0 + (way * gain);
         xm = xm0 + (way * vm);
@@ -2104,14 +2126,15 @@ static void drive_step_all(double *state, double *trial, double *memory, double 
     int each = 0;
     int n = 0;
     int stage = 0;
-    double at = 0.0;
-    tuple_dddd t1 = {0};
+    tuple_ddd t1 = {0};
+    double after = 0.0;
+    double weight = 0.0;
+    double way = 0.0;
+    tuple_dddd t2 = {0};
     double a = 0.0;
     double motor = 0.0;
     double part = 0.0;
     double circuit = 0.0;
-    double weight = 0.0;
-    double way = 0.0;
     double total[N_STATE];
     double slope[N_STATE];
     if ((p[MODE_MASS] == 0.0) && (!drive_depends_on_motion(p))) {
@@ -2128,12 +2151,15 @@ static void drive_step_all(double *state, double *trial, double *memory, double 
         trial[n] = state[n];
     }
     for (stage = 0; stage < 4; ++stage) {
-        at = (stage == 0) ? 0.0 : ((stage == 3) ? h : (0.5 * h));
-        t1 = drive_acceleration(trial, memory, push, done + at, p);
-        a = t1.m0;
-        motor = t1.m1;
-        part = t1.m2;
-        circuit = t1.m3;
+        t1 = drive_runge_kutta_stage(stage, h);
+        after = t1.m0;
+        weight = t1.m1;
+        way = t1.m2;
+        t2 = drive_acceleration(trial, memory, push, done + after, p);
+        a = t2.m0;
+        motor = t2.m1;
+        part = t2.m2;
+        circuit = t2.m3;
         slope[0] = trial[V];
         slope[1] = a;
         if (is_held) {
@@ -2145,8 +2171,6 @@ static void drive_step_all(double *state, double *trial, double *memory, double 
         slope[4] = trial[PART_V];
         slope[5] = part;
         slope[6] = circuit;
-        weight = (stage == 0 || stage == 3) ? 1.0 : 2.0;
-        way = (stage == 2) ? h : (0.5 * h);
         for (n = 0; n < N_STATE; ++n) {
             total[n] += weight * slope[n];
             trial[n] = state[n] + (way * slope[n]);
