@@ -14,6 +14,7 @@ from hwid_cli.diagnosis.intervals import intervals
 from hwid_cli.diagnosis.latent_force import Smoothed
 from hwid_cli.diagnosis.laws import LawFound
 from hwid_cli.diagnosis.next_experiment import propose
+from hwid_cli.diagnosis.parameters import is_factor
 from hwid_cli.diagnosis.problem import Compared, DiagnosisProblem
 from hwid_cli.diagnosis.rounds import RoundsResult
 from hwid_cli.diagnosis.selection import DiagnosisVerdict, SelectionCriteria, ranked
@@ -211,8 +212,9 @@ def _mean_factor(chosen: CandidateFit, name: str) -> float:
     """Mean of the factors by which recordings change a parameter; 1 without any."""
     mean = 1.0
     for column, one in enumerate(chosen.own_names):
-        changed = one.parameter.removeprefix("log_")
-        if changed != one.parameter and name.startswith(f"{changed}_"):
+        if is_factor(one) and name.startswith(
+            f"{CATALOGUE[one.owner].words['which']}_"
+        ):
             mean = float(np.mean(np.exp(chosen.own[:, column])))
     return mean
 
@@ -290,8 +292,7 @@ def _fitted_effects_of(
 
 
 def _unit_of(ref: ParameterRef) -> str:
-    parameters = CATALOGUE[ref.owner].parameters
-    return next(one.unit for one in parameters if one.name == ref.parameter)
+    return CATALOGUE[ref.owner].parameter(ref.parameter).unit
 
 
 def _described(identifier: str, parameters: Sequence[FittedParameter]) -> FittedEffect:

@@ -124,6 +124,19 @@ class ParameterLayout:
         return len(self.shared) + recordings * len(self.own)
 
 
+def is_factor(ref: ParameterRef) -> bool:
+    """Whether a recording's own value is the logarithm of what multiplies a parameter.
+
+    Parameters
+    ----------
+    ref : ParameterRef
+        Of an own value; how recordings start is none.
+    """
+    return (
+        ref.owner != START and CATALOGUE[ref.owner].parameter(ref.parameter).is_factor
+    )
+
+
 @dataclass(frozen=True, eq=False)
 class ParameterPoint:
     """Values of all coordinates.

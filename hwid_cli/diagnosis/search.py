@@ -29,6 +29,7 @@ from hwid_cli.diagnosis.parameters import (
     sum_of_squares,
 )
 from hwid_cli.diagnosis.problem import DiagnosisProblem
+from hwid_cli.drive.catalogue import CATALOGUE
 
 # Difference for derivatives, in coordinates; large enough to look across the corners of
 # thresholds, small enough for a straight line.
@@ -46,13 +47,6 @@ OWN_ITERATIONS = 12
 _LEAST_RATIO = 0.1
 # Blocks of a recording whose own values are evaluated on other blocks; an even number.
 _BLOCKS = 10
-# Values that an own parameter is tried at before its search.
-_OWN_TRIALS = {
-    "phase_rad": (0.0, 0.5 * np.pi, np.pi, 1.5 * np.pi),
-    "log_stiffness": (-0.1, -0.03, 0.0, 0.03, 0.1),
-    "log_force_constant": (-0.1, -0.03, 0.0, 0.03, 0.1),
-    "log_damping": (-0.2, -0.06, 0.0, 0.06, 0.2),
-}
 
 
 @dataclass(frozen=True, eq=False)
@@ -390,7 +384,7 @@ def with_own_trials(
             continue
         best = np.full(len(problem.signals), np.inf)
         chosen = point.own[:, column].copy()
-        for value in _OWN_TRIALS[unknown.name]:
+        for value in CATALOGUE[unknown.owner].parameter(unknown.name).trials:
             own = point.own.copy()
             own[:, column] = unknown.coordinate(value)
             parts = residuals_at(problem, fit_layout, ParameterPoint(point.shared, own))

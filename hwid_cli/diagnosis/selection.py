@@ -14,7 +14,7 @@ from itertools import combinations
 import numpy as np
 from scipy.stats import f as f_distribution
 
-from hwid_cli.diagnosis.parameters import START
+from hwid_cli.diagnosis.parameters import START, is_factor
 from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals
 from hwid_cli.drive.catalogue import CATALOGUE, public_id
 from hwid_cli.records.candidates import CandidateFit, RankedCandidate
@@ -232,9 +232,7 @@ class SelectionCriteria:
         docs/method_diagnosis.md, eq. (D24).
         """
         columns = [
-            column
-            for column, one in enumerate(found.own_names)
-            if one.parameter.startswith("log_")
+            column for column, one in enumerate(found.own_names) if is_factor(one)
         ]
         return any(_goes_with(found.own[:, one], self.inputs) for one in columns)
 
@@ -283,8 +281,7 @@ def _count_starts(found: CandidateFit) -> int:
 def has_size(found: CandidateFit) -> bool:
     """Whether changes between recordings are more than scatter."""
     return not any(
-        one.parameter.startswith("log_")
-        and float(np.std(found.own[:, column])) < LEAST_SPREAD
+        is_factor(one) and float(np.std(found.own[:, column])) < LEAST_SPREAD
         for column, one in enumerate(found.own_names)
     )
 
@@ -599,10 +596,7 @@ def _changes_freely(found: CandidateFit, effect: str) -> bool:
 
     Such values make up for a law that is not quite right, down to the noise.
     """
-    return any(
-        one.owner == effect and one.parameter.startswith("log_")
-        for one in found.own_names
-    )
+    return any(one.owner == effect and is_factor(one) for one in found.own_names)
 
 
 def _needs_each(

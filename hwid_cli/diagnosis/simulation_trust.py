@@ -23,9 +23,9 @@ from hwid_cli.diagnosis.parameters import (
     ParameterPoint,
     Unknown,
     compare_at,
+    is_factor,
 )
 from hwid_cli.diagnosis.problem import Compared, DiagnosisProblem
-from hwid_cli.drive.catalogue import CATALOGUE
 from hwid_cli.drive.effect import Scales
 from hwid_cli.records.candidates import CandidateFit
 from hwid_cli.records.trust import Inside, ModelTrust, ShownBand, TrustOnTests
@@ -105,10 +105,10 @@ def _as_unseen(
     for column, one in enumerate(fit_layout.own):
         if one.owner == START or not is_held.any():
             continue
-        parameters = CATALOGUE[one.owner].parameters
-        is_factor = any(p.is_factor for p in parameters if p.name == one.name)
         # An exported simulation has the mean of the factors, and no phase.
-        usual = own[~is_held, column].mean() if is_factor else one.coordinate(0.0)
+        usual = (
+            own[~is_held, column].mean() if is_factor(one.ref) else one.coordinate(0.0)
+        )
         own[is_held, column] = usual
     return ParameterPoint(point.shared, own)
 

@@ -7,7 +7,7 @@ read, the search of a diagnosis and the documents follow from them.
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from itertools import product
-from math import inf
+from math import inf, pi
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,6 +19,8 @@ Values = Mapping[str, float]
 
 # Share of a start value at which an effect changes next to nothing.
 FAINT = 1e-3
+# Phases that a search of a wave's own one tries, [rad].
+QUARTERS = (0.0, 0.5 * pi, pi, 1.5 * pi)
 
 
 @dataclass(frozen=True)
@@ -254,6 +256,8 @@ class Parameter:
         What a search counts from, where it is not searched by its logarithm.
     is_own : bool
         Whether each recording has its own value.
+    trials : tuple of float, [unit of the parameter]
+        What each recording's own value is tried at before its search.
     places : tuple of str
         Names in ``slots`` of the places in the vector that hold it. What several effects
         hold there adds up.
@@ -275,6 +279,7 @@ class Parameter:
     is_positive: bool = True
     center: float = 0.0
     is_own: bool = False
+    trials: tuple[float, ...] = ()
     places: tuple[str, ...] = ()
     is_factor: bool = False
     off: float = 0.0
@@ -361,7 +366,10 @@ class Effect:
     @property
     def strongest(self) -> Parameter:
         """The parameter without which the effect is not there."""
-        name = self.strength or self.parameters[0].name
+        return self.parameter(self.strength or self.parameters[0].name)
+
+    def parameter(self, name: str) -> Parameter:
+        """Its parameter of a name."""
         return next(one for one in self.parameters if one.name == name)
 
     def faint(self, values: Values, scales: Scales) -> dict[str, float]:

@@ -7,6 +7,12 @@ entry for each parameter of the base that may change.
 from hwid_cli.drive.effect import NOT_NEGATIVE, Effect, Parameter, Stated
 from hwid_cli.records.drive import CHANGING
 
+_TRIALS = {
+    "stiffness": (-0.1, -0.03, 0.0, 0.03, 0.1),
+    "force_constant": (-0.1, -0.03, 0.0, 0.03, 0.1),
+    "damping": (-0.2, -0.06, 0.0, 0.06, 0.2),
+}
+
 EFFECTS = tuple(
     Effect(
         id=f"parameter_change:{which}",
@@ -21,6 +27,7 @@ EFFECTS = tuple(
                 lambda scales: (-1.5, 1.5),
                 is_positive=False,
                 is_own=True,
+                trials=_TRIALS[which],
                 places=(which.upper(),),
                 is_factor=True,
                 default=0.0,

@@ -8,6 +8,7 @@ from math import pi
 from hwid_cli.drive.effect import (
     NOT_NEGATIVE,
     POSITIVE,
+    QUARTERS,
     Effect,
     Limit,
     Parameter,
@@ -139,6 +140,7 @@ PERIODIC = Effect(
             lambda scales: (0.0,),
             is_positive=False,
             is_own=True,
+            trials=QUARTERS,
             places=("PERIODIC_PHASE",),
             default=0.0,
         ),

@@ -7,6 +7,7 @@ from math import inf, pi
 
 from hwid_cli.drive.effect import (
     POSITIVE,
+    QUARTERS,
     Effect,
     Limit,
     Parameter,
@@ -138,6 +139,7 @@ HUM = Effect(
             lambda scales: (0.0,),
             is_positive=False,
             is_own=True,
+            trials=QUARTERS,
             places=("HUM_PHASE",),
             default=0.0,
         ),
