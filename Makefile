@@ -15,7 +15,7 @@ PLATFORM ?= linux-x86_64-py311
 LOCKED_INSTALL = $(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes --requirement
 
 .DEFAULT_GOAL := help
-.PHONY: help install run test test-all check audit format smoke clean reliability \
+.PHONY: help install run test test-thorough test-all check audit format smoke clean reliability \
         bench bench-beyond bench-campaign bench-growth bench-maps bench-page bench-rounds bench-search bench-size bench-starts bench-wide bench-advice docs \
         bench-real bench-trust bench-next scale \
         wheel lowest away-run lock sbom licences simulate calibrate identify crossval group test-stage steps model1 model2 \
@@ -54,8 +54,11 @@ install: $(DEV)  ## make .venv with everything that tests and checks need
 run: $(RUN)  ## the main job on the virtual gun: raw measurements in, tables out
 	$(HWID) run configs/demo.yaml
 
-test: $(DEV)  ## fast tests
+test: $(DEV)  ## fast tests, below 90 s on two cores
 	$(BIN)/python -m pytest --quiet --numprocesses auto --dist worksteal
+
+test-thorough: $(DEV)  ## tests that take a second or more, for CI: two to three minutes
+	$(BIN)/python -m pytest --quiet --numprocesses auto --dist worksteal -m 'thorough and not slow and not browser'
 
 test-all: $(DEV)  ## all tests, also the slow ones
 	$(BIN)/python -m pytest --quiet --numprocesses auto --dist worksteal -m ''

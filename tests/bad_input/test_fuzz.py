@@ -31,6 +31,7 @@ def test_damaged_files_are_read_or_refused_and_nothing_else(kind, tmp_path):
     assert outcomes["read"] > 0
 
 
+@pytest.mark.thorough
 def test_a_few_damaged_files_of_every_kind_are_read_or_refused(tmp_path):
     _, broken = tried(",".join(COUNTS), 1, 40 * len(COUNTS), tmp_path)
 

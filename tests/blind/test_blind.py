@@ -38,6 +38,7 @@ def test_a_hidden_effect_is_named_measured_and_removed(effect, tmp_path):
     assert outcome["after_to_noise"] < 1.06
 
 
+@pytest.mark.thorough
 @pytest.mark.usefixtures("blank_figures")
 def test_wrong_parameters_alone_are_no_missing_effect(tmp_path):
     outcome = only_outcome(short_case(suite="clean"), tmp_path)

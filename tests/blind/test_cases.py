@@ -56,6 +56,7 @@ def short_case(*effects, **fields):
     return make_case("full", effects, 0, plan="short", **fields)
 
 
+@pytest.mark.thorough
 def test_every_effect_is_hidden_with_the_parameters_that_must_be_reported():
     assert set(CATALOGUE) == set(REPORTED) == set(FAMILY_OF)
     for effect in ("gear_backlash", "cogging", "parameter_change", "end_stop"):

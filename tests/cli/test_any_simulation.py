@@ -63,6 +63,7 @@ def hwid(folder, *arguments):
     return done
 
 
+@pytest.mark.thorough
 def test_the_simulation_of_the_page_is_run_beside_the_recordings(folder):
     done = hwid(folder, "simulate", str(folder / "mine.yaml"))
     assert "6 recordings simulated" in done.output

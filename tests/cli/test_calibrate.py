@@ -19,6 +19,7 @@ def test_measurements_are_simulated_where_they_are_missing(hwid):
     assert "simulate: 3 measurements computed" in hwid("calibrate").stderr
 
 
+@pytest.mark.thorough
 def test_an_unchanged_calibration_is_not_repeated(after_run, hwid, out):
     figure = out / "figures" / "calibrate" / "step_02.png"
     before = figure.stat().st_mtime_ns

@@ -87,6 +87,7 @@ def server(answer):
             one.close()
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "answer",
     [
@@ -106,6 +107,7 @@ def test_nobody_there_is_one_line(config):
     assert_one_line(start(config, "tcp://127.0.0.1:1"), "tcp://127.0.0.1:1")
 
 
+@pytest.mark.thorough
 def test_tls_without_settings_is_one_line(config):
     process = start(config, "tls://127.0.0.1:8786")
 

@@ -130,6 +130,7 @@ def test_lost_results_are_made_from_the_cache(again, out):
     assert found_in(out)["effects"] == before["effects"]
 
 
+@pytest.mark.thorough
 def test_force_diagnoses_again(again):
     assert "diagnose: 0 tasks from the cache" in again("--force").stderr
 
@@ -247,6 +248,7 @@ def test_quiet_says_nothing(again):
     assert (result.exit_code, result.stdout, result.stderr) == (0, "", "")
 
 
+@pytest.mark.thorough
 def test_a_start_away_from_equilibrium_is_one_line_of_warning(config, edit, again):
     for path in (config.parent / "data").glob("sine_*.csv"):
         head, *rows = path.read_text().splitlines()

@@ -66,6 +66,7 @@ def run(command, folder, expected=0):
     return result
 
 
+@pytest.mark.thorough
 def test_one_line_finds_what_the_model_lacks_where_it_does_not_cover(tested):
     result = run("diagnose", tested)
     found = json.loads((tested / "out" / "diagnosis.json").read_text())

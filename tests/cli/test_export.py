@@ -49,6 +49,7 @@ def test_stages_before_run(hwid, out):
     assert (out / "models" / "step_02_1_1.json").is_file()
 
 
+@pytest.mark.thorough
 def test_a_group_is_exported_under_its_own_name(after_run, hwid, config, out):
     # Models of this sine do not cover all three recordings.
     options = "{start: [sine_12], keep: {best: true}, max_level: 2}"

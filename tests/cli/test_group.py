@@ -41,6 +41,7 @@ def rows_of(path):
         return list(csv.DictReader(file))
 
 
+@pytest.mark.thorough
 def test_the_search_is_written_and_shown(grouped, out):
     rows = rows_of(out / "groups.csv")
 
@@ -61,6 +62,7 @@ def test_a_second_run_answers_from_the_cache_with_the_same_table(grouped, hwid, 
     assert (out / "groups.csv").read_bytes() == before
 
 
+@pytest.mark.thorough
 def test_force_searches_again_but_keeps_the_models_of_single_recordings(grouped, hwid):
     result = hwid("group", "--force", "-v")
 
@@ -68,6 +70,7 @@ def test_force_searches_again_but_keeps_the_models_of_single_recordings(grouped,
     assert "group level 2: 0 fits from the cache" in result.stderr
 
 
+@pytest.mark.thorough
 def test_another_threshold_fits_nothing_again(grouped, hwid, edit):
     edit("crossval: {threshold: 0.004}", "crossval: {threshold: 0.005}")
     result = hwid("group", "-v")
@@ -78,6 +81,7 @@ def test_another_threshold_fits_nothing_again(grouped, hwid, edit):
     assert all(", 0 computed" in line for line in fits if "level 1" in line)
 
 
+@pytest.mark.thorough
 def test_test_recordings_take_no_part(config, hwid, after_run, out):
     config.write_text(config.read_text() + SECTION + "test: {recordings: [step_12]}\n")
     result = hwid("group")
@@ -86,6 +90,7 @@ def test_test_recordings_take_no_part(config, hwid, after_run, out):
     assert "step_12" not in (out / "groups.csv").read_text()
 
 
+@pytest.mark.thorough
 def test_results_that_lack_a_part_come_back_from_the_cache(grouped, hwid, out):
     before = (out / "groups.csv").read_bytes()
     with h5py.File(out / "results.h5", "a") as file:

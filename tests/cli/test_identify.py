@@ -21,6 +21,7 @@ def test_a_second_run_answers_from_the_cache(after_run, hwid):
     assert "identify: 6 fits from the cache, 0 computed" in result.stderr
 
 
+@pytest.mark.thorough
 def test_force_computes_this_stage_again_and_no_other(after_run, hwid):
     result = hwid("identify", "--force")
 
@@ -28,6 +29,7 @@ def test_force_computes_this_stage_again_and_no_other(after_run, hwid):
     assert "identify: 0 fits from the cache, 6 computed" in result.stderr
 
 
+@pytest.mark.thorough
 def test_another_order_is_fitted_and_the_others_are_not(after_run, hwid, edit):
     edit("nk: [1, 2]", "nk: [1, 3]")
     result = hwid("identify")
@@ -35,6 +37,7 @@ def test_another_order_is_fitted_and_the_others_are_not(after_run, hwid, edit):
     assert "identify: 6 fits from the cache, 3 computed" in result.stderr
 
 
+@pytest.mark.thorough
 def test_one_changed_recording_is_fitted_again_and_the_others_are_not(
     after_run, hwid, edit, out
 ):
@@ -79,6 +82,7 @@ def own_map(config, edit):
     return path
 
 
+@pytest.mark.thorough
 def test_a_map_of_ones_own_is_fitted_and_kept(own_map, hwid, edit, out):
     edit("nk: [1, 2]", "nk: 1")
     assert hwid("identify").exit_code == 0

@@ -176,6 +176,7 @@ def write_recording(folder, one):
     np.savetxt(folder / f"{one.name}.csv", rows, delimiter=",", **head)
 
 
+@pytest.mark.thorough
 def test_a_proposed_recording_tells_two_candidates_apart(tmp_path):
     noise = 4e-4
     for one in slow_ramps(noise):

@@ -34,6 +34,7 @@ def test_a_second_run_says_the_same(after_run, hwid, out):
     assert (out / "order.csv").read_bytes() == first
 
 
+@pytest.mark.thorough
 def test_the_tolerance_is_a_key_of_the_configuration(after_run, hwid, edit, out):
     edit("identify: {}", "identify: {}\norder: {tolerance: 1000.0}")
     hwid("order", "-v")
@@ -41,6 +42,7 @@ def test_the_tolerance_is_a_key_of_the_configuration(after_run, hwid, edit, out)
     assert {row["nk"] for row in rows_of(out / "order.csv")} == {"1"}
 
 
+@pytest.mark.thorough
 def test_outliers_of_the_judges_do_not_count_where_fits_bear_them(
     after_run, hwid, edit, out
 ):
@@ -87,6 +89,7 @@ def test_wrong_usage_is_told_from_what_can_be_mended(hwid):
 MAPS = "identify: {}\norder: {maps: [none], units: [2]}"
 
 
+@pytest.mark.thorough
 def test_maps_are_recommended_and_come_from_the_cache_the_second_time(
     after_run, hwid, edit, out
 ):

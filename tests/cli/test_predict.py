@@ -195,6 +195,7 @@ def test_a_hostile_model_is_one_plain_line(model, tmp_path, place, value, says):
     assert not out.exists()
 
 
+@pytest.mark.thorough
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="a system without pipes")
 @pytest.mark.parametrize("kind", ["pipe", "/dev/zero", "large", "pipe as input"])
 def test_a_file_without_an_end_is_one_line(model, tmp_path, kind):

@@ -39,6 +39,7 @@ def test_progress_is_apart_from_the_results(after_run, hwid):
     assert done.stdout.startswith("\ntiny: run done in ")
 
 
+@pytest.mark.thorough
 def test_a_stage_draws_a_page_anew_that_is_there(after_run, hwid, out, edit):
     (out / "report.html").unlink()
     edit("threshold: 0.01", "threshold: 0.02")
@@ -63,6 +64,7 @@ def test_a_page_that_cannot_be_drawn_stays_and_fails_nothing(after_run, hwid, ou
     assert (out / "report.html").read_text() == "an older page"
 
 
+@pytest.mark.thorough
 def test_a_second_run_computes_nothing_and_force_computes_all(after_run, hwid, edit):
     assert hwid("run").stderr.count("from the cache, 0 computed") == 2
 
@@ -155,6 +157,7 @@ def test_an_unknown_key_is_refused_by_every_stage(hwid, edit, command):
     assert "'nk'" in result.stderr
 
 
+@pytest.mark.thorough
 @pytest.mark.usefixtures("blank_figures")
 def test_a_stage_that_fails_still_leaves_a_report_of_those_before(
     after_run, config, hwid, out
@@ -169,6 +172,7 @@ def test_a_stage_that_fails_still_leaves_a_report_of_those_before(
     assert (out / "report.html").is_file()
 
 
+@pytest.mark.thorough
 def test_a_stage_ends_with_the_same_model_as_the_whole_run(config, hwid):
     config.write_text(
         config.read_text().replace("identify: {}", "identify: {recordings: [step_02]}")

@@ -78,6 +78,7 @@ def in_si(tmp_path_factory):
     return diagnosis(write_experiment(tmp_path_factory.mktemp("si")))
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("header", "more"),
     [

@@ -134,6 +134,7 @@ def test_cells_above_numbers_may_be_units():
     ]
 
 
+@pytest.mark.thorough
 def test_plain_units_do_not_load_the_library():
     script = (
         "import sys\n"

@@ -11,6 +11,7 @@ from tests.stages.diagnosed_drive import FEW, FRICTION, diagnosed
 from tests.store.record_examples import assert_same
 
 
+@pytest.mark.thorough
 def test_any_runner_gives_what_the_stage_gives():
     given = recordings(FRICTION)
     options = DiagnoseOptions(effects=FEW, max_effects=1)

@@ -124,6 +124,7 @@ def test_without_effects_the_gap_is_that_of_the_refit():
     assert all(one.rms_before == one.rms_after for one in found.gaps)
 
 
+@pytest.mark.thorough
 def test_an_unknown_gap_stays_as_it_is():
     found = diagnosed(breathing())
     assert found.after == found.before

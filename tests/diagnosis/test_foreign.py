@@ -78,6 +78,7 @@ def diagnosis(simulator, hidden=FRICTION, effects=None):
 FEW = ("coulomb_friction", "quadratic_drag", "cubic_stiffness", "input_delay")
 
 
+@pytest.mark.thorough
 def test_friction_is_named_and_confirmed_in_the_simulation_with_its_parameters():
     able = Capabilities(run=True, parameters=True, force=True)
     found, runs = diagnosis(Simulator(able, simulate, {}, FREE, GIVEN), effects=FEW)
@@ -106,6 +107,7 @@ def test_references_of_a_stand_in_are_those_of_the_training_recordings():
     assert drive.reference_current_A == 2.5
 
 
+@pytest.mark.thorough
 def test_without_a_force_input_a_force_acts_through_the_input():
     able = Capabilities(run=True, parameters=True)
     found, _ = diagnosis(Simulator(able, simulate, {}, FREE, GIVEN), effects=FEW)
@@ -125,6 +127,7 @@ def test_of_outputs_alone_the_name_is_found_and_not_confirmed():
     assert (found.confirmed, runs) == ("surrogate", 0)
 
 
+@pytest.mark.thorough
 def test_where_nothing_is_hidden_the_parameters_are_all():
     able = Capabilities(run=True, parameters=True, force=True)
     simulator = Simulator(able, simulate, {}, FREE, GIVEN)
@@ -134,6 +137,7 @@ def test_where_nothing_is_hidden_the_parameters_are_all():
         assert one.after == pytest.approx(TRUE[one.name], rel=0.01)
 
 
+@pytest.mark.thorough
 def test_bounds_of_parameters_are_kept():
     able = Capabilities(run=True, parameters=True, force=True)
     seen = []
@@ -195,6 +199,7 @@ def pendulum_run(values, current, force, spring=0.0):
     return found
 
 
+@pytest.mark.thorough
 def test_what_a_linear_stand_in_leaves_of_a_pendulum_becomes_no_second_effect():
     # Angles of more than a radian: beside the sine of gravity the stand-in is wrong.
     rng, noise, spring = np.random.default_rng(5), 4e-3, 0.4

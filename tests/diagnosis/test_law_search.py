@@ -61,6 +61,7 @@ def found_terms(found, size):
     }
 
 
+@pytest.mark.thorough
 def test_the_terms_of_a_force_are_found_with_their_coefficients():
     pair = motions(
         lambda x, v, u, t: -900 * x * v - 0.4 * np.abs(u), noise=1e-6,

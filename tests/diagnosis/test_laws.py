@@ -47,6 +47,7 @@ def found():
     return recordings, diagnose(recordings, SIMULATION, NOTHING)
 
 
+@pytest.mark.thorough
 def test_a_law_of_two_terms_is_found_with_units_intervals_and_inclusion(found):
     _, diagnosis = found
     law = diagnosis.law
@@ -90,6 +91,7 @@ def test_the_extended_simulation_holds_the_law_and_lacks_nothing(found, tmp_path
     assert [one.id for one in told.present] == ["law"]
 
 
+@pytest.mark.thorough
 def test_a_law_that_is_an_effect_of_the_catalogue_gets_its_name():
     friction = Hidden(lambda x, v, u, t, way: -0.9 * way, has_friction=True)
     told = diagnose(machine(friction), SIMULATION, NOTHING)
@@ -115,6 +117,7 @@ def test_a_law_takes_no_name_away_from_what_leaves_hardly_more_than_noise(
     assert _is_wanted(rounds, unknown)
 
 
+@pytest.mark.thorough
 def test_a_law_that_held_out_recordings_do_not_share_is_refused():
     # Trained on damping that grows to one side, judged on what grows to the other.
     other = Hidden(lambda x, v, u, t, way: 700 * x * v)
@@ -126,17 +129,20 @@ def test_a_law_that_held_out_recordings_do_not_share_is_refused():
     assert told.law is None
 
 
+@pytest.mark.thorough
 def test_a_machine_that_lacks_nothing_has_no_law():
     told = diagnose(machine(Hidden()), SIMULATION, NOTHING)
     assert (told.verdict, told.law) == ("parameters", None)
 
 
+@pytest.mark.thorough
 def test_who_asks_for_some_effects_gets_no_law():
     options = DiagnoseOptions(effects=("input_delay",))
     told = diagnose(machine(ROOT), SIMULATION, options)
     assert told.law is None
 
 
+@pytest.mark.thorough
 def test_a_law_of_a_sensor_is_told_as_what_it_reads():
     sensor = Hidden(sensor=lambda x, v, u, t: x + 0.04 * np.abs(x))
     told = diagnose(machine(sensor), SIMULATION, NOTHING)

@@ -89,6 +89,7 @@ CHANGES = {
 }
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("effect", CHANGES)
 def test_what_has_come_since_is_named_and_confirmed(model, effect):
     found = diagnosed(model, machine(**CHANGES[effect]))

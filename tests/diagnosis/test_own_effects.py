@@ -61,6 +61,7 @@ def found():
     return recordings, options, diagnose(recordings, SIMULATION, options)
 
 
+@pytest.mark.thorough
 def test_a_formula_is_named_with_its_parameters(found):
     _, _, diagnosis = found
     assert diagnosis.verdict == "named"
@@ -96,6 +97,7 @@ def test_a_formula_that_is_not_there_is_not_named():
     assert diagnosis.verdict == "parameters"
 
 
+@pytest.mark.thorough
 def test_a_formula_is_put_into_a_foreign_simulation():
     stated = OwnEffect(
         force_N="-a*sign(v)",

@@ -88,6 +88,7 @@ def pair():
     return Watched({**FRICTION, **STIFFNESS}, FEW, 3)
 
 
+@pytest.mark.thorough
 def test_the_hidden_effect_wins_against_the_whole_catalogue(friction):
     assert friction.found.best[-1].effects == ("coulomb_friction",)
     assert len(friction.found.best) == 1
@@ -100,6 +101,7 @@ def test_every_effect_gets_a_forecast_and_a_screening(friction):
     assert set(friction.effects_of("screen")) == alone
 
 
+@pytest.mark.thorough
 def test_the_first_ones_of_the_screening_are_finished(pair):
     sse = {}
     for task, result in pair.tasks:

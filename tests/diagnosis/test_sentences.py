@@ -43,6 +43,7 @@ def shifted(names):
 SINES = ("sine_0", "sine_1", "sine_2", "sine_3")
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("names", [SINES, ("sine_1",)])
 def test_an_unknown_gap_in_some_recordings_names_them(names):
     found = diagnosed(shifted(names), effects=("quadratic_drag",))
@@ -50,6 +51,7 @@ def test_an_unknown_gap_in_some_recordings_names_them(names):
     assert f"gap sits in {', '.join(names)}: check how they start" in found.summary
 
 
+@pytest.mark.thorough
 def test_an_unknown_gap_in_all_recordings_names_none():
     found = diagnosed(breathing(), effects=("coulomb_friction",))
     assert found.verdict == "unknown"
@@ -179,6 +181,7 @@ def test_motion_to_both_sides_shows_friction():
     assert ONE_WAY not in said(ways(np.sin(3 * way)))
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("friction_N", "stiffness_N_per_m", "leads"),
     [

@@ -56,6 +56,7 @@ def test_zeros_hide_no_friction():
     assert [one.id for one in diagnosis.effects] == ["coulomb_friction"]
 
 
+@pytest.mark.thorough
 def test_where_more_is_missing_the_zeros_are_not_the_cause():
     diagnosis = found(moved(recordings(FRICTION), ZEROS))
 

@@ -188,6 +188,7 @@ def test_matlab_is_refused(tmp_path):
         write_exported(tmp_path, exported_drive({}), "mat")
 
 
+@pytest.mark.thorough
 def test_the_unit_of_a_simulation_answers_like_hwid(tmp_path):
     exported = exported_drive(cases.COULOMB)
     u = example_command(300)

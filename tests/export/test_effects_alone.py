@@ -113,6 +113,7 @@ def rms(values):
     return float(np.sqrt(np.mean(np.square(values))))
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", VALUES)
 def test_modelica_text_moves_a_mass_as_the_effect_does(name):
     effects = {name: VALUES[name]}
@@ -200,6 +201,7 @@ void run_mass(int n, const double *u, double *y) {
 """
 
 
+@pytest.mark.thorough
 @needs_compiler
 @pytest.mark.parametrize("name", ["coulomb_friction", "sensor_quadratic", "hysteresis"])
 def test_s_function_moves_a_mass_as_the_effect_does(name, tmp_path):

@@ -87,12 +87,14 @@ def differences(plant, effects, path):
         yield name, np.std(found - known) / np.std(known - bare)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", EFFECTS)
 def test_it_gives_what_the_extended_simulation_gives(plant, name, tmp_path):
     for current, share in differences(plant, EFFECTS[name], tmp_path / "a.fmu"):
         assert share < 0.01, current
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("missing", [{"velocity": None}, {"force_input": None}])
 @pytest.mark.parametrize("name", ["friction", "cubic"])
 def test_without_a_velocity_or_a_force_input(plant, name, missing, tmp_path):
@@ -101,6 +103,7 @@ def test_without_a_velocity_or_a_force_input(plant, name, missing, tmp_path):
         assert share < 0.01, current
 
 
+@pytest.mark.thorough
 def test_friction_is_nearer_to_the_machine_than_the_extended_simulation(
     plant, tmp_path
 ):
@@ -121,6 +124,7 @@ def test_friction_is_nearer_to_the_machine_than_the_extended_simulation(
         assert np.std(found - truth) < 0.002 * np.std(bare - truth), name
 
 
+@pytest.mark.thorough
 def test_it_is_reset_to_its_start_and_runs_again(plant, tmp_path):
     extended = extended_of(plant, EFFECTS["hysteresis"])
     write_extended_fmu(tmp_path / "a.fmu", extended, CARD, STEP_S)
@@ -131,6 +135,7 @@ def test_it_is_reset_to_its_start_and_runs_again(plant, tmp_path):
     np.testing.assert_array_equal(first, second)
 
 
+@pytest.mark.thorough
 def test_fmpy_takes_it_and_its_parameters_have_the_fitted_values(plant, tmp_path):
     import fmpy
 
@@ -148,6 +153,7 @@ def test_fmpy_takes_it_and_its_parameters_have_the_fitted_values(plant, tmp_path
     assert np.ptp(found["displacement_m"]) > 1e-3
 
 
+@pytest.mark.thorough
 def test_a_step_that_does_not_fit_is_one_line_of_the_unit(plant, tmp_path):
     extended = extended_of(plant, EFFECTS["drag"])
     write_extended_fmu(tmp_path / "a.fmu", extended, CARD, STEP_S)

@@ -80,6 +80,7 @@ def test_one_process_reads_all_files(good):
     np.testing.assert_array_equal(found.output.values, ARRAYS["y"])
 
 
+@pytest.mark.thorough
 def test_a_crash_of_the_reader_is_a_message_and_the_next_file_is_read(good, crashing):
     with pytest.raises(
         MeasurementError,
@@ -100,6 +101,7 @@ def test_a_process_that_an_earlier_file_has_spoilt_is_replaced(good):
     assert read_columns(good, COLUMNS).input.values.size == 5
 
 
+@pytest.mark.thorough
 def test_a_reader_that_does_not_come_back_is_stopped(good, endless):
     reader = IsolatedReader("hwid_cli.data.formats")
     reader.ask(request(good))
@@ -155,6 +157,7 @@ input()
 """
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "number",
     [

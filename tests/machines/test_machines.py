@@ -115,6 +115,7 @@ def test_arms_and_loads_rest_where_forces_balance():
     assert np.allclose(x, x[0])
 
 
+@pytest.mark.thorough
 def test_a_current_through_a_winding_lags_by_inductance_over_resistance():
     # Heavy enough to stay where it is, on a stiff spring: position follows the current.
     base = Base(1e-3, 2.0, 4e4, 1.0, resistance=2.0)

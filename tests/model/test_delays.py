@@ -120,6 +120,7 @@ def test_a_smaller_model_keeps_its_own_delay_where_that_is_needed():
 FOUR = (10, 11, 12, 13)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("delays", "seeds"),
     [

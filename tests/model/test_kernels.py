@@ -157,6 +157,7 @@ for loop in (kernels.block_output, derivative_rows, regression_columns):
 """
 
 
+@pytest.mark.thorough
 def test_a_fit_compiles_each_loop_once():
     """Read-only arguments would be compiled for again, which takes seconds."""
     done = subprocess.run(

@@ -52,6 +52,7 @@ def run(folder, out, *options):
     return numbers(folder, out)
 
 
+@pytest.mark.thorough
 def test_repeats_and_answers_from_the_cache_are_the_same_bits(experiment):
     first = run(experiment, "first")
 

@@ -68,6 +68,7 @@ def derived(folder):
     return {str(path.relative_to(folder)): path.read_bytes() for path in paths}
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(("name", "damage"), CASES)
 def test_report_draws_damaged_files_again(config, out, reported, name, damage):
     shutil.copytree(reported, out)
@@ -91,6 +92,7 @@ def test_run_makes_damaged_files_again(config, out, reported, name, damage):
     assert derived(out) == derived(reported)
 
 
+@pytest.mark.thorough
 def test_a_page_leaves_the_figures_of_calibration_alone(config, out, undisturbed):
     shutil.copytree(undisturbed, out)
     before = {path: path.read_bytes() for path in out.rglob("calibrate/*.png")}

@@ -23,6 +23,7 @@ def run(config, out, command, **faults):
     )
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("error", [errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOSYS])
 def test_a_lock_that_fails_is_no_damage(config, out, undisturbed, error):
     shutil.copytree(undisturbed, out)
@@ -46,6 +47,7 @@ def test_a_whole_campaign_needs_no_locks(config, out, undisturbed):
     assert harness.results(out) == harness.results(undisturbed)
 
 
+@pytest.mark.thorough
 def test_results_that_the_disk_does_not_give_are_no_damage(config, out, undisturbed):
     """Reading fails while a stage is written again: whole results stay in place."""
     shutil.copytree(undisturbed, out)

@@ -63,6 +63,7 @@ def _page(page):
     return re.sub(r"<td>\d+\.\d</td>", "<td>s</td>", text)
 
 
+@pytest.mark.thorough
 def test_two_runs_of_a_campaign_give_the_same_bytes(tmp_path):
     config = harness.write_config(tmp_path)
     for name in ("one", "two"):

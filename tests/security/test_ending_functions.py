@@ -56,6 +56,7 @@ def assert_one_line(done, *words):
     assert all(word in complaint for word in ("curve", *words)), complaint
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("at_start", "in_value", "says"),
     [

@@ -91,6 +91,7 @@ def faults(tree: ast.Module, place: str) -> list[str]:
     return [f"{place}: {one}" for one in found]
 
 
+@pytest.mark.thorough
 def test_the_source_starts_no_program_and_trusts_no_file():
     found = [
         fault

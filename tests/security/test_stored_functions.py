@@ -77,6 +77,7 @@ def after_own(folder):
     return folder
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("command", ["check", "run", "crossval", "report"])
 def test_each_run_of_a_function_is_announced_in_one_line(after_own, command):
     done = hwid(after_own, command, after_own / "own.yaml")
@@ -100,6 +101,7 @@ def test_report_of_a_plain_configuration_does_not_run_a_stored_function(after_ow
     assert "fit.input_map" in done.stderr
 
 
+@pytest.mark.thorough
 def test_function_of_another_text_does_not_run(after_own):
     text = (after_own / "curve.py").read_text()
     (after_own / "curve.py").write_text(text.replace("ran\\n", "new\\n"))
@@ -160,6 +162,7 @@ def test_compare_runs_functions_of_another_folder_only_when_told(after_own):
     assert done.stdout.count(": runs the Python function") == 1
 
 
+@pytest.mark.thorough
 def test_model_that_is_a_simulation_runs_no_function_that_is_not_named(after_own):
     exported = hwid(after_own, "export", after_own / "own.yaml", "--model", "run/1/1")
     assert exported.exit_code == 0, exported.output
@@ -175,6 +178,7 @@ def test_model_that_is_a_simulation_runs_no_function_that_is_not_named(after_own
     assert "Traceback" not in done.stderr
 
 
+@pytest.mark.thorough
 def test_predict_announces_the_function_that_it_runs(after_own):
     exported = hwid(after_own, "export", after_own / "own.yaml", "--model", "run/1/1")
     assert exported.exit_code == 0, exported.output

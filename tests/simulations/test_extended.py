@@ -107,6 +107,7 @@ def extended(tmp_path):
     return ExtendedSimulation(base, plain, replace(plain, effects=drag))
 
 
+@pytest.mark.thorough
 def test_a_function_with_drag(extended):
     from scipy.integrate import solve_ivp
 

@@ -183,6 +183,7 @@ def test_an_fmu_without_a_true_reset_starts_fresh(tmp_path, plant_2, reset):
     assert all(np.array_equal(one, expected) for one in found)
 
 
+@pytest.mark.thorough
 def test_two_thousand_runs(plant):
     current = CURRENT[:20]
     first = run(plant, current=current).output
@@ -225,6 +226,7 @@ def test_a_file_that_changes_is_opened_again(tmp_path):
     assert np.ptp(after) < 0.95 * np.ptp(before)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("version", [2, 3])
 @pytest.mark.parametrize(
     ("fault", "expected"),
@@ -264,6 +266,7 @@ def test_one_that_asks_to_end(tmp_path):
     assert "its step gave Discard at 0.051 s" in told(section(path))
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("changes", "expected"),
     [

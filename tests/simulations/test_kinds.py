@@ -68,6 +68,7 @@ def test_without_a_force_the_force_input_is_zero(python):
     np.testing.assert_allclose(found.output, plain, atol=1e-9)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("text", "said"),
     [

@@ -1,4 +1,5 @@
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
@@ -22,6 +23,7 @@ def test_own_recordings_are_left_out_of_both_counts():
     assert count_covered_by(COVERED, IS_OWN).tolist() == [0, 1, 1]
 
 
+@pytest.mark.thorough
 @given(hnp.arrays(bool, (5, 7)), hnp.arrays(bool, (5, 7), elements=st.booleans()))
 def test_both_counts_add_up_to_the_same(covered, is_own):
     covers, covered_by = (

@@ -71,6 +71,7 @@ def test_the_tensor_holds_each_model_on_each_recording_at_its_place():
         np.testing.assert_allclose(result.rmsd[1, :, :, j], expected, atol=1e-13)
 
 
+@pytest.mark.thorough
 def test_the_number_of_workers_changes_no_number():
     np.testing.assert_array_equal(validate(jobs=2).rmsd, validate().rmsd)
 

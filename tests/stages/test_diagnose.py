@@ -81,6 +81,7 @@ def test_wrong_parameters_do_not_hide_friction(with_friction):
     assert parameters(found.effects[0])["force_N"] == pytest.approx(0.8, rel=0.01)
 
 
+@pytest.mark.thorough
 def test_one_of_two_effects_is_named_as_incomplete():
     hidden = {**PAIR, "coulomb_friction": {"force_N": 0.2}}
     found = diagnosed(recordings(hidden), effects=TWO)
@@ -89,12 +90,14 @@ def test_one_of_two_effects_is_named_as_incomplete():
     assert "remains" in found.summary
 
 
+@pytest.mark.thorough
 def test_half_of_a_large_gap_is_no_name():
     found = diagnosed(recordings(PAIR), effects=TWO)
     assert found.after.ratio_to_noise > 10
     assert found.verdict == "unknown"
 
 
+@pytest.mark.thorough
 def test_both_of_two_effects_are_named():
     found = diagnosed(recordings(PAIR), effects=TWO, max_effects=2)
     assert (found.verdict, found.complete) == ("named", True)
@@ -124,6 +127,7 @@ def slow_ramps(noise):
     return found
 
 
+@pytest.mark.thorough
 def test_slow_ramps_with_noise_cannot_tell_a_delay_from_a_lag():
     two = ("actuator_lag", "input_delay")
     found = diagnosed(slow_ramps(4e-4), effects=two)
@@ -136,6 +140,7 @@ def test_slow_ramps_with_noise_cannot_tell_a_delay_from_a_lag():
     assert (clear.verdict, clear.effects[0].id) == ("named", "actuator_lag")
 
 
+@pytest.mark.thorough
 def test_what_no_effect_explains_is_unknown():
     found = diagnosed(breathing(), effects=TWO, max_effects=2)
     assert (found.verdict, found.complete, found.effects) == ("unknown", False, ())
@@ -187,6 +192,7 @@ def test_several_processes_find_the_same(with_friction, friction_found):
     assert_same(spread, friction_found)
 
 
+@pytest.mark.thorough
 def test_a_second_run_computes_no_candidate_again(with_friction, friction_found):
     store, seen = MemoryStore(), []
     run = settings(store, on_done=seen.append)
@@ -264,6 +270,7 @@ def test_a_simulation_that_runs_away_is_a_verdict_and_no_exception(with_friction
     assert found.verdict == "unknown"
 
 
+@pytest.mark.thorough
 def test_with_a_wrong_law_in_the_catalogue_the_right_name_is_not_found(monkeypatch):
     given = recordings({"input_dead_zone": {"threshold_A": 0.25}})
     right = diagnosed(given)
@@ -304,6 +311,7 @@ def test_a_simulation_may_leave_out_what_completes_a_law(effects, names):
     assert list(parameters(found.present[0])) == names
 
 
+@pytest.mark.thorough
 def test_a_known_parameter_stays_where_data_would_move_it():
     # A force constant that is 6 % too large, held to 2 %: its neighbours take the rest.
     wrong = simulation(

@@ -62,6 +62,7 @@ def test_friction_by_load_is_told_and_extended_with_its_word():
     assert diagnosed(given, extended, effects=effects).verdict == "none"
 
 
+@pytest.mark.thorough
 def test_a_second_stop_is_found_beside_the_one_of_the_simulation():
     first = {"position_m": 0.008, "stiffness_N_per_m": 2e4}
     second = {"position_m": -0.006, "stiffness_N_per_m": 1e4}
@@ -100,6 +101,7 @@ def test_a_single_recording_is_diagnosed():
     assert any("only one" in text for text in found.not_observable)
 
 
+@pytest.mark.thorough
 def test_a_voltage_is_an_input_too():
     driven = replace(DRIVE, **VOLTAGE)
     given = recordings(FRICTION, drive=driven)
@@ -182,6 +184,7 @@ def test_recordings_that_begin_in_motion_are_diagnosed():
     assert parameters(found.effects[0])["force_N"] == pytest.approx(0.8, rel=0.02)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("sensor", ["motor", "load"])
 def test_an_elastic_coupling_is_extended_by_the_place_of_its_sensor(sensor):
     hidden = {"stiffness_N_per_m": 2e4, "motor_share": 0.4, "damping_ratio": 0.05}
@@ -202,6 +205,7 @@ def test_an_elastic_coupling_is_extended_by_the_place_of_its_sensor(sensor):
     assert [one.text for one in after.present[0].parameters if one.text] == [sensor]
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("hidden", "others"),
     [
@@ -233,6 +237,7 @@ def test_a_ratio_of_clocks_is_found_to_a_tenth_of_a_thousandth():
     assert ratio.low < 1.004 < ratio.high
 
 
+@pytest.mark.thorough
 def test_a_hum_of_the_sensor_is_no_force():
     hum = {"amplitude_m": 4e-4, "frequency_Hz": 31.0}
     given = recordings(
@@ -247,6 +252,7 @@ def test_a_hum_of_the_sensor_is_no_force():
     assert told["frequency_Hz"] == pytest.approx(31.0, rel=0.002)
 
 
+@pytest.mark.thorough
 def test_a_coil_delays_what_a_voltage_does():
     circuit = {"resistance_ohm": 1.0, "back_emf_V_s_per_m": 5.0}
     coil = {"winding_inductance": {"inductance_H": 4e-3}}

@@ -64,6 +64,7 @@ def test_nothing_is_compared_unless_asked_for():
     assert len(candidate_maps(FIT, OrderOptions())) == 1
 
 
+@pytest.mark.thorough
 def test_the_maps_of_the_plant_are_recommended():
     options = OrderOptions(maps=("none", "dead_zone"), units=(3,))
     advice = advice_on(recordings(4), options)
@@ -77,6 +78,7 @@ def test_the_maps_of_the_plant_are_recommended():
     assert advice.evidence.n_validation == 4
 
 
+@pytest.mark.thorough
 def test_too_many_units_for_few_data_are_not():
     chosen = recordings(4, noise=0.2, samples=120)
     advice = advice_on(chosen, OrderOptions(maps=("none",), units=(2, 4)))

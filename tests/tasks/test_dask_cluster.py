@@ -51,6 +51,7 @@ def settings(scheduler, on_done=None):
     return RunSettings(MemoryStore(), Workers(None, "dask", scheduler), on_done=on_done)
 
 
+@pytest.mark.thorough
 def test_results_and_errors_are_those_of_this_process(address, tmp_path):
     with dask_processes.workers(address, tmp_path):
         there = run_tasks(tasks_of(slow_sum, 60), settings(address))

@@ -150,6 +150,7 @@ INTERRUPTED = """
 """
 
 
+@pytest.mark.thorough
 def test_an_interrupt_keeps_what_was_finished_and_stops_the_workers(tmp_path):
     done = subprocess.run(
         [sys.executable, "-c", textwrap.dedent(INTERRUPTED), str(tmp_path)],

@@ -30,6 +30,7 @@ def ran():
     return [run(source, scope) for source in cells()], scope
 
 
+@pytest.mark.thorough
 def test_every_cell_runs(ran):
     shown, scope = ran
     assert [one for one in shown[2:] if one is None] == []

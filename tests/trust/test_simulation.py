@@ -83,6 +83,7 @@ def test_the_band_of_a_complete_diagnosis_holds_what_it_promises(right, kind):
     assert width < 8 * 2e-5
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("kind", ["steps", "multisine"])
 def test_a_simulation_of_the_wrong_structure_has_a_wide_band(right, wrong, kind):
     (found, drive, _), (other, without, _) = right, wrong
