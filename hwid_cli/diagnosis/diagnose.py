@@ -38,7 +38,7 @@ from hwid_cli.diagnosis.parameters import (
     first_point,
     parameter_layout,
 )
-from hwid_cli.diagnosis.pieces import in_pieces
+from hwid_cli.diagnosis.pieces import JudgedPieces, in_pieces
 from hwid_cli.diagnosis.problem import (
     Compared,
     DiagnosisProblem,
@@ -80,6 +80,9 @@ from hwid_cli.records.recordings import Recording
 
 # A line that takes this share of what the base leaves is no colour of noise.
 LINE_SHARE = 0.3
+# Whole recordings cannot judge where the noise of their start alone, sent through the
+# fit, makes up this share of what the fit leaves of them.
+LOST_TO_NOISE = 0.3
 
 
 def diagnose(
@@ -216,19 +219,25 @@ def find(
         run_tasks,
         on_round,
     )
-    found = _search(rounds, given_sse, force, options.max_effects)
+    found, seeds = _search(rounds, given_sse, force, options.max_effects)
     on_round("verdict", 0)
     verdict = _decided(rounds, given_sse, found)
-    law = None
+    whole = Findings(
+        problem=problem, criteria=criteria, scales=scales, given_sse=given_sse,
+        base=base, before=before, force=force, where=where,
+        found=found, verdict=verdict,
+    )  # fmt: skip
+    if verdict.word == "unknown" and seeds:
+        on_round("pieces with free starts", 0)
+        judged = _judged_in_pieces(rounds, whole, seeds)
+        if judged is not None:
+            return judged
     # Who asks for some effects only wants no formula instead.
     is_open = options.laws == "auto" and options.effects is None
     if is_open or options.laws == "only":
         verdict, found, law = find_law(rounds, before, force, found, verdict)
-    return Findings(
-        problem=problem, criteria=criteria, scales=scales, given_sse=given_sse,
-        base=base, before=before, force=force, where=where,
-        found=found, verdict=verdict, law=law,
-    )  # fmt: skip
+        return replace(whole, found=found, verdict=verdict, law=law)
+    return whole
 
 
 @dataclass(frozen=True, eq=False)
@@ -273,20 +282,28 @@ def _fitted_base(problem: DiagnosisProblem) -> _FittedBase:
 
 def _search(
     rounds: Rounds, given_sse: np.ndarray, force: Sequence[Smoothed], max_effects: int
-) -> RoundsResult:
-    """Sets of effects, from whole recordings and where these are lost from pieces."""
+) -> tuple[RoundsResult, tuple[CandidateFit, ...]]:
+    """Sets of effects, from whole recordings and where these are lost from pieces.
+
+    Returns
+    -------
+    RoundsResult
+        On whole recordings.
+    tuple of CandidateFit
+        Best sets of each size on pieces; empty where these were not asked.
+    """
     base, criteria = rounds.base, rounds.criteria
     if not base.is_usable or criteria.is_complete(base):
-        return RoundsResult()
+        return RoundsResult(), ()
     found = run_rounds(rounds, max_effects)
     is_lost = (
         _decided(rounds, given_sse, found).word == "unknown"
         and criteria.ratio(base) > STILL_LARGE
     )
-    if is_lost and not rounds.problem.compares_command:
-        seeds = _seeds_of_pieces(rounds, force, max_effects)
-        found = continue_rounds(rounds, found, seeds)
-    return found
+    if not is_lost or rounds.problem.compares_command:
+        return found, ()
+    seeds = _seeds_of_pieces(rounds, force, max_effects)
+    return continue_rounds(rounds, found, seeds), seeds
 
 
 def _decided(
@@ -329,19 +346,24 @@ def _seeds_of_pieces(
     rounds: Rounds, force: Sequence[Smoothed], max_effects: int
 ) -> tuple[CandidateFit, ...]:
     """Best sets of each size on pieces of the recordings."""
-    pieces = in_pieces(rounds.problem, force)
+    of_pieces = _rounds_of(rounds, in_pieces(rounds.problem, force))
+    if not of_pieces.base.is_usable:
+        return ()
+    return run_rounds(of_pieces, max_effects).best
+
+
+def _rounds_of(rounds: Rounds, pieces: DiagnosisProblem) -> Rounds:
+    """The same rounds on pieces of the recordings, with their own base."""
     baseline = rounds.baseline
     start = SearchStart(base_of(baseline.drive), drive_effects(pieces.drive))
     base = fit_candidate(pieces, (), [start], baseline.scales, baseline.noise)
-    if not base.is_usable:
-        return ()
     # Values of each recording would be values of each piece, which imitate anything.
     shared = tuple(
         one
         for one in rounds.allowed
         if not any(parameter.is_own for parameter in CATALOGUE[one].parameters)
     )
-    of_pieces = replace(
+    return replace(
         rounds,
         problem=pieces,
         allowed=shared,
@@ -349,7 +371,53 @@ def _seeds_of_pieces(
         base=base,
         baseline=replace(baseline, drive=fitted_drive(pieces.drive, base)),
     )
-    return run_rounds(of_pieces, max_effects).best
+
+
+def _judged_in_pieces(
+    rounds: Rounds, whole: Findings, seeds: Sequence[CandidateFit]
+) -> Findings | None:
+    """What pieces with free starts name, where whole recordings cannot tell.
+
+    None where they name nothing, or where a start that is off by the noise changes whole
+    recordings by less than what the named effects leave of them.
+    """
+    pieces = in_pieces(rounds.problem, whole.force, are_free=True)
+    of_pieces = _rounds_of(rounds, pieces)
+    if not of_pieces.base.is_usable:
+        return None
+    found = continue_rounds(of_pieces, RoundsResult(), seeds)
+    given = each_sum_of_squares([one.residual for one in compared_as_given(pieces)])
+    verdict = _decided(of_pieces, given, found)
+    is_near = of_pieces.criteria.ratio(verdict.chosen) <= STILL_LARGE
+    if verdict.word != "named" or not is_near:
+        return None
+    problem, scales, noise = rounds.problem, whole.scales, rounds.baseline.noise
+    judged = JudgedPieces(problem, pieces, verdict.chosen)
+    spread, left = judged.spread_by_noise(scales, noise.rms)
+    if not spread >= LOST_TO_NOISE * left:
+        return None
+    joined = {name: judged.joined_fit(one) for name, one in found.fits.items()}
+    base = judged.joined_fit(of_pieces.base)
+    return replace(
+        whole,
+        given_sse=judged.joined_sse(given),
+        base=base,
+        before=judged.compared(of_pieces.base, scales),
+        found=replace(
+            found, fits=joined, best=tuple(joined[one.effects] for one in found.best)
+        ),
+        verdict=replace(
+            verdict,
+            chosen=joined[verdict.chosen.effects],
+            rivals=tuple(joined[one.effects] for one in verdict.rivals),
+        ),
+        pieces=judged,
+        warnings=(
+            f"judged in pieces of {judged.longest_s:.2g} s with starts of their own: over "
+            f"whole recordings a start that is off by the noise changes the motion by "
+            f"{spread:.2g} {problem.unit}",
+        ),
+    )
 
 
 def _with_input_noise(

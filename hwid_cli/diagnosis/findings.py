@@ -15,6 +15,7 @@ from hwid_cli.diagnosis.latent_force import Smoothed
 from hwid_cli.diagnosis.laws import LawFound
 from hwid_cli.diagnosis.next_experiment import propose
 from hwid_cli.diagnosis.parameters import is_factor
+from hwid_cli.diagnosis.pieces import JudgedPieces
 from hwid_cli.diagnosis.problem import Compared, DiagnosisProblem
 from hwid_cli.diagnosis.rounds import RoundsResult
 from hwid_cli.diagnosis.selection import DiagnosisVerdict, SelectionCriteria, ranked
@@ -43,6 +44,7 @@ from hwid_cli.records.diagnosis import (
 )
 from hwid_cli.records.drive import BASE_PARAMETERS, Drive
 from hwid_cli.records.own_effects import is_own, own_of
+from hwid_cli.records.trust import ModelTrust, TrustOnTests
 
 MOST_OVERLAYS = 4
 
@@ -61,6 +63,10 @@ class Findings:
         Simulations with the re-fitted base.
     force : list of Smoothed
         That the re-fitted base lacks.
+    pieces : JudgedPieces or None
+        Fits that all of this was joined from, where whole recordings cannot judge.
+    warnings : tuple of str
+        What a reader has to know of how it was judged.
     """
 
     problem: DiagnosisProblem
@@ -74,6 +80,32 @@ class Findings:
     found: RoundsResult
     verdict: DiagnosisVerdict
     law: LawFound | None = None
+    pieces: JudgedPieces | None = None
+    warnings: tuple[str, ...] = ()
+
+    def intervals_of(self, ids: Sequence[str]) -> tuple[FittedEffect, ...]:
+        """The chosen effects with intervals, as the fit that judges gives them."""
+        pieces = self.pieces
+        if pieces is None:
+            problem, chosen = self.problem, self.verdict.chosen
+        else:
+            problem, chosen = pieces.problem, pieces.chosen
+        return _fitted_effects_of(problem, chosen, self.scales, ids)
+
+    def after(self) -> list[Compared]:
+        """Simulations with the chosen effects, beside the measurements."""
+        chosen = self.verdict.chosen
+        if chosen is self.base:
+            return self.before
+        if self.pieces is not None:
+            return self.pieces.compared(self.pieces.chosen, self.scales)
+        return compared_with_fit(self.problem, chosen, self.scales)
+
+    def trust(self) -> tuple[ModelTrust | None, TrustOnTests]:
+        """What is known of the errors on whole recordings, if these can be predicted."""
+        if self.pieces is not None:
+            return None, TrustOnTests()
+        return simulation_trust(self.problem, self.verdict.chosen, self.scales)
 
 
 def describe(findings: Findings) -> Diagnosis:
@@ -83,14 +115,14 @@ def describe(findings: Findings) -> Diagnosis:
     chosen, before = verdict.chosen, findings.before
     fits = list(findings.found.fits.values())
     is_base = chosen is base
-    after = before if is_base else compared_with_fit(problem, chosen, scales)
+    after = findings.after()
     given_sse = findings.given_sse
     from_sse = given_sse if verdict.word in ("parameters", "none") else base.sse
     present = tuple(drive_effects(problem.drive))
     parameters = _base(problem.drive, base, chosen)
-    told = _fitted_effects_of(problem, chosen, scales, (*present, *chosen.effects))
+    told = findings.intervals_of((*present, *chosen.effects))
     effects = told[len(present) :]
-    trust, bands = simulation_trust(problem, chosen, scales)
+    trust, bands = findings.trust()
     return Diagnosis(
         verdict=verdict.word,
         complete=verdict.is_complete,
@@ -116,7 +148,7 @@ def describe(findings: Findings) -> Diagnosis:
         reference_current_A=problem.drive.reference_current_A,
         reference_displacement_m=problem.drive.reference_displacement_m,
         output_unit=problem.unit,
-        warnings=doubtful_values(parameters),
+        warnings=(*findings.warnings, *doubtful_values(parameters)),
         axis=problem.drive.axis,
         output=problem.drive.output,
         law=None if findings.law is None else _law(findings.law, effects),

@@ -283,6 +283,9 @@ def first_point(
             if one.owner != START:
                 value = start[one.owner].get(one.name, 0.0)
                 each[row, column] = one.coordinate(value)
+            elif signals.start is not None:
+                value = signals.start[0 if one.name == "position" else 1]
+                each[row, column] = one.coordinate(value)
             elif one.name == "position" and problem.start == "estimated":
                 each[row, column] = one.coordinate(float(signals.position[0]))
             elif one.name == "position" and problem.start == "rest":
@@ -341,7 +344,7 @@ def vectors_at(
         if common is None or fit_layout.own:
             common = parameter_vector(drive, effects_at(fit_layout, point, row))
         vector = common.copy()
-        if signals.start is not None:
+        if problem.has_starts and signals.start is not None:
             set_start(vector, *signals.start)
         else:
             _place_start(

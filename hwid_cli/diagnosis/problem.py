@@ -50,7 +50,8 @@ class Signals:
     used : ndarray of bool, shape (n_samples,), or None
         Which of the others are; None means all.
     start : tuple of float, or None, [m], [m/s]
-        Position and velocity at the first sample, where they are known.
+        Position and velocity at the first sample, where they are known; a search begins
+        there where the problem estimates its starts.
     is_velocity : bool
         Whether the output is a velocity. What needs one or the other asks ``position``
         and ``velocity``.
@@ -167,9 +168,10 @@ class DiagnosisProblem:
 
     @property
     def has_starts(self) -> bool:
-        """Whether it is known how each recording starts."""
+        """Whether it is known how each recording starts, exactly."""
         starts = [one.start for one in self.signals]
-        return bool(starts) and all(one is not None for one in starts)
+        are_given = bool(starts) and all(one is not None for one in starts)
+        return are_given and self.start != "estimated"
 
     @property
     def n_evaluated(self) -> int:

@@ -480,7 +480,7 @@ class _Search:
                 content={
                     "effects": ids,
                     "starts": list(starts),
-                    "pieces": rounds.problem.has_starts,
+                    "pieces": _starts_of(rounds.problem),
                     "most_samples": most_samples,
                 },
                 arrays=(rounds.base.values,),
@@ -702,6 +702,14 @@ def _includes_one_of(effects: Effects, others: Iterable[Effects]) -> bool:
             if narrow in CATALOGUE[wide].contains:
                 return True
     return False
+
+
+def _starts_of(problem: DiagnosisProblem) -> str:
+    """How pieces of recordings start, for the keys of their tasks; empty for whole ones."""
+    if problem.has_starts:
+        return "given"
+    are_pieces = any(one.start is not None for one in problem.signals)
+    return "free" if are_pieces else ""
 
 
 def _relatives(effect: str) -> list[str]:

@@ -32,6 +32,8 @@ MOST_TRIES, FURTHER, NARROWING = 120, 1.3, 90
 # Length of a step along the deflection of a hysteresis, in yield lengths, and what is
 # left of it when it has yielded, [-].
 SHAPE_STEP, YIELDED = 0.1, 1e-14
+# Where the law of what is left has a solution of its own, to a part in 1e8 of the force.
+NEARLY_YIELDED = 1e-3
 # Tries that find how far a motor on its tooth has turned, each far below the last one.
 MOST_TURNS = 60
 
@@ -510,7 +512,9 @@ def _yielded_in_shape(ahead: float, gone: float, p: np.ndarray) -> float:
     count = np.ceil(gone * (1.0 + p[slots.HYSTERESIS_BEND]) / SHAPE_STEP)
     h = gone / max(count, 1.0)
     left = gone
-    while left > 0.5 * h and 1.0 - ahead > YIELDED:
+    while left > 0.5 * h:
+        if 1.0 - ahead < NEARLY_YIELDED:
+            return 1.0 - _left_to_yield(1.0 - ahead, left, p)
         step = h
         after = _shape_step(ahead, step, p)
         if ahead < 0.0 and after > 0.0:
@@ -521,6 +525,17 @@ def _yielded_in_shape(ahead: float, gone: float, p: np.ndarray) -> float:
         ahead = after
         left -= h
     return min(ahead, 1.0)
+
+
+@njit(**INNER)
+def _left_to_yield(left: float, gone: float, p: np.ndarray) -> float:
+    """Return what is left of a deflection near 1, where the law is nearly linear.
+
+    With d = 1 - z the law is d' = -n d + n (n - 1) / 2 d^2, up to d^3.
+    """
+    fading = np.exp(-(1.0 + p[slots.HYSTERESIS_BEND]) * gone)
+    bent = 0.5 * p[slots.HYSTERESIS_BEND] * left * (1.0 - fading)
+    return left * fading / (1.0 - bent)
 
 
 @njit(**INNER)

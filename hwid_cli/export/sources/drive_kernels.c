@@ -987,6 +987,15 @@ static double drive_shape_step(double ahead, double h, double *p)
     return ahead + ((h / 6.0) * ((k1 + (2.0 * (k2 + k3))) + k4));
 }
 
+static double drive_left_to_yield(double left, double gone, double *p)
+{
+    double fading = 0.0;
+    double bent = 0.0;
+    fading = exp((-(1.0 + p[HYSTERESIS_BEND])) * gone);
+    bent = ((0.5 * p[HYSTERESIS_BEND]) * left) * (1.0 - fading);
+    return (left * fading) / (1.0 - bent);
+}
+
 static double drive_yielded_in_shape(double ahead, double gone, double *p)
 {
     double count = 0.0;
@@ -998,7 +1007,10 @@ static double drive_yielded_in_shape(double ahead, double gone, double *p)
     count = ceil((gone * (1.0 + p[HYSTERESIS_BEND])) / 0.1);
     h = gone / most(count, 1.0);
     left = gone;
-    while ((left > (0.5 * h)) && ((1.0 - ahead) > 1e-14)) {
+    while (left > (0.5 * h)) {
+        if ((1.0 - ahead) < 0.001) {
+            return 1.0 - drive_left_to_yield(1.0 - ahead, left, p);
+        }
         step = h;
         after = drive_shape_step(ahead, step, p);
         if ((ahead < 0.0) && (after > 0.0)) {
