@@ -18,6 +18,7 @@ from hwid_cli.diagnosis.candidate import (
     compared_with_fit,
     fit_candidate,
     fitted_drive,
+    fitted_values,
     rebuilt,
 )
 from hwid_cli.diagnosis.causes import fit_with_input_noise, without_repeats
@@ -61,6 +62,7 @@ from hwid_cli.diagnosis.scales import (
 )
 from hwid_cli.diagnosis.search import fit_own
 from hwid_cli.diagnosis.selection import (
+    SMALL_REMAINDER,
     DiagnosisVerdict,
     SelectionCriteria,
     decide,
@@ -349,7 +351,28 @@ def _seeds_of_pieces(
     of_pieces = _rounds_of(rounds, in_pieces(rounds.problem, force))
     if not of_pieces.base.is_usable:
         return ()
-    return run_rounds(of_pieces, max_effects).best
+    free = in_pieces(rounds.problem, force, are_free=True)
+    criteria = SelectionCriteria.of(free, rounds.baseline.noise)
+
+    def is_enough(winner: CandidateFit) -> bool:
+        # What starts that are not exact leave looks as if more were missing.
+        return criteria.ratio(_from_there(rounds, free, winner)) <= SMALL_REMAINDER
+
+    return run_rounds(of_pieces, max_effects, is_enough).best
+
+
+def _from_there(
+    rounds: Rounds, problem: DiagnosisProblem, found: CandidateFit
+) -> CandidateFit:
+    """The same effects fitted to another problem, from where their fit has ended."""
+    start = SearchStart(
+        base_of(fitted_drive(problem.drive, found)),
+        fitted_values(found, drive_effects(problem.drive)),
+    )
+    baseline = rounds.baseline
+    return fit_candidate(
+        problem, found.effects, [start], baseline.scales, baseline.noise
+    )
 
 
 def _rounds_of(rounds: Rounds, pieces: DiagnosisProblem) -> Rounds:

@@ -88,7 +88,16 @@ class JudgedPieces:
         return joined
 
     def joined_sse(self, sse: np.ndarray) -> np.ndarray:
-        """Sums of squares of the pieces, shape (n_pieces,), as those of recordings."""
+        """Add up what is left of the pieces, for each recording.
+
+        Parameters
+        ----------
+        sse : ndarray, shape (n_pieces,), [output unit squared]
+
+        Returns
+        -------
+        ndarray, shape (n_recordings,), [output unit squared]
+        """
         return np.asarray(np.add.reduceat(sse, self._firsts))
 
     @property

@@ -164,8 +164,18 @@ class RoundsResult:
     shares: Mapping[Effects, float] = field(default_factory=dict)
 
 
-def run_rounds(rounds: Rounds, max_effects: int) -> RoundsResult:
-    """Fit single effects, and larger sets while something remains."""
+def run_rounds(
+    rounds: Rounds,
+    max_effects: int,
+    is_enough: Callable[[CandidateFit], bool] = lambda winner: False,
+) -> RoundsResult:
+    """Fit single effects, and larger sets while something remains.
+
+    Parameters
+    ----------
+    is_enough : callable
+        Whether larger sets than the best one of a size are not worth their time.
+    """
     search = _Search(rounds)
     best: list[CandidateFit] = []
     parents = [rounds.base]
@@ -177,6 +187,8 @@ def run_rounds(rounds: Rounds, max_effects: int) -> RoundsResult:
             break
         best.append(winner)
         if rounds.criteria.is_complete(winner) or search.is_nearly_all(winner):
+            break
+        if is_enough(winner):
             break
         parents = search.parents(size)
     search.fit_parts(best)
