@@ -39,7 +39,7 @@ from hwid_cli.diagnosis.search import (
 from hwid_cli.drive.effect import Scales
 from hwid_cli.drive.simulation import drive_effects
 from hwid_cli.records.candidates import CandidateFit
-from hwid_cli.records.diagnosis import NoiseFloor
+from hwid_cli.records.diagnosis import STILL_LARGE, NoiseFloor
 from hwid_cli.records.drive import BASE_PARAMETERS, Drive
 
 Start = Mapping[str, Mapping[str, float]]
@@ -245,7 +245,8 @@ def fit_candidate(
     if most_samples is not None:
         train = fewer_recordings(train, most_samples)
     everything = (*drive_effects(problem.drive), *effects)
-    best = _best_from(train, everything, starts, scales)
+    near = train.n_evaluated * (STILL_LARGE * noise.rms) ** 2
+    best = _best_from(train, everything, starts, scales, near)
     return _evaluated(problem, effects, best, train, noise)
 
 
@@ -254,23 +255,30 @@ def _best_from(
     effects: tuple[str, ...],
     starts: Sequence[SearchStart],
     scales: Scales,
+    near: float,
 ) -> SearchResult:
     """Search from several starts; those that fall behind stop early."""
     first = MOST_ITERATIONS if len(starts) == 1 else FIRST_ITERATIONS
-    found = [_fit_from(problem, effects, start, scales, first) for start in starts]
+    found = [
+        _fit_from(problem, effects, start, scales, first, near) for start in starts
+    ]
     if len(starts) > 1:
         least = min(one.sse for one in found)
-        near = [one for one in found if one.sse <= WITHIN_BEST * least]
-        found = [_gone_on(problem, one) for one in near]
+        first_ones = [one for one in found if one.sse <= WITHIN_BEST * least]
+        found = [_gone_on(problem, one, near) for one in first_ones]
     return min(found, key=lambda one: one.sse)
 
 
-def _gone_on(problem: DiagnosisProblem, found: SearchResult) -> SearchResult:
+def _gone_on(
+    problem: DiagnosisProblem, found: SearchResult, near: float
+) -> SearchResult:
     """Search that has gone on from where it stopped at its limit of iterations."""
     if found.has_converged:
         return found
     left = MOST_ITERATIONS - found.iterations
-    further = fit_point(problem, found.layout, found.point, max_iterations=left)
+    further = fit_point(
+        problem, found.layout, found.point, max_iterations=left, near=near
+    )
     return replace(further, iterations=found.iterations + further.iterations)
 
 
@@ -289,13 +297,16 @@ def _fit_from(
     start: SearchStart,
     scales: Scales,
     max_iterations: int,
+    near: float = np.inf,
 ) -> SearchResult:
     base: dict[str, Any] = dict(start.base)
     drive = replace(problem.drive, **base)
     fit_layout = parameter_layout(problem, effects, start.effects, scales)
     point = first_point(problem, fit_layout, drive, start.effects)
     point = with_own_trials(problem, fit_layout, point)
-    return fit_point(problem, fit_layout, point, max_iterations=max_iterations)
+    return fit_point(
+        problem, fit_layout, point, max_iterations=max_iterations, near=near
+    )
 
 
 def _evaluated(

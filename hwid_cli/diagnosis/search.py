@@ -35,6 +35,9 @@ from hwid_cli.drive.catalogue import CATALOGUE
 # thresholds, small enough for a straight line.
 _DIFFERENCE = 3e-4
 LEAST_GAIN = 2e-5
+# What is far from the noise is fitted so far only: other effects are missing, and sets of
+# effects differ by much more.
+LEAST_GAIN_FAR = 5e-4
 # A step that promises less than this is not tried shorter.
 LEAST_PROMISE = 2e-6
 _FIRST_DAMPING = 1e-3
@@ -99,6 +102,7 @@ def fit_point(
     *,
     max_iterations: int,
     own_columns: Sequence[int] | None = None,
+    near: float = np.inf,
 ) -> SearchResult:
     """Lower the sum of squared residuals until it stands still.
 
@@ -111,13 +115,15 @@ def fit_point(
     own_columns : sequence of int or None
         Hold what is shared, and find these of each recording's own values; None finds
         everything.
+    near : float
+        Sum of squares below which it is followed to the end.
     """
     parts = residuals_at(problem, fit_layout, point)
     place = _Iterate(point, parts, sum_of_squares(parts))
     free = _free(fit_layout, len(problem.signals), own_columns)
     if not np.isfinite(place.sse) or not free.any():
         return SearchResult(fit_layout, point, place.sse, 0, False)
-    descent = _Descent(problem, fit_layout, free)
+    descent = _Descent(problem, fit_layout, free, near)
     small = 0
     for iteration in range(max_iterations):
         better = descent.advance(place)
@@ -125,7 +131,7 @@ def fit_point(
             return SearchResult(fit_layout, place.point, place.sse, iteration, True)
         gain = (place.sse - better.sse) / max(place.sse, 1e-300)
         place = better
-        small = small + 1 if gain < LEAST_GAIN else 0
+        small = small + 1 if gain < descent.least_gain(place) else 0
         if small == 2 or place.sse == 0.0:
             return SearchResult(fit_layout, place.point, place.sse, iteration + 1, True)
     return SearchResult(fit_layout, place.point, place.sse, max_iterations, False)
@@ -135,12 +141,21 @@ class _Descent:
     """Damped steps of one search; keeps the damping from one to the next."""
 
     def __init__(
-        self, problem: DiagnosisProblem, fit_layout: ParameterLayout, free: np.ndarray
+        self,
+        problem: DiagnosisProblem,
+        fit_layout: ParameterLayout,
+        free: np.ndarray,
+        near: float,
     ) -> None:
         self.problem = problem
         self.layout = fit_layout
         self.free = free
+        self.near = near
         self.damping = _FIRST_DAMPING
+
+    def least_gain(self, place: _Iterate) -> float:
+        """Share of the sum of squares that a step has to gain."""
+        return LEAST_GAIN if place.sse < self.near else LEAST_GAIN_FAR
 
     def advance(self, place: _Iterate) -> _Iterate | None:
         """Take a step from fresh derivatives, and secant steps while they pay.
@@ -156,7 +171,9 @@ class _Descent:
         worth = (place.sse - taken.place.sse) / (n_unknowns + 1)
         for _ in range(n_unknowns):
             gain = place.sse - taken.place.sse
-            is_poor = taken.ratio < _LEAST_RATIO or gain < LEAST_GAIN * place.sse
+            is_poor = (
+                taken.ratio < _LEAST_RATIO or gain < self.least_gain(place) * place.sse
+            )
             if is_poor or gain < worth:
                 break
             jacobians = self._secant(jacobians, place, taken)

@@ -20,6 +20,7 @@ SEEDS = {
     "development": 20_260_101,
     "reporting": 77_431_902,
     "second_reporting": 41_907_263,
+    "third_reporting": 63_580_417,
 }
 # Largest share by which the simulation's parameters are wrong.
 LARGEST_ERROR = 0.3

@@ -132,12 +132,14 @@ def test_seeds_are_frozen():
         "development": 20_260_101,
         "reporting": 77_431_902,
         "second_reporting": 41_907_263,
+        "third_reporting": 63_580_417,
     }
     first = {seeds: round(float(Draw("any", seeds).rng.random()), 6) for seeds in SEEDS}
     assert first == {
         "development": 0.295498,
         "reporting": 0.204564,
         "second_reporting": 0.096051,
+        "third_reporting": 0.574006,
     }
     made = [built("voice_coil_coulomb", seeds) for seeds in SEEDS]
     assert len({one.base.mass for one in made}) == len(SEEDS)
