@@ -167,7 +167,7 @@ def chain_on_tests(final: FinalTest) -> ChainOnTests:
 
 
 # Raised when the page or a figure changes, so that pages are drawn again.
-REPORT_VERSION = 5
+REPORT_VERSION = 6
 
 
 def report_key(stored: StoredResults) -> str:

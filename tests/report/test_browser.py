@@ -16,6 +16,8 @@ WIDTHS = (390, 1280, 1920)
 CHART = "#recordings .item:not([hidden]) figure.chart"
 # A page that opens for everybody; issues of the network do not count here, [bytes].
 MOST_BYTES = 5_000_000
+# A4 less the margins of the page, 190 mm at 96 pixels to the inch, [pixels].
+PAPER_PX = 719
 # What WCAG 2 asks of small text, [-].
 LEAST_CONTRAST = 4.5
 
@@ -353,6 +355,22 @@ def test_paper_is_white_and_shows_what_is_folded(visit):
     assert tab.locator("#diagnosis canvas").count() > 3
     tab.evaluate("dispatchEvent(new Event('afterprint'))")
     assert tab.evaluate(back) != "rgb(255, 255, 255)"
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+def test_paper_holds_every_chart_whole(visit, width):
+    tab = visit(width)
+    tab.evaluate("dispatchEvent(new Event('beforeprint'))")
+    widths = tab.evaluate(
+        """[...document.querySelectorAll("canvas")].map(one =>
+          one.getBoundingClientRect().right
+          - document.querySelector("main").getBoundingClientRect().left)"""
+    )
+
+    assert len(widths) > 5
+    assert max(widths) <= PAPER_PX
+    # Charts over the whole width use it, also those of a phone.
+    assert max(widths) > 0.9 * PAPER_PX
 
 
 def test_without_a_program_the_answers_and_the_gap_are_there(visit):

@@ -54,7 +54,10 @@ def test_the_summary_comes_first_and_the_effects_follow(of_nine):
     effect = named().effects[0]
 
     assert texts(found)[0] == named().summary
-    assert texts(found)[1:3] == [effect.sentence, f"Law: {effect.equation}"]
+    assert texts(found)[1:3] == [
+        f"{effect.id}: {effect.sentence}",
+        f"Law of {effect.id}: {effect.equation}",
+    ]
     assert tables(found)[0].rows[0][0] == "coulomb_friction"
     assert headings(found) == [
         "The gap",
