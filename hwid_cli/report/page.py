@@ -12,6 +12,7 @@ from hwid_cli.records.report import ReportContents
 from hwid_cli.report.charts import Chart
 from hwid_cli.report.dots import Dots
 from hwid_cli.report.figures.style import DOTS, as_png, report_style
+from hwid_cli.report.plots import shared_sheets
 from hwid_cli.report.simulation_note import HUBER_NOTE, simulation_note
 from hwid_cli.report.table import Block, Table, Text
 
@@ -172,7 +173,7 @@ class Drawing:
     @property
     def png(self) -> bytes:
         """The drawn file."""
-        with report_style():
+        with report_style(), shared_sheets():
             return as_png(self.draw())
 
 

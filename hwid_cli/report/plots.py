@@ -1,7 +1,13 @@
-"""Figures of the calibration: records in, figures out; those of the report are in ``figures``."""
+"""Figures of the calibration: records in, figures out; those of the report are in ``figures``.
+
+What all drawings share: sheets that are used again, and the PNG file.
+"""
 
 import io
 import warnings
+from collections.abc import Callable, Hashable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,6 +17,55 @@ from hwid_cli.records.recordings import CalibrationLog, RawRecording, Recording
 
 # Inches and dots: 800 x 500 pixels, fast to draw and sharp enough to judge a cut.
 _SIZE, DOTS = (8.0, 5.0), 100
+# Higher levels make files a tenth smaller in a third more time, [-].
+_COMPRESSION = 3
+# Sheets that were drawn on, by what they are for; None where each drawing gets its own.
+_used: ContextVar[dict[Hashable, Figure] | None] = ContextVar("used", default=None)
+_SHEETS: dict[Hashable, Figure] = {}
+
+
+@contextmanager
+def shared_sheets() -> Iterator[None]:
+    """Draw on sheets that were used before: axes and their ticks take a third of the time.
+
+    For figures that become a file at once; the next one of its kind wipes a sheet.
+    """
+    token = _used.set(_SHEETS)
+    try:
+        yield
+    finally:
+        _used.reset(token)
+
+
+def sheet(kind: Hashable, make: Callable[[], Figure]) -> Figure:
+    """Give a figure with empty axes.
+
+    Parameters
+    ----------
+    kind : hashable
+        What it is for. Whoever draws on a sheet of a kind sets the same labels, limits and
+        formats each time: only what was drawn is wiped.
+    make : callable
+        Gives a new one.
+    """
+    used = _used.get()
+    if used is None:
+        return make()
+    if kind in used:
+        for axes in used[kind].axes:
+            _wipe(axes)
+    else:
+        used[kind] = make()
+    return used[kind]
+
+
+def _wipe(axes: Axes) -> None:
+    legend = axes.get_legend()
+    drawn = (*axes.lines, *axes.patches, *axes.collections, *axes.texts)
+    for one in (*drawn, *([] if legend is None else [legend])):
+        one.remove()
+    axes.relim()
+    axes.autoscale()
 
 
 def calibration_figure(
@@ -24,10 +79,8 @@ def calibration_figure(
         Input above output over time; what was cut is shaded, repaired samples are
         marked.
     """
-    figure = Figure(figsize=_SIZE, dpi=DOTS)
-    # Fixed margins: a layout engine draws everything twice.
-    figure.subplots_adjust(left=0.12, right=0.98, top=0.93, bottom=0.1, hspace=0.08)
-    upper, lower = figure.subplots(2, 1, sharex=True)
+    figure = sheet("calibration", _blank)
+    upper, lower = figure.axes
     _draw_column(upper, raw.input, recording.input, log.repaired_input, log, raw)
     _draw_column(lower, raw.output, recording.output, log.repaired_output, log, raw)
     steps = ", ".join(log.steps) or "as it is"
@@ -43,6 +96,14 @@ def calibration_figure(
         fontsize="small",
         frameon=False,
     )
+    return figure
+
+
+def _blank() -> Figure:
+    figure = Figure(figsize=_SIZE, dpi=DOTS)
+    # Fixed margins: a layout engine draws everything twice.
+    figure.subplots_adjust(left=0.12, right=0.98, top=0.93, bottom=0.1, hspace=0.08)
+    figure.subplots(2, 1, sharex=True)
     return figure
 
 
@@ -87,5 +148,10 @@ def as_png(figure: Figure) -> bytes:
         # Names of recordings may be Chinese: a box in a figure, whole in page and tables.
         warnings.filterwarnings("ignore", r"Glyph \d+ .* missing from", UserWarning)
         # No software name or date: the same figure gives the same bytes.
-        figure.savefig(buffer, format="png", metadata={"Software": None})
+        figure.savefig(
+            buffer,
+            format="png",
+            metadata={"Software": None},
+            pil_kwargs={"compress_level": _COMPRESSION},
+        )
     return buffer.getvalue()
