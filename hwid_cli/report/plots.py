@@ -13,7 +13,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from hwid_cli.records.recordings import CalibrationLog, RawRecording, Recording
+from hwid_cli.data.calibration import as_measured
+from hwid_cli.records.recordings import CalibrationLog, Recording
 
 # Inches and dots: 800 x 500 pixels, fast to draw and sharp enough to judge a cut.
 _SIZE, DOTS = (8.0, 5.0), 100
@@ -68,9 +69,7 @@ def _wipe(axes: Axes) -> None:
     axes.autoscale()
 
 
-def calibration_figure(
-    raw: RawRecording, recording: Recording, log: CalibrationLog
-) -> Figure:
+def calibration_figure(recording: Recording, log: CalibrationLog) -> Figure:
     """Draw a recording before and after calibration.
 
     Returns
@@ -78,15 +77,28 @@ def calibration_figure(
     Figure
         Input above output over time; what was cut is shaded, repaired samples are
         marked.
+
+    Raises
+    ------
+    ValueError
+        If the log does not hold what was removed.
     """
+    measured = as_measured(recording, log)
+    if measured is None:
+        raise ValueError(f"{log.name}: the log does not hold what was removed")
     figure = sheet("calibration", _blank)
     upper, lower = figure.axes
-    _draw_column(upper, raw.input, recording.input, log.repaired_input, log, raw)
-    _draw_column(lower, raw.output, recording.output, log.repaired_output, log, raw)
+    step = recording.sample_time_s
+    columns = (
+        (upper, recording.input, log.repaired_input),
+        (lower, recording.output, log.repaired_output),
+    )
+    for (axes, after, repaired), before in zip(columns, measured, strict=True):
+        _draw_column(axes, before, after, repaired, log, step)
     steps = ", ".join(log.steps) or "as it is"
-    upper.set_title(f"{raw.name}: {steps}", loc="left", fontsize="medium")
-    upper.set_ylabel(f"input u [{raw.input_unit}]")
-    lower.set_ylabel(f"output y [{raw.output_unit}]")
+    upper.set_title(f"{log.name}: {steps}", loc="left", fontsize="medium")
+    upper.set_ylabel(f"input u [{recording.input_unit}]")
+    lower.set_ylabel(f"output y [{recording.output_unit}]")
     lower.set_xlabel("time t in the raw record [s]")
     # Above the axes, where no curve is.
     upper.legend(
@@ -113,9 +125,8 @@ def _draw_column(
     after: np.ndarray,
     repaired: tuple[int, ...],
     log: CalibrationLog,
-    raw: RawRecording,
+    step: float,
 ) -> None:
-    step = raw.sample_time_s
     first, last = log.first_sample, log.first_sample + log.n_samples
     axes.plot(step * np.arange(before.size), before, color="0.6", lw=0.8, label="raw")
     axes.plot(

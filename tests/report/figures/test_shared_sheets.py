@@ -6,6 +6,7 @@ from functools import partial
 import numpy as np
 import pytest
 
+from hwid_cli.data.calibration import removed_samples
 from hwid_cli.records.recordings import CalibrationLog, RawRecording, Recording
 from hwid_cli.report.figures.recordings import simulation_figure
 from hwid_cli.report.figures.residuals import residuals_figure
@@ -36,7 +37,12 @@ def calibrated(scale, cut):
     kept = slice(cut, 500 - cut)
     recording = Recording("r", raw.input[kept], raw.output[kept] - scale, 0.01)
     repaired = (cut + 7,) if cut else ()
-    return raw, recording, CalibrationLog("r", ("cut",), cut, 500 - 2 * cut, 500, 500, repaired_input=repaired)  # fmt: skip
+    log = CalibrationLog(
+        *("r", ("cut",), cut, 500 - 2 * cut, 500, 500),
+        output_offset=scale,
+        repaired_input=repaired,
+    )
+    return recording, replace(log, removed=removed_samples(raw, log))
 
 
 @pytest.fixture
