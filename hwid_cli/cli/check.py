@@ -132,7 +132,7 @@ def _names(experiment: Experiment, known: set[str]) -> list[str]:
 def _show_warnings(experiment: Experiment, checked: Checked, out: Path) -> None:
     """Say what stages would warn of that work on calibrated recordings alone."""
     calibrated = Calibrated(checked.recordings, checked.logs, "")
-    context = Context(experiment, out, {"calibrate": calibrated}, click.echo)
+    context = Context(experiment, out, {"calibrate": calibrated})
     # What a simulation is compared with needs no section 'diagnose' to be looked at.
     extra = () if experiment.simulation is None else ("diagnose",)
     for name in dict.fromkeys((*named(experiment), *extra)):

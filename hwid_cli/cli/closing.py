@@ -52,6 +52,8 @@ def say_end(session: Session, name: str, files: Sequence[str] = ()) -> None:
     if diagnosis is not None:
         rows.append(("simulation", diagnosis_sentence(diagnosis)))
     rows += _places(session, name, files)
+    if best is not None and name in (_RUN, "test"):
+        rows += _hints(session, best)
     rows.append(("next", _next(session, name, best)))
     title = f"{session.experiment.name}: {name} done in {session.timer}"
     session.say(closing_text(f"\n{title}", rows, screen_width()))
@@ -74,6 +76,18 @@ def _best(session: Session) -> BestModel | None:
         | {"identify": results["identify"]},
     )
     return beside_linear(best, named_fits(stored), results["calibrate"].recordings)
+
+
+def _hints(session: Session, best: BestModel) -> list[tuple[str, str]]:
+    """What may help a model that is not good enough."""
+    experiment = session.experiment
+    if experiment.group is not None or not best.rmsd >= best.threshold:
+        return []
+    text = (
+        "a model of several recordings may cover more: add 'group: {}' to "
+        f"{experiment.source} and run it again"
+    )
+    return [("hint", text)]
 
 
 def _places(session: Session, name: str, files: Sequence[str]) -> list[tuple[str, str]]:

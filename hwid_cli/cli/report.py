@@ -2,23 +2,21 @@
 
 import json
 import logging
-from collections.abc import Iterable, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import closing
 from hashlib import sha256
 from pathlib import Path
 
 from hwid_cli.cli.options import Choices
-from hwid_cli.cli.session import Session, Timer, context_of, open_session
+from hwid_cli.cli.session import Session, Timer, open_session
 from hwid_cli.config.load import describe_experiment
-from hwid_cli.errors import ConfigError, HwidError
+from hwid_cli.errors import ConfigError
 from hwid_cli.files.atomic import replace_file
 from hwid_cli.files.figure_files import read_figure, write_figure
-from hwid_cli.records.recordings import Calibrated
 from hwid_cli.records.report import StageRun, StoredResults
 from hwid_cli.report.html import report_page
 from hwid_cli.report.page import Drawing
 from hwid_cli.report.progress import StageProgress
-from hwid_cli.stages.calibrate import figure_path
 from hwid_cli.stages.report import changed_sections, report_contents, report_key
 from hwid_cli.stages.table import STAGES, stage_named
 from hwid_cli.store.diagnosis_results import read_diagnosis
@@ -33,8 +31,6 @@ FILE = "report.html"
 FIGURES = "figures"
 # Fewer figures than this are drawn before workers have started, [-].
 _FEW_FIGURES = 48
-# Figures that are read, not drawn: they are part of what a page is drawn from.
-_OF_CALIBRATION = "calibrate/"
 _KEY_MARK, _KEY_END = "<!-- drawn from ", " -->\n"
 
 
@@ -70,31 +66,37 @@ def write_report(session: Session) -> Path:
     key = report_key(stored)
     path = session.out / FILE
     stages = ", ".join(run.stage for run in stored.stages) or "the diagnosis"
-    about = _figures_key(stored)
-    if "report" not in session.forced and _is_complete(session.out, path, key, about):
+    if "report" not in session.forced and _is_complete(session.out, path, key):
         session.note_end("report", f"{path} shows {stages} already", timer)
         return path
     page = report_page(report_contents(stored), STAGES)
-    for name, png in page.figures.items():
-        _write_figure(session.out, name, png, about)
+    keys = {one.file: one.key for one in page.drawings}
     # The page before the figures beside it: it is what people wait for.
-    replace_file(path, _signed(page.html + _last_line(key, page.files)))
+    replace_file(path, _signed(page.html + _last_line(key, keys)))
     session.note_end("report", f"{path} shows {stages}", timer)
-    _draw(session, page.drawings, about)
+    _draw(session, page.drawings, keys)
     return path
 
 
-def _draw(session: Session, drawings: Sequence[Drawing], about: str) -> None:
-    """Write the figures beside the page.
+def _draw(
+    session: Session, drawings: Sequence[Drawing], keys: Mapping[str, str]
+) -> None:
+    """Write the figures beside the page that are not there already.
 
     Parameters
     ----------
-    about : str
-        What they are drawn from.
+    keys : mapping of str to str
+        What each file is drawn from.
     """
-    if not drawings:
+    folder = session.out / FIGURES
+    is_forced = "report" in session.forced
+    tasks = [
+        Task(one.file, one.file, _png, (one,), bytes)
+        for one in drawings
+        if is_forced or read_figure(folder / one.file, keys[one.file]) is None
+    ]
+    if not tasks:
         return
-    tasks = [Task(one.file, one.file, _png, (one,), bytes) for one in drawings]
     is_few = len(tasks) < _FEW_FIGURES
     workers = Workers(1 if is_few else session.workers.jobs)
     with (
@@ -104,24 +106,18 @@ def _draw(session: Session, drawings: Sequence[Drawing], about: str) -> None:
         closing(compute(tasks, workers)) as results,
     ):
         for file, (png, _) in results:
-            _write_figure(session.out, file, png, about)
+            write_figure(folder / file, png, keys[file])
             bar.advance(from_cache=False)
-
-
-def _write_figure(out: Path, name: str, png: bytes, about: str) -> None:
-    """Write a figure that the page draws; those of calibration are its own."""
-    if not name.startswith(_OF_CALIBRATION):
-        write_figure(out / FIGURES / name, png, f"{about} {name}")
 
 
 def _png(drawing: Drawing) -> bytes:
     return drawing.png
 
 
-def _last_line(key: str, figures: Iterable[str]) -> str:
-    """Comment that says what a page was drawn from, and which figures belong to it."""
+def _last_line(key: str, figures: Mapping[str, str]) -> str:
+    """Comment that says what a page and the figures that belong to it were drawn from."""
     # The sign that ends a comment may be part of a name.
-    names = json.dumps(sorted(figures)).replace(">", "\\u003e")
+    names = json.dumps(dict(sorted(figures.items()))).replace(">", "\\u003e")
     return f"{_KEY_MARK}{key} {names}{_KEY_END}"
 
 
@@ -131,14 +127,7 @@ def _signed(page: str) -> bytes:
     return content + f"<!-- sha256 {sha256(content).hexdigest()} -->\n".encode()
 
 
-def _figures_key(stored: StoredResults) -> str:
-    """What figures are drawn from; unlike the page they say nothing of how long it took."""
-    diagnosis = (stored.diagnosis or {}).get("provenance") or {}
-    keys = [*(run.key for run in stored.stages), str(diagnosis.get("key"))]
-    return sha256(" ".join(keys).encode()).hexdigest()
-
-
-def _is_complete(out: Path, path: Path, key: str, about: str) -> bool:
+def _is_complete(out: Path, path: Path, key: str) -> bool:
     """Whether a page was drawn from the same, and it and all its figures are whole."""
     if not path.is_file():
         return False
@@ -151,9 +140,8 @@ def _is_complete(out: Path, path: Path, key: str, about: str) -> bool:
         return False
     figures = json.loads(names.removesuffix(_KEY_END))
     return all(
-        read_figure(out / FIGURES / name, f"{about} {name}") is not None
-        for name in figures
-        if not name.startswith(_OF_CALIBRATION)
+        read_figure(out / FIGURES / name, about) is not None
+        for name, about in figures.items()
     )
 
 
@@ -181,7 +169,7 @@ def read_stored(session: Session) -> StoredResults:
             StageRun(name, origin.key, origin.seconds, origin.versions, changed)
         )
         results[name] = storage.read(path)
-    calibrated, crossval = results.get("calibrate"), results.get("crossval")
+    crossval = results.get("crossval")
     nk_role = experiment.orders.nk_role if crossval is None else crossval.nk_role
     return StoredResults(
         name=experiment.name,
@@ -191,46 +179,6 @@ def read_stored(session: Session) -> StoredResults:
         results=results,
         diagnosis=read_diagnosis(session.out / "diagnosis.json"),
         thesis_names=experiment.thesis_names,
-        calibration_figures={}
-        if calibrated is None
-        else _calibration_figures(session, calibrated),
         order=experiment.order,
         chosen_maps=read_chosen_maps(session.out),
     )
-
-
-def _calibration_figures(session: Session, calibrated: Calibrated) -> dict[str, bytes]:
-    """Figures that calibration left, by the names of the recordings."""
-    figures = _whole_figures(session.out, calibrated)
-    names = [log.name for log in calibrated.logs if log.name not in figures]
-    damaged = [name for name in names if figure_path(session.out, name).exists()]
-    if damaged and not _draw_again(session, calibrated):
-        _log.warning(
-            "%s: damaged, or of other results; left out; 'hwid calibrate' draws it again",
-            ", ".join(str(figure_path(session.out, name)) for name in damaged),
-        )
-    return _whole_figures(session.out, calibrated) if damaged else figures
-
-
-def _whole_figures(out: Path, calibrated: Calibrated) -> dict[str, bytes]:
-    found = {
-        log.name: read_figure(
-            figure_path(out, log.name), f"{calibrated.key} {log.name}"
-        )
-        for log in calibrated.logs
-    }
-    return {name: png for name, png in found.items() if png is not None}
-
-
-def _draw_again(session: Session, calibrated: Calibrated) -> bool:
-    """Draw the figures of a calibration again, where its measurements are unchanged."""
-    stage = stage_named("calibrate")
-    try:
-        given = stage.choose(context_of(session))
-    except HwidError:
-        # Measurements may be gone; what has been stored of them is shown all the same.
-        return False
-    if stage.key is None or stage.key(given) != calibrated.key:
-        return False
-    stage.write_files(session.out, given, calibrated, None, False)
-    return True

@@ -124,7 +124,7 @@ class Timer:
 
 def context_of(session: Session) -> Context:
     """What stages may know of a session."""
-    return Context(session.experiment, session.out, session.results, session.note)
+    return Context(session.experiment, session.out, session.results)
 
 
 def open_session(choices: Choices, *stages: str, is_alone: bool = True) -> Session:

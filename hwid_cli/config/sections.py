@@ -6,6 +6,7 @@ no number and ``"3"`` is none. A single value may stand for a list, and a sectio
 body has its defaults.
 """
 
+import re
 from collections.abc import Mapping
 from dataclasses import MISSING, Field, fields, is_dataclass
 from functools import cache, partial
@@ -48,6 +49,8 @@ from hwid_cli.records.rules import OtherForm, Refusal, Refused, Rule, StandsFor
 
 # A path of Linux has no more; a text of a configuration needs no more.
 _LONGEST_TEXT = 4096
+# As a number with its unit, or in quotes, does.
+_BEGINS_WITH_NUMBER = re.compile(r"\s*[-+]?\.?\d")
 # What 64 bits hold.
 _LARGEST_INTEGER = 2**63 - 1
 _WORDS: dict[Any, str] = {
@@ -326,9 +329,17 @@ def _fault(record_type: Any, content: Any, error: Any) -> Fault:
     if place[-1] == "[key]":
         place = (*place[:-2], value)
         return Fault(place, f"the key is {value!r}", "text", "put it in quotes")
-    is_single = value is not None and not isinstance(value, list | dict)
-    quotes = "put it in quotes" if kind == "string_type" and is_single else ""
-    return wrong(place, value, _EXPECTED[kind], quotes)
+    return wrong(place, value, _EXPECTED[kind], _step(kind, value))
+
+
+def _step(kind: str, value: Any) -> str:
+    """What to do about a value of another type; empty where what is expected says it."""
+    if kind == "string_type" and value is not None:
+        return "" if isinstance(value, list | dict) else "put it in quotes"
+    is_number = _EXPECTED[kind] in (_WORDS[int], _WORDS[float])
+    if is_number and isinstance(value, str) and _BEGINS_WITH_NUMBER.match(value):
+        return "write the number alone, without quotes or a unit"
+    return ""
 
 
 def _unknown_key(place: tuple[Any, ...], record_type: Any, content: Any) -> Fault:

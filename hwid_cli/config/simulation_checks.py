@@ -31,6 +31,12 @@ _OF_CIRCUIT = ("inductance_H", "back_emf_V_s_per_m", "back_emf_V_s_per_rad")
 # A parameter that may move by all of its value is not known, [-].
 _LARGEST_TOLERANCE = 1.0
 
+# What a section may look like, for messages.
+SIMULATION_EXAMPLE = (
+    "simulation: {mass_kg: 0.3, damping_N_s_per_m: 15, stiffness_N_per_m: 0, "
+    "force_constant_N_per_A: 5}"
+)
+
 
 def circuit_faults(experiment: Experiment) -> Iterator[Fault]:
     """Parts of an electrical circuit that has no resistance."""
@@ -211,7 +217,7 @@ def simulation_faults(experiment: Experiment) -> Iterator[Fault]:
         yield missing(
             ("simulation",),
             "the physics model that diagnose judges",
-            "add the section (configs/README.md explains it), or remove diagnose",
+            f"add it, such as '{SIMULATION_EXAMPLE}', or remove diagnose",
             without=("diagnose",),
         )
 

@@ -22,6 +22,8 @@ from hwid_cli.files.small_files import read_small_file
 
 # A list of 38 recordings in every section of a large example makes 800.
 MOST_VALUES = 100_000
+# What a file may hold in place of sections.
+_CONTENTS = {type(None): "nothing", str: "text", int: "a number", float: "a number"}
 
 
 def count_values(root: yaml.Node) -> int:
@@ -155,10 +157,10 @@ def read_yaml(path: Path) -> dict[Any, Any]:
         ) from None
     content = _content(path, text)
     if not isinstance(content, dict):
-        found = "nothing" if content is None else f"a {type(content).__name__}"
+        found = _CONTENTS.get(type(content), f"a {type(content).__name__}")
         raise ConfigError(
             f"{path}: holds {found}; expected sections such as 'name:' and "
-            "'recordings:'; see configs/README.md"
+            "'recordings:'; 'hwid init FOLDER' writes such a file for your measurements"
         )
     return content
 

@@ -300,13 +300,13 @@ def _of_one_clock(
     read: list[RawRecording], experiment: Experiment, problems: list[str]
 ) -> list[RawRecording]:
     """Recordings with the usual sample time; each of the others is a fault."""
-    by_step = sorted(read, key=lambda one: one.sample_time_s)
-    common = []
+    if not read:
+        return []
+    usual, common = checks.usual_clock(read), []
     for one in read:
-        usual = by_step[len(by_step) // 2]
         with _noting(problems):
             tolerance = recordings_options(experiment).sampling_tolerance
-            checks.check_sample_times([usual, one], tolerance)
+            checks.check_sample_time(one, usual, tolerance)
             checks.check_units([usual, one])
             common.append(replace(one, sample_time_s=usual.sample_time_s))
     return common

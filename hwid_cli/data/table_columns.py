@@ -199,9 +199,11 @@ def column_named(key: str, header: Sequence[str], role: str, place: str) -> int:
             f"recordings.columns.{role}"
         )
     if key not in header:
+        said = did_you_mean(key, [name for name in header if name])
+        # A name that was nearly right says what to do by itself.
+        step = "" if said.endswith("?") else "; name one of them, or rename the column"
         raise MeasurementError(
-            f"{place}: has no column {key!r} for the {role}; "
-            f"{did_you_mean(key, [name for name in header if name])}"
+            f"{place}: has no column {key!r} for the {role}; {said}{step}"
         )
     return header.index(key)
 

@@ -131,6 +131,11 @@ def _check_format(path: Path, content: dict[str, Any]) -> None:
     wanted = _schema()["oneOf"][0]["properties"]
     found = [content.get(key) for key in ("format", "schema_version")]
     expected = [wanted[key]["const"] for key in ("format", "schema_version")]
+    if found[0] is None:
+        raise ModelFileError(
+            f"{path}: holds no key 'format'; expected a model that 'hwid export --format "
+            "json' wrote; correct the path"
+        )
     if found != expected:
         name, version = (escaped(str(one)[:40]) for one in found)
         raise ModelFileError(

@@ -17,6 +17,7 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterable, Mapping
@@ -65,6 +66,7 @@ class IsolatedReader:
     def __init__(self, module: str, word: str = "its reader") -> None:
         self._module, self._word = module, word
         self._process: Any = None
+        self._folder: tempfile.TemporaryDirectory[str] | None = None
         self._lock = threading.Lock()
         atexit.register(self.end)
 
@@ -121,13 +123,29 @@ class IsolatedReader:
         for pipe in (process.stdin, process.stdout):
             with suppress(OSError):
                 pipe.close()
-        return process.wait()
+        code: int = process.wait()
+        if self._folder is not None:
+            self._folder.cleanup()
+        return code
+
+    def _begin(self) -> Any:
+        """Start the process, with a folder of its own for temporary files.
+
+        Libraries leave copies of damaged measurements there, and so does a process that
+        is killed; they go with the folder.
+        """
+        with suppress(OSError):
+            self._folder = tempfile.TemporaryDirectory(
+                prefix="hwid-", ignore_cleanup_errors=True
+            )
+        name = None if self._folder is None else self._folder.name
+        self._process = _start(self._module, name)
+        return self._process
 
     def _exchange(
         self, request: Mapping[str, Any], most_seconds: float
     ) -> tuple[list[Labelled], dict[str, Any]]:
-        process: Any = self._process or _start(self._module)
-        self._process = process
+        process: Any = self._process or self._begin()
         line = json.dumps({**request, "seconds": most_seconds}).encode()
         timer = threading.Timer(most_seconds, process.kill)
         timer.daemon = True
@@ -153,17 +171,20 @@ class IsolatedReader:
             timer.cancel()
 
 
-def _start(module: str) -> "subprocess.Popen[bytes]":
+def _start(module: str, temporary: str | None) -> "subprocess.Popen[bytes]":
     """Start the process: it imports from where this one does, and nowhere else."""
     folders = os.pathsep.join(os.path.abspath(one) for one in sys.path)  # noqa: PTH100
     # Threads of linear algebra would take address space, and have nothing to do.
     alone = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+    # Where tempfile looks on the systems there are.
+    names = ("TMPDIR", "TEMP", "TMP")
+    own = {} if temporary is None else dict.fromkeys(names, temporary)
     return subprocess.Popen(
         [sys.executable, "-P", "-m", module],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
-        env={**os.environ, **alone, "PYTHONPATH": folders},
+        env={**os.environ, **alone, **own, "PYTHONPATH": folders},
     )
 
 

@@ -211,6 +211,9 @@ class CalibrationLog:
         replaced.
     units : tuple of SignalUnit
         Where the units come from, and what was converted.
+    removed : ndarray, shape (n_removed,), [input unit], then [output unit]
+        What the recording does not hold any more, for the input and then for the output:
+        what was cut before it and behind it, and the damaged samples.
     """
 
     name: str
@@ -225,6 +228,9 @@ class CalibrationLog:
     repaired_input: tuple[int, ...] = field(default=())
     repaired_output: tuple[int, ...] = field(default=())
     units: tuple[SignalUnit, ...] = field(default=(), metadata=ADDED_LATER)
+    removed: np.ndarray = field(
+        default_factory=lambda: np.zeros(0), compare=False, metadata=ADDED_LATER
+    )
 
 
 def _freeze_reference(record: "RawRecording | Recording") -> None:

@@ -63,8 +63,6 @@ class StoredResults:
         Content of ``diagnosis.json``.
     thesis_names : bool
         Whether the configuration asks for the thesis's names of models and tables.
-    calibration_figures : mapping of str to bytes
-        PNG files of ``hwid calibrate`` by the names of the recordings.
     order : OrderOptions or None
         Section of the configuration; None takes its defaults.
     chosen_maps : ChosenMaps or None
@@ -78,7 +76,6 @@ class StoredResults:
     results: Mapping[str, Any] = field(default_factory=dict)
     diagnosis: Mapping[str, Any] | None = None
     thesis_names: bool = False
-    calibration_figures: Mapping[str, bytes] = field(default_factory=dict)
     order: OrderOptions | None = None
     chosen_maps: ChosenMaps | None = None
 

@@ -3,10 +3,21 @@
 import numpy as np
 
 from hwid_cli.records.trust import ShownBand
-from hwid_cli.report.charts import MOST_POINTS, Chart, Curve, Panel
+from hwid_cli.report.charts import (
+    MOST_POINTS,
+    Chart,
+    Curve,
+    Panel,
+    thinned,
+    thinned_note,
+    thinned_places,
+    thinning,
+)
 
 # Shaded stretches of one chart; more are told apart by nobody, and the shortest are left out.
 _MOST_SPANS = 60
+# Curves of this label are hidden together.
+BAND = "90 % band"
 
 
 def band_chart(shown: ShownBand, sentence: str) -> Chart:
@@ -20,31 +31,51 @@ def band_chart(shown: ShownBand, sentence: str) -> Chart:
     Returns
     -------
     Chart
-        Shaded where the prediction rests on data in every respect.
+        The prediction above, what is left of the measurement beneath, where a narrow band
+        is seen; shaded where the prediction rests on data in every respect.
     """
-    part = slice(None, None, -(-shown.time_s.size // MOST_POINTS))
-    band = Curve(
-        "90 % band", shown.lower[part], "noise", "band", upper=shown.upper[part]
+    chosen = thinning(shown.time_s.size, MOST_POINTS, (0, 0))
+    spans = _stretches(shown.time_s, shown.is_inside)
+    parts = (shown.measured, shown.output, shown.lower, shown.upper)
+    measured, output, lower, upper = (thinned(one, chosen) for one in parts)
+    residual, below, above = (
+        thinned(one - shown.output, chosen)
+        for one in (shown.measured, shown.lower, shown.upper)
     )
-    panel = Panel(
-        f"output y [{shown.unit}]",
-        (
-            band,
-            Curve("measured", shown.measured[part], "measured"),
-            Curve("predicted", shown.output[part], "taken"),
+    panels = (
+        Panel(
+            f"output y [{shown.unit}]",
+            (
+                Curve(BAND, lower, "noise", "band", upper=upper),
+                Curve("measured", measured, "measured"),
+                Curve("predicted", output, "taken"),
+            ),
+            height_px=240,
+            spans=spans,
         ),
-        height_px=260,
-        spans=_stretches(shown.time_s, shown.is_inside),
+        Panel(
+            f"residual e [{shown.unit}]",
+            (
+                Curve(BAND, below, "noise", "band", upper=above),
+                Curve("measured less predicted", residual, "input"),
+            ),
+            height_px=120,
+            lines=(0.0,),
+            spans=spans,
+        ),
     )
     where = "Shaded: rests on data in every respect."
     if not shown.is_inside.any():
         where = "No sample rests on data in every respect: nothing is shaded."
     return Chart(
         name=f"{shown.model} on {shown.recording}",
-        at=shown.time_s[part],
+        at=np.interp(
+            thinned_places(chosen), np.arange(shown.time_s.size), shown.time_s
+        ),
         label="time t [s]",
-        panels=(panel,),
-        sentence=f"{shown.model} on {shown.recording}. {sentence} {where}",
+        panels=panels,
+        sentence=f"{shown.model} on {shown.recording}. {sentence} {where}"
+        f"{thinned_note(chosen)}",
         alt="A prediction with its band of 90 % beside the measured output",
     )
 

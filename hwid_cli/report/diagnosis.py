@@ -383,12 +383,13 @@ def verdict_sentence(diagnosis: Diagnosis) -> str:
 
 
 def effect_sentences(diagnosis: Diagnosis) -> list[str]:
-    """Say what each effect does, and its law."""
-    return [
-        line
-        for effect in diagnosis.effects
-        for line in (effect.sentence, f"Law: {effect.equation}")
-    ]
+    """Say what each effect does, where the summary has not, and its law."""
+    found = []
+    for effect in diagnosis.effects:
+        if effect.sentence not in diagnosis.summary:
+            found.append(f"{effect.id}: {effect.sentence}")
+        found.append(f"Law of {effect.id}: {effect.equation}")
+    return found
 
 
 def used_sentence(diagnosis: Diagnosis) -> str:

@@ -9,7 +9,7 @@ templates/uplot.LICENSE).
 import base64
 import hashlib
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
@@ -24,7 +24,7 @@ from markupsafe import Markup, escape
 from hwid_cli.records.report import ReportContents
 from hwid_cli.report.charts import chart_data
 from hwid_cli.report.dots import dot_drawing
-from hwid_cli.report.page import Answer, Drawing, Section, images_of
+from hwid_cli.report.page import Answer, Drawing, Section
 from hwid_cli.report.sections.about import about_section
 from hwid_cli.report.sections.summary import summary_section
 from hwid_cli.report.table import shown_part
@@ -44,20 +44,12 @@ class Page:
 
     Parameters
     ----------
-    figures : mapping of str to bytes
-        PNG files that are part of it, by their place below ``figures/``.
     drawings : tuple of Drawing
-        Figures that lie beside it as files only; none is drawn yet.
+        Figures that lie beside it as files; none is drawn yet.
     """
 
     html: str
-    figures: Mapping[str, bytes]
     drawings: tuple[Drawing, ...]
-
-    @property
-    def files(self) -> tuple[str, ...]:
-        """All files below ``figures/`` that belong to it."""
-        return (*self.figures, *(one.file for one in self.drawings))
 
 
 def report_page(contents: ReportContents, stages: Iterable[str]) -> Page:
@@ -85,9 +77,7 @@ def report_page(contents: ReportContents, stages: Iterable[str]) -> Page:
         about_section(contents, [one for one in made if one.missing]),
     )
     drawings = [one for make in _all_of(modules, "DRAWINGS") for one in make(contents)]
-    images = images_of(tuple(block for one in sections for block in one.blocks))
-    figures = {one.file: one.png for one in images}
-    return Page(_html(contents, sections), figures, tuple(drawings))
+    return Page(_html(contents, sections), tuple(drawings))
 
 
 def _html(contents: ReportContents, sections: Iterable[Section]) -> str:
@@ -99,7 +89,6 @@ def _html(contents: ReportContents, sections: Iterable[Section]) -> str:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    environment.filters["base64"] = lambda png: base64.b64encode(png).decode("ascii")
     environment.filters["chart_data"] = chart_data
     environment.filters["soft"] = soft
     environment.filters["laid_out"] = dot_drawing
@@ -144,7 +133,7 @@ def _policy(style: str, script: str) -> str:
     # report.js saves pictures of charts as blobs; nothing else may be loaded or run.
     return (
         f"default-src 'none'; style-src {_hash(style)}; script-src {_hash(script)}; "
-        "img-src data: blob:; base-uri 'none'; form-action 'none'"
+        "img-src blob:; base-uri 'none'; form-action 'none'"
     )
 
 

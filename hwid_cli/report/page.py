@@ -1,62 +1,25 @@
 """Blocks that a page of the report is made of; templates/report.html draws them."""
 
+import hashlib
 import re
-import struct
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, fields, is_dataclass
+from functools import partial
 from typing import ClassVar
 
+import numpy as np
 from matplotlib.figure import Figure
 
 from hwid_cli.records.report import ReportContents
 from hwid_cli.report.charts import Chart
 from hwid_cli.report.dots import Dots
-from hwid_cli.report.figures.style import DOTS, as_png, report_style
+from hwid_cli.report.figures.style import as_png, report_style
+from hwid_cli.report.plots import shared_sheets
 from hwid_cli.report.simulation_note import HUBER_NOTE, simulation_note
 from hwid_cli.report.table import Block, Table, Text
 
-
-@dataclass(frozen=True)
-class Image:
-    """One figure of the report.
-
-    Parameters
-    ----------
-    file : str
-        Where it lies below ``figures/``.
-    alt : str
-        What a reader who does not see it should know.
-    width_px, height_px : int, [pixels]
-    dots_per_inch : int, [pixels/inch]
-        What text and lines were sized for.
-    """
-
-    file: str
-    png: bytes
-    alt: str
-    width_px: int
-    height_px: int
-    dots_per_inch: int
-
-    @property
-    def width_in(self) -> int:
-        """Width that the text was sized for, in whole inches."""
-        return max(3, min(12, round(self.width_px / self.dots_per_inch)))
-
-
-@dataclass(frozen=True)
-class Figures:
-    """Figures that belong together, and the one sentence that says what they show.
-
-    Parameters
-    ----------
-    images : tuple of Image
-        Side by side where there is room.
-    """
-
-    kind: ClassVar[str] = "figures"
-    images: tuple[Image, ...]
-    sentence: str
+# Raised when a figure changes, so that figures are drawn again.
+FIGURES_VERSION = 1
 
 
 @dataclass(frozen=True)
@@ -130,7 +93,7 @@ class Answer:
     is_small: bool = False
 
 
-PageBlock = Block | Figures | Collapsible | Chart | Dots | Picker | Row | Answer
+PageBlock = Block | Collapsible | Chart | Dots | Picker | Row | Answer
 
 
 @dataclass(frozen=True)
@@ -162,37 +125,49 @@ class Drawing:
     ----------
     file : str
         Where it lies below ``figures/``.
-    draw : callable
-        Gives the figure; nothing is drawn before.
+    draw : partial
+        Gives the figure from the records that it holds; nothing is drawn before.
     """
 
     file: str
-    draw: Callable[[], Figure]
+    draw: "partial[Figure]"
+
+    @property
+    def key(self) -> str:
+        """Hash of what it is drawn from: as long as it stays, the file may stay.
+
+        Values that nothing tells apart reliably give another key each time, and a figure
+        that is drawn again.
+        """
+        digest = hashlib.blake2b(f"{FIGURES_VERSION} {self.file}".encode())
+        _add(digest, self.draw)
+        return digest.hexdigest()
 
     @property
     def png(self) -> bytes:
         """The drawn file."""
-        with report_style():
+        with report_style(), shared_sheets():
             return as_png(self.draw())
 
 
-def images_of(blocks: tuple[PageBlock, ...]) -> tuple[Image, ...]:
-    """Collect the figures of some blocks, folded ones too.
-
-    Returns
-    -------
-    tuple of Image
-        In the order of the page.
-    """
-    found: list[Image] = []
-    for block in blocks:
-        if isinstance(block, Figures):
-            found += block.images
-        elif isinstance(block, Collapsible | Row | Answer):
-            found += images_of(block.blocks)
-        elif isinstance(block, Picker):
-            found += [one for _, inner in block.items for one in images_of(inner)]
-    return tuple(found)
+def _add(digest: "hashlib.blake2b", value: object) -> None:
+    """Add a value to a digest, with all that it holds."""
+    if isinstance(value, partial):
+        value = (value.func.__qualname__, value.args, value.keywords)
+    if is_dataclass(value):
+        digest.update(type(value).__name__.encode())
+        value = {one.name: getattr(value, one.name) for one in fields(value)}
+    if isinstance(value, np.ndarray) and not value.dtype.hasobject:
+        digest.update(f"array {value.dtype.str} {value.shape} ".encode())
+        digest.update(np.ascontiguousarray(value).data)
+    elif isinstance(value, Mapping):
+        _add(digest, tuple(value.items()))
+    elif isinstance(value, tuple | list | np.ndarray):
+        digest.update(f"many {len(value)} ".encode())
+        for one in value:
+            _add(digest, one)
+    else:
+        digest.update(f"{value!r} ".encode())
 
 
 def section_notes(contents: ReportContents, *, is_validation: bool) -> list[Text]:
@@ -229,32 +204,6 @@ def collapsed_beyond(most: int, table: Table, summary: str) -> Table | Collapsib
         What is inside.
     """
     return table if len(table.rows) <= most else Collapsible(summary, (table,))
-
-
-def drawn(file: str, figure: Figure, alt: str) -> Image:
-    """Render a figure for the page.
-
-    Parameters
-    ----------
-    file : str
-        Where it lies below ``figures/``; without ending.
-    """
-    return image(f"{file}.png", as_png(figure), alt, dots_per_inch=DOTS)
-
-
-def image(file: str, png: bytes, alt: str, *, dots_per_inch: int) -> Image:
-    """Take a finished PNG file into the page.
-
-    Parameters
-    ----------
-    file : str
-        Where it lies below ``figures/``.
-    dots_per_inch : int, [pixels/inch]
-    """
-    # Width and height stand at a fixed place in every PNG file, behind its signature
-    # and the head of its first part.
-    width, height = struct.unpack(">II", png[16:24])
-    return Image(file, png, alt, width, height, dots_per_inch)
 
 
 def file_names(names: Iterable[str], endings: Sequence[str] = ("",)) -> dict[str, str]:

@@ -9,7 +9,8 @@ from hwid_cli.records.units import behind
 from hwid_cli.report.formats import number
 from hwid_cli.report.table import Table, numbers, texts
 
-_HOW = (
+# What the columns of the tables say.
+COLUMNS = (
     "value, rate, frequency: share of the samples at which the fit has seen the like. By "
     "frequency the whole sample counts as new where one octave of the input is stronger than "
     "it ever was in the fit, however little that adds: steps of another size or length often "
@@ -58,6 +59,6 @@ def trust_table(found: Sequence[RecordingTrust], about: str = TESTED) -> Table:
             *numbers("value", "rate", "frequency", "held", "width", "RMSD"),
         ),
         rows,
-        (_HOW,) if rows else (),
+        (COLUMNS,) if rows else (),
         is_validation=True,
     )

@@ -13,7 +13,13 @@ from pathlib import Path
 
 import numpy as np
 
-from hwid_cli.data.calibration import LEAST_QUIET, OFFSETS, Draft, run_recipe
+from hwid_cli.data.calibration import (
+    LEAST_QUIET,
+    OFFSETS,
+    Draft,
+    removed_samples,
+    run_recipe,
+)
 from hwid_cli.data.recording_files import (
     find_files,
     missing_files_message,
@@ -30,8 +36,8 @@ from hwid_cli.records.recordings import (
     RawRecording,
     Recording,
 )
-from hwid_cli.report import plots
 from hwid_cli.report.calibration import calibration_table
+from hwid_cli.report.sections.calibrate import drawings_of
 from hwid_cli.stages.fit_seconds import counted
 from hwid_cli.stages.selection import named_recordings, select_recordings
 from hwid_cli.stages.stage import Context, Planning, Runner, Stage, in_results
@@ -40,7 +46,7 @@ from hwid_cli.store.results import read_calibrated, write_calibrated
 from hwid_cli.tasks.cache import task_key
 
 NAME = "calibrate"
-STAGE_VERSION = 2
+STAGE_VERSION = 3
 
 # Two passes settle nearly every recording (the second one changes nothing); noise at a
 # threshold may take one or two more.
@@ -195,7 +201,8 @@ def _finish(draft: Draft) -> tuple[Recording, CalibrationLog]:
         output_unit=raw.output_unit,
         reference=draft.reference,
     )
-    return recording, replace(draft.log, n_samples=recording.n_samples)
+    log = replace(draft.log, n_samples=recording.n_samples)
+    return recording, replace(log, removed=removed_samples(raw, log))
 
 
 # Drawing a recording before and after, [s].
@@ -244,19 +251,10 @@ def _draw(
     """Draw each recording before and after, unless a whole figure of it is there."""
     if given.options is None:
         return
-    for raw, recording, log in zip(
-        given.recordings, result.recordings, result.logs, strict=True
-    ):
-        about = f"{result.key} {raw.name}"
-        path = figure_path(out, raw.name)
-        if is_new or read_figure(path, about) is None:
-            figure = plots.calibration_figure(raw, recording, log)
-            write_figure(path, plots.as_png(figure), about)
-
-
-def figure_path(out: Path, name: str) -> Path:
-    """Where the figure of a recording lies."""
-    return out / "figures" / NAME / f"{name}.png"
+    for drawing in drawings_of(result.recordings, result.logs):
+        path = out / "figures" / drawing.file
+        if is_new or read_figure(path, drawing.key) is None:
+            write_figure(path, drawing.png, drawing.key)
 
 
 def _summary(given: Measured, result: Calibrated, is_stored: bool) -> str:

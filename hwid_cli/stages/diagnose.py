@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from hwid_cli.config.extended_simulation import write_extended_simulation
+from hwid_cli.config.simulation_checks import SIMULATION_EXAMPLE
 from hwid_cli.diagnosis import diagnose as pipeline
 from hwid_cli.diagnosis.foreign import diagnose_foreign
 from hwid_cli.diagnosis.rounds import DiagnosisTask, OnRound, RunTasks
@@ -330,8 +331,7 @@ def _simulation(experiment: Experiment) -> SimulationOptions | ForeignSimulation
     if experiment.simulation is None:
         raise ConfigError(
             f"{experiment.source}: simulation: missing; expected the physics model that "
-            "is compared with the recordings; add the section (configs/README.md "
-            "explains it)"
+            f"is compared with the recordings; add it, such as '{SIMULATION_EXAMPLE}'"
         )
     foreign = experiment.foreign_simulation
     return (

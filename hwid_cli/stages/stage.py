@@ -32,14 +32,11 @@ class Context:
         Folder of the results.
     results : mapping of str to object
         What the stages before it gave, by their names.
-    say : callable
-        Shows a line to people.
     """
 
     experiment: Experiment
     out: Path
     results: Mapping[str, Any]
-    say: Callable[[str], None]
 
 
 class Runner(Protocol):

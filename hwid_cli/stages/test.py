@@ -518,11 +518,6 @@ class _Given:
 def _choose(context: Context) -> _Given:
     experiment, results = context.experiment, context.results
     options = _options(experiment)
-    if experiment.group is None:
-        context.say(
-            f"test: {experiment.source} has no group: section, so there is no chain of "
-            "groups to test; models of single recordings only"
-        )
     recordings, crossval = results["calibrate"].recordings, results["crossval"]
     tested = select_recordings(
         recordings,

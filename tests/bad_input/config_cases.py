@@ -59,6 +59,7 @@ SYNTAX = [
         "no closing brace", text(CONFIG.replace("y}", "y")), "line 5", "expected valid"
     ),
     _case("two documents", text(f"{CONFIG}---\n{CONFIG}"), "single document"),
+    _case("a table of measurements", text("t;u;y\n0;1;2\n"), "holds text", "hwid init"),
     _case("a list", text("- a\n- b\n"), "holds a list", "expected sections"),
     _case("nothing", text(""), "holds nothing", "expected sections"),
     _case("Python object", more("fit: !!python/object/apply:os.system [id]"), "tag"),

@@ -199,6 +199,10 @@ def test_without_a_simulation_one_line_says_what_to_add(again, config):
     assert result.exit_code == 1
     (line,) = result.stderr.splitlines()
     assert "simulation: missing; expected the physics model" in line
+    example = line.partition("add it, such as '")[2].rstrip("'")
+    # What it proposes is a section that can be read.
+    config.write_text(f"{text[: text.index('simulation:')]}{example}\n")
+    assert load_experiment(config).drive_simulation.mass_kg == 0.3
 
 
 def test_an_unknown_recording_is_one_line_that_names_it(again, edit):

@@ -38,7 +38,7 @@ def test_a_report_of_all_stages(after_run, hwid, out):
     html = (out / "report.html").read_text()
     figures = files_below(out / "figures")
     assert {"calibrate/step_02.png", "recordings/step_02_detail.png"} <= set(figures)
-    names = json.loads(re.search(r"<!-- drawn from \w+ (\[.*\]) -->\n", html)[1])
+    names = json.loads(re.search(r"<!-- drawn from \w+ (\{.*\}) -->\n", html)[1])
     assert names
     assert set(names) <= set(figures)
     assert "hwid group CONFIG" in html
@@ -47,6 +47,30 @@ def test_a_report_of_all_stages(after_run, hwid, out):
     assert re.search(r"<td>\d+\.\d</td>", row[1])
     assert "unknown" not in row[1]
     assert "as configured" in row[1]
+
+
+def test_only_figures_of_results_that_changed_are_drawn_again(
+    after_run, hwid, out, edit, monkeypatch
+):
+    drawn = []
+
+    def count(self):
+        drawn.append(self.file)
+        return blank
+
+    blank = (out / "figures" / "crossval" / "matrix.png").read_bytes()
+    monkeypatch.setattr("hwid_cli.report.page.Drawing.png", property(count))
+    (out / "figures" / "recordings" / "step_02.png").unlink()
+    hwid("report")
+    assert drawn == ["recordings/step_02.png"]
+    drawn.clear()
+    # The threshold decides what is covered and so the widest model, nothing else.
+    edit("threshold: 0.01", "threshold: 0.02")
+    assert hwid("crossval").exit_code == 0
+    assert {file.split("/")[0] for file in drawn} == {"crossval", "models"}
+    drawn.clear()
+    hwid("report", "--force")
+    assert {"recordings/step_02.png", "residuals/step_02.png"} <= set(drawn)
 
 
 @pytest.mark.slow
@@ -166,15 +190,15 @@ def test_a_figure_that_was_deleted_is_written_again(after_run, hwid, out):
 
 
 def test_the_last_line_stays_one_comment_whatever_figures_are_called(tmp_path):
-    figures = ["models/a-->b.png", "recordings/\u00e4\n.png"]
+    figures = {"models/a-->b.png": "key a", "recordings/\u00e4\n.png": "key b"}
     line = _last_line("key", figures)
-    for name in figures:
-        write_figure(tmp_path / "figures" / name, b"PNG" + bytes(12), f"drawn {name}")
+    for name, about in figures.items():
+        write_figure(tmp_path / "figures" / name, b"PNG" + bytes(12), about)
     page = tmp_path / "report.html"
     page.write_bytes(_signed(f"<html>\n{line}"))
 
     assert line.count("-->") == line.count("\n") == 1
-    assert _is_complete(tmp_path, page, "key", "drawn")
-    assert not _is_complete(tmp_path, page, "other", "drawn")
-    (tmp_path / "figures" / figures[0]).unlink()
-    assert not _is_complete(tmp_path, page, "key", "drawn")
+    assert _is_complete(tmp_path, page, "key")
+    assert not _is_complete(tmp_path, page, "other")
+    (tmp_path / "figures" / "models" / "a-->b.png").unlink()
+    assert not _is_complete(tmp_path, page, "key")

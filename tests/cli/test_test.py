@@ -138,12 +138,30 @@ def test_without_groups_the_single_models_are_judged(again, edit, out):
     result = again()
 
     assert result.exit_code == 0, result.output
-    assert "no group: section, so there is no chain of groups to test" in result.stderr
+    assert "group" not in result.stderr
     assert "The chain" not in result.stdout
     # Three models of their own; the test recordings have none.
     rows = rows_of(out / "test.csv")
     assert len(rows) == 3 * 5
     assert {row["level"] for row in rows} == {"1"}
+
+
+def test_joining_is_proposed_where_no_single_model_is_good_enough(
+    again, edit, config, hwid
+):
+    hint = "hint        a model of several recordings may cover more: add 'group: {}'"
+    assert hint not in again().stdout
+    edit(GROUP, "")
+    edit("threshold: 0.01", "threshold: 1000.0")
+    assert hint not in hwid("test").stdout
+    edit("threshold: 1000.0", "threshold: 1.0e-9")
+    said = hwid("test").stdout
+
+    assert hint in said
+    assert " ".join(said.split()).count(f"to {config} and run it again") == 1
+    # What it proposes is a configuration that runs.
+    config.write_text(config.read_text() + "group: {}\n")
+    assert hwid("test").exit_code == 0
 
 
 def test_a_second_run_answers_from_the_results_with_the_same_tables(

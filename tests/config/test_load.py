@@ -138,6 +138,16 @@ def test_source_is_the_path_as_given_and_no_key(load, write_config):
             r"order_grid: unknown key; did you mean 'order' or 'orders'\?",
         ),
         ("fit: 3", r"fit: found 3; expected a section with keys"),
+        (
+            "crossval: {threshold: 1 mm}",
+            r"threshold: found '1 mm'; expected a finite number; write the number alone, "
+            "without quotes or a unit",
+        ),
+        (
+            "fit: {units: '3'}",
+            r"found '3'; expected an integer; write the number alone",
+        ),
+        ("fit: {units: three}", r"found 'three'; expected an integer$"),
         ("crossval: {threshold: .inf}", r"threshold: found inf; expected a finite"),
         ("crossval: {threshold: .nan}", r"threshold: found nan; expected a finite"),
         ("test: ", r"test.recordings: missing; expected a list \(each text\); add"),

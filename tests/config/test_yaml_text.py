@@ -41,7 +41,7 @@ def test_faulty_yaml_is_one_line_with_its_place(write_config, text, message):
 
 
 @pytest.mark.parametrize(
-    ("text", "found"), [("", "nothing"), ("- a\n", "a list"), ("hello\n", "a str")]
+    ("text", "found"), [("", "nothing"), ("- a\n", "a list"), ("hello\n", "text")]
 )
 def test_file_without_sections_is_refused(write_config, text, found):
     with pytest.raises(ConfigError, match=f"holds {found}; expected sections"):

@@ -112,10 +112,24 @@ def test_a_name_that_reads_like_a_group_is_refused():
 def test_different_sample_times_are_refused():
     first = RawRecording("a", np.ones(2), np.ones(2), 0.001, source="a.csv")
     second = replace(first, name="b", sample_time_s=0.00101, source="b.csv")
-    checks.check_sample_times([first, second], 0.02)
+    checks.check_sample_time(second, first, 0.02)
     message = (
         r"^b.csv: has a sample time of 0.00101 s; expected 0.001 s as in a.csv, because "
         "models are discrete; make one experiment for each sample time"
     )
     with pytest.raises(MeasurementError, match=message):
-        checks.check_sample_times([first, second], 0.005)
+        checks.check_sample_time(second, first, 0.005)
+
+
+def test_the_odd_one_out_is_told_by_its_clock_wherever_it_stands():
+    steps = {"a": 0.002, "b": 0.001, "c": 0.00101, "d": 0.001}
+    every = [RawRecording(name, np.ones(2), np.ones(2), steps[name]) for name in steps]
+
+    with pytest.raises(MeasurementError, match=r"has a sample time of 0.002 s"):
+        checks.check_sample_times(every, 0.02)
+    checks.check_sample_times(every[1:], 0.02)
+    checks.check_sample_times([], 0.02)
+    assert checks.usual_clock(every).name in "bd"
+    assert checks.usual_clock(every[::-1]).name in "bd"
+    # Of two nobody knows: the longer sample time is called another one.
+    assert checks.usual_clock(every[:2]).name == "b"

@@ -98,6 +98,12 @@ def test_cell_without_a_number_is_kept_as_text_of_its_row(tmp_path):
 @pytest.mark.parametrize(
     ("text", "columns", "message"),
     [
+        (
+            "hello world\n0,1,2\n",
+            BY_NAME,
+            r"row 1: has no column 'u' for the input; expected one of hello world; name "
+            "one of them, or rename the column",
+        ),
         ("T,u,y\n0,1,2\n", BY_NAME, r"run.csv, row 1: has no column 't' .*mean 'T'\?"),
         ("t,cur,y\n0,1,2\n", BY_NAME, r"'u' for the input; expected one of t, cur, y"),
         ("t,u,u,y\n0,1,2,3\n", BY_NAME, r"row 1: column 'u' occurs 2 times"),

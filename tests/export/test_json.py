@@ -311,13 +311,13 @@ def test_a_fault_in_a_model_is_one_line(fault, tmp_path):
 @pytest.mark.parametrize(
     ("text", "said"),
     [
+        ("{}", "m.json: holds no key 'format'; expected a model that 'hwid export"),
         ("", "is no JSON"),
         ("{", "is no JSON"),
         ("[]", "holds a list"),
         ('{"a": NaN}', "NaN is no number"),
         ('{"a": 1, "a": 2}', "key 'a' occurs twice"),
         ("[" * 100_000, "is no JSON"),
-        ("{}", "format None"),
     ],
 )
 def test_what_is_no_model_is_refused(text, said, tmp_path):

@@ -5,6 +5,7 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 
 import numpy as np
@@ -111,6 +112,68 @@ def test_a_reader_that_does_not_come_back_is_stopped(good, endless):
 
     assert not is_there(pid)
     # Three columns, each with its rows.
+    assert len(reader.ask(request(good))) == 6
+    reader.end()
+
+
+@pytest.fixture
+def unfinished(tmp_path):
+    """A measurement whose recorder was switched off, cut in its first blocks."""
+    asammdf = pytest.importorskip("asammdf")
+    path = tmp_path / "run.mf4"
+    file = asammdf.MDF(version="4.10")
+    clock = np.arange(5.0)
+    file.append([asammdf.Signal(clock, clock, name=name) for name in "uy"])
+    file.save(path)
+    file.close()
+    content = bytearray(path.read_bytes())
+    content[:8] = b"UnFinMF "
+    content[60] |= 1
+    path.write_bytes(content[:360])
+    return path
+
+
+@pytest.fixture
+def temporary(tmp_path, monkeypatch):
+    """Where temporary files go in this test."""
+    folder = tmp_path / "temporary"
+    folder.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(folder))
+    return folder
+
+
+def test_no_copy_of_a_damaged_measurement_stays_behind(
+    unfinished, temporary, monkeypatch
+):
+    reader = IsolatedReader("hwid_cli.data.formats")
+    monkeypatch.setattr(formats, "_ISOLATED", reader)
+    with pytest.raises(MeasurementError, match=r"run\.mf4: cannot be read"):
+        read_columns(unfinished, COLUMNS)
+
+    # The library has made a copy, in the folder of the process that goes with it.
+    (folder,) = temporary.iterdir()
+    assert [one.name[12:] for one in folder.glob("*.mf4")] == ["_run.mf4"]
+    reader.end()
+    assert list(temporary.iterdir()) == []
+
+
+def test_nothing_stays_behind_of_a_reader_that_was_stopped(
+    good, endless, temporary, monkeypatch
+):
+    reader = IsolatedReader("hwid_cli.data.formats")
+    reader.ask(request(good))
+    assert len(list(temporary.iterdir())) == 1
+    with pytest.raises(ValueError, match="did not come back within"):
+        reader.ask(request(endless), most_seconds=1.0)
+    assert list(temporary.iterdir()) == []
+
+
+def test_files_are_read_where_there_is_no_room_for_temporary_ones(
+    good, tmp_path, monkeypatch
+):
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "missing"))
+    reader = IsolatedReader("hwid_cli.data.formats")
+
     assert len(reader.ask(request(good))) == 6
     reader.end()
 

@@ -69,8 +69,16 @@ def recording(name, seed=0, n_samples=240):
 
 
 def log(name, n_samples=240):
-    steps = ("cut", "output_offset")
-    return CalibrationLog(name, steps, 20, n_samples, 280, 275, repaired_input=(3,))
+    """Twenty samples were cut before, 20 and 15 behind, and one was damaged."""
+    steps, raw = ("cut", "output_offset"), (n_samples + 40, n_samples + 35)
+    cut_input, damaged, cut_output = np.zeros(40), [9.0], np.full(35, 0.01)
+    removed = np.concatenate([cut_input, damaged, cut_output])
+    return CalibrationLog(
+        *(name, steps, 20, n_samples, *raw),
+        output_offset=0.01,
+        repaired_input=(3,),
+        removed=removed,
+    )
 
 
 def crossval(count=15, seed=1):

@@ -16,6 +16,8 @@ WIDTHS = (390, 1280, 1920)
 CHART = "#recordings .item:not([hidden]) figure.chart"
 # A page that opens for everybody; issues of the network do not count here, [bytes].
 MOST_BYTES = 5_000_000
+# A4 less the margins of the page, 190 mm at 96 pixels to the inch, [pixels].
+PAPER_PX = 719
 # What WCAG 2 asks of small text, [-].
 LEAST_CONTRAST = 4.5
 
@@ -353,6 +355,57 @@ def test_paper_is_white_and_shows_what_is_folded(visit):
     assert tab.locator("#diagnosis canvas").count() > 3
     tab.evaluate("dispatchEvent(new Event('afterprint'))")
     assert tab.evaluate(back) != "rgb(255, 255, 255)"
+
+
+def test_calibration_shows_what_was_measured_beside_what_was_kept(visit, contents):
+    tab = visit()
+    see_all(tab)
+    chart = drawn(tab, "#calibration .item:not([hidden]) figure.chart")
+    recording, log = contents.stored.recordings[0], contents.stored.logs[0]
+    step = recording.sample_time_s
+
+    names = chart.locator("button.curve span:nth-child(2)").all_inner_texts()
+    assert names == ["measured", "calibrated", "repaired"]
+    # All of the longer raw column is in sight.
+    assert shown_range(chart) == pytest.approx((0.0, step * (log.n_raw_input - 1)))
+    assert coloured(chart, 0, "red") > 5
+    assert coloured(chart, 1, "red") == 0
+    chart.locator("button.curve", has_text="measured").click()
+    assert min(coloured(chart, panel, "blue") for panel in (0, 1)) > 50
+    chart.locator("button.curve", has_text="measured").click()
+    over = chart.locator(".u-over").first.bounding_box()
+    tab.mouse.move(over["x"] + 0.37 * over["width"], over["y"] + 30)
+    place = round(float(chart.locator(".at").inner_text().split()[-2]) / step)
+    told = {
+        name: chart.locator("button.curve", has_text=name).locator(".value")
+        for name in ("measured", "calibrated")
+    }
+    values = {
+        name: [float(one) for one in value.inner_text().split("|")]
+        for name, value in told.items()
+    }
+    kept = place - log.first_sample
+    found = [recording.input[kept], recording.output[kept]]
+    # The page rounds to a 40 000th of the range, and shows four digits.
+    assert values["calibrated"] == pytest.approx(found, rel=1e-3, abs=1e-4)
+    found[1] += log.output_offset
+    assert values["measured"] == pytest.approx(found, rel=1e-3, abs=3e-4)
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+def test_paper_holds_every_chart_whole(visit, width):
+    tab = visit(width)
+    tab.evaluate("dispatchEvent(new Event('beforeprint'))")
+    widths = tab.evaluate(
+        """[...document.querySelectorAll("canvas")].map(one =>
+          one.getBoundingClientRect().right
+          - document.querySelector("main").getBoundingClientRect().left)"""
+    )
+
+    assert len(widths) > 5
+    assert max(widths) <= PAPER_PX
+    # Charts over the whole width use it, also those of a phone.
+    assert max(widths) > 0.9 * PAPER_PX
 
 
 def test_without_a_program_the_answers_and_the_gap_are_there(visit):

@@ -8,8 +8,11 @@ from hwid_cli.records.report import ReportContents, StoredResults
 from hwid_cli.records.trust import RecordingTrust, ShownBand, TrustOnTests
 from hwid_cli.report.bands import band_chart
 from hwid_cli.report.figures.next import band_figure, visited_figure
-from hwid_cli.report.page import images_of
-from hwid_cli.report.sections.next import trust_drawings, trust_section
+from hwid_cli.report.sections.next import (
+    trust_drawings,
+    trust_section,
+    visited_chart,
+)
 from hwid_cli.report.table import Table, Text
 from tests.report.diagnosis_examples import named
 from tests.report.report_examples import crossval, final_test
@@ -76,7 +79,10 @@ def test_bands_of_a_simulation_and_of_validated_models_are_shown():
         crossval=replace(crossval(), bands=TrustOnTests((ROW,))),
     )
 
-    folded, chart, table = trust_section(contents).blocks
+    heading, chart, table, folded, note = trust_section(contents).blocks
+    assert heading.text == "The simulation on recordings that were held out"
+    assert note.text.startswith("value, rate, frequency: share of the samples")
+    assert (table.notes, folded.blocks[0].notes) == ((), ())
     assert folded.blocks[0].rows[0][0] == "a/1/2"
     assert "recordings of others" in folded.blocks[0].caption
     files = [one.file for one in trust_drawings(contents)]
@@ -95,30 +101,35 @@ def test_bands_and_proposals_are_tables_with_a_figure_each():
     tables = [one for one in blocks if isinstance(one, Table)]
     assert tables[0].rows[0][:2] == ("a/1/2", "step_14")
     assert tables[1].rows[0][1] == "step_p100"
-    assert [one.file for one in images_of(blocks)] == ["next/visited.png"]
     assert "New: b." in words(blocks)
-    (chart,) = [one for one in blocks if one.kind == "chart"]
+    chart, visited = [one for one in blocks if one.kind == "chart"]
+    assert visited.name == "visited"
     assert "holds 93% of what was measured" in chart.sentence
     assert "the values of 90% of the samples, the rates of 80% and" in chart.sentence
     assert "the frequencies of 70%" in chart.sentence
-    assert "one octave of the input is stronger" in tables[0].notes[0]
+    assert words(blocks).count("one octave of the input is stronger") == 1
 
 
 @pytest.mark.usefixtures("blank_figures")
 def test_the_band_lies_beside_the_page_as_a_file():
     stored = StoredResults(
         *("a", "{}", "poles"),
-        results={"test": replace(final_test(), trust=TrustOnTests((ROW,), SHOWN))},
+        results={
+            "test": replace(final_test(), trust=TrustOnTests((ROW,), SHOWN)),
+            "next": found(),
+        },
     )
-    (drawing,) = trust_drawings(ReportContents(stored))
-    assert drawing.file == "next/band.png"
+    drawing, visited = trust_drawings(ReportContents(stored))
+    assert (drawing.file, visited.file) == ("next/band.png", "next/visited.png")
+    assert visited.draw().axes[0].get_ylabel() == "largest amplitude [A]"
     assert drawing.draw().axes[0].get_title(loc="left") == "a/1/2 on step_14"
     assert trust_drawings(ReportContents(replace(stored, results={}))) == []
 
 
 def test_the_chart_shades_what_rests_on_data_and_says_where_nothing_does():
     chart = band_chart(SHOWN, "How it did.")
-    (panel,) = chart.panels
+    panel, beneath = chart.panels
+    assert panel.spans == beneath.spans
     assert panel.spans == ((0.0, pytest.approx(TIME[SHOWN.is_inside][-1])),)
     band, measured, predicted = panel.curves
     np.testing.assert_array_equal(band.values, SHOWN.lower)
@@ -126,10 +137,45 @@ def test_the_chart_shades_what_rests_on_data_and_says_where_nothing_does():
     np.testing.assert_array_equal(measured.values, SHOWN.measured)
     np.testing.assert_array_equal(predicted.values, SHOWN.output)
     assert "Shaded: rests on data" in chart.sentence
+    # What is left of the measurement, and the same band about zero.
+    band, left = beneath.curves
+    np.testing.assert_allclose(left.values, -0.01, rtol=1e-12)
+    np.testing.assert_allclose(band.values, -0.03, rtol=1e-12)
+    np.testing.assert_allclose(band.upper, 0.03, rtol=1e-12)
 
     nothing = band_chart(replace(SHOWN, is_inside=TIME < 0), "How it did.")
     assert nothing.panels[0].spans == ()
     assert "nothing is shaded" in nothing.sentence
+
+
+def test_a_long_prediction_keeps_its_single_peak():
+    n_samples = 50_000
+    peaked = np.zeros(n_samples)
+    peaked[31_007] = 5.0
+    flat = np.zeros(n_samples)
+    time = 1e-3 * np.arange(n_samples)
+    shown = ShownBand("a", "b", time, peaked, flat, flat, flat, flat == 0, "m")
+    chart = band_chart(shown, "")
+
+    measured = chart.panels[0].curves[1].values
+    assert measured.size < 4100
+    assert measured.max() == 5.0
+    # A bin holds 25 samples.
+    assert chart.at[measured.argmax()] == pytest.approx(31.007, abs=0.025)
+    assert "thinned" in chart.sentence
+
+
+def test_the_visited_octaves_are_steps_from_low_to_high():
+    chart = visited_chart(input_map(), "A")
+    on_offer, proposed, visited = chart.panels[0].curves
+
+    assert chart.is_log
+    assert (np.diff(chart.at) >= 0).all()
+    # The highest octave ends at Nyquist's frequency, where the first row of the map is.
+    assert chart.at[-2:].tolist() == [250.0, 500.0]
+    assert visited.values[-2:].tolist() == [1.0, 1.0]
+    np.testing.assert_allclose(proposed.values, 1.5 * visited.values)
+    np.testing.assert_allclose(on_offer.values, 2.0 * visited.values)
 
 
 def test_many_short_stretches_are_cut_to_the_longest():

@@ -6,7 +6,7 @@ Figures of a diagnosis that show curves: simulations over measurements, missing 
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
@@ -535,7 +535,7 @@ def diagnosis_figures(diagnosis: Diagnosis) -> dict[str, Figure]:
     return {name: draw() for name, draw in figure_makers(diagnosis).items()}
 
 
-def figure_makers(diagnosis: Diagnosis) -> dict[str, Callable[[], Figure]]:
+def figure_makers(diagnosis: Diagnosis) -> "dict[str, partial[Figure]]":
     """Give what draws each figure that there is something for, none of them drawn yet."""
     is_there = {
         gap_figure: bool(diagnosis.gaps),

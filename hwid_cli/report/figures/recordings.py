@@ -14,6 +14,7 @@ from hwid_cli.report.figures.style import (
     new_figure,
     styled,
 )
+from hwid_cli.report.plots import sheet
 
 # Up to so many samples each of them is marked, [samples].
 _MOST_MARKED = 250
@@ -37,9 +38,8 @@ def simulation_figure(simulated: SimulatedRecording, *, is_detail: bool) -> Figu
     step = recording.sample_time_s
     first, end = simulated.detail if is_detail else (0, recording.n_samples)
     time = step * np.arange(first, end)
-    figure = new_figure(HALF_WIDTH, 3.9)
-    figure.subplots_adjust(left=0.15, right=0.97, top=0.86, bottom=0.125, hspace=0.12)
-    upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2.2, 1.0))
+    figure = sheet("simulation", _blank)
+    upper, lower = figure.axes
     _draw_outputs(upper, simulated, time, slice(first, end))
     lower.axhline(0.0, color="#555555", lw=0.7)
     lower.plot(time, simulated.residual[first:end], color=VERMILLION, lw=0.9)
@@ -59,6 +59,13 @@ def simulation_figure(simulated: SimulatedRecording, *, is_detail: bool) -> Figu
     upper.legend(
         loc="lower right", bbox_to_anchor=(1.01, 0.99), ncols=2, handlelength=2.6
     )
+    return figure
+
+
+def _blank() -> Figure:
+    figure = new_figure(HALF_WIDTH, 3.9)
+    figure.subplots_adjust(left=0.15, right=0.97, top=0.86, bottom=0.125, hspace=0.12)
+    figure.subplots(2, 1, sharex=True, height_ratios=(2.2, 1.0))
     return figure
 
 

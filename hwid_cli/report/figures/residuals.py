@@ -13,6 +13,7 @@ from hwid_cli.report.figures.style import (
     new_figure,
     styled,
 )
+from hwid_cli.report.plots import sheet
 
 # Room above the largest value or band, [-].
 _HEADROOM = 1.15
@@ -42,16 +43,15 @@ def residuals_figure(simulated: SimulatedRecording) -> Figure:
         raise ValueError(
             f"{simulated.recording.name}: no tests of its residual to draw"
         )
-    figure = new_figure(FULL_WIDTH, 2.7)
-    figure.subplots_adjust(left=0.07, right=0.985, top=0.88, bottom=0.19, wspace=0.24)
     panels = (
         (tests.with_itself, "residual with itself"),
         (tests.with_input, "with the whitened input"),
         (tests.with_square, "with the input's square"),
     )
-    for axes, (correlation, title) in zip(
-        figure.subplots(1, len(panels)), panels, strict=True
-    ):
+    # Axes without lags lose their ticks.
+    has_lags = tuple(bool(one.lags.size) for one, _ in panels)
+    figure = sheet(("residuals", has_lags), _blank)
+    for axes, (correlation, title) in zip(figure.axes, panels, strict=True):
         _draw(axes, correlation)
         axes.set_title(title, pad=6)
         axes.set_xlabel("lag [samples]")
@@ -59,12 +59,18 @@ def residuals_figure(simulated: SimulatedRecording) -> Figure:
     return figure
 
 
+def _blank() -> Figure:
+    figure = new_figure(FULL_WIDTH, 2.7)
+    figure.subplots_adjust(left=0.07, right=0.985, top=0.88, bottom=0.19, wspace=0.24)
+    figure.subplots(1, 3)
+    return figure
+
+
 def _draw(axes: Axes, correlation: Correlation) -> None:
     lags, values = correlation.lags, correlation.values
     axes.axhline(0.0, color="#555555", lw=0.7)
     if lags.size == 0:
-        axes.set_yticks([])
-        axes.set_xticks([])
+        axes.set(xlim=(0.0, 1.0), ylim=(-1.0, 1.0), xticks=[], yticks=[])
         axes.text(
             0.5, 0.5, "two levels: nothing new", ha="center", transform=axes.transAxes
         )

@@ -29,8 +29,8 @@ const shown = value => {
   if (value === null || value === undefined || !Number.isFinite(value)) return "–";
   const size = Math.abs(value);
   if (size === 0) return "0";
-  if (size < 1e-3 || size >= 1e5) return value.toExponential(3).replace("e", "e");
-  return String(Number(value.toPrecision(4)));
+  const short = Number(value.toPrecision(4));
+  return size < 1e-3 || size >= 1e5 ? short.toExponential() : String(short);
 };
 
 // ---- how the curves look -----------------------------------------------------------
