@@ -28,6 +28,7 @@ from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals
 from hwid_cli.diagnosis.search import fit_own, fit_point
 from hwid_cli.diagnosis.selection import (
     WITHIN_REACH,
+    DiagnosisVerdict,
     decide,
     is_part_of,
     select_best,
@@ -134,11 +135,12 @@ def confirm(
     Returns
     -------
     Findings
-        Of the simulation's own run, where that is better than without the effects.
+        Of the simulation's own run; without the effects, which stay a lead, where that
+        run leaves clearly more than the stand-in said.
     dict of str to float
-        Parameters of the simulation that go with them.
+        Parameters of the simulation at that run.
     bool
-        Whether that run leaves about as little as the stand-in said.
+        Whether that run bears the effects out.
     """
     chosen, verdict = findings.verdict.chosen, findings.verdict
     if runs.simulator.run is None:
@@ -147,10 +149,24 @@ def confirm(
         return findings, values, True
     best = _settled(findings, chosen, runs, values)
     if best is None:
-        return findings, values, False
-    found = _with_run(findings, best)
-    is_its_own = not findings.criteria.replaces(found.verdict.chosen)
-    return found, best.values_of_run, is_its_own and _is_as_good(best)
+        return _unconfirmed(findings), values, False
+    found, criteria = _with_run(findings, best), findings.criteria
+    run = found.verdict.chosen
+    is_enough = _is_as_good(best) or criteria.is_nearly_all(run, findings.base)
+    if is_enough and not criteria.replaces(run):
+        return found, best.values_of_run, True
+    return _unconfirmed(findings), best.values_of_run, False
+
+
+def _unconfirmed(findings: Findings) -> Findings:
+    """Findings whose effects the simulation itself, with them in it, does not bear out.
+
+    What a stand-in says is no fact where the simulation says otherwise; it stays a lead.
+    """
+    if not findings.verdict.chosen.effects:
+        return findings
+    verdict = DiagnosisVerdict("unknown", False, findings.base, ())
+    return replace(findings, verdict=verdict, law=None)
 
 
 def single_in_simulation(

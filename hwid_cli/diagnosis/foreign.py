@@ -93,12 +93,12 @@ def diagnose_foreign(
             abs(moved[one] - values[one]) > _MOVED * abs(values[one])
             for one in simulator.free
         )
-        values = moved
+        before, values = values, moved
         if is_done or not has_moved:
             break
         # Parameters that imitated what is missing have led elsewhere.
         given = runs.of(problem.signals, values)
-    told = _told(found, simulator, (refitted, values))
+    told = _told(found, simulator, (refitted, values if is_confirmed else before))
     confirmed = "simulation" if is_confirmed else "surrogate"
     return replace(told, confirmed=confirmed)
 
