@@ -1,6 +1,6 @@
 """Diagnosis of a simulation that cannot be opened, by a drive that stands for it.
 
-Its parameters are fitted again where there are some; a linear drive then stands for it
+Its parameters are fitted again where there are some; a plain drive then stands for it
 (``stand_in``), and what that lacks is looked for as for any drive. What is found is put
 into the simulation itself as a force along its motion, and that run corrects the stand-in,
 until both agree: only then is it confirmed. docs/method_diagnosis.md, eq. (D30) to (D33).
@@ -255,7 +255,7 @@ def stand_in_for(
     *,
     may_curve: bool = True,
 ) -> tuple[StandIn, tuple[Signals, ...]]:
-    """Linear drive that stands for a simulation that can be run, and what it was fitted to.
+    """Plain drive that stands for a simulation that can be run, and what it was fitted to.
 
     Parameters
     ----------

@@ -1,9 +1,9 @@
 """A plain drive that stands for a simulation which cannot be opened.
 
 A mass, a damper and a spring are fitted to what the simulation makes of the recordings'
-inputs; the spring is curved where that is clearly nearer. What they do not reproduce becomes a force along each recording, so that the
-stand-in moves as the simulation does; its own equation is only used for what an effect
-changes around that motion. docs/method_diagnosis.md, eq. (D30), (D31).
+inputs; the spring is curved where that is clearly nearer. What they do not reproduce
+becomes a force along each recording, so that the stand-in moves as the simulation does;
+its own equation is only used for what an effect changes around that motion. docs/method_diagnosis.md, eq. (D30), (D31).
 """
 
 from collections.abc import Sequence
@@ -30,8 +30,10 @@ _DEGREE = 5
 # A spring or a damper that gives less of the force than this share is none.
 _LEAST_SHARE = 1e-4
 _LEAST_MASS = 1e-12
-# A curved spring has to leave at most this share of what a straight one leaves of the
-# balance of forces, and to push back over so many times the way that was seen.
+# A straight spring that leaves less than this share of the balance of forces is enough; a
+# curved one has to leave at most this share of that, and to push back over so many times
+# the way that was seen.
+_STRAIGHT = 1e-3
 _CURVED = 0.5
 _PUSHES_BACK = 1.3
 _ITERATIONS = 20
@@ -97,10 +99,9 @@ def fit_stand_in(
     straight, left = _by_regression(signals, runs, is_curved=False)
     curved, left_then = _by_regression(signals, runs, is_curved=True)
     widest = _PUSHES_BACK * max(float(np.max(np.abs(one.output))) for one in runs)
-    is_nearer = (
-        may_curve and left_then <= _CURVED * left and _pushes_back(curved, widest)
-    )
-    return _in_free_run(curved if is_nearer else straight, signals, runs)
+    is_nearer = left > _STRAIGHT and left_then <= _CURVED * left
+    is_curved = may_curve and is_nearer and _pushes_back(curved, widest)
+    return _in_free_run(curved if is_curved else straight, signals, runs)
 
 
 def _by_regression(
