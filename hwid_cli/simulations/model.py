@@ -41,8 +41,10 @@ _DELAY_OF_FORCE = 1
 # stable, and how far out a pole may be that is at the edge.
 _FACTORS = (5.0, 3.0, 2.0, 1.5, 1.2)
 _AT_EDGE = 1e-9
-# Before the map: a smaller one would undo a map that cuts off, beside a larger gain.
+# Before the map less: beside the gain behind it that imitates other maps.
 _MOST_BEFORE_MAP = 1.5
+# Inputs beyond any recording, where a map that cuts off is flat.
+_FAR = np.array([-2e9, -1e9, 1e9, 2e9])
 # A stiffness below this share of what its coefficients add up to is rounding.
 _ROUNDING = 1e-9
 
@@ -53,11 +55,11 @@ def free_parameters(model: HammersteinWiener) -> dict[str, FreeParameter]:
     Returns
     -------
     dict of str to FreeParameter
-        ``gain``; ``input_gain`` before a map that is not straight; ``stiffness`` and
+        ``gain``; ``input_gain`` before a map that cuts nothing off; ``stiffness`` and
         ``damping`` where the block has such and stays stable.
     """
     found = {"gain": FreeParameter(1.0, (1 / _FACTORS[0], _FACTORS[0]))}
-    if model.input_map.kind != "none":
+    if model.input_map.kind != "none" and _goes_on(model):
         found["input_gain"] = FreeParameter(
             1.0, (1 / _MOST_BEFORE_MAP, _MOST_BEFORE_MAP)
         )
@@ -73,6 +75,13 @@ def free_parameters(model: HammersteinWiener) -> dict[str, FreeParameter]:
             ends = (1 / factor, factor)
             return {**found, **{name: FreeParameter(1.0, ends) for name in own}}
     return found
+
+
+def _goes_on(model: HammersteinWiener) -> bool:
+    """Whether the input map cuts nothing off, which a gain before it would move."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        ends = evaluate_repeatably(outlined_model(model).input_map, _FAR)
+    return bool(ends[0] != ends[1] and ends[2] != ends[3])
 
 
 _FEEDBACK = ("stiffness", "damping")

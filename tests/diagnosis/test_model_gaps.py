@@ -121,10 +121,12 @@ def test_what_has_come_since_is_named_and_confirmed(name):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["hysteresis", "map ends, cut"])
-def test_of_the_whole_catalogue_and_laws_the_right_one_is_confirmed(name):
-    found = diagnosed(CASES[name])
-    assert (score(CASES[name], found), found.confirmed) == ("right", "simulation")
+def test_of_the_whole_catalogue_and_laws_the_right_one_is_confirmed():
+    found = diagnosed(CASES["hysteresis"])
+    assert (score(CASES["hysteresis"], found), found.confirmed) == (
+        "right",
+        "simulation",
+    )
     assert found.after.ratio_to_noise < 1.2
 
 
