@@ -26,13 +26,19 @@ from hwid_cli.diagnosis.parameters import (
 )
 from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals
 from hwid_cli.diagnosis.search import fit_own, fit_point
-from hwid_cli.diagnosis.selection import WITHIN_REACH, decide, select_best
+from hwid_cli.diagnosis.selection import (
+    WITHIN_REACH,
+    DiagnosisVerdict,
+    decide,
+    is_part_of,
+    select_best,
+)
 from hwid_cli.diagnosis.simulator import DIFFERENCE, Runs
 from hwid_cli.diagnosis.stand_in import (
     Moved,
     corrected,
     derived,
-    force_along,
+    force_of_change,
     force_of_motion,
 )
 from hwid_cli.drive.catalogue import CATALOGUE
@@ -55,6 +61,9 @@ _EFFECT_DIFFERENCE = 3e-4
 _NO_WORSE = 1.2
 # The simulation's own parameters rather than further forces, if no more squares are left.
 _PREFERRED = 2.0
+# An effect through the input that leaves more than this share of what the base leaves is
+# tried at the force input as well.
+_CUT_OFF = 0.9
 # Single effects that the simulation is run with: at most so many, of those that leave at
 # most so many times what the best one leaves beside the stand-in, which counts as at least
 # this share of what the base leaves.
@@ -77,6 +86,8 @@ class _Turn:
         Parameters of the simulation that go with it.
     said : float
         Sum of squares that the stand-in alone left.
+    at_force : bool
+        Whether forces act at the simulation's force input, not through its input.
     tried : tuple of CandidateFit and dict of str to float, or None
         What the simulation itself was run with.
     slopes : tuple of ndarray, shape (n_samples, n_free)
@@ -93,6 +104,7 @@ class _Turn:
     fit: CandidateFit
     values: dict[str, float]
     said: float
+    at_force: bool
     tried: tuple[CandidateFit, dict[str, float]] | None = None
     slopes: tuple[np.ndarray, ...] = ()
     slopes_at: dict[str, float] = field(default_factory=dict)
@@ -123,11 +135,12 @@ def confirm(
     Returns
     -------
     Findings
-        Of the simulation's own run, where that is better than without the effects.
+        Of the simulation's own run; without the effects, which stay a lead, where that
+        run leaves clearly more than the stand-in said.
     dict of str to float
-        Parameters of the simulation that go with them.
+        Parameters of the simulation at that run.
     bool
-        Whether that run leaves about as little as the stand-in said.
+        Whether that run bears the effects out.
     """
     chosen, verdict = findings.verdict.chosen, findings.verdict
     if runs.simulator.run is None:
@@ -136,8 +149,24 @@ def confirm(
         return findings, values, True
     best = _settled(findings, chosen, runs, values)
     if best is None:
-        return findings, values, False
-    return _with_run(findings, best), best.values_of_run, _is_as_good(best)
+        return _unconfirmed(findings), values, False
+    found, criteria = _with_run(findings, best), findings.criteria
+    run = found.verdict.chosen
+    is_enough = _is_as_good(best) or criteria.is_nearly_all(run, findings.base)
+    if is_enough and not criteria.replaces(run):
+        return found, best.values_of_run, True
+    return _unconfirmed(findings), best.values_of_run, False
+
+
+def _unconfirmed(findings: Findings) -> Findings:
+    """Findings whose effects the simulation itself, with them in it, does not bear out.
+
+    What a stand-in says is no fact where the simulation says otherwise; it stays a lead.
+    """
+    if not findings.verdict.chosen.effects:
+        return findings
+    verdict = DiagnosisVerdict("unknown", False, findings.base, ())
+    return replace(findings, verdict=verdict, law=None)
 
 
 def single_in_simulation(
@@ -156,7 +185,8 @@ def single_in_simulation(
     Returns
     -------
     tuple of Findings and dict of str to float, or None
-        None where no single effect leaves noise alone in the simulation.
+        None where no single effect leaves so little in the simulation that a further
+        one could not be named.
     """
     if runs.simulator.run is None or not findings.base.is_usable:
         return None
@@ -166,9 +196,8 @@ def single_in_simulation(
     tried: dict[tuple[str, ...], _Turn] = {}
     fits: dict[tuple[str, ...], CandidateFit] = {}
     for one in _likely(findings):
-        done = [fit for fit in fits.values() if findings.criteria.is_complete(fit)]
-        if done and not _is_near(findings, one, done):
-            break
+        if _is_settled_by(findings, one, list(fits.values())):
+            continue
         turn = _settled(findings, one, runs, values)
         if turn is not None:
             tried[one.effects], fits[one.effects] = turn, _fit_of_run(findings, turn)
@@ -197,10 +226,11 @@ def _base_in_simulation(
 
 
 def _likely(findings: Findings) -> list[CandidateFit]:
-    """Single effects that leave least beside the stand-in, the best first."""
+    """Single effects that leave least beside the stand-in, limit cases first."""
     criteria = findings.criteria
     usable = [one for one in findings.found.fits.values()
-              if one.is_usable and len(one.effects) == 1]  # fmt: skip
+              if one.is_usable and len(one.effects) == 1
+              and not criteria.replaces(one)]  # fmt: skip
     usable.sort(key=criteria.excess)
     if not usable:
         return []
@@ -208,16 +238,61 @@ def _likely(findings: Findings) -> list[CandidateFit]:
         criteria.excess(usable[0]), _LEAST_LEFT * criteria.excess(findings.base)
     )
     near = [one for one in usable if criteria.excess(one) <= _LIKELY * least]
-    return near[:_MOST_SINGLES]
+    first = near[:_MOST_SINGLES]
+    # What leaves little more with fewer parameters may be all of it.
+    limits = [one for one in near if one not in first
+              and any(is_part_of(one, wide) for wide in first)]  # fmt: skip
+    return sorted([*first, *limits], key=lambda one: -_n_including(one, near))
+
+
+def _n_including(one: CandidateFit, others: Sequence[CandidateFit]) -> int:
+    """Of how many others an effect is a limit case."""
+    return sum(is_part_of(one, other) for other in others if other is not one)
+
+
+def _is_settled_by(
+    findings: Findings, one: CandidateFit, fits: Sequence[CandidateFit]
+) -> bool:
+    """Whether runs with other effects leave nothing that an effect could explain."""
+    criteria = findings.criteria
+    if any(criteria.is_complete(fit) and is_part_of(fit, one) for fit in fits):
+        return True
+    done = [fit for fit in fits if criteria.is_nearly_all(fit, findings.base)]
+    is_limit = any(is_part_of(one, fit) for fit in done)
+    return bool(done) and not is_limit and not _is_near(findings, one, done)
 
 
 def _settled(
     findings: Findings, fit: CandidateFit, runs: Runs, values: dict[str, float]
 ) -> _Turn | None:
     """Best run of the simulation with a set of effects; None if it is no better."""
-    # The simulation's own parameters do what the stand-in's base did; where they cannot,
-    # forces that go with displacement, velocity and input do it.
-    turn = _Turn(findings.problem, fit, values, float(fit.sse.sum()))
+    has_force = runs.simulator.capabilities.force
+    enters = {CATALOGUE[one].enters for one in fit.effects}
+    at_force = has_force and bool(enters - {"command", "output"})
+    said = float(fit.sse.sum())
+    turn = _Turn(findings.problem, fit, values, said, at_force)
+    best = _best_of(findings, turn, runs)
+    without = float(findings.base.sse.sum())
+    if (
+        fit.effects
+        and has_force
+        and not at_force
+        and best.sse.sum() > _CUT_OFF * without
+    ):
+        # A map of the simulation may cut off what should come through its input.
+        other = _best_of(findings, replace(turn, at_force=True), runs)
+        best = min(best, other, key=lambda one: float(one.sse.sum()))
+    # A run that is worse than without the effect says nothing of it.
+    is_worse = bool(fit.effects) and float(best.sse.sum()) >= without
+    return None if best.tried is None or is_worse else best
+
+
+def _best_of(findings: Findings, turn: _Turn, runs: Runs) -> _Turn:
+    """Best turn, of those in which the simulation's own parameters may do enough.
+
+    They do what the stand-in's base did; where they cannot, forces that go with
+    displacement, velocity and input do it.
+    """
     best = None
     if runs.simulator.free:
         held = replace(turn, problem=_held(findings.problem))
@@ -226,12 +301,7 @@ def _settled(
         other = _best_turn(findings, turn, runs)
         if best is None or other.sse.sum() * _PREFERRED < best.sse.sum():
             best = other
-    # A run that is worse than without the effect says nothing of it: a map of the
-    # simulation may cut off what should come through its input.
-    is_worse = bool(fit.effects) and float(best.sse.sum()) >= float(
-        findings.base.sse.sum()
-    )
-    return None if best.tried is None or is_worse else best
+    return best
 
 
 def _is_near(
@@ -259,7 +329,7 @@ def _decided(
         return unclear_effects(problem, one, findings.scales)
 
     verdict = decide(criteria, findings.given_sse, base, fits, (best,), unclear)
-    if verdict.word not in ("named", "ambiguous") or not verdict.is_complete:
+    if not verdict.chosen.effects or not criteria.is_nearly_all(verdict.chosen, base):
         return None
     turn = tried[verdict.chosen.effects]
     found = replace(findings.found, fits={**findings.found.fits, **fits})
@@ -319,7 +389,7 @@ def _next_turn(findings: Findings, turn: _Turn, runs: Runs) -> _Turn | None:
     ]
     if not all(np.isfinite(one).all() for one in forces):
         return None
-    push = partial(_pushed, runs, problem, turn.fit, forces)
+    push = partial(_pushed, runs, problem, forces, turn.at_force)
     found = push(turn.values)
     late = [
         run.output - motion.position - (0.0 if one.offset is None else one.offset)
@@ -331,6 +401,7 @@ def _next_turn(findings: Findings, turn: _Turn, runs: Runs) -> _Turn | None:
         fit=turn.fit,
         values=turn.values,
         said=turn.said,
+        at_force=turn.at_force,
         slopes=turn.slopes,
         slopes_at=turn.slopes_at,
         tried=(turn.fit, turn.values),
@@ -384,7 +455,8 @@ def _with_values(
         The last runs, and the forces that they were made with.
     """
     (found, forces), slopes = run_with, turn.slopes
-    fit, change = _fitted_together(turn.problem, turn.fit, slopes, findings)
+    pushes = _pushes(turn.problem, slopes, found)
+    fit, change = _fitted_together(turn.problem, turn.fit, (slopes, pushes), findings)
     values = dict(turn.values)
     for column, (name, one) in enumerate(runs.simulator.free.items()):
         low, high = one.bounds or (-np.inf, np.inf)
@@ -446,10 +518,15 @@ def _slopes(
 def _fitted_together(
     problem: DiagnosisProblem,
     before: CandidateFit,
-    slopes: Sequence[np.ndarray],
+    moved_by: tuple[Sequence[np.ndarray], Sequence[np.ndarray]],
     findings: Findings,
 ) -> tuple[CandidateFit, np.ndarray]:
     """Fit of effects and of the simulation's parameters.
+
+    Parameters
+    ----------
+    moved_by : tuple of two sequences of ndarray, shape (n_samples, n_free)
+        What these parameters change: the output, and the force of the stand-in.
 
     Returns
     -------
@@ -459,8 +536,8 @@ def _fitted_together(
     """
     rows = [row for row, one in enumerate(problem.signals) if not one.is_held_out]
     fit_layout, point = rebuilt(problem, before, findings.scales)
+    slopes, pushes = moved_by
     sizes = _sizes(problem, slopes, findings.criteria.noise.rms)
-    pushes = _pushes(problem, slopes)
     n_free, n_shared = sizes.size, len(fit_layout.shared)
 
     def changed(coordinates: np.ndarray) -> DiagnosisProblem:
@@ -500,7 +577,9 @@ def _sizes(
 
 
 def _pushes(
-    problem: DiagnosisProblem, slopes: Sequence[np.ndarray]
+    problem: DiagnosisProblem,
+    slopes: Sequence[np.ndarray],
+    found: Sequence[SimulatorRun],
 ) -> list[np.ndarray]:
     """Forces that move the stand-in as the simulation's parameters do.
 
@@ -510,11 +589,11 @@ def _pushes(
     return [
         np.column_stack(
             [
-                force_along(drive, _moved_by(column, one), np.zeros(column.size))
+                force_of_change(drive, _moved_by(column, one), run.output)
                 for column in slope.T
             ]
         )
-        for one, slope in zip(problem.signals, slopes, strict=True)
+        for one, slope, run in zip(problem.signals, slopes, found, strict=True)
     ]
 
 
@@ -538,13 +617,12 @@ def _derivatives(
 def _pushed(
     runs: Runs,
     problem: DiagnosisProblem,
-    fit: CandidateFit,
     forces: Sequence[np.ndarray],
+    at_force: bool,
     values: Mapping[str, float],
 ) -> list[SimulatorRun]:
     """Run the simulation with forces, at its force input or through its input's gain."""
-    enters = {CATALOGUE[one].enters for one in fit.effects}
-    if runs.simulator.capabilities.force and enters - {"command", "output"}:
+    if at_force:
         return runs.of(problem.signals, values, forces)
     gain = problem.drive.force_constant_N_per_A
     inputs = [

@@ -1,6 +1,6 @@
 """Diagnosis of a simulation that cannot be opened, by a drive that stands for it.
 
-Its parameters are fitted again where there are some; a linear drive then stands for it
+Its parameters are fitted again where there are some; a plain drive then stands for it
 (``stand_in``), and what that lacks is looked for as for any drive. What is found is put
 into the simulation itself as a force along its motion, and that run corrects the stand-in,
 until both agree: only then is it confirmed. docs/method_diagnosis.md, eq. (D30) to (D33).
@@ -8,7 +8,6 @@ until both agree: only then is it confirmed. docs/method_diagnosis.md, eq. (D30)
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -29,7 +28,7 @@ from hwid_cli.diagnosis.stand_in import (
     standing_for,
 )
 from hwid_cli.records.diagnosis import BaseParameter, Diagnosis
-from hwid_cli.records.drive import Drive
+from hwid_cli.records.drive import StandIn
 from hwid_cli.records.experiment import DiagnoseOptions, SimulationOptions
 from hwid_cli.records.programs import SimulatorRun
 from hwid_cli.records.recordings import Recording
@@ -79,7 +78,7 @@ def diagnose_foreign(
         given = runs.of(problem.signals, values)
     refitted = values
     for _ in range(_MOST_SEARCHES):
-        drive = replace(problem.drive, **_base(fit_stand_in(problem.signals, given)))
+        drive = _standing(problem, given)
         drive = _in_newtons(runs, problem.signals, given, values, drive)
         drive = replace(
             drive, effects={k: dict(v) for k, v in simulator.effects.items()}
@@ -88,17 +87,18 @@ def diagnose_foreign(
         found, moved, is_confirmed = _found(
             standing, options, (runs, values), on_round, given_sse
         )
-        is_done = is_confirmed and found.verdict.is_complete
+        chosen, criteria = found.verdict.chosen, found.criteria
+        is_done = is_confirmed and criteria.is_nearly_all(chosen, found.base)
         has_moved = any(
             abs(moved[one] - values[one]) > _MOVED * abs(values[one])
             for one in simulator.free
         )
-        values = moved
+        before, values = values, moved
         if is_done or not has_moved:
             break
         # Parameters that imitated what is missing have led elsewhere.
         given = runs.of(problem.signals, values)
-    told = _told(found, simulator, (refitted, values))
+    told = _told(found, simulator, (refitted, values if is_confirmed else before))
     confirmed = "simulation" if is_confirmed else "surrogate"
     return replace(told, confirmed=confirmed)
 
@@ -133,9 +133,15 @@ def _found(
     return confirm(found, runs, values)
 
 
-def _base(drive: Drive) -> dict[str, Any]:
-    names = ("mass_kg", "damping_N_s_per_m", "stiffness_N_per_m")
-    return {name: getattr(drive, name) for name in (*names, "force_constant_N_per_A")}
+def _standing(
+    problem: DiagnosisProblem, given: Sequence[SimulatorRun], *, may_curve: bool = True
+) -> StandIn:
+    """The stand-in, with where laws count from."""
+    return replace(
+        fit_stand_in(problem.signals, given, may_curve=may_curve),
+        reference_current_A=problem.drive.reference_current_A,
+        reference_displacement_m=problem.drive.reference_displacement_m,
+    )
 
 
 def _sse(signals: Sequence[Signals], runs: Sequence[SimulatorRun]) -> np.ndarray:
@@ -147,7 +153,7 @@ def _sse(signals: Sequence[Signals], runs: Sequence[SimulatorRun]) -> np.ndarray
 
 
 def _with_stand_in(
-    problem: DiagnosisProblem, drive: Drive, given: Sequence[SimulatorRun]
+    problem: DiagnosisProblem, drive: StandIn, given: Sequence[SimulatorRun]
 ) -> DiagnosisProblem:
     """The problem of a drive that moves as the simulation did."""
     signals = []
@@ -215,8 +221,8 @@ def _in_newtons(
     signals: Sequence[Signals],
     given: Sequence[SimulatorRun],
     values: Mapping[str, float],
-    drive: Drive,
-) -> Drive:
+    drive: StandIn,
+) -> StandIn:
     """The stand-in with forces in N, where a force can be put into the simulation."""
     if not runs.simulator.capabilities.force:
         return drive
@@ -246,8 +252,10 @@ def stand_in_for(
     simulator: Simulator,
     options: DiagnoseOptions,
     run_tasks: RunTasks,
-) -> tuple[Drive, tuple[Signals, ...]]:
-    """Linear drive that stands for a simulation that can be run, and what it was fitted to.
+    *,
+    may_curve: bool = True,
+) -> tuple[StandIn, tuple[Signals, ...]]:
+    """Plain drive that stands for a simulation that can be run, and what it was fitted to.
 
     Parameters
     ----------
@@ -255,12 +263,14 @@ def stand_in_for(
         At least one.
     options : DiagnoseOptions
         Which of them are held out: laws that need a reference count from the others.
+    may_curve : bool
+        Whether its spring may be curved.
     """
     held_out = held_out_of(recordings, options)
     problem = prepare(recordings, SimulationOptions(), options, held_out)
     runs = Runs(simulator, run_tasks)
     given = runs.of(problem.signals, simulator.values)
-    drive = replace(problem.drive, **_base(fit_stand_in(problem.signals, given)))
+    drive = _standing(problem, given, may_curve=may_curve)
     return (
         _in_newtons(runs, problem.signals, given, simulator.values, drive),
         problem.signals,

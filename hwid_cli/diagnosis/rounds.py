@@ -37,7 +37,6 @@ from hwid_cli.diagnosis.problem import DiagnosisProblem
 from hwid_cli.diagnosis.scales import scales_of_fit
 from hwid_cli.diagnosis.selection import (
     LEAST_ADDED,
-    LEAST_LAST_CONTRIBUTION,
     SelectionCriteria,
     is_part_of,
     select_best,
@@ -186,7 +185,7 @@ def run_rounds(
         if winner is None or (best and not search.is_better(winner, best[-1])):
             break
         best.append(winner)
-        if rounds.criteria.is_complete(winner) or search.is_nearly_all(winner):
+        if rounds.criteria.is_nearly_all(winner, rounds.base):
             break
         if is_enough(winner):
             break
@@ -277,12 +276,6 @@ class _Search:
         """Whether a further effect is worth looking for more."""
         against = self.rounds.criteria.evidence(larger, smaller)
         return against.gain >= LEAST_STEP and against.explained >= LEAST_FURTHER
-
-    def is_nearly_all(self, found: CandidateFit) -> bool:
-        """Whether so little remains that no further effect could be named."""
-        criteria = self.rounds.criteria
-        whole = criteria.excess(self.rounds.base)
-        return criteria.excess(found) < LEAST_LAST_CONTRIBUTION * whole
 
     def parents(self, size: int) -> list[CandidateFit]:
         """Sets to build on: the best one, and the next that is of another kind."""

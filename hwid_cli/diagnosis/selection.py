@@ -14,11 +14,12 @@ from itertools import combinations
 import numpy as np
 from scipy.stats import f as f_distribution
 
-from hwid_cli.diagnosis.parameters import START, is_factor
+from hwid_cli.diagnosis.parameters import BASE, START, is_factor
 from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals
 from hwid_cli.drive.catalogue import CATALOGUE, public_id
 from hwid_cli.records.candidates import CandidateFit, RankedCandidate
 from hwid_cli.records.diagnosis import STILL_LARGE, NoiseFloor
+from hwid_cli.records.drive import StandIn
 from hwid_cli.records.own_effects import plain_name
 
 # A set of effects must lower the criterion by this much against the smaller one.
@@ -63,6 +64,10 @@ WITHIN_REACH = 1.25
 LEAST_OF_RIVALS = 0.35
 # Share of what a verdict leaves that makes a set worth following.
 LEAST_LEAD = 0.25
+# The base of a stand-in that a candidate changes by more than this factor is no longer that
+# of the simulation. A damping may be near nothing, and so its factor anything.
+REPLACED = 3.0
+_OF_SIMULATION = ("stiffness_N_per_m", "force_constant_N_per_A")
 # An effect that includes another one must add this share of what both gain.
 LEAST_ADDED = 0.03
 
@@ -96,12 +101,15 @@ class SelectionCriteria:
     is_held_out : ndarray of bool, shape (n_recordings,)
     inputs : ndarray, shape (n_recordings, n_features)
         Size, direction and speed of each recording's input.
+    standing : StandIn or None
+        What stands for the simulation, if anything does.
     """
 
     n_samples: np.ndarray
     is_held_out: np.ndarray
     noise: NoiseFloor
     inputs: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
+    standing: StandIn | None = None
 
     @classmethod
     def of(cls, problem: DiagnosisProblem, noise: NoiseFloor) -> "SelectionCriteria":
@@ -110,9 +118,9 @@ class SelectionCriteria:
         # A single recording validates itself; the report says so.
         held = held if held.any() else ~held
         counts = np.array([one.n_evaluated for one in problem.signals])
-        return cls(
-            counts, held, noise, np.array([_features(one) for one in problem.signals])
-        )
+        features = np.array([_features(one) for one in problem.signals])
+        standing = problem.drive if isinstance(problem.drive, StandIn) else None
+        return cls(counts, held, noise, features, standing)
 
     def rms(self, found: CandidateFit, *, held_out: bool) -> float:
         """RMS over the held-out recordings, or the others.
@@ -191,6 +199,18 @@ class SelectionCriteria:
         """Whether nothing but noise remains."""
         return found.is_usable and found.whiteness <= 1.0
 
+    def is_nearly_all(self, found: CandidateFit, base: CandidateFit) -> bool:
+        """Whether nothing remains, or too little for a further effect to be named.
+
+        Parameters
+        ----------
+        base : CandidateFit
+            Re-fitted, without further effects.
+        """
+        if self.is_complete(found):
+            return True
+        return self.excess(found) < LEAST_LAST_CONTRIBUTION * self.excess(base)
+
     def may_be_named(self, found: CandidateFit, base: CandidateFit) -> bool:
         """Whether the evidence for a set of effects suffices.
 
@@ -217,8 +237,32 @@ class SelectionCriteria:
             and (explains or self.is_complete(found))
             and against.improved >= LEAST_IMPROVED
             and has_size(found)
+            and not self.replaces(found)
             and not self.is_systematic(found)
             and (self.is_complete(found) or not holds_look_alikes(found))
+        )
+
+    def replaces(self, found: CandidateFit) -> bool:
+        """Whether a candidate puts another base in the place of the simulation's.
+
+        What stands for a simulation moves as it does: an effect beside which it has to
+        become another drive says nothing about the simulation.
+
+        References
+        ----------
+        docs/method_diagnosis.md, eq. (D30).
+        """
+        if self.standing is None:
+            return False
+        values = {one.parameter: value
+                  for one, value in zip(found.names, found.values, strict=True)
+                  if one.owner == BASE}  # fmt: skip
+        pairs = [(values[one], getattr(self.standing, one))
+                 for one in _OF_SIMULATION if one in values]  # fmt: skip
+        return any(
+            abs(one) > REPLACED * abs(other) or abs(other) > REPLACED * abs(one)
+            for one, other in pairs
+            if other != 0
         )
 
     def is_systematic(self, found: CandidateFit) -> bool:

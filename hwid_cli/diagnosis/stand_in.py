@@ -1,13 +1,14 @@
-"""A linear drive that stands for a simulation which cannot be opened.
+"""A plain drive that stands for a simulation which cannot be opened.
 
 A mass, a damper and a spring are fitted to what the simulation makes of the recordings'
-inputs. What they do not reproduce becomes a force along each recording, so that the
-stand-in moves as the simulation does; its own equation is only used for what an effect
-changes around that motion. docs/method_diagnosis.md, eq. (D30), (D31).
+inputs; the spring is curved where that is clearly nearer. What they do not reproduce
+becomes a force along each recording, so that the stand-in moves as the simulation does;
+its own equation is only used for what an effect changes around that motion. docs/method_diagnosis.md, eq. (D30), (D31).
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy import sparse
@@ -16,18 +17,25 @@ from scipy.optimize import nnls
 from scipy.signal import butter, sosfiltfilt
 from scipy.sparse.linalg import spsolve
 
+from hwid_cli.diagnosis.candidate import base_of
 from hwid_cli.diagnosis.parameters import drive_at, first_point, parameter_layout
 from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals
 from hwid_cli.diagnosis.scales import scales_of_recordings
 from hwid_cli.diagnosis.search import fit_point
 from hwid_cli.drive.simulation import Motion, parameter_vector, run, set_start
-from hwid_cli.records.drive import Drive
+from hwid_cli.records.drive import BASE_PARAMETERS, Drive, StandIn
 from hwid_cli.records.programs import SimulatorRun
 
 _DEGREE = 5
 # A spring or a damper that gives less of the force than this share is none.
 _LEAST_SHARE = 1e-4
 _LEAST_MASS = 1e-12
+# A straight spring that leaves less than this share of the balance of forces is enough; a
+# curved one has to leave at most this share of that, and to push back over so many times
+# the way that was seen.
+_STRAIGHT = 1e-3
+_CURVED = 0.5
+_PUSHES_BACK = 1.3
 _ITERATIONS = 20
 # A first velocity below this share of the largest is rest.
 _STILL = 1e-3
@@ -65,8 +73,13 @@ def derived(found: SimulatorRun, sample_time_s: float) -> Moved:
     return Moved(found.output, spline.derivative()(time), spline.derivative(2)(time))
 
 
-def fit_stand_in(signals: Sequence[Signals], runs: Sequence[SimulatorRun]) -> Drive:
-    """Linear drive that moves most nearly as a simulation does.
+def fit_stand_in(
+    signals: Sequence[Signals],
+    runs: Sequence[SimulatorRun],
+    *,
+    may_curve: bool = True,
+) -> StandIn:
+    """Plain drive that moves most nearly as a simulation does.
 
     Its force constant is 1: forces count in the unit of the input.
 
@@ -76,46 +89,93 @@ def fit_stand_in(signals: Sequence[Signals], runs: Sequence[SimulatorRun]) -> Dr
         With the inputs.
     runs : sequence of SimulatorRun
         What the simulation made of them.
+    may_curve : bool
+        Whether its spring may be curved.
 
     References
     ----------
     docs/method_diagnosis.md, eq. (D30).
     """
-    drive = _by_regression(signals, runs)
-    return _in_free_run(drive, signals, runs)
+    straight, left = _by_regression(signals, runs, is_curved=False)
+    curved, left_then = _by_regression(signals, runs, is_curved=True)
+    widest = _PUSHES_BACK * max(float(np.max(np.abs(one.output))) for one in runs)
+    is_nearer = left > _STRAIGHT and left_then <= _CURVED * left
+    is_curved = may_curve and is_nearer and _pushes_back(curved, widest)
+    return _in_free_run(curved if is_curved else straight, signals, runs)
 
 
-def _by_regression(signals: Sequence[Signals], runs: Sequence[SimulatorRun]) -> Drive:
-    """Mass, damping and stiffness that balance the input along the motion."""
+def _by_regression(
+    signals: Sequence[Signals], runs: Sequence[SimulatorRun], *, is_curved: bool
+) -> tuple[StandIn, float]:
+    """Mass, damping and spring that balance the input along the motion.
+
+    Returns
+    -------
+    StandIn
+    float
+        Share of the input that it leaves.
+    """
     rows, right = [], []
     for one, found in zip(signals, runs, strict=True):
         moved = derived(found, one.sample_time_s)
         size = float(np.std(one.driven_by)) or 1.0
-        # An offset of either sign is two columns that are not negative.
-        constant = np.ones(one.driven_by.size)
-        columns = (moved.acceleration, moved.velocity, moved.position)
-        rows.append(np.column_stack([*columns, constant, -constant]) / size)
+        # What may have either sign is two columns that are not negative.
+        signed = [np.ones(one.driven_by.size)]
+        if is_curved:
+            signed += [moved.position**2, moved.position**3]
+        columns = [moved.acceleration, moved.velocity, moved.position]
+        columns += [sign * column for column in signed for sign in (1.0, -1.0)]
+        rows.append(np.column_stack(columns) / size)
         right.append(one.driven_by / size)
     matrix, vector = np.concatenate(rows), np.concatenate(right)
     lengths = np.sqrt(np.sum(matrix**2, axis=0))
     lengths[lengths == 0] = 1.0
-    values = nnls(matrix / lengths, vector)[0] / lengths
-    shares = values * lengths / np.sqrt(np.sum(vector**2))
+    found_values, left = nnls(matrix / lengths, vector)
+    values = found_values / lengths
+    whole = float(np.sqrt(np.sum(vector**2))) or 1.0
+    shares = values * lengths / whole
     mass, damping, stiffness = values[:3]
     if shares[0] < _LEAST_SHARE:
         # Hardly any inertia: as much as a sampled motion can show.
-        mass = max(_LEAST_SHARE * np.sqrt(np.sum(vector**2)) / lengths[0], _LEAST_MASS)
-    return Drive(
+        mass = max(_LEAST_SHARE * whole / lengths[0], _LEAST_MASS)
+    bends = values[5::2] - values[6::2]
+    drive = StandIn(
         mass_kg=float(mass),
         damping_N_s_per_m=float(damping if shares[1] > _LEAST_SHARE else 0.0),
         stiffness_N_per_m=float(stiffness if shares[2] > _LEAST_SHARE else 0.0),
         force_constant_N_per_A=1.0,
+        quadratic_N_per_m2=float(bends[0]) if is_curved else 0.0,
+        cubic_N_per_m3=float(bends[1]) if is_curved else 0.0,
     )
+    return drive, float(left) / whole
+
+
+def _pushes_back(drive: StandIn, widest: float) -> bool:
+    """Whether a spring becomes stiffer or softer, but never lets go."""
+    return bool(np.all(_stiffness_at(drive, np.linspace(-widest, widest, 101)) > 0))
+
+
+def _stiffness_at(drive: Drive, position: np.ndarray) -> np.ndarray:
+    quadratic, cubic = _bends(drive)
+    bend = 2 * quadratic + 3 * cubic * position
+    return np.asarray(drive.stiffness_N_per_m + bend * position)
+
+
+def _spring_force(drive: Drive, position: np.ndarray) -> np.ndarray:
+    quadratic, cubic = _bends(drive)
+    bend = quadratic + cubic * position
+    return np.asarray((drive.stiffness_N_per_m + bend * position) * position)
+
+
+def _bends(drive: Drive) -> tuple[float, float]:
+    if not isinstance(drive, StandIn):
+        return 0.0, 0.0
+    return drive.quadratic_N_per_m2, drive.cubic_N_per_m3
 
 
 def _in_free_run(
-    drive: Drive, signals: Sequence[Signals], runs: Sequence[SimulatorRun]
-) -> Drive:
+    drive: StandIn, signals: Sequence[Signals], runs: Sequence[SimulatorRun]
+) -> StandIn:
     """The same, nearer in a free run, where that can be found."""
     compared = tuple(
         replace(
@@ -134,18 +194,12 @@ def _in_free_run(
     found = fit_point(problem, fit_layout, point, max_iterations=_ITERATIONS)
     if not np.isfinite(found.sse):
         return drive
-    better = drive_at(problem, fit_layout, found.point)
-    gain = better.force_constant_N_per_A
-    return replace(
-        better,
-        mass_kg=better.mass_kg / gain,
-        damping_N_s_per_m=better.damping_N_s_per_m / gain,
-        stiffness_N_per_m=better.stiffness_N_per_m / gain,
-        force_constant_N_per_A=1.0,
-    )
+    base: dict[str, Any] = base_of(drive_at(problem, fit_layout, found.point))
+    better = replace(drive, **base)
+    return in_newtons(better, better.force_constant_N_per_A)
 
 
-def in_newtons(drive: Drive, force_gain: float) -> Drive:
+def in_newtons(drive: StandIn, force_gain: float) -> StandIn:
     """The same drive with forces in another unit.
 
     Parameters
@@ -153,13 +207,9 @@ def in_newtons(drive: Drive, force_gain: float) -> Drive:
     force_gain : float, [unit of the input/N]
         By how much of the input a force of 1 N can be replaced.
     """
-    return replace(
-        drive,
-        mass_kg=drive.mass_kg / force_gain,
-        damping_N_s_per_m=drive.damping_N_s_per_m / force_gain,
-        stiffness_N_per_m=drive.stiffness_N_per_m / force_gain,
-        force_constant_N_per_A=drive.force_constant_N_per_A / force_gain,
-    )
+    names = ("mass_kg", *BASE_PARAMETERS, "quadratic_N_per_m2", "cubic_N_per_m3")
+    scaled: dict[str, Any] = {one: getattr(drive, one) / force_gain for one in names}
+    return replace(drive, **scaled)
 
 
 def force_along(drive: Drive, moved: Moved, driven_by: np.ndarray) -> np.ndarray:
@@ -180,8 +230,27 @@ def force_along(drive: Drive, moved: Moved, driven_by: np.ndarray) -> np.ndarray
     return np.asarray(
         drive.mass_kg * moved.acceleration
         + drive.damping_N_s_per_m * moved.velocity
-        + drive.stiffness_N_per_m * moved.position
+        + _spring_force(drive, moved.position)
         - drive.force_constant_N_per_A * driven_by
+    )
+
+
+def force_of_change(drive: Drive, change: Moved, position: np.ndarray) -> np.ndarray:
+    """Further force that a drive needs to move a little differently.
+
+    Parameters
+    ----------
+    position : ndarray, shape (n_samples,), [m]
+        Along which.
+
+    Returns
+    -------
+    ndarray, shape (n_samples,), [N]
+    """
+    return np.asarray(
+        drive.mass_kg * change.acceleration
+        + drive.damping_N_s_per_m * change.velocity
+        + _stiffness_at(drive, position) * change.position
     )
 
 
@@ -253,7 +322,8 @@ def corrected(
     """
     step, nothing = signals.sample_time_s, np.zeros(0)
     change = derived(SimulatorRun(late, nothing), step)
-    more = signals.force + _slow(force_along(drive, change, np.zeros(late.size)))
+    # Half way between where it was and where it has to be.
+    more = signals.force + _slow(force_of_change(drive, change, target - 0.5 * late))
     there = derived(SimulatorRun(target, nothing), step)
     plain = moved_plainly(drive, signals, more + force, there)
     return replace(signals, force=more, offset=target - plain.position)
@@ -278,12 +348,11 @@ def force_of_motion(drive: Drive, signals: Signals, motion: Motion) -> np.ndarra
     """
     dt, x, v = signals.sample_time_s, motion.position, motion.velocity
     way = np.diff(x)
-    area = 0.5 * dt * (x[1:] + x[:-1]) - dt**2 / 12 * np.diff(v)
-    impulse = (
-        drive.mass_kg * np.diff(v)
-        + drive.damping_N_s_per_m * way
-        + drive.stiffness_N_per_m * area
-    )
+    # Simpson's rule on the cubics through positions and velocities.
+    middle = 0.5 * (x[1:] + x[:-1]) - dt / 8 * np.diff(v)
+    ends = _spring_force(drive, x)
+    area = dt / 6 * (ends[1:] + ends[:-1] + 4 * _spring_force(drive, middle))
+    impulse = drive.mass_kg * np.diff(v) + drive.damping_N_s_per_m * way + area
     given = drive.force_constant_N_per_A * signals.driven_by
     if signals.force.size:
         given = given + signals.force

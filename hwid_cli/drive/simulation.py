@@ -17,7 +17,7 @@ from hwid_cli.drive.effect import Effect, Values
 from hwid_cli.drive.motion.move import move
 from hwid_cli.drive.output import on_other_clock, read
 from hwid_cli.drive.own_effect import with_formulas
-from hwid_cli.records.drive import Drive
+from hwid_cli.records.drive import Drive, StandIn
 
 # A smooth input is followed in straight lines of a quarter of a sample: at a fifth of the
 # sampling frequency a straight line over a whole sample loses 12 % of the amplitude, one
@@ -209,6 +209,9 @@ def parameter_vector(drive: Drive, effects: Mapping[str, Values]) -> np.ndarray:
     vector[slots.DAMPING] = drive.damping_N_s_per_m
     vector[slots.STIFFNESS] = drive.stiffness_N_per_m
     vector[slots.FORCE_CONSTANT] = drive.force_constant_N_per_A
+    if isinstance(drive, StandIn):
+        vector[slots.QUADRATIC] = drive.quadratic_N_per_m2
+        vector[slots.CUBIC] = drive.cubic_N_per_m3
     vector[slots.REFERENCE_CURRENT] = drive.reference_current_A
     vector[slots.REFERENCE_DISPLACEMENT] = drive.reference_displacement_m
     vector[slots.ZERO_ORDER_HOLD] = float(drive.hold == "zero")

@@ -213,6 +213,22 @@ class Drive:
         check_fields(self)
 
 
+@dataclass(frozen=True)
+class StandIn(Drive):
+    """A drive that stands for a simulation which cannot be opened.
+
+    Its spring may be curved, ``k x + k2 x^2 + k3 x^3``, beside any effect.
+
+    Parameters
+    ----------
+    quadratic_N_per_m2, cubic_N_per_m3 : float, [N/m^2], [N/m^3]
+        k2 and k3, of either sign.
+    """
+
+    quadratic_N_per_m2: float = 0.0
+    cubic_N_per_m3: float = 0.0
+
+
 @dataclass(frozen=True, eq=False)
 class DriveResponse:
     """A recording beside the simulation of its drive.

@@ -50,8 +50,31 @@ class FreeParameter:
             raise Refused(Refusal(self.value, expected, ("value",)))
 
 
+class _Parametrised:
+    """Parameters of a simulation, by name: numbers that stay, and those that are free."""
+
+    parameters: dict[str, float | FreeParameter]
+
+    @property
+    def free(self) -> dict[str, FreeParameter]:
+        """Parameters that may be fitted again, by name."""
+        return {
+            name: one
+            for name, one in self.parameters.items()
+            if isinstance(one, FreeParameter)
+        }
+
+    @property
+    def values(self) -> dict[str, float]:
+        """All parameters as given, by name."""
+        return {
+            name: one.value if isinstance(one, FreeParameter) else float(one)
+            for name, one in self.parameters.items()
+        }
+
+
 @dataclass(frozen=True, kw_only=True)
-class _Program:
+class _Program(_Parametrised):
     """What all simulations that can be run have in common.
 
     Parameters
@@ -80,23 +103,6 @@ class _Program:
     effects: Annotated[dict[str, dict[str, float | str]], Repeatable()] = field(
         default_factory=dict
     )
-
-    @property
-    def free(self) -> dict[str, FreeParameter]:
-        """Parameters that may be fitted again, by name."""
-        return {
-            name: one
-            for name, one in self.parameters.items()
-            if isinstance(one, FreeParameter)
-        }
-
-    @property
-    def values(self) -> dict[str, float]:
-        """All parameters as given, by name."""
-        return {
-            name: one.value if isinstance(one, FreeParameter) else float(one)
-            for name, one in self.parameters.items()
-        }
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -140,7 +146,7 @@ class CommandSimulation(_Program):
 
 
 @dataclass(frozen=True, kw_only=True)
-class ModelSimulation:
+class ModelSimulation(_Parametrised):
     """A model that was fitted: out of a folder of results, or exported as JSON.
 
     Parameters
@@ -151,6 +157,8 @@ class ModelSimulation:
         Folder of results in place of a file, relative to the configuration.
     name : str
         Of the model in it; empty: the one that covers most recordings in the final test.
+    parameters : dict of str to float or FreeParameter
+        Factors of its linear block (``simulations.model``); a plain number stays.
     model : HammersteinWiener or None
         That the file holds; None until it is read.
     """
@@ -159,6 +167,7 @@ class ModelSimulation:
     file: str = ""
     results: str = ""
     name: str = ""
+    parameters: dict[str, float | FreeParameter] = field(default_factory=dict)
     model: HammersteinWiener | None = field(default=None, metadata=NO_KEY)
     model_sample_time_s: float = field(default=0.0, metadata=NO_KEY)
     effects: Annotated[dict[str, dict[str, float | str]], Repeatable()] = field(

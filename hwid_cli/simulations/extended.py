@@ -104,9 +104,32 @@ def run_extended(
     SimulationError
         If simulation and drive do not agree.
     """
-    plain, stand_in = drives
-    enters = {CATALOGUE[one].enters for one in drive_effects(stand_in)}
+    enters = {CATALOGUE[one].enters for one in drive_effects(drives[1])}
     at_force = has_force and (not enters or bool(enters - {"command", "output"}))
+    best = _settled(simulate, request, drives, at_force=at_force)
+    if best.disagreement > MOST_DISAGREEMENT and has_force and not at_force:
+        # A map of the simulation may cut off what should come through its input.
+        other = _settled(simulate, request, drives, at_force=True)
+        best = min(best, other, key=lambda one: one.disagreement)
+    if best.disagreement > MOST_DISAGREEMENT:
+        raise SimulationError(
+            f"simulation: recording {request.name!r}: with its effects it does not "
+            f"settle: the last two runs differ by {best.disagreement:.0%} of what the "
+            f"effects do; expected less than {MOST_DISAGREEMENT:.0%}; take a smaller "
+            "sample time"
+        )
+    return best
+
+
+def _settled(
+    simulate: Callable[[RunRequest], SimulatorRun],
+    request: RunRequest,
+    drives: tuple[Drive, Drive],
+    *,
+    at_force: bool,
+) -> ExtendedRun:
+    """Run after run until simulation and drive agree; the one that agrees best."""
+    plain, stand_in = drives
     given = simulate(request)
     signals = _standing(plain, given, request)
     best = ExtendedRun(given.output, given.velocity, np.inf)
@@ -126,13 +149,6 @@ def run_extended(
         if disagreement <= _AGREEMENT:
             break
         signals = corrected(signals, plain, late, found.output, force)
-    if best.disagreement > MOST_DISAGREEMENT:
-        raise SimulationError(
-            f"simulation: recording {request.name!r}: with its effects it does not "
-            f"settle: the last two runs differ by {best.disagreement:.0%} of what the "
-            f"effects do; expected less than {MOST_DISAGREEMENT:.0%}; take a smaller "
-            "sample time"
-        )
     return best
 
 

@@ -48,7 +48,10 @@ def extended_program(
     """
     section: Any = extended_foreign(diagnosis, program)
     simulator = simulator_of(section, given.recordings, given.logs)
-    plain, signals = stand_in_for(given.recordings, simulator, given.options, in_turn)
+    # What is exported holds a drive with a straight spring.
+    plain, signals = stand_in_for(
+        given.recordings, simulator, given.options, in_turn, may_curve=False
+    )
     base: dict[str, Any] = {} if program.free else _changed(plain, diagnosis)
     stand_in = replace(
         plain,

@@ -19,6 +19,7 @@ from hwid_cli.records.diagnosis import Diagnosis
 from hwid_cli.records.drive import DriveResponse, told_apart
 from hwid_cli.records.experiment import DiagnoseOptions
 from hwid_cli.records.exported import ExportedModel
+from hwid_cli.records.model import HammersteinWiener
 from hwid_cli.records.programs import (
     CommandSimulation,
     ForeignSimulation,
@@ -30,6 +31,7 @@ from hwid_cli.records.programs import (
 from hwid_cli.records.recordings import CalibrationLog, Recording
 from hwid_cli.simulations.extended import run_extended
 from hwid_cli.simulations.kinds import kind_named
+from hwid_cli.simulations.model import free_parameters
 from hwid_cli.store.final_test_results import read_final_test
 from hwid_cli.store.result_files import has_left_results
 
@@ -75,8 +77,7 @@ def _with_result(options: ModelSimulation, source: str) -> ModelSimulation:
         found = read_stored_model(folder, name)
     except ConfigError as error:
         raise ConfigError(f"{source}: simulation.results: {error}") from error
-    step = found.model.sample_time_s
-    return replace(options, name=name, model=found.model, model_sample_time_s=step)
+    return _filled(replace(options, name=name), found.model, source)
 
 
 def _widest(folder: Path, source: str) -> str:
@@ -105,7 +106,27 @@ def _with_model(options: ModelSimulation, source: str) -> ModelSimulation:
             f"{source}: simulation.file: {options.file} is a physics simulation; "
             "expected a Hammerstein-Wiener model; write its section with kind: drive"
         )
-    return replace(options, model=found.model, model_sample_time_s=found.sample_time_s)
+    model = replace(found.model, sample_time_s=found.sample_time_s)
+    return _filled(options, model, source)
+
+
+def _filled(
+    options: ModelSimulation, model: HammersteinWiener, source: str
+) -> ModelSimulation:
+    """With a model, and those of its parameters that the section does not give."""
+    free = free_parameters(model)
+    unknown = [name for name in options.parameters if name not in free]
+    if unknown:
+        raise ConfigError(
+            f"{source}: simulation.parameters.{unknown[0]}: this model has no such "
+            f"parameter; expected {', '.join(free)}"
+        )
+    return replace(
+        options,
+        model=model,
+        model_sample_time_s=model.sample_time_s,
+        parameters={**free, **options.parameters},
+    )
 
 
 # Fewer recordings than these say too little alone.
@@ -270,7 +291,7 @@ def extended_foreign(
     ]
     changes: dict[str, Any] = {"effects": told_apart(effects)}
     fitted = {one.name: one.after for one in diagnosis.base}
-    if not isinstance(options, ModelSimulation | OutputsSimulation):
+    if not isinstance(options, OutputsSimulation):
         changes["parameters"] = {
             name: replace(one, value=fitted[name])
             if isinstance(one, FreeParameter) and name in fitted

@@ -170,7 +170,7 @@ def score(found, truth):
             ],
         ]
         return "right" if any(one in accepted for one in sets) else "wrong"
-    return "refused" if verdict != "failed" else "failed"
+    return verdict if verdict in ("failed", "law") else "refused"
 
 
 def place_of_truth(folder, truth):

@@ -1,5 +1,7 @@
 """Diagnosis of simulations that cannot be opened, against machines of their own making."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.signal import lsim
@@ -150,6 +152,22 @@ def test_bounds_of_parameters_are_kept():
     diagnosis(Simulator(able, watched, {}, free, GIVEN), effects=FEW)
     assert min(seen) >= 13.0
     assert max(seen) <= 15.0 + 1e-9
+
+
+def test_what_the_simulation_does_not_bear_out_is_no_fact():
+    able = Capabilities(run=True, parameters=True, force=True)
+
+    def deaf(request):
+        # It is said to have a force input, and takes no notice of it.
+        return simulate(replace(request, force=np.zeros(0)))
+
+    found, _ = diagnosis(Simulator(able, deaf, {}, FREE, GIVEN), effects=FEW)
+    assert (found.verdict, found.effects, found.confirmed) == (
+        "unknown",
+        (),
+        "surrogate",
+    )
+    assert any(one.effects == ("coulomb_friction",) for one in found.candidates)
 
 
 SWING_S, SWUNG = 2e-3, 600

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from hwid_cli.diagnosis.parameters import BASE
 from hwid_cli.diagnosis.selection import (
     LEAST_ADDED,
     LEAST_EXPLAINED,
@@ -21,7 +22,9 @@ from hwid_cli.diagnosis.selection import (
     rivals,
     select_best,
 )
+from hwid_cli.records.candidates import ParameterRef
 from hwid_cli.records.diagnosis import VERDICTS
+from hwid_cli.records.drive import StandIn
 from tests.diagnosis.made_up_fits import CRITERIA, HELD_OUT, base, made_up
 from tests.diagnosis.small_drive import problem, recordings, white
 
@@ -460,3 +463,33 @@ def test_a_small_remainder_that_goes_with_no_effect_is_none_but_not_all(sse, whi
 def test_there_is_a_word_for_every_case_and_no_other():
     words = {"named", "ambiguous", "law", "parameters", "unknown", "none"}
     assert set(VERDICTS) == words
+
+
+def with_base(found, **values):
+    names = tuple(ParameterRef(BASE, name) for name in values)
+    return replace(found, names=names, values=np.array(list(values.values())))
+
+
+def test_an_effect_beside_which_the_stand_in_becomes_another_drive_is_not_named():
+    standing = StandIn(
+        mass_kg=1.0, damping_N_s_per_m=1e-3, stiffness_N_per_m=100.0,
+        force_constant_N_per_A=2.0,
+    )  # fmt: skip
+    criteria = replace(CRITERIA, standing=standing)
+    # A damping near nothing may become anything.
+    near = with_base(
+        made_up(GOOD, 150.0), stiffness_N_per_m=250.0, damping_N_s_per_m=1.0
+    )
+    assert criteria.may_be_named(near, base())
+    for changed in ({"stiffness_N_per_m": 310.0}, {"force_constant_N_per_A": 0.6}):
+        far = with_base(made_up(GOOD, 150.0), **changed)
+        assert not criteria.may_be_named(far, base())
+        # A drive whose parameters were only guessed may be far off.
+        assert CRITERIA.may_be_named(far, base())
+
+
+def test_what_leaves_too_little_for_another_name_is_nearly_all():
+    # 100 of noise in each recording, and 300 beyond it before.
+    for left, is_so in ((100.14, True), (100.16, False)):
+        assert CRITERIA.is_nearly_all(made_up(GOOD, left), base()) == is_so
+    assert CRITERIA.is_nearly_all(made_up(GOOD, 110.0, whiteness=0.9), base())

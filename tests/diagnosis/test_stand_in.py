@@ -1,5 +1,7 @@
 """The drive that stands for another simulation, and the force that makes it move so."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.signal import lsim
@@ -9,13 +11,14 @@ from hwid_cli.diagnosis.stand_in import (
     derived,
     fit_stand_in,
     force_along,
+    force_of_change,
     force_of_motion,
     in_newtons,
     moved_plainly,
     standing_for,
 )
 from hwid_cli.drive.simulation import parameter_vector, run
-from hwid_cli.records.drive import Drive
+from hwid_cli.records.drive import Drive, StandIn
 from hwid_cli.records.programs import SimulatorRun
 from tests.black_boxes.plants import HARDENING, integrate
 
@@ -52,6 +55,7 @@ def test_the_stand_in_of_a_linear_drive_is_this_drive(given):
         found.force_constant_N_per_A,
     ]  # fmt: skip
     np.testing.assert_allclose(values, expected, rtol=1e-4)
+    assert (found.quadratic_N_per_m2, found.cubic_N_per_m3) == (0.0, 0.0)
     same = in_newtons(found, 1 / GAIN)
     assert same.mass_kg == pytest.approx(MASS, rel=1e-4)
     assert same.force_constant_N_per_A == pytest.approx(GAIN, rel=1e-9)
@@ -110,3 +114,63 @@ def test_the_force_of_friction_leads_the_plain_drive_the_same_way(given):
     again = linear(GAIN * INPUTS[0] + force)
     # Jumps within a sample are spread over it.
     assert np.std(again - motion.position) < 2e-3 * np.std(motion.position - without)
+
+
+def hardening(command, **values):
+    return integrate(HARDENING, {**HARDENING.values, **values}, command, STEP_S)
+
+
+def test_the_spring_of_a_stand_in_is_curved_where_that_of_the_simulation_is(given):
+    outputs = [hardening(one) for one in INPUTS]
+    runs = [SimulatorRun(one, NOTHING) for one in outputs]
+    found = in_newtons(fit_stand_in(given, runs), 1 / HARDENING.values["kt"])
+    bends = (found.stiffness_N_per_m, found.cubic_N_per_m3)
+    # Derivatives of a spline at steps of 1 ms.
+    assert bends == pytest.approx((900.0, 4e6), rel=0.01)
+    plain = moved_plainly(found, given[0], 0 * TIME, derived(runs[0], STEP_S))
+    assert np.std(plain.position - outputs[0]) < 1e-2 * np.std(outputs[0])
+    straight = fit_stand_in(given, runs, may_curve=False)
+    assert straight.cubic_N_per_m3 == 0.0
+
+
+def test_a_spring_that_would_let_go_beyond_what_was_seen_stays_straight():
+    def softened(share):
+        # It lets go at 12.2 mm.
+        commands = [share * one for one in INPUTS]
+        runs = [SimulatorRun(hardening(one, k3=-2e6), NOTHING) for one in commands]
+        widest = max(np.max(np.abs(one.output)) for one in runs)
+        return fit_stand_in([signals(one) for one in commands], runs), widest
+
+    found, widest = softened(0.5)
+    assert found.cubic_N_per_m3 < 0
+    assert widest < 12.2e-3 / 1.3
+    found, widest = softened(0.62)
+    assert found.cubic_N_per_m3 == 0.0
+    assert 12.2e-3 / 1.3 < widest < 12.2e-3
+
+
+CURVED = StandIn(
+    mass_kg=0.3, damping_N_s_per_m=8.0, stiffness_N_per_m=900.0,
+    force_constant_N_per_A=5.0, quadratic_N_per_m2=2e4, cubic_N_per_m3=4e6,
+)  # fmt: skip
+
+
+def test_what_an_effect_made_is_what_a_curved_spring_did_not(given):
+    drag = {"quadratic_drag": {"drag_N_s2_per_m2": 40.0}}
+    motion = run(INPUTS[0], parameter_vector(CURVED, drag), STEP_S)
+    found = force_of_motion(CURVED, given[0], motion)
+    law = -40.0 * motion.velocity * np.abs(motion.velocity)
+    assert np.max(np.abs(found - law)) < 2e-3 * np.max(np.abs(law))
+
+
+def test_a_small_further_force_moves_a_curved_stand_in_as_it_says(given):
+    push = 0.05 * np.sin(2 * np.pi * 6 * TIME)
+    nothing = derived(SimulatorRun(0 * TIME, NOTHING), STEP_S)
+    before = moved_plainly(CURVED, given[0], 0 * TIME, nothing).position
+    after = moved_plainly(CURVED, given[0], push, nothing).position
+    change = derived(SimulatorRun(after - before, NOTHING), STEP_S)
+    found = force_of_change(CURVED, change, 0.5 * (before + after))
+    # Ends of the spline apart.
+    assert np.max(np.abs(found - push)[20:-20]) < 0.01 * np.max(push)
+    straight = force_of_change(replace(CURVED, cubic_N_per_m3=0.0), change, before)
+    assert np.max(np.abs(straight - push)[20:-20]) > 0.1 * np.max(push)
