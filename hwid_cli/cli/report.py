@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from contextlib import closing
 from hashlib import sha256
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from hwid_cli.cli.options import Choices
 from hwid_cli.cli.session import Session, Timer, context_of, open_session
@@ -15,8 +16,6 @@ from hwid_cli.files.atomic import replace_file
 from hwid_cli.files.figure_files import read_figure, write_figure
 from hwid_cli.records.recordings import Calibrated
 from hwid_cli.records.report import StageRun, StoredResults
-from hwid_cli.report.html import report_page
-from hwid_cli.report.page import Drawing
 from hwid_cli.report.progress import StageProgress
 from hwid_cli.stages.calibrate import figure_path
 from hwid_cli.stages.report import changed_sections, report_contents, report_key
@@ -26,6 +25,9 @@ from hwid_cli.store.order_results import read_chosen_maps
 from hwid_cli.store.result_files import has_left_results, read_provenance
 from hwid_cli.tasks.task import Task
 from hwid_cli.tasks.workers import Workers, compute
+
+if TYPE_CHECKING:
+    from hwid_cli.report.page import Drawing
 
 _log = logging.getLogger(__name__)
 
@@ -74,6 +76,9 @@ def write_report(session: Session) -> Path:
     if "report" not in session.forced and _is_complete(session.out, path, key, about):
         session.note_end("report", f"{path} shows {stages} already", timer)
         return path
+    # What draws is loaded where something is drawn.
+    from hwid_cli.report.html import report_page
+
     page = report_page(report_contents(stored), STAGES)
     for name, png in page.figures.items():
         _write_figure(session.out, name, png, about)
@@ -84,7 +89,7 @@ def write_report(session: Session) -> Path:
     return path
 
 
-def _draw(session: Session, drawings: Sequence[Drawing], about: str) -> None:
+def _draw(session: Session, drawings: "Sequence[Drawing]", about: str) -> None:
     """Write the figures beside the page.
 
     Parameters
@@ -114,7 +119,7 @@ def _write_figure(out: Path, name: str, png: bytes, about: str) -> None:
         write_figure(out / FIGURES / name, png, f"{about} {name}")
 
 
-def _png(drawing: Drawing) -> bytes:
+def _png(drawing: "Drawing") -> bytes:
     return drawing.png
 
 

@@ -339,10 +339,10 @@ def _read_body(sheet: _Sheet, titles: dict[int, str]) -> dict[int, MeasuredColum
         for _ in islice(file, number):
             pass
         while lines := list(islice(file, _BLOCK_LINES)):
-            table = _plain_table(sheet, lines, parts)
-            if table is not None:
-                parts.add_numbers(number + 1, *table)
-                number += len(lines)
+            plain = _add_plain(sheet, lines, parts, number)
+            number += plain
+            lines = lines[plain:]
+            if not lines:
                 continue
             source = _Counted(lines, file)
             rows = _cells_of(sheet.path, source, sheet.separator, number)
@@ -385,6 +385,36 @@ def _while_inside(
         yield end, row
         if end >= last:
             return
+
+
+def _add_plain(
+    sheet: _Sheet, lines: Sequence[str], parts: ColumnParts, before: int
+) -> int:
+    """Add the lines in front that hold nothing but numbers; how many these are.
+
+    Parameters
+    ----------
+    before : int
+        Lines of the file in front of these.
+    """
+    table = _plain_table(sheet, lines, parts)
+    if table is not None:
+        parts.add_numbers(before + 1, *table)
+        return len(lines)
+    half = len(lines) // 2
+    # Which way of writing a column keeps to is told from whole blocks.
+    if half < _PLAIN_LINES or not parts.are_known(".") or _may_be_grouped(sheet, lines):
+        return 0
+    first = _add_plain(sheet, lines[:half], parts, before)
+    if first < half:
+        return first
+    return half + _add_plain(sheet, lines[half:], parts, before + half)
+
+
+def _may_be_grouped(sheet: _Sheet, lines: Iterable[str]) -> bool:
+    """Whether a comma may stand in a cell, or a cell in quotes go on in the next line."""
+    text = "".join(lines)
+    return '"' in text or (sheet.separator != "," and "," in text)
 
 
 def _plain_table(

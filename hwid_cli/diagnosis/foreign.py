@@ -11,7 +11,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from scipy.optimize import least_squares
+import scipy
 
 from hwid_cli.diagnosis.causes import without_repeats
 from hwid_cli.diagnosis.confirmation import confirm, single_in_simulation
@@ -194,7 +194,7 @@ def _fit_parameters(
         return np.column_stack(columns)
 
     start = np.array([values[name] for name in free]) / sizes
-    found = least_squares(
+    found = scipy.optimize.least_squares(
         errors, np.clip(start, low, high), slopes, (low, high), x_scale=1.0,
         max_nfev=_MOST_EVALUATIONS, ftol=1e-6, xtol=1e-5,
     )  # fmt: skip

@@ -30,7 +30,6 @@ from hwid_cli.records.recordings import (
     RawRecording,
     Recording,
 )
-from hwid_cli.report import plots
 from hwid_cli.report.calibration import calibration_table
 from hwid_cli.stages.fit_seconds import counted
 from hwid_cli.stages.selection import named_recordings, select_recordings
@@ -250,6 +249,9 @@ def _draw(
         about = f"{result.key} {raw.name}"
         path = figure_path(out, raw.name)
         if is_new or read_figure(path, about) is None:
+            # Loading what draws takes longer than reading what is drawn already.
+            from hwid_cli.report import plots
+
             figure = plots.calibration_figure(raw, recording, log)
             write_figure(path, plots.as_png(figure), about)
 
