@@ -21,6 +21,7 @@ from hwid_cli import __version__
 from hwid_cli.errors import CacheError, UntrustedFunctionError
 from hwid_cli.files.atomic import check_format, replaced_hdf5
 from hwid_cli.files.checksums import has_checksum, with_checksum, without_checksum
+from hwid_cli.files.plain_files import refuse_unless_plain
 from hwid_cli.store.hdf5_records import read_array, write_array
 
 Result = TypeVar("Result")
@@ -209,6 +210,7 @@ def replaced_stage(
 
 def _readable_bytes(path: Path, stage: str) -> bytes:
     """Content of a results file; one that cannot be read is set aside."""
+    refuse_unless_plain(path)
     if not path.exists():
         return b""
     try:

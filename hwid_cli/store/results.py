@@ -9,6 +9,7 @@ from pathlib import Path
 
 import h5py
 import numpy as np
+from h5py import h5d
 
 from hwid_cli.files.atomic import replaced_hdf5
 from hwid_cli.files.checksums import with_checksum
@@ -78,7 +79,8 @@ def _write_recordings(group: h5py.Group, recordings: Sequence[Recording]) -> Non
         inner = group.create_group(recording.name)
         write_record(inner, recording)
         for side in ("input", "output"):
-            write_small(inner[side], "unit", getattr(recording, f"{side}_unit"), str)
+            array = h5py.Dataset(h5d.open(inner.id, side.encode()))
+            write_small(array, "unit", getattr(recording, f"{side}_unit"), str)
 
 
 def _write_logs(group: h5py.Group, logs: Sequence[CalibrationLog]) -> None:

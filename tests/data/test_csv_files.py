@@ -192,6 +192,7 @@ def test_more_rows_of_the_same_kind_tell_nothing_new(
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(csv_files, "_PLAIN_LINES", 10**6)
+        patch.setattr(csv_files, "_forms", {})
         by_all = told()
 
     assert told() == by_all
@@ -209,10 +210,19 @@ def test_the_form_of_a_long_file_is_told_from_few_rows(tmp_path, monkeypatch):
         return real(rows, **options)
 
     monkeypatch.setattr(csv_files, "read_head", read_head)
+    monkeypatch.setattr(csv_files, "_forms", {})
     (_, time), *_ = csv_files.read_csv_columns(path, BY_NUMBER)
 
     assert time.values.size == 5000
     assert looked_at == [26]  # the names and 25 rows of numbers
+    # Other numbers below the same names are of the same form.
+    path.write_text(path.read_text().replace(",3,", ",-3e-2,"))
+    csv_files.read_csv_columns(path, BY_NUMBER)
+    assert looked_at == [26]
+    path.write_text(path.read_text().replace("current_A", "current_mA"))
+    found = dict(csv_files.read_csv_columns(path, BY_NUMBER))
+    assert looked_at == [26, 26]
+    assert found["input"].unit == "mA"
 
 
 @given(

@@ -180,7 +180,7 @@ def test_what_is_remembered_is_computed_once_and_again_where_nothing_can_be_kept
     assert len(calls) == 1
 
     class Full(MemoryStore):
-        def put(self, key, record):
+        def put(self, *_):
             raise CacheError("the disk is full")
 
     for _ in range(2):
