@@ -206,6 +206,11 @@ def read_crossval(path: Path) -> CrossValidation:
     CacheError
         If it is missing or cannot be read.
     """
-    return read_results(
-        path, "crossval", lambda file: read_record(file["crossval"], CrossValidation)
-    )
+
+    def read(file: h5py.File) -> CrossValidation:
+        found = read_record(file["crossval"], CrossValidation)
+        if not 0.0 < found.threshold < np.inf:
+            raise ValueError(f"a threshold of {found.threshold:g}")
+        return found
+
+    return read_results(path, "crossval", read)

@@ -228,6 +228,13 @@ def test_unreadable_results_are_set_aside_not_overwritten(path, damage, caplog):
     assert read_crossval(path).validated_on == crossval().validated_on
 
 
+@pytest.mark.parametrize("threshold", [np.nan, -1.0, 0.0, np.inf])
+def test_a_threshold_that_nothing_lies_below_is_refused(path, threshold):
+    write_crossval(path, replace(crossval(), threshold=threshold), PROVENANCE)
+    with pytest.raises(CacheError, match="a threshold of"):
+        read_crossval(path)
+
+
 def test_a_disk_that_fails_at_a_second_look_is_no_damage(path, monkeypatch):
     write_all(path)
     reads, read_bytes, open_file = [], Path.read_bytes, h5py.File
