@@ -3,7 +3,7 @@
 import shlex
 from collections.abc import Sequence
 
-from hwid_cli.cli.session import Session, screen_width
+from hwid_cli.cli.session import Session, context_of, screen_width
 from hwid_cli.records.best_model import BestModel
 from hwid_cli.records.diagnosis import Diagnosis
 from hwid_cli.records.experiment import CrossvalOptions
@@ -75,7 +75,12 @@ def _best(session: Session) -> BestModel | None:
         results={one: results.get(one) for one in ("group",)}
         | {"identify": results["identify"]},
     )
-    return beside_linear(best, named_fits(stored), results["calibrate"].recordings)
+    return beside_linear(
+        best,
+        named_fits(stored),
+        results["calibrate"].recordings,
+        context_of(session).store,
+    )
 
 
 def _hints(session: Session, best: BestModel) -> list[tuple[str, str]]:

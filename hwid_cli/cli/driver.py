@@ -64,8 +64,9 @@ def run_command(name: str, choices: Choices) -> None:
     if has_page:
         session.plan("report")
     result_of(session, name)
-    for shown in (*stage.shows_before, name):
-        show_blocks(session, blocks_of(session, shown))
+    if not session.is_quiet:
+        for shown in (*stage.shows_before, name):
+            show_blocks(session, blocks_of(session, shown))
     if has_page:
         refresh_report(session)
     session.results.update(_current(session))

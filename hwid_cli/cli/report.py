@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import closing
 from hashlib import sha256
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from hwid_cli.cli.options import Choices
 from hwid_cli.cli.session import Session, Timer, open_session
@@ -14,8 +15,6 @@ from hwid_cli.errors import ConfigError
 from hwid_cli.files.atomic import replace_file
 from hwid_cli.files.figure_files import read_figure, write_figure
 from hwid_cli.records.report import StageRun, StoredResults
-from hwid_cli.report.html import report_page
-from hwid_cli.report.page import Drawing
 from hwid_cli.report.progress import StageProgress
 from hwid_cli.stages.report import changed_sections, report_contents, report_key
 from hwid_cli.stages.table import STAGES, stage_named
@@ -24,6 +23,9 @@ from hwid_cli.store.order_results import read_chosen_maps
 from hwid_cli.store.result_files import has_left_results, read_provenance
 from hwid_cli.tasks.task import Task
 from hwid_cli.tasks.workers import Workers, compute
+
+if TYPE_CHECKING:
+    from hwid_cli.report.page import Drawing
 
 _log = logging.getLogger(__name__)
 
@@ -69,6 +71,9 @@ def write_report(session: Session) -> Path:
     if "report" not in session.forced and _is_complete(session.out, path, key):
         session.note_end("report", f"{path} shows {stages} already", timer)
         return path
+    # What draws is loaded where something is drawn.
+    from hwid_cli.report.html import report_page
+
     page = report_page(report_contents(stored), STAGES)
     keys = {one.file: one.key for one in page.drawings}
     # The page before the figures beside it: it is what people wait for.
@@ -79,7 +84,7 @@ def write_report(session: Session) -> Path:
 
 
 def _draw(
-    session: Session, drawings: Sequence[Drawing], keys: Mapping[str, str]
+    session: Session, drawings: "Sequence[Drawing]", keys: Mapping[str, str]
 ) -> None:
     """Write the figures beside the page that are not there already.
 
@@ -110,7 +115,7 @@ def _draw(
             bar.advance(from_cache=False)
 
 
-def _png(drawing: Drawing) -> bytes:
+def _png(drawing: "Drawing") -> bytes:
     return drawing.png
 
 

@@ -19,6 +19,7 @@ from hwid_cli.files.plain_files import folders_below, refuse_linked_folders
 from hwid_cli.records.experiment import Experiment
 from hwid_cli.stages.own_functions import check_own_functions
 from hwid_cli.stages.stage import Context
+from hwid_cli.store.cache import Hdf5Store
 from hwid_cli.tasks.workers import Workers
 
 # So long a command says nothing of its progress, [s].
@@ -124,7 +125,9 @@ class Timer:
 
 def context_of(session: Session) -> Context:
     """What stages may know of a session."""
-    return Context(session.experiment, session.out, session.results)
+    return Context(
+        session.experiment, session.out, session.results, Hdf5Store(session.cache)
+    )
 
 
 def open_session(choices: Choices, *stages: str, is_alone: bool = True) -> Session:

@@ -26,7 +26,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy import integrate, ndimage
+import scipy
 
 from hwid_cli.errors import MeasurementError
 from hwid_cli.records.experiment import CalibrateOptions
@@ -124,7 +124,7 @@ def find_damaged(values: np.ndarray) -> np.ndarray:
 
 
 def _local_median(values: np.ndarray) -> np.ndarray:
-    return ndimage.median_filter(values, LOCAL_WINDOW, mode="nearest")
+    return scipy.ndimage.median_filter(values, LOCAL_WINDOW, mode="nearest")
 
 
 def replace_damaged(values: np.ndarray, damaged: np.ndarray) -> np.ndarray:
@@ -228,8 +228,8 @@ def _rests_elsewhere(
     if rest.size < window:
         return False
     stretches = slice(window // 2, rest.size - (window - 1) // 2)
-    high = ndimage.maximum_filter1d(rest, window)[stretches]
-    low = ndimage.minimum_filter1d(rest, window)[stretches]
+    high = scipy.ndimage.maximum_filter1d(rest, window)[stretches]
+    low = scipy.ndimage.minimum_filter1d(rest, window)[stretches]
     is_quiet = high - low <= 2.0 * tolerance
     is_elsewhere = np.abs(0.5 * (high + low) - level) > 2.0 * tolerance
     return bool(np.any(is_quiet & is_elsewhere))
@@ -304,7 +304,7 @@ def mean_over_period(values: np.ndarray, period_samples: float) -> float:
     """
     times = np.append(np.arange(np.ceil(period_samples)), period_samples)
     period = np.interp(times, np.arange(values.size), values)
-    return float(integrate.trapezoid(period, times)) / period_samples
+    return float(scipy.integrate.trapezoid(period, times)) / period_samples
 
 
 def whole_periods(n_samples: int, period_samples: float) -> int:

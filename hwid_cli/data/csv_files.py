@@ -13,9 +13,9 @@ import codecs
 import csv
 import re
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
-from itertools import chain, islice
+from itertools import chain, islice, repeat
 from pathlib import Path
 from typing import TextIO
 
@@ -76,6 +76,11 @@ class _Sheet:
     def first_line(self) -> int:
         """Lines in front of the numbers."""
         return self.lines[self.head.body - 1] if self.head.body else 0
+
+
+# Forms by the lines that tell them: a folder has thousands of files of one form.
+_forms: dict[tuple[tuple[str, ...], tuple[str, ...]], _Sheet] = {}
+_MOST_FORMS = 64
 
 
 def read_csv_columns(path: Path, columns: Columns) -> list[tuple[str, MeasuredColumn]]:
@@ -142,6 +147,17 @@ def _read_sheet(path: Path, wanted: Sequence[str]) -> _Sheet:
     encoding = _encoding(path)
     with path.open(encoding=encoding, errors="replace", newline="") as file:
         lines = _telling(list(islice(file, _HEAD_LINES)))
+    told_by = (tuple(lines), tuple(wanted))
+    form = _forms.get(told_by)
+    if form is None:
+        form = _form_of(path, lines, wanted)
+        if len(_forms) < _MOST_FORMS and sum(map(len, lines)) <= _LONGEST_LINE:
+            _forms[told_by] = form
+    return replace(form, path=path, encoding=encoding)
+
+
+def _form_of(path: Path, lines: list[str], wanted: Sequence[str]) -> _Sheet:
+    """Form of a file that begins with some lines."""
     separator = _separator(lines)
     rows, ends, comments = _rows(path, lines, separator)
     if not any(any(row) for number, row in enumerate(rows) if number not in comments):
@@ -151,35 +167,40 @@ def _read_sheet(path: Path, wanted: Sequence[str]) -> _Sheet:
         )
     head = read_head(rows, wanted=wanted, comments=comments)
     place = head.name_row if head.name_row >= 0 else min(head.body, len(rows) - 1)
-    return _Sheet(path, encoding, separator, rows, ends, head, len(rows[place]))
+    return _Sheet(path, "", separator, rows, ends, head, len(rows[place]))
 
 
 def _telling(lines: list[str]) -> list[str]:
     """Leave out the last lines of a beginning where they only go on as those above.
 
     What is left tells the same: its lower half, from which the form is told, consists of
-    rows of as many plain numbers too.
+    rows of as many plain numbers too. Which numbers tells nothing, so zeros stand for them:
+    files of one logger are told alike.
     """
     if len(lines) <= _PLAIN_LINES:
         return lines
     mark = next((one for one in _SEPARATORS if one in lines[-1].strip()), None)
     if mark is None or len(lines[-1]) > _LONGEST_LINE:
         return lines
-    row = _plain_row(mark, len(_split(lines[-1].strip(), mark)))
-    first = next((n for n, line in enumerate(lines) if row.fullmatch(line)), len(lines))
+    width = len(_split(lines[-1].strip(), mark))
+    rows = _plain_rows(mark, width)
+    first = next(
+        (n for n, line in enumerate(lines) if rows.fullmatch(line)), len(lines)
+    )
     kept = 2 * first + _PLAIN_LINES
-    if kept >= len(lines) or not all(map(row.fullmatch, lines[first:])):
+    if kept >= len(lines) or not rows.fullmatch("".join(lines[first:])):
         return lines
-    return lines[:kept]
+    return [*lines[:first], *[mark.join("0" * width) + "\n"] * (kept - first)]
 
 
 @lru_cache(maxsize=32)
-def _plain_row(mark: str, count: int) -> re.Pattern[str]:
+def _plain_rows(mark: str, count: int) -> re.Pattern[str]:
     """Lines of so many plain numbers; a comma is decimal where it separates nothing."""
     point = "[.,]" if mark in "\t;" else "[.]"
     number = rf"[-+]?(?:[0-9]++(?:{point}[0-9]*+)?|{point}[0-9]++)(?:[eE][-+]?[0-9]++)?"
     between = " ++" if mark == " " else f" *+{re.escape(mark)} *+"
-    return re.compile(rf" *+{number}(?:{between}{number}){{{count - 1}}} *+\r?\n?")
+    row = rf" *+{number}(?:{between}{number}){{{count - 1}}} *+"
+    return re.compile(rf"(?:{row}(?:\r\n?|\n))*+(?:{row})?")
 
 
 def _encoding(path: Path) -> str:
@@ -339,10 +360,10 @@ def _read_body(sheet: _Sheet, titles: dict[int, str]) -> dict[int, MeasuredColum
         for _ in islice(file, number):
             pass
         while lines := list(islice(file, _BLOCK_LINES)):
-            table = _plain_table(sheet, lines, parts)
-            if table is not None:
-                parts.add_numbers(number + 1, *table)
-                number += len(lines)
+            plain = _add_plain(sheet, lines, parts, number)
+            number += plain
+            lines = lines[plain:]
+            if not lines:
                 continue
             source = _Counted(lines, file)
             rows = _cells_of(sheet.path, source, sheet.separator, number)
@@ -387,6 +408,36 @@ def _while_inside(
             return
 
 
+def _add_plain(
+    sheet: _Sheet, lines: Sequence[str], parts: ColumnParts, before: int
+) -> int:
+    """Add the lines in front that hold nothing but numbers; how many these are.
+
+    Parameters
+    ----------
+    before : int
+        Lines of the file in front of these.
+    """
+    table = _plain_table(sheet, lines, parts)
+    if table is not None:
+        parts.add_numbers(before + 1, *table)
+        return len(lines)
+    half = len(lines) // 2
+    # Which way of writing a column keeps to is told from whole blocks.
+    if half < _PLAIN_LINES or not parts.are_known(".") or _may_be_grouped(sheet, lines):
+        return 0
+    first = _add_plain(sheet, lines[:half], parts, before)
+    if first < half:
+        return first
+    return half + _add_plain(sheet, lines[half:], parts, before + half)
+
+
+def _may_be_grouped(sheet: _Sheet, lines: Iterable[str]) -> bool:
+    """Whether a comma may stand in a cell, or a cell in quotes go on in the next line."""
+    text = "".join(lines)
+    return '"' in text or (sheet.separator != "," and "," in text)
+
+
 def _plain_table(
     sheet: _Sheet, lines: Sequence[str], parts: ColumnParts
 ) -> tuple[np.ndarray, str] | None:
@@ -397,7 +448,7 @@ def _plain_table(
     if '"' in text or _COMMENT in text or not all(map(str.strip, lines)):
         return None
     mark = sheet.separator
-    if mark != " " and max([line.count(mark) for line in lines]) >= max(sheet.width, 1):
+    if mark != " " and max(map(str.count, lines, repeat(mark))) >= max(sheet.width, 1):
         return None
     decimal = "," if mark != "," and "," in text else "." if "." in text else ""
     if decimal and not parts.are_decimal(decimal):

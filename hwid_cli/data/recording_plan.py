@@ -32,6 +32,8 @@ COLUMNS = (
 _REST = 0.05
 # Samples of an input; a typing error in its duration must not fill the memory.
 _MOST_SAMPLES = 5_000_000
+# As of what was measured (docs/security.md).
+_LARGEST = 1e60
 
 
 def read_plan(
@@ -60,7 +62,11 @@ def read_plan(
         if name in {one.name for one in found}:
             _refuse(place, "name", name, "a name that no row before has")
         if row["file"]:
-            values = _input_of(path.parent / row["file"], options)
+            given = path.parent / row["file"]
+            if not _is_file(given):
+                expected = "a file with the input of a recording that could be taken"
+                _refuse(place, "file", row["file"], expected)
+            values = _input_of(given, options)
             found.append(PlannedInput(name, values, f"the input of {row['file']}"))
         else:
             found.append(_made(place, row, sample_time_s))
@@ -111,22 +117,25 @@ def _refuse(place: str, column: str, found: str, expected: str) -> NoReturn:
     )
 
 
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except OSError:
+        # Of a name that no file can have.
+        return False
+
+
 def _input_of(path: Path, options: RecordingsOptions) -> np.ndarray:
     columns = options.columns
     # Nobody knows the output yet: the input's column stands in for it.
     wanted = Columns(
         input=columns.input, output=columns.input, variable=columns.variable
     )
-    if not path.is_file():
-        raise MeasurementError(
-            f"{path}: no such file; expected the input of a recording that could be "
-            "taken; correct the plan"
-        )
     values = read_columns(path, wanted).input.values
-    if not values.size or not np.isfinite(values).all():
+    if not values.size or not (np.abs(values) <= _LARGEST).all():
         raise MeasurementError(
-            f"{path}: its input holds no numbers, or one that is not finite; expected "
-            "numbers only; correct the file"
+            f"{path}: its input holds no numbers, or one that is not finite or beyond "
+            f"{_LARGEST:g}; expected numbers only; correct the file"
         )
     n = values.size // options.average * options.average
     means = values[:n].reshape(-1, options.average).mean(axis=1)
@@ -168,6 +177,6 @@ def _number(place: str, row: Mapping[str, str], name: str) -> float:
         value = float(row[name])
     except ValueError:
         value = float("nan")
-    if not np.isfinite(value):
-        _refuse(place, name, row[name], "a finite number")
+    if not abs(value) <= _LARGEST:
+        _refuse(place, name, row[name], f"a finite number up to {_LARGEST:g}")
     return value

@@ -63,6 +63,10 @@ class ColumnParts:
         is_known = any(one.decimal for one in found) or mark == "."
         return is_known and found <= {Writing(), Writing(mark)}
 
+    def are_known(self, mark: str) -> bool:
+        """Whether all columns have shown this decimal mark alone."""
+        return set(self._writing.values()) == {Writing(mark)}
+
     def add_numbers(self, first_row: int, table: np.ndarray, decimal: str) -> None:
         """Add rows of nothing but numbers.
 

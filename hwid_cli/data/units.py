@@ -6,7 +6,7 @@ frequency in Hz is not taken for an angular velocity.
 """
 
 import re
-from functools import cache
+from functools import cache, lru_cache
 from typing import Any
 
 # What a drive's signals are, each with the SI unit that its numbers are converted to.
@@ -280,6 +280,7 @@ _MEASURED_IN = {
 }
 
 
+@lru_cache(maxsize=256)
 def split_unit(title: str) -> tuple[str, str]:
     """Take the unit off the name of a column.
 

@@ -10,9 +10,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.linalg import expm, solve_discrete_are
-from scipy.optimize import least_squares
-from scipy.signal import lfilter
+import scipy
 
 from hwid_cli.diagnosis.noise import portmanteau, whiteness
 from hwid_cli.diagnosis.parameters import (
@@ -210,7 +208,9 @@ def fit_with_input_noise(
         if scaled(start).size < start.size:
             return point
         most = _MOST_CALLS * (start.size + 1)
-        found = least_squares(scaled, start, method="lm", x_scale=1.0, max_nfev=most)
+        found = scipy.optimize.least_squares(
+            scaled, start, method="lm", x_scale=1.0, max_nfev=most
+        )
         point = at(found.x)
     return point
 
@@ -253,14 +253,16 @@ def _whitened(
     both = strength * through * b[:, None]
     read = np.array([[1.0 + strength * through**2]])
     try:
-        covariance = solve_discrete_are(a.T, reading.T, moved, read, s=both)
+        covariance = scipy.linalg.solve_discrete_are(
+            a.T, reading.T, moved, read, s=both
+        )
     except (np.linalg.LinAlgError, ValueError):
         return None
     variance = float((reading @ covariance @ reading.T)[0, 0]) + float(read[0, 0])
     correct = ((a @ covariance @ reading.T + both) / variance).ravel()
     top = np.poly(a)
     bottom = np.poly(a - np.outer(correct, reading))
-    return np.asarray(lfilter(top, bottom, residual)), variance
+    return np.asarray(scipy.signal.lfilter(top, bottom, residual)), variance
 
 
 def _gain(drive: Drive, signals: Signals, size: int) -> float:
@@ -295,7 +297,7 @@ def _discrete(
     block[0, 1] = 1.0
     block[1, :3] = np.array([-drive.stiffness_N_per_m, -damping, push]) / drive.mass_kg
     block[2, 3] = 1.0 / sample_time_s
-    step = expm(block * sample_time_s)
+    step = scipy.linalg.expm(block * sample_time_s)
     a, rising = step[:2, :2], step[:2, 3]
     falling = step[:2, 2] - rising
     return a, a @ rising + falling, float(rising[0])
@@ -306,7 +308,7 @@ def _impulse(a: np.ndarray, b: np.ndarray, through: float, size: int) -> np.ndar
     top = np.array([0.0, b[0], a[0, 1] * b[1] - a[1, 1] * b[0]])
     pulse = np.zeros(max(size, 3))
     pulse[0] = 1.0
-    return np.asarray(lfilter(top, np.poly(a), pulse)) + through * pulse
+    return np.asarray(scipy.signal.lfilter(top, np.poly(a), pulse)) + through * pulse
 
 
 def whiteness_but_for_neighbours(

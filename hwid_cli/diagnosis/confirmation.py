@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
-from scipy.optimize import least_squares
+import scipy
 
 from hwid_cli.diagnosis.candidate import at_point, fitted_drive, rebuilt
 from hwid_cli.diagnosis.causes import left_over
@@ -562,7 +562,9 @@ def _fitted_together(
         return np.concatenate(residuals_at(train, fit_layout, at(coordinates)))
 
     start = np.r_[np.zeros(n_free), point.shared, point.own[rows].ravel()]
-    found = least_squares(errors, start, partial(_derivatives, errors), method="lm")
+    found = scipy.optimize.least_squares(
+        errors, start, partial(_derivatives, errors), method="lm"
+    )
     fit = _evaluated(changed(found.x), before, fit_layout, at(found.x), findings)
     return fit, found.x[:n_free] * sizes
 

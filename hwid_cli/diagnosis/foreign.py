@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.optimize import least_squares
+import scipy
 
 from hwid_cli.diagnosis.causes import without_repeats
 from hwid_cli.diagnosis.confirmation import confirm, single_in_simulation
@@ -200,7 +200,7 @@ def _fit_parameters(
         return np.column_stack(columns)
 
     start = np.array([values[name] for name in free]) / sizes
-    found = least_squares(
+    found = scipy.optimize.least_squares(
         errors, np.clip(start, low, high), slopes, (low, high), x_scale=1.0,
         max_nfev=_MOST_EVALUATIONS, ftol=1e-6, xtol=1e-5,
     )  # fmt: skip

@@ -19,8 +19,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numba import njit
-from scipy.linalg import expm
 
 from hwid_cli.diagnosis.problem import Compared
 from hwid_cli.records.diagnosis import NoiseFloor
@@ -404,7 +404,9 @@ def _copy(drive: Drive, sample_time_s: float, sigma: float) -> _Copy:
     rates = np.array(
         [[0, 1, 0], [-stiffness / mass, -damping / mass, 1 / mass], [0, 0, 0]]
     )
-    transition = expm(rates * sample_time_s) * sizes[None, :] / sizes[:, None]
+    transition = (
+        scipy.linalg.expm(rates * sample_time_s) * sizes[None, :] / sizes[:, None]
+    )
     return _Copy(np.ascontiguousarray(transition), reading * sizes / sigma, sizes)
 
 

@@ -12,8 +12,7 @@ from dataclasses import dataclass
 from itertools import combinations, pairwise
 
 import numpy as np
-from scipy.linalg import expm
-from scipy.signal import lfilter
+import scipy
 
 from hwid_cli.diagnosis.latent_force import Smoothed, finite
 from hwid_cli.diagnosis.law_terms import Term
@@ -173,7 +172,7 @@ class _Responses:
         rates[0, 1] = rates[2, 3] = 1.0
         rates[1, :3] = -drive.stiffness_N_per_m / mass, -damping / mass, 1 / mass
         # The third state is the force, the fourth its slope.
-        self._step = expm(rates * dt)
+        self._step = scipy.linalg.expm(rates * dt)
         self._seen = 1 if drive.output == "velocity" else 0
         moves = self._step[:2, :2]
         self._poles = np.r_[1.0, -np.trace(moves), np.linalg.det(moves)]
@@ -191,7 +190,9 @@ class _Responses:
         return np.array(found)
 
     def of(self, forces: np.ndarray) -> np.ndarray:
-        return np.asarray(lfilter(self._zeros, self._poles, finite(forces), axis=0))
+        return np.asarray(
+            scipy.signal.lfilter(self._zeros, self._poles, finite(forces), axis=0)
+        )
 
     def free(self, n: int) -> np.ndarray:
         """Motion from either state without any force."""

@@ -12,9 +12,7 @@ from dataclasses import dataclass
 from math import comb
 
 import numpy as np
-from scipy.optimize import least_squares
-from scipy.signal import lfilter
-from scipy.stats import chi2
+import scipy
 
 from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals, rest_length
 from hwid_cli.records.diagnosis import NoiseFloor
@@ -163,7 +161,7 @@ def _is_white(pieces: Sequence[np.ndarray], *, n_removed: int = 1) -> bool:
     pulled = n_removed * sum(piece.size > _LAGS_OF_COLOUR for piece in pieces)
     correlations = sums[1:] / counts[1:] * counts[0] / sums[0] + pulled / counts[1:]
     statistic = float(np.sum(counts[1:] * np.square(correlations)))
-    return statistic < chi2.ppf(1 - FALSE_ALARM, _LAGS_OF_COLOUR)
+    return statistic < scipy.stats.chi2.ppf(1 - FALSE_ALARM, _LAGS_OF_COLOUR)
 
 
 def _whitening_filter(pieces: Sequence[np.ndarray]) -> np.ndarray:
@@ -210,9 +208,11 @@ def _long_filter(pieces: Sequence[np.ndarray], first: int) -> tuple[np.ndarray, 
     def remaining(point: np.ndarray) -> np.ndarray:
         # The hyperbolic tangent keeps both roots inside the unit circle.
         phi, theta = np.tanh(point)
-        return lfilter([1.0, -phi], [1.0, -theta], block, axis=1)[weight]
+        return scipy.signal.lfilter([1.0, -phi], [1.0, -theta], block, axis=1)[weight]
 
-    fit = least_squares(remaining, np.arctanh([0.9, 0.5]), method="lm", max_nfev=100)
+    fit = scipy.optimize.least_squares(
+        remaining, np.arctanh([0.9, 0.5]), method="lm", max_nfev=100
+    )
     phi, theta = np.tanh(fit.x)
     size = max(abs(theta), 1e-3)
     # Long enough that what is cut off is nothing beside the errors of estimation.
@@ -257,7 +257,7 @@ def portmanteau(
     for piece in pieces:
         # The filter does not know what came before the first samples.
         unknown = min(taps.size - 1, piece.size // 4)
-        white.append(lfilter(taps, [1.0], piece)[unknown:])
+        white.append(scipy.signal.lfilter(taps, [1.0], piece)[unknown:])
     sums, counts = _autocovariances(white, n_lags)
     if counts[0] == 0:
         return 0.0
@@ -269,7 +269,7 @@ def portmanteau(
     basis = np.linalg.qr(_errors_of(taps, n_lags)[used])[0]
     scores = scores - basis @ (basis.T @ scores)
     free = max(scores.size - basis.shape[1], 1)
-    return float(scores @ scores / chi2.ppf(1 - FALSE_ALARM, free))
+    return float(scores @ scores / scipy.stats.chi2.ppf(1 - FALSE_ALARM, free))
 
 
 def _errors_of(taps: np.ndarray, n_lags: int) -> np.ndarray:
@@ -281,9 +281,12 @@ def _errors_of(taps: np.ndarray, n_lags: int) -> np.ndarray:
         theta = taps[2] / taps[1]
         phi = theta - taps[1]
         return np.column_stack(
-            [lfilter([1.0], [1.0, -root], impulse) for root in (phi, theta)]
+            [
+                scipy.signal.lfilter([1.0], [1.0, -root], impulse)
+                for root in (phi, theta)
+            ]
         )
-    answer = lfilter([1.0], taps, impulse)
+    answer = scipy.signal.lfilter([1.0], taps, impulse)
     columns = [np.concatenate([np.zeros(j), answer[: n_lags - j]])
                for j in range(min(order, n_lags - 1))]  # fmt: skip
     return np.array(columns).reshape(-1, n_lags).T

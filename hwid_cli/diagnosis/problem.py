@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.integrate import cumulative_trapezoid
+import scipy
 
 from hwid_cli.drive.simulation import NO_FORCE, refined
 from hwid_cli.records.axis import base_of
@@ -82,7 +82,9 @@ class Signals:
         """Measured position, [m]; of a velocity the way since the first sample."""
         if not self.is_velocity:
             return self.output
-        way = cumulative_trapezoid(self.output, dx=self.sample_time_s, initial=0.0)
+        way = scipy.integrate.cumulative_trapezoid(
+            self.output, dx=self.sample_time_s, initial=0.0
+        )
         return np.asarray(way)
 
     @cached_property

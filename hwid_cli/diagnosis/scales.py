@@ -7,7 +7,7 @@ docs/method_diagnosis.md, eq. (D15).
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.signal import lfilter
+import scipy
 
 from hwid_cli.diagnosis.candidate import compared_with_fit, fitted_drive
 from hwid_cli.diagnosis.covariates import (
@@ -166,7 +166,7 @@ def line_frequencies(
     """
     pairs = [
         (
-            lfilter(noise.whitening, [1.0], finite(one.residual)),
+            scipy.signal.lfilter(noise.whitening, [1.0], finite(one.residual)),
             one.signals.sample_time_s,
         )
         for one in compared

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from itertools import combinations
 
 import numpy as np
-from scipy.stats import f as f_distribution
+import scipy
 
 from hwid_cli.diagnosis.parameters import BASE, START, is_factor
 from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals
@@ -308,7 +308,7 @@ def _goes_with(values: np.ndarray, inputs: np.ndarray) -> bool:
     whole = float(np.sum((values - values.mean()) ** 2))
     unexplained = float(left @ left)
     ratio = (whole - unexplained) / used.shape[1] / max(unexplained / freedom, 1e-300)
-    return bool(f_distribution.sf(ratio, used.shape[1], freedom) < CHANCE)
+    return bool(scipy.stats.f.sf(ratio, used.shape[1], freedom) < CHANCE)
 
 
 def count(found: CandidateFit) -> int:

@@ -11,11 +11,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy import sparse
-from scipy.interpolate import make_interp_spline
-from scipy.optimize import nnls
-from scipy.signal import butter, sosfiltfilt
-from scipy.sparse.linalg import spsolve
+import scipy
 
 from hwid_cli.diagnosis.candidate import base_of
 from hwid_cli.diagnosis.parameters import drive_at, first_point, parameter_layout
@@ -39,9 +35,9 @@ _PUSHES_BACK = 1.3
 _ITERATIONS = 20
 # A first velocity below this share of the largest is rest.
 _STILL = 1e-3
-# Filter of the forces that correct the stand-in, to a quarter of the sampling rate: lower
-# ones leave edges of contacts to the offset, which the effect does not see.
-_SLOW_ONES = butter(2, 0.5, output="sos")
+# The forces that correct the stand-in are filtered to this share of the largest frequency:
+# lower ones leave edges of contacts to the offset, which the effect does not see, [-].
+_SLOW_SHARE = 0.5
 _FEWEST = 30
 # Weight of the bends of a force against its means.
 _SMOOTHNESS = 1e-2
@@ -66,9 +62,11 @@ def derived(found: SimulatorRun, sample_time_s: float) -> Moved:
     size = found.output.size
     time = sample_time_s * np.arange(size)
     degree = min(_DEGREE, size - 1)
-    spline = make_interp_spline(time, found.output, k=degree)
+    spline = scipy.interpolate.make_interp_spline(time, found.output, k=degree)
     if found.velocity.size:
-        slope = make_interp_spline(time, found.velocity, k=degree).derivative()
+        slope = scipy.interpolate.make_interp_spline(
+            time, found.velocity, k=degree
+        ).derivative()
         return Moved(found.output, found.velocity, slope(time))
     return Moved(found.output, spline.derivative()(time), spline.derivative(2)(time))
 
@@ -130,7 +128,7 @@ def _by_regression(
     matrix, vector = np.concatenate(rows), np.concatenate(right)
     lengths = np.sqrt(np.sum(matrix**2, axis=0))
     lengths[lengths == 0] = 1.0
-    found_values, left = nnls(matrix / lengths, vector)
+    found_values, left = scipy.optimize.nnls(matrix / lengths, vector)
     values = found_values / lengths
     whole = float(np.sqrt(np.sum(vector**2))) or 1.0
     shares = values * lengths / whole
@@ -333,7 +331,8 @@ def _slow(force: np.ndarray) -> np.ndarray:
     """A force without what changes from sample to sample, which adds up in the turns."""
     if force.size <= _FEWEST:
         return force
-    return np.asarray(sosfiltfilt(_SLOW_ONES, force))
+    slow_ones = scipy.signal.butter(2, _SLOW_SHARE, output="sos")
+    return np.asarray(scipy.signal.sosfiltfilt(slow_ones, force))
 
 
 def force_of_motion(drive: Drive, signals: Signals, motion: Motion) -> np.ndarray:
@@ -368,7 +367,7 @@ def _with_means(means: np.ndarray) -> np.ndarray:
     size = means.size + 1
     if size < 4 or not np.isfinite(means).all():
         return np.r_[means[:1], 0.5 * (means[1:] + means[:-1]), means[-1:]]
-    pairs = sparse.diags([0.5, 0.5], [0, 1], shape=(size - 1, size))
-    bends = sparse.diags([1.0, -2.0, 1.0], [0, 1, 2], shape=(size - 2, size))
+    pairs = scipy.sparse.diags([0.5, 0.5], [0, 1], shape=(size - 1, size))
+    bends = scipy.sparse.diags([1.0, -2.0, 1.0], [0, 1, 2], shape=(size - 2, size))
     matrix = pairs.T @ pairs + _SMOOTHNESS * (bends.T @ bends)
-    return np.asarray(spsolve(matrix.tocsc(), pairs.T @ means))
+    return np.asarray(scipy.sparse.linalg.spsolve(matrix.tocsc(), pairs.T @ means))

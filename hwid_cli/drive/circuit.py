@@ -7,7 +7,7 @@ time. docs/method_simulation.md, eq. (S1) to (S6).
 """
 
 import numpy as np
-from scipy import linalg
+import scipy
 
 from hwid_cli.records.machines import ServoMachine
 
@@ -83,9 +83,9 @@ def switch_on(
     if first == times_s.size:
         return states
     # The distance to the steady state obeys the equations without input.
-    distance = linalg.expm(a * (times_s[first] - servo.rest_s)) @ -steady
+    distance = scipy.linalg.expm(a * (times_s[first] - servo.rest_s)) @ -steady
     spacing = times_s[1] - times_s[0] if times_s.size > 1 else 0.0
-    step = linalg.expm(a * spacing)
+    step = scipy.linalg.expm(a * spacing)
     for row in range(first, times_s.size):
         states[row] = steady + distance
         distance = step @ distance

@@ -12,7 +12,7 @@ from itertools import product
 from math import inf
 
 import numpy as np
-from scipy.optimize import least_squares
+import scipy
 
 from hwid_cli.drive import formula as text
 from hwid_cli.drive import slots
@@ -186,7 +186,7 @@ class _Fitted:
             rest = wanted - (change - absorbed @ (absorbed.T @ change))
             return np.r_[rest / whole, _RIDGE * (scaled - start / sizes)]
 
-        found = least_squares(
+        found = scipy.optimize.least_squares(
             left, start / sizes, bounds=(low / sizes, high / sizes),
             max_nfev=_EVALUATIONS, x_scale="jac",
         )  # fmt: skip

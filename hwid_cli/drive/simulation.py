@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import make_interp_spline
+import scipy
 
 from hwid_cli.drive import slots
 from hwid_cli.drive.catalogue import CATALOGUE, entry_of
@@ -131,7 +131,9 @@ def refined(driven_by: np.ndarray) -> np.ndarray:
             np.arange(REFINEMENT * (n - 1) + 1) / REFINEMENT, np.arange(n), driven_by
         )
         return np.ascontiguousarray(fine)
-    spline = make_interp_spline(np.arange(n), driven_by, k=_SPLINE_DEGREE)
+    spline = scipy.interpolate.make_interp_spline(
+        np.arange(n), driven_by, k=_SPLINE_DEGREE
+    )
     return np.ascontiguousarray(
         spline(np.arange(REFINEMENT * (n - 1) + 1) / REFINEMENT)
     )

@@ -4,7 +4,7 @@ The schema says what each key holds; what several must agree on is checked here.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +32,9 @@ from hwid_cli.records.maps import Extrapolation, OwnFunction, StaticMap
 from hwid_cli.records.model import HammersteinWiener
 from hwid_cli.records.trust import ModelTrust, Visited, VisitedPlane
 from hwid_cli.trust.simulation import moved
+
+# As of signals (docs/security.md), in any unit.
+_LARGEST = 1e60
 
 
 def read_exported(path: Path) -> Exported:
@@ -99,6 +102,7 @@ def _trust(path: Path, given: Mapping[str, Any], n_parameters: int) -> ModelTrus
         if len(step) != n_parameters:
             expected = f"{n_parameters}, one a parameter"
             refuse(path, ("trust", "steps", row), f"{len(step)} numbers", expected)
+    _refuse_huge(path, given, ("trust",))
     visited = given["visited"]
     before, after = (_plane(path, visited[side], side) for side in ("input", "inner"))
     return ModelTrust(
@@ -112,6 +116,19 @@ def _trust(path: Path, given: Mapping[str, Any], n_parameters: int) -> ModelTrus
         float(given.get("gain", 0.0)),
         tuple(given.get("parameters", ())),
     )
+
+
+def _refuse_huge(path: Path, given: Any, place: tuple[str | int, ...]) -> None:
+    """Refuse numbers whose squares and sums a float cannot hold: no signal is so large."""
+    inner: Iterable[tuple[str | int, Any]] = ()
+    if isinstance(given, dict):
+        inner = given.items()
+    elif isinstance(given, list):
+        inner = enumerate(given)
+    elif isinstance(given, float | int) and abs(given) > _LARGEST:
+        refuse(path, place, given, f"numbers up to {_LARGEST:g}")
+    for key, value in inner:
+        _refuse_huge(path, value, (*place, key))
 
 
 def _plane(path: Path, given: Mapping[str, Any], side: str) -> VisitedPlane:

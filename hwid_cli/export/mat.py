@@ -7,7 +7,7 @@ from textwrap import indent
 from typing import Any
 
 import numpy as np
-from scipy.io import savemat
+import scipy
 
 from hwid_cli.export.c_source import card_text, filled
 from hwid_cli.export.json_writer import described
@@ -45,7 +45,9 @@ def write_mat(path: Path, exported: ExportedModel) -> Path:
     if _is_of_another(path.with_name(f"{name}.m"), mat_file):
         name = identifier(exported.card.name, is_taken=True)
     content = io.BytesIO()
-    savemat(content, _variables(exported), long_field_names=True, oned_as="row")
+    scipy.io.savemat(
+        content, _variables(exported), long_field_names=True, oned_as="row"
+    )
     words = card_text(exported.card, exported.sample_time_s)
     script = filled(
         "model.m",

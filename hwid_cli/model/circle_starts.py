@@ -18,8 +18,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg.lapack import dpotrf, dpotrs
-from scipy.signal import lfilter
+import scipy
 
 from hwid_cli.model.candidates import FitData, thinned
 from hwid_cli.model.linear_block import is_stable, reflected
@@ -167,7 +166,9 @@ class _Iterations:
     ) -> np.ndarray:
         """Rest that follows; all signals pass D, or one, before they are compared."""
         columns = self._columns(inputs, rest, behind)
-        seen = [lfilter(behind, rest, one.output) for one in self.experiments]
+        seen = [
+            scipy.signal.lfilter(behind, rest, one.output) for one in self.experiments
+        ]
         past = np.vstack(
             [
                 -_delayed(y[:, None], 1, rest.size - 1)[one.counted]
@@ -238,11 +239,13 @@ class _Iterations:
         for index, (one, signal) in enumerate(
             zip(self.experiments, inputs, strict=True)
         ):
-            driven = lfilter(behind, denominator, signal, axis=0)
+            driven = scipy.signal.lfilter(behind, denominator, signal, axis=0)
             own = _delayed(driven, orders.nk, orders.nb)
             free = np.zeros((one.output.size, count, orders.n_state))
             if count:
-                pulse = lfilter(behind, denominator, np.eye(1, one.output.size)[0])
+                pulse = scipy.signal.lfilter(
+                    behind, denominator, np.eye(1, one.output.size)[0]
+                )
                 free[:, index] = _delayed(pulse[:, None], 0, orders.n_state)
             rows.append(
                 np.hstack([own, free.reshape(one.output.size, -1)])[one.counted]
@@ -279,13 +282,13 @@ def _solved(columns: np.ndarray, target: np.ndarray) -> tuple[np.ndarray, float]
     # solution leaves is solved for once more.
     matrix = scaled.T @ scaled
     matrix.flat[:: scale.size + 1] += _RIDGE
-    factor, info = dpotrf(matrix, lower=1)
+    factor, info = scipy.linalg.lapack.dpotrf(matrix, lower=1)
     if info != 0:
         return np.zeros(scale.size), float("inf")
     solution = np.zeros(scale.size)
     for _ in range(2):
         rest = scaled.T @ (target - scaled @ solution)
-        solution += dpotrs(factor, rest, lower=1)[0]
+        solution += scipy.linalg.lapack.dpotrs(factor, rest, lower=1)[0]
     residual = target - scaled @ solution
     solution /= scale
     return solution, float(residual @ residual)

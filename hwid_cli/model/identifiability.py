@@ -27,7 +27,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import qr
+import scipy
 
 from hwid_cli.model import sensitivities, static_map
 from hwid_cli.model.candidates import Candidate, FitData, JacobianColumns, columns
@@ -167,7 +167,7 @@ class Directions:
         count = flat.shape[1]
         if count == 0:
             return flat
-        _, _, order = qr(flat.T, mode="economic", pivoting=True)
+        _, _, order = scipy.linalg.qr(flat.T, mode="economic", pivoting=True)
         return flat @ np.linalg.pinv(flat[order[:count]])
 
     @property

@@ -20,8 +20,8 @@ depend on whether a process compiled a loop or loaded it, and so on the number o
 from functools import lru_cache
 
 import numpy as np
+import scipy
 from numba import njit
-from scipy.special import binom
 
 # Decaying responses end in subnormal numbers, which processors handle a hundred times
 # slower; anything this small is far below the rounding of the values it is added to.
@@ -392,7 +392,7 @@ def difference_basis(count: int) -> np.ndarray:
            [0., 0., 1.]])
     """
     i, j = np.indices((count, count))
-    matrix = binom(j, i) * (-1.0) ** i
+    matrix = scipy.special.binom(j, i) * (-1.0) ** i
     matrix.flags.writeable = False
     return matrix
 

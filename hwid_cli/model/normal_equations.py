@@ -1,8 +1,8 @@
 """Arithmetic on normal equations, compiled where it is by loops; the solution of them."""
 
 import numpy as np
+import scipy
 from numba import njit
-from scipy.linalg.lapack import dposv
 
 # Initial states of fewer experiments are solved for together with all else.
 _FEW = 3
@@ -65,7 +65,7 @@ def solved(
 def _positive(matrix: np.ndarray, vector: np.ndarray) -> np.ndarray | None:
     """Solution with a positive definite matrix, which is overwritten; None without."""
     # The transpose of a symmetric matrix lies in memory as LAPACK takes it.
-    _, step, info = dposv(matrix.T, vector, lower=1, overwrite_a=1)
+    _, step, info = scipy.linalg.lapack.dposv(matrix.T, vector, lower=1, overwrite_a=1)
     return step if info == 0 and np.isfinite(step @ step) else None
 
 

@@ -6,7 +6,7 @@ docs/method.md, eqs. (34a), (34b).
 """
 
 import numpy as np
-from scipy import ndimage
+import scipy
 
 # Neighbours on each side that a sample is compared with: more than a burst is long,
 # fewer than a transient lasts.
@@ -133,8 +133,8 @@ def _sides(residual: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def _movement(simulated: np.ndarray) -> np.ndarray:
     """Range of the last samples up to each one."""
     until_now = {"size": _MOVING, "origin": _MOVING // 2, "mode": "nearest"}
-    highest = ndimage.maximum_filter1d(simulated, **until_now)
-    return highest - ndimage.minimum_filter1d(simulated, **until_now)
+    highest = scipy.ndimage.maximum_filter1d(simulated, **until_now)
+    return highest - scipy.ndimage.minimum_filter1d(simulated, **until_now)
 
 
 def _similar_error(residual: np.ndarray, movement: np.ndarray) -> np.ndarray:
@@ -142,7 +142,7 @@ def _similar_error(residual: np.ndarray, movement: np.ndarray) -> np.ndarray:
     order = np.argsort(movement, kind="stable")
     deviation = np.abs(residual - np.median(residual))[order]
     similar = np.empty(residual.size)
-    similar[order] = ndimage.median_filter(deviation, _SIMILAR, mode="nearest")
+    similar[order] = scipy.ndimage.median_filter(deviation, _SIMILAR, mode="nearest")
     return _NORMAL * similar
 
 

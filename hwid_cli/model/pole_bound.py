@@ -16,8 +16,7 @@ Lawson, Hanson, Solving Least Squares Problems (1974), chapter 23. docs/method.m
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import solve_triangular
-from scipy.optimize import nnls
+import scipy
 
 from hwid_cli.model.linear_block import difference_basis, is_stable, reflected
 
@@ -264,8 +263,8 @@ def _least_squares_within(
         factor = np.linalg.cholesky(matrix)
     except np.linalg.LinAlgError:
         return None
-    centre = solve_triangular(factor, vector, lower=True)
-    across = solve_triangular(factor, rows.T, lower=True)
+    centre = scipy.linalg.solve_triangular(factor, vector, lower=True)
+    across = scipy.linalg.solve_triangular(factor, rows.T, lower=True)
     excess = across.T @ centre - room
     # Rows of very different lengths would hide one another from the dual.
     length = np.linalg.norm(across, axis=0)
@@ -274,9 +273,9 @@ def _least_squares_within(
     if unit > 0.0:
         dual = np.vstack([-across / length, excess / length / unit])
         target = np.eye(1, dual.shape[0], dual.shape[0] - 1)[0]
-        multipliers, _ = nnls(dual, target)
+        multipliers, _ = scipy.optimize.nnls(dual, target)
         residual = dual @ multipliers - target
         if -residual[-1] < _INFEASIBLE:
             return None
         centre = centre - unit * residual[:-1] / residual[-1]
-    return np.asarray(solve_triangular(factor.T, centre, lower=False))
+    return np.asarray(scipy.linalg.solve_triangular(factor.T, centre, lower=False))

@@ -15,8 +15,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numba import njit
-from scipy.linalg.lapack import dposv
 
 from hwid_cli.model.candidates import FitData
 from hwid_cli.model.derivative_rows import all_pole, differences
@@ -335,7 +335,7 @@ def _least_squares(
     while True:
         damped = matrix.copy()
         damped.flat[:: scale.size + 1] += ridge
-        _, solution, info = dposv(damped, vector, lower=1)
+        _, solution, info = scipy.linalg.lapack.dposv(damped, vector, lower=1)
         if info == 0 and np.isfinite(solution).all():
             break
         ridge *= _RIDGE_GROWTH

@@ -27,9 +27,7 @@ docs/method.md, eq. (30).
 """
 
 import numpy as np
-from scipy.linalg import solve_toeplitz, svd
-from scipy.signal import lfilter
-from scipy.stats import chi2, norm
+import scipy
 
 from hwid_cli.model import static_map
 from hwid_cli.model.linear_block import difference_basis, filtered
@@ -77,7 +75,7 @@ def pull(
     scaled = derivatives[:, size > 0.0] / size[size > 0.0]
     if not np.isfinite(scaled).all() or scaled.shape[1] == 0:
         return np.zeros(n_lags + 1)
-    left, strength, _ = svd(scaled, full_matrices=False)
+    left, strength, _ = scipy.linalg.svd(scaled, full_matrices=False)
     basis = left[:, strength > _SINGULAR * strength[0]]
     n_samples = basis.shape[0]
     return np.array(
@@ -251,7 +249,7 @@ def _with_itself(residual: np.ndarray, pull: np.ndarray) -> tuple[Correlation, f
     values = sums / power + pull[1:] / free
     deviation = np.sqrt(np.maximum(free - lags, 1.0) / (free * (free + 2.0)))
     statistic = float(np.sum((values / deviation) ** 2))
-    p_value = float(chi2.sf(statistic, n_lags))
+    p_value = float(scipy.stats.chi2.sf(statistic, n_lags))
     return _banded(lags, values, deviation, p_value), statistic
 
 
@@ -263,8 +261,8 @@ def _with_signal(
         return _no_correlation(np.zeros(0, dtype=int)), False
     whitening = _whitening_filter(signal)
     skip = whitening.size - 1
-    e = lfilter(whitening, 1.0, residual)[skip:]
-    a = lfilter(whitening, 1.0, signal)[skip:]
+    e = scipy.signal.lfilter(whitening, 1.0, residual)[skip:]
+    a = scipy.signal.lfilter(whitening, 1.0, signal)[skip:]
     lags = np.arange(-n_lags, n_lags + 1)
     power_e, power_a = float(e @ e), float(a @ a)
     if power_e == 0.0 or power_a == 0.0:
@@ -300,7 +298,7 @@ def _whitening_filter(signal: np.ndarray) -> np.ndarray:
         [signal[: signal.size - lag] @ signal[lag:] for lag in range(order + 1)]
     )
     sums[0] *= 1.0 + _FLOOR
-    return np.append(1.0, -solve_toeplitz(sums[:-1], sums[1:]))
+    return np.append(1.0, -scipy.linalg.solve_toeplitz(sums[:-1], sums[1:]))
 
 
 def _shared_colour(e: np.ndarray, a: np.ndarray, n_lags: int) -> float:
@@ -330,7 +328,7 @@ def _p_of_largest(sizes: np.ndarray) -> float:
     """Probability that the largest of so many normal variables is as large."""
     if sizes.size == 0:
         return float("nan")
-    single = 2.0 * norm.sf(float(sizes.max()))
+    single = 2.0 * scipy.stats.norm.sf(float(sizes.max()))
     return float(-np.expm1(sizes.size * np.log1p(-min(single, 1.0 - 1e-16))))
 
 
@@ -345,12 +343,12 @@ def _banded(
     """Correlation with its bands."""
     counted = np.ones(lags.size, dtype=bool) if counted is None else counted
     each = 1.0 - (1.0 - LEVEL) ** (1.0 / max(int(counted.sum()), 1))
-    common = norm.isf(each / 2.0) * deviation
+    common = scipy.stats.norm.isf(each / 2.0) * deviation
     outside = lags[counted & (np.abs(values) > common) & (common > 0.0)]
     return Correlation(
         lags,
         values,
-        norm.isf(LEVEL / 2.0) * deviation,
+        scipy.stats.norm.isf(LEVEL / 2.0) * deviation,
         common,
         p_value,
         int(outside.max(initial=-1)),

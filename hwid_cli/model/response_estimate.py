@@ -13,9 +13,7 @@ docs/method.md, eqs. (35)-(36). Ljung (1999), sections 4.2 and 10.6 (subspace me
 """
 
 import numpy as np
-from scipy.linalg import hankel, solve_triangular, svdvals
-from scipy.signal import lfilter
-from scipy.stats import f as f_distribution
+import scipy
 
 from hwid_cli.records.order import ResponseEstimate
 from hwid_cli.records.recordings import Recording
@@ -56,7 +54,7 @@ def estimate_response(recording: Recording) -> ResponseEstimate:
     if delay < 0:
         return nothing
     kept = shares.size - delay
-    solution = solve_triangular(triangle[:kept, :kept], shares[:kept])
+    solution = scipy.linalg.solve_triangular(triangle[:kept, :kept], shares[:kept])
     past, newest_last = solution[1 : order + 1], solution[order + 1 :]
     response = _impulse_response(np.append(1.0, -past), newest_last[::-1])
     values = _hankel_values(response)
@@ -91,7 +89,7 @@ def _delay(shares: np.ndarray, residual: float, freedom: int) -> int:
         is_needed = gains > 0.0
     else:
         is_needed = (
-            f_distribution.sf(gains / counts / noise, counts, freedom) < _FALSE_ALARM
+            scipy.stats.f.sf(gains / counts / noise, counts, freedom) < _FALSE_ALARM
         )
     return int(np.argmax(is_needed)) if is_needed.any() else -1
 
@@ -102,7 +100,7 @@ def _impulse_response(denominator: np.ndarray, numerator: np.ndarray) -> np.ndar
         return np.zeros(0)
     pulse = np.zeros(_LONGEST)
     pulse[0] = 1.0
-    response = lfilter(numerator, denominator, pulse)
+    response = scipy.signal.lfilter(numerator, denominator, pulse)
     large = np.flatnonzero(np.abs(response) > _DECAYED * np.abs(response).max())
     if large.size == 0 or large[-1] > 0.9 * _LONGEST:
         return np.zeros(0)
@@ -117,7 +115,9 @@ def _hankel_values(response: np.ndarray) -> np.ndarray:
     stride = max(1, response.size // (2 * _ROWS))
     thinned = response[::stride]
     first = (thinned.size + 1) // 2
-    values = svdvals(hankel(thinned[:first], thinned[first - 1 :]))
+    values = scipy.linalg.svdvals(
+        scipy.linalg.hankel(thinned[:first], thinned[first - 1 :])
+    )
     return values / values[0]
 
 

@@ -9,6 +9,8 @@ from typing import ClassVar
 _WIDTH, _NARROW, _ROW, _TITLE, _AXIS = 720, 340, 20, 26, 40
 # Room of a character of a name and of a number, of which a narrow drawing has less.
 _CHARACTER, _MOST_NAME = 6.4, 240
+# Numbers beyond this, or below its reciprocal on a logarithmic axis, have no place on one.
+_LARGEST = 1e100
 # A logarithmic axis reaches at least so far, [-].
 _LEAST_RANGE = 6.0
 _MARGIN = 0.06
@@ -213,7 +215,9 @@ def _values(dots: Dots) -> list[float]:
     if dots.reference is not None:
         found.append(dots.reference[0])
     return [
-        one for one in found if math.isfinite(one) and (one > 0.0 or not dots.is_log)
+        one
+        for one in found
+        if abs(one) < _LARGEST and (one > 1.0 / _LARGEST or not dots.is_log)
     ]
 
 

@@ -5,18 +5,18 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass
 from functools import partial
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from hwid_cli.records.report import ReportContents
 from hwid_cli.report.charts import Chart
 from hwid_cli.report.dots import Dots
-from hwid_cli.report.figures.style import as_png, report_style
-from hwid_cli.report.plots import shared_sheets
 from hwid_cli.report.simulation_note import HUBER_NOTE, simulation_note
 from hwid_cli.report.table import Block, Table, Text
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 # Raised when a figure changes, so that figures are drawn again.
 FIGURES_VERSION = 1
@@ -146,6 +146,10 @@ class Drawing:
     @property
     def png(self) -> bytes:
         """The drawn file."""
+        # Loading what draws takes longer than to see that nothing has to be drawn.
+        from hwid_cli.report.figures.style import as_png, report_style
+        from hwid_cli.report.plots import shared_sheets
+
         with report_style(), shared_sheets():
             return as_png(self.draw())
 

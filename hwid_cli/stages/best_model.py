@@ -6,7 +6,7 @@ recordings of the final test.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -15,13 +15,15 @@ from hwid_cli.model.scores import rmsd
 from hwid_cli.model.simulate import validation_output
 from hwid_cli.records.best_model import BestModel
 from hwid_cli.records.groups import FinalTest, GroupSearch
-from hwid_cli.records.model import Fit
+from hwid_cli.records.model import Fit, HammersteinWiener
 from hwid_cli.records.recordings import Recording
 from hwid_cli.records.results import CrossValidation
 from hwid_cli.stages.compare import linear_beside
+from hwid_cli.stages.identify import STAGE_VERSION
 from hwid_cli.stages.order_grid import grid_place
 from hwid_cli.stages.ranking import best_fits, widest_model
 from hwid_cli.stages.test import best_single, taken_model
+from hwid_cli.tasks.cache import Store, recording_key, remembered, task_key
 
 
 def best_model(
@@ -145,7 +147,10 @@ def _own(
 
 
 def beside_linear(
-    best: BestModel, fits: Mapping[str, Fit], recordings: Sequence[Recording]
+    best: BestModel,
+    fits: Mapping[str, Fit],
+    recordings: Sequence[Recording],
+    store: Store,
 ) -> BestModel:
     """Put the linear model of the same orders and recordings beside a model.
 
@@ -155,6 +160,8 @@ def beside_linear(
         By the names of their models.
     recordings : sequence of Recording
         All of them.
+    store : Store
+        Keeps what the linear model gave.
 
     Returns
     -------
@@ -163,12 +170,36 @@ def beside_linear(
     """
     if best.judge == "own" or best.name not in fits:
         return best
-    found = linear_beside(fits[best.name], recordings)
-    if found is None:
-        return best
+    fit = fits[best.name]
     by_name = {one.name: one for one in recordings}
-    deviations = [
-        rmsd(by_name[name].output, validation_output(found, by_name[name]))
-        for name in best.judged_on
-    ]
-    return replace(best, linear_rmsd=float(np.mean(deviations)))
+    if not set(fit.identified_on) <= set(by_name):
+        return best
+    judges = [by_name[name] for name in best.judged_on]
+    settings = {
+        "fitted_to": [recording_key(by_name[name]) for name in fit.identified_on],
+        "judges": [recording_key(one) for one in judges],
+        "orders": fit.orders,
+        "options": fit.options,
+    }
+    key = task_key("linear_beside", STAGE_VERSION, settings, [])
+    found = remembered(
+        store,
+        key,
+        _LinearModel,
+        lambda: _LinearModel(_mean_rmsd(linear_beside(fit, recordings), judges)),
+    )
+    return best if np.isnan(found.rmsd) else replace(best, linear_rmsd=found.rmsd)
+
+
+@dataclass(frozen=True)
+class _LinearModel:
+    """Mean RMSD of a linear model on the recordings that judge; NaN without a model."""
+
+    rmsd: float
+
+
+def _mean_rmsd(model: HammersteinWiener | None, judges: Sequence[Recording]) -> float:
+    if model is None:
+        return np.nan
+    deviations = [rmsd(one.output, validation_output(model, one)) for one in judges]
+    return float(np.mean(deviations))

@@ -18,8 +18,7 @@ docs/method.md, eqs. (21) and (22).
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import Bounds, LinearConstraint, OptimizeResult, milp
-from scipy.sparse import coo_array
+import scipy
 
 # The solver stops within 1e-6 of the least cost, an absolute number: costs are stretched
 # until that is nothing.
@@ -65,11 +64,11 @@ def _fewest_rows(covered: np.ndarray) -> int:
     """Count the rows of a smallest cover."""
     n_rows = len(covered)
     result = _solved(
-        milp(
+        scipy.optimize.milp(
             np.ones(n_rows),
             integrality=np.ones(n_rows),
-            bounds=Bounds(0, 1),
-            constraints=LinearConstraint(covered.T.astype(float), lb=1),
+            bounds=scipy.optimize.Bounds(0, 1),
+            constraints=scipy.optimize.LinearConstraint(covered.T.astype(float), lb=1),
         )
     )
     return round(result.fun)
@@ -86,8 +85,10 @@ def _cheapest_rows(covered: np.ndarray, costs: np.ndarray, count: int) -> np.nda
     n_pairs = row.size
     pair, last = np.arange(n_pairs), n_rows + np.arange(n_pairs)
     ones = np.ones(n_pairs)
-    is_served = coo_array((ones, (column, last)), shape=(n_columns, n_rows + n_pairs))
-    by_chosen = coo_array(
+    is_served = scipy.sparse.coo_array(
+        (ones, (column, last)), shape=(n_columns, n_rows + n_pairs)
+    )
+    by_chosen = scipy.sparse.coo_array(
         (np.append(ones, -ones), (np.tile(pair, 2), np.append(last, row))),
         shape=(n_pairs, n_rows + n_pairs),
     )
@@ -95,14 +96,14 @@ def _cheapest_rows(covered: np.ndarray, costs: np.ndarray, count: int) -> np.nda
     largest = float(np.max(costs[covered]))
     scale = _LARGEST_COST / largest if largest > 0 else 1.0
     result = _solved(
-        milp(
+        scipy.optimize.milp(
             np.append(np.zeros(n_rows), scale * costs[row, column]),
             integrality=is_row,
-            bounds=Bounds(0, 1),
+            bounds=scipy.optimize.Bounds(0, 1),
             constraints=[
-                LinearConstraint(is_served, lb=1, ub=1),
-                LinearConstraint(by_chosen, ub=0),
-                LinearConstraint(is_row[np.newaxis], lb=count, ub=count),
+                scipy.optimize.LinearConstraint(is_served, lb=1, ub=1),
+                scipy.optimize.LinearConstraint(by_chosen, ub=0),
+                scipy.optimize.LinearConstraint(is_row[np.newaxis], lb=count, ub=count),
             ],
             options={"mip_rel_gap": 0},
         )
@@ -110,7 +111,9 @@ def _cheapest_rows(covered: np.ndarray, costs: np.ndarray, count: int) -> np.nda
     return np.flatnonzero(result.x[:n_rows] > 0.5)
 
 
-def _solved(result: OptimizeResult) -> OptimizeResult:
+def _solved(
+    result: "scipy.optimize.OptimizeResult",
+) -> "scipy.optimize.OptimizeResult":
     """Every cover exists, so a solver without one is a fault of ours."""
     if not result.success:
         raise RuntimeError(f"no smallest cover was found: {result.message}")

@@ -4,7 +4,7 @@ One task simulates all models of one recording on one recording, one after the o
 keeps the RMSDs only: simulated signals are never held for more than one model.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -113,13 +113,20 @@ def crossval_tasks(
     fits : sequence of Fit
         Recording by recording, orders within.
     """
-    n_grid = len(orders.nb) * len(orders.nk)
     contents = [recording_key(recording) for recording in recordings]
     tasks: list[Task] = []
-    for first in range(0, len(fits), n_grid):
-        models = tuple(fit.model for fit in fits[first : first + n_grid])
-        tasks += deviation_tasks(models, recordings, contents, fits[first].name)
+    for name, models in _models_of_each(fits, orders):
+        tasks += deviation_tasks(models, recordings, contents, name)
     return tuple(tasks)
+
+
+def _models_of_each(
+    fits: Sequence[Fit], orders: OrdersOptions
+) -> Iterator[tuple[str, list[HammersteinWiener | None]]]:
+    """Name of each recording with the models of all of its orders."""
+    n_grid = len(orders.nb) * len(orders.nk)
+    for first in range(0, len(fits), n_grid):
+        yield fits[first].name, [fit.model for fit in fits[first : first + n_grid]]
 
 
 def deviation_tasks(
@@ -146,24 +153,36 @@ def deviation_tasks(
     tuple of Task
         Each gives ``Deviations``.
     """
-    model_keys = [None if model is None else model_key(model) for model in models]
+    keys = deviation_keys(models, contents)
     # Once for all recordings: the outputs are the same to the last bit.
     models = tuple(None if one is None else outlined_model(one) for one in models)
     return tuple(
         Task(
-            key=task_key(
-                NAME,
-                STAGE_VERSION,
-                {"models": model_keys, "recording": content},
-                [],
-            ),
+            key=key,
             name=f"{name} on {recording.name}",
             function=_deviations,
             arguments=(models, recording),
             result_type=Deviations,
         )
-        for recording, content in zip(recordings, contents, strict=True)
+        for recording, key in zip(recordings, keys, strict=True)
     )
+
+
+def deviation_keys(
+    models: Sequence[HammersteinWiener | None], contents: Sequence[str]
+) -> list[str]:
+    """Keys of the tasks that ``deviation_tasks`` lists, without the tasks.
+
+    Parameters
+    ----------
+    contents : sequence of str
+        ``recording_key`` of each recording.
+    """
+    model_keys = [None if model is None else model_key(model) for model in models]
+    return [
+        task_key(NAME, STAGE_VERSION, {"models": model_keys, "recording": content}, [])
+        for content in contents
+    ]
 
 
 def crossval_key(
@@ -173,8 +192,13 @@ def crossval_key(
     options: CrossvalOptions,
 ) -> str:
     """Content key of the whole stage: its RMSDs and the names on their axes."""
+    contents = [recording_key(recording) for recording in recordings]
     settings = {
-        "rmsds": [task.key for task in crossval_tasks(fits, recordings, orders)],
+        "rmsds": [
+            key
+            for _, models in _models_of_each(fits, orders)
+            for key in deviation_keys(models, contents)
+        ],
         "identified_on": [fit.name for fit in fits],
         "validated_on": [recording.name for recording in recordings],
         "orders": orders,

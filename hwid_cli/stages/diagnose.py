@@ -25,9 +25,7 @@ from hwid_cli.records.drive import DriveResponse, told_apart
 from hwid_cli.records.experiment import DiagnoseOptions, Experiment, SimulationOptions
 from hwid_cli.records.programs import ForeignSimulation, ModelSimulation
 from hwid_cli.records.recordings import CalibrationLog, Recording
-from hwid_cli.report import plots
 from hwid_cli.report.diagnosis import diagnosis_blocks
-from hwid_cli.report.figures.diagnosis import diagnosis_figures
 from hwid_cli.simulations.drive import simulate_recordings
 from hwid_cli.simulations.kinds import kind_named
 from hwid_cli.stages.diagnosis_seconds import time_diagnosis
@@ -486,6 +484,10 @@ def _drawn_before(out: Path, origin: Provenance) -> list[str] | None:
 
 
 def _draw(folder: Path, diagnosis: Diagnosis, about: str) -> list[str]:
+    # Loading what draws takes longer than reading what is drawn already.
+    from hwid_cli.report import plots
+    from hwid_cli.report.figures.diagnosis import diagnosis_figures
+
     figures = diagnosis_figures(diagnosis)
     drawn = {f"{name}.png": plots.as_png(figure) for name, figure in figures.items()}
     for path in folder.glob("diagnosis_*.png"):

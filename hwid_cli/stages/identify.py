@@ -233,7 +233,7 @@ def _tables(context: Context, fits: tuple[Fit, ...]) -> list[Block]:
     unit = recordings[0].output_unit
     table = best_models_table(best_fits(fits), unit, nk_is_delay=nk_role == "delay")
     blocks: list[Block] = [table]
-    left = own_residuals(fits, recordings, nk_role)
+    left = own_residuals(fits, recordings, nk_role, context.store)
     if left:
         blocks.append(residual_table(left))
     return [*blocks, *fits_ended(count_statuses(fits), fits)]

@@ -1,6 +1,7 @@
 """What the best models leave of their own recordings."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -13,13 +14,22 @@ from hwid_cli.records.recordings import Recording
 from hwid_cli.records.residuals import ModelResiduals, ResidualTests
 from hwid_cli.stages.order_grid import grid_place
 from hwid_cli.stages.ranking import best_fits
+from hwid_cli.tasks.cache import (
+    Store,
+    model_key,
+    recording_key,
+    remembered,
+    task_key,
+)
 
+# Raised where a formula of the tests changes.
+RESIDUALS_VERSION = 1
 # Robust standard deviations that residuals of fits that bear outliers are cut to.
 _CUT = 3.0
 
 
 def own_residuals(
-    fits: Sequence[Fit], recordings: Sequence[Recording], nk_role: str
+    fits: Sequence[Fit], recordings: Sequence[Recording], nk_role: str, store: Store
 ) -> tuple[ModelResiduals, ...]:
     """Test the residuals of the best model of each recording on that recording.
 
@@ -31,6 +41,8 @@ def own_residuals(
         All that fits are named after.
     nk_role : str
         What the second axis of the order grid counts.
+    store : Store
+        Keeps the tests: they take longer than reading everything else that is stored.
 
     Returns
     -------
@@ -42,7 +54,7 @@ def own_residuals(
     for best in best_fits(fits, 1):
         for fit in best:
             recording = by_name[fit.name]
-            tests = examined_residual(recording, fit)
+            tests = _remembered_tests(recording, fit, store)
             if tests is not None:
                 nb, nk = grid_place(fit, nk_role)
                 name, unit = f"{fit.name}/{nb}/{nk}", recording.output_unit
@@ -51,6 +63,31 @@ def own_residuals(
                     ModelResiduals(name, tests, flat, fit.name, fit.rmsd, unit)
                 )
     return tuple(found)
+
+
+def _remembered_tests(
+    recording: Recording, fit: Fit, store: Store
+) -> ResidualTests | None:
+    """Tests of the residual of a fit to this very recording."""
+    if fit.model is None:
+        return None
+    settings = {
+        "recording": recording_key(recording),
+        "model": model_key(fit.model),
+        "loss": fit.options.loss,
+        "free_break_points": fit.options.free_break_points,
+    }
+    key = task_key("residuals", RESIDUALS_VERSION, settings, [])
+    return remembered(
+        store, key, _Examined, lambda: _Examined(examined_residual(recording, fit))
+    ).tests
+
+
+@dataclass(frozen=True, eq=False)
+class _Examined:
+    """Tests of a residual; None where the model's output is not finite."""
+
+    tests: ResidualTests | None
 
 
 def examined_residual(recording: Recording, fit: Fit) -> ResidualTests | None:

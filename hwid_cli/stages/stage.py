@@ -8,7 +8,7 @@ where they differ it computes, stores, and writes its files.
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
@@ -18,7 +18,7 @@ from hwid_cli.records.experiment import Experiment
 from hwid_cli.records.recordings import CalibrationLog, Recording
 from hwid_cli.report.table import Block
 from hwid_cli.store.result_files import Provenance, read_stage_key, results_file
-from hwid_cli.tasks.cache import Store
+from hwid_cli.tasks.cache import MemoryStore, Store
 from hwid_cli.tasks.runner import RunSettings
 
 
@@ -32,11 +32,14 @@ class Context:
         Folder of the results.
     results : mapping of str to object
         What the stages before it gave, by their names.
+    store : Store
+        What was computed before.
     """
 
     experiment: Experiment
     out: Path
     results: Mapping[str, Any]
+    store: Store = field(default_factory=MemoryStore)
 
 
 class Runner(Protocol):

@@ -25,6 +25,8 @@ from hwid_cli.store.hdf5_records import (
 Record = TypeVar("Record")
 
 _PRESENT = "is_present"
+# Kinds of numpy in which what a column holds may be stored.
+_KINDS: dict[type, str] = {str: "U", bool: "b", int: "iu", float: "f"}
 _DTYPES: dict[type, Any] = {str: object, bool: bool, int: np.int64, float: np.float64}
 
 
@@ -153,10 +155,16 @@ def _read_column(group: h5py.Group, field: StoredField) -> list[Any]:
 def _read_values(group: h5py.Group, field: StoredField) -> list[Any]:
     """Scalars or rows of a column, filling included."""
     values = read_array(group, field.name)
+    if values.size and values.dtype.kind not in _KINDS.get(field.member, "iufcbU"):
+        raise TypeError(f"{field.name} holds numbers or words of another kind")
     if field.form == "scalar":
         return values.tolist()
     lengths = np.full(len(values), values.shape[1])
     if has_value(group, f"{field.name}_length"):
         lengths = read_array(group, f"{field.name}_length")
+        if ((lengths < 0) | (lengths > values.shape[1])).any():
+            raise ValueError(
+                f"{field.name} has rows longer than what is stored of them"
+            )
     rows = [row[:length] for row, length in zip(values, lengths, strict=True)]
     return rows if field.form == "array" else [tuple(row.tolist()) for row in rows]

@@ -21,6 +21,7 @@ from hwid_cli import __version__
 from hwid_cli.errors import CacheError, UntrustedFunctionError
 from hwid_cli.files.atomic import check_format, replaced_hdf5
 from hwid_cli.files.checksums import has_checksum, with_checksum, without_checksum
+from hwid_cli.files.plain_files import refuse_unless_plain
 from hwid_cli.store.hdf5_records import read_array, write_array
 
 Result = TypeVar("Result")
@@ -209,10 +210,11 @@ def replaced_stage(
 
 def _readable_bytes(path: Path, stage: str) -> bytes:
     """Content of a results file; one that cannot be read is set aside."""
+    refuse_unless_plain(path)
     if not path.exists():
         return b""
     try:
-        path.read_bytes()
+        content = path.read_bytes()
     except OSError as error:
         # What cannot be read now may be whole: only a content that is wrong is damage.
         raise CacheError(
@@ -220,10 +222,14 @@ def _readable_bytes(path: Path, stage: str) -> bytes:
             "read and replaced; mend the disk, or choose another folder with --out"
         ) from error
     try:
-        with _opened(path, stage) as file:
-            # Damage below the root shows only where it is looked at.
-            file.visititems(_look_at)
-            return without_checksum(path.read_bytes())
+        with _faults_of(path, stage):
+            # Of what was read: a disk that fails at a second look says nothing of it.
+            image = without_checksum(content)
+            with h5py.File(h5py.h5f.open_file_image(image), "r") as file:
+                _check(file, stage, content)
+                # Damage below the root shows only where it is looked at.
+                file.visititems(_look_at)
+            return image
     except CacheError:
         aside = path.with_name(f"{path.name}.bad")
         try:
@@ -279,19 +285,31 @@ def read_results(path: Path, stage: str, read: Callable[[h5py.File], Result]) ->
 @contextmanager
 def _opened(path: Path, stage: str) -> Iterator[h5py.File]:
     """Give an open results file; faults in it become errors that a user can act on."""
-    _, format_name = _OWN_FILES.get(stage, (RESULTS, RESULTS_FORMAT))
-    try:
+    with _faults_of(path, stage):
         if not path.is_file():
             raise ValueError("it is no plain file")
         content = path.read_bytes()
         without_checksum(content)
         # File systems without locks exist; a file that is replaced as a whole needs none.
         with h5py.File(path, "r", locking=False) as file:
-            check_format(file, format_name=format_name, version=SCHEMA_VERSION)
-            if HAS_CHECKSUM in file.attrs and not has_checksum(content):
-                raise ValueError("its checksum is gone: cut off, or changed since")
+            _check(file, stage, content)
             del content
             yield file
+
+
+def _check(file: h5py.File, stage: str, content: bytes) -> None:
+    """Refuse a file of another format, or one that has lost its checksum."""
+    _, format_name = _OWN_FILES.get(stage, (RESULTS, RESULTS_FORMAT))
+    check_format(file, format_name=format_name, version=SCHEMA_VERSION)
+    if HAS_CHECKSUM in file.attrs and not has_checksum(content):
+        raise ValueError("its checksum is gone: cut off, or changed since")
+
+
+@contextmanager
+def _faults_of(path: Path, stage: str) -> Iterator[None]:
+    """What is wrong with a results file, as an error that a user can act on."""
+    try:
+        yield
     except UntrustedFunctionError as error:
         raise UntrustedFunctionError(f"{path}: {stage}: {error}") from error
     except (LookupError, OSError, RuntimeError, TypeError, ValueError) as error:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import h5py
 import numpy as np
+from h5py import h5d
 
 from hwid_cli.files.atomic import replaced_hdf5
 from hwid_cli.files.checksums import with_checksum
@@ -78,7 +79,8 @@ def _write_recordings(group: h5py.Group, recordings: Sequence[Recording]) -> Non
         inner = group.create_group(recording.name)
         write_record(inner, recording)
         for side in ("input", "output"):
-            write_small(inner[side], "unit", getattr(recording, f"{side}_unit"), str)
+            array = h5py.Dataset(h5d.open(inner.id, side.encode()))
+            write_small(array, "unit", getattr(recording, f"{side}_unit"), str)
 
 
 def _write_logs(group: h5py.Group, logs: Sequence[CalibrationLog]) -> None:
@@ -204,6 +206,11 @@ def read_crossval(path: Path) -> CrossValidation:
     CacheError
         If it is missing or cannot be read.
     """
-    return read_results(
-        path, "crossval", lambda file: read_record(file["crossval"], CrossValidation)
-    )
+
+    def read(file: h5py.File) -> CrossValidation:
+        found = read_record(file["crossval"], CrossValidation)
+        if not 0.0 < found.threshold < np.inf:
+            raise ValueError(f"a threshold of {found.threshold:g}")
+        return found
+
+    return read_results(path, "crossval", read)

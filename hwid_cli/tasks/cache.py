@@ -10,16 +10,20 @@ Keys of what tasks are given: recordings and models, by their content.
 import hashlib
 import json
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import asdict, fields, is_dataclass
+from contextlib import suppress
+from dataclasses import fields, is_dataclass
 from typing import Any, Protocol, TypeVar
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from hwid_cli.errors import CacheError
 from hwid_cli.records.maps import Extrapolation
 from hwid_cli.records.model import HammersteinWiener, StaticMap
 from hwid_cli.records.recordings import Recording
 
 Record = TypeVar("Record")
+Keyed = TypeVar("Keyed", Recording, HammersteinWiener)
 
 
 class Store(Protocol):
@@ -87,6 +91,28 @@ class MemoryStore:
         self.put(key, packed)
 
 
+def remembered(
+    store: Store, key: str, record_type: type[Record], compute: Callable[[], Record]
+) -> Record:
+    """Look up what a table or a sentence shows beside stored results, or compute it.
+
+    Where it cannot be stored it is computed each time: it is nothing that may be lost.
+
+    Parameters
+    ----------
+    key : str
+        As ``task_key`` gives it.
+    compute : callable
+        Gives the record.
+    """
+    found = store.get(key, record_type)
+    if found is None:
+        found = compute()
+        with suppress(CacheError):
+            store.put(key, found)
+    return found
+
+
 def _as_it_is(_: str, record: Any) -> Any:
     return record
 
@@ -143,7 +169,7 @@ def _canonical(data: Any) -> bytes:
 def _plain(value: Any) -> Any:
     """Settings as JSON can hold them."""
     if is_dataclass(value) and not isinstance(value, type):
-        return _plain(asdict(value))
+        return {item.name: _plain(getattr(value, item.name)) for item in fields(value)}
     if isinstance(value, Mapping):
         if not all(isinstance(key, str) for key in value):
             raise TypeError(f"settings need text as keys, got {list(value)!r}")
@@ -157,8 +183,23 @@ def _plain(value: Any) -> Any:
     raise TypeError(f"a setting of type {type(value).__name__} has no definite bytes")
 
 
+# Keys by the record: its arrays are read-only, and the same one is asked for many times.
+_known_keys: WeakKeyDictionary[Recording | HammersteinWiener, str] = WeakKeyDictionary()
+
+
 def recording_key(recording: Recording) -> str:
     """Content key of a recording: what a fit sees of it."""
+    return _key_once(recording, _recording_key)
+
+
+def _key_once(record: Keyed, key_of: Callable[[Keyed], str]) -> str:
+    key = _known_keys.get(record)
+    if key is None:
+        key = _known_keys[record] = key_of(record)
+    return key
+
+
+def _recording_key(recording: Recording) -> str:
     settings = {
         "sample_time_s": recording.sample_time_s,
         "input_unit": recording.input_unit,
@@ -169,6 +210,10 @@ def recording_key(recording: Recording) -> str:
 
 def model_key(model: HammersteinWiener) -> str:
     """Content key of a model: every number and word that it consists of."""
+    return _key_once(model, _model_key)
+
+
+def _model_key(model: HammersteinWiener) -> str:
     settings, arrays = _content(model, "")
     return task_key("model", 1, settings, arrays)
 

@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from scipy.stats import t as student
+import scipy
 
 from hwid_cli.model.extrapolation import outlined_model
 from hwid_cli.model.fit import fit_without_standard_errors
@@ -172,7 +172,7 @@ def _scale(scores: Sequence[np.ndarray]) -> float:
         # Recordings that differ more than so many errors would are fewer errors.
         relative = np.var(squares / squares.mean(), ddof=1)
         number = min(number, 2.0 * squares.size / relative)
-    quantile = student.ppf(0.5 + COVERAGE / 2.0, number)
+    quantile = scipy.stats.t.ppf(0.5 + COVERAGE / 2.0, number)
     return max(float(quantile * np.sqrt(squares.mean())), _LEAST_SCALE)
 
 

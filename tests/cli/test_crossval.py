@@ -1,4 +1,6 @@
 import csv
+import subprocess
+import sys
 
 import h5py
 import numpy as np
@@ -126,3 +128,26 @@ def test_results_say_how_long_they_took_and_what_computed_them(after_run, out):
         origin = read_provenance(path, stage)
         assert 0 < origin.seconds < 600, stage
         assert origin.versions["numpy"] == np.__version__
+
+
+def test_a_second_run_loads_nothing_that_computes_or_draws(after_run, config, out):
+    code = (
+        "import sys; from hwid_cli.cli.main import main\n"
+        "try: main(sys.argv[1:])\n"
+        "except SystemExit as end: assert not end.code\n"
+        "heavy = 'scipy.signal scipy.stats scipy.optimize scipy.interpolate matplotlib'\n"
+        "print([one for one in heavy.split() if one in sys.modules])"
+    )
+
+    def loaded(command):
+        done = subprocess.run(
+            [sys.executable, "-c", code, command, config, "--out", out],
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        return done.stdout.splitlines()[-1]
+
+    # The first time it tests residuals, and fits a linear model beside the best one.
+    loaded("crossval")
+    assert [loaded(one) for one in ("identify", "crossval", "report")] == ["[]"] * 3

@@ -249,6 +249,37 @@ def test_a_band_adds_two_columns_around_the_same_prediction(tmp_path):
     assert predict(path, given, "--out", out).exit_code == 0
 
 
+@pytest.mark.parametrize("value", [1e308, -1e308, 1e61])
+@pytest.mark.parametrize(
+    "place",
+    [
+        ("noise_rms",),
+        ("scale",),
+        ("scatter",),
+        ("steps", 0, -1),
+        ("visited", "input", "edges", -1),
+        ("visited", "inner", "lowest_rate", 0),
+    ],
+)
+def test_a_band_of_numbers_that_no_signal_has_is_refused(tmp_path, place, value):
+    path, out = tmp_path / "m.json", tmp_path / "p.csv"
+    write_json(path, with_trust(exported_of(example_model(1))))
+    content = json.loads(path.read_text())
+    inner = content["trust"]
+    for key in place[:-1]:
+        inner = inner[key]
+    inner[place[-1]] = value
+    path.write_text(json.dumps(content))
+    given = write_input(tmp_path / "u.csv", example_input(1))
+
+    result = predict(path, given, "--out", out, "--band")
+
+    assert result.exit_code == 1
+    assert result.stderr.count("\n") == 1
+    assert f"{path}: trust.{place[0]}" in result.stderr
+    assert not out.exists()
+
+
 def test_a_model_of_an_earlier_version_has_no_band_and_says_what_to_do(model, tmp_path):
     out = tmp_path / "p.csv"
     given = write_input(tmp_path / "u.csv", example_input(1))

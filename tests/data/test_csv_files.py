@@ -198,6 +198,7 @@ def test_more_rows_of_the_same_kind_tell_nothing_new(
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(csv_files, "_PLAIN_LINES", 10**6)
+        patch.setattr(csv_files, "_forms", {})
         by_all = told()
 
     assert told() == by_all
@@ -215,7 +216,72 @@ def test_the_form_of_a_long_file_is_told_from_few_rows(tmp_path, monkeypatch):
         return real(rows, **options)
 
     monkeypatch.setattr(csv_files, "read_head", read_head)
+    monkeypatch.setattr(csv_files, "_forms", {})
     (_, time), *_ = csv_files.read_csv_columns(path, BY_NUMBER)
 
     assert time.values.size == 5000
     assert looked_at == [26]  # the names and 25 rows of numbers
+    # Other numbers below the same names are of the same form.
+    path.write_text(path.read_text().replace(",3,", ",-3e-2,"))
+    csv_files.read_csv_columns(path, BY_NUMBER)
+    assert looked_at == [26]
+    path.write_text(path.read_text().replace("current_A", "current_mA"))
+    found = dict(csv_files.read_csv_columns(path, BY_NUMBER))
+    assert looked_at == [26, 26]
+    assert found["input"].unit == "mA"
+
+
+@given(
+    st.lists(
+        st.tuples(
+            st.integers(0, 399),
+            st.integers(0, 2),
+            st.sampled_from(["", "-", "x", '"1"']),
+        ),
+        max_size=4,
+    ),
+    st.sampled_from([",", ";", "\t", " "]),
+)
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_rows_of_numbers_between_others_are_read_as_cell_by_cell(
+    tmp_path, monkeypatch, odd, mark
+):
+    rows = [[f"{k / 8}", f"{k % 7 - 3}.25", f"{-k}e-3"] for k in range(400)]
+    for number, place, cell in odd:
+        rows[number][place] = cell if cell or mark != " " else "nan"
+    path = tmp_path / "run.csv"
+    path.write_text("\n".join(map(mark.join, [["t", "u", "y"], *rows])) + "\n")
+
+    def columns():
+        found = read_columns(path, BY_NAME)
+        return [
+            (one.values.tolist(), one.rows.tolist(), one.texts)
+            for one in (found.time, found.input, found.output)
+        ]
+
+    with monkeypatch.context() as patch:
+        # Blocks so short that most of them follow others, whose way of writing is known.
+        patch.setattr(csv_files, "_BLOCK_LINES", 100)
+        fast = columns()
+        patch.setattr(csv_files, "_add_plain", lambda *_: 0)
+        slow = columns()
+
+    assert repr(fast) == repr(slow)
+
+
+def test_few_cells_are_read_one_by_one_where_columns_end_early(tmp_path, monkeypatch):
+    rows = [f"{k / 8},1.5,{-k}.5" for k in range(5000)] + ["625.0,,1.5"] * 3
+    path = tmp_path / "run.csv"
+    path.write_text("\n".join(["t,u,y", *rows]))
+    seen = []
+    add_cells = csv_files.ColumnParts.add_cells
+    monkeypatch.setattr(
+        csv_files.ColumnParts,
+        "add_cells",
+        lambda parts, rows: (seen.append(len(rows)), add_cells(parts, rows))[1],
+    )
+    found = read_columns(path, BY_NAME)
+
+    assert found.input.values.size == 5000
+    # Of 5003 rows at most twice those in which a block is not halved any more.
+    assert 3 <= sum(seen) <= 2 * csv_files._PLAIN_LINES + 3

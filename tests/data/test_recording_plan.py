@@ -50,7 +50,12 @@ def test_a_row_is_a_file_or_says_how_it_is_made(tmp_path):
         ("name,kind,amplitude,duration_s\na,step,1,1e9\n", "2 to 5000000 samples"),
         ("name,file\n,a.csv\n", "row 2: name: found ''; expected a name"),
         ("name,file\n../a,a.csv\n", "row 2: name: found '../a'; expected a name"),
-        ("name,file\na,none.csv\n", "none.csv: no such file; expected the input of"),
+        ("name,file\na,none.csv\n", "row 2: file: found 'none.csv'; expected a file w"),
+        (f"name,file\na,{'x' * 10**5}.csv\n", r"^.{0,300}row 2: file: found .{0,200}$"),
+        ("name,file\na,/dev/zero\n", "row 2: file: found '/dev/zero'; expected a file"),
+        ("name,file\na,huge.csv\n", "huge.csv: its input holds .* beyond 1e"),
+        ("name,kind,amplitude,duration_s\na,step,1e308,1\n", "a finite number up to"),
+        ("name,kind,amplitude,duration_s\na,step,nan,1\n", "amplitude: found 'nan'"),
         (
             "name,kind,amplitude,duration_s\na,step,1,1\na,step,2,1\n",
             "row 3: name: found 'a'; expected a name that no row before has",
@@ -58,6 +63,7 @@ def test_a_row_is_a_file_or_says_how_it_is_made(tmp_path):
     ],
 )
 def test_a_plan_that_cannot_be_used_is_refused_in_one_line(tmp_path, text, said):
+    (tmp_path / "huge.csv").write_text("t,u\n0,1\n0.01,1e200\n")
     with pytest.raises(MeasurementError, match=said) as refused:
         read_plan(plan(tmp_path, text), OPTIONS, 0.01)
     assert "\n" not in str(refused.value)

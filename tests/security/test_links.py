@@ -76,6 +76,17 @@ def test_result_that_is_no_plain_file_is_refused(out, victim, name, kind):
     assert place.is_symlink() or place.is_fifo()
 
 
+@pytest.mark.parametrize("is_readable", [True, False])
+def test_results_of_a_stage_that_are_a_link_stay_a_link(out, victim, is_readable):
+    place = out / "results.h5"
+    place.symlink_to(victim if is_readable else victim.with_name("new"))
+    done = trial.run(out.parent, "identify")
+
+    assert_refused(done, place, victim)
+    assert place.is_symlink()
+    assert not list(out.glob("*.bad"))
+
+
 @pytest.mark.parametrize(
     "name", ["figures", "figures/calibrate", "cache", "cache/0a", "next"]
 )

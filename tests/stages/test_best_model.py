@@ -11,6 +11,7 @@ from hwid_cli.records.recordings import Recording
 from hwid_cli.records.results import CrossValidation
 from hwid_cli.stages.best_model import beside_linear
 from hwid_cli.stages.best_model import best_model as choose
+from hwid_cli.tasks.cache import MemoryStore
 
 
 def best_model(results):
@@ -118,7 +119,7 @@ def test_the_linear_model_is_of_the_same_recordings_and_judged_on_the_same():
     )
     fits = {"a/1/1": fit(recordings[:1], Orders(1, 1, 1), options)}
     found = best_model({"crossval": crossval([[[0.0, 0.5, 0.5]]], ("a",))})
-    after = beside_linear(found, fits, recordings)
+    after = beside_linear(found, fits, recordings, MemoryStore())
 
     # y[k] = p y[k-1] + b u[k-1] by hand: the best p and b on a alone, judged on b and c.
     def simulated(p, b, u):
@@ -144,6 +145,6 @@ def test_a_linear_fit_that_fails_is_no_reason_to_say_nothing():
     fits = {"a/1/1": fit(recordings[:1], Orders(1, 1, 1), linear)}
     gone = {"a/1/1": fit([saturated("z", 2.0)], Orders(1, 1, 1), FitOptions(units=3))}
 
-    assert beside_linear(found, fits, recordings) == found
-    assert beside_linear(found, gone, recordings) == found
-    assert beside_linear(found, {}, recordings) == found
+    assert beside_linear(found, fits, recordings, MemoryStore()) == found
+    assert beside_linear(found, gone, recordings, MemoryStore()) == found
+    assert beside_linear(found, {}, recordings, MemoryStore()) == found

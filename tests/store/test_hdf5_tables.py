@@ -1,3 +1,4 @@
+from dataclasses import replace
 from uuid import uuid4
 
 import h5py
@@ -91,3 +92,24 @@ def test_columns_that_earlier_versions_did_not_write_hold_their_defaults():
 def test_form_without_a_place_in_columns_is_an_error():
     with in_memory() as file, pytest.raises(TypeError, match="inners: a tuple of reco"):
         write_table(file, [], WithMore)
+
+
+@pytest.mark.parametrize(
+    ("place", "values"),
+    [
+        ("rmsd", np.array([b"</script>"] * 2)),
+        ("message", np.array([1.0, 2.0])),
+        ("iterations", np.array([1.5, 2.0])),
+        ("model/numerator_length", np.array([-1, 1])),
+        ("model/numerator_length", np.array([10**9, 1])),
+    ],
+)
+def test_a_column_of_another_kind_is_refused(place, values):
+    shorter = example_fit(seed=1)
+    model = replace(shorter.model, numerator=np.ones(1))
+    with in_memory() as file:
+        write_table(file, [example_fit(), replace(shorter, model=model)], Fit)
+        del file[place]
+        file[place] = values
+        with pytest.raises((TypeError, ValueError)):
+            read_table(file, Fit)

@@ -228,6 +228,37 @@ def test_unreadable_results_are_set_aside_not_overwritten(path, damage, caplog):
     assert read_crossval(path).validated_on == crossval().validated_on
 
 
+@pytest.mark.parametrize("threshold", [np.nan, -1.0, 0.0, np.inf])
+def test_a_threshold_that_nothing_lies_below_is_refused(path, threshold):
+    write_crossval(path, replace(crossval(), threshold=threshold), PROVENANCE)
+    with pytest.raises(CacheError, match="a threshold of"):
+        read_crossval(path)
+
+
+def test_a_disk_that_fails_at_a_second_look_is_no_damage(path, monkeypatch):
+    write_all(path)
+    reads, read_bytes, open_file = [], Path.read_bytes, h5py.File
+
+    def read_once(self):
+        reads.append(self)
+        if len(reads) > 1:
+            raise OSError(5, "Input/output error", str(self))
+        return read_bytes(self)
+
+    def not_from_disk(place, *arguments, **options):
+        if isinstance(place, Path):
+            raise OSError(5, "Input/output error", str(place))
+        return open_file(place, *arguments, **options)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "read_bytes", read_once)
+        patch.setattr(h5py, "File", not_from_disk)
+        write_crossval(path, crossval(), PROVENANCE)
+
+    assert not list(path.parent.glob("*.bad"))
+    assert len(read_fits(path)) > 0
+
+
 def test_full_disk_leaves_the_old_results_untouched(path, monkeypatch):
     write_all(path)
     write_calibrated(path.with_name("c.h5"), recordings(), logs(), PROVENANCE)

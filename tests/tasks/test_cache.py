@@ -3,10 +3,11 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
+from hwid_cli.errors import CacheError
 from hwid_cli.records.model import Fit, FitOptions, Orders
 from hwid_cli.records.recordings import Recording
 from hwid_cli.store.cache import Hdf5Store
-from hwid_cli.tasks.cache import MemoryStore, Store, task_key
+from hwid_cli.tasks.cache import MemoryStore, Store, remembered, task_key
 from tests.store.record_examples import assert_same, example_fit, failed_fit
 
 KEYS = [task_key("identify", 1, {"number": number}, []) for number in range(3)]
@@ -163,3 +164,25 @@ def test_setting_that_is_not_finite_is_refused():
 def test_array_of_objects_is_refused():
     with pytest.raises(TypeError, match="no definite bytes"):
         task_key("identify", 1, {}, [np.array([{}], dtype=object)])
+
+
+def test_what_is_remembered_is_computed_once_and_again_where_nothing_can_be_kept(
+    store, tmp_path
+):
+    calls = []
+
+    def compute():
+        calls.append(1)
+        return example_fit()
+
+    for _ in range(2):
+        assert_same(remembered(store, KEYS[0], Fit, compute), example_fit())
+    assert len(calls) == 1
+
+    class Full(MemoryStore):
+        def put(self, *_):
+            raise CacheError("the disk is full")
+
+    for _ in range(2):
+        assert_same(remembered(Full(), KEYS[0], Fit, compute), example_fit())
+    assert len(calls) == 3

@@ -12,8 +12,8 @@ import math
 from functools import lru_cache
 
 import numpy as np
+import scipy
 from numba import njit
-from scipy.interpolate import CubicSpline
 
 from hwid_cli.model.maps.positions_and_values import amplified, compressed, mean_slope
 from hwid_cli.model.maps.rule import (
@@ -51,7 +51,7 @@ def knots(one: StaticMap) -> np.ndarray:
 def _bends(count: int) -> np.ndarray:
     """Second derivatives at knots of distance one, for each value that is one."""
     at = np.arange(count, dtype=float)
-    spline = CubicSpline(at, np.eye(count), bc_type="natural")
+    spline = scipy.interpolate.CubicSpline(at, np.eye(count), bc_type="natural")
     bends = spline(at, 2)
     # Zero but for rounding: the line beyond the ends goes on without a bend.
     bends[[0, -1]] = 0.0

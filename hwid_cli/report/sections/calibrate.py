@@ -1,6 +1,7 @@
 """Section about calibration."""
 
 from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -28,8 +29,10 @@ from hwid_cli.report.page import (
     Section,
     collapsed_beyond,
 )
-from hwid_cli.report.plots import calibration_figure
 from hwid_cli.report.table import Text
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 # Rows of a table that stands open before the first chart.
 _MOST_ROWS = 12
@@ -150,10 +153,17 @@ def drawings_of(
 ) -> list[Drawing]:
     """Draw each recording whose measurement is known."""
     return [
-        Drawing(f"calibrate/{log.name}.png", partial(calibration_figure, one, log))
+        Drawing(f"calibrate/{log.name}.png", partial(_figure, one, log))
         for one, log in zip(recordings, logs, strict=True)
         if as_measured(one, log) is not None
     ]
+
+
+def _figure(recording: Recording, log: CalibrationLog) -> "Figure":
+    # Loading what draws takes longer than to see that nothing has to be drawn.
+    from hwid_cli.report.plots import calibration_figure
+
+    return calibration_figure(recording, log)
 
 
 # Sections of the page, in their order, and figures beside it.
