@@ -36,16 +36,19 @@ def candidate_maps(fit: FitOptions, options: OrderOptions) -> tuple[FitOptions, 
     --------
     >>> fit = FitOptions(output_map="none")
     >>> [one.input_units for one in candidate_maps(fit, OrderOptions(units=(3, 5)))]
-    [10, 3, 5]
+    [None, 3, 5]
     """
     sides = [
         [
             (kind, units)
             for kind in dict.fromkeys((own.kind, *options.maps))
-            for units in dict.fromkeys((own.units, *options.units))
-            if _has_units(kind) or units == own.units
+            for units in dict.fromkeys((given, *options.units))
+            if _has_units(kind) or units == given
         ]
-        for own in (fit.of_input, fit.of_output)
+        for own, given in (
+            (one, None if one.is_most else one.units)
+            for one in (fit.of_input, fit.of_output)
+        )
     ]
     return tuple(
         replace(
@@ -199,9 +202,9 @@ def _deviations(
 
 
 def _named(options: FitOptions) -> tuple[str, int, str, int]:
-    """Both maps, each with its size; 0 where its kind has none."""
+    """Both maps, each with its size; 0 where its kind has none or none is given."""
     first, second = (
-        (one.kind, one.units * _has_units(one.kind))
+        (one.kind, 0 if one.is_most or not _has_units(one.kind) else one.units)
         for one in (options.of_input, options.of_output)
     )
     return (*first, *second)

@@ -143,7 +143,10 @@ def place_of(one: MapCandidate) -> int:
     """Number of a pair of maps among the candidates."""
     wanted = (one.input_map, one.input_units, one.output_map, one.output_units)
     listed = [
-        (side.kind, side.units * (side.kind not in ("none", "polynomial")))
+        (
+            side.kind,
+            0 if side.is_most or side.kind in ("none", "polynomial") else side.units,
+        )
         for options in MAPS
         for side in (options.of_input, options.of_output)
     ]
