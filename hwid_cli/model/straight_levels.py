@@ -66,7 +66,7 @@ def with_straight_maps(
 def _line(asked: MapOptions, argument: np.ndarray, slope: float) -> StaticMap:
     rule = RULES[asked.kind]
     one = identity(asked.kind, asked, argument)
-    if slope != 1.0:
+    if rule.amplify is not None and slope != 1.0:
         one = rule.amplify(one, slope)
     if rule.has_slope:
         return extrapolated_map(one, argument)
