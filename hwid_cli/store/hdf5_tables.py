@@ -141,7 +141,8 @@ def _read_column(group: h5py.Group, field: StoredField) -> list[Any]:
     if field.form == "record":
         return read_table(group[field.name], field.member)
     values = _read_values(group, field)
-    if not field.is_optional:
+    # An earlier version wrote every value of a field that may be missing today.
+    if not field.is_optional or not has_value(group, f"{field.name}_{_PRESENT}"):
         return values
     there = read_array(group, f"{field.name}_{_PRESENT}")
     return [
