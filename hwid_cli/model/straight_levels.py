@@ -33,6 +33,16 @@ def asks_for_levels(options: FitOptions) -> bool:
     )
 
 
+def has_no_levels(model: HammersteinWiener) -> bool:
+    """Tell whether a map with levels is straight everywhere: its parameters say nothing."""
+    return any(
+        not RULES[one.kind].has_slope
+        and one.extrapolation is not None
+        and not np.ptp(one.extrapolation.visited)
+        for one in (model.input_map, model.output_map)
+    )
+
+
 def with_straight_maps(
     linear: HammersteinWiener, options: FitOptions, u: np.ndarray, x: np.ndarray
 ) -> HammersteinWiener:

@@ -2,9 +2,10 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from hwid_cli.model.fit import fit
+from hwid_cli.model.fit import fit, fit_without_standard_errors
 from hwid_cli.model.simulate import simulate
 from hwid_cli.model.static_map import evaluate
+from hwid_cli.model.uncertainty import parameter_covariance, with_standard_errors
 from hwid_cli.records.model import FitOptions, Orders
 from hwid_cli.records.recordings import Recording
 
@@ -50,6 +51,18 @@ def test_levels_of_the_output_are_straight_too():
     np.testing.assert_allclose(
         simulate(found.model, one.input), simulate(linear.model, one.input), rtol=1e-9
     )
+
+
+def test_parameters_that_say_nothing_have_no_standard_errors():
+    one = recording(lambda u: u)
+    options = FitOptions(input_map="piecewise_constant", output_map="none", units=4)
+    fast = fit_without_standard_errors([one], ORDERS, options)
+    found = with_standard_errors(fast, [one])
+
+    assert found.uncertainty.names == ()
+    assert "no levels" in found.uncertainty.reason
+    with pytest.raises(ValueError, match="no levels"):
+        parameter_covariance(found, [one])
 
 
 def test_levels_that_the_plant_has_stay():
