@@ -141,8 +141,7 @@ def _read_column(group: h5py.Group, field: StoredField) -> list[Any]:
     if field.form == "record":
         return read_table(group[field.name], field.member)
     values = _read_values(group, field)
-    # An earlier version wrote every value of a field that may be missing today.
-    if not field.is_optional or not has_value(group, f"{field.name}_{_PRESENT}"):
+    if not field.is_optional:
         return values
     there = read_array(group, f"{field.name}_{_PRESENT}")
     return [

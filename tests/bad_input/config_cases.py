@@ -96,7 +96,7 @@ VALUES = [
     _case(
         "infinite", more("crossval: {threshold: .inf}"), "crossval.threshold", "finite"
     ),
-    _case("no value", more("fit: {degree: }"), "fit.degree", "no value", "an integer"),
+    _case("no value", more("fit: {units: }"), "fit.units", "no value", "an integer"),
     _case("10^9 units", more("fit: {units: 1000000000}"), "fit.units", "at most 1000"),
     _case(
         "10^400 units", more(f"fit: {{units: 1{'0' * 400}}}"), "fit.units", "integer"

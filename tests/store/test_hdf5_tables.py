@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hwid_cli.records.model import Fit, FitOptions
+from hwid_cli.records.model import Fit
 from hwid_cli.store.hdf5_tables import read_table, write_table
 from tests.store.record_examples import (
     EVERYTHING,
@@ -91,20 +91,3 @@ def test_columns_that_earlier_versions_did_not_write_hold_their_defaults():
 def test_form_without_a_place_in_columns_is_an_error():
     with in_memory() as file, pytest.raises(TypeError, match="inners: a tuple of reco"):
         write_table(file, [], WithMore)
-
-
-def test_a_field_that_had_to_be_there_in_an_earlier_version_is_read():
-    options = [FitOptions(units=7), FitOptions(units=4)]
-    with in_memory() as file:
-        write_table(file, options, FitOptions)
-        # Written before a size could be left to the data.
-        del file["units_is_present"]
-        found = read_table(file, FitOptions)
-    assert [one.units for one in found] == [7, 4]
-
-
-def test_a_size_that_is_left_to_the_data_comes_back_as_it_was():
-    options = [FitOptions(), FitOptions(units=4)]
-    with in_memory() as file:
-        write_table(file, options, FitOptions)
-        assert read_table(file, FitOptions) == options
