@@ -91,9 +91,9 @@ def with_needed_break_points(
     given = _Given(experiments, options, min(costs, default=np.inf))
     for chosen in ((True, True), (True, False), (False, True)):
         if all(m for m, c in zip(may, chosen, strict=True) if c):
-            of_input, of_output = _sizes(best)
-            size = (0 if chosen[0] else of_input, 0 if chosen[1] else of_output)
-            found = _attempt(best, size, given)
+            size = _sizes(best)
+            straight = tuple(0 if c else k for c, k in zip(chosen, size, strict=True))
+            found = _attempt(best, straight, given)
             if found is not None:
                 best = found
                 break

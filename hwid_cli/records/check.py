@@ -81,7 +81,7 @@ class FitCost:
     n_samples : int, [samples]
     order : float, [-]
         Mean of nb and the number of poles.
-    units : float, [-]
+    units : int, [-]
     source : str
         Where the time comes from, in words.
     rounds : tuple of float, [s]
@@ -92,6 +92,6 @@ class FitCost:
     seconds: float
     n_samples: int
     order: float
-    units: float
+    units: int
     source: str
     rounds: tuple[float, ...] = ()

@@ -25,13 +25,9 @@ SLOW = ("jax-sysid, 10-knot maps",)
 BASELINE = "by hand, free break-points"
 
 
-# As many break-points as by hand.
-TEN = FitOptions(units=10)
-
-
-def by_hwid(orders, u, y, u_test, options=TEN):
-    """The fit of this project."""
-    result = fit([Recording("r", u, y, 1.0)], orders, options)
+def by_hwid(orders, u, y, u_test):
+    """The fit of this project with its defaults."""
+    result = fit([Recording("r", u, y, 1.0)], orders, FitOptions())
     return simulate(result.model, u_test)
 
 
@@ -42,8 +38,7 @@ METHODS = {
     BASELINE: lambda orders, u, y, u_test: fit_by_hand(
         orders, u, y, free=True
     ).simulate(u_test),
-    "hwid, ten break-points": by_hwid,
-    "hwid, as many as data ask for": lambda *data: by_hwid(*data, FitOptions()),
+    "hwid": by_hwid,
 }
 
 
