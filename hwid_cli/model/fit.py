@@ -39,7 +39,6 @@ from hwid_cli.model.initial_candidates import (
 from hwid_cli.model.levenberg_marquardt import Search, minimise
 from hwid_cli.model.linear_block import is_stable
 from hwid_cli.model.linear_search import linear_from_nested
-from hwid_cli.model.needed_break_points import with_needed_break_points
 from hwid_cli.model.phases import converge, finish, place, standing
 from hwid_cli.model.placing import coarser, finer, with_maps
 from hwid_cli.model.pole_bound import is_within
@@ -217,10 +216,7 @@ def warm_search(
         screened = _screened(experiments, options, starts)
         (placed,) = place([screened], experiments, options)
         found.append(finish(placed, experiments, options, least_gain=_LEAST_GAIN))
-    best = min(found, key=lambda one: one.cost)
-    if nested and not search_anew:
-        return best
-    return with_needed_break_points(best, experiments, options, nested)
+    return min(found, key=lambda one: one.cost)
 
 
 def _screened(

@@ -24,7 +24,7 @@ from hwid_cli.model.phases import finish
 from hwid_cli.records.model import FitOptions
 
 # Threshold in standard deviations: 95 % efficient for normal residuals.
-CORNER = 1.345
+_CORNER = 1.345
 # Standard deviation of a normal variable over the median of its size.
 _NORMAL = 1.4826
 # Scale of the residuals, as a share of the output's, below which none is measured.
@@ -50,7 +50,7 @@ def with_loss(
     """
     if options.loss == "squared":
         return tuple(experiments)
-    return tuple(replace(one, threshold=CORNER) for one in experiments)
+    return tuple(replace(one, threshold=_CORNER) for one in experiments)
 
 
 def renewed(
@@ -75,7 +75,7 @@ def renewed(
     if not known:
         return experiments
     size = np.std(np.concatenate([one.output for one in experiments]))
-    threshold = CORNER * max(min(known), _LEAST_SCALE * float(size))
+    threshold = _CORNER * max(min(known), _LEAST_SCALE * float(size))
     return tuple(replace(one, threshold=threshold) for one in experiments)
 
 
@@ -143,7 +143,7 @@ def unhidden(
     """
     if experiments[0].threshold == np.inf or not np.isfinite(search.cost):
         return search, experiments, 0
-    scale = experiments[0].threshold / CORNER
+    scale = experiments[0].threshold / _CORNER
     candidate, mended, count = without_hidden_outliers(
         search.candidate, experiments, scale
     )

@@ -20,7 +20,6 @@ from hwid_cli.model import static_map
 from hwid_cli.model.candidates import Candidate, FitData
 from hwid_cli.model.initial_candidates import block_starts
 from hwid_cli.model.levenberg_marquardt import Search
-from hwid_cli.model.needed_break_points import with_needed_break_points
 from hwid_cli.model.phases import converge, finish, place, refine, standing
 from hwid_cli.model.placing import reaching
 from hwid_cli.model.restart import (
@@ -85,8 +84,7 @@ def nonlinear_search(
         best = _finished_where_better(lasting, best, experiments, options)
     best = _from_break_points(best, experiments, options, starts, linear)
     best = _not_worse_than(linear, best, experiments, options)
-    best = _without_needless_limits(linear, best, experiments, options)
-    return with_needed_break_points(best, experiments, options)
+    return _without_needless_limits(linear, best, experiments, options)
 
 
 def _with_reestimated_block(
@@ -223,8 +221,7 @@ def search_beside_nested(
     if len(options.delays) > 1:
         best = _with_reestimated_block(best, experiments, options)
     least = min(standing(one, experiments).cost for one in nested)
-    best = _without_needless_limits(linear, best, experiments, options, least)
-    return with_needed_break_points(best, experiments, options, nested)
+    return _without_needless_limits(linear, best, experiments, options, least)
 
 
 def _not_worse_than(

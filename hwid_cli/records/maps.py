@@ -118,8 +118,6 @@ class MapOptions:
         Degree of a polynomial.
     function : OwnFunction or None
         Of the kind ``own_function``; other kinds take no notice of it.
-    is_most : bool
-        Whether a piecewise linear map may have fewer units, as the data ask for.
 
     Raises
     ------
@@ -131,7 +129,6 @@ class MapOptions:
     units: int = 10
     degree: int = 5
     function: OwnFunction | None = None
-    is_most: bool = False
 
     def __post_init__(self) -> None:
         if self.kind not in MAP_KINDS:

@@ -226,8 +226,6 @@ class Information:
 INITIAL_STATES = ("zero", "steady", "estimated")
 JOINS = ("concatenate", "experiments")
 LOSSES = ("squared", "huber")
-# Of a map whose size is not asked for.
-_MOST_UNITS = 10
 FIT_STATUSES = ("converged", "iteration_limit", "stalled", "failed")
 
 
@@ -239,9 +237,8 @@ class FitOptions:
     ----------
     input_map, output_map : str
         One of ``MAP_KINDS``.
-    units : int or None, [-]
-        Break-points, network units, knots or levels of both maps. None: ten, of which
-        piecewise linear maps keep as many as the data ask for.
+    units : int, [-]
+        Break-points, network units, knots or levels of both maps.
     input_units, output_units : int or None, [-]
         The same for one of the maps; None means ``units``.
     degree : int, [-]
@@ -275,7 +272,7 @@ class FitOptions:
 
     input_map: Annotated[str, OneOf(MAP_KINDS)] = "piecewise_linear"
     output_map: Annotated[str, OneOf(MAP_KINDS)] = "piecewise_linear"
-    units: Annotated[int | None, Integer(least=2), FileLimit(1000)] = None
+    units: Annotated[int, Integer(least=2), FileLimit(1000)] = 10
     degree: Annotated[int, Integer(least=1), FileLimit(100)] = 5
     initial_state: Annotated[str, OneOf(INITIAL_STATES)] = "estimated"
     join: Annotated[str, OneOf(JOINS)] = "concatenate"
@@ -329,21 +326,14 @@ class FitOptions:
     @property
     def of_input(self) -> MapOptions:
         """What is asked of the input map."""
-        return self._map_options(self.input_map, self.input_units, self.input_function)
+        units = self.units if self.input_units is None else self.input_units
+        return MapOptions(self.input_map, units, self.degree, self.input_function)
 
     @property
     def of_output(self) -> MapOptions:
         """What is asked of the output map."""
-        return self._map_options(
-            self.output_map, self.output_units, self.output_function
-        )
-
-    def _map_options(
-        self, kind: str, units: int | None, function: OwnFunction | None
-    ) -> MapOptions:
-        asked = self.units if units is None else units
-        most = _MOST_UNITS if asked is None else asked
-        return MapOptions(kind, most, self.degree, function, is_most=asked is None)
+        units = self.units if self.output_units is None else self.output_units
+        return MapOptions(self.output_map, units, self.degree, self.output_function)
 
     def in_units(self, input_unit: float, output_unit: float) -> "FitOptions":
         """Give the same options for data that are divided by these units.

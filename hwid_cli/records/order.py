@@ -136,7 +136,7 @@ class MapCandidate:
     input_map, output_map : str
         One of ``MAP_KINDS``.
     input_units, output_units : int, [-]
-        Size of the maps; 0 for kinds that have none, and where none is given.
+        Size of the maps; 0 for kinds that have none.
     n_parameters : int, [-]
         That the data determine; the most over the recordings, 0 where no fit has them.
     rmsd : float, [output unit]

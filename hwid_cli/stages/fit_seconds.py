@@ -101,7 +101,7 @@ def time_fits(
         seconds=seconds,
         n_samples=round(sum(one.n_samples for one in chosen) / len(chosen)),
         order=(middle.nb + middle.nf) / 2,
-        units=_mean_units(options),
+        units=options.units,
         source=f"one fit of {chosen[0].name} with orders {middle.nb} {middle.nf} "
         f"{middle.nk}",
         rounds=tuple(sum(times) / len(each) for times in zip(*each, strict=True)),
@@ -252,7 +252,7 @@ def grid_seconds(
         if cost.rounds:
             kind = 0 if number == 0 else 1 if number < SEARCHED_ROUNDS else 2
             return cost.rounds[kind] * _work(n_samples) / _work(cost.n_samples)
-        units = _mean_units(experiment.fit)
+        units = experiment.fit.units
         alone = fit_seconds(cost, grid[place], n_samples, units=units)
         return share_of_round(number) * alone
 
@@ -285,7 +285,7 @@ def group_grid_seconds(
     """
     grid = [orders for _, _, orders in candidate_orders(experiment.orders)]
     is_warm = (experiment.group or GroupOptions()).warm_start
-    units = _mean_units(experiment.fit)
+    units = experiment.fit.units
     return sum(
         share_of_round(number, of_group=True, is_warm=is_warm)
         * fit_seconds(cost, grid[place], n_samples, units=units, n_recordings=level)
@@ -312,16 +312,11 @@ def map_seconds(
             cost,
             middle,
             one.n_samples,
-            units=_mean_units(options),
+            units=(options.of_input.units + options.of_output.units) / 2,
         )
         for one in recordings
         for options in maps
     )
-
-
-def _mean_units(options: FitOptions) -> float:
-    """Size of a map, the mean of both."""
-    return (options.of_input.units + options.of_output.units) / 2
 
 
 def middle_orders(orders: OrdersOptions) -> Orders:

@@ -36,19 +36,16 @@ def candidate_maps(fit: FitOptions, options: OrderOptions) -> tuple[FitOptions, 
     --------
     >>> fit = FitOptions(output_map="none")
     >>> [one.input_units for one in candidate_maps(fit, OrderOptions(units=(3, 5)))]
-    [None, 3, 5]
+    [10, 3, 5]
     """
     sides = [
         [
             (kind, units)
             for kind in dict.fromkeys((own.kind, *options.maps))
-            for units in dict.fromkeys((given, *options.units))
-            if _has_units(kind) or units == given
+            for units in dict.fromkeys((own.units, *options.units))
+            if _has_units(kind) or units == own.units
         ]
-        for own, given in (
-            (one, None if one.is_most else one.units)
-            for one in (fit.of_input, fit.of_output)
-        )
+        for own in (fit.of_input, fit.of_output)
     ]
     return tuple(
         replace(
@@ -202,9 +199,9 @@ def _deviations(
 
 
 def _named(options: FitOptions) -> tuple[str, int, str, int]:
-    """Both maps, each with its size; 0 where its kind has none or none is given."""
+    """Both maps, each with its size; 0 where its kind has none."""
     first, second = (
-        (one.kind, 0 if one.is_most or not _has_units(one.kind) else one.units)
+        (one.kind, one.units * _has_units(one.kind))
         for one in (options.of_input, options.of_output)
     )
     return (*first, *second)

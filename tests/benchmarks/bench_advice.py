@@ -143,10 +143,7 @@ def place_of(one: MapCandidate) -> int:
     """Number of a pair of maps among the candidates."""
     wanted = (one.input_map, one.input_units, one.output_map, one.output_units)
     listed = [
-        (
-            side.kind,
-            0 if side.is_most or side.kind in ("none", "polynomial") else side.units,
-        )
+        (side.kind, side.units * (side.kind not in ("none", "polynomial")))
         for options in MAPS
         for side in (options.of_input, options.of_output)
     ]

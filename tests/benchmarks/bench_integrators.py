@@ -22,7 +22,7 @@ from tests.benchmarks.plants import linear_block
 
 KINDS = ("integrator", "double", "near", "near_double", "mode", "integrator_mode")
 LINEAR = FitOptions(input_map="none", output_map="none")
-WITH_MAP = FitOptions(input_map="piecewise_linear", output_map="none", units=10)
+WITH_MAP = FitOptions(input_map="piecewise_linear", output_map="none")
 # Deviation, as a multiple of what scipy reaches, from which on a fit counts as missed.
 MISSED = 1.05
 LEAD_IN = 200

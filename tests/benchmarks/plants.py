@@ -68,7 +68,7 @@ def cut_model(curves, reached, numerator, denominator, nk):
     for curve, signal in zip(curves, reached, strict=True):
         points = np.linspace(signal.min(), signal.max(), 120)
         values = curve(points)
-        units = FitOptions().of_input.units + 2
+        units = FitOptions().units + 2
         kept = thinned_break_points(points, values, np.ones(points.size), units)
         parameters = np.concatenate([points[kept], values[kept]])
         maps.append(StaticMap("piecewise_linear", parameters, (points[0], points[-1])))

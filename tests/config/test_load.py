@@ -50,7 +50,7 @@ def test_full_example_of_the_design_is_read(load):
     assert experiment.recordings.kind["sine"] == ("sine_*",)
     assert experiment.calibrate.sine[-1] == "recut"
     assert experiment.orders.nb == tuple(range(1, 11))
-    assert experiment.fit == FitOptions(units=10)
+    assert experiment.fit == FitOptions()
     assert experiment.identify.recordings == ("step_01", "step_02")
     assert experiment.group.keep == {"coverage_at_least": 7}
     assert experiment.test.recordings == ("step_05", "step_10", "step_11")
@@ -123,7 +123,7 @@ def test_source_is_the_path_as_given_and_no_key(load, write_config):
         ("fit: {units: ten}", r"fit.units: found 'ten'; expected an integer"),
         ("fit: {units: 2.5}", r"fit.units: found 2.5; expected an integer"),
         ("fit: {units: true}", r"fit.units: found True; expected an integer"),
-        ("fit: {degree: }", r"fit.degree: found no value; expected an integer"),
+        ("fit: {units: }", r"fit.units: found no value; expected an integer"),
         ("fit: {units: 1}", r"fit.units: found 1; expected an integer >= 2"),
         ("fit: {input_map: wavy}", r"fit.input_map: found 'wavy'; expected one of pi"),
         (

@@ -9,9 +9,6 @@ from hwid_cli.model.uncertainty import with_standard_errors
 from hwid_cli.records.model import FitOptions, Orders
 from hwid_cli.records.recordings import Recording
 
-# Whether or not the data ask for them.
-TEN = FitOptions(units=10)
-
 
 def recording(u, *, noise=0.0, seed=0):
     y = lfilter([0.0, 0.5], [1.0, -0.5], u)
@@ -27,7 +24,7 @@ def noisy_line():
 
 @pytest.fixture(scope="module")
 def fitted(noisy_line):
-    return fit([noisy_line], Orders(1, 1, 1), TEN)
+    return fit([noisy_line], Orders(1, 1, 1))
 
 
 def test_fits_of_noisy_lines_go_on_as_lines():
@@ -39,7 +36,7 @@ def test_fits_of_noisy_lines_go_on_as_lines():
         return np.std(simulate(model, u, initial_state=np.zeros(1)) - true)
 
     noisy = [recording(near, noise=0.02, seed=seed) for seed in range(6)]
-    models = [fit([one], Orders(1, 1, 1), TEN).model for one in noisy]
+    models = [fit([one], Orders(1, 1, 1)).model for one in noisy]
     errors = [error(one) for one in models]
     last_segments = [error(for_search(one)) for one in models]
 
@@ -57,7 +54,7 @@ def test_a_fit_says_what_its_model_gives(fitted, noisy_line):
 @pytest.mark.parametrize("role", ["starts", "contained"])
 def test_a_search_goes_on_from_what_the_parameters_say(role, fitted, noisy_line):
     orders = Orders(1, 1, 1) if role == "starts" else Orders(1, 2, 1)
-    short = FitOptions(units=10, max_iterations=3)
+    short = FitOptions(max_iterations=3)
 
     one, other = (
         fit([noisy_line], orders, short, **{role: [model]})

@@ -13,7 +13,7 @@ from hwid_cli.tasks.cache import MemoryStore
 from hwid_cli.tasks.runner import RunSettings
 from hwid_cli.tasks.workers import Workers
 
-FIT = FitOptions(initial_state="zero", units=10)
+FIT = FitOptions(initial_state="zero")
 ORDERS = Orders(1, 2, 1)
 
 
@@ -58,15 +58,6 @@ def test_both_sides_begin_with_their_own_kind_and_size():
     assert [(one.input_map, one.output_map) for one in found] == [
         ("own_function", "none")
     ]
-
-
-def test_a_size_that_is_not_given_is_compared_as_it_is():
-    found = candidate_maps(FitOptions(), OrderOptions(units=(3,)))
-
-    assert [one.input_units for one in found] == [None, None, 3, 3]
-    assert found[0] == FitOptions()
-    assert found[0].of_input.is_most
-    assert not found[-1].of_input.is_most
 
 
 def test_nothing_is_compared_unless_asked_for():
