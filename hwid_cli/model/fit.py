@@ -49,8 +49,16 @@ from hwid_cli.model.search import (
     nonlinear_search,
     search_beside_nested,
 )
+from hwid_cli.model.simulate import validation_output
 from hwid_cli.model.starts import Start
-from hwid_cli.records.model import Fit, FitOptions, HammersteinWiener, Orders
+from hwid_cli.model.straight_levels import SAID, asks_for_levels, with_straight_maps
+from hwid_cli.records.model import (
+    Fit,
+    FitOptions,
+    HammersteinWiener,
+    Orders,
+    Uncertainty,
+)
 from hwid_cli.records.recordings import Recording
 
 # Sizes whose squares, and those of their ratios, still are numbers of 64 bits.
@@ -377,7 +385,37 @@ def _fitted(
         standard_errors=standard_errors,
     )
     said = [fitted.message, offset_left(recordings, options), found.outliers_said]
-    return replace(fitted, message="; ".join(one for one in said if one))
+    fitted = replace(fitted, message="; ".join(one for one in said if one))
+    return _without_needless_levels(fitted, recordings, standard_errors=standard_errors)
+
+
+def _without_needless_levels(
+    fitted: Fit, recordings: Sequence[Recording], *, standard_errors: bool
+) -> Fit:
+    """The same fit, or a linear model where that is as close as maps with levels."""
+    options = fitted.options
+    if options.keeps_block or not asks_for_levels(options):
+        return fitted
+    linear = _fitted(
+        recordings,
+        fitted.orders,
+        replace(options, input_map="none", output_map="none", delays=()),
+        _Given((), (), search_anew=True),
+        standard_errors=standard_errors,
+    )
+    if linear.model is None or not linear.rmsd <= fitted.rmsd:
+        return fitted
+    u = np.concatenate([one.input for one in recordings])
+    x = np.concatenate([validation_output(linear.model, one) for one in recordings])
+    model = with_straight_maps(linear.model, options, u, x)
+    uncertainty = Uncertainty(reason=SAID)
+    return replace(
+        linear,
+        options=options,
+        model=model,
+        message=f"{linear.message}; {SAID}",
+        uncertainty=uncertainty,
+    )
 
 
 @dataclass(frozen=True, eq=False)

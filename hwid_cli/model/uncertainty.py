@@ -36,6 +36,7 @@ from hwid_cli.model.information import information
 from hwid_cli.model.robust import plain, renewed, squared_error
 from hwid_cli.model.simulate import estimated_state
 from hwid_cli.model.static_map import RULES
+from hwid_cli.model.straight_levels import SAID, has_no_levels
 from hwid_cli.records.model import Fit, Information, ParameterCovariance, Uncertainty
 from hwid_cli.records.recordings import Recording
 
@@ -111,6 +112,8 @@ def with_standard_errors(fit: Fit, recordings: Sequence[Recording]) -> Fit:
     ValueError
         If the fit failed or the recordings are others.
     """
+    if fit.model is not None and has_no_levels(fit.model):
+        return replace(fit, uncertainty=Uncertainty(reason=SAID))
     candidate, experiments = as_fitted(fit, recordings)
     uncertainty, information = parameter_statistics(
         candidate, experiments, free_break_points=fit.options.free_break_points
@@ -140,6 +143,8 @@ def parameter_covariance(
     ----------
     docs/method.md, eq. (16).
     """
+    if fit.model is not None and has_no_levels(fit.model):
+        raise ValueError(SAID)
     candidate, experiments = as_fitted(fit, recordings)
     kind = candidate.model.output_map.kind
     if not RULES[kind].has_slope:

@@ -20,7 +20,7 @@ from hwid_cli.records.recordings import Recording
 from hwid_cli.records.results import CrossValidation
 from hwid_cli.stages import diagnose as diagnosing
 from hwid_cli.stages.crossval import cross_validate
-from hwid_cli.stages.group import GroupPlan, search_all
+from hwid_cli.stages.group_levels import GroupPlan, search_all
 from hwid_cli.stages.identify import identify_all
 from hwid_cli.stages.order_grid import candidate_orders
 from hwid_cli.stages.selection import select_recordings

@@ -1,6 +1,6 @@
 """Are the orders and maps that ``hwid order`` recommends the best ones for new recordings?
 
-``make bench-advice`` (``python -m tests.benchmarks.bench_advice [--plants N] [--choose]``):
+``make bench-advice`` (``python -m tests.benchmarks.bench_advice [--plants N] [--first SEED] [--choose]``):
 random plants of orders 1 to 4, each with three recordings: a step, levels and a multisine.
 ``hwid order`` sees these alone. Four fresh ones, of the same kinds with other draws and a
 sine, then score every candidate as (33) and (34) do, all pairs counting alike; the factor
@@ -155,9 +155,10 @@ def main() -> None:
     """Print how far recommended candidates are from the best ones."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--plants", type=int, default=20)
+    parser.add_argument("--first", type=int, default=REPORTING)
     parser.add_argument("--choose", action="store_true")
     given = parser.parse_args()
-    seeds = range(REPORTING, REPORTING + given.plants)
+    seeds = range(given.first, given.first + given.plants)
     found = [advised(seed) for seed in (CHOOSING if given.choose else seeds)]
     print(
         f"\n{len(found)} plants, {len(candidate_orders(GRID))} orders, {len(MAPS)} pairs of "

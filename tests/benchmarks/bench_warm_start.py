@@ -19,7 +19,7 @@ from hwid_cli.records.machines import GunMachine, GunPlan
 from hwid_cli.records.model import FitOptions
 from hwid_cli.records.recordings import RawRecording
 from hwid_cli.stages.calibrate import calibrate_all
-from hwid_cli.stages.group import GroupPlan, fit_level
+from hwid_cli.stages.group_levels import GroupPlan, fit_level
 from hwid_cli.stages.identify import identify_all
 from hwid_cli.stages.simulate import simulate_machine
 from hwid_cli.tasks.cache import MemoryStore

@@ -6,7 +6,7 @@ The public ones are looked for in a folder ``peers`` beside the measured data.
 import numpy as np
 from scipy.signal import lfilter
 
-from hwid_cli.model.maps.piecewise_linear import thinned_break_points
+from hwid_cli.model.maps.positions import thinned_break_points
 from hwid_cli.records.model import FitOptions, HammersteinWiener, Orders, StaticMap
 from tests.benchmarks.real_data import folder
 

@@ -7,7 +7,7 @@ from scipy import signal
 
 from hwid_cli.model import derivative_rows as row_kernels
 from hwid_cli.model import linear_block
-from hwid_cli.model.maps import piecewise_linear
+from hwid_cli.model.maps import bends, positions
 
 POINTS = np.array([-3.0, -1.0, 0.5, 2.0, 3.0])
 VALUES = np.array([-1.0, -0.5, 0.4, 2.0, 2.1])
@@ -54,7 +54,7 @@ def test_decaying_response_ends_in_zeros_instead_of_subnormal_numbers():
 
 @pytest.mark.parametrize("with_positions", [True, False])
 def test_bends_are_changes_of_slope_with_the_stated_derivatives(with_positions):
-    bend, jacobian = piecewise_linear.bends(POINTS, VALUES, with_positions)
+    bend, jacobian = bends.bends(POINTS, VALUES, with_positions)
     size = np.ptp(VALUES) / np.ptp(POINTS)
     slopes = np.diff(VALUES) / np.diff(POINTS)
     np.testing.assert_allclose(bend, np.diff(slopes) / size, rtol=1e-13)
@@ -65,7 +65,7 @@ def test_bends_are_changes_of_slope_with_the_stated_derivatives(with_positions):
     for k in inner:
         moved = parameters.copy()
         moved[k] += step
-        above, _ = piecewise_linear.bends(moved[:5], moved[5:], with_positions)
+        above, _ = bends.bends(moved[:5], moved[5:], with_positions)
         column = k if with_positions else k - 5
         if column >= 0:
             np.testing.assert_allclose(
@@ -79,14 +79,12 @@ def test_the_prior_and_its_gradient_are_of_one_function(with_positions):
     parameters = np.r_[POINTS, VALUES]
     first = 0 if with_positions else 5
     matrix, vector = np.zeros((12, 12)), np.zeros(12)
-    total = piecewise_linear.add_bends(
-        POINTS, VALUES, with_positions, 0.7, matrix, vector, 1
-    )
+    total = bends.add_bends(POINTS, VALUES, with_positions, 0.7, matrix, vector, 1)
 
     def judged(moved):
-        return piecewise_linear.squared_bends_after(*np.split(moved, 2), POINTS, VALUES)
+        return bends.squared_bends_after(*np.split(moved, 2), POINTS, VALUES)
 
-    bend, _ = piecewise_linear.bends(POINTS, VALUES, with_positions)
+    bend, _ = bends.bends(POINTS, VALUES, with_positions)
     assert total == pytest.approx(bend @ bend)
     assert total == pytest.approx(judged(parameters))
 
@@ -101,12 +99,12 @@ def test_the_prior_and_its_gradient_are_of_one_function(with_positions):
 def test_a_factor_on_a_map_or_on_its_argument_gains_nothing_from_the_prior():
     # Else every step makes a map smaller and the block larger, and nothing better.
     matrix, vector = np.zeros((10, 10)), np.zeros(10)
-    piecewise_linear.add_bends(POINTS, VALUES, True, 0.7, matrix, vector, 0)
+    bends.add_bends(POINTS, VALUES, True, 0.7, matrix, vector, 0)
     by_value, by_argument = np.r_[np.zeros(5), VALUES], np.r_[POINTS, np.zeros(5)]
     for direction in (by_value, by_argument):
         assert vector @ direction == pytest.approx(0.0, abs=1e-12)
         np.testing.assert_allclose(matrix @ direction, 0.0, atol=1e-10)
-    grown = piecewise_linear.growth(2.0 * POINTS, 0.1 * VALUES, POINTS, VALUES)
+    grown = bends.growth(2.0 * POINTS, 0.1 * VALUES, POINTS, VALUES)
     assert grown == pytest.approx(0.05)
 
 
@@ -115,20 +113,20 @@ def test_sliding_an_end_along_its_line_does_not_make_a_map_steeper():
     slope = (values[1] - values[0]) / (points[1] - points[0])
     points[0] -= 7.0
     values[0] -= 7.0 * slope
-    assert piecewise_linear.growth(points, values, POINTS, VALUES) == 1.0
+    assert bends.growth(points, values, POINTS, VALUES) == 1.0
 
 
 def test_break_points_that_came_too_close_part_to_both_sides():
     old = np.array([0.0, 1.0, 2.0, 3.0])
     proposed = np.array([0.0, 1.6, 1.5, 3.0])
-    piecewise_linear.settled_break_points(old, proposed, 0.2, 1e-4)
+    positions.settled_break_points(old, proposed, 0.2, 1e-4)
     np.testing.assert_allclose(proposed, [0.0, 1.45, 1.65, 3.0])
 
 
 def test_thinning_keeps_the_break_points_where_a_map_bends():
     points = np.linspace(0.0, 10.0, 31)
     values = np.interp(points, [0.0, 2.0, 7.0, 10.0], [0.0, 0.0, 5.0, 2.0])
-    kept = piecewise_linear.thinned_break_points(points, values, np.ones(31), 4)
+    kept = positions.thinned_break_points(points, values, np.ones(31), 4)
     np.testing.assert_allclose(points[kept], [0.0, 2.0, 7.0, 10.0])
 
 
@@ -136,7 +134,7 @@ def test_thinning_heeds_where_the_samples_are():
     points = np.linspace(0.0, 10.0, 21)
     values = np.abs(points - 2.0) + np.abs(points - 8.0)
     weights = np.where(points < 5.0, 1.0, 1e-6)
-    kept = piecewise_linear.thinned_break_points(points, values, weights, 3)
+    kept = positions.thinned_break_points(points, values, weights, 3)
     assert points[kept][1] == 2.0
 
 

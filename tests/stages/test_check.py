@@ -14,7 +14,8 @@ from hwid_cli.stages.fit_seconds import (
     share_of_round,
     time_fits,
 )
-from hwid_cli.stages.group import group_bound, search_groups
+from hwid_cli.stages.group import group_bound
+from hwid_cli.stages.group_search import search_groups
 
 NAMES = tuple("abcdefg")
 

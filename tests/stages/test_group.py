@@ -10,7 +10,8 @@ from hwid_cli.model.uncertainty import parameter_covariance
 from hwid_cli.records.experiment import GroupOptions, OrdersOptions
 from hwid_cli.records.model import FitOptions
 from hwid_cli.records.recordings import Recording
-from hwid_cli.stages.group import GroupPlan, group_key, search_all
+from hwid_cli.stages.group import group_key
+from hwid_cli.stages.group_levels import GroupPlan, search_all
 from hwid_cli.stages.identify import identify_all
 from hwid_cli.tasks.cache import MemoryStore
 from hwid_cli.tasks.runner import RunSettings, Workers, run_tasks

@@ -10,7 +10,7 @@ import pytest
 
 from hwid_cli.records.experiment import GroupOptions
 from hwid_cli.records.groups import Group
-from hwid_cli.stages.group import Level, kept, reason_to_stop, search_groups
+from hwid_cli.stages.group_search import Level, kept, reason_to_stop, search_groups
 
 REFERENCE = Path(__file__).parents[1] / "reference"
 # T3.3.3-1: steps that identify and validate; 5, 10 and 11 are kept for the test.

@@ -16,7 +16,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from hwid_cli.model.maps.piecewise_linear import WEIGHT_OF_SHAPE, put_in_order
+from hwid_cli.model.maps.positions import WEIGHT_OF_SHAPE, put_in_order
 from hwid_cli.model.maps.positions_and_values import amplified, compressed, mean_slope
 from hwid_cli.model.maps.rule import (
     MapRule,

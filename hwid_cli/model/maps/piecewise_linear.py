@@ -13,6 +13,12 @@ from dataclasses import replace
 import numpy as np
 from numba import njit
 
+from hwid_cli.model.maps.bends import add_bends, smallest_bends, squared_bends_after
+from hwid_cli.model.maps.positions import (
+    WEIGHT_OF_SHAPE,
+    put_in_order,
+    thinned_break_points,
+)
 from hwid_cli.model.maps.positions_and_values import amplified, compressed, mean_slope
 from hwid_cli.model.maps.rule import (
     Derivatives,
@@ -27,18 +33,8 @@ from hwid_cli.model.maps.rule import (
 )
 from hwid_cli.records.maps import MapOptions, StaticMap
 
-# Sweeps that put break-points into order.
-_SWEEPS = 4
-# Share of the samples that every break-point counts for beyond those near it when the
-# needless ones go, so that the ends of a map, which few samples reach, keep theirs.
-WEIGHT_OF_SHAPE = 1e-3
 # Ends of a map, stored beside the break-points between them.
 N_ENDS = 2
-# A step of the fit may shrink a segment to this share of its width at most, so that
-# break-points stay in order and can still come close to each other over several steps.
-_LEAST_SHRINK = 0.2
-# Segments narrower than this share of the whole would be jumps, not slopes.
-_LEAST_WIDTH = 1e-4
 # Share of the range: break-points closer to the ends of a stretch are taken for them.
 _EDGE = 1e-9
 
@@ -355,19 +351,6 @@ def _names(static_map: StaticMap) -> tuple[str, ...]:
     return points + tuple(f"value[{i}]" for i in range(units))
 
 
-def put_in_order(old: np.ndarray, proposed: np.ndarray) -> None:
-    """Keep positions in their order after a step, in place.
-
-    Parameters
-    ----------
-    old : ndarray, shape (n,)
-        Rising.
-    proposed : ndarray, shape (n,)
-        Stay as they are where none comes too close to its neighbour.
-    """
-    settled_break_points(old, proposed, _LEAST_SHRINK, _LEAST_WIDTH)
-
-
 def _settle(old: StaticMap, parameters: np.ndarray) -> None:
     """Keep the break-points in order."""
     points, _ = break_points_and_values(old)
@@ -389,40 +372,6 @@ def _with_domain(one: StaticMap, domain: tuple[float, float]) -> StaticMap:
     return replace(one, parameters=np.concatenate([ends, values]), domain=domain)
 
 
-@njit(cache=True)
-def settled_break_points(
-    old: np.ndarray, proposed: np.ndarray, least_shrink: float, least_width: float
-) -> None:
-    """Put break-points into order again, in place.
-
-    Parameters
-    ----------
-    old, proposed : ndarray, shape (units,)
-    least_shrink : float, [-]
-        Share of its old width that a segment keeps at least.
-    least_width : float, [-]
-        Share of the whole that it keeps at least.
-    """
-    whole = old[-1] - old[0]
-    least = np.empty(old.size - 1)
-    for i in range(least.size):
-        width = old[i + 1] - old[i]
-        least[i] = min(max(least_shrink * width, least_width * whole), width)
-    # Neighbours that came too close part to both sides alike; what that does to the
-    # next ones is mended in further sweeps, and the last one is one-sided.
-    for sweep in range(_SWEEPS):
-        is_legal = True
-        for i in range(least.size):
-            lack = least[i] - (proposed[i + 1] - proposed[i])
-            if lack > 0.0:
-                is_legal = False
-                share = 0.5 if sweep < _SWEEPS - 1 else 0.0
-                proposed[i] -= share * lack
-                proposed[i + 1] += (1.0 - share) * lack
-        if is_legal:
-            return
-
-
 def _finer(one: StaticMap, corners: np.ndarray, argument: np.ndarray) -> StaticMap:
     """Same map with more break-points."""
     points = np.union1d(break_points_and_values(one)[0], corners)
@@ -442,61 +391,6 @@ def _coarser(one: StaticMap, argument: np.ndarray, units: int) -> StaticMap:
     weights = near + WEIGHT_OF_SHAPE * argument.size
     kept = thinned_break_points(points, values, weights, count)
     return replace(one, parameters=np.concatenate([points[kept], values[kept]]))
-
-
-@njit(cache=True)
-def thinned_break_points(
-    break_points: np.ndarray, values: np.ndarray, weights: np.ndarray, count: int
-) -> np.ndarray:
-    """Choose the break-points that a coarser map needs most.
-
-    One after the other, the inner break-point goes whose absence adds least to the
-    weighted squared error at all given break-points.
-
-    Parameters
-    ----------
-    break_points, values, weights : ndarray, shape (n,)
-    count : int
-        How many stay.
-
-    Returns
-    -------
-    ndarray of int, shape (count,)
-        Their indices.
-    """
-    kept = np.arange(break_points.size)
-    while kept.size > count:
-        cheapest, least = 1, np.inf
-        for j in range(1, kept.size - 1):
-            first, middle, last = kept[j - 1], kept[j], kept[j + 1]
-            added = 0.0
-            for i in range(first + 1, last):
-                near, far = (first, middle) if i <= middle else (middle, last)
-                with_it = _between(break_points, values, near, far, i)
-                without = _between(break_points, values, first, last, i)
-                added += weights[i] * (
-                    (without - values[i]) ** 2 - (with_it - values[i]) ** 2
-                )
-            if added < least:
-                cheapest, least = j, added
-        for j in range(cheapest, kept.size - 1):
-            kept[j] = kept[j + 1]
-        kept = kept[: kept.size - 1]
-    return kept
-
-
-@njit(cache=True)
-def _between(
-    points: np.ndarray, values: np.ndarray, first: int, last: int, at: int
-) -> float:
-    """Straight line through two break-points, read at a third."""
-    share = (points[at] - points[first]) / (points[last] - points[first])
-    return values[first] + share * (values[last] - values[first])
-
-
-# Share of a segment over which its samples must spread to tell its slope, and strength
-# of a direction, as a share of the strongest, below which the samples do not see it.
-_LEAST_SPREAD, _UNSEEN = 1e-3, 1e-6
 
 
 def straightened(one: StaticMap, argument: np.ndarray) -> StaticMap:
@@ -521,268 +415,11 @@ def straightened(one: StaticMap, argument: np.ndarray) -> StaticMap:
     >>> straightened(bent, np.array([0.0, 0.5, 1.0, 3.0])).parameters[4:].round(6)
     array([0., 1., 2., 3.])
     """
-    if one.parameters.size < 6:
-        return one
     points, values = break_points_and_values(one)
-    if not np.isfinite(argument).all():
+    straight = smallest_bends(points, values, argument)
+    if straight is values:
         return one
-    levels = np.sort(argument)
-    if _is_told(points, levels):
-        return one
-    seen = _shares(points, np.unique(levels))
-    _, strength, directions = np.linalg.svd(np.linalg.qr(seen, mode="r"))
-    rank = int(np.sum(strength > _UNSEEN * strength[0]))
-    unseen = directions[rank:].T
-    if unseen.shape[1] == 0:
-        return one
-    bend, jacobian = bends(points, values, False)
-    steps = np.linalg.lstsq(jacobian @ unseen, -bend, rcond=None)[0]
-    return replace(one, parameters=np.concatenate([points, values + unseen @ steps]))
-
-
-def _is_told(points: np.ndarray, levels: np.ndarray) -> bool:
-    """Tell whether the samples in every segment spread enough to know its line."""
-    inner = np.searchsorted(levels, points[1:-1], side="left")
-    first, end = np.append(0, inner), np.append(inner, levels.size)
-    if np.any(first == end):
-        return False
-    spread = levels[end - 1] - levels[first]
-    return bool(np.all(spread > _LEAST_SPREAD * np.diff(points)))
-
-
-def _shares(points: np.ndarray, argument: np.ndarray) -> np.ndarray:
-    """How much the value at each break-point counts for a map's values."""
-    segment = np.clip(
-        np.searchsorted(points, argument, side="right") - 1, 0, points.size - 2
-    )
-    share = (argument - points[segment]) / (points[segment + 1] - points[segment])
-    rows = np.zeros((argument.size, points.size))
-    at = np.arange(argument.size)
-    rows[at, segment], rows[at, segment + 1] = 1.0 - share, share
-    return rows
-
-
-@njit(cache=True, error_model="numpy")
-def _mean_slope(break_points: np.ndarray, values: np.ndarray) -> float:
-    """Range of the values over that of the break-points; 1 for a constant map.
-
-    Parameters
-    ----------
-    break_points, values : ndarray, shape (units,)
-    """
-    low = high = values[0]
-    for value in values:
-        low, high = min(low, value), max(high, value)
-    size = (high - low) / (break_points[-1] - break_points[0])
-    return size if size != 0.0 else 1.0
-
-
-@njit(cache=True, error_model="numpy")
-def bends(
-    break_points: np.ndarray, values: np.ndarray, with_positions: bool
-) -> tuple[np.ndarray, np.ndarray]:
-    """Changes of slope of a piecewise linear map, in units of its mean slope.
-
-    Parameters
-    ----------
-    break_points, values : ndarray, shape (units,)
-    with_positions : bool
-        Whether the break-points have columns in the jacobian.
-
-    Returns
-    -------
-    bend : ndarray, shape (units - 2,)
-    jacobian : ndarray, shape (units - 2, 2 units) or (units - 2, units)
-        By the break-points (if asked for) and the values, at a fixed mean slope.
-    """
-    units = break_points.size
-    offset = units if with_positions else 0
-    bend = np.zeros(units - 2)
-    jacobian = np.zeros((units - 2, offset + units))
-    size = _mean_slope(break_points, values)
-    for i in range(units - 2):
-        left = 1.0 / ((break_points[i + 1] - break_points[i]) * size)
-        right = 1.0 / ((break_points[i + 2] - break_points[i + 1]) * size)
-        rise_left = (values[i + 1] - values[i]) * left
-        rise_right = (values[i + 2] - values[i + 1]) * right
-        bend[i] = rise_right - rise_left
-        jacobian[i, offset + i] = left
-        jacobian[i, offset + i + 1] = -left - right
-        jacobian[i, offset + i + 2] = right
-        if with_positions:
-            left, right = rise_left * left * size, rise_right * right * size
-            jacobian[i, i] = -left
-            jacobian[i, i + 1] = left + right
-            jacobian[i, i + 2] = -right
-    return bend, jacobian
-
-
-@njit(cache=True, error_model="numpy")
-def add_bends(
-    break_points: np.ndarray,
-    values: np.ndarray,
-    with_positions: bool,
-    weight: float,
-    matrix: np.ndarray,
-    vector: np.ndarray,
-    first: int,
-) -> float:
-    """Add the rows of all bends to normal equations.
-
-    The slope that counts as one is the mean slope here and grows as the map does, so that
-    a factor on the map changes nothing: measured by a slope that stays, every search would
-    win by making the map smaller and the next block larger, for ever.
-
-    Parameters
-    ----------
-    break_points, values : ndarray, shape (units,)
-    weight : float
-        Of the squared bends.
-    matrix : ndarray, shape (n_parameters, n_parameters)
-    vector : ndarray, shape (n_parameters,)
-    first : int
-        Where the map's parameters begin.
-
-    Returns
-    -------
-    float
-        Sum of the squared bends.
-    """
-    bend, jacobian = bends(break_points, values, with_positions)
-    units = break_points.size
-    offset = units if with_positions else 0
-    rates, growing = _relative_growth(break_points, values, with_positions)
-    total = 0.0
-    places = np.empty(10, dtype=np.int64)
-    slopes = np.empty(10)
-    for i in range(bend.size):
-        total += bend[i] * bend[i]
-        count = 0
-        for k in range(3):
-            places[count], slopes[count] = (
-                offset + i + k,
-                jacobian[i, offset + i + k],
-            )
-            count += 1
-            if with_positions:
-                places[count], slopes[count] = i + k, jacobian[i, i + k]
-                count += 1
-        for k in range(growing.size):
-            places[count], slopes[count] = growing[k], -bend[i] * rates[k]
-            count += 1
-        for a in range(count):
-            left = weight * slopes[a]
-            vector[first + places[a]] -= left * bend[i]
-            for b in range(count):
-                matrix[first + places[a], first + places[b]] += left * slopes[b]
-    return total
-
-
-@njit(cache=True, error_model="numpy")
-def _relative_growth(
-    break_points: np.ndarray, values: np.ndarray, with_positions: bool
-) -> tuple[np.ndarray, np.ndarray]:
-    """Derivatives of the logarithm of `growth`, and the columns that have any."""
-    units = break_points.size
-    first, last = _inner_ends(units)
-    low, high = _extremes(values, first, last)
-    size = values[high] - values[low]
-    if size == 0.0:
-        return np.empty(0), np.empty(0, dtype=np.int64)
-    offset = units if with_positions else 0
-    if not with_positions:
-        return (
-            np.array([-1.0 / size, 1.0 / size]),
-            np.array([offset + low, offset + high]),
-        )
-    width = break_points[last] - break_points[first]
-    return (
-        np.array([-1.0 / size, 1.0 / size, 1.0 / width, -1.0 / width]),
-        np.array([offset + low, offset + high, first, last]),
-    )
-
-
-@njit(cache=True)
-def _extremes(values: np.ndarray, first: int, last: int) -> tuple[int, int]:
-    """Places of the first lowest and the first highest value from one place to another."""
-    low = high = first
-    for i in range(first + 1, last + 1):
-        if values[i] < values[low]:
-            low = i
-        if values[i] > values[high]:
-            high = i
-    return low, high
-
-
-@njit(cache=True)
-def _inner_ends(units: int) -> tuple[int, int]:
-    """Break-points between which a map's growth is measured.
-
-    The outermost ones may slide along the line on which the map goes on; they would run
-    away if that made the bends look smaller.
-    """
-    return (1, units - 2) if units > 3 else (0, units - 1)
-
-
-@njit(cache=True, error_model="numpy")
-def growth(
-    break_points: np.ndarray,
-    values: np.ndarray,
-    before: np.ndarray,
-    values_before: np.ndarray,
-) -> float:
-    """Factor by which a map has become steeper, measured between its inner break-points.
-
-    Parameters
-    ----------
-    break_points, values : ndarray, shape (units,)
-    before, values_before : ndarray, shape (units,)
-        Of the map as it was.
-
-    Returns
-    -------
-    float
-        1 where one of the two is constant.
-    """
-    first, last = _inner_ends(values.size)
-    low, high = _extremes(values, first, last)
-    size = values[high] - values[low]
-    low, high = _extremes(values_before, first, last)
-    size_before = values_before[high] - values_before[low]
-    if size == 0.0 or size_before == 0.0:
-        return 1.0
-    width = break_points[last] - break_points[first]
-    return size / size_before * (before[last] - before[first]) / width
-
-
-@njit(cache=True, error_model="numpy")
-def squared_bends_after(
-    break_points: np.ndarray,
-    values: np.ndarray,
-    before: np.ndarray,
-    values_before: np.ndarray,
-) -> float:
-    """Sum of the squared changes of slope after a step, as the step saw them.
-
-    The slope that counts as one is the mean slope before the step, times the growth of
-    the map in it.
-
-    Parameters
-    ----------
-    break_points, values : ndarray, shape (units,)
-    before, values_before : ndarray, shape (units,)
-        Of the map before the step.
-    """
-    size = _mean_slope(before, values_before)
-    size *= growth(break_points, values, before, values_before)
-    total = 0.0
-    last = 0.0
-    for i in range(values.size - 1):
-        slope = (values[i + 1] - values[i]) / (break_points[i + 1] - break_points[i])
-        if i > 0:
-            total += ((slope - last) / size) ** 2
-        last = slope
-    return total
+    return replace(one, parameters=np.concatenate([points, straight]))
 
 
 # Fewer samples than this in a segment leave its line open, and the share of a map's mean
