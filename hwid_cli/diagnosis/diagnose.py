@@ -229,17 +229,17 @@ def find(
         base=base, before=before, force=force, where=where,
         found=found, verdict=verdict,
     )  # fmt: skip
-    if verdict.word == "unknown" and seeds:
-        on_round("pieces with free starts", 0)
+    # Where a drive stands for another simulation, that one judges.
+    if verdict.word == "unknown" and seeds and criteria.standing is None:
         judged = _judged_in_pieces(rounds, whole, seeds)
         if judged is not None:
             return judged
     # Who asks for some effects only wants no formula instead.
     is_open = options.laws == "auto" and options.effects is None
-    if is_open or options.laws == "only":
-        verdict, found, law = find_law(rounds, before, force, found, verdict)
-        return replace(whole, found=found, verdict=verdict, law=law)
-    return whole
+    if not is_open and options.laws != "only":
+        return whole
+    verdict, found, law = find_law(rounds, before, force, found, verdict)
+    return replace(whole, found=found, verdict=verdict, law=law)
 
 
 @dataclass(frozen=True, eq=False)
@@ -404,6 +404,7 @@ def _judged_in_pieces(
     None where they name nothing, or where a start that is off by the noise changes whole
     recordings by less than what the named effects leave of them.
     """
+    rounds.on_round("pieces with free starts", 0)
     pieces = in_pieces(rounds.problem, whole.force, are_free=True)
     of_pieces = _rounds_of(rounds, pieces)
     if not of_pieces.base.is_usable:

@@ -322,7 +322,7 @@ def test_a_search_under_input_noise_stays_within_the_bounds(monkeypatch):
         asked.append(drive_at(of, fit_layout, point).stiffness_N_per_m)
         return residuals_at(of, fit_layout, point)
 
-    monkeypatch.setattr(causes, "least_squares", far_away)
+    monkeypatch.setattr("scipy.optimize.least_squares", far_away)
     monkeypatch.setattr(causes, "residuals_at", noted)
     of = problem(recordings(noise=10 * NOISE))
     fit_layout = parameter_layout(of, (), {}, sizes(of))
