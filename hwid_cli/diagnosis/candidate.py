@@ -487,6 +487,18 @@ def fitted_values(
     return {**fitted_start(found, present), **fitted_effects(found)}
 
 
+def start_from(drive: Drive, found: CandidateFit) -> SearchStart:
+    """Where a fit has ended, as the start of another one.
+
+    Parameters
+    ----------
+    drive : Drive
+        That was fitted, with the effects that the simulation has.
+    """
+    values = fitted_values(found, drive_effects(drive))
+    return SearchStart(base_of(fitted_drive(drive, found)), values)
+
+
 def fitted_drive(drive: Drive, found: CandidateFit) -> Drive:
     """Drive with the base of a fit."""
     base: dict[str, Any] = _values_by_owner(found).get(BASE, {})

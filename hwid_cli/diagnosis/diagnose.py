@@ -18,8 +18,8 @@ from hwid_cli.diagnosis.candidate import (
     compared_with_fit,
     fit_candidate,
     fitted_drive,
-    fitted_values,
     rebuilt,
+    start_from,
 )
 from hwid_cli.diagnosis.causes import fit_with_input_noise, without_repeats
 from hwid_cli.diagnosis.direction import find_reversal, reversal_sentence
@@ -365,10 +365,7 @@ def _from_there(
     rounds: Rounds, problem: DiagnosisProblem, found: CandidateFit
 ) -> CandidateFit:
     """The same effects fitted to another problem, from where their fit has ended."""
-    start = SearchStart(
-        base_of(fitted_drive(problem.drive, found)),
-        fitted_values(found, drive_effects(problem.drive)),
-    )
+    start = start_from(problem.drive, found)
     baseline = rounds.baseline
     return fit_candidate(
         problem, found.effects, [start], baseline.scales, baseline.noise

@@ -25,6 +25,7 @@ from hwid_cli.diagnosis.candidate import (
     fitted_start,
     fitted_values,
     screen,
+    start_from,
 )
 from hwid_cli.diagnosis.forecast import (
     Forecast,
@@ -309,12 +310,8 @@ class _Search:
 
     def fit_seeds(self, seeds: Sequence[CandidateFit]) -> None:
         """Fit sets from the values that another search has found."""
-        present = drive_effects(self.rounds.problem.drive)
         sets = {
-            one.effects: [
-                SearchStart(_base_values(one, self.rounds), fitted_values(one, present))
-            ]
-            for one in seeds
+            one.effects: [start_from(self.rounds.problem.drive, one)] for one in seeds
         }
         self._finish("sets that pieces have led to", sets)
         for size in sorted({len(one.effects) for one in seeds}):
@@ -432,11 +429,8 @@ class _Search:
         least = min(
             (excess(one) for size in sizes for one in self._of_size(size)), default=0.0
         )
-        present = drive_effects(self.rounds.problem.drive)
         near = {
-            one.effects: [
-                SearchStart(_base_values(one, self.rounds), fitted_values(one, present))
-            ]
+            one.effects: [start_from(self.rounds.problem.drive, one)]
             for one in found
             if one.is_usable
             and excess(one) <= WORTH_MORE * least
@@ -526,7 +520,6 @@ class _Search:
 
     def _go_on(self, size: int) -> None:
         """Search on where the best sets stopped at the limit of iterations."""
-        present = drive_effects(self.rounds.problem.drive)
         excess = self.rounds.criteria.excess
         before: dict[Effects, float] = {}
         for _ in range(MOST_TURNS):
@@ -545,11 +538,7 @@ class _Search:
             sets = {
                 one.effects: self._unless_tried(
                     one.effects,
-                    [
-                        SearchStart(
-                            _base_values(one, self.rounds), fitted_values(one, present)
-                        )
-                    ],
+                    [start_from(self.rounds.problem.drive, one)],
                 )
                 for one in unfinished
             }

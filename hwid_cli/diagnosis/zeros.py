@@ -10,16 +10,12 @@ from dataclasses import replace
 import numpy as np
 
 from hwid_cli.diagnosis.candidate import (
-    SearchStart,
-    base_of,
     compared_with_fit,
     fit_candidate,
-    fitted_drive,
-    fitted_values,
+    start_from,
 )
 from hwid_cli.diagnosis.problem import DiagnosisProblem
 from hwid_cli.drive.effect import Scales
-from hwid_cli.drive.simulation import drive_effects
 from hwid_cli.records.candidates import CandidateFit
 from hwid_cli.records.diagnosis import NoiseFloor
 
@@ -54,10 +50,7 @@ def with_zeros(
         left = compared_with_fit(shifted, found, scales)
         offsets = offsets + [float(np.mean(one.residual)) for one in left]
         shifted = _shifted(problem, offsets)
-        start = SearchStart(
-            base_of(fitted_drive(problem.drive, found)),
-            fitted_values(found, drive_effects(problem.drive)),
-        )
+        start = start_from(problem.drive, found)
         better = fit_candidate(shifted, (), [start], scales, noise)
         if not better.is_usable:
             return problem, base
