@@ -192,6 +192,9 @@ def _force_curves(
     findings: Findings, after: Sequence[Compared] | None
 ) -> tuple[LatentForce, ...]:
     drive = fitted_drive(findings.problem.drive, findings.base)
+    if findings.pieces is not None:
+        # Joined pieces jump where the next one starts: that is no force.
+        after = None
     return latent_force_curves(
         findings.before, after, findings.force, drive, findings.criteria.noise
     )

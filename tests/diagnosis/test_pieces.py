@@ -92,6 +92,12 @@ def test_who_reads_it_is_told_of_the_pieces(diagnosis):
 
 
 @pytest.mark.thorough
+def test_where_pieces_meet_no_force_is_drawn(diagnosis):
+    assert diagnosis.latent_force
+    assert [one.law.size for one in diagnosis.latent_force] == [0, 0]
+
+
+@pytest.mark.thorough
 def test_recordings_keep_their_names_and_their_lengths(diagnosis):
     names = [one.name for one in diagnosis.gaps]
 
