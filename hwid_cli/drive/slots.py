@@ -130,5 +130,6 @@ that is switched off is 0, except where the comment says infinite.
     OWN_FINENESS,  # steps in a sample, at least
     OWN_BENDS,  # set: the force has corners
     SAMPLE_TIME,  # set by the simulation
+    LAG_DAMPING_RATIO,
     N_SLOTS,
-) = range(123)
+) = range(124)

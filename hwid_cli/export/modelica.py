@@ -76,6 +76,16 @@ LAWS = {
     "input_dead_zone": _Law("{u} - max(min({u}, {threshold_A}), -{threshold_A})"),
     "input_saturation": _Law("max(min({u}, {limit_A}), -{limit_A})"),
     "actuator_lag": _Law("#i", (("i", "({u} - #i)/{time_constant_s}"),)),
+    "actuator_lag:second_order": _Law(
+        "#i",
+        (
+            ("i", "#r"),
+            (
+                "r",
+                "({u} - #i)/{time_constant_s}^2 - 2*{damping_ratio}/{time_constant_s}*#r",
+            ),
+        ),
+    ),
     "force_constant_saturation": _Law("{u}*(1 - {loss_at_reference}*({u}/i_ref)^2)"),
     "supply_sag": _Law("{u}*(1 - {loss_at_reference}*abs({u})/i_ref)"),
     "torque_ripple": _Law("{u}*(1 + {share}*sin({per_turn}*x + {phase_rad}))"),
@@ -97,7 +107,8 @@ LAWS = {
 # What changes the input, and what changes the reading, in the order of the signal.
 _INPUT_ORDER = (
     "input_delay", "own", "input_dead_zone", "input_saturation", "actuator_lag",
-    "force_constant_saturation", "supply_sag", "thermal_gain_loss", "torque_ripple",
+    "actuator_lag:second_order", "force_constant_saturation", "supply_sag",
+    "thermal_gain_loss", "torque_ripple",
 )  # fmt: skip
 _OUTPUT_ORDER = (
     "sensor_eccentricity", "own", "sensor_quadratic", "sensor_cubic", "sensor_drift",

@@ -40,6 +40,9 @@ SATURATION = {"input_saturation": {"limit_A": 3.3}}
 RATE = {"rate_limit": {"rate_A_per_s": 80.0}}
 DELAY = {"input_delay": {"delay_s": 0.0034}}
 LAG = {"actuator_lag": {"time_constant_s": 0.005}}
+RINGING_LAG = {"actuator_lag": {"time_constant_s": 0.005, "damping_ratio": 0.4}}
+SLOW_LAG = {"actuator_lag": {"time_constant_s": 0.004, "damping_ratio": 1.7}}
+EVEN_LAG = {"actuator_lag": {"time_constant_s": 0.003, "damping_ratio": 1.0}}
 LOSS = {"force_constant_saturation": {"loss_at_reference": 0.25}}
 HEAT = {"thermal_gain_loss": {"loss_at_reference": 0.3, "time_constant_s": 0.2}}
 CLIP = {"voltage_limit": {"limit_A": 4.0, "slope_A_s_per_m": 3.0}}
@@ -135,6 +138,10 @@ VARIANTS = (
     TWO_WAVES,
     BOUC_WEN,
     SHAPED,
+    RINGING_LAG,
+    SLOW_LAG,
+    EVEN_LAG,
+    {**RINGING_LAG, **HEAT},
 )
 # What the corners do to the drive of these tests.
 SCALES = Scales(

@@ -14,7 +14,9 @@ from scipy.optimize import brentq
 
 from tests.drive.drive_oracle_machine import command_path
 
-X, V, MOTOR_X, MOTOR_V, PART_X, PART_V, CIRCUIT, LAGGED, WARMTH, YIELDED = range(10)
+X, V, MOTOR_X, MOTOR_V, PART_X, PART_V, CIRCUIT, LAGGED, WARMTH, YIELDED, PACE, N = range(
+    12
+)
 # Far below the tolerances of the tests: motions are 1e-2 m.
 RELATIVE, ABSOLUTE = 1e-10, 1e-14
 # Further than this from an edge an event is not looked at again, [s].
@@ -62,7 +64,7 @@ class _Run:
 
     def solve(self, samples, start):
         one = self.machine
-        state = np.zeros(10)
+        state = np.zeros(N)
         first = self.command[0]
         state[LAGGED] = first
         state[CIRCUIT] = first / one.resistance if one.resistance else 0.0
@@ -95,7 +97,7 @@ class _Run:
 
     def _segment(self, state, begin, end, samples):
         """Run from one corner of the command to the next."""
-        found = np.empty((len(samples), 10))
+        found = np.empty((len(samples), N))
         now, filled = begin, 0
         while now < end:
             self._decide(now, state)
@@ -316,7 +318,7 @@ class _Run:
         return force + one.value("gravity", "torque_N_m") * math.sin(angle)
 
     def _rest(self, current, with_cogging=True):
-        y = np.zeros(10)
+        y = np.zeros(N)
 
         def away(x, side=0.0):
             y[X] = y[MOTOR_X] = x
@@ -369,7 +371,7 @@ class _Run:
 
     def _rate(self, t, y):
         one = self.machine
-        out = np.zeros(10)
+        out = np.zeros(N)
         mass = one.mass
         if one.has("gear_backlash"):
             inner = one.mass * one.value("gear_backlash", "motor_share", 0.5)
@@ -386,7 +388,10 @@ class _Run:
             out[PART_V] = -self._pull(y) / one.value("second_mode", "mass_kg")
         if one.has("actuator_lag"):
             tau = one.value("actuator_lag", "time_constant_s")
-            out[LAGGED] = (self.current(t) - y[LAGGED]) / tau
+            missing = (self.current(t) - y[LAGGED]) / tau
+            ratio = one.value("actuator_lag", "damping_ratio")
+            out[LAGGED] = y[PACE] if ratio else missing
+            out[PACE] = (missing - 2 * ratio * y[PACE]) / tau if ratio else 0.0
         if one.has("thermal_gain_loss"):
             tau = one.value("thermal_gain_loss", "time_constant_s")
             lagged = y[LAGGED] if one.has("actuator_lag") else self.current(t)

@@ -77,6 +77,7 @@ NEUTRAL = {
     "rate_limit": {"rate_A_per_s": 1e4},
     "input_delay": {"delay_s": 1e-15},
     "actuator_lag": {"time_constant_s": 1e-13},
+    "actuator_lag:second_order": {"time_constant_s": 1e-14, "damping_ratio": 1.0},
     "force_constant_saturation": {"loss_at_reference": 0.0},
     "supply_sag": {"loss_at_reference": 0.0},
     "thermal_gain_loss": {"loss_at_reference": 0.0, "time_constant_s": 1.0},

@@ -56,6 +56,7 @@ VALUES = {
     "input_dead_zone": {"threshold_A": 0.3},
     "input_saturation": {"limit_A": 1.8},
     "actuator_lag": {"time_constant_s": 5e-3},
+    "actuator_lag:second_order": {"time_constant_s": 5e-3, "damping_ratio": 0.6},
     "force_constant_saturation": {"loss_at_reference": 0.2},
     "supply_sag": {"loss_at_reference": 0.2},
     "torque_ripple": {"share": 0.2, "per_turn": 900.0, "phase_rad": 0.2},

@@ -118,6 +118,32 @@ LAG = Effect(
     },
 )
 
+SECOND_ORDER_LAG = Effect(
+    id="actuator_lag:second_order",
+    sentence="the current follows the command with a second-order lag",
+    equation="tau^2 i'' + 2 z tau i' + i = command",
+    enters="command",
+    parameters=(
+        Parameter(
+            "time_constant_s", _times, _time_bounds, places=("LAG",), limits=(POSITIVE,)
+        ),
+        Parameter(
+            "damping_ratio",
+            lambda scales: (0.7, 1.5),
+            # What rings more than a current loop that somebody has tuned is a spring.
+            lambda scales: (0.3, 10.0),
+            places=("LAG_DAMPING_RATIO",),
+            limits=(POSITIVE,),
+        ),
+    ),
+    # Strongly damped, with a small time constant.
+    contains=("actuator_lag",),
+    confused_with={
+        "input_delay": "a sine far above the natural frequency",
+        "elastic_coupling": "a sensor at the motor beside that at the load",
+    },
+)
+
 CONSTANT_SATURATION = Effect(
     id="force_constant_saturation",
     sentence="the force constant falls with the square of the current",
@@ -295,6 +321,7 @@ EFFECTS = (
     RATE_LIMIT,
     DELAY,
     LAG,
+    SECOND_ORDER_LAG,
     CONSTANT_SATURATION,
     SAG,
     RIPPLE,

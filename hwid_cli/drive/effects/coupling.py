@@ -185,7 +185,8 @@ def _elastic(sensor: str, looks_like: dict[str, str]) -> Effect:
             Parameter(
                 "damping_ratio",
                 lambda scales: (0.05,),
-                lambda scales: (1e-4, 2.0),
+                # What is damped more shows no swing: a lag of the amplifier looks the same.
+                lambda scales: (1e-4, 0.7),
                 places=("COUPLING_DAMPING_RATIO",),
                 default=0.0,
                 limits=(NOT_NEGATIVE,),

@@ -25,8 +25,9 @@ from hwid_cli.drive.motion.push import (
 # Places in the state: mass, motor, appendage, current of the circuit.
 X, V, MOTOR_X, MOTOR_V, PART_X, PART_V, CIRCUIT, N_STATE = range(8)
 # Places in the memory: direction of sliding (0 at rest), position and deflection at the
-# last reversal, current after the lag, temperature, side of a preload (0 held at 0).
-WAY, TURNED_AT, DEFLECTION, LAGGED, HEAT, SIDE, N_MEMORY = range(7)
+# last reversal, current after the lag, temperature, side of a preload (0 held at 0), rate
+# of a second-order lag.
+WAY, TURNED_AT, DEFLECTION, LAGGED, HEAT, SIDE, LAG_RATE, N_MEMORY = range(8)
 # Tries that bracket the position at rest, each this much further, and that narrow it.
 MOST_TRIES, FURTHER, NARROWING = 120, 1.3, 90
 # Length of a step along the deflection of a hysteresis, in yield lengths, and what is

@@ -1,6 +1,6 @@
 """Compiled push of the drive within one straight piece of the command.
 
-Lag, losses of the force constant, heating and a periodic force make a curve of time
+Lag of first or second order, losses of the force constant, heating and a periodic force make a curve of time
 out of the straight piece. A cubic stands for it, the projection on polynomials (five
 Gauss points): it has the same mean and moments, so that even a lag much faster than
 the piece gives the right motion. docs/method_diagnosis.md, eq. (D5), (D6), (D12).
@@ -18,7 +18,9 @@ TURN = 2.0 * np.pi
 # command at its start, its rate, and the time.
 DRIVE, OTHER, WARMTH, COMMAND, COMMAND_RATE, BEGUN, N_PUSH = 0, 4, 8, 9, 10, 11, 12
 # Numbers that depend on the length of a piece alone.
-N_ROOM = 17
+N_ROOM = 23
+# Below this, the two rates of a second-order lag are one.
+_ONE_RATE = 1e-4
 # Gauss-Legendre points and weights on -1 to 1.
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(5)
 # Rows: what each point adds to the coefficients of 1, s, s^2, s^3, with s from 0 to 1.
@@ -103,26 +105,56 @@ def prepare_push(room: np.ndarray, length: float, p: np.ndarray) -> None:
     ----------
     room : ndarray, shape (N_ROOM,)
         Length; fading of the lag at the Gauss points and at the end; fading of the
-        temperature; cubics of sine and cosine of the periodic force.
+        temperature; cubics of sine and cosine of the periodic force; what the rate of a
+        second-order lag adds at the Gauss points and at the end.
     length : float, [s]
     p : ndarray, shape (N_SLOTS,)
     """
     room[0] = length
     if p[slots.LAG] > 0.0:
+        turns, ratio = length / p[slots.LAG], p[slots.LAG_DAMPING_RATIO]
         for j in range(5):
-            room[1 + j] = np.exp(-_SHARES[j] * length / p[slots.LAG])
-        room[6] = np.exp(-length / p[slots.LAG])
+            room[1 + j], room[17 + j] = _faded(_SHARES[j] * turns, ratio)
+        room[6], room[22] = _faded(turns, ratio)
     if p[slots.THERMAL_LOSS] != 0.0:
         room[7] = np.exp(-length / p[slots.THERMAL_TIME])
         room[8] = np.sqrt(room[7])
     if p[slots.PERIODIC_FORCE] != 0.0:
-        for n in range(9, N_ROOM):
+        for n in range(9, 17):
             room[n] = 0.0
         for j in range(5):
             angle = TURN * p[slots.PERIODIC_FREQUENCY] * _SHARES[j] * length
             for n in range(4):
                 room[9 + n] += _PROJECT[j, n] * np.cos(angle)
                 room[13 + n] += _PROJECT[j, n] * np.sin(angle)
+
+
+@njit(**INNER)
+def _faded(turns: float, ratio: float) -> tuple[float, float]:
+    """Return what is left of a lag's value, and what its rate has added, without input.
+
+    Parameters
+    ----------
+    turns : float, [-]
+        Time over the time constant, which the rate is in as well.
+    ratio : float, [-]
+        Damping ratio; 0 for a first-order lag.
+    """
+    if ratio <= 0.0:
+        return np.exp(-turns), 0.0
+    square = ratio * ratio - 1.0
+    spread = np.sqrt(abs(square))
+    if spread < _ONE_RATE:
+        rest = np.exp(-ratio * turns)
+        return rest * (1.0 + ratio * turns), rest * turns
+    if square < 0.0:
+        rest = np.exp(-ratio * turns)
+        held, added = rest * np.cos(spread * turns), rest * np.sin(spread * turns)
+    else:
+        slow, fast = np.exp((spread - ratio) * turns), np.exp(-(spread + ratio) * turns)
+        held, added = 0.5 * (slow + fast), 0.5 * (slow - fast)
+    added /= spread
+    return held + ratio * added, added
 
 
 @njit(**INNER)
@@ -142,7 +174,8 @@ def set_push(
     room : ndarray, shape (N_ROOM,)
         From ``prepare_push``; prepared again where the length is another one.
     memory : ndarray, shape (N_MEMORY,)
-        The fourth is the current after the lag, the fifth the temperature.
+        The fourth is the current after the lag, the fifth the temperature, the seventh
+        the rate of a second-order lag times its time constant.
     piece : tuple
         Time at its start [s], length [s], command at both ends.
     current_now : float, [A]
@@ -153,12 +186,18 @@ def set_push(
     if room[0] != length:
         prepare_push(room, length, p)
     lag, swing = p[slots.LAG], p[slots.PERIODIC_FORCE]
+    ratio = p[slots.LAG_DAMPING_RATIO]
     depends, is_hot = depends_on_motion(p), p[slots.THERMAL_LOSS] != 0.0
     is_force = has_losses(p) and not depends
     rise = last - first
-    steady, fading = first, 0.0
+    # What the lag tends to, how far its value is off, and its rate.
+    steady, fading, turning, pace = first, 0.0, 0.0, 0.0
     if lag > 0.0:
-        steady = first - rise * lag / length
+        pace = rise * lag / length
+        steady = first - pace
+        if ratio > 0.0:
+            steady = first - 2.0 * ratio * pace
+            turning = memory[6] - pace
         fading = memory[3] - steady
     for n in range(4):
         push[DRIVE + n], push[OTHER + n] = 0.0, 0.0
@@ -171,6 +210,7 @@ def set_push(
             square = 0.0
             for j in range(5):
                 share = steady + rise * _SHARES[j] + fading * room[1 + j]
+                share += turning * room[17 + j]
                 share /= p[slots.REFERENCE_CURRENT]
                 square += _HALF_WEIGHTS[j] * share * share
         push[WARMTH] = square + (cold - square) * room[8]
@@ -178,6 +218,7 @@ def set_push(
     if lag > 0.0 or is_force:
         for j in range(5):
             value = steady + rise * _SHARES[j] + fading * room[1 + j]
+            value += turning * room[17 + j]
             if is_force:
                 value = force_of(value, cold + (memory[4] - cold) * _SHARES[j], p)
             elif not depends:
@@ -195,7 +236,10 @@ def set_push(
             push[OTHER + n] += sine * room[9 + n] + cosine * room[13 + n]
     memory[3] = last
     if lag > 0.0:
-        memory[3] = steady + rise + fading * room[6]
+        memory[3] = steady + rise + fading * room[6] + turning * room[22]
+        if ratio > 0.0:
+            left = room[6] - 2.0 * ratio * room[22]
+            memory[6] = pace - fading * room[22] + turning * left
     # From shares of the piece to seconds.
     scale = 1.0
     for n in range(1, 4):

@@ -123,7 +123,8 @@ enum {
     OWN_FINENESS = 119,
     OWN_BENDS = 120,
     SAMPLE_TIME = 121,
-    N_SLOTS = 122,
+    LAG_DAMPING_RATIO = 122,
+    N_SLOTS = 123,
     CONSTANT = 0,
     VARIABLE = 1,
     ADD = 2,
@@ -162,7 +163,7 @@ enum {
     COMMAND_RATE = 10,
     BEGUN = 11,
     N_PUSH = 12,
-    N_ROOM = 17,
+    N_ROOM = 23,
     X = 0,
     V = 1,
     MOTOR_X = 2,
@@ -177,7 +178,8 @@ enum {
     LAGGED = 3,
     HEAT = 4,
     SIDE = 5,
-    N_MEMORY = 6,
+    LAG_RATE = 6,
+    N_MEMORY = 7,
     MOST_TRIES = 120,
     NARROWING = 90,
     MOST_TURNS = 60,
@@ -683,24 +685,66 @@ static double drive_force_of(double current, double warmth, double *p)
     return (p[FORCE_CONSTANT] * (1.0 - loss)) * current;
 }
 
+static tuple_dd drive_faded(double turns, double ratio)
+{
+    double square = 0.0;
+    double spread = 0.0;
+    double rest = 0.0;
+    double held = 0.0;
+    double added = 0.0;
+    double slow = 0.0;
+    double fast = 0.0;
+    if (ratio <= 0.0) {
+        return (tuple_dd){exp(-turns), 0.0};
+    }
+    square = (ratio * ratio) - 1.0;
+    spread = sqrt(fabs(square));
+    if (spread < 0.0001) {
+        rest = exp((-ratio) * turns);
+        return (tuple_dd){rest * (1.0 + (ratio * turns)), rest * turns};
+    }
+    if (square < 0.0) {
+        rest = exp((-ratio) * turns);
+        held = rest * cos(spread * turns);
+        added = rest * sin(spread * turns);
+    } else {
+        slow = exp((spread - ratio) * turns);
+        fast = exp((-(spread + ratio)) * turns);
+        held = 0.5 * (slow + fast);
+        added = 0.5 * (slow - fast);
+    }
+    added /= spread;
+    return (tuple_dd){held + (ratio * added), added};
+}
+
 static void drive_prepare_push(double *room, double length, double *p)
 {
+    double turns = 0.0;
+    double ratio = 0.0;
     int j = 0;
+    tuple_dd t1 = {0};
+    tuple_dd t2 = {0};
     int n = 0;
     double angle = 0.0;
     room[0] = length;
     if (p[LAG] > 0.0) {
+        turns = length / p[LAG];
+        ratio = p[LAG_DAMPING_RATIO];
         for (j = 0; j < 5; ++j) {
-            room[1 + j] = exp(((-shares[j]) * length) / p[LAG]);
+            t1 = drive_faded(shares[j] * turns, ratio);
+            room[1 + j] = t1.m0;
+            room[17 + j] = t1.m1;
         }
-        room[6] = exp((-length) / p[LAG]);
+        t2 = drive_faded(turns, ratio);
+        room[6] = t2.m0;
+        room[22] = t2.m1;
     }
     if (p[THERMAL_LOSS] != 0.0) {
         room[7] = exp((-length) / p[THERMAL_TIME]);
         room[8] = sqrt(room[7]);
     }
     if (p[PERIODIC_FORCE] != 0.0) {
-        for (n = 9; n < N_ROOM; ++n) {
+        for (n = 9; n < 17; ++n) {
             room[n] = 0.0;
         }
         for (j = 0; j < 5; ++j) {
@@ -722,12 +766,15 @@ static void drive_set_push(double *push, double *room, double *memory, tuple_ddd
     double last = 0.0;
     double lag = 0.0;
     double swing = 0.0;
+    double ratio = 0.0;
     int depends = 0;
     int is_hot = 0;
     int is_force = 0;
     double rise = 0.0;
     double steady = 0.0;
     double fading = 0.0;
+    double turning = 0.0;
+    double pace = 0.0;
     int n = 0;
     double cold = 0.0;
     double square = 0.0;
@@ -738,6 +785,7 @@ static void drive_set_push(double *push, double *room, double *memory, tuple_ddd
     double angle = 0.0;
     double sine = 0.0;
     double cosine = 0.0;
+    double left = 0.0;
     double scale = 0.0;
     t1 = piece;
     time = t1.m0;
@@ -749,14 +797,22 @@ static void drive_set_push(double *push, double *room, double *memory, tuple_ddd
     }
     lag = p[LAG];
     swing = p[PERIODIC_FORCE];
+    ratio = p[LAG_DAMPING_RATIO];
     depends = drive_depends_on_motion(p);
     is_hot = p[THERMAL_LOSS] != 0.0;
     is_force = drive_has_losses(p) && (!depends);
     rise = last - first;
     steady = first;
     fading = 0.0;
+    turning = 0.0;
+    pace = 0.0;
     if (lag > 0.0) {
-        steady = first - ((rise * lag) / length);
+        pace = (rise * lag) / length;
+        steady = first - pace;
+        if (ratio > 0.0) {
+            steady = first - ((2.0 * ratio) * pace);
+            turning = memory[6] - pace;
+        }
         fading = memory[3] - steady;
     }
     for (n = 0; n < 4; ++n) {
@@ -772,6 +828,7 @@ static void drive_set_push(double *push, double *room, double *memory, tuple_ddd
             square = 0.0;
             for (j = 0; j < 5; ++j) {
                 share = (steady + (rise * shares[j])) + (fading * room[1 + j]);
+                share += turning * room[17 + j];
                 share /= p[REFERENCE_CURRENT];
                 square += (half_weights[j] * share) * share;
             }
@@ -782,6 +839,7 @@ static void drive_set_push(double *push, double *room, double *memory, tuple_ddd
     if ((lag > 0.0) || is_force) {
         for (j = 0; j < 5; ++j) {
             value = (steady + (rise * shares[j])) + (fading * room[1 + j]);
+            value += turning * room[17 + j];
             if (is_force) {
                 value = drive_force_of(value, cold + ((memory[4] - cold) * shares[j]), p);
             } else {
@@ -808,7 +866,11 @@ static void drive_set_push(double *push, double *room, double *memory, tuple_ddd
     }
     memory[3] = last;
     if (lag > 0.0) {
-        memory[3] = (steady + rise) + (fading * room[6]);
+        memory[3] = ((steady + rise) + (fading * room[6])) + (turning * room[22]);
+        if (ratio > 0.0) {
+            left = room[6] - ((2.0 * ratio) * room[22]);
+            memory[6] = (pace - (fading * room[22])) + (turning * left);
+        }
     }
     scale = 1.0;
     for (n = 1; n < 4; ++n) {
