@@ -187,6 +187,14 @@ def span_of(quantity: str, low: float, high: float) -> Bounds:
     )
 
 
+def line_bounds(scales: Scales) -> tuple[float, float]:
+    """Bounds of a frequency that goes on all the time.
+
+    The longest recording shows it come back at least once: a slower swing is any wander.
+    """
+    return 1.5 / scales.duration_s, 0.5 / scales.sample_time_s
+
+
 @dataclass(frozen=True)
 class Limit:
     """What a configuration must keep to.

@@ -15,6 +15,7 @@ from hwid_cli.drive.effect import (
     Scales,
     Stated,
     Values,
+    line_bounds,
     shares_of,
     span_of,
 )
@@ -131,7 +132,7 @@ PERIODIC = Effect(
         Parameter(
             "frequency_Hz",
             lambda scales: scales.frequencies_Hz,
-            lambda scales: (0.5 / scales.duration_s, 0.5 / scales.sample_time_s),
+            line_bounds,
             places=("PERIODIC_FREQUENCY",),
             limits=(POSITIVE,),
         ),

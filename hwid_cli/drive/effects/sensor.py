@@ -12,6 +12,7 @@ from hwid_cli.drive.effect import (
     Limit,
     Parameter,
     Scales,
+    line_bounds,
     shares_of,
     span_of,
 )
@@ -130,7 +131,7 @@ HUM = Effect(
         Parameter(
             "frequency_Hz",
             lambda scales: scales.frequencies_Hz,
-            lambda scales: (0.5 / scales.duration_s, 0.5 / scales.sample_time_s),
+            line_bounds,
             places=("HUM_FREQUENCY",),
             limits=(POSITIVE,),
         ),
