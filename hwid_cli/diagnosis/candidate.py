@@ -9,6 +9,7 @@ Below it, what a fit stands for: its drive, its effects, its point of a search.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import zip_longest
 from typing import Any
 
 import numpy as np
@@ -28,7 +29,12 @@ from hwid_cli.diagnosis.parameters import (
     residuals_at,
     sum_of_squares,
 )
-from hwid_cli.diagnosis.problem import Compared, DiagnosisProblem
+from hwid_cli.diagnosis.problem import (
+    Compared,
+    DiagnosisProblem,
+    Signals,
+    rest_length,
+)
 from hwid_cli.diagnosis.search import (
     SearchResult,
     cross_fitted,
@@ -46,6 +52,9 @@ Start = Mapping[str, Mapping[str, float]]
 
 # Samples that the screening of starts looks at.
 SCREENING_SAMPLES = 6000
+# Recordings that few samples are taken of, at least, and samples of each.
+FEWEST_RECORDINGS = 6
+SHORTEST_PART = 1500
 # Iterations from every start, then from the two best. A second start is worth further
 # time only where its sum of squares is within the factor.
 SCREENING = ((2, 2.0), (3, 1.2))
@@ -133,29 +142,41 @@ def fewer_recordings(problem: DiagnosisProblem, most_samples: int) -> DiagnosisP
 
     Takes the recordings in turn from each kind, the largest outputs first, and those
     with the largest and the smallest inputs however long they are: what acts on the
-    command shows only beside inputs of other sizes.
+    command shows only beside inputs of other sizes. Where long ones are too few to show
+    what differs between recordings, more are taken, and of each the first part.
     """
     if problem.n_evaluated <= most_samples:
         return problem
+    order = _in_turn(problem)
+    counts = np.array([problem.signals[row].n_evaluated for row in order])
+    n_enough = int(np.searchsorted(np.cumsum(counts), most_samples)) + 1
+    n_enough = max(n_enough, len(_of_extreme_inputs(problem)))
+    longest = max(most_samples // FEWEST_RECORDINGS, SHORTEST_PART)
+    if n_enough < FEWEST_RECORDINGS and max(counts[:n_enough]) > longest:
+        parts = [_first_part(one, longest) for one in problem.signals]
+        rows = order[:FEWEST_RECORDINGS]
+    else:
+        parts, rows = list(problem.signals), order[:n_enough]
+    return replace(problem, signals=tuple(parts[row] for row in sorted(rows)))
+
+
+def _first_part(signals: Signals, n_samples: int) -> Signals:
+    """What a recording holds until it has moved for so many samples."""
+    still = min(rest_length(signals.driven_by), n_samples)
+    last = max(signals.skip, still) + n_samples
+    return signals if last >= signals.driven_by.size else signals.part(0, last)
+
+
+def _in_turn(problem: DiagnosisProblem) -> list[int]:
+    """Rows of the recordings, the most telling ones first."""
     kinds: dict[str, list[int]] = {}
     sizes = [float(np.max(np.abs(one.output))) for one in problem.signals]
     for row in np.argsort(sizes)[::-1]:
         kinds.setdefault(problem.signals[row].kind, []).append(int(row))
     # Every second one first, so that small and large ones are both there.
     queues = [rows[::2] + rows[1::2] for rows in kinds.values()]
-    chosen = _of_extreme_inputs(problem)
-    n_samples = sum(problem.signals[row].n_evaluated for row in chosen)
-    for turn in range(max(len(queue) for queue in queues)):
-        for queue in queues:
-            if (
-                turn < len(queue)
-                and n_samples < most_samples
-                and queue[turn] not in chosen
-            ):
-                chosen.append(queue[turn])
-                n_samples += problem.signals[queue[turn]].n_evaluated
-    signals = tuple(problem.signals[row] for row in sorted(chosen))
-    return replace(problem, signals=signals)
+    turns = [row for turn in zip_longest(*queues) for row in turn if row is not None]
+    return list(dict.fromkeys((*_of_extreme_inputs(problem), *turns)))
 
 
 def _of_extreme_inputs(problem: DiagnosisProblem) -> list[int]:
@@ -408,6 +429,27 @@ def compared_with_fit(
 ) -> list[Compared]:
     """Simulate all recordings with a fit, beside the measurements."""
     return compare_at(problem, *rebuilt(problem, found, scales))
+
+
+def residuals_of_few(
+    few: DiagnosisProblem,
+    problem: DiagnosisProblem,
+    found: CandidateFit,
+    scales: Scales,
+) -> list[np.ndarray]:
+    """What a fit leaves of some of the recordings, or of parts of them.
+
+    Parameters
+    ----------
+    few : DiagnosisProblem
+        From ``fewer_recordings``.
+    problem : DiagnosisProblem
+        The recordings that the fit was evaluated on, in their order.
+    """
+    fit_layout, point = rebuilt(problem, found, scales)
+    names = {one.name for one in few.signals}
+    rows = [row for row, one in enumerate(problem.signals) if one.name in names]
+    return residuals_at(few, fit_layout, ParameterPoint(point.shared, point.own[rows]))
 
 
 def at_point(

@@ -159,18 +159,8 @@ def _cut(signals: Signals, motion: Smoothed) -> list[Signals]:
 def _piece(
     signals: Signals, motion: Smoothed, first: int, last: int, number: int
 ) -> Signals:
-    rows = slice(first, last)
-    used = None if signals.used is None else signals.used[rows].copy()
     return replace(
-        signals,
+        signals.part(first, last),
         name=f"{signals.name}#{number}",
-        driven_by=signals.driven_by[rows].copy(),
-        compared=signals.compared[rows].copy(),
-        input=signals.input[rows].copy(),
-        output=signals.output[rows].copy(),
-        force=signals.force[rows].copy(),
-        offset=None if signals.offset is None else signals.offset[rows].copy(),
-        skip=min(max(signals.skip - first, 0), last - first - 1),
-        used=used,
         start=(float(motion.position[first]), float(motion.velocity[first])),
     )

@@ -132,6 +132,26 @@ class Signals:
         both = used if self.used is None else used & self.used
         return replace(self, used=both)
 
+    def part(self, first: int, last: int) -> "Signals":
+        """Samples from the first one to the one before the last.
+
+        Parameters
+        ----------
+        first, last : int, [samples]
+        """
+        rows = slice(first, last)
+        return replace(
+            self,
+            driven_by=self.driven_by[rows].copy(),
+            compared=self.compared[rows].copy(),
+            input=self.input[rows].copy(),
+            output=self.output[rows].copy(),
+            force=self.force[rows].copy(),
+            offset=None if self.offset is None else self.offset[rows].copy(),
+            skip=min(max(self.skip - first, 0), last - first - 1),
+            used=None if self.used is None else self.used[rows].copy(),
+        )
+
     @cached_property
     def rest_position_m(self) -> float:
         """Mean of the position before the input first moves; of a velocity 0."""

@@ -24,6 +24,7 @@ from hwid_cli.diagnosis.candidate import (
     fitted_drive,
     fitted_start,
     fitted_values,
+    residuals_of_few,
     screen,
     start_from,
 )
@@ -34,6 +35,7 @@ from hwid_cli.diagnosis.forecast import (
     linearise,
     pair_shares,
 )
+from hwid_cli.diagnosis.parameters import sum_of_squares
 from hwid_cli.diagnosis.problem import DiagnosisProblem
 from hwid_cli.diagnosis.scales import scales_of_fit
 from hwid_cli.diagnosis.selection import (
@@ -262,9 +264,8 @@ class _Search:
         self._finish(name, {ids: chosen[ids] for ids in chosen if ids not in wide})
         best = self.best_of_size(size)
         if best is None or not self.rounds.criteria.is_complete(best):
-            self._finish(
-                f"{name} that include others", {ids: chosen[ids] for ids in wide}
-            )
+            further = self._that_add({ids: chosen[ids] for ids in wide})
+            self._finish(f"{name} that include others", further)
         self._use_again(size)
         self._go_on(size)
         return self.best_of_size(size)
@@ -438,6 +439,56 @@ class _Search:
         }
         self._keep(self._fitted(f"{what}, all recordings", near, None))
 
+    def _that_add(
+        self, sets: Mapping[Effects, Sequence[SearchStart]]
+    ) -> dict[Effects, Sequence[SearchStart]]:
+        """Sets without those that bring hardly more than a finished one they include.
+
+        Few samples tell, from where that one ended. Where there are no more, the fit
+        itself costs as little.
+        """
+        if self._train.n_evaluated <= MANY_SAMPLES:
+            return dict(sets)
+        narrow = {
+            ids: [one for one in self.fits if _includes_one_of(ids, [one])]
+            for ids in sets
+        }
+        tried = {
+            one: [start_from(self.rounds.problem.drive, self.fits[one])]
+            for several in narrow.values()
+            for one in several
+        }
+        for ids, several in narrow.items():
+            if several:
+                tried[ids] = [*sets[ids], *self._widened(ids, several)]
+        screened = {
+            one.effects: one
+            for one in self._screen("sets and what they include", tried)
+        }
+        whole = self._few_sse(self.rounds.base)
+        found: dict[Effects, Sequence[SearchStart]] = {}
+        for ids, starts in sets.items():
+            wide = screened.get(ids)
+            least = min((screened[one].sse for one in narrow[ids]), default=np.inf)
+            if wide is None:
+                found[ids] = starts
+            elif least - wide.sse >= LEAST_ADDED * (whole - wide.sse):
+                found[ids] = wide.starts
+        return found
+
+    def _widened(
+        self, ids: Effects, narrow: Sequence[Effects]
+    ) -> Iterable[SearchStart]:
+        """Starts of a set where narrower ones have ended."""
+        rounds, present = self.rounds, drive_effects(self.rounds.problem.drive)
+        for one in narrow:
+            fit = self.fits[one]
+            values, base = fitted_values(fit, present), _base_values(fit, rounds)
+            (more,), (less,) = set(ids) - set(one), set(one) - set(ids)
+            given = _translated(more, values[less], rounds.baseline.scales)
+            for start in given:
+                yield SearchStart(base, {**_without(values, less), more: start})
+
     def _adds_enough(self, wide: CandidateFit) -> bool:
         """Whether a set brings more than the sets of its size that it includes."""
         excess, whole = self.rounds.criteria.excess, self.rounds.base
@@ -497,7 +548,7 @@ class _Search:
             name = f"{_name_of(size)}, from related ones"
             best = self.best_of_size(size)
             screened = self._screen(name, sets)
-            near = self._near(screened, best)
+            near = self._that_add(self._near(screened, best))
             if not near:
                 return
             self._finish(name, near)
@@ -510,9 +561,10 @@ class _Search:
 
     def _few_sse(self, found: CandidateFit) -> float:
         """Sum of squares on the recordings of the screening."""
-        names = {one.name for one in self._few.signals}
-        rows = [one.name in names for one in self.rounds.problem.signals]
-        return float(found.sse[rows].sum())
+        rounds = self.rounds
+        return sum_of_squares(
+            residuals_of_few(self._few, rounds.problem, found, rounds.baseline.scales)
+        )
 
     def _floor(self) -> float:
         """Sum of squares of the noise on these recordings."""

@@ -96,7 +96,7 @@ def test_the_hidden_effect_wins_against_the_whole_catalogue(friction):
 
 def test_every_effect_gets_a_forecast_and_a_screening(friction):
     # A second one of a kind is tried beside its first only.
-    alone = {(name,) for name in CATALOGUE if ":second" not in name}
+    alone = {(name,) for name, one in CATALOGUE.items() if not one.beside}
     assert set(friction.found.shares) == alone
     assert set(friction.effects_of("screen")) == alone
 
