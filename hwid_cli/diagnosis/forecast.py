@@ -7,18 +7,25 @@ share of the error that the candidate should explain, and where to start its fit
 of candidates follow from the same columns. docs/method_diagnosis.md, eq. (D19).
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
+import scipy
 
 from hwid_cli.diagnosis.candidate import Start
-from hwid_cli.diagnosis.parameters import first_point, parameter_layout, residuals_at
+from hwid_cli.diagnosis.parameters import (
+    START,
+    first_point,
+    parameter_layout,
+    residuals_at,
+)
 from hwid_cli.diagnosis.problem import DiagnosisProblem
-from hwid_cli.diagnosis.search import derivatives, with_own_trials
+from hwid_cli.diagnosis.search import derivatives, fit_own, with_own_trials
 from hwid_cli.drive.catalogue import CATALOGUE
 from hwid_cli.drive.effect import Scales
+from hwid_cli.records.candidates import ParameterRef
 from hwid_cli.records.drive import Drive
 
 # A column may be taken between these multiples of what was simulated; beyond, the
@@ -64,10 +71,13 @@ class Linearisation:
         With the re-fitted base.
     present : mapping
         Effects that the base has already, as fitted.
+    own : mapping of ParameterRef to ndarray, shape (n_recordings,)
+        Coordinates of what each recording has for itself of these effects.
     parts : list of ndarray
         Error of the base in each recording.
-    absorbed : ndarray, shape (n_samples, n_shared)
-        Orthonormal directions that the base's parameters can absorb.
+    absorbed : ndarray, shape (n_samples, n_absorbed)
+        Orthonormal directions that the base's parameters can absorb, and what each
+        recording has for itself.
     error : ndarray, shape (n_samples,)
         Error of the base without what they absorb.
     """
@@ -76,6 +86,7 @@ class Linearisation:
     drive: Drive
     present: Start
     scales: Scales
+    own: Mapping[ParameterRef, np.ndarray]
     parts: list[np.ndarray]
     absorbed: np.ndarray
     error: np.ndarray
@@ -87,14 +98,23 @@ def linearise(
     """Simulate the base and its derivatives."""
     fit_layout = parameter_layout(problem, tuple(present), present, scales)
     point = first_point(problem, fit_layout, drive, present)
-    point = with_own_trials(problem, fit_layout, point)
+    of_effects = [j for j, one in enumerate(fit_layout.own) if one.owner != START]
+    if of_effects:
+        point = fit_own(problem, fit_layout, point.shared)
     parts = residuals_at(problem, fit_layout, point)
     jacobians = derivatives(problem, fit_layout, point, parts)
-    shared = len(fit_layout.shared)
-    absorbed = _orthonormal(np.vstack([one[:, :shared] for one in jacobians]))
+    absorbed = _orthonormal(_whole(jacobians, len(fit_layout.shared)))
     error = np.concatenate(parts)
     error = error - absorbed @ (absorbed.T @ error)
-    return Linearisation(problem, drive, present, scales, parts, absorbed, error)
+    own = {fit_layout.own[j].ref: point.own[:, j] for j in of_effects}
+    return Linearisation(problem, drive, present, scales, own, parts, absorbed, error)
+
+
+def _whole(jacobians: Sequence[np.ndarray], n_shared: int) -> np.ndarray:
+    """Derivatives of all recordings one below the other, own columns side by side."""
+    shared = np.vstack([one[:, :n_shared] for one in jacobians])
+    own = scipy.linalg.block_diag(*(one[:, n_shared:] for one in jacobians))
+    return np.column_stack([shared, own])
 
 
 def forecast(at_base: Linearisation, identifier: str) -> Forecast:
@@ -136,7 +156,10 @@ def _changed(
     full = {**at_base.present, identifier: start}
     fit_layout = parameter_layout(at_base.problem, tuple(full), full, at_base.scales)
     point = first_point(at_base.problem, fit_layout, at_base.drive, full)
-    point = with_own_trials(at_base.problem, fit_layout, point)
+    for column, one in enumerate(fit_layout.own):
+        if one.ref in at_base.own:
+            point.own[:, column] = at_base.own[one.ref]
+    point = with_own_trials(at_base.problem, fit_layout, point, at_base.own)
     with_effect = residuals_at(at_base.problem, fit_layout, point)
     changed = np.concatenate(at_base.parts) - np.concatenate(with_effect)
     return changed if np.isfinite(changed).all() else None

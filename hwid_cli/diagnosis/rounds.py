@@ -35,7 +35,7 @@ from hwid_cli.diagnosis.forecast import (
     linearise,
     pair_shares,
 )
-from hwid_cli.diagnosis.parameters import sum_of_squares
+from hwid_cli.diagnosis.parameters import is_factor, sum_of_squares
 from hwid_cli.diagnosis.problem import DiagnosisProblem
 from hwid_cli.diagnosis.scales import scales_of_fit
 from hwid_cli.diagnosis.selection import (
@@ -258,6 +258,11 @@ class _Search:
             further = {one.effects: list(one.starts) for one in screened}
             screened = self._screen(name, further)
         chosen = _promising(self.rounds, self._few, screened)
+        if self._has_many:
+            # Most of the first ones may be wide, and fall away.
+            ids = [one.effects for one in screened]
+            plain = [one for one in screened if not _includes_one_of(one.effects, ids)]
+            chosen |= _promising(self.rounds, self._few, plain)
         # What includes another candidate must be better; where the simpler one leaves
         # nothing, it cannot be.
         wide = {ids for ids in chosen if _includes_one_of(ids, chosen)}
@@ -270,14 +275,25 @@ class _Search:
         self._go_on(size)
         return self.best_of_size(size)
 
+    @property
+    def _has_many(self) -> bool:
+        """Whether sets are fitted to a part of the samples first."""
+        return self._train.n_evaluated > MANY_SAMPLES
+
     def best_of_size(self, size: int) -> CandidateFit | None:
         """The best set of a size."""
         return select_best(self.rounds.criteria, self._of_size(size), self.rounds.base)
 
     def is_better(self, larger: CandidateFit, smaller: CandidateFit) -> bool:
         """Whether a further effect is worth looking for more."""
-        against = self.rounds.criteria.evidence(larger, smaller)
-        return against.gain >= LEAST_STEP and against.explained >= LEAST_FURTHER
+        criteria = self.rounds.criteria
+        against = criteria.evidence(larger, smaller)
+        explained = against.explained
+        if any(is_factor(one) for one in smaller.own_names):
+            # Its values for the held-out recordings are of these.
+            excess = criteria.excess(smaller)
+            explained = 1.0 - criteria.excess(larger) / max(excess, 1e-300)
+        return against.gain >= LEAST_STEP and explained >= LEAST_FURTHER
 
     def parents(self, size: int) -> list[CandidateFit]:
         """Sets to build on: the best one, and the next that is of another kind."""
@@ -420,7 +436,7 @@ class _Search:
 
         Of many samples, only sets that come near the best one are fitted to all.
         """
-        if self._train.n_evaluated <= MANY_SAMPLES:
+        if not self._has_many:
             self._keep(self._fitted(what, sets, None))
             return
         found = self._fitted(what, sets, MANY_SAMPLES)
@@ -447,7 +463,7 @@ class _Search:
         Few samples tell, from where that one ended. Where there are no more, the fit
         itself costs as little.
         """
-        if self._train.n_evaluated <= MANY_SAMPLES:
+        if not self._has_many:
             return dict(sets)
         narrow = {
             ids: [one for one in self.fits if _includes_one_of(ids, [one])]

@@ -14,7 +14,7 @@ Marquardt (1963); damping rule of Nielsen (1999), IMM-REP-1999-05; Broyden (1965
 docs/method_diagnosis.md, eq. (D16) to (D18b).
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -30,6 +30,7 @@ from hwid_cli.diagnosis.parameters import (
 )
 from hwid_cli.diagnosis.problem import DiagnosisProblem
 from hwid_cli.drive.catalogue import CATALOGUE
+from hwid_cli.records.candidates import ParameterRef
 
 # Difference for derivatives, in coordinates; large enough to look across the corners of
 # thresholds, small enough for a straight line.
@@ -393,11 +394,20 @@ def _inside(unknown: Unknown, coordinate: float) -> float:
 
 
 def with_own_trials(
-    problem: DiagnosisProblem, fit_layout: ParameterLayout, point: ParameterPoint
+    problem: DiagnosisProblem,
+    fit_layout: ParameterLayout,
+    point: ParameterPoint,
+    known: Collection[ParameterRef] = (),
 ) -> ParameterPoint:
-    """Set each recording's own parameters to the best of a few values."""
+    """Set each recording's own parameters to the best of a few values.
+
+    Parameters
+    ----------
+    known : collection of ParameterRef
+        What stays as it is.
+    """
     for column, unknown in enumerate(fit_layout.own):
-        if unknown.owner == START:
+        if unknown.owner == START or unknown.ref in known:
             continue
         best = np.full(len(problem.signals), np.inf)
         chosen = point.own[:, column].copy()

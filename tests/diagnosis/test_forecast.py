@@ -1,11 +1,12 @@
 """The ranking beforehand: what each candidate should explain."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
 
-from hwid_cli.diagnosis.candidate import fitted_drive
+from hwid_cli.diagnosis.candidate import fitted_drive, fitted_values
 from hwid_cli.diagnosis.forecast import Forecast, forecast, linearise, pair_shares
 from hwid_cli.drive.catalogue import CATALOGUE
 from tests.diagnosis.small_drive import fit, problem, recordings, sizes
@@ -72,13 +73,34 @@ def test_the_base_absorbs_its_own_directions():
     assert np.abs(at_base.absorbed.T @ column).max() < 1e-9
 
 
+def test_what_recordings_have_for_themselves_takes_nothing_from_a_further_effect():
+    # Springs of several rooms, between the values that are tried first; a fixed stop.
+    factors = (1.05, 0.93, 1.08, 0.96, 1.02, 1.07, 0.94, 0.98, 1.06)
+    cut = {"input_saturation": {"limit_A": 3.3}}
+    of = problem(
+        recordings(
+            cut,
+            own=lambda number, drive: replace(
+                drive, stiffness_N_per_m=drive.stiffness_N_per_m * factors[number]
+            ),
+        )
+    )
+    scales, change = sizes(of), "parameter_change:stiffness"
+    parent = fit(of, {change: {}})
+
+    drive = fitted_drive(of.drive, parent)
+    at_parent = linearise(of, drive, fitted_values(parent, {}), scales)
+    left = forecast(at_parent, "input_saturation").share
+
+    # What is left of it once the springs are right, and not of the wrong springs.
+    assert left > 0.8
+
+
 def test_an_effect_of_the_wrong_sign_explains_nothing():
     # Friction only resists: what drags along looks like its opposite.
     at_base = linearised("coulomb_friction")
-    turned = type(at_base)(
-        at_base.problem, at_base.drive, at_base.present, at_base.scales,
-        [-one for one in at_base.parts], at_base.absorbed, -at_base.error,
-    )  # fmt: skip
+    parts = [-one for one in at_base.parts]
+    turned = replace(at_base, parts=parts, error=-at_base.error)
     assert forecast(at_base, "coulomb_friction").share > 0.8
     changed = forecast(turned, "quadratic_drag")
     assert changed.share >= 0.0
@@ -87,11 +109,7 @@ def test_an_effect_of_the_wrong_sign_explains_nothing():
 def test_an_effect_that_changes_nothing_gets_no_share():
     # No current is cut at a limit that it never reaches.
     at_base = linearised("coulomb_friction")
-    far = type(at_base)(
-        at_base.problem, at_base.drive, at_base.present,
-        type(at_base.scales)(**{**vars(at_base.scales), "current_A": 100.0}),
-        at_base.parts, at_base.absorbed, at_base.error,
-    )  # fmt: skip
+    far = replace(at_base, scales=replace(at_base.scales, current_A=100.0))
     found = forecast(far, "input_saturation")
     assert found.share == 0.0
     assert not found.column.any()
