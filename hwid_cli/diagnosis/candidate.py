@@ -137,17 +137,26 @@ class Screened:
     starts: tuple[SearchStart, ...]
 
 
-def fewer_recordings(problem: DiagnosisProblem, most_samples: int) -> DiagnosisProblem:
+def fewer_recordings(
+    problem: DiagnosisProblem, most_samples: int, left: np.ndarray | None = None
+) -> DiagnosisProblem:
     """Problem with so few recordings that they have about ``most_samples``.
 
     Takes the recordings in turn from each kind, the largest outputs first, and those
     with the largest and the smallest inputs however long they are: what acts on the
     command shows only beside inputs of other sizes. Where long ones are too few to show
     what differs between recordings, more are taken, and of each the first part.
+
+    Parameters
+    ----------
+    left : ndarray, shape (n_recordings,), or None, [output unit]
+        RMS that a fit leaves of each recording; the largest come first then.
     """
     if problem.n_evaluated <= most_samples:
         return problem
-    order = _in_turn(problem)
+    if left is None:
+        left = np.array([np.max(np.abs(one.output)) for one in problem.signals])
+    order = _in_turn(problem, left)
     counts = np.array([problem.signals[row].n_evaluated for row in order])
     n_enough = int(np.searchsorted(np.cumsum(counts), most_samples)) + 1
     n_enough = max(n_enough, len(_of_extreme_inputs(problem)))
@@ -167,10 +176,9 @@ def _first_part(signals: Signals, n_samples: int) -> Signals:
     return signals if last >= signals.driven_by.size else signals.part(0, last)
 
 
-def _in_turn(problem: DiagnosisProblem) -> list[int]:
-    """Rows of the recordings, the most telling ones first."""
+def _in_turn(problem: DiagnosisProblem, sizes: np.ndarray) -> list[int]:
+    """Rows of the recordings: extreme inputs, then the largest sizes of each kind."""
     kinds: dict[str, list[int]] = {}
-    sizes = [float(np.max(np.abs(one.output))) for one in problem.signals]
     for row in np.argsort(sizes)[::-1]:
         kinds.setdefault(problem.signals[row].kind, []).append(int(row))
     # Every second one first, so that small and large ones are both there.

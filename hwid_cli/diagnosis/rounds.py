@@ -58,8 +58,10 @@ WITHIN_REACH = 4.0
 MANY_SAMPLES = 40_000
 # Share of what a set leaves that counts as left beyond the noise, at least.
 LEAST_LEFT = 0.02
-# Candidates on top of a set, by their forecasts, that are screened.
+# Candidates on top of a set, by their forecasts, that are screened; among them so many
+# that include no other one, since all shapes of one law may come first.
 SCREENED_ON_TOP = 12
+KINDS_ON_TOP = 8
 # Sets are screened again, at most so often, until one of them explains this share of what
 # the smaller set leaves.
 MOST_SCREENINGS = 2
@@ -242,6 +244,8 @@ class _Search:
         self, size: int, parents: Sequence[CandidateFit]
     ) -> CandidateFit | None:
         """Fit sets of one size on top of smaller ones; return the best of that size."""
+        if self._has_many and parents:
+            self._few = self._worst_of(parents[0])
         proposed: dict[Effects, list[SearchStart]] = {}
         for parent in parents:
             for ids, starts in self._on_top(parent).items():
@@ -280,6 +284,14 @@ class _Search:
         """Whether sets are fitted to a part of the samples first."""
         return self._train.n_evaluated > MANY_SAMPLES
 
+    def _worst_of(self, parent: CandidateFit) -> DiagnosisProblem:
+        """Few recordings, those first of which a set leaves most."""
+        signals = self.rounds.problem.signals
+        rows = [row for row, one in enumerate(signals) if not one.is_held_out]
+        counts = [one.n_evaluated for one in self._train.signals]
+        left = np.sqrt(parent.sse[rows] / counts)
+        return fewer_recordings(self._train, SCREENING_SAMPLES, left)
+
     def best_of_size(self, size: int) -> CandidateFit | None:
         """The best set of a size."""
         return select_best(self.rounds.criteria, self._of_size(size), self.rounds.base)
@@ -287,13 +299,12 @@ class _Search:
     def is_better(self, larger: CandidateFit, smaller: CandidateFit) -> bool:
         """Whether a further effect is worth looking for more."""
         criteria = self.rounds.criteria
-        against = criteria.evidence(larger, smaller)
-        explained = against.explained
+        gain, part = criteria.gain(larger, smaller), smaller
         if any(is_factor(one) for one in smaller.own_names):
-            # Its values for the held-out recordings are of these.
-            excess = criteria.excess(smaller)
-            explained = 1.0 - criteria.excess(larger) / max(excess, 1e-300)
-        return against.gain >= LEAST_STEP and explained >= LEAST_FURTHER
+            # Its values for the held-out recordings are of these: no measure for others.
+            part = self._largest_part(larger) or smaller
+        explained = criteria.evidence(larger, part).explained
+        return gain >= LEAST_STEP and explained >= LEAST_FURTHER
 
     def parents(self, size: int) -> list[CandidateFit]:
         """Sets to build on: the best one, and the next that is of another kind."""
@@ -369,7 +380,7 @@ class _Search:
             self._forecasts, self._error = found, at.error
             self.shares.update({(one.effect,): one.share for one in found})
         else:
-            found = found[:SCREENED_ON_TOP]
+            found = _most_promising(found)
         pairs = {
             one.effect: [(base_of(drive), values) for values in one.starts]
             for one in found
@@ -753,6 +764,20 @@ def _promising(
         if rank < FEWEST_FINISHED or one.sse - floor <= WITHIN_REACH * least
     }
     return {one.effects: one.starts for one in usable if one.effects in chosen}
+
+
+def _most_promising(found: Sequence[Forecast]) -> list[Forecast]:
+    """The first ones of the forecasts, the best first, of several kinds.
+
+    Parameters
+    ----------
+    found : sequence of Forecast
+        The best first.
+    """
+    ids = [(one.effect,) for one in found]
+    plain = [one for one in found if not _includes_one_of((one.effect,), ids)]
+    chosen = {one.effect for one in (*found[:SCREENED_ON_TOP], *plain[:KINDS_ON_TOP])}
+    return [one for one in found if one.effect in chosen]
 
 
 def _includes_one_of(effects: Effects, others: Iterable[Effects]) -> bool:

@@ -267,6 +267,37 @@ def test_inputs_of_every_size_are_screened_however_long_they_are():
     assert few.n_evaluated < of.n_evaluated / 3
 
 
+def test_of_long_recordings_the_first_parts_of_several_are_taken():
+    of = problem(recordings(n=4000))
+    few = fewer_recordings(of, SCREENING_SAMPLES)
+    whole = {one.name: one for one in of.signals}
+
+    assert len(few.signals) == 6
+    assert few.n_evaluated < 2 * SCREENING_SAMPLES
+    for one in few.signals:
+        # From where it begins to move.
+        assert 1500 <= one.driven_by.size <= 1500 + 50
+        np.testing.assert_array_equal(
+            one.output, whole[one.name].output[: one.output.size]
+        )
+    # Whole ones that are as many stay whole.
+    assert {one.driven_by.size for one in fewer_recordings(of, 30_000).signals} == {
+        4000
+    }
+
+
+def test_the_recordings_of_which_most_is_left_come_first():
+    of = problem(recordings(n=4000))
+    usual = {one.name for one in fewer_recordings(of, 100).signals}
+    others = [row for row, one in enumerate(of.signals) if one.name not in usual]
+    for row in others:
+        left = np.ones(len(of.signals))
+        left[row] = 2.0
+        few = {one.name for one in fewer_recordings(of, 100, left).signals}
+        assert of.signals[row].name in few
+    assert len(others) == 3
+
+
 def test_recordings_that_are_few_anyway_are_all_taken():
     of = problem(recordings())
     assert fewer_recordings(of, SCREENING_SAMPLES) is of

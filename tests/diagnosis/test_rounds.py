@@ -1,7 +1,9 @@
 """Rounds of candidate fits: which sets are tried, which are kept."""
 
+import numpy as np
 import pytest
 
+from hwid_cli.diagnosis import rounds
 from hwid_cli.diagnosis.candidate import Baseline, fitted_drive
 from hwid_cli.diagnosis.rounds import (
     FEWEST_FINISHED,
@@ -12,7 +14,16 @@ from hwid_cli.diagnosis.rounds import (
 )
 from hwid_cli.diagnosis.selection import SelectionCriteria
 from hwid_cli.drive.catalogue import CATALOGUE
-from tests.diagnosis.small_drive import fit, in_turn, problem, recordings, sizes, white
+from tests.diagnosis.made_up_fits import CRITERIA, made_up
+from tests.diagnosis.small_drive import (
+    fit,
+    in_turn,
+    problem,
+    recordings,
+    search_start,
+    sizes,
+    white,
+)
 from tests.stages.diagnosed_drive import FRICTION
 
 STIFFNESS = {"cubic_stiffness": {"stiffness_N_per_m3": 8e5}}
@@ -43,6 +54,13 @@ def rounds_of(effects, allowed, **options):
             **options,
         }
     )
+
+
+def rounds_of_fits():
+    """Rounds that weigh made-up fits."""
+    six = recordings()[:6]
+    of = problem(six, held_out=[one.name for one in six[3:]])
+    return rounds_of(FRICTION, FEW, problem=of, criteria=CRITERIA)
 
 
 class Watched:
@@ -125,6 +143,43 @@ def test_what_includes_another_one_is_finished_after_it(pair):
     finished = pair.effects_of("fit_candidate")
     first = finished.index(("coulomb_friction",))
     assert first < finished.index(("stribeck_friction",))
+
+
+BREAKING = {"force_N": 0.5, "static_excess_N": 0.6, "velocity_m_per_s": 0.03}
+
+
+@pytest.mark.parametrize(
+    ("hidden", "is_kept"), [(FRICTION, False), ({"stribeck_friction": BREAKING}, True)]
+)
+def test_of_many_samples_what_includes_another_one_has_to_bring_more(
+    hidden, is_kept, monkeypatch
+):
+    of = rounds_of(hidden, FEW)
+    search = rounds._Search(of)
+    found = fit(of.problem, FRICTION, scales=of.baseline.scales)
+    search.fits[found.effects] = found
+    start = {**BREAKING, "velocity_m_per_s": 0.01}
+    begun = [search_start(of.problem, {"stribeck_friction": start})]
+    wide, other = {("stribeck_friction",): begun}, {("cubic_stiffness",): begun}
+
+    # Of few samples all go on.
+    assert search._that_add(wide | other) == wide | other
+    monkeypatch.setattr(rounds, "MANY_SAMPLES", 1000)
+    kept = search._that_add(wide | other)
+    assert (("stribeck_friction",) in kept) == is_kept
+    assert kept[("cubic_stiffness",)] == begun
+
+
+def test_a_further_effect_is_measured_by_its_own_part_beside_values_of_recordings():
+    # A change between recordings leaves little of what its values are fitted to; friction
+    # and a stop leave less of all, and much less than the stop alone.
+    search = rounds._Search(rounds_of_fits())
+    changing = made_up(("parameter_change:damping",), 400.0, own=np.ones(6))
+    stop, both = made_up(("end_stop",), 900.0), made_up(("a", "end_stop"), 350.0)
+    search.fits = {one.effects: one for one in (changing, stop, both)}
+
+    assert search.is_better(both, changing)
+    assert not search.is_better(both, made_up(("x",), 400.0))
 
 
 def test_no_larger_set_is_tried_once_nothing_remains():
