@@ -21,6 +21,7 @@ SEEDS = {
     "reporting": 77_431_902,
     "second_reporting": 41_907_263,
     "third_reporting": 63_580_417,
+    "fourth_reporting": 18_946_035,
 }
 # Largest share by which the simulation's parameters are wrong.
 LARGEST_ERROR = 0.3
