@@ -7,7 +7,7 @@ members. Each round describes its fits as tasks and hands them to a runner that 
 given, so that nothing here knows of processes or of a cache. docs/method_diagnosis.md.
 """
 
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
@@ -28,6 +28,18 @@ from hwid_cli.diagnosis.candidate import (
     screen,
     start_from,
 )
+from hwid_cli.diagnosis.effect_sets import (
+    Effects,
+    includes_one_of,
+    is_nested,
+    may_stand,
+    moved_up,
+    relatives,
+    second_of,
+    translated,
+    with_effect,
+    without_effect,
+)
 from hwid_cli.diagnosis.forecast import (
     Forecast,
     Linearisation,
@@ -44,8 +56,7 @@ from hwid_cli.diagnosis.selection import (
     is_part_of,
     select_best,
 )
-from hwid_cli.drive.catalogue import CATALOGUE, may_be_added, public_id
-from hwid_cli.drive.effect import Values
+from hwid_cli.drive.catalogue import CATALOGUE
 from hwid_cli.drive.simulation import drive_effects
 from hwid_cli.records.candidates import CandidateFit
 
@@ -86,7 +97,6 @@ LEAST_STEP = 10.0
 LEAST_FURTHER = 0.25
 
 OnRound = Callable[[str, int], None]
-Effects = tuple[str, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -246,38 +256,51 @@ class _Search:
         """Fit sets of one size on top of smaller ones; return the best of that size."""
         if self._has_many and parents:
             self._few = self._worst_of(parents[0])
-        proposed: dict[Effects, list[SearchStart]] = {}
-        for parent in parents:
-            for ids, starts in self._on_top(parent).items():
-                proposed.setdefault(ids, []).extend(starts)
-        if size == 2:
-            for ids, start in self._likely_pairs():
-                proposed.setdefault(ids, []).append(start)
         name = _name_of(size)
-        screened = self._screen(name, proposed)
+        screened = self._screen(name, self._proposed(size, parents))
         for _ in range(MOST_SCREENINGS):
             if not parents or self._stands_out(screened, parents[0]):
                 break
             # Nothing has got far yet: all of them go on.
             further = {one.effects: list(one.starts) for one in screened}
             screened = self._screen(name, further)
-        chosen = _promising(self.rounds, self._few, screened)
-        if self._has_many:
-            # Most of the first ones may be wide, and fall away.
-            ids = [one.effects for one in screened]
-            plain = [one for one in screened if not _includes_one_of(one.effects, ids)]
-            chosen |= _promising(self.rounds, self._few, plain)
+        chosen = self._chosen(screened)
         # What includes another candidate must be better; where the simpler one leaves
         # nothing, it cannot be.
-        wide = {ids for ids in chosen if _includes_one_of(ids, chosen)}
+        wide = {ids for ids in chosen if includes_one_of(ids, chosen)}
         self._finish(name, {ids: chosen[ids] for ids in chosen if ids not in wide})
         best = self.best_of_size(size)
         if best is None or not self.rounds.criteria.is_complete(best):
-            further = self._that_add({ids: chosen[ids] for ids in wide})
-            self._finish(f"{name} that include others", further)
+            added = self._that_add({ids: chosen[ids] for ids in wide})
+            self._finish(f"{name} that include others", added)
         self._use_again(size)
         self._go_on(size)
         return self.best_of_size(size)
+
+    def _proposed(
+        self, size: int, parents: Sequence[CandidateFit]
+    ) -> dict[Effects, list[SearchStart]]:
+        """Sets of one size that are worth a screening, with their starts."""
+        found: dict[Effects, list[SearchStart]] = {}
+        for parent in parents:
+            for ids, starts in self._on_top(parent).items():
+                found.setdefault(ids, []).extend(starts)
+        if size == 2:
+            for ids, start in self._likely_pairs():
+                found.setdefault(ids, []).append(start)
+        return found
+
+    def _chosen(
+        self, screened: Sequence[Screened]
+    ) -> Mapping[Effects, Sequence[SearchStart]]:
+        """Sets whose fits are finished."""
+        chosen = _promising(self.rounds, self._few, screened)
+        if not self._has_many:
+            return chosen
+        # Most of the first ones may be wide, and fall away.
+        every = [one.effects for one in screened]
+        plain = [one for one in screened if not includes_one_of(one.effects, every)]
+        return {**chosen, **_promising(self.rounds, self._few, plain)}
 
     @property
     def _has_many(self) -> bool:
@@ -353,7 +376,7 @@ class _Search:
         sets: dict[Effects, list[SearchStart]] = {}
         for effect in whole.effects:
             left = tuple(one for one in whole.effects if one != effect)
-            ids, start = _moved_up(left, _without(values, effect), present)
+            ids, start = moved_up(left, without_effect(values, effect), present)
             sets.setdefault(ids, []).append(SearchStart(base, start))
         self._finish("without each effect", sets)
 
@@ -371,9 +394,7 @@ class _Search:
         drive = fitted_drive(rounds.problem.drive, parent)
         at = linearise(self._few, drive, start, scales)
         others = [
-            one
-            for one in rounds.allowed
-            if not _is_nested(one, parent.effects, present)
+            one for one in rounds.allowed if not is_nested(one, parent.effects, present)
         ]
         found = self._forecast(at, others)
         if parent is rounds.base:
@@ -391,7 +412,7 @@ class _Search:
             for one in found:
                 pairs[one.effect] += [(given, values) for values in one.starts[:count]]
         return {
-            _together(parent.effects, effect): [
+            with_effect(parent.effects, effect): [
                 SearchStart(base, {**start, effect: values}) for base, values in several
             ]
             for effect, several in pairs.items()
@@ -418,11 +439,11 @@ class _Search:
             (first, second)
             for share, first, second in pair_shares(self._forecasts, self._error)
             if share >= max(found[first].share, found[second].share) + PROMISING_PAIR
-            and not _is_nested(first, (second,))
+            and not is_nested(first, (second,))
         ]
         for first, second in likely[:LIKELY_PAIRS]:
             both = {one: found[one].starts[0] for one in (first, second)}
-            yield _together((first,), second), SearchStart(base, {**present, **both})
+            yield with_effect((first,), second), SearchStart(base, {**present, **both})
 
     def _screen(
         self, name: str, proposed: Mapping[Effects, list[SearchStart]]
@@ -477,7 +498,7 @@ class _Search:
         if not self._has_many:
             return dict(sets)
         narrow = {
-            ids: [one for one in self.fits if _includes_one_of(ids, [one])]
+            ids: [one for one in self.fits if includes_one_of(ids, [one])]
             for ids in sets
         }
         tried = {
@@ -512,9 +533,9 @@ class _Search:
             fit = self.fits[one]
             values, base = fitted_values(fit, present), _base_values(fit, rounds)
             (more,), (less,) = set(ids) - set(one), set(one) - set(ids)
-            given = _translated(more, values[less], rounds.baseline.scales)
+            given = translated(more, values[less], rounds.baseline.scales)
             for start in given:
-                yield SearchStart(base, {**_without(values, less), more: start})
+                yield SearchStart(base, {**without_effect(values, less), more: start})
 
     def _adds_enough(self, wide: CandidateFit) -> bool:
         """Whether a set brings more than the sets of its size that it includes."""
@@ -658,18 +679,18 @@ class _Search:
         sets: dict[Effects, list[SearchStart]] = {}
         for effect in best.effects:
             others = tuple(one for one in best.effects if one != effect)
-            kin = CATALOGUE[effect].contains if is_complete else _relatives(effect)
+            kin = CATALOGUE[effect].contains if is_complete else relatives(effect)
             for one in kin:
-                relative = _second_of(one) if one in others else one
-                ids = _together(others, relative)
-                if relative not in rounds.allowed or not _may_stand(ids, present):
+                relative = second_of(one) if one in others else one
+                ids = with_effect(others, relative)
+                if relative not in rounds.allowed or not may_stand(ids, present):
                     continue
                 here = self.fits.get(ids)
                 if here is not None and not self._is_behind(here, best):
                     continue
-                given = _translated(relative, values[effect], rounds.baseline.scales)
+                given = translated(relative, values[effect], rounds.baseline.scales)
                 starts = [
-                    SearchStart(base, {**_without(values, effect), relative: one})
+                    SearchStart(base, {**without_effect(values, effect), relative: one})
                     for one in given
                 ]
                 if here is not None:
@@ -730,14 +751,6 @@ def _name_of(size: int) -> str:
     return "single effects" if size == 1 else f"sets of {size} effects"
 
 
-def _together(effects: Effects, another: str) -> Effects:
-    return tuple(sorted((*effects, another)))
-
-
-def _without(values: Mapping[str, Values], effect: str) -> dict[str, Values]:
-    return {name: one for name, one in values.items() if name != effect}
-
-
 def _train_sse(rounds: Rounds, found: CandidateFit) -> float:
     """Sum of squares of the training recordings."""
     rows = np.array([not one.is_held_out for one in rounds.problem.signals])
@@ -775,20 +788,9 @@ def _most_promising(found: Sequence[Forecast]) -> list[Forecast]:
         The best first.
     """
     ids = [(one.effect,) for one in found]
-    plain = [one for one in found if not _includes_one_of((one.effect,), ids)]
+    plain = [one for one in found if not includes_one_of((one.effect,), ids)]
     chosen = {one.effect for one in (*found[:SCREENED_ON_TOP], *plain[:KINDS_ON_TOP])}
     return [one for one in found if one.effect in chosen]
-
-
-def _includes_one_of(effects: Effects, others: Iterable[Effects]) -> bool:
-    """Whether a set is another one but for one effect that includes the other's."""
-    for other in others:
-        more, less = set(effects) - set(other), set(other) - set(effects)
-        if len(more) == 1 == len(less):
-            (wide,), (narrow,) = more, less
-            if narrow in CATALOGUE[wide].contains:
-                return True
-    return False
 
 
 def _starts_of(problem: DiagnosisProblem) -> str:
@@ -797,79 +799,3 @@ def _starts_of(problem: DiagnosisProblem) -> str:
         return "given"
     are_pieces = any(one.start is not None for one in problem.signals)
     return "free" if are_pieces else ""
-
-
-def _relatives(effect: str) -> list[str]:
-    """Effects that an effect contains, that contain it, or that look like it."""
-    contained = CATALOGUE[effect].contains
-    containing = [name for name, one in CATALOGUE.items() if effect in one.contains]
-    alike = [name for name in CATALOGUE[effect].confused_with if name in CATALOGUE]
-    return list(dict.fromkeys((*contained, *containing, *alike)))
-
-
-def _second_of(effect: str) -> str:
-    """The second one of an effect, where the catalogue has one; else the effect."""
-    seconds = [name for name, one in CATALOGUE.items() if one.beside == effect]
-    return seconds[0] if seconds else effect
-
-
-def _translated(effect: str, values: Values, scales: Any) -> list[dict[str, float]]:
-    """Start values of an effect from those of a related one: equal names, equal values.
-
-    A second one of its kind starts on both sides of 0.
-    """
-    entry = CATALOGUE[effect]
-    given = [values]
-    if entry.beside:
-        signed = {one.name for one in entry.parameters if not one.is_positive}
-        given.append({k: -one if k in signed else one for k, one in values.items()})
-    found = []
-    for start in entry.starts(scales)[:SCREENED_STARTS]:
-        for one in given:
-            same = {name: one.get(name, value) for name, value in start.items()}
-            if same not in found:
-                found.append(same)
-    return found
-
-
-def _is_nested(
-    effect: str, others: Sequence[str], present: Collection[str] = ()
-) -> bool:
-    """Whether an effect is, includes, or is included in one of the others.
-
-    A second one of its kind stands beside its first, and never without it.
-
-    Parameters
-    ----------
-    present : collection of str
-        Ids of what the simulation holds.
-    """
-    return not may_be_added(effect, (*present, *others)) or any(
-        effect in CATALOGUE[other].contains
-        or other in CATALOGUE[effect].contains
-        or bool(set(CATALOGUE[effect].contains) & set(CATALOGUE[other].contains))
-        for other in others
-        if public_id(other) != public_id(effect)
-    )
-
-
-def _may_stand(effects: Effects, present: Collection[str]) -> bool:
-    """Whether no effect of a set is nested with another, or lacks its first."""
-    return not any(
-        _is_nested(one, tuple(other for other in effects if other != one), present)
-        for one in effects
-    )
-
-
-def _moved_up(
-    effects: Effects, values: Mapping[str, Values], present: Collection[str]
-) -> tuple[Effects, Mapping[str, Values]]:
-    """A set in which a second one whose first has gone is the first."""
-    for one in effects:
-        others = tuple(two for two in effects if two != one)
-        first = CATALOGUE[one].beside
-        if first and not may_be_added(one, (*present, *others)):
-            names = {parameter.name for parameter in CATALOGUE[first].parameters}
-            same = {name: value for name, value in values[one].items() if name in names}
-            return _together(others, first), {**_without(values, one), first: same}
-    return effects, values

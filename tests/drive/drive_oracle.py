@@ -14,8 +14,8 @@ from scipy.optimize import brentq
 
 from tests.drive.drive_oracle_machine import command_path
 
-X, V, MOTOR_X, MOTOR_V, PART_X, PART_V, CIRCUIT, LAGGED, WARMTH, YIELDED, PACE, N = range(
-    12
+X, V, MOTOR_X, MOTOR_V, PART_X, PART_V, CIRCUIT, LAGGED, WARMTH, YIELDED, PACE, N = (
+    range(12)
 )
 # Far below the tolerances of the tests: motions are 1e-2 m.
 RELATIVE, ABSOLUTE = 1e-10, 1e-14

@@ -1,13 +1,13 @@
-"""Sets of effects with two of a kind: which may stand together."""
+"""Which effects may stand together in a set, two of a kind among them."""
 
 import pytest
 
-from hwid_cli.diagnosis.rounds import (
-    _is_nested,
-    _may_stand,
-    _moved_up,
-    _second_of,
-    _translated,
+from hwid_cli.diagnosis.effect_sets import (
+    is_nested,
+    may_stand,
+    moved_up,
+    second_of,
+    translated,
 )
 from tests.diagnosis.small_drive import problem, sizes
 
@@ -24,8 +24,8 @@ STOP, SECOND = "one_sided_stop", "one_sided_stop:second"
     ],
 )
 def test_a_second_one_stands_beside_its_first(effect, others):
-    assert not _is_nested(effect, others)
-    assert _may_stand((*others, effect), ())
+    assert not is_nested(effect, others)
+    assert may_stand((*others, effect), ())
 
 
 @pytest.mark.parametrize(
@@ -44,31 +44,31 @@ def test_a_second_one_stands_beside_its_first(effect, others):
     ],
 )
 def test_what_is_nested_or_lacks_its_first_stands_alone(effect, others):
-    assert _is_nested(effect, others)
-    assert not _may_stand((*others, effect), ())
+    assert is_nested(effect, others)
+    assert not may_stand((*others, effect), ())
 
 
 def test_the_first_one_may_be_of_the_simulation():
-    assert not _is_nested(SECOND, ("gravity",), (STOP,))
-    assert _may_stand((SECOND, "gravity"), (STOP,))
+    assert not is_nested(SECOND, ("gravity",), (STOP,))
+    assert may_stand((SECOND, "gravity"), (STOP,))
 
 
 def test_a_second_one_without_its_first_becomes_the_first():
     stop = {"position_m": 0.01, "stiffness_N_per_m": 1e4}
     values = {"gravity": {"torque_N_m": 1.0}, SECOND: stop}
-    ids, moved = _moved_up(("gravity", SECOND), values, ())
+    ids, moved = moved_up(("gravity", SECOND), values, ())
     assert ids == ("gravity", STOP)
     assert moved == {"gravity": {"torque_N_m": 1.0}, STOP: stop}
-    assert _moved_up(("gravity", SECOND), values, (STOP,)) == (
+    assert moved_up(("gravity", SECOND), values, (STOP,)) == (
         ("gravity", SECOND),
         values,
     )
 
 
 def test_in_the_place_of_a_stop_on_both_sides_a_second_one_starts_on_each():
-    assert _second_of(STOP) == SECOND
-    assert _second_of("gravity") == "gravity"
+    assert second_of(STOP) == SECOND
+    assert second_of("gravity") == "gravity"
     both_sides = {"position_m": 0.012, "stiffness_N_per_m": 1e4}
-    found = _translated(SECOND, both_sides, sizes(problem()))
+    found = translated(SECOND, both_sides, sizes(problem()))
     assert [one["position_m"] for one in found] == [0.012, -0.012]
     assert {one["stiffness_N_per_m"] for one in found} == {1e4}
