@@ -1,11 +1,13 @@
 """What a diagnosis found: the verdict, how it was reached, and what shows it."""
 
 from dataclasses import dataclass, field
+from typing import Annotated
 
 import numpy as np
 
 from hwid_cli.records.candidates import RankedCandidate
 from hwid_cli.records.programs import OF_DRIVE, Capabilities
+from hwid_cli.records.rules import STORED_NUMBERS, STORED_OR_MISSING
 from hwid_cli.records.shown import Shown
 from hwid_cli.records.stored import ADDED_LATER
 from hwid_cli.records.trust import ModelTrust, TrustOnTests
@@ -212,11 +214,11 @@ class Overlay:
     """
 
     name: str
-    time_s: np.ndarray
-    input: np.ndarray
-    measured: np.ndarray
-    before: np.ndarray
-    after: np.ndarray
+    time_s: Annotated[np.ndarray, STORED_NUMBERS]
+    input: Annotated[np.ndarray, STORED_OR_MISSING]
+    measured: Annotated[np.ndarray, STORED_OR_MISSING]
+    before: Annotated[np.ndarray, STORED_OR_MISSING]
+    after: Annotated[np.ndarray, STORED_OR_MISSING]
     noise_rms: float
 
 
@@ -235,10 +237,10 @@ class LatentForce:
 
     variable: str
     unit: str
-    at: np.ndarray
-    mean: np.ndarray
-    spread: np.ndarray
-    law: np.ndarray
+    at: Annotated[np.ndarray, STORED_NUMBERS]
+    mean: Annotated[np.ndarray, STORED_OR_MISSING]
+    spread: Annotated[np.ndarray, STORED_OR_MISSING]
+    law: Annotated[np.ndarray, STORED_OR_MISSING]
 
 
 @dataclass(frozen=True)

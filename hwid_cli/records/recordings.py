@@ -1,9 +1,11 @@
 """Measurements as records: what was read, what was calibrated, and what was changed."""
 
 from dataclasses import dataclass, field
+from typing import Annotated
 
 import numpy as np
 
+from hwid_cli.records.rules import SAMPLE_TIME, STORED_NUMBERS
 from hwid_cli.records.shown import Shown
 from hwid_cli.records.stored import ADDED_LATER
 
@@ -148,14 +150,14 @@ class Recording(Shown):
     """
 
     name: str
-    input: np.ndarray
-    output: np.ndarray
-    sample_time_s: float
+    input: Annotated[np.ndarray, STORED_NUMBERS]
+    output: Annotated[np.ndarray, STORED_NUMBERS]
+    sample_time_s: Annotated[float, SAMPLE_TIME]
     kind: str = "other"
     sha256: str = ""
     input_unit: str = "A"
     output_unit: str = "m"
-    reference: np.ndarray | None = None
+    reference: Annotated[np.ndarray | None, STORED_NUMBERS] = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "input", frozen_vector(self.input, "input"))

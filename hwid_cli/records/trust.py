@@ -1,10 +1,12 @@
 """What a model's recordings visited, and what is known of the error of its prediction."""
 
 from dataclasses import dataclass, field
+from typing import Annotated
 
 import numpy as np
 
 from hwid_cli.records.recordings import frozen_vector
+from hwid_cli.records.rules import STORED_NUMBERS, STORED_OR_MISSING
 
 
 def frozen_matrix(values: np.ndarray, n_columns: int) -> np.ndarray:
@@ -35,9 +37,9 @@ class VisitedPlane:
         Of the samples in each cell; NaN in a cell without any.
     """
 
-    edges: np.ndarray
-    lowest_rate: np.ndarray
-    highest_rate: np.ndarray
+    edges: Annotated[np.ndarray, STORED_NUMBERS]
+    lowest_rate: Annotated[np.ndarray, STORED_OR_MISSING]
+    highest_rate: Annotated[np.ndarray, STORED_OR_MISSING]
 
     def __post_init__(self) -> None:
         for name in ("edges", "lowest_rate", "highest_rate"):
@@ -61,7 +63,7 @@ class Visited:
 
     input: VisitedPlane
     inner: VisitedPlane
-    bands: np.ndarray
+    bands: Annotated[np.ndarray, STORED_NUMBERS]
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "bands", frozen_vector(self.bands, "bands"))
@@ -94,7 +96,7 @@ class ModelTrust:
     """
 
     visited: Visited
-    steps: np.ndarray
+    steps: Annotated[np.ndarray, STORED_NUMBERS]
     noise_rms: float
     scale: float
     judged_on: tuple[str, ...]
@@ -183,7 +185,7 @@ class ShownBand:
 
     model: str
     recording: str
-    time_s: np.ndarray
+    time_s: Annotated[np.ndarray, STORED_NUMBERS]
     measured: np.ndarray
     output: np.ndarray
     lower: np.ndarray
