@@ -5,7 +5,7 @@ from typing import Annotated
 
 import numpy as np
 
-from hwid_cli.records.rules import SAMPLE_TIME, STORED_NUMBERS
+from hwid_cli.records.rules import SAMPLE_TIME, STORED_NUMBERS, Integer
 from hwid_cli.records.shown import Shown
 from hwid_cli.records.stored import ADDED_LATER
 
@@ -190,6 +190,10 @@ class Recording(Shown):
         )
 
 
+# As many numbers as the largest array of a file may hold, 512 MB.
+_COUNT = Integer(least=0, most=2**26)
+
+
 @dataclass(frozen=True)
 class CalibrationLog:
     """What calibration did to one recording.
@@ -220,10 +224,10 @@ class CalibrationLog:
 
     name: str
     steps: tuple[str, ...]
-    first_sample: int
-    n_samples: int
-    n_raw_input: int
-    n_raw_output: int
+    first_sample: Annotated[int, _COUNT]
+    n_samples: Annotated[int, _COUNT]
+    n_raw_input: Annotated[int, _COUNT]
+    n_raw_output: Annotated[int, _COUNT]
     input_offset: float = 0.0
     output_offset: float = 0.0
     period_samples: float = 0.0

@@ -187,6 +187,10 @@ def _resized(place, change):
     return spoil
 
 
+def _count(place, name, value):
+    return lambda file: file[place].attrs.modify(name, value)
+
+
 _MODEL = "identify/fit/model"
 _MAP = f"{_MODEL}/input_map"
 # Place, what is planted there, and what must be said of the place, value and expectation.
@@ -228,6 +232,11 @@ CASES += [
             _resized(f"{_MODEL}/free_response", lambda one: np.tile(one, (1, 3))),
         ),
         *("results.h5", f"/{_MODEL}, row 0: free_response", "or none", _AWAY),
+    ),
+    _case(
+        "calibrated.h5: more samples than a file holds",
+        _edited("calibrated.h5", _count("logs/step_02", "n_raw_input", 2**62)),
+        *("calibrated.h5", "/logs/step_02: n_raw_input", f"got {2**62}", _AWAY),
     ),
     _case(
         "calibrated.h5: 1e308",
