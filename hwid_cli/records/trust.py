@@ -6,7 +6,7 @@ from typing import Annotated
 import numpy as np
 
 from hwid_cli.records.recordings import frozen_vector
-from hwid_cli.records.rules import STORED_NUMBERS, STORED_OR_MISSING
+from hwid_cli.records.rules import STORED_NUMBERS, STORED_OR_MISSING, ArrayOf
 
 
 def frozen_matrix(values: np.ndarray, n_columns: int) -> np.ndarray:
@@ -171,6 +171,10 @@ class RecordingTrust:
     unit: str = field(default="m")
 
 
+# What runs away has numbers of any size.
+_CURVE = ArrayOf("f", "numbers")
+
+
 @dataclass(frozen=True, eq=False)
 class ShownBand:
     """A prediction with its band beside what was measured.
@@ -186,11 +190,11 @@ class ShownBand:
     model: str
     recording: str
     time_s: Annotated[np.ndarray, STORED_NUMBERS]
-    measured: np.ndarray
-    output: np.ndarray
-    lower: np.ndarray
-    upper: np.ndarray
-    is_inside: np.ndarray
+    measured: Annotated[np.ndarray, _CURVE]
+    output: Annotated[np.ndarray, _CURVE]
+    lower: Annotated[np.ndarray, _CURVE]
+    upper: Annotated[np.ndarray, _CURVE]
+    is_inside: Annotated[np.ndarray, ArrayOf("b", "truth values")]
     unit: str
 
 

@@ -154,6 +154,7 @@ def test_bounds_of_parameters_are_kept():
     assert max(seen) <= 15.0 + 1e-9
 
 
+@pytest.mark.thorough
 def test_what_the_simulation_does_not_bear_out_is_no_fact():
     able = Capabilities(run=True, parameters=True, force=True)
 

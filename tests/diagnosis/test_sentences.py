@@ -16,6 +16,7 @@ def said(of):
     return " | ".join(hidden_from_view(of))
 
 
+@pytest.mark.thorough
 def test_the_five_words_are_said_differently():
     right, wrong = simulation(), simulation(force_constant_N_per_A=5.3)
     summaries = [
@@ -75,6 +76,7 @@ def test_an_unknown_gap_comes_with_the_input_that_separates_the_nearest():
     assert "A" in found.next_experiment.input
 
 
+@pytest.mark.thorough
 def test_with_a_single_candidate_there_is_nothing_to_separate():
     found = diagnosed(breathing(), effects=("coulomb_friction",))
     assert found.verdict == "unknown"

@@ -244,6 +244,7 @@ def rmsd_on_the_bound(recording, radius):
     return float(np.sqrt(np.mean(least_squares(residuals, begin).fun ** 2)))
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("seed", "radius"),
     [

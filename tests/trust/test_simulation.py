@@ -71,6 +71,7 @@ def test_the_machine_of_these_tests_answers_as_its_equations_say():
     assert motion(0.01 * current, friction=0.8)[-2] == 0.0
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("kind", ["steps", "multisine"])
 def test_the_band_of_a_complete_diagnosis_holds_what_it_promises(right, kind):
     found, drive, _ = right

@@ -249,6 +249,7 @@ def test_a_wide_spread_leaves_the_curves_readable():
     assert high - low < 4.0 * np.ptp(force.mean)
 
 
+@pytest.mark.thorough
 def test_hostile_and_long_names_stay_inside_the_figures():
     found = named(3)
     name = "$\\bad{_<b>%" + 80 * "n"
