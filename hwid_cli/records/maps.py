@@ -272,6 +272,6 @@ class StaticMap:
             expected = f"numbers of which the first {rising.size} rise"
             raise Refused(Refusal(rising.tolist(), expected, ("parameters",)))
         low, high = self.domain
-        if not low < high:
+        if high < low:
             expected = "two numbers, the lower one first"
             raise Refused(Refusal([low, high], expected, ("domain",)))

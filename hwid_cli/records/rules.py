@@ -190,10 +190,12 @@ class Distances(ArrayOf):
             raise Refused(Refusal(float(np.nanmin(value)), self.words))
 
 
-# Signals have at most 1e60 (docs/security.md). Beyond this, the square of what a model
-# computes from its numbers, or their sums, may be more than a float holds.
-STORED_NUMBERS = Numbers(most=1e100)
-STORED_OR_MISSING = Numbers(most=1e100, may_be_missing=True)
+# Signals have at most 1e60 and span at least 1e-60 (docs/security.md): gains stay below
+# this. Beyond it the squares of what a model computes are more than a float holds.
+STORED_NUMBERS = Numbers(most=1e130)
+STORED_OR_MISSING = Numbers(most=1e130, may_be_missing=True)
+# What a simulation gives may be of any size: some run away.
+STORED_CURVE = ArrayOf("f", "numbers")
 # A measurement has no other; ``data.checks`` says so of files.
 SAMPLE_TIME = Number(least=1e-12, most=1e9)
 POSITIVE = Number(above=0)

@@ -6,7 +6,13 @@ from typing import Annotated
 import numpy as np
 
 from hwid_cli.records.recordings import frozen_vector
-from hwid_cli.records.rules import STORED_NUMBERS, STORED_OR_MISSING, ArrayOf
+from hwid_cli.records.rules import (
+    STORED_CURVE,
+    STORED_NUMBERS,
+    STORED_OR_MISSING,
+    ArrayOf,
+)
+from hwid_cli.records.stored import check_lengths
 
 
 def frozen_matrix(values: np.ndarray, n_columns: int) -> np.ndarray:
@@ -171,10 +177,6 @@ class RecordingTrust:
     unit: str = field(default="m")
 
 
-# What runs away has numbers of any size.
-_CURVE = ArrayOf("f", "numbers")
-
-
 @dataclass(frozen=True, eq=False)
 class ShownBand:
     """A prediction with its band beside what was measured.
@@ -190,12 +192,22 @@ class ShownBand:
     model: str
     recording: str
     time_s: Annotated[np.ndarray, STORED_NUMBERS]
-    measured: Annotated[np.ndarray, _CURVE]
-    output: Annotated[np.ndarray, _CURVE]
-    lower: Annotated[np.ndarray, _CURVE]
-    upper: Annotated[np.ndarray, _CURVE]
+    measured: Annotated[np.ndarray, STORED_CURVE]
+    output: Annotated[np.ndarray, STORED_CURVE]
+    lower: Annotated[np.ndarray, STORED_CURVE]
+    upper: Annotated[np.ndarray, STORED_CURVE]
     is_inside: Annotated[np.ndarray, ArrayOf("b", "truth values")]
     unit: str
+
+    def check_stored(self) -> None:
+        """Refuse curves of different lengths.
+
+        Raises
+        ------
+        ValueError
+        """
+        curves = ("measured", "output", "lower", "upper", "is_inside")
+        check_lengths(self, "time_s", *curves)
 
 
 @dataclass(frozen=True, eq=False)
@@ -212,3 +224,15 @@ class TrustOnTests:
 
     rows: tuple[RecordingTrust, ...] = ()
     shown: ShownBand | None = None
+
+    def check_stored(self) -> None:
+        """Refuse a band of a model and a recording that no row is about.
+
+        Raises
+        ------
+        ValueError
+        """
+        names = [(one.model, one.recording) for one in self.rows]
+        if self.shown and (self.shown.model, self.shown.recording) not in names:
+            told = f"{self.shown.model} on {self.shown.recording}"
+            raise ValueError(f"shown: {told} has no row")

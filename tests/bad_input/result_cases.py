@@ -149,6 +149,11 @@ CASES += [
         *("results.h5", "must have shape", "hwid crossval"),
     ),
     _case(
+        "results.h5: axes of other orders",
+        _edited("results.h5", _put("crossval/nk", data=[7])),
+        *("results.h5: crossval: has no place for the model step_02/1/1", "--force"),
+    ),
+    _case(
         "results.h5: no fits",
         _edited("results.h5", _without("identify/fit")),
         *("results.h5", "'fit' doesn't exist", "hwid identify"),
@@ -187,7 +192,7 @@ def _resized(place, change):
     return spoil
 
 
-def _count(place, name, value):
+def _attribute_of(place, name, value):
     return lambda file: file[place].attrs.modify(name, value)
 
 
@@ -203,9 +208,10 @@ for _place, _change, *_says in (
         "1e-12 to 1e+09",
     ),
     (f"{_MODEL}/sample_time_s", float("nan"), "sample_time_s", "got nan"),
-    (f"{_MODEL}/numerator", 1e308, "numerator", "got 1e+308", "up to 1e+100"),
+    (f"{_MODEL}/numerator", 1e308, "numerator", "got 1e+308", "up to 1e+130"),
     (f"{_MODEL}/free_response", float("inf"), "free_response", "got inf"),
     (f"{_MODEL}/denominator", 2.0, f"/{_MODEL}, row 0: denominator must start with 1"),
+    ("identify/fit/orders/nf", 9, "name: 'step_02/1/1' is a fit of 'step_02/1/9'"),
     (f"{_MODEL}/delay", -1, "nk must be an integer >= 0, got -1"),
     (f"{_MAP}/parameters", -1e308, f"/{_MAP}, row 0: parameters", "got -1e+308"),
     (f"{_MAP}/parameters", 1e9, f"/{_MAP}, row 0: parameters", "the first", "rise"),
@@ -235,8 +241,18 @@ CASES += [
     ),
     _case(
         "calibrated.h5: more samples than a file holds",
-        _edited("calibrated.h5", _count("logs/step_02", "n_raw_input", 2**62)),
+        _edited("calibrated.h5", _attribute_of("logs/step_02", "n_raw_input", 2**62)),
         *("calibrated.h5", "/logs/step_02: n_raw_input", f"got {2**62}", _AWAY),
+    ),
+    *(
+        _case(
+            f"calibrated.h5: another name in {part}",
+            _edited(
+                "calibrated.h5", _attribute_of(f"{part}/step_02", "name", "nobody")
+            ),
+            *("calibrated.h5", "step_02: is named 'nobody' inside", _AWAY),
+        )
+        for part in ("recordings", "logs")
     ),
     _case(
         "calibrated.h5: 1e308",

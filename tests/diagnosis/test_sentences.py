@@ -59,6 +59,7 @@ def test_an_unknown_gap_in_all_recordings_names_none():
     assert "gap sits in" not in found.summary
 
 
+@pytest.mark.thorough
 def test_a_named_effect_is_explained_with_its_numbers():
     found = diagnosed(recordings(FRICTION))
     assert "coulomb_friction (dry friction" in found.summary
@@ -68,6 +69,7 @@ def test_a_named_effect_is_explained_with_its_numbers():
     assert found.next_experiment.input == ""
 
 
+@pytest.mark.thorough
 def test_an_unknown_gap_comes_with_the_input_that_separates_the_nearest():
     found = diagnosed(breathing())
     first, second = (one.effects[0] for one in found.candidates[:2])

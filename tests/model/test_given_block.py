@@ -198,6 +198,7 @@ def test_numbers_that_are_no_block_are_refused(values, message):
         LinearBlock(*values)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("radius", "output_map"),
     [

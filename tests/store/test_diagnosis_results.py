@@ -64,9 +64,25 @@ def test_a_planted_number_is_one_line_with_its_place(tmp_path, place, value):
     group, name = place.rsplit("/", 1)
     with pytest.raises(
         CacheError,
-        match=rf"/diagnose/{group}: {name} must be finite numbers up to 1e\+100, got "
+        match=rf"/diagnose/{group}: {name} must be finite numbers up to 1e\+130, got "
         rf".* run 'hwid diagnose' again",
     ):
+        read_diagnosis_record(path)
+
+
+@pytest.mark.parametrize(
+    ("place", "says"),
+    [
+        ("latent_force/0/spread", r"at \(\d+,\), mean \(\d+,\), spread \(1,\)"),
+        ("overlays/0/after", r"time_s \(\d+,\), .*, after \(1,\)"),
+    ],
+)
+def test_curves_of_different_lengths_are_one_line(tmp_path, place, says):
+    path = tmp_path / "results.h5"
+    write_diagnosis(path, named(), Provenance("k1"))
+    plant(path, f"diagnose/{place}", [1.0])
+
+    with pytest.raises(CacheError, match=f"{says}.* must have one shape"):
         read_diagnosis_record(path)
 
 

@@ -8,7 +8,7 @@ from hypothesis import given
 
 from hwid_cli.records.candidates import CandidateFit, ParameterRef
 from hwid_cli.records.model import LinearBlock
-from hwid_cli.records.trust import ShownBand
+from hwid_cli.records.trust import RecordingTrust, ShownBand, TrustOnTests
 from hwid_cli.store.hdf5_records import LONGEST_ATTRIBUTE, read_record, write_record
 from hwid_cli.store.hdf5_tables import read_table, write_table
 from tests.diagnosis.made_up_fits import made_up
@@ -241,3 +241,13 @@ def test_an_array_that_breaks_the_rules_of_its_record_is_an_error(field, values,
 
     with pytest.raises(ValueError, match=f"^/record: {says}"):
         round_trip(replace(band, **{field: values}))
+
+
+def test_a_band_without_its_row_is_an_error():
+    curve = np.zeros(3)
+    band = ShownBand("m", "r", curve, curve, curve, curve, curve, curve > 0, "m")
+    rows = tuple(RecordingTrust(one, "r", *[0.5] * 7) for one in ("m", "n"))
+    assert_same(round_trip(TrustOnTests(rows, band)), TrustOnTests(rows, band))
+
+    with pytest.raises(ValueError, match="shown: m on r has no row"):
+        round_trip(TrustOnTests(rows[1:], band))

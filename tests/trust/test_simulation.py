@@ -97,6 +97,7 @@ def test_a_simulation_of_the_wrong_structure_has_a_wide_band(right, wrong, kind)
     assert width > 10 * narrow
 
 
+@pytest.mark.thorough
 def test_bands_of_held_out_recordings_are_told_by_the_others(right):
     found, _, _ = right
 
@@ -108,6 +109,7 @@ def test_bands_of_held_out_recordings_are_told_by_the_others(right):
     assert found.bands.shown.recording == worst.recording
 
 
+@pytest.mark.thorough
 def test_steps_are_the_intervals_of_the_effects(right):
     found, _, _ = right
     trust = found.trust
@@ -139,6 +141,7 @@ def test_the_part_of_the_parameters_is_what_two_simulations_differ_by():
         moved(drive, ("gravity.torque_N_m",), np.zeros(1))
 
 
+@pytest.mark.thorough
 def test_an_exported_simulation_predicts_with_the_same_band(right, tmp_path):
     found, drive, recordings = right
     path = tmp_path / "simulation.json"

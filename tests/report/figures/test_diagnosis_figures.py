@@ -37,6 +37,7 @@ def legend_of(figure):
     return [text.get_text() for one in figure.legends for text in one.get_texts()]
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "count",
     # Nine are rendered for the page of tests/report as well.
