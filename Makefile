@@ -9,6 +9,10 @@ THESIS := --cache results/cache
 RUN := $(VENV)/installed-run
 DEV := $(VENV)/installed-dev
 
+# Modules that were compiled are kept, also where the environment says otherwise: each
+# start of Python would compile them again.
+unexport PYTHONDONTWRITEBYTECODE
+
 # make run LOCKED=yes, make test LOCKED=yes: the versions and checksums of tools/locks/, nothing else.
 LOCKS := tools/locks
 PLATFORM ?= linux-x86_64-py311
@@ -57,7 +61,7 @@ run: $(RUN)  ## the main job on the virtual gun: raw measurements in, tables out
 test: $(DEV)  ## fast tests, below 90 s on two cores
 	$(BIN)/python -m pytest --quiet --numprocesses auto --dist worksteal
 
-test-thorough: $(DEV)  ## tests that take a second or more, for CI: two to three minutes
+test-thorough: $(DEV)  ## tests that take half a second or more, for CI: three to four minutes
 	$(BIN)/python -m pytest --quiet --numprocesses auto --dist worksteal -m 'thorough and not slow and not browser'
 
 test-all: $(DEV)  ## all tests, also the slow ones

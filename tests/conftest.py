@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 
 import pytest
+from _pytest.doctest import DoctestModule
 from hypothesis import settings
 
 # Tests run side by side already: threads of the linear algebra would fight over the
@@ -31,6 +32,18 @@ def pytest_collection_finish():
     """Look for garbage among what the tests make, not among what is collected."""
     gc.freeze()
     gc.enable()
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collect_file(file_path):
+    """Look for examples in docstrings only where there are some.
+
+    pytest imports every module for them: benchmarks, and what only slow tests need.
+    """
+    found = yield
+    if file_path.suffix != ".py" or ">>>" in file_path.read_text(encoding="utf-8"):
+        return found
+    return [one for one in found if not isinstance(one, DoctestModule)]
 
 
 TINY_CONFIG = """\

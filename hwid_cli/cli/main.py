@@ -2,7 +2,10 @@
 
 import errno
 import logging
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import IO, Any
 
 import click
 
@@ -30,8 +33,42 @@ _MENDABLE = (
 EXIT_ERROR = 1
 
 
+class _WrongUsage(click.UsageError):
+    """Wrong usage that is told in one line, with the next step."""
+
+    def show(self, file: IO[Any] | None = None) -> None:  # noqa: ARG002
+        """Say it on stderr."""
+        message = self.message.rstrip(".")
+        name = "" if self.ctx is None else self.ctx.command_path
+        # Of a command; before it there is only the program, which begins every line.
+        place = self.ctx.info_name if self.ctx and self.ctx.parent else ""
+        step = "" if message.endswith("?") else f"; '{name} --help' says what may stand"
+        said = f"{message[:1].lower()}{message[1:]}{step}"
+        _complain(f"{place}: {said}" if place else said)
+
+
+@contextmanager
+def _usage_in_one_line() -> Iterator[None]:
+    try:
+        yield
+    except click.exceptions.NoArgsIsHelpError:
+        raise
+    except click.UsageError as error:
+        raise _WrongUsage(error.format_message(), error.ctx) from None
+
+
 class _Commands(click.Group):
     """Turns what a user can mend into one line and an exit code."""
+
+    def make_context(self, *values: Any, **options: Any) -> click.Context:
+        """Read the words before the command.
+
+        Returns
+        -------
+        click.Context
+        """
+        with _usage_in_one_line():
+            return super().make_context(*values, **options)
 
     def invoke(self, ctx: click.Context) -> object:
         """Run the chosen command.
@@ -42,7 +79,7 @@ class _Commands(click.Group):
             What the command returns.
         """
         try:
-            with stop_signals(ctx):
+            with stop_signals(ctx), _usage_in_one_line():
                 _require_current_folder()
                 return super().invoke(ctx)
         except NothingToDo as reason:

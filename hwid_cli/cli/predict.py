@@ -12,7 +12,7 @@ from hwid_cli.files.messages import escaped
 from hwid_cli.model.input_range import outside_share
 from hwid_cli.records.exported import Exported, ExportedModel
 from hwid_cli.records.maps import OwnFunction
-from hwid_cli.records.units import behind
+from hwid_cli.records.units import as_percent, behind
 from hwid_cli.report.simulation_note import prediction_note
 from hwid_cli.report.trust import band_note
 from hwid_cli.stages.own_functions import described, functions_of
@@ -50,7 +50,7 @@ def predict_file(  # noqa: PLR0913 - one for each option of the command
         click.echo(
             f"hwid: {input_file}: the input goes from {lowest:.4g} to {highest:.4g}"
             f"{behind(card.input_unit)}; the model knows {low:.4g} to {high:.4g}, so "
-            f"{share:.1%} of the samples are extrapolated",
+            f"{as_percent(share, 1)} of the samples are extrapolated",
             err=True,
         )
     found = None

@@ -18,6 +18,8 @@ from hwid_cli.records.recordings import RawRecording
 
 # Samples that must remain beyond the largest orders, to estimate anything at all.
 SPARE_SAMPLES = 50
+# Names of files in a line that is about many.
+_MOST_NAMES = 10
 # Sizes whose squares, and those of their ratios, still are numbers of 64 bits.
 _SMALLEST, _LARGEST = 1e-60, 1e60
 # A picosecond, faster than any sampler; and thirty years.
@@ -118,6 +120,36 @@ def check_clock(path: Path, step: float) -> None:
         )
 
 
+class ShortRecordingError(MeasurementError):
+    """A recording too short for the largest orders.
+
+    Parameters
+    ----------
+    samples : int, [samples]
+        That it has.
+    expected : str
+        How many it must have, and the next step.
+    """
+
+    def __init__(self, path: Path, samples: int, expected: str) -> None:
+        super().__init__(f"{path}: has {samples} samples; {expected}")
+        self.path, self.samples, self.expected = path, samples, expected
+
+
+def short_recordings_line(short: Sequence[ShortRecordingError]) -> str:
+    """Say of all recordings that are too short in one line that they are."""
+    if len(short) == 1:
+        return str(short[0])
+    named = [f"{one.path.name} ({one.samples})" for one in short[:_MOST_NAMES]]
+    more = len(short) - len(named)
+    end = f" and {more} more" if more else ""
+    expected = " / ".join(dict.fromkeys(one.expected for one in short))
+    return (
+        f"{short[0].path.parent}: {len(short)} recordings have too few samples, "
+        f"{', '.join(named)}{end}; {expected}"
+    )
+
+
 def check_length(
     path: Path, columns: FileColumns, orders: OrdersOptions, *, longest_delay: int = 0
 ) -> None:
@@ -139,10 +171,11 @@ def check_length(
     least += longest_delay
     if samples <= least:
         delay = f" and a delay of {longest_delay}" if longest_delay else ""
-        raise MeasurementError(
-            f"{path}: has {samples} samples; expected more than {least} for orders up "
-            f"to nb {max(orders.nb)} and nk {max(orders.nk)}{delay}; use a longer "
-            "recording or lower orders"
+        raise ShortRecordingError(
+            path,
+            samples,
+            f"expected more than {least} for orders up to nb {max(orders.nb)} and nk "
+            f"{max(orders.nk)}{delay}; use a longer recording or lower orders",
         )
 
 

@@ -269,6 +269,7 @@ def survey_recordings(experiment: Experiment, out: Path) -> Survey:
     with _noting(problems):
         checks.check_names([(part.path, part.name) for part in parts])
     read: list[RawRecording] = []
+    short: list[checks.ShortRecordingError] = []
     jitter: dict[str, float] = {}
     by_path = _by_path(parts)
     for path in paths:
@@ -282,11 +283,13 @@ def survey_recordings(experiment: Experiment, out: Path) -> Survey:
         if columns is None or plan is None:
             continue
         for part in by_path.get(path, []):
-            with _noting(problems):
+            with _noting(problems, short):
                 raw = _read_part(part, columns, plan, experiment)
                 read.append(replace(raw, sha256=file_sha256(path)))
                 if (time := cut_part(columns, part).time) is not None:
                     jitter[part.name] = _jitter(time.values)
+    if short:
+        problems.append(checks.short_recordings_line(short))
     common = _of_one_clock(read, experiment, problems)
     common.sort(key=lambda recording: KINDS.index(recording.kind))
     good = {recording.name for recording in common}
@@ -318,11 +321,16 @@ def _of_one_clock(
 
 
 @contextmanager
-def _noting(problems: list[str]) -> Iterator[None]:
-    """Note a fault once, and go on behind what raised it."""
+def _noting(
+    problems: list[str], short: list[checks.ShortRecordingError] | None = None
+) -> Iterator[None]:
+    """Note a fault once, and go on behind what raised it; short recordings apart."""
     try:
         yield
     except HwidError as error:
+        if short is not None and isinstance(error, checks.ShortRecordingError):
+            short.append(error)
+            return
         said = " ".join(str(error).split())
         if said not in problems:
             problems.append(said)

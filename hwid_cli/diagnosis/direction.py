@@ -15,6 +15,7 @@ from hwid_cli.drive.effect import Scales
 from hwid_cli.drive.simulation import drive_effects
 from hwid_cli.records.candidates import CandidateFit
 from hwid_cli.records.diagnosis import NoiseFloor
+from hwid_cli.records.units import as_percent
 
 # A fit that leaves less than this share of the motion has its direction right ...
 _LEAVES_LITTLE = 0.5
@@ -84,8 +85,8 @@ def reversal_sentence(found: Reversal) -> str:
     """Say what was seen and what to do, in one line."""
     return (
         "recordings.input_scale: the output moves against the input: the re-fitted "
-        f"simulation errs by {found.as_given:.0%} of the motion as it is, and by "
-        f"{found.reversed:.0%} with the input turned round; write input_scale: -1, or "
+        f"simulation errs by {as_percent(found.as_given)} of the motion as it is, and by "
+        f"{as_percent(found.reversed)} with the input turned round; write input_scale: -1, or "
         "give the force constant the other sign"
     )
 

@@ -27,7 +27,7 @@ motion by a linear drive that stands for it, and runs it again with that force, 
 agree. Parameters are those that were fitted with the effects.
 
 How exact: {exactness}
-An answer that does not settle within {most:.0%} of what the effects do is an error.
+An answer that does not settle within {most:.0f} % of what the effects do is an error.
 Needs hwid ({version} wrote it): pip install hwid
 """
 
@@ -98,7 +98,7 @@ def write_module(
         input=base.input,
         folder=BASE_FOLDER,
         exactness=_in_docstring(exactness),
-        most=_most(),
+        most=100.0 * _most(),
         version=__version__,
         kind=type(base).__name__,
         base=f"        file=str(_FOLDER / {file.name!r}),\n{arguments}",

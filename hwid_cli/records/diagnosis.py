@@ -1,13 +1,15 @@
 """What a diagnosis found: the verdict, how it was reached, and what shows it."""
 
 from dataclasses import dataclass, field
+from typing import Annotated
 
 import numpy as np
 
 from hwid_cli.records.candidates import RankedCandidate
 from hwid_cli.records.programs import OF_DRIVE, Capabilities
+from hwid_cli.records.rules import STORED_CURVE, STORED_NUMBERS, STORED_OR_MISSING
 from hwid_cli.records.shown import Shown
-from hwid_cli.records.stored import ADDED_LATER
+from hwid_cli.records.stored import ADDED_LATER, check_lengths
 from hwid_cli.records.trust import ModelTrust, TrustOnTests
 
 # What leaves more than so many times the noise is a part of what is missing, no fact.
@@ -212,12 +214,21 @@ class Overlay:
     """
 
     name: str
-    time_s: np.ndarray
-    input: np.ndarray
-    measured: np.ndarray
-    before: np.ndarray
-    after: np.ndarray
+    time_s: Annotated[np.ndarray, STORED_NUMBERS]
+    input: Annotated[np.ndarray, STORED_OR_MISSING]
+    measured: Annotated[np.ndarray, STORED_OR_MISSING]
+    before: Annotated[np.ndarray, STORED_CURVE]
+    after: Annotated[np.ndarray, STORED_CURVE]
     noise_rms: float
+
+    def check_stored(self) -> None:
+        """Refuse curves of different lengths.
+
+        Raises
+        ------
+        ValueError
+        """
+        check_lengths(self, "time_s", "input", "measured", "before", "after")
 
 
 @dataclass(frozen=True, eq=False)
@@ -235,10 +246,20 @@ class LatentForce:
 
     variable: str
     unit: str
-    at: np.ndarray
-    mean: np.ndarray
-    spread: np.ndarray
-    law: np.ndarray
+    at: Annotated[np.ndarray, STORED_NUMBERS]
+    mean: Annotated[np.ndarray, STORED_OR_MISSING]
+    spread: Annotated[np.ndarray, STORED_OR_MISSING]
+    law: Annotated[np.ndarray, STORED_OR_MISSING]
+
+    def check_stored(self) -> None:
+        """Refuse curves of different lengths.
+
+        Raises
+        ------
+        ValueError
+        """
+        laws = ("law",) if self.law.size else ()
+        check_lengths(self, "at", "mean", "spread", *laws)
 
 
 @dataclass(frozen=True)

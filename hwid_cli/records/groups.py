@@ -1,13 +1,29 @@
 """Results of the search for groups of recordings, and of the final test."""
 
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
+from typing import Annotated
 
 import numpy as np
 
 from hwid_cli.records.model import Fit
+from hwid_cli.records.rules import ArrayOf, Distances
 from hwid_cli.records.shown import Shown
 from hwid_cli.records.stored import ADDED_LATER
 from hwid_cli.records.trust import TrustOnTests
+
+
+def _require_names(
+    what: str, names: Sequence[str], known: Collection[str], count: int | None = None
+) -> None:
+    """Raise ValueError unless all names are known, and there are as many as there must."""
+    if count is not None and len(names) != count:
+        raise ValueError(f"{what} must be {count} names, got {len(names)}")
+    for name in names:
+        if name not in known:
+            raise ValueError(
+                f"{what}: {name!r} is none of {', '.join(known) or 'none'}"
+            )
 
 
 @dataclass(frozen=True)
@@ -123,7 +139,7 @@ class GroupSearch(Shown):
     joins: tuple[Join, ...]
     fits: tuple[Fit | None, ...]
     validated_on: tuple[str, ...]
-    rmsd: np.ndarray
+    rmsd: Annotated[np.ndarray, Distances()]
     chain: tuple[str, ...]
     reason: str
     join: str
@@ -136,6 +152,20 @@ class GroupSearch(Shown):
             raise ValueError(
                 f"rmsd {self.rmsd.shape} must have shape {shape}, and every group a fit"
             )
+
+    def check_stored(self) -> None:
+        """Refuse names that none of the groups has.
+
+        Raises
+        ------
+        ValueError
+        """
+        names = {group.name: None for group in self.groups}
+        _require_names("chain", self.chain, names)
+        _require_names("joins/group", [one.group for one in self.joins], names)
+        for one in self.joins:
+            if one.level > 1:
+                _require_names("joins/base", [one.base], names)
 
     @property
     def chain_groups(self) -> tuple[Group, ...]:
@@ -237,10 +267,10 @@ class FinalTest(Shown):
     chain: tuple[str, ...]
     recordings: tuple[str, ...]
     tested_on: tuple[str, ...]
-    rmsd: np.ndarray
-    is_own: np.ndarray
-    covers: np.ndarray
-    covered_by: np.ndarray
+    rmsd: Annotated[np.ndarray, Distances()]
+    is_own: Annotated[np.ndarray, ArrayOf("b", "truth values")]
+    covers: Annotated[np.ndarray, ArrayOf("iu", "integers")]
+    covered_by: Annotated[np.ndarray, ArrayOf("iu", "integers")]
     uncovered: tuple[str, ...]
     hard_to_cover: tuple[str, ...]
     assigned: tuple[str, ...]
@@ -258,6 +288,31 @@ class FinalTest(Shown):
                 f"rmsd {self.rmsd.shape} and is_own {self.is_own.shape} must have "
                 f"shape {shape}"
             )
+
+    def check_stored(self) -> None:
+        """Refuse counts of another length, and names that no model or recording has.
+
+        Raises
+        ------
+        ValueError
+        """
+        shape = self.rmsd.shape
+        if (self.covers.shape, self.covered_by.shape) != (shape[:1], shape[1:]):
+            raise ValueError(
+                f"covers {self.covers.shape} and covered_by {self.covered_by.shape} must "
+                f"have shapes {shape[:1]} and {shape[1:]}"
+            )
+        count = len(self.recordings)
+        for what in ("tested_on", "uncovered", "hard_to_cover"):
+            _require_names(what, getattr(self, what), self.recordings)
+        for what in ("chain", "smallest_set"):
+            _require_names(what, getattr(self, what), self.models)
+        # Empty where there is no model.
+        _require_names("assigned", self.assigned, ("", *self.models), count)
+        in_set = ("", *self.smallest_set)
+        _require_names("assigned_in_set", self.assigned_in_set, in_set, count)
+        predicted = [one.recording for one in self.predictions]
+        _require_names("predictions/recording", predicted, self.recordings, count)
 
     def facts(self) -> tuple[tuple[str, str], ...]:
         """Name and what there is of it."""

@@ -2,11 +2,12 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from hwid_cli.records.recordings import frozen_vector
-from hwid_cli.records.rules import Refusal, Refused
+from hwid_cli.records.rules import POSITIVE, STORED_NUMBERS, Refusal, Refused
 
 
 @dataclass(frozen=True)
@@ -19,24 +20,49 @@ class MapKind:
         Fewest units; None where their number does not set the size of the map.
     has_function : bool
         Whether the map is a function of the user's own.
+    may_have : callable (int) -> bool
+        Whether so many parameters are what the kind has.
+    n_rising : callable (int) -> int
+        How many of the leading ones must rise, from their number.
     """
 
     least_units: int | None = None
     has_function: bool = False
+    may_have: Callable[[int], bool] = lambda size: True
+    n_rising: Callable[[int], int] = lambda size: 0
+
+
+def _are_limits(size: int) -> bool:
+    return size == 2
+
+
+def _are_units(size: int) -> bool:
+    """Three numbers a unit, and two of the straight line beside them."""
+    return size >= 5 and size % 3 == 2
 
 
 # The table of kinds, by name: each is the module of this name in ``model.maps``. Networks
 # have a linear part beside their units; other kinds need two to have a slope.
 MAP_KINDS = {
-    "piecewise_linear": MapKind(least_units=2),
-    "saturation": MapKind(),
-    "dead_zone": MapKind(),
-    "polynomial": MapKind(),
-    "none": MapKind(),
-    "sigmoid_network": MapKind(least_units=1),
-    "wavelet_network": MapKind(least_units=1),
-    "cubic_spline": MapKind(least_units=2),
-    "piecewise_constant": MapKind(least_units=2),
+    "piecewise_linear": MapKind(
+        least_units=2,
+        may_have=lambda size: size >= 4 and size % 2 == 0,
+        n_rising=lambda size: size // 2,
+    ),
+    "saturation": MapKind(may_have=_are_limits),
+    "dead_zone": MapKind(may_have=_are_limits),
+    "polynomial": MapKind(may_have=lambda size: size >= 1),
+    "none": MapKind(may_have=lambda size: size == 0),
+    "sigmoid_network": MapKind(least_units=1, may_have=_are_units),
+    "wavelet_network": MapKind(least_units=1, may_have=_are_units),
+    "cubic_spline": MapKind(
+        least_units=2, may_have=lambda size: size >= 4, n_rising=lambda size: 2
+    ),
+    "piecewise_constant": MapKind(
+        least_units=2,
+        may_have=lambda size: size >= 3 and size % 2 == 1,
+        n_rising=lambda size: size // 2,
+    ),
     "own_function": MapKind(has_function=True),
 }
 
@@ -101,7 +127,7 @@ class OwnFunction:
 
     name: str
     source: str
-    unit: float = 1.0
+    unit: Annotated[float, POSITIVE] = 1.0
 
 
 @dataclass(frozen=True)
@@ -161,9 +187,9 @@ class Extrapolation:
         If the shapes do not fit together or arguments do not rise.
     """
 
-    visited: np.ndarray
-    arguments: np.ndarray
-    values: np.ndarray
+    visited: Annotated[np.ndarray, STORED_NUMBERS]
+    arguments: Annotated[np.ndarray, STORED_NUMBERS]
+    values: Annotated[np.ndarray, STORED_NUMBERS]
 
     def __post_init__(self) -> None:
         for name in ("visited", "arguments", "values"):
@@ -175,8 +201,8 @@ class Extrapolation:
                 f"an extrapolation needs as many values as arguments, at least two, got "
                 f"{self.values.size} and {self.arguments.size}"
             )
-        falls = (np.diff(self.visited) < 0.0).any()
-        if falls or not (np.diff(self.arguments) > 0.0).all():
+        falls = (self.visited[1:] < self.visited[:-1]).any()
+        if falls or not (self.arguments[1:] > self.arguments[:-1]).all():
             raise ValueError("visited and arguments must rise")
 
     @property
@@ -213,8 +239,8 @@ class StaticMap:
     """
 
     kind: str
-    parameters: np.ndarray
-    domain: tuple[float, float] = (-1.0, 1.0)
+    parameters: Annotated[np.ndarray, STORED_NUMBERS]
+    domain: Annotated[tuple[float, float], STORED_NUMBERS] = (-1.0, 1.0)
     function: OwnFunction | None = None
     extrapolation: Extrapolation | None = None
 
@@ -229,3 +255,23 @@ class StaticMap:
         object.__setattr__(
             self, "parameters", frozen_vector(self.parameters, "parameters")
         )
+
+    def check_stored(self) -> None:
+        """Refuse parameters that no map of the kind has.
+
+        Raises
+        ------
+        Refused
+        """
+        kind, size = MAP_KINDS[self.kind], self.parameters.size
+        if not kind.may_have(size):
+            expected = f"as many numbers as a {self.kind} map has"
+            raise Refused(Refusal(f"{size} numbers", expected, ("parameters",)))
+        rising = self.parameters[: kind.n_rising(size)]
+        if not (np.diff(rising) > 0.0).all():
+            expected = f"numbers of which the first {rising.size} rise"
+            raise Refused(Refusal(rising.tolist(), expected, ("parameters",)))
+        low, high = self.domain
+        if high < low:
+            expected = "two numbers, the lower one first"
+            raise Refused(Refusal([low, high], expected, ("domain",)))

@@ -16,6 +16,8 @@ from hwid_cli.records.maps import MAP_KINDS, MapOptions, OwnFunction, StaticMap
 from hwid_cli.records.recordings import frozen_vector
 from hwid_cli.records.rules import (
     NO_KEY,
+    SAMPLE_TIME,
+    STORED_NUMBERS,
     FileLimit,
     Integer,
     Number,
@@ -386,13 +388,15 @@ class HammersteinWiener(Shown):
     """
 
     input_map: StaticMap
-    numerator: np.ndarray
-    denominator: np.ndarray
+    numerator: Annotated[np.ndarray, STORED_NUMBERS]
+    denominator: Annotated[np.ndarray, STORED_NUMBERS]
     delay: int
     output_map: StaticMap
-    sample_time_s: float
-    initial_state: str = "zero"
-    free_response: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    sample_time_s: Annotated[float, SAMPLE_TIME]
+    initial_state: Annotated[str, OneOf(INITIAL_STATES)] = "zero"
+    free_response: Annotated[np.ndarray, STORED_NUMBERS] = field(
+        default_factory=lambda: np.zeros(0)
+    )
     input_unit: str = "A"
     output_unit: str = "m"
 
@@ -401,6 +405,18 @@ class HammersteinWiener(Shown):
             object.__setattr__(self, name, frozen_vector(getattr(self, name), name))
         if self.denominator.size == 0 or self.denominator[0] != 1.0:
             raise ValueError("denominator must start with 1")
+
+    def check_stored(self) -> None:
+        """Refuse orders that no model has, or a start that is not of its orders.
+
+        Raises
+        ------
+        ValueError
+        """
+        n_state, found = self.orders.n_state, self.free_response.size
+        if found not in (0, n_state):
+            expected = f"{n_state} numbers, or none"
+            raise Refused(Refusal(f"{found} numbers", expected, ("free_response",)))
 
     @property
     def orders(self) -> Orders:

@@ -1,10 +1,16 @@
 """The recordings to take next, and what was known before them."""
 
 from dataclasses import dataclass, field
+from typing import Annotated
 
 import numpy as np
 
 from hwid_cli.records.recordings import frozen_vector
+from hwid_cli.records.rules import (
+    SAMPLE_TIME,
+    STORED_NUMBERS,
+    STORED_OR_MISSING,
+)
 
 GOALS = ("coverage", "parameters", "diagnosis")
 
@@ -45,7 +51,7 @@ class ProposedRecording:
 
     name: str
     words: str
-    values: np.ndarray
+    values: Annotated[np.ndarray, STORED_NUMBERS]
     gain: float
     gain_words: str
     reason: str
@@ -68,11 +74,11 @@ class InputMap:
         Largest amplitude by the recordings, with the proposals, by all that was offered.
     """
 
-    octaves_Hz: np.ndarray
-    edges: np.ndarray
-    visited: np.ndarray
-    proposed: np.ndarray
-    reachable: np.ndarray
+    octaves_Hz: Annotated[np.ndarray, STORED_NUMBERS]
+    edges: Annotated[np.ndarray, STORED_NUMBERS]
+    visited: Annotated[np.ndarray, STORED_OR_MISSING]
+    proposed: Annotated[np.ndarray, STORED_OR_MISSING]
+    reachable: Annotated[np.ndarray, STORED_OR_MISSING]
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,6 +112,6 @@ class NextRecordings:
     proposals: tuple[ProposedRecording, ...]
     map: InputMap
     n_offered: int
-    sample_time_s: float
+    sample_time_s: Annotated[float, SAMPLE_TIME]
     input_unit: str
     changed: str = field(default="")

@@ -1,9 +1,11 @@
 """Measurements as records: what was read, what was calibrated, and what was changed."""
 
 from dataclasses import dataclass, field
+from typing import Annotated
 
 import numpy as np
 
+from hwid_cli.records.rules import SAMPLE_TIME, STORED_NUMBERS, Integer
 from hwid_cli.records.shown import Shown
 from hwid_cli.records.stored import ADDED_LATER
 
@@ -148,14 +150,14 @@ class Recording(Shown):
     """
 
     name: str
-    input: np.ndarray
-    output: np.ndarray
-    sample_time_s: float
+    input: Annotated[np.ndarray, STORED_NUMBERS]
+    output: Annotated[np.ndarray, STORED_NUMBERS]
+    sample_time_s: Annotated[float, SAMPLE_TIME]
     kind: str = "other"
     sha256: str = ""
     input_unit: str = "A"
     output_unit: str = "m"
-    reference: np.ndarray | None = None
+    reference: Annotated[np.ndarray | None, STORED_NUMBERS] = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "input", frozen_vector(self.input, "input"))
@@ -188,6 +190,10 @@ class Recording(Shown):
         )
 
 
+# As many numbers as the largest array of a file may hold, 512 MB.
+_COUNT = Integer(least=0, most=2**26)
+
+
 @dataclass(frozen=True)
 class CalibrationLog:
     """What calibration did to one recording.
@@ -218,10 +224,10 @@ class CalibrationLog:
 
     name: str
     steps: tuple[str, ...]
-    first_sample: int
-    n_samples: int
-    n_raw_input: int
-    n_raw_output: int
+    first_sample: Annotated[int, _COUNT]
+    n_samples: Annotated[int, _COUNT]
+    n_raw_input: Annotated[int, _COUNT]
+    n_raw_output: Annotated[int, _COUNT]
     input_offset: float = 0.0
     output_offset: float = 0.0
     period_samples: float = 0.0

@@ -1,10 +1,12 @@
 """Results of whole stages: the cross-validation tensor and the tables read off it."""
 
 from dataclasses import dataclass, field
+from typing import Annotated
 
 import numpy as np
 
 from hwid_cli.records.model import Orders
+from hwid_cli.records.rules import ArrayOf, Distances
 from hwid_cli.records.shown import Shown
 from hwid_cli.records.stored import ADDED_LATER
 from hwid_cli.records.trust import TrustOnTests
@@ -37,8 +39,8 @@ class CrossValidation(Shown):
     nk: tuple[int, ...]
     nk_role: str
     validated_on: tuple[str, ...]
-    rmsd: np.ndarray
-    status: np.ndarray
+    rmsd: Annotated[np.ndarray, Distances()]
+    status: Annotated[np.ndarray, ArrayOf("UO", "words")]
     unit: str
     threshold: float
     bands: TrustOnTests = field(default=TrustOnTests(), metadata=ADDED_LATER)

@@ -1,7 +1,7 @@
 """What a field of a record may hold, said once as metadata of its annotation.
 
 ``mass_kg: Annotated[float, POSITIVE] = 1.0``. A record that checks itself when it is built
-calls ``check_fields``; a configuration file is read by the same rules.
+calls ``check_fields``; a configuration file and stored results are read by the same rules.
 """
 
 import math
@@ -10,6 +10,8 @@ from dataclasses import dataclass, replace
 from functools import cache
 from types import MappingProxyType
 from typing import Any, get_args, get_type_hints
+
+import numpy as np
 
 # Metadata of a field that the program sets: no key of a configuration.
 NO_KEY = MappingProxyType({"is_key": False})
@@ -142,6 +144,60 @@ class Integer(Number):
         return super()._holds(number) and number == int(number)
 
 
+@dataclass(frozen=True)
+class Numbers(Rule):
+    """An array or a tuple of numbers, none further from zero than ``most``.
+
+    Parameters
+    ----------
+    may_be_missing : bool
+        Whether some may be NaN.
+    """
+
+    most: float
+    may_be_missing: bool = False
+
+    def _check(self, value: Any) -> None:
+        sizes = np.abs(np.asarray(value))
+        is_wrong = sizes > self.most if self.may_be_missing else ~(sizes <= self.most)
+        if is_wrong.any():
+            found = np.asarray(value)[is_wrong].flat[0].item()
+            raise Refused(Refusal(found, f"finite numbers up to {self.most:g}"))
+
+
+@dataclass(frozen=True)
+class ArrayOf(Rule):
+    """An array of one of numpy's kinds, and this in words."""
+
+    kinds: str
+    words: str
+
+    def _check(self, value: Any) -> None:
+        if value.dtype.kind not in self.kinds:
+            raise Refused(Refusal(str(value.dtype), self.words))
+
+
+@dataclass(frozen=True)
+class Distances(ArrayOf):
+    """Distances between outputs: none below zero, NaN where there is none."""
+
+    kinds: str = "f"
+    words: str = "numbers >= 0"
+
+    def _check(self, value: Any) -> None:
+        super()._check(value)
+        if (value < 0.0).any():
+            raise Refused(Refusal(float(np.nanmin(value)), self.words))
+
+
+# Signals have at most 1e60 and span at least 1e-60 (docs/security.md): gains stay below
+# this. Beyond it the squares of what a model computes are more than a float holds.
+STORED_NUMBERS = Numbers(most=1e130)
+STORED_OR_MISSING = Numbers(most=1e130, may_be_missing=True)
+# What a simulation gives may be of any size: some run away.
+STORED_CURVE = ArrayOf("f", "numbers")
+# A measurement has no other; ``data.checks`` says so of files.
+SAMPLE_TIME = Number(least=1e-12, most=1e9)
 POSITIVE = Number(above=0)
 NOT_NEGATIVE = Number(least=0)
 SHARE = Number(least=0, most=1)

@@ -1,10 +1,18 @@
 """What a model's recordings visited, and what is known of the error of its prediction."""
 
 from dataclasses import dataclass, field
+from typing import Annotated
 
 import numpy as np
 
 from hwid_cli.records.recordings import frozen_vector
+from hwid_cli.records.rules import (
+    STORED_CURVE,
+    STORED_NUMBERS,
+    STORED_OR_MISSING,
+    ArrayOf,
+)
+from hwid_cli.records.stored import check_lengths
 
 
 def frozen_matrix(values: np.ndarray, n_columns: int) -> np.ndarray:
@@ -35,9 +43,9 @@ class VisitedPlane:
         Of the samples in each cell; NaN in a cell without any.
     """
 
-    edges: np.ndarray
-    lowest_rate: np.ndarray
-    highest_rate: np.ndarray
+    edges: Annotated[np.ndarray, STORED_NUMBERS]
+    lowest_rate: Annotated[np.ndarray, STORED_OR_MISSING]
+    highest_rate: Annotated[np.ndarray, STORED_OR_MISSING]
 
     def __post_init__(self) -> None:
         for name in ("edges", "lowest_rate", "highest_rate"):
@@ -61,7 +69,7 @@ class Visited:
 
     input: VisitedPlane
     inner: VisitedPlane
-    bands: np.ndarray
+    bands: Annotated[np.ndarray, STORED_NUMBERS]
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "bands", frozen_vector(self.bands, "bands"))
@@ -94,7 +102,7 @@ class ModelTrust:
     """
 
     visited: Visited
-    steps: np.ndarray
+    steps: Annotated[np.ndarray, STORED_NUMBERS]
     noise_rms: float
     scale: float
     judged_on: tuple[str, ...]
@@ -183,13 +191,23 @@ class ShownBand:
 
     model: str
     recording: str
-    time_s: np.ndarray
-    measured: np.ndarray
-    output: np.ndarray
-    lower: np.ndarray
-    upper: np.ndarray
-    is_inside: np.ndarray
+    time_s: Annotated[np.ndarray, STORED_NUMBERS]
+    measured: Annotated[np.ndarray, STORED_CURVE]
+    output: Annotated[np.ndarray, STORED_CURVE]
+    lower: Annotated[np.ndarray, STORED_CURVE]
+    upper: Annotated[np.ndarray, STORED_CURVE]
+    is_inside: Annotated[np.ndarray, ArrayOf("b", "truth values")]
     unit: str
+
+    def check_stored(self) -> None:
+        """Refuse curves of different lengths.
+
+        Raises
+        ------
+        ValueError
+        """
+        curves = ("measured", "output", "lower", "upper", "is_inside")
+        check_lengths(self, "time_s", *curves)
 
 
 @dataclass(frozen=True, eq=False)
@@ -206,3 +224,15 @@ class TrustOnTests:
 
     rows: tuple[RecordingTrust, ...] = ()
     shown: ShownBand | None = None
+
+    def check_stored(self) -> None:
+        """Refuse a band of a model and a recording that no row is about.
+
+        Raises
+        ------
+        ValueError
+        """
+        names = [(one.model, one.recording) for one in self.rows]
+        if self.shown and (self.shown.model, self.shown.recording) not in names:
+            told = f"{self.shown.model} on {self.shown.recording}"
+            raise ValueError(f"shown: {told} has no row")

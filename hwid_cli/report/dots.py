@@ -152,8 +152,10 @@ def dot_drawing(dots: Dots) -> DotDrawing:
     )
 
     def place(value: float) -> float:
+        # What has no logarithm stands at the lower end.
         at, first, last = (
-            math.log(one) if dots.is_log else one for one in (value, low, high)
+            math.log(max(one, low)) if dots.is_log else one
+            for one in (value, low, high)
         )
         share = (at - first) / (last - first)
         return round(left + min(max(share, 0.0), 1.0) * (right - left), 1)

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from hwid_cli.records.units import behind
+from hwid_cli.records.units import as_percent, behind
 
 # Shown where there is no number.
 MISSING = "-"
@@ -77,6 +77,16 @@ def percent(value: float) -> str:
     value : float, [%]
     """
     return f"{value:.2f}{_GLUE}%" if np.isfinite(value) else MISSING
+
+
+def share_text(share: float, decimals: int = 0) -> str:
+    """Write a share in percent.
+
+    Parameters
+    ----------
+    share : float, [-]
+    """
+    return as_percent(share, decimals).replace(" ", _GLUE)
 
 
 def counted(count: int, one: str, many: str = "") -> str:

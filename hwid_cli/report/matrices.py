@@ -95,7 +95,8 @@ def _scale(values: np.ndarray, unit: str) -> tuple[float, str]:
     usable = values[np.isfinite(values) & (values > 0.0)]
     if not usable.size:
         return 1.0, f" [{unit}]"
-    power = 3 * math.floor(math.log10(float(np.median(usable))) / 3)
+    # Of logarithms: two that run away may be more together than a float holds.
+    power = 3 * math.floor(float(np.median(np.log10(usable))) / 3)
     if power == 0:
         return 1.0, f" [{unit}]"
     raised = f"10{str(power).translate(_RAISED)}"

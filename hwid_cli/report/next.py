@@ -9,8 +9,8 @@ def next_blocks(found: NextRecordings) -> list[Block]:
     """Show what is proposed and why, or that enough is known."""
     blocks: list[Block] = []
     if found.changed:
-        blocks.append(Text(f"{found.changed[0].upper()}{found.changed[1:]}."))
-    blocks.append(Text(f"{found.sentence[0].upper()}{found.sentence[1:]}."))
+        blocks.append(Text(f"{found.changed[:1].upper()}{found.changed[1:]}."))
+    blocks.append(Text(f"{found.sentence[:1].upper()}{found.sentence[1:]}."))
     if found.proposals:
         blocks.append(next_table(found))
     return blocks

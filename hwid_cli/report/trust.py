@@ -6,7 +6,7 @@ import numpy as np
 
 from hwid_cli.records.trust import Band, RecordingTrust
 from hwid_cli.records.units import behind
-from hwid_cli.report.formats import number
+from hwid_cli.report.formats import number, share_text
 from hwid_cli.report.table import Table, numbers, texts
 
 # What the columns of the tables say.
@@ -25,9 +25,9 @@ def band_note(band: Band, unit: str) -> str:
     width = number(float(np.mean(band.upper - band.lower)))
     return (
         f"the band of 90 % is {width}{behind(unit)} wide on average; "
-        f"{where.all.mean():.0%} of the samples rest on data in every respect "
-        f"(value {where.amplitude.mean():.0%}, rate {where.rate.mean():.0%}, frequency "
-        f"{where.frequency.mean():.0%})"
+        f"{share_text(where.all.mean())} of the samples rest on data in every respect "
+        f"(value {share_text(where.amplitude.mean())}, rate {share_text(where.rate.mean())}, frequency "
+        f"{share_text(where.frequency.mean())})"
     )
 
 
@@ -43,10 +43,10 @@ def trust_table(found: Sequence[RecordingTrust], about: str = TESTED) -> Table:
         (
             one.model,
             one.recording,
-            f"{one.inside_amplitude:.0%}",
-            f"{one.inside_rate:.0%}",
-            f"{one.inside_frequency:.0%}",
-            f"{one.coverage:.0%}",
+            share_text(one.inside_amplitude),
+            share_text(one.inside_rate),
+            share_text(one.inside_frequency),
+            share_text(one.coverage),
             number(one.width),
             number(one.rmsd),
         )

@@ -32,6 +32,7 @@ from hwid_cli.drive.simulation import (
 from hwid_cli.errors import SimulationError
 from hwid_cli.records.drive import Drive
 from hwid_cli.records.programs import Program, RunRequest, SimulatorRun
+from hwid_cli.records.units import as_percent
 from hwid_cli.simulations.kinds import kind_named
 
 # Runs with the effect; drive and simulation agree to this share of what the effect does.
@@ -114,8 +115,8 @@ def run_extended(
     if best.disagreement > MOST_DISAGREEMENT:
         raise SimulationError(
             f"simulation: recording {request.name!r}: with its effects it does not "
-            f"settle: the last two runs differ by {best.disagreement:.0%} of what the "
-            f"effects do; expected less than {MOST_DISAGREEMENT:.0%}; take a smaller "
+            f"settle: the last two runs differ by {as_percent(best.disagreement)} of what the "
+            f"effects do; expected less than {as_percent(MOST_DISAGREEMENT)}; take a smaller "
             "sample time"
         )
     return best

@@ -14,6 +14,7 @@ from hwid_cli.errors import SimulationError
 from hwid_cli.records.diagnosis import Diagnosis
 from hwid_cli.records.drive import Drive
 from hwid_cli.records.programs import Program, RunRequest
+from hwid_cli.records.units import as_percent
 from hwid_cli.simulations.extended import ExtendedRun, ExtendedSimulation, run_extended
 from hwid_cli.simulations.kinds import kind_named
 from hwid_cli.stages.diagnose import ToDiagnose
@@ -101,7 +102,7 @@ def exactness_of(program: ExtendedProgram, diagnosis: Diagnosis) -> str:
     return (
         f"on the recordings of the diagnosis it leaves {rms:.3g} (RMS, unit of the "
         f"output);\nthe diagnosis left {said:.3g}. Its last two runs differed by at most "
-        f"{max(shares):.2%}\nof what the effects do."
+        f"{as_percent(max(shares), 2)}\nof what the effects do."
     )
 
 
@@ -131,10 +132,10 @@ def told_difference(program: ExtendedProgram, path: Path) -> str:
     if share > _MOST_DIFFERENCE:
         raise SimulationError(
             f"--format fmu: {path.name} differs from the extended simulation by "
-            f"{share:.0%} of what the effects do; expected at most {_MOST_DIFFERENCE:.0%}; "
+            f"{as_percent(share)} of what the effects do; expected at most {as_percent(_MOST_DIFFERENCE)}; "
             "use --format python"
         )
     return (
-        f"{path.name} differs from the extended simulation by {share:.2%} of what the "
+        f"{path.name} differs from the extended simulation by {as_percent(share, 2)} of what the "
         f"effects do, on {len(program.signals)} recordings"
     )

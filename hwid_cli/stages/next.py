@@ -33,7 +33,7 @@ from hwid_cli.records.next import (
     ProposedRecording,
 )
 from hwid_cli.records.recordings import Recording
-from hwid_cli.records.units import behind
+from hwid_cli.records.units import as_percent, behind
 from hwid_cli.report.next import next_blocks
 from hwid_cli.report.table import Block
 from hwid_cli.stages.diagnose import ToDiagnose, undecided
@@ -154,15 +154,17 @@ def _for_coverage(given: ToChoose, _: Runner) -> _Choice:
             break
         one = given.offered[place]
         reason = (
-            f"visits {by:.0%} more of the amplitudes and frequencies on offer "
-            f"({now:.0%} to {now + by:.0%}), most of it {_where(before, tables[place])}"
+            f"visits {as_percent(by)} more of the amplitudes and frequencies on offer "
+            f"({as_percent(now)} to {as_percent(now + by)}), most of it {_where(before, tables[place])}"
         )
         proposals.append(_proposal(one, by, "share visited", reason))
         now, before = now + by, joined([before, tables[place]])
     words = "of the amplitudes and frequencies on offer are visited"
     best = found[0][1] if found else 0.0
-    sentence = f"{share:.0%} {words}; " + _verdict(
-        len(proposals), f"the best input on offer adds {best:.1%}", given.options.enough
+    sentence = f"{as_percent(share)} {words}; " + _verdict(
+        len(proposals),
+        f"the best input on offer adds {as_percent(best, 1)}",
+        given.options.enough,
     )
     return _Choice(share, words, sentence, tuple(proposals))
 
@@ -182,7 +184,7 @@ def _verdict(count: int, best: str, enough: float) -> str:
     if count:
         many = "one recording is" if count == 1 else f"{count} recordings are"
         return f"{many} proposed"
-    return f"enough is known: {best}, less than {enough:.1%}"
+    return f"enough is known: {best}, less than {as_percent(enough, 1)}"
 
 
 def _proposal(
@@ -222,11 +224,11 @@ def _for_parameters(given: ToChoose, _: Runner) -> _Choice:
             break
         reason = (
             f"lets standard errors of the {count} parameters of {fit.name} shrink by "
-            f"{shrink:.0%} on (geometric) average"
+            f"{as_percent(shrink)} on (geometric) average"
         )
         one = given.offered[place]
         proposals.append(_proposal(one, by, "log determinant", reason))
-    best = f"the best input on offer shrinks standard errors by {max(shrinks):.1%}"
+    best = f"the best input on offer shrinks standard errors by {as_percent(max(shrinks), 1)}"
     sentence = f"{count} {words} of {fit.name}; " + _verdict(
         len(proposals), best, given.options.enough
     )
@@ -278,10 +280,10 @@ def _changed(given: ToChoose, choice: _Choice) -> str:
         return before.changed
     asked = {one.name for one in before.proposals}
     words = ", ".join(f"{name}{' (proposed)' * (name in asked)}" for name in names)
-    form = ".0%" if given.options.goal == "coverage" else "g"
+    form = as_percent if given.options.goal == "coverage" else "{:g}".format
     return (
-        f"new since the last proposal: {words}; {format(before.known, form)} before, "
-        f"{format(choice.known, form)} now {choice.known_words}"
+        f"new since the last proposal: {words}; {form(before.known)} before, "
+        f"{form(choice.known)} now {choice.known_words}"
     )
 
 

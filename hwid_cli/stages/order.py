@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hwid_cli.errors import ConfigError
+from hwid_cli.errors import CacheError, ConfigError
 from hwid_cli.model.response_estimate import estimate_response
 from hwid_cli.records.check import StagePlan
 from hwid_cli.records.experiment import Experiment, OrderOptions, OrdersOptions
@@ -171,11 +171,17 @@ def _criterion(fits: Sequence[Fit], crossval: CrossValidation, name: str) -> np.
     values = np.full(shape, np.inf)
     for fit in fits:
         nb, nk = grid_place(fit, crossval.nk_role)
-        place = (
-            crossval.identified_on.index(fit.name),
-            crossval.nb.index(nb),
-            crossval.nk.index(nk),
-        )
+        try:
+            place = (
+                crossval.identified_on.index(fit.name),
+                crossval.nb.index(nb),
+                crossval.nk.index(nk),
+            )
+        except ValueError:
+            raise CacheError(
+                f"results.h5: crossval: has no place for the model {fit.name}/{nb}/{nk} "
+                "of identify; expected the axes of its models; run 'hwid crossval --force'"
+            ) from None
         value = getattr(fit.information, name)
         values[place] = np.inf if np.isnan(value) else value
     return values

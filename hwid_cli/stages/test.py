@@ -492,7 +492,10 @@ def best_single(final: FinalTest) -> int:
         others = final.rmsd[place, is_known & ~final.is_own[place]]
         if others.size and np.isfinite(others).all():
             share = float(np.mean(others < final.threshold))
-            found.append((-share, float(np.mean(np.log(others))), int(place)))
+            # An RMSD of zero is the best there is.
+            with np.errstate(divide="ignore"):
+                order = float(np.mean(np.log(others)))
+            found.append((-share, order, int(place)))
     return min(found)[-1] if found else -1
 
 

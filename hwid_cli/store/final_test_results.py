@@ -12,6 +12,7 @@ from hwid_cli.files.csv_tables import write_table_csv
 from hwid_cli.records.groups import FinalTest, Prediction
 from hwid_cli.records.trust import RecordingTrust, TrustOnTests
 from hwid_cli.store.hdf5_records import (
+    built,
     read_array,
     read_record,
     read_small,
@@ -96,7 +97,7 @@ def read_final_test(path: Path) -> FinalTest:
         values[_PREDICTIONS] = tuple(read_table(group[_PREDICTIONS], Prediction))
         if _TRUST in group:
             values[_TRUST] = read_record(group[_TRUST], TrustOnTests)
-        return FinalTest(**values)
+        return built(FinalTest, values, group)
 
     return read_results(path, _STAGE, read)
 

@@ -12,7 +12,13 @@ import numpy as np
 from hwid_cli.files.csv_tables import write_table_csv
 from hwid_cli.records.groups import Group, GroupSearch, Join
 from hwid_cli.records.model import Fit
-from hwid_cli.store.hdf5_records import read_array, read_small, write_array, write_small
+from hwid_cli.store.hdf5_records import (
+    built,
+    read_array,
+    read_small,
+    write_array,
+    write_small,
+)
 from hwid_cli.store.hdf5_tables import read_table, write_table
 from hwid_cli.store.result_files import Provenance, read_results, replaced_stage
 
@@ -70,18 +76,19 @@ def read_group(path: Path) -> GroupSearch:
     def read(file: h5py.File) -> GroupSearch:
         stage = file["group"]
         reason, join, unit = (str(read_small(stage, name, str)) for name in _TEXTS)
-        return GroupSearch(
-            groups=tuple(read_table(stage["groups"], Group)),  # type: ignore[arg-type]
-            joins=tuple(read_table(stage["joins"], Join)),  # type: ignore[arg-type]
-            fits=tuple(read_table(stage["fit"], Fit)),
-            validated_on=tuple(read_array(stage, "validated_on").tolist()),
-            rmsd=read_array(stage, "rmsd"),
-            chain=tuple(read_array(stage, "chain").tolist()),
-            reason=reason,
-            join=join,
-            unit=unit,
-            threshold=float(stage.attrs["threshold"]),
-        )
+        values = {
+            "groups": tuple(read_table(stage["groups"], Group)),
+            "joins": tuple(read_table(stage["joins"], Join)),
+            "fits": tuple(read_table(stage["fit"], Fit)),
+            "validated_on": tuple(read_array(stage, "validated_on").tolist()),
+            "rmsd": read_array(stage, "rmsd"),
+            "chain": tuple(read_array(stage, "chain").tolist()),
+            "reason": reason,
+            "join": join,
+            "unit": unit,
+            "threshold": float(stage.attrs["threshold"]),
+        }
+        return built(GroupSearch, values, stage)
 
     return read_results(path, "group", read)
 

@@ -24,6 +24,7 @@ from h5py import h5a, h5d, h5p, h5s, h5t
 
 from hwid_cli.data.array_columns import check_size
 from hwid_cli.records.maps import OwnFunction
+from hwid_cli.records.rules import check_fields
 from hwid_cli.store.trusted_functions import check_function
 
 Scalar = str | bool | int | float
@@ -262,18 +263,37 @@ def read_record(group: h5py.Group, record_type: type[Record]) -> Record:
             values[field.name] = field.default()
         else:
             values[field.name] = _read_field(group, field)
-    return built(record_type, values)
+    return built(record_type, values, group)
 
 
-def built(record_type: type[Record], values: dict[str, Any]) -> Record:
-    """Build a record out of what was stored; Python in it must be trusted.
+def built(
+    record_type: type[Record],
+    values: dict[str, Any],
+    group: h5py.Group,
+    row: int | None = None,
+) -> Record:
+    """Build a record out of what was stored: by its rules, Python in it trusted.
+
+    Parameters
+    ----------
+    group : h5py.Group
+        Where the values stand; with the row, where they are one of many, for messages.
 
     Raises
     ------
     UntrustedFunctionError
         If it is a function that the configuration at hand does not name.
+    ValueError
+        If such a record cannot be.
     """
-    record = record_type(**values)
+    try:
+        record = record_type(**values)
+        check_fields(record)
+        if hasattr(record, "check_stored"):
+            record.check_stored()
+    except (TypeError, ValueError) as error:
+        place = group.name if row is None else f"{group.name}, row {row}"
+        raise ValueError(f"{place}: {error}") from error
     if isinstance(record, OwnFunction):
         check_function(record)
     return record

@@ -101,7 +101,12 @@ def read_table(group: h5py.Group, record_type: type[Record]) -> list[Record | No
     if has_value(group, _PRESENT):
         is_present = read_array(group, _PRESENT).tolist()
     return [
-        built(record_type, {name: column[row] for name, column in columns.items()})
+        built(
+            record_type,
+            {name: column[row] for name, column in columns.items()},
+            group,
+            row,
+        )
         if is_present[row]
         else None
         for row in range(count)

@@ -5,6 +5,7 @@ the groups of the others. docs/storage.md draws the trees.
 """
 
 from collections.abc import Sequence
+from itertools import zip_longest
 from pathlib import Path
 
 import h5py
@@ -110,11 +111,15 @@ def read_calibrated(path: Path) -> Calibrated:
 
     def read(file: h5py.File) -> Calibrated:
         names = read_array(file, "names").tolist()
-        return Calibrated(
-            tuple(read_record(file[f"recordings/{n}"], Recording) for n in names),
-            tuple(read_record(file[f"logs/{n}"], CalibrationLog) for n in names),
-            str(file.attrs["key"]),
+        recordings = tuple(
+            read_record(file[f"recordings/{n}"], Recording) for n in names
         )
+        logs = tuple(read_record(file[f"logs/{n}"], CalibrationLog) for n in names)
+        inside = [*(one.name for one in recordings), *(one.name for one in logs)]
+        for name, found in zip((*names, *names), inside, strict=True):
+            if found != name:
+                raise ValueError(f"{name}: is named {found!r} inside")
+        return Calibrated(recordings, logs, str(file.attrs["key"]))
 
     return read_results(path, "calibrate", read)
 
@@ -134,18 +139,25 @@ def write_fits(
     CacheError
         If it cannot be written; an old file is untouched then.
     """
-    of_poles = orders.nk_role == "poles"
-    nb = np.array([fit.orders.nb for fit in fits], dtype=np.int64)
-    nk = np.array(
-        [fit.orders.nf if of_poles else fit.orders.nk for fit in fits], dtype=np.int64
-    )
-    names = [f"{fit.name}/{b}/{k}" for fit, b, k in zip(fits, nb, nk, strict=True)]
+    nk = [_second_order(fit, orders.nk_role) for fit in fits]
+    names = _names_of(fits, orders.nk_role)
     with replaced_stage(path, "identify", provenance) as group:
         group.attrs["nk_role"] = orders.nk_role
         write_array(group, "name", np.array(names, dtype=object))
-        write_array(group, "nb", nb)
-        write_array(group, "nk", nk)
+        nb = [fit.orders.nb for fit in fits]
+        write_array(group, "nb", np.array(nb, dtype=np.int64))
+        write_array(group, "nk", np.array(nk, dtype=np.int64))
         write_table(group.create_group("fit"), fits, Fit)
+
+
+def _second_order(fit: Fit, nk_role: str) -> int:
+    """Its place along the second axis of the grid."""
+    return fit.orders.nf if nk_role == "poles" else fit.orders.nk
+
+
+def _names_of(fits: Sequence[Fit], nk_role: str) -> list[str]:
+    """Names of models, as users write them."""
+    return [f"{fit.name}/{fit.orders.nb}/{_second_order(fit, nk_role)}" for fit in fits]
 
 
 def read_fits(path: Path) -> tuple[Fit, ...]:
@@ -163,8 +175,14 @@ def read_fits(path: Path) -> tuple[Fit, ...]:
     """
 
     def read(file: h5py.File) -> tuple[Fit, ...]:
-        fits = read_table(file["identify/fit"], Fit)
-        return tuple(fit for fit in fits if fit is not None)
+        group = file["identify"]
+        found = read_table(group["fit"], Fit)
+        fits = tuple(fit for fit in found if fit is not None)
+        said = read_array(group, "name").tolist()
+        for name, one in zip_longest(said, _names_of(fits, group.attrs["nk_role"])):
+            if name != one:
+                raise ValueError(f"name: {name!r} is a fit of {one!r}")
+        return fits
 
     return read_results(path, "identify", read)
 

@@ -3,6 +3,7 @@
 import os
 
 import h5py
+import numpy as np
 
 from hwid_cli.files.checksums import with_checksum
 from tests.bad_input.trial import Case
@@ -148,6 +149,11 @@ CASES += [
         *("results.h5", "must have shape", "hwid crossval"),
     ),
     _case(
+        "results.h5: axes of other orders",
+        _edited("results.h5", _put("crossval/nk", data=[7])),
+        *("results.h5: crossval: has no place for the model step_02/1/1", "--force"),
+    ),
+    _case(
         "results.h5: no fits",
         _edited("results.h5", _without("identify/fit")),
         *("results.h5", "'fit' doesn't exist", "hwid identify"),
@@ -161,6 +167,97 @@ CASES += [
         "results.h5: a list as configuration",
         _edited("results.h5", _put("crossval/provenance/config", data="[1]")),
         *("results.h5", "the configuration is a list", _AWAY),
+    ),
+]
+
+
+def _number(place, value):
+    """Another first number in a data set."""
+
+    def change(file):
+        values = file[place][()]
+        values.flat[0] = value
+        file[place][...] = values
+
+    return change
+
+
+def _resized(place, change):
+    """Another data set in the place of one, made of it."""
+
+    def spoil(file):
+        values = file[place][()]
+        _put(place, data=change(values))(file)
+
+    return spoil
+
+
+def _attribute_of(place, name, value):
+    return lambda file: file[place].attrs.modify(name, value)
+
+
+_MODEL = "identify/fit/model"
+_MAP = f"{_MODEL}/input_map"
+# Place, what is planted there, and what must be said of the place, value and expectation.
+for _place, _change, *_says in (
+    (
+        f"{_MODEL}/sample_time_s",
+        -1.0,
+        f"/{_MODEL}, row 0",
+        "got -1.0",
+        "1e-12 to 1e+09",
+    ),
+    (f"{_MODEL}/sample_time_s", float("nan"), "sample_time_s", "got nan"),
+    (f"{_MODEL}/numerator", 1e308, "numerator", "got 1e+308", "up to 1e+130"),
+    (f"{_MODEL}/free_response", float("inf"), "free_response", "got inf"),
+    (f"{_MODEL}/denominator", 2.0, f"/{_MODEL}, row 0: denominator must start with 1"),
+    ("identify/fit/orders/nf", 9, "name: 'step_02/1/1' is a fit of 'step_02/1/9'"),
+    (f"{_MODEL}/delay", -1, "nk must be an integer >= 0, got -1"),
+    (f"{_MAP}/parameters", -1e308, f"/{_MAP}, row 0: parameters", "got -1e+308"),
+    (f"{_MAP}/parameters", 1e9, f"/{_MAP}, row 0: parameters", "the first", "rise"),
+    (f"{_MAP}/domain", 1e9, "domain", "the lower one first", "1000000000.0"),
+    (f"{_MAP}/extrapolation/values", 1e308, "extrapolation", "got 1e+308"),
+):
+    CASES.append(
+        _case(
+            f"results.h5: {_change:g} in {_place}",
+            _edited("results.h5", _number(_place, _change)),
+            *("results.h5", *_says, f"{_AWAY} identify' again"),
+        )
+    )
+CASES += [
+    _case(
+        "results.h5: a map of three numbers",
+        _edited("results.h5", _resized(f"{_MAP}/parameters", lambda one: one[:, :3])),
+        *("results.h5", f"/{_MAP}, row 0: parameters", "3 numbers", _AWAY),
+    ),
+    _case(
+        "results.h5: a start of other orders",
+        _edited(
+            "results.h5",
+            _resized(f"{_MODEL}/free_response", lambda one: np.tile(one, (1, 3))),
+        ),
+        *("results.h5", f"/{_MODEL}, row 0: free_response", "or none", _AWAY),
+    ),
+    _case(
+        "calibrated.h5: more samples than a file holds",
+        _edited("calibrated.h5", _attribute_of("logs/step_02", "n_raw_input", 2**62)),
+        *("calibrated.h5", "/logs/step_02: n_raw_input", f"got {2**62}", _AWAY),
+    ),
+    *(
+        _case(
+            f"calibrated.h5: another name in {part}",
+            _edited(
+                "calibrated.h5", _attribute_of(f"{part}/step_02", "name", "nobody")
+            ),
+            *("calibrated.h5", "step_02: is named 'nobody' inside", _AWAY),
+        )
+        for part in ("recordings", "logs")
+    ),
+    _case(
+        "calibrated.h5: 1e308",
+        _edited("calibrated.h5", _number(_INPUT, 1e308)),
+        *("calibrated.h5", "/recordings/step_02: input", "got 1e+308", _AWAY),
     ),
 ]
 for _what, _text, _says in (

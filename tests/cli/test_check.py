@@ -157,6 +157,36 @@ def test_every_bad_file_and_every_bad_name_is_one_line(tmp_path):
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.parametrize(
+    ("count", "says"),
+    [
+        (1, r"run00\.csv: has 60 samples; expected more than 110 .* or lower orders"),
+        (
+            3,
+            r"3 recordings have too few samples, run00\.csv \(60\), run01\.csv \(61\), "
+            r"run02\.csv \(62\); expected more than 110 for orders up to nb 30 and nk 30.*",
+        ),
+        (12, r"12 recordings have too few .*run09\.csv \(69\) and 2 more; expected .*"),
+    ],
+)
+def test_orders_too_high_for_many_recordings_are_one_line(tmp_path, count, says):
+    for number in range(count):
+        rows = [f"{k % 5},{k % 7}" for k in range(60 + number)]
+        (tmp_path / f"run{number:02}.csv").write_text("u,y\n" + "\n".join(rows))
+    path = tmp_path / "mine.yaml"
+    path.write_text(
+        "name: mine\n"
+        "recordings: {files: run*.csv, columns: {input: u, output: y}, sample_time_s: 1}\n"
+        "orders: {nb: [1, 30], nk: [1, 30]}\n"
+    )
+    result = check(path, "--out", str(tmp_path / "out"))
+
+    assert result.exit_code == 1
+    assert re.fullmatch(rf"hwid: {tmp_path}(/|: ){says}\n", result.stderr), (
+        result.stderr
+    )
+
+
 def test_measurements_that_are_still_to_be_simulated_are_no_fault(config, tmp_path):
     result = check(config, "--out", str(tmp_path / "new"))
 

@@ -120,6 +120,7 @@ def test_a_lost_figure_is_drawn_again(again, out):
     assert path.is_file()
 
 
+@pytest.mark.thorough
 def test_lost_results_are_made_from_the_cache(again, out):
     before = found_in(out)
     (out / "results.h5").unlink()
@@ -135,6 +136,7 @@ def test_force_diagnoses_again(again):
     assert "diagnose: 0 tasks from the cache" in again("--force").stderr
 
 
+@pytest.mark.thorough
 def test_another_simulation_is_another_diagnosis(again, edit, out):
     key = found_in(out)["provenance"]["key"]
     figure = out / "figures" / found_in(out)["figures"][0]
@@ -147,6 +149,7 @@ def test_another_simulation_is_another_diagnosis(again, edit, out):
     assert figure.stat().st_mtime_ns > drawn
 
 
+@pytest.mark.thorough
 def test_chosen_recordings_are_used_and_held_out_ones_judge(again, edit, out):
     names = "step_01, step_02, step_03, sine_01, sine_02, sine_03"
     edit(

@@ -147,6 +147,7 @@ def test_a_fault_of_the_section_is_one_line(folder, old, new, expected):
     assert re.search(f"drive.yaml: {expected}", said.stderr)
 
 
+@pytest.mark.thorough
 def test_another_platform_is_one_line(folder):
     other = "win64" if fmpy.platform != "win64" else "linux64"
     make_fmu(folder, platform=other)

@@ -82,6 +82,7 @@ def test_one_line_finds_what_the_model_lacks_where_it_does_not_cover(tested):
     assert found["gap"]["after"]["ratio_to_noise"] < 1.2
 
 
+@pytest.mark.thorough
 def test_another_model_of_the_folder_may_be_named(tested):
     text = ONE_LINE.replace("out}", "out, name: sine_9/2/2}")
     (tested / "stage.yaml").write_text(CONFIG + text + FEW)
@@ -90,6 +91,7 @@ def test_another_model_of_the_folder_may_be_named(tested):
     assert "no model 'sine_9/2/2'; did you mean 'sine_1/2/2'" in result.stderr
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("line", "said"),
     [

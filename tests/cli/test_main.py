@@ -1,3 +1,4 @@
+import re
 import subprocess
 import sys
 import time
@@ -67,22 +68,34 @@ def test_the_version_is_the_packages():
 
 
 @pytest.mark.parametrize(
-    "arguments",
+    ("words", "says"),
     [
-        ["identfy", "c.yaml"],
-        ["run"],
-        ["run", "c.yaml", "--jobs", "0"],
-        ["run", "c.yaml", "--scheduler", "tcp://x:1"],
-        ["run", "c.yaml", "-v", "-q"],
-        ["run", "c.yaml", "--backend", "threads"],
+        ("identfy c.yaml", r"no such command 'identfy'.*"),
+        ("--nonsense", r"no such option:? '?--nonsense'?.*"),
+        (
+            "run",
+            r"run: missing argument 'CONFIG'; 'hwid run --help' says what may stand",
+        ),
+        ("run c.yaml --jobs 0", r"run: invalid value for '--jobs': 0 is not in .*"),
+        ("run c.yaml --scheduler tcp://x:1", r"run: --scheduler tcp://x:1: needs .*"),
+        ("run c.yaml -v -q", r"run: --verbose and --quiet: choose one of them.*"),
+        ("run c.yaml --backend threads", r"run: invalid value for '--backend'.*"),
+        ("check a.yaml b.yaml", r"check: got unexpected extra argument \(b.yaml\).*"),
     ],
-    ids=" ".join,
 )
-def test_wrong_usage_is_exit_code_2(arguments):
-    result = CliRunner().invoke(main, arguments)
+def test_wrong_usage_is_exit_code_2_and_one_line_with_the_next_step(words, says):
+    result = CliRunner().invoke(main, words.split(), prog_name="hwid")
 
     assert result.exit_code == 2
-    assert result.stderr.startswith("Usage:")
+    assert re.fullmatch(f"hwid: {says}\n", result.stderr), result.stderr
+    assert "--help' says what may stand" in result.stderr or "?" in result.stderr
+
+
+def test_without_a_command_the_help_is_shown():
+    result = CliRunner().invoke(main, [], prog_name="hwid")
+
+    assert result.exit_code == 2
+    assert result.stderr.startswith("Usage: hwid")
 
 
 def test_help_needs_no_numerical_library():

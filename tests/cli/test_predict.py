@@ -94,7 +94,7 @@ def test_an_input_beyond_the_data_is_warned_of_in_one_line(tmp_path):
     assert result.exit_code == 0
     assert result.stderr == (
         f"hwid: {given}: the input goes from -1 to 2 A; the model knows -1 to 1, so "
-        "25.0% of the samples are extrapolated\n"
+        "25.0 % of the samples are extrapolated\n"
     )
 
 

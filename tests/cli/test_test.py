@@ -146,6 +146,7 @@ def test_without_groups_the_single_models_are_judged(again, edit, out):
     assert {row["level"] for row in rows} == {"1"}
 
 
+@pytest.mark.thorough
 def test_joining_is_proposed_where_no_single_model_is_good_enough(
     again, edit, config, hwid
 ):
@@ -182,6 +183,7 @@ def test_a_second_run_answers_from_the_results_with_the_same_tables(
     assert shown == before
 
 
+@pytest.mark.thorough
 def test_a_lost_results_file_is_made_from_the_cache(again, out, first_run):
     (out / "results.h5").unlink()
     result = again()

@@ -35,6 +35,7 @@ def test_fits_are_to_be_kept_and_forecasts_are_not():
     assert {keep for keep, names in seen if names != {"CandidateFit"}} == {False}
 
 
+@pytest.mark.thorough
 def test_tasks_that_are_kept_differ_in_their_content():
     contents = []
 

@@ -31,6 +31,7 @@ def linearised(hidden):
     return linearise(of, fitted_drive(of.drive, fit(of)), {}, sizes(of))
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "hidden",
     [

@@ -118,6 +118,7 @@ def test_without_a_force_input_a_force_acts_through_the_input():
     assert found.effects[0].parameters[0].value == pytest.approx(2.0 / 9.0, rel=0.02)
 
 
+@pytest.mark.thorough
 def test_of_outputs_alone_the_name_is_found_and_not_confirmed():
     given = {
         name: lsim(([GIVEN["kt"]], [0.8, GIVEN["c"], GIVEN["k"]]), u, TIME)[1]
@@ -154,6 +155,7 @@ def test_bounds_of_parameters_are_kept():
     assert max(seen) <= 15.0 + 1e-9
 
 
+@pytest.mark.thorough
 def test_what_the_simulation_does_not_bear_out_is_no_fact():
     able = Capabilities(run=True, parameters=True, force=True)
 

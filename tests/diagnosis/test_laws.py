@@ -66,6 +66,7 @@ def test_a_law_of_two_terms_is_found_with_units_intervals_and_inclusion(found):
     assert "No effect of the catalogue" in diagnosis.summary
 
 
+@pytest.mark.thorough
 def test_sympy_reads_the_formula(found):
     _, diagnosis = found
     x, v = sympy.symbols("x v")
@@ -75,6 +76,7 @@ def test_sympy_reads_the_formula(found):
     assert at == pytest.approx(1.0 + 700 * 0.01 * 0.2, rel=0.02)
 
 
+@pytest.mark.thorough
 def test_the_extended_simulation_holds_the_law_and_lacks_nothing(found, tmp_path):
     recordings, diagnosis = found
     extended = extended_options(diagnosis, SIMULATION)

@@ -109,6 +109,7 @@ def test_a_gain_is_a_parameter_where_no_linear_drive_is_the_model():
     assert found.after.ratio_to_noise < 1.1
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "name",
     ["delay, no map", "delay", "play at the output", "friction at the output"],

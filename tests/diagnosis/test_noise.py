@@ -157,6 +157,7 @@ def test_repeats_that_drift_show_their_noise_alone(motions, driven_by):
     assert not noise.is_coloured
 
 
+@pytest.mark.thorough
 def test_repeats_show_slow_noise(motions, driven_by):
     rng = np.random.default_rng(5)
     pairs = [(u, y) for u, y in zip(driven_by, motions, strict=True) for _ in range(2)]

@@ -80,6 +80,7 @@ def test_a_formula_is_named_with_its_parameters(found):
     assert not any("{" in one for one in names)
 
 
+@pytest.mark.thorough
 def test_with_it_nothing_is_missing(found):
     recordings, options, diagnosis = found
     extended = extended_options(diagnosis, SIMULATION)
@@ -91,6 +92,7 @@ def test_with_it_nothing_is_missing(found):
     assert [one.id for one in again.present] == ["friction"]
 
 
+@pytest.mark.thorough
 def test_a_formula_that_is_not_there_is_not_named():
     options = DiagnoseOptions(effects=FEW, own_effects={"friction": FRICTION})
     diagnosis = diagnose(machine(Hidden()), SIMULATION, options)

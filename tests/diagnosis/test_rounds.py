@@ -112,6 +112,7 @@ def test_the_hidden_effect_wins_against_the_whole_catalogue(friction):
     assert len(friction.found.best) == 1
 
 
+@pytest.mark.thorough
 def test_every_effect_gets_a_forecast_and_a_screening(friction):
     # A second one of a kind is tried beside its first only.
     alone = {(name,) for name, one in CATALOGUE.items() if not one.beside}
@@ -132,6 +133,7 @@ def test_the_first_ones_of_the_screening_are_finished(pair):
     assert set(first) <= set(pair.effects_of("fit_candidate"))
 
 
+@pytest.mark.thorough
 def test_what_includes_another_one_is_not_finished_where_that_leaves_noise(friction):
     assert friction.found.best[0].whiteness <= 1
     for name, entry in CATALOGUE.items():
@@ -139,6 +141,7 @@ def test_what_includes_another_one_is_not_finished_where_that_leaves_noise(frict
             assert (name,) not in friction.found.fits
 
 
+@pytest.mark.thorough
 def test_what_includes_another_one_is_finished_after_it(pair):
     finished = pair.effects_of("fit_candidate")
     first = finished.index(("coulomb_friction",))
@@ -192,6 +195,7 @@ def test_no_larger_set_is_tried_once_nothing_remains():
     assert len(watched.found.best) == 1
 
 
+@pytest.mark.thorough
 def test_a_pair_is_found_although_neither_effect_explains_much_alone(pair):
     assert [len(one.effects) for one in pair.found.best] == [1, 2]
     assert pair.found.best[-1].effects == ("coulomb_friction", "cubic_stiffness")
@@ -199,12 +203,14 @@ def test_a_pair_is_found_although_neither_effect_explains_much_alone(pair):
     assert not any("sets of 3 effects" in what for what, _ in pair.announced)
 
 
+@pytest.mark.thorough
 def test_the_larger_sets_that_are_finished_are_few(pair):
     counts = dict(pair.announced)
     assert 0 < counts["sets of 2 effects, screening"] <= 2 * SCREENED_ON_TOP
     assert 0 < counts["sets of 2 effects"] <= MOST_FINISHED
 
 
+@pytest.mark.thorough
 def test_nested_effects_are_never_put_together(pair):
     screened = {ids for ids in pair.effects_of("screen") if len(ids) == 2}
     assert screened

@@ -16,6 +16,7 @@ def said(of):
     return " | ".join(hidden_from_view(of))
 
 
+@pytest.mark.thorough
 def test_the_five_words_are_said_differently():
     right, wrong = simulation(), simulation(force_constant_N_per_A=5.3)
     summaries = [
@@ -58,6 +59,7 @@ def test_an_unknown_gap_in_all_recordings_names_none():
     assert "gap sits in" not in found.summary
 
 
+@pytest.mark.thorough
 def test_a_named_effect_is_explained_with_its_numbers():
     found = diagnosed(recordings(FRICTION))
     assert "coulomb_friction (dry friction" in found.summary
@@ -67,6 +69,7 @@ def test_a_named_effect_is_explained_with_its_numbers():
     assert found.next_experiment.input == ""
 
 
+@pytest.mark.thorough
 def test_an_unknown_gap_comes_with_the_input_that_separates_the_nearest():
     found = diagnosed(breathing())
     first, second = (one.effects[0] for one in found.candidates[:2])
@@ -75,6 +78,7 @@ def test_an_unknown_gap_comes_with_the_input_that_separates_the_nearest():
     assert "A" in found.next_experiment.input
 
 
+@pytest.mark.thorough
 def test_with_a_single_candidate_there_is_nothing_to_separate():
     found = diagnosed(breathing(), effects=("coulomb_friction",))
     assert found.verdict == "unknown"

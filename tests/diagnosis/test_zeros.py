@@ -28,6 +28,7 @@ def moved(given, zeros):
 ZEROS = 1e-3 * np.random.default_rng(3).standard_normal(9)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("stiffness", "verdict"), [(1184.0, "none"), (1000.0, "parameters")]
 )
@@ -43,6 +44,7 @@ def test_zeros_that_differ_are_no_effect(stiffness, verdict):
     assert diagnosis.after.held_out_rms == pytest.approx(NOISE, rel=0.05)
 
 
+@pytest.mark.thorough
 def test_one_zero_of_all_recordings_is_a_constant_load():
     diagnosis = found(moved(recordings(), np.full(9, 1e-3)))
 

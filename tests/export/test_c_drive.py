@@ -119,6 +119,7 @@ def check(folder, effects, values, n):
     assert deviation(found, predict(exported, u)) <= PROMISED
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "effects",
     [
@@ -157,6 +158,7 @@ def test_formulas_of_the_users_own_are_in_the_program(tmp_path):
     check(tmp_path, effects | cases.DELAY, {}, 1500)
 
 
+@pytest.mark.thorough
 def test_a_simulation_that_runs_away_is_nan_from_there(tmp_path):
     exported = exported_drive({"cubic_stiffness": {"stiffness_N_per_m3": -1e7}})
     u = example_command(1000)

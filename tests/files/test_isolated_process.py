@@ -142,6 +142,7 @@ def temporary(tmp_path, monkeypatch):
     return folder
 
 
+@pytest.mark.thorough
 def test_no_copy_of_a_damaged_measurement_stays_behind(
     unfinished, temporary, monkeypatch
 ):

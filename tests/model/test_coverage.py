@@ -55,6 +55,7 @@ def spread(kinds, state, runs):
     return one.uncertainty, coverage, np.std(found, axis=0), median
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("state", ["zero", "estimated"])
 @pytest.mark.parametrize(
     "kinds",

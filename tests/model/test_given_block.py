@@ -198,6 +198,7 @@ def test_numbers_that_are_no_block_are_refused(values, message):
         LinearBlock(*values)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("radius", "output_map"),
     [
@@ -244,6 +245,7 @@ def rmsd_on_the_bound(recording, radius):
     return float(np.sqrt(np.mean(least_squares(residuals, begin).fun ** 2)))
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("seed", "radius"),
     [

@@ -21,6 +21,7 @@ NONE = StaticMap("none", np.zeros(0))
 SEEDS = range(1000, 1012)
 
 
+@pytest.mark.thorough
 def test_poles_on_the_circle_are_fitted_as_well_as_from_the_truth():
     for seed in SEEDS:
         plant = integrating_plant(seed)
@@ -101,6 +102,7 @@ def test_where_an_integrator_starts_is_said_to_look_like_a_constant():
     assert found.fit_percent > 99.0
 
 
+@pytest.mark.thorough
 # Of sixty plants with a dead zone before poles on, or next to, the circle: those whose
 # search stood still at 1.06 to 1.9 times the noise, in the block and not in the map.
 @pytest.mark.parametrize("seed", [2009, 2024, 2036, 2039])

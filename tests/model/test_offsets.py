@@ -44,6 +44,7 @@ def test_a_displaced_model_gives_the_same_at_another_zero():
     assert found >= 75
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("kinds", KINDS)
 def test_an_offset_of_any_size_costs_nothing(kinds):
     orders, u, y, *_ = random_plant(1, 800)

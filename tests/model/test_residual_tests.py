@@ -58,6 +58,7 @@ def test_the_statistic_is_that_of_ljung_and_box():
     assert found.with_itself.p_value == pytest.approx(chi2.sf(expected, 2))
 
 
+@pytest.mark.thorough
 def test_white_noise_is_called_coloured_in_one_of_twenty_cases():
     found = [residual_tests(white(seed), white(seed + 10_000)) for seed in range(SEEDS)]
     # 400 cases at 5 %: standard deviation 1.1 %; chi2 is a limit, hence three of them.

@@ -150,6 +150,7 @@ def test_the_shape_of_a_map_is_not_lost_beside_its_offset(seed):
     assert abs(np.mean(values)) < 2.0 * np.ptp(values)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("seed", [pytest.param(2, marks=pytest.mark.slow), 4])
 def test_maps_of_other_kinds_begin_with_those_that_break_points_found(seed):
     # Without that these end at ten times the noise: the output folds.

@@ -47,6 +47,7 @@ def test_the_diagonal_holds_the_squares_of_the_standard_errors(join):
     )
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("join", "loss"),
     [

@@ -108,6 +108,7 @@ def test_a_score_that_is_no_number_says_why(fits, data):
     assert (scores.status[0, 0, 0] == "not finite").all()
 
 
+@pytest.mark.thorough
 def test_recordings_that_judge_change_no_model(fits, data):
     """Models of a and b where c is as it was, reversed, of noise, or gone."""
     noise = np.random.default_rng(9).standard_normal((2, 300))

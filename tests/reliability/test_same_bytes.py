@@ -36,15 +36,19 @@ def content(path):
     def note(name, item):
         for key, value in item.attrs.items():
             if key not in ("REFERENCE_LIST", "DIMENSION_LIST", "seconds"):
-                found[f"{name}@{key}"] = np.asarray(value).tolist()
+                found[f"{name}@{key}"] = _comparable(value)
         if isinstance(item, h5py.Dataset):
-            values = item[()]
-            is_number = np.asarray(values).dtype.kind in "fiubc"
-            found[name] = values.tobytes() if is_number else np.asarray(values).tolist()
+            found[name] = _comparable(item[()])
 
     with h5py.File(path) as file:
         file.visititems(note)
     return found
+
+
+def _comparable(value):
+    """Numbers bit by bit, for NaN is not equal to itself."""
+    values = np.asarray(value)
+    return values.tobytes() if values.dtype.kind in "fiubc" else values.tolist()
 
 
 def assert_same(one, other):

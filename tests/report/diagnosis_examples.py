@@ -129,12 +129,14 @@ def places(names):
         ("amplitude", "sine", NAN, "It grows with amplitude to the power 0.1."),
     )
     found = [
-        Place(one, variable, share, NAN, sentence or f"{share:.0%} in {variable}.")
+        Place(
+            one, variable, share, NAN, sentence or f"{100 * share:.0f} % in {variable}."
+        )
         for one, variable, share, sentence in about
     ]
     shares = np.linspace(1.0, 0.1, len(names))
     for name, share in zip(names, shares / shares.sum(), strict=True):
-        sentence = f"{share:.0%} of the excess error is in {name}."
+        sentence = f"{100 * share:.0f} % of the excess error is in {name}."
         found.append(Place("recording", name, float(share), 3e-4, sentence))
     return tuple(found)
 

@@ -75,3 +75,12 @@ def test_what_is_no_number_is_left_out():
     drawing = drawing_of(1.0, float("nan"), is_log=True)
 
     assert [len(row.dots) for row in drawing.rows] == [1, 0]
+
+
+@pytest.mark.parametrize("value", [0.0, -1.0])
+def test_what_has_no_logarithm_stands_at_the_lower_end(value):
+    drawing = drawing_of(value, 2.0, 9.0, is_log=True)
+    lowest, middle, highest = dots_of(drawing)
+
+    assert lowest == drawing.left
+    assert lowest < middle < highest

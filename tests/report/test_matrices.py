@@ -82,3 +82,9 @@ def test_equal_numbers_have_one_colour():
     same = replace(MATRIX, rmsd=np.full((2, 2), 2.0))
 
     assert {row[1].share for row in rmsd_matrix_table(same).rows} == {1.0}
+
+
+def test_models_that_run_away_have_a_scale_too():
+    far = replace(GRID, rmsd=np.where(GRID.rmsd > 0.0, 1.5e308, np.nan))
+
+    assert "10³⁰⁶" in order_grid_table(far, 0).caption

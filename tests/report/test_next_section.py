@@ -39,11 +39,11 @@ def found(**changes):
         np.ones(5),
         0.2,
         "share visited",
-        "visits 20% more",
+        "visits 20 % more",
     )
     return replace(
         NextRecordings(
-            "coverage", ("a",), 0.5, "visited", False, "50% visited", (proposal,),
+            "coverage", ("a",), 0.5, "visited", False, "50 % visited", (proposal,),
             input_map(), 20, 0.01, "A",
         ),
         **changes,
@@ -88,7 +88,7 @@ def test_bands_of_a_simulation_and_of_validated_models_are_shown():
     files = [one.file for one in trust_drawings(contents)]
     assert files == ["next/simulation_band.png"]
     assert chart.name.startswith("simulation on ")
-    assert "holds 93% of what was measured" in chart.sentence
+    assert "holds 93\N{NO-BREAK SPACE}% of what was measured" in chart.sentence
     assert table.rows[0][0] == "simulation"
     assert "the simulation may be trusted" in table.caption
 
@@ -104,9 +104,12 @@ def test_bands_and_proposals_are_tables_with_a_figure_each():
     assert "New: b." in words(blocks)
     chart, visited = [one for one in blocks if one.kind == "chart"]
     assert visited.name == "visited"
-    assert "holds 93% of what was measured" in chart.sentence
-    assert "the values of 90% of the samples, the rates of 80% and" in chart.sentence
-    assert "the frequencies of 70%" in chart.sentence
+    assert "holds 93\N{NO-BREAK SPACE}% of what was measured" in chart.sentence
+    assert (
+        "the values of 90\N{NO-BREAK SPACE}% of the samples, the rates of 80\N{NO-BREAK SPACE}% and"
+        in chart.sentence
+    )
+    assert "the frequencies of 70\N{NO-BREAK SPACE}%" in chart.sentence
     assert words(blocks).count("one octave of the input is stronger") == 1
 
 

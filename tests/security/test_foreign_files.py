@@ -190,6 +190,7 @@ def test_formulas_of_a_spreadsheet_are_no_numbers_and_do_not_run(folder, canary)
     assert not canary.exists()
 
 
+@pytest.mark.thorough
 def test_bombs_beside_the_sheet_of_a_spreadsheet_are_refused(folder):
     zeros = b"0" * 2**29
     for member in ("xl/sharedStrings.xml", "xl/styles.xml", "docProps/other.bin"):
@@ -256,7 +257,14 @@ def write_named(path, name):
 ENDINGS = (".xlsx", ".tdms", ".mf4", ".parquet", ".h5", ".npz")
 
 
-@pytest.mark.parametrize("kind", HOSTILE)
+# A megabyte takes seconds to read and to show.
+KINDS = [
+    pytest.param(kind, marks=pytest.mark.thorough if kind == "long" else ())
+    for kind in HOSTILE
+]
+
+
+@pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("ending", ENDINGS)
 def test_hostile_names_and_units_are_shown_as_text(folder, ending, kind):
     path = folder / f"run{ending}"

@@ -159,6 +159,7 @@ def test_an_instance_is_used_again_where_it_can_be_reset(tmp_path, reset, expect
     assert len(made) == expected
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("delay", [0, 2])
 def test_an_fmu_of_hwids_own_gives_what_its_model_does(tmp_path, delay):
     exported = exported_of(example_model(2, nb=2, nf=3, nk=delay))
@@ -173,6 +174,7 @@ def test_an_fmu_of_hwids_own_gives_what_its_model_does(tmp_path, delay):
     assert np.array_equal(found[1], found[0])
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("reset", ["return 3;", "return 0;"])
 def test_an_fmu_without_a_true_reset_starts_fresh(tmp_path, plant_2, reset):
     options = section(make_fmu(tmp_path, reset=reset, name="stubborn"))
@@ -251,6 +253,7 @@ def test_a_run_that_fails_is_one_line_and_loses_nothing(
     assert np.isfinite(run(plant_2).output).all()
 
 
+@pytest.mark.thorough
 def test_a_short_run_of_a_faulty_one_is_good_after_a_fault(tmp_path, plant_2):
     options = section(make_fmu(tmp_path, fault="error"))
     told(options)

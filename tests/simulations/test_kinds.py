@@ -2,6 +2,7 @@
 
 import json
 import sys
+import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -97,6 +98,15 @@ def test_without_a_force_the_force_input_is_zero(python):
             "def simulate(t, u, p):\n    return {'displacement_m': t / (t - t[7])}",
             "= inf at 0.007 s",
         ),
+        (
+            "def simulate(t, u, p):\n    y = 0 * t\n    y[-1] = float('nan')\n"
+            "    return {'displacement_m': y}",
+            "= nan at 0.299 s",
+        ),
+        (
+            "import numpy\ndef simulate(t, u, p):\n    return {'x': numpy.zeros(10**15)}",
+            "line 3: MemoryError",
+        ),
     ],
 )
 def test_a_function_that_gives_no_answer_is_one_line(python, tmp_path, text, said):
@@ -171,6 +181,25 @@ def test_a_program_that_gives_no_answer_is_one_line(program, tmp_path, text, sai
         run(replace(program, time_limit_s=1.0))
     assert said in str(error.value)
     assert "\n" not in str(error.value)
+
+
+def test_what_a_program_has_started_ends_with_it(program, tmp_path):
+    (tmp_path / "program.py").write_text(
+        "import subprocess, sys, time\n"
+        "child = subprocess.Popen([sys.executable, '-c', 'import time; time.sleep(60)'])\n"
+        f"open({str(tmp_path / 'pid')!r}, 'w').write(str(child.pid))\n"
+        "time.sleep(60)\n"
+    )
+    with pytest.raises(SimulationError, match="did not end within 2 s"):
+        run(replace(program, time_limit_s=2.0))
+    pid = int((tmp_path / "pid").read_text())
+    for _ in range(100):
+        state = Path(f"/proc/{pid}/stat")
+        # Z: has ended, and nobody has asked how.
+        if not state.exists() or state.read_text().rpartition(")")[2].split()[0] == "Z":
+            return
+        time.sleep(0.05)
+    pytest.fail("it still runs")
 
 
 def test_a_program_that_is_not_there_is_told_before_it_runs(program):

@@ -74,6 +74,7 @@ def test_friction_is_named_with_its_force(friction_found):
     assert friction_found.ambiguous_with == ()
 
 
+@pytest.mark.thorough
 def test_wrong_parameters_do_not_hide_friction(with_friction):
     wrong = simulation(stiffness_N_per_m=1000.0, damping_N_s_per_m=20.0)
     found = diagnosed(with_friction, wrong)
@@ -171,6 +172,7 @@ def test_a_refitted_base_is_extended_without_an_effect():
     assert diagnosed(recordings(), extended).verdict == "none"
 
 
+@pytest.mark.thorough
 def test_the_order_of_the_recordings_does_not_change_the_verdict(
     with_friction, friction_found
 ):
@@ -246,6 +248,7 @@ def test_only_effects_that_are_asked_for_are_tried(friction_found):
     assert tried == {("coulomb_friction",), ("input_dead_zone",), ("output_backlash",)}
 
 
+@pytest.mark.thorough
 def test_without_any_effect_allowed_a_gap_is_unknown(with_friction):
     assert diagnosed(with_friction, effects=()).verdict == "unknown"
     assert diagnosed(with_friction, max_effects=0).verdict == "unknown"

@@ -24,6 +24,7 @@ PAIR = {**FRICTION, "cubic_stiffness": {"stiffness_N_per_m3": 8e5}}
 VOLTAGE = {"resistance_ohm": 2.0, "inductance_H": 2e-3, "back_emf_V_s_per_m": 5.0}
 
 
+@pytest.mark.thorough
 def test_a_change_between_recordings_is_extended_by_its_word():
     factors = 1 + 0.05 * np.sin(2.1 * np.arange(9))
     given = recordings(
@@ -45,6 +46,7 @@ def test_a_change_between_recordings_is_extended_by_its_word():
     assert diagnosed(given, extended, effects=("coulomb_friction",)).verdict == "none"
 
 
+@pytest.mark.thorough
 def test_friction_by_load_is_told_and_extended_with_its_word():
     friction = {"force_N": 0.2, "load_share": 0.1, "load": "spring"}
     given = recordings({"load_friction": friction})
@@ -78,6 +80,7 @@ def test_a_second_stop_is_found_beside_the_one_of_the_simulation():
     assert diagnosed(given, extended, effects=("cogging",)).verdict == "none"
 
 
+@pytest.mark.thorough
 def test_a_force_from_outside_is_named_whatever_its_phases():
     force = {"amplitude_N": 0.4, "frequency_Hz": 31.0}
     given = recordings(
@@ -113,6 +116,7 @@ def test_a_voltage_is_an_input_too():
     assert not any("before the current" in text for text in found.not_observable)
 
 
+@pytest.mark.thorough
 def test_an_input_that_was_filtered_is_smooth_between_samples():
     given = recordings(PAIR, drive=replace(DRIVE, hold="smooth"))
     found = diagnosed(
@@ -174,6 +178,7 @@ def test_under_a_controller_nothing_is_named_where_nothing_is_missing():
     assert diagnosed(given, model).verdict == "none"
 
 
+@pytest.mark.thorough
 def test_recordings_that_begin_in_motion_are_diagnosed():
     cut = [
         replace(one, input=one.input[60:], output=one.output[60:])
@@ -273,6 +278,7 @@ def speeds(effects, **drive):
     return [replace(one, output_unit="m/s") for one in measured]
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("stiffness", [1184.0, 0.0], ids=["spring", "free"])
 def test_a_velocity_is_compared_where_it_is_measured(stiffness):
     base = {"stiffness_N_per_m": stiffness}
@@ -291,6 +297,7 @@ def test_a_velocity_is_compared_where_it_is_measured(stiffness):
     assert after.verdict == "none"
 
 
+@pytest.mark.thorough
 def test_a_saturated_sensor_of_the_velocity_has_a_limit_in_its_unit():
     found = diagnosed(
         speeds({"sensor_saturation": {"limit_m": 0.25}}),
@@ -302,6 +309,7 @@ def test_a_saturated_sensor_of_the_velocity_has_a_limit_in_its_unit():
     assert limit == pytest.approx(0.25, rel=0.002)
 
 
+@pytest.mark.thorough
 def test_a_rotating_axis_is_told_by_its_own_names():
     rotary = SimulationOptions(
         inertia_kg_m2=DRIVE.mass_kg,

@@ -188,6 +188,7 @@ def test_a_second_search_computes_nothing(search, bench):
     assert again.computed == []
 
 
+@pytest.mark.thorough
 def test_the_order_in_which_starts_are_named_changes_nothing_without_order(search):
     one, other = (
         search_all(plan(start=start), Bench()) for start in (("a", "c"), ("c", "a"))
@@ -225,6 +226,7 @@ def test_a_recording_that_only_joins_is_fitted_alone_for_its_warm_start():
     assert _fitted(bench) == ["a/1/1", "a/2/1", "b/1/1", "b/2/1", "a+b/1/1", "a+b/2/1"]
 
 
+@pytest.mark.thorough
 def test_cold_fits_are_other_tasks_than_warm_ones():
     warm, cold = (
         GroupOptions(keep={"best": True}, max_level=2, warm_start=flag)

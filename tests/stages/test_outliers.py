@@ -74,6 +74,7 @@ def test_judges_without_their_outliers_choose_the_true_poles(robust):
     assert {one.evidence.n_outliers for one in advice.choices} == {3 * N_OUTLIERS}
 
 
+@pytest.mark.thorough
 def test_an_outlier_among_the_first_samples_does_not_hide_in_the_initial_state():
     estimated = replace(ROBUST, initial_state="estimated")
     clean = recordings(outliers=0)

@@ -2,10 +2,12 @@
 
 from dataclasses import dataclass, fields, is_dataclass, replace
 
+import h5py
 import numpy as np
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
+from hwid_cli.files.checksums import with_checksum
 from hwid_cli.records.maps import OwnFunction
 from hwid_cli.records.model import (
     Fit,
@@ -108,7 +110,13 @@ def example_fit(name="step_01", nb=2, nf=2, seed=1):
     """A fit that succeeded, with numbers that are no round ones."""
     rng = np.random.default_rng(seed)
     maps = [
-        StaticMap("piecewise_linear", rng.normal(size=6), (-1.5, 2.5)) for _ in range(2)
+        StaticMap(
+            "piecewise_linear",
+            # Break-points rise.
+            np.append(np.sort(rng.normal(size=3)), rng.normal(size=3)),
+            (-1.5, 2.5),
+        )
+        for _ in range(2)
     ]
     denominator = np.append(1.0, rng.normal(size=nf))
     model = HammersteinWiener(
@@ -173,3 +181,11 @@ def assert_same(found, expected):
         assert np.float64(found).tobytes() == np.float64(expected).tobytes()
     else:
         assert found == expected
+
+
+def plant(path, place, values):
+    """Put other values in the place of some in a file of results, checksum and all."""
+    with h5py.File(path, "a") as file:
+        del file[place]
+        file[place] = values
+    path.write_bytes(with_checksum(path.read_bytes()))

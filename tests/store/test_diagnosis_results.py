@@ -14,7 +14,7 @@ from hwid_cli.store.diagnosis_results import (
 )
 from hwid_cli.store.result_files import Provenance, read_provenance, read_stage_key
 from tests.report.diagnosis_examples import named, nothing_missing, unknown
-from tests.store.record_examples import assert_same
+from tests.store.record_examples import assert_same, plant
 
 
 def rows_of(path):
@@ -48,6 +48,41 @@ def test_a_damaged_diagnosis_is_one_line_with_the_next_step(tmp_path):
         del file["diagnose/gaps"]
 
     with pytest.raises(CacheError, match=r"results of diagnose; .*'hwid diagnose'"):
+        read_diagnosis_record(path)
+
+
+@pytest.mark.parametrize(
+    ("place", "value"),
+    [("latent_force/0/at", np.nan), ("overlays/0/time_s", 1e308)],
+    ids=["force", "overlay"],
+)
+def test_a_planted_number_is_one_line_with_its_place(tmp_path, place, value):
+    path = tmp_path / "results.h5"
+    write_diagnosis(path, named(), Provenance("k1"))
+    plant(path, f"diagnose/{place}", [value, 1.0])
+
+    group, name = place.rsplit("/", 1)
+    with pytest.raises(
+        CacheError,
+        match=rf"/diagnose/{group}: {name} must be finite numbers up to 1e\+130, got "
+        rf".* run 'hwid diagnose' again",
+    ):
+        read_diagnosis_record(path)
+
+
+@pytest.mark.parametrize(
+    ("place", "says"),
+    [
+        ("latent_force/0/spread", r"at \(\d+,\), mean \(\d+,\), spread \(1,\)"),
+        ("overlays/0/after", r"time_s \(\d+,\), .*, after \(1,\)"),
+    ],
+)
+def test_curves_of_different_lengths_are_one_line(tmp_path, place, says):
+    path = tmp_path / "results.h5"
+    write_diagnosis(path, named(), Provenance("k1"))
+    plant(path, f"diagnose/{place}", [1.0])
+
+    with pytest.raises(CacheError, match=f"{says}.* must have one shape"):
         read_diagnosis_record(path)
 
 

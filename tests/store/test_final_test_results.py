@@ -15,7 +15,7 @@ from hwid_cli.store.final_test_results import (
     write_test_csv,
 )
 from hwid_cli.store.result_files import Provenance, read_stage_key
-from tests.store.record_examples import assert_same
+from tests.store.record_examples import assert_same, plant
 
 MODELS = ("a/1/2", "b/1/1", "a+b/2/2")
 THIRD = 1 / 3
@@ -54,7 +54,10 @@ EMPTY = {
     "tested_on": (),
     "smallest_set": (),
     "assigned_in_set": ("", "", ""),
-    "predictions": (),
+    "predictions": tuple(
+        Prediction(name, "", NAN, "", NAN, "", NAN, False, False)
+        for name in ("a", "b", "µ")
+    ),
 }
 
 
@@ -102,6 +105,48 @@ def test_a_damaged_stage_is_one_clear_line(path):
 def rows_of(path):
     with path.open(newline="", encoding="utf-8") as file:
         return list(csv.reader(file))
+
+
+PLANTED = {
+    "smallest_set": ("b/1/1", "nobody"),
+    "assigned": ("a/1/2", "b/1/1", "nobody"),
+    "assigned_in_set": ("a+b/2/2", "b/1/1", "a/1/2"),
+    "chain": ("nobody",),
+    "tested_on": ("nobody",),
+    "uncovered": ("nobody",),
+    "hard_to_cover": ("nobody",),
+    "predictions/recording": ("a", "b", "nobody"),
+}
+
+
+@pytest.mark.parametrize("place", PLANTED)
+def test_a_name_that_nobody_has_is_one_clear_line(path, place):
+    write_final_test(path, final_test(), Provenance("k1"))
+    plant(path, f"test/{place}", list(PLANTED[place]))
+
+    unknown = "a/1/2" if place == "assigned_in_set" else "nobody"
+    with pytest.raises(
+        CacheError, match=rf"{place}: '{unknown}' is none of .* run 'hwid test' again"
+    ):
+        read_final_test(path)
+
+
+@pytest.mark.parametrize(
+    ("place", "values", "says"),
+    [
+        ("assigned", ["a/1/2"], "assigned must be 3 names, got 1"),
+        ("covers", [0, 1], r"covers \(2,\) and covered_by \(3,\) must have shapes"),
+        ("covers", ["0", "1", "0"], "covers must be integers, got '"),
+        ("is_own", np.ones((3, 3)), "is_own must be truth values, got 'float64'"),
+        ("rmsd", -np.ones((3, 3)), "rmsd must be numbers >= 0, got -1.0"),
+    ],
+)
+def test_a_planted_table_is_one_clear_line(path, place, values, says):
+    write_final_test(path, final_test(), Provenance("k1"))
+    plant(path, f"test/{place}", values)
+
+    with pytest.raises(CacheError, match=f"{says}.* run 'hwid test' again"):
+        read_final_test(path)
 
 
 def test_the_long_table_has_a_row_for_each_model_and_recording(tmp_path):

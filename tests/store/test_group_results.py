@@ -8,7 +8,7 @@ from hwid_cli.errors import CacheError
 from hwid_cli.records.groups import Group, GroupSearch, Join
 from hwid_cli.store.group_results import read_group, write_group, write_groups_csv
 from hwid_cli.store.result_files import Provenance, read_stage_key
-from tests.store.record_examples import assert_same, example_fit
+from tests.store.record_examples import assert_same, example_fit, plant
 
 PROVENANCE = Provenance(key="k1")
 NAN = float("nan")
@@ -59,6 +59,32 @@ def test_a_search_without_a_winner_comes_back_too(path):
 
 def test_a_missing_stage_names_the_command_that_makes_it(path):
     with pytest.raises(CacheError, match="run 'hwid group'"):
+        read_group(path)
+
+
+@pytest.mark.parametrize(
+    ("place", "values"),
+    [
+        ("chain", ["nobody"]),
+        ("joins/group", ["a", "b 1", "nobody"]),
+        ("joins/base", ["a", "b 1", "nobody"]),
+    ],
+)
+def test_a_name_that_no_group_has_is_one_clear_line(path, place, values):
+    write_group(path, search(), Provenance("k1"))
+    plant(path, f"group/{place}", values)
+
+    with pytest.raises(
+        CacheError, match=rf"{place}: 'nobody' is none of .* run 'hwid group' again"
+    ):
+        read_group(path)
+
+
+def test_a_negative_distance_is_one_clear_line(path):
+    write_group(path, search(), Provenance("k1"))
+    plant(path, "group/rmsd", -np.ones(search().rmsd.shape))
+
+    with pytest.raises(CacheError, match=r"rmsd must be numbers >= 0, got -1\.0"):
         read_group(path)
 
 

@@ -8,6 +8,7 @@ from hypothesis import given
 
 from hwid_cli.records.candidates import CandidateFit, ParameterRef
 from hwid_cli.records.model import LinearBlock
+from hwid_cli.records.trust import RecordingTrust, ShownBand, TrustOnTests
 from hwid_cli.store.hdf5_records import LONGEST_ATTRIBUTE, read_record, write_record
 from hwid_cli.store.hdf5_tables import read_table, write_table
 from tests.diagnosis.made_up_fits import made_up
@@ -223,3 +224,30 @@ def test_a_single_text_in_place_of_parameters_is_an_error():
         file.attrs["names"] = "base/damping_N_s_per_m"
         with pytest.raises(TypeError, match="names has the wrong shape"):
             read_record(file, CandidateFit)
+
+
+@pytest.mark.parametrize(
+    ("field", "values", "says"),
+    [
+        ("is_inside", np.ones(3), "is_inside must be truth values, got 'float64'"),
+        ("upper", np.array(["a", "b", "c"]), "upper must be numbers, got '<U1'"),
+        ("time_s", np.full(3, np.nan), "time_s must be finite .*, got nan"),
+    ],
+)
+def test_an_array_that_breaks_the_rules_of_its_record_is_an_error(field, values, says):
+    curve = np.zeros(3)
+    band = ShownBand("m", "r", curve, curve, curve, curve, curve, curve > 0, "m")
+    assert_same(round_trip(band), band)
+
+    with pytest.raises(ValueError, match=f"^/record: {says}"):
+        round_trip(replace(band, **{field: values}))
+
+
+def test_a_band_without_its_row_is_an_error():
+    curve = np.zeros(3)
+    band = ShownBand("m", "r", curve, curve, curve, curve, curve, curve > 0, "m")
+    rows = tuple(RecordingTrust(one, "r", *[0.5] * 7) for one in ("m", "n"))
+    assert_same(round_trip(TrustOnTests(rows, band)), TrustOnTests(rows, band))
+
+    with pytest.raises(ValueError, match="shown: m on r has no row"):
+        round_trip(TrustOnTests(rows[1:], band))

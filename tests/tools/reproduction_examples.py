@@ -72,7 +72,6 @@ def final_of(rmsd, models, recordings, *, n_chain, tested_on=TESTED_ON, chosen=N
     covered = rmsd < THRESHOLD
     best = [models[int(np.nanargmin(column))] for column in rmsd.T]
     chosen = tuple(dict.fromkeys(best)) if chosen is None else chosen
-    prediction = Prediction("a", "b", 0.1, best[0], 0.1, best[0], 0.1, False, False)
     return FinalTest(
         models=tuple(models),
         chain=tuple(models[len(models) - n_chain :]),
@@ -91,7 +90,10 @@ def final_of(rmsd, models, recordings, *, n_chain, tested_on=TESTED_ON, chosen=N
         assigned=tuple(best),
         smallest_set=chosen,
         assigned_in_set=tuple(best),
-        predictions=(prediction,) * len(recordings),
+        predictions=tuple(
+            Prediction(name, "b", 0.1, best[0], 0.1, best[0], 0.1, False, False)
+            for name in recordings
+        ),
         unit="m",
         threshold=THRESHOLD,
     )

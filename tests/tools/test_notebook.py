@@ -38,6 +38,7 @@ def test_every_cell_runs(ran):
     assert len(scope["grid"]) == 16
 
 
+@pytest.mark.thorough
 def test_what_it_promises_is_found(ran):
     _, scope = ran
     (effect,) = scope["found"].effects

@@ -42,6 +42,7 @@ def covered(draw, count, *, trials=400):
     return float(np.mean(found))
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("count", [2, 8])
 def test_recordings_with_one_error_each_count_as_one_error_each(count):
     rng = np.random.default_rng([1, count])
@@ -54,6 +55,7 @@ def test_recordings_with_one_error_each_count_as_one_error_each(count):
     assert 0.84 < share < 0.96
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("count", [2, 8])
 def test_a_machine_whose_gain_changes_has_a_band_that_grows_with_the_output(count):
     rng = np.random.default_rng([2, count])

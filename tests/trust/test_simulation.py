@@ -71,6 +71,7 @@ def test_the_machine_of_these_tests_answers_as_its_equations_say():
     assert motion(0.01 * current, friction=0.8)[-2] == 0.0
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("kind", ["steps", "multisine"])
 def test_the_band_of_a_complete_diagnosis_holds_what_it_promises(right, kind):
     found, drive, _ = right
@@ -96,6 +97,7 @@ def test_a_simulation_of_the_wrong_structure_has_a_wide_band(right, wrong, kind)
     assert width > 10 * narrow
 
 
+@pytest.mark.thorough
 def test_bands_of_held_out_recordings_are_told_by_the_others(right):
     found, _, _ = right
 
@@ -107,6 +109,7 @@ def test_bands_of_held_out_recordings_are_told_by_the_others(right):
     assert found.bands.shown.recording == worst.recording
 
 
+@pytest.mark.thorough
 def test_steps_are_the_intervals_of_the_effects(right):
     found, _, _ = right
     trust = found.trust
@@ -138,6 +141,7 @@ def test_the_part_of_the_parameters_is_what_two_simulations_differ_by():
         moved(drive, ("gravity.torque_N_m",), np.zeros(1))
 
 
+@pytest.mark.thorough
 def test_an_exported_simulation_predicts_with_the_same_band(right, tmp_path):
     found, drive, recordings = right
     path = tmp_path / "simulation.json"

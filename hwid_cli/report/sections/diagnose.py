@@ -30,7 +30,13 @@ from hwid_cli.report.figures.diagnosis import (
     shown_candidates,
     shown_places,
 )
-from hwid_cli.report.formats import MISSING, counted, listed, with_unit
+from hwid_cli.report.formats import (
+    MISSING,
+    counted,
+    listed,
+    share_text,
+    with_unit,
+)
 from hwid_cli.report.page import (
     Collapsible,
     Drawing,
@@ -333,7 +339,7 @@ def _gap_table(found: Mapping[str, Any]) -> Table | None:
         f"Gap between simulation and measurement; noise {_text(gap.get('noise_rms'))}"
     )
     if isinstance(share, int | float):
-        caption += f", explained share {share:.1%}"
+        caption += f", explained share {share_text(share, 1)}"
     heads = ("train RMS", "held-out RMS", "ratio to noise [-]")
     return Table(caption, (*texts("simulation"), *numbers(*heads)), tuple(rows))
 

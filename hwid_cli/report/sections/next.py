@@ -11,7 +11,7 @@ from hwid_cli.records.trust import ShownBand, TrustOnTests
 from hwid_cli.report.bands import band_chart
 from hwid_cli.report.charts import Chart, Curve, Panel
 from hwid_cli.report.figures.next import band_figure, visited_figure
-from hwid_cli.report.formats import counted, with_unit
+from hwid_cli.report.formats import counted, share_text, with_unit
 from hwid_cli.report.next import next_blocks
 from hwid_cli.report.page import (
     Collapsible,
@@ -110,11 +110,11 @@ def _band_sentence(found: TrustOnTests, shown: ShownBand) -> str:
         if (one.model, one.recording) == (shown.model, shown.recording)
     )
     return (
-        f"The band of 90 % holds {row.coverage:.0%} of what was measured here; it is "
+        f"The band of 90 % holds {share_text(row.coverage)} of what was measured here; it is "
         f"{with_unit(row.width, row.unit)} wide on average, the RMSD is "
         f"{with_unit(row.rmsd, row.unit)}. The fit has seen the values of "
-        f"{row.inside_amplitude:.0%} of the samples, the rates of {row.inside_rate:.0%} and "
-        f"the frequencies of {row.inside_frequency:.0%}."
+        f"{share_text(row.inside_amplitude)} of the samples, the rates of {share_text(row.inside_rate)} and "
+        f"the frequencies of {share_text(row.inside_frequency)}."
     )
 
 

@@ -37,6 +37,7 @@ def legend_of(figure):
     return [text.get_text() for one in figure.legends for text in one.get_texts()]
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "count",
     # Nine are rendered for the page of tests/report as well.
@@ -249,6 +250,7 @@ def test_a_wide_spread_leaves_the_curves_readable():
     assert high - low < 4.0 * np.ptp(force.mean)
 
 
+@pytest.mark.thorough
 def test_hostile_and_long_names_stay_inside_the_figures():
     found = named(3)
     name = "$\\bad{_<b>%" + 80 * "n"

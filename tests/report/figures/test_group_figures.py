@@ -1,6 +1,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from hwid_cli.records.groups import Group, GroupSearch, Join
@@ -66,6 +67,7 @@ def test_the_trend_names_what_each_level_added(contents):
     assert ticks == ["1: step_06", "2: + step_03"]
 
 
+@pytest.mark.thorough
 def test_a_tree_of_hundreds_of_groups_stays_readable():
     search = group_search(12, kept=40)
     figure = tree_figure(search)

@@ -66,6 +66,7 @@ def drawings(contents):
     ]
 
 
+@pytest.mark.thorough
 def test_a_used_sheet_shows_nothing_of_the_drawing_before(drawings):
     with report_style():
         fresh = [as_png(draw()) for draw in drawings]
