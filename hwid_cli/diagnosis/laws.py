@@ -389,6 +389,7 @@ def _holds(rounds: Rounds, one: _Tried, verdict: DiagnosisVerdict) -> bool:
         against.gain >= LEAST_GAIN
         and against.explained >= LEAST_EXPLAINED_LAW
         and against.improved >= LEAST_IMPROVED
+        and criteria.is_beyond_stand_in(fit, rounds.base)
         and not _unclear_terms(rounds, one)
     )
     if not verdict.chosen.effects or not holds:
