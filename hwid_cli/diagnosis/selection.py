@@ -567,6 +567,8 @@ def lead(
             continue
         against = criteria.evidence(one, chosen)
         is_clear = against.gain >= LEAST_GAIN and against.improved >= LEAST_IMPROVED
+        takes = float(chosen.sse.sum() - one.sse.sum())
+        is_clear = is_clear and takes >= criteria.stand_in_error
         if is_clear and against.explained > most:
             best, most = one, against.explained
     return best

@@ -13,11 +13,13 @@ from hwid_cli.diagnosis.selection import (
     LEAST_GAIN,
     LEAST_IMPROVED,
     TIE,
+    DiagnosisVerdict,
     SelectionCriteria,
     count,
     decide,
     has_size,
     is_part_of,
+    lead,
     ranked,
     rivals,
     select_best,
@@ -202,6 +204,16 @@ def test_the_little_that_a_stand_in_may_be_wrong_by_is_nothing(sse, error, holds
     criteria = replace(CRITERIA, stand_in_error=error)
     assert criteria.needs_nothing(base(sse)) is holds
     assert not CRITERIA.needs_nothing(base(sse))
+
+
+def test_what_makes_up_for_the_error_of_a_stand_in_is_no_lead():
+    chosen = made_up(GOOD, 200.0)
+    verdict = DiagnosisVerdict("named", False, chosen, ())
+    more = made_up(PAIR, 130.0, parameters=2)
+    assert lead(CRITERIA, [chosen, more], verdict) is more
+    # It takes 420 in all.
+    rough = replace(CRITERIA, stand_in_error=421.0)
+    assert lead(rough, [chosen, more], verdict) is None
 
 
 def test_what_makes_up_for_the_error_of_a_stand_in_is_not_named():
