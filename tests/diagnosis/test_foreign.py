@@ -143,10 +143,8 @@ def amplified(values, command):
     return lsim(plant, 1.5 * np.tanh(command / 1.5), TIME)[1]
 
 
-@pytest.mark.parametrize("tempting", ["parameter_change", "supply_sag"])
-def test_of_outputs_alone_no_name_rests_on_the_error_of_the_stand_in(tempting):
-    # Its parameters alone are off; no plain drive has such an amplifier, and either effect
-    # takes nearly all of what that leaves.
+def beside_amplified_outputs(options):
+    """Diagnosis of that stage's outputs, of which the parameters alone are off."""
     rng = np.random.default_rng(3)
     measured = [
         Recording(
@@ -156,15 +154,27 @@ def test_of_outputs_alone_no_name_rests_on_the_error_of_the_stand_in(tempting):
         for name, u in inputs()
     ]  # fmt: skip
     given = {name: amplified(GIVEN, u) for name, u in inputs()}
-    found = diagnose_foreign(
-        measured, Simulator(Capabilities(run=False), None, given),
-        DiagnoseOptions(effects=(tempting, "coulomb_friction")), Count(),
+    return diagnose_foreign(
+        measured, Simulator(Capabilities(run=False), None, given), options, Count(),
         lambda what, total: None,
     )  # fmt: skip
+
+
+@pytest.mark.parametrize("tempting", ["parameter_change", "supply_sag"])
+def test_of_outputs_alone_no_name_rests_on_the_error_of_the_stand_in(tempting):
+    # No plain drive has such an amplifier, and either effect takes nearly all that it leaves.
+    options = DiagnoseOptions(effects=(tempting, "coulomb_friction"))
+    found = beside_amplified_outputs(options)
     assert found.before.ratio_to_noise > 5
     assert found.candidates[0].effects[0].startswith(tempting)
     assert found.candidates[0].explained_share > 0.8
     assert (found.verdict, found.effects) == ("unknown", ())
+
+
+def test_of_outputs_alone_no_law_rests_on_the_error_of_the_stand_in():
+    options = DiagnoseOptions(effects=("coulomb_friction",), laws="only")
+    found = beside_amplified_outputs(options)
+    assert (found.verdict, found.effects, found.law) == ("unknown", (), None)
 
 
 @pytest.mark.thorough
