@@ -27,8 +27,10 @@ from hwid_cli.diagnosis.parameters import (
 from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals
 from hwid_cli.diagnosis.search import fit_own, fit_point
 from hwid_cli.diagnosis.selection import (
+    LEAST_EXPLAINED,
     WITHIN_REACH,
     DiagnosisVerdict,
+    count,
     decide,
     is_part_of,
     select_best,
@@ -51,6 +53,10 @@ from hwid_cli.records.programs import SimulatorRun
 # simulation may differ.
 _MOST_TURNS = 8
 _AGREEMENT = 0.1
+# Turns in a row that leave more than the stand-in said, and more than this share of the best
+# run before: there it does not settle.
+_MOST_IN_VAIN = 3
+_WORTH_A_TURN = 0.95
 _TURN_ITERATIONS = 10
 # Derivatives by the simulation's parameters are found again where one of these has moved by
 # more than this share.
@@ -171,7 +177,7 @@ def _unconfirmed(findings: Findings) -> Findings:
 
 def single_in_simulation(
     findings: Findings, runs: Runs, values: dict[str, float]
-) -> tuple[Findings, dict[str, float]] | None:
+) -> tuple[Findings | None, dict[str, float]]:
     """Put the likely single effects into the simulation, and let its runs decide.
 
     Where the simulation is not linear, what the stand-in leaves of a large effect is its
@@ -184,12 +190,15 @@ def single_in_simulation(
 
     Returns
     -------
-    tuple of Findings and dict of str to float, or None
+    Findings or None
         None where no single effect leaves so little in the simulation that a further
         one could not be named.
+    dict of str to float
+        Parameters of the simulation at the run that decides; without one, at the best run
+        of an effect that explains most, which the parameters may have imitated.
     """
-    if runs.simulator.run is None or not findings.base.is_usable:
-        return None
+    if not findings.base.is_usable:
+        return None, values
     alone = _base_in_simulation(findings, runs, values)
     if alone is not None:
         return alone
@@ -201,7 +210,24 @@ def single_in_simulation(
         turn = _settled(findings, one, runs, values)
         if turn is not None:
             tried[one.effects], fits[one.effects] = turn, _fit_of_run(findings, turn)
-    return _decided(findings, tried, fits)
+    decided = _decided(findings, tried, fits)
+    if decided is not None:
+        return decided
+    return None, _moved_by_best(findings, tried, fits, values)
+
+
+def _moved_by_best(
+    findings: Findings,
+    tried: Mapping[tuple[str, ...], _Turn],
+    fits: Mapping[tuple[str, ...], CandidateFit],
+    values: dict[str, float],
+) -> dict[str, float]:
+    """Parameters at the best run, where its effect explains most; the given ones else."""
+    best = select_best(findings.criteria, list(fits.values()), findings.base)
+    if best is None:
+        return values
+    explained = findings.criteria.evidence(best, findings.base).explained
+    return tried[best.effects].values_of_run if explained >= LEAST_EXPLAINED else values
 
 
 def _base_in_simulation(
@@ -253,13 +279,17 @@ def _n_including(one: CandidateFit, others: Sequence[CandidateFit]) -> int:
 def _is_settled_by(
     findings: Findings, one: CandidateFit, fits: Sequence[CandidateFit]
 ) -> bool:
-    """Whether runs with other effects leave nothing that an effect could explain."""
+    """Whether runs with other effects leave nothing that an effect could explain.
+
+    Of effects with fewer parameters the simulation itself decides: what the stand-in leaves
+    of them more than of others may be its own error.
+    """
     criteria = findings.criteria
     if any(criteria.is_complete(fit) and is_part_of(fit, one) for fit in fits):
         return True
     done = [fit for fit in fits if criteria.is_nearly_all(fit, findings.base)]
-    is_limit = any(is_part_of(one, fit) for fit in done)
-    return bool(done) and not is_limit and not _is_near(findings, one, done)
+    is_simpler = any(is_part_of(one, fit) or count(one) < count(fit) for fit in done)
+    return bool(done) and not is_simpler and not _is_near(findings, one, done)
 
 
 def _settled(
@@ -349,19 +379,21 @@ def _best_turn(findings: Findings, turn: _Turn, runs: Runs) -> _Turn:
     Agreement within a part of the noise still shows beside many samples: while something
     remains, one more turn follows.
     """
-    best, agreed = turn, 0
+    best, agreed, in_vain = turn, 0, 0
     for _ in range(_MOST_TURNS):
         following = _next_turn(findings, turn, runs)
         if following is None:
             break
         turn = following
+        is_worth_it = turn.sse.sum() < _WORTH_A_TURN * best.sse.sum()
+        in_vain = 0 if is_worth_it or _is_as_good(turn) else in_vain + 1
         if turn.sse.sum() < best.sse.sum():
             best = turn
         agreed = agreed + 1 if _agrees(findings, turn) and _is_as_good(turn) else 0
         is_enough = agreed > 0 and findings.criteria.is_complete(
             _fit_of_run(findings, turn)
         )
-        if is_enough or agreed > 1:
+        if is_enough or agreed > 1 or in_vain == _MOST_IN_VAIN:
             break
     return best
 
@@ -410,18 +442,23 @@ def _next_turn(findings: Findings, turn: _Turn, runs: Runs) -> _Turn | None:
     )
     if not problem.known:
         return replace(following, fit=_fitted_again(corrected, turn.fit, findings))
-    if not turn.slopes or _has_moved(turn.values, turn.slopes_at):
+    if not turn.slopes or have_moved(turn.slopes_at, turn.values, _SAME_SLOPES):
         slopes = tuple(_slopes(runs, push, turn.values, found))
         following = replace(following, slopes=slopes, slopes_at=turn.values)
     return _with_values(following, (found, forces), runs, findings)
 
 
-def _has_moved(values: Mapping[str, float], before: Mapping[str, float]) -> bool:
-    """Whether derivatives by parameters are worth further runs."""
-    return any(
-        abs(one - before[name]) > _SAME_SLOPES * abs(before[name])
-        for name, one in values.items()
-    )
+def have_moved(
+    before: Mapping[str, float], now: Mapping[str, float], share: float
+) -> bool:
+    """Whether a parameter of a simulation is elsewhere.
+
+    Parameters
+    ----------
+    share : float, [-]
+        Of its value before, by which it may have changed.
+    """
+    return any(abs(now[one] - before[one]) > share * abs(before[one]) for one in before)
 
 
 def _left(

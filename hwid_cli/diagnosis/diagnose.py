@@ -295,7 +295,7 @@ def _search(
         Best sets of each size on pieces; empty where these were not asked.
     """
     base, criteria = rounds.base, rounds.criteria
-    if not base.is_usable or criteria.is_complete(base):
+    if not base.is_usable or criteria.needs_nothing(base):
         return RoundsResult(), ()
     found = run_rounds(rounds, max_effects)
     is_lost = (

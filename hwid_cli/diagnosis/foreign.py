@@ -13,7 +13,11 @@ import numpy as np
 import scipy
 
 from hwid_cli.diagnosis.causes import without_repeats
-from hwid_cli.diagnosis.confirmation import confirm, single_in_simulation
+from hwid_cli.diagnosis.confirmation import (
+    confirm,
+    have_moved,
+    single_in_simulation,
+)
 from hwid_cli.diagnosis.diagnose import find, held_out_of
 from hwid_cli.diagnosis.findings import Findings, describe
 from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals, prepare
@@ -21,6 +25,7 @@ from hwid_cli.diagnosis.rounds import OnRound, RunTasks
 from hwid_cli.diagnosis.simulator import DIFFERENCE, Runs, Simulator
 from hwid_cli.diagnosis.stand_in import (
     derived,
+    error_of,
     fit_stand_in,
     force_along,
     in_newtons,
@@ -77,22 +82,22 @@ def diagnose_foreign(
         values = _fit_parameters(runs, problem, values)
         given = runs.of(problem.signals, values)
     refitted = values
-    for _ in range(_MOST_SEARCHES):
+    for search in range(_MOST_SEARCHES):
         drive = _standing(problem, given)
         drive = _in_newtons(runs, problem.signals, given, values, drive)
         drive = replace(
             drive, effects={k: dict(v) for k, v in simulator.effects.items()}
         )
         standing = _with_stand_in(problem, drive, given)
+        if simulator.run is None:
+            error = error_of(drive, problem.signals, given)
+            standing = replace(standing, stand_in_error=error)
         found, moved, is_confirmed = _found(
-            standing, options, (runs, values), on_round, given_sse
+            standing, options, (runs, values), on_round, given_sse, is_first=search == 0
         )
         chosen, criteria = found.verdict.chosen, found.criteria
         is_done = is_confirmed and criteria.is_nearly_all(chosen, found.base)
-        has_moved = any(
-            abs(moved[one] - values[one]) > _MOVED * abs(values[one])
-            for one in simulator.free
-        )
+        has_moved = have_moved(values, moved, _MOVED)
         before, values = values, moved
         if is_done or not has_moved:
             break
@@ -109,8 +114,13 @@ def _found(
     simulation: tuple[Runs, dict[str, float]],
     on_round: OnRound,
     given_sse: np.ndarray | None,
+    *,
+    is_first: bool,
 ) -> tuple[Findings, dict[str, float], bool]:
     """What the stand-in lacks, single effects first, put into the simulation.
+
+    Where one that explains most has moved the parameters, these had imitated it: no set is
+    looked for beside a stand-in of the old ones.
 
     Parameters
     ----------
@@ -122,15 +132,53 @@ def _found(
     if options.laws != "only" and runs.simulator.run is not None:
         found = find(standing, singles, runs.run_tasks, on_round, given_sse)
         on_round("single effects in the simulation", 0)
-        alone = single_in_simulation(found, runs, values)
+        alone, moved = single_in_simulation(found, runs, values)
         if alone is not None:
-            return *alone, True
+            return alone, moved, True
+        if is_first and have_moved(values, moved, _MOVED):
+            return found, moved, False
         # Nothing more to look for: no gap, or parameters.
         if found.verdict.word in ("none", "parameters"):
             return confirm(found, runs, values)
+    if runs.simulator.run is None:
+        standing = _with_nearer_spring(standing, singles, runs.run_tasks, on_round)
     found = find(standing, options, runs.run_tasks, on_round, given_sse)
     on_round("the effect in the simulation", 0)
     return confirm(found, runs, values)
+
+
+def _with_nearer_spring(
+    standing: DiagnosisProblem,
+    singles: DiagnoseOptions,
+    run_tasks: RunTasks,
+    on_round: OnRound,
+) -> DiagnosisProblem:
+    """The stand-in whose curved spring changes as the recordings say.
+
+    Outputs do not tell whether a parameter that is off belongs to the straight part of a
+    spring alone, as beside a hardening one, or to all of it, as the weight of a pendulum.
+
+    Parameters
+    ----------
+    singles : DiagnoseOptions
+        For single effects alone.
+    """
+    drive = standing.drive
+    if not isinstance(drive, StandIn) or drive.bends == (0.0, 0.0):
+        return standing
+    whole = replace(drive, one_curve_N_per_m=drive.stiffness_N_per_m)
+    problems = (standing, replace(standing, drive=whole))
+    found = [find(one, singles, run_tasks, on_round) for one in problems]
+    criteria, base = found[0].criteria, found[0].base
+
+    def worth(row: int) -> tuple[bool, float]:
+        # Where one of them lacks nothing, the other one's effects make up for its curve.
+        one = found[row]
+        fits = (one.base, *one.found.fits.values())
+        best = max(criteria.gain(fit, base) for fit in fits)
+        return criteria.needs_nothing(one.base), best
+
+    return problems[max(range(len(problems)), key=worth)]
 
 
 def _standing(

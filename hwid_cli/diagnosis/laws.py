@@ -356,7 +356,8 @@ def _best(rounds: Rounds, tried: Sequence[_Tried]) -> _Tried | None:
         taken = 1 - criteria.excess(_fit(winner)) / max(
             criteria.excess(_fit(best)), 1e-300
         )
-        is_clear = not _unclear_terms(rounds, winner)
+        is_clear = criteria.is_beyond_stand_in(_fit(winner), _fit(best))
+        is_clear = is_clear and not _unclear_terms(rounds, winner)
         if against.gain > LEAST_GAIN and taken > _LEAST_OF_TERM and is_clear:
             best = winner
     return best
@@ -389,12 +390,14 @@ def _holds(rounds: Rounds, one: _Tried, verdict: DiagnosisVerdict) -> bool:
         against.gain >= LEAST_GAIN
         and against.explained >= LEAST_EXPLAINED_LAW
         and against.improved >= LEAST_IMPROVED
+        and criteria.is_beyond_stand_in(fit, rounds.base)
         and not _unclear_terms(rounds, one)
     )
     if not verdict.chosen.effects or not holds:
         return holds
     rest = criteria.excess(fit) / max(criteria.excess(verdict.chosen), 1e-300)
     is_better = criteria.gain(fit, verdict.chosen) >= LEAST_GAIN
+    is_better = is_better and criteria.is_beyond_stand_in(fit, verdict.chosen)
     return is_better and (rest <= _MOST_OF_NAMED or criteria.is_complete(fit))
 
 

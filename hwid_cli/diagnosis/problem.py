@@ -175,6 +175,9 @@ class DiagnosisProblem:
         Of what is compared.
     known : mapping of str to float, [-]
         Parameters of the base that may not move beyond this share of their value.
+    stand_in_error : float, [output unit squared]
+        Sum of squares by which a stand-in that no run corrects may be wrong about what
+        lies between simulation and recordings.
     """
 
     signals: tuple[Signals, ...]
@@ -182,6 +185,7 @@ class DiagnosisProblem:
     start: str = "rest"
     unit: str = "m"
     known: Mapping[str, float] = field(default_factory=dict)
+    stand_in_error: float = 0.0
 
     @property
     def compares_command(self) -> bool:

@@ -68,6 +68,8 @@ LEAST_LEAD = 0.25
 # of the simulation. A damping may be near nothing, and so its factor anything.
 REPLACED = 3.0
 _OF_SIMULATION = ("stiffness_N_per_m", "force_constant_N_per_A")
+# What is named explains this many times what a stand-in may be wrong by, at least.
+LEAST_OVER_STAND_IN = 10.0
 # An effect that includes another one must add this share of what both gain.
 LEAST_ADDED = 0.03
 
@@ -103,6 +105,8 @@ class SelectionCriteria:
         Size, direction and speed of each recording's input.
     standing : StandIn or None
         What stands for the simulation, if anything does.
+    stand_in_error : float, [output unit squared]
+        Of the problem.
     """
 
     n_samples: np.ndarray
@@ -110,6 +114,7 @@ class SelectionCriteria:
     noise: NoiseFloor
     inputs: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
     standing: StandIn | None = None
+    stand_in_error: float = 0.0
 
     @classmethod
     def of(cls, problem: DiagnosisProblem, noise: NoiseFloor) -> "SelectionCriteria":
@@ -120,7 +125,8 @@ class SelectionCriteria:
         counts = np.array([one.n_evaluated for one in problem.signals])
         features = np.array([_features(one) for one in problem.signals])
         standing = problem.drive if isinstance(problem.drive, StandIn) else None
-        return cls(counts, held, noise, features, standing)
+        error = problem.stand_in_error
+        return cls(counts, held, noise, features, standing, error)
 
     def rms(self, found: CandidateFit, *, held_out: bool) -> float:
         """RMS over the held-out recordings, or the others.
@@ -199,6 +205,18 @@ class SelectionCriteria:
         """Whether nothing but noise remains."""
         return found.is_usable and found.whiteness <= 1.0
 
+    def needs_nothing(self, base: CandidateFit) -> bool:
+        """Whether nothing remains but noise, or the little that a stand-in may be wrong by.
+
+        Parameters
+        ----------
+        base : CandidateFit
+            Re-fitted, without further effects.
+        """
+        is_small = self.ratio(base) <= SMALL_REMAINDER
+        is_of_stand_in = is_small and self.excess(base) < self.stand_in_error
+        return self.is_complete(base) or is_of_stand_in
+
     def is_nearly_all(self, found: CandidateFit, base: CandidateFit) -> bool:
         """Whether nothing remains, or too little for a further effect to be named.
 
@@ -238,6 +256,7 @@ class SelectionCriteria:
             and against.improved >= LEAST_IMPROVED
             and has_size(found)
             and not self.replaces(found)
+            and self.is_beyond_stand_in(found, base)
             and not self.is_systematic(found)
             and (self.is_complete(found) or not holds_look_alikes(found))
         )
@@ -264,6 +283,20 @@ class SelectionCriteria:
             for one, other in pairs
             if other != 0
         )
+
+    def is_beyond_stand_in(self, found: CandidateFit, other: CandidateFit) -> bool:
+        """Whether a candidate explains more than a stand-in may be wrong by.
+
+        Where nothing but noise remains, that error was small; but all that is explained
+        may be it.
+
+        References
+        ----------
+        docs/method_diagnosis.md, eq. (D33b).
+        """
+        explained = float(other.sse.sum() - found.sse.sum())
+        times = 1.0 if self.is_complete(found) else LEAST_OVER_STAND_IN
+        return explained >= times * self.stand_in_error
 
     def is_systematic(self, found: CandidateFit) -> bool:
         """Whether what should differ by chance goes with the recordings' inputs.
@@ -493,6 +526,8 @@ def rivals(
         the best one has one kind twice.
     """
     is_complete = criteria.is_complete(best)
+    left = criteria.excess(best)
+    most = max(WITHIN_REACH * left, left + criteria.stand_in_error)
     return [
         one
         for one in found
@@ -504,10 +539,7 @@ def rivals(
         and not _has_fewer_kinds(best, one)
         and (
             criteria.gain(best, one) < TIE
-            or (
-                not is_complete
-                and criteria.excess(one) <= WITHIN_REACH * criteria.excess(best)
-            )
+            or (not is_complete and criteria.excess(one) <= most)
         )
     ]
 
@@ -535,6 +567,8 @@ def lead(
             continue
         against = criteria.evidence(one, chosen)
         is_clear = against.gain >= LEAST_GAIN and against.improved >= LEAST_IMPROVED
+        takes = float(chosen.sse.sum() - one.sse.sum())
+        is_clear = is_clear and takes >= criteria.stand_in_error
         if is_clear and against.explained > most:
             best, most = one, against.explained
     return best
@@ -593,10 +627,9 @@ def decide(
     unclear : callable
         Effects of a fit that may as well not be there.
     """
-    if criteria.is_complete(base):
-        return DiagnosisVerdict(
-            _without_effect(criteria, given_sse, base), True, base, ()
-        )
+    if criteria.needs_nothing(base):
+        word = _without_effect(criteria, given_sse, base)
+        return DiagnosisVerdict(word, criteria.is_complete(base), base, ())
 
     def may_be_named(one: CandidateFit) -> bool:
         return (
@@ -664,6 +697,7 @@ def _needs_each(
         is_last = completes and not _changes_freely(whole, effect)
         least = LEAST_LAST_CONTRIBUTION if is_last else LEAST_CONTRIBUTION
         is_clear = is_clear and brings >= least * criteria.excess(base)
+        is_clear = is_clear and criteria.is_beyond_stand_in(whole, fits[left])
         if not (is_clear and explains):
             return False
     return True
@@ -682,7 +716,8 @@ def _rivals_by_halves(
             continue
         against = criteria.evidence(one, base)
         explains = against.explained >= LEAST_OF_RIVALS and against.improved == 1.0
-        if explains and against.gain >= LEAST_GAIN and not unclear(one):
+        is_clear = explains and against.gain >= LEAST_GAIN and not unclear(one)
+        if is_clear and criteria.is_beyond_stand_in(one, base):
             found.append(one)
     found.sort(key=lambda one: -criteria.gain(one, base))
     if not found:

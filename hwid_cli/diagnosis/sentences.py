@@ -85,12 +85,12 @@ def _verdict_in_words(
     if verdict.word == "none":
         return (
             "Nothing is missing: the simulation agrees with the recordings up to "
-            f"their noise ({after:.3g} times the noise).{_cause(verdict)}"
+            f"their noise ({after:.3g} times the noise).{_cause(criteria, verdict)}"
         )
     if verdict.word == "parameters":
         return (
             "No effect is missing: the parameters were off, and once they are fitted "
-            f"the error is {after:.3g} times the noise.{_cause(verdict)}"
+            f"the error is {after:.3g} times the noise.{_cause(criteria, verdict)}"
         )
     if verdict.word == "unknown":
         return (
@@ -116,10 +116,15 @@ def _verdict_in_words(
     return text
 
 
-def _cause(verdict: DiagnosisVerdict) -> str:
-    """Say what the measuring chain adds to the noise of the output."""
+def _cause(criteria: SelectionCriteria, verdict: DiagnosisVerdict) -> str:
+    """Say what is left beside the noise of the output."""
     if verdict.chosen.cause:
         return f" What is left is {CAUSES[verdict.chosen.cause]}."
+    if not verdict.is_complete and criteria.needs_nothing(verdict.chosen):
+        return (
+            " What is left is no more than the drive that stands for the simulation may "
+            "be wrong by: outputs alone do not tell it from a small effect."
+        )
     if not verdict.is_complete:
         return " The little that is left beyond the noise goes with no effect."
     return ""

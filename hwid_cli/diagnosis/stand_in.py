@@ -6,7 +6,7 @@ becomes a force along each recording, so that the stand-in moves as the simulati
 its own equation is only used for what an effect changes around that motion. docs/method_diagnosis.md, eq. (D30), (D31).
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -31,7 +31,7 @@ _LEAST_MASS = 1e-12
 # the way that was seen.
 _STRAIGHT = 1e-3
 _CURVED = 0.5
-_PUSHES_BACK = 1.3
+_PUSHES_BACK = 1.2
 _ITERATIONS = 20
 # A first velocity below this share of the largest is rest.
 _STILL = 1e-3
@@ -39,6 +39,8 @@ _STILL = 1e-3
 # lower ones leave edges of contacts to the offset, which the effect does not see, [-].
 _SLOW_SHARE = 0.5
 _FEWEST = 30
+# A bend of the least odd order, x^3, changes three times as steeply as it has grown.
+_SLOPE_OF_BEND = 3.0
 # Weight of the bends of a force against its means.
 _SMOOTHNESS = 1e-2
 
@@ -149,8 +151,10 @@ def _by_regression(
 
 
 def _pushes_back(drive: StandIn, widest: float) -> bool:
-    """Whether a spring becomes stiffer or softer, but never lets go."""
-    return bool(np.all(_stiffness_at(drive, np.linspace(-widest, widest, 101)) > 0))
+    """Whether a spring pushes back wherever it is, be it softer there."""
+    position = np.linspace(-widest, widest, 101)
+    position = position[position != 0]
+    return bool(np.all(_spring_force(drive, position) / position > 0))
 
 
 def _stiffness_at(drive: Drive, position: np.ndarray) -> np.ndarray:
@@ -166,9 +170,7 @@ def _spring_force(drive: Drive, position: np.ndarray) -> np.ndarray:
 
 
 def _bends(drive: Drive) -> tuple[float, float]:
-    if not isinstance(drive, StandIn):
-        return 0.0, 0.0
-    return drive.quadratic_N_per_m2, drive.cubic_N_per_m3
+    return drive.bends if isinstance(drive, StandIn) else (0.0, 0.0)
 
 
 def _in_free_run(
@@ -205,7 +207,8 @@ def in_newtons(drive: StandIn, force_gain: float) -> StandIn:
     force_gain : float, [unit of the input/N]
         By how much of the input a force of 1 N can be replaced.
     """
-    names = ("mass_kg", *BASE_PARAMETERS, "quadratic_N_per_m2", "cubic_N_per_m3")
+    bends = ("quadratic_N_per_m2", "cubic_N_per_m3", "one_curve_N_per_m")
+    names = ("mass_kg", *BASE_PARAMETERS, *bends)
     scaled: dict[str, Any] = {one: getattr(drive, one) / force_gain for one in names}
     return replace(drive, **scaled)
 
@@ -272,6 +275,71 @@ def standing_for(
         offset=found.output - plain.position,
         start=start if drive.stiffness_N_per_m > 0 else signals.start,
     )
+
+
+def error_of(
+    drive: StandIn, signals: Sequence[Signals], runs: Sequence[SimulatorRun]
+) -> float:
+    """Sum of squares by which a stand-in may be wrong about recordings.
+
+    What it does not reproduce of the simulation's own runs by its own equation, it does
+    not reproduce of what lies between these and the recordings either.
+
+    Parameters
+    ----------
+    signals : sequence of Signals
+        The recordings.
+    runs : sequence of SimulatorRun
+        Of the simulation, which the stand-in was fitted to.
+
+    Returns
+    -------
+    float, [output unit squared]
+
+    References
+    ----------
+    docs/method_diagnosis.md, eq. (D33b).
+    """
+    moved = [
+        derived(found, one.sample_time_s)
+        for one, found in zip(signals, runs, strict=True)
+    ]
+    forces = [
+        force_along(drive, there, one.driven_by)
+        for one, there in zip(signals, moved, strict=True)
+    ]
+    bend = _bend_along(moved, forces)
+    total = 0.0
+    for one, there, force in zip(signals, moved, forces, strict=True):
+        as_run = moved_plainly(drive, one, force, there).position
+        more = bend(one.position) - bend(there.position)
+        bent = moved_plainly(drive, one, force + more, there).position - as_run
+        total += float(np.sum(bent[one.evaluated] ** 2))
+        plain = moved_plainly(drive, one, 0.0 * force, there).position
+        size = float(np.sum((there.position - there.position[0]) ** 2))
+        share = float(np.sum((there.position - plain) ** 2)) / size if size > 0 else 0.0
+        gap = one.compared - there.position
+        total += _SLOPE_OF_BEND**2 * share * float(np.sum(gap[one.evaluated] ** 2))
+    return total
+
+
+def _bend_along(
+    moved: Sequence[Moved], forces: Sequence[np.ndarray]
+) -> Callable[[np.ndarray], np.ndarray]:
+    """What of the forces that correct a stand-in goes with the position.
+
+    Where a recording was elsewhere, it is another force there.
+    """
+    widest = max(float(np.max(np.abs(one.position))) for one in moved) or 1.0
+    matrix = np.concatenate([
+        np.column_stack([np.vander(one.position / widest, _DEGREE + 1), one.velocity])
+        for one in moved
+    ])  # fmt: skip
+    sizes = np.sqrt(np.mean(matrix**2, axis=0))
+    sizes[sizes == 0] = 1.0
+    found = np.linalg.lstsq(matrix / sizes, np.concatenate(forces), rcond=None)[0]
+    powers = (found / sizes)[:-1]
+    return lambda position: np.polyval(powers, position / widest)
 
 
 def start_of(moved: Moved) -> tuple[float, float] | None:

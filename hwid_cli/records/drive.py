@@ -223,10 +223,21 @@ class StandIn(Drive):
     ----------
     quadratic_N_per_m2, cubic_N_per_m3 : float, [N/m^2], [N/m^3]
         k2 and k3, of either sign.
+    one_curve_N_per_m : float, [N/m]
+        Stiffness k that k2 and k3 belong to, where the spring is one curve that changes
+        as a whole; 0 where k changes alone.
     """
 
     quadratic_N_per_m2: float = 0.0
     cubic_N_per_m3: float = 0.0
+    one_curve_N_per_m: float = 0.0
+
+    @property
+    def bends(self) -> tuple[float, float]:
+        """k2 and k3 beside the stiffness that the drive has now."""
+        of_curve = self.one_curve_N_per_m
+        share = self.stiffness_N_per_m / of_curve if of_curve > 0 else 1.0
+        return share * self.quadratic_N_per_m2, share * self.cubic_N_per_m3
 
 
 @dataclass(frozen=True, eq=False)

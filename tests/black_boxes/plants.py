@@ -6,7 +6,7 @@ that holds (Karnopp, 1985). Nothing of the program is used.
 """
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -185,6 +185,37 @@ MOTOR = Plant(
     steps=8,
 )
 PLANTS = {one.name: one for one in (LINEAR, PENDULUM, HARDENING, TWO_MASSES, MOTOR)}
+
+# No plain drive with a curved spring comes near to these.
+RUBBING = replace(
+    LINEAR,
+    name="rubbing",
+    rates="""def rates(y, u, push, p):
+    x, v = y
+    rubs = p["fc"] * math.tanh(v / 0.005) + p["d"] * v * abs(v)
+    return v, (p["kt"] * u + push - p["c"] * v - p["k"] * x - rubs) / p["m"]
+""",
+    values={**LINEAR.values, "fc": 3.0, "d": 60.0},
+)
+YIELDING = replace(
+    LINEAR,
+    name="yielding",
+    rates="""def rates(y, u, push, p):
+    x, v = y
+    spring = p["k"] * 0.006 * math.tanh(x / 0.006) + 300.0 * x
+    return v, (p["kt"] * u + push - p["c"] * v - spring) / p["m"]
+""",
+)
+AMPLIFIED = replace(
+    LINEAR,
+    name="amplified",
+    rates="""def rates(y, u, push, p):
+    x, v = y
+    force = p["kt"] * 2.0 * math.tanh(u / 2.0) + push
+    return v, (force - p["c"] * v - p["k"] * x) / p["m"]
+""",
+)
+FAR_PLANTS = {one.name: one for one in (RUBBING, YIELDING, AMPLIFIED)}
 
 
 @dataclass(frozen=True)

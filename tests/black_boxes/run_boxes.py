@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tests.black_boxes.plants import PLANTS, hidden_in, integrate
+from tests.black_boxes.plants import FAR_PLANTS, PLANTS, hidden_in, integrate
 
 DT, N = 1e-3, 1200
 # By how much the given parameters are off.
@@ -200,13 +200,14 @@ def main():
     parser.add_argument("--noise", type=float, default=0.005)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--singles", action="store_true", help="no sets, no laws")
+    parser.add_argument("--far", action="store_true", help="plants far from a drive")
     parser.add_argument("--write", type=Path)
     options = parser.parse_args()
     kept = options.write.read_text() if options.write and options.write.exists() else ""
     if options.write and not kept:
         options.write.write_text(HEAD)
     words = []
-    for name, plant in PLANTS.items():
+    for name, plant in (FAR_PLANTS if options.far else PLANTS).items():
         for effect in hidden_in(plant, 1.0, 1.0):
             label = f"{name}/{effect}"
             if options.only and not any(one in label for one in options.only):

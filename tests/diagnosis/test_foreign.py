@@ -11,7 +11,15 @@ from hwid_cli.diagnosis.foreign import diagnose_foreign, stand_in_for
 from hwid_cli.diagnosis.simulator import Simulator
 from hwid_cli.records.experiment import DiagnoseOptions
 from hwid_cli.records.programs import Capabilities, FreeParameter, SimulatorRun
-from tests.black_boxes.plants import LINEAR, PENDULUM, Hidden, integrate
+from tests.black_boxes.plants import (
+    LINEAR,
+    MOTOR,
+    PENDULUM,
+    Hidden,
+    hidden_in,
+    integrate,
+)
+from tests.black_boxes.run_boxes import diagnose, runs_of, write_case
 
 STEP_S, N = 1e-3, 500
 TIME = STEP_S * np.arange(N)
@@ -128,6 +136,46 @@ def test_of_outputs_alone_the_name_is_found_and_not_confirmed():
     found, runs = diagnosis(simulator, effects=FEW)
     assert (found.verdict, found.effects[0].id) == ("named", "coulomb_friction")
     assert (found.confirmed, runs) == ("surrogate", 0)
+
+
+def amplified(values, command):
+    """The stage behind an amplifier that gives less of large commands."""
+    plant = ([values["kt"]], [values["m"], values["c"], values["k"]])
+    return lsim(plant, 1.5 * np.tanh(command / 1.5), TIME)[1]
+
+
+def beside_amplified_outputs(options):
+    """Diagnosis of that stage's outputs, of which the parameters alone are off."""
+    rng = np.random.default_rng(3)
+    measured = [
+        Recording(
+            name, u, amplified(TRUE, u) + NOISE * rng.standard_normal(N), STEP_S,
+            kind=name.split("_", maxsplit=1)[0],
+        )
+        for name, u in inputs()
+    ]  # fmt: skip
+    given = {name: amplified(GIVEN, u) for name, u in inputs()}
+    return diagnose_foreign(
+        measured, Simulator(Capabilities(run=False), None, given), options, Count(),
+        lambda what, total: None,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("tempting", ["parameter_change", "supply_sag"])
+def test_of_outputs_alone_no_name_rests_on_the_error_of_the_stand_in(tempting):
+    # No plain drive has such an amplifier, and either effect takes nearly all that it leaves.
+    options = DiagnoseOptions(effects=(tempting, "coulomb_friction"))
+    found = beside_amplified_outputs(options)
+    assert found.before.ratio_to_noise > 5
+    assert found.candidates[0].effects[0].startswith(tempting)
+    assert found.candidates[0].explained_share > 0.8
+    assert (found.verdict, found.effects) == ("unknown", ())
+
+
+def test_of_outputs_alone_no_law_rests_on_the_error_of_the_stand_in():
+    options = DiagnoseOptions(effects=("coulomb_friction",), laws="only")
+    found = beside_amplified_outputs(options)
+    assert (found.verdict, found.effects, found.law) == ("unknown", (), None)
 
 
 @pytest.mark.thorough
@@ -249,3 +297,51 @@ def test_what_a_linear_stand_in_leaves_of_a_pendulum_becomes_no_second_effect():
         assert one.after == pytest.approx(PENDULUM.values[one.name], rel=0.02)
     assert found.after.ratio_to_noise < 1.1
     assert run.runs <= 800
+
+
+@pytest.mark.thorough
+def test_of_outputs_of_a_pendulum_the_stop_is_named_and_no_changed_parameter():
+    # Half a turn to either side; weight and gain of the simulation are off.
+    rng = np.random.default_rng(5)
+    stop = Hidden("stop", (), force=lambda x, v, t: -30 * max(x - 0.6, 0.0))
+    measured = [
+        Recording(
+            name, u,
+            integrate(PENDULUM, PENDULUM.values, u, SWING_S, stop, finer=4)
+            + 4e-3 * rng.standard_normal(SWUNG),
+            SWING_S, kind=name.split("_", maxsplit=1)[0],
+        )
+        for name, u in pendulum_inputs()
+    ]  # fmt: skip
+    off = {**PENDULUM.values, "c": 0.0575, "g": 0.77, "kt": 0.4}
+    given = {name: pendulum_run(off, u, np.zeros(0)) for name, u in pendulum_inputs()}
+    options = DiagnoseOptions(effects=("one_sided_stop", "parameter_change", "cogging"))
+    found = diagnose_foreign(
+        measured, Simulator(Capabilities(run=False), None, given), options, Count(),
+        lambda what, total: None,
+    )  # fmt: skip
+    assert found.verdict == "named", found.summary
+    assert [one.id for one in found.effects] == ["one_sided_stop"]
+    assert found.after.ratio_to_noise < 1.5 < 40 < found.before.ratio_to_noise
+
+
+# Of the motor the stand-in takes a contact with four parameters for nearer than the spring;
+# of the pendulum the first runs go to a wrong place, and a set makes up for that.
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("plant", "effect", "seed", "tempting"),
+    [(MOTOR, "cubic", 1, "end_stop"), (PENDULUM, "stop", 2, "cubic_stiffness")],
+)
+def test_the_simulation_decides_between_an_effect_and_what_makes_up_for_it(
+    tmp_path, plant, effect, seed, tempting
+):
+    ((true,),) = hidden_in(plant, 1.0, 1.0)[effect].accepted
+    write_case(
+        tmp_path, plant, effect, access="python", noise=0.005, seed=seed,
+        most=f"effects: [{true}, {tempting}], laws: never",
+    )  # fmt: skip
+    found, _ = diagnose(tmp_path, 1)
+    assert (found["verdict"], found["confirmed"]) == ("named", "simulation")
+    assert [one["id"] for one in found["effects"]] == [true]
+    assert found["complete"]
+    assert runs_of(tmp_path) <= 800

@@ -13,6 +13,7 @@ from tests.black_boxes.run_models import (
     STEP_S,
     TIME,
     Case,
+    Count,
     Machine,
     bent,
     cases,
@@ -129,6 +130,17 @@ def test_of_the_whole_catalogue_and_laws_the_right_one_is_confirmed():
         "simulation",
     )
     assert found.after.ratio_to_noise < 1.2
+
+
+@pytest.mark.slow
+def test_of_the_whole_catalogue_a_map_that_ends_too_early_is_a_law_in_800_runs():
+    count = Count()
+    found = diagnosed(CASES["map ends, cut"], run_tasks=count)
+    assert (score(CASES["map ends, cut"], found), found.confirmed) == (
+        "right",
+        "simulation",
+    )
+    assert count.runs <= 800
 
 
 @pytest.mark.slow

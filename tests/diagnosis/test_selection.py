@@ -13,11 +13,13 @@ from hwid_cli.diagnosis.selection import (
     LEAST_GAIN,
     LEAST_IMPROVED,
     TIE,
+    DiagnosisVerdict,
     SelectionCriteria,
     count,
     decide,
     has_size,
     is_part_of,
+    lead,
     ranked,
     rivals,
     select_best,
@@ -165,6 +167,68 @@ def test_evidence_that_fails_one_rule_does_not_suffice(rule, found, against):
 
 def test_one_effect_may_explain_less_than_two_must():
     assert CRITERIA.may_be_named(made_up(GOOD, 220.0), base())
+
+
+# A stand-in that may be wrong by 100 in all, beside an excess of 1800.
+ROUGH = replace(CRITERIA, stand_in_error=100.0)
+
+
+@pytest.mark.parametrize(
+    ("explained", "whiteness", "holds"),
+    [(1001.0, 3.0, True), (999.0, 3.0, False), (101.0, 0.5, True), (99.0, 0.5, False)],
+)
+def test_a_name_explains_more_than_the_error_of_a_stand_in(explained, whiteness, holds):
+    found = made_up(GOOD, 400.0 - explained / 6, whiteness=whiteness)
+    assert ROUGH.is_beyond_stand_in(found, base()) is holds
+    assert CRITERIA.is_beyond_stand_in(found, base())
+
+
+def test_a_good_name_is_none_beside_a_stand_in_that_is_worse():
+    found = made_up(GOOD, 110.0)
+    assert ROUGH.may_be_named(found, base())
+    bad = replace(CRITERIA, stand_in_error=200.0)
+    assert not bad.may_be_named(found, base())
+
+
+@pytest.mark.parametrize(
+    ("sse", "error", "holds"),
+    # 1.2 times the noise is 144.
+    [
+        (110.0, 61.0, True),
+        (110.0, 59.0, False),
+        (143.0, 1e3, True),
+        (145.0, 1e3, False),
+    ],
+)
+def test_the_little_that_a_stand_in_may_be_wrong_by_is_nothing(sse, error, holds):
+    criteria = replace(CRITERIA, stand_in_error=error)
+    assert criteria.needs_nothing(base(sse)) is holds
+    assert not CRITERIA.needs_nothing(base(sse))
+
+
+def test_what_makes_up_for_the_error_of_a_stand_in_is_no_lead():
+    chosen = made_up(GOOD, 200.0)
+    verdict = DiagnosisVerdict("named", False, chosen, ())
+    more = made_up(PAIR, 130.0, parameters=2)
+    assert lead(CRITERIA, [chosen, more], verdict) is more
+    # It takes 420 in all.
+    rough = replace(CRITERIA, stand_in_error=421.0)
+    assert lead(rough, [chosen, more], verdict) is None
+
+
+def test_what_makes_up_for_the_error_of_a_stand_in_is_not_named():
+    tempting = made_up(GOOD, 110.0, whiteness=0.6)
+    given = (base(143.0), [tempting], [tempting])
+    assert decided(*given).word == "named"
+    verdict = decided(*given, criteria=replace(CRITERIA, stand_in_error=300.0))
+    assert (verdict.word, verdict.is_complete) == ("parameters", False)
+
+
+def test_rivals_within_the_error_of_a_stand_in_are_not_told_apart():
+    best, near = made_up(COULOMB, 200.0), made_up(DEAD_ZONE, 230.0)
+    assert rivals(CRITERIA, [best, near], best) == []
+    assert rivals(replace(CRITERIA, stand_in_error=190.0), [best, near], best) == [near]
+    assert rivals(replace(CRITERIA, stand_in_error=170.0), [best, near], best) == []
 
 
 def test_what_leaves_white_noise_need_not_explain_half():

@@ -9,6 +9,7 @@ from scipy.signal import lsim
 from hwid_cli.diagnosis.problem import Signals
 from hwid_cli.diagnosis.stand_in import (
     derived,
+    error_of,
     fit_stand_in,
     force_along,
     force_of_change,
@@ -20,7 +21,7 @@ from hwid_cli.diagnosis.stand_in import (
 from hwid_cli.drive.simulation import parameter_vector, run
 from hwid_cli.records.drive import Drive, StandIn
 from hwid_cli.records.programs import SimulatorRun
-from tests.black_boxes.plants import HARDENING, integrate
+from tests.black_boxes.plants import HARDENING, PENDULUM, integrate
 
 STEP_S, N = 1e-3, 600
 TIME = STEP_S * np.arange(N)
@@ -133,20 +134,84 @@ def test_the_spring_of_a_stand_in_is_curved_where_that_of_the_simulation_is(give
     assert straight.cubic_N_per_m3 == 0.0
 
 
+def swung(command, **values):
+    """A pendulum: its spring is a sine, which no stand-in is."""
+    return integrate(PENDULUM, {**PENDULUM.values, **values}, command, STEP_S)
+
+
+SWINGS = [
+    size * np.sin(2 * np.pi * frequency * (TIME - 0.05)) * (TIME > 0.05)
+    for size, frequency in ((1.2, 2.0), (2.8, 2.0))
+]
+
+
 def test_a_spring_that_would_let_go_beyond_what_was_seen_stays_straight():
-    def softened(share):
-        # It lets go at 12.2 mm.
-        commands = [share * one for one in INPUTS]
-        runs = [SimulatorRun(hardening(one, k3=-2e6), NOTHING) for one in commands]
+    def found(share):
+        commands = [share / 2 * one for one in SWINGS]
+        runs = [SimulatorRun(swung(one), NOTHING) for one in commands]
         widest = max(np.max(np.abs(one.output)) for one in runs)
         return fit_stand_in([signals(one) for one in commands], runs), widest
 
-    found, widest = softened(0.5)
+    # Beyond a quarter turn it becomes softer, and still pushes back.
+    drive, widest = found(4.0)
+    assert drive.cubic_N_per_m3 < 0
+    assert widest > np.pi / 2
+    # Its cubic pushes no more from about 2.7 on.
+    drive, widest = found(5.3)
+    assert drive.cubic_N_per_m3 == 0.0
+    assert 2.7 / 1.2 < widest < 2.7
+
+
+@pytest.mark.parametrize("share", [0.9, 1.2])
+def test_the_error_of_a_stand_in_is_about_what_it_makes_wrong(share):
+    # Recordings of a pendulum whose weight is off, by a fit that knows by how much.
+    runs = [SimulatorRun(swung(one), NOTHING) for one in SWINGS]
+    given = [signals(one) for one in SWINGS]
+    found = fit_stand_in(given, runs)
     assert found.cubic_N_per_m3 < 0
-    assert widest < 12.2e-3 / 1.3
-    found, widest = softened(0.62)
-    assert found.cubic_N_per_m3 == 0.0
-    assert 12.2e-3 / 1.3 < widest < 12.2e-3
+    measured = [swung(one, g=share * PENDULUM.values["g"]) for one in SWINGS]
+    told = [
+        replace(one, output=y, compared=y)
+        for one, y in zip(given, measured, strict=True)
+    ]
+    right = replace(
+        found,
+        stiffness_N_per_m=share * found.stiffness_N_per_m,
+        one_curve_N_per_m=found.stiffness_N_per_m,
+    )
+    wrong = 0.0
+    for one, run_of, y in zip(told, runs, measured, strict=True):
+        moved = derived(run_of, STEP_S)
+        force = force_along(found, moved, one.driven_by)
+        wrong += float(
+            np.sum((moved_plainly(right, one, force, moved).position - y) ** 2)
+        )
+    # A size, no value: within a factor of four, of what is 100 times less than the gap.
+    assert 1 / 16 < error_of(found, told, runs) / wrong < 16
+    gap = sum(
+        np.sum((y - one.output) ** 2) for y, one in zip(measured, runs, strict=True)
+    )
+    assert wrong < 1e-4 * gap
+
+
+def test_a_stand_in_of_a_linear_drive_has_no_error(given):
+    runs = [SimulatorRun(linear(GAIN * one), NOTHING) for one in INPUTS]
+    told = [
+        replace(one, output=1.5 * run_of.output, compared=1.5 * run_of.output)
+        for one, run_of in zip(given, runs, strict=True)
+    ]
+    gap = sum(float(np.sum((0.5 * one.output) ** 2)) for one in runs)
+    assert error_of(fit_stand_in(given, runs), told, runs) < 1e-6 * gap
+
+
+def test_a_spring_that_is_one_curve_changes_as_a_whole():
+    alone = StandIn(stiffness_N_per_m=900.0, quadratic_N_per_m2=2e4, cubic_N_per_m3=4e6)
+    whole = replace(alone, one_curve_N_per_m=900.0)
+    assert alone.bends == whole.bends == (2e4, 4e6)
+    assert replace(alone, stiffness_N_per_m=1800.0).bends == (2e4, 4e6)
+    assert replace(whole, stiffness_N_per_m=1800.0).bends == (4e4, 8e6)
+    # In another unit of the force it is the same curve.
+    assert in_newtons(whole, 10.0).bends == pytest.approx((2e3, 4e5))
 
 
 CURVED = StandIn(
