@@ -60,14 +60,17 @@ def diagnosed(config, out):
     return json.loads((out / "diagnosis.json").read_text(encoding="utf-8")), ""
 
 
-def add_next(config, recordings):
-    """The limits of what was played before, as a section of the configuration."""
+def add_next(config, recordings, seconds=None):
+    """The limits of what was played before, as a section of the configuration.
+
+    ``seconds`` is how long a further recording may be, where not as long as these.
+    """
     largest = max(np.abs(one.current_A).max() for one in recordings)
     steps = [
         np.abs(np.diff(one.current_A)).max() / np.median(np.diff(one.time_s))
         for one in recordings
     ]
-    seconds = max(one.time_s[-1] for one in recordings)
+    seconds = seconds or max(one.time_s[-1] for one in recordings)
     limits = {
         "amplitude": float(largest),
         "rate": float(max(steps)),
@@ -103,13 +106,13 @@ def answer(truth, diagnosis):
     return [diagnosis["verdict"], named, rivals, result_of(truth, diagnosis)]
 
 
-def run_case(case, work):
+def run_case(case, work, seconds=None):
     """First and later answers of one case."""
     folder, out = work / case.name, work / f"{case.name}-out"
     # A case that was stopped half way may have left recordings.
     shutil.rmtree(folder, ignore_errors=True)
     config, truth = write_case(case, folder, work / "truth" / f"{case.name}.json", 1)
-    add_next(config, measured_case(case)[0])
+    add_next(config, measured_case(case)[0], seconds)
     diagnosis, failure = diagnosed(config, out)
     answers, taken, further = [answer(truth, diagnosis)], [], {}
     while answers[-1][0] in UNDECIDED and len(taken) < MOST_FURTHER:
@@ -138,15 +141,15 @@ def cases_of(effects, number, seeds):
 class Results:
     """Results of cases; what an earlier run has written is not run again."""
 
-    def __init__(self, work):
-        self.work, self.file = work, work / "next.jsonl"
+    def __init__(self, work, seconds):
+        self.work, self.seconds, self.file = work, seconds, work / "next.jsonl"
         lines = self.file.read_text().splitlines() if self.file.is_file() else []
         self.known = {one["case"]: one for one in map(json.loads, lines)}
 
     def of(self, case):
         """The result of a case."""
         if case.name not in self.known:
-            found = run_case(case, self.work)
+            found = run_case(case, self.work, self.seconds)
             with self.file.open("a", encoding="utf-8") as file:
                 file.write(json.dumps(found) + "\n")
             sys.stdout.write(f"{json.dumps(found)}\n")
@@ -204,17 +207,22 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--work", type=Path, required=True)
     parser.add_argument("--undecided", type=int, default=20)
+    parser.add_argument("--only", choices=list(CATALOGUE), help="only this effect")
+    parser.add_argument("--seconds", type=float, help="longest further recording")
     parser.add_argument("--seeds", choices=list(SEEDS), default="development")
     chosen = parser.parse_args()
     chosen.work.mkdir(parents=True, exist_ok=True)
-    results = Results(chosen.work)
-    first = cases_of(CATALOGUE, 0, chosen.seeds)
-    left = {case.effects[0] for case in first if is_undecided(results.of(case))}
-    effects = [one for one in CATALOGUE if one in left]
+    results = Results(chosen.work, chosen.seconds)
+    effects = [chosen.only]
+    if chosen.only is None:
+        first = cases_of(CATALOGUE, 0, chosen.seeds)
+        left = {case.effects[0] for case in first if is_undecided(results.of(case))}
+        effects = [one for one in CATALOGUE if one in left]
+        sys.stdout.write(f"{len(first)} cases tried\n")
     found, tried = undecided_cases(effects, chosen.seeds, chosen.undecided, results)
     sys.stdout.write(
-        f"\n{len(first)} cases tried, undecided {', '.join(effects)}; "
-        f"of these effects {tried} cases, {len(found)} undecided\n{table(found)}\n"
+        f"\nof {', '.join(effects)} {tried} cases tried, {len(found)} undecided\n"
+        f"{table(found)}\n"
     )
 
 
