@@ -223,7 +223,7 @@ def show(
             flush=True,
         )
     # The aim is half of the median, and the upper quartile lies further out.
-    most = min(total, 3 * coverage.needed(order, wanted))
+    most = min(total, 4 * coverage.needed(order, wanted))
     counts = []
     for seed in range(draws):
         random = np.random.default_rng([26, seed]).permutation(total)

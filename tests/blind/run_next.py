@@ -4,11 +4,12 @@
 short steps in one direction each, after which the answer is `ambiguous` or `unknown` most
 often. One case of every effect of the catalogue and every noise is diagnosed; the effects
 of which one is undecided are drawn again, in the order of number, noise and catalogue,
-until there are ``--undecided`` undecided cases. Nothing else chooses them. For each, ``hwid next`` proposes one recording within the limits of those that are there
-(goal: diagnosis), the hidden machine answers it, and the diagnosis is made again; twice at
-most. Of the program only its commands are used. One effect may be added at most, which
-saves time: one is hidden. Results are written as they come; the same command goes on where
-it was stopped.
+until there are ``--undecided`` undecided cases. Nothing else chooses them. For each,
+``hwid next`` proposes one recording within the limits of those that are there (goal:
+diagnosis), the hidden machine answers it, and the diagnosis is made again; twice at most.
+Of the program only its commands are used. One effect may be added at most, which saves
+time: one is hidden. Results are written as they come; the same command goes on where it
+was stopped.
 """
 
 import argparse
