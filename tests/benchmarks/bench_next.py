@@ -21,7 +21,7 @@ import argparse
 import json
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from itertools import combinations, product
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
@@ -255,13 +255,13 @@ def show_repeats(
         f"  it says that enough is known after {sorted({one for _, one in found})}; "
         f"they cover {quartiles(covered, total + 1)}"
     )
-    levels: dict[str, list[int]] = {}
-    for place, one in enumerate(coverage.recordings):
-        levels.setdefault(one.name.rpartition("_")[0], []).append(place)
-    for first, second in combinations(levels, 2):
-        pairs = list(product(levels[first], levels[second]))
-        do = sum(coverage.of(one) >= wanted for one in pairs)
-        print(f"  {first} and {second}: {do} of {len(pairs)} pairs do", flush=True)
+    levels = [one.name.rpartition("_")[0] for one in coverage.recordings]
+    does: dict[str, list[bool]] = {}
+    for first, second in combinations(range(total), 2):
+        of = " and ".join(dict.fromkeys((levels[first], levels[second])))
+        does.setdefault(of, []).append(coverage.of([first, second]) >= wanted)
+    for of, each in does.items():
+        print(f"  pairs of {of}: {sum(each)} of {len(each)} do", flush=True)
 
 
 def both(
