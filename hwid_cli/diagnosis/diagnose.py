@@ -31,6 +31,7 @@ from hwid_cli.diagnosis.next_experiment import (
     FittedCandidate,
     separation,
     undecided_candidates,
+    with_best_lead,
 )
 from hwid_cli.diagnosis.noise import noise_floor
 from hwid_cli.diagnosis.parameters import (
@@ -153,6 +154,7 @@ def separations(
     found = find(problem, options, run_tasks, on_round)
     criteria, fits = found.criteria, list(found.found.fits.values())
     candidates = undecided_candidates(criteria, found.verdict, fits)
+    candidates = with_best_lead(criteria, candidates, fits)
     titles = tuple(title_of(one) for one in candidates)
     if len(candidates) < 2:
         return Separations(titles, np.full(len(inputs), np.nan))

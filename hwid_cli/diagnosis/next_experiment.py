@@ -101,6 +101,30 @@ def undecided_candidates(
     return sorted(usable, key=lambda one: -criteria.gain(one, verdict.chosen))[:2]
 
 
+def with_best_lead(
+    criteria: SelectionCriteria,
+    candidates: Sequence[CandidateFit],
+    fits: Sequence[CandidateFit],
+) -> list[CandidateFit]:
+    """The same behind the set that fits best, where that is another one.
+
+    It may be best and not named, because the recordings leave its parameters open: a loss
+    and its time constant in recordings that are shorter. Then the next one is to tell it
+    from the named ones, which may be alike to each other whatever is played.
+
+    Parameters
+    ----------
+    fits : sequence of CandidateFit
+        Of all sets of effects.
+    """
+    usable = [one for one in fits if one.is_usable]
+    if not candidates or not usable:
+        return list(candidates)
+    best = max(usable, key=lambda one: criteria.gain(one, candidates[0]))
+    is_known = best.effects in {one.effects for one in candidates}
+    return list(candidates) if is_known else [best, *candidates]
+
+
 @dataclass(frozen=True, eq=False)
 class FittedCandidate:
     """A fitted candidate, ready to be simulated on other inputs.

@@ -77,7 +77,8 @@ class ParameterRef:
     @classmethod
     def of_text(cls, text: str) -> "ParameterRef":
         """Read what ``str`` gives."""
-        owner, _, parameter = text.partition("/")
+        # A formula of the owner may divide; names of parameters hold no slash.
+        owner, _, parameter = text.rpartition("/")
         return cls(owner, parameter)
 
 

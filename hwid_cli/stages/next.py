@@ -57,7 +57,7 @@ from hwid_cli.trust.designs import LEAST_SAMPLES, designs
 from hwid_cli.trust.visited import N_BANDS
 
 NAME = "next"
-STAGE_VERSION = 1
+STAGE_VERSION = 2
 # Separation of candidates, in standard deviations of the noise, below which a recording
 # does not tell them apart.
 LEAST_SEPARATION = 0.1

@@ -6,8 +6,11 @@ Some of them are taken, one model is fitted to these together, and the coverage 
 number of all recordings on which its RMSD is below the threshold, as in the tables of a
 chain (its own included). Taken are the first k of an order: that of ``hwid next``, which
 sees inputs only; that of the plan, which on the gun is the thesis's; and random ones. Shown
-is the least k whose coverage is 90 % of that of all recordings together. ``--keep FILE``
-writes each fitted set as it comes, and what the file has is not fitted again.
+is the least k whose coverage is 90 % of that of all recordings together. The motor was
+given every command three times; of equal commands ``hwid next`` takes the one that the plan
+lists first, so its order is that of several listings, each by chance. All pairs of its
+recordings are fitted, which tells whether two could do at all. ``--keep FILE`` writes each
+fitted set as it comes, and what the file has is not fitted again.
 
 Beside it, without a joint fit: a set covers what the model of one of its recordings covers,
 from the matrix of all models on all recordings. That is another quantity, which grows with
@@ -16,8 +19,9 @@ every recording and costs nothing more for another order.
 
 import argparse
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
@@ -44,6 +48,7 @@ COUNTS = (1, 2, 3, 4, 5, 6, 8, 10, 11, 12, 15, 18, 22, 26, 30, 34, 38)
 REACHED = 0.9
 # Below this an input on offer is not worth recording: the default of next.enough.
 ENOUGH = 0.01
+QUARTILES = (0.25, 0.5, 0.75)
 
 
 def averaged(one: Recording, count: int) -> Recording:
@@ -73,14 +78,20 @@ def gun() -> list[Recording]:
     return [averaged(one, 10) for one in calibrate_all(raws, recipe)[0]]
 
 
-def hsm150() -> list[Recording]:
-    """Current and speed of the motor, twenty samples averaged, as its configuration has it."""
-    found = []
+def hsm150() -> tuple[list[Recording], list[np.ndarray]]:
+    """Current and speed of the motor, twenty samples averaged, as its configuration has it.
+
+    Beside them the torques that were commanded: the measured current is noisier than the
+    steps are large, and what is played next is no measurement.
+    """
+    found, commands = [], []
     for path in sorted((folder() / "hsm150_motor").glob("*.mat")):
         data = loadmat(path)["data"]
         step_s = float(np.median(np.diff(data[:, 0])))
         found.append(averaged(Recording(path.stem, data[:, 6], data[:, 3], step_s), 20))
-    return found
+        asked = Recording(path.stem, data[:, 4], data[:, 3], step_s)
+        commands.append(averaged(asked, 20).input)
+    return found, commands
 
 
 class Coverage:
@@ -155,9 +166,8 @@ class CoverageOfSingles(Coverage):
         return int(np.any(table, axis=0).sum())
 
 
-def proposed(recordings: Sequence[Recording]) -> tuple[list[int], int]:
+def proposed(inputs: Sequence[np.ndarray]) -> tuple[list[int], int]:
     """Order of ``hwid next``, and after how many it says that enough is known."""
-    inputs = [one.input for one in recordings]
     edges = value_edges(inputs)
     tables = [content(one, edges) for one in inputs]
     reachable = joined(tables)
@@ -173,12 +183,24 @@ def proposed(recordings: Sequence[Recording]) -> tuple[list[int], int]:
     return [place for place, _ in found], enough
 
 
-def show(name: str, coverage: Coverage, draws: int) -> None:
+def listings(
+    inputs: Sequence[np.ndarray], draws: int
+) -> Iterator[tuple[list[int], int]]:
+    """What ``hwid next`` proposes of a plan whose rows are listed in random order."""
+    for seed in range(draws):
+        rows = np.random.default_rng([27, seed]).permutation(len(inputs))
+        order, enough = proposed([inputs[row] for row in rows])
+        yield [int(rows[place]) for place in order], enough
+
+
+def show(
+    name: str, coverage: Coverage, inputs: Sequence[np.ndarray], draws: int
+) -> None:
     """The table of one plan."""
     total = len(coverage.recordings)
     everything = coverage.of(range(total))
     wanted = REACHED * everything
-    order, enough = proposed(coverage.recordings)
+    order, enough = proposed(inputs)
     print(
         f"\n{name}: {total} recordings; all together cover {everything}, wanted {wanted:.1f}"
     )
@@ -200,28 +222,61 @@ def show(name: str, coverage: Coverage, draws: int) -> None:
             f"with the rest of the plan behind it: {coverage.needed(first + rest, wanted)}",
             flush=True,
         )
-    # The aim is half of the median: no order is followed beyond twice the own count.
-    most = min(total, 2 * coverage.needed(order, wanted))
+    # The aim is half of the median, and the upper quartile lies further out.
+    most = min(total, 4 * coverage.needed(order, wanted))
     counts = []
     for seed in range(draws):
         random = np.random.default_rng([26, seed]).permutation(total)
         counts.append(coverage.needed(random, wanted, most))
         if seed % 5 == 4 or seed == draws - 1:
-            middle = np.median(counts)
-            beyond = "at least " if middle >= most else ""
-            print(
-                f"{seed + 1} random orders: median {beyond}{middle:g}; "
-                f"{sum(one >= most for one in counts)} need {most} or more",
-                flush=True,
-            )
+            print(f"{seed + 1} random orders: {quartiles(counts, most)}", flush=True)
 
 
-def both(name: str, joint: Coverage, threshold: float, draws: int) -> None:
+def quartiles(counts: Sequence[int], most: int) -> str:
+    """Median and quartiles of counts that were not followed beyond the largest."""
+    low, middle, high = (
+        f"{'at least ' if one >= most else ''}{one:g}"
+        for one in np.quantile(counts, QUARTILES)
+    )
+    return f"median {middle}, quartiles {low} to {high}"
+
+
+def show_repeats(
+    coverage: Coverage, commands: Sequence[np.ndarray], draws: int
+) -> None:
+    """What chance among equal commands changes, and which pairs of recordings do."""
+    total = len(coverage.recordings)
+    wanted = REACHED * coverage.of(range(total))
+    found = list(listings(commands, draws))
+    counts = [coverage.needed(order, wanted) for order, _ in found]
+    covered = [coverage.of(order[:enough]) for order, enough in found]
+    print(f"hwid next, plan listed in {draws} orders: {quartiles(counts, total + 1)}")
+    print(
+        f"  it says that enough is known after {sorted({one for _, one in found})}; "
+        f"they cover {quartiles(covered, total + 1)}"
+    )
+    levels = [one.name.rpartition("_")[0] for one in coverage.recordings]
+    does: dict[str, list[bool]] = {}
+    for first, second in combinations(range(total), 2):
+        of = " and ".join(dict.fromkeys((levels[first], levels[second])))
+        does.setdefault(of, []).append(coverage.of([first, second]) >= wanted)
+    for of, each in does.items():
+        print(f"  pairs of {of}: {sum(each)} of {len(each)} do", flush=True)
+
+
+def both(
+    name: str,
+    joint: Coverage,
+    inputs: Sequence[np.ndarray],
+    threshold: float,
+    draws: int,
+) -> None:
     """The table of one plan by single models, and by joint ones."""
     singles = CoverageOfSingles(joint.recordings, joint.orders, joint.options)
     singles.known, singles.keep = joint.known, joint.keep
-    show(f"{name}, models of single recordings", singles.under(threshold), draws)
-    show(name, joint.under(threshold), draws)
+    under = singles.under(threshold)
+    show(f"{name}, models of single recordings", under, inputs, draws)
+    show(name, joint.under(threshold), inputs, draws)
 
 
 def main() -> None:
@@ -234,17 +289,22 @@ def main() -> None:
     joint = FitOptions(join="experiments")
     if chosen.only != "gun" and folder().is_dir():
         options = replace(joint, units=3, initial_state="steady")
-        motor = Coverage(hsm150(), Orders(1, 1, 1), options)
+        recordings, commands = hsm150()
+        motor = Coverage(recordings, Orders(1, 1, 1), options)
         if chosen.keep:
             motor.kept_in(chosen.keep, "HSM150")
         # Repeats of one level differ by up to 60: below that chance decides.
         for threshold in (20.0, 60.0):
-            both(f"HSM150 below {threshold:g}", motor, threshold, chosen.draws)
+            name = f"HSM150 below {threshold:g}"
+            both(name, motor, commands, threshold, chosen.draws)
+            show_repeats(motor.under(threshold), commands, chosen.draws)
     if chosen.only != "hsm150":
-        machine = Coverage(gun(), Orders(3, 4, 1), joint)
+        recordings = gun()
+        machine = Coverage(recordings, Orders(3, 4, 1), joint)
         if chosen.keep:
             machine.kept_in(chosen.keep, "gun")
-        both("virtual gun", machine, 0.01, chosen.draws)
+        inputs = [one.input for one in recordings]
+        both("virtual gun", machine, inputs, 0.01, chosen.draws)
 
 
 if __name__ == "__main__":

@@ -5,7 +5,9 @@ the band were chosen, without it others are drawn. Random plants (`trust_plants`
 of one recording, judged by others or by its own rest; the band on recordings that nothing
 has used, of the same kind of input and of others, apart. Public measurements
 (``HWID_REALDATA``) and the virtual gun by the same functions. ``--keep FILE`` writes each
-plant as it comes, and what the file has is not computed again.
+plant as it comes, and what the file has is not computed again. ``--moving DRIFT`` lets the
+recordings of the plants begin in the middle of a motion, behind a sensor that drifts: at
+rest a start and an offset are known, here they are part of the error.
 """
 
 import argparse
@@ -42,6 +44,8 @@ CHOOSING, REPORTING = 1000, 70_000
 # Who judges: recordings by their place among those of a plant. The first is the model's.
 JUDGES = {"two of its kind": (1, 2), "one of each of two kinds": (1, 5), "none": ()}
 ORDERS = Orders(2, 2, 1)
+# Samples cut off where recordings begin in motion.
+BEGINNING = 300
 HEAD = f"{'':34}{'recordings':>11}{'coverage':>10}{'10 % below':>11}{'width/error':>12}{'width/spread':>13}{'inside':>8}"
 
 Row = tuple[float, float, float, float]
@@ -81,12 +85,27 @@ def show(name: str, rows: Sequence[Row]) -> None:
     )
 
 
-def plant(seed: int, structure: str) -> dict[str, list[Row]]:
+def begun_in_motion(
+    recordings: Sequence[Recording], drift: float, seed: int
+) -> list[Recording]:
+    """The rest of each recording; the drift is its deviation, in spreads of the output."""
+    rng, found = np.random.default_rng([seed, 5]), []
+    for one in recordings:
+        y = one.output[BEGINNING:]
+        slope = drift * np.std(y) * rng.standard_normal()
+        y = y + slope * np.linspace(-1.0, 1.0, y.size)
+        found.append(replace(one, input=one.input[BEGINNING:], output=y))
+    return found
+
+
+def plant(seed: int, structure: str, moving: float | None) -> dict[str, list[Row]]:
     """Rows of one random plant, by who judges, structure and kind of input."""
     rng = np.random.default_rng(seed)
     order = [str(one) for one in rng.permutation(INPUTS)]
     kinds = [order[0]] * 5 + [order[1], order[1], order[2]]
     recordings = plant_recordings(seed, structure, kinds)
+    if moving is not None:
+        recordings = begun_in_motion(recordings, moving, seed)
     options = FitOptions(units=int(rng.choice([5, 10])))
     model = fit(recordings[:1], ORDERS, options)
     if model.model is None:
@@ -105,7 +124,7 @@ def plant(seed: int, structure: str) -> dict[str, list[Row]]:
     return found
 
 
-def plants(count: int, first: int, keep: Path | None) -> None:
+def plants(count: int, first: int, keep: Path | None, moving: float | None) -> None:
     """Random plants, right and wrong structure in turn."""
     wrong = STRUCTURES[1:]
     known = {}
@@ -117,7 +136,7 @@ def plants(count: int, first: int, keep: Path | None) -> None:
         structure = "right" if number % 2 == 0 else wrong[number // 2 % len(wrong)]
         seed = first + number
         if seed not in known:
-            known[seed] = plant(seed, structure)
+            known[seed] = plant(seed, structure, moving)
             if keep is not None:
                 with keep.open("a") as file:
                     file.write(json.dumps({"seed": seed, "rows": known[seed]}) + "\n")
@@ -127,6 +146,12 @@ def plants(count: int, first: int, keep: Path | None) -> None:
     order = [f"{who}, {word}" for who in JUDGES for word in ("right", "wrong")]
     for name in sorted(found, key=lambda one: order.index(one.rpartition(",")[0])):
         show(name, found[name])
+        if name.startswith("none") and name.endswith("same"):
+            coverage = np.array(found[name])[:, 0]
+            print(
+                f"  half of these hold {np.median(coverage):.3f} or more, "
+                f"{np.mean(coverage == 1.0):.0%} hold every sample"
+            )
 
 
 def hsm150() -> list[Row]:
@@ -216,10 +241,12 @@ def main() -> None:
     parser.add_argument("--plants", type=int, default=320)
     parser.add_argument("--choose", action="store_true")
     parser.add_argument("--keep", type=Path)
+    parser.add_argument("--moving", type=float, metavar="DRIFT")
     parser.add_argument("--only", choices=["plants", "real", "gun"])
     chosen = parser.parse_args()
     if chosen.only in (None, "plants"):
-        plants(chosen.plants, CHOOSING if chosen.choose else REPORTING, chosen.keep)
+        first = CHOOSING if chosen.choose else REPORTING
+        plants(chosen.plants, first, chosen.keep, chosen.moving)
     if chosen.only in (None, "real"):
         print(f"\nmeasured\n{HEAD}")
         if folder().is_dir():

@@ -36,7 +36,8 @@ class Recorded(NamedTuple):
 def measured_case(case, further=None):
     """Recordings of a case and its truth as plain values.
 
-    ``further`` are commands by name that are measured after those of the plan.
+    ``further`` are commands by name that the same machine answers after those of the
+    plan: its laws, its noise and its sensor are those that the plan's recordings set.
     """
     rng = case.rng()
     machine = Machine()
@@ -47,14 +48,15 @@ def measured_case(case, further=None):
     whole = machine
     for effect, values in hidden.items():
         whole = hide(effect, values, whole)
-    commands = {**plan(case.plan, rng), **(further or {})}
-    factors = _factors(hidden, commands, rng)
+    planned = plan(case.plan, rng)
+    commands = {**planned, **(further or {})}
+    factors = _factors(hidden, planned, further or {}, rng)
     clean = {
         name: _displacement(whole, command, hidden, factors.get(name, 1.0), rng)
         for name, command in commands.items()
     }
-    clean, reference = _through_sensor(clean, hidden)
-    full_scale = max(np.abs(y).max() for y in clean.values())
+    clean, reference = _through_sensor(clean, hidden, planned)
+    full_scale = max(np.abs(clean[name]).max() for name in planned)
     travel = machine.force_constant_N_per_A * LARGEST_A / machine.stiffness_N_per_m
     if not full_scale < MOST_TRAVELS * travel:
         raise ValueError(
@@ -105,14 +107,15 @@ def _spread(machine, shares, rng):
     return moved
 
 
-def _factors(hidden, commands, rng):
-    """Factor on the changing parameter, by recording; their spread is the drawn one."""
+def _factors(hidden, planned, further, rng):
+    """Factor on the changing parameter, by recording; the plan's spread is the drawn one."""
     if "parameter_change" not in hidden:
         return {}
-    shifts = rng.standard_normal(len(commands))
+    shifts = rng.standard_normal(len(planned))
     shifts = (shifts - shifts.mean()) / shifts.std()
+    shifts = np.r_[shifts, rng.standard_normal(len(further))]
     factors = 1.0 + hidden["parameter_change"]["spread"] * shifts
-    return dict(zip(commands, factors.tolist(), strict=True))
+    return dict(zip([*planned, *further], factors.tolist(), strict=True))
 
 
 def _displacement(machine, command, hidden, factor, rng):
@@ -159,9 +162,9 @@ def _stiffness_change(hidden, times, rng):
     return p["share"] * np.sin(2 * np.pi * p["frequency_Hz"] * times + phase)
 
 
-def _through_sensor(positions, hidden):
-    """Readings of the sensor; the largest one over all recordings is its reference."""
-    largest = max(np.abs(x).max() for x in positions.values())
+def _through_sensor(positions, hidden, planned):
+    """Readings of the sensor; the largest one of the plan's recordings is its reference."""
+    largest = max(np.abs(positions[name]).max() for name in planned)
     square = hidden.get("sensor_quadratic", {}).get("coefficient", 0.0)
     cube = hidden.get("sensor_cubic", {}).get("coefficient", 0.0)
     drift = hidden.get("sensor_drift", {}).get("drift_m_per_s", 0.0)
@@ -177,7 +180,7 @@ def _through_sensor(positions, hidden):
         }
         if not (square or cube):
             break
-        reference = max(np.abs(y).max() for y in readings.values())
+        reference = max(np.abs(readings[name]).max() for name in planned)
     return readings, float(reference)
 
 

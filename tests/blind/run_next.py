@@ -1,18 +1,22 @@
 """Further recordings for hidden cases that the diagnosis leaves undecided.
 
-``python tests/blind/run_next.py --work DIR [--number N]`` diagnoses cases as in the blind
-test, with six short steps in one direction each, after which the answer often is
-`ambiguous` or `unknown`. Where it is, ``hwid next`` proposes one recording within the
-limits of the recordings that are there (goal: diagnosis), the hidden machine answers it,
-and the diagnosis is made again; twice at most. Of the program only its commands are used.
-One effect may be added at most, which saves time: one is hidden. Results are written as
-they come; the same command goes on where it was stopped.
+``python tests/blind/run_next.py --work DIR`` diagnoses cases of the blind test with six
+short steps in one direction each, after which the answer is `ambiguous` or `unknown` most
+often. One case of every effect of the catalogue and every noise is diagnosed; the effects
+of which one is undecided are drawn again, in the order of number, noise and catalogue,
+until there are ``--undecided`` undecided cases. Nothing else chooses them. For each,
+``hwid next`` proposes one recording within the limits of those that are there (goal:
+diagnosis), the hidden machine answers it, and the diagnosis is made again; twice at most.
+Of the program only its commands are used. One effect may be added at most, which saves
+time: one is hidden. Results are written as they come; the same command goes on where it
+was stopped.
 """
 
 import argparse
 import json
+import shutil
 import sys
-from collections import Counter
+from itertools import count
 from pathlib import Path
 
 import numpy as np
@@ -25,30 +29,17 @@ if str(PROJECT) not in sys.path:
 
 from hwid_cli.cli.main import main as hwid  # noqa: E402
 from tests.blind.campaign import measured_case  # noqa: E402
-from tests.blind.cases import make_case  # noqa: E402
+from tests.blind.cases import SEEDS, make_case  # noqa: E402
+from tests.blind.effects import CATALOGUE  # noqa: E402
 from tests.blind.score import result_of  # noqa: E402
 from tests.blind.write_case import HEADER, write_case  # noqa: E402
 
-FEW = {"plan": "few"}
-# Effects that look like others in one-way steps; every noise in turn.
-EFFECTS = (
-    "end_stop",
-    "input_delay",
-    "one_sided_stop",
-    "actuator_lag",
-    "second_mode",
-    "sensor_quadratic",
-    "quadratic_stiffness",
-    "cubic_stiffness",
-    "supply_sag",
-    "force_constant_saturation",
-    "output_backlash",
-    "spring_gap",
-    "quadratic_drag",
-    "voltage_limit",
-)
-NOISE_PERCENT = (1.0, 0.1, 3.0)
+PLAN = "few"
+NOISE_PERCENT = (3.0, 1.0, 0.3)
+UNDECIDED = ("ambiguous", "unknown")
 MOST_FURTHER = 2
+# Exit code after SIGTERM.
+INTERRUPTED = 143
 
 
 def command(name, config, out):
@@ -56,24 +47,31 @@ def command(name, config, out):
     done = CliRunner().invoke(
         hwid, [name, str(config), "--out", str(out), "--jobs", "1", "-q"]
     )
+    if done.exit_code == INTERRUPTED:
+        # What was stopped is no result: it runs again.
+        raise SystemExit(INTERRUPTED)
     return "" if done.exit_code == 0 else f"{done.exception!r} {done.output[-300:]}"
 
 
 def diagnosed(config, out):
+    """The diagnosis, and what went wrong."""
     failed = command("diagnose", config, out)
     if failed:
         return None, failed
     return json.loads((out / "diagnosis.json").read_text(encoding="utf-8")), ""
 
 
-def add_next(config, recordings):
-    """The limits of what was played before, as a section of the configuration."""
+def add_next(config, recordings, seconds=None):
+    """The limits of what was played before, as a section of the configuration.
+
+    ``seconds`` is how long a further recording may be, where not as long as these.
+    """
     largest = max(np.abs(one.current_A).max() for one in recordings)
     steps = [
         np.abs(np.diff(one.current_A)).max() / np.median(np.diff(one.time_s))
         for one in recordings
     ]
-    seconds = max(one.time_s[-1] for one in recordings)
+    seconds = seconds or max(one.time_s[-1] for one in recordings)
     limits = {
         "amplitude": float(largest),
         "rate": float(max(steps)),
@@ -85,10 +83,10 @@ def add_next(config, recordings):
 
 
 def played(case, folder, out, further):
-    """Take the proposed recording from the hidden machine; its name, or none."""
+    """Take the proposed recording from the hidden machine; its name and expected gain."""
     proposals = json.loads((out / "next.json").read_text())["proposals"]
     if not proposals:
-        return ""
+        return None
     one = proposals[0]
     values = np.loadtxt(out / one["file"], delimiter=",", skiprows=1)[:, 1]
     further[one["name"]] = values
@@ -97,59 +95,136 @@ def played(case, folder, out, further):
     rows = np.column_stack([taken.time_s, taken.current_A, taken.displacement_m])
     path = folder / "raw" / f"{one['name']}.csv"
     np.savetxt(path, rows, fmt="%.9e", delimiter=",", header=HEADER, comments="")
-    return one["name"]
+    return [one["name"], one["gain"]]
 
 
-def run_case(case, work):
+def answer(truth, diagnosis):
+    """The verdict, what is named and the rivals, and whether that is right."""
+    if diagnosis is None:
+        return ["failed", [], [], "failed"]
+    named = [one["id"] for one in diagnosis["effects"]]
+    rivals = diagnosis["ambiguous_with"]
+    return [diagnosis["verdict"], named, rivals, result_of(truth, diagnosis)]
+
+
+def run_case(case, work, seconds=None):
     """First and later answers of one case."""
     folder, out = work / case.name, work / f"{case.name}-out"
+    # A case that was stopped half way may have left recordings.
+    shutil.rmtree(folder, ignore_errors=True)
     config, truth = write_case(case, folder, work / "truth" / f"{case.name}.json", 1)
-    add_next(config, measured_case(case)[0])
+    add_next(config, measured_case(case)[0], seconds)
     diagnosis, failure = diagnosed(config, out)
-    answers, taken, further = [], [], {}
-    while True:
-        verdict = "failed" if diagnosis is None else diagnosis["verdict"]
-        answers.append([verdict, result_of(truth, diagnosis)])
-        if verdict not in ("ambiguous", "unknown") or len(taken) == MOST_FURTHER:
-            break
+    answers, taken, further = [answer(truth, diagnosis)], [], {}
+    while answers[-1][0] in UNDECIDED and len(taken) < MOST_FURTHER:
         failure = command("next", config, out)
-        name = "" if failure else played(case, folder, out, further)
-        if not name:
+        more = None if failure else played(case, folder, out, further)
+        if more is None:
             break
-        taken.append(name)
+        taken.append(more)
         diagnosis, failure = diagnosed(config, out)
+        answers.append(answer(truth, diagnosis))
+    if answers[0][0] not in UNDECIDED:
+        shutil.rmtree(folder)
+        shutil.rmtree(out, ignore_errors=True)
     return {"case": case.name, "answers": answers, "taken": taken, "failure": failure}
+
+
+def cases_of(effects, number, seeds):
+    """One case of each effect and noise."""
+    return [
+        make_case(PLAN, (effect,), number, seeds=seeds, noise=noise, plan=PLAN)
+        for noise in NOISE_PERCENT
+        for effect in effects
+    ]
+
+
+class Results:
+    """Results of cases; what an earlier run has written is not run again."""
+
+    def __init__(self, work, seconds):
+        self.work, self.seconds, self.file = work, seconds, work / "next.jsonl"
+        lines = self.file.read_text().splitlines() if self.file.is_file() else []
+        self.known = {one["case"]: one for one in map(json.loads, lines)}
+
+    def of(self, case):
+        """The result of a case."""
+        if case.name not in self.known:
+            found = run_case(case, self.work, self.seconds)
+            with self.file.open("a", encoding="utf-8") as file:
+                file.write(json.dumps(found) + "\n")
+            sys.stdout.write(f"{json.dumps(found)}\n")
+            sys.stdout.flush()
+            self.known[case.name] = found
+        return self.known[case.name]
+
+
+def is_undecided(one):
+    """Whether the recordings that were there at first leave it open."""
+    return one["answers"][0][0] in UNDECIDED
+
+
+def undecided_cases(effects, seeds, least, results):
+    """Results of the first undecided cases of some effects, and how many were tried."""
+    found, tried = [], 0
+    for number in count() if effects else ():
+        for case in cases_of(effects, number, seeds):
+            tried += 1
+            one = results.of(case)
+            if is_undecided(one):
+                found.append(one)
+            if len(found) == least:
+                return found, tried
+    return found, tried
+
+
+def is_right_after(one, most):
+    """Whether the name is right after so many further recordings or fewer."""
+    return one["answers"][: most + 1][-1][-1] == "right"
+
+
+def table(found):
+    """One line for each case, and the shares."""
+    lines = [
+        "| undecided case | at first | taken (separation over noise) | then |",
+        "|---|---|---|---|",
+    ]
+    for one in found:
+        first, *later = (
+            " or ".join([*sorted(named), *map(str, rivals)]) or verdict
+            for verdict, named, rivals, _ in one["answers"]
+        )
+        taken = ", ".join(f"{name} ({gain:.2g})" for name, gain in one["taken"])
+        then = f"{', then '.join(later)}: {one['answers'][-1][-1]}"
+        lines.append(f"| {one['case']} | {first} | {taken} | {then} |")
+    for most in range(1, MOST_FURTHER + 1):
+        right = sum(is_right_after(one, most) for one in found)
+        lines.append(f"right after {most}: {right} of {len(found)}")
+    return "\n".join(lines)
 
 
 def main():
     """Run the cases and count."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--work", type=Path, required=True)
-    parser.add_argument("--number", type=int, default=3)
-    parser.add_argument("--seeds", default="development")
+    parser.add_argument("--undecided", type=int, default=20)
+    parser.add_argument("--only", choices=list(CATALOGUE), help="only this effect")
+    parser.add_argument("--seconds", type=float, help="longest further recording")
+    parser.add_argument("--seeds", choices=list(SEEDS), default="development")
     chosen = parser.parse_args()
     chosen.work.mkdir(parents=True, exist_ok=True)
-    results = chosen.work / "outcomes.jsonl"
-    known = {}
-    if results.is_file():
-        lines = [json.loads(one) for one in results.read_text().splitlines()]
-        known = {one["case"]: one for one in lines}
-    undecided = Counter()
-    for number in range(chosen.number):
-        for effect in EFFECTS:
-            noise = NOISE_PERCENT[number % len(NOISE_PERCENT)]
-            case = make_case(
-                "few", (effect,), number, seeds=chosen.seeds, noise=noise, **FEW
-            )
-            if case.name not in known:
-                known[case.name] = run_case(case, chosen.work)
-                with results.open("a", encoding="utf-8") as file:
-                    file.write(json.dumps(known[case.name]) + "\n")
-            found = known[case.name]
-            if found["answers"][0][0] in ("ambiguous", "unknown"):
-                undecided[found["answers"][-1][1]] += 1
-            sys.stdout.write(f"{json.dumps(found)}\n{dict(undecided)}\n")
-            sys.stdout.flush()
+    results = Results(chosen.work, chosen.seconds)
+    effects = [chosen.only]
+    if chosen.only is None:
+        first = cases_of(CATALOGUE, 0, chosen.seeds)
+        left = {case.effects[0] for case in first if is_undecided(results.of(case))}
+        effects = [one for one in CATALOGUE if one in left]
+        sys.stdout.write(f"{len(first)} cases tried\n")
+    found, tried = undecided_cases(effects, chosen.seeds, chosen.undecided, results)
+    sys.stdout.write(
+        f"\nof {', '.join(effects)} {tried} cases tried, {len(found)} undecided\n"
+        f"{table(found)}\n"
+    )
 
 
 if __name__ == "__main__":

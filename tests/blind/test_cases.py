@@ -126,6 +126,27 @@ def test_the_spread_of_a_changing_parameter_is_the_drawn_one():
     assert np.std(factors) / np.mean(factors) == pytest.approx(spread)
 
 
+@pytest.mark.parametrize("effect", ["sensor_quadratic", "parameter_change"])
+def test_a_further_recording_is_answered_by_the_same_machine(effect):
+    case = make_case("few", (effect,), 0, plan="few", noise=1e-6)
+    before, truth = measured(case)
+    # Further than the steps of the plan: 7 A instead of 5 A.
+    further = {"fast": 7.0 * np.sin(0.06 * np.arange(500))}
+
+    after, told = measured_case(case, further)
+
+    assert [one.name for one in after] == [*(one.name for one in before), "fast"]
+    largest = max(np.abs(one.displacement_m).max() for one in before)
+    assert np.abs(after[-1].displacement_m).max() > 1.05 * largest
+    for one, again in zip(before, after, strict=False):
+        # The noise is other noise, of 1e-8 of the largest reading.
+        assert again.displacement_m == pytest.approx(
+            one.displacement_m, abs=1e-6 * largest
+        )
+    assert told["reference_m"] == truth["reference_m"]
+    assert told["noise_sigma_m"] == truth["noise_sigma_m"]
+
+
 @pytest.mark.parametrize("nuisance", NUISANCES)
 def test_a_nuisance_shows_in_the_recording(nuisance):
     rng = np.random.default_rng(3)

@@ -9,10 +9,12 @@ from hwid_cli.diagnosis.next_experiment import (
     Separation,
     best_separation,
     menu,
+    with_best_lead,
 )
 from hwid_cli.diagnosis.parameters import first_point, parameter_layout
 from hwid_cli.drive.simulation import simulate_drive
 from hwid_cli.records.recordings import Recording
+from tests.diagnosis.made_up_fits import CRITERIA, base, made_up
 from tests.diagnosis.small_drive import (
     DRIVE,
     NOISE,
@@ -23,6 +25,9 @@ from tests.diagnosis.small_drive import (
     sizes,
 )
 
+NAMED = made_up(["periodic_force"], 200.0)
+RIVAL = made_up(["sensor_hum"], 201.0)
+LEAD = made_up(["thermal_gain_loss"], 110.0)
 FRICTION = {"coulomb_friction": {"force_N": 0.8}}
 
 
@@ -104,3 +109,26 @@ def test_the_menu_has_no_frequency_that_the_samples_cannot_follow(rivals):
     fast = [name for name in menu(slow) if "at 60.7 Hz" in name]
     assert fast == []
     assert len(menu(slow)) < len(menu(scales))
+
+
+def effects(found):
+    return [one.effects for one in found]
+
+
+def test_the_set_that_fits_best_stands_first_though_it_is_not_named():
+    found = with_best_lead(CRITERIA, [NAMED, RIVAL], [base(), NAMED, RIVAL, LEAD])
+
+    assert effects(found) == effects([LEAD, NAMED, RIVAL])
+
+
+def test_candidates_stay_where_the_best_is_one_of_them():
+    found = with_best_lead(CRITERIA, [NAMED, RIVAL], [base(), RIVAL, NAMED])
+
+    assert effects(found) == effects([NAMED, RIVAL])
+
+
+def test_a_set_that_could_not_be_simulated_is_no_lead():
+    lost = replace(LEAD, sse=LEAD.sse * float("inf"))
+
+    assert with_best_lead(CRITERIA, [NAMED], [lost, NAMED]) == [NAMED]
+    assert with_best_lead(CRITERIA, [], [LEAD]) == []

@@ -5,7 +5,7 @@ from dataclasses import FrozenInstanceError, replace
 import numpy as np
 import pytest
 
-from hwid_cli.records.candidates import CandidateFit
+from hwid_cli.records.candidates import CandidateFit, ParameterRef
 from hwid_cli.records.diagnosis import VERDICTS, FittedParameter, Gap
 from tests.report.diagnosis_examples import named
 
@@ -43,3 +43,9 @@ def test_a_parameter_without_interval_has_none():
 def test_a_record_does_not_change():
     with pytest.raises(FrozenInstanceError):
         Gap(1.0, 2.0, 3.0).train_rms = 0.0
+
+
+def test_a_parameter_of_an_effect_whose_formula_divides_is_read_as_it_was_written():
+    own = ParameterRef('law:{"force_N":"c1*sin(2*pi*x/l1)","unit":"N/(m s)"}', "l1")
+
+    assert ParameterRef.of_text(str(own)) == own
