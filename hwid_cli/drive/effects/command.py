@@ -133,7 +133,9 @@ SECOND_ORDER_LAG = Effect(
             # What rings more than a current loop that somebody has tuned is a spring.
             lambda scales: (0.3, 10.0),
             places=("LAG_DAMPING_RATIO",),
-            limits=(POSITIVE,),
+            # Without it, the lag is of first order.
+            default=0.0,
+            limits=(NOT_NEGATIVE,),
         ),
     ),
     # Strongly damped, with a small time constant.

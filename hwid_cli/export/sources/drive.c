@@ -24,9 +24,9 @@
 /* Parameters, motion, memory of friction and command, and the commands of a while. */
 typedef struct {
     double p[@n_slots@];
-    double motion[8];
-    double memory[7];
-    double room[17];
+    double motion[@n_state@];
+    double memory[@n_memory@];
+    double room[@n_room@];
     double control[3];
     double starts[@n_history@];
     double ends[@n_history@];
