@@ -232,7 +232,7 @@ def find(
         found=found, verdict=verdict,
     )  # fmt: skip
     # Where a drive stands for another simulation, that one judges.
-    if verdict.word == "unknown" and seeds and criteria.standing is None:
+    if _is_lost(criteria, verdict) and seeds and criteria.standing is None:
         judged = _judged_in_pieces(rounds, whole, seeds)
         if judged is not None:
             return judged
@@ -300,14 +300,17 @@ def _search(
     if not base.is_usable or criteria.needs_nothing(base):
         return RoundsResult(), ()
     found = run_rounds(rounds, max_effects)
-    is_lost = (
-        _decided(rounds, given_sse, found).word == "unknown"
-        and criteria.ratio(base) > STILL_LARGE
-    )
+    is_lost = _is_lost(criteria, _decided(rounds, given_sse, found))
     if not is_lost or rounds.problem.compares_command:
         return found, ()
     seeds = _seeds_of_pieces(rounds, force, max_effects)
     return continue_rounds(rounds, found, seeds), seeds
+
+
+def _is_lost(criteria: SelectionCriteria, verdict: DiagnosisVerdict) -> bool:
+    """Whether whole recordings settle nothing, with much left."""
+    is_open = verdict.word in ("unknown", "ambiguous")
+    return is_open and criteria.ratio(verdict.chosen) > STILL_LARGE
 
 
 def _decided(
