@@ -35,6 +35,10 @@ MOST_LEFT_BY_SET = 2.0
 # that is not quite right leaves as much.
 LEAST_CONTRIBUTION = 5e-3
 LEAST_LAST_CONTRIBUTION = 5e-4
+# What leaves more has to explain this share, and each effect of a set to bring that much:
+# of several effects, and of values that each recording has for itself, which imitate most.
+LEAST_EXPLAINED_FAR = 0.99
+LEAST_CONTRIBUTION_FAR = 0.05
 # ... in this share of the held-out recordings.
 LEAST_IMPROVED = 0.65
 # Chance at which changes between recordings are said to go with their inputs, and the
@@ -242,14 +246,7 @@ class SelectionCriteria:
         docs/method_diagnosis.md, eq. (D24).
         """
         against = self.evidence(found, base)
-        is_large = self.ratio(found) > STILL_LARGE
-        if len(found.effects) > 1:
-            # Where much remains, a further effect makes up for a law that is not right.
-            is_near = self.ratio(found) <= MOST_LEFT_BY_SET
-            explains = against.explained >= LEAST_EXPLAINED_SET and is_near
-        else:
-            least = LEAST_EXPLAINED_LARGE if is_large else LEAST_EXPLAINED
-            explains = against.explained >= least
+        explains = against.explained >= self._least_explained(found)
         return (
             against.gain >= LEAST_GAIN
             and (explains or self.is_complete(found))
@@ -260,6 +257,20 @@ class SelectionCriteria:
             and not self.is_systematic(found)
             and (self.is_complete(found) or not holds_look_alikes(found))
         )
+
+    def _least_explained(self, found: CandidateFit) -> float:
+        """Share that a set has to explain, from how much it leaves."""
+        # Where much remains, a further effect makes up for a law that is not right.
+        if len(found.effects) > 1:
+            return LEAST_EXPLAINED_FAR if self.is_far(found) else LEAST_EXPLAINED_SET
+        if self.ratio(found) <= STILL_LARGE:
+            return LEAST_EXPLAINED
+        is_free = any(is_factor(one) for one in found.own_names)
+        return LEAST_EXPLAINED_FAR if is_free else LEAST_EXPLAINED_LARGE
+
+    def is_far(self, found: CandidateFit) -> bool:
+        """Whether a set of several effects leaves more than such sets may."""
+        return len(found.effects) > 1 and self.ratio(found) > MOST_LEFT_BY_SET
 
     def replaces(self, found: CandidateFit) -> bool:
         """Whether a candidate puts another base in the place of the simulation's.
@@ -685,9 +696,12 @@ def _needs_each(
     """Whether a set leaves much more without any one of its effects."""
     if len(whole.effects) == 1:
         return True
+    is_far = criteria.is_far(whole)
     for effect in whole.effects:
         left = tuple(one for one in whole.effects if one != effect)
         if left not in fits:
+            if is_far:
+                return False
             continue
         against = criteria.evidence(whole, fits[left])
         completes = criteria.is_complete(whole) and not criteria.is_complete(fits[left])
@@ -695,7 +709,8 @@ def _needs_each(
         is_clear = against.gain >= LEAST_GAIN and against.improved >= LEAST_IMPROVED
         brings = criteria.excess(fits[left]) - criteria.excess(whole)
         is_last = completes and not _changes_freely(whole, effect)
-        least = LEAST_LAST_CONTRIBUTION if is_last else LEAST_CONTRIBUTION
+        least = LEAST_CONTRIBUTION_FAR if is_far else LEAST_CONTRIBUTION
+        least = LEAST_LAST_CONTRIBUTION if is_last else least
         is_clear = is_clear and brings >= least * criteria.excess(base)
         is_clear = is_clear and criteria.is_beyond_stand_in(whole, fits[left])
         if not (is_clear and explains):
@@ -713,6 +728,9 @@ def _rivals_by_halves(
     found = []
     for one in fits.values():
         if len(one.effects) != 1 or not one.is_usable or not has_size(one):
+            continue
+        is_free = any(is_factor(ref) for ref in one.own_names)
+        if is_free and criteria.ratio(one) > STILL_LARGE:
             continue
         against = criteria.evidence(one, base)
         explains = against.explained >= LEAST_OF_RIVALS and against.improved == 1.0

@@ -485,6 +485,44 @@ def test_free_values_must_bring_more_to_complete_a_set(left, own, chosen):
     assert verdict.chosen is (both if chosen == "both" else one)
 
 
+@pytest.mark.parametrize(
+    ("without", "is_both"),
+    [
+        # 80 % would not do beside three times the noise; of 99 % each brings a part.
+        (20_000.0, True),
+        # The second one brings 2 %: it makes up for the first one's law.
+        (5_000.0, False),
+    ],
+)
+def test_a_set_that_leaves_much_must_explain_nearly_all_by_each_effect(
+    without, is_both
+):
+    whole = made_up(("coulomb_friction", "one_sided_stop"), 1_000.0, whiteness=9.0)
+    one = made_up(("coulomb_friction",), without, whiteness=9.0)
+    other = made_up(("one_sided_stop",), 150_000.0, whiteness=9.0)
+    fits = [one, other, whole]
+    verdict = decided(base(200_000.0), fits, [one, whole], given=200_000.0)
+    assert verdict.chosen is (whole if is_both else one)
+    # What has not been tried without one of them is not known to need it.
+    verdict = decided(base(200_000.0), [one, whole], [one, whole], given=200_000.0)
+    assert verdict.chosen is one
+
+
+@pytest.mark.parametrize(
+    ("left", "word"), [(5_000.0, "unknown"), (1_500.0, "named"), (140.0, "named")]
+)
+def test_values_of_each_recording_that_leave_much_must_explain_nearly_all(left, word):
+    own = [0.3, -0.3] * 3
+    change = made_up(("parameter_change:damping",), left, whiteness=9.0, own=own)
+    verdict = decided(base(200_000.0), [change], [change], given=200_000.0)
+    assert verdict.word == word
+    # Nor is it one of rivals that each explain a part.
+    friction = made_up(("coulomb_friction",), 90_000.0, whiteness=9.0)
+    half = replace(change, sse=np.full(6, 95_000.0))
+    verdict = decided(base(200_000.0), [half, friction], [friction], given=200_000.0)
+    assert change.effects not in [one.effects for one in verdict.rivals]
+
+
 def test_two_that_are_as_good_are_ambiguous():
     verdict = decided(base(), [NAMED, RIVAL], [NAMED])
     assert verdict.word == "ambiguous"
