@@ -92,7 +92,7 @@ def candidates(folder: Path) -> list[str]:
         "## Candidates that explain most",
         "",
         "Each row is a set of effects that was added to the simulation and fitted. *Explained* is the share of the excess over the noise, on",
-        "held-out recordings, that the set removes. A larger set is named only if it also explains 80 % of what the smaller set leaves",
+        "held-out recordings, that the set removes. A larger set is named only where each of its effects is needed",
         '([method_diagnosis.md](method_diagnosis.md), "Which candidate").',
         "",
         "| effects added | explained |",
