@@ -102,16 +102,16 @@ DELAY = Effect(
     confused_with={"actuator_lag": "a sine far above the natural frequency"},
 )
 
+_TIME_CONSTANT = Parameter(
+    "time_constant_s", _times, _time_bounds, places=("LAG",), limits=(POSITIVE,)
+)
+
 LAG = Effect(
     id="actuator_lag",
     sentence="the current follows the command with a first-order lag",
     equation="tau di/dt + i = command",
     enters="command",
-    parameters=(
-        Parameter(
-            "time_constant_s", _times, _time_bounds, places=("LAG",), limits=(POSITIVE,)
-        ),
-    ),
+    parameters=(_TIME_CONSTANT,),
     confused_with={
         "input_delay": "a sine far above the natural frequency",
         "winding_inductance": "fast motion without voltage, such as after a release",
@@ -124,9 +124,7 @@ SECOND_ORDER_LAG = Effect(
     equation="tau^2 i'' + 2 z tau i' + i = command",
     enters="command",
     parameters=(
-        Parameter(
-            "time_constant_s", _times, _time_bounds, places=("LAG",), limits=(POSITIVE,)
-        ),
+        _TIME_CONSTANT,
         Parameter(
             "damping_ratio",
             lambda scales: (0.7, 1.5),
