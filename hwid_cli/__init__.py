@@ -30,10 +30,7 @@ Examples
 True
 """
 
-import os
 from importlib import import_module
-from pathlib import Path
-from tempfile import TemporaryFile, mkdtemp
 from typing import Any
 
 __version__ = "0.1.0"
@@ -101,34 +98,6 @@ __all__ = [
     "rmsd",
     "simulate",
 ]
-
-
-def _may_be_made(folder: Path) -> bool:
-    """Whether a folder may be written, or made where it is missing."""
-    there = next(one for one in (folder, *folder.parents) if one.exists())
-    try:
-        # As numba tries it: rights alone do not say whether a disk takes a file.
-        TemporaryFile(dir=there).close()
-    except OSError:
-        return False
-    return True
-
-
-def _place_compiled_loops() -> None:
-    """Name a folder for compiled loops where numba would find none: some give up then."""
-    user = Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser()
-    places = (Path(__file__).parent / "model" / "__pycache__", user / "numba")
-    if os.environ.get("NUMBA_CACHE_DIR") or any(map(_may_be_made, places)):
-        return
-    import atexit  # noqa: PLC0415, RUF100
-    import shutil  # noqa: PLC0415, RUF100
-
-    # Workers inherit it; it goes with the process that made it.
-    folder = os.environ["NUMBA_CACHE_DIR"] = mkdtemp(prefix="hwid_loops_")
-    atexit.register(shutil.rmtree, folder, ignore_errors=True)
-
-
-_place_compiled_loops()
 
 
 def __getattr__(name: str) -> Any:

@@ -216,16 +216,6 @@ def with_places(text: str, places: Sequence[str]) -> str:
     return text.replace(_END.format(count), added + _END.format(count + len(places)))
 
 
-def forget_compiled() -> None:
-    """Remove what numba keeps of the loops.
-
-    It compiles a function again where its own file changed, but not where only a function
-    that it calls did.
-    """
-    for path in (ROOT / "hwid_cli" / "drive").rglob("*.nb[ic]"):
-        path.unlink()
-
-
 def main() -> int:
     """Write the source, or compare it.
 
@@ -242,7 +232,6 @@ def main() -> int:
     if missing:
         SLOTS.write_text(with_places(SLOTS.read_text(), missing))
         importlib.reload(slots)
-    forget_compiled()
     TARGET.write_text(source())
     return 0
 

@@ -20,8 +20,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
-from numba import njit
 
+from hwid_cli.compiled import compiled
 from hwid_cli.diagnosis.problem import Compared
 from hwid_cli.records.diagnosis import NoiseFloor
 from hwid_cli.records.drive import Controller, Drive
@@ -31,7 +31,7 @@ _N = 3
 _SETTLED = 1e-12
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def forward_gains(
     transition: np.ndarray,
     reading: np.ndarray,
@@ -95,7 +95,7 @@ def forward_gains(
     return int(gains.shape[0])
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def misfit(
     measured: np.ndarray,
     transition: np.ndarray,
@@ -141,7 +141,7 @@ def misfit(
     return total
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def backward_gains(
     transition: np.ndarray,
     walk: float,
@@ -167,7 +167,7 @@ def backward_gains(
         gains[n] = np.linalg.solve(predicted, transition @ covariances[n]).T
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def smoothed_variance(
     transition: np.ndarray,
     walk: float,
@@ -202,7 +202,7 @@ def smoothed_variance(
         variance[n] = known[_N - 1, _N - 1]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def smooth(
     measured: np.ndarray,
     transition: np.ndarray,

@@ -6,10 +6,9 @@ on their ends. docs/method_diagnosis.md, eq. (D4).
 """
 
 import numpy as np
-from numba import njit
 
+from hwid_cli.compiled import INNER, compiled
 from hwid_cli.drive import slots
-from hwid_cli.drive.compiled import INNER
 from hwid_cli.drive.interpreter import formula_value
 
 # Most pieces of one interval: 2 (delay) x 3 (dead zone) x 3 (saturation) x 2 (rate), with
@@ -19,7 +18,7 @@ MOST_PIECES = 80
 OWN_PIECES = 4
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def command_pieces(
     n: int,
     time: float,
@@ -79,7 +78,7 @@ def command_pieces(
     return count, followed
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def is_untouched(p: np.ndarray) -> bool:
     """Return whether the command passes as it is.
 
@@ -96,7 +95,7 @@ def is_untouched(p: np.ndarray) -> bool:
     )
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def static_command(value: float, p: np.ndarray) -> float:
     """Return what becomes of a constant command.
 
@@ -113,7 +112,7 @@ def static_command(value: float, p: np.ndarray) -> float:
     return min(max(value, -limit), limit)
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def _dead_zone(value: float, half: float) -> float:
     if value > half:
         return value - half
@@ -122,7 +121,7 @@ def _dead_zone(value: float, half: float) -> float:
     return 0.0
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def _delayed(
     n: int,
     sample_time: float,
@@ -162,7 +161,7 @@ def _delayed(
     return count
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def _through_formula(pieces: np.ndarray, count: int, time: float, p: np.ndarray) -> int:
     """Put pieces through a formula of input and time, each cut into several.
 
@@ -190,7 +189,7 @@ def _through_formula(pieces: np.ndarray, count: int, time: float, p: np.ndarray)
     return OWN_PIECES * count
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def _split(pieces: np.ndarray, count: int, level: float) -> int:
     """Split pieces where they cross plus or minus a level."""
     for side in (-1.0, 1.0):
@@ -214,7 +213,7 @@ def _split(pieces: np.ndarray, count: int, level: float) -> int:
     return count
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def _limit_rate(
     pieces: np.ndarray, count: int, rate: float, followed: float
 ) -> tuple[int, float]:

@@ -4,17 +4,16 @@ docs/method_diagnosis.md, eq. (D1a), (D1b).
 """
 
 import numpy as np
-from numba import njit
 
+from hwid_cli.compiled import INNER, compiled
 from hwid_cli.drive import slots
-from hwid_cli.drive.compiled import INNER
 
 # Places in what a controller keeps: sum of the error over time, error at the last
 # sample, and whether there was one.
 ERROR_SUM, LAST_ERROR, HAS_ERROR, N_CONTROL = range(4)
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def is_closed(p: np.ndarray) -> bool:
     """Return whether a controller sets the command.
 
@@ -25,7 +24,7 @@ def is_closed(p: np.ndarray) -> bool:
     return p[slots.VELOCITY_GAIN] > 0.0 or p[slots.PROPORTIONAL_GAIN] > 0.0
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def controlled(
     reference: float,
     x: float,

@@ -7,10 +7,9 @@ docs/method_diagnosis.md, eq. (D34).
 """
 
 import numpy as np
-from numba import njit
 
+from hwid_cli.compiled import INNER, compiled
 from hwid_cli.drive import slots
-from hwid_cli.drive.compiled import INNER
 
 # What a step may put on the pile, by the number beside its code. ``way`` is the direction
 # of sliding, 0 at rest; ``gain`` the force constant.
@@ -45,7 +44,7 @@ VARIABLES = ("x", "v", "u", "t", "way", "gain")
 ) = range(25)
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def formula_value(
     at: float,
     x: float,
@@ -87,7 +86,7 @@ def formula_value(
     return p[bottom]
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def _variable(
     which: int,
     x: float,
@@ -109,7 +108,7 @@ def _variable(
     return way if which == 4 else p[slots.FORCE_CONSTANT]
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def _combined(step: int, a: float, b: float) -> float:
     """Return what becomes of two numbers."""
     if step == ADD:
@@ -125,7 +124,7 @@ def _combined(step: int, a: float, b: float) -> float:
     return max(a, b) if step == MAX else min(a, b)
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def _changed(step: int, a: float) -> float:
     """Return what becomes of a number."""
     if step == NEGATE:
@@ -147,7 +146,7 @@ def _changed(step: int, a: float) -> float:
     return _curved(step, a)
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def _curved(step: int, a: float) -> float:
     """Return what becomes of a number, by the rarer functions."""
     if step == EXP:

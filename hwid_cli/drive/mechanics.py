@@ -15,8 +15,8 @@ event search relies on. docs/method_simulation.md, eq. (G5) to (G8).
 """
 
 import numpy as np
-from numba import njit
 
+from hwid_cli.compiled import compiled
 from hwid_cli.records.mechanics import Mechanics
 
 # Terms of the series. With h (c/m + sqrt(k/m)) <= LONGEST_PHASE the first term left out
@@ -35,7 +35,7 @@ TIME_RESOLUTION = 4e-16
 END, STOP, EDGE = 0, 1, 2
 
 
-@njit(cache=True)
+@compiled()
 def propagate(
     force: np.ndarray,
     sample_time: float,
@@ -80,7 +80,7 @@ def propagate(
     return positions, velocities
 
 
-@njit(cache=True)
+@compiled()
 def _sub_step(
     moving: tuple[float, float, float],
     push: tuple[float, float],
@@ -128,7 +128,7 @@ def _sub_step(
             side = _side(x, direction, contact)
 
 
-@njit(cache=True)
+@compiled()
 def _net_force(
     x: float,
     side: float,
@@ -145,7 +145,7 @@ def _net_force(
     return force - spring, BALANCE * (abs(force) + abs(spring))
 
 
-@njit(cache=True)
+@compiled()
 def _break_away_time(net: float, slope: float, threshold: float, left: float) -> float:
     """Return when the net force leaves the band of stiction; ``left`` if it does not."""
     if abs(net) > threshold:
@@ -155,7 +155,7 @@ def _break_away_time(net: float, slope: float, threshold: float, left: float) ->
     return (threshold - net * _sign(slope)) / abs(slope)
 
 
-@njit(cache=True)
+@compiled()
 def _fill_series(
     series: np.ndarray,
     x: float,
@@ -179,7 +179,7 @@ def _fill_series(
         series[n + 2] = -pull / (m * (n + 2) * (n + 1))
 
 
-@njit(cache=True)
+@compiled()
 def _first_event(
     series: np.ndarray,
     direction: float,
@@ -196,7 +196,7 @@ def _first_event(
     return time, event
 
 
-@njit(cache=True)
+@compiled()
 def _stop_time(series: np.ndarray, direction: float, left: float) -> tuple[float, int]:
     """Return when the velocity first changes its sign; ``left`` and END if never."""
     start = direction * series[2]
@@ -217,7 +217,7 @@ def _stop_time(series: np.ndarray, direction: float, left: float) -> tuple[float
     return left, END
 
 
-@njit(cache=True)
+@compiled()
 def _crossing(
     series: np.ndarray, order: int, level: float, sense: float, low: float, high: float
 ) -> float:
@@ -238,7 +238,7 @@ def _crossing(
     return high
 
 
-@njit(cache=True)
+@compiled()
 def _edge_ahead(
     direction: float, side: float, contact: tuple[float, float, float]
 ) -> float:
@@ -250,7 +250,7 @@ def _edge_ahead(
     return direction * np.inf
 
 
-@njit(cache=True)
+@compiled()
 def _side(x: float, direction: float, contact: tuple[float, float, float]) -> float:
     """Return 1 beyond the upper edge, -1 beyond the lower one, else 0."""
     if x > contact[1] or (x == contact[1] and direction > 0.0):
@@ -260,7 +260,7 @@ def _side(x: float, direction: float, contact: tuple[float, float, float]) -> fl
     return 0.0
 
 
-@njit(cache=True)
+@compiled()
 def _value(series: np.ndarray, time: float) -> float:
     """Return the sum of the series."""
     total = 0.0
@@ -269,7 +269,7 @@ def _value(series: np.ndarray, time: float) -> float:
     return total
 
 
-@njit(cache=True)
+@compiled()
 def _slope(series: np.ndarray, time: float) -> float:
     """Return the first derivative of the series."""
     total = 0.0
@@ -278,7 +278,7 @@ def _slope(series: np.ndarray, time: float) -> float:
     return total
 
 
-@njit(cache=True)
+@compiled()
 def _bend(series: np.ndarray, time: float) -> float:
     """Return the second derivative of the series."""
     total = 0.0
@@ -287,7 +287,7 @@ def _bend(series: np.ndarray, time: float) -> float:
     return total
 
 
-@njit(cache=True)
+@compiled()
 def _sign(value: float) -> float:
     """Return -1, 0 or 1."""
     if value > 0.0:

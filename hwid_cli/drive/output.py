@@ -4,10 +4,9 @@ docs/method_diagnosis.md, eq. (D14), (D14a).
 """
 
 import numpy as np
-from numba import njit
 
+from hwid_cli.compiled import INNER, MAKING, compiled
 from hwid_cli.drive import slots
-from hwid_cli.drive.compiled import INNER, MAKING
 from hwid_cli.drive.interpreter import formula_value
 from hwid_cli.drive.motion.push import TURN
 
@@ -15,7 +14,7 @@ from hwid_cli.drive.motion.push import TURN
 TOUCHING = 1e-9
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def read(
     positions: np.ndarray,
     velocities: np.ndarray,
@@ -42,7 +41,7 @@ def read(
     return output
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def on_other_clock(
     positions: np.ndarray, velocities: np.ndarray, step: float, n: int
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -76,7 +75,7 @@ def on_other_clock(
     return places, speeds
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def sensed(
     y: float, lag: float, speed: float, command: float, time: float, p: np.ndarray
 ) -> float:
@@ -125,7 +124,7 @@ def sensed(
     return y
 
 
-@njit(**MAKING)
+@compiled(**MAKING)
 def _play(
     positions: np.ndarray,
     velocities: np.ndarray,
@@ -151,7 +150,7 @@ def _play(
     return followed
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def _extreme(x0: float, v0: float, x1: float, v1: float) -> float:
     """Return the turning point of the cubic with these ends and slopes."""
     # Slope of the cubic: a t^2 + b t + v0 for t from 0 to 1.

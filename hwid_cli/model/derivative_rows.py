@@ -1,7 +1,8 @@
 """Compiled rows of a model's derivatives and sums over them; nothing else compiles here."""
 
 import numpy as np
-from numba import njit
+
+from hwid_cli.compiled import compiled
 
 # Decaying responses end in subnormal numbers, which processors handle a hundred times
 # slower; anything this small is far below the rounding of the values it is added to.
@@ -13,7 +14,7 @@ _FLUSH, _CHUNK = 64, 256
 _DENSE = 2
 
 
-@njit(cache=True)
+@compiled()
 def derivative_rows(
     signals: tuple[np.ndarray, np.ndarray],
     block: tuple[np.ndarray, np.ndarray, int],
@@ -123,7 +124,7 @@ def derivative_rows(
                 lines[k, m] = lines[last + 1 + k, m]
 
 
-@njit(cache=True)
+@compiled()
 def all_pole(lines: np.ndarray, begin: int, length: int, taps: np.ndarray) -> None:
     """Subtract from each row its predecessors times the taps, in place.
 
@@ -172,14 +173,14 @@ def all_pole(lines: np.ndarray, begin: int, length: int, taps: np.ndarray) -> No
                 row[m] -= taps[j] * source[m]
 
 
-@njit(cache=True)
+@compiled()
 def _flush(row: np.ndarray) -> None:
     """Set what has all but died away to zero."""
     for m in range(row.size):
         row[m] = 0.0 if abs(row[m]) < _TINY else row[m]
 
 
-@njit(cache=True)
+@compiled()
 def _all_zero(
     lines: np.ndarray, at: int, zeros: np.ndarray, wide: int, out: np.ndarray
 ) -> None:
@@ -202,7 +203,7 @@ def _all_zero(
                 out[m] += b0 * s0[m] + b1 * s1[m] + b2 * s2[m] + b3 * s3[m]
 
 
-@njit(cache=True)
+@compiled()
 def differences(
     lines: np.ndarray, at: int, column: int, count: int, length: int, table: np.ndarray
 ) -> None:
@@ -231,7 +232,7 @@ def differences(
             higher[k] = lower[k] - lower[k - 1]
 
 
-@njit(cache=True)
+@compiled()
 def local_sums(
     first: np.ndarray, shares: np.ndarray, rows: np.ndarray, count: int
 ) -> tuple[np.ndarray, np.ndarray]:

@@ -21,7 +21,8 @@ from functools import lru_cache
 
 import numpy as np
 import scipy
-from numba import njit
+
+from hwid_cli.compiled import compiled
 
 # Decaying responses end in subnormal numbers, which processors handle a hundred times
 # slower; anything this small is far below the rounding of the values it is added to.
@@ -30,7 +31,7 @@ _TINY = 1e-200
 _FLUSH = 64
 
 
-@njit(cache=True)
+@compiled()
 def block_output(
     signal: np.ndarray,
     numerator: np.ndarray,
@@ -87,7 +88,7 @@ def block_output(
     return _all_pole(passed, denominator, rest)
 
 
-@njit(cache=True)
+@compiled()
 def _all_pole(signal: np.ndarray, denominator: np.ndarray, rest: float) -> np.ndarray:
     """Run 1/F along a signal; before it the result was at rest."""
     n, nf = signal.size, denominator.size - 1
@@ -126,7 +127,7 @@ def _all_pole(signal: np.ndarray, denominator: np.ndarray, rest: float) -> np.nd
     return out[taps.size :]
 
 
-@njit(cache=True)
+@compiled()
 def residuals_and_loss(
     measured: np.ndarray, simulated: np.ndarray, counted: np.ndarray, threshold: float
 ) -> tuple[np.ndarray, float]:
@@ -166,7 +167,7 @@ def residuals_and_loss(
     return residuals, total
 
 
-@njit(cache=True)
+@compiled()
 def difference_columns(
     signal: np.ndarray,
     pad: int,
@@ -200,7 +201,7 @@ def difference_columns(
             out[t, first + j] = gain[t] * differences[j]
 
 
-@njit(cache=True)
+@compiled()
 def _push(value: float, differences: np.ndarray, before: np.ndarray) -> None:
     """Advance the differences of all orders by one sample."""
     current = value
@@ -210,7 +211,7 @@ def _push(value: float, differences: np.ndarray, before: np.ndarray) -> None:
         before[j] = differences[j]
 
 
-@njit(cache=True)
+@compiled()
 def is_schur_stable(denominator: np.ndarray) -> bool:
     """Tell whether every root of a monic polynomial lies inside the unit circle.
 

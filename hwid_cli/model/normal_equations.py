@@ -2,7 +2,8 @@
 
 import numpy as np
 import scipy
-from numba import njit
+
+from hwid_cli.compiled import compiled
 
 # Initial states of fewer experiments are solved for together with all else.
 _FEW = 3
@@ -69,7 +70,7 @@ def _positive(matrix: np.ndarray, vector: np.ndarray) -> np.ndarray | None:
     return step if info == 0 and np.isfinite(step @ step) else None
 
 
-@njit(cache=True)
+@compiled()
 def scaled_equations(
     matrix: np.ndarray, vector: np.ndarray, least: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -108,7 +109,7 @@ def scaled_equations(
     return scaled, right, scale
 
 
-@njit(cache=True)
+@compiled()
 def combined(total: np.ndarray, change: np.ndarray, first: int) -> np.ndarray:
     """Products of columns after some of them are replaced by combinations of them.
 

@@ -16,8 +16,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
-from numba import njit
 
+from hwid_cli.compiled import compiled
 from hwid_cli.model.candidates import FitData
 from hwid_cli.model.derivative_rows import all_pole, differences
 from hwid_cli.model.linear_block import (
@@ -30,7 +30,7 @@ from hwid_cli.model.maps.piecewise_linear import hat_functions
 from hwid_cli.records.model import Orders
 
 
-@njit(cache=True)
+@compiled()
 def regression_columns(
     output: np.ndarray,
     basis: tuple[np.ndarray, np.ndarray, int, int],
@@ -99,7 +99,7 @@ def regression_columns(
     _pick(output, counted, 1.0, columns[place + 2])
 
 
-@njit(cache=True)
+@compiled()
 def _pick(
     signal: np.ndarray, counted: np.ndarray, factor: float, out: np.ndarray
 ) -> None:

@@ -4,10 +4,9 @@ docs/method_diagnosis.md, eq. (D2), (D7), (D10), (D11).
 """
 
 import numpy as np
-from numba import njit
 
+from hwid_cli.compiled import INNER, compiled
 from hwid_cli.drive import slots
-from hwid_cli.drive.compiled import INNER
 from hwid_cli.drive.motion.forces import (
     MOTOR_V,
     MOTOR_X,
@@ -20,7 +19,7 @@ from hwid_cli.drive.motion.forces import (
 from hwid_cli.drive.motion.push import depends_on_motion
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def has_teeth(p: np.ndarray) -> bool:
     """Return whether motor and load can let go of each other.
 
@@ -31,7 +30,7 @@ def has_teeth(p: np.ndarray) -> bool:
     return p[slots.GEAR_STIFFNESS] > 0.0 and p[slots.IS_COUPLED] <= 0.0
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def count_edges(p: np.ndarray) -> int:
     """Return how many effects have corners in their force.
 
@@ -49,7 +48,7 @@ def count_edges(p: np.ndarray) -> int:
     return count
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def corner_of(
     state: np.ndarray, command: float, p: np.ndarray
 ) -> tuple[int, float, float, float, float, float]:
@@ -114,7 +113,7 @@ def corner_of(
     return code, stiffness, offset, teeth, teeth_offset, clip
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def _further_corner(code: int, state: np.ndarray, command: float, p: np.ndarray) -> int:
     """Number that tells the sides of the edges that few drives have, too."""
     x = state[X]
@@ -130,7 +129,7 @@ def _further_corner(code: int, state: np.ndarray, command: float, p: np.ndarray)
     return code
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def margin(state: np.ndarray, command: float, corner: int, p: np.ndarray) -> float:
     """Return how far the drive is from the next corner of a force.
 
@@ -183,13 +182,13 @@ def margin(state: np.ndarray, command: float, corner: int, p: np.ndarray) -> flo
     return left
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def _pushing(state: np.ndarray, command: float, p: np.ndarray) -> float:
     """Force of the motor, or the current that has its sign."""
     return drawn_current(command, state, p) if depends_on_motion(p) else command
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def _inside_teeth(state: np.ndarray, side: int, p: np.ndarray) -> float:
     """Teeth touch beyond the gap, as long as their damping does not pull."""
     twist = state[MOTOR_X] - state[X]
@@ -203,14 +202,14 @@ def _inside_teeth(state: np.ndarray, side: int, p: np.ndarray) -> float:
     return forward if side == 2 else backward
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def _inside(x: float, edge: float, side: int) -> float:
     if side == 1:
         return edge - abs(x)
     return x - edge if side == 2 else -edge - x
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def _side(x: float, edge: float) -> int:
     if x > edge:
         return 2

@@ -4,10 +4,9 @@ docs/method_diagnosis.md, eq. (D2), (D8) to (D10).
 """
 
 import numpy as np
-from numba import njit
 
+from hwid_cli.compiled import INNER, MAKING, compiled
 from hwid_cli.drive import slots
-from hwid_cli.drive.compiled import INNER, MAKING
 from hwid_cli.drive.motion.forces import (
     DEFLECTION,
     MOTOR_V,
@@ -55,7 +54,7 @@ OWN_AHEAD = 6.0
 CONTACT_FINER = 2.0
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def is_always_curved(p: np.ndarray) -> bool:
     """Return whether no stretch of the motion is linear.
 
@@ -66,7 +65,7 @@ def is_always_curved(p: np.ndarray) -> bool:
     return is_force_curved(p) or (depends_on_motion(p) and has_losses(p))
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def is_curved_here(state: np.ndarray, memory: np.ndarray, p: np.ndarray) -> bool:
     """Return whether friction is curved at this velocity and after this way.
 
@@ -89,7 +88,7 @@ def is_curved_here(state: np.ndarray, memory: np.ndarray, p: np.ndarray) -> bool
     return p[slots.HAS_CONTACT] != 0.0 and _touches(state[X], p)
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def _touches(x: float, p: np.ndarray) -> bool:
     """Whether the drive is in a contact whose force is curved."""
     is_bent = p[slots.STOP_BEND] + p[slots.STOP_LOSS] != 0.0
@@ -102,7 +101,7 @@ def _touches(x: float, p: np.ndarray) -> bool:
     return is_bent and beyond_side(x, p[slots.SECOND_POSITION]) != 0.0
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def _contact_rate(x: float, v: float, mass: float, p: np.ndarray) -> float:
     """Return how fast the motion in curved contacts turns."""
     into = beyond(x, p[slots.STOP_POSITION])
@@ -116,7 +115,7 @@ def _contact_rate(x: float, v: float, mass: float, p: np.ndarray) -> float:
     return rate + _rate_of_contact(into, v, mass, p[slots.SECOND_STIFFNESS], bend, loss)
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def _rate_of_contact(
     into: float, v: float, mass: float, stiffness: float, bend: float, loss: float
 ) -> float:
@@ -132,7 +131,7 @@ def _rate_of_contact(
     )
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def step_limit(
     state: np.ndarray, memory: np.ndarray, push: np.ndarray, done: float, p: np.ndarray
 ) -> float:
@@ -191,7 +190,7 @@ def step_limit(
     return LONGEST_PHASE / max(rate, 1e-9)
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def _rate_of_own(
     state: np.ndarray,
     memory: np.ndarray,
@@ -225,7 +224,7 @@ def _rate_of_own(
     return rate
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def _further_stiffness(
     state: np.ndarray, push: np.ndarray, done: float, p: np.ndarray
 ) -> tuple[float, float]:
@@ -247,7 +246,7 @@ def _further_stiffness(
     return stiffness, waves
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def _rate_of_yielding(
     state: np.ndarray, memory: np.ndarray, mass: float, p: np.ndarray
 ) -> float:
@@ -264,7 +263,7 @@ def _rate_of_yielding(
     return np.sqrt(stiffness * fading / mass) + 0.6 * speed * np.sqrt(np.sqrt(fading))
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def _rate_in_shape(
     state: np.ndarray, memory: np.ndarray, mass: float, p: np.ndarray
 ) -> float:
@@ -280,7 +279,7 @@ def _rate_in_shape(
     return np.sqrt(stiffness / mass) + 0.6 * speed * np.sqrt(np.sqrt(fading))
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def step_plain(
     x: float,
     v: float,
@@ -322,7 +321,7 @@ def step_plain(
     )
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def runge_kutta_stage(stage: int, h: float) -> tuple[float, float, float]:
     """Return a stage's time in the step, its weight, and the way to the next one.
 
@@ -342,7 +341,7 @@ def runge_kutta_stage(stage: int, h: float) -> tuple[float, float, float]:
     return 0.5 * h, 2.0, h if stage == 2 else 0.5 * h
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def _step_varying(
     x: float,
     v: float,
@@ -373,7 +372,7 @@ def _step_varying(
     return x1, v1
 
 
-@njit(**MAKING)
+@compiled(**MAKING)
 def step_all(
     state: np.ndarray,
     trial: np.ndarray,
@@ -418,7 +417,7 @@ def step_all(
         trial[n] = state[n] + h / 6.0 * total[n]
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def _step_coupled(
     state: np.ndarray,
     trial: np.ndarray,

@@ -4,10 +4,9 @@ docs/method_diagnosis.md, eq. (D2), (D3).
 """
 
 import numpy as np
-from numba import njit
 
+from hwid_cli.compiled import INNER, compiled
 from hwid_cli.drive import slots
-from hwid_cli.drive.compiled import INNER
 from hwid_cli.drive.motion.corners import corner_of, margin
 from hwid_cli.drive.motion.curved import is_curved_here, step_all, step_plain
 from hwid_cli.drive.motion.forces import (
@@ -47,7 +46,7 @@ OFF_EDGE, ON_EDGE = 1e-100, 1e-200
 LEAVING, REVERSAL, EDGE = 0, 1, 2
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def steady_force(memory: np.ndarray, p: np.ndarray) -> float:
     """Return friction and preload on a stretch that is linear.
 
@@ -67,7 +66,7 @@ def steady_force(memory: np.ndarray, p: np.ndarray) -> float:
     return force
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def set_inputs(
     inputs: np.ndarray, memory: np.ndarray, push: np.ndarray, done: float, p: np.ndarray
 ) -> None:
@@ -90,7 +89,7 @@ def set_inputs(
     inputs[OTHERS], inputs[OTHERS + 1], inputs[OTHERS + 2] = b, c, d
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def advance(
     state: np.ndarray,
     trial: np.ndarray,
@@ -154,7 +153,7 @@ def advance(
         trial[X], trial[V] = x, v
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def excess(
     state: np.ndarray, memory: np.ndarray, push: np.ndarray, done: float, p: np.ndarray
 ) -> tuple[float, float]:
@@ -176,7 +175,7 @@ def excess(
     return net, more
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def set_off(state: np.ndarray, memory: np.ndarray, way: float, p: np.ndarray) -> None:
     """Let the drive slide from where it rests.
 
@@ -194,7 +193,7 @@ def set_off(state: np.ndarray, memory: np.ndarray, way: float, p: np.ndarray) ->
         memory[SIDE] = way
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def pass_zero(
     state: np.ndarray, memory: np.ndarray, push: np.ndarray, done: float, p: np.ndarray
 ) -> None:
@@ -228,7 +227,7 @@ def pass_zero(
     memory[SIDE] = np.sign(state[X])
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def stop(
     state: np.ndarray, memory: np.ndarray, push: np.ndarray, done: float, p: np.ndarray
 ) -> None:
@@ -253,7 +252,7 @@ def stop(
         set_off(state, memory, np.sign(net), p)
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def time_of(
     event: int,
     state: np.ndarray,

@@ -4,10 +4,9 @@ docs/method_diagnosis.md, eq. (D1) to (D3), (D7) to (D13).
 """
 
 import numpy as np
-from numba import njit
 
+from hwid_cli.compiled import INNER, compiled
 from hwid_cli.drive import slots
-from hwid_cli.drive.compiled import INNER
 from hwid_cli.drive.interpreter import formula_value
 from hwid_cli.drive.motion.push import (
     BEGUN,
@@ -39,7 +38,7 @@ NEARLY_YIELDED = 1e-3
 MOST_TURNS = 60
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def acceleration(
     state: np.ndarray, memory: np.ndarray, push: np.ndarray, done: float, p: np.ndarray
 ) -> tuple[float, float, float, float]:
@@ -80,7 +79,7 @@ def acceleration(
     return net / mass, motor, mode, rate
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def net_forces(
     x: float,
     v: float,
@@ -122,7 +121,7 @@ def net_forces(
     return net, motor
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def own_force(
     x: float, v: float, way: float, push: np.ndarray, done: float, p: np.ndarray
 ) -> float:
@@ -149,7 +148,7 @@ def own_force(
     return 0.5 * (forward + formula_value(at, x, 0.0, u, t, -1.0, p))
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def own_friction(x: float, push: np.ndarray, done: float, p: np.ndarray) -> float:
     """Return up to which force formulas of the user's own hold a resting drive.
 
@@ -170,7 +169,7 @@ def own_friction(x: float, push: np.ndarray, done: float, p: np.ndarray) -> floa
     return 0.5 * (backward - formula_value(at, x, 0.0, u, t, 1.0, p))
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def own_force_at_rest(x: float, command: float, p: np.ndarray) -> float:
     """Return the force of the user's own formulas on a drive that rests at first.
 
@@ -189,7 +188,7 @@ def own_force_at_rest(x: float, command: float, p: np.ndarray) -> float:
     return min(max(0.0, low), high)
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def wanted_current(command: float, state: np.ndarray, p: np.ndarray) -> float:
     """Return the current before the voltage limit.
 
@@ -207,7 +206,7 @@ def wanted_current(command: float, state: np.ndarray, p: np.ndarray) -> float:
     return (command - p[slots.BACK_EMF] * speed) / p[slots.RESISTANCE]
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def moved_mass(p: np.ndarray) -> float:
     """Return the mass that the spring holds.
 
@@ -220,7 +219,7 @@ def moved_mass(p: np.ndarray) -> float:
     return p[slots.MASS]
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def resisting(x: float, v: float, memory: np.ndarray, p: np.ndarray) -> float:
     """Return what acts against the motion.
 
@@ -245,7 +244,7 @@ def resisting(x: float, v: float, memory: np.ndarray, p: np.ndarray) -> float:
     return force
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def spring_force(x: float, p: np.ndarray) -> float:
     """Return the force of everything that depends on position alone but a preload.
 
@@ -270,7 +269,7 @@ def spring_force(x: float, p: np.ndarray) -> float:
     return force
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def further_spring(x: float, p: np.ndarray) -> float:
     """Return the force of what few drives have: weight, a second of a kind.
 
@@ -290,7 +289,7 @@ def further_spring(x: float, p: np.ndarray) -> float:
     return force
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def spring_rate(x: float, p: np.ndarray) -> float:
     """Return how stiff the springs are here at most but for curved contacts, [N/m].
 
@@ -319,7 +318,7 @@ def spring_rate(x: float, p: np.ndarray) -> float:
     return stiffness
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def is_force_curved(p: np.ndarray) -> bool:
     """Return whether a force on the mass is curved everywhere.
 
@@ -341,7 +340,7 @@ def is_force_curved(p: np.ndarray) -> bool:
     )
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def cogging(x: float, p: np.ndarray) -> float:
     """Return the force that repeats along the way.
 
@@ -355,7 +354,7 @@ def cogging(x: float, p: np.ndarray) -> float:
     return p[slots.COGGING_FORCE] * swing
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def second_cogging(x: float, p: np.ndarray) -> float:
     """Return the force that repeats along the way with another period.
 
@@ -369,7 +368,7 @@ def second_cogging(x: float, p: np.ndarray) -> float:
     return p[slots.SECOND_COGGING_FORCE] * (np.sin(angle + phase) - np.sin(phase))
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def ripple(angle: float, p: np.ndarray) -> float:
     """Return by what the motor's force is multiplied at an angle.
 
@@ -382,7 +381,7 @@ def ripple(angle: float, p: np.ndarray) -> float:
     return 1.0 + p[slots.RIPPLE_SHARE] * np.sin(turned)
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def bent(into: float, bend: float) -> float:
     """Return how a contact's force grows: ``into |into|^bend``.
 
@@ -398,7 +397,7 @@ def bent(into: float, bend: float) -> float:
     return into * np.power(abs(into), bend)
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def contact_damping(x: float, v: float, p: np.ndarray) -> float:
     """Return what the damping of stops adds to their force; they never pull.
 
@@ -424,7 +423,7 @@ def contact_damping(x: float, v: float, p: np.ndarray) -> float:
     return force
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def beyond_side(x: float, edge: float) -> float:
     """Return how far a position is beyond a stop on the side of its sign.
 
@@ -436,7 +435,7 @@ def beyond_side(x: float, edge: float) -> float:
     return into if into * edge > 0.0 else 0.0
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def beyond(x: float, half_gap: float) -> float:
     """Return how far a position is beyond a gap, with its sign.
 
@@ -452,7 +451,7 @@ def beyond(x: float, half_gap: float) -> float:
     return 0.0
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def bite(twist: float, speed: float, p: np.ndarray) -> float:
     """Return the force of the teeth, which push and never pull, or of the coupling.
 
@@ -472,7 +471,7 @@ def bite(twist: float, speed: float, p: np.ndarray) -> float:
     return min(force, 0.0) if into < 0.0 else 0.0
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def yielded(x: float, memory: np.ndarray, p: np.ndarray) -> float:
     """Return the deflection of the hysteresis, -1 to 1.
 
@@ -491,7 +490,7 @@ def yielded(x: float, memory: np.ndarray, p: np.ndarray) -> float:
     return way - (way - memory[DEFLECTION]) * np.exp(-gone)
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def yielding(ahead: float, p: np.ndarray) -> float:
     """Return how the deflection of a hysteresis of any shape grows, [1/yield length].
 
@@ -507,7 +506,7 @@ def yielding(ahead: float, p: np.ndarray) -> float:
     return 1.0 - share
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def _yielded_in_shape(ahead: float, gone: float, p: np.ndarray) -> float:
     """Return the deflection in the direction of motion after a way in yield lengths."""
     count = np.ceil(gone * (1.0 + p[slots.HYSTERESIS_BEND]) / SHAPE_STEP)
@@ -528,7 +527,7 @@ def _yielded_in_shape(ahead: float, gone: float, p: np.ndarray) -> float:
     return min(ahead, 1.0)
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def _left_to_yield(left: float, gone: float, p: np.ndarray) -> float:
     """Return what is left of a deflection near 1, where the law is nearly linear.
 
@@ -539,7 +538,7 @@ def _left_to_yield(left: float, gone: float, p: np.ndarray) -> float:
     return left * fading / (1.0 - bent)
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def _shape_step(ahead: float, h: float, p: np.ndarray) -> float:
     """Return the deflection one Runge-Kutta step on."""
     k1 = yielding(ahead, p)
@@ -549,7 +548,7 @@ def _shape_step(ahead: float, h: float, p: np.ndarray) -> float:
     return ahead + h / 6.0 * (k1 + 2.0 * (k2 + k3) + k4)
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def remember(x: float, memory: np.ndarray, p: np.ndarray) -> None:
     """Keep how far a hysteresis of any shape has yielded, at the end of a step.
 
@@ -568,7 +567,7 @@ def remember(x: float, memory: np.ndarray, p: np.ndarray) -> None:
     memory[TURNED_AT] = x
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def has_dry_friction(p: np.ndarray) -> bool:
     """Return whether the drive can stick.
 
@@ -582,7 +581,7 @@ def has_dry_friction(p: np.ndarray) -> bool:
     return level > 0.0 or p[slots.STATIC_EXCESS] != 0.0
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def friction_here(x: float, p: np.ndarray) -> float:
     """Return the part of dry friction that depends on position.
 
@@ -603,7 +602,7 @@ def friction_here(x: float, p: np.ndarray) -> float:
     return level
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def held_further(
     state: np.ndarray, push: np.ndarray, done: float, p: np.ndarray
 ) -> float:
@@ -627,7 +626,7 @@ def held_further(
     return level
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def drive_now(state: np.ndarray, push: np.ndarray, done: float, p: np.ndarray) -> float:
     """Return the motor's force.
 
@@ -646,7 +645,7 @@ def drive_now(state: np.ndarray, push: np.ndarray, done: float, p: np.ndarray) -
     return force * ripple(state[MOTOR_X] if has_motor else state[X], p)
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def drawn_current(command: float, state: np.ndarray, p: np.ndarray) -> float:
     """Return the current behind the voltage limit.
 
@@ -662,7 +661,7 @@ def drawn_current(command: float, state: np.ndarray, p: np.ndarray) -> float:
     return min(max(current, middle - limit), middle + limit)
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def surplus(net: float, p: np.ndarray) -> float:
     """Return by how much a force exceeds what friction at rest holds.
 
@@ -675,7 +674,7 @@ def surplus(net: float, p: np.ndarray) -> float:
     return abs(net) - max(p[way] + p[slots.STATIC_EXCESS], 0.0)
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def sliding_friction(way: float, v: float, p: np.ndarray) -> float:
     """Return the size of dry friction while sliding.
 
@@ -693,7 +692,7 @@ def sliding_friction(way: float, v: float, p: np.ndarray) -> float:
     return level
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def is_anywhere(p: np.ndarray) -> bool:
     """Return whether nothing holds a position.
 
@@ -704,7 +703,7 @@ def is_anywhere(p: np.ndarray) -> bool:
     return p[slots.STIFFNESS] <= 0.0 and p[slots.CUBIC] <= 0.0
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def resting_point(current: float, has_cogging: bool, p: np.ndarray) -> float:
     """Return where the drive rests without friction, nearest to zero.
 
@@ -746,7 +745,7 @@ def resting_point(current: float, has_cogging: bool, p: np.ndarray) -> float:
     return far
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def _away(
     x: float, side: float, current: float, has_cogging: bool, p: np.ndarray
 ) -> float:
@@ -762,13 +761,13 @@ def _away(
     return left
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def _command_at(current: float, p: np.ndarray) -> float:
     """Return the command that lets a current flow at rest."""
     return current * p[slots.RESISTANCE] if p[slots.RESISTANCE] > 0.0 else current
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def resting_force(x: float, current: float, p: np.ndarray) -> float:
     """Return the motor's force at rest.
 

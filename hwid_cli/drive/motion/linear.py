@@ -6,10 +6,9 @@ summed once, into matrices. docs/method_diagnosis.md, eq. (D2), (D3).
 """
 
 import numpy as np
-from numba import njit
 
+from hwid_cli.compiled import INNER, MAKING, compiled
 from hwid_cli.drive import slots
-from hwid_cli.drive.compiled import INNER, MAKING
 from hwid_cli.drive.motion.forces import N_STATE
 
 # Inputs of a step: offsets of gaps and stops, force on the mass, cubic of the drive,
@@ -24,7 +23,7 @@ SHORT_SUM, FEW_TERMS = 0.25, 12
 _PARTS = 1.0 / np.arange(1, N_TERMS + 1)
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def fastest(p: np.ndarray) -> float:
     """Return a bound of the rates of all linear forces together, [1/s].
 
@@ -59,7 +58,7 @@ def fastest(p: np.ndarray) -> float:
     return rate
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def sum_series(
     state: np.ndarray,
     out: np.ndarray,
@@ -155,7 +154,7 @@ def sum_series(
             out[6] += i
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def _coefficient(inputs: np.ndarray, first: int, n: int, at: float) -> float:
     """Return a coefficient of a cubic counted from a later time."""
     d = inputs[first + 3]
@@ -172,7 +171,7 @@ def _coefficient(inputs: np.ndarray, first: int, n: int, at: float) -> float:
     return a + at * (b + at * (c + at * d))
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def sum_plain(
     x: float,
     v: float,
@@ -223,7 +222,7 @@ def sum_plain(
     return x, v
 
 
-@njit(**MAKING)
+@compiled(**MAKING)
 def active_states(p: np.ndarray) -> np.ndarray:
     """Return the places of the state that move at all.
 
@@ -246,7 +245,7 @@ def active_states(p: np.ndarray) -> np.ndarray:
     return active[:count]
 
 
-@njit(**MAKING)
+@compiled(**MAKING)
 def fill(
     matrices: np.ndarray,
     which: int,
@@ -283,7 +282,7 @@ def fill(
     matrices[which, 0, FILLED] = 1.0
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def apply(
     matrices: np.ndarray,
     which: int,

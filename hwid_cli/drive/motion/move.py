@@ -8,11 +8,10 @@ docs/method_diagnosis.md, eq. (D1) to (D3).
 """
 
 import numpy as np
-from numba import njit
 
+from hwid_cli.compiled import INNER, MAKING, compiled
 from hwid_cli.drive import slots
 from hwid_cli.drive.command import MOST_PIECES, static_command
-from hwid_cli.drive.compiled import INNER, MAKING
 from hwid_cli.drive.controller import N_CONTROL, controlled, is_closed
 from hwid_cli.drive.motion.corners import corner_of, count_edges
 from hwid_cli.drive.motion.curved import is_always_curved, step_limit
@@ -71,7 +70,7 @@ MOST_EVENTS = 100
 CAPTURE_SHARE = 0.02
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def move(
     command: np.ndarray, force: np.ndarray, sample_time: float, given_p: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -110,7 +109,7 @@ def move(
     seen = MOTOR_X if p[slots.SENSOR_AT_MOTOR] > 0.0 else X
     positions[0], velocities[0] = state[seen], state[seen + 1]
     # Not plain 0: numba would compile what it is handed to twice.
-    sample = np.int64(0)
+    sample: int = np.int64(0)  # type: ignore[assignment]
     while sample < n and np.isfinite(positions[sample]):
         if has_controller:
             given[sample] = controlled(
@@ -122,7 +121,7 @@ def move(
             sample, sample_time, given, force, ends, before, followed, now, pieces,
             pushes, room, memory, p,
         )  # fmt: skip
-        j = np.int64(0)
+        j: int = np.int64(0)  # type: ignore[assignment]
         while j < count:
             push, length, done = pushes[j], pieces[j, LENGTH], 0.0
             if kind[0]:
@@ -152,7 +151,7 @@ def move(
     return positions, velocities, given
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def _blank(positions: np.ndarray, velocities: np.ndarray, given: np.ndarray) -> None:
     """Set everything to NaN from where the simulation has run away."""
     is_away = False
@@ -162,7 +161,7 @@ def _blank(positions: np.ndarray, velocities: np.ndarray, given: np.ndarray) -> 
             positions[i] = velocities[i] = given[i] = np.nan
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def _kind_of(p: np.ndarray) -> tuple[bool, bool, bool, bool, bool, float]:
     """Return what kind of drive it is, as in ``events.advance``."""
     has_inner = (
@@ -183,7 +182,7 @@ def _kind_of(p: np.ndarray) -> tuple[bool, bool, bool, bool, bool, float]:
     )
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def _longest_step(
     sample_time: float, kind: tuple[bool, bool, bool, bool, bool, float]
 ) -> float:
@@ -196,7 +195,7 @@ def _longest_step(
     return sample_time / count
 
 
-@njit(**MAKING)
+@compiled(**MAKING)
 def _make_room(
     sample_time: float, step: float, p: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -210,7 +209,7 @@ def _make_room(
     return np.zeros((n_matrices, N_STATE, N_COLUMNS)), lengths
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def _start(
     state: np.ndarray,
     memory: np.ndarray,
@@ -259,7 +258,7 @@ def _start(
     return command
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def _couple(p: np.ndarray) -> None:
     """Make an elastic coupling what the loops know; with teeth both are in series."""
     stiffness, teeth = p[slots.COUPLING_STIFFNESS], p[slots.GEAR_STIFFNESS]
@@ -275,7 +274,7 @@ def _couple(p: np.ndarray) -> None:
     p[slots.GEAR_DAMPING_RATIO] += p[slots.COUPLING_DAMPING_RATIO]
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def _take_stock(sample_time: float, p: np.ndarray) -> None:
     """Note what the drive has of what few drives have, so that others need not ask."""
     p[slots.CAPTURE_TIME] = CAPTURE_SHARE * sample_time
@@ -301,7 +300,7 @@ def _take_stock(sample_time: float, p: np.ndarray) -> None:
     p[slots.DRIVE_VARIES] = 1.0 if varies else 0.0
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def _move_piece(
     state: np.ndarray,
     trial: np.ndarray,

@@ -4,11 +4,10 @@ docs/method_diagnosis.md, eq. (D4) to (D6).
 """
 
 import numpy as np
-from numba import njit
 
+from hwid_cli.compiled import MAKING, compiled
 from hwid_cli.drive import slots
 from hwid_cli.drive.command import MOST_PIECES, command_pieces, is_untouched
-from hwid_cli.drive.compiled import MAKING
 from hwid_cli.drive.controller import is_closed
 from hwid_cli.drive.motion.push import (
     DRIVE,
@@ -23,7 +22,7 @@ from hwid_cli.drive.motion.push import (
 LENGTH, SAMPLE, N_PIECE = range(3)
 
 
-@njit(**MAKING)
+@compiled(**MAKING)
 def list_pieces(
     sample: int,
     sample_time: float,

@@ -7,10 +7,9 @@ the piece gives the right motion. docs/method_diagnosis.md, eq. (D5), (D6), (D12
 """
 
 import numpy as np
-from numba import njit
 
+from hwid_cli.compiled import INNER, compiled
 from hwid_cli.drive import slots
-from hwid_cli.drive.compiled import INNER
 
 TURN = 2.0 * np.pi
 # Places in the push: cubic of the drive's force (or command, where the current depends
@@ -42,7 +41,7 @@ _SHARES = 0.5 * (_POINTS + 1.0)
 _HALF_WEIGHTS = 0.5 * _WEIGHTS
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def depends_on_motion(p: np.ndarray) -> bool:
     """Return whether the current depends on the motion.
 
@@ -53,7 +52,7 @@ def depends_on_motion(p: np.ndarray) -> bool:
     return p[slots.RESISTANCE] > 0.0 or p[slots.CLIP_LIMIT] < np.inf
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def has_losses(p: np.ndarray) -> bool:
     """Return whether the force is no constant times the current.
 
@@ -68,7 +67,7 @@ def has_losses(p: np.ndarray) -> bool:
     )
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def is_straight(p: np.ndarray) -> bool:
     """Return whether straight pieces of the command give straight pieces of force.
 
@@ -81,7 +80,7 @@ def is_straight(p: np.ndarray) -> bool:
     return not is_bent
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def force_of(current: float, warmth: float, p: np.ndarray) -> float:
     """Return the force that a current makes.
 
@@ -97,7 +96,7 @@ def force_of(current: float, warmth: float, p: np.ndarray) -> float:
     return p[slots.FORCE_CONSTANT] * (1.0 - loss) * current
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def prepare_push(room: np.ndarray, length: float, p: np.ndarray) -> None:
     """Prepare what depends on the length of a piece alone.
 
@@ -129,7 +128,7 @@ def prepare_push(room: np.ndarray, length: float, p: np.ndarray) -> None:
                 room[13 + n] += _PROJECT[j, n] * np.sin(angle)
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def _faded(turns: float, ratio: float) -> tuple[float, float]:
     """Return what is left of a lag's value, and what its rate has added, without input.
 
@@ -157,7 +156,7 @@ def _faded(turns: float, ratio: float) -> tuple[float, float]:
     return held + ratio * added, added
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def set_push(
     push: np.ndarray,
     room: np.ndarray,
@@ -248,7 +247,7 @@ def set_push(
         push[OTHER + n] *= scale
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def set_moment(
     push: np.ndarray, time: float, length: float, first: float, last: float
 ) -> None:
@@ -265,7 +264,7 @@ def set_moment(
     push[BEGUN] = time
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def value_of(push: np.ndarray, which: int, done: float) -> float:
     """Return the value of a cubic.
 
@@ -281,7 +280,7 @@ def value_of(push: np.ndarray, which: int, done: float) -> float:
     return push[which] + done * (push[which + 1] + done * rest)
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def turns_sign(push: np.ndarray, done: float, h: float) -> bool:
     """Return whether the motor's force has another sign at the end of a step.
 
@@ -295,7 +294,7 @@ def turns_sign(push: np.ndarray, done: float, h: float) -> bool:
     return first != np.sign(value_of(push, DRIVE, done + h))
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def shift(
     push: np.ndarray, which: int, done: float
 ) -> tuple[float, float, float, float]:

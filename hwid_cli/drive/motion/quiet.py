@@ -5,10 +5,9 @@ which something happens. docs/method_diagnosis.md, eq. (D2).
 """
 
 import numpy as np
-from numba import njit
 
+from hwid_cli.compiled import INNER, compiled
 from hwid_cli.drive import slots
-from hwid_cli.drive.compiled import INNER
 from hwid_cli.drive.motion.corners import corner_of
 from hwid_cli.drive.motion.curved import is_curved_here, step_limit, step_plain
 from hwid_cli.drive.motion.events import (
@@ -37,7 +36,7 @@ FAR_FROM_LIMIT = 4
 MOST_STEPS = 400
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def bounds(x: float, p: np.ndarray) -> tuple[float, float]:
     """Return between which edges of gaps and stops a position is.
 
@@ -79,7 +78,7 @@ def bounds(x: float, p: np.ndarray) -> tuple[float, float]:
     return low, high
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def which_matrix(h: float, lengths: np.ndarray, corner: int, is_held: bool) -> int:
     """Return the number of a matrix; -1 for a length that does not come back.
 
@@ -94,7 +93,7 @@ def which_matrix(h: float, lengths: np.ndarray, corner: int, is_held: bool) -> i
     return -1
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def glide_plain(
     j: int,
     count: int,
@@ -218,7 +217,7 @@ def glide_plain(
     return j, done
 
 
-@njit(**INNER)
+@compiled(**INNER)
 def glide_inner(
     state: np.ndarray,
     trial: np.ndarray,

@@ -11,7 +11,8 @@ Compiled loops; of the rest only `smallest_bends` is no loop.
 """
 
 import numpy as np
-from numba import njit
+
+from hwid_cli.compiled import compiled
 
 # Share of a segment over which its samples must spread to tell its slope, and strength
 # of a direction, as a share of the strongest, below which the samples do not see it.
@@ -72,7 +73,7 @@ def _shares(points: np.ndarray, argument: np.ndarray) -> np.ndarray:
     return rows
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _mean_slope(break_points: np.ndarray, values: np.ndarray) -> float:
     """Range of the values over that of the break-points; 1 for a constant map.
 
@@ -87,7 +88,7 @@ def _mean_slope(break_points: np.ndarray, values: np.ndarray) -> float:
     return size if size != 0.0 else 1.0
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def bends(
     break_points: np.ndarray, values: np.ndarray, with_positions: bool
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -127,7 +128,7 @@ def bends(
     return bend, jacobian
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def add_bends(
     break_points: np.ndarray,
     values: np.ndarray,
@@ -188,7 +189,7 @@ def add_bends(
     return total
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _relative_growth(
     break_points: np.ndarray, values: np.ndarray, with_positions: bool
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -212,7 +213,7 @@ def _relative_growth(
     )
 
 
-@njit(cache=True)
+@compiled()
 def _extremes(values: np.ndarray, first: int, last: int) -> tuple[int, int]:
     """Places of the first lowest and the first highest value from one place to another."""
     low = high = first
@@ -224,7 +225,7 @@ def _extremes(values: np.ndarray, first: int, last: int) -> tuple[int, int]:
     return low, high
 
 
-@njit(cache=True)
+@compiled()
 def _inner_ends(units: int) -> tuple[int, int]:
     """Break-points between which a map's growth is measured.
 
@@ -234,7 +235,7 @@ def _inner_ends(units: int) -> tuple[int, int]:
     return (1, units - 2) if units > 3 else (0, units - 1)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def growth(
     break_points: np.ndarray,
     values: np.ndarray,
@@ -265,7 +266,7 @@ def growth(
     return size / size_before * (before[last] - before[first]) / width
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def squared_bends_after(
     break_points: np.ndarray,
     values: np.ndarray,

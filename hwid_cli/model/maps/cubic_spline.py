@@ -13,8 +13,8 @@ from functools import lru_cache
 
 import numpy as np
 import scipy
-from numba import njit
 
+from hwid_cli.compiled import compiled
 from hwid_cli.model.maps.positions_and_values import amplified, compressed, mean_slope
 from hwid_cli.model.maps.rule import (
     MapRule,
@@ -99,7 +99,7 @@ def _repeatable(one: StaticMap, argument: np.ndarray) -> np.ndarray:
     return _spline_value(argument, first, last, values, bends(one))
 
 
-@njit(cache=True)
+@compiled()
 def _spline_value(
     argument: np.ndarray,
     first: float,

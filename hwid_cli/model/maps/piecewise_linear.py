@@ -11,8 +11,8 @@ docs/method.md, eq. (2).
 from dataclasses import replace
 
 import numpy as np
-from numba import njit
 
+from hwid_cli.compiled import compiled
 from hwid_cli.model.maps.bends import add_bends, smallest_bends, squared_bends_after
 from hwid_cli.model.maps.positions import (
     WEIGHT_OF_SHAPE,
@@ -124,7 +124,7 @@ def _derivatives(
     )
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _slopes(break_points: np.ndarray, values: np.ndarray) -> np.ndarray:
     """Slope of each segment; by a loop, because expressions of arrays compile slowly."""
     slopes = np.empty(values.size - 1)
@@ -135,7 +135,7 @@ def _slopes(break_points: np.ndarray, values: np.ndarray) -> np.ndarray:
     return slopes
 
 
-@njit(cache=True)
+@compiled()
 def piecewise_linear(
     argument: np.ndarray, break_points: np.ndarray, values: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -172,7 +172,7 @@ def piecewise_linear(
     return result, slope, segment
 
 
-@njit(cache=True)
+@compiled()
 def piecewise_linear_jacobian(
     argument: np.ndarray,
     break_points: np.ndarray,
@@ -211,7 +211,7 @@ def piecewise_linear_jacobian(
             out[t, first + k + 1] = -slope[t] * share
 
 
-@njit(cache=True)
+@compiled()
 def piecewise_linear_value(
     argument: np.ndarray, break_points: np.ndarray, values: np.ndarray
 ) -> np.ndarray:
@@ -241,7 +241,7 @@ def piecewise_linear_value(
     return result
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def piecewise_linear_shares(
     argument: np.ndarray, break_points: np.ndarray, values: np.ndarray, spacing: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
@@ -311,7 +311,7 @@ def hat_functions(
     return first, shares
 
 
-@njit(cache=True)
+@compiled()
 def columns_of_segments(break_points: np.ndarray, values: np.ndarray) -> np.ndarray:
     """Parameters' columns out of those of each segment's own end values.
 

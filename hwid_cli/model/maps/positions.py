@@ -5,7 +5,8 @@ piecewise constant one.
 """
 
 import numpy as np
-from numba import njit
+
+from hwid_cli.compiled import compiled
 
 # Sweeps that put break-points into order.
 _SWEEPS = 4
@@ -32,7 +33,7 @@ def put_in_order(old: np.ndarray, proposed: np.ndarray) -> None:
     settled_break_points(old, proposed, _LEAST_SHRINK, _LEAST_WIDTH)
 
 
-@njit(cache=True)
+@compiled()
 def settled_break_points(
     old: np.ndarray, proposed: np.ndarray, least_shrink: float, least_width: float
 ) -> None:
@@ -66,7 +67,7 @@ def settled_break_points(
             return
 
 
-@njit(cache=True)
+@compiled()
 def thinned_break_points(
     break_points: np.ndarray, values: np.ndarray, weights: np.ndarray, count: int
 ) -> np.ndarray:
@@ -107,7 +108,7 @@ def thinned_break_points(
     return kept
 
 
-@njit(cache=True)
+@compiled()
 def _between(
     points: np.ndarray, values: np.ndarray, first: int, last: int, at: int
 ) -> float:

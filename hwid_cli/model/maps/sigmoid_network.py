@@ -11,8 +11,8 @@ docs/method.md, eqs. (4a), (4b).
 import math
 
 import numpy as np
-from numba import njit
 
+from hwid_cli.compiled import compiled
 from hwid_cli.model.maps.network import Unit, network_rule
 
 # Widths of the starting units as a share of the distance of their centres: a step from
@@ -33,7 +33,7 @@ def _layout(count: int) -> tuple[np.ndarray, np.ndarray]:
     return (np.arange(count) + 0.5) / count, np.full(count, _WIDTH_SHARE / count)
 
 
-@njit(cache=True)
+@compiled()
 def _sum(
     argument: np.ndarray, centres: np.ndarray, widths: np.ndarray, heights: np.ndarray
 ) -> np.ndarray:

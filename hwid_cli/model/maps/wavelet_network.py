@@ -10,8 +10,8 @@ Zhang, Benveniste, Wavelet networks (1992). docs/method.md, eqs. (4a), (4c).
 import math
 
 import numpy as np
-from numba import njit
 
+from hwid_cli.compiled import compiled
 from hwid_cli.model.maps.network import Unit, network_rule
 
 # Width of the coarsest wavelet as a share of the range: its positive part is two widths
@@ -42,7 +42,7 @@ def _layout(count: int) -> tuple[np.ndarray, np.ndarray]:
     return np.array(centres), np.array(widths)
 
 
-@njit(cache=True)
+@compiled()
 def _sum(
     argument: np.ndarray, centres: np.ndarray, widths: np.ndarray, heights: np.ndarray
 ) -> np.ndarray:

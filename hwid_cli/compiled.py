@@ -1,0 +1,172 @@
+"""Compiled loops, kept on disk for as long as no source that they are made from changes.
+
+numba keeps what it compiled and compiles anew where the file of the function itself has
+changed. It does not look at the loops that a function calls or at the constants that it
+reads, both of which are built into it. Here the folder of a module's loops is named after
+a checksum of all sources that the module imports, directly or not: after a change there
+is nothing to be found, and older folders are removed.
+"""
+
+import atexit
+import os
+import re
+import shutil
+from collections.abc import Callable, Iterator
+from functools import cache
+from hashlib import sha256
+from pathlib import Path
+from tempfile import TemporaryFile, mkdtemp
+from typing import Any, TypeVar
+
+from numba import config, njit
+from numba.core.options import DefaultOptions
+
+_Function = TypeVar("_Function", bound=Callable[..., Any])
+
+PACKAGE = Path(__file__).parent
+_IMPORT = re.compile(
+    rf"^\s*(?:from ({PACKAGE.name}[\w.]*) import (\([^)]*\)|.*)|import ({PACKAGE.name}[\w.]*))",
+    re.MULTILINE,
+)
+
+_BOTH: dict[str, Any] = {
+    "nogil": True,
+    "error_model": "numpy",
+    # Without entries for Python and C they compile a fifth faster.
+    "no_cpython_wrapper": True,
+    "no_cfunc_wrapper": True,
+}
+_COUNTS = hasattr(DefaultOptions, "_nrt")
+# Options of functions that only other compiled functions call. Those that make no arrays
+# need not count who holds one: twice to five times as fast. One that makes an array after
+# all does not compile.
+INNER = {**_BOTH, "_nrt": False} if _COUNTS else _BOTH
+# Those that make arrays; said of each, or they would do as the one that calls them.
+MAKING = {**_BOTH, "_nrt": True} if _COUNTS else _BOTH
+
+
+def compiled(**options: Any) -> Callable[[_Function], _Function]:
+    """Decorate a function of this package that numba compiles at its first call.
+
+    Parameters
+    ----------
+    **options : Any
+        Options of ``numba.njit`` but ``cache``.
+
+    Returns
+    -------
+    callable
+        Decorator.
+    """
+
+    def compile_later(function: _Function) -> _Function:
+        source = Path(function.__code__.co_filename)
+        # numba asks for the folder here and now; other people's functions keep theirs.
+        before = vars(config)["CACHE_DIR"]
+        vars(config)["CACHE_DIR"] = str(folder_of_loops(source))
+        try:
+            return njit(cache=True, **options)(function)
+        finally:
+            vars(config)["CACHE_DIR"] = before
+
+    return compile_later
+
+
+@cache
+def folder_of_loops(source: Path) -> Path:
+    """Name the folder of a module's compiled loops, and remove the ones before it.
+
+    Parameters
+    ----------
+    source : Path
+        File of a module of this package.
+
+    Returns
+    -------
+    Path
+        Folder that is made where it is missing.
+    """
+    checksum = sha256()
+    for path in sorted(sources_behind(source)):
+        checksum.update(path.relative_to(PACKAGE).as_posix().encode())
+        checksum.update(_text_of(path).encode())
+    name = ".".join(source.relative_to(PACKAGE).with_suffix("").parts)
+    folder = _place() / f"{name}-{checksum.hexdigest()[:16]}"
+    if not folder.exists():
+        for before in folder.parent.glob(f"{name}-*"):
+            shutil.rmtree(before, ignore_errors=True)
+    return folder
+
+
+def sources_behind(source: Path) -> set[Path]:
+    """Files of this package that a module imports, directly or not, and its own.
+
+    Parameters
+    ----------
+    source : Path
+        File of a module of this package.
+
+    Returns
+    -------
+    set of Path
+    """
+    found, todo = set(), [source]
+    while todo:
+        path = todo.pop()
+        if path not in found:
+            found.add(path)
+            todo += _imports(path)
+    return found
+
+
+@cache
+def _imports(source: Path) -> tuple[Path, ...]:
+    return tuple(
+        path
+        for module in _modules_named(_text_of(source))
+        for path in (
+            PACKAGE.parent.joinpath(*module.split(".")).with_suffix(".py"),
+            PACKAGE.parent.joinpath(*module.split("."), "__init__.py"),
+        )
+        if path.exists()
+    )
+
+
+def _modules_named(text: str) -> Iterator[str]:
+    """Names in import lines, also those that turn out to be no modules."""
+    for package, names, module in _IMPORT.findall(text):
+        yield package or module
+        for name in re.findall(r"\w+", re.sub(r"#.*| as \w+", "", names)):
+            yield f"{package}.{name}"
+
+
+@cache
+def _text_of(source: Path) -> str:
+    return source.read_text(encoding="utf-8")
+
+
+@cache
+def _place() -> Path:
+    """Folder of all compiled loops: the package's own, the user's, or one that goes."""
+    mine = f"{PACKAGE.name}-{sha256(str(PACKAGE).encode()).hexdigest()[:16]}"
+    if given := vars(config)["CACHE_DIR"]:
+        return Path(given) / mine
+    user = Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser()
+    for folder in (PACKAGE / "__pycache__" / "loops", user / "numba" / mine):
+        if _may_be_made(folder):
+            return folder
+    # Workers inherit it; it goes with the process that made it.
+    passing = os.environ["NUMBA_CACHE_DIR"] = mkdtemp(prefix="hwid_loops_")
+    atexit.register(shutil.rmtree, passing, ignore_errors=True)
+    return Path(passing) / mine
+
+
+def _may_be_made(folder: Path) -> bool:
+    """Whether a folder may be written, or made where it is missing."""
+    there = next(one for one in (folder, *folder.parents) if one.exists())
+    try:
+        # As numba tries it: rights alone do not say whether a disk takes a file.
+        TemporaryFile(dir=there).close()
+    except OSError:
+        return False
+    return True
