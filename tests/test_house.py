@@ -298,6 +298,8 @@ def test_every_make_target_that_ci_calls_exists():
 def test_compiled_loops_keep_strict_arithmetic():
     # Reassociated sums have other last bits in a process that compiled a loop than in
     # one that loaded it: results would depend on the number of workers.
-    files = [path for path in SOURCES if re.search(r"^@compiled\(", path.read_text(), re.M)]
+    files = [
+        path for path in SOURCES if re.search(r"^@compiled\(", path.read_text(), re.M)
+    ]
     assert len(files) > 5
     assert [path for path in files if "fastmath" in path.read_text()] == []
