@@ -2,28 +2,6 @@
 
 Judged are the widest model of each single recording and the best model of each group in
 the chain that the search for groups followed.
-
-Which model to use for a recording, told from its input alone.
-
-A new recording has an input and no measured output yet. The known recording with the
-most similar input is looked up, and the model that serves that one best is used. How
-often that works is found out on recordings whose output is known.
-
-How alike two inputs are: their mean and their amplitudes in octave bands.
-
-An input is told by twelve numbers: its mean, which keeps its sign, and the amplitude
-that it has around Nyquist's frequency, half of it, a quarter and so on; the last of the
-eleven bands holds all that is slower. The bands overlap: a frequency between two
-centres gives its power to both, so that two sines at nearly one frequency never fall
-apart at the edge of a band.
-
-Powers are per sample, so records of different length compare. What happens when is not
-seen: two inputs whose parts stand in another order are alike. Frequencies are counted
-in cycles per sample; the inputs must share their sample time.
-
-References
-----------
-docs/method.md, eqs. (18)-(20).
 """
 
 from collections.abc import Mapping, Sequence
@@ -35,7 +13,7 @@ import numpy as np
 from hwid_cli.errors import ConfigError
 from hwid_cli.records.check import StagePlan
 from hwid_cli.records.experiment import Experiment, FinalTestOptions
-from hwid_cli.records.groups import ChainTrend, FinalTest, GroupSearch, Prediction
+from hwid_cli.records.groups import ChainTrend, FinalTest, GroupSearch
 from hwid_cli.records.model import Fit
 from hwid_cli.records.recordings import Recording
 from hwid_cli.records.results import CrossValidation
@@ -55,6 +33,7 @@ from hwid_cli.stages.coverage_matrix import (
 from hwid_cli.stages.crossval import deviation_tasks
 from hwid_cli.stages.fit_seconds import PAIR_BYTES, counted
 from hwid_cli.stages.identify import recording_key
+from hwid_cli.stages.predictions import predict_all
 from hwid_cli.stages.ranking import best_of_each, score_models
 from hwid_cli.stages.selection import select_recordings
 from hwid_cli.stages.stage import Context, Planning, Runner, Stage, in_results
@@ -70,180 +49,7 @@ from hwid_cli.store.final_test_results import (
 from hwid_cli.store.result_files import Provenance
 from hwid_cli.tasks.cache import task_key
 from hwid_cli.tasks.runner import RunSettings, Task, run_tasks
-
-
-def predict_all(
-    scored: ScoredModels, distances: np.ndarray, is_known: np.ndarray
-) -> tuple[Prediction, ...]:
-    """Predict the model for each recording as if it were new.
-
-    Models that were fitted to the recording itself are left out of the choice. They would
-    cover it whatever its input is like, and for a recording that is really new there is
-    no such model: with them the choice would look right far more often than it is. For the
-    same reason a recording is never its own neighbour.
-
-    The models to choose from were themselves chosen with all recordings in view. So
-    ``is_possible`` may be too favourable to a new recording; the choice among them is
-    not, it sees nothing but the input.
-
-    Parameters
-    ----------
-    scored : ScoredModels
-        The models to choose from, on all recordings.
-    distances : ndarray, shape (n_recordings, n_recordings), [-]
-        Between the inputs of the recordings.
-    is_known : ndarray of bool, shape (n_recordings,)
-        Recordings that may be neighbours: all but the test recordings, which stand for
-        those yet to come.
-
-    Returns
-    -------
-    tuple of Prediction
-        In the order of the recordings. Where there is no neighbour or no model to choose
-        from, its name is empty and its number NaN.
-    """
-    return tuple(
-        _predict(scored, number, _nearest(distances[number], is_known, number))
-        for number in range(len(scored.recordings))
-    )
-
-
-def _nearest(
-    distances: np.ndarray, is_known: np.ndarray, number: int
-) -> tuple[int, float]:
-    """Find the nearest known recording other than that of the number."""
-    may_be = is_known.copy()
-    may_be[number] = False
-    if not may_be.any():
-        return -1, float("nan")
-    nearest = int(np.argmin(np.where(may_be, distances, np.inf)))
-    return nearest, float(distances[nearest])
-
-
-def _predict(
-    scored: ScoredModels, number: int, neighbour: tuple[int, float]
-) -> Prediction:
-    nearest, distance = neighbour
-    # Models that are fitted to the recording are blanked, not dropped: places stay.
-    eligible = np.where(scored.is_own[:, number, np.newaxis], np.nan, scored.rmsd)
-    serving = assign(eligible)
-    chosen = -1 if nearest < 0 else int(serving[nearest])
-    best = int(serving[number])
-    own_rmsd = eligible[:, number]
-    rmsd, best_rmsd = (
-        float("nan") if model < 0 else float(own_rmsd[model])
-        for model in (chosen, best)
-    )
-    return Prediction(
-        recording=scored.recordings[number],
-        nearest="" if nearest < 0 else scored.recordings[nearest],
-        distance=distance,
-        model="" if chosen < 0 else scored.models[chosen],
-        rmsd=rmsd,
-        best_model="" if best < 0 else scored.models[best],
-        best_rmsd=best_rmsd,
-        is_right=rmsd < scored.threshold,
-        is_possible=best_rmsd < scored.threshold,
-    )
-
-
-# Octaves below Nyquist's frequency that are told apart, [-]: at 1 kHz down to 0.5 Hz,
-# below the slowest excitation of a servo drive.
-N_OCTAVES = 10
-
-
-def input_signature(values: np.ndarray) -> np.ndarray:
-    """Mean and band amplitudes of an input.
-
-    Parameters
-    ----------
-    values : ndarray, shape (n_samples,), [input unit]
-
-    Returns
-    -------
-    ndarray, shape (N_OCTAVES + 2,), [input unit]
-        The mean, then the bands from Nyquist's frequency down. Its norm is the root
-        mean square of the input.
-
-    Raises
-    ------
-    ValueError
-        If there are no samples, or they are not 1-D.
-
-    References
-    ----------
-    docs/method.md, eqs. (18) and (19).
-
-    Examples
-    --------
-    >>> signature = input_signature(np.array([4.0, 2.0, 4.0, 2.0]))
-    >>> signature[:4].tolist()
-    [3.0, 1.0, 0.0, 0.0]
-    """
-    signal = np.asarray(values, dtype=float)
-    if signal.ndim != 1 or signal.size == 0:
-        raise ValueError(f"input must be a 1-D array with samples, got {signal.shape}")
-    mean = float(np.mean(signal))
-    half = np.abs(np.fft.rfft(signal - mean)[1:] / signal.size) ** 2
-    cycles = np.arange(1, half.size + 1)
-    # All frequencies but Nyquist's stand for their negative twin too.
-    power = np.where(2 * cycles == signal.size, half, 2.0 * half)
-    octaves_down = np.clip(np.log2(0.5 * signal.size / cycles), 0.0, N_OCTAVES)
-    upper = np.minimum(octaves_down.astype(int), N_OCTAVES - 1)
-    to_lower = octaves_down - upper
-    bands = np.zeros(N_OCTAVES + 1)
-    np.add.at(bands, upper, (1.0 - to_lower) * power)
-    np.add.at(bands, upper + 1, to_lower * power)
-    return np.append(mean, np.sqrt(bands))
-
-
-def input_distance(one: np.ndarray, other: np.ndarray) -> float:
-    """Distance between two inputs, relative to the larger one.
-
-    Parameters
-    ----------
-    one, other : ndarray, shape (N_OCTAVES + 2,), [input unit]
-        As ``input_signature`` gives them.
-
-    Returns
-    -------
-    float, [-]
-        0 for equal ones, between 1 and 1.4 for inputs that have nothing in common, 2
-        for a constant and its opposite.
-
-    References
-    ----------
-    docs/method.md, eq. (20).
-
-    Examples
-    --------
-    >>> step = input_signature(np.full(100, 2.0))
-    >>> input_distance(step, input_signature(np.full(50, 1.5)))
-    0.25
-    """
-    larger = max(float(np.linalg.norm(one)), float(np.linalg.norm(other)))
-    if larger == 0.0:
-        return 0.0
-    return float(np.linalg.norm(one - other)) / larger
-
-
-def input_distances(inputs: list[np.ndarray]) -> np.ndarray:
-    """Distance between any two of several inputs.
-
-    Parameters
-    ----------
-    inputs : list of ndarray, shape (n_samples,), [input unit]
-        Lengths may differ.
-
-    Returns
-    -------
-    ndarray, shape (n_inputs, n_inputs), [-]
-    """
-    signatures = [input_signature(values) for values in inputs]
-    return np.array(
-        [[input_distance(one, other) for other in signatures] for one in signatures]
-    ).reshape(len(inputs), len(inputs))
-
+from hwid_cli.trust.input_distance import input_distances
 
 NAME = "test"
 STAGE_VERSION = 4

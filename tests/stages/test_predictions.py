@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from hwid_cli.stages.coverage_matrix import ScoredModels
-from hwid_cli.stages.test import predict_all
+from hwid_cli.stages.predictions import predict_all
 
 RECORDINGS = ("a", "b", "c", "t")
 MODELS = ("a/1/1", "b/1/1", "c/1/1")

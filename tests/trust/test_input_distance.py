@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from hwid_cli.stages.test import (
+from hwid_cli.trust.input_distance import (
     N_OCTAVES,
     input_distance,
     input_distances,
