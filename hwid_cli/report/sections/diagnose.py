@@ -24,9 +24,9 @@ from hwid_cli.report.diagnosis import (
     warning_sentences,
 )
 from hwid_cli.report.dots import Dot, DotGroup, DotRow, Dots
-from hwid_cli.report.figures.diagnosis import (
+from hwid_cli.report.figures.diagnosis import figure_makers
+from hwid_cli.report.figures.diagnosis_bars import (
     PLACES,
-    figure_makers,
     shown_candidates,
     shown_places,
 )

@@ -28,7 +28,7 @@ from hwid_cli.report.charts import (
 )
 from hwid_cli.report.diagnosis import quantity_and_unit, shown_value, warning_sentences
 from hwid_cli.report.dots import Dot, DotGroup, DotRow, Dots
-from hwid_cli.report.figures.diagnosis import telling_stretch
+from hwid_cli.report.figures.diagnosis_curves import telling_stretch
 from hwid_cli.report.formats import counted, listed, percent, with_unit
 from hwid_cli.report.page import Answer, PageBlock
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_hex
 
-from hwid_cli.report.figures.diagnosis import (
-    diagnosis_figures,
+from hwid_cli.report.figures.diagnosis import diagnosis_figures
+from hwid_cli.report.figures.diagnosis_bars import (
     ranking_figure,
     shortened,
     shown_candidates,

@@ -5,10 +5,9 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from hwid_cli.records.diagnosis import LatentForce
-from hwid_cli.report.figures.diagnosis import (
-    diagnosis_figures,
+from hwid_cli.report.figures.diagnosis import diagnosis_figures, gap_figure
+from hwid_cli.report.figures.diagnosis_curves import (
     force_figure,
-    gap_figure,
     overlay_figure,
     telling_stretch,
 )
