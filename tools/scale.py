@@ -12,7 +12,7 @@ import matplotlib.pyplot as plt
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from hwid_cli.tasks.cluster import CHUNK_S, CHUNKS_AHEAD, LEAST_CHUNK_S, MOST_IN_CHUNK
+from hwid_cli.tasks.chunks import CHUNK_S, CHUNKS_AHEAD, LEAST_CHUNK_S, MOST_IN_CHUNK
 from tests.benchmarks.cluster_model import Costs, Played, Round, grid_rounds, play
 
 FIGURE = Path(__file__).resolve().parents[1] / "docs" / "figures" / "scale.png"

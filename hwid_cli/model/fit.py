@@ -7,18 +7,6 @@ exception: a campaign counts failures, it does not stop at them.
 References
 ----------
 docs/method.md, sections "The fit" and "The search".
-
-What a fit needs: arguments that make sense, and data that can determine a model.
-
-Search that begins with models of the same orders instead of from nothing.
-
-A group's recordings each have a model already. Its linear block and maps are where the
-group's model is looked for: the screening of linear starts and the re-estimation of the
-block, which make up most of a fit, are left out.
-
-References
-----------
-docs/method.md, section "Warm starts".
 """
 
 from collections.abc import Sequence
@@ -27,20 +15,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hwid_cli.model import static_map
-from hwid_cli.model.candidates import Candidate, FitData, limits_of, thinned
+from hwid_cli.model.candidates import Candidate
 from hwid_cli.model.circle_starts import lasting_poles
 from hwid_cli.model.description import described
+from hwid_cli.model.fit_conditions import check_arguments, reason_not_to_fit
 from hwid_cli.model.initial_candidates import (
     block_starts,
     linear_initial_candidates,
     member_models,
     nested_candidates,
 )
-from hwid_cli.model.levenberg_marquardt import Search, minimise
-from hwid_cli.model.linear_block import is_stable
+from hwid_cli.model.levenberg_marquardt import Search
 from hwid_cli.model.linear_search import linear_from_nested
-from hwid_cli.model.phases import converge, finish, place, standing
-from hwid_cli.model.placing import coarser, finer, with_maps
 from hwid_cli.model.pole_bound import is_within
 from hwid_cli.model.problem import FitProblem, offset_left, rmsd, scaled
 from hwid_cli.model.robust import renewed, rescored, settled, unhidden, winsorised
@@ -52,6 +38,7 @@ from hwid_cli.model.search import (
 from hwid_cli.model.simulate import validation_output
 from hwid_cli.model.starts import Start
 from hwid_cli.model.straight_levels import SAID, asks_for_levels, with_straight_maps
+from hwid_cli.model.warm_search import warm_search
 from hwid_cli.records.model import (
     Fit,
     FitOptions,
@@ -60,204 +47,6 @@ from hwid_cli.records.model import (
     Uncertainty,
 )
 from hwid_cli.records.recordings import Recording
-
-# Sizes whose squares, and those of their ratios, still are numbers of 64 bits.
-_SMALLEST, _LARGEST = 1e-60, 1e60
-
-
-def check_arguments(
-    recordings: Sequence[Recording],
-    orders: Orders,
-    options: FitOptions,
-    starts: Sequence[HammersteinWiener],
-) -> None:
-    """Refuse arguments that make no sense together, whatever the data are.
-
-    Raises
-    ------
-    TypeError
-        If ``recordings`` is a single one, or ``orders`` are no ``Orders``.
-    ValueError
-        If there is no recording, the sample times differ, a start has other orders or
-        kinds of maps, or a frozen linear block has other orders.
-    """
-    _check_types(recordings, orders)
-    if len({one.sample_time_s for one in recordings}) > 1:
-        raise ValueError("recordings of one fit must share their sample time")
-    kinds = (options.input_map, options.output_map)
-    for start in starts:
-        nk = start.delay if start.delay in options.delays else orders.nk
-        if (start.input_map.kind, start.output_map.kind) != kinds or (
-            start.orders != replace(orders, nk=nk)
-        ):
-            raise ValueError(f"a start must have the orders {orders} and maps {kinds}")
-    block = options.linear_block
-    if block is not None and block.frozen and block.orders != orders:
-        raise ValueError(
-            f"the frozen linear block has the orders {block.orders}, not {orders}"
-        )
-
-
-def reason_not_to_fit(
-    recordings: Sequence[Recording], orders: Orders, options: FitOptions
-) -> str:
-    """Say why data cannot determine a model.
-
-    Returns
-    -------
-    str
-        Empty if they can.
-    """
-    block = options.linear_block
-    if block is not None and block.frozen:
-        radius = options.largest_pole_radius
-        if not is_stable(np.array(block.denominator), radius):
-            return f"the frozen linear block has a pole at or beyond radius {radius:g}"
-    total = sum(one.n_samples for one in recordings)
-    delay = min(options.delays, default=orders.nk)
-    needed = _least_parameters(orders, options) + replace(orders, nk=delay).n_state
-    if total <= needed:
-        return f"{total} samples cannot determine a model that needs more than {needed}"
-    longest = total
-    if options.join == "experiments":
-        longest = max(one.n_samples for one in recordings)
-    if delay >= longest:
-        return f"a delay of {delay} samples leaves nothing of a record of {longest}"
-    for side in ("input", "output"):
-        signal = np.concatenate([getattr(one, side) for one in recordings])
-        largest = float(np.max(np.abs(signal)))
-        if largest > _LARGEST:
-            return f"the {side} reaches {largest:.3g}, beyond {_LARGEST:g}"
-        span = float(np.ptp(signal))
-        if span == 0.0:
-            return f"the {side} is constant at {signal[0]:g}"
-        if span < _SMALLEST:
-            return f"the {side} spans {span:.3g}, less than {_SMALLEST:g}"
-    return ""
-
-
-def _check_types(recordings: Sequence[Recording], orders: Orders) -> None:
-    """Refuse what a program that nobody type-checks hands over easily."""
-    if isinstance(recordings, Recording):
-        raise TypeError(
-            "recordings must be a sequence of Recording; put it into a list"
-        )
-    if not isinstance(orders, Orders):
-        raise TypeError(
-            f"orders must be Orders(nb=..., nf=..., nk=...), got {orders!r}"
-        )
-    if not recordings:
-        raise ValueError("fit needs at least one recording")
-
-
-def _least_parameters(orders: Orders, options: FitOptions) -> int:
-    """Parameters of a model, each shared gain counted once."""
-    maps = (
-        static_map.identity(one.kind, one, np.array([0.0, 1.0]))
-        for one in (options.of_input, options.of_output)
-    )
-    n_block = 0 if options.keeps_block else orders.nb + orders.nf
-    return n_block + sum(one.parameters.size for one in maps)
-
-
-# Samples that count where starts are compared, and iterations of the best: enough to
-# adapt initial states and offsets.
-_ROWS, _SCREENING_ITERATIONS = 1000, 3
-# Groups are told apart by a threshold: the last tenth of a percent of the deviation is
-# not worth half of the time.
-_LEAST_GAIN = 1e-3
-# Smaller gains in a row that end the continuation of a nested model: the next orders go
-# on from here again.
-_PATIENCE = 1
-
-
-def warm_search(
-    experiments: Sequence[FitData],
-    options: FitOptions,
-    starts: Sequence[HammersteinWiener],
-    nested: Sequence[Candidate] = (),
-    *,
-    search_anew: bool = True,
-) -> Search:
-    """Hammerstein-Wiener model found from models that are near it.
-
-    Parameters
-    ----------
-    experiments : sequence of FitData
-        Scaled to about one.
-    starts : sequence of HammersteinWiener
-        At least one; in the units of the experiments, with the orders and the kinds of
-        maps that the result has.
-    nested : sequence of Candidate
-        Models of smaller orders, written with those of the result, which is not worse
-        than any of them.
-    search_anew : bool
-        Whether the starts are tried beside nested models.
-
-    Returns
-    -------
-    Search
-        From the start that is best for these experiments; of equal ones the first.
-    """
-    found = []
-    if nested:
-        known = min(
-            (standing(one, experiments) for one in nested), key=lambda one: one.cost
-        )
-        near = converge(
-            known,
-            experiments,
-            options,
-            least_gain=_LEAST_GAIN,
-            patience=_PATIENCE,
-        )
-        found = [known, near]
-    if search_anew or not nested:
-        screened = _screened(experiments, options, starts)
-        (placed,) = place([screened], experiments, options)
-        found.append(finish(placed, experiments, options, least_gain=_LEAST_GAIN))
-    return min(found, key=lambda one: one.cost)
-
-
-def _screened(
-    experiments: Sequence[FitData],
-    options: FitOptions,
-    starts: Sequence[HammersteinWiener],
-) -> Search:
-    """The start that is best for these experiments, after a few iterations."""
-    few = thinned(experiments, _ROWS)
-    best = min(
-        (standing(_starting(one, experiments, options), few) for one in starts),
-        key=lambda one: one.cost,
-    )
-    return minimise(
-        _spread(best.candidate, experiments, options),
-        few,
-        with_positions=False,
-        max_iterations=min(_SCREENING_ITERATIONS, options.max_iterations),
-    )
-
-
-def _starting(
-    model: HammersteinWiener, experiments: Sequence[FitData], options: FitOptions
-) -> Candidate:
-    """A model with empty initial states for every experiment."""
-    is_estimated = options.initial_state == "estimated"
-    n_state = model.orders.n_state if is_estimated else 0
-    return Candidate(
-        replace(model, free_response=np.zeros(0), initial_state=options.initial_state),
-        np.zeros((len(experiments), n_state)),
-        limits_of(options),
-    )
-
-
-def _spread(
-    candidate: Candidate, experiments: Sequence[FitData], options: FitOptions
-) -> Candidate:
-    """Maps whose break-points cover what the experiments reach, not the start's data."""
-    fine = with_maps(candidate, experiments, finer)
-    return coarser(fine, experiments, options)
-
 
 _DEFAULTS = FitOptions()
 

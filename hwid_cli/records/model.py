@@ -1,11 +1,4 @@
-"""The Hammerstein-Wiener model, the options of a fit and its result.
-
-The linear block: its orders, and one that the user gives.
-
-How well a fit's parameters are known.
-
-Information criteria of a fit: how its error weighs against its parameters.
-"""
+"""The Hammerstein-Wiener model, the options of a fit, its result, and how well it is known."""
 
 from dataclasses import dataclass, field, replace
 from typing import Annotated

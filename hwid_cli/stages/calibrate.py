@@ -13,19 +13,14 @@ from pathlib import Path
 
 import numpy as np
 
-from hwid_cli.data.calibration import (
-    LEAST_QUIET,
-    OFFSETS,
-    Draft,
-    removed_samples,
-    run_recipe,
-)
+from hwid_cli.data.calibration import OFFSETS, Draft, removed_samples, run_recipe
 from hwid_cli.data.recording_files import (
     find_files,
     missing_files_message,
     recordings_base,
 )
 from hwid_cli.data.recordings import read_recordings
+from hwid_cli.data.signal_features import LEAST_QUIET
 from hwid_cli.errors import ConfigError, MeasurementError, NothingToDo
 from hwid_cli.files.figure_files import read_figure, write_figure
 from hwid_cli.records.check import StagePlan

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from hwid_cli.data.calibration import LEAST_QUIET, find_onset
+from hwid_cli.data.signal_features import LEAST_QUIET, find_onset
 from hwid_cli.diagnosis.noise import noise_floor
 from hwid_cli.diagnosis.problem import prepare
 from hwid_cli.records.axis import base_of

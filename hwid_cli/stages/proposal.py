@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from hwid_cli.data import column_signs as signs
-from hwid_cli.data.calibration import LEAST_QUIET, find_onset
+from hwid_cli.data.signal_features import LEAST_QUIET, find_onset
 from hwid_cli.errors import HwidError
 from hwid_cli.records.experiment import CalibrateOptions
 from hwid_cli.records.recordings import KINDS, RawRecording

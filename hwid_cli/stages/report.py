@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from hwid_cli.data.calibration import find_period
+from hwid_cli.data.signal_features import find_period
 from hwid_cli.model.scores import coverage, fit_percent, rmsd
 from hwid_cli.model.simulate import validation_output
 from hwid_cli.records.answer import ModelAnswer

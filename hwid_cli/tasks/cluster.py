@@ -2,25 +2,16 @@
 
 Workers need this package in the same version and nothing else: no shared disk and no
 configuration. Large arguments, such as recordings, are tasks of their own: the scheduler
-hands them to another worker when one has died, with what that one was computing. Tasks
-go out in chunks that last long enough for the way there and back not to matter; what a
-chunk holds changes no number.
-
-Which tasks go out together, and which are tried again after workers have died.
-
-A chunk lasts long enough for its way there and back not to matter. One over which workers
-died is taken apart; a task whose workers die again although it is alone is given up.
+hands them to another worker when one has died, with what that one was computing.
 """
 
 import atexit
 import logging
-import math
 import pickle
 import queue
-import statistics
 import threading
 import time
-from collections import Counter, deque
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import CancelledError
 from contextlib import suppress
@@ -34,116 +25,10 @@ from uuid import uuid4
 from threadpoolctl import threadpool_limits
 
 from hwid_cli import __version__
-from hwid_cli.errors import ConfigError, WorkerError
+from hwid_cli.errors import ConfigError
 from hwid_cli.files.messages import shown
+from hwid_cli.tasks.chunks import CHUNKS_AHEAD, RECENT, Chunks
 from hwid_cli.tasks.task import Computed, Task, computed
-
-# How long a chunk shall last, [s], and how many tasks it holds at most. Near the end
-# chunks get shorter, so that none is waited for long, down to a length, [s], at which the
-# way to a worker and back (docs/scale.md) is still a small share of it.
-CHUNK_S, LEAST_CHUNK_S, MOST_IN_CHUNK = 1.0, 0.2, 64
-# Chunks handed out ahead for each thread of a worker.
-CHUNKS_AHEAD = 3
-# Chunks from whose duration that of the next ones is taken.
-RECENT = 30
-# Names of tasks in a message.
-_MOST_NAMES = 4
-
-
-class Chunks:
-    """Tasks that wait for a worker.
-
-    Parameters
-    ----------
-    tasks : sequence of Task
-        Of one kind.
-    recent : deque of float, optional, [s]
-        How long tasks of that kind took last; goes on with these.
-    """
-
-    def __init__(
-        self, tasks: Sequence[Task], recent: deque[float] | None = None
-    ) -> None:
-        self._waiting = deque(tasks)
-        self._alone: deque[Task] = deque()
-        self._deaths: Counter[str] = Counter()
-        self._given_up: list[Task] = []
-        self._seconds = deque(maxlen=RECENT) if recent is None else recent
-
-    def __bool__(self) -> bool:
-        """Whether a task waits."""
-        return bool(self._waiting or self._alone)
-
-    def take(self, threads: int) -> tuple[Task, ...]:
-        """Take the next chunk.
-
-        Parameters
-        ----------
-        threads : int, [-]
-            That compute; the last tasks are divided among them.
-
-        Returns
-        -------
-        tuple of Task
-            At least one.
-        """
-        if self._alone:
-            return (self._alone.popleft(),)
-        count = 1
-        if self._seconds:
-            typical = max(statistics.median(self._seconds), 1e-6)
-            left = len(self._waiting)
-            longest = min(int(CHUNK_S / typical), MOST_IN_CHUNK)
-            shortest = min(math.ceil(LEAST_CHUNK_S / typical), -(-left // threads))
-            fair = left // (CHUNKS_AHEAD * threads)
-            count = max(1, min(longest, max(shortest, fair)))
-        return tuple(self._waiting.popleft() for _ in range(count))
-
-    def is_done(self, chunk: Sequence[Task], seconds: float) -> None:
-        """Note how long a chunk took.
-
-        Parameters
-        ----------
-        seconds : float, [s]
-        """
-        self._seconds.append(seconds / len(chunk))
-
-    def has_died(self, chunk: Sequence[Task]) -> str:
-        """Try the tasks of a chunk again, each alone, unless they were already.
-
-        Returns
-        -------
-        str
-            Their names.
-        """
-        for task in chunk:
-            self._deaths[task.key] += 1
-            is_first = self._deaths[task.key] == 1
-            (self._alone if is_first else self._given_up).append(task)
-        return _names(chunk)
-
-    def check(self) -> None:
-        """Refuse to end well where tasks were given up.
-
-        Raises
-        ------
-        WorkerError
-            Naming them.
-        """
-        if self._given_up:
-            raise WorkerError(
-                f"{_names(self._given_up)}: workers died over it again and again; "
-                "expected a task that fits into their memory and that they finish; what "
-                "was finished is kept: look into their logs and run the same command "
-                "again"
-            )
-
-
-def _names(tasks: Sequence[Task]) -> str:
-    named = ", ".join(task.name for task in tasks[:_MOST_NAMES])
-    more = len(tasks) - _MOST_NAMES
-    return f"{named} and {more} more" if more > 0 else named
-
 
 # A scheduler that does not answer within this time is not there, [s]; the first for the
 # library, which bounds only some of its waiting, the second for all of it.

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from hwid_cli.data.calibration import (
+from hwid_cli.data.signal_features import (
     find_damaged,
     find_onset,
     find_period,

@@ -2,7 +2,7 @@ import pytest
 
 from hwid_cli.errors import ConfigError
 from hwid_cli.records.machines import GunPlan
-from hwid_cli.stages.simulate import plan_gun, select_recordings
+from hwid_cli.stages.gun_plan import plan_gun, select_recordings
 
 PLAN = {recording.name: recording for recording in plan_gun(GunPlan())}
 

@@ -1,8 +1,10 @@
+from collections import deque
+
 import pytest
 
 from hwid_cli.errors import WorkerError
-from hwid_cli.tasks import cluster
-from hwid_cli.tasks.cluster import Chunks
+from hwid_cli.tasks import chunks
+from hwid_cli.tasks.chunks import Chunks
 from hwid_cli.tasks.task import Task
 
 
@@ -24,19 +26,19 @@ def test_the_first_chunks_hold_one_task():
 
 def test_chunks_last_as_long_as_they_shall():
     found = waiting(1000)
-    found.is_done(found.take(2), cluster.CHUNK_S / 5)
+    found.is_done(found.take(2), chunks.CHUNK_S / 5)
     assert keys(found.take(2)) == [f"key {n}" for n in range(1, 6)]
 
 
 def test_short_tasks_are_not_packed_without_limit():
     found = waiting(1000)
     found.is_done(found.take(2), 1e-9)
-    assert len(found.take(2)) == cluster.MOST_IN_CHUNK
+    assert len(found.take(2)) == chunks.MOST_IN_CHUNK
 
 
 def test_the_last_tasks_are_divided_among_all():
     found = waiting(43)
-    found.is_done(found.take(2), cluster.LEAST_CHUNK_S / 2)
+    found.is_done(found.take(2), chunks.LEAST_CHUNK_S / 2)
     sizes = []
     while found:
         sizes.append(len(found.take(2)))
@@ -50,9 +52,9 @@ def test_the_last_tasks_do_not_wait_for_one_worker_to_take_them_all():
 
 
 def test_a_round_goes_on_at_the_pace_of_the_one_before():
-    recent = cluster.deque(maxlen=cluster.RECENT)
+    recent = deque(maxlen=chunks.RECENT)
     first = Chunks([Task("k", "t", sum, ((1,),), int)], recent)
-    first.is_done(first.take(2), cluster.CHUNK_S / 4)
+    first.is_done(first.take(2), chunks.CHUNK_S / 4)
     tasks = [Task(f"k {n}", "t", sum, ((1,),), int) for n in range(99)]
     assert len(Chunks(tasks, recent).take(2)) == 4
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from hwid_cli.tasks.cluster import CHUNK_S
+from hwid_cli.tasks.chunks import CHUNK_S
 
 DOCS = Path(__file__).parents[2] / "docs"
 
