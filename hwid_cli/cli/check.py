@@ -17,7 +17,7 @@ from hwid_cli.data.recording_files import (
 )
 from hwid_cli.data.recordings import survey_recordings
 from hwid_cli.errors import HwidError, MeasurementError
-from hwid_cli.files.messages import did_you_mean
+from hwid_cli.files.suggestions import did_you_mean
 from hwid_cli.records.check import FitCost, RecordingFacts, StagePlan
 from hwid_cli.records.experiment import Experiment
 from hwid_cli.records.recordings import Calibrated

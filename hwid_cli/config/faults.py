@@ -3,7 +3,8 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from hwid_cli.files.messages import did_you_mean, escaped, shown
+from hwid_cli.files.messages import escaped, shown
+from hwid_cli.files.suggestions import did_you_mean
 from hwid_cli.records.rules import Refusal
 
 Place = tuple[object, ...]

@@ -25,7 +25,7 @@ def load_experiment(path: Path) -> Experiment:
     ConfigError
         One line with file, key, value found, what was expected and the next step.
     """
-    from hwid_cli.config.yaml_text import read_yaml  # noqa: PLC0415, RUF100
+    from hwid_cli.config.yaml_text import read_yaml
 
     return experiment_of(read_yaml(Path(path)), str(path))
 

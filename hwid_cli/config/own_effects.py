@@ -16,7 +16,8 @@ from hwid_cli.data.formula_units import (
 from hwid_cli.data.units import base_exponents
 from hwid_cli.drive.catalogue import configured_effects
 from hwid_cli.drive.formula import CONSTANTS, NAMED_FUNCTIONS, VARIABLES, names, parsed
-from hwid_cli.files.messages import did_you_mean, name_fault
+from hwid_cli.files.messages import name_fault
+from hwid_cli.files.suggestions import did_you_mean
 from hwid_cli.records.axis import axis_of
 from hwid_cli.records.experiment import Experiment
 from hwid_cli.records.own_effects import (

@@ -17,7 +17,8 @@ import numpy as np
 from hwid_cli.data.columns import ROLES, MeasuredColumn, array_column
 from hwid_cli.data.units import bare_unit, unit_in_name
 from hwid_cli.errors import MeasurementError
-from hwid_cli.files.messages import did_you_mean, is_plain
+from hwid_cli.files.messages import is_plain
+from hwid_cli.files.suggestions import did_you_mean
 from hwid_cli.records.experiment import Columns
 from hwid_cli.records.starter import FoundColumn
 

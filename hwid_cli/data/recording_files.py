@@ -15,8 +15,9 @@ from pathlib import Path
 
 from hwid_cli.data.columns import FileColumns, keep_rows, with_each
 from hwid_cli.errors import ConfigError, MeasurementError
-from hwid_cli.files.messages import did_you_mean, shown
+from hwid_cli.files.messages import shown
 from hwid_cli.files.small_files import read_small_file
+from hwid_cli.files.suggestions import did_you_mean
 from hwid_cli.records.experiment import Experiment, RecordingsOptions
 from hwid_cli.records.recordings import KINDS
 

@@ -13,8 +13,9 @@ import numpy as np
 
 from hwid_cli.data.formats import read_columns
 from hwid_cli.errors import MeasurementError
-from hwid_cli.files.messages import did_you_mean, name_fault, shown
+from hwid_cli.files.messages import name_fault, shown
 from hwid_cli.files.small_files import read_small_file
+from hwid_cli.files.suggestions import did_you_mean
 from hwid_cli.records.experiment import Columns, RecordingsOptions
 from hwid_cli.records.next import PlannedInput
 

@@ -22,7 +22,7 @@ from hwid_cli.data.table_columns import (
 )
 from hwid_cli.data.table_heads import TableHead, read_head
 from hwid_cli.errors import MeasurementError
-from hwid_cli.files.messages import did_you_mean
+from hwid_cli.files.suggestions import did_you_mean
 from hwid_cli.records.experiment import Columns
 from hwid_cli.records.starter import FoundColumn
 

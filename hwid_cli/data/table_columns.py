@@ -17,7 +17,8 @@ from hwid_cli.data.columns import MeasuredColumn
 from hwid_cli.data.table_heads import TableHead
 from hwid_cli.data.units import unit_in_name
 from hwid_cli.errors import MeasurementError
-from hwid_cli.files.messages import did_you_mean, is_plain, shown
+from hwid_cli.files.messages import is_plain, shown
+from hwid_cli.files.suggestions import did_you_mean
 from hwid_cli.records.starter import FoundColumn
 
 # Rows of text below the numbers that are no part of them; more are a fault.

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from hwid_cli.errors import ConfigError
 from hwid_cli.export.loading import load_model
-from hwid_cli.files.messages import did_you_mean
+from hwid_cli.files.suggestions import did_you_mean
 from hwid_cli.records.comparison import NamedModel
 from hwid_cli.records.model import Fit
 from hwid_cli.store.group_results import read_group

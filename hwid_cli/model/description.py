@@ -3,15 +3,6 @@
 References
 ----------
 docs/method.md, section "What a fit reports".
-
-Where a static map is not monotonic: turns back, so that two arguments give one value.
-
-Such a map is legitimate, such as that of a sensor that rectifies, but the position
-can no longer be told from the output, and no controller can invert it.
-
-References
-----------
-docs/method.md, section "What a fit reports".
 """
 
 from collections.abc import Sequence
@@ -22,82 +13,16 @@ import numpy as np
 from hwid_cli.model import scores, sensitivities, static_map
 from hwid_cli.model.candidates import Candidate, columns
 from hwid_cli.model.extrapolation import extrapolated
-from hwid_cli.model.identifiability import offset_is_shared
+from hwid_cli.model.held_directions import offset_is_shared
 from hwid_cli.model.levenberg_marquardt import Search
 from hwid_cli.model.linear_block import poles
-from hwid_cli.model.map_curve import map_curve
 from hwid_cli.model.normalise import normalise, with_zero_at_zero
 from hwid_cli.model.placing import reaching, with_maps
 from hwid_cli.model.problem import FitProblem, joined
+from hwid_cli.model.turning_points import turning_points
 from hwid_cli.model.uncertainty import NOT_WORKED_OUT, parameter_statistics
-from hwid_cli.records.model import Fit, FitOptions, StaticMap
+from hwid_cli.records.model import Fit, FitOptions
 from hwid_cli.records.recordings import Recording
-
-# Share of a map's range by which it must turn back; less is the shape of a flat part.
-_LEAST_DEPTH = 0.02
-
-
-def turning_points(
-    one: StaticMap,
-    *,
-    least: float = 0.0,
-    between: tuple[float, float] | None = None,
-) -> np.ndarray:
-    """Arguments at which a map turns back.
-
-    Parameters
-    ----------
-    least : float
-        Turning back by less than this, in the unit of the value, does not count, nor does
-        less than 2 % of the map's range.
-    between : tuple of float, optional
-        Range of the argument that counts; the domain unless given.
-
-    Returns
-    -------
-    ndarray, shape (n_turns,)
-        Rising; empty for a map that is monotonic.
-
-    Examples
-    --------
-    >>> turning_points(StaticMap("polynomial", np.array([0.5, 0.0, 0.5]), (-1.0, 1.0)))
-    array([0.])
-    """
-    curve = map_curve(one)
-    low, high = one.domain if between is None else between
-    inside = (curve.argument >= low) & (curve.argument <= high)
-    argument, value = curve.argument[inside], curve.value[inside]
-    if value.size < 3 or not np.isfinite(value).all() or _is_monotonic(value):
-        return np.zeros(0)
-    depth = max(_LEAST_DEPTH * float(np.ptp(value)), least)
-    return argument[_turns(value, depth)]
-
-
-def _is_monotonic(value: np.ndarray) -> bool:
-    steps = np.diff(value)
-    return bool((steps >= 0.0).all() or (steps <= 0.0).all())
-
-
-def _turns(value: np.ndarray, depth: float) -> list[int]:
-    """Places of the extremes from which a curve goes back by a depth on both sides."""
-    turns: list[int] = []
-    highest = lowest = 0
-    rising: bool | None = None
-    for place, here in enumerate(value):
-        if here > value[highest]:
-            highest = place
-        if here < value[lowest]:
-            lowest = place
-        if rising is not False and here < value[highest] - depth:
-            if rising:
-                turns.append(highest)
-            rising, lowest = False, place
-        elif rising is not True and here > value[lowest] + depth:
-            if rising is False:
-                turns.append(lowest)
-            rising, highest = True, place
-    return turns
-
 
 # RMSDs by which an output map must turn back to be called non-monotonic: less may be noise.
 _TOLD = 2.0

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from hwid_cli.errors import SimulationError
-from hwid_cli.files.messages import did_you_mean
+from hwid_cli.files.suggestions import did_you_mean
 from hwid_cli.records.programs import RunRequest, SimulatorRun
 
 

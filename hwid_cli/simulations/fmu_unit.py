@@ -30,7 +30,8 @@ from fmpy.fmi3 import FMU3Slave
 from fmpy.logging import addLoggerProxy
 from fmpy.model_description import ModelDescription, read_model_description
 
-from hwid_cli.files.messages import did_you_mean, shown
+from hwid_cli.files.messages import shown
+from hwid_cli.files.suggestions import did_you_mean
 
 _REAL = ("Real", "Float64")
 _OUTPUTS = ("output", "local")

@@ -5,8 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hwid_cli.model.leverage import pull
 from hwid_cli.model.outliers import usual_error
-from hwid_cli.model.residual_tests import n_tested_lags, pull, residual_tests
+from hwid_cli.model.residual_tests import n_tested_lags, residual_tests
 from hwid_cli.model.robust_validation import robust_validation
 from hwid_cli.model.simulate import validation_output
 from hwid_cli.records.model import Fit, HammersteinWiener

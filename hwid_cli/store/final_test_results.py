@@ -11,17 +11,9 @@ import numpy as np
 from hwid_cli.files.csv_tables import write_table_csv
 from hwid_cli.records.groups import FinalTest, Prediction
 from hwid_cli.records.trust import RecordingTrust, TrustOnTests
-from hwid_cli.store.hdf5_records import (
-    built,
-    read_array,
-    read_record,
-    read_small,
-    schema,
-    write_array,
-    write_record,
-    write_small,
-)
+from hwid_cli.store.hdf5_records import built, read_record, schema, write_record
 from hwid_cli.store.hdf5_tables import read_table, write_table
+from hwid_cli.store.hdf5_values import read_array, read_small, write_array, write_small
 from hwid_cli.store.result_files import Provenance, read_results, replaced_stage
 
 TEST_COLUMNS = ("model", "level", "recording", "is_test", "rmsd", "covered")

@@ -12,14 +12,9 @@ import numpy as np
 from hwid_cli.files.csv_tables import write_table_csv
 from hwid_cli.records.groups import Group, GroupSearch, Join
 from hwid_cli.records.model import Fit
-from hwid_cli.store.hdf5_records import (
-    built,
-    read_array,
-    read_small,
-    write_array,
-    write_small,
-)
+from hwid_cli.store.hdf5_records import built
 from hwid_cli.store.hdf5_tables import read_table, write_table
+from hwid_cli.store.hdf5_values import read_array, read_small, write_array, write_small
 from hwid_cli.store.result_files import Provenance, read_results, replaced_stage
 
 GROUP_COLUMNS = (

@@ -13,14 +13,8 @@ from typing import Any, TypeVar
 import h5py
 import numpy as np
 
-from hwid_cli.store.hdf5_records import (
-    StoredField,
-    built,
-    has_value,
-    read_array,
-    schema,
-    write_array,
-)
+from hwid_cli.store.hdf5_records import StoredField, built, schema
+from hwid_cli.store.hdf5_values import has_value, read_array, write_array
 
 Record = TypeVar("Record")
 

@@ -22,7 +22,7 @@ from hwid_cli.errors import CacheError, UntrustedFunctionError
 from hwid_cli.files.atomic import check_format, replaced_hdf5
 from hwid_cli.files.checksums import has_checksum, with_checksum, without_checksum
 from hwid_cli.files.plain_files import refuse_unless_plain
-from hwid_cli.store.hdf5_records import read_array, write_array
+from hwid_cli.store.hdf5_values import read_array, write_array
 
 Result = TypeVar("Result")
 

@@ -23,14 +23,9 @@ from hwid_cli.records.recordings import (
     SignalUnit,
 )
 from hwid_cli.records.results import CrossValidation
-from hwid_cli.store.hdf5_records import (
-    read_array,
-    read_record,
-    write_array,
-    write_record,
-    write_small,
-)
+from hwid_cli.store.hdf5_records import read_record, write_record
 from hwid_cli.store.hdf5_tables import read_table, write_table
+from hwid_cli.store.hdf5_values import read_array, write_array, write_small
 from hwid_cli.store.result_files import (
     CALIBRATED_FORMAT,
     HAS_CHECKSUM,

@@ -6,12 +6,8 @@ from scipy.stats import chi2
 from hwid_cli.model import sensitivities
 from hwid_cli.model.candidates import Candidate, FitData, columns
 from hwid_cli.model.fit import fit
-from hwid_cli.model.residual_tests import (
-    n_tested_lags,
-    output_derivatives,
-    pull,
-    residual_tests,
-)
+from hwid_cli.model.leverage import output_derivatives, pull
+from hwid_cli.model.residual_tests import n_tested_lags, residual_tests
 from hwid_cli.records.model import FitOptions, Orders
 from hwid_cli.records.recordings import Recording
 from tests.model.plants import ORDERS, measured, options, plant

@@ -3,9 +3,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hwid_cli.model.description import turning_points
 from hwid_cli.model.fit import fit
 from hwid_cli.model.simulate import simulate
+from hwid_cli.model.turning_points import turning_points
 from hwid_cli.records.model import FitOptions, StaticMap
 from tests.model.plants import MAPS, ORDERS, measured, plant
 

@@ -15,8 +15,8 @@ from hwid_cli.stages.coverage_matrix import (
     assign,
     count_covered_by,
     count_covers,
-    smallest_cover,
 )
+from hwid_cli.stages.set_cover import smallest_cover
 
 REFERENCE = Path(__file__).parents[1] / "reference"
 THRESHOLD = 0.01

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from hwid_cli.stages.coverage_matrix import smallest_cover
+from hwid_cli.stages.set_cover import smallest_cover
 
 SHAPES = st.tuples(st.integers(1, 7), st.integers(1, 6))
 

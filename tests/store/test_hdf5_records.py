@@ -9,8 +9,9 @@ from hypothesis import given
 from hwid_cli.records.candidates import CandidateFit, ParameterRef
 from hwid_cli.records.model import LinearBlock
 from hwid_cli.records.trust import RecordingTrust, ShownBand, TrustOnTests
-from hwid_cli.store.hdf5_records import LONGEST_ATTRIBUTE, read_record, write_record
+from hwid_cli.store.hdf5_records import read_record, write_record
 from hwid_cli.store.hdf5_tables import read_table, write_table
+from hwid_cli.store.hdf5_values import LONGEST_ATTRIBUTE
 from tests.diagnosis.made_up_fits import made_up
 from tests.store.record_examples import (
     WITH_MORE,
@@ -170,7 +171,7 @@ def test_text_with_a_null_character_is_an_error(word):
 
 def test_record_type_has_every_form_that_is_stored():
     forms = {"scalar", "tuple", "array", "record", "records"}
-    from hwid_cli.store.hdf5_records import schema  # noqa: PLC0415, RUF100
+    from hwid_cli.store.hdf5_records import schema
 
     assert {field.form for field in schema(WithMore)} == forms
 
