@@ -257,7 +257,8 @@ def _is_contradicted(role: str, word: str, unit: str) -> bool:
     """Whether a current leaves a plug ``out``, or a position comes in at one."""
     says = "input" if unit.lower() in _CURRENT_UNITS else ""
     says = "output" if unit.lower() in _OUTPUT_UNITS else says
-    return word in _PLUGS and says not in ("", role)
+    # A letter stands for many things; what is measured in A is none of them but a current.
+    return (word in _PLUGS or len(word) == 1) and says not in ("", role)
 
 
 def _words(title: str) -> list[str]:

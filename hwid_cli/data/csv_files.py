@@ -21,7 +21,7 @@ from typing import TextIO
 
 import numpy as np
 
-from hwid_cli.data.cells import is_stamp
+from hwid_cli.data.cells import is_stamp, is_word
 from hwid_cli.data.columns import ROLES, MeasuredColumn
 from hwid_cli.data.table_columns import (
     ColumnParts,
@@ -112,7 +112,8 @@ def read_csv_columns(path: Path, columns: Columns) -> list[tuple[str, MeasuredCo
             "export the measurement again or leave the file out"
         )
     titles = titles_of(wanted, places)
-    read = _read_body(sheet, titles)
+    # Without a clock, nobody can tell whether a second head begins a second recording.
+    read = _read_body(sheet, titles, keep_heads="time" not in wanted)
     return [
         (role, with_unit(path, read[place], role, sheet.head, place))
         for role, place in places.items()
@@ -346,14 +347,23 @@ def _find(sheet: _Sheet, key: str | int, role: str) -> int:
     return column_named(key, header, role, f"{sheet.path}, row {line}")
 
 
-def _read_body(sheet: _Sheet, titles: dict[int, str]) -> dict[int, MeasuredColumn]:
+def _read_body(
+    sheet: _Sheet, titles: dict[int, str], *, keep_heads: bool = False
+) -> dict[int, MeasuredColumn]:
     """Read some columns of the numbers.
 
     Parameters
     ----------
     titles : dict of int to str
         How messages call each of them.
+    keep_heads : bool
+        Whether a head that comes again, further down, is a fault.
     """
+    begins = {
+        row[0] for row in sheet.rows[: sheet.head.body] if row and is_word(row[0])
+    }
+    if keep_heads:
+        begins = set()
     parts = ColumnParts(sheet.path, titles, _stamped(sheet, titles))
     number = sheet.first_line
     with sheet.path.open(encoding=sheet.encoding, errors="replace", newline="") as file:
@@ -367,7 +377,8 @@ def _read_body(sheet: _Sheet, titles: dict[int, str]) -> dict[int, MeasuredColum
                 continue
             source = _Counted(lines, file)
             rows = _cells_of(sheet.path, source, sheet.separator, number)
-            block = list(_while_inside(rows, number + len(lines)))
+            inside = _while_inside(rows, number + len(lines))
+            block = [(end, row) for end, row in inside if row[0] not in begins]
             _check_widths(sheet, block)
             parts.add_cells(block)
             number += source.count

@@ -178,8 +178,8 @@ def list_columns(path: Path) -> tuple[FoundColumn, ...]:
             return tuple(reader.list_columns(path))
         replies = _asked(reader, path)
     return tuple(
-        FoundColumn(title, key, values, variable, unit)
-        for (title, key, variable, unit), values in replies
+        FoundColumn(title, key, values, *about)
+        for (title, key, *about), values in replies
     )
 
 
@@ -220,7 +220,7 @@ def _answer(request: dict[str, Any]) -> Iterator[Labelled]:
     reader = reader_of(path)
     if request["columns"] is None:
         for one in reader.list_columns(path):
-            yield [one.title, one.key, one.variable, one.unit], one.values
+            yield [one.title, one.key, one.variable, one.unit, one.scale], one.values
     else:
         for role, column in reader.read(path, Columns(**request["columns"])):
             about = {name: getattr(column, name) for name in (*_TOLD, "texts")}

@@ -21,6 +21,8 @@ class FoundColumn:
         Table that a numbered column belongs to.
     unit : str
         That the file states beside the name; empty where it states none.
+    scale : float, [-]
+        Factor that the file states for its counts; 1 where it states none.
     """
 
     title: str
@@ -28,6 +30,7 @@ class FoundColumn:
     values: np.ndarray
     variable: str | None = None
     unit: str = ""
+    scale: float = 1.0
 
     @property
     def place(self) -> tuple[str | None, str | int]:
