@@ -13,7 +13,12 @@ from itertools import permutations
 import numpy as np
 
 from hwid_cli.data import column_signs as signs
-from hwid_cli.data.column_words import Meaning, meaning_of, place_in_chain
+from hwid_cli.data.column_words import (
+    Meaning,
+    counts_recordings,
+    meaning_of,
+    place_in_chain,
+)
 from hwid_cli.data.table_heads import sample_time_named
 from hwid_cli.data.units import factor_between, unit_in_name, unit_of_dates
 from hwid_cli.errors import MeasurementError
@@ -148,6 +153,22 @@ def guess_time(columns: Sequence[FoundColumn]) -> TimeGuess:
     return TimeGuess(None, None, False, "nothing in the file tells the time")
 
 
+def unused_times(columns: Sequence[FoundColumn]) -> tuple[str, ...]:
+    """Say why columns that are named after time are no clocks."""
+    notes = []
+    for one in long_columns(columns):
+        if meaning_of(one.title, one.unit).role != "time" and not _is_in_time(one):
+            continue
+        with np.errstate(invalid="ignore"):
+            bad = np.flatnonzero(~(np.diff(one.values) > 0))
+        what = f"does not grow at sample {bad[0] + 1}" if bad.size else "grows unevenly"
+        notes.append(
+            f"NOT USED: {one.title!r} is named after time, but {what}; sort the rows, or "
+            "export the file again"
+        )
+    return tuple(notes)
+
+
 def clocks_of(
     columns: Sequence[FoundColumn],
 ) -> list[tuple[FoundColumn, Meaning, signs.Clock]]:
@@ -155,11 +176,20 @@ def clocks_of(
     found = [
         (one, meaning_of(one.title, one.unit), clock)
         for one in long_columns(columns)
-        if (clock := signs.clock_of(one.values)) is not None
+        if (clock := _clock_of(one)) is not None
     ]
     return sorted(
         found, key=lambda one: one[1].role != "time" and not _is_in_time(one[0])
     )
+
+
+def _clock_of(column: FoundColumn) -> signs.Clock | None:
+    """How a column ticks; one that is named after time may begin again."""
+    clock = signs.clock_of(column.values)
+    named = meaning_of(column.title, column.unit).role == "time" or _is_in_time(column)
+    if clock is None and named and (begins := signs.restarts_of(column.values)):
+        return signs.clock_of(column.values[: begins[0]])
+    return clock
 
 
 def _is_in_time(column: FoundColumn) -> bool:
@@ -233,7 +263,9 @@ def guess_signals(columns: Sequence[FoundColumn]) -> SignalGuess:
         [
             one
             for one in long_columns(columns)
-            if signs.changes(one.values) and signs.clock_of(one.values) is None
+            if signs.changes(one.values)
+            and _clock_of(one) is None
+            and not (counts_recordings(one.title) and signs.blocks_of(one.values))
         ]
     )
     able = [one for one in named if one.meaning.role not in ("time", "counter")]

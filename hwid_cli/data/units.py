@@ -324,7 +324,11 @@ _MEASURED_IN = {
 
 
 # A column of time may be named by its unit alone.
-_NAMES_OF_TIME = ("ms", "us", "µs", "ns", "sec", "msec")
+_NAMES_OF_TIME = {
+    **{unit: unit for unit in ("ms", "us", "µs", "ns", "sec", "msec")},
+    "millis": "ms",
+    "micros": "us",
+}
 
 
 @lru_cache(maxsize=256)
@@ -380,7 +384,7 @@ def unit_in_name(title: str, role: str) -> str:
     """
     bare, unit = split_unit(title)
     if role == "time" and title.strip() in _NAMES_OF_TIME:
-        return title.strip()
+        return _NAMES_OF_TIME[title.strip()]
     if not unit:
         return ""
     bracket = _BRACKET.search(title)

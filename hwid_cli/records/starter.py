@@ -95,6 +95,8 @@ class FolderLayout:
         Files that are not used, and why.
     first_sample : int, [samples]
         Rows at the beginning of the files in which a signal has no number.
+    parts : dict of str to tuple of int, [samples]
+        First and end of each recording where a file holds several; empty for one.
     """
 
     patterns: tuple[str, ...]
@@ -110,6 +112,7 @@ class FolderLayout:
     output_time: Role | None = None
     left: tuple[tuple[str, str], ...] = ()
     first_sample: int = 0
+    parts: dict[str, tuple[int, ...]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

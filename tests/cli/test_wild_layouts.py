@@ -143,3 +143,39 @@ def test_segments_without_a_clock_are_not_joined(folder, tmp_path):
 
     assert result.exit_code == 1
     assert "which is not a number" in result.stderr
+
+
+def test_a_number_of_the_recording_cuts_where_nothing_tells_the_time(folder, tmp_path):
+    lines = [
+        f"{number},{row}"
+        for number, (_, u, y) in enumerate(RUNS, 1)
+        for row in rows((u, y))
+    ]
+    put(folder, "all.csv", ["run,i [A],x [mm]", *lines])
+    raws, said = read(folder, tmp_path / "mine.yaml")
+
+    assert [raw.name for raw in raws] == ["part_1", "part_2", "part_3"]
+    for raw, (_, u, _) in zip(raws, RUNS, strict=True):
+        assert (raw.input == u).all()
+    assert "THE SAMPLE TIME IS NOT KNOWN" in said
+
+
+def test_files_cut_at_other_samples_are_named_and_the_others_used(folder, tmp_path):
+    for name, (t, u, y) in zip(NAMES, RUNS, strict=True):
+        put(folder, f"{name}.csv", [HEAD, *rows((t, u, y))])
+    t, u, y = RUNS[0]
+    put(folder, "two.csv", [HEAD, *rows((np.where(t < 0.2999, t, t - 0.3), u, y))])
+    raws, said = read(folder, tmp_path / "mine.yaml")
+
+    assert [raw.name for raw in raws] == list(NAMES)
+    assert "two.csv: holds 2 recordings, the second from sample 150" in said
+
+
+def test_a_time_that_runs_backwards_is_named(folder, tmp_path):
+    for name, run in zip(NAMES, RUNS, strict=True):
+        put(folder, f"{name}.csv", [HEAD, *rows(run)[::-1]])
+    _, said = read(folder, tmp_path / "mine.yaml")
+
+    assert (
+        "NOT USED: 't [s]' is named after time, but does not grow at sample 1" in said
+    )

@@ -372,3 +372,81 @@ def mdf_of_three_groups(folder):
         file.save(folder / f"{name}.mf4", overwrite=True)
         file.close()
     return _expected()
+
+
+def _below_one_another(folder, name, head, begin, **how):
+    """One file of all recordings; a function says what stands in front of each."""
+    lines = [
+        line
+        for number, run in enumerate(RUNS)
+        for line in [*begin(number), *_rows(run, " " if name.endswith("dat") else ",")]
+    ]
+    _put(folder / name, [*head, *lines], **how)
+    return _expected()
+
+
+@layout
+def recordings_between_blank_lines(folder):
+    return _below_one_another(folder, "all.csv", [HEAD], lambda _: ["", ""])
+
+
+@layout
+def recordings_as_gnuplot_takes_them(folder):
+    def begin(number):
+        return ["", "", f"# {NAMES[number]}", "# t[s] i[A] x[mm]"]
+
+    return _below_one_another(folder, "all.dat", [], begin)
+
+
+def _numbered(column):
+    import pandas as pd
+
+    frames = [
+        pd.DataFrame({"trial": column(number), "t_s": t, "i_A": u, "x_mm": y})
+        for number, (t, u, y) in enumerate(RUNS)
+    ]
+    return pd.concat(frames)
+
+
+@layout
+def recordings_below_one_another_with_a_column_of_names(folder):
+    _numbered(lambda number: NAMES[number]).to_csv(folder / "all.csv", index=False)
+    return _expected()
+
+
+@layout
+def recordings_below_one_another_in_parquet(folder):
+    _numbered(lambda number: number).to_parquet(folder / "all.parquet")
+    return _expected()
+
+
+@layout
+def a_time_that_begins_again_in_every_file(folder):
+    def rows(run):
+        t, u, y = run
+        return _rows((np.where(t < 0.3599, t, t - 0.36), u, y))
+
+    _texts(folder, [HEAD], rows)
+    halves = (slice(0, 180), slice(180, 360))
+    return [
+        Written(u[half], 1e-3 * y[half], "A", "m")
+        for _, u, y in RUNS
+        for half in halves
+    ]
+
+
+@layout
+def microseconds_of_32_bits_that_overflow(folder):
+    begin = 2**32 - 300_000
+
+    def stamp(seconds):
+        return str((begin + round(1e6 * seconds)) % 2**32)
+
+    head = ["micros,current_A,position_mm"]
+    _texts(folder, head, lambda run: _timed(run, stamp))
+    halves = (slice(0, 150), slice(150, 360))
+    return [
+        Written(u[half], 1e-3 * y[half], "A", "m")
+        for _, u, y in RUNS
+        for half in halves
+    ]
