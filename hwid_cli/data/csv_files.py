@@ -48,6 +48,7 @@ _BLOCK_LINES = 4096
 # The csv module reads no longer cell, and says so.
 _LONGEST_LINE = 2**16
 _READ_BYTES = 2**20
+_QUOTED_OR_BARE = re.compile(r'"([^"]*)"|([^\s"]+)')
 
 
 @dataclass(frozen=True)
@@ -168,7 +169,8 @@ def _form_of(path: Path, lines: list[str], wanted: Sequence[str]) -> _Sheet:
         )
     head = read_head(rows, wanted=wanted, comments=comments)
     place = head.name_row if head.name_row >= 0 else min(head.body, len(rows) - 1)
-    return _Sheet(path, "", separator, rows, ends, head, len(rows[place]))
+    width = max(len(rows[place]), len(head.names))
+    return _Sheet(path, "", separator, rows, ends, head, width)
 
 
 def _telling(lines: list[str]) -> list[str]:
@@ -257,12 +259,19 @@ def _separator(lines: Sequence[str]) -> str:
 
 def _split(line: str, separator: str) -> list[str]:
     if separator == " ":
-        return line.split()
+        return _between_blanks(line)
     # A quote that is not closed, or a cell of any length, is told when it is read.
     if '"' not in line or len(line) > _LONGEST_LINE:
         return [cell.strip() for cell in line.split(separator)]
     row = next(csv.reader([line], delimiter=separator, skipinitialspace=True), [])
     return [cell.strip() for cell in row]
+
+
+def _between_blanks(line: str) -> list[str]:
+    """Cells between any number of blanks; a cell in quotes may hold some."""
+    if '"' not in line or len(line) > _LONGEST_LINE:
+        return line.split()
+    return [quoted or bare for quoted, bare in _QUOTED_OR_BARE.findall(line)]
 
 
 def _is_comment(line: str) -> bool:
@@ -314,7 +323,7 @@ def _cells_of(
     if separator == " ":
         for number, line in enumerate(lines, before + 1):
             if line.strip() and not _is_comment(line):
-                yield number, line.split()
+                yield number, _between_blanks(line)
         return
     kept = ("\n" if _is_comment(line) else line for line in lines)
     reader = csv.reader(kept, delimiter=separator, skipinitialspace=True)

@@ -5,7 +5,7 @@ For ``hwid init``.
 
 import glob
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path, PurePosixPath
@@ -34,6 +34,9 @@ from hwid_cli.records.starter import FolderLayout, FoundColumn, FoundFile, Role
 # Beyond this share of samples that are missing a signal is slower than its rows, [-].
 _MOST_LOST = 0.05
 _SLOW = -1
+# Stands for every table of a file, and how deep these may lie.
+STAR = "*"
+_DEEPEST_TABLE = 3
 # What spreadsheets and systems leave beside data.
 _SYSTEM_NAMES = ("~$", "._", "Thumbs", "desktop")
 
@@ -99,6 +102,54 @@ def _listed(path: Path, folder: Path) -> FoundFile:
     return FoundFile(name, columns, "" if columns else "no table of numbers")
 
 
+def _with_starred_tables(file: FoundFile) -> FoundFile:
+    """Stand the first of tables with the same columns for all: each is a recording.
+
+    So does a table with the name of its file, which is another one in every file.
+    """
+    stem = PurePosixPath(file.name).stem
+    for depth in range(1, _DEEPEST_TABLE + 1):
+        tables: dict[str, dict[str | int, FoundColumn]] = {}
+        for one in long_columns(file.columns):
+            if (place := _split_at(one, depth)) is not None:
+                tables.setdefault(place[0], {})[place[1]] = one
+        for name, members in tables.items():
+            alike = [own for own in tables.values() if own.keys() == members.keys()]
+            if not _holds_signals(members.values()):
+                continue
+            if len(alike) > 1 or name == stem:
+                beside = [one for one in file.columns if _is_beside(one, tables)]
+                starred = [
+                    replace(one, key=key, variable=STAR) for key, one in members.items()
+                ]
+                return replace(file, columns=(*starred, *beside))
+    return file
+
+
+def _split_at(column: FoundColumn, depth: int) -> tuple[str, str | int] | None:
+    """Table of a column and its key in there; None where it is in none so deep."""
+    if column.variable is not None:
+        return (column.variable, column.key) if depth == 1 else None
+    marks = [found.start() for found in re.finditer(r"[./]", str(column.key))]
+    if len(marks) < depth:
+        return None
+    key = str(column.key)
+    return key[: marks[depth - 1]], key[marks[depth - 1] + 1 :]
+
+
+def _is_beside(column: FoundColumn, tables: Mapping[str, object]) -> bool:
+    """Whether a column is in no table: a clock or a setting for all of them."""
+    name = str(column.key)
+    inside = any(name.startswith((f"{one}.", f"{one}/")) for one in tables)
+    return column.variable is None and not inside
+
+
+def _holds_signals(columns: Iterable[FoundColumn]) -> bool:
+    """Whether columns may be an input and an output."""
+    able = [one for one in columns if signs.changes(one.values)]
+    return sum(signs.clock_of(one.values) is None for one in able) > 1
+
+
 # Where nothing tells the time, [s]: wrong, and said to be.
 UNKNOWN_SAMPLE_TIME_S = 1.0
 
@@ -116,6 +167,7 @@ def guess_layout(files: Sequence[FoundFile]) -> FolderLayout:
     MeasurementError
         If no file holds an input and an output.
     """
+    files = [_with_starred_tables(one) for one in files]
     alike = _alike(files)
     if not alike:
         raise MeasurementError(_no_signals(files))
@@ -141,6 +193,12 @@ def guess_layout(files: Sequence[FoundFile]) -> FolderLayout:
     used, left = _sorted_out(files, there, typical)
     layout = _layout(signals, clocks, (_patterns(used, files), left))
     layout = _in_parts(layout, used, there.get("time"))
+    if layout.variable == STAR:
+        note = (
+            "a file holds tables with the same columns: each is a recording; if they are "
+            "not, name one in columns: {variable: ...}"
+        )
+        layout = replace(layout, notes=(*layout.notes, note))
     if layout.time is None:
         layout = replace(layout, notes=(*layout.notes, *unused_times(long_ones)))
     if lacks == _SLOW and layout.time is not None:

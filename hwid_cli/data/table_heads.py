@@ -197,7 +197,9 @@ def read_head(
     numeric, texts = _kinds_of_columns(rows, comments)
     body = _first_row(rows, numeric, comments)
     plain = [number for number in range(body) if number not in comments]
-    noted = [number for number in range(body) if number in comments]
+    # A comment of fewer cells says something else.
+    width = max(numeric, default=-1) + 1
+    noted = [n for n in range(body) if n in comments and len(rows[n]) >= width]
     asked = [n for n in (*plain[::-1], *noted[::-1]) if set(wanted) <= set(rows[n])]
     units: dict[int, str] = {}
     name_row, names = -1, []
@@ -210,11 +212,19 @@ def read_head(
         name_row = asked[0]
     if name_row >= 0:
         names = _named(rows, name_row, numeric, units)
+        if not units and _are_rows_named(rows[body:], len(names)):
+            names = ["", *names]
     settings = _settings(rows, body, numeric)
     scales = _scales(rows[:body], numeric)
     return TableHead(
         body, numeric, texts, tuple(names), name_row, units, settings, scales
     )
+
+
+def _are_rows_named(body: Sequence[Sequence[str]], names: int) -> bool:
+    """Whether rows begin with their number, above which no name stands, as R writes."""
+    first = [row[0] for row in body[:_ROWS_BELOW] if len(row) == names + 1]
+    return first == [str(number + 1) for number in range(_ROWS_BELOW)]
 
 
 def _kinds_of_columns(

@@ -179,3 +179,36 @@ def test_a_time_that_runs_backwards_is_named(folder, tmp_path):
     assert (
         "NOT USED: 't [s]' is named after time, but does not grow at sample 1" in said
     )
+
+
+def test_tables_of_a_file_are_recordings_with_their_names(folder, tmp_path):
+    LAYOUTS["recordings in groups of hdf5"](folder)
+    raws, said = read(folder, tmp_path / "mine.yaml")
+
+    assert sorted(raw.name for raw in raws) == list(NAMES)
+    options = load_experiment(tmp_path / "mine.yaml").recordings
+    assert (options.columns.variable, options.columns.input) == ("*", "current")
+    assert "each is a recording" in said
+
+
+def test_a_pattern_of_tables_chooses_among_them(folder, tmp_path):
+    LAYOUTS["recordings in members of a struct"](folder)
+    read(folder, tmp_path / "mine.yaml")
+    text = (tmp_path / "mine.yaml").read_text()
+    path = tmp_path / "two.yaml"
+    head = text.split("\ntest:")[0]
+    path.write_text(head.replace("variable: '*'", "variable: 'data.run_[ab]*'"))
+
+    raws = read_recordings(load_experiment(path), tmp_path)
+    assert [raw.name for raw in raws] == ["run_a", "run_b"]
+
+
+def test_a_pattern_without_a_table_is_refused_with_its_columns(folder, tmp_path):
+    LAYOUTS["recordings in sheets"](folder)
+    read(folder, tmp_path / "mine.yaml")
+    path = tmp_path / "mine.yaml"
+    path.write_text(path.read_text().replace("variable: '*'", "variable: 'no*'"))
+    result = invoke("calibrate", path)
+
+    assert result.exit_code == 1
+    assert "has no table like 'no*' with 'I [A]' and 'x [mm]'" in result.stderr

@@ -450,3 +450,172 @@ def microseconds_of_32_bits_that_overflow(folder):
         for _, u, y in RUNS
         for half in halves
     ]
+
+
+@layout
+def recordings_in_sheets(folder):
+    import openpyxl
+
+    book = openpyxl.Workbook()
+    book.remove(book.active)
+    for name, run in zip(NAMES, RUNS, strict=True):
+        sheet = book.create_sheet(name)
+        sheet.append(["t [s]", "I [A]", "x [mm]"])
+        for cells in zip(*run, strict=True):
+            sheet.append([float(cell) for cell in cells])
+    book.save(folder / "all.xlsx")
+    return _expected()
+
+
+@layout
+def recordings_in_groups_of_hdf5(folder):
+    import h5py
+
+    units = {"t": "s", "current": "A", "position": "mm"}
+    with h5py.File(folder / "all.h5", "w") as file:
+        for name, run in zip(NAMES, RUNS, strict=True):
+            group = file.create_group(f"recordings/{name}")
+            for (key, unit), values in zip(units.items(), run, strict=True):
+                group[key] = values
+                group[key].attrs["unit"] = unit
+    return _expected()
+
+
+def _records(run):
+    fields = [("t", "f8"), ("i_A", "f8"), ("x_mm", "f8")]
+    return np.array(list(zip(*run, strict=True)), dtype=fields)
+
+
+@layout
+def recordings_as_records_of_hdf5(folder):
+    import h5py
+
+    with h5py.File(folder / "all.h5", "w") as file:
+        for name, run in zip(NAMES, RUNS, strict=True):
+            file[name] = _records(run)
+    return _expected()
+
+
+@layout
+def a_rate_as_attribute_of_hdf5(folder):
+    import h5py
+
+    for name, (_, u, y) in zip(NAMES, RUNS, strict=True):
+        with h5py.File(folder / f"{name}.h5", "w") as file:
+            file["current"], file["position"] = u, y
+            file.attrs["sample_rate"] = 500.0
+    return _plain()
+
+
+@layout
+def recordings_in_groups_of_mdf(folder):
+    from asammdf import MDF, Signal
+
+    file = MDF(version="4.10")
+    for name, (t, u, y) in zip(NAMES, RUNS, strict=True):
+        pair = [
+            Signal(u, t, name="I_q", unit="A"),
+            Signal(y, t, name="s_ist", unit="mm"),
+        ]
+        file.append(pair, acq_name=name)
+    file.save(folder / "all.mf4", overwrite=True)
+    file.close()
+    return _expected()
+
+
+@layout
+def recordings_in_members_of_a_struct(folder):
+    import scipy.io
+
+    runs = {
+        name: dict(zip(("t", "i_A", "x_mm"), run, strict=True))
+        for name, run in zip(NAMES, RUNS, strict=True)
+    }
+    scipy.io.savemat(folder / "all.mat", {"data": runs})
+    return _expected()
+
+
+@layout
+def recordings_in_matrices(folder):
+    import scipy.io
+
+    runs = {name: np.column_stack(run) for name, run in zip(NAMES, RUNS, strict=True)}
+    scipy.io.savemat(folder / "all.mat", runs)
+    return _plain()
+
+
+@layout
+def structs_named_after_their_files(folder):
+    """ControlDesk: an abscissa, and an array of signals with names and units."""
+    import scipy.io
+
+    for name, (t, u, y) in zip(NAMES, RUNS, strict=True):
+        fields = [("Name", object), ("Data", object), ("Unit", object)]
+        signals = np.zeros((1, 2), dtype=fields)
+        signals[0, 0] = ("Model Root/s_Tisch", y[None, :], "mm")
+        signals[0, 1] = ("Model Root/i_q", u[None, :], "A")
+        time = {"Name": "timestamps", "Data": t[None, :], "Unit": "s"}
+        about = {"General": "x"}
+        content = {"X": time, "Y": signals, "Description": about}
+        scipy.io.savemat(folder / f"{name}.mat", {name: content})
+    return _expected()
+
+
+@layout
+def rows_of_a_to_file_block(folder):
+    import scipy.io
+
+    for name, run in zip(NAMES, RUNS, strict=True):
+        scipy.io.savemat(folder / f"{name}.mat", {"ans": np.vstack(run)})
+    return _plain()
+
+
+@layout
+def rows_of_two_signals_and_a_rate(folder):
+    for name, (_, u, y) in zip(NAMES, RUNS, strict=True):
+        np.savez(folder / f"{name}.npz", data=np.vstack([u, y]), fs=500.0)
+    return _plain()
+
+
+@layout
+def records_of_numpy(folder):
+    for name, run in zip(NAMES, RUNS, strict=True):
+        np.savez(folder / f"{name}.npz", data=_records(run), about=np.array("rig 3"))
+    return _expected()
+
+
+@layout
+def text_of_octave(folder):
+    def rows(run):
+        lines = ["# name: t", "# type: range", "# base, limit, increment"]
+        lines += [f"0 {STEP_S * (N - 1)} {STEP_S}", "", ""]
+        for name, values in zip("uy", run[1:], strict=True):
+            lines += [
+                f"# name: {name}",
+                "# type: matrix",
+                f"# rows: {N}",
+                "# columns: 1",
+            ]
+            lines += [f" {_number(value)}" for value in values]
+        return lines
+
+    head = ["# Created by Octave 8.4.0, Wed May 01 12:00:00 2024 CEST <lab@rig>"]
+    _texts(folder, head, rows, "mat")
+    return _plain()
+
+
+@layout
+def matrix_of_octave_under_another_ending(folder):
+    head = ["# Created by Octave 8.4.0", "# name: data", "# type: matrix"]
+    head += [f"# rows: {N}", "# columns: 3"]
+    _texts(folder, head, lambda run: [f" {row}" for row in _rows(run, " ")], "txt")
+    return _plain()
+
+
+@layout
+def tables_of_r_without_a_name_above_their_rows(folder):
+    def rows(run):
+        return [f'"{k + 1}" {row}' for k, row in enumerate(_rows(run, " "))]
+
+    _texts(folder, ['"t" "i_A" "x_mm"'], rows, "txt")
+    return _expected()
