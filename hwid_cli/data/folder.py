@@ -70,8 +70,8 @@ def list_measurements(folder: Path) -> tuple[FoundFile, ...]:
     if not paths:
         raise ConfigError(
             f"{folder}: holds no measurement file; expected some of "
-            f"{', '.join('*' + ending for ending in SUFFIXES)}; put the files there, or "
-            "convert them"
+            f"{', '.join('*' + ending for ending in SUFFIXES)}; put the files there, "
+            "unpacked, or convert them"
         )
     return tuple(_listed(path, folder) for path in paths)
 
