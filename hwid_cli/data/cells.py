@@ -23,7 +23,8 @@ MISSING_WORDS = frozenset(
     ]
 )
 _DAY_S = 86_400.0
-_FORTRAN = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)[dD][-+]?\d{1,3}")
+# Always with a point: other signs around a D are a code.
+_FORTRAN = re.compile(r"[-+]?(?:\d+\.\d*|\.\d+)[dD][-+]?\d{1,3}")
 # Marks between thousands that are no decimal mark; the blanks are those of typography.
 _APART = re.compile(r"(?<=\d)[ '\u2019\u00a0\u202f](?=\d{3}(?:\D|$))")
 _GROUPED = {
