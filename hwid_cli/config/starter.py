@@ -205,6 +205,8 @@ def _recordings(layout: FolderLayout, own: str) -> dict[str, Any]:
         section["resample"] = True
     if layout.first_sample:
         section["first_sample"] = layout.first_sample
+    if layout.parts:
+        section["parts"] = {name: list(cut) for name, cut in layout.parts.items()}
     return section
 
 
@@ -258,6 +260,8 @@ def _recordings_lines(layout: FolderLayout, proposal: Proposal, own: str) -> lis
         lines += [
             f"  first_sample: {layout.first_sample}   # a signal has no number before"
         ]
+    if layout.parts:
+        lines += [f"  parts: {_flow(section['parts'])}"]
     if proposal.parts:
         lines += ["  # One file only: its first two thirds identify, the rest judges."]
         first = layout.first_sample

@@ -105,7 +105,7 @@ def _places_of_units(name: str) -> list[str]:
     places = [name + UNIT_MARK]
     places += [f"{name}{end}" for end in ("_unit", "_units", ".unit", ".units")]
     parent, mark, last = _parted(name)
-    for word in ("units", "unit"):
+    for word in ("units", "unit", "Unit"):
         places += [f"{parent}{mark}{word}{other}{last}" for other in (mark or ".", ".")]
         if last in _VALUES and parent:
             places.append(f"{parent}{mark}{word}")
@@ -144,6 +144,9 @@ def list_variables(variables: Variables) -> Iterator[FoundColumn]:
         if name.endswith(_MARKS) or not is_plain(name):
             continue
         values = np.asarray(_checked(name, load()))
+        if values.dtype.names and values.ndim == 1:
+            has_columns = True
+            yield from _fields(name, values)
         if values.dtype.kind not in "fiub" or values.size == 0:
             continue
         vector = np.squeeze(values)
@@ -153,8 +156,9 @@ def list_variables(variables: Variables) -> Iterator[FoundColumn]:
             unit = _stated_unit(variables, None, name) or ("", "")
             numbers = np.atleast_1d(vector).astype(float)
             yield FoundColumn(title or name, name, numbers, unit=unit[0])
-        elif values.ndim == 2 and values.shape[0] > values.shape[1]:
+        elif values.ndim == 2 and values.shape[0] != values.shape[1]:
             has_columns = True
+            values = upright(values)
             for number in range(values.shape[1]):
                 unit = _stated_unit(variables, name, number) or ("", "")
                 numbers = values[:, number].astype(float)
@@ -162,6 +166,23 @@ def list_variables(variables: Variables) -> Iterator[FoundColumn]:
                 yield FoundColumn(called, number, numbers, name, unit[0])
     if not has_columns and (said := _unread_objects(variables)):
         raise ValueError(f"holds no plain arrays{said}")
+
+
+def _fields(name: str, records: np.ndarray) -> Iterator[FoundColumn]:
+    """Columns of numbers of a structured array."""
+    for field in records.dtype.names or ():
+        if records.dtype[field].kind in "fiub" and is_plain(field):
+            yield FoundColumn(field, field, records[field].astype(float), name)
+
+
+def upright(table: np.ndarray) -> np.ndarray:
+    """Give a table with a column for each signal; Simulink's To File has rows of them.
+
+    Parameters
+    ----------
+    table : ndarray, shape (n, m)
+    """
+    return table.T if table.shape[0] < table.shape[1] else table
 
 
 def _title(variables: Variables, name: str) -> str:
@@ -249,6 +270,8 @@ def _numbered(
             f"{path}: variable {variable!r} has shape {shape}; expected a table of "
             f"rows and columns; name vectors in recordings.columns.{role}"
         )
+    table = upright(table)
+    shape = table.shape
     if key >= shape[1]:
         raise MeasurementError(
             f"{path}: variable {variable!r} has {shape[1]} columns, so none with "

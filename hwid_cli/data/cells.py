@@ -13,22 +13,50 @@ import numpy as np
 
 # What programs write where they have no number, in lower case.
 MISSING_WORDS = frozenset(
-    ("", "nan", "na", "n/a", "n.a.", "#n/a", "null", "none", "-", "--", "---", "#nv")
+    [
+        *("", "nan", "na", "n/a", "n.a.", "null", "none", "-", "--", "---", "-nan"),
+        # Spreadsheets, in English and German.
+        *("#n/a", "#nv", "#div/0!", "#value!", "#wert!", "#num!", "#zahl!", "#null!"),
+        *("#ref!", "#bezug!", "#name?"),
+        # The library of C under Windows.
+        *("1.#qnan", "-1.#qnan", "1.#ind", "-1.#ind", "nan(ind)", "-nan(ind)"),
+    ]
 )
 _DAY_S = 86_400.0
+# Always with a point: other signs around a D are a code.
+_FORTRAN = re.compile(r"[-+]?(?:\d+\.\d*|\.\d+)[dD][-+]?\d{1,3}")
 # Marks between thousands that are no decimal mark; the blanks are those of typography.
 _APART = re.compile(r"(?<=\d)[ '\u2019\u00a0\u202f](?=\d{3}(?:\D|$))")
 _GROUPED = {
     ",": re.compile(r"[-+]?\d{1,3}(?:,\d{3})+(?:\.\d*)?"),
     ".": re.compile(r"[-+]?\d{1,3}(?:\.\d{3})+(?:,\d*)?"),
 }
-_TIME_OF_DAY = r"(?P<h>\d{1,2}):(?P<m>\d{2}):(?P<s>\d{2})(?:[.,:](?P<f>\d{1,12}))?"
+_TIME_OF_DAY = (
+    r"(?:(?P<h>\d{1,2}):(?P<m>\d{2}):(?P<s>\d{2})(?:[.,:](?P<f>\d{1,12}))?"
+    # Minutes and seconds, if a fraction shows what they are.
+    r"|(?P<m2>\d{1,2}):(?P<s2>\d{2})[.,](?P<f2>\d{1,12}))"
+)
+_MONTHS = (
+    *(("jan",), ("feb",), ("mar", "mär", "mrz"), ("apr",), ("may", "mai"), ("jun",)),
+    *(("jul",), ("aug",), ("sep",), ("oct", "okt"), ("nov",), ("dec", "dez")),
+)
+_MONTH = {name: number for number, one in enumerate(_MONTHS, 1) for name in one}
 _STAMP = re.compile(
     r"(?:(?:(?P<y>\d{4})[-/.](?P<mo>\d{1,2})[-/.](?P<d>\d{1,2})"
-    r"|(?P<a>\d{1,2})(?P<mark>[./-])(?P<b>\d{1,2})[./-](?P<y2>\d{4}))[T ]\s*)?"
+    r"|(?P<a>\d{1,2})(?P<mark>[./-])(?P<b>\d{1,2})[./-](?P<y2>\d{4})"
+    # Two digits of a year stand behind points: others have several orders.
+    r"|(?P<d3>\d{1,2})\.(?P<mo3>\d{1,2})\.(?P<y3>\d{2})"
+    rf"|(?P<d4>\d{{1,2}})[-. ]+(?P<month>(?i:{'|'.join(_MONTH)}))[a-zä]*[-. ]+(?P<y4>\d{{4}})"
+    r")[T ]\s*)?"
     + _TIME_OF_DAY
     + r"\s*(?P<half>[AaPp][Mm])?(?P<zone>Z|[+-]\d{2}:?\d{2})?"
 )
+# A time with its unit behind, as MATLAB writes durations.
+_DURATION = re.compile(
+    r"([-+]?\d+(?:[.,]\d*)?(?:[eE][-+]?\d+)?) ?(us|µs|ms|s|sec|min|hr)"
+)
+_IN_UNIT = {"us": 1e6, "µs": 1e6, "ms": 1e3, "s": 1.0, "sec": 1.0}
+_SECONDS = {"min": 60.0, "hr": 3600.0}
 
 
 @dataclass(frozen=True)
@@ -58,11 +86,25 @@ def plain_number(cell: str) -> float | None:
     --------
     >>> plain_number("1e-3"), plain_number("1_0"), plain_number("off")
     (0.001, None, None)
+    >>> plain_number("1.0D-03")  # Fortran's double precision
+    0.001
     """
     try:
         return None if "_" in cell else float(cell)
     except ValueError:
+        if _FORTRAN.fullmatch(cell):
+            return float(cell.replace("D", "E").replace("d", "e"))
         return None
+
+
+def is_word(cell: str) -> bool:
+    """Whether a cell holds something else than a number, a time or nothing."""
+    return (
+        cell.lower() not in MISSING_WORDS
+        and plain_number(cell) is None
+        and not is_stamp(cell)
+        and not is_grouped(cell)
+    )
 
 
 def number_in(cell: str, writing: Writing) -> float | None:
@@ -186,14 +228,18 @@ def _settled(
 
 
 def is_stamp(cell: str) -> bool:
-    """Whether a cell holds a date with its time, or a time of day.
+    """Whether a cell holds a date with its time, a time of day, or a time with its unit.
 
     Examples
     --------
     >>> is_stamp("2024-05-01T12:00:00.125Z"), is_stamp("12:00:00,5"), is_stamp("12:00")
     (True, True, False)
+    >>> is_stamp("01-May-2024 12:00:00.125"), is_stamp("1.25 sec"), is_stamp("1.25 mm")
+    (True, True, False)
     """
-    return ":" in cell and _STAMP.fullmatch(cell) is not None
+    if ":" in cell:
+        return _STAMP.fullmatch(cell) is not None
+    return _DURATION.fullmatch(cell) is not None
 
 
 def stamps_in_seconds(cells: Iterable[str]) -> tuple[np.ndarray, dict[int, str]]:
@@ -209,8 +255,8 @@ def stamps_in_seconds(cells: Iterable[str]) -> tuple[np.ndarray, dict[int, str]]
     days, seconds, others = [], [], {}
     for number, cell in enumerate(cells):
         match = _STAMP.fullmatch(cell)
-        day, second = (0, np.nan) if match is None else _instant(match)
-        if match is None:
+        day, second = (0, _duration(cell)) if match is None else _instant(match)
+        if second != second:
             others[number] = cell
         days.append(day)
         seconds.append(second)
@@ -220,18 +266,27 @@ def stamps_in_seconds(cells: Iterable[str]) -> tuple[np.ndarray, dict[int, str]]
     return values if any(known) else _past_midnight(values), others
 
 
+def _duration(cell: str) -> float:
+    match = _DURATION.fullmatch(cell)
+    if match is None:
+        return np.nan
+    value, unit = float(match[1].replace(",", ".")), match[2]
+    # A division keeps decimal fractions more exact than a factor.
+    return value * _SECONDS[unit] if unit in _SECONDS else value / _IN_UNIT[unit]
+
+
 def _instant(match: re.Match[str]) -> tuple[int, float]:
     """Day (0 without a date) and seconds of it."""
     part = match.groupdict()
-    hour = int(part["h"])
+    hour = int(part["h"] or 0)
     if part["half"]:
         hour = hour % 12 + (12 if part["half"].lower() == "pm" else 0)
-    fraction = float(f"0.{part['f']}") if part["f"] else 0.0
-    second = 3600.0 * hour + 60.0 * int(part["m"]) + int(part["s"]) + fraction
+    minute, whole, digits = (part[one] or part[f"{one}2"] or "0" for one in "msf")
+    second = 3600.0 * hour + 60.0 * int(minute) + int(whole) + float(f"0.{digits}")
     if part["zone"] and part["zone"] != "Z":
         sign = -1.0 if part["zone"][0] == "+" else 1.0
-        digits = part["zone"][1:].replace(":", "")
-        second += sign * 60.0 * (60 * int(digits[:2]) + int(digits[2:]))
+        zone = part["zone"][1:].replace(":", "")
+        second += sign * 60.0 * (60 * int(zone[:2]) + int(zone[2:]))
     return _day(part), second
 
 
@@ -244,6 +299,11 @@ def _day(part: dict[str, str | None]) -> int:
         is_american = part["mark"] == "/" and one <= 12
         month, day = (one, other) if is_american else (other, one)
         fields = [int(part["y2"]), month, day]
+    elif part["y3"]:
+        fields = [2000 + int(part["y3"]), int(part["mo3"] or 0), int(part["d3"] or 0)]
+    elif part["y4"]:
+        month = _MONTH[(part["month"] or "").lower()]
+        fields = [int(part["y4"]), month, int(part["d4"] or 0)]
     else:
         return 0
     try:

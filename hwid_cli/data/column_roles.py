@@ -13,9 +13,14 @@ from itertools import permutations
 import numpy as np
 
 from hwid_cli.data import column_signs as signs
-from hwid_cli.data.column_words import Meaning, meaning_of, place_in_chain
+from hwid_cli.data.column_words import (
+    Meaning,
+    counts_recordings,
+    meaning_of,
+    place_in_chain,
+)
 from hwid_cli.data.table_heads import sample_time_named
-from hwid_cli.data.units import factor_between, unit_in_name, unit_since_1970
+from hwid_cli.data.units import factor_between, unit_in_name, unit_of_dates
 from hwid_cli.errors import MeasurementError
 from hwid_cli.records.starter import FoundColumn, Role
 
@@ -41,6 +46,8 @@ _MOST_COMPARED = 8
 # Clocks that agree within this share tick alike, [-].
 _SAME_STEP = 0.01
 # Whole-numbered stamps without a unit: a step from so many on is in the next smaller one.
+# Where other units of dates begin than in 1970.
+_BEGINS = {"d": "1900 (or the year 0)", "100ns": "1601"}
 _WHOLE_STEPS = ((1.0, "ms"), (200.0, "us"), (2e5, "ns"))
 
 
@@ -134,7 +141,8 @@ def guess_time(columns: Sequence[FoundColumn]) -> TimeGuess:
         unit, why, notes = _unit_of_clock(column, clock, stated)
         is_counter = clock.step == 1.0 and clock.jitter == 0.0 and not unit
         is_other = meaning.role != "time" and (meaning.role or is_counter)
-        if unit is None or (is_other and not _is_in_time(column)):
+        # Unless something beside it says its unit.
+        if unit is None or (is_other and not why and not _is_in_time(column)):
             continue
         named = "named so, and it grows evenly" if meaning.role else "it grows evenly"
         role = Role(column.key, column.title, unit, named + why)
@@ -145,6 +153,22 @@ def guess_time(columns: Sequence[FoundColumn]) -> TimeGuess:
     return TimeGuess(None, None, False, "nothing in the file tells the time")
 
 
+def unused_times(columns: Sequence[FoundColumn]) -> tuple[str, ...]:
+    """Say why columns that are named after time are no clocks."""
+    notes = []
+    for one in long_columns(columns):
+        if meaning_of(one.title, one.unit).role != "time" and not _is_in_time(one):
+            continue
+        with np.errstate(invalid="ignore"):
+            bad = np.flatnonzero(~(np.diff(one.values) > 0))
+        what = f"does not grow at sample {bad[0] + 1}" if bad.size else "grows unevenly"
+        notes.append(
+            f"NOT USED: {one.title!r} is named after time, but {what}; sort the rows, or "
+            "export the file again"
+        )
+    return tuple(notes)
+
+
 def clocks_of(
     columns: Sequence[FoundColumn],
 ) -> list[tuple[FoundColumn, Meaning, signs.Clock]]:
@@ -152,11 +176,20 @@ def clocks_of(
     found = [
         (one, meaning_of(one.title, one.unit), clock)
         for one in long_columns(columns)
-        if (clock := signs.clock_of(one.values)) is not None
+        if (clock := _clock_of(one)) is not None
     ]
     return sorted(
         found, key=lambda one: one[1].role != "time" and not _is_in_time(one[0])
     )
+
+
+def _clock_of(column: FoundColumn) -> signs.Clock | None:
+    """How a column ticks; one that is named after time may begin again."""
+    clock = signs.clock_of(column.values)
+    named = meaning_of(column.title, column.unit).role == "time" or _is_in_time(column)
+    if clock is None and named and (begins := signs.restarts_of(column.values)):
+        return signs.clock_of(column.values[: begins[0]])
+    return clock
 
 
 def _is_in_time(column: FoundColumn) -> bool:
@@ -180,9 +213,9 @@ def _unit_of_clock(
     unit = unit_of_column(column, "time")
     if unit:
         return unit, "", ()
-    since = unit_since_1970(column.values)
+    since = unit_of_dates(column.values)
     if since:
-        return since, f"; its size says {since} since 1970", ()
+        return since, f"; its size says {since} since {_BEGINS.get(since, 1970)}", ()
     for title, stated_s in stated:
         for unit in ("s", "ms", "us", "ns"):
             step_s = clock.step * (factor_between(unit, "s") or 1.0)
@@ -230,14 +263,14 @@ def guess_signals(columns: Sequence[FoundColumn]) -> SignalGuess:
         [
             one
             for one in long_columns(columns)
-            if signs.changes(one.values) and signs.clock_of(one.values) is None
+            if signs.changes(one.values)
+            and _clock_of(one) is None
+            and not (counts_recordings(one.title) and signs.blocks_of(one.values))
         ]
     )
-    if len(named) < 2:
-        raise MeasurementError(
-            f"has {len(named)} columns of more than {FEWEST_SAMPLES} numbers that "
-            "change; expected at least an input and an output"
-        )
+    able = [one for one in named if one.meaning.role not in ("time", "counter")]
+    if len(named) < 2 or not able:
+        raise _too_few(len(able))
     first, last, reasons = _pair(named)
     first, twins = _current_of_twins(first, named, reasons)
     if last == first:
@@ -248,6 +281,7 @@ def guess_signals(columns: Sequence[FoundColumn]) -> SignalGuess:
         *_array_notes(first, repeats),
         *_twin_notes(first, [one for one in twins if one not in (last, *repeats)]),
         *_other_columns([one for one in named if one not in repeats], first, last),
+        *_scale_notes(first.column, last.column),
     ]
     wanted = (one for one in _of_role(named, "reference") if one not in (first, last))
     reference = next(wanted, None)
@@ -257,6 +291,13 @@ def guess_signals(columns: Sequence[FoundColumn]) -> SignalGuess:
         None if reference is None else reference.column,
         reasons,
         tuple(notes),
+    )
+
+
+def _too_few(count: int) -> MeasurementError:
+    return MeasurementError(
+        f"has {count} columns of more than {FEWEST_SAMPLES} numbers that change; "
+        "expected at least an input and an output, side by side in one file"
     )
 
 
@@ -315,7 +356,11 @@ def _pair(named: list[_Named]) -> tuple[_Named, _Named, dict[str, str]]:
         found = _along_chain(inputs)
         if found is not None:
             return found
-    return _by_content(free or named)
+    others = [one for one in named if one.meaning.role not in ("time", "counter")]
+    pool = free if len(free) > 1 else others
+    if len(pool) < 2:
+        raise _too_few(len(pool))
+    return _by_content(pool)
 
 
 def _by(one: _Named) -> str:
@@ -472,6 +517,23 @@ def _other_columns(named: list[_Named], first: _Named, last: _Named) -> list[str
     shown = ", ".join(_called(one.column) for one in left[:8])
     more = ", ..." if len(left) > 8 else ""
     return [f"other columns that change: {shown}{more}"] if left else []
+
+
+def _scale_notes(first: FoundColumn, last: FoundColumn) -> list[str]:
+    """Say that whole numbers may be counts, where the file states a factor for them."""
+    found = {"input": first, "output": last}
+    return [
+        f"NOT SURE: the file states a factor of {one.scale:g} for {_called(one)}, whose "
+        f"numbers are whole and taken as they stand; if they are counts, write "
+        f"{role}_scale: {one.scale!r}"
+        for role, one in found.items()
+        if one.scale != 1.0 and _is_whole(one.values)
+    ]
+
+
+def _is_whole(values: np.ndarray) -> bool:
+    known = values[np.isfinite(values)]
+    return bool((known == np.round(known)).all())
 
 
 def _called(column: FoundColumn) -> str:

@@ -26,6 +26,8 @@ _LINE_SHARE = 0.85
 # A step's levels hold for this share of all samples at least, [-].
 _HELD_SHARE = 0.8
 _FEWEST = 20
+# Recordings in one file, and the largest ratio of their steps.
+_MOST_RESTARTS, _SAME_STEP = 1000, 1.02
 
 
 @dataclass(frozen=True)
@@ -73,6 +75,54 @@ def clock_of(values: np.ndarray) -> Clock | None:
     if np.mean(off > MOST_JITTER) > MOST_GAPS:
         return None
     return Clock(median, float(off.max()))
+
+
+def restarts_of(values: np.ndarray) -> tuple[int, ...]:
+    """Samples at which a column begins to tick again.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+
+    Returns
+    -------
+    tuple of int
+        Empty for one clock, and for what is none between two of them.
+
+    Examples
+    --------
+    >>> restarts_of(np.tile(0.5 * np.arange(100), 3))
+    (100, 200)
+    """
+    if not np.isfinite(values).all():
+        return ()
+    begins = np.flatnonzero(np.diff(values) < 0) + 1
+    if not 0 < begins.size <= _MOST_RESTARTS:
+        return ()
+    clocks = [clock_of(one) for one in np.split(values, begins)]
+    steps = [one.step for one in clocks if one is not None]
+    is_one = len(steps) == len(clocks) and max(steps) <= _SAME_STEP * min(steps)
+    return tuple(int(one) for one in begins) if is_one else ()
+
+
+def blocks_of(values: np.ndarray) -> tuple[int, ...]:
+    """Samples at which a column of whole numbers, each held for long, goes on to the next.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+
+    Examples
+    --------
+    >>> blocks_of(np.repeat([1.0, 2.0, 5.0], 100)), blocks_of(np.arange(100.0))
+    ((100, 200), ())
+    """
+    if not np.isfinite(values).all() or (values != np.round(values)).any():
+        return ()
+    begins = np.flatnonzero(np.diff(values)) + 1
+    lengths = np.diff(begins, prepend=0, append=values.size)
+    is_block = 0 < begins.size <= _MOST_RESTARTS and lengths.min() >= _FEWEST
+    return tuple(int(one) for one in begins) if is_block else ()
 
 
 def changes(values: np.ndarray) -> bool:

@@ -122,6 +122,11 @@ _REFERENCE = [
     "führungsgrösse",
     "führungsgröße",
 ]
+# Whole numbers under such a name say which recording a row belongs to.
+_RECORDINGS = [
+    *("run", "trial", "recording", "experiment", "segment", "id", "series", "session"),
+    *("versuch", "messung", "lauf", "durchgang", "serie", "aufnahme"),
+]
 # Words of what is wanted, where another word says of what: position command.
 _WANTED = ["cmd", "command", "commanded", "set", "sp", "dem", "cmnd", "vorgabe"]
 _COUNTER = [
@@ -244,6 +249,17 @@ def meaning_of(title: str, stated: str = "") -> Meaning:
     return Meaning(role, rank, unit, " ".join([*others, numbers]).strip())
 
 
+def counts_recordings(title: str) -> bool:
+    """Whether the name of a column says which recording a row belongs to.
+
+    Examples
+    --------
+    >>> counts_recordings("run_id"), counts_recordings("Versuch Nr."), counts_recordings("i")
+    (True, True, False)
+    """
+    return any(word in _RECORDINGS for word in _words(title))
+
+
 def _role_of_unit(unit: str) -> str:
     plain = unit.lower()
     if plain in _TIME_UNITS:
@@ -257,12 +273,13 @@ def _is_contradicted(role: str, word: str, unit: str) -> bool:
     """Whether a current leaves a plug ``out``, or a position comes in at one."""
     says = "input" if unit.lower() in _CURRENT_UNITS else ""
     says = "output" if unit.lower() in _OUTPUT_UNITS else says
-    return word in _PLUGS and says not in ("", role)
+    # A letter stands for many things; what is measured in A is none of them but a current.
+    return (word in _PLUGS or len(word) == 1) and says not in ("", role)
 
 
 def _words(title: str) -> list[str]:
     """Lower-case words of a name, split at marks, digits and capitals."""
-    member = title.replace("/", ".").split(".")[-1]
+    member = title.replace("/", ".").rstrip(". ").split(".")[-1]
     spaced = re.sub(r"([a-zäöü])([A-ZÄÖÜ])", r"\1 \2", member)
     return [word.lower() for word in re.findall(r"[^\W\d_]+|\d+", spaced)]
 

@@ -21,7 +21,7 @@ from typing import TextIO
 
 import numpy as np
 
-from hwid_cli.data.cells import is_stamp
+from hwid_cli.data.cells import is_stamp, is_word
 from hwid_cli.data.columns import ROLES, MeasuredColumn
 from hwid_cli.data.table_columns import (
     ColumnParts,
@@ -48,6 +48,7 @@ _BLOCK_LINES = 4096
 # The csv module reads no longer cell, and says so.
 _LONGEST_LINE = 2**16
 _READ_BYTES = 2**20
+_QUOTED_OR_BARE = re.compile(r'"([^"]*)"|([^\s"]+)')
 
 
 @dataclass(frozen=True)
@@ -112,7 +113,8 @@ def read_csv_columns(path: Path, columns: Columns) -> list[tuple[str, MeasuredCo
             "export the measurement again or leave the file out"
         )
     titles = titles_of(wanted, places)
-    read = _read_body(sheet, titles)
+    # Without a clock, nobody can tell whether a second head begins a second recording.
+    read = _read_body(sheet, titles, keep_heads="time" not in wanted)
     return [
         (role, with_unit(path, read[place], role, sheet.head, place))
         for role, place in places.items()
@@ -167,7 +169,8 @@ def _form_of(path: Path, lines: list[str], wanted: Sequence[str]) -> _Sheet:
         )
     head = read_head(rows, wanted=wanted, comments=comments)
     place = head.name_row if head.name_row >= 0 else min(head.body, len(rows) - 1)
-    return _Sheet(path, "", separator, rows, ends, head, len(rows[place]))
+    width = max(len(rows[place]), len(head.names))
+    return _Sheet(path, "", separator, rows, ends, head, width)
 
 
 def _telling(lines: list[str]) -> list[str]:
@@ -256,12 +259,19 @@ def _separator(lines: Sequence[str]) -> str:
 
 def _split(line: str, separator: str) -> list[str]:
     if separator == " ":
-        return line.split()
+        return _between_blanks(line)
     # A quote that is not closed, or a cell of any length, is told when it is read.
     if '"' not in line or len(line) > _LONGEST_LINE:
         return [cell.strip() for cell in line.split(separator)]
     row = next(csv.reader([line], delimiter=separator, skipinitialspace=True), [])
     return [cell.strip() for cell in row]
+
+
+def _between_blanks(line: str) -> list[str]:
+    """Cells between any number of blanks; a cell in quotes may hold some."""
+    if '"' not in line or len(line) > _LONGEST_LINE:
+        return line.split()
+    return [quoted or bare for quoted, bare in _QUOTED_OR_BARE.findall(line)]
 
 
 def _is_comment(line: str) -> bool:
@@ -313,7 +323,7 @@ def _cells_of(
     if separator == " ":
         for number, line in enumerate(lines, before + 1):
             if line.strip() and not _is_comment(line):
-                yield number, line.split()
+                yield number, _between_blanks(line)
         return
     kept = ("\n" if _is_comment(line) else line for line in lines)
     reader = csv.reader(kept, delimiter=separator, skipinitialspace=True)
@@ -346,14 +356,23 @@ def _find(sheet: _Sheet, key: str | int, role: str) -> int:
     return column_named(key, header, role, f"{sheet.path}, row {line}")
 
 
-def _read_body(sheet: _Sheet, titles: dict[int, str]) -> dict[int, MeasuredColumn]:
+def _read_body(
+    sheet: _Sheet, titles: dict[int, str], *, keep_heads: bool = False
+) -> dict[int, MeasuredColumn]:
     """Read some columns of the numbers.
 
     Parameters
     ----------
     titles : dict of int to str
         How messages call each of them.
+    keep_heads : bool
+        Whether a head that comes again, further down, is a fault.
     """
+    begins = {
+        row[0] for row in sheet.rows[: sheet.head.body] if row and is_word(row[0])
+    }
+    if keep_heads:
+        begins = set()
     parts = ColumnParts(sheet.path, titles, _stamped(sheet, titles))
     number = sheet.first_line
     with sheet.path.open(encoding=sheet.encoding, errors="replace", newline="") as file:
@@ -367,7 +386,8 @@ def _read_body(sheet: _Sheet, titles: dict[int, str]) -> dict[int, MeasuredColum
                 continue
             source = _Counted(lines, file)
             rows = _cells_of(sheet.path, source, sheet.separator, number)
-            block = list(_while_inside(rows, number + len(lines)))
+            inside = _while_inside(rows, number + len(lines))
+            block = [(end, row) for end, row in inside if row[0] not in begins]
             _check_widths(sheet, block)
             parts.add_cells(block)
             number += source.count

@@ -5,14 +5,16 @@ For ``hwid init``.
 
 import glob
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path, PurePosixPath
 
 import numpy as np
 
 from hwid_cli.data import column_signs as signs
 from hwid_cli.data.column_roles import (
+    FEWEST_SAMPLES,
     SignalGuess,
     TimeGuess,
     clocks_of,
@@ -20,8 +22,9 @@ from hwid_cli.data.column_roles import (
     guess_time,
     long_columns,
     unit_of_column,
+    unused_times,
 )
-from hwid_cli.data.column_words import meaning_of
+from hwid_cli.data.column_words import counts_recordings, meaning_of
 from hwid_cli.data.formats import SUFFIXES, list_columns, reader_of
 from hwid_cli.data.recording_files import PLAN_NAME
 from hwid_cli.errors import ConfigError, MeasurementError
@@ -31,6 +34,9 @@ from hwid_cli.records.starter import FolderLayout, FoundColumn, FoundFile, Role
 # Beyond this share of samples that are missing a signal is slower than its rows, [-].
 _MOST_LOST = 0.05
 _SLOW = -1
+# Stands for every table of a file, and how deep these may lie.
+STAR = "*"
+_DEEPEST_TABLE = 3
 # What spreadsheets and systems leave beside data.
 _SYSTEM_NAMES = ("~$", "._", "Thumbs", "desktop")
 
@@ -64,8 +70,8 @@ def list_measurements(folder: Path) -> tuple[FoundFile, ...]:
     if not paths:
         raise ConfigError(
             f"{folder}: holds no measurement file; expected some of "
-            f"{', '.join('*' + ending for ending in SUFFIXES)}; put the files there, or "
-            "convert them"
+            f"{', '.join('*' + ending for ending in SUFFIXES)}; put the files there, "
+            "unpacked, or convert them"
         )
     return tuple(_listed(path, folder) for path in paths)
 
@@ -96,6 +102,54 @@ def _listed(path: Path, folder: Path) -> FoundFile:
     return FoundFile(name, columns, "" if columns else "no table of numbers")
 
 
+def _with_starred_tables(file: FoundFile) -> FoundFile:
+    """Stand the first of tables with the same columns for all: each is a recording.
+
+    So does a table with the name of its file, which is another one in every file.
+    """
+    stem = PurePosixPath(file.name).stem
+    for depth in range(1, _DEEPEST_TABLE + 1):
+        tables: dict[str, dict[str | int, FoundColumn]] = {}
+        for one in long_columns(file.columns):
+            if (place := _split_at(one, depth)) is not None:
+                tables.setdefault(place[0], {})[place[1]] = one
+        for name, members in tables.items():
+            alike = [own for own in tables.values() if own.keys() == members.keys()]
+            if not _holds_signals(members.values()):
+                continue
+            if len(alike) > 1 or name == stem:
+                beside = [one for one in file.columns if _is_beside(one, tables)]
+                starred = [
+                    replace(one, key=key, variable=STAR) for key, one in members.items()
+                ]
+                return replace(file, columns=(*starred, *beside))
+    return file
+
+
+def _split_at(column: FoundColumn, depth: int) -> tuple[str, str | int] | None:
+    """Table of a column and its key in there; None where it is in none so deep."""
+    if column.variable is not None:
+        return (column.variable, column.key) if depth == 1 else None
+    marks = [found.start() for found in re.finditer(r"[./]", str(column.key))]
+    if len(marks) < depth:
+        return None
+    key = str(column.key)
+    return key[: marks[depth - 1]], key[marks[depth - 1] + 1 :]
+
+
+def _is_beside(column: FoundColumn, tables: Mapping[str, object]) -> bool:
+    """Whether a column is in no table: a clock or a setting for all of them."""
+    name = str(column.key)
+    inside = any(name.startswith((f"{one}.", f"{one}/")) for one in tables)
+    return column.variable is None and not inside
+
+
+def _holds_signals(columns: Iterable[FoundColumn]) -> bool:
+    """Whether columns may be an input and an output."""
+    able = [one for one in columns if signs.changes(one.values)]
+    return sum(signs.clock_of(one.values) is None for one in able) > 1
+
+
 # Where nothing tells the time, [s]: wrong, and said to be.
 UNKNOWN_SAMPLE_TIME_S = 1.0
 
@@ -113,6 +167,7 @@ def guess_layout(files: Sequence[FoundFile]) -> FolderLayout:
     MeasurementError
         If no file holds an input and an output.
     """
+    files = [_with_starred_tables(one) for one in files]
     alike = _alike(files)
     if not alike:
         raise MeasurementError(_no_signals(files))
@@ -134,14 +189,27 @@ def guess_layout(files: Sequence[FoundFile]) -> FolderLayout:
         "output_time": None if clocks[1] is None else clocks[1].column,
     }
     lacks = _lacking(alike, (signals.input, signals.output))
-    layout = _layout(signals, clocks, _sorted_out(files, roles, typical))
+    there = {role: one for role, one in roles.items() if one is not None}
+    used, left = _sorted_out(files, there, typical)
+    layout = _layout(signals, clocks, (_patterns(used, files), left))
+    layout = _in_parts(layout, used, there.get("time"))
+    if layout.variable == STAR:
+        note = (
+            "a file holds tables with the same columns: each is a recording; if they are "
+            "not, name one in columns: {variable: ...}"
+        )
+        layout = replace(layout, notes=(*layout.notes, note))
+    if layout.time is None:
+        layout = replace(layout, notes=(*layout.notes, *unused_times(long_ones)))
     if lacks == _SLOW and layout.time is not None:
         note = (
             "a signal has no number in every row: all are put on one grid, that of the "
             "slower one"
         )
         return replace(layout, resample=True, notes=(*layout.notes, note))
-    return layout if lacks == _SLOW else replace(layout, first_sample=lacks)
+    if lacks == _SLOW or layout.parts:
+        return layout
+    return replace(layout, first_sample=lacks)
 
 
 def _lacking(files: Sequence[FoundFile], signals: Sequence[FoundColumn]) -> int:
@@ -169,16 +237,60 @@ def _no_signals(files: Sequence[FoundFile]) -> str:
 
 
 def _sorted_out(
-    files: Sequence[FoundFile],
-    roles: Mapping[str, FoundColumn | None],
-    typical: FoundFile,
-) -> tuple[tuple[str, ...], tuple[tuple[str, str], ...]]:
-    """Patterns of the files that are used, and the others, each with its reason."""
-    there = {role: one for role, one in roles.items() if one is not None}
-    why = {one.name: _why_not(one, there, typical) for one in files}
+    files: Sequence[FoundFile], roles: Mapping[str, FoundColumn], typical: FoundFile
+) -> tuple[list[FoundFile], tuple[tuple[str, str], ...]]:
+    """Files that are used, and the others, each with its reason."""
+    why = {one.name: _why_not(one, roles, typical) for one in files}
     used = [one for one in files if not why[one.name]]
+    begins = {one.name: _begins(one, roles.get("time")) for one in used}
+    if len(set(begins.values())) > 1:
+        # The same rows are cut from every file.
+        why |= {
+            name: f"holds {len(found) + 1} recordings, the second from sample {found[0]}; "
+            "cut it into files of one recording each"
+            for name, found in begins.items()
+            if found
+        }
+    used = [one for one in used if not why[one.name]]
     left = tuple((name, reason) for name, reason in why.items() if reason)
-    return _patterns(used, files), left
+    if not used:
+        raise MeasurementError(f"{escaped(left[0][0])}: {left[0][1]}")
+    return used, left
+
+
+def _begins(file: FoundFile, time: FoundColumn | None) -> tuple[int, ...]:
+    """Samples at which further recordings begin in a file."""
+    for column in long_columns(file.columns):
+        if time is not None and column.place == time.place:
+            found = signs.restarts_of(column.values)
+        else:
+            is_named = counts_recordings(column.title)
+            found = signs.blocks_of(column.values) if is_named else ()
+        if found:
+            return found
+    return ()
+
+
+def _in_parts(
+    layout: FolderLayout, files: Sequence[FoundFile], time: FoundColumn | None
+) -> FolderLayout:
+    """Cut files in which several recordings stand below one another."""
+    begins = _begins(files[0], time)
+    ends = [
+        max(one.values.size for one in long_columns(file.columns)) for file in files
+    ]
+    bounds = [0, *begins, min(ends)]
+    long_ones = [cut for cut in pairwise(bounds) if cut[1] - cut[0] > FEWEST_SAMPLES]
+    if not begins or not long_ones:
+        return layout
+    note = (
+        f"{len(begins) + 1} recordings stand below one another in a file: "
+        f"{len(long_ones)} are long enough, and cut by recordings.parts"
+    )
+    parts: dict[str, tuple[int, ...]] = {
+        f"part_{number}": cut for number, cut in enumerate(long_ones, 1)
+    }
+    return replace(layout, parts=parts, notes=(*layout.notes, note))
 
 
 def _layout(
@@ -222,7 +334,9 @@ def _alike(files: Sequence[FoundFile]) -> list[FoundFile]:
     return max(sets.values(), key=len, default=[])
 
 
-def _why_not(file: FoundFile, roles: dict[str, FoundColumn], typical: FoundFile) -> str:
+def _why_not(
+    file: FoundFile, roles: Mapping[str, FoundColumn], typical: FoundFile
+) -> str:
     """Why a file is not used; empty if it has the chosen columns in the same units."""
     if file.problem:
         return file.problem

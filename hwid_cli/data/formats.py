@@ -7,6 +7,7 @@ import os
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import asdict, dataclass
+from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +30,7 @@ from hwid_cli.files.isolated_process import (
     Labelled,
     serve,
 )
-from hwid_cli.files.messages import escaped
+from hwid_cli.files.messages import escaped, shown
 from hwid_cli.records.experiment import Columns
 from hwid_cli.records.starter import FoundColumn
 
@@ -155,13 +156,17 @@ def read_columns(path: Path, columns: Columns) -> FileColumns:
         return FileColumns(**_with_rows(replies))
     except MeasurementError:
         raise
+    # The readers of foreign formats raise whatever their parser stumbles on.
     except Exception as error:
-        # The readers of foreign formats raise whatever their parser stumbles on.
-        said = escaped(" ".join(str(error).split())[:120]) or type(error).__name__
-        raise MeasurementError(
-            f"{path}: cannot be read ({said}); expected a readable {path.suffix} file; "
-            "export it again or leave it out"
-        ) from error
+        raise _unreadable(path, error) from error
+
+
+def _unreadable(path: Path, error: Exception) -> MeasurementError:
+    said = escaped(" ".join(str(error).split())[:120]) or type(error).__name__
+    return MeasurementError(
+        f"{path}: cannot be read ({said}); expected a readable {path.suffix} file; "
+        "export it again or leave it out"
+    )
 
 
 def list_columns(path: Path) -> tuple[FoundColumn, ...]:
@@ -178,9 +183,50 @@ def list_columns(path: Path) -> tuple[FoundColumn, ...]:
             return tuple(reader.list_columns(path))
         replies = _asked(reader, path)
     return tuple(
-        FoundColumn(title, key, values, variable, unit)
-        for (title, key, variable, unit), values in replies
+        FoundColumn(title, key, values, *about)
+        for (title, key, *about), values in replies
     )
+
+
+def tables_of(path: Path, columns: Columns) -> tuple[str, ...]:
+    """Name the tables of a file that match ``columns.variable`` and hold its columns.
+
+    A table is a sheet, a group, a struct, or an array with columns.
+
+    Raises
+    ------
+    MeasurementError
+        If the file cannot be read, or no table does.
+    """
+    wanted = (columns.input, columns.output)
+    found: dict[str, set[str | int]] = {}
+    try:
+        listed = list_columns(path)
+    except MeasurementError:
+        raise
+    # The readers of foreign formats raise whatever their parser stumbles on.
+    except Exception as error:
+        raise _unreadable(path, error) from error
+    for one in listed:
+        for key in wanted:
+            if one.place == (one.variable, key) and one.variable is not None:
+                found.setdefault(one.variable, set()).add(key)
+            elif one.variable is None and str(one.key).endswith((f".{key}", f"/{key}")):
+                table = str(one.key)[: -len(str(key)) - 1]
+                found.setdefault(table, set()).add(key)
+    pattern = columns.variable or "*"
+    names = [
+        name
+        for name, keys in found.items()
+        if set(wanted) <= keys and fnmatchcase(name, pattern)
+    ]
+    if not names:
+        raise MeasurementError(
+            f"{path}: has no table like {shown(pattern)} with {columns.input!r} and "
+            f"{columns.output!r}; expected one for each recording; correct "
+            "recordings.columns"
+        )
+    return tuple(names)
 
 
 @contextmanager
@@ -220,7 +266,7 @@ def _answer(request: dict[str, Any]) -> Iterator[Labelled]:
     reader = reader_of(path)
     if request["columns"] is None:
         for one in reader.list_columns(path):
-            yield [one.title, one.key, one.variable, one.unit], one.values
+            yield [one.title, one.key, one.variable, one.unit, one.scale], one.values
     else:
         for role, column in reader.read(path, Columns(**request["columns"])):
             about = {name: getattr(column, name) for name in (*_TOLD, "texts")}

@@ -47,7 +47,15 @@ def open_hdf5(path: Path, *, is_matlab: bool = False) -> Iterator[Variables]:
     """
     import h5py
 
-    variables = {}
+    variables: dict[str, Any] = {}
+
+    def note_settings(name: str, item: Any) -> None:
+        for attribute, value in item.attrs.items():
+            number = np.asarray(value)
+            if number.size == 1 and number.dtype.kind in "fiu":
+                key = f"{name}/{attribute}" if name else attribute
+                variables[key] = partial(np.float64, number.item())
+                variables[key + TITLE_MARK] = partial(np.array, attribute)
 
     def note(name: str, item: Any) -> None:
         if isinstance(item, h5py.Dataset) and not name.startswith("#"):
@@ -61,6 +69,9 @@ def open_hdf5(path: Path, *, is_matlab: bool = False) -> Iterator[Variables]:
                     variables[key + UNIT_MARK] = partial(item.attrs.get, attribute)
 
     with h5py.File(path, "r", locking=False) as file:
+        if not is_matlab:
+            note_settings("", file)
+            file.visititems(note_settings)
         file.visititems(note)
         yield variables
 

@@ -16,9 +16,12 @@ from hwid_cli.data.array_columns import (
 )
 from hwid_cli.data.hdf5_files import matlab_classes, open_hdf5
 from hwid_cli.data.mat_objects import object_variables
+from hwid_cli.data.octave_files import is_octave_text, octave_variables
 
 # Elements of a struct array that are looked at: Simulink has one for each signal.
 _MOST_ELEMENTS = 1000
+# Simulink and ControlDesk name each signal of a structure beside its numbers.
+_LABELS = (("values", "label"), ("Data", "Name"))
 # What scipy calls every object.
 _UNNAMED = "None"
 
@@ -45,6 +48,10 @@ def open_mat(path: Path) -> Iterator[Variables]:
         objects = object_variables(path, matlab_classes(path))
         with open_hdf5(path, is_matlab=True) as variables:
             yield {**variables, **objects}
+        return
+    if is_octave_text(path):
+        plain = octave_variables(path)
+        yield {name: partial(plain.get, name) for name in plain}
         return
     with warnings.catch_warnings():
         # Such as two variables of one name: which one was meant?
@@ -87,10 +94,10 @@ def _with_members(name: str, value: Any) -> dict[str, Any]:
     else:
         for member in members:
             found.update(_with_members(f"{name}.{member}", member_of(value, member)))
-    # Simulink names each signal of a structure by a label beside its values.
-    if {"values", "label"} <= set(members):
-        for key in [one for one in found if one.endswith(".values")]:
-            label = found.get(key.removesuffix("values") + "label")
-            if label is not None and text_of(label):
-                found[key + TITLE_MARK] = label
+    for numbers, words in _LABELS:
+        if {numbers, words} <= set(members):
+            for key in [one for one in found if one.endswith(f".{numbers}")]:
+                label = found.get(key.removesuffix(numbers) + words)
+                if label is not None and text_of(label):
+                    found[key + TITLE_MARK] = label
     return found

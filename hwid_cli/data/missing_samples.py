@@ -18,6 +18,8 @@ _log = logging.getLogger(__name__)
 
 # Beyond this share a signal is no longer one with a sample lost, [-].
 _MOST_BRIDGED = 0.01
+# Instruments send 9.9E37 for overflow and 9.91E37 for no number (SCPI 1999, 7.2.1).
+_NO_NUMBER, _NO_MORE = 9.9e37, 1e38
 
 
 def missing(column: MeasuredColumn) -> np.ndarray:
@@ -55,6 +57,9 @@ def bridge_missing(
     changed: dict[str, MeasuredColumn] = {}
     for role in ROLES:
         column = getattr(columns, role)
+        if column is not None and (is_none := _says_none(column.values)).any():
+            column = replace(column, values=np.where(is_none, np.nan, column.values))
+            changed[role] = column
         places = np.zeros(0, int) if column is None else _single(missing(column))
         if places.size == 0:
             continue
@@ -70,6 +75,10 @@ def bridge_missing(
             more,
         )
     return replace(columns, **changed), bridged
+
+
+def _says_none(values: np.ndarray) -> np.ndarray:
+    return (np.abs(values) >= _NO_NUMBER) & (np.abs(values) < _NO_MORE)
 
 
 def _single(is_lost: np.ndarray) -> np.ndarray:

@@ -9,7 +9,7 @@ import io
 import os
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from pathlib import Path
 
@@ -220,6 +220,8 @@ class FilePart:
     first : int, [samples]
     stop : int or None, [samples]
         The sample after the last one; None for the file's end.
+    table : str
+        Of several in the file; empty for the one that the configuration names.
     """
 
     path: Path
@@ -227,11 +229,14 @@ class FilePart:
     part: str
     first: int
     stop: int | None
+    table: str = ""
 
     @property
     def place(self) -> Path:
-        """The file, for messages, with the part where there is one."""
-        return Path(f"{self.path} (part {self.part})") if self.part else self.path
+        """The file, for messages, with table and part where there are some."""
+        inside = [self.table] if self.table else []
+        inside += [f"part {self.part}"] if self.part else []
+        return Path(f"{self.path} ({', '.join(inside)})") if inside else self.path
 
 
 def parts_of_files(paths: Sequence[Path], options: RecordingsOptions) -> list[FilePart]:
@@ -250,10 +255,46 @@ def parts_of_files(paths: Sequence[Path], options: RecordingsOptions) -> list[Fi
             FilePart(path, path.stem, "", options.first_sample, stop) for path in paths
         ]
     return [
-        FilePart(path, part if len(paths) == 1 else f"{path.stem}_{part}", part, *cut)
+        FilePart(
+            path,
+            part if len(paths) == 1 else f"{path.stem}_{part}",
+            part,
+            cut[0],
+            cut[1],
+        )
         for path in paths
         for part, cut in options.parts.items()
     ]
+
+
+def parts_of_tables(
+    parts: Sequence[FilePart], tables: Sequence[str], *, is_only_file: bool
+) -> list[FilePart]:
+    """Take the parts of a file from each of its tables.
+
+    Returns
+    -------
+    list of FilePart
+        Named after the table too where there are several; after it alone where the
+        experiment has one file, which is not cut.
+    """
+    last = [_as_name(re.split(r"[./]", table)[-1]) for table in tables]
+    if len(set(last)) < len(last):
+        last = [_as_name(table) for table in tables]
+    found = []
+    for table, own in zip(tables, last, strict=True):
+        for part in parts:
+            name = f"{part.name}_{own}"
+            if is_only_file and not part.part:
+                name = own
+            found.append(
+                replace(part, table=table, name=part.name if len(tables) == 1 else name)
+            )
+    return found
+
+
+def _as_name(table: str) -> str:
+    return re.sub(r"[^\w-]+", "_", table).strip("_") or "table"
 
 
 def cut_part(columns: FileColumns, part: FilePart) -> FileColumns:

@@ -5,7 +5,7 @@ A command stops at the first fault; ``hwid check`` and ``init`` survey every fil
 
 import hashlib
 import logging
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -18,7 +18,7 @@ from hwid_cli.data.columns import (
     block_means,
     with_each,
 )
-from hwid_cli.data.formats import read_columns
+from hwid_cli.data.formats import read_columns, tables_of
 from hwid_cli.data.missing_samples import bridge_missing
 from hwid_cli.data.recording_files import (
     FilePart,
@@ -26,6 +26,7 @@ from hwid_cli.data.recording_files import (
     find_files,
     kind_of,
     parts_of_files,
+    parts_of_tables,
     read_plan,
     recordings_base,
     recordings_options,
@@ -77,21 +78,21 @@ def read_recordings(experiment: Experiment, out: Path) -> list[RawRecording]:
     """
     options = recordings_options(experiment)
     paths = find_files(experiment, recordings_base(experiment, out))
-    parts = parts_of_files(paths, options)
+    by_path = _by_path(paths, options)
+    parts = [part for path in paths for part in by_path[path]]
     checks.check_names([(part.path, part.name) for part in parts])
     plans = {folder: read_plan(folder) for folder in {path.parent for path in paths}}
     recordings = []
-    by_path = _by_path(parts)
     for path in paths:
         digest = file_sha256(path)
-        columns = read_columns(path, _as_read(options.columns))
+        columns = _read_tables(path, by_path[path], options)
         if file_sha256(path) != digest:
             raise MeasurementError(
                 f"{path}: changed while it was read; expected a finished recording; "
                 "run again when it is written"
             )
-        for part in by_path.get(path, []):
-            raw = _read_part(part, columns, plans[path.parent], experiment)
+        for part in by_path[path]:
+            raw = _read_part(part, columns[part.table], plans[path.parent], experiment)
             recordings.append(replace(raw, sha256=digest))
     _warn_of_unused_kinds(recordings, experiment.source, options)
     recordings.sort(key=lambda recording: KINDS.index(recording.kind))
@@ -104,11 +105,33 @@ def read_recordings(experiment: Experiment, out: Path) -> list[RawRecording]:
     ]
 
 
-def _by_path(parts: Iterable[FilePart]) -> dict[Path, list[FilePart]]:
-    found: dict[Path, list[FilePart]] = {}
-    for part in parts:
-        found.setdefault(part.path, []).append(part)
-    return found
+def _by_path(
+    paths: Sequence[Path], options: RecordingsOptions
+) -> dict[Path, list[FilePart]]:
+    """Recordings of each file; a variable with a star stands for several tables."""
+    found: dict[Path, list[FilePart]] = {path: [] for path in paths}
+    for part in parts_of_files(paths, options):
+        found[part.path].append(part)
+    if "*" not in (options.columns.variable or ""):
+        return found
+    is_only = len(paths) == 1
+    return {
+        path: parts_of_tables(
+            parts, tables_of(path, options.columns), is_only_file=is_only
+        )
+        for path, parts in found.items()
+    }
+
+
+def _read_tables(
+    path: Path, parts: Sequence[FilePart], options: RecordingsOptions
+) -> dict[str, FileColumns]:
+    """Columns of each table that the recordings of a file are in."""
+    wanted = _as_read(options.columns)
+    return {
+        table: read_columns(path, replace(wanted, variable=table) if table else wanted)
+        for table in dict.fromkeys(part.table for part in parts)
+    }
 
 
 def _read_part(
@@ -261,32 +284,34 @@ def survey_recordings(experiment: Experiment, out: Path) -> Survey:
     out : Path
         Folder of the results, where simulated measurements lie.
     """
+    options = recordings_options(experiment)
     problems: list[str] = []
     paths: list[Path] = []
+    by_path: dict[Path, list[FilePart]] = {}
     with _noting(problems):
         paths = find_files(experiment, recordings_base(experiment, out))
-    parts = parts_of_files(paths, recordings_options(experiment)) if paths else []
+    with _noting(problems):
+        by_path = _by_path(paths, options)
+    parts = [part for path in paths for part in by_path.get(path, [])]
     with _noting(problems):
         checks.check_names([(part.path, part.name) for part in parts])
     read: list[RawRecording] = []
     short: list[checks.ShortRecordingError] = []
     jitter: dict[str, float] = {}
-    by_path = _by_path(parts)
-    for path in paths:
+    for path, own in by_path.items():
         columns = plan = None
         with _noting(problems):
-            columns = read_columns(
-                path, _as_read(recordings_options(experiment).columns)
-            )
+            columns = _read_tables(path, own, options)
         with _noting(problems):
             plan = read_plan(path.parent)
         if columns is None or plan is None:
             continue
-        for part in by_path.get(path, []):
+        for part in own:
             with _noting(problems, short):
-                raw = _read_part(part, columns, plan, experiment)
+                table = columns[part.table]
+                raw = _read_part(part, table, plan, experiment)
                 read.append(replace(raw, sha256=file_sha256(path)))
-                if (time := cut_part(columns, part).time) is not None:
+                if (time := cut_part(table, part).time) is not None:
                     jitter[part.name] = _jitter(time.values)
     if short:
         problems.append(checks.short_recordings_line(short))

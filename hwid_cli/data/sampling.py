@@ -25,6 +25,8 @@ from hwid_cli.records.experiment import RecordingsOptions
 _SCATTER = 0.02
 # A clock that keeps its step most of the time has no jitter, but gaps.
 _REGULAR, _MOSTLY = 1e-3, 0.5
+# Stamps that keep to their mean step this much better than to the usual one are rounded.
+_ROUNDED = 0.2
 
 _log = logging.getLogger(__name__)
 
@@ -217,7 +219,8 @@ def _grid_step(time: np.ndarray, median: float) -> float:
     ticks = min((every, counted), key=lambda one: _misfit(time, one))
     mean = float(time[-1] - time[0]) / ticks[-1]
     regular = np.abs(np.diff(time) - median) <= _REGULAR * median
-    if np.mean(regular) < _MOSTLY and abs(mean - median) <= _SCATTER * median:
+    is_even = np.mean(regular) >= _MOSTLY and not _is_rounded(time, ticks, median)
+    if not is_even and abs(mean - median) <= _SCATTER * median:
         return _simplest_step(time, ticks)
     return float(f"{median:.{_STEP_DIGITS}g}")
 
@@ -276,6 +279,15 @@ def _simplest_step(time: np.ndarray, ticks: np.ndarray) -> float:
         if abs(simple - step) <= allowed:
             return simple
     return step
+
+
+def _is_rounded(time: np.ndarray, ticks: np.ndarray, median: float) -> bool:
+    """Whether stamps are a clock's, rounded: the mean step keeps to them, no gap is left.
+
+    Most steps of rounded stamps are alike, and none is the clock's own.
+    """
+    drift = float(np.max(np.abs(time - time[0] - median * ticks)))
+    return _misfit(time, ticks) < _ROUNDED * drift
 
 
 def _misfit(time: np.ndarray, ticks: np.ndarray) -> float:

@@ -22,7 +22,7 @@ from hwid_cli.data.units import (
     is_unitless,
     quantity_of,
     unit_in_name,
-    unit_since_1970,
+    unit_of_dates,
 )
 from hwid_cli.errors import MeasurementError
 from hwid_cli.records.experiment import (
@@ -78,8 +78,8 @@ def _in_seconds(
     if stated is not None:
         given, said_by = stated, "recordings.units.time"
     elif not given or is_unitless(given):
-        given = unit_since_1970(time.values)
-        said_by = "its size, a time since 1970"
+        given = unit_of_dates(time.values)
+        said_by = "its size, a date"
     if not given:
         return time, SignalUnit("time", "", "", "s")
     factor = factor_between(given, "s")
@@ -89,8 +89,8 @@ def _in_seconds(
             "of time, such as s, ms or us; correct it, or say recordings.units.time"
         )
     values = time.values
-    if values.size and unit_since_1970(values):
-        # Days since 1970 hold nothing but digits that are lost in a conversion.
+    if values.size and unit_of_dates(values):
+        # Whole days hold nothing but digits that are lost in a conversion.
         day = _DAY_S / factor
         values = values - np.floor(values[0] / day) * day
     seconds = replace(time, values=in_unit(values, given, "s"))

@@ -9,6 +9,7 @@ import numpy as np
 from hwid_cli.data.cells import (
     TwoWaysError,
     Writing,
+    is_word,
     number_in,
     stamp_reader,
     writing_of,
@@ -117,6 +118,7 @@ class ColumnParts:
         self._rows.clear()
         is_text_below = self._count - self._last_value <= _MOST_TEXT_BELOW
         last = self._last_value if is_text_below and self._last_value else self._count
+        last = self._above_footer(rows, last)
         found = {}
         for place in self.places:
             values = np.concatenate([np.zeros(0), *self._blocks.pop(place)])
@@ -133,6 +135,14 @@ class ColumnParts:
                 else "",
             )
         return found
+
+    def _above_footer(self, rows: np.ndarray, last: int) -> int:
+        """Leave out last rows that begin with a word: a mean, a largest value."""
+        texts = self._texts[self.places[0]] if self.places else {}
+        first = last
+        while first > 0 and is_word(texts.get(int(rows[first - 1]), "")):
+            first -= 1
+        return first if last - first <= _MOST_TEXT_BELOW else last
 
     def _numbers(
         self, place: int, cells: Sequence[str | float], lines: np.ndarray
@@ -261,7 +271,8 @@ def found_columns(
             is_name = bool(title) and head.names.count(title) == 1 and is_plain(title)
             key = title if is_name else place
             unit = head.units.get(place, column.unit)
-            found.append(FoundColumn(title, key, column.values, variable, unit))
+            scale = head.scales.get(place, 1.0)
+            found.append(FoundColumn(title, key, column.values, variable, unit, scale))
     for title, step_s in head.settings:
         found.append(FoundColumn(title, title, np.array([step_s]), variable, "s"))
     return tuple(found)

@@ -19,13 +19,13 @@ _NAME_WORDS = frozenset(
     [
         *("name", "names", "channelname", "channel", "channels", "path", "signal"),
         *("signals", "signalname", "variable", "kanal", "kanalname", "spurname"),
-        *("label", "symbolname"),
+        *("label", "symbolname", "tracename", "source"),
     ]
 )
 _UNIT_WORDS = frozenset(
     [
         *("unit", "units", "einheit", "einheiten", "verticalunits", "yunitlabel"),
-        "yunit",
+        *("yunit", "vunit"),
     ]
 )
 # Words in front of rows that say something else about each column.
@@ -33,8 +33,15 @@ _OTHER_WORDS = frozenset(
     [
         *("datatype", "type", "description", "quantity", "mode", "variablesize"),
         *("comment", "symbolbased", "symbolcomment", "indexgroup", "indexoffset"),
-        *("netid", "port", "offset", "scalefactor", "bitmask", "source", "coupling"),
-        *("samples", "date"),
+        *("netid", "port", "offset", "bitmask", "coupling"),
+        *("samples", "date", "hunit", "horizontalunits", "horizontalunit"),
+    ]
+)
+# Words in front of factors by which whole numbers become quantities.
+_SCALE_WORDS = frozenset(
+    [
+        *("scale", "scaling", "scalefactor", "factor", "faktor", "skalierung", "slope"),
+        *("skalierungsfaktor", "umrechnungsfaktor", "resolution", "auflösung", "lsb"),
     ]
 )
 _TIME_WORDS = frozenset(("time", "zeit", "timestamp", "t", "x"))
@@ -45,7 +52,7 @@ _INTERVAL_WORDS = frozenset(
         *("samplinginterval", "samplingtimeinterval", "increment", "xincr"),
         *("xincrement", "sampleperiod", "abtastintervall", "abtastperiode", "deltat"),
         *("timestep", "zykluszeit", "cycletime", "timeinterval", "timeincrement"),
-        *("wfincrement", "stepsize"),
+        *("wfincrement", "stepsize", "tinterval", "hresolution"),
     ]
 )
 _RATE_WORDS = frozenset(
@@ -86,6 +93,8 @@ class TableHead:
         By column, where a row of units says one.
     settings : tuple of (str, float), [s]
         Sample times that the rows state, with the words in front of them.
+    scales : dict of int to float
+        By column, where a row of factors states another one than 1.
     """
 
     body: int
@@ -95,6 +104,7 @@ class TableHead:
     name_row: int = -1
     units: dict[int, str] = field(default_factory=dict)
     settings: tuple[tuple[str, float], ...] = ()
+    scales: dict[int, float] = field(default_factory=dict)
 
 
 def sample_time_named(title: str, value: float, unit: str = "") -> float | None:
@@ -125,8 +135,10 @@ def sample_time_named(title: str, value: float, unit: str = "") -> float | None:
     said = (unit or in_title).strip()
     if not 0 < value < float("inf"):
         return None
-    if word in _INTERVAL_WORDS:
-        factor = factor_between(said, "s") if said else 1.0
+    in_time = factor_between(said, "s") if said else None
+    # What a rate says may stand as its interval already.
+    if word in _INTERVAL_WORDS or (word in _RATE_WORDS and in_time is not None):
+        factor = in_time if said else 1.0
         return None if factor is None else float(f"{value * factor:.12g}")
     if word in _RATE_WORDS:
         factor = _RATE_UNITS.get(said.lower(), 1.0)
@@ -185,7 +197,9 @@ def read_head(
     numeric, texts = _kinds_of_columns(rows, comments)
     body = _first_row(rows, numeric, comments)
     plain = [number for number in range(body) if number not in comments]
-    noted = [number for number in range(body) if number in comments]
+    # A comment of fewer cells says something else.
+    width = max(numeric, default=-1) + 1
+    noted = [n for n in range(body) if n in comments and len(rows[n]) >= width]
     asked = [n for n in (*plain[::-1], *noted[::-1]) if set(wanted) <= set(rows[n])]
     units: dict[int, str] = {}
     name_row, names = -1, []
@@ -198,8 +212,19 @@ def read_head(
         name_row = asked[0]
     if name_row >= 0:
         names = _named(rows, name_row, numeric, units)
+        if not units and _are_rows_named(rows[body:], len(names)):
+            names = ["", *names]
     settings = _settings(rows, body, numeric)
-    return TableHead(body, numeric, texts, tuple(names), name_row, units, settings)
+    scales = _scales(rows[:body], numeric)
+    return TableHead(
+        body, numeric, texts, tuple(names), name_row, units, settings, scales
+    )
+
+
+def _are_rows_named(body: Sequence[Sequence[str]], names: int) -> bool:
+    """Whether rows begin with their number, above which no name stands, as R writes."""
+    first = [row[0] for row in body[:_ROWS_BELOW] if len(row) == names + 1]
+    return first == [str(number + 1) for number in range(_ROWS_BELOW)]
 
 
 def _kinds_of_columns(
@@ -292,11 +317,14 @@ def _name_row(
         key = _letters(next(cell for cell in row if cell))
         # In front of the columns, or of each pair of them, stands what a row is about.
         is_about = bool(row[0]) and (0 not in numeric or row.count(row[0]) > 1)
-        is_about |= key in _OTHER_WORDS
+        is_about |= key in _OTHER_WORDS | _SCALE_WORDS
+        states_clock = key in _INTERVAL_WORDS | _RATE_WORDS
+        is_about |= states_clock and all(map(is_quantity, filter(None, row[1:])))
         if key in _UNIT_WORDS:
             units = {**_units_of(row, numeric), **units}
             continue
-        if (is_named or number != above[0]) and _is_unit_row(cells):
+        is_other = key in _OTHER_WORDS
+        if (is_named or number != above[0]) and not is_other and _is_unit_row(cells):
             units = {**_units_of(row, numeric), **units}
         elif not is_about or key in _NAME_WORDS:
             upper = above[: above.index(number)]
@@ -340,6 +368,18 @@ def _named(
             units.setdefault(place, own)
             names[place] = word
     return names
+
+
+def _scales(above: Sequence[Sequence[str]], numeric: Sequence[int]) -> dict[int, float]:
+    """Factors of rows that begin with a word for them."""
+    found = {}
+    for row in above:
+        if row and _letters(row[0]) in _SCALE_WORDS:
+            for place, cell in zip(numeric, _cells(row, numeric), strict=True):
+                value = plain_number(cell.replace(",", "."))
+                if value is not None and value not in (0.0, 1.0):
+                    found[place] = value
+    return found
 
 
 def _is_unit_row(cells: Sequence[str]) -> bool:

@@ -9,6 +9,8 @@ import re
 from functools import cache, lru_cache
 from typing import Any
 
+import numpy as np
+
 # What a drive's signals are, each with the SI unit that its numbers are converted to.
 QUANTITIES = {
     "time": "s",
@@ -36,6 +38,8 @@ _SPELLINGS = {
     "sek": "s",
     "Sek": "s",
     "secs": "s",
+    "Second": "s",
+    "Seconds": "s",
     "amp": "A",
     "amps": "A",
     "Amp": "A",
@@ -53,14 +57,23 @@ _SPELLINGS = {
     "rev/min": "rpm",
     "rev": "turn",
     "mps": "m/s",
+    "100ns": "tick_of_windows",
     "%": "percent",
 }
 # Degrees in German, gradians to pint: nobody can tell.
 _AMBIGUOUS = ("grad", "Grad", "gr")
 _UNITLESS_WORDS = ("", "-", "1", "none", "unitless", "dimensionless")
-_SYMBOL = r"[A-Za-z\u00b5\u03bc°Ωµ]+(?:(?:\^|\*\*)?-?[1-4])?"
+_SYMBOL = r"[A-Za-z_\u00b5\u03bc°Ωµ]+(?:(?:\^|\*\*)?-?[1-4])?"
 _FORM = re.compile(rf"{_SYMBOL}(?:[ */·.]{_SYMBOL}){{0,5}}")
 _LONGEST = 40
+_DAY_S = 86_400.0
+# Days since 1900 and since the year 0, and steps of 100 ns since 1601, of 1970 to 2080.
+_DAYS = ((25_569.0, 66_000.0), (719_529.0, 760_000.0))
+_FIRST_TICKS, _LAST_TICKS = 1.164e17, 1.52e17
+# Of seconds of a day, no clock steps by less, [s]; of days, no measurement by more, [d].
+_SHORTEST_STEP_S, _LONGEST_DAY_STEP = 2e-6, 1e-2
+# A step is a round number within this share: days have eleven digits behind five, [-].
+_SIMPLE = 1e-5
 
 
 def quantity_of(unit: str) -> str:
@@ -143,8 +156,8 @@ def in_unit(values: Any, unit: str, target: str) -> Any:
     return values * factor
 
 
-def unit_since_1970(values: Any) -> str:
-    """Unit of times that count from the beginning of 1970, told from their size.
+def unit_of_dates(values: Any) -> str:
+    """Unit of times that count from a date long ago, told from their size.
 
     Parameters
     ----------
@@ -153,14 +166,42 @@ def unit_since_1970(values: Any) -> str:
     Returns
     -------
     str
-        Empty where they are something else: seconds of these days have ten digits.
+        Empty where they are something else. Seconds since 1970 have ten digits these
+        days; days are those of spreadsheets (since 1900) or of MATLAB's ``datenum``
+        (since the year 0); ``100ns`` are those of Windows (since 1601).
+
+    Examples
+    --------
+    >>> seconds = 0.002 * np.arange(100)
+    >>> unit_of_dates(1.7e9 + seconds), unit_of_dates(45413.5 + seconds / 86400)
+    ('s', 'd')
+    >>> unit_of_dates(45413.5 + seconds)
+    ''
     """
     if len(values) == 0:
         return ""
+    first = float(values[0])
     for unit, size in (("s", 1.0), ("ms", 1e3), ("us", 1e6), ("ns", 1e9)):
-        if 1e9 * size < values[0] < 2.5e9 * size:
+        if 1e9 * size < first < 2.5e9 * size:
             return unit
-    return ""
+    if _FIRST_TICKS < first < _LAST_TICKS:
+        return "100ns"
+    is_day = any(begin < first < end for begin, end in _DAYS)
+    return "d" if is_day and _steps_in_days(values) else ""
+
+
+def _steps_in_days(values: Any) -> bool:
+    """Whether steps are so short, or so odd, that they are shares of a day."""
+    step = float(np.median(np.diff(values))) if len(values) > 1 else 0.0
+    if not 0.0 < step < _LONGEST_DAY_STEP:
+        return False
+    return step < _SHORTEST_STEP_S or (
+        _is_simple(step * _DAY_S) and not _is_simple(step)
+    )
+
+
+def _is_simple(step: float) -> bool:
+    return abs(float(f"{step:.3g}") - step) <= _SIMPLE * step
 
 
 @cache
@@ -168,7 +209,9 @@ def _registry() -> Any:
     # Half a second: loaded where it is needed.
     import pint
 
-    return pint.UnitRegistry()
+    registry: Any = pint.UnitRegistry()
+    registry.define("tick_of_windows = 1e-7 second")
+    return registry
 
 
 def _spelt(unit: str) -> str:
@@ -265,7 +308,7 @@ _SUFFIXES = {
 # What is followed by a member is the place in an array: run(2).current.
 _BRACKET = re.compile(r"([\[(])\s*([^\])]*?)\s*[\])](?!\.\w)")
 _LONGEST_FIRST = sorted(_SUFFIXES.items(), key=lambda pair: -len(pair[0]))
-_BEHIND = re.compile(r"(?:/| in )\s*([A-Za-zµ°%]{1,4})$")
+_BEHIND = re.compile(r"(?:[/,]|(?:^| )in )\s*([A-Za-zµ°%]{1,4})$")
 # Arguments of a function, not units: x[k], i(t).
 _ARGUMENTS = ("t", "k", "n", "i", "j", "z", "x")
 # A letter behind a symbol may be an index: theta_m is the motor's angle, i_s the stator's
@@ -277,6 +320,14 @@ _MEASURED_IN = {
     "V": ("u", "uq", "ud"),
     "N": ("f",),
     "m": ("x", "y", "z", "s", "l", "h"),
+}
+
+
+# A column of time may be named by its unit alone.
+_NAMES_OF_TIME = {
+    **{unit: unit for unit in ("ms", "us", "µs", "ns", "sec", "msec")},
+    "millis": "ms",
+    "micros": "us",
 }
 
 
@@ -332,6 +383,8 @@ def unit_in_name(title: str, role: str) -> str:
     ('', 'A')
     """
     bare, unit = split_unit(title)
+    if role == "time" and title.strip() in _NAMES_OF_TIME:
+        return _NAMES_OF_TIME[title.strip()]
     if not unit:
         return ""
     bracket = _BRACKET.search(title)
@@ -344,8 +397,9 @@ def unit_in_name(title: str, role: str) -> str:
         return "" if is_round and not quantity_of(unit) else unit
     if role == "time" and quantity_of(unit) != "time":
         return ""
-    if len(unit) == 1 and _SYMBOLS.fullmatch(bare):
-        return unit if bare.lower() in _MEASURED_IN.get(unit, ()) else ""
+    symbol = bare.strip().lower()
+    if len(unit) == 1 and symbol and _SYMBOLS.fullmatch(symbol):
+        return unit if symbol in _MEASURED_IN.get(unit, ()) else ""
     return unit
 
 

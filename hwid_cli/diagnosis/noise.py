@@ -161,7 +161,9 @@ def _is_white(pieces: Sequence[np.ndarray], *, n_removed: int = 1) -> bool:
     pulled = n_removed * sum(piece.size > _LAGS_OF_COLOUR for piece in pieces)
     correlations = sums[1:] / counts[1:] * counts[0] / sums[0] + pulled / counts[1:]
     statistic = float(np.sum(counts[1:] * np.square(correlations)))
-    return statistic < scipy.stats.chi2.ppf(1 - FALSE_ALARM, _LAGS_OF_COLOUR)
+    return statistic < 2.0 * scipy.special.gammaincinv(
+        _LAGS_OF_COLOUR / 2.0, 1 - FALSE_ALARM
+    )
 
 
 def _whitening_filter(pieces: Sequence[np.ndarray]) -> np.ndarray:
@@ -269,7 +271,9 @@ def portmanteau(
     basis = np.linalg.qr(_errors_of(taps, n_lags)[used])[0]
     scores = scores - basis @ (basis.T @ scores)
     free = max(scores.size - basis.shape[1], 1)
-    return float(scores @ scores / scipy.stats.chi2.ppf(1 - FALSE_ALARM, free))
+    return float(
+        scores @ scores / (2.0 * scipy.special.gammaincinv(free / 2.0, 1 - FALSE_ALARM))
+    )
 
 
 def _errors_of(taps: np.ndarray, n_lags: int) -> np.ndarray:

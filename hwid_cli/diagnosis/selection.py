@@ -352,7 +352,7 @@ def _goes_with(values: np.ndarray, inputs: np.ndarray) -> bool:
     whole = float(np.sum((values - values.mean()) ** 2))
     unexplained = float(left @ left)
     ratio = (whole - unexplained) / used.shape[1] / max(unexplained / freedom, 1e-300)
-    return bool(scipy.stats.f.sf(ratio, used.shape[1], freedom) < CHANCE)
+    return bool(scipy.special.fdtrc(used.shape[1], freedom, ratio) < CHANCE)
 
 
 def count(found: CandidateFit) -> int:

@@ -110,7 +110,7 @@ def _with_itself(residual: np.ndarray, pull: np.ndarray) -> tuple[Correlation, f
     values = sums / power + pull[1:] / free
     deviation = np.sqrt(np.maximum(free - lags, 1.0) / (free * (free + 2.0)))
     statistic = float(np.sum((values / deviation) ** 2))
-    p_value = float(scipy.stats.chi2.sf(statistic, n_lags))
+    p_value = float(scipy.special.chdtrc(n_lags, statistic))
     return _banded(lags, values, deviation, p_value), statistic
 
 
@@ -189,7 +189,7 @@ def _p_of_largest(sizes: np.ndarray) -> float:
     """Probability that the largest of so many normal variables is as large."""
     if sizes.size == 0:
         return float("nan")
-    single = 2.0 * scipy.stats.norm.sf(float(sizes.max()))
+    single = 2.0 * scipy.special.ndtr(-float(sizes.max()))
     return float(-np.expm1(sizes.size * np.log1p(-min(single, 1.0 - 1e-16))))
 
 
@@ -204,12 +204,12 @@ def _banded(
     """Correlation with its bands."""
     counted = np.ones(lags.size, dtype=bool) if counted is None else counted
     each = 1.0 - (1.0 - LEVEL) ** (1.0 / max(int(counted.sum()), 1))
-    common = scipy.stats.norm.isf(each / 2.0) * deviation
+    common = -scipy.special.ndtri(each / 2.0) * deviation
     outside = lags[counted & (np.abs(values) > common) & (common > 0.0)]
     return Correlation(
         lags,
         values,
-        scipy.stats.norm.isf(LEVEL / 2.0) * deviation,
+        -scipy.special.ndtri(LEVEL / 2.0) * deviation,
         common,
         p_value,
         int(outside.max(initial=-1)),

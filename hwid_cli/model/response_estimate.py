@@ -89,7 +89,7 @@ def _delay(shares: np.ndarray, residual: float, freedom: int) -> int:
         is_needed = gains > 0.0
     else:
         is_needed = (
-            scipy.stats.f.sf(gains / counts / noise, counts, freedom) < _FALSE_ALARM
+            scipy.special.fdtrc(counts, freedom, gains / counts / noise) < _FALSE_ALARM
         )
     return int(np.argmax(is_needed)) if is_needed.any() else -1
 

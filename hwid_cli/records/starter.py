@@ -21,6 +21,8 @@ class FoundColumn:
         Table that a numbered column belongs to.
     unit : str
         That the file states beside the name; empty where it states none.
+    scale : float, [-]
+        Factor that the file states for its counts; 1 where it states none.
     """
 
     title: str
@@ -28,6 +30,7 @@ class FoundColumn:
     values: np.ndarray
     variable: str | None = None
     unit: str = ""
+    scale: float = 1.0
 
     @property
     def place(self) -> tuple[str | None, str | int]:
@@ -92,6 +95,8 @@ class FolderLayout:
         Files that are not used, and why.
     first_sample : int, [samples]
         Rows at the beginning of the files in which a signal has no number.
+    parts : dict of str to tuple of int, [samples]
+        First and end of each recording where a file holds several; empty for one.
     """
 
     patterns: tuple[str, ...]
@@ -107,6 +112,7 @@ class FolderLayout:
     output_time: Role | None = None
     left: tuple[tuple[str, str], ...] = ()
     first_sample: int = 0
+    parts: dict[str, tuple[int, ...]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -5,9 +5,10 @@ References
 docs/method.md, section "Groups".
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from math import comb
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ import numpy as np
 from hwid_cli.records.check import StagePlan
 from hwid_cli.records.experiment import CrossvalOptions, GroupOptions
 from hwid_cli.records.groups import GroupSearch
+from hwid_cli.records.recordings import Calibrated
 from hwid_cli.report.groups import chain_table, join_table, levels_table
 from hwid_cli.report.table import Block
 from hwid_cli.stages.fit_seconds import (
@@ -30,8 +32,9 @@ from hwid_cli.stages.order_grid import candidate_orders
 from hwid_cli.stages.selection import select_recordings
 from hwid_cli.stages.stage import Context, Planning, Runner, Stage, in_results
 from hwid_cli.store.group_results import read_group, write_group, write_groups_csv
-from hwid_cli.tasks.cache import recording_key, task_key
-from hwid_cli.tasks.runner import run_tasks
+from hwid_cli.tasks.cache import Store, recording_key, task_key
+from hwid_cli.tasks.runner import TaskDone, run_tasks
+from hwid_cli.tasks.task import Task
 
 
 def group_key(plan: GroupPlan) -> str:
@@ -134,7 +137,45 @@ def group_bound(
     return tuple(counts)
 
 
+class _NotStoredError(Exception):
+    """A search asks for what the cache does not have."""
+
+
+def stored_tasks(plan: GroupPlan, store: Store) -> int | None:
+    """Count the tasks of a search that finds all its results in the cache.
+
+    Returns
+    -------
+    int or None, [-]
+        None where a result is missing.
+    """
+    count = 0
+
+    def look_up(tasks: Sequence[Task]) -> tuple[TaskDone, ...]:
+        nonlocal count
+        done: list[TaskDone] = []
+        for task in tasks:
+            result = store.get(task.key, task.result_type)
+            if result is None:
+                raise _NotStoredError
+            done.append(TaskDone(task, result, from_cache=True))
+        count += len(done)
+        return tuple(done)
+
+    try:
+        search_all(plan, lambda level, unit, total, work: work(look_up))
+    except _NotStoredError:
+        return None
+    return count
+
+
 def _plan(planning: Planning) -> tuple[StagePlan, ...]:
+    calibrated = Calibrated(planning.recordings, planning.logs, "")
+    context = Context(planning.experiment, Path(), {"calibrate": calibrated})
+    stored = stored_tasks(_choose(context), planning.store)
+    if stored is not None:
+        what = f"a search of {stored} tasks, all stored"
+        return (StagePlan(NAME, what, stored, stored, TASK_SECONDS * stored, 0.0),)
     experiment = planning.experiment
     options = experiment.group or GroupOptions()
     held_out = () if experiment.test is None else experiment.test.recordings

@@ -172,7 +172,7 @@ def _scale(scores: Sequence[np.ndarray]) -> float:
         # Recordings that differ more than so many errors would are fewer errors.
         relative = np.var(squares / squares.mean(), ddof=1)
         number = min(number, 2.0 * squares.size / relative)
-    quantile = scipy.stats.t.ppf(0.5 + COVERAGE / 2.0, number)
+    quantile = scipy.special.stdtrit(number, 0.5 + COVERAGE / 2.0)
     return max(float(quantile * np.sqrt(squares.mean())), _LEAST_SCALE)
 
 

@@ -1,7 +1,7 @@
 """What ``hwid check`` forecasts for each stage beside what the stage then takes.
 
-``python -m tests.benchmarks.bench_forecast CONFIG...``; one process, empty results.
-Processor time: a busy machine changes it little. A simulation of the user's own works in
+``python -m tests.benchmarks.bench_forecast CONFIG...``; one process, first with an empty
+cache, then with the full one and empty results. Processor time: a busy machine changes it little. A simulation of the user's own works in
 a process of its own, so the forecast of its diagnosis is to be read beside the wall time.
 """
 
@@ -21,8 +21,9 @@ from hwid_cli.store.cache import Hdf5Store
 from hwid_cli.tasks.task import one_thread
 
 
-def compare(config: str, out: Path) -> None:
-    session = open_session(Choices(Path(config), out, jobs=1, quiet=True))
+def compare(config: str, out: Path, cache: Path, *, said: str) -> None:
+    choices = Choices(Path(config), out, cache=cache, jobs=1, quiet=True)
+    session = open_session(choices)
     experiment, measured = session.experiment, result_of(session, "calibrate")
     start = time.process_time()
     with one_thread():
@@ -33,7 +34,7 @@ def compare(config: str, out: Path) -> None:
         )
         names = [one for one in to_run(experiment) if one != "calibrate"]
         plans = [one for name in names for one in stage_named(name).plan(planning)]
-    print(f"{config}: forecast made in {time.process_time() - start:.1f} s")
+    print(f"{config}, {said}: forecast made in {time.process_time() - start:.1f} s")
     for plan in plans:
         start, wall = time.process_time(), time.perf_counter()
         result_of(session, plan.stage)
@@ -45,15 +46,19 @@ def compare(config: str, out: Path) -> None:
 
 
 def _missed(plan: StagePlan, taken: float) -> float:
-    """How many times the time lies outside of the range; 1 within it."""
-    return max(plan.seconds / taken, taken / plan.longest_seconds, 1.0)
+    """How many times the time lies outside of the range; 1 within it, or below a second."""
+    least, most = (max(one, 1.0) for one in (plan.seconds, plan.longest_seconds))
+    taken = max(taken, 1.0)
+    return max(least / taken, taken / most, 1.0)
 
 
 def main() -> None:
     print("stage         least     most    taken missed")
     for config in sys.argv[1:]:
-        with tempfile.TemporaryDirectory() as out:
-            compare(config, Path(out))
+        with tempfile.TemporaryDirectory() as folder:
+            cache = Path(folder) / "cache"
+            for said in ("empty cache", "full cache"):
+                compare(config, Path(folder) / said, cache, said=said)
 
 
 if __name__ == "__main__":

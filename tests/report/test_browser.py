@@ -16,6 +16,8 @@ WIDTHS = (390, 1280, 1920)
 CHART = "#recordings .item:not([hidden]) figure.chart"
 # A page that opens for everybody; issues of the network do not count here, [bytes].
 MOST_BYTES = 5_000_000
+# What a person does not wait for, [s].
+MOST_WORKED_S = 1.0
 # A4 less the margins of the page, 190 mm at 96 pixels to the inch, [pixels].
 PAPER_PX = 719
 # What WCAG 2 asks of small text, [-].
@@ -447,16 +449,32 @@ def luminance(colour):
     return float(linear @ [0.2126, 0.7152, 0.0722])
 
 
-def test_the_page_is_small_and_its_first_paint_is_measured(
-    visit, page, record_property
+# The paint may come after the page is loaded, on a busy machine.
+WAIT_FOR_PAINT = """() => new Promise(done => {
+  new PerformanceObserver(list => {
+    const [first] = list.getEntriesByName("first-contentful-paint");
+    if (first) done(first.startTime / 1000);
+  }).observe({type: "paint", buffered: true});
+})"""
+
+
+def test_the_page_is_small_and_painted_below_a_second(
+    browser, address, page, record_property
 ):
+    """Processor time of the thread that works out and paints: other work counts not."""
     assert len(page.html.encode()) < MOST_BYTES
+    tab = browser.new_page(viewport={"width": 1280, "height": 800})
+    tools = tab.context.new_cdp_session(tab)
+    tools.send("Performance.enable", {"timeDomain": "threadTicks"})
     start = time.perf_counter()
-    tab = visit()
+    tab.goto(address)
+    paint = tab.evaluate(WAIT_FOR_PAINT)
     seconds = time.perf_counter() - start
-    paint = tab.evaluate(
-        "performance.getEntriesByName('first-contentful-paint')[0].startTime / 1000"
-    )
+    told = tools.send("Performance.getMetrics")["metrics"]
+    tab.close()
+    worked = {one["name"]: one["value"] for one in told}["TaskDuration"]
 
     record_property("first_paint_s", paint)
+    record_property("worked_s", worked)
     assert 0.0 < paint <= seconds
+    assert 0.0 < worked < MOST_WORKED_S

@@ -10,7 +10,7 @@ from hwid_cli.model.uncertainty import parameter_covariance
 from hwid_cli.records.experiment import GroupOptions, OrdersOptions
 from hwid_cli.records.model import FitOptions
 from hwid_cli.records.recordings import Recording
-from hwid_cli.stages.group import group_key
+from hwid_cli.stages.group import group_key, stored_tasks
 from hwid_cli.stages.group_levels import GroupPlan, search_all
 from hwid_cli.stages.identify import identify_all
 from hwid_cli.tasks.cache import MemoryStore
@@ -186,6 +186,15 @@ def test_a_second_search_computes_nothing(search, bench):
 
     assert same(search_all(plan(), again), search)
     assert again.computed == []
+
+
+def test_a_search_is_forecast_from_the_cache_only_where_all_of_it_is_there(
+    search, bench
+):
+    assert stored_tasks(plan(), bench.store) >= len(bench.computed)
+    assert stored_tasks(plan(threshold=0.05), MemoryStore()) is None
+    further = plan(fit_options=replace(QUICK, max_iterations=21))
+    assert stored_tasks(further, bench.store) is None
 
 
 @pytest.mark.thorough
