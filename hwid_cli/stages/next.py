@@ -31,6 +31,7 @@ from hwid_cli.records.next import (
     NextRecordings,
     PlannedInput,
     ProposedRecording,
+    RepeatSpread,
 )
 from hwid_cli.records.recordings import Recording
 from hwid_cli.records.units import as_percent, behind
@@ -40,6 +41,7 @@ from hwid_cli.stages.diagnose import ToDiagnose, undecided
 from hwid_cli.stages.diagnose import choose as choose_diagnosis
 from hwid_cli.stages.fit_seconds import counted
 from hwid_cli.stages.ranking import best_fits
+from hwid_cli.stages.repeats import Repeats, proposed_repeats
 from hwid_cli.stages.stage import Context, Planning, Runner, Stage, in_results
 from hwid_cli.stages.trust import kept_for_test, trust_of
 from hwid_cli.store.next_results import (
@@ -57,7 +59,7 @@ from hwid_cli.trust.designs import LEAST_SAMPLES, designs
 from hwid_cli.trust.visited import N_BANDS
 
 NAME = "next"
-STAGE_VERSION = 2
+STAGE_VERSION = 3
 # Separation of candidates, in standard deviations of the noise, below which a recording
 # does not tell them apart.
 LEAST_SEPARATION = 0.1
@@ -65,16 +67,22 @@ LEAST_SEPARATION = 0.1
 
 @dataclass(frozen=True, eq=False)
 class ToChoose:
-    """What is known, what is offered, and what for."""
+    """What is known, what could be played or was, and what for."""
 
     options: NextOptions
     recordings: tuple[Recording, ...]
-    offered: tuple[PlannedInput, ...]
+    plan: tuple[PlannedInput, ...]
     tested: tuple[str, ...] = ()
     fit: Fit | None = None
     diagnosed: ToDiagnose | None = None
     verdict: str = ""
     previous: NextRecordings | None = None
+
+    @property
+    def offered(self) -> tuple[PlannedInput, ...]:
+        """What is no recording yet."""
+        known = {one.name for one in self.recordings}
+        return tuple(one for one in self.plan if one.name not in known)
 
     @property
     def key(self) -> str:
@@ -84,12 +92,12 @@ class ToChoose:
             "options": self.options,
             "recordings": [one.name for one in self.recordings],
             "contents": [recording_key(one) for one in self.recordings],
-            "offered": [one.name for one in self.offered],
+            "plan": [one.name for one in self.plan],
             "model": None if model is None else model_key(model),
             "diagnosis": None if self.diagnosed is None else self.diagnosed.key,
             "tested": self.tested,
         }
-        arrays = [one.values for one in self.offered]
+        arrays = [one.values for one in self.plan]
         return task_key(NAME, STAGE_VERSION, settings, arrays)
 
 
@@ -116,6 +124,7 @@ def propose_next(given: ToChoose, runner: Runner) -> NextRecordings:
         sample_time_s=given.recordings[0].sample_time_s,
         input_unit=given.recordings[0].input_unit,
         changed=_changed(given, choice),
+        repeats=choice.repeats,
     )
 
 
@@ -127,6 +136,7 @@ class _Choice:
     known_words: str
     sentence: str
     proposals: tuple[ProposedRecording, ...]
+    repeats: RepeatSpread | None = None
 
 
 def _for_coverage(given: ToChoose, _: Runner) -> _Choice:
@@ -161,12 +171,32 @@ def _for_coverage(given: ToChoose, _: Runner) -> _Choice:
         now, before = now + by, joined([before, tables[place]])
     words = "of the amplitudes and frequencies on offer are visited"
     best = found[0][1] if found else 0.0
-    sentence = f"{as_percent(share)} {words}; " + _verdict(
-        len(proposals),
-        f"the best input on offer adds {as_percent(best, 1)}",
-        given.options.enough,
+    known, repeats = f"the best input on offer adds {as_percent(best, 1)}", None
+    if not proposals:
+        judges = [one for one in given.recordings if one.name not in given.tested]
+        repeats = proposed_repeats(
+            judges or given.recordings, given.plan, given.options
+        )
+        proposals = list(repeats.proposals)
+    sentence = f"{as_percent(share)} {words}; " + (
+        _verdict(len(proposals), known, given.options.enough)
+        if repeats is None
+        else _repeats_verdict(repeats, known, given.options.enough)
     )
-    return _Choice(share, words, sentence, tuple(proposals))
+    spread = None if repeats is None else repeats.spread
+    return _Choice(share, words, sentence, tuple(proposals), spread)
+
+
+def _repeats_verdict(repeats: Repeats, best: str, enough: float) -> str:
+    """What to take once the inputs are enough."""
+    inputs = f"{best}, less than {as_percent(enough, 1)}"
+    if not repeats.proposals:
+        return f"enough is known: {inputs}; {repeats.words}"
+    many = counted(len(repeats.proposals), "repeat")
+    verb = "is" if len(repeats.proposals) == 1 else "are"
+    return (
+        f"the inputs are enough ({inputs}), but {repeats.words}; {many} {verb} proposed"
+    )
 
 
 def _where(before: np.ndarray, more: np.ndarray) -> str:
@@ -304,13 +334,11 @@ def _choose(context: Context) -> ToChoose:
     experiment, results = context.experiment, context.results
     options = _options(experiment)
     recordings = results["calibrate"].recordings
-    offered = _offered(experiment, recordings)
-    known = {one.name for one in recordings}
     is_diagnosis = options.goal == "diagnosis"
     return ToChoose(
         options,
         recordings,
-        tuple(one for one in offered if one.name not in known),
+        _offered(experiment, recordings),
         kept_for_test(experiment),
         _model(experiment, results["identify"], recordings)
         if options.goal == "parameters"
