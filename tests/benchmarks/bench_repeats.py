@@ -203,7 +203,7 @@ def _truth(
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--plants", type=int, default=30)
+    parser.add_argument("--plants", type=int, default=40)
     parser.add_argument("--seed", type=int, default=80000)
     parser.add_argument("--each", action="store_true", help="a line for each plant")
     chosen = parser.parse_args()
