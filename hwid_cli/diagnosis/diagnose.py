@@ -24,6 +24,7 @@ from hwid_cli.diagnosis.candidate import (
 from hwid_cli.diagnosis.causes import fit_with_input_noise, without_repeats
 from hwid_cli.diagnosis.direction import find_reversal, reversal_sentence
 from hwid_cli.diagnosis.findings import Findings, describe
+from hwid_cli.diagnosis.hidden import HiddenEffect, hidden_effects
 from hwid_cli.diagnosis.intervals import unclear_effects
 from hwid_cli.diagnosis.latent_force import Smoothed, latent_force
 from hwid_cli.diagnosis.laws import find_law
@@ -167,6 +168,34 @@ def separations(
         for one in inputs
     ]
     return Separations(titles, np.array(ratios))
+
+
+def hidden(
+    recordings: Sequence[Recording],
+    simulation: SimulationOptions,
+    options: DiagnoseOptions,
+    inputs: Sequence[np.ndarray],
+    run_tasks: RunTasks,
+    on_round: OnRound,
+) -> list[HiddenEffect]:
+    """Look for effects that a diagnosis does not name, in inputs.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+        Of the diagnosis, whose tasks are asked for again.
+    inputs : sequence of ndarray, shape (n_samples,), [input unit]
+        That could be played, at the sample time of the recordings.
+
+    References
+    ----------
+    docs/method_diagnosis.md, eq. (D26b).
+    """
+    problem = prepare(recordings, simulation, options, held_out_of(recordings, options))
+    problem = without_repeats(problem)
+    found = find(problem, options, run_tasks, on_round)
+    on_round("hidden effects", 0)
+    return hidden_effects(found, allowed_effects(problem, options), inputs, run_tasks)
 
 
 def held_out_of(

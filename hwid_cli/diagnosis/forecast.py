@@ -129,7 +129,7 @@ def forecast(at_base: Linearisation, identifier: str) -> Forecast:
     size = float(error @ error)
     tried: list[tuple[float, dict[str, float], np.ndarray]] = []
     for start in effect.starts(at_base.scales):
-        changed = _changed(at_base, identifier, start)
+        changed = changed_by(at_base, identifier, start)
         if changed is None:
             continue
         column = changed - at_base.absorbed @ (at_base.absorbed.T @ changed)
@@ -149,10 +149,21 @@ def forecast(at_base: Linearisation, identifier: str) -> Forecast:
     return Forecast(identifier, tried[0][0], starts, tried[0][2])
 
 
-def _changed(
+def changed_by(
     at_base: Linearisation, identifier: str, start: dict[str, float]
 ) -> np.ndarray | None:
-    """What a candidate adds to the simulation; None where it ran away."""
+    """What a candidate adds to the simulation; None where it ran away.
+
+    Parameters
+    ----------
+    start : dict of str to float
+        Its parameters.
+
+    Returns
+    -------
+    ndarray, shape (n_samples,), or None, [output unit]
+        Of all recordings.
+    """
     full = {**at_base.present, identifier: start}
     fit_layout = parameter_layout(at_base.problem, tuple(full), full, at_base.scales)
     point = first_point(at_base.problem, fit_layout, at_base.drive, full)

@@ -18,6 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from hwid_cli.data.recording_plan import read_plan
+from hwid_cli.diagnosis.hidden import LEAST_SHOWN, HiddenEffect
 from hwid_cli.diagnosis.next_experiment import UNDECIDED
 from hwid_cli.errors import ConfigError
 from hwid_cli.model.extrapolation import outlined_model
@@ -37,7 +38,7 @@ from hwid_cli.records.recordings import Recording
 from hwid_cli.records.units import as_percent, behind
 from hwid_cli.report.next import next_blocks
 from hwid_cli.report.table import Block
-from hwid_cli.stages.diagnose import ToDiagnose, undecided
+from hwid_cli.stages.diagnose import ToDiagnose, hidden, undecided
 from hwid_cli.stages.diagnose import choose as choose_diagnosis
 from hwid_cli.stages.fit_seconds import counted
 from hwid_cli.stages.ranking import best_fits
@@ -63,6 +64,8 @@ STAGE_VERSION = 3
 # Separation of candidates, in standard deviations of the noise, below which a recording
 # does not tell them apart.
 LEAST_SEPARATION = 0.1
+# Hidden effects that a reason names.
+_NAMED_EFFECTS = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -267,12 +270,10 @@ def _for_parameters(given: ToChoose, _: Runner) -> _Choice:
 
 def _for_diagnosis(given: ToChoose, runner: Runner) -> _Choice:
     words = "candidates that the recordings do not tell apart"
-    if given.diagnosed is None or given.verdict not in UNDECIDED:
-        sentence = (
-            f"enough is known: the diagnosis says {given.verdict!r}, and no candidates "
-            "are left to tell apart"
-        )
-        return _Choice(0.0, words, sentence, ())
+    if given.diagnosed is None:
+        raise ValueError("this goal has a diagnosis")
+    if given.verdict not in UNDECIDED:
+        return _for_hidden_effects(given, given.diagnosed, runner)
     found = undecided(given.diagnosed, runner, [one.values for one in given.offered])
     if len(found.titles) < 2 or not np.isfinite(found.ratios).any():
         sentence = "no two candidates could be simulated; nothing is proposed"
@@ -298,6 +299,74 @@ def _for_diagnosis(given: ToChoose, runner: Runner) -> _Choice:
         f"(the best {best:.2g}): only other limits can tell them apart"
     )
     return _Choice(float(len(found.titles)), words, sentence, proposals)
+
+
+def _for_hidden_effects(
+    given: ToChoose, diagnosed: ToDiagnose, runner: Runner
+) -> _Choice:
+    """Inputs that show effects behind what the recordings do not tell."""
+    words = "effects that may hide behind the recordings"
+    says = f"the diagnosis says {given.verdict!r}"
+    if not diagnosed.can_play_inputs:
+        sentence = (
+            f"{says}, and no candidates are left to tell apart; which effects may hide is "
+            "told for a drive without a controller only"
+        )
+        return _Choice(0.0, words, sentence, ())
+    found = hidden(diagnosed, runner, [one.values for one in given.offered])
+    left = [one for one in found if one.may_hide]
+    untold = ", ".join(one.effect for one in found if not one.is_told)
+    beside = f"; no input tells {untold}" if untold else ""
+    if not left:
+        sentence = (
+            f"enough is known: {says}, and no input on offer would show another one of "
+            f"{len(found)} effects, of a size that the recordings do not exclude{beside}"
+        )
+        return _Choice(0.0, words, sentence, ())
+    chosen = chosen_by_gain(
+        [np.zeros(len(one.shares)) for one in left],
+        [[one.shares[:, place] for one in left] for place in range(len(given.offered))],
+        _shown_beside,
+        lambda known, more: [
+            np.maximum(a, b) for a, b in zip(known, more, strict=True)
+        ],
+        given.options.number,
+    )
+    proposals = tuple(
+        _proposal(
+            given.offered[place],
+            gain,
+            "hidden effects that it is expected to show",
+            _shows(left, place),
+        )
+        for place, gain in chosen
+        if gain >= LEAST_SHOWN
+    )
+    many = counted(len(proposals), "recording")
+    verb = "is" if len(proposals) == 1 else "are"
+    sentence = (
+        f"{says}; {len(left)} of {len(found)} further effects may hide behind the "
+        f"recordings ({', '.join(one.effect for one in left)}){beside}; {many} {verb} proposed"
+    )
+    return _Choice(float(len(left)), words, sentence, proposals)
+
+
+def _shown_beside(known: list[np.ndarray], more: list[np.ndarray]) -> float:
+    """How many effects an input is expected to show that others do not."""
+    pairs = zip(known, more, strict=True)
+    return sum(float(np.mean(np.maximum(b - a, 0.0))) for a, b in pairs)
+
+
+def _shows(left: Sequence[HiddenEffect], place: int) -> str:
+    """The effects that an input shows best, and how well."""
+    shares = [float(one.shares[:, place].mean()) for one in left]
+    order = [k for k in np.argsort(-np.array(shares), kind="stable") if shares[k] > 0.0]
+    parts = [
+        f"{left[k].effect} ({as_percent(shares[k])} of the sizes that the recordings do "
+        f"not exclude, up to {left[k].ratios[:, place].max():.2g} times the noise)"
+        for k in order[:_NAMED_EFFECTS]
+    ]
+    return f"would show {'; '.join(parts)}"
 
 
 def _changed(given: ToChoose, choice: _Choice) -> str:

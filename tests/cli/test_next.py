@@ -256,6 +256,51 @@ def test_a_proposed_recording_tells_two_candidates_apart(tmp_path):
     assert "nough is known: the diagnosis says 'named'" in flat(second.output)
 
 
+def answered(name, current, effects=None):
+    """What a drive answers, with noise of its own."""
+    rng = np.random.default_rng(list(name.encode()))
+    drive = replace(DRIVE, effects=effects or {})
+    read = simulate_drive(current, drive, sample_time_s=1e-3).output
+    return Recording(
+        name, current, read + 2e-5 * rng.standard_normal(current.size), 1e-3
+    )
+
+
+@pytest.mark.parametrize(
+    ("effects", "said"),
+    [
+        ({}, "nough is known: the diagnosis says 'none', and no input on offer would"),
+        ({"one_sided_stop": {"position_m": -0.008, "stiffness_N_per_m": 5000.0}},
+         "nough is known: the diagnosis says 'named', and no input on offer would"),
+    ],
+)  # fmt: skip
+def test_an_effect_that_hides_is_looked_for_where_no_recording_was(
+    tmp_path, effects, said
+):
+    time = 1e-3 * np.arange(400)
+    for number, size in enumerate((1.0, 2.0, 3.0, 4.0)):
+        current = size * np.interp(time, [0.04, 0.05, 0.24, 0.25], [0, 1, 1, 0])
+        one = answered(f"step_{number}", current, effects)
+        write_recording(tmp_path / "raw", one)
+    config = tmp_path / "bench.yaml"
+    config.write_text(DIAGNOSIS.replace("actuator_lag, input_delay", "one_sided_stop"))
+    asked = ["next", str(config), "--out", str(tmp_path / "out"), "--jobs", "1"]
+
+    first = CliRunner().invoke(main, asked)
+    assert first.exit_code == 0, first.output
+    assert "may hide behind the recordings (one_sided_stop)" in flat(first.output)
+    (row,) = proposals(tmp_path)
+    assert "would show one_sided_stop" in row["reason"]
+    u = played(tmp_path, row)[:, 1]
+    assert u.min() < -2.0
+    write_recording(tmp_path / "raw", answered(row["name"], u, effects))
+    second = CliRunner().invoke(main, asked)
+
+    assert second.exit_code == 0, second.output
+    assert said in flat(second.output)
+    assert "1 before, 0 now" in flat(second.output)
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [
