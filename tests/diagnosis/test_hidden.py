@@ -7,7 +7,7 @@ from hwid_cli.diagnosis.diagnose import hidden
 from hwid_cli.drive.simulation import simulate_drive
 from hwid_cli.records.experiment import DiagnoseOptions
 from hwid_cli.records.recordings import Recording
-from tests.diagnosis.small_drive import DRIVE, N, NOISE, STEP_S, in_turn, simulation
+from tests.diagnosis.small_drive import DRIVE, NOISE, STEP_S, N, in_turn, simulation
 
 TIME = STEP_S * np.arange(N)
 EFFECTS = ("one_sided_stop", "coulomb_friction", "cubic_stiffness", "sensor_hum")
