@@ -81,3 +81,14 @@ def test_no_ratio_is_larger_than_the_whole_effect_makes(to_one_side):
     most = np.sqrt(np.mean(free**2)) / NOISE
 
     assert 0.0 < stop.ratios[:, 1].max() < most
+
+
+def test_a_stop_further_out_than_anybody_went_may_hide():
+    near = found_behind((1.0, -1.0, 0.7, -0.7), (step(1.0), step(4.0)))[
+        "one_sided_stop"
+    ]
+
+    assert near.may_hide
+    as_far, further = near.shares.mean(axis=0)
+    assert as_far < 0.05
+    assert further > 0.2
