@@ -107,9 +107,18 @@ def diagnose(
     on_round : callable
         Called with what begins and its number of tasks.
     """
-    problem = prepare(recordings, simulation, options, held_out_of(recordings, options))
-    problem = without_repeats(problem)
+    problem = _problem(recordings, simulation, options)
     return describe(find(problem, options, run_tasks, on_round))
+
+
+def _problem(
+    recordings: Sequence[Recording],
+    simulation: SimulationOptions,
+    options: DiagnoseOptions,
+) -> DiagnosisProblem:
+    """What a diagnosis of recordings works on."""
+    held_out = held_out_of(recordings, options)
+    return without_repeats(prepare(recordings, simulation, options, held_out))
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,8 +159,7 @@ def separations(
     ----------
     docs/method_diagnosis.md, eq. (D26).
     """
-    problem = prepare(recordings, simulation, options, held_out_of(recordings, options))
-    problem = without_repeats(problem)
+    problem = _problem(recordings, simulation, options)
     found = find(problem, options, run_tasks, on_round)
     criteria, fits = found.criteria, list(found.found.fits.values())
     candidates = undecided_candidates(criteria, found.verdict, fits)
@@ -191,8 +199,7 @@ def hidden(
     ----------
     docs/method_diagnosis.md, eq. (D26b).
     """
-    problem = prepare(recordings, simulation, options, held_out_of(recordings, options))
-    problem = without_repeats(problem)
+    problem = _problem(recordings, simulation, options)
     found = find(problem, options, run_tasks, on_round)
     on_round("hidden effects", 0)
     return hidden_effects(found, allowed_effects(problem, options), inputs, run_tasks)

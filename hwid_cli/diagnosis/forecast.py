@@ -91,6 +91,23 @@ class Linearisation:
     absorbed: np.ndarray
     error: np.ndarray
 
+    def unabsorbed(self, changed: np.ndarray) -> np.ndarray:
+        """What is left of a change beside what the base's parameters absorb.
+
+        Parameters
+        ----------
+        changed : ndarray, shape (n_samples,), [output unit]
+
+        Returns
+        -------
+        ndarray, shape (n_samples,), [output unit]
+            Zero where only rounding is left.
+        """
+        column = changed - self.absorbed @ (self.absorbed.T @ changed)
+        if np.sqrt(column @ column) <= _VISIBLE * np.sqrt(changed @ changed):
+            return np.zeros_like(column)
+        return np.asarray(column)
+
 
 def linearise(
     problem: DiagnosisProblem, drive: Drive, present: Start, scales: Scales
@@ -132,9 +149,9 @@ def forecast(at_base: Linearisation, identifier: str) -> Forecast:
         changed = changed_by(at_base, identifier, start)
         if changed is None:
             continue
-        column = changed - at_base.absorbed @ (at_base.absorbed.T @ changed)
+        column = at_base.unabsorbed(changed)
         length = float(np.sqrt(column @ column))
-        if length <= _VISIBLE * np.sqrt(float(changed @ changed)) or size == 0:
+        if length == 0 or size == 0:
             continue
         along = float(column @ error) / length
         multiple = min(max(along / length, _LEAST_MULTIPLE), _MOST_MULTIPLE) * length

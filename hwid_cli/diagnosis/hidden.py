@@ -32,8 +32,6 @@ _QUANTILE = 1.645
 # Share of the sizes that are not excluded, of all start values alike, that an input must
 # show for an effect to hide.
 LEAST_SHOWN = 0.1
-# What is left of a change must exceed this share of it, or it is rounding.
-_VISIBLE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,11 +142,7 @@ def look_for(
     ratios = np.zeros((len(starts), len(offered)))
     for row, start in enumerate(starts):
         largest = _not_excluded(known, identifier, start, deviation)
-        if largest == 0.0:
-            continue
-        for column, one in enumerate(offered):
-            change = _unabsorbed(one, identifier, start)
-            ratios[row, column] = largest * float(np.sqrt(np.mean(change**2)))
+        ratios[row] = [largest * _size_in(one, identifier, start) for one in offered]
     ratios /= deviation
     n = np.array([one.error.size for one in offered])
     penalty = len(effect.parameters) * np.log(n_known + n)
@@ -161,7 +155,10 @@ def _not_excluded(
     known: Linearisation, identifier: str, start: dict[str, float], deviation: float
 ) -> float:
     """Largest multiple of an effect, up to 1, that the recordings do not exclude."""
-    column = _unabsorbed(known, identifier, start)
+    changed = changed_by(known, identifier, start)
+    if changed is None:
+        return 0.0
+    column = known.unabsorbed(changed)
     square = float(column @ column)
     if square == 0.0:
         return 1.0
@@ -169,14 +166,9 @@ def _not_excluded(
     return min(1.0, max(best, 0.0) + _QUANTILE * deviation / np.sqrt(square))
 
 
-def _unabsorbed(
-    at: Linearisation, identifier: str, start: dict[str, float]
-) -> np.ndarray:
-    """What an effect changes beside what the parameters of the fit absorb."""
+def _size_in(at: Linearisation, identifier: str, start: dict[str, float]) -> float:
+    """RMS of what an effect changes; 0 where it runs away, which tells nothing."""
     changed = changed_by(at, identifier, start)
     if changed is None:
-        # A simulation that runs away tells nothing.
-        return np.zeros(at.error.size)
-    column = changed - at.absorbed @ (at.absorbed.T @ changed)
-    is_rounding = column @ column <= _VISIBLE**2 * (changed @ changed)
-    return np.zeros_like(column) if is_rounding else column
+        return 0.0
+    return float(np.sqrt(np.mean(at.unabsorbed(changed) ** 2)))

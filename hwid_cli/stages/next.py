@@ -215,9 +215,13 @@ def _where(before: np.ndarray, more: np.ndarray) -> str:
 
 def _verdict(count: int, best: str, enough: float) -> str:
     if count:
-        many = "one recording is" if count == 1 else f"{count} recordings are"
-        return f"{many} proposed"
+        return _are_proposed(count, "recording")
     return f"enough is known: {best}, less than {as_percent(enough, 1)}"
+
+
+def _are_proposed(count: int, thing: str) -> str:
+    many = f"one {thing} is" if count == 1 else f"{count} {thing}s are"
+    return f"{many} proposed"
 
 
 def _proposal(
@@ -293,7 +297,7 @@ def _for_diagnosis(given: ToChoose, runner: Runner) -> _Choice:
     )
     best = float(np.max(found.ratios))
     sentence = f"{len(found.titles)} {words} ({names}); " + (
-        f"{len(proposals)} recordings are proposed"
+        _are_proposed(len(proposals), "recording")
         if proposals
         else f"no input on offer brings them {LEAST_SEPARATION:g} of the noise apart "
         f"(the best {best:.2g}): only other limits can tell them apart"
@@ -342,11 +346,10 @@ def _for_hidden_effects(
         for place, gain in chosen
         if gain >= LEAST_SHOWN
     )
-    many = counted(len(proposals), "recording")
-    verb = "is" if len(proposals) == 1 else "are"
     sentence = (
         f"{says}; {len(left)} of {len(found)} further effects may hide behind the "
-        f"recordings ({', '.join(one.effect for one in left)}){beside}; {many} {verb} proposed"
+        f"recordings ({', '.join(one.effect for one in left)}){beside}; "
+        f"{_are_proposed(len(proposals), 'recording')}"
     )
     return _Choice(float(len(left)), words, sentence, proposals)
 
