@@ -176,9 +176,8 @@ def _for_coverage(given: ToChoose, _: Runner) -> _Choice:
     best = found[0][1] if found else 0.0
     known, repeats = f"the best input on offer adds {as_percent(best, 1)}", None
     if not proposals:
-        judges = [one for one in given.recordings if one.name not in given.tested]
         repeats = proposed_repeats(
-            judges or given.recordings, given.plan, given.options
+            given.recordings, given.plan, given.options, given.tested
         )
         proposals = list(repeats.proposals)
     sentence = f"{as_percent(share)} {words}; " + (
@@ -195,11 +194,8 @@ def _repeats_verdict(repeats: Repeats, best: str, enough: float) -> str:
     inputs = f"{best}, less than {as_percent(enough, 1)}"
     if not repeats.proposals:
         return f"enough is known: {inputs}; {repeats.words}"
-    many = counted(len(repeats.proposals), "repeat")
-    verb = "is" if len(repeats.proposals) == 1 else "are"
-    return (
-        f"the inputs are enough ({inputs}), but {repeats.words}; {many} {verb} proposed"
-    )
+    proposed = _are_proposed(len(repeats.proposals), "repeat")
+    return f"the inputs are enough ({inputs}), but {repeats.words}; {proposed}"
 
 
 def _where(before: np.ndarray, more: np.ndarray) -> str:
@@ -317,6 +313,9 @@ def _for_hidden_effects(
             "told for a drive without a controller only"
         )
         return _Choice(0.0, words, sentence, ())
+    if not given.offered:
+        sentence = f"{says}, and no input is on offer that could show another effect"
+        return _Choice(0.0, words, sentence, ())
     found = hidden(diagnosed, runner, [one.values for one in given.offered])
     left = [one for one in found if one.may_hide]
     untold = ", ".join(one.effect for one in found if not one.is_told)
@@ -327,6 +326,19 @@ def _for_hidden_effects(
             f"{len(found)} effects, of a size that the recordings do not exclude{beside}"
         )
         return _Choice(0.0, words, sentence, ())
+    proposals = _showing(given, left)
+    sentence = (
+        f"{says}; {len(left)} of {len(found)} further effects may hide behind the "
+        f"recordings ({', '.join(one.effect for one in left)}){beside}; "
+        f"{_are_proposed(len(proposals), 'recording')}"
+    )
+    return _Choice(float(len(left)), words, sentence, proposals)
+
+
+def _showing(
+    given: ToChoose, left: Sequence[HiddenEffect]
+) -> tuple[ProposedRecording, ...]:
+    """Inputs that show hidden effects, one after the other."""
     chosen = chosen_by_gain(
         [np.zeros(len(one.shares)) for one in left],
         [[one.shares[:, place] for one in left] for place in range(len(given.offered))],
@@ -336,7 +348,7 @@ def _for_hidden_effects(
         ],
         given.options.number,
     )
-    proposals = tuple(
+    return tuple(
         _proposal(
             given.offered[place],
             gain,
@@ -346,12 +358,6 @@ def _for_hidden_effects(
         for place, gain in chosen
         if gain >= LEAST_SHOWN
     )
-    sentence = (
-        f"{says}; {len(left)} of {len(found)} further effects may hide behind the "
-        f"recordings ({', '.join(one.effect for one in left)}){beside}; "
-        f"{_are_proposed(len(proposals), 'recording')}"
-    )
-    return _Choice(float(len(left)), words, sentence, proposals)
 
 
 def _shown_beside(known: list[np.ndarray], more: list[np.ndarray]) -> float:

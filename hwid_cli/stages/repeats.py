@@ -10,8 +10,9 @@ docs/trust.md.
 """
 
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
+from itertools import chain, count
 
 import numpy as np
 
@@ -61,6 +62,7 @@ def proposed_repeats(
     recordings: Sequence[Recording],
     plan: Sequence[PlannedInput],
     options: NextOptions,
+    tested: Sequence[str] = (),
 ) -> Repeats:
     """Say how much repeats differ, and choose those that are worth taking.
 
@@ -71,19 +73,21 @@ def proposed_repeats(
     plan : sequence of PlannedInput
         All that could be played or was: a recording of that name had that input, however
         noisy the measured one is.
+    tested : sequence of str
+        Recordings for the test, which tell nothing where there are others.
     """
-    groups = _groups(recordings, plan)
+    judges = [one for one in recordings if one.name not in tested] or recordings
+    groups = _groups(judges, plan)
     outputs = [[one.output for one in group.recordings] for group in groups]
     spread = repeat_spread(outputs)
-    names = {one.name for one in recordings}
-    left = [one for one in plan if one.name not in names]
+    known = {one.name for one in recordings}
     if spread is None:
         words = "whether repeats differ is not known: no input was recorded twice"
-        (proposal,) = _ready(_fewest_first(groups, 1), left, [(1.0, words)])
+        (proposal,) = _ready(_fewest_first(groups, 1), plan, known, [(1.0, words)])
         return Repeats(None, words, (proposal,))
     unit = behind(recordings[0].output_unit)
     words = _size(spread, unit)
-    varies = float(np.std(np.concatenate([one.output for one in recordings])))
+    varies = float(np.std(np.concatenate([one.output for one in judges])))
     reasons: list[tuple[float, str]] = []
     for taken in range(options.number):
         now, then = (with_repeats(spread, taken + more) for more in (0, 1))
@@ -96,7 +100,7 @@ def proposed_repeats(
         )
         reasons.append((shrinks / now.half_width, reason))
     repeated = _fewest_first(groups, len(reasons))
-    return Repeats(spread, words, _ready(repeated, left, reasons))
+    return Repeats(spread, words, _ready(repeated, plan, known, reasons))
 
 
 def _groups(
@@ -124,11 +128,11 @@ def _groups(
     return [groups[place] for place in np.argsort(-np.array(visits), kind="stable")]
 
 
-def _fewest_first(groups: Sequence[_Repeated], count: int) -> list[_Repeated]:
+def _fewest_first(groups: Sequence[_Repeated], number: int) -> list[_Repeated]:
     """Inputs to repeat, one after the other; one may come again."""
     counts = [len(one.recordings) for one in groups]
     found = []
-    for _ in range(count):
+    for _ in range(number):
         place = int(np.argmin(counts))
         counts[place] += 1
         found.append(groups[place])
@@ -137,28 +141,23 @@ def _fewest_first(groups: Sequence[_Repeated], count: int) -> list[_Repeated]:
 
 def _ready(
     repeated: Sequence[_Repeated],
-    left: Sequence[PlannedInput],
+    plan: Sequence[PlannedInput],
+    known: Collection[str],
     reasons: Sequence[tuple[float, str]],
 ) -> tuple[ProposedRecording, ...]:
     """Repeats under the names that the plan has for them, or names of their own."""
-    free, found = list(left), []
-    for number, (one, (gain, reason)) in enumerate(zip(repeated, reasons, strict=True)):
+    taken, found = set(known), []
+    for one, (gain, reason) in zip(repeated, reasons, strict=True):
         first = one.recordings[0].name
-        row = next(
-            (row for row in free if is_same_input(one.command, row.values)), None
-        )
-        if row is None:
-            before = len(one.recordings) + sum(
-                other is one for other in repeated[:number]
-            )
-            row = PlannedInput(f"{first}_repeat_{before + 1}", one.command, "")
-        else:
-            free.remove(row)
+        rows = (row.name for row in plan if is_same_input(one.command, row.values))
+        names = chain(rows, (f"{first}_repeat_{number}" for number in count(2)))
+        name = next(name for name in names if name not in taken)
+        taken.add(name)
         found.append(
             ProposedRecording(
-                row.name,
+                name,
                 f"a repeat of {first}",
-                row.values,
+                one.command,
                 gain,
                 "share by which the band of a further recording shrinks",
                 f"is a repeat of {first}: {reason}",

@@ -71,3 +71,13 @@ def test_a_spread_of_no_account_is_known_well_enough():
     # The band shrinks by more than a tenth, but by less than 5 % of what varies.
     assert not proposed_repeats(taken, [], NextOptions(enough=0.05)).proposals
     assert proposed_repeats(taken, [], NextOptions(enough=0.001)).proposals
+
+
+def test_recordings_for_the_test_tell_nothing_and_keep_their_names():
+    taken = [recording("large", LARGE, 1.0), recording("last", LARGE, 1.5)]
+    plan = [PlannedInput(name, LARGE, "") for name in ("large", "last")]
+
+    found = proposed_repeats(taken, plan, NextOptions(), tested=("last",))
+
+    assert found.spread is None
+    assert names(found) == ["large_repeat_2"]
