@@ -21,7 +21,7 @@ LOCKED_INSTALL = $(BIN)/python -m pip install --quiet --disable-pip-version-chec
 .DEFAULT_GOAL := help
 .PHONY: help install run test test-thorough test-all check audit format smoke clean reliability \
         bench bench-beyond bench-campaign bench-growth bench-maps bench-page bench-rounds bench-search bench-size bench-starts bench-wide bench-advice docs \
-        bench-real bench-trust bench-next scale \
+        bench-real bench-trust bench-next bench-repeats scale \
         wheel lowest away-run lock sbom licences simulate calibrate identify crossval group test-stage steps model1 model2 \
         reproduction thesis chapter2 hsm150 diagnose gun real effects drive-source model-schema golden export-check laws blind machines
 
@@ -182,6 +182,9 @@ bench-trust: $(DEV)  ## coverage and width of bands on random plants, measuremen
 
 bench-next: $(DEV)  ## recordings needed, chosen by hwid next and by chance: half an hour
 	@$(BENCH).bench_next
+
+bench-repeats: $(DEV)  ## does hwid next find that repeats differ: three minutes
+	@$(BENCH).bench_repeats
 
 bench-real: $(DEV)  ## public benchmarks beside the published errors (data in HWID_REALDATA)
 	@$(BENCH).bench_real

@@ -24,6 +24,7 @@ from hwid_cli.diagnosis.candidate import (
 from hwid_cli.diagnosis.causes import fit_with_input_noise, without_repeats
 from hwid_cli.diagnosis.direction import find_reversal, reversal_sentence
 from hwid_cli.diagnosis.findings import Findings, describe
+from hwid_cli.diagnosis.hidden import HiddenEffect, hidden_effects
 from hwid_cli.diagnosis.intervals import unclear_effects
 from hwid_cli.diagnosis.latent_force import Smoothed, latent_force
 from hwid_cli.diagnosis.laws import find_law
@@ -106,9 +107,18 @@ def diagnose(
     on_round : callable
         Called with what begins and its number of tasks.
     """
-    problem = prepare(recordings, simulation, options, held_out_of(recordings, options))
-    problem = without_repeats(problem)
+    problem = _problem(recordings, simulation, options)
     return describe(find(problem, options, run_tasks, on_round))
+
+
+def _problem(
+    recordings: Sequence[Recording],
+    simulation: SimulationOptions,
+    options: DiagnoseOptions,
+) -> DiagnosisProblem:
+    """What a diagnosis of recordings works on."""
+    held_out = held_out_of(recordings, options)
+    return without_repeats(prepare(recordings, simulation, options, held_out))
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,8 +159,7 @@ def separations(
     ----------
     docs/method_diagnosis.md, eq. (D26).
     """
-    problem = prepare(recordings, simulation, options, held_out_of(recordings, options))
-    problem = without_repeats(problem)
+    problem = _problem(recordings, simulation, options)
     found = find(problem, options, run_tasks, on_round)
     criteria, fits = found.criteria, list(found.found.fits.values())
     candidates = undecided_candidates(criteria, found.verdict, fits)
@@ -167,6 +176,33 @@ def separations(
         for one in inputs
     ]
     return Separations(titles, np.array(ratios))
+
+
+def hidden(
+    recordings: Sequence[Recording],
+    simulation: SimulationOptions,
+    options: DiagnoseOptions,
+    inputs: Sequence[np.ndarray],
+    run_tasks: RunTasks,
+    on_round: OnRound,
+) -> list[HiddenEffect]:
+    """Look for effects that a diagnosis does not name, in inputs.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+        Of the diagnosis, whose tasks are asked for again.
+    inputs : sequence of ndarray, shape (n_samples,), [input unit]
+        That could be played, at the sample time of the recordings.
+
+    References
+    ----------
+    docs/method_diagnosis.md, eq. (D26b).
+    """
+    problem = _problem(recordings, simulation, options)
+    found = find(problem, options, run_tasks, on_round)
+    on_round("hidden effects", 0)
+    return hidden_effects(found, allowed_effects(problem, options), inputs, run_tasks)
 
 
 def held_out_of(

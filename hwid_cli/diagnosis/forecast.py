@@ -91,6 +91,23 @@ class Linearisation:
     absorbed: np.ndarray
     error: np.ndarray
 
+    def unabsorbed(self, changed: np.ndarray) -> np.ndarray:
+        """What is left of a change beside what the base's parameters absorb.
+
+        Parameters
+        ----------
+        changed : ndarray, shape (n_samples,), [output unit]
+
+        Returns
+        -------
+        ndarray, shape (n_samples,), [output unit]
+            Zero where only rounding is left.
+        """
+        column = changed - self.absorbed @ (self.absorbed.T @ changed)
+        if np.sqrt(column @ column) <= _VISIBLE * np.sqrt(changed @ changed):
+            return np.zeros_like(column)
+        return np.asarray(column)
+
 
 def linearise(
     problem: DiagnosisProblem, drive: Drive, present: Start, scales: Scales
@@ -129,12 +146,12 @@ def forecast(at_base: Linearisation, identifier: str) -> Forecast:
     size = float(error @ error)
     tried: list[tuple[float, dict[str, float], np.ndarray]] = []
     for start in effect.starts(at_base.scales):
-        changed = _changed(at_base, identifier, start)
+        changed = changed_by(at_base, identifier, start)
         if changed is None:
             continue
-        column = changed - at_base.absorbed @ (at_base.absorbed.T @ changed)
+        column = at_base.unabsorbed(changed)
         length = float(np.sqrt(column @ column))
-        if length <= _VISIBLE * np.sqrt(float(changed @ changed)) or size == 0:
+        if length == 0 or size == 0:
             continue
         along = float(column @ error) / length
         multiple = min(max(along / length, _LEAST_MULTIPLE), _MOST_MULTIPLE) * length
@@ -149,10 +166,21 @@ def forecast(at_base: Linearisation, identifier: str) -> Forecast:
     return Forecast(identifier, tried[0][0], starts, tried[0][2])
 
 
-def _changed(
+def changed_by(
     at_base: Linearisation, identifier: str, start: dict[str, float]
 ) -> np.ndarray | None:
-    """What a candidate adds to the simulation; None where it ran away."""
+    """What a candidate adds to the simulation; None where it ran away.
+
+    Parameters
+    ----------
+    start : dict of str to float
+        Its parameters.
+
+    Returns
+    -------
+    ndarray, shape (n_samples,), or None, [output unit]
+        Of all recordings.
+    """
     full = {**at_base.present, identifier: start}
     fit_layout = parameter_layout(at_base.problem, tuple(full), full, at_base.scales)
     point = first_point(at_base.problem, fit_layout, at_base.drive, full)

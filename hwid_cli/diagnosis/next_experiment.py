@@ -25,6 +25,7 @@ from hwid_cli.diagnosis.selection import (
     title_of,
 )
 from hwid_cli.drive.effect import Scales
+from hwid_cli.drive.simulation import Motion
 from hwid_cli.records.candidates import CandidateFit
 from hwid_cli.records.diagnosis import NextExperiment
 from hwid_cli.records.units import behind
@@ -194,15 +195,39 @@ def separation(
     float, [output unit]
         Root mean square of the difference that the rival cannot absorb.
     """
+    return _left_over(played(problem, favourite, command)[0], rival)
+
+
+def played(
+    problem: DiagnosisProblem, candidate: FittedCandidate, command: np.ndarray
+) -> tuple[DiagnosisProblem, Motion]:
+    """One further recording, as a candidate would answer it.
+
+    Parameters
+    ----------
+    problem : DiagnosisProblem
+        For the drive.
+    command : ndarray, shape (n_samples,), [input unit]
+
+    Returns
+    -------
+    DiagnosisProblem
+        Of that recording alone.
+    Motion
+        The simulation that it is.
+    """
     step = min(one.sample_time_s for one in problem.signals)
     is_velocity = problem.drive.output == "velocity"
     nothing = np.zeros(command.size)
-    signals = Signals("next", "other", command, nothing, command, nothing, step)
-    one = replace(problem, signals=(replace(signals, is_velocity=is_velocity),))
-    (truth,) = simulate_at(one, favourite.layout, _single(favourite.point))
+    signals = Signals(
+        "next", "other", command, nothing, command, nothing, step,
+        is_velocity=is_velocity,
+    )  # fmt: skip
+    one = replace(problem, signals=(signals,))
+    point = _single(candidate.point)
+    (truth,) = simulate_at(one, candidate.layout, point)
     seen = replace(signals, compared=truth.output, output=truth.output)
-    asked = replace(problem, signals=(replace(seen, is_velocity=is_velocity),))
-    return _left_over(asked, rival)
+    return replace(problem, signals=(seen,)), truth
 
 
 def _single(point: ParameterPoint) -> ParameterPoint:

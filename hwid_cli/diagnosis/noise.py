@@ -17,6 +17,7 @@ import scipy
 from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals, rest_length
 from hwid_cli.records.diagnosis import NoiseFloor
 from hwid_cli.records.units import behind
+from hwid_cli.trust.repeats import is_same_input
 
 # Chance of calling white noise coloured, and what remains of it something missing.
 FALSE_ALARM = 1e-3
@@ -24,9 +25,6 @@ _LAGS_OF_COLOUR = 10
 _HIGHEST_ORDER = 20
 # Fewest samples for each coefficient of a filter.
 _SAMPLES_PER_COEFFICIENT = 20
-# Inputs that differ by less than this share of their largest value are repeats.
-_SAME_INPUT = 0.02
-_SAME_LENGTH = 2
 _FEWEST_AT_REST = 30
 _FEWEST_RESTS = 3
 # Orders of differences: the second where the first still sees motion or colour.
@@ -393,13 +391,9 @@ def _groups(all_signals: Sequence[Signals]) -> list[list[Signals]]:
 
 def _is_same_input(one: Signals, other: Signals) -> bool:
     """Whether two recordings are repeats of each other."""
-    if abs(one.driven_by.size - other.driven_by.size) > _SAME_LENGTH:
-        return False
     if not np.isclose(one.sample_time_s, other.sample_time_s, rtol=1e-3):
         return False
-    length = min(one.driven_by.size, other.driven_by.size)
-    a, b = one.driven_by[:length], other.driven_by[:length]
-    return float(np.max(np.abs(a - b))) < _SAME_INPUT * float(np.max(np.abs(a)))
+    return is_same_input(one.driven_by, other.driven_by)
 
 
 def _from_rest(all_signals: Sequence[Signals], may_move: bool) -> _Stretch | None:

@@ -228,7 +228,8 @@ class NextOptions:
         Within which they are designed instead.
     enough : float, [-]
         Gain below which a recording is not worth taking: a share of the table of
-        amplitudes and frequencies, or by which standard errors shrink.
+        amplitudes and frequencies, by which standard errors shrink, or of what the output
+        varies, by which a repeat lets the band of a further recording shrink.
     """
 
     goal: Annotated[str, OneOf(GOALS)] = "coverage"

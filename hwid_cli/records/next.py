@@ -7,10 +7,13 @@ import numpy as np
 
 from hwid_cli.records.recordings import frozen_vector
 from hwid_cli.records.rules import (
+    NOT_NEGATIVE,
     SAMPLE_TIME,
     STORED_NUMBERS,
     STORED_OR_MISSING,
+    Integer,
 )
+from hwid_cli.records.stored import ADDED_LATER
 
 GOALS = ("coverage", "parameters", "diagnosis")
 
@@ -81,6 +84,28 @@ class InputMap:
     reachable: Annotated[np.ndarray, STORED_OR_MISSING]
 
 
+@dataclass(frozen=True)
+class RepeatSpread:
+    """How much repeats of one input differ, and how well that is known.
+
+    Parameters
+    ----------
+    spread : float, [output unit]
+        Standard deviation of a recording around the mean of its repeats.
+    noise : float, [output unit]
+        Part of it that changes from sample to sample.
+    n_repeats : int, [-]
+        Recordings beside the first of each input.
+    half_width : float, [output unit]
+        Of the band of 90 % that so many repeats allow around a further recording.
+    """
+
+    spread: Annotated[float, NOT_NEGATIVE]
+    noise: Annotated[float, NOT_NEGATIVE]
+    n_repeats: Annotated[int, Integer(least=1)]
+    half_width: Annotated[float, NOT_NEGATIVE]
+
+
 @dataclass(frozen=True, eq=False)
 class NextRecordings:
     """What to record next, or that enough is known.
@@ -101,6 +126,8 @@ class NextRecordings:
         What the recordings since the last proposal changed; empty where none came.
     n_offered : int, [-]
         Inputs that were compared.
+    repeats : RepeatSpread or None
+        None where no input was recorded twice, or the goal does not ask.
     """
 
     goal: str
@@ -115,3 +142,4 @@ class NextRecordings:
     sample_time_s: Annotated[float, SAMPLE_TIME]
     input_unit: str
     changed: str = field(default="")
+    repeats: RepeatSpread | None = field(default=None, metadata=ADDED_LATER)

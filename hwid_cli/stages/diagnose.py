@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from math import nan
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from hwid_cli.config.extended_simulation import write_extended_simulation
 from hwid_cli.config.simulation_checks import SIMULATION_EXAMPLE
 from hwid_cli.diagnosis import diagnose as pipeline
 from hwid_cli.diagnosis.foreign import diagnose_foreign
+from hwid_cli.diagnosis.hidden import HiddenEffect
 from hwid_cli.diagnosis.rounds import DiagnosisTask, OnRound, RunTasks
 from hwid_cli.errors import CacheError, ConfigError
 from hwid_cli.files.figure_files import read_figure, write_figure
@@ -62,6 +63,8 @@ from hwid_cli.tasks.task import Task, one_thread
 
 NAME = "diagnose"
 STAGE_VERSION = 9
+
+_Answer = TypeVar("_Answer")
 
 
 def diagnosis_key(
@@ -272,6 +275,12 @@ class ToDiagnose:
         return _key_of(self.recordings, content, self.options)
 
     @property
+    def can_play_inputs(self) -> bool:
+        """Whether what was found can be simulated on inputs that nobody has played."""
+        simulation = self.simulation
+        return isinstance(simulation, SimulationOptions) and not simulation.controller
+
+    @property
     def extended(self) -> Callable[[Diagnosis], SimulationOptions | ForeignSimulation]:
         """From a diagnosis to the simulation with what was found."""
         given = self.simulation
@@ -427,6 +436,34 @@ def undecided(
     ConfigError
         If the simulation is not the program's own drive.
     """
+    return _on_inputs(given, runner, inputs, pipeline.separations)
+
+
+def hidden(
+    given: ToDiagnose, runner: Runner, inputs: Sequence[np.ndarray]
+) -> list[HiddenEffect]:
+    """How well inputs show effects that a diagnosis does not name.
+
+    Parameters
+    ----------
+    inputs : sequence of ndarray, shape (n_samples,), [input unit]
+        At the sample time of the recordings.
+
+    Raises
+    ------
+    ConfigError
+        If the simulation is not the program's own drive.
+    """
+    return _on_inputs(given, runner, inputs, pipeline.hidden)
+
+
+def _on_inputs(
+    given: ToDiagnose,
+    runner: Runner,
+    inputs: Sequence[np.ndarray],
+    ask: Callable[..., _Answer],
+) -> _Answer:
+    """Ask the pipeline of a diagnosis about inputs."""
     simulation, options = given.simulation, given.options
     if not isinstance(simulation, SimulationOptions):
         raise ConfigError(
@@ -437,7 +474,7 @@ def undecided(
     recordings = given.recordings
     key = diagnosis_key(given.recordings, simulation, options)
     with runner.rounds("tasks") as (settings, begin_round), one_thread():
-        return pipeline.separations(
+        return ask(
             recordings, simulation, options, inputs, _runner(key, settings), begin_round
         )
 

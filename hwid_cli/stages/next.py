@@ -18,6 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from hwid_cli.data.recording_plan import read_plan
+from hwid_cli.diagnosis.hidden import LEAST_SHOWN, HiddenEffect
 from hwid_cli.diagnosis.next_experiment import UNDECIDED
 from hwid_cli.errors import ConfigError
 from hwid_cli.model.extrapolation import outlined_model
@@ -31,15 +32,17 @@ from hwid_cli.records.next import (
     NextRecordings,
     PlannedInput,
     ProposedRecording,
+    RepeatSpread,
 )
 from hwid_cli.records.recordings import Recording
 from hwid_cli.records.units import as_percent, behind
 from hwid_cli.report.next import next_blocks
 from hwid_cli.report.table import Block
-from hwid_cli.stages.diagnose import ToDiagnose, undecided
+from hwid_cli.stages.diagnose import ToDiagnose, hidden, undecided
 from hwid_cli.stages.diagnose import choose as choose_diagnosis
 from hwid_cli.stages.fit_seconds import counted
 from hwid_cli.stages.ranking import best_fits
+from hwid_cli.stages.repeats import Repeats, proposed_repeats
 from hwid_cli.stages.stage import Context, Planning, Runner, Stage, in_results
 from hwid_cli.stages.trust import kept_for_test, trust_of
 from hwid_cli.store.next_results import (
@@ -57,24 +60,32 @@ from hwid_cli.trust.designs import LEAST_SAMPLES, designs
 from hwid_cli.trust.visited import N_BANDS
 
 NAME = "next"
-STAGE_VERSION = 2
+STAGE_VERSION = 3
 # Separation of candidates, in standard deviations of the noise, below which a recording
 # does not tell them apart.
 LEAST_SEPARATION = 0.1
+# Hidden effects that a reason names.
+_NAMED_EFFECTS = 3
 
 
 @dataclass(frozen=True, eq=False)
 class ToChoose:
-    """What is known, what is offered, and what for."""
+    """What is known, what could be played or was, and what for."""
 
     options: NextOptions
     recordings: tuple[Recording, ...]
-    offered: tuple[PlannedInput, ...]
+    plan: tuple[PlannedInput, ...]
     tested: tuple[str, ...] = ()
     fit: Fit | None = None
     diagnosed: ToDiagnose | None = None
     verdict: str = ""
     previous: NextRecordings | None = None
+
+    @property
+    def offered(self) -> tuple[PlannedInput, ...]:
+        """What is no recording yet."""
+        known = {one.name for one in self.recordings}
+        return tuple(one for one in self.plan if one.name not in known)
 
     @property
     def key(self) -> str:
@@ -84,12 +95,12 @@ class ToChoose:
             "options": self.options,
             "recordings": [one.name for one in self.recordings],
             "contents": [recording_key(one) for one in self.recordings],
-            "offered": [one.name for one in self.offered],
+            "plan": [one.name for one in self.plan],
             "model": None if model is None else model_key(model),
             "diagnosis": None if self.diagnosed is None else self.diagnosed.key,
             "tested": self.tested,
         }
-        arrays = [one.values for one in self.offered]
+        arrays = [one.values for one in self.plan]
         return task_key(NAME, STAGE_VERSION, settings, arrays)
 
 
@@ -116,6 +127,7 @@ def propose_next(given: ToChoose, runner: Runner) -> NextRecordings:
         sample_time_s=given.recordings[0].sample_time_s,
         input_unit=given.recordings[0].input_unit,
         changed=_changed(given, choice),
+        repeats=choice.repeats,
     )
 
 
@@ -127,6 +139,7 @@ class _Choice:
     known_words: str
     sentence: str
     proposals: tuple[ProposedRecording, ...]
+    repeats: RepeatSpread | None = None
 
 
 def _for_coverage(given: ToChoose, _: Runner) -> _Choice:
@@ -161,12 +174,28 @@ def _for_coverage(given: ToChoose, _: Runner) -> _Choice:
         now, before = now + by, joined([before, tables[place]])
     words = "of the amplitudes and frequencies on offer are visited"
     best = found[0][1] if found else 0.0
-    sentence = f"{as_percent(share)} {words}; " + _verdict(
-        len(proposals),
-        f"the best input on offer adds {as_percent(best, 1)}",
-        given.options.enough,
+    known, repeats = f"the best input on offer adds {as_percent(best, 1)}", None
+    if not proposals:
+        repeats = proposed_repeats(
+            given.recordings, given.plan, given.options, given.tested
+        )
+        proposals = list(repeats.proposals)
+    sentence = f"{as_percent(share)} {words}; " + (
+        _verdict(len(proposals), known, given.options.enough)
+        if repeats is None
+        else _repeats_verdict(repeats, known, given.options.enough)
     )
-    return _Choice(share, words, sentence, tuple(proposals))
+    spread = None if repeats is None else repeats.spread
+    return _Choice(share, words, sentence, tuple(proposals), spread)
+
+
+def _repeats_verdict(repeats: Repeats, best: str, enough: float) -> str:
+    """What to take once the inputs are enough."""
+    inputs = f"{best}, less than {as_percent(enough, 1)}"
+    if not repeats.proposals:
+        return f"enough is known: {inputs}; {repeats.words}"
+    proposed = _are_proposed(len(repeats.proposals), "repeat")
+    return f"the inputs are enough ({inputs}), but {repeats.words}; {proposed}"
 
 
 def _where(before: np.ndarray, more: np.ndarray) -> str:
@@ -182,9 +211,13 @@ def _where(before: np.ndarray, more: np.ndarray) -> str:
 
 def _verdict(count: int, best: str, enough: float) -> str:
     if count:
-        many = "one recording is" if count == 1 else f"{count} recordings are"
-        return f"{many} proposed"
+        return _are_proposed(count, "recording")
     return f"enough is known: {best}, less than {as_percent(enough, 1)}"
+
+
+def _are_proposed(count: int, thing: str) -> str:
+    many = f"one {thing} is" if count == 1 else f"{count} {thing}s are"
+    return f"{many} proposed"
 
 
 def _proposal(
@@ -237,12 +270,10 @@ def _for_parameters(given: ToChoose, _: Runner) -> _Choice:
 
 def _for_diagnosis(given: ToChoose, runner: Runner) -> _Choice:
     words = "candidates that the recordings do not tell apart"
-    if given.diagnosed is None or given.verdict not in UNDECIDED:
-        sentence = (
-            f"enough is known: the diagnosis says {given.verdict!r}, and no candidates "
-            "are left to tell apart"
-        )
-        return _Choice(0.0, words, sentence, ())
+    if given.diagnosed is None:
+        raise ValueError("this goal has a diagnosis")
+    if given.verdict not in UNDECIDED:
+        return _for_hidden_effects(given, given.diagnosed, runner)
     found = undecided(given.diagnosed, runner, [one.values for one in given.offered])
     if len(found.titles) < 2 or not np.isfinite(found.ratios).any():
         sentence = "no two candidates could be simulated; nothing is proposed"
@@ -262,12 +293,89 @@ def _for_diagnosis(given: ToChoose, runner: Runner) -> _Choice:
     )
     best = float(np.max(found.ratios))
     sentence = f"{len(found.titles)} {words} ({names}); " + (
-        f"{len(proposals)} recordings are proposed"
+        _are_proposed(len(proposals), "recording")
         if proposals
         else f"no input on offer brings them {LEAST_SEPARATION:g} of the noise apart "
         f"(the best {best:.2g}): only other limits can tell them apart"
     )
     return _Choice(float(len(found.titles)), words, sentence, proposals)
+
+
+def _for_hidden_effects(
+    given: ToChoose, diagnosed: ToDiagnose, runner: Runner
+) -> _Choice:
+    """Inputs that show effects behind what the recordings do not tell."""
+    words = "effects that may hide behind the recordings"
+    says = f"the diagnosis says {given.verdict!r}"
+    if not diagnosed.can_play_inputs:
+        sentence = (
+            f"{says}, and no candidates are left to tell apart; which effects may hide is "
+            "told for a drive without a controller only"
+        )
+        return _Choice(0.0, words, sentence, ())
+    if not given.offered:
+        sentence = f"{says}, and no input is on offer that could show another effect"
+        return _Choice(0.0, words, sentence, ())
+    found = hidden(diagnosed, runner, [one.values for one in given.offered])
+    left = [one for one in found if one.may_hide]
+    untold = ", ".join(one.effect for one in found if not one.is_told)
+    beside = f"; no input tells {untold}" if untold else ""
+    if not left:
+        sentence = (
+            f"enough is known: {says}, and no input on offer would show another one of "
+            f"{len(found)} effects, of a size that the recordings do not exclude{beside}"
+        )
+        return _Choice(0.0, words, sentence, ())
+    proposals = _showing(given, left)
+    sentence = (
+        f"{says}; {len(left)} of {len(found)} further effects may hide behind the "
+        f"recordings ({', '.join(one.effect for one in left)}){beside}; "
+        f"{_are_proposed(len(proposals), 'recording')}"
+    )
+    return _Choice(float(len(left)), words, sentence, proposals)
+
+
+def _showing(
+    given: ToChoose, left: Sequence[HiddenEffect]
+) -> tuple[ProposedRecording, ...]:
+    """Inputs that show hidden effects, one after the other."""
+    chosen = chosen_by_gain(
+        [np.zeros(len(one.shares)) for one in left],
+        [[one.shares[:, place] for one in left] for place in range(len(given.offered))],
+        _shown_beside,
+        lambda known, more: [
+            np.maximum(a, b) for a, b in zip(known, more, strict=True)
+        ],
+        given.options.number,
+    )
+    return tuple(
+        _proposal(
+            given.offered[place],
+            gain,
+            "hidden effects that it is expected to show",
+            _shows(left, place),
+        )
+        for place, gain in chosen
+        if gain >= LEAST_SHOWN
+    )
+
+
+def _shown_beside(known: list[np.ndarray], more: list[np.ndarray]) -> float:
+    """How many effects an input is expected to show that others do not."""
+    pairs = zip(known, more, strict=True)
+    return sum(float(np.mean(np.maximum(b - a, 0.0))) for a, b in pairs)
+
+
+def _shows(left: Sequence[HiddenEffect], place: int) -> str:
+    """The effects that an input shows best, and how well."""
+    shares = [float(one.shares[:, place].mean()) for one in left]
+    order = [k for k in np.argsort(-np.array(shares), kind="stable") if shares[k] > 0.0]
+    parts = [
+        f"{left[k].effect} ({as_percent(shares[k])} of the sizes that the recordings do "
+        f"not exclude, up to {left[k].ratios[:, place].max():.2g} times the noise)"
+        for k in order[:_NAMED_EFFECTS]
+    ]
+    return f"would show {'; '.join(parts)}"
 
 
 def _changed(given: ToChoose, choice: _Choice) -> str:
@@ -304,13 +412,11 @@ def _choose(context: Context) -> ToChoose:
     experiment, results = context.experiment, context.results
     options = _options(experiment)
     recordings = results["calibrate"].recordings
-    offered = _offered(experiment, recordings)
-    known = {one.name for one in recordings}
     is_diagnosis = options.goal == "diagnosis"
     return ToChoose(
         options,
         recordings,
-        tuple(one for one in offered if one.name not in known),
+        _offered(experiment, recordings),
         kept_for_test(experiment),
         _model(experiment, results["identify"], recordings)
         if options.goal == "parameters"

@@ -19,10 +19,11 @@ every recording and costs nothing more for another order.
 
 import argparse
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from scipy.io import loadmat
@@ -30,11 +31,13 @@ from scipy.io import loadmat
 from hwid_cli.model.fit import fit_without_standard_errors
 from hwid_cli.model.scores import rmsd
 from hwid_cli.model.simulate import validation_output
-from hwid_cli.records.experiment import CalibrateOptions
+from hwid_cli.records.experiment import CalibrateOptions, NextOptions
 from hwid_cli.records.machines import GunMachine, GunPlan
 from hwid_cli.records.model import FitOptions, Orders
+from hwid_cli.records.next import NextRecordings, PlannedInput
 from hwid_cli.records.recordings import RawRecording, Recording
 from hwid_cli.stages.calibrate import calibrate_all
+from hwid_cli.stages.next import ToChoose, propose_next
 from hwid_cli.stages.simulate import simulate_machine
 from hwid_cli.trust.choice import chosen_by_gain
 from hwid_cli.trust.content import content, joined, value_edges, visited_share
@@ -60,11 +63,16 @@ def averaged(one: Recording, count: int) -> Recording:
     return replace(one, input=u, output=y, sample_time_s=count * one.sample_time_s)
 
 
-def gun() -> list[Recording]:
+GUN_PLAN = (
+    *(f"step_{k:02d}" for k in range(1, 16)),
+    *(f"sine_{k:02d}" for k in range(1, 24)),
+)
+
+
+def gun(names: Sequence[str] = GUN_PLAN, seed: int = 1) -> list[Recording]:
     """The 15 steps and 23 sines of the thesis's plan, ten samples averaged."""
-    names = [f"step_{k:02d}" for k in range(1, 16)]
-    names += [f"sine_{k:02d}" for k in range(1, 24)]
-    machine = replace(GunMachine(), plan=replace(GunPlan(), only=tuple(names)))
+    plan = replace(GunPlan(), only=tuple(names))
+    machine = replace(GunMachine(), plan=plan, seed=seed)
     step_s = machine.plan.sample_time_s
     raws = [
         RawRecording(one.name, one.input, one.output, step_s, one.kind)
@@ -183,14 +191,80 @@ def proposed(inputs: Sequence[np.ndarray]) -> tuple[list[int], int]:
     return [place for place, _ in found], enough
 
 
+def taken_until_enough(
+    recordings: Sequence[Recording],
+    inputs: Sequence[np.ndarray],
+    first: int,
+    repeat: Callable[[str, int], Recording | None],
+) -> tuple[list[str], NextRecordings]:
+    """Ask ``hwid next``, record what it proposes, and ask again; the names and its end.
+
+    Parameters
+    ----------
+    repeat : callable
+        From a name that the plan does not have and how many there were to a recording.
+    """
+    names = [one.name for one in recordings]
+    plan = tuple(
+        PlannedInput(name, u, name) for name, u in zip(names, inputs, strict=True)
+    )
+    own = {
+        one.name: replace(one, input=u)
+        for one, u in zip(recordings, inputs, strict=True)
+    }
+    taken = [own[names[first]]]
+    options, further = NextOptions(number=1), 0
+    while True:
+        found = propose_next(ToChoose(options, tuple(taken), plan), None)
+        if found.is_enough:
+            break
+        name = found.proposals[0].name
+        more = own.get(name) or repeat(name, further)
+        if more is None:
+            break
+        further += name not in own
+        taken.append(more)
+    return [one.name for one in taken], found
+
+
+class Listing(NamedTuple):
+    """What ``hwid next`` proposes of a plan whose rows are listed in some order.
+
+    Parameters
+    ----------
+    order : list of int
+        By inputs alone.
+    inputs : int
+        After so many of them the inputs are enough.
+    taken : list of int
+        Until enough is known, repeats too.
+    """
+
+    order: list[int]
+    inputs: int
+    taken: list[int]
+
+
 def listings(
-    inputs: Sequence[np.ndarray], draws: int
-) -> Iterator[tuple[list[int], int]]:
-    """What ``hwid next`` proposes of a plan whose rows are listed in random order."""
+    recordings: Sequence[Recording], inputs: Sequence[np.ndarray], draws: int
+) -> Iterator[Listing]:
+    """The same for rows in random orders."""
     for seed in range(draws):
         rows = np.random.default_rng([27, seed]).permutation(len(inputs))
-        order, enough = proposed([inputs[row] for row in rows])
-        yield [int(rows[place]) for place in order], enough
+        listed = [inputs[row] for row in rows]
+        order, enough = proposed(listed)
+        names, _ = taken_until_enough(
+            [recordings[row] for row in rows], listed, order[0], lambda *_: None
+        )
+        places = {one.name: place for place, one in enumerate(recordings)}
+        chosen = [places[name] for name in names]
+        yield Listing([int(rows[place]) for place in order], enough, chosen)
+
+
+def gun_repeat(name: str, count: int) -> Recording:
+    """The same input on another day of the virtual gun."""
+    (one,) = gun([name.partition("_repeat_")[0]], seed=1000 + count)
+    return replace(one, name=name)
 
 
 def show(
@@ -210,7 +284,7 @@ def show(
         flush=True,
     )
     print(
-        f"  it says that enough is known after {enough}; they cover {coverage.of(order[:enough])}"
+        f"  the inputs are enough after {enough}; they cover {coverage.of(order[:enough])}"
     )
     print(f"the plan's own order: {coverage.needed(range(total), wanted)}", flush=True)
     for model, chain in THESIS.items() if name.startswith("virtual gun") else ():
@@ -247,13 +321,17 @@ def show_repeats(
     """What chance among equal commands changes, and which pairs of recordings do."""
     total = len(coverage.recordings)
     wanted = REACHED * coverage.of(range(total))
-    found = list(listings(commands, draws))
-    counts = [coverage.needed(order, wanted) for order, _ in found]
-    covered = [coverage.of(order[:enough]) for order, enough in found]
+    found = list(listings(coverage.recordings, commands, draws))
+    counts = [coverage.needed(one.order, wanted) for one in found]
+    covered = [coverage.of(one.order[: one.inputs]) for one in found]
+    after = [coverage.of(one.taken) for one in found]
+    taken = [len(one.taken) for one in found]
     print(f"hwid next, plan listed in {draws} orders: {quartiles(counts, total + 1)}")
     print(
-        f"  it says that enough is known after {sorted({one for _, one in found})}; "
-        f"they cover {quartiles(covered, total + 1)}"
+        f"  the inputs are enough after {sorted({one.inputs for one in found})}; they "
+        f"cover {quartiles(covered, total + 1)}\n"
+        f"  enough is known after {quartiles(taken, total + 1)}; they cover "
+        f"{quartiles(after, total + 1)}"
     )
     levels = [one.name.rpartition("_")[0] for one in coverage.recordings]
     does: dict[str, list[bool]] = {}
@@ -304,6 +382,12 @@ def main() -> None:
         if chosen.keep:
             machine.kept_in(chosen.keep, "gun")
         inputs = [one.input for one in recordings]
+        names, end = taken_until_enough(
+            recordings, inputs, proposed(inputs)[0][0], gun_repeat
+        )
+        print(
+            f"virtual gun: {len(names)} recordings, {', '.join(names)}: {end.sentence}"
+        )
         both("virtual gun", machine, inputs, 0.01, chosen.draws)
 
 

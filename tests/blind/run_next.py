@@ -7,7 +7,10 @@ of which one is undecided are drawn again, in the order of number, noise and cat
 until there are ``--undecided`` undecided cases. Nothing else chooses them. For each,
 ``hwid next`` proposes one recording within the limits of those that are there (goal:
 diagnosis), the hidden machine answers it, and the diagnosis is made again; twice at most.
-Of the program only its commands are used. One effect may be added at most, which saves
+With ``--hidden`` it is the cases in which the diagnosis says ``parameters``, although an
+effect hides: what ``hwid next`` proposes is recorded until something else is said or nothing
+is proposed, three times at most; ``--nothing N`` adds N cases in which nothing hides. Of the
+program only its commands are used. One effect may be added at most, which saves
 time: one is hidden. Results are written as they come; the same command goes on where it
 was stopped.
 """
@@ -16,7 +19,7 @@ import argparse
 import json
 import shutil
 import sys
-from itertools import count
+from itertools import count, cycle
 from pathlib import Path
 
 import numpy as np
@@ -37,7 +40,9 @@ from tests.blind.write_case import HEADER, write_case  # noqa: E402
 PLAN = "few"
 NOISE_PERCENT = (3.0, 1.0, 0.3)
 UNDECIDED = ("ambiguous", "unknown")
-MOST_FURTHER = 2
+# The base is re-fitted and nothing is named.
+HIDING = ("parameters", "none")
+MOST_FURTHER, MOST_HIDDEN = 2, 3
 # Exit code after SIGTERM.
 INTERRUPTED = 143
 
@@ -107,8 +112,8 @@ def answer(truth, diagnosis):
     return [diagnosis["verdict"], named, rivals, result_of(truth, diagnosis)]
 
 
-def run_case(case, work, seconds=None):
-    """First and later answers of one case."""
+def run_case(case, work, seconds=None, *, goes_on=UNDECIDED, most=MOST_FURTHER):
+    """First and later answers of one case, while the verdict is one of some."""
     folder, out = work / case.name, work / f"{case.name}-out"
     # A case that was stopped half way may have left recordings.
     shutil.rmtree(folder, ignore_errors=True)
@@ -116,7 +121,7 @@ def run_case(case, work, seconds=None):
     add_next(config, measured_case(case)[0], seconds)
     diagnosis, failure = diagnosed(config, out)
     answers, taken, further = [answer(truth, diagnosis)], [], {}
-    while answers[-1][0] in UNDECIDED and len(taken) < MOST_FURTHER:
+    while answers[-1][0] in goes_on and len(taken) < most:
         failure = command("next", config, out)
         more = None if failure else played(case, folder, out, further)
         if more is None:
@@ -124,7 +129,7 @@ def run_case(case, work, seconds=None):
         taken.append(more)
         diagnosis, failure = diagnosed(config, out)
         answers.append(answer(truth, diagnosis))
-    if answers[0][0] not in UNDECIDED:
+    if answers[0][0] not in goes_on:
         shutil.rmtree(folder)
         shutil.rmtree(out, ignore_errors=True)
     return {"case": case.name, "answers": answers, "taken": taken, "failure": failure}
@@ -142,15 +147,17 @@ def cases_of(effects, number, seeds):
 class Results:
     """Results of cases; what an earlier run has written is not run again."""
 
-    def __init__(self, work, seconds):
-        self.work, self.seconds, self.file = work, seconds, work / "next.jsonl"
+    def __init__(self, work, seconds, *, hidden=False):
+        self.work, self.seconds = work, seconds
+        self.file = work / ("hidden.jsonl" if hidden else "next.jsonl")
+        self.loop = {"goes_on": HIDING, "most": MOST_HIDDEN} if hidden else {}
         lines = self.file.read_text().splitlines() if self.file.is_file() else []
         self.known = {one["case"]: one for one in map(json.loads, lines)}
 
     def of(self, case):
         """The result of a case."""
         if case.name not in self.known:
-            found = run_case(case, self.work, self.seconds)
+            found = run_case(case, self.work, self.seconds, **self.loop)
             with self.file.open("a", encoding="utf-8") as file:
                 file.write(json.dumps(found) + "\n")
             sys.stdout.write(f"{json.dumps(found)}\n")
@@ -203,6 +210,38 @@ def table(found):
     return "\n".join(lines)
 
 
+def hidden_table(found):
+    """A line for each case that begins without a name, and the shares."""
+    hiding = [one for one in found if one["answers"][0][0] in HIDING]
+    lines = [
+        "| case | taken (hidden effects expected to show) | then |",
+        "|---|---|---|",
+    ]
+    for one in hiding:
+        taken = ", ".join(f"{name} ({gain:.2g})" for name, gain in one["taken"])
+        *_, (verdict, named, rivals, result) = one["answers"]
+        then = " or ".join([*sorted(named), *map(str, rivals)]) or verdict
+        lines.append(f"| {one['case']} | {taken} | {then}: {result} |")
+    for most in range(1, MOST_HIDDEN + 1):
+        last = [one["answers"][: most + 1][-1] for one in hiding]
+        shows = sum(one[0] not in HIDING for one in last)
+        right = sum(one[-1] == "right" for one in last)
+        lines.append(
+            f"after {most}: something shows in {shows} of {len(hiding)}, right {right}"
+        )
+    return "\n".join(lines)
+
+
+def run_hidden(seeds, nothing, results):
+    """The cases of one each, in which something or nothing hides."""
+    cases = cases_of(CATALOGUE, 0, seeds)
+    cases += [
+        make_case(PLAN, (), number, seeds=seeds, noise=noise, plan=PLAN)
+        for number, noise in zip(range(nothing), cycle(NOISE_PERCENT))
+    ]
+    return [results.of(case) for case in cases]
+
+
 def main():
     """Run the cases and count."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -211,9 +250,17 @@ def main():
     parser.add_argument("--only", choices=list(CATALOGUE), help="only this effect")
     parser.add_argument("--seconds", type=float, help="longest further recording")
     parser.add_argument("--seeds", choices=list(SEEDS), default="development")
+    parser.add_argument("--hidden", action="store_true", help="after `parameters`")
+    parser.add_argument(
+        "--nothing", type=int, default=6, help="cases without an effect"
+    )
     chosen = parser.parse_args()
     chosen.work.mkdir(parents=True, exist_ok=True)
-    results = Results(chosen.work, chosen.seconds)
+    results = Results(chosen.work, chosen.seconds, hidden=chosen.hidden)
+    if chosen.hidden:
+        found = run_hidden(chosen.seeds, chosen.nothing, results)
+        sys.stdout.write(f"{hidden_table(found)}\n")
+        return
     effects = [chosen.only]
     if chosen.only is None:
         first = cases_of(CATALOGUE, 0, chosen.seeds)

@@ -25,10 +25,10 @@ HEAD = (
 )
 
 
-def measure(folder, name, u):
+def measure(folder, name, u, gain=1.0):
     """What a drive of the first order would answer, with noise of its own."""
-    rng = np.random.default_rng(len(name))
-    y = lfilter([0.0, 0.2], [1.0, -0.8], u) + 0.01 * rng.standard_normal(u.size)
+    rng = np.random.default_rng(list(name.encode()))
+    y = lfilter([0.0, 0.2 * gain], [1.0, -0.8], u) + 0.01 * rng.standard_normal(u.size)
     folder.mkdir(exist_ok=True)
     rows = np.column_stack([STEP_S * np.arange(u.size), u, y])
     head = {"header": "t,u,y", "comments": ""}
@@ -38,7 +38,7 @@ def measure(folder, name, u):
 @pytest.fixture
 def bench(tmp_path):
     u = np.zeros(N)
-    u[40:] = 0.5
+    u[N // 20 :] = 0.5
     measure(tmp_path / "raw", "small_step", u)
     return tmp_path
 
@@ -100,6 +100,55 @@ def test_the_loop_takes_up_what_was_recorded_and_ends(bench):
 
 def flat(text):
     return " ".join(text.split())
+
+
+ONE_STEP = "name,kind,amplitude,frequency_Hz,duration_s\nsmall_step,step,0.5,,4\n"
+
+
+def test_inputs_without_a_repeat_are_enough_but_one_repeat_is_asked_for(bench):
+    (bench / "plan.csv").write_text(ONE_STEP)
+    said = run(bench, "next: {plan: plan.csv}\n")
+
+    assert said.exit_code == 0, said.output
+    assert "the inputs are enough" in flat(said.output)
+    assert "whether repeats differ is not known" in flat(said.output)
+    (row,) = proposals(bench)
+    assert row["name"] == "small_step_repeat_2"
+    content = json.loads((bench / "out" / "next.json").read_text())
+    assert content["repeats"] is None
+    assert not content["is_enough"]
+
+
+@pytest.mark.parametrize(("change", "repeats"), [(0.0, 1), (0.3, 3)])
+def test_repeats_are_asked_for_until_their_spread_is_known(bench, change, repeats):
+    (bench / "plan.csv").write_text(ONE_STEP)
+    rng, taken = np.random.default_rng(5), []
+    said = run(bench, "next: {plan: plan.csv, number: 1}\n")
+    while rows := proposals(bench):
+        (row,) = rows
+        gain = 1.0 + change * rng.standard_normal()
+        measure(bench / "raw", row["name"], played(bench, row)[:, 1], gain)
+        taken.append(row["name"])
+        said = run(bench, "next: {plan: plan.csv, number: 1}\n")
+
+    assert said.exit_code == 0, said.output
+    # One drive that stays as it is; one whose gain is drawn anew for each recording.
+    assert taken == [f"small_step_repeat_{2 + k}" for k in range(repeats)]
+    assert "nough is known: the best input" in flat(said.output)
+    known = json.loads((bench / "out" / "next.json").read_text())["repeats"]
+    assert known["n_repeats"] == repeats
+    assert (known["spread"] > 2.0 * known["noise"]) == (change > 0.0)
+
+
+def test_a_repeat_has_the_name_that_the_plan_has_for_it(bench):
+    plan = ONE_STEP + "again,step,0.5,,4\n"
+    (bench / "plan.csv").write_text(plan)
+    said = run(bench, "next: {plan: plan.csv}\n")
+
+    assert said.exit_code == 0, said.output
+    (row,) = proposals(bench)
+    assert row["name"] == "again"
+    assert "is a repeat of small_step" in row["reason"]
 
 
 def test_an_unchanged_folder_answers_from_the_results(bench):
@@ -205,6 +254,51 @@ def test_a_proposed_recording_tells_two_candidates_apart(tmp_path):
         "actuator_lag",
     )
     assert "nough is known: the diagnosis says 'named'" in flat(second.output)
+
+
+def answered(name, current, effects=None):
+    """What a drive answers, with noise of its own."""
+    rng = np.random.default_rng(list(name.encode()))
+    drive = replace(DRIVE, effects=effects or {})
+    read = simulate_drive(current, drive, sample_time_s=1e-3).output
+    return Recording(
+        name, current, read + 2e-5 * rng.standard_normal(current.size), 1e-3
+    )
+
+
+@pytest.mark.parametrize(
+    ("effects", "said"),
+    [
+        ({}, "nough is known: the diagnosis says 'none', and no input on offer would"),
+        ({"one_sided_stop": {"position_m": -0.008, "stiffness_N_per_m": 5000.0}},
+         "nough is known: the diagnosis says 'named', and no input on offer would"),
+    ],
+)  # fmt: skip
+def test_an_effect_that_hides_is_looked_for_where_no_recording_was(
+    tmp_path, effects, said
+):
+    time = 1e-3 * np.arange(400)
+    for number, size in enumerate((1.0, 2.0, 3.0, 4.0)):
+        current = size * np.interp(time, [0.04, 0.05, 0.24, 0.25], [0, 1, 1, 0])
+        one = answered(f"step_{number}", current, effects)
+        write_recording(tmp_path / "raw", one)
+    config = tmp_path / "bench.yaml"
+    config.write_text(DIAGNOSIS.replace("actuator_lag, input_delay", "one_sided_stop"))
+    asked = ["next", str(config), "--out", str(tmp_path / "out"), "--jobs", "1"]
+
+    first = CliRunner().invoke(main, asked)
+    assert first.exit_code == 0, first.output
+    assert "may hide behind the recordings (one_sided_stop)" in flat(first.output)
+    (row,) = proposals(tmp_path)
+    assert "would show one_sided_stop" in row["reason"]
+    u = played(tmp_path, row)[:, 1]
+    assert u.min() < -2.0
+    write_recording(tmp_path / "raw", answered(row["name"], u, effects))
+    second = CliRunner().invoke(main, asked)
+
+    assert second.exit_code == 0, second.output
+    assert said in flat(second.output)
+    assert "1 before, 0 now" in flat(second.output)
 
 
 @pytest.mark.parametrize(
