@@ -36,8 +36,9 @@ CONNECT_TIMEOUT_S, ANSWER_S = 5.0, 6.0
 # A scheduler that was there and is connected may be busy for so long; one whose
 # connection broke is given up after the other time, [s].
 _BUSY_S, _BROKEN_S = 20.0, 4.0
-# Time for giving up what is under way, and for leaving a cluster, [s].
-_LEAVE_S = 1.0
+# Time for giving up what is under way, and for leaving a cluster, [s]; one of our own is
+# left when its workers have ended, or the library reports it at exit.
+_LEAVE_S, _END_S = 1.0, 10.0
 # Arguments with a longer pickle are sent once, [bytes].
 LARGE = 8192
 # Time between two looks at the workers, and after which a message says there are none.
@@ -401,7 +402,7 @@ def _cluster(scheduler: str | None, count: int) -> _Cluster:
             f"--scheduler {scheduler}: {shown(said)}; expected the address of a "
             f"running dask scheduler, such as tcp://127.0.0.1:8786{_on_tls(scheduler)}"
         ) from error
-    atexit.register(_leave, client)
+    atexit.register(_leave, client, _END_S if scheduler is None else _LEAVE_S)
     return _Cluster(client, scheduler or "the cluster on this machine")
 
 
@@ -414,6 +415,6 @@ def _on_tls(scheduler: str | None) -> str:
     )
 
 
-def _leave(client: Any) -> None:
+def _leave(client: Any, seconds: float) -> None:
     with suppress(Exception):
-        _within(_LEAVE_S, client.close)
+        _within(seconds, client.close)
