@@ -622,18 +622,34 @@ class _Search:
         return rounds.run_tasks(tasks, keep=True)
 
     def _use_again(self, size: int) -> None:
-        """Start simpler effects where richer ones ended, and the other way round."""
+        """Start simpler effects where richer ones ended, and the other way round.
+
+        Richer ones last, and not at all once nothing is left.
+        """
+        name = f"{_name_of(size)}, from related ones"
         for _ in range(2):
             sets = self._again(size)
-            if not sets:
-                return
-            name = f"{_name_of(size)}, from related ones"
+            wide = {ids for ids in sets if includes_one_of(ids, self.fits)}
+            plain = {ids: sets[ids] for ids in sets if ids not in wide}
+            is_any = self._tried_again(name, size, plain)
             best = self.best_of_size(size)
-            screened = self._screen(name, {**self._parts(sets), **sets})
-            near = self._that_add(self._near(sets, screened, best))
-            if not near:
+            if best is not None and not self.rounds.criteria.is_complete(best):
+                richer = {ids: sets[ids] for ids in sets if ids in wide}
+                is_any |= self._tried_again(f"{name} that include others", size, richer)
+            if not is_any:
                 return
-            self._finish(name, near)
+
+    def _tried_again(
+        self, name: str, size: int, sets: Mapping[Effects, list[SearchStart]]
+    ) -> bool:
+        """Fit those of some sets that come near the best one; whether there are any."""
+        if not sets:
+            return False
+        best = self.best_of_size(size)
+        screened = self._screen(name, {**self._parts(sets), **sets})
+        near = self._that_add(self._near(sets, screened, best))
+        self._finish(name, near)
+        return bool(near)
 
     def _stands_out(self, screened: Sequence[Screened], parent: CandidateFit) -> bool:
         """Whether a set has explained a good part of what the smaller one leaves."""

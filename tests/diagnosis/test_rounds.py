@@ -258,6 +258,30 @@ def test_nothing_is_screened_again_once_a_set_explains_half(monkeypatch):
     assert turns.turns == []
 
 
+@pytest.mark.parametrize("completes", [True, False])
+def test_richer_relatives_are_not_tried_once_a_plain_one_leaves_nothing(
+    completes, monkeypatch
+):
+    search = rounds._Search(rounds_of_fits())
+    friction = made_up(("coulomb_friction",), 300.0)
+    drag = made_up(("quadratic_drag",), 100.0, whiteness=0.5 if completes else 2.0)
+    search.fits = {friction.effects: friction}
+    plain, richer = ("quadratic_drag",), ("stribeck_friction",)
+    tried = []
+
+    def tried_again(name, size, sets):
+        tried.append((name, size, *sets))
+        search.fits[drag.effects] = drag
+        return True
+
+    monkeypatch.setattr(search, "_again", lambda size: {richer: [], plain: []})
+    monkeypatch.setattr(search, "_tried_again", tried_again)
+    search._use_again(1)
+    name = "single effects, from related ones"
+    wide = () if completes else ((f"{name} that include others", 1, richer),)
+    assert tried == [(name, 1, plain), *wide] * 2
+
+
 def test_sets_that_bring_nothing_from_where_a_smaller_one_ended_are_not_finished():
     search = rounds._Search(rounds_of({**FRICTION, **STIFFNESS}, FEW))
     of = search.rounds
