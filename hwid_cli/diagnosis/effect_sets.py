@@ -56,8 +56,8 @@ def is_nested(
 
 
 def may_stand(effects: Effects, present: Collection[str]) -> bool:
-    """Whether no effect of a set is nested with another, or lacks its first."""
-    return not any(
+    """Whether no effect of a set occurs twice, is nested with another, or lacks its first."""
+    return len(set(effects)) == len(effects) and not any(
         is_nested(one, tuple(other for other in effects if other != one), present)
         for one in effects
     )

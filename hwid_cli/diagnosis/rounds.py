@@ -74,9 +74,10 @@ LEAST_LEFT = 0.02
 SCREENED_ON_TOP = 12
 KINDS_ON_TOP = 8
 # Sets are screened again, at most so often, until one of them explains this share of what
-# the smaller set leaves.
+# the smaller set leaves; not those that leave more than so many times as much.
 MOST_SCREENINGS = 2
 STANDS_OUT = 0.5
+FAR_BEHIND = 10.0
 # Sets that leave at most so many times what the best one leaves are searched on, at most
 # so many times.
 WORTH_MORE = 2.0
@@ -92,9 +93,11 @@ PROMISING_PAIR = 0.05
 # Starts of one effect that are screened.
 SCREENED_STARTS = 3
 # A further effect is looked for only if the last one lowered the criterion by this much,
-# and explained this share of what the smaller set left.
+# and explained this share of what the smaller set left; more where that is so little that
+# only a set which leaves nothing could be named.
 LEAST_STEP = 10.0
 LEAST_FURTHER = 0.25
+LEAST_OF_REST = 0.5
 
 OnRound = Callable[[str, int], None]
 
@@ -258,12 +261,8 @@ class _Search:
             self._few = self._worst_of(parents[0])
         name = _name_of(size)
         screened = self._screen(name, self._proposed(size, parents))
-        for _ in range(MOST_SCREENINGS):
-            if not parents or self._stands_out(screened, parents[0]):
-                break
-            # Nothing has got far yet: all of them go on.
-            further = {one.effects: list(one.starts) for one in screened}
-            screened = self._screen(name, further)
+        if parents:
+            screened = self._screened_on(name, screened, parents[0])
         chosen = self._chosen(screened)
         # What includes another candidate must be better; where the simpler one leaves
         # nothing, it cannot be.
@@ -276,6 +275,29 @@ class _Search:
         self._use_again(size)
         self._go_on(size)
         return self.best_of_size(size)
+
+    def _screened_on(
+        self, name: str, screened: Sequence[Screened], parent: CandidateFit
+    ) -> list[Screened]:
+        """Screen sets again while none of them has got far.
+
+        All go on that still get further, but for those far behind the smaller set: it
+        leaves less than they do, and sets that include it begin there.
+        """
+        reached = {one.effects: one for one in screened}
+        floor, whole = self._floor(), self._few_sse(parent)
+        most = FAR_BEHIND * max(whole - floor, LEAST_LEFT * whole)
+        moving = [one for one in screened if one.sse - floor <= most]
+        for _ in range(MOST_SCREENINGS):
+            if not moving or self._stands_out(list(reached.values()), parent):
+                break
+            sets = {one.effects: list(one.starts) for one in moving}
+            moving = []
+            for one in self._screen(name, sets):
+                if one.sse - floor <= LEAST_TURN * (reached[one.effects].sse - floor):
+                    moving.append(one)
+                reached[one.effects] = one
+        return list(reached.values())
 
     def _proposed(
         self, size: int, parents: Sequence[CandidateFit]
@@ -325,12 +347,19 @@ class _Search:
         gain, part = criteria.gain(larger, smaller), smaller
         if any(is_factor(one) for one in smaller.own_names):
             # Its values for the held-out recordings are of these: no measure for others.
-            part = self._largest_part(larger) or smaller
+            part = self._largest_part(larger.effects) or smaller
         explained = criteria.evidence(larger, part).explained
-        return gain >= LEAST_STEP and explained >= LEAST_FURTHER
+        # Too little for a name unless nothing is left: then a few effects share it.
+        is_rest = criteria.is_small_part(smaller, self.rounds.base)
+        is_rest = is_rest and not criteria.is_complete(larger)
+        least = LEAST_OF_REST if is_rest else LEAST_FURTHER
+        return gain >= LEAST_STEP and explained >= least
 
     def parents(self, size: int) -> list[CandidateFit]:
-        """Sets to build on: the best one, and the next that is of another kind."""
+        """Sets to build on: the best one, and the next that is of another kind.
+
+        A set that is hardly more than a smaller one leads where that one has led.
+        """
         fits = sorted(
             (one for one in self._of_size(size) if one.is_usable),
             key=lambda one: -self.rounds.criteria.gain(one, self.rounds.base),
@@ -338,7 +367,7 @@ class _Search:
         best = self.best_of_size(size)
         chosen = [best] if best is not None and self._is_worth_it(best) else []
         for one in fits:
-            if not self._is_worth_it(one):
+            if not (self._is_worth_it(one) and self._is_more(one)):
                 continue
             is_kin = any(is_part_of(one, two) or is_part_of(two, one) for two in chosen)
             if not is_kin and len(chosen) < MOST_PARENTS:
@@ -349,6 +378,11 @@ class _Search:
         """Whether a set explains enough for others to be built on it."""
         against = self.rounds.criteria.evidence(found, self.rounds.base)
         return against.explained >= LEAST_OF_PARENT
+
+    def _is_more(self, found: CandidateFit) -> bool:
+        """Whether a set of several effects has got further than a smaller one in it."""
+        part = self._largest_part(found.effects)
+        return len(found.effects) == 1 or part is None or self.is_better(found, part)
 
     def fit_parts(self, best: list[CandidateFit]) -> None:
         """Fit each best set without each of its effects, from the largest down.
@@ -455,8 +489,8 @@ class _Search:
         scales = self.rounds.baseline.scales
         tasks = [
             DiagnosisTask(
-                "+".join(ids), screen, (self._few, ids, starts, scales), Screened,
-                {"effects": ids},
+                "+".join(ids) or "base", screen, (self._few, ids, starts, scales),
+                Screened, {"effects": ids},
             )
             for ids, starts in proposed.items()
         ]  # fmt: skip
@@ -588,18 +622,34 @@ class _Search:
         return rounds.run_tasks(tasks, keep=True)
 
     def _use_again(self, size: int) -> None:
-        """Start simpler effects where richer ones ended, and the other way round."""
+        """Start simpler effects where richer ones ended, and the other way round.
+
+        Richer ones last, and not at all once nothing is left.
+        """
+        name = f"{_name_of(size)}, from related ones"
         for _ in range(2):
             sets = self._again(size)
-            if not sets:
-                return
-            name = f"{_name_of(size)}, from related ones"
+            wide = {ids for ids in sets if includes_one_of(ids, self.fits)}
+            plain = {ids: sets[ids] for ids in sets if ids not in wide}
+            is_any = self._tried_again(name, size, plain)
             best = self.best_of_size(size)
-            screened = self._screen(name, sets)
-            near = self._that_add(self._near(screened, best))
-            if not near:
+            if best is not None and not self.rounds.criteria.is_complete(best):
+                richer = {ids: sets[ids] for ids in sets if ids in wide}
+                is_any |= self._tried_again(f"{name} that include others", size, richer)
+            if not is_any:
                 return
-            self._finish(name, near)
+
+    def _tried_again(
+        self, name: str, size: int, sets: Mapping[Effects, list[SearchStart]]
+    ) -> bool:
+        """Fit those of some sets that come near the best one; whether there are any."""
+        if not sets:
+            return False
+        best = self.best_of_size(size)
+        screened = self._screen(name, {**self._parts(sets), **sets})
+        near = self._that_add(self._near(sets, screened, best))
+        self._finish(name, near)
+        return bool(near)
 
     def _stands_out(self, screened: Sequence[Screened], parent: CandidateFit) -> bool:
         """Whether a set has explained a good part of what the smaller one leaves."""
@@ -648,14 +698,35 @@ class _Search:
             self._keep(self._fitted(f"{_name_of(size)}, going on", sets, None))
 
     def _near(
-        self, screened: Sequence[Screened], best: CandidateFit | None
+        self,
+        sets: Iterable[Effects],
+        screened: Sequence[Screened],
+        best: CandidateFit | None,
     ) -> dict[Effects, Sequence[SearchStart]]:
-        """Sets that come close to the best one, from where it ended, in the screening."""
+        """Sets that come close to the best one, from where it ended, in the screening.
+
+        Not those that there bring hardly more than the best set in them.
+        """
         if best is None:
             return {}
+        found = {one.effects: one for one in screened}
         floor, reached = self._floor(), self._few_sse(best)
         most = floor + WORTH_MORE * max(reached - floor, LEAST_LEFT * reached)
-        return {one.effects: one.starts for one in screened if one.sse <= most}
+        near: dict[Effects, Sequence[SearchStart]] = {}
+        for ids in sets:
+            part = self._largest_part(ids)
+            left = np.inf if part is None else found[part.effects].sse - floor
+            if found[ids].sse <= most and found[ids].sse - floor <= LEAST_TURN * left:
+                near[ids] = found[ids].starts
+        return near
+
+    def _parts(self, sets: Iterable[Effects]) -> dict[Effects, list[SearchStart]]:
+        """The best set in each set, from where it ended."""
+        parts = [self._largest_part(ids) for ids in sets]
+        drive = self.rounds.problem.drive
+        return {
+            one.effects: [start_from(drive, one)] for one in parts if one is not None
+        }
 
     def _again(self, size: int) -> dict[Effects, list[SearchStart]]:
         """Starts from related fits that have come further than a set's own fit."""
@@ -702,7 +773,7 @@ class _Search:
         """Starts at a smaller set, the further effect faint: none ends up worse."""
         rounds, present = self.rounds, drive_effects(self.rounds.problem.drive)
         for one in self._of_size(size):
-            smaller = self._largest_part(one)
+            smaller = self._largest_part(one.effects)
             if smaller is None or not self._is_behind(one, smaller):
                 continue
             added = set(one.effects) - set(smaller.effects)
@@ -729,15 +800,14 @@ class _Search:
                 fresh.append(one)
         return fresh
 
-    def _largest_part(self, whole: CandidateFit) -> CandidateFit | None:
+    def _largest_part(self, whole: Effects) -> CandidateFit | None:
         """The best fit with one effect less; the base for a single effect."""
-        if len(whole.effects) == 1:
+        if len(whole) == 1:
             return self.rounds.base
         parts = [
             self.fits[left]
-            for effect in whole.effects
-            if (left := tuple(one for one in whole.effects if one != effect))
-            in self.fits
+            for effect in whole
+            if (left := tuple(one for one in whole if one != effect)) in self.fits
         ]
         usable = [one for one in parts if one.is_usable]
         return min(usable, key=lambda one: _train_sse(self.rounds, one), default=None)

@@ -233,6 +233,16 @@ class SelectionCriteria:
             return True
         return self.excess(found) < LEAST_LAST_CONTRIBUTION * self.excess(base)
 
+    def is_small_part(self, found: CandidateFit, base: CandidateFit) -> bool:
+        """Whether too little is left for a name unless then nothing remains.
+
+        Parameters
+        ----------
+        base : CandidateFit
+            Re-fitted, without further effects.
+        """
+        return self.excess(found) < LEAST_CONTRIBUTION * self.excess(base)
+
     def may_be_named(self, found: CandidateFit, base: CandidateFit) -> bool:
         """Whether the evidence for a set of effects suffices.
 

@@ -48,6 +48,11 @@ def test_what_is_nested_or_lacks_its_first_stands_alone(effect, others):
     assert not may_stand((*others, effect), ())
 
 
+def test_no_set_holds_an_effect_twice():
+    assert may_stand(("gravity", "second_mode"), ())
+    assert not may_stand(("second_mode", "second_mode"), ())
+
+
 def test_the_first_one_may_be_of_the_simulation():
     assert not is_nested(SECOND, ("gravity",), (STOP,))
     assert may_stand((SECOND, "gravity"), (STOP,))

@@ -1,10 +1,17 @@
 """Rounds of candidate fits: which sets are tried, which are kept."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from hwid_cli.diagnosis import rounds
-from hwid_cli.diagnosis.candidate import Baseline, fitted_drive
+from hwid_cli.diagnosis.candidate import (
+    Baseline,
+    Screened,
+    fitted_drive,
+    start_from,
+)
 from hwid_cli.diagnosis.rounds import (
     FEWEST_FINISHED,
     MOST_FINISHED,
@@ -15,6 +22,7 @@ from hwid_cli.diagnosis.rounds import (
 from hwid_cli.diagnosis.selection import SelectionCriteria
 from hwid_cli.drive.catalogue import CATALOGUE
 from tests.diagnosis.made_up_fits import CRITERIA, made_up
+from tests.diagnosis.made_up_fits import base as made_up_base
 from tests.diagnosis.small_drive import (
     fit,
     in_turn,
@@ -117,7 +125,7 @@ def test_every_effect_gets_a_forecast_and_a_screening(friction):
     # A second one of a kind is tried beside its first only.
     alone = {(name,) for name, one in CATALOGUE.items() if not one.beside}
     assert set(friction.found.shares) == alone
-    assert set(friction.effects_of("screen")) == alone
+    assert set(friction.effects_of("screen")) - {()} == alone
 
 
 @pytest.mark.thorough
@@ -183,6 +191,116 @@ def test_a_further_effect_is_measured_by_its_own_part_beside_values_of_recording
 
     assert search.is_better(both, changing)
     assert not search.is_better(both, made_up(("x",), 400.0))
+
+
+@pytest.mark.parametrize(("of_base", "goes_on"), [(400.0, True), (1e6, False)])
+def test_of_little_that_only_a_complete_set_could_name_one_effect_takes_half(
+    of_base, goes_on
+):
+    # Two fifths of what a single effect leaves: much, or next to nothing, of all.
+    search = rounds._Search(replace(rounds_of_fits(), base=made_up_base(of_base)))
+    one = made_up(("end_stop",), 300.0)
+    assert search.is_better(made_up(("a", "end_stop"), 220.0), one) == goes_on
+    assert search.is_better(made_up(("a", "end_stop"), 180.0), one)
+    assert search.is_better(made_up(("a", "end_stop"), 220.0, whiteness=0.5), one)
+
+
+@pytest.mark.parametrize(("of_pair", "parents"), [(299.0, 1), (200.0, 2)])
+def test_a_set_that_is_hardly_more_than_a_smaller_one_is_built_on_by_none(
+    of_pair, parents
+):
+    search = rounds._Search(replace(rounds_of_fits(), base=made_up_base(900.0)))
+    one, best = (
+        made_up(("end_stop",), 300.0),
+        made_up(("gravity", "sensor_drift"), 150.0),
+    )
+    pair = made_up(("cogging", "end_stop"), of_pair)
+    search.fits = {fit.effects: fit for fit in (one, best, pair)}
+    assert search.parents(2) == [best, pair][:parents]
+
+
+class Screenings:
+    """Screenings that leave made-up multiples of what they left before."""
+
+    def __init__(self, factors):
+        self.factors, self.turns = factors, []
+
+    def run(self, tasks, *, keep):
+        assert not keep
+        self.turns.append([one.content["effects"][0] for one in tasks])
+        return [self._screened(*one.content["effects"]) for one in tasks]
+
+    def _screened(self, effect):
+        turns = sum(effect in turn for turn in self.turns)
+        return Screened((effect,), 1.0 * self.factors[effect] ** turns, ())
+
+
+def test_screened_again_is_what_gets_further_and_is_not_far_behind(monkeypatch):
+    turns = Screenings({"moves": 0.8, "stands": 0.99, "far": 0.5})
+    search = rounds._Search(rounds_of(FRICTION, FEW, run_tasks=turns.run))
+    monkeypatch.setattr(search, "_floor", lambda: 0.0)
+    monkeypatch.setattr(search, "_few_sse", lambda found: 0.9)
+    first = [Screened((one,), 1.0, ()) for one in ("moves", "stands")]
+    first.append(Screened(("far",), 10.0, ()))
+
+    found = search._screened_on("sets", first, search.rounds.base)
+    assert turns.turns == [["moves", "stands"], ["moves"]]
+    assert [one.sse for one in found] == pytest.approx([0.64, 0.99, 10.0])
+
+
+def test_nothing_is_screened_again_once_a_set_explains_half(monkeypatch):
+    turns = Screenings({})
+    search = rounds._Search(rounds_of(FRICTION, FEW, run_tasks=turns.run))
+    monkeypatch.setattr(search, "_floor", lambda: 0.0)
+    monkeypatch.setattr(search, "_few_sse", lambda found: 0.9)
+    first = [Screened((name,), sse, ()) for name, sse in (("a", 0.4), ("b", 0.8))]
+    assert search._screened_on("sets", first, search.rounds.base) == first
+    assert turns.turns == []
+
+
+@pytest.mark.parametrize("completes", [True, False])
+def test_richer_relatives_are_not_tried_once_a_plain_one_leaves_nothing(
+    completes, monkeypatch
+):
+    search = rounds._Search(rounds_of_fits())
+    friction = made_up(("coulomb_friction",), 300.0)
+    drag = made_up(("quadratic_drag",), 100.0, whiteness=0.5 if completes else 2.0)
+    search.fits = {friction.effects: friction}
+    plain, richer = ("quadratic_drag",), ("stribeck_friction",)
+    tried = []
+
+    def tried_again(name, size, sets):
+        tried.append((name, size, *sets))
+        search.fits[drag.effects] = drag
+        return True
+
+    monkeypatch.setattr(search, "_again", lambda size: {richer: [], plain: []})
+    monkeypatch.setattr(search, "_tried_again", tried_again)
+    search._use_again(1)
+    name = "single effects, from related ones"
+    wide = () if completes else ((f"{name} that include others", 1, richer),)
+    assert tried == [(name, 1, plain), *wide] * 2
+
+
+def test_sets_that_bring_nothing_from_where_a_smaller_one_ended_are_not_finished():
+    search = rounds._Search(rounds_of({**FRICTION, **STIFFNESS}, FEW))
+    of = search.rounds
+    friction = fit(of.problem, FRICTION, scales=of.baseline.scales)
+    search.fits[friction.effects] = friction
+    here = start_from(of.problem.drive, friction)
+    faint = {"cubic_stiffness": {"stiffness_N_per_m3": 100.0},
+             "input_dead_zone": {"threshold_A": 1e-3}}  # fmt: skip
+    sets = {
+        ("coulomb_friction", name): [replace(here, effects={**here.effects, name: one})]
+        for name, one in faint.items()
+    }
+    screened = search._screen("sets", {**search._parts(sets), **sets})
+    assert {one.effects for one in screened} == {friction.effects, *sets}
+    pair = ("coulomb_friction", "cubic_stiffness")
+    best = fit(of.problem, {**FRICTION, **STIFFNESS}, scales=of.baseline.scales)
+    assert set(search._near(sets, screened, best)) == {pair}
+    # It is what they bring that counts: beside what leaves as much both would be near.
+    assert set(search._near(sets, screened, friction)) == {pair}
 
 
 def test_no_larger_set_is_tried_once_nothing_remains():

@@ -40,6 +40,14 @@ def _turn(value: Values) -> float:
     return 2 * pi * value["frequency_Hz"]
 
 
+def _coupling_stiffness(scales: Scales) -> tuple[float, float]:
+    """Softer is no drive any more; what swings faster than is sampled is one mass."""
+    low, high = (share * scales.stiffness_N_per_m for share in (0.5, 1e5))
+    # Two equal masses then swing once in a sample.
+    fastest = 0.25 * scales.mass_kg * (2 * pi / scales.sample_time_s) ** 2
+    return low, min(high, max(fastest, 10 * low))
+
+
 # The load has the rest.
 _BELOW_WHOLE = Limit("a share of the mass below 1", lambda value: value < 1)
 
@@ -170,8 +178,7 @@ def _elastic(sensor: str, looks_like: dict[str, str]) -> Effect:
             Parameter(
                 "stiffness_N_per_m",
                 shares_of("stiffness_N_per_m", 3, 15, 75, 400, 2000),
-                # Softer is no drive any more, stiffer is one mass.
-                span_of("stiffness_N_per_m", 0.5, 1e5),
+                _coupling_stiffness,
                 places=("COUPLING_STIFFNESS",),
                 limits=(POSITIVE,),
             ),
