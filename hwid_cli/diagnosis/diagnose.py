@@ -268,7 +268,7 @@ def find(
         found=found, verdict=verdict,
     )  # fmt: skip
     # Where a drive stands for another simulation, that one judges.
-    if _is_lost(criteria, verdict) and seeds and criteria.standing is None:
+    if _is_lost(criteria, verdict, base) and seeds and criteria.standing is None:
         judged = _judged_in_pieces(rounds, whole, seeds)
         if judged is not None:
             return judged
@@ -336,16 +336,21 @@ def _search(
     if not base.is_usable or criteria.needs_nothing(base):
         return RoundsResult(), ()
     found = run_rounds(rounds, max_effects)
-    is_lost = _is_lost(criteria, _decided(rounds, given_sse, found))
+    is_lost = _is_lost(criteria, _decided(rounds, given_sse, found), base)
     if not is_lost or rounds.problem.compares_command:
         return found, ()
     seeds = _seeds_of_pieces(rounds, force, max_effects)
     return continue_rounds(rounds, found, seeds), seeds
 
 
-def _is_lost(criteria: SelectionCriteria, verdict: DiagnosisVerdict) -> bool:
+def _is_lost(
+    criteria: SelectionCriteria, verdict: DiagnosisVerdict, base: CandidateFit
+) -> bool:
     """Whether whole recordings settle nothing, with much left."""
     is_open = verdict.word in ("unknown", "ambiguous")
+    if verdict.word == "named":
+        # What all near sets share has a name without being enough.
+        is_open = not criteria.may_be_named(verdict.chosen, base)
     return is_open and criteria.ratio(verdict.chosen) > STILL_LARGE
 
 

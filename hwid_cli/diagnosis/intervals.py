@@ -29,9 +29,10 @@ _DETERMINED = 1e-12
 def unclear_effects(
     problem: DiagnosisProblem, found: CandidateFit, scales: Scales
 ) -> tuple[str, ...]:
-    """Effects of a fit that may as well not be there.
+    """Effects of a fit that may as well not be there, or be a simpler one.
 
-    The interval of an effect's strength reaches zero.
+    The interval of an effect's strength reaches zero, or that of the parameter that tells
+    it from what it contains.
 
     Returns
     -------
@@ -42,21 +43,28 @@ def unclear_effects(
         return found.effects
     fit_layout, point = rebuilt(problem, found, scales)
     deviations = _standard_errors(problem, found, fit_layout, point)
-    unclear = []
-    for effect in found.effects:
-        parameter = CATALOGUE[effect].strongest
-        ref = ParameterRef(effect, parameter.name)
-        # A limit shows in every sample that it cuts: the criterion decides.
-        if ref not in found.names or parameter.off == inf:
-            continue
+
+    def is_clear(ref: ParameterRef) -> bool:
         column = found.names.index(ref)
         unknown, q = fit_layout.shared[column], point.shared[column]
         reach = _QUANTILE * float(deviations[column])
         # Of a logarithm linearised: a relative deviation of the value itself.
-        is_clear = reach < 1.0 if unknown.is_log else abs(q) > reach
-        if not is_clear:
-            unclear.append(effect)
-    return tuple(unclear)
+        return reach < 1.0 if unknown.is_log else abs(q) > reach
+
+    return tuple(
+        effect
+        for effect in found.effects
+        if not all(map(is_clear, _telling(effect, found.names)))
+    )
+
+
+def _telling(effect: str, names: tuple[ParameterRef, ...]) -> tuple[ParameterRef, ...]:
+    """Fitted parameters without which an effect is not there, or is a simpler one."""
+    entry = CATALOGUE[effect]
+    # A limit shows in every sample that it cuts: the criterion decides.
+    told = [] if entry.strongest.off == inf else [entry.strongest.name]
+    refs = [ParameterRef(effect, one) for one in (*told, entry.told_by) if one]
+    return tuple(one for one in refs if one in names)
 
 
 def intervals(

@@ -10,6 +10,7 @@ docs/method_diagnosis.md, eq. (D21) to (D25).
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations
+from math import inf
 
 import numpy as np
 import scipy
@@ -39,6 +40,9 @@ LEAST_LAST_CONTRIBUTION = 5e-4
 # of several effects, and of values that each recording has for itself, which imitate most.
 LEAST_EXPLAINED_FAR = 0.99
 LEAST_CONTRIBUTION_FAR = 0.05
+# So has one effect that leaves this share of the motion: whatever turns with the error
+# explains a good part of one that large.
+LARGE_SHARE_OF_MOTION = 0.1
 # ... in this share of the held-out recordings.
 LEAST_IMPROVED = 0.65
 # Chance at which changes between recordings are said to go with their inputs, and the
@@ -66,6 +70,9 @@ TIE = 6.0
 WITHIN_REACH = 1.25
 # Share that each of several rivals explains of what none of them explains for the most.
 LEAST_OF_RIVALS = 0.35
+# Sets that leave at most so many times what the best one leaves count as near it, and
+# what at least so many near sets share is there, whatever the rest is.
+NEAR_BEST, LEAST_SHARING = 2.0, 10
 # Share of what a verdict leaves that makes a set worth following.
 LEAST_LEAD = 0.25
 # The base of a stand-in that a candidate changes by more than this factor is no longer that
@@ -111,6 +118,9 @@ class SelectionCriteria:
         What stands for the simulation, if anything does.
     stand_in_error : float, [output unit squared]
         Of the problem.
+    motion : float, [output unit]
+        RMS of the held-out motion about its mean; infinite where a command is compared, in
+        which all that the motion lacks shows.
     """
 
     n_samples: np.ndarray
@@ -119,6 +129,7 @@ class SelectionCriteria:
     inputs: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
     standing: StandIn | None = None
     stand_in_error: float = 0.0
+    motion: float = inf
 
     @classmethod
     def of(cls, problem: DiagnosisProblem, noise: NoiseFloor) -> "SelectionCriteria":
@@ -130,7 +141,14 @@ class SelectionCriteria:
         features = np.array([_features(one) for one in problem.signals])
         standing = problem.drive if isinstance(problem.drive, StandIn) else None
         error = problem.stand_in_error
-        return cls(counts, held, noise, features, standing, error)
+        moved = [
+            one.compared - np.mean(one.compared)
+            for one, is_held in zip(problem.signals, held, strict=True)
+            if is_held
+        ]
+        motion = float(np.sqrt(np.mean(np.concatenate(moved) ** 2)))
+        motion = inf if problem.compares_command else motion
+        return cls(counts, held, noise, features, standing, error, motion)
 
     def rms(self, found: CandidateFit, *, held_out: bool) -> float:
         """RMS over the held-out recordings, or the others.
@@ -275,8 +293,9 @@ class SelectionCriteria:
             return LEAST_EXPLAINED_FAR if self.is_far(found) else LEAST_EXPLAINED_SET
         if self.ratio(found) <= STILL_LARGE:
             return LEAST_EXPLAINED
-        is_free = any(is_factor(one) for one in found.own_names)
-        return LEAST_EXPLAINED_FAR if is_free else LEAST_EXPLAINED_LARGE
+        is_free = _is_free(found)
+        is_far = self.rms(found, held_out=True) > LARGE_SHARE_OF_MOTION * self.motion
+        return LEAST_EXPLAINED_FAR if is_free or is_far else LEAST_EXPLAINED_LARGE
 
     def is_far(self, found: CandidateFit) -> bool:
         """Whether a set of several effects leaves more than such sets may."""
@@ -662,9 +681,8 @@ def decide(
     for winner in reversed(best):
         same_size = [one for one in fits.values()
                      if len(one.effects) == len(winner.effects)]  # fmt: skip
-        simpler = [one for one in same_size
-                   if one is not winner and is_part_of(one, winner)]  # fmt: skip
-        chosen = next((one for one in (winner, *simpler) if may_be_named(one)), None)
+        tried = _as_winner(criteria, winner, same_size, base)
+        chosen = next((one for one in tried if may_be_named(one)), None)
         if chosen is None:
             continue
         near = [one for one in rivals(criteria, same_size, chosen) if may_be_named(one)]
@@ -686,7 +704,61 @@ def decide(
     halves = _rivals_by_halves(criteria, base, fits, unclear)
     if len(halves) > 1:
         return DiagnosisVerdict("ambiguous", False, halves[0], tuple(halves[1:]))
+    shared = _shared_by_best(criteria, base, fits, unclear)
+    if shared is not None:
+        return DiagnosisVerdict("named", False, shared, ())
     return DiagnosisVerdict("unknown", False, base, ())
+
+
+def _as_winner(
+    criteria: SelectionCriteria,
+    winner: CandidateFit,
+    same_size: Sequence[CandidateFit],
+    base: CandidateFit,
+) -> list[CandidateFit]:
+    """The winner of a size, its limit cases, and what it is a limit case of."""
+    others = [one for one in same_size if one is not winner]
+    simpler = [one for one in others if is_part_of(one, winner)]
+    # It explains a little more, which the winner may lack for a name.
+    wider = [one for one in others if one.is_usable and is_part_of(winner, one)]
+    wider.sort(key=lambda one: -criteria.gain(one, base))
+    return [winner, *simpler, *wider]
+
+
+def _shared_by_best(
+    criteria: SelectionCriteria,
+    base: CandidateFit,
+    fits: Mapping[tuple[str, ...], CandidateFit],
+    unclear: Callable[[CandidateFit], tuple[str, ...]],
+) -> CandidateFit | None:
+    """What all sets near the best one share, where no set is enough for a name.
+
+    References
+    ----------
+    docs/method_diagnosis.md, eq. (D24a).
+    """
+    usable = [one for one in fits.values() if one.is_usable and not _is_free(one)]
+    left = [1.0 - criteria.evidence(one, base).explained for one in usable]
+    most = NEAR_BEST * min(left, default=0.0)
+    near = [one for one, rest in zip(usable, left, strict=True) if rest <= most]
+    if len(near) < LEAST_SHARING:
+        return None
+    shared = set.intersection(*(set(names_of(one)) for one in near))
+    for one in sorted(usable, key=lambda one: -criteria.gain(one, base)):
+        against = criteria.evidence(one, base)
+        is_clear = against.gain >= LEAST_GAIN and against.improved >= LEAST_IMPROVED
+        is_clear = is_clear and against.explained >= LEAST_EXPLAINED
+        is_clear = is_clear and criteria.is_beyond_stand_in(one, base)
+        # The sets show that it is there; how large it is may hang on what is missing.
+        is_simpler = any(CATALOGUE[effect].told_by for effect in unclear(one))
+        if shared and set(names_of(one)) == shared and is_clear and not is_simpler:
+            return one
+    return None
+
+
+def _is_free(found: CandidateFit) -> bool:
+    """Whether each recording has a value for itself."""
+    return any(is_factor(one) for one in found.own_names)
 
 
 def _changes_freely(found: CandidateFit, effect: str) -> bool:
@@ -739,8 +811,7 @@ def _rivals_by_halves(
     for one in fits.values():
         if len(one.effects) != 1 or not one.is_usable or not has_size(one):
             continue
-        is_free = any(is_factor(ref) for ref in one.own_names)
-        if is_free and criteria.ratio(one) > STILL_LARGE:
+        if _is_free(one) and criteria.ratio(one) > STILL_LARGE:
             continue
         against = criteria.evidence(one, base)
         explains = against.explained >= LEAST_OF_RIVALS and against.improved == 1.0

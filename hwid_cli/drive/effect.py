@@ -342,6 +342,8 @@ class Effect:
     strength : str
         Name of the parameter without which the effect is not there: where it is zero,
         or for a limit beyond all that it limits. Empty means the first one.
+    told_by : str
+        Name of the parameter that tells it from the effects that it contains.
     words : mapping of str to str
         What it states in words for this one of several entries with one public id.
     is_possible : callable or None
@@ -366,6 +368,7 @@ class Effect:
     stated: tuple[Stated, ...] = ()
     moves_at_rest: bool = False
     strength: str = ""
+    told_by: str = ""
     words: Mapping[str, str] = field(default_factory=dict)
     is_possible: Callable[[Values], bool] | None = None
     beside: str = ""

@@ -595,3 +595,106 @@ def test_what_leaves_too_little_for_another_name_is_nearly_all():
     for left, is_so in ((100.14, True), (100.16, False)):
         assert CRITERIA.is_nearly_all(made_up(GOOD, left), base()) == is_so
     assert CRITERIA.is_nearly_all(made_up(GOOD, 110.0, whiteness=0.9), base())
+
+
+def test_a_winner_that_explains_too_little_gives_way_to_what_it_is_a_case_of():
+    # Far from the noise a set must explain 99 %: Coulomb friction beside it does not, the
+    # asymmetric one that includes it does; the criterion alone takes the simpler set.
+    start = base(1e6)
+    change = np.tile([-0.1, 0.1], 3)
+    winner, wider = (
+        made_up((friction, "parameter_change:damping"), sse, own=change, whiteness=9.0)
+        for friction, sse in (("coulomb_friction", 1.1e4), ("asymmetric_friction", 9e3))
+    )
+    parts = [
+        made_up((one,), 2e5, own=own, whiteness=9.0)
+        for one, own in (
+            ("coulomb_friction", None),
+            ("asymmetric_friction", None),
+            ("parameter_change:damping", change),
+        )
+    ]
+    verdict = decided(start, [winner, wider, *parts], [parts[0], winner])
+    assert (verdict.word, verdict.chosen) == ("named", wider)
+
+    alone = decided(start, [winner, *parts], [parts[0], winner])
+    assert alone.chosen is parts[0]
+
+
+@pytest.mark.parametrize(
+    ("motion", "word"),
+    [(30.0, "unknown"), (60.0, "named"), (np.inf, "named")],
+)
+def test_an_effect_that_leaves_a_tenth_of_the_motion_is_no_name(motion, word):
+    # It explains 84 % and leaves 4 times the noise.
+    found = made_up(("coulomb_friction",), 1600.0, whiteness=9.0)
+    criteria = replace(CRITERIA, motion=motion)
+    verdict = decided(base(1e4), [found], [found], criteria=criteria)
+    assert verdict.word == word
+
+
+def near_sets(count, core=("end_stop",), others=None):
+    """Sets that leave a tenth, all with the core and something else."""
+    others = others or [
+        "coulomb_friction",
+        "input_dead_zone",
+        "input_saturation",
+        "rate_limit",
+        "hysteresis",
+        "supply_sag",
+        "cogging",
+        "constant_load",
+        "sensor_quadratic",
+        "actuator_lag",
+        "input_delay",
+        "clock_skew",
+    ]
+    return [
+        made_up((*core, one), 4e4, parameters=2, whiteness=9.0)
+        for one in others[:count]
+    ]
+
+
+@pytest.mark.parametrize(("count", "word"), [(12, "named"), (9, "unknown")])
+def test_what_all_sets_near_the_best_one_share_is_named(count, word):
+    # Alone it explains 55 %: too little for a name beside the size of what it leaves.
+    core = made_up(("end_stop",), 1.8e5, whiteness=9.0)
+    sets = near_sets(count)
+    verdict = decided(base(4e5), [core, *sets], [core, sets[0]], unclear=("end_stop",))
+    assert verdict.word == word
+    assert verdict.chosen is core or word == "unknown"
+    assert not verdict.is_complete
+
+
+def test_what_one_near_set_does_without_is_not_named():
+    core = made_up(("end_stop",), 1.8e5, whiteness=9.0)
+    without = made_up(
+        ("coulomb_friction", "hysteresis"), 5e4, parameters=2, whiteness=9
+    )
+    sets = [*near_sets(12), without]
+    assert decided(base(4e5), [core, *sets], [core, sets[0]]).word == "unknown"
+
+
+def test_a_shared_law_that_may_be_a_simpler_one_is_not_named():
+    # Nothing tells this excess at rest from plain friction.
+    core = made_up(("stribeck_friction",), 1.8e5, whiteness=9.0)
+    others = [
+        "input_saturation",
+        "rate_limit",
+        "supply_sag",
+        "constant_load",
+        "sensor_quadratic",
+    ]
+    others += [
+        "actuator_lag",
+        "input_delay",
+        "clock_skew",
+        "end_stop",
+        "spring_gap",
+        "cogging",
+    ]
+    sets = near_sets(11, ("stribeck_friction",), others)
+    fits = [core, *sets]
+    verdict = decided(base(4e5), fits, [core], unclear=("stribeck_friction",))
+    assert verdict.word == "unknown"
+    assert decided(base(4e5), fits, [core]).chosen is core

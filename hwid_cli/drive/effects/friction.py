@@ -100,6 +100,7 @@ STRIBECK = Effect(
         ),
     ),
     confused_with={"coulomb_friction": "slow small triangles, which stick and slip"},
+    told_by="static_excess_N",
     contains=("coulomb_friction",),
 )
 
@@ -127,6 +128,7 @@ HYSTERESIS = Effect(
     confused_with={
         "coulomb_friction": "very slow small triangles, which show the way before sliding"
     },
+    told_by="yield_m",
     contains=("coulomb_friction",),
 )
 
@@ -210,6 +212,7 @@ POSITION = Effect(
         "cogging": "the same slow way forward and backward",
         "coulomb_friction": "slow motion over the whole stroke",
     },
+    told_by="variation_share",
     contains=("coulomb_friction",),
 )
 
