@@ -64,6 +64,7 @@ def coloured(rng, coefficient, rms=NOISE):
 def recordings(hides="", size=0.0, *, spring=True, loop=False, coefficient=0.0, seed=1):
     """What the sensor reads of a drive in which something of some size hides.
 
+    ``asymmetry`` is friction that is twice as large backward as forward.
     Under a controller what the sensor reads goes back into the command, noise too.
     """
     rng = np.random.default_rng(seed)
@@ -89,8 +90,9 @@ def recordings(hides="", size=0.0, *, spring=True, loop=False, coefficient=0.0, 
             force = force + PUSH * behind - stiffness * x
             middle = v + 0.5 * h * (force - DAMPING * v) / MASS
             v = v + h * (force - DAMPING * middle) / MASS
-            if hides == "friction":
-                v = np.sign(v) * np.maximum(np.abs(v) - size * h / MASS, 0.0)
+            if hides in ("friction", "asymmetry"):
+                more = np.where((v < 0) & (hides == "asymmetry"), 2.0, 1.0)
+                v = np.sign(v) * np.maximum(np.abs(v) - more * size * h / MASS, 0.0)
             x = x + 0.5 * h * v
     return [
         Recording(name, command[row], read[row], STEP_S, kind=name.split("_")[0])
