@@ -34,7 +34,7 @@ from hwid_cli.diagnosis.next_experiment import (
     undecided_candidates,
     with_best_lead,
 )
-from hwid_cli.diagnosis.noise import noise_floor
+from hwid_cli.diagnosis.noise import noise_floor, residual_noise, whiteness
 from hwid_cli.diagnosis.parameters import (
     compare_at,
     each_sum_of_squares,
@@ -64,6 +64,7 @@ from hwid_cli.diagnosis.scales import (
 )
 from hwid_cli.diagnosis.search import fit_own
 from hwid_cli.diagnosis.selection import (
+    LEAST_GAIN,
     SMALL_REMAINDER,
     DiagnosisVerdict,
     SelectionCriteria,
@@ -274,10 +275,30 @@ def find(
             return judged
     # Who asks for some effects only wants no formula instead.
     is_open = options.laws == "auto" and options.effects is None
-    if not is_open and options.laws != "only":
+    if is_open or options.laws == "only":
+        verdict, found, law = find_law(rounds, before, force, found, verdict)
+        whole = replace(whole, found=found, verdict=verdict, law=law)
+    return _with_residual_noise(whole)
+
+
+def _with_residual_noise(whole: Findings) -> Findings:
+    """What is left as noise, where nothing explains anything of it and it looks like it."""
+    criteria, base = whole.criteria, whole.base
+    explains = any(
+        criteria.gain(one, base) >= LEAST_GAIN for one in whole.found.fits.values()
+    )
+    # Where a drive stands for another simulation, its own error may have any colour.
+    is_open = whole.verdict.word == "unknown" and criteria.standing is None
+    if explains or not is_open or not base.is_usable:
         return whole
-    verdict, found, law = find_law(rounds, before, force, found, verdict)
-    return replace(whole, found=found, verdict=verdict, law=law)
+    noise = residual_noise(whole.before, criteria.noise, whole.problem.unit)
+    if noise is None:
+        return whole
+    criteria = replace(criteria, noise=noise)
+    left = whiteness([one.residual for one in whole.before], noise)
+    base = replace(base, whiteness=left, cause="coloured_noise")
+    verdict = decide(criteria, whole.given_sse, base, {}, (), lambda _: ())
+    return replace(whole, criteria=criteria, base=base, verdict=verdict)
 
 
 @dataclass(frozen=True, eq=False)

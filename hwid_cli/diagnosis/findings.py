@@ -14,12 +14,18 @@ from hwid_cli.diagnosis.intervals import intervals
 from hwid_cli.diagnosis.latent_force import Smoothed
 from hwid_cli.diagnosis.laws import LawFound
 from hwid_cli.diagnosis.next_experiment import propose
+from hwid_cli.diagnosis.observability import absorbed_effects
 from hwid_cli.diagnosis.parameters import is_factor
 from hwid_cli.diagnosis.pieces import JudgedPieces
 from hwid_cli.diagnosis.problem import Compared, DiagnosisProblem
 from hwid_cli.diagnosis.rounds import RoundsResult
 from hwid_cli.diagnosis.selection import DiagnosisVerdict, SelectionCriteria, ranked
-from hwid_cli.diagnosis.sentences import doubtful_values, hidden_from_view, summarise
+from hwid_cli.diagnosis.sentences import (
+    doubtful_values,
+    hidden_from_view,
+    summarise,
+    taken_up,
+)
 from hwid_cli.diagnosis.simulation_trust import simulation_trust
 from hwid_cli.diagnosis.where import latent_force_curves
 from hwid_cli.drive.catalogue import CATALOGUE, public_id
@@ -101,6 +107,14 @@ class Findings:
             return self.pieces.compared(self.pieces.chosen, self.scales)
         return compared_with_fit(self.problem, chosen, self.scales)
 
+    def absorbed(self) -> tuple[str, ...]:
+        """What the recordings' own zeros take up, in words."""
+        if self.pieces is not None:
+            return ()
+        chosen, noise = self.verdict.chosen, self.criteria.noise
+        found = absorbed_effects(self.problem, chosen, self.scales, noise.rms)
+        return taken_up(found, [public_id(one) for one in chosen.effects])
+
     def trust(self) -> tuple[ModelTrust | None, TrustOnTests]:
         """What is known of the errors on whole recordings, if these can be predicted."""
         if self.pieces is not None:
@@ -136,7 +150,7 @@ def describe(findings: Findings) -> Diagnosis:
         explained_share=_explained(criteria, chosen.sse, from_sse),
         base=parameters,
         places=findings.where,
-        not_observable=hidden_from_view(problem),
+        not_observable=(*hidden_from_view(problem), *findings.absorbed()),
         next_experiment=propose(problem, criteria, scales, verdict, fits),
         train=tuple(one.name for one in problem.signals if not one.is_held_out),
         held_out=tuple(one.name for one in problem.signals if one.is_held_out),

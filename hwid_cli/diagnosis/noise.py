@@ -2,19 +2,26 @@
 
 From repeats where there are some; else from differences of high order, which remove any
 smooth motion; from the rest before the input moves where the noise there is coloured,
-because differences see only its fast part. Colour is correlation between neighbouring
-samples; a filter removes it. All is pooled over pieces of different length.
+because differences see only its fast part. Where there is no rest to read, as under a
+controller that feeds the noise back, from what the re-fitted base leaves, if that has all
+marks of noise. Colour is correlation between neighbouring samples; a filter removes it.
+All is pooled over pieces of different length.
 docs/method_diagnosis.md.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import comb
 
 import numpy as np
 import scipy
 
-from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals, rest_length
+from hwid_cli.diagnosis.problem import (
+    Compared,
+    DiagnosisProblem,
+    Signals,
+    rest_length,
+)
 from hwid_cli.records.diagnosis import NoiseFloor
 from hwid_cli.records.units import behind
 from hwid_cli.trust.repeats import is_same_input
@@ -23,6 +30,7 @@ from hwid_cli.trust.repeats import is_same_input
 FALSE_ALARM = 1e-3
 _LAGS_OF_COLOUR = 10
 _HIGHEST_ORDER = 20
+_LAGS = 30
 # Fewest samples for each coefficient of a filter.
 _SAMPLES_PER_COEFFICIENT = 20
 _FEWEST_AT_REST = 30
@@ -41,6 +49,17 @@ _MORE_THAN_QUIETEST = 3.0
 # Repeats that differ this much more in motion than at rest differ by more than noise.
 # Slow noise reads a little less in a short rest.
 _MORE_IN_MOTION = 2.0
+# Filters of sensors and amplifiers are of a low order. What is left of a missing effect
+# beside noise takes more.
+_ORDER_OF_SENSOR = 3
+# Parts of each recording in which what is left has to have the same spectrum.
+_PARTS = 4
+# Samples behind which a missing effect may show in the innovations of what is left.
+_LATER = (1, 2, 3)
+# Correlations that make the size of coloured noise less sure, at most.
+_MOST_LAGS = 200
+# Directions of columns that make up less than this share of the largest are rounding.
+_LEAST_COLUMN = 1e-10
 
 
 def noise_floor(problem: DiagnosisProblem, *, rests: bool = True) -> NoiseFloor:
@@ -89,7 +108,7 @@ def noise_floor(problem: DiagnosisProblem, *, rests: bool = True) -> NoiseFloor:
 
 
 def whiteness(
-    residuals: Sequence[np.ndarray], noise: NoiseFloor, lags: int = 30
+    residuals: Sequence[np.ndarray], noise: NoiseFloor, lags: int = _LAGS
 ) -> float:
     """Whether residuals hold more than noise.
 
@@ -120,6 +139,120 @@ def whiteness(
         pieces = [np.sign(one) * np.maximum(np.abs(one) - half, 0.0) for one in pieces]
         least = (noise.rms / largest) ** 2
     return portmanteau(pieces, noise.whitening, n_lags=lags, least_variance=least)
+
+
+def residual_noise(
+    compared: Sequence[Compared], noise: NoiseFloor, unit: str
+) -> NoiseFloor | None:
+    """Noise of one colour that is all that a base leaves; None where more may be left.
+
+    Noise is alike in all recordings and all along them, and does not know what the drive
+    does. A filter of low order, from the training recordings, has to make white what is
+    left of all; its innovations must then have the same power in every octave of every
+    part of a recording, and must not go with input and motion.
+
+    Parameters
+    ----------
+    compared : sequence of Compared
+        With the re-fitted base.
+    noise : NoiseFloor
+        As found without a model: from differences, which see no colour.
+
+    References
+    ----------
+    docs/method_diagnosis.md, eq. (D28b).
+    """
+    parts = [one.residual for one in compared]
+    shortest = min(one.size for one in parts)
+    is_told = noise.method != "differences" or noise.resolution > 0
+    if is_told or shortest < _PARTS * _FEWEST_AT_REST:
+        return None
+    size = _rms(parts)
+    if not (np.isfinite(size) and size > 0):
+        return None
+    parts = [one / size for one in parts]
+    train = [part for part, one in zip(parts, compared, strict=True)
+             if not one.signals.is_held_out] or parts  # fmt: skip
+    taps, _ = _short_filter(train, _highest_order(train, _ORDER_OF_SENSOR))
+    whitening = tuple(float(tap) for tap in taps)
+    order = len(whitening) - 1
+    white = [scipy.signal.lfilter(taps, [1.0], one)[order:] for one in parts]
+    is_noise = (
+        order > 0
+        and portmanteau(parts, whitening, n_lags=_LAGS) <= 1.0
+        and _is_even(white)
+        and not _goes_with_motion(white, compared)
+    )
+    if not is_noise:
+        return None
+    sentence = _sentence(_Stretch(size, True, whitening), "residuals", 0.0, unit)
+    return replace(
+        noise, rms=size, method="residuals", is_coloured=True, whitening=whitening,
+        sentence=f"{sentence} ({_colour(parts, size, unit)})",
+    )  # fmt: skip
+
+
+def _is_even(white: Sequence[np.ndarray]) -> bool:
+    """Whether each octave of each part of each piece has the same power, but for chance.
+
+    The periodogram of white noise has independent ordinates, exponentially distributed.
+    Fisher's sum of the logarithms of all chances, and the least of them.
+    """
+    variance = _rms(white) ** 2
+    chances = []
+    for piece in white:
+        for part in np.array_split(piece, _PARTS):
+            power = np.abs(np.fft.rfft(part)[1 : (part.size + 1) // 2]) ** 2
+            power /= part.size * variance
+            edges = 2 ** np.arange(int(np.log2(max(power.size, 1))) + 1) - 1
+            for octave in np.split(power, edges[1:]):
+                chances.append(scipy.special.gammaincc(octave.size, octave.sum()))
+    found = np.maximum(chances, 1e-300)
+    together = scipy.special.gammaincc(found.size, -np.sum(np.log(found)))
+    return bool(together >= FALSE_ALARM and found.min() >= FALSE_ALARM / found.size)
+
+
+def _goes_with_motion(
+    white: Sequence[np.ndarray], compared: Sequence[Compared]
+) -> bool:
+    """Whether innovations go with what was before them: with input or motion.
+
+    Before them only: under a controller the input holds the noise of its own sample.
+    """
+    width = len(_LATER) * _functions_of_motion(compared[0]).shape[1]
+    gram, along = np.zeros((width, width)), np.zeros(width)
+    for piece, one in zip(white, compared, strict=True):
+        table = _functions_of_motion(one)[one.signals.evaluated]
+        rows = np.arange(table.shape[0] - piece.size, table.shape[0])
+        block = np.hstack([table[np.maximum(rows - lag, 0)] for lag in _LATER])
+        gram += block.T @ block
+        along += block.T @ piece
+    lengths = np.sqrt(np.diag(gram))
+    lengths[lengths == 0] = 1.0
+    sizes, basis = np.linalg.eigh(gram / np.outer(lengths, lengths))
+    used = sizes > _LEAST_COLUMN * sizes[-1]
+    scores = basis[:, used].T @ (along / lengths) / np.sqrt(sizes[used])
+    statistic = float(scores @ scores) / _rms(white) ** 2
+    return _chance_of(statistic, scores.size) < FALSE_ALARM
+
+
+def _chance_of(statistic: float, freedom: int) -> float:
+    """Chance of a chi-squared statistic as large as this one."""
+    return float(scipy.special.gammaincc(freedom / 2.0, statistic / 2.0))
+
+
+def _functions_of_motion(one: Compared) -> np.ndarray:
+    """What missing forces and sensors go with, of the simulated motion and the input."""
+    u, x, v = one.signals.driven_by, one.position, one.velocity
+    time = one.signals.sample_time_s * np.arange(x.size)
+    return np.column_stack(
+        [
+            np.ones(x.size), time, time**2,
+            u, np.abs(u), u**2, u**3, u * x, u * x**2,
+            x, np.abs(x), x**2, x**3, np.sign(x),
+            v, np.abs(v), v * np.abs(v), np.sign(v), v * x,
+        ]
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,11 +302,31 @@ def _whitening_filter(pieces: Sequence[np.ndarray]) -> np.ndarray:
 
     Either of an order up to 20, or the long one of slow noise beside white noise,
     ``(1 - phi/z) / (1 - theta/z)``, whichever has the lowest information criterion of
-    Schwarz. Least squares on earlier samples.
+    Schwarz.
     """
+    highest = _highest_order(pieces, _HIGHEST_ORDER)
+    best, lowest = _short_filter(pieces, highest)
+    count = sum(piece.size - highest for piece in pieces)
+    long, remaining = _long_filter(pieces, highest)
+    if remaining > 0 and count * np.log(remaining) + 2 * np.log(count) < lowest:
+        return long
+    return best
+
+
+def _highest_order(pieces: Sequence[np.ndarray], most: int) -> int:
+    """Order of a filter that pieces have enough samples for."""
     total = sum(piece.size for piece in pieces)
     shortest = min(piece.size for piece in pieces)
-    highest = min(_HIGHEST_ORDER, shortest // 2, total // _SAMPLES_PER_COEFFICIENT)
+    return min(most, shortest // 2, total // _SAMPLES_PER_COEFFICIENT)
+
+
+def _short_filter(
+    pieces: Sequence[np.ndarray], highest: int
+) -> tuple[np.ndarray, float]:
+    """Filter of the best order up to the highest, and Schwarz's criterion.
+
+    Least squares on earlier samples.
+    """
     # All orders predict the same samples, or their criteria could not be compared.
     windows = [np.lib.stride_tricks.sliding_window_view(one, highest + 1)[:, ::-1]
                for one in pieces]  # fmt: skip
@@ -190,10 +343,7 @@ def _whitening_filter(pieces: Sequence[np.ndarray]) -> np.ndarray:
         criterion = count * np.log(remaining) + order * np.log(count)
         if criterion < lowest:
             best, lowest = np.concatenate([[1.0], -taps]), criterion
-    long, remaining = _long_filter(pieces, highest)
-    if remaining > 0 and count * np.log(remaining) + 2 * np.log(count) < lowest:
-        return long
-    return best
+    return best, float(lowest)
 
 
 def _long_filter(pieces: Sequence[np.ndarray], first: int) -> tuple[np.ndarray, float]:
@@ -491,8 +641,27 @@ def _sentence(found: _Stretch, method: str, resolution: float, unit: str) -> str
         "repeats": "from what repeats differ by",
         "rest": "from the rest before the input moves",
         "differences": "from sixth differences",
+        "residuals": "from what the re-fitted simulation leaves",
     }[method]
     if found.rms == 0:
         return f"no noise, {source}"
     colour = "coloured" if found.is_coloured else "white"
     return f"{colour} noise of {found.rms:.2g}{behind(unit)}, {source}"
+
+
+def _colour(parts: Sequence[np.ndarray], size: float, unit: str) -> str:
+    """How sure the size of coloured noise is, and how its samples go together.
+
+    ``parts`` have an RMS of 1, ``size`` is that of the noise.
+    """
+    n_lags = min(min(one.size for one in parts) // _PARTS, _MOST_LAGS)
+    sums, counts = _autocovariances(parts, n_lags)
+    correlations = sums[1:] / counts[1:]
+    # Bartlett: of Gaussian noise the mean square has the variance 2 sum r^2 / n.
+    together = 1.0 + 2.0 * float(correlations @ correlations)
+    reach = 1.96 * float(np.sqrt(together / (2.0 * counts[0])))
+    return (
+        f"95 % interval {size * (1 - reach):.3g} to {size * (1 + reach):.3g}"
+        f"{behind(unit)}; neighbouring samples correlate by {correlations[0]:.2f}; alike in "
+        "all recordings and all along them, and it goes with neither input nor motion"
+    )

@@ -11,7 +11,7 @@ from hwid_cli.diagnosis.selection import (
     lead,
     title_of,
 )
-from hwid_cli.drive.catalogue import public_id
+from hwid_cli.drive.catalogue import CATALOGUE, public_id
 from hwid_cli.records.candidates import CAUSES, CandidateFit
 from hwid_cli.records.diagnosis import (
     STILL_LARGE,
@@ -240,6 +240,27 @@ def hidden_from_view(problem: DiagnosisProblem) -> tuple[str, ...]:
     if len(problem.part(held_out=True).signals) == 0:
         texts.append("how the result does on other recordings: there is only one")
     return tuple(texts)
+
+
+def taken_up(effects: Sequence[str], named: Sequence[str]) -> tuple[str, ...]:
+    """Say which effects the free zeros of the recordings hide, and what would show them.
+
+    Parameters
+    ----------
+    effects, named : sequence of str
+        Public ids.
+    """
+    if not effects:
+        return ()
+    wider = [f"{of} may be {one}, with the named size as the mean of its parts"
+             for one in effects for of in named if of in CATALOGUE[one].contains]  # fmt: skip
+    means = f" ({'; '.join(wider)})" if wider else ""
+    return (
+        f"{' and '.join(effects)}: each recording's zero is free and takes up the constant "
+        f"shift that is all they would change{means}; recordings in both directions that "
+        "keep one known zero, where the spring is relaxed, show it with "
+        "diagnose.initial_state: estimated",
+    )
 
 
 def _moves_one_way(problem: DiagnosisProblem) -> bool:

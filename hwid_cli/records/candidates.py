@@ -9,6 +9,7 @@ CAUSES = {
     "input_noise": "noise of the measured input, seen through the drive",
     "zeros": "the sensor's zero, which differs between recordings",
     "interpolation": "noise that interpolation between uneven samples has linked",
+    "coloured_noise": "coloured noise, of one size and colour in all recordings",
 }
 
 

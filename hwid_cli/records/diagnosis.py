@@ -110,7 +110,7 @@ class NoiseFloor:
     ----------
     rms : float, [output unit]
     method : str
-        ``repeats``, ``rest`` or ``differences``.
+        ``repeats``, ``rest``, ``differences`` or ``residuals``.
     resolution : float, [output unit]
         Smallest difference of a coarse sensor; 0 where it is not the limit.
     is_coloured : bool

@@ -136,7 +136,8 @@ def gap_table(diagnosis: Diagnosis) -> Table:
     """
     steps = [
         ("as given", diagnosis.given),
-        ("base re-fitted", diagnosis.before),
+        # Without effects the gap is that of the simulation as given.
+        ("base re-fitted", diagnosis.before if diagnosis.effects else diagnosis.after),
         ("with the effects", diagnosis.after),
     ]
     unit = diagnosis.output_unit
