@@ -27,8 +27,12 @@ from hwid_cli.records.drive import Drive
 # Single repeats are damage where they are between these shares of the samples: more are
 # a hold, fewer may be chance.
 _LEAST_REPEATED, _MOST_REPEATED = 2e-3, 0.25
-# Repeats are damage where they are so many times those that a signal in steps has.
+# Repeats are damage where they are so many times those that a signal in steps has, and
+# where so many happen by chance with less than this probability, or the signal bends so
+# many times more there than usual.
 _BY_CHANCE = 2.0
+_LEAST_CHANCE = 1e-3
+_STOPPED = 3.0
 # The input's noise may be so many times what its differences show.
 _LESS_NOISE, _MORE_NOISE = 0.7, 1.3
 # Innovations may be so far from white where the noise's size is right.
@@ -76,14 +80,29 @@ def _repeats(values: np.ndarray) -> np.ndarray:
     single = same[1:-1] & ~same[:-2] & ~same[2:]
     share = np.count_nonzero(single) / values.size
     moving = np.count_nonzero(~same) / values.size
-    is_damage = np.count_nonzero(single) > _BY_CHANCE * max(_one_step(values), 1.0)
     if (
-        is_damage
+        _are_too_many(values, single)
         and _LEAST_REPEATED <= share <= _MOST_REPEATED
         and moving > 1 - _MOST_REPEATED
     ):
         found[2:-1] = single
     return found
+
+
+def _are_too_many(values: np.ndarray, single: np.ndarray) -> bool:
+    """Whether repeats are more than a signal in steps has by chance.
+
+    Of noise in steps no step, one up and one down are about as likely; the smallest
+    move of all says nothing of steps. A smooth signal stops at its repeats.
+    """
+    n_repeats, by_steps = int(np.count_nonzero(single)), _one_step(values)
+    if n_repeats <= _BY_CHANCE * max(by_steps, 1.0):
+        return False
+    n_steps = max(round(2.0 * by_steps) - 1, 0)
+    chance = float(scipy.special.bdtrc(n_repeats - 1, n_repeats + n_steps, 1 / 3))
+    bends = np.abs(np.diff(values, 2))[1:]
+    stops = np.median(bends[single]) > _STOPPED * np.median(bends)
+    return chance < _LEAST_CHANCE or bool(stops)
 
 
 def _one_step(values: np.ndarray) -> float:

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from hwid_cli.diagnosis.causes import without_repeats
 from hwid_cli.diagnosis.diagnose import compared_as_given
 from hwid_cli.diagnosis.problem import prepare
 from hwid_cli.records.drive import DriveResponse
@@ -32,7 +33,8 @@ def simulate_recordings(
     tuple of SimulatedRecording
         In the order of the recordings. NaN where the simulation runs away.
     """
-    problem = prepare(recordings, simulation, options, ())
+    # As a diagnosis does: its numbers are those of the simulation that it writes.
+    problem = without_repeats(prepare(recordings, simulation, options, ()))
     return tuple(
         DriveResponse(
             one.signals.name,
