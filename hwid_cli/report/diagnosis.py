@@ -136,7 +136,7 @@ def gap_table(diagnosis: Diagnosis) -> Table:
     """
     steps = [
         ("as given", diagnosis.given),
-        ("base re-fitted", diagnosis.before),
+        ("base re-fitted", diagnosis.refitted),
         ("with the effects", diagnosis.after),
     ]
     unit = diagnosis.output_unit

@@ -79,6 +79,15 @@ def test_the_gap_closes_row_by_row():
     )
 
 
+def test_parameters_that_were_off_are_shown_with_the_gap_that_fitting_them_leaves():
+    found = nothing_missing("parameters")
+
+    assert gap_table(found).rows == (
+        ("as given", "7.10e-04", "7.40e-04", "35.2"),
+        ("base re-fitted", "2.09e-05", "2.10e-05", "1.000"),
+    )
+
+
 def test_without_effects_nothing_is_shown_with_them():
     found = unknown()
 

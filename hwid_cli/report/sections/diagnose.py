@@ -329,8 +329,14 @@ def _gap_table(found: Mapping[str, Any]) -> Table | None:
     gap = found.get("gap")
     if not isinstance(gap, Mapping):
         return None
+    steps = [("as given", "given"), ("base re-fitted", "refitted")]
+    if "refitted" not in gap:
+        # As files of earlier versions are.
+        steps = [("before", "before")]
+    if found.get("effects"):
+        steps.append(("with the effects", "after"))
     rows = []
-    for label, key in (("before", "before"), ("with the effects", "after")):
+    for label, key in steps:
         part = gap.get(key) or {}
         cells = [_text(part.get(one)) for one in ("train_rms", "held_out_rms")]
         rows.append((label, *cells, _text(part.get("ratio_to_noise"))))
