@@ -140,7 +140,7 @@ def describe(findings: Findings) -> Diagnosis:
         next_experiment=propose(problem, criteria, scales, verdict, fits),
         train=tuple(one.name for one in problem.signals if not one.is_held_out),
         held_out=tuple(one.name for one in problem.signals if one.is_held_out),
-        candidates=ranked(criteria, fits, base, findings.found.shares),
+        candidates=ranked(criteria, fits, base, findings.found.shares, verdict),
         gaps=_recording_gaps(problem, given_sse, base, chosen),
         overlays=_overlays(before, after, noise),
         latent_force=_force_curves(findings, None if is_base else after),

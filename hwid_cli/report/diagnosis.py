@@ -85,12 +85,6 @@ def candidate_name(effects: Sequence[str]) -> str:
     return AND.join(effects) or NO_EFFECT
 
 
-def is_chosen(candidate: RankedCandidate, diagnosis: Diagnosis) -> bool:
-    """Say whether a candidate is what the diagnosis names."""
-    found = {effect.id for effect in diagnosis.effects}
-    return bool(found) and set(candidate.effects) == found
-
-
 # Where something else remains, an effect also takes up some of that.
 INTERVALS_OF_A_PART = "intervals hold as if nothing else were missing"
 
@@ -189,13 +183,18 @@ def _shift(one: BaseParameter, fitted: float) -> str:
     return f"{100.0 * (fitted / one.before - 1.0):+.1f} %"
 
 
+def is_chosen(candidate: RankedCandidate) -> bool:
+    """Say whether a candidate is what the diagnosis names."""
+    return bool(candidate.effects) and candidate.role == "diagnosis"
+
+
 def ranking_table(diagnosis: Diagnosis, *, count: int | None = None) -> Table:
     """Show the candidates, the best first.
 
     Parameters
     ----------
     count : int or None, [-]
-        How many; None for all.
+        How many, and the diagnosis where it ranks below them; None for all.
 
     Returns
     -------
@@ -203,12 +202,17 @@ def ranking_table(diagnosis: Diagnosis, *, count: int | None = None) -> Table:
         What was not fitted has a forecast only.
     """
     has_noise = diagnosis.noise.rms > 0.0
+    shown = [
+        one
+        for rank, one in enumerate(diagnosis.candidates)
+        if count is None or rank < count or is_chosen(one)
+    ]
     rows = []
-    for one in diagnosis.candidates[:count]:
+    for one in shown:
         error = one.held_out_rms
         rows.append(
             (
-                candidate_name(one.effects) + "*" * is_chosen(one, diagnosis),
+                candidate_name(one.effects) + "*" * is_chosen(one),
                 percent(one.forecast_share),
                 _ratio(error / diagnosis.noise.rms) if has_noise else number(error),
                 percent(one.explained_share),
@@ -218,7 +222,7 @@ def ranking_table(diagnosis: Diagnosis, *, count: int | None = None) -> Table:
             )
         )
     mark = " (* the diagnosis)" if diagnosis.effects else ""
-    left = [one for one in diagnosis.candidates[:count] if np.isnan(one.held_out_rms)]
+    left = [one for one in shown if np.isnan(one.held_out_rms)]
     why = f"{MISSING}: left after its first iterations, where others were better."
     heads = (
         "forecast",

@@ -121,6 +121,24 @@ def test_the_ranking_marks_the_chosen_candidate_only():
     assert not [row for row in ranking_table(unknown()).rows if "*" in row[0]]
 
 
+def test_the_star_stands_on_the_set_of_the_diagnosis_and_on_no_namesake():
+    curved, plain = (
+        replace(named().candidates[0], effects=effects, role=role)
+        for effects, role in (
+            (("one_sided_stop:contact",), "diagnosis"),
+            (("one_sided_stop",), ""),
+        )
+    )
+    stop = replace(FRICTION, id="one_sided_stop")
+    found = replace(named(), effects=(stop,), candidates=(plain, curved))
+
+    names = [row[0] for row in ranking_table(found).rows]
+    assert names == ["one_sided_stop", "one_sided_stop:contact*"]
+    # A set that ranks below those that are shown is shown nevertheless.
+    few = [row[0] for row in ranking_table(found, count=1).rows]
+    assert few == names
+
+
 def test_the_ranking_without_noise_shows_the_rms_itself():
     found = named()
     table = ranking_table(replace(found, noise=replace(found.noise, rms=0.0)))
