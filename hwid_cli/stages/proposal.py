@@ -108,7 +108,7 @@ def propose(
         names=tuple(names),
         problems=tuple(problems),
         average=max(1, memory // _ENOUGH_SAMPLES),
-        initial_state=_initial_state(raws, kinds, recipes, is_cut=bool(parts)),
+        initial_state=_initial_state(raws, recipes, is_cut=bool(parts)),
     )
 
 
@@ -230,7 +230,6 @@ def _of_kind(raw: RawRecording, kind: str) -> RawRecording:
 
 def _initial_state(
     raws: Sequence[RawRecording],
-    kinds: dict[str, str],
     recipes: dict[str, tuple[str, ...]],
     *,
     is_cut: bool,
