@@ -15,7 +15,7 @@ from hwid_cli.records.diagnosis import (
 )
 from hwid_cli.records.drive import DriveResponse
 from hwid_cli.records.units import behind
-from hwid_cli.report.formats import MISSING, counted, decimals, number
+from hwid_cli.report.formats import MISSING, counted, decimals, listed, number
 from hwid_cli.report.table import Column, Heading, Table, Text, numbers, texts
 
 # What a unit in a name is made of.
@@ -396,20 +396,41 @@ def effect_sentences(diagnosis: Diagnosis) -> list[str]:
     return found
 
 
-def used_sentence(diagnosis: Diagnosis) -> str:
-    """Say what the effects were fitted to and validated on."""
-    return (
+def used_sentence(diagnosis: Diagnosis, tests: Sequence[str] = ()) -> str:
+    """Say what the effects were fitted to and validated on.
+
+    Parameters
+    ----------
+    tests : sequence of str
+        Recordings of the final test of models: a diagnosis holds out its own.
+    """
+    text = (
         f"Trained on {counted(len(diagnosis.train), 'recording')}, validated on "
         f"{counted(len(diagnosis.held_out), 'recording')} held out."
     )
+    trained = [one for one in tests if one in diagnosis.train]
+    if trained:
+        text += (
+            f" Trained on {listed(trained)} of test.recordings too, which are kept from "
+            "models only; diagnose.recordings says which are used."
+        )
+    return text
 
 
-def diagnosis_blocks(diagnosis: Diagnosis) -> list[Text | Heading | Table]:
-    """Collect what the screen shows of a diagnosis: little where nothing is missing."""
+def diagnosis_blocks(
+    diagnosis: Diagnosis, tests: Sequence[str] = ()
+) -> list[Text | Heading | Table]:
+    """Collect what the screen shows of a diagnosis: little where nothing is missing.
+
+    Parameters
+    ----------
+    tests : sequence of str
+        Recordings of the final test of models.
+    """
     is_short = diagnosis.verdict in _SHORT
     sentences = [verdict_sentence(diagnosis), diagnosis.summary]
     sentences += warning_sentences(diagnosis.warnings)
-    sentences += [used_sentence(diagnosis), *effect_sentences(diagnosis)]
+    sentences += [used_sentence(diagnosis, tests), *effect_sentences(diagnosis)]
     blocks: list[Text | Heading | Table] = [
         Text(one) for one in sentences if one.strip()
     ]

@@ -575,7 +575,10 @@ STAGE = Stage(
         f"{len(given.recordings)} recordings from the cache" if is_stored else ""
     ),
     write_files=_write_files,
-    tables=lambda context, result: diagnosis_blocks(result),
+    tables=lambda context, result: diagnosis_blocks(
+        result,
+        () if context.experiment.test is None else context.experiment.test.recordings,
+    ),
     files=(
         "diagnosis.json",
         "ranking.csv",

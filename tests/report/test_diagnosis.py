@@ -14,8 +14,9 @@ from hwid_cli.report.diagnosis import (
     quantity_and_unit,
     ranking_table,
     recordings_table,
+    used_sentence,
 )
-from hwid_cli.report.table import as_text
+from hwid_cli.report.table import Text, as_text
 from tests.report.diagnosis_examples import (
     DRAG,
     FRICTION,
@@ -86,6 +87,20 @@ def test_parameters_that_were_off_are_shown_with_the_gap_that_fitting_them_leave
         ("as given", "7.10e-04", "7.40e-04", "35.2"),
         ("base re-fitted", "2.09e-05", "2.10e-05", "1.000"),
     )
+
+
+def test_test_recordings_that_the_diagnosis_was_trained_on_are_told():
+    found = named()
+    tests = (found.train[0], found.held_out[0], "not_diagnosed")
+
+    (line,) = [
+        one.text
+        for one in diagnosis_blocks(found, tests)
+        if isinstance(one, Text) and one.text.startswith("Trained on")
+    ]
+    assert f"Trained on {found.train[0]} of test.recordings too" in line
+    assert "test.recordings" not in used_sentence(found, found.held_out)
+    assert "test.recordings" not in used_sentence(found)
 
 
 def test_without_effects_nothing_is_shown_with_them():
