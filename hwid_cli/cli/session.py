@@ -82,8 +82,9 @@ class Session:
     def show_notes(self) -> None:
         """Show what was held back."""
         if not self.is_quiet:
-            for text in self.notes:
-                click.echo(text, err=True)
+            # One by one: lines of progress come from a thread of their own.
+            while self.notes:
+                click.echo(self.notes.pop(0), err=True)
         self.notes.clear()
 
     def plan(self, *stages: str) -> None:
