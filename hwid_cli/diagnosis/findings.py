@@ -148,7 +148,7 @@ def describe(findings: Findings) -> Diagnosis:
         reference_current_A=problem.drive.reference_current_A,
         reference_displacement_m=problem.drive.reference_displacement_m,
         output_unit=problem.unit,
-        warnings=(*findings.warnings, *doubtful_values(parameters)),
+        warnings=(*findings.warnings, *doubtful_values(parameters, problem.drive)),
         axis=problem.drive.axis,
         output=problem.drive.output,
         law=None if findings.law is None else _law(findings.law, effects),
