@@ -411,8 +411,8 @@ def used_sentence(diagnosis: Diagnosis, tests: Sequence[str] = ()) -> str:
     trained = [one for one in tests if one in diagnosis.train]
     if trained:
         text += (
-            f" Trained on {listed(trained)} of test.recordings too, which are kept from "
-            "models only; diagnose.recordings says which are used."
+            f" Among those trained on: {listed(trained)} of test.recordings, kept away "
+            "from models only; diagnose.recordings says which are used."
         )
     return text
 

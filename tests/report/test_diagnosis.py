@@ -98,7 +98,7 @@ def test_test_recordings_that_the_diagnosis_was_trained_on_are_told():
         for one in diagnosis_blocks(found, tests)
         if isinstance(one, Text) and one.text.startswith("Trained on")
     ]
-    assert f"Trained on {found.train[0]} of test.recordings too" in line
+    assert f"Among those trained on: {found.train[0]} of test.recordings" in line
     assert "test.recordings" not in used_sentence(found, found.held_out)
     assert "test.recordings" not in used_sentence(found)
 
