@@ -8,6 +8,7 @@ from typing import Any
 
 from hwid_cli.cli.closing import say_end
 from hwid_cli.cli.options import Choices
+from hwid_cli.cli.progress_lines import ProgressLines
 from hwid_cli.cli.report import FILE, write_report
 from hwid_cli.cli.session import (
     Session,
@@ -131,15 +132,19 @@ def text_of(session: Session, blocks: Sequence[Block], width: int = WIDTH) -> st
 
 
 def _run(session: Session, stage: Stage) -> Any:
-    context = context_of(session)
+    runner = StageRunner(session, stage.name)
+    with ProgressLines(session, lambda: runner.doing):
+        return _bring_up_to_date(session, stage, runner)
+
+
+def _bring_up_to_date(session: Session, stage: Stage, runner: "StageRunner") -> Any:
+    context, timer = context_of(session), Timer()
     given = session.given[stage.name] = stage.choose(context)
     for warning in stage.warnings(context, given):
         _log.warning("%s", warning)
-    timer = Timer()
     key = "" if stage.key is None else stage.key(given)
     is_stored, result = _stored(session, stage, key)
     origin = None
-    runner = StageRunner(session, stage.name)
     if not is_stored:
         result = stage.compute(given, runner)
         if stage.storage is not None:
@@ -193,11 +198,24 @@ class StageRunner:
         Of the stage, for the progress bar and ``--force``.
     parts : list
         What was done so far, filled by the runner.
+    bars : list of StageProgress
+        Of what is under way, filled by the runner.
     """
 
     session: Session
     name: str
     parts: list["_Part"] = field(default_factory=list)
+    bars: list[StageProgress] = field(default_factory=list)
+
+    @property
+    def place(self) -> str:
+        """The stage with its place among those of the command."""
+        return f"{self.session.place(self.name)} {self.name}".lstrip()
+
+    @property
+    def doing(self) -> str:
+        """What is under way, in words."""
+        return self.bars[-1].text if self.bars else self.place
 
     @property
     def counted(self) -> str:
@@ -245,11 +263,12 @@ class StageRunner:
         callable
             Takes what the next round does and how many tasks it has.
         """
-        label = f"{self.session.place(self.name)} {self.name}".lstrip()
         with self._progress(0, unit, "") as (settings, progress):
             yield (
                 settings,
-                lambda text, total: progress.begin_round(f"{label}: {text}", total),
+                lambda text, total: progress.begin_round(
+                    f"{self.place}: {text}", total
+                ),
             )
 
     @contextmanager
@@ -258,7 +277,7 @@ class StageRunner:
     ) -> Iterator[tuple[RunSettings, StageProgress]]:
         session, timer = self.session, Timer()
         label = f"{self.name} {part}".rstrip()
-        shown = f"{session.place(self.name)} {label}".lstrip()
+        shown = f"{self.place} {part}".rstrip()
         with StageProgress(shown, total, unit, is_silent=session.is_quiet) as progress:
 
             def on_done(item: TaskDone) -> None:
@@ -267,7 +286,9 @@ class StageRunner:
             store = Hdf5Store(session.cache)
             is_forced = self.name in session.forced
             settings = RunSettings(store, session.workers, is_forced, on_done)
+            self.bars.append(progress)
             yield settings, progress
+            self.bars.pop()
         if store.unusable:
             _log.warning(
                 "%s: %d damaged entries of the cache set aside, computed again "

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from hwid_cli.cli.options import Choices
+from hwid_cli.cli.progress_lines import ProgressLines
 from hwid_cli.cli.session import Session, Timer, open_session
 from hwid_cli.config.load import describe_experiment
 from hwid_cli.errors import ConfigError
@@ -108,6 +109,7 @@ def _draw(
         StageProgress(
             "figures", len(tasks), "figures", is_silent=session.is_quiet
         ) as bar,
+        ProgressLines(session, lambda: bar.text),
         closing(compute(tasks, workers)) as results,
     ):
         for file, (png, _) in results:

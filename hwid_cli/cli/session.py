@@ -3,7 +3,7 @@
 import shutil
 import time
 from collections.abc import Iterator
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -81,10 +81,12 @@ class Session:
 
     def show_notes(self) -> None:
         """Show what was held back."""
-        if not self.is_quiet:
-            for text in self.notes:
-                click.echo(text, err=True)
-        self.notes.clear()
+        # One by one: lines of progress come from a thread of their own, which may be first.
+        with suppress(IndexError):
+            while True:
+                text = self.notes.pop(0)
+                if not self.is_quiet:
+                    click.echo(text, err=True)
 
     def plan(self, *stages: str) -> None:
         """Add stages to those that the command works through, each once."""

@@ -357,7 +357,11 @@ def _validation_lines(layout: FolderLayout, proposal: Proposal) -> list[str]:
         "order: {maps: [none], units: [3, 5]}",
     ]
     if proposal.held_out:
-        lines += ["# Kept away from everything else: they judge the final models."]
+        lines += [
+            "# Kept away from all fits of models, whose final ones they judge. 'hwid diagnose' "
+            "uses them too:",
+            "# it holds out recordings of its own (diagnose.hold_out, diagnose.recordings).",
+        ]
         lines += [f"test: {{recordings: {_flow(list(proposal.held_out))}}}"]
     return lines
 

@@ -44,6 +44,9 @@ _JUMP = 5.0
 # the other noise moves the reading over several steps, and the error of rounding is
 # noise like any other.
 _GRID_SHARE = 0.5
+# Values that all differ lie on a grid where their distances are so many multiples of the
+# smallest one: of values on none already a few are not.
+_FEWEST_MULTIPLES = 5
 # A piece in which this much more happens than in the quietest one is no rest.
 _MORE_THAN_QUIETEST = 3.0
 # Repeats that differ this much more in motion than at rest differ by more than noise.
@@ -85,7 +88,10 @@ def noise_floor(problem: DiagnosisProblem, *, rests: bool = True) -> NoiseFloor:
     repeats = _from_repeats(problem.signals, differences)
     may_move = problem.start == "estimated"
     rest = None if is_limited or not rests else _from_rest(problem.signals, may_move)
-    if repeats is not None and not (is_limited and repeats.rms < step):
+    # Below its grid a sensor shows nothing: a reading that stands still is no less noise.
+    if rest is not None and rest.rms < step:
+        rest = None
+    if repeats is not None and repeats.rms >= step:
         found, method = repeats, "repeats"
     elif rest is not None and rest.is_coloured:
         found, method = rest, "rest"
@@ -490,14 +496,23 @@ def _grid_of(piece: np.ndarray) -> float:
     steps = np.diff(levels)
     # What is left over from rounding is no step.
     steps = steps[steps > 1e-9 * max(float(np.ptp(levels)), 1e-300)]
-    if steps.size < 1 or 4 * (steps.size + 1) > 3 * piece.size:
+    if steps.size < 1:
         return 0.0
     smallest = float(np.min(steps))
     ratios = steps / smallest
     # Wide gaps are left out, over which the rounding of the file adds up.
     ratios = ratios[ratios <= 20]
-    is_multiple = np.abs(ratios - np.round(ratios)) < 0.05
-    return smallest if ratios.size * 2 > steps.size and is_multiple.all() else 0.0
+    if (np.abs(ratios - np.round(ratios)) >= 0.05).any():
+        return 0.0
+    comes_again = 4 * (steps.size + 1) <= 3 * piece.size
+    if comes_again and 2 * ratios.size > steps.size:
+        return smallest
+    # A fast motion meets no level twice. What rounding leaves of it is noise; without
+    # that it is a motion whose own steps are multiples, as under a constant force.
+    has_many = np.unique(np.round(ratios[ratios > 1.5])).size >= _FEWEST_MULTIPLES
+    rounding = smallest / np.sqrt(12)
+    is_rounded = _difference_rms([piece], _ORDER, rounding) >= _GRID_SHARE * rounding
+    return smallest if has_many and is_rounded else 0.0
 
 
 def _from_repeats(all_signals: Sequence[Signals], white_rms: float) -> _Stretch | None:

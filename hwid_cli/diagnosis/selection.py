@@ -8,7 +8,7 @@ docs/method_diagnosis.md, eq. (D21) to (D25).
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import combinations
 from math import inf
 
@@ -421,6 +421,7 @@ def ranked(
     found: Sequence[CandidateFit],
     base: CandidateFit,
     shares: Mapping[tuple[str, ...], float],
+    verdict: "DiagnosisVerdict",
 ) -> tuple[RankedCandidate, ...]:
     """Table of all candidates, the best first.
 
@@ -428,8 +429,15 @@ def ranked(
     ----------
     shares : dict of tuple of str to float
         Forecasts, of candidates that were not fitted as well.
+    verdict : DiagnosisVerdict
+        Whose set and rivals are marked, with the errors that it states.
     """
-    rows = [_row(criteria, one, base, shares) for one in found]
+    told = {one.effects: ("rival", one) for one in verdict.rivals}
+    told[verdict.chosen.effects] = ("diagnosis", verdict.chosen)
+    rows = []
+    for fit in found:
+        role, one = told.get(fit.effects, ("", fit))
+        rows.append(replace(_row(criteria, one, base, shares), role=role))
     rows.sort(key=lambda row: -row.bic_gain if np.isfinite(row.bic_gain) else np.inf)
     fitted = {one.effects for one in found}
     nan = float("nan")

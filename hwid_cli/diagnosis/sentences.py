@@ -12,6 +12,7 @@ from hwid_cli.diagnosis.selection import (
     title_of,
 )
 from hwid_cli.drive.catalogue import CATALOGUE, public_id
+from hwid_cli.records.axis import name_on
 from hwid_cli.records.candidates import CAUSES, CandidateFit
 from hwid_cli.records.diagnosis import (
     STILL_LARGE,
@@ -19,7 +20,13 @@ from hwid_cli.records.diagnosis import (
     FittedEffect,
     NoiseFloor,
 )
+from hwid_cli.records.drive import Drive
 
+# What moves and what drives it, by axis.
+_WORDS = {
+    "linear": ("mass", "force constant"),
+    "rotary": ("inertia", "torque constant"),
+}
 # Share of the largest displacement that counts as motion to one side.
 _ONE_SIDE = 0.05
 # The gap sits in recordings that hold this share of it ...
@@ -192,8 +199,10 @@ def _rows_of_gap(excess: np.ndarray, kinds: list[str]) -> list[int]:
     return sorted(largest[:n_most]) if n_most <= _FEW * len(kinds) else []
 
 
-def doubtful_values(base: Sequence[BaseParameter]) -> tuple[str, ...]:
+def doubtful_values(base: Sequence[BaseParameter], drive: Drive) -> tuple[str, ...]:
     """Question the parameters that the last fit moved far away from what was given."""
+    held, known = _held_and_known(drive)
+    names = " and ".join(name_on(drive.axis, one) for one in held)
     texts = []
     for one in base:
         if one.before * one.after <= 0 or not np.isfinite(one.after):
@@ -203,9 +212,26 @@ def doubtful_values(base: Sequence[BaseParameter]) -> tuple[str, ...]:
             texts.append(
                 f"{one.name} was {one.before:.3g} and is fitted as {one.after:.3g}: "
                 "check its value, or the units of the recordings; simulation.known: "
-                f"[{one.name}] holds it"
+                f"[{one.name}] holds it; it rests on the given {names}: {known}"
             )
     return tuple(texts)
+
+
+def _held_and_known(drive: Drive) -> tuple[tuple[str, ...], str]:
+    """Given parameters that no fit moves, and what recordings show beside them.
+
+    From ``m x'' = kt i - d v - k x`` with ``i = (u - kt v) / R`` under a voltage: whatever
+    leaves these quotients as they are leaves the motion as it is.
+    """
+    mass, constant = _WORDS[drive.axis]
+    if drive.resistance_ohm is None:
+        return ("mass_kg",), (
+            f"{constant}, damping and stiffness are known only in proportion to it"
+        )
+    return ("mass_kg", "resistance_ohm"), (
+        f"known is only {constant} / (resistance x {mass}), (damping + {constant}^2 / "
+        f"resistance) / {mass} and stiffness / {mass}"
+    )
 
 
 def hidden_from_view(problem: DiagnosisProblem) -> tuple[str, ...]:
@@ -216,13 +242,12 @@ def hidden_from_view(problem: DiagnosisProblem) -> tuple[str, ...]:
             "what happens before the current (resistance, inductance, brush drop, "
             "supply voltage), because the current is the input"
         )
-    held, constant = (
-        ("mass", "force") if drive.axis == "linear" else ("inertia", "torque")
+    held, known = _held_and_known(drive)
+    mass, _ = _WORDS[drive.axis]
+    which = (
+        f"{mass} itself" if len(held) == 1 else f"{mass} and the resistance themselves"
     )
-    texts.append(
-        f"the {held} itself: {constant} constant, damping and stiffness are known only "
-        "in proportion to it"
-    )
+    texts.append(f"the {which}: {known}")
     if drive.output == "velocity":
         texts.append("where the drive is, because its velocity is measured")
     else:

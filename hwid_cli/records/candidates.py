@@ -1,8 +1,15 @@
 """Sets of effects that a diagnosis considers: how they were fitted, how they rank."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Annotated
 
 import numpy as np
+
+from hwid_cli.records.rules import OneOf
+from hwid_cli.records.stored import ADDED_LATER
+
+# What a candidate is to the verdict: what it states, what it cannot tell from that.
+CANDIDATE_ROLES = ("", "diagnosis", "rival")
 
 # What the measuring chain may add to the noise of the output, in words.
 CAUSES = {
@@ -34,6 +41,8 @@ class RankedCandidate:
         Of the held-out recordings.
     whiteness : float, [-]
         Statistic of what it leaves, over its limit: above 1 something remains.
+    role : str
+        One of ``CANDIDATE_ROLES``.
     """
 
     effects: tuple[str, ...]
@@ -46,6 +55,9 @@ class RankedCandidate:
     improved_share: float
     whiteness: float
     note: str = ""
+    role: Annotated[str, OneOf(CANDIDATE_ROLES)] = field(
+        default="", metadata=ADDED_LATER
+    )
 
 
 @dataclass(frozen=True)

@@ -290,8 +290,11 @@ class Diagnosis(Shown):
         The verdict in one or two sentences.
     ambiguous_with : tuple of str
         Effects that fit as well; the ids of a set are joined by ``+``.
-    given, before, after : Gap
-        Simulation as given, base re-fitted, with the effects.
+    given, after : Gap
+        Simulation as given, and with all that was found.
+    before : Gap
+        What the effects had to explain: base re-fitted; of the verdicts that need no
+        effect what fitting had to explain: the simulation as given.
     explained_share : float, [-]
     places : tuple of Place
         Where the error sits, the largest first.
@@ -356,6 +359,11 @@ class Diagnosis(Shown):
     law: Law | None = field(default=None, metadata=ADDED_LATER)
     trust: ModelTrust | None = field(default=None, metadata=ADDED_LATER)
     bands: TrustOnTests = field(default=TrustOnTests(), metadata=ADDED_LATER)
+
+    @property
+    def refitted(self) -> Gap:
+        """The gap with the base re-fitted and no effect added."""
+        return self.before if self.effects else self.after
 
     @property
     def judged_on(self) -> str:

@@ -15,7 +15,7 @@ from hwid_cli.records.diagnosis import (
 )
 from hwid_cli.records.drive import DriveResponse
 from hwid_cli.records.units import behind
-from hwid_cli.report.formats import MISSING, counted, decimals, number
+from hwid_cli.report.formats import MISSING, counted, decimals, listed, number
 from hwid_cli.report.table import Column, Heading, Table, Text, numbers, texts
 
 # What a unit in a name is made of.
@@ -85,12 +85,6 @@ def candidate_name(effects: Sequence[str]) -> str:
     return AND.join(effects) or NO_EFFECT
 
 
-def is_chosen(candidate: RankedCandidate, diagnosis: Diagnosis) -> bool:
-    """Say whether a candidate is what the diagnosis names."""
-    found = {effect.id for effect in diagnosis.effects}
-    return bool(found) and set(candidate.effects) == found
-
-
 # Where something else remains, an effect also takes up some of that.
 INTERVALS_OF_A_PART = "intervals hold as if nothing else were missing"
 
@@ -136,8 +130,7 @@ def gap_table(diagnosis: Diagnosis) -> Table:
     """
     steps = [
         ("as given", diagnosis.given),
-        # Without effects the gap is that of the simulation as given.
-        ("base re-fitted", diagnosis.before if diagnosis.effects else diagnosis.after),
+        ("base re-fitted", diagnosis.refitted),
         ("with the effects", diagnosis.after),
     ]
     unit = diagnosis.output_unit
@@ -190,13 +183,18 @@ def _shift(one: BaseParameter, fitted: float) -> str:
     return f"{100.0 * (fitted / one.before - 1.0):+.1f} %"
 
 
+def is_chosen(candidate: RankedCandidate) -> bool:
+    """Say whether a candidate is what the diagnosis names."""
+    return bool(candidate.effects) and candidate.role == "diagnosis"
+
+
 def ranking_table(diagnosis: Diagnosis, *, count: int | None = None) -> Table:
     """Show the candidates, the best first.
 
     Parameters
     ----------
     count : int or None, [-]
-        How many; None for all.
+        How many, and the diagnosis where it ranks below them; None for all.
 
     Returns
     -------
@@ -204,12 +202,17 @@ def ranking_table(diagnosis: Diagnosis, *, count: int | None = None) -> Table:
         What was not fitted has a forecast only.
     """
     has_noise = diagnosis.noise.rms > 0.0
+    shown = [
+        one
+        for rank, one in enumerate(diagnosis.candidates)
+        if count is None or rank < count or is_chosen(one)
+    ]
     rows = []
-    for one in diagnosis.candidates[:count]:
+    for one in shown:
         error = one.held_out_rms
         rows.append(
             (
-                candidate_name(one.effects) + "*" * is_chosen(one, diagnosis),
+                candidate_name(one.effects) + "*" * is_chosen(one),
                 percent(one.forecast_share),
                 _ratio(error / diagnosis.noise.rms) if has_noise else number(error),
                 percent(one.explained_share),
@@ -219,7 +222,7 @@ def ranking_table(diagnosis: Diagnosis, *, count: int | None = None) -> Table:
             )
         )
     mark = " (* the diagnosis)" if diagnosis.effects else ""
-    left = [one for one in diagnosis.candidates[:count] if np.isnan(one.held_out_rms)]
+    left = [one for one in shown if np.isnan(one.held_out_rms)]
     why = f"{MISSING}: left after its first iterations, where others were better."
     heads = (
         "forecast",
@@ -393,20 +396,41 @@ def effect_sentences(diagnosis: Diagnosis) -> list[str]:
     return found
 
 
-def used_sentence(diagnosis: Diagnosis) -> str:
-    """Say what the effects were fitted to and validated on."""
-    return (
+def used_sentence(diagnosis: Diagnosis, tests: Sequence[str] = ()) -> str:
+    """Say what the effects were fitted to and validated on.
+
+    Parameters
+    ----------
+    tests : sequence of str
+        Recordings of the final test of models: a diagnosis holds out its own.
+    """
+    text = (
         f"Trained on {counted(len(diagnosis.train), 'recording')}, validated on "
         f"{counted(len(diagnosis.held_out), 'recording')} held out."
     )
+    trained = [one for one in tests if one in diagnosis.train]
+    if trained:
+        text += (
+            f" Among those trained on: {listed(trained)} of test.recordings, kept away "
+            "from models only; diagnose.recordings says which are used."
+        )
+    return text
 
 
-def diagnosis_blocks(diagnosis: Diagnosis) -> list[Text | Heading | Table]:
-    """Collect what the screen shows of a diagnosis: little where nothing is missing."""
+def diagnosis_blocks(
+    diagnosis: Diagnosis, tests: Sequence[str] = ()
+) -> list[Text | Heading | Table]:
+    """Collect what the screen shows of a diagnosis: little where nothing is missing.
+
+    Parameters
+    ----------
+    tests : sequence of str
+        Recordings of the final test of models.
+    """
     is_short = diagnosis.verdict in _SHORT
     sentences = [verdict_sentence(diagnosis), diagnosis.summary]
     sentences += warning_sentences(diagnosis.warnings)
-    sentences += [used_sentence(diagnosis), *effect_sentences(diagnosis)]
+    sentences += [used_sentence(diagnosis, tests), *effect_sentences(diagnosis)]
     blocks: list[Text | Heading | Table] = [
         Text(one) for one in sentences if one.strip()
     ]

@@ -41,6 +41,7 @@ class StageProgress:
         self.from_cache = 0
         self.computed = 0
         self._computed_before = 0
+        self._unit = unit
         console = Console(file=sys.stderr)
         self._is_shown = console.is_terminal and not is_silent
         self._bar = Progress(
@@ -71,6 +72,13 @@ class StageProgress:
         # Stopping a bar that was never shown prints an empty line in some versions.
         if self._is_shown:
             self._bar.stop()
+
+    @property
+    def text(self) -> str:
+        """What is under way and how much of it is done, in words."""
+        (task,) = self._bar.tasks
+        done = f": {task.completed:.0f} of {task.total:.0f} {self._unit}"
+        return f"{task.description}{done if task.total else ''}"
 
     def begin_round(self, stage: str, total: int) -> None:
         """Start the bar anew for another round of tasks; what was counted stays.

@@ -62,7 +62,7 @@ from hwid_cli.tasks.runner import RunSettings, Workers, run_tasks
 from hwid_cli.tasks.task import Task, one_thread
 
 NAME = "diagnose"
-STAGE_VERSION = 10
+STAGE_VERSION = 11
 
 _Answer = TypeVar("_Answer")
 
@@ -575,7 +575,10 @@ STAGE = Stage(
         f"{len(given.recordings)} recordings from the cache" if is_stored else ""
     ),
     write_files=_write_files,
-    tables=lambda context, result: diagnosis_blocks(result),
+    tables=lambda context, result: diagnosis_blocks(
+        result,
+        () if context.experiment.test is None else context.experiment.test.recordings,
+    ),
     files=(
         "diagnosis.json",
         "ranking.csv",

@@ -108,7 +108,7 @@ def propose(
         names=tuple(names),
         problems=tuple(problems),
         average=max(1, memory // _ENOUGH_SAMPLES),
-        initial_state=_initial_state(raws, kinds, recipes, is_cut=bool(parts)),
+        initial_state=_initial_state(raws, recipes, is_cut=bool(parts)),
     )
 
 
@@ -190,10 +190,17 @@ def _recipes(
         candidates = (*_RECIPES[kind], ("cut",)) if needs_cut else _RECIPES[kind]
         fitting = [one for one in candidates if _works(one, kind, own)]
         recipes[kind] = fitting[0] if fitting else ()
-    some = [kind for kind, recipe in recipes.items() if recipe]
-    if not some:
-        return recipes, "nothing is cut: the recordings do not begin with a rest"
-    return recipes, f"tried: {' and '.join(some)} recordings begin with a rest"
+    some = [
+        kind
+        for kind, recipe in recipes.items()
+        if recipe
+        and all(_begins_at_rest(raw) for raw in raws if kinds[raw.name] == kind)
+    ]
+    if some:
+        return recipes, f"tried: {' and '.join(some)} recordings begin with a rest"
+    if all(_begins_at_rest(raw) for raw in raws):
+        return recipes, "nothing is cut: the rest before may be a level of the input"
+    return recipes, "no rest is cut: not all recordings begin with one"
 
 
 def _works(recipe: tuple[str, ...], kind: str, raws: Sequence[RawRecording]) -> bool:
@@ -211,8 +218,9 @@ def _works(recipe: tuple[str, ...], kind: str, raws: Sequence[RawRecording]) -> 
     differ = any(log.n_raw_input != log.n_raw_output for log in logs)
     is_random = kind == "random"
     onsets = [find_onset(raw.input, quiet_is_rest=not is_random) for raw in raws]
-    rests = all((onset or 0) >= LEAST_QUIET for onset in onsets)
-    return is_long and (rests or differ)
+    is_seen = all((onset or 0) >= LEAST_QUIET for onset in onsets)
+    rests = is_seen and all(_begins_at_rest(raw) for raw in raws)
+    return is_long and (rests or (differ and "output_offset" not in recipe))
 
 
 def _of_kind(raw: RawRecording, kind: str) -> RawRecording:
@@ -222,13 +230,12 @@ def _of_kind(raw: RawRecording, kind: str) -> RawRecording:
 
 def _initial_state(
     raws: Sequence[RawRecording],
-    kinds: dict[str, str],
     recipes: dict[str, tuple[str, ...]],
     *,
     is_cut: bool,
 ) -> str:
     """How a diagnosis must take the recordings to start, rests cut as proposed."""
-    if is_cut or any(not _begins_at_rest(raw, kinds[raw.name]) for raw in raws):
+    if is_cut or not all(_begins_at_rest(raw) for raw in raws):
         return "estimated"
     # Of these kinds 'cut' keeps no rest: the drive is still where it was before.
     if any("cut" in recipes.get(kind, ()) for kind in ("sine", "random")):
@@ -236,9 +243,13 @@ def _initial_state(
     return "rest"
 
 
-def _begins_at_rest(raw: RawRecording, kind: str) -> bool:
-    onset = find_onset(raw.input, quiet_is_rest=kind != "random")
-    return onset is None or onset >= LEAST_QUIET
+def _begins_at_rest(raw: RawRecording) -> bool:
+    """Whether input and output stand still at first: a drive may move before its input."""
+    onsets = [
+        find_onset(signal[np.isfinite(signal)], quiet_is_rest=True)
+        for signal in (raw.input, raw.output)
+    ]
+    return all(onset is None or onset >= LEAST_QUIET for onset in onsets)
 
 
 def _held_out(

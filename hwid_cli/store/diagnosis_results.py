@@ -176,6 +176,7 @@ def _gap(diagnosis: Diagnosis) -> dict[str, Any]:
         "noise_rms": diagnosis.noise.rms,
         "given": asdict(diagnosis.given),
         "before": asdict(diagnosis.before),
+        "refitted": asdict(diagnosis.refitted),
         "after": asdict(diagnosis.after),
         "explained_share": diagnosis.explained_share,
         "unit": diagnosis.output_unit,

@@ -77,6 +77,7 @@ def test_the_configuration_is_sound_and_says_why(folder, tmp_path):
     assert "# simulation:" in text
     experiment = load_experiment(out)
     assert set(experiment.test.recordings) == {"Sprung_2"}
+    assert "'hwid diagnose' uses them too" in text
     # A swing of 1e3 tanh(1.5) mm, converted; the threshold is rounded to one digit.
     assert experiment.crossval.threshold in (0.04, 0.05)
     assert "RMSD lies below, in m:" in text

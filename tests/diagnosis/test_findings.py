@@ -119,6 +119,7 @@ def test_without_effects_the_gap_is_that_of_the_refit():
     found = diagnosed(recordings(), simulation(**WRONG))
     assert found.verdict == "parameters"
     assert found.before == found.given
+    assert found.refitted == found.after
     assert found.explained_share > 0.99
     assert all(one.after == one.refitted for one in found.base)
     assert all(one.rms_before == one.rms_after for one in found.gaps)

@@ -126,6 +126,64 @@ def test_a_coarse_sensor_is_recognised(motions, driven_by, step_share, noise_sha
     assert "steps of" in noise.sentence
 
 
+def fast_motions(n_samples=1000, n_recordings=6):
+    """Inputs, and motions so fast that hardly a level of a grid is met twice, [m]."""
+    times = 1e-3 * np.arange(n_samples)
+    inputs, motions = [], []
+    for number in range(n_recordings):
+        start = 0.1 * (times > 0.08) * (times - 0.08)
+        phase = 2 * np.pi * (1.1 + 0.23 * number)
+        inputs.append(np.where(times > 0.08, 1.0 + number, 0.0))
+        motions.append(start * (1 + np.sin(phase * times)) * (3 + number))
+    return inputs, motions
+
+
+def test_a_grid_is_seen_where_a_fast_motion_meets_no_level_twice():
+    step = 2e-5
+    inputs, motions = fast_motions()
+    rng = np.random.default_rng(12)
+    measured = [
+        step * np.round((y + rng.normal(0, 0.2 * step, y.size)) / step) for y in motions
+    ]
+    moving = [np.unique(y).size / y.size for y in measured]
+    assert np.median(moving) > 0.75
+
+    noise = noise_floor(problem_of(measured, inputs))
+
+    assert noise.resolution == pytest.approx(step, rel=1e-6)
+    # Rounding and the noise before it; one standard error of six recordings is 2 %.
+    assert noise.rms == pytest.approx(step * np.sqrt(1 / 12 + 0.04), rel=0.06)
+
+
+def test_multiples_of_a_motion_without_noise_are_no_grid():
+    times = np.arange(1000.0)
+    # Way under a constant force: its distances are 1, 3, 5, ... times the first one.
+    forces = [np.full(1000, 1.0 + number) for number in range(5)]
+    measured = [1e-6 * force * times**2 for force in forces]
+
+    noise = noise_floor(problem_of(measured, forces))
+
+    assert noise.resolution == 0
+    # What doubles resolve of 5 m.
+    assert noise.rms < 1e-14
+
+
+def test_a_rest_on_one_level_is_no_noise_below_the_grid():
+    step = 2e-5
+    inputs, motions = fast_motions()
+    rng = np.random.default_rng(13)
+    # The motion shakes the sensor; at rest the reading hardly leaves its level.
+    size = [np.where(u == 0.0, 0.2, 2.5) * step for u in inputs]
+    measured = [
+        step * np.round((y + rng.normal(0, 1, y.size) * one) / step)
+        for y, one in zip(motions, size, strict=True)
+    ]
+
+    noise = noise_floor(problem_of(measured, inputs))
+
+    assert noise.rms >= step / np.sqrt(12)
+
+
 def test_noise_above_the_grid_is_noise(motions, driven_by):
     rng = np.random.default_rng(3)
     step = 1e-5

@@ -271,7 +271,8 @@ def test_the_table_is_ordered_by_gain_with_the_lost_and_the_waiting_last():
         replace(made_up(("d",), 350.0), has_converged=False),
     ]
     shares = {("a",): 0.2, ("b",): 0.1, ("e",): 0.01, ("f",): 0.02}
-    rows = ranked(CRITERIA, fits, base(), shares)
+    verdict = DiagnosisVerdict("unknown", False, base(), ())
+    rows = ranked(CRITERIA, fits, base(), shares, verdict)
 
     assert [row.effects[0] for row in rows] == ["c", "a", "d", "b", "f", "e"]
     assert [row.is_fitted for row in rows] == [True] * 4 + [False] * 2
@@ -283,6 +284,26 @@ def test_the_table_is_ordered_by_gain_with_the_lost_and_the_waiting_last():
     assert "not finished" in rows[4].note
     assert rows[0].held_out_rms == pytest.approx(np.sqrt(1.5))
     assert rows[0].improved_share == 1.0
+
+
+def test_the_table_marks_the_very_set_of_the_verdict_with_its_error():
+    fits = [
+        made_up(("cogging",), 300.0),
+        made_up(("cogging", "constant_load"), 200.0),
+        made_up(("cogging", "cogging:second", "constant_load"), 150.0),
+    ]
+    # A run of the simulation itself may leave something else than its stand-in.
+    stated = made_up(fits[2].effects, 180.0)
+    verdict = DiagnosisVerdict("ambiguous", True, stated, (fits[1],))
+    rows = {one.effects: one for one in ranked(CRITERIA, fits, base(), {}, verdict)}
+
+    assert {key: one.role for key, one in rows.items()} == {
+        ("cogging",): "",
+        ("cogging", "constant_load"): "rival",
+        ("cogging", "cogging:second", "constant_load"): "diagnosis",
+    }
+    assert rows[stated.effects].held_out_rms == CRITERIA.rms(stated, held_out=True)
+    assert rows[stated.effects].held_out_rms > CRITERIA.rms(fits[2], held_out=True)
 
 
 def test_the_made_up_recordings_are_as_said():

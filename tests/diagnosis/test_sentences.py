@@ -6,9 +6,17 @@ import numpy as np
 import pytest
 
 from hwid_cli.diagnosis.sentences import doubtful_values, hidden_from_view
+from hwid_cli.drive.simulation import simulate_drive
 from hwid_cli.records.diagnosis import BaseParameter
 from hwid_cli.records.drive import Controller
-from tests.diagnosis.small_drive import problem, recordings, simulation
+from tests.diagnosis.small_drive import (
+    DRIVE,
+    STEP_S,
+    N,
+    problem,
+    recordings,
+    simulation,
+)
 from tests.stages.diagnosed_drive import FRICTION, breathing, diagnosed
 
 
@@ -87,9 +95,9 @@ def test_with_a_single_candidate_there_is_nothing_to_separate():
 
 def test_a_measured_current_hides_what_comes_before_it():
     of = problem(recordings()[:2])
-    assert "resistance" in said(of)
+    assert "before the current (resistance" in said(of)
     volts = problem(recordings()[:2], resistance_ohm=2.0)
-    assert "resistance" not in said(volts)
+    assert "before the current" not in said(volts)
 
 
 def test_the_mass_is_always_hidden():
@@ -148,15 +156,72 @@ def test_a_parameter_that_moved_by_more_than_a_factor_of_three_is_questioned(
     before, after, is_doubtful
 ):
     one = BaseParameter("force_constant_N_per_A", before, 1.0, after)
-    assert bool(doubtful_values([one])) == is_doubtful
+    assert bool(doubtful_values([one], DRIVE)) == is_doubtful
 
 
 def test_the_question_says_the_values_and_what_holds_the_parameter():
     one = BaseParameter("force_constant_N_per_A", 3.34, 1.0, 0.4104)
-    assert doubtful_values([one]) == (
+    assert doubtful_values([one], DRIVE) == (
         "force_constant_N_per_A was 3.34 and is fitted as 0.41: check its value, or the "
-        "units of the recordings; simulation.known: [force_constant_N_per_A] holds it",
+        "units of the recordings; simulation.known: [force_constant_N_per_A] holds it; "
+        "it rests on the given mass_kg: force constant, damping and stiffness are known "
+        "only in proportion to it",
     )
+
+
+KNOWN = (
+    "known is only force constant / (resistance x mass), (damping + force constant^2 / "
+    "resistance) / mass and stiffness / mass"
+)
+
+
+def test_under_a_voltage_the_resistance_may_be_what_is_wrong():
+    driven = replace(DRIVE, resistance_ohm=1.8)
+    one = BaseParameter("damping_N_s_per_m", 28.7, 5.0, 5.03)
+    (text,) = doubtful_values([one], driven)
+    assert text.endswith(f"rests on the given mass_kg and resistance_ohm: {KNOWN}")
+    shown = said(problem(recordings()[:2], resistance_ohm=1.8))
+    assert f"the mass and the resistance themselves: {KNOWN}" in shown
+    assert "in proportion to it" not in shown
+
+    turning = replace(driven, axis="rotary")
+    (text,) = doubtful_values([one], turning)
+    assert "the given inertia_kg_m2 and resistance_ohm" in text
+    assert "torque constant / (resistance x inertia)" in text
+
+
+@pytest.mark.parametrize("mass", [0.15, 0.45])
+@pytest.mark.parametrize("resistance", [1.2, 2.2])
+def test_drives_with_the_same_quotients_move_alike(mass, resistance):
+    """What is said to be all that is known is: other values of it move otherwise."""
+    one = replace(DRIVE, resistance_ohm=1.8)
+    constant = (
+        one.force_constant_N_per_A
+        * mass
+        / one.mass_kg
+        * resistance
+        / one.resistance_ohm
+    )
+    braking = one.damping_N_s_per_m + one.force_constant_N_per_A**2 / one.resistance_ohm
+    other = replace(
+        one,
+        mass_kg=mass,
+        resistance_ohm=resistance,
+        force_constant_N_per_A=constant,
+        damping_N_s_per_m=braking * mass / one.mass_kg - constant**2 / resistance,
+        stiffness_N_per_m=one.stiffness_N_per_m * mass / one.mass_kg,
+    )
+    volts = 6.0 * np.sin(2 * np.pi * 7.0 * STEP_S * np.arange(N))
+    here, there, damped = (
+        simulate_drive(volts, drive, sample_time_s=STEP_S).position
+        for drive in (
+            one,
+            other,
+            replace(other, damping_N_s_per_m=one.damping_N_s_per_m),
+        )
+    )
+    assert np.max(np.abs(here - there)) < 1e-9 * np.max(np.abs(here))
+    assert np.max(np.abs(here - damped)) > 1e-3 * np.max(np.abs(here))
 
 
 ONE_WAY = "all recordings move in one direction only"

@@ -48,6 +48,8 @@ RANKING = (
     (("voltage_limit",), 24.0, -0.4),
 )
 
+ROLES = {("coulomb_friction",): "diagnosis", ("stribeck_friction",): "rival"}
+
 
 def recording_names(count):
     return tuple(f"{('step', 'sine', 'random')[n % 3]}_{n:02d}" for n in range(count))
@@ -65,6 +67,7 @@ def candidates():
             explained_share=share,
             improved_share=float(share > 0.0),
             whiteness=ratio,
+            role=ROLES.get(effects, ""),
         )
         for effects, ratio, share in RANKING
     )
@@ -189,6 +192,7 @@ def unknown(count=9):
         ambiguous_with=(),
         after=found.before,
         explained_share=0.0,
+        candidates=tuple(replace(one, role="") for one in found.candidates),
         latent_force=tuple(replace(one, law=np.empty(0)) for one in found.latent_force),
     )
 
@@ -201,7 +205,7 @@ def nothing_missing(verdict="none"):
         verdict=verdict,
         complete=True,
         summary="Nothing is missing.",
-        before=gap,
+        before=unknown().given,
         after=gap,
         places=(),
         candidates=(),

@@ -73,6 +73,14 @@ def test_the_picture_before_and_after_stands_beside_the_noise():
     assert gaps.reference[0] == 1.0
 
 
+def test_the_picture_of_parameters_that_were_off_ends_where_fitting_them_leads():
+    record = nothing_missing("parameters")
+    rows = answer_to(record).blocks[0].groups[0].rows
+
+    assert [row.name for row in rows] == ["as given", "re-fitted"]
+    assert [row.dots[0].value for row in rows] == [35.2, 1.0]
+
+
 def test_what_leaves_much_is_a_part_and_no_fact():
     much = replace(named().after, ratio_to_noise=3.5)
     found = answer_to(

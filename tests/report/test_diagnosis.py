@@ -14,8 +14,9 @@ from hwid_cli.report.diagnosis import (
     quantity_and_unit,
     ranking_table,
     recordings_table,
+    used_sentence,
 )
-from hwid_cli.report.table import as_text
+from hwid_cli.report.table import Text, as_text
 from tests.report.diagnosis_examples import (
     DRAG,
     FRICTION,
@@ -79,6 +80,29 @@ def test_the_gap_closes_row_by_row():
     )
 
 
+def test_parameters_that_were_off_are_shown_with_the_gap_that_fitting_them_leaves():
+    found = nothing_missing("parameters")
+
+    assert gap_table(found).rows == (
+        ("as given", "7.10e-04", "7.40e-04", "35.2"),
+        ("base re-fitted", "2.09e-05", "2.10e-05", "1.000"),
+    )
+
+
+def test_test_recordings_that_the_diagnosis_was_trained_on_are_told():
+    found = named()
+    tests = (found.train[0], found.held_out[0], "not_diagnosed")
+
+    (line,) = [
+        one.text
+        for one in diagnosis_blocks(found, tests)
+        if isinstance(one, Text) and one.text.startswith("Trained on")
+    ]
+    assert f"Among those trained on: {found.train[0]} of test.recordings" in line
+    assert "test.recordings" not in used_sentence(found, found.held_out)
+    assert "test.recordings" not in used_sentence(found)
+
+
 def test_without_effects_nothing_is_shown_with_them():
     found = unknown()
 
@@ -110,6 +134,24 @@ def test_the_ranking_marks_the_chosen_candidate_only():
     )
     assert rows[-1] == ("cogging", "10.0 %", "-", "-", "-", "-", "not fitted")
     assert not [row for row in ranking_table(unknown()).rows if "*" in row[0]]
+
+
+def test_the_star_stands_on_the_set_of_the_diagnosis_and_on_no_namesake():
+    curved, plain = (
+        replace(named().candidates[0], effects=effects, role=role)
+        for effects, role in (
+            (("one_sided_stop:contact",), "diagnosis"),
+            (("one_sided_stop",), ""),
+        )
+    )
+    stop = replace(FRICTION, id="one_sided_stop")
+    found = replace(named(), effects=(stop,), candidates=(plain, curved))
+
+    names = [row[0] for row in ranking_table(found).rows]
+    assert names == ["one_sided_stop", "one_sided_stop:contact*"]
+    # A set that ranks below those that are shown is shown nevertheless.
+    few = [row[0] for row in ranking_table(found, count=1).rows]
+    assert few == names
 
 
 def test_the_ranking_without_noise_shows_the_rms_itself():

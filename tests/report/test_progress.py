@@ -54,3 +54,11 @@ def test_what_has_passed_and_what_is_left_each_have_their_word():
 
     column = progress._bar.columns[-1]
     assert str(column.render(task)) == "40 s passed, 40 s left"
+
+
+def test_what_is_under_way_is_told_in_words():
+    progress = StageProgress("stage 2 of 2 diagnose", 0, "tasks", is_silent=True)
+    assert progress.text == "stage 2 of 2 diagnose"
+    progress.begin_round("stage 2 of 2 diagnose: pairs", 9)
+    progress.advance(from_cache=False)
+    assert progress.text == "stage 2 of 2 diagnose: pairs: 1 of 9 tasks"

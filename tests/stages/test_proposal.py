@@ -60,3 +60,43 @@ def test_what_is_named_for_training_is_not_held_out():
     names = ("train_1", "train_2", "train_3", "other")
     recordings = [raw(name, levels(seed)) for seed, name in enumerate(names)]
     assert held_out(*recordings)[0] == ("other",)
+
+
+def after_a_rest(values, size=70):
+    return np.concatenate([np.zeros(size), values])
+
+
+def step_and_prbs():
+    """After rests as long as a level of the second one."""
+    signs = np.repeat(np.random.default_rng(3).choice([-1.0, 1.0], 9), 70)
+    return {"step_1": after_a_rest(np.ones(600)), "prbs_1": after_a_rest(signs)}
+
+
+def test_what_is_said_of_rests_and_how_a_diagnosis_starts_agree():
+    found = propose([raw(name, one) for name, one in step_and_prbs().items()])
+    assert found.recipe_reason == "tried: step recordings begin with a rest"
+    assert found.recipes["step"] == ("cut", "output_offset")
+    assert found.recipes["random"] == ()
+    # The second one stood still as well, which its output tells.
+    assert found.initial_state == "rest"
+
+
+def test_a_drive_that_moves_before_its_input_does_not_begin_with_a_rest():
+    recordings = []
+    for name, values in step_and_prbs().items():
+        swing = 0.2 * np.cos(0.2 * np.arange(values.size))
+        still = raw(name, values)
+        recordings.append(RawRecording(name, values, still.output + swing, 1e-3))
+    found = propose(recordings)
+    assert found.recipe_reason == "no rest is cut: not all recordings begin with one"
+    assert set(found.recipes.values()) == {()}
+    assert found.initial_state == "estimated"
+
+
+def test_a_rest_that_is_not_cut_is_no_missing_rest():
+    recordings = [raw("prbs_1", step_and_prbs()["prbs_1"])]
+    recordings.append(raw("prbs_2", -recordings[0].input))
+    found = propose(recordings)
+    assert found.recipes == {"random": ()}
+    assert found.recipe_reason.startswith("nothing is cut: the rest before")
+    assert found.initial_state == "rest"

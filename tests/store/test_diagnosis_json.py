@@ -93,6 +93,17 @@ def test_every_key_of_the_design_is_there(written):
     }
 
 
+@pytest.mark.parametrize(
+    ("record", "same"),
+    [(named(), "before"), (nothing_missing("parameters"), "after")],
+)
+def test_the_gap_of_the_refitted_base_stands_under_its_own_name(written, record, same):
+    gap = written(record)["gap"]
+    assert gap["refitted"] == gap[same]
+    assert gap["given"]["ratio_to_noise"] == 35.2
+    assert (gap["before"] == gap["given"]) == (record.verdict == "parameters")
+
+
 def test_base_is_as_given_and_as_fitted_with_the_effects(written):
     base = written(named())["base"]
 

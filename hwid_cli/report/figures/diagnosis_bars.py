@@ -95,7 +95,7 @@ def shown_candidates(diagnosis: Diagnosis) -> tuple[RankedCandidate, ...]:
         The first ones that were fitted; the chosen one and the base alone always.
     """
     fitted = [one for one in diagnosis.candidates if one.is_fitted]
-    needed = [one for one in fitted if not one.effects or is_chosen(one, diagnosis)]
+    needed = [one for one in fitted if not one.effects or is_chosen(one)]
     others = [one for one in fitted if one not in needed]
     kept = needed + others[: max(0, _MOST_CANDIDATES - len(needed))]
     return tuple(one for one in fitted if one in kept)
@@ -129,7 +129,7 @@ def ranking_figure(diagnosis: Diagnosis) -> Figure:
     )
     errors, shares = figure.subplots(1, 2, sharey=True)
     rows = np.arange(len(shown))
-    colours = [_colour(one, diagnosis) for one in shown]
+    colours = [_colour(one) for one in shown]
     noise = diagnosis.noise.rms
     has_noise = np.isfinite(noise) and noise > 0.0
     rms = np.array([one.held_out_rms for one in shown]) / (noise if has_noise else 1.0)
@@ -146,7 +146,7 @@ def ranking_figure(diagnosis: Diagnosis) -> Figure:
     for axes in (errors, shares):
         axes.tick_params(axis="y", length=0)
     for label, one in zip(errors.get_yticklabels(), shown, strict=True):
-        label.set_fontweight("bold" if is_chosen(one, diagnosis) else "normal")
+        label.set_fontweight("bold" if is_chosen(one) else "normal")
     _explain_colours(figure, diagnosis)
     return figure
 
@@ -167,17 +167,16 @@ def _draw_shares(
     axes.set_xlabel("share of the excess error explained [%]")
 
 
-def _colour(candidate: RankedCandidate, diagnosis: Diagnosis) -> str:
-    if is_chosen(candidate, diagnosis):
+def _colour(candidate: RankedCandidate) -> str:
+    if is_chosen(candidate):
         return BLUE
-    rivals = [set(one.split("+")) for one in diagnosis.ambiguous_with]
-    return ORANGE if set(candidate.effects) in rivals else GREY
+    return ORANGE if candidate.role == "rival" else GREY
 
 
 def _explain_colours(figure: Figure, diagnosis: Diagnosis) -> None:
     """Above the axes, where no row is."""
     parts = [(BLUE, "chosen"), (ORANGE, "cannot be told from it"), (GREY, "others")]
-    used = {_colour(one, diagnosis) for one in shown_candidates(diagnosis)}
+    used = {_colour(one) for one in shown_candidates(diagnosis)}
     axes = figure.axes[1]
     handles = [
         axes.barh([0], [np.nan], color=colour, label=label)

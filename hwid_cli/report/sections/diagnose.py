@@ -203,20 +203,18 @@ def _where_bars(sorts: Mapping[str, Sequence[Place]]) -> Dots:
     )
 
 
+# How a candidate is drawn, by what it is to the verdict.
+_ROLES = {"": "given", "diagnosis": "extended", "rival": "refitted"}
+
+
 def _candidate_dots(diagnosis: Diagnosis) -> Dots:
     """The best candidates by the share of the gap that they explain on held-out data."""
-    rivals = [set(one.split("+")) for one in diagnosis.ambiguous_with]
     noise = diagnosis.noise.rms
     rows = []
-    for one in shown_candidates(diagnosis):
-        is_it = is_chosen(one, diagnosis)
-        role = (
-            "extended"
-            if is_it
-            else "refitted"
-            if set(one.effects) in rivals
-            else "given"
-        )
+    shown = shown_candidates(diagnosis)
+    for one in shown:
+        is_it = is_chosen(one)
+        role = _ROLES[one.role]
         share = 100.0 * one.explained_share
         told = f"{share:.1f} %"
         if np.isfinite(noise) and noise > 0.0 and np.isfinite(one.held_out_rms):
@@ -224,7 +222,7 @@ def _candidate_dots(diagnosis: Diagnosis) -> Dots:
         dots = (Dot(max(share, _LOWEST), role, told),)
         rows.append(DotRow(candidate_name(one.effects), dots, told, is_bold=is_it))
     keys = [("extended", "chosen"), ("given", "others")]
-    if rivals:
+    if any(one.role == "rival" for one in shown):
         keys.insert(1, ("refitted", "cannot be told from it"))
     return Dots(
         label="share of the excess error explained on held-out recordings [%]",
@@ -329,8 +327,14 @@ def _gap_table(found: Mapping[str, Any]) -> Table | None:
     gap = found.get("gap")
     if not isinstance(gap, Mapping):
         return None
+    steps = [("as given", "given"), ("base re-fitted", "refitted")]
+    if "refitted" not in gap:
+        # As files of earlier versions are.
+        steps = [("before", "before")]
+    if found.get("effects"):
+        steps.append(("with the effects", "after"))
     rows = []
-    for label, key in (("before", "before"), ("with the effects", "after")):
+    for label, key in steps:
         part = gap.get(key) or {}
         cells = [_text(part.get(one)) for one in ("train_rms", "held_out_rms")]
         rows.append((label, *cells, _text(part.get("ratio_to_noise"))))

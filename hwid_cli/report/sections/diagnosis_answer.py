@@ -172,7 +172,7 @@ def _steps(diagnosis: Diagnosis) -> list[tuple[str, str, Gap]]:
     """Name, role and gap of the simulation as given, re-fitted, and with the effects."""
     steps = [
         ("as given", "given", diagnosis.given),
-        ("re-fitted", "refitted", diagnosis.before),
+        ("re-fitted", "refitted", diagnosis.refitted),
     ]
     if diagnosis.effects:
         names = [effect_name(one.id) for one in diagnosis.effects]
