@@ -254,7 +254,7 @@ def test_motion_to_both_sides_shows_friction():
 @pytest.mark.parametrize(
     ("friction_N", "stiffness_N_per_m", "leads"),
     [
-        (1.0, 3e3, "coulomb_friction"),
+        (1.0, 1e3, "coulomb_friction"),
         (1.5, 5e3, "coulomb_friction and cubic_stiffness"),
     ],
 )
