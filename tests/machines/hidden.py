@@ -684,7 +684,7 @@ def slow_sensor(time_s: float) -> Hidden:
 
 def wrong_clock(ratio: float) -> Hidden:
     """The output's logger runs fast by a share."""
-    return Hidden("clock_skew", {"ratio": ratio}, clock_skew=ratio)
+    return Hidden("clock_skew", {"ratio": 1.0 + ratio}, clock_skew=ratio)
 
 
 # Nuisances: no effect of the machine
