@@ -29,9 +29,7 @@ from hwid_cli.diagnosis.search import fit_own, fit_point
 from hwid_cli.diagnosis.selection import (
     LEAST_EXPLAINED,
     WITHIN_REACH,
-    DiagnosisVerdict,
     count,
-    decide,
     is_part_of,
     select_best,
 )
@@ -43,6 +41,7 @@ from hwid_cli.diagnosis.stand_in import (
     force_of_change,
     force_of_motion,
 )
+from hwid_cli.diagnosis.verdict import DiagnosisVerdict, decide
 from hwid_cli.drive.catalogue import CATALOGUE
 from hwid_cli.drive.simulation import Motion
 from hwid_cli.records.candidates import CandidateFit, ParameterRef

@@ -66,11 +66,10 @@ from hwid_cli.diagnosis.search import fit_own
 from hwid_cli.diagnosis.selection import (
     LEAST_GAIN,
     SMALL_REMAINDER,
-    DiagnosisVerdict,
     SelectionCriteria,
-    decide,
     title_of,
 )
+from hwid_cli.diagnosis.verdict import DiagnosisVerdict, decide
 from hwid_cli.diagnosis.where import places
 from hwid_cli.diagnosis.zeros import with_zeros
 from hwid_cli.drive.catalogue import CATALOGUE, may_be_added, public_id

@@ -18,8 +18,9 @@ from hwid_cli.diagnosis.observability import absorbed_effects
 from hwid_cli.diagnosis.parameters import is_factor
 from hwid_cli.diagnosis.pieces import JudgedPieces
 from hwid_cli.diagnosis.problem import Compared, DiagnosisProblem
+from hwid_cli.diagnosis.ranking import ranked
 from hwid_cli.diagnosis.rounds import RoundsResult
-from hwid_cli.diagnosis.selection import DiagnosisVerdict, SelectionCriteria, ranked
+from hwid_cli.diagnosis.selection import SelectionCriteria
 from hwid_cli.diagnosis.sentences import (
     doubtful_values,
     hidden_from_view,
@@ -27,6 +28,7 @@ from hwid_cli.diagnosis.sentences import (
     taken_up,
 )
 from hwid_cli.diagnosis.simulation_trust import simulation_trust
+from hwid_cli.diagnosis.verdict import DiagnosisVerdict
 from hwid_cli.diagnosis.where import latent_force_curves
 from hwid_cli.drive.catalogue import CATALOGUE, public_id
 from hwid_cli.drive.effect import Scales

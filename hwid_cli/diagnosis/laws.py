@@ -39,8 +39,8 @@ from hwid_cli.diagnosis.selection import (
     LEAST_IMPROVED,
     SMALL_REMAINDER,
     TIE,
-    DiagnosisVerdict,
 )
+from hwid_cli.diagnosis.verdict import DiagnosisVerdict
 from hwid_cli.drive.catalogue import CATALOGUE, public_id
 from hwid_cli.drive.simulation import drive_effects
 from hwid_cli.records.axis import unit_on

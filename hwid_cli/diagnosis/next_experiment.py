@@ -19,11 +19,8 @@ from hwid_cli.diagnosis.parameters import (
 )
 from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals
 from hwid_cli.diagnosis.search import derivatives
-from hwid_cli.diagnosis.selection import (
-    DiagnosisVerdict,
-    SelectionCriteria,
-    title_of,
-)
+from hwid_cli.diagnosis.selection import SelectionCriteria, title_of
+from hwid_cli.diagnosis.verdict import DiagnosisVerdict
 from hwid_cli.drive.effect import Scales
 from hwid_cli.drive.simulation import Motion
 from hwid_cli.records.candidates import CandidateFit

@@ -1,14 +1,13 @@
-"""Which candidate is best, whether its evidence suffices, and what the verdict is.
+"""Which candidate is best, and whether its evidence suffices for a name.
 
 An information criterion alone names something even where nothing is missing: input
 noise or a coarse sensor is enough. Naming therefore also asks for held-out recordings:
-most of their error beyond the noise must be explained, in most of them. Candidates that
-the recordings cannot tell apart are all given.
-docs/method_diagnosis.md, eq. (D21) to (D25).
+most of their error beyond the noise must be explained, in most of them.
+docs/method_diagnosis.md, eq. (D21) to (D24).
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from itertools import combinations
 from math import inf
 
@@ -18,10 +17,9 @@ import scipy
 from hwid_cli.diagnosis.parameters import BASE, START, is_factor
 from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals
 from hwid_cli.drive.catalogue import CATALOGUE, public_id
-from hwid_cli.records.candidates import CandidateFit, RankedCandidate
+from hwid_cli.records.candidates import CandidateFit
 from hwid_cli.records.diagnosis import STILL_LARGE, NoiseFloor
 from hwid_cli.records.drive import StandIn
-from hwid_cli.records.own_effects import plain_name
 
 # A set of effects must lower the criterion by this much against the smaller one.
 LEAST_GAIN = 10.0
@@ -61,20 +59,11 @@ CLOSE_TO_NOISE = 1.03
 # Ratio up to which a remainder that no effect explains is no missing effect: the logger,
 # a timer, a cable.
 SMALL_REMAINDER = 1.2
-# Whiteness up to which a small remainder counts as noise that is not quite white.
-_NEARLY_WHITE = 2.0
 # Candidates closer than this are not told apart.
 TIE = 6.0
 # Nor are those that leave at most so many times as much beyond the noise, where both
 # leave something.
 WITHIN_REACH = 1.25
-# Share that each of several rivals explains of what none of them explains for the most.
-LEAST_OF_RIVALS = 0.35
-# Sets that leave at most so many times what the best one leaves count as near it, and
-# what at least so many near sets share is there, whatever the rest is.
-NEAR_BEST, LEAST_SHARING = 2.0, 10
-# Share of what a verdict leaves that makes a set worth following.
-LEAST_LEAD = 0.25
 # The base of a stand-in that a candidate changes by more than this factor is no longer that
 # of the simulation. A damping may be near nothing, and so its factor anything.
 REPLACED = 3.0
@@ -293,7 +282,7 @@ class SelectionCriteria:
             return LEAST_EXPLAINED_FAR if self.is_far(found) else LEAST_EXPLAINED_SET
         if self.ratio(found) <= STILL_LARGE:
             return LEAST_EXPLAINED
-        is_free = _is_free(found)
+        is_free = has_own_values(found)
         is_far = self.rms(found, held_out=True) > LARGE_SHARE_OF_MOTION * self.motion
         return LEAST_EXPLAINED_FAR if is_free or is_far else LEAST_EXPLAINED_LARGE
 
@@ -416,82 +405,6 @@ def holds_look_alikes(found: CandidateFit) -> bool:
     )
 
 
-def ranked(
-    criteria: SelectionCriteria,
-    found: Sequence[CandidateFit],
-    base: CandidateFit,
-    shares: Mapping[tuple[str, ...], float],
-    verdict: "DiagnosisVerdict",
-) -> tuple[RankedCandidate, ...]:
-    """Table of all candidates, the best first.
-
-    Parameters
-    ----------
-    shares : dict of tuple of str to float
-        Forecasts, of candidates that were not fitted as well.
-    verdict : DiagnosisVerdict
-        Whose set and rivals are marked, with the errors that it states.
-    """
-    told = {one.effects: ("rival", one) for one in verdict.rivals}
-    told[verdict.chosen.effects] = ("diagnosis", verdict.chosen)
-    rows = []
-    for fit in found:
-        role, one = told.get(fit.effects, ("", fit))
-        rows.append(replace(_row(criteria, one, base, shares), role=role))
-    rows.sort(key=lambda row: -row.bic_gain if np.isfinite(row.bic_gain) else np.inf)
-    fitted = {one.effects for one in found}
-    nan = float("nan")
-    waiting = sorted(
-        (item for item in shares.items() if item[0] not in fitted),
-        key=lambda item: -item[1],
-    )
-    rows += [
-        RankedCandidate(
-            tuple(plain_name(one) for one in ids),
-            share,
-            False,
-            nan,
-            nan,
-            nan,
-            nan,
-            nan,
-            nan,
-            "not finished: far behind",
-        )
-        for ids, share in waiting
-    ]
-    return tuple(rows)
-
-
-def _row(
-    criteria: SelectionCriteria,
-    found: CandidateFit,
-    base: CandidateFit,
-    shares: Mapping[tuple[str, ...], float],
-) -> RankedCandidate:
-    share = shares.get(found.effects, float("nan"))
-    nan = float("nan")
-    if not found.is_usable:
-        text = "could not be simulated"
-        return RankedCandidate(
-            tuple(plain_name(one) for one in found.effects), share, True,
-            nan, nan, nan, nan, nan, nan, text,
-        )  # fmt: skip
-    against = criteria.evidence(found, base)
-    return RankedCandidate(
-        effects=tuple(plain_name(one) for one in found.effects),
-        forecast_share=share,
-        is_fitted=True,
-        train_rms=criteria.rms(found, held_out=False),
-        held_out_rms=criteria.rms(found, held_out=True),
-        bic_gain=against.gain,
-        explained_share=against.explained,
-        improved_share=against.improved,
-        whiteness=found.whiteness,
-        note="" if found.has_converged else "stopped at the iteration limit",
-    )
-
-
 def select_best(
     criteria: SelectionCriteria, found: Sequence[CandidateFit], base: CandidateFit
 ) -> CandidateFit | None:
@@ -592,36 +505,6 @@ def rivals(
     ]
 
 
-def lead(
-    criteria: SelectionCriteria,
-    found: Iterable[CandidateFit],
-    verdict: "DiagnosisVerdict",
-) -> CandidateFit | None:
-    """Set of effects that explains most of what the verdict leaves, without a proof.
-
-    Returns
-    -------
-    CandidateFit or None
-        For people to follow; None where nothing remains, or nothing explains a good
-        part of it in most of the held-out recordings.
-    """
-    chosen = verdict.chosen
-    if verdict.is_complete or verdict.word not in ("named", "unknown"):
-        return None
-    best, most = None, LEAST_LEAD
-    for one in found:
-        adds = set(chosen.effects) < set(one.effects)
-        if not (adds and one.is_usable and has_size(one)):
-            continue
-        against = criteria.evidence(one, chosen)
-        is_clear = against.gain >= LEAST_GAIN and against.improved >= LEAST_IMPROVED
-        takes = float(chosen.sse.sum() - one.sse.sum())
-        is_clear = is_clear and takes >= criteria.stand_in_error
-        if is_clear and against.explained > most:
-            best, most = one, against.explained
-    return best
-
-
 def title_of(found: CandidateFit) -> str:
     """Public ids of a set of effects, in words."""
     return " with ".join(public_id(one) for one in found.effects)
@@ -632,217 +515,6 @@ def names_of(found: CandidateFit) -> tuple[str, ...]:
     return tuple(sorted(public_id(one) for one in found.effects))
 
 
-@dataclass(frozen=True, eq=False)
-class DiagnosisVerdict:
-    """What is said, and the fit that it rests on.
-
-    Parameters
-    ----------
-    word : str
-        One of ``records.diagnosis.VERDICTS``.
-    chosen : CandidateFit
-        With the effects that are named; the base where there are none.
-    rivals : tuple of CandidateFit
-        Sets of effects that the data cannot tell from the chosen one.
-    """
-
-    word: str
-    is_complete: bool
-    chosen: CandidateFit
-    rivals: tuple[CandidateFit, ...]
-
-
-def decide(
-    criteria: SelectionCriteria,
-    given_sse: np.ndarray,
-    base: CandidateFit,
-    fits: Mapping[tuple[str, ...], CandidateFit],
-    best: Sequence[CandidateFit],
-    unclear: Callable[[CandidateFit], tuple[str, ...]],
-) -> DiagnosisVerdict:
-    """Weigh the evidence.
-
-    Parameters
-    ----------
-    given_sse : ndarray, shape (n_recordings,)
-        Of the simulation with the parameters that the configuration gives.
-    base : CandidateFit
-        Re-fitted, without further effects.
-    fits : mapping of tuple of str to CandidateFit
-        Of all sets of effects.
-    best : sequence of CandidateFit
-        The best of each size.
-    unclear : callable
-        Effects of a fit that may as well not be there.
-    """
-    if criteria.needs_nothing(base):
-        word = _without_effect(criteria, given_sse, base)
-        return DiagnosisVerdict(word, criteria.is_complete(base), base, ())
-
-    def may_be_named(one: CandidateFit) -> bool:
-        return (
-            criteria.may_be_named(one, base)
-            and _needs_each(criteria, one, fits, base)
-            and not unclear(one)
-        )
-
-    for winner in reversed(best):
-        same_size = [one for one in fits.values()
-                     if len(one.effects) == len(winner.effects)]  # fmt: skip
-        tried = _as_winner(criteria, winner, same_size, base)
-        chosen = next((one for one in tried if may_be_named(one)), None)
-        if chosen is None:
-            continue
-        near = [one for one in rivals(criteria, same_size, chosen) if may_be_named(one)]
-        word = "ambiguous" if near else "named"
-        return DiagnosisVerdict(word, criteria.is_complete(chosen), chosen, tuple(near))
-    is_close = criteria.ratio(base) <= CLOSE_TO_NOISE
-    if is_close and base.whiteness <= _NEARLY_WHITE:
-        return DiagnosisVerdict(
-            _without_effect(criteria, given_sse, base), True, base, ()
-        )
-    explained = [
-        criteria.evidence(one, base).explained for one in fits.values() if one.is_usable
-    ]
-    is_small = criteria.ratio(base) <= SMALL_REMAINDER
-    if is_small and max(explained, default=0.0) < LEAST_OF_RIVALS:
-        return DiagnosisVerdict(
-            _without_effect(criteria, given_sse, base), False, base, ()
-        )
-    halves = _rivals_by_halves(criteria, base, fits, unclear)
-    if len(halves) > 1:
-        return DiagnosisVerdict("ambiguous", False, halves[0], tuple(halves[1:]))
-    shared = _shared_by_best(criteria, base, fits, unclear)
-    if shared is not None:
-        return DiagnosisVerdict("named", False, shared, ())
-    return DiagnosisVerdict("unknown", False, base, ())
-
-
-def _as_winner(
-    criteria: SelectionCriteria,
-    winner: CandidateFit,
-    same_size: Sequence[CandidateFit],
-    base: CandidateFit,
-) -> list[CandidateFit]:
-    """The winner of a size, its limit cases, and what it is a limit case of."""
-    others = [one for one in same_size if one is not winner]
-    simpler = [one for one in others if is_part_of(one, winner)]
-    # It explains a little more, which the winner may lack for a name.
-    wider = [one for one in others if one.is_usable and is_part_of(winner, one)]
-    wider.sort(key=lambda one: -criteria.gain(one, base))
-    return [winner, *simpler, *wider]
-
-
-def _shared_by_best(
-    criteria: SelectionCriteria,
-    base: CandidateFit,
-    fits: Mapping[tuple[str, ...], CandidateFit],
-    unclear: Callable[[CandidateFit], tuple[str, ...]],
-) -> CandidateFit | None:
-    """What all sets near the best one share, where no set is enough for a name.
-
-    References
-    ----------
-    docs/method_diagnosis.md, eq. (D24a).
-    """
-    usable = [one for one in fits.values() if one.is_usable]
-    left = [1.0 - criteria.evidence(one, base).explained for one in usable]
-    most = NEAR_BEST * min(left, default=0.0)
-    near = [one for one, rest in zip(usable, left, strict=True) if rest <= most]
-    if len(near) < LEAST_SHARING:
-        return None
-    shared = set.intersection(*(set(names_of(one)) for one in near))
-    for one in sorted(usable, key=lambda one: -criteria.gain(one, base)):
-        against = criteria.evidence(one, base)
-        is_clear = against.gain >= LEAST_GAIN and against.improved >= LEAST_IMPROVED
-        is_clear = is_clear and against.explained >= LEAST_EXPLAINED
-        is_clear = is_clear and criteria.is_beyond_stand_in(one, base)
-        is_clear = is_clear and not _is_free(one)
-        # The sets show that it is there; how large it is may hang on what is missing.
-        is_simpler = any(CATALOGUE[effect].told_by for effect in unclear(one))
-        if shared and set(names_of(one)) == shared and is_clear and not is_simpler:
-            return one
-    return None
-
-
-def _is_free(found: CandidateFit) -> bool:
+def has_own_values(found: CandidateFit) -> bool:
     """Whether each recording has a value for itself."""
     return any(is_factor(one) for one in found.own_names)
-
-
-def _changes_freely(found: CandidateFit, effect: str) -> bool:
-    """Whether an effect has a value of its own in every recording.
-
-    Such values make up for a law that is not quite right, down to the noise.
-    """
-    return any(one.owner == effect and is_factor(one) for one in found.own_names)
-
-
-def _needs_each(
-    criteria: SelectionCriteria,
-    whole: CandidateFit,
-    fits: Mapping[tuple[str, ...], CandidateFit],
-    base: CandidateFit,
-) -> bool:
-    """Whether a set leaves much more without any one of its effects."""
-    if len(whole.effects) == 1:
-        return True
-    is_far = criteria.is_far(whole)
-    for effect in whole.effects:
-        left = tuple(one for one in whole.effects if one != effect)
-        if left not in fits:
-            if is_far:
-                return False
-            continue
-        against = criteria.evidence(whole, fits[left])
-        completes = criteria.is_complete(whole) and not criteria.is_complete(fits[left])
-        explains = against.explained >= LEAST_EXPLAINED or completes
-        is_clear = against.gain >= LEAST_GAIN and against.improved >= LEAST_IMPROVED
-        brings = criteria.excess(fits[left]) - criteria.excess(whole)
-        is_last = completes and not _changes_freely(whole, effect)
-        least = LEAST_CONTRIBUTION_FAR if is_far else LEAST_CONTRIBUTION
-        least = LEAST_LAST_CONTRIBUTION if is_last else least
-        is_clear = is_clear and brings >= least * criteria.excess(base)
-        is_clear = is_clear and criteria.is_beyond_stand_in(whole, fits[left])
-        if not (is_clear and explains):
-            return False
-    return True
-
-
-def _rivals_by_halves(
-    criteria: SelectionCriteria,
-    base: CandidateFit,
-    fits: Mapping[tuple[str, ...], CandidateFit],
-    unclear: Callable[[CandidateFit], tuple[str, ...]],
-) -> list[CandidateFit]:
-    """Single effects that each explain a good part, in every recording, the best first."""
-    found = []
-    for one in fits.values():
-        if len(one.effects) != 1 or not one.is_usable or not has_size(one):
-            continue
-        if _is_free(one) and criteria.ratio(one) > STILL_LARGE:
-            continue
-        against = criteria.evidence(one, base)
-        explains = against.explained >= LEAST_OF_RIVALS and against.improved == 1.0
-        is_clear = explains and against.gain >= LEAST_GAIN and not unclear(one)
-        if is_clear and criteria.is_beyond_stand_in(one, base):
-            found.append(one)
-    found.sort(key=lambda one: -criteria.gain(one, base))
-    if not found:
-        return []
-    return [found[0], *rivals(criteria, found, found[0])]
-
-
-def _without_effect(
-    criteria: SelectionCriteria, given_sse: np.ndarray, base: CandidateFit
-) -> str:
-    """``parameters`` if the re-fit was needed, else ``none``."""
-    before, after = float(given_sse.sum()), float(base.sse.sum())
-    if not np.isfinite(before):
-        return "parameters"
-    n = float(criteria.n_samples.sum())
-    gain = n * np.log(max(before, 1e-300) / max(after, 1e-300))
-    least = LEAST_GAIN + base.values.size * np.log(n)
-    # Noise-free records: rounding differences are no parameters.
-    is_visible = before > after * 1.001
-    return "parameters" if gain > least and is_visible else "none"

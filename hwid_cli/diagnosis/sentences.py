@@ -5,12 +5,8 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from hwid_cli.diagnosis.problem import DiagnosisProblem
-from hwid_cli.diagnosis.selection import (
-    DiagnosisVerdict,
-    SelectionCriteria,
-    lead,
-    title_of,
-)
+from hwid_cli.diagnosis.selection import SelectionCriteria, title_of
+from hwid_cli.diagnosis.verdict import DiagnosisVerdict, lead
 from hwid_cli.drive.catalogue import CATALOGUE, public_id
 from hwid_cli.records.axis import name_on
 from hwid_cli.records.candidates import CAUSES, CandidateFit

@@ -10,7 +10,7 @@ from hwid_cli import DiagnoseOptions, Recording, SimulationOptions, diagnose
 from hwid_cli.config.extended_simulation import write_extended_simulation
 from hwid_cli.config.load import experiment_of, load_experiment
 from hwid_cli.diagnosis.laws import _is_wanted
-from hwid_cli.diagnosis.selection import DiagnosisVerdict
+from hwid_cli.diagnosis.verdict import DiagnosisVerdict
 from hwid_cli.stages.diagnose import extended_options
 from tests.diagnosis.made_up_fits import CRITERIA, base, made_up
 from tests.diagnosis.small_drive import NOISE, STEP_S, inputs

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from hwid_cli.diagnosis.parameters import BASE
+from hwid_cli.diagnosis.ranking import ranked
 from hwid_cli.diagnosis.selection import (
     LEAST_ADDED,
     LEAST_EXPLAINED,
@@ -13,17 +14,14 @@ from hwid_cli.diagnosis.selection import (
     LEAST_GAIN,
     LEAST_IMPROVED,
     TIE,
-    DiagnosisVerdict,
     SelectionCriteria,
     count,
-    decide,
     has_size,
     is_part_of,
-    lead,
-    ranked,
     rivals,
     select_best,
 )
+from hwid_cli.diagnosis.verdict import DiagnosisVerdict, decide, lead
 from hwid_cli.records.candidates import ParameterRef
 from hwid_cli.records.diagnosis import VERDICTS
 from hwid_cli.records.drive import StandIn
