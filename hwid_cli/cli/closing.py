@@ -3,7 +3,7 @@
 import shlex
 from collections.abc import Sequence
 
-from hwid_cli.cli.session import Session, context_of, screen_width
+from hwid_cli.cli.session import Session, say_damaged, screen_width
 from hwid_cli.records.best_model import BestModel
 from hwid_cli.records.diagnosis import Diagnosis
 from hwid_cli.records.experiment import CrossvalOptions
@@ -16,6 +16,7 @@ from hwid_cli.report.closing import (
 from hwid_cli.stages.best_model import beside_linear, best_model
 from hwid_cli.stages.model_views import named_fits
 from hwid_cli.stages.table import is_named, stage_named
+from hwid_cli.store.cache import Hdf5Store
 
 PAGE = "report.html"
 TABLES = "tables.txt"
@@ -75,12 +76,11 @@ def _best(session: Session) -> BestModel | None:
         results={one: results.get(one) for one in ("group",)}
         | {"identify": results["identify"]},
     )
-    return beside_linear(
-        best,
-        named_fits(stored),
-        results["calibrate"].recordings,
-        context_of(session).store,
-    )
+    store = Hdf5Store(session.cache)
+    recordings = results["calibrate"].recordings
+    found = beside_linear(best, named_fits(stored), recordings, store)
+    say_damaged("best model", store)
+    return found
 
 
 def _hints(session: Session, best: BestModel) -> list[tuple[str, str]]:

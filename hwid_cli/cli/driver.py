@@ -15,6 +15,7 @@ from hwid_cli.cli.session import (
     Timer,
     context_of,
     open_session,
+    say_damaged,
     screen_width,
 )
 from hwid_cli.config.load import describe_experiment
@@ -105,7 +106,11 @@ def _current(session: Session) -> dict[str, Any]:
 
 def blocks_of(session: Session, name: str) -> Sequence[Block]:
     """Tables and paragraphs of a stage that has run."""
-    return stage_named(name).tables(context_of(session), session.results[name])
+    store = Hdf5Store(session.cache)
+    context = replace(context_of(session), store=store)
+    blocks = stage_named(name).tables(context, session.results[name])
+    say_damaged(name, store)
+    return blocks
 
 
 def show_blocks(session: Session, blocks: Sequence[Block]) -> None:
@@ -289,14 +294,7 @@ class StageRunner:
             self.bars.append(progress)
             yield settings, progress
             self.bars.pop()
-        if store.unusable:
-            _log.warning(
-                "%s: %d damaged entries of the cache set aside, computed again "
-                "(such as %s)",
-                label,
-                len(store.unusable),
-                store.unusable[0],
-            )
+        say_damaged(label, store)
         self.parts.append(_Part(unit, progress.from_cache, progress.computed))
         if part and session.is_verbose:
             session.note(f"{label}: {self.parts[-1]}, {timer}")

@@ -1,5 +1,6 @@
 """One run of the program: its experiment, its folders, and who computes."""
 
+import logging
 import shutil
 import time
 from collections.abc import Iterator
@@ -21,6 +22,8 @@ from hwid_cli.stages.own_functions import check_own_functions
 from hwid_cli.stages.stage import Context
 from hwid_cli.store.cache import Hdf5Store
 from hwid_cli.tasks.workers import Workers
+
+_log = logging.getLogger(__name__)
 
 # So long a command says nothing of its progress, [s].
 _HELD_S = 5.0
@@ -130,6 +133,26 @@ def context_of(session: Session) -> Context:
     return Context(
         session.experiment, session.out, session.results, Hdf5Store(session.cache)
     )
+
+
+def say_damaged(label: str, store: Hdf5Store) -> None:
+    """Warn of the entries of a cache that could not be used, in one line.
+
+    Parameters
+    ----------
+    label : str
+        What has asked for them.
+    store : Hdf5Store
+        As it is when all of them have been asked for.
+    """
+    if store.unusable:
+        _log.warning(
+            "%s: %d damaged entries of the cache set aside, computed again "
+            "(such as %s)",
+            label,
+            len(store.unusable),
+            store.unusable[0],
+        )
 
 
 def open_session(choices: Choices, *stages: str, is_alone: bool = True) -> Session:
