@@ -187,6 +187,9 @@ def parameter_layout(
     if problem.start == "estimated" or is_moving:
         speed = scales.velocity_m_per_s
         own.append(Unknown(START, "velocity", False, speed, -far, far))
+    if problem.start == "estimated" and _keeps_current(problem.drive, effects):
+        size = scales.current_A
+        own.append(Unknown(START, "current", False, size, -far, far))
     return ParameterLayout(tuple(shared), tuple(own), tuple(effects))
 
 
@@ -194,6 +197,14 @@ def _starts_in_motion(problem: DiagnosisProblem, effects: Sequence[str]) -> bool
     """Whether an effect moves the drive before its input does."""
     is_free = problem.start == "rest" and not problem.compares_command
     return is_free and any(CATALOGUE[one].moves_at_rest for one in effects)
+
+
+def _keeps_current(drive: Drive, effects: Sequence[str]) -> bool:
+    """Whether the motor's current has a state: it lags, or flows in a winding."""
+    if drive.inductance_H > 0:
+        return True
+    parameters = [one for key in effects for one in CATALOGUE[key].parameters]
+    return any({"LAG", "INDUCTANCE"} & set(one.places) for one in parameters)
 
 
 def _rests_anywhere(problem: DiagnosisProblem) -> bool:
@@ -283,7 +294,7 @@ def first_point(
             if one.owner != START:
                 value = start[one.owner].get(one.name, 0.0)
                 each[row, column] = one.coordinate(value)
-            elif signals.start is not None:
+            elif signals.start is not None and one.name != "current":
                 value = signals.start[0 if one.name == "position" else 1]
                 each[row, column] = one.coordinate(value)
             elif one.name == "position" and problem.start == "estimated":
@@ -367,7 +378,8 @@ def _place_start(
         if one.owner == START
     }
     if found:
-        set_start(vector, found["position"], found.get("velocity", 0.0))
+        further = [found.get(one, 0.0) for one in ("velocity", "current")]
+        set_start(vector, found["position"], *further)
         if problem.start == "held":
             # The recording starts at its measured level, wherever the sensor's zero is.
             vector[slots.OUTPUT_ZERO] = found["position"] - rest_position

@@ -59,7 +59,7 @@ def simulate_drive(
     drive: Drive,
     *,
     sample_time_s: float,
-    start: tuple[float, float] | None = None,
+    start: tuple[float, ...] | None = None,
     rest_position_m: float = 0.0,
 ) -> Motion:
     """Motion that an input causes.
@@ -69,8 +69,9 @@ def simulate_drive(
     driven_by : ndarray, shape (n_samples,), [A], [V] or [m]
         Command; under a controller the reference.
     sample_time_s : float, [s]
-    start : tuple of float or None, [m], [m/s]
-        Position and velocity at the first sample; None starts at rest in equilibrium.
+    start : tuple of float or None, [m], [m/s], [A] or [V]
+        Position and velocity at the first sample, and where its own state matters the
+        current, as in ``set_start``; None starts at rest in equilibrium.
     rest_position_m : float, [m]
         Where a free axis rests, which has no equilibrium.
 
@@ -301,7 +302,12 @@ def drive_effects(drive: Drive) -> dict[str, dict[str, float]]:
     return effects
 
 
-def set_start(vector: np.ndarray, position_m: float, velocity_m_per_s: float) -> None:
+def set_start(
+    vector: np.ndarray,
+    position_m: float,
+    velocity_m_per_s: float,
+    current: float = 0.0,
+) -> None:
     """Set where a simulation starts.
 
     Parameters
@@ -309,7 +315,11 @@ def set_start(vector: np.ndarray, position_m: float, velocity_m_per_s: float) ->
     vector : ndarray, shape (N_SLOTS,)
         Changed in place.
     position_m, velocity_m_per_s : float, [m], [m/s]
+    current : float, [A], or [V] of a voltage that lags
+        What the winding, or else the lag, holds beyond the value that it would rest at
+        under the first sample of the command; without both it means nothing.
     """
     vector[slots.START_POSITION] = position_m
     vector[slots.START_VELOCITY] = velocity_m_per_s
+    vector[slots.START_CURRENT] = current
     vector[slots.IS_START_GIVEN] = 1.0

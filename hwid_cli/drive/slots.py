@@ -67,6 +67,7 @@ that is switched off is 0, except where the comment says infinite.
     ZERO_ORDER_HOLD,
     START_POSITION,  # used where nothing holds a position, or where it is estimated
     START_VELOCITY,
+    START_CURRENT,  # beyond what rests there: of a lag's output, or in the winding
     IS_START_GIVEN,
     OUTPUT_ZERO,  # position at which the sensor reads 0
     IS_COUPLED,  # set by the simulation: the teeth are an elastic coupling
@@ -132,4 +133,4 @@ that is switched off is 0, except where the comment says infinite.
     SAMPLE_TIME,  # set by the simulation
     LAG_DAMPING_RATIO,
     N_SLOTS,
-) = range(124)
+) = range(125)

@@ -294,3 +294,37 @@ def test_a_scale_that_reads_backwards_leaves_no_number(amplitude_m, is_possible)
 
     assert all(np.isfinite(part).all() == is_possible for part in parts)
     assert np.isfinite(sum_of_squares(parts)) == is_possible
+
+
+@pytest.mark.parametrize(
+    ("initial_state", "effects", "has_current"),
+    [
+        ("estimated", {"actuator_lag": {"time_constant_s": 0.01}}, True),
+        ("estimated", {"input_delay": {"delay_s": 0.01}}, False),
+        ("rest", {"actuator_lag": {"time_constant_s": 0.01}}, False),
+    ],
+)
+def test_a_current_with_a_state_has_a_start_of_its_own(
+    initial_state, effects, has_current
+):
+    of = problem(
+        recordings()[:3], options=DiagnoseOptions(initial_state=initial_state)
+    )
+    _, found, point = laid_out(tuple(effects), effects, of=of)
+    names = [one.name for one in found.own if one.owner == START]
+    assert ("current" in names) == has_current
+    if has_current:
+        column = names.index("current")
+        each = point.own.copy()
+        each[:, column] = np.array([0.1, 0.2, 0.3]) / found.own[column].scale
+        vectors = vectors_at(of, found, ParameterPoint(point.shared, each))
+        given = [one[slots.START_CURRENT] for one in vectors]
+        assert given == pytest.approx([0.1, 0.2, 0.3])
+
+
+def test_a_winding_of_the_base_has_a_start_of_its_own():
+    options = DiagnoseOptions(initial_state="estimated")
+    changes = {"resistance_ohm": 2.0, "inductance_H": 4e-3}
+    of = problem(recordings()[:3], options=options, **changes)
+    _, found, _ = laid_out(of=of)
+    assert [one.name for one in found.own] == ["position", "velocity", "current"]

@@ -326,6 +326,34 @@ def test_a_start_in_motion_is_found():
     assert np.abs(left).max() < 1e-9
 
 
+@pytest.mark.parametrize(
+    ("effects", "changes"),
+    [
+        ({"actuator_lag": {"time_constant_s": 0.02}}, {}),
+        (
+            {"winding_inductance": {"inductance_H": 0.02}},
+            {"resistance_ohm": 1.0, "back_emf_V_s_per_m": 5.0},
+        ),
+    ],
+)
+def test_a_current_that_has_not_settled_is_found(effects, changes):
+    drive = replace(DRIVE, **changes)
+    # In the middle of ramps, where the current is far from what it would rest at.
+    cut = [
+        replace(one, input=one.input[42:], output=one.output[42:])
+        for one in recordings(effects, drive=drive, noise=0.0)
+    ]
+    of = problem(cut, options=DiagnoseOptions(initial_state="estimated"), **changes)
+    found, point = begun(of, effects)
+    assert found.own[-1].name == "current"
+    left = residuals_at(of, found, fit_own(of, found, point.shared))
+    assert np.abs(np.concatenate(left)).max() < 1e-9
+    # Position and velocity alone do not tell it.
+    only_motion = replace(found, own=found.own[:2])
+    left = residuals_at(of, only_motion, fit_own(of, only_motion, point.shared))
+    assert np.abs(np.concatenate(left)).max() > 1e-4
+
+
 def test_one_recording_does_not_move_another():
     given = recordings(own=pushed)
     spoilt = [given[0], replace(given[1], output=-given[1].output), *given[2:]]

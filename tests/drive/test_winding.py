@@ -31,6 +31,27 @@ def test_the_current_follows_the_linear_circuit():
     assert rms(found - expected) < 1e-14
 
 
+@pytest.mark.parametrize("is_winding", [True, False])
+def test_a_current_that_has_not_settled_dies_away(is_winding):
+    # States: current, position, velocity; 3 A or 3 V beyond what rests, in motion.
+    gain = 5.0 / 0.3
+    if is_winding:
+        a = [[-250.0, 0, -2500.0], [0, 0, 1], [gain, -1184 / 0.3, -15.1 / 0.3]]
+        effects, changes, rest = INDUCTANCE, CIRCUIT, 2.0 / 0.5
+    else:
+        a = [[-100.0, 0, 0], [0, 0, 1], [gain, -1184 / 0.3, -15.1 / 0.3]]
+        effects, changes, rest = {"actuator_lag": {"time_constant_s": 0.01}}, {}, 2.0
+    b = [[500.0 if is_winding else 100.0], [0], [0]]
+    system = signal.StateSpace(a, b, [[0, 1, 0]], [[0]])
+    times, start = TIMES_S[:400], (0.004, -0.3, 3.0)
+    first = [rest + 3.0, 0.004, -0.3]
+    expected = signal.lsim(system, np.full(400, 2.0), times, X0=first)[1]
+    found = tool(effects, np.full(400, 2.0), start=start, **changes).position
+    assert rms(found - expected) < 1e-11
+    settled = tool(effects, np.full(400, 2.0), start=start[:2], **changes).position
+    assert rms(settled - expected) > 1e-4
+
+
 def test_with_friction_it_follows_the_oracle():
     machine = Machine(effects=COULOMB, resistance=0.5, inductance=2e-3, back_emf=5.0)
     expected, _ = simulate(machine, CORNER_TIMES_S, CORNERS, TIMES_S)

@@ -221,10 +221,14 @@ def _start(
     _couple(p)
     _take_stock(sample_time, p)
     command = static_command(command, p)
+    # One start for both: a lag that is followed by a winding is only the quicker one.
+    has_winding = p[slots.RESISTANCE] > 0.0 and p[slots.INDUCTANCE] > 0.0
     memory[LAGGED] = command
-    current = command
+    memory[LAGGED] += 0.0 if has_winding else p[slots.START_CURRENT]
+    current = memory[LAGGED]
     if p[slots.RESISTANCE] > 0.0:
-        current = command / p[slots.RESISTANCE]
+        current /= p[slots.RESISTANCE]
+        current += p[slots.START_CURRENT] if has_winding else 0.0
         state[CIRCUIT] = current
     p[slots.COGGING_REST] = np.sin(p[slots.COGGING_PHASE])
     if p[slots.STIFFNESS] > 0.0:
