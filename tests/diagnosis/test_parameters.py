@@ -307,9 +307,7 @@ def test_a_scale_that_reads_backwards_leaves_no_number(amplitude_m, is_possible)
 def test_a_current_with_a_state_has_a_start_of_its_own(
     initial_state, effects, has_current
 ):
-    of = problem(
-        recordings()[:3], options=DiagnoseOptions(initial_state=initial_state)
-    )
+    of = problem(recordings()[:3], options=DiagnoseOptions(initial_state=initial_state))
     _, found, point = laid_out(tuple(effects), effects, of=of)
     names = [one.name for one in found.own if one.owner == START]
     assert ("current" in names) == has_current
