@@ -5,7 +5,7 @@ docs/method_diagnosis.md, eq. (D20).
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -53,6 +53,7 @@ from hwid_cli.records.diagnosis import (
 from hwid_cli.records.drive import BASE_PARAMETERS, Drive
 from hwid_cli.records.own_effects import is_own, own_of
 from hwid_cli.records.trust import ModelTrust, TrustOnTests
+from hwid_cli.records.units import behind
 
 MOST_OVERLAYS = 4
 
@@ -145,7 +146,7 @@ def describe(findings: Findings) -> Diagnosis:
         summary=summarise(problem, criteria, base, verdict, effects, fits),
         effects=effects,
         ambiguous_with=_ids_of(verdict.rivals),
-        noise=noise,
+        noise=_told(criteria, problem.unit),
         given=_gap(criteria, given_sse),
         before=_gap(criteria, from_sse),
         after=_gap(criteria, chosen.sse),
@@ -225,9 +226,23 @@ def _gap(criteria: SelectionCriteria, sse: np.ndarray) -> Gap:
         float(np.sqrt(sse[rows].sum() / criteria.n_samples[rows].sum()))
         for rows in (train, held)
     )
-    noise_rms = criteria.noise.rms
+    noise_rms = criteria.held_out_noise
     ratio = judged_rms / noise_rms if noise_rms > 0 else float("inf")
     return Gap(train_rms, judged_rms if has_held_out else float("nan"), ratio)
+
+
+def _told(criteria: SelectionCriteria, unit: str) -> NoiseFloor:
+    """The noise, and by how much it differs between recordings."""
+    noise, levels = criteria.noise, criteria.levels
+    if not np.ptp(levels):
+        return noise
+    low, high = noise.rms * levels.min(), noise.rms * levels.max()
+    sentence = (
+        f"{noise.sentence}; it differs between recordings, from {low:.2g} to {high:.2g}"
+        f"{behind(unit)}, and is {criteria.held_out_noise:.2g}{behind(unit)} in those that "
+        "judge"
+    )
+    return replace(noise, sentence=sentence, held_out_rms=criteria.held_out_noise)
 
 
 def _explained(
@@ -235,7 +250,7 @@ def _explained(
 ) -> float:
     """Share of the held-out excess over the noise; 0 where there is none."""
     held = criteria.is_held_out
-    floor = criteria.n_samples[held].sum() * criteria.noise.rms**2
+    floor = criteria.floors[held].sum()
     excess = before[held].sum() - floor
     if not np.isfinite(excess):
         return 1.0

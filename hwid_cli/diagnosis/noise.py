@@ -38,6 +38,12 @@ _FEWEST_RESTS = 3
 # Orders of differences: the second where the first still sees motion or colour.
 _ORDER, _HIGHER_ORDER = 6, 16
 _SEES_MOTION = 0.7
+# Recordings whose noise differs by no more than this have the same: differences of a few
+# hundred samples tell it no better.
+_ALIKE = 1.5
+# A recording counts as no quieter than this share of all of them: what it leaves there
+# may be rounding.
+_QUIETEST = 0.01
 # A difference that is larger than this many standard deviations is a jump.
 _JUMP = 5.0
 # The grid of a sensor limits it while it makes this share of the noise or more: below,
@@ -111,6 +117,35 @@ def noise_floor(problem: DiagnosisProblem, *, rests: bool = True) -> NoiseFloor:
         float(found.rms), method, resolution, found.is_coloured, found.whitening,
         sentence, _input_rms(problem),
     )  # fmt: skip
+
+
+def noise_levels(problem: DiagnosisProblem, noise: NoiseFloor) -> np.ndarray:
+    """How much noise each recording holds, beside all of them together.
+
+    Sensors have ranges, and some noise goes with the motion. The size of all together is
+    that of the noise floor; their ratios are those of differences of high order.
+
+    Returns
+    -------
+    ndarray, shape (n_recordings,), [-]
+        Mean square over all samples 1; all of them 1 where noise is alike in all.
+    """
+    counts = np.array([one.n_evaluated for one in problem.signals])
+    alike = np.ones(counts.size)
+    # A grid is the same in all, and what a base leaves was tested to be.
+    if noise.resolution > 0 or noise.method == "residuals" or counts.sum() == 0:
+        return alike
+    found = np.array(
+        [
+            _from_differences([one.compared[one.evaluated]], 0.0)
+            for one in problem.signals
+        ]
+    )
+    least = _QUIETEST * float(found.max(initial=0.0))
+    found = np.maximum(found, least)
+    if least <= 0 or found.max() <= _ALIKE * found.min():
+        return alike
+    return np.asarray(found / np.sqrt(np.sum(counts * found**2) / counts.sum()))
 
 
 def whiteness(
@@ -291,7 +326,7 @@ def _is_white(pieces: Sequence[np.ndarray], *, n_removed: int = 1) -> bool:
     By the pooled portmanteau statistic of the first ten lags; ``n_removed`` regressors,
     the mean among them, were taken off each piece.
     """
-    sums, counts = _autocovariances(pieces, _LAGS_OF_COLOUR)
+    sums, counts = _autocovariances(_of_one_size(pieces), _LAGS_OF_COLOUR)
     if sums[0] <= 0 or counts[-1] == 0:
         return True
     # Taking off one regressor pulls every correlation down by one over the length.
@@ -414,20 +449,36 @@ def portmanteau(
         # The filter does not know what came before the first samples.
         unknown = min(taps.size - 1, piece.size // 4)
         white.append(scipy.signal.lfilter(taps, [1.0], piece)[unknown:])
-    sums, counts = _autocovariances(white, n_lags)
-    if counts[0] == 0:
-        return 0.0
-    variance = max(sums[0] / counts[0], least_variance)
+    sums, counts = _autocovariances(_of_one_size(white, least_variance), n_lags)
     used = (counts[1:] > 0) & (np.arange(n_lags) >= n_linked)
-    if variance == 0 or not used.any():
+    if sums[0] == 0 or not used.any():
         return 0.0
-    scores = sums[1:][used] / (variance * np.sqrt(counts[1:][used]))
+    scores = sums[1:][used] / np.sqrt(counts[1:][used])
     basis = np.linalg.qr(_errors_of(taps, n_lags)[used])[0]
     scores = scores - basis @ (basis.T @ scores)
     free = max(scores.size - basis.shape[1], 1)
     return float(
         scores @ scores / (2.0 * scipy.special.gammaincinv(free / 2.0, 1 - FALSE_ALARM))
     )
+
+
+def _of_one_size(
+    pieces: Sequence[np.ndarray], least_variance: float = 0.0
+) -> list[np.ndarray]:
+    """Pieces over their own RMS: each then says as much as it has samples.
+
+    Otherwise those with the most noise outvote the others, and chance is taken for
+    correlation: so few samples scatter more.
+    """
+    pooled, floor = _rms(pieces), float(np.sqrt(least_variance))
+    least = max(_QUIETEST * pooled, floor)
+    if least <= 0:
+        return list(pieces)
+    sizes = [max(_rms([one]), least) for one in pieces]
+    if max(sizes) <= _MORE_THAN_QUIETEST * min(sizes):
+        # They may as well be alike: the sizes of short pieces scatter.
+        sizes = [max(pooled, floor)] * len(sizes)
+    return [one / size for one, size in zip(pieces, sizes, strict=True)]
 
 
 def _errors_of(taps: np.ndarray, n_lags: int) -> np.ndarray:
@@ -469,12 +520,18 @@ def _difference_rms(pieces: Sequence[np.ndarray], order: int, step: float) -> fl
     if not longer:
         return 0.0
     scale = np.sqrt(comb(2 * order, order))
-    found = np.concatenate([np.diff(piece, order) for piece in longer]) / scale
-    size = np.abs(found)
+    found = [np.diff(piece, order) / scale for piece in longer]
+    # Of each piece: beside quiet ones, all of a noisy one would be jumps.
+    kept = np.concatenate([_without_jumps(one, step) for one in found])
+    return float(np.sqrt(np.mean(np.square(kept)))) if kept.size else 0.0
+
+
+def _without_jumps(differences: np.ndarray, step: float) -> np.ndarray:
+    """Differences without those that are far larger than most."""
+    size = np.abs(differences)
     # 1.4826: from the median of the magnitudes to a standard deviation.
     limit = _JUMP * max(1.4826 * float(np.median(size)), step)
-    kept = found[size <= limit] if limit > 0 else found
-    return float(np.sqrt(np.mean(np.square(kept)))) if kept.size else 0.0
+    return differences[size <= limit] if limit > 0 else differences
 
 
 def _upper_quartile(pieces: Sequence[np.ndarray], step: float) -> float:

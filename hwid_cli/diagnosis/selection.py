@@ -14,6 +14,7 @@ from math import inf
 import numpy as np
 import scipy
 
+from hwid_cli.diagnosis.noise import noise_levels
 from hwid_cli.diagnosis.parameters import BASE, START, is_factor
 from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals
 from hwid_cli.drive.catalogue import CATALOGUE, public_id
@@ -110,6 +111,8 @@ class SelectionCriteria:
     motion : float, [output unit]
         RMS of the held-out motion about its mean; infinite where a command is compared, in
         which all that the motion lacks shows.
+    levels : ndarray, shape (n_recordings,), [-]
+        Noise of each recording over that of all; empty where it is alike in all.
     """
 
     n_samples: np.ndarray
@@ -119,6 +122,7 @@ class SelectionCriteria:
     standing: StandIn | None = None
     stand_in_error: float = 0.0
     motion: float = inf
+    levels: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     @classmethod
     def of(cls, problem: DiagnosisProblem, noise: NoiseFloor) -> "SelectionCriteria":
@@ -137,7 +141,20 @@ class SelectionCriteria:
         ]
         motion = float(np.sqrt(np.mean(np.concatenate(moved) ** 2)))
         motion = inf if problem.compares_command else motion
-        return cls(counts, held, noise, features, standing, error, motion)
+        levels = noise_levels(problem, noise)
+        return cls(counts, held, noise, features, standing, error, motion, levels)
+
+    @property
+    def floors(self) -> np.ndarray:
+        """Sum of squares of the noise in each recording, [output unit squared]."""
+        levels = self.levels if self.levels.size else np.ones(self.n_samples.size)
+        return np.asarray(self.n_samples * (levels * self.noise.rms) ** 2)
+
+    @property
+    def held_out_noise(self) -> float:
+        """RMS of the noise in the recordings that judge, [output unit]."""
+        held = self.is_held_out
+        return float(np.sqrt(self.floors[held].sum() / self.n_samples[held].sum()))
 
     def rms(self, found: CandidateFit, *, held_out: bool) -> float:
         """RMS over the held-out recordings, or the others.
@@ -157,13 +174,13 @@ class SelectionCriteria:
         -------
         float, [-]
         """
-        rms = self.rms(found, held_out=True)
-        return rms / self.noise.rms if self.noise.rms > 0 else float("inf")
+        rms, noise = self.rms(found, held_out=True), self.held_out_noise
+        return rms / noise if noise > 0 else float("inf")
 
     def evidence(self, found: CandidateFit, other: CandidateFit) -> Evidence:
         """How a candidate does against another one."""
         held = self.is_held_out
-        floor = self.n_samples[held].sum() * self.noise.rms**2
+        floor = self.floors[held].sum()
         before, after = other.sse[held].sum(), found.sse[held].sum()
         excess = before - floor
         explained = (before - after) / excess if excess > 0 else 0.0
@@ -209,7 +226,7 @@ class SelectionCriteria:
         -------
         float, [output unit squared]
         """
-        floor = float(self.n_samples.sum()) * self.noise.rms**2
+        floor = float(self.floors.sum())
         return max(float(found.sse.sum()) - floor, 0.0)
 
     def is_complete(self, found: CandidateFit) -> bool:

@@ -14,7 +14,6 @@ from hwid_cli.records.diagnosis import (
     STILL_LARGE,
     BaseParameter,
     FittedEffect,
-    NoiseFloor,
 )
 from hwid_cli.records.drive import Drive
 
@@ -32,6 +31,8 @@ _FEW = 1 / 3
 _MOST_NAMED = 6
 # A value off by more than this factor is a wrong one, not an inaccurate one, [-].
 _DOUBTFUL = 3.0
+# A ratio to the noise that is taken for 1, [-].
+_NO_MORE_THAN_NOISE = 1.02
 # All move in one direction if the way back is no longer than this share of the way, [-].
 _WAY_BACK = 0.05
 
@@ -99,11 +100,11 @@ def _verdict_in_words(
         return (
             f"The simulation differs from the recordings by {before:.3g} times their "
             "noise, and no effect of the catalogue explains most of it."
-            f"{_where_it_sits(problem, criteria.noise, verdict.chosen)}"
+            f"{_where_it_sits(problem, criteria, verdict.chosen)}"
         )
     if verdict.word == "law":
         share = 100 * criteria.evidence(verdict.chosen, base).explained
-        rest = "" if verdict.is_complete else " Something smaller remains."
+        rest = _rest(criteria, verdict)
         return (
             "No effect of the catalogue is what the simulation lacks, but a formula holds: "
             f"{effects[0].equation}. With it the error on held-out recordings falls from "
@@ -157,16 +158,24 @@ def _named(
         f"The simulation lacks {names} ({meaning}): with it the error on {on} "
         f"recordings falls from {before:.3g} to {after:.3g} times the noise."
     )
-    return text if verdict.is_complete else f"{text} Something smaller remains."
+    return f"{text}{_rest(criteria, verdict)}"
+
+
+def _rest(criteria: SelectionCriteria, verdict: DiagnosisVerdict) -> str:
+    """Say what remains beside what was found; nothing where it is complete."""
+    if verdict.is_complete:
+        return ""
+    if criteria.ratio(verdict.chosen) > _NO_MORE_THAN_NOISE:
+        return " Something smaller remains."
+    return " What remains is no larger than the noise, but not as random."
 
 
 def _where_it_sits(
-    problem: DiagnosisProblem, noise: NoiseFloor, chosen: CandidateFit
+    problem: DiagnosisProblem, criteria: SelectionCriteria, chosen: CandidateFit
 ) -> str:
     """Name the recordings that hold the gap, if they are of one kind or few."""
     signals = problem.signals
-    floor = np.array([one.n_evaluated for one in signals]) * noise.rms**2
-    excess = np.maximum(chosen.sse - floor, 0.0)
+    excess = np.maximum(chosen.sse - criteria.floors, 0.0)
     if not 0 < excess.sum() < np.inf:
         return ""
     rows = _rows_of_gap(excess, [one.kind for one in signals])

@@ -122,6 +122,7 @@ def decide(
         return (
             criteria.may_be_named(one, base)
             and _needs_each(criteria, one, fits, base)
+            and not _is_beaten_by_fewer(criteria, one, fits, base)
             and not unclear(one)
         )
 
@@ -241,6 +242,29 @@ def _needs_each(
         if not (is_clear and explains):
             return False
     return True
+
+
+def _is_beaten_by_fewer(
+    criteria: SelectionCriteria,
+    whole: CandidateFit,
+    fits: Mapping[tuple[str, ...], CandidateFit],
+    base: CandidateFit,
+) -> bool:
+    """Whether fewer effects leave less, where a set leaves more than noise.
+
+    Such a set makes up for a law that the fewer ones come closer to, named or not.
+    """
+    if criteria.is_complete(whole):
+        return False
+    gain = criteria.gain(whole, base)
+    return any(
+        len(one.effects) < len(whole.effects)
+        and one.is_usable
+        and not has_own_values(one)
+        and criteria.gain(one, base) > gain
+        and criteria.rms(one, held_out=True) < criteria.rms(whole, held_out=True)
+        for one in fits.values()
+    )
 
 
 def _rivals_by_halves(

@@ -119,6 +119,9 @@ class NoiseFloor:
         Coefficients of the autoregressive filter that makes it white; (1,) if it is.
     input_rms : float, [input unit]
         Noise that the measured input holds at most, from its differences.
+    held_out_rms : float, [output unit]
+        Of the recordings that judge, which may hold more or less; 0 where it was not
+        asked for.
     """
 
     rms: float
@@ -128,6 +131,12 @@ class NoiseFloor:
     whitening: tuple[float, ...]
     sentence: str
     input_rms: float = field(default=0.0, metadata=ADDED_LATER)
+    held_out_rms: float = field(default=0.0, metadata=ADDED_LATER)
+
+    @property
+    def judging_rms(self) -> float:
+        """Noise that a held-out error is compared with, [output unit]."""
+        return self.held_out_rms or self.rms
 
 
 @dataclass(frozen=True)

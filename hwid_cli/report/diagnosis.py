@@ -214,7 +214,9 @@ def ranking_table(diagnosis: Diagnosis, *, count: int | None = None) -> Table:
             (
                 candidate_name(one.effects) + "*" * is_chosen(one),
                 percent(one.forecast_share),
-                _ratio(error / diagnosis.noise.rms) if has_noise else number(error),
+                _ratio(error / diagnosis.noise.judging_rms)
+                if has_noise
+                else number(error),
                 percent(one.explained_share),
                 percent(one.improved_share),
                 decimals(one.bic_gain, 0),

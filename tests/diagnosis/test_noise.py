@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from hwid_cli.diagnosis.noise import noise_floor, whiteness
+from hwid_cli.diagnosis.noise import noise_floor, noise_levels, whiteness
 from hwid_cli.drive.simulation import simulate_drive
 from tests.diagnosis.diagnosed import (
     DRIVE,
@@ -16,6 +16,7 @@ from tests.diagnosis.diagnosed import (
     problem_of,
     white,
 )
+from tests.diagnosis.small_drive import problem, recordings
 
 # Correlation over 20 samples.
 PHI = float(np.exp(-1 / 20))
@@ -345,3 +346,37 @@ def test_whiteness_of_what_is_not_finite_is_infinite():
 def test_whiteness_of_nothing_is_zero():
     assert whiteness([np.zeros(100)], white(0.0)) == 0
     assert whiteness([], white(1.0)) == 0
+
+
+def test_noise_that_differs_between_recordings_is_white_as_often_as_alike_noise():
+    # One recording in eight is thirty times as noisy: pooled by size, its samples alone
+    # would speak, and their chance correlations would count eight times too much.
+    rng = np.random.default_rng(5)
+    sizes = [30.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0]
+    floor = white(1.0)
+    found = [
+        whiteness([size * rng.standard_normal(300) for size in sizes], floor)
+        for _ in range(300)
+    ]
+    # 0.1 % by design.
+    assert np.mean(np.array(found) > 1.0) <= 0.01
+    assert 0.4 < np.median(found) < 0.6
+
+
+def test_what_remains_in_one_quiet_recording_is_seen():
+    rng = np.random.default_rng(6)
+    pieces = [30.0 * rng.standard_normal(300) for _ in range(7)]
+    hum = np.sin(2 * np.pi * 0.05 * np.arange(300))
+    assert whiteness([*pieces, rng.standard_normal(300) + 2 * hum], white(1.0)) > 1.5
+
+
+def test_levels_of_noise_are_those_of_the_recordings():
+    noises = (2e-5, 2e-5, 8e-5, 2e-5, 2e-5, 2e-5, 2e-5, 2e-5, 4e-6)
+    given = [recordings(noise=noise, seed=3 + n)[n] for n, noise in enumerate(noises)]
+    of = problem(given)
+    floor = noise_floor(of)
+    true = np.array(noises) / np.sqrt(np.mean(np.square(noises)))
+    assert noise_levels(of, floor) == pytest.approx(true, rel=0.25)
+    assert floor.rms == pytest.approx(np.sqrt(np.mean(np.square(noises))), rel=0.1)
+    alike = problem(recordings())
+    np.testing.assert_array_equal(noise_levels(alike, noise_floor(alike)), 1.0)

@@ -717,3 +717,23 @@ def test_a_shared_law_that_may_be_a_simpler_one_is_not_named():
     verdict = decided(base(4e5), fits, [core], unclear=("stribeck_friction",))
     assert verdict.word == "unknown"
     assert decided(base(4e5), fits, [core]).chosen is core
+
+
+@pytest.mark.parametrize(
+    ("of_fewer", "whiteness", "chosen"),
+    [
+        (600.0, 3.0, ("hysteresis:bouc_wen",)),
+        # Less is left by the set, or nothing but noise.
+        (1200.0, 3.0, ("coulomb_friction", "elastic_coupling:motor")),
+        (600.0, 0.5, ("coulomb_friction", "elastic_coupling:motor")),
+    ],
+)
+def test_a_set_is_not_named_where_fewer_effects_leave_less(of_fewer, whiteness, chosen):
+    both = ("coulomb_friction", "elastic_coupling:motor")
+    pair = made_up(both, 800.0, parameters=4, whiteness=whiteness)
+    fewer = made_up(("hysteresis:bouc_wen",), of_fewer, parameters=3)
+    singles = [made_up(both[:1], 2e5), made_up(both[1:], 3e5), fewer]
+    start = base(1e6)
+    fits = {one.effects: one for one in (*singles, pair)}
+    found = decide(CRITERIA, start.sse, start, fits, (fewer, pair), lambda _: ())
+    assert found.chosen.effects == chosen

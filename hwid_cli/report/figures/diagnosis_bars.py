@@ -130,7 +130,7 @@ def ranking_figure(diagnosis: Diagnosis) -> Figure:
     errors, shares = figure.subplots(1, 2, sharey=True)
     rows = np.arange(len(shown))
     colours = [_colour(one) for one in shown]
-    noise = diagnosis.noise.rms
+    noise = diagnosis.noise.judging_rms
     has_noise = np.isfinite(noise) and noise > 0.0
     rms = np.array([one.held_out_rms for one in shown]) / (noise if has_noise else 1.0)
     errors.scatter(rms, rows, c=colours, s=38, zorder=3)

@@ -209,7 +209,7 @@ _ROLES = {"": "given", "diagnosis": "extended", "rival": "refitted"}
 
 def _candidate_dots(diagnosis: Diagnosis) -> Dots:
     """The best candidates by the share of the gap that they explain on held-out data."""
-    noise = diagnosis.noise.rms
+    noise = diagnosis.noise.judging_rms
     rows = []
     shown = shown_candidates(diagnosis)
     for one in shown:

@@ -182,7 +182,7 @@ def _steps(diagnosis: Diagnosis) -> list[tuple[str, str, Gap]]:
 
 
 def _has_noise(diagnosis: Diagnosis) -> bool:
-    return isfinite(diagnosis.noise.rms) and diagnosis.noise.rms > 0.0
+    return isfinite(diagnosis.noise.judging_rms) and diagnosis.noise.judging_rms > 0.0
 
 
 def _rms(gap: Gap, diagnosis: Diagnosis) -> float:
@@ -228,7 +228,7 @@ def _gaps(diagnosis: Diagnosis) -> Dots:
             DotRow(name, (Dot(value, role, told),), told, is_bold=role == "extended")
         )
     on = "held-out recordings" if diagnosis.held_out else "recordings of the fit"
-    noise = with_unit(diagnosis.noise.rms, unit)
+    noise = with_unit(diagnosis.noise.judging_rms, unit)
     return Dots(
         label="RMS gap over noise [-]" if has_noise else f"RMS gap [{unit}]",
         groups=(DotGroup("", tuple(rows)),),
