@@ -29,6 +29,8 @@ _IMPORT = re.compile(
     re.MULTILINE,
 )
 
+# Entries for C, which nothing calls, take a twentieth of the time to compile.
+_ALWAYS: dict[str, Any] = {"no_cfunc_wrapper": True}
 _BOTH: dict[str, Any] = {
     "nogil": True,
     "error_model": "numpy",
@@ -65,7 +67,7 @@ def compiled(**options: Any) -> Callable[[_Function], _Function]:
         before = vars(config)["CACHE_DIR"]
         vars(config)["CACHE_DIR"] = str(folder_of_loops(source))
         try:
-            return njit(cache=True, **options)(function)
+            return njit(cache=True, **{**_ALWAYS, **options})(function)
         finally:
             vars(config)["CACHE_DIR"] = before
 
