@@ -11,7 +11,9 @@ import atexit
 import os
 import re
 import shutil
+import sys
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
@@ -19,7 +21,13 @@ from tempfile import TemporaryFile, mkdtemp
 from typing import Any, TypeVar
 
 from numba import config, njit
+from numba.core.caching import FunctionCache
 from numba.core.options import DefaultOptions
+
+if sys.platform != "win32":
+    import fcntl
+
+HAS_LOCKS = sys.platform != "win32"
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
@@ -29,6 +37,8 @@ _IMPORT = re.compile(
     re.MULTILINE,
 )
 
+# Entries for C, which nothing calls, take a twentieth of the time to compile.
+_ALWAYS: dict[str, Any] = {"no_cfunc_wrapper": True}
 _BOTH: dict[str, Any] = {
     "nogil": True,
     "error_model": "numpy",
@@ -43,6 +53,38 @@ _COUNTS = hasattr(DefaultOptions, "_nrt")
 INNER = {**_BOTH, "_nrt": False} if _COUNTS else _BOTH
 # Those that make arrays; said of each, or they would do as the one that calls them.
 MAKING = {**_BOTH, "_nrt": True} if _COUNTS else _BOTH
+
+
+class _Kept(FunctionCache):
+    """Compiled forms of a function on the disk, which one process at a time adds to.
+
+    numba numbers the forms of a function. Two processes that keep two forms at the same
+    moment would give both the same number, and later ones would run the wrong one.
+    """
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Keep a form; numba calls it so."""
+        with one_writer(Path(self.cache_path)):
+            super().save_overload(sig, data)
+
+
+@contextmanager
+def one_writer(folder: Path) -> Iterator[None]:
+    """Wait until no other process writes to a folder, where the system has locks.
+
+    Parameters
+    ----------
+    folder : Path
+        Made where it is missing.
+    """
+    with ExitStack() as stack:
+        if sys.platform != "win32":
+            # A disk without locks is written to as numba does it, without.
+            with suppress(OSError):
+                folder.mkdir(parents=True, exist_ok=True)
+                file = stack.enter_context((folder / "lock").open("ab"))
+                fcntl.flock(file, fcntl.LOCK_EX)
+        yield
 
 
 def compiled(**options: Any) -> Callable[[_Function], _Function]:
@@ -65,7 +107,12 @@ def compiled(**options: Any) -> Callable[[_Function], _Function]:
         before = vars(config)["CACHE_DIR"]
         vars(config)["CACHE_DIR"] = str(folder_of_loops(source))
         try:
-            return njit(cache=True, **options)(function)
+            loop = njit(**{**_ALWAYS, **options})(function)
+            # Without numba's compiler it is the function as it was.
+            if loop is not function:
+                # As njit(cache=True) does it.
+                vars(loop)["_cache"] = _Kept(function)
+            return loop
         finally:
             vars(config)["CACHE_DIR"] = before
 

@@ -80,6 +80,16 @@ class Trial:
         value, hits = done.stdout.split()
         return float(value), int(hits)
 
+    def process(self, code):
+        """A process that has begun."""
+        return subprocess.Popen(
+            [sys.executable, "-B", "-c", code],
+            env=self.environment,
+            cwd=self.folder,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+
     def loops(self, place="hwid_cli/__pycache__/loops"):
         return sorted(path.name for path in (self.folder / place).iterdir())
 
@@ -158,6 +168,44 @@ def test_loops_of_other_people_stay_where_numba_puts_them(trial):
 
     assert trial.ask("from own import twice\nprint(twice(1.0), 0)") == (12.0, 0)
     assert list((trial.folder / "__pycache__").glob("own.twice-*.nbi"))
+
+
+@pytest.mark.skipif(not compiled.HAS_LOCKS, reason="no locks on this system")
+def test_one_process_at_a_time_adds_to_a_folder(tmp_path):
+    import fcntl
+
+    folder = tmp_path / "loops"
+    folder.mkdir()
+    with (folder / "lock").open("ab") as other:
+        with compiled.one_writer(folder), pytest.raises(BlockingIOError):
+            fcntl.flock(other, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        fcntl.flock(other, fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+
+@pytest.mark.skipif(not compiled.HAS_LOCKS, reason="no locks on this system")
+@pytest.mark.thorough
+def test_a_loop_is_kept_when_the_other_process_is_done(trial):
+    hold = (
+        "import time\n"
+        "from pathlib import Path\n"
+        "from hwid_cli.compiled import one_writer\n"
+        "from hwid_cli.outer import outer\n"
+        "with one_writer(Path(outer.stats.cache_path)):\n"
+        "    print('held', flush=True)\n"
+        "    time.sleep(600)\n"
+    )
+    with trial.process(hold) as holder:
+        try:
+            assert holder.stdout.readline() == "held\n"
+            with trial.process(ASK) as asker:
+                with pytest.raises(subprocess.TimeoutExpired):
+                    asker.wait(3.0)
+                assert list(trial.folder.rglob("outer.outer-*")) == []
+                holder.kill()
+                assert asker.stdout.read() == "6.0 0\n"
+        finally:
+            holder.kill()
+    assert trial.ask() == (6.0, 1)
 
 
 def modules_imported(path):

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from hwid_cli.compiled import compiled
+from hwid_cli.compiled import INNER, MAKING, compiled
 
 # Decaying responses end in subnormal numbers, which processors handle a hundred times
 # slower; anything this small is far below the rounding of the values it is added to.
@@ -173,14 +173,14 @@ def all_pole(lines: np.ndarray, begin: int, length: int, taps: np.ndarray) -> No
                 row[m] -= taps[j] * source[m]
 
 
-@compiled()
+@compiled(**INNER)
 def _flush(row: np.ndarray) -> None:
     """Set what has all but died away to zero."""
     for m in range(row.size):
         row[m] = 0.0 if abs(row[m]) < _TINY else row[m]
 
 
-@compiled()
+@compiled(**INNER)
 def _all_zero(
     lines: np.ndarray, at: int, zeros: np.ndarray, wide: int, out: np.ndarray
 ) -> None:
@@ -203,7 +203,7 @@ def _all_zero(
                 out[m] += b0 * s0[m] + b1 * s1[m] + b2 * s2[m] + b3 * s3[m]
 
 
-@compiled()
+@compiled(**MAKING)
 def differences(
     lines: np.ndarray, at: int, column: int, count: int, length: int, table: np.ndarray
 ) -> None:

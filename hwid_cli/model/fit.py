@@ -27,6 +27,7 @@ from hwid_cli.model.initial_candidates import (
 )
 from hwid_cli.model.levenberg_marquardt import Search
 from hwid_cli.model.linear_search import linear_from_nested
+from hwid_cli.model.loops_beside import loops_compiled_beside
 from hwid_cli.model.pole_bound import is_within
 from hwid_cli.model.problem import FitProblem, offset_left, rmsd, scaled
 from hwid_cli.model.robust import renewed, rescored, settled, unhidden, winsorised
@@ -114,7 +115,8 @@ def fit(
     ('converged', array([ 1. , -0.8]))
     """
     given = _Given(tuple(starts), tuple(contained), search_anew)
-    return _fitted(recordings, orders, options, given, standard_errors=True)
+    with loops_compiled_beside((options.input_map, options.output_map)):
+        return _fitted(recordings, orders, options, given, standard_errors=True)
 
 
 def fit_without_standard_errors(
@@ -135,7 +137,8 @@ def fit_without_standard_errors(
         `uncertainty.with_standard_errors` works them out.
     """
     given = _Given(tuple(starts), tuple(contained), search_anew)
-    return _fitted(recordings, orders, options, given, standard_errors=False)
+    with loops_compiled_beside((options.input_map, options.output_map)):
+        return _fitted(recordings, orders, options, given, standard_errors=False)
 
 
 # A step to a model that overflows is refused by its cost.

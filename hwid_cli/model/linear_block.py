@@ -22,7 +22,7 @@ from functools import lru_cache
 import numpy as np
 import scipy
 
-from hwid_cli.compiled import compiled
+from hwid_cli.compiled import MAKING, compiled
 
 # Decaying responses end in subnormal numbers, which processors handle a hundred times
 # slower; anything this small is far below the rounding of the values it is added to.
@@ -88,7 +88,7 @@ def block_output(
     return _all_pole(passed, denominator, rest)
 
 
-@compiled()
+@compiled(**MAKING)
 def _all_pole(signal: np.ndarray, denominator: np.ndarray, rest: float) -> np.ndarray:
     """Run 1/F along a signal; before it the result was at rest."""
     n, nf = signal.size, denominator.size - 1

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from hwid_cli.compiled import compiled
+from hwid_cli.compiled import INNER, compiled
 from hwid_cli.model.candidates import FitData
 from hwid_cli.model.derivative_rows import all_pole, differences
 from hwid_cli.model.linear_block import (
@@ -99,7 +99,7 @@ def regression_columns(
     _pick(output, counted, 1.0, columns[place + 2])
 
 
-@compiled()
+@compiled(**INNER)
 def _pick(
     signal: np.ndarray, counted: np.ndarray, factor: float, out: np.ndarray
 ) -> None:

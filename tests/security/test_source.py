@@ -30,13 +30,15 @@ _OWN_FUNCTION = "hwid_cli/model/maps/own_function.py"
 # Tasks go through pickle on their way to a worker, here and on a cluster; an FMU is
 # compiled by the system's compiler, without a shell, and its text escaped for XML;
 # foreign files are read by a Python of its own, which sends text and numbers; an FMU is
-# a library of the user's own, called in such a Python.
+# a library of the user's own, called in such a Python; a first fit compiles its loops in
+# two such Pythons.
 ALLOWED_MODULES = {
     ("hwid_cli/tasks/workers.py", "pickle"),
     ("hwid_cli/tasks/cluster.py", "pickle"),
     ("hwid_cli/files/isolated_process.py", "subprocess"),
     ("hwid_cli/simulations/command.py", "subprocess"),
     ("hwid_cli/export/fmu.py", "subprocess"),
+    ("hwid_cli/model/loops_beside.py", "subprocess"),
     ("hwid_cli/simulations/fmu_unit.py", "ctypes"),
     ("hwid_cli/export/fmu.py", "xml.sax.saxutils"),
     # Of an FMU that FMPy has read before; entities are refused.

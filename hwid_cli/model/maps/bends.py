@@ -12,7 +12,7 @@ Compiled loops; of the rest only `smallest_bends` is no loop.
 
 import numpy as np
 
-from hwid_cli.compiled import compiled
+from hwid_cli.compiled import INNER, MAKING, compiled
 
 # Share of a segment over which its samples must spread to tell its slope, and strength
 # of a direction, as a share of the strongest, below which the samples do not see it.
@@ -73,7 +73,7 @@ def _shares(points: np.ndarray, argument: np.ndarray) -> np.ndarray:
     return rows
 
 
-@compiled(error_model="numpy")
+@compiled(**INNER)
 def _mean_slope(break_points: np.ndarray, values: np.ndarray) -> float:
     """Range of the values over that of the break-points; 1 for a constant map.
 
@@ -189,7 +189,7 @@ def add_bends(
     return total
 
 
-@compiled(error_model="numpy")
+@compiled(**MAKING)
 def _relative_growth(
     break_points: np.ndarray, values: np.ndarray, with_positions: bool
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -213,7 +213,7 @@ def _relative_growth(
     )
 
 
-@compiled()
+@compiled(**INNER)
 def _extremes(values: np.ndarray, first: int, last: int) -> tuple[int, int]:
     """Places of the first lowest and the first highest value from one place to another."""
     low = high = first
@@ -225,7 +225,7 @@ def _extremes(values: np.ndarray, first: int, last: int) -> tuple[int, int]:
     return low, high
 
 
-@compiled()
+@compiled(**INNER)
 def _inner_ends(units: int) -> tuple[int, int]:
     """Break-points between which a map's growth is measured.
 

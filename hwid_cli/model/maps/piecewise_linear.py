@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from hwid_cli.compiled import compiled
+from hwid_cli.compiled import MAKING, compiled
 from hwid_cli.model.maps.bends import add_bends, smallest_bends, squared_bends_after
 from hwid_cli.model.maps.positions import (
     WEIGHT_OF_SHAPE,
@@ -124,7 +124,7 @@ def _derivatives(
     )
 
 
-@compiled(error_model="numpy")
+@compiled(**MAKING)
 def _slopes(break_points: np.ndarray, values: np.ndarray) -> np.ndarray:
     """Slope of each segment; by a loop, because expressions of arrays compile slowly."""
     slopes = np.empty(values.size - 1)

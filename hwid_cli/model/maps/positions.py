@@ -6,7 +6,7 @@ piecewise constant one.
 
 import numpy as np
 
-from hwid_cli.compiled import compiled
+from hwid_cli.compiled import INNER, compiled
 
 # Sweeps that put break-points into order.
 _SWEEPS = 4
@@ -108,7 +108,7 @@ def thinned_break_points(
     return kept
 
 
-@compiled()
+@compiled(**INNER)
 def _between(
     points: np.ndarray, values: np.ndarray, first: int, last: int, at: int
 ) -> float:
