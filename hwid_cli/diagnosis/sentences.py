@@ -165,6 +165,8 @@ def _rest(criteria: SelectionCriteria, verdict: DiagnosisVerdict) -> str:
     """Say what remains beside what was found; nothing where it is complete."""
     if verdict.is_complete:
         return ""
+    if criteria.ratio(verdict.chosen) > STILL_LARGE:
+        return " What remains is not explained."
     if criteria.ratio(verdict.chosen) > _NO_MORE_THAN_NOISE:
         return " Something smaller remains."
     return " What remains is no larger than the noise, but not as random."
