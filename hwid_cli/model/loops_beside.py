@@ -31,6 +31,8 @@ from hwid_cli.model.maps.piecewise_linear import (
 from hwid_cli.model.maps.positions import settled_break_points, thinned_break_points
 from hwid_cli.model.normal_equations import combined, scaled_equations
 
+# How far the second process stands back, [-]: it only takes what nobody else wants.
+_NICER = 19
 _FLOAT, _INT, _BOOL = types.float64, types.int64, types.boolean
 _VECTOR, _PLACES, _TABLE = _FLOAT[::1], _INT[::1], _FLOAT[:, ::1]
 # Parameters of maps are held fixed, and parts of normal equations are views.
@@ -128,4 +130,6 @@ def compile_them() -> None:
 
 
 if __name__ == "__main__":
+    # Where no core waits after all, the fit goes first.
+    os.nice(_NICER)
     compile_them()

@@ -13,7 +13,7 @@ import time
 from pathlib import Path
 
 PROJECT = Path(__file__).resolve().parents[2]
-REPEATS = 10
+REPEATS, FIRST_FITS = 10, 3
 FIT = """
 import numpy as np
 from hwid_cli import Orders, Recording, fit
@@ -44,18 +44,19 @@ def show(name: str, seconds: list[float]) -> None:
 
 
 def main() -> None:
-    """Start everything several times, what compiles only once."""
+    """Start everything several times."""
     print(f"\n{'start':44}{'median s':>9}{'least':>9}{'most':>9}{'runs':>6}")
     show("python -c pass", [seconds_of("-c", "pass") for _ in range(REPEATS)])
     helped = [seconds_of("-m", "hwid_cli", "--help") for _ in range(REPEATS)]
     show("hwid --help", helped)
-    with tempfile.TemporaryDirectory() as empty:
-        cache = {"NUMBA_CACHE_DIR": empty}
-        show(
-            "a fit of 300 samples, loops not compiled", [seconds_of("-c", FIT, **cache)]
-        )
-        later = [seconds_of("-c", FIT, **cache) for _ in range(REPEATS // 2)]
-        show("the same later, loops from the cache", later)
+    first, later = [], []
+    for _ in range(FIRST_FITS):
+        with tempfile.TemporaryDirectory() as empty:
+            cache = {"NUMBA_CACHE_DIR": empty}
+            first.append(seconds_of("-c", FIT, **cache))
+            later += [seconds_of("-c", FIT, **cache) for _ in range(2)]
+    show("a fit of 300 samples, loops not compiled", first)
+    show("the same later, loops from the cache", later)
 
 
 if __name__ == "__main__":

@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -88,6 +89,22 @@ def test_there_is_none_where_it_would_not_help(started, monkeypatch, name, value
 def test_linear_models_have_none(started):
     with loops_beside.loops_compiled_beside(("none", "none")):
         assert started == []
+
+
+@pytest.mark.thorough
+@pytest.mark.skipif(not loops_beside.HAS_LOCKS, reason="no second process there")
+def test_the_second_process_stands_back():
+    process = loops_beside._started()
+    try:
+        for _ in range(100):
+            nice = os.getpriority(os.PRIO_PROCESS, process.pid)
+            if nice > os.nice(0):
+                break
+            time.sleep(0.1)
+        assert nice == 19
+    finally:
+        process.kill()
+        process.wait()
 
 
 def test_a_fit_goes_on_where_no_process_is_to_be_had(monkeypatch):
