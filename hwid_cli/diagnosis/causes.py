@@ -7,7 +7,7 @@ before an effect is named. docs/method_diagnosis.md, eq. (D27), (D28).
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
@@ -39,10 +39,12 @@ _LESS_NOISE, _MORE_NOISE = 0.7, 1.3
 _NEARLY_WHITE = 6.0
 # Times that the filter follows the drive that was fitted with it.
 _REWEIGHTINGS = 2
-# Coordinates of that search go no farther, as powers of e, and it takes no more simulations
-# for each of them.
+# What is left calls for so many times the noise that the input shows: something else is
+# missing, and no filter makes it white.
+_FAR_MORE_NOISE = 5.0
+# Coordinates of that search go no farther, as powers of e, and it takes no more steps.
 _FARTHEST = 30.0
-_MOST_CALLS = 30
+_MOST_STEPS = 30
 # Correlations of neighbours, and of the next but one, that interpolation makes at most.
 _MOST_LINKED = (0.35, 0.1)
 
@@ -208,30 +210,44 @@ def fit_with_input_noise(
         excess = _mean_square(parts) - noise.rms**2
         if excess <= 0:
             return point
-        strength = _strength(parts, problem, drive, excess) / noise.rms**2
+        needed = _strength(parts, problem, drive, excess)
+        if needed > (_FAR_MORE_NOISE * noise.input_rms) ** 2:
+            return point
+        strength = needed / noise.rms**2
 
         def scaled(coordinates: np.ndarray, strength: float = strength) -> np.ndarray:
-            drive = drive_at(problem, fit_layout, at(coordinates))
-            found = []
-            for one, signals in zip(
-                residuals_at(problem, fit_layout, at(coordinates)),
-                problem.signals,
-                strict=True,
-            ):
-                white = _whitened(one, signals, drive, strength)
-                # Where the filter does not exist, the residual as it is.
-                found.append(one if white is None else white[0] / np.sqrt(white[1]))
-            return np.concatenate(found)
+            return _in_deviations(problem, fit_layout, at(coordinates), strength)
 
         start = np.concatenate([point.shared, point.own.ravel()])
         if scaled(start).size < start.size:
             return point
-        most = _MOST_CALLS * (start.size + 1)
+        # "lm" counts the simulations for derivatives among its calls in some versions of
+        # SciPy only, "trf" in none.
         found = scipy.optimize.least_squares(
-            scaled, start, method="lm", x_scale=1.0, max_nfev=most
+            scaled, start, method="trf", x_scale=1.0, max_nfev=_MOST_STEPS
         )
         point = at(found.x)
     return point
+
+
+def _in_deviations(
+    problem: DiagnosisProblem,
+    fit_layout: ParameterLayout,
+    point: ParameterPoint,
+    strength: float,
+) -> np.ndarray:
+    """Innovations of all recordings, in units of their own deviation."""
+    drive = drive_at(problem, fit_layout, point)
+    sample_times = {one.sample_time_s for one in problem.signals}
+    filters = {one: _whitening(drive, one, strength) for one in sample_times}
+    found = []
+    for part, signals in zip(
+        residuals_at(problem, fit_layout, point), problem.signals, strict=True
+    ):
+        filtered = filters[signals.sample_time_s]
+        # Where the filter does not exist, the residual as it is.
+        found.append(part if filtered is None else filtered.in_deviations(part))
+    return np.concatenate(found)
 
 
 def _mean_square(parts: Sequence[np.ndarray]) -> float:
@@ -254,18 +270,44 @@ def _innovations(
     limit = (_MORE_NOISE * input_rms) ** 2
     if excess <= 0 or excess / gain > limit:
         return None
-    white = _whitened(residual, signals, drive, excess / gain / rms**2)
-    return None if white is None else white[0]
+    strength = excess / gain / rms**2
+    filtered = _whitening(drive, signals.sample_time_s, strength)
+    return None if filtered is None else filtered.innovations(residual)
 
 
-def _whitened(
-    residual: np.ndarray, signals: Signals, drive: Drive, strength: float
-) -> tuple[np.ndarray, float] | None:
-    """Innovations, and their variance in units of the output's noise.
+@dataclass(frozen=True, eq=False)
+class _Whitening:
+    """Filter from a residual to its innovations.
 
-    ``strength`` is the variance of the input's noise in the same unit.
+    Parameters
+    ----------
+    top, bottom : ndarray, shape (3,)
+        Its coefficients, the newest sample first.
+    variance : float, [-]
+        Of the innovations, in units of the output's noise.
     """
-    a, b, through = _discrete(drive, signals.sample_time_s)
+
+    top: np.ndarray
+    bottom: np.ndarray
+    variance: float
+
+    def innovations(self, residual: np.ndarray) -> np.ndarray:
+        """What the samples before do not tell of each residual."""
+        return np.asarray(scipy.signal.lfilter(self.top, self.bottom, residual))
+
+    def in_deviations(self, residual: np.ndarray) -> np.ndarray:
+        """Innovations in units of their own deviation."""
+        return self.innovations(residual) / np.sqrt(self.variance)
+
+
+def _whitening(
+    drive: Drive, sample_time_s: float, strength: float
+) -> _Whitening | None:
+    """Whitening filter of input and output noise; None where there is none.
+
+    ``strength`` is the variance of the input's noise in units of the output's.
+    """
+    a, b, through = _discrete(drive, sample_time_s)
     # The input's noise moves the reading at once, too.
     reading = np.array([[1.0, 0.0]])
     moved = strength * np.outer(b, b)
@@ -279,9 +321,8 @@ def _whitened(
         return None
     variance = float((reading @ covariance @ reading.T)[0, 0]) + float(read[0, 0])
     correct = ((a @ covariance @ reading.T + both) / variance).ravel()
-    top = np.poly(a)
     bottom = np.poly(a - np.outer(correct, reading))
-    return np.asarray(scipy.signal.lfilter(top, bottom, residual)), variance
+    return _Whitening(np.poly(a), bottom, variance)
 
 
 def _gain(drive: Drive, signals: Signals, size: int) -> float:
