@@ -38,18 +38,19 @@ END, STOP, EDGE = 0, 1, 2
 @compiled()
 def propagate(
     force: np.ndarray,
-    sample_time: float,
+    lengths: np.ndarray,
     linear: tuple[float, float, float],
     dry: tuple[float, float],
     contact: tuple[float, float, float],
     state: tuple[float, float],
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return position and velocity at every sample of a force held linearly.
+    """Return position and velocity at every corner of a force in straight lines.
 
     Parameters
     ----------
     force : ndarray, shape (n,), [N]
-    sample_time : float, [s]
+    lengths : ndarray, shape (n - 1,), [s]
+        Time from each corner to the next.
     linear : tuple of mass [kg], damping [N s/m], stiffness [N/m]
     dry : tuple of Coulomb force [N], break-away force [N]
     contact : tuple of lower edge [m], upper edge [m], stiffness [N/m]
@@ -61,8 +62,6 @@ def propagate(
     velocities = np.empty(n)
     mass, damping, stiffness = linear
     rate = damping / mass + np.sqrt((stiffness + contact[2]) / mass)
-    n_sub = max(1, int(np.ceil(sample_time * rate / LONGEST_PHASE)))
-    h = sample_time / n_sub
     position, velocity = state
     direction = _sign(velocity)
     for i in range(n):
@@ -70,7 +69,9 @@ def propagate(
         velocities[i] = velocity
         if i + 1 == n:
             break
-        slope = (force[i + 1] - force[i]) / sample_time
+        n_sub = max(1, int(np.ceil(lengths[i] * rate / LONGEST_PHASE)))
+        h = lengths[i] / n_sub
+        slope = (force[i + 1] - force[i]) / lengths[i]
         for j in range(n_sub):
             push = (force[i] + slope * (j * h), slope)
             moving = (position, velocity, direction)
@@ -329,16 +330,94 @@ def simulate_motion(
     ----------
     docs/method_simulation.md, eq. (G1) to (G8).
     """
-    current = np.ascontiguousarray(current_A, dtype=np.float64)
-    if current.ndim != 1 or not np.isfinite(current).all():
-        raise ValueError("current_A must be 1-D and finite")
+    current = _checked(current_A, "current_A", sample_time_s)
+    lengths = np.full(max(current.size - 1, 0), float(sample_time_s))
+    start = (float(position_m), float(velocity_m_per_s))
+    return _move(current, lengths, mechanics, start)
+
+
+def simulate_limited_motion(
+    command_A: np.ndarray,
+    limit_A: float,
+    mechanics: Mechanics,
+    *,
+    sample_time_s: float,
+    position_m: float = 0.0,
+    velocity_m_per_s: float = 0.0,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Displacement and velocity that a command causes whose current has a limit.
+
+    Parameters
+    ----------
+    command_A : ndarray, shape (n_samples,), [A]
+        Held linearly between samples; the amplifier cuts that line, so the current
+        reaches its limit between two samples.
+    limit_A : float, [A]
+        On both sides.
+    sample_time_s : float, [s]
+    position_m, velocity_m_per_s : float, [m], [m/s]
+        State at the first sample.
+
+    Returns
+    -------
+    displacement : ndarray, shape (n_samples,), [m]
+    velocity : ndarray, shape (n_samples,), [m/s]
+
+    Raises
+    ------
+    ValueError
+        If the command is not 1-D and finite, or the sample time not positive.
+
+    References
+    ----------
+    docs/method_simulation.md, eq. (G9).
+    """
+    command = _checked(command_A, "command_A", sample_time_s)
+    places = _corners(command, limit_A)
+    line = np.interp(places, np.arange(command.size), command)
+    start = (float(position_m), float(velocity_m_per_s))
+    displacement, velocity = _move(
+        np.clip(line, -limit_A, limit_A),
+        float(sample_time_s) * np.diff(places),
+        mechanics,
+        start,
+    )
+    samples = np.searchsorted(places, np.arange(command.size))
+    return displacement[samples], velocity[samples]
+
+
+def _corners(command: np.ndarray, limit: float) -> np.ndarray:
+    """Return every sample, and where the line between two of them crosses a limit."""
+    found = [np.arange(command.size, dtype=float)]
+    first, last = command[:-1], command[1:]
+    for level in (-limit, limit):
+        (rows,) = np.nonzero((first - level) * (last - level) < 0)
+        share = (level - first[rows]) / (last[rows] - first[rows])
+        found.append(rows + share)
+    return np.unique(np.concatenate(found))
+
+
+def _checked(values: np.ndarray, name: str, sample_time_s: float) -> np.ndarray:
+    signal = np.ascontiguousarray(values, dtype=np.float64)
+    if signal.ndim != 1 or not np.isfinite(signal).all():
+        raise ValueError(f"{name} must be 1-D and finite")
     if not sample_time_s > 0:
         raise ValueError(f"sample_time_s must be positive, got {sample_time_s!r}")
+    return signal
+
+
+def _move(
+    current: np.ndarray,
+    lengths: np.ndarray,
+    mechanics: Mechanics,
+    start: tuple[float, float],
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return displacement and velocity at every corner of a current."""
     friction = mechanics.friction
     lower, upper = _edges(mechanics)
     return propagate(
         float(mechanics.force_constant_N_per_A) * current,
-        float(sample_time_s),
+        lengths,
         (
             float(mechanics.mass_kg),
             float(mechanics.damping_N_s_per_m),
@@ -346,27 +425,8 @@ def simulate_motion(
         ),
         (float(friction.coulomb_N), float(friction.break_away_N)),
         (lower, upper, float(mechanics.contact.stiffness_N_per_m)),
-        (float(position_m), float(velocity_m_per_s)),
+        start,
     )
-
-
-def limit_current(command_A: np.ndarray, limit_A: float) -> np.ndarray:
-    """Cut a command to what the drive can deliver.
-
-    Parameters
-    ----------
-    command_A : ndarray, any shape, [A]
-    limit_A : float, [A]
-
-    Returns
-    -------
-    ndarray, same shape, [A]
-
-    References
-    ----------
-    docs/method_simulation.md, eq. (G9).
-    """
-    return np.clip(command_A, -limit_A, limit_A)
 
 
 def spring_force(position_m: np.ndarray, mechanics: Mechanics) -> np.ndarray:

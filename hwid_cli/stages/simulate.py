@@ -36,7 +36,7 @@ from hwid_cli.store.result_files import Provenance
 from hwid_cli.tasks.cache import task_key
 
 NAME = "simulate"
-STAGE_VERSION = 1
+STAGE_VERSION = 2
 
 # The gun rests within this share of its stiction band, so that no reading of the lead-in
 # depends on rounding at the band's edge.
@@ -92,8 +92,9 @@ def _measure_gun(
     command, lead_in, lengths = _command(plan, recording, command_rng)
     mechanism, factor = _changed_mechanics(gun, machine_rng)
     rest = _rest_position(mechanism, machine_rng)
-    displacement, _ = mechanics.simulate_motion(
-        mechanics.limit_current(command, gun.current_limit_A),
+    displacement, _ = mechanics.simulate_limited_motion(
+        command,
+        gun.current_limit_A,
         mechanism,
         sample_time_s=plan.sample_time_s,
         position_m=rest,

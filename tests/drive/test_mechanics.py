@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 from hwid_cli.drive import excitation
 from hwid_cli.drive.mechanics import (
     energy,
-    limit_current,
     rest_range,
+    simulate_limited_motion,
     simulate_motion,
     spring_force,
     static_position,
@@ -18,6 +18,8 @@ from hwid_cli.records.mechanics import Contact, Friction, Mechanics
 
 GUN = Mechanics(friction=Friction(2.4, 3.6), contact=Contact(0.33, 250.0))
 TS = 0.005
+# From rest, within one sample.
+JUMP = np.repeat([0.0, 8.0], [5, 400])
 
 # Tests on drawn currents have no deadline: the first one waits for the compiler.
 currents = st.lists(st.floats(-10, 10), min_size=2, max_size=60).map(np.array)
@@ -182,7 +184,43 @@ def test_mass_rests_inside_its_rest_range_and_leaves_it_outside(current_A):
         assert sense * (position[-1] - start) > 0
 
 
-def test_drive_cuts_both_signs_of_its_command():
-    np.testing.assert_array_equal(
-        limit_current(np.array([-10.0, 3.0, 10.0]), 9.5), [-9.5, 3.0, 9.5]
-    )
+# The amplifier's limit -----------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        JUMP,
+        -JUMP,
+        np.tile([0.0, 9.0, -7.0, 3.0, 4.0, 5.0], 60),
+    ],
+    ids=["jump", "jump down", "through both limits"],
+)
+def test_amplifier_cuts_its_command_between_the_samples_too(command):
+    factor = 4000
+    found = simulate_limited_motion(command, 4.0, GUN, sample_time_s=TS)
+    fine = np.clip(refined(command, factor), -4.0, 4.0)
+    expected = simulate_motion(fine, GUN, sample_time_s=TS / factor)
+    for one, two in zip(found, expected, strict=True):
+        # The fine line misses the corners by half its step, 6e-7 s.
+        scale = np.max(np.abs(two))
+        np.testing.assert_allclose(one, two[::factor], atol=1e-7 * scale)
+
+
+def test_samples_that_are_cut_alone_move_less():
+    line, _ = simulate_limited_motion(JUMP, 4.0, GUN, sample_time_s=TS)
+    samples, _ = simulate_motion(np.clip(JUMP, -4.0, 4.0), GUN, sample_time_s=TS)
+    assert np.max(line - samples) > 1e-3
+
+
+@given(current=currents)
+@settings(deadline=None)
+def test_limit_that_nothing_reaches_changes_nothing(current):
+    found = simulate_limited_motion(current, 10.0, GUN, sample_time_s=TS)
+    expected = simulate_motion(current, GUN, sample_time_s=TS)
+    np.testing.assert_array_equal(found, expected)
+
+
+def test_command_that_is_not_finite_is_refused():
+    with pytest.raises(ValueError, match="command_A must be 1-D and finite"):
+        simulate_limited_motion(np.array([0.0, np.inf]), 4.0, GUN, sample_time_s=TS)
