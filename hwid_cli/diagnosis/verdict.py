@@ -232,6 +232,7 @@ def _needs_each(
         against = criteria.evidence(whole, fits[left])
         completes = criteria.is_complete(whole) and not criteria.is_complete(fits[left])
         explains = against.explained >= LEAST_EXPLAINED or completes
+        completes = completes or _nearly_completes(criteria, whole, fits[left])
         is_clear = against.gain >= LEAST_GAIN and against.improved >= LEAST_IMPROVED
         brings = criteria.excess(fits[left]) - criteria.excess(whole)
         is_last = completes and not _changes_freely(whole, effect)
@@ -242,6 +243,14 @@ def _needs_each(
         if not (is_clear and explains):
             return False
     return True
+
+
+def _nearly_completes(
+    criteria: SelectionCriteria, whole: CandidateFit, part: CandidateFit
+) -> bool:
+    """Whether an effect takes a large error down to what a logger may leave."""
+    is_small = criteria.ratio(whole) <= SMALL_REMAINDER
+    return is_small and criteria.ratio(part) > STILL_LARGE
 
 
 def _is_beaten_by_fewer(

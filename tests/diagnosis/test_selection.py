@@ -505,6 +505,26 @@ def test_free_values_must_bring_more_to_complete_a_set(left, own, chosen):
 
 
 @pytest.mark.parametrize(
+    ("without", "with_both", "is_both"),
+    [
+        # The second effect brings 0.2 %: from 4.1 to 1.15 times the noise ...
+        (1_700.0, 132.0, True),
+        # ... to 1.3 times, and from 2.9 times: another law may do as well.
+        (1_740.0, 169.0, False),
+        (850.0, 132.0, False),
+    ],
+)
+def test_a_small_effect_is_needed_that_takes_much_down_to_nearly_noise(
+    without, with_both, is_both
+):
+    one = made_up(("input_saturation",), without, whiteness=9.0)
+    both = made_up(("input_saturation", "coulomb_friction"), with_both, whiteness=2.0)
+    start = base(780_000.0)
+    verdict = decided(start, [one, both], [one, both], given=780_000.0)
+    assert verdict.chosen is (both if is_both else one)
+
+
+@pytest.mark.parametrize(
     ("without", "is_both"),
     [
         # 80 % would not do beside three times the noise; of 99 % each brings a part.
