@@ -185,7 +185,8 @@ def _shared_by_best(
     ----------
     docs/method_diagnosis.md, eq. (D24a).
     """
-    usable = [one for one in fits.values() if one.is_usable]
+    # Values of each recording make up for anything, and so measure nothing.
+    usable = [one for one in fits.values() if one.is_usable and not has_own_values(one)]
     left = [1.0 - criteria.evidence(one, base).explained for one in usable]
     most = NEAR_BEST * min(left, default=0.0)
     near = [one for one, rest in zip(usable, left, strict=True) if rest <= most]
@@ -197,7 +198,6 @@ def _shared_by_best(
         is_clear = against.gain >= LEAST_GAIN and against.improved >= LEAST_IMPROVED
         is_clear = is_clear and against.explained >= LEAST_EXPLAINED
         is_clear = is_clear and criteria.is_beyond_stand_in(one, base)
-        is_clear = is_clear and not has_own_values(one)
         # The sets show that it is there; how large it is may hang on what is missing.
         is_simpler = any(CATALOGUE[effect].told_by for effect in unclear(one))
         if shared and set(names_of(one)) == shared and is_clear and not is_simpler:

@@ -705,6 +705,23 @@ def test_what_all_sets_near_the_best_one_share_is_named(count, word):
     assert not verdict.is_complete
 
 
+def test_values_of_each_recording_do_not_say_what_is_near():
+    core = made_up(("end_stop",), 1.8e5, whiteness=9.0)
+    free = made_up(
+        ("end_stop", "parameter_change:damping"),
+        1e4,
+        whiteness=9.0,
+        own=[0.5, -0.4] * 3,
+    )
+    other = made_up(
+        ("hysteresis", "parameter_change:damping"), 2e4, whiteness=9.0, own=[0.5, 0] * 3
+    )
+    sets = [*near_sets(12), free, other]
+    verdict = decided(base(4e5), [core, *sets], [core, free], unclear=("end_stop",))
+    assert verdict.word == "named"
+    assert verdict.chosen is core
+
+
 def test_what_one_near_set_does_without_is_not_named():
     core = made_up(("end_stop",), 1.8e5, whiteness=9.0)
     without = made_up(

@@ -43,8 +43,8 @@ def _turn(value: Values) -> float:
 def _coupling_stiffness(scales: Scales) -> tuple[float, float]:
     """Softer is no drive any more; what swings faster than is sampled is one mass."""
     low, high = (share * scales.stiffness_N_per_m for share in (0.5, 1e5))
-    # Two equal masses then swing once in a sample.
-    fastest = 0.25 * scales.mass_kg * (2 * pi / scales.sample_time_s) ** 2
+    # Two equal masses then swing once in two samples.
+    fastest = 0.25 * scales.mass_kg * (pi / scales.sample_time_s) ** 2
     return low, min(high, max(fastest, 10 * low))
 
 

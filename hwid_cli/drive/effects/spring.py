@@ -164,7 +164,7 @@ def _contact(stop: Effect, slots: str, sentence: str) -> Effect:
                 lambda scales: (0.3 / scales.velocity_m_per_s,),
                 lambda scales: (
                     1e-4 / scales.velocity_m_per_s,
-                    100.0 / scales.velocity_m_per_s,
+                    10.0 / scales.velocity_m_per_s,
                 ),
                 places=(f"{slots}_LOSS",),
                 default=0.0,
