@@ -299,62 +299,23 @@ def _sign(value: float) -> float:
 
 
 def simulate_motion(
-    current_A: np.ndarray,
-    mechanics: Mechanics,
-    *,
-    sample_time_s: float,
-    position_m: float = 0.0,
-    velocity_m_per_s: float = 0.0,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Displacement and velocity that a current causes.
-
-    Parameters
-    ----------
-    current_A : ndarray, shape (n_samples,), [A]
-        What the drive really delivers, held linearly between samples.
-    sample_time_s : float, [s]
-    position_m, velocity_m_per_s : float, [m], [m/s]
-        State at the first sample.
-
-    Returns
-    -------
-    displacement : ndarray, shape (n_samples,), [m]
-    velocity : ndarray, shape (n_samples,), [m/s]
-
-    Raises
-    ------
-    ValueError
-        If the current is not 1-D and finite, or the sample time not positive.
-
-    References
-    ----------
-    docs/method_simulation.md, eq. (G1) to (G8).
-    """
-    current = _checked(current_A, "current_A", sample_time_s)
-    lengths = np.full(max(current.size - 1, 0), float(sample_time_s))
-    start = (float(position_m), float(velocity_m_per_s))
-    return _move(current, lengths, mechanics, start)
-
-
-def simulate_limited_motion(
     command_A: np.ndarray,
-    limit_A: float,
     mechanics: Mechanics,
     *,
     sample_time_s: float,
+    limit_A: float = np.inf,
     position_m: float = 0.0,
     velocity_m_per_s: float = 0.0,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Displacement and velocity that a command causes whose current has a limit.
+    """Displacement and velocity that a command of current causes.
 
     Parameters
     ----------
     command_A : ndarray, shape (n_samples,), [A]
-        Held linearly between samples; the amplifier cuts that line, so the current
-        reaches its limit between two samples.
-    limit_A : float, [A]
-        On both sides.
+        Held linearly between samples.
     sample_time_s : float, [s]
+    limit_A : float, [A]
+        The amplifier cuts the command there, on both sides and between samples too.
     position_m, velocity_m_per_s : float, [m], [m/s]
         State at the first sample.
 
@@ -370,20 +331,32 @@ def simulate_limited_motion(
 
     References
     ----------
-    docs/method_simulation.md, eq. (G9).
+    docs/method_simulation.md, eq. (G1) to (G9).
     """
-    command = _checked(command_A, "command_A", sample_time_s)
-    places = _corners(command, limit_A)
-    line = np.interp(places, np.arange(command.size), command)
-    start = (float(position_m), float(velocity_m_per_s))
-    displacement, velocity = _move(
-        np.clip(line, -limit_A, limit_A),
-        float(sample_time_s) * np.diff(places),
-        mechanics,
-        start,
+    command = np.ascontiguousarray(command_A, dtype=np.float64)
+    if command.ndim != 1 or not np.isfinite(command).all():
+        raise ValueError("command_A must be 1-D and finite")
+    if not sample_time_s > 0:
+        raise ValueError(f"sample_time_s must be positive, got {sample_time_s!r}")
+    samples = np.arange(command.size)
+    corners = _corners(command, limit_A)
+    current = np.clip(np.interp(corners, samples, command), -limit_A, limit_A)
+    friction = mechanics.friction
+    lower, upper = _edges(mechanics)
+    displacement, velocity = propagate(
+        float(mechanics.force_constant_N_per_A) * current,
+        float(sample_time_s) * np.diff(corners),
+        (
+            float(mechanics.mass_kg),
+            float(mechanics.damping_N_s_per_m),
+            float(mechanics.stiffness_N_per_m),
+        ),
+        (float(friction.coulomb_N), float(friction.break_away_N)),
+        (lower, upper, float(mechanics.contact.stiffness_N_per_m)),
+        (float(position_m), float(velocity_m_per_s)),
     )
-    samples = np.searchsorted(places, np.arange(command.size))
-    return displacement[samples], velocity[samples]
+    at = np.searchsorted(corners, samples)
+    return displacement[at], velocity[at]
 
 
 def _corners(command: np.ndarray, limit: float) -> np.ndarray:
@@ -395,38 +368,6 @@ def _corners(command: np.ndarray, limit: float) -> np.ndarray:
         share = (level - first[rows]) / (last[rows] - first[rows])
         found.append(rows + share)
     return np.unique(np.concatenate(found))
-
-
-def _checked(values: np.ndarray, name: str, sample_time_s: float) -> np.ndarray:
-    signal = np.ascontiguousarray(values, dtype=np.float64)
-    if signal.ndim != 1 or not np.isfinite(signal).all():
-        raise ValueError(f"{name} must be 1-D and finite")
-    if not sample_time_s > 0:
-        raise ValueError(f"sample_time_s must be positive, got {sample_time_s!r}")
-    return signal
-
-
-def _move(
-    current: np.ndarray,
-    lengths: np.ndarray,
-    mechanics: Mechanics,
-    start: tuple[float, float],
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return displacement and velocity at every corner of a current."""
-    friction = mechanics.friction
-    lower, upper = _edges(mechanics)
-    return propagate(
-        float(mechanics.force_constant_N_per_A) * current,
-        lengths,
-        (
-            float(mechanics.mass_kg),
-            float(mechanics.damping_N_s_per_m),
-            float(mechanics.stiffness_N_per_m),
-        ),
-        (float(friction.coulomb_N), float(friction.break_away_N)),
-        (lower, upper, float(mechanics.contact.stiffness_N_per_m)),
-        start,
-    )
 
 
 def spring_force(position_m: np.ndarray, mechanics: Mechanics) -> np.ndarray:

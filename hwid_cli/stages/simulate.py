@@ -92,10 +92,10 @@ def _measure_gun(
     command, lead_in, lengths = _command(plan, recording, command_rng)
     mechanism, factor = _changed_mechanics(gun, machine_rng)
     rest = _rest_position(mechanism, machine_rng)
-    displacement, _ = mechanics.simulate_limited_motion(
+    displacement, _ = mechanics.simulate_motion(
         command,
-        gun.current_limit_A,
         mechanism,
+        limit_A=gun.current_limit_A,
         sample_time_s=plan.sample_time_s,
         position_m=rest,
     )

@@ -9,7 +9,6 @@ from hwid_cli.drive import excitation
 from hwid_cli.drive.mechanics import (
     energy,
     rest_range,
-    simulate_limited_motion,
     simulate_motion,
     spring_force,
     static_position,
@@ -145,9 +144,9 @@ def test_motion_can_be_taken_up_again_from_any_sample(current, cut):
 
 
 def test_current_that_is_not_finite_or_not_a_vector_is_refused():
-    with pytest.raises(ValueError, match="current_A must be 1-D and finite"):
+    with pytest.raises(ValueError, match="command_A must be 1-D and finite"):
         simulate_motion(np.array([0.0, np.nan]), GUN, sample_time_s=TS)
-    with pytest.raises(ValueError, match="current_A must be 1-D and finite"):
+    with pytest.raises(ValueError, match="command_A must be 1-D and finite"):
         simulate_motion(np.zeros((2, 2)), GUN, sample_time_s=TS)
     with pytest.raises(ValueError, match="sample_time_s must be positive"):
         simulate_motion(np.zeros(3), GUN, sample_time_s=0.0)
@@ -198,7 +197,7 @@ def test_mass_rests_inside_its_rest_range_and_leaves_it_outside(current_A):
 )
 def test_amplifier_cuts_its_command_between_the_samples_too(command):
     factor = 4000
-    found = simulate_limited_motion(command, 4.0, GUN, sample_time_s=TS)
+    found = simulate_motion(command, GUN, sample_time_s=TS, limit_A=4.0)
     fine = np.clip(refined(command, factor), -4.0, 4.0)
     expected = simulate_motion(fine, GUN, sample_time_s=TS / factor)
     for one, two in zip(found, expected, strict=True):
@@ -208,7 +207,7 @@ def test_amplifier_cuts_its_command_between_the_samples_too(command):
 
 
 def test_samples_that_are_cut_alone_move_less():
-    line, _ = simulate_limited_motion(JUMP, 4.0, GUN, sample_time_s=TS)
+    line, _ = simulate_motion(JUMP, GUN, sample_time_s=TS, limit_A=4.0)
     samples, _ = simulate_motion(np.clip(JUMP, -4.0, 4.0), GUN, sample_time_s=TS)
     assert np.max(line - samples) > 1e-3
 
@@ -216,11 +215,6 @@ def test_samples_that_are_cut_alone_move_less():
 @given(current=currents)
 @settings(deadline=None)
 def test_limit_that_nothing_reaches_changes_nothing(current):
-    found = simulate_limited_motion(current, 10.0, GUN, sample_time_s=TS)
+    found = simulate_motion(current, GUN, sample_time_s=TS, limit_A=10.0)
     expected = simulate_motion(current, GUN, sample_time_s=TS)
     np.testing.assert_array_equal(found, expected)
-
-
-def test_command_that_is_not_finite_is_refused():
-    with pytest.raises(ValueError, match="command_A must be 1-D and finite"):
-        simulate_limited_motion(np.array([0.0, np.inf]), 4.0, GUN, sample_time_s=TS)
