@@ -500,7 +500,8 @@ class _Search:
     def _finish(self, what: str, sets: Mapping[Effects, Sequence[SearchStart]]) -> None:
         """Fit sets of effects to the end; keep what is better than before.
 
-        Of many samples, only sets that come near the best one are fitted to all.
+        Of many samples, only sets that come near the best one are fitted to all, and of
+        several effects only those that have got further than what they are built on.
         """
         if not self._has_many:
             self._keep(self._fitted(what, sets, None))
@@ -518,6 +519,7 @@ class _Search:
             if one.is_usable
             and excess(one) <= WORTH_MORE * least
             and self._adds_enough(one)
+            and self._is_more(one)
         }
         self._keep(self._fitted(f"{what}, all recordings", near, None))
 
