@@ -99,6 +99,7 @@ def trial(tmp_path):
     return Trial(tmp_path)
 
 
+@pytest.mark.thorough
 def test_unchanged_sources_compile_once(trial):
     assert trial.ask() == (6.0, 0)
     assert trial.ask() == (6.0, 1)

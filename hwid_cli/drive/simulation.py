@@ -153,6 +153,7 @@ def run(
     Parameters
     ----------
     driven_by : ndarray, shape (refinement (n_samples - 1) + 1,), float64, contiguous
+        A copy is made of one that may not be written.
     vector : ndarray, shape (N_SLOTS,)
     sample_time_s : float, [s]
         Of the motion that is returned.
@@ -171,8 +172,12 @@ def run(
         at = np.arange(driven_by.size) / refinement
         force = np.interp(at, np.arange(force.size), force)
     fine_time = sample_time_s / refinement
+    # Loops are compiled once for each kind of array: these take seconds to compile.
+    driven_by = np.require(driven_by, requirements="W")
     columns = move(driven_by, force, fine_time, vector)
-    position, velocity, command = (column[::refinement][:n] for column in columns)
+    position, velocity, command = (
+        np.ascontiguousarray(column[::refinement][:n]) for column in columns
+    )
     if gain == 0.0 or driven_by.size < 2:
         output = read(position, velocity, command, sample_time_s, vector)
     else:

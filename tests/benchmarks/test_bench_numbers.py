@@ -46,6 +46,7 @@ def test_the_baseline_is_a_fair_one():
         assert found.is_stable
 
 
+@pytest.mark.thorough
 def test_a_recording_costs_few_calls_however_many_there_are(tmp_path):
     few, many = (calls_each(tmp_path / str(count), count) for count in (10, 60))
 

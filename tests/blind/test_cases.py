@@ -79,6 +79,7 @@ def test_every_suite_holds_each_case_once_and_seeds_never_meet():
     assert full == {((one,), noise) for one in CATALOGUE for noise in NOISE_PERCENT}
 
 
+@pytest.mark.thorough
 def test_a_case_is_the_same_at_every_call_and_another_for_another_number():
     first = measured(short_case("gear_backlash"))
     again = measured_case(short_case("gear_backlash"))

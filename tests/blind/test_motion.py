@@ -137,6 +137,7 @@ def test_a_force_law_gives_the_motion_of_another_integrator(name):
     assert distance(BASE, expected) > 1000 * tolerance
 
 
+@pytest.mark.thorough
 def test_further_states_give_the_motion_of_another_integrator():
     stiffness, damping = 0.05 * (2 * math.pi * 30) ** 2, 2 * 0.05 * 0.05 * 188.5
 

@@ -87,6 +87,7 @@ def test_one_of_a_kind_is_no_plural(simulated, edit):
     assert "1 model on 1 recording = 1 validation in 1 task " in text
 
 
+@pytest.mark.thorough
 def test_a_timed_fit_is_named(simulated):
     config, out = simulated
     result = check(config, "--out", str(out))

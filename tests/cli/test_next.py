@@ -270,8 +270,11 @@ def answered(name, current, effects=None):
     ("effects", "said"),
     [
         ({}, "nough is known: the diagnosis says 'none', and no input on offer would"),
-        ({"one_sided_stop": {"position_m": -0.008, "stiffness_N_per_m": 5000.0}},
-         "nough is known: the diagnosis says 'named', and no input on offer would"),
+        pytest.param(
+            {"one_sided_stop": {"position_m": -0.008, "stiffness_N_per_m": 5000.0}},
+            "nough is known: the diagnosis says 'named', and no input on offer would",
+            marks=pytest.mark.thorough,
+        ),
     ],
 )  # fmt: skip
 def test_an_effect_that_hides_is_looked_for_where_no_recording_was(

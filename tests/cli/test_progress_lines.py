@@ -53,7 +53,7 @@ def test_a_stage_that_takes_long_says_so_in_its_log(hwid, monkeypatch):
     # A moment is long here, and nothing is held back.
     monkeypatch.setattr(ProgressLines.__init__, "__kwdefaults__", {"every_s": 0.02})
     monkeypatch.setattr(session, "_HELD_S", 0.0)
-    one_s = 1.0
+    one_s = 0.3
 
     def slow(name):
         # Looking at recordings before the work itself may compile loops.

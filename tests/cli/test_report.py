@@ -49,6 +49,7 @@ def test_a_report_of_all_stages(after_run, hwid, out):
     assert "as configured" in row[1]
 
 
+@pytest.mark.thorough
 def test_only_figures_of_results_that_changed_are_drawn_again(
     after_run, hwid, out, edit, monkeypatch
 ):

@@ -170,6 +170,7 @@ HEADS = (
 ODD = ("", "nan;1;2", "1;2", "1;2;3;4", "12:00:01;2;3", "x;y;z", "1;;3", '"1";2;3', "#")
 
 
+@pytest.mark.thorough
 @settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     head=st.sampled_from(HEADS),

@@ -161,7 +161,10 @@ def beside_amplified_outputs(options):
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("tempting", ["parameter_change", "supply_sag"])
+@pytest.mark.parametrize(
+    "tempting",
+    ["parameter_change", pytest.param("supply_sag", marks=pytest.mark.thorough)],
+)
 def test_of_outputs_alone_no_name_rests_on_the_error_of_the_stand_in(tempting):
     # No plain drive has such an amplifier, and either effect takes nearly all that it leaves.
     options = DiagnoseOptions(effects=(tempting, "coulomb_friction"))
@@ -172,6 +175,7 @@ def test_of_outputs_alone_no_name_rests_on_the_error_of_the_stand_in(tempting):
     assert (found.verdict, found.effects) == ("unknown", ())
 
 
+@pytest.mark.thorough
 def test_of_outputs_alone_no_law_rests_on_the_error_of_the_stand_in():
     options = DiagnoseOptions(effects=("coulomb_friction",), laws="only")
     found = beside_amplified_outputs(options)

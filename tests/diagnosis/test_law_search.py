@@ -79,6 +79,7 @@ def test_the_terms_of_a_force_are_found_with_their_coefficients():
     assert of_base[1:] == pytest.approx([-30, 0.7, 0.2], rel=0.05)
 
 
+@pytest.mark.thorough
 def test_four_terms_are_found_on_top_of_three():
     pair = motions(
         lambda x, v, u, t: (

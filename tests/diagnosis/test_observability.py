@@ -47,6 +47,7 @@ def test_free_zeros_hide_whether_friction_has_one_size(hides):
     assert absorbed(of, found) == ("asymmetric_friction", "constant_load")
 
 
+@pytest.mark.thorough
 def test_one_known_zero_shows_it():
     of, found = fitted("asymmetry", 0.4, "estimated", ASYMMETRIC)
     assert found.whiteness <= 1.0
@@ -82,6 +83,7 @@ def test_the_words_say_what_a_name_may_be_and_what_shows_it():
     assert taken_up([], ["coulomb_friction"]) == ()
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("hides", ["friction", "asymmetry"])
 def test_a_diagnosis_names_friction_and_says_what_it_cannot_tell(hides):
     found = diagnosed(

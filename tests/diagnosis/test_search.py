@@ -207,6 +207,7 @@ def test_a_search_never_ends_above_its_start():
         assert fit_point(of, found, point, max_iterations=3).sse <= before
 
 
+@pytest.mark.thorough
 def test_secant_steps_save_simulations_and_end_in_the_same_place(monkeypatch):
     # From far away, where one set of derivatives is not enough.
     true = {"force_N": 0.5, "static_excess_N": 0.4, "velocity_m_per_s": 0.02}

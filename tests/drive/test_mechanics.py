@@ -186,6 +186,7 @@ def test_mass_rests_inside_its_rest_range_and_leaves_it_outside(current_A):
 # The amplifier's limit -----------------------------------------------------------------
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "command",
     [

@@ -144,6 +144,7 @@ def test_all_effects_alone_and_together(place, tmp_path):
     check(tmp_path, *(ALONE + TOGETHER + MACHINES)[place], 4000)
 
 
+@pytest.mark.thorough
 def test_formulas_of_the_users_own_are_in_the_program(tmp_path):
     parameters = {"a": OwnParameter("N"), "b": OwnParameter("m")}
     stated = [

@@ -158,6 +158,7 @@ def test_no_copy_of_a_damaged_measurement_stays_behind(
     assert list(temporary.iterdir()) == []
 
 
+@pytest.mark.thorough
 def test_nothing_stays_behind_of_a_reader_that_was_stopped(
     good, endless, temporary, monkeypatch
 ):

@@ -46,6 +46,7 @@ def response(machine):
     return clean_readings(machine, machine.hidden, commands)[:, 0]
 
 
+@pytest.mark.thorough
 def test_a_step_against_dry_friction_swings_in_half_cosines():
     base, force, friction = Base(2.0, 0.0, 800.0, 1.0), 10.0, 1.5
     values = np.full(600, force)
@@ -62,6 +63,7 @@ def test_a_step_against_dry_friction_swings_in_half_cosines():
     assert np.abs(x[1 : int(2 * half / 1e-3)] - expected).max() < 1e-3 * top
 
 
+@pytest.mark.thorough
 def test_friction_stops_a_free_mass_and_holds_it():
     base = Base(2.0, 0.0, 0.0, 1.0)
     values = np.zeros(1700)

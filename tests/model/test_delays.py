@@ -70,6 +70,7 @@ def test_more_parameters_never_fit_worse_whatever_delays_are_found():
         assert large.orders.nk in ANY.delays
 
 
+@pytest.mark.thorough
 def test_a_group_begins_with_members_of_different_delays():
     pair = [measured(delayed(3), seed=seed, noise=0.01) for seed in (1, 2)]
     given = replace(ANY, join="experiments")

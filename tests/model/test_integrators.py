@@ -31,6 +31,7 @@ def test_poles_on_the_circle_are_fitted_as_well_as_from_the_truth():
         assert found.is_stable
 
 
+@pytest.mark.thorough
 def test_an_integrator_behind_a_dead_zone_is_fitted_to_the_noise():
     for seed in (1000, 1008, 1020, 1026, 1032):
         plant = integrating_plant(seed, bent=True)

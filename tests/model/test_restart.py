@@ -126,6 +126,7 @@ def test_maps_are_sought_anew_around_the_block_that_was_found():
     assert without.input_values.tolist() == [0.0, 4.0]
 
 
+@pytest.mark.thorough
 # Plants on which the first search stops 2 to 19 points short: outputs that fold, whose
 # least squares see a wrong input map, or that need their maps anew.
 # Inputs that jump within a sample's distance (163) need break-points nearer together.

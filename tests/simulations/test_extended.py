@@ -139,6 +139,7 @@ def test_a_function_with_drag(extended):
     assert np.std(found["v"] - truth[1]) < 0.01 * np.std(bare["v"] - truth[1])
 
 
+@pytest.mark.thorough
 def test_one_that_does_not_settle_is_no_answer(extended):
     # A stop that the stand-in meets and that the function, far too stiff, does not.
     wrong = replace(extended.plain, mass_kg=3000.0, force_constant_N_per_A=-5.0)

@@ -218,6 +218,7 @@ def test_content_follows_the_file(tmp_path, plant_2):
     assert fmu.KIND.content(replace(plant_2, parameters={"kt": 3.0})) == first
 
 
+@pytest.mark.thorough
 def test_a_file_that_changes_is_opened_again(tmp_path):
     path = make_fmu(tmp_path)
     before = run(section(path)).output

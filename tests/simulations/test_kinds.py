@@ -183,6 +183,7 @@ def test_a_program_that_gives_no_answer_is_one_line(program, tmp_path, text, sai
     assert "\n" not in str(error.value)
 
 
+@pytest.mark.thorough
 def test_what_a_program_has_started_ends_with_it(program, tmp_path):
     (tmp_path / "program.py").write_text(
         "import subprocess, sys, time\n"

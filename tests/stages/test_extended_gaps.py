@@ -48,6 +48,7 @@ MACHINES = {
 }  # fmt: skip
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", MACHINES)
 def test_the_written_simulation_leaves_what_the_diagnosis_says(name):
     read, model, start = MACHINES[name]

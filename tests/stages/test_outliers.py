@@ -53,6 +53,7 @@ def robust():
     return fits, judging, n_outliers, plain, advice
 
 
+@pytest.mark.thorough
 def test_all_outliers_of_the_judges_are_found_and_replaced(robust):
     fits, judging, n_outliers, *_ = robust
     clean = recordings(outliers=0)

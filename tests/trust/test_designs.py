@@ -6,6 +6,7 @@ from hypothesis import strategies as st
 from hwid_cli.trust.designs import designs
 
 
+@pytest.mark.thorough
 @given(
     st.floats(1e-3, 1e3),
     st.floats(1.0, 1e4),

@@ -100,6 +100,7 @@ def test_the_steps_of_a_straight_line_are_equal(values):
     np.testing.assert_array_equal(nearest_steps(values, 5), [12, 24, 36, 48])
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("seeds", "sizes"),
     [
