@@ -20,6 +20,7 @@ from hwid_cli.diagnosis.candidate import (
     fit_candidate,
     fitted_drive,
     fitted_start,
+    start_from,
 )
 from hwid_cli.diagnosis.intervals import intervals, unclear_effects
 from hwid_cli.diagnosis.latent_force import Smoothed
@@ -33,7 +34,12 @@ from hwid_cli.diagnosis.law_search import (
 )
 from hwid_cli.diagnosis.law_terms import Term, coefficient_unit, library, readings
 from hwid_cli.diagnosis.problem import Compared
-from hwid_cli.diagnosis.rounds import DiagnosisTask, Rounds, RoundsResult
+from hwid_cli.diagnosis.rounds import (
+    DiagnosisTask,
+    Rounds,
+    RoundsResult,
+    has_many_samples,
+)
 from hwid_cli.diagnosis.selection import (
     LEAST_GAIN,
     LEAST_IMPROVED,
@@ -50,8 +56,10 @@ from hwid_cli.records.own_effects import OwnEffect, OwnParameter, own_id, own_of
 # The verdict, and the name of the effect that holds a law.
 LAW = "law"
 _SENTENCE = "a law that was found in the recordings"
-# Subsets of each size that are simulated.
+# Subsets of each size that are simulated; of many training samples on so many, and the
+# best one on all. A regression on all samples says where each one starts.
 _SIMULATED = 2
+_FEW_SAMPLES = 10_000
 # Share of the held-out excess over the noise that a law must explain.
 LEAST_EXPLAINED_LAW = 0.8
 # What a law may leave of what effects of the catalogue leave, where it is not complete.
@@ -320,8 +328,24 @@ def _renamed(text: str, name: str, new: str) -> str:
 
 
 def _simulated(rounds: Rounds, tried: Sequence[_Tried], what: str) -> list[_Tried]:
-    """Fit effects with the base in a free run."""
-    rounds.on_round(f"{what}, in a free run", len(tried))
+    """Fit effects with the base in a free run; of many samples only the best to all."""
+    what = f"{what}, in a free run"
+    if not has_many_samples(rounds.problem):
+        return _fitted(rounds, tried, what, None)
+    found = _fitted(rounds, tried, what, _FEW_SAMPLES)
+    best = max(found, key=lambda one: rounds.criteria.gain(_fit(one), rounds.base))
+    if not _fit(best).is_usable:
+        return found
+    again = replace(best, start=start_from(rounds.problem.drive, _fit(best)))
+    (whole,) = _fitted(rounds, [again], f"{what}, all recordings", None)
+    return [whole if one is best else one for one in found]
+
+
+def _fitted(
+    rounds: Rounds, tried: Sequence[_Tried], what: str, most: int | None
+) -> list[_Tried]:
+    """Fit effects with the base to so many samples, or to all."""
+    rounds.on_round(what, len(tried))
     baseline = rounds.baseline
     tasks = [
         DiagnosisTask(
@@ -329,10 +353,10 @@ def _simulated(rounds: Rounds, tried: Sequence[_Tried], what: str) -> list[_Trie
             function=fit_candidate,
             arguments=(
                 rounds.problem, (one.identifier,), (one.start,), baseline.scales,
-                baseline.noise,
+                baseline.noise, most,
             ),
             result_type=CandidateFit,
-            content={"law": one.identifier, "start": one.start},
+            content={"law": one.identifier, "start": one.start, "most_samples": most},
             arrays=(rounds.base.values,),
         )
         for number, one in enumerate(tried)

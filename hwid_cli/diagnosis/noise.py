@@ -46,6 +46,8 @@ _ALIKE = 1.5
 _QUIETEST = 0.01
 # A difference that is larger than this many standard deviations is a jump.
 _JUMP = 5.0
+# Bends of a signal below this share of its size are rounding.
+_ROUNDING = 1e-9
 # The grid of a sensor limits it while it makes this share of the noise or more: below,
 # the other noise moves the reading over several steps, and the error of rounding is
 # noise like any other.
@@ -502,9 +504,23 @@ def _errors_of(taps: np.ndarray, n_lags: int) -> np.ndarray:
 
 
 def _input_rms(problem: DiagnosisProblem) -> float:
-    """Noise that the measured input may hold; a fast command makes it more."""
+    """Noise that the measured input may hold; a fast command makes it more.
+
+    A command that is held or goes in straight lines most of the time has none: its steps
+    and corners are not noise.
+    """
     pieces = [one.driven_by[one.skip :] for one in problem.signals]
-    return float(_from_differences(pieces, 0.0))
+    noisy = [piece for piece in pieces if not _is_mostly_straight(piece)]
+    counts = [piece.size for piece in pieces]
+    share = sum(piece.size for piece in noisy) / max(sum(counts), 1)
+    return float(_from_differences(noisy, 0.0) * np.sqrt(share)) if noisy else 0.0
+
+
+def _is_mostly_straight(piece: np.ndarray) -> bool:
+    """Whether most of a signal is on straight lines, up to rounding."""
+    bends = np.abs(np.diff(piece, _ORDER))
+    rounding = _ROUNDING * float(np.max(np.abs(piece), initial=0.0))
+    return bends.size > 0 and float(np.median(bends)) <= rounding
 
 
 def _from_differences(pieces: Sequence[np.ndarray], step: float) -> float:

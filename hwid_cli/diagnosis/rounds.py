@@ -327,7 +327,7 @@ class _Search:
     @property
     def _has_many(self) -> bool:
         """Whether sets are fitted to a part of the samples first."""
-        return self._train.n_evaluated > MANY_SAMPLES
+        return has_many_samples(self.rounds.problem)
 
     def _worst_of(self, parent: CandidateFit) -> DiagnosisProblem:
         """Few recordings, those first of which a set leaves most."""
@@ -529,10 +529,32 @@ class _Search:
         """Sets without those that bring hardly more than a finished one they include.
 
         Few samples tell, from where that one ended. Where there are no more, the fit
-        itself costs as little.
+        itself costs as little. The wider of two comes after the narrower one, and only
+        where that has brought something.
         """
         if not self._has_many:
             return dict(sets)
+        found: dict[Effects, Sequence[SearchStart]] = {}
+        dropped: list[Effects] = []
+        left = dict(sets)
+        while left:
+            now = {
+                ids: starts
+                for ids, starts in left.items()
+                if not includes_one_of(ids, left)
+            }
+            left = {ids: left[ids] for ids in left if ids not in now}
+            dropped += [ids for ids in now if includes_one_of(ids, dropped)]
+            asked = {ids: now[ids] for ids in now if ids not in dropped}
+            adding = self._that_add_here(asked)
+            dropped += [ids for ids in asked if ids not in adding]
+            found.update(adding)
+        return found
+
+    def _that_add_here(
+        self, sets: Mapping[Effects, Sequence[SearchStart]]
+    ) -> dict[Effects, Sequence[SearchStart]]:
+        """Of sets none of which includes another, those that add to a finished one."""
         narrow = {
             ids: [one for one in self.fits if includes_one_of(ids, [one])]
             for ids in sets
@@ -817,6 +839,12 @@ class _Search:
     def _is_behind(self, one: CandidateFit, other: CandidateFit) -> bool:
         """Whether a fit has left more of the training recordings than another one."""
         return _train_sse(self.rounds, one) > _train_sse(self.rounds, other)
+
+
+def has_many_samples(problem: DiagnosisProblem) -> bool:
+    """Whether first fits are made to a part of the training samples."""
+    counts = [one.n_evaluated for one in problem.signals if not one.is_held_out]
+    return sum(counts) > MANY_SAMPLES
 
 
 def _name_of(size: int) -> str:

@@ -60,6 +60,8 @@ CLOSE_TO_NOISE = 1.03
 # Ratio up to which a remainder that no effect explains is no missing effect: the logger,
 # a timer, a cable.
 SMALL_REMAINDER = 1.2
+# Standard deviations of a ratio of few samples that count as chance.
+LEAST_SURE = 3.0
 # Candidates closer than this are not told apart.
 TIE = 6.0
 # Nor are those that leave at most so many times as much beyond the noise, where both
@@ -230,8 +232,38 @@ class SelectionCriteria:
         return max(float(found.sse.sum()) - floor, 0.0)
 
     def is_complete(self, found: CandidateFit) -> bool:
-        """Whether nothing but noise remains."""
-        return found.is_usable and found.whiteness <= 1.0
+        """Whether nothing but noise remains.
+
+        The training recordings' residuals must be noise by their shape, and the held-out
+        recordings must not leave clearly more: a law that is not quite right may take all
+        there is from the recordings that it is fitted to.
+
+        References
+        ----------
+        docs/method_diagnosis.md, eq. (D23a).
+        """
+        return found.is_usable and found.whiteness <= 1.0 and self.holds(found)
+
+    def holds(self, found: CandidateFit) -> bool:
+        """Whether a candidate leaves hardly more of held-out recordings than of others."""
+        held, train = (self._over_noise(found, rows) for rows in self._sides)
+        both = min(max(found.neighbour, 0.0), 1.0) ** 2
+        n = max(
+            float(self.n_samples[self.is_held_out].sum()) * (1 - both) / (1 + both), 1
+        )
+        scatter = LEAST_SURE * np.sqrt(0.5 / n)
+        return bool(held <= (SMALL_REMAINDER + scatter) * max(train, 1.0))
+
+    @property
+    def _sides(self) -> tuple[np.ndarray, np.ndarray]:
+        """Rows of the held-out recordings, and of the others; of all where these judge."""
+        held = self.is_held_out
+        return held, held if held.all() else ~held
+
+    def _over_noise(self, found: CandidateFit, rows: np.ndarray) -> float:
+        """RMS of some recordings over that of their noise, [-]."""
+        floor = float(self.floors[rows].sum())
+        return float(np.sqrt(found.sse[rows].sum() / floor)) if floor > 0 else 1.0
 
     def needs_nothing(self, base: CandidateFit) -> bool:
         """Whether nothing remains but noise, or the little that a stand-in may be wrong by.

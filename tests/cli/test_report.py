@@ -185,9 +185,9 @@ def test_a_figure_that_was_deleted_is_written_again(after_run, hwid, out):
     figures = files_below(out)
     (out / "figures" / "crossval" / "matrix.png").unlink()
 
-    assert "already" not in hwid("report").stdout
+    assert "already" not in hwid("report").stderr
     assert files_below(out) == figures
-    assert "already" in hwid("report").stdout
+    assert "already" in hwid("report").stderr
 
 
 def test_the_last_line_stays_one_comment_whatever_figures_are_called(tmp_path):

@@ -9,6 +9,8 @@ import sympy
 from hwid_cli import DiagnoseOptions, Recording, SimulationOptions, diagnose
 from hwid_cli.config.extended_simulation import write_extended_simulation
 from hwid_cli.config.load import experiment_of, load_experiment
+from hwid_cli.diagnosis import laws, rounds
+from hwid_cli.diagnosis.candidate import fit_candidate
 from hwid_cli.diagnosis.laws import _is_wanted
 from hwid_cli.diagnosis.verdict import DiagnosisVerdict
 from hwid_cli.stages.diagnose import extended_options
@@ -64,6 +66,26 @@ def test_a_law_of_two_terms_is_found_with_units_intervals_and_inclusion(found):
         assert one.inclusion > 0.8
     assert diagnosis.explained_share > 0.99
     assert "No effect of the catalogue" in diagnosis.summary
+
+
+@pytest.mark.thorough
+def test_of_many_samples_a_part_leads_to_the_same_law_fitted_to_all(found, monkeypatch):
+    recordings, of_all = found
+    monkeypatch.setattr(rounds, "MANY_SAMPLES", 1000)
+    monkeypatch.setattr(laws, "_FEW_SAMPLES", 1000)
+    sizes = []
+
+    def spied(problem, ids, *rest):
+        sizes.append((ids, rest[-1]))
+        return fit_candidate(problem, ids, *rest)
+
+    monkeypatch.setattr(laws, "fit_candidate", spied)
+    law = diagnose(recordings, SIMULATION, NOTHING).law
+    assert {one.term for one in law.terms} == {"sign(v)", "x*v"}
+    for one, other in zip(law.terms, of_all.law.terms, strict=True):
+        assert one.value == pytest.approx(other.value, rel=1e-3)
+    # Several of each size on a part; one of each size on all.
+    assert [most for _, most in sizes] == [1000, 1000, 1000, 1000, None] * 2
 
 
 @pytest.mark.thorough

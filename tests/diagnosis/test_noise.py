@@ -380,3 +380,28 @@ def test_levels_of_noise_are_those_of_the_recordings():
     assert floor.rms == pytest.approx(np.sqrt(np.mean(np.square(noises))), rel=0.1)
     alike = problem(recordings())
     np.testing.assert_array_equal(noise_levels(alike, noise_floor(alike)), 1.0)
+
+
+@pytest.mark.parametrize("rounded", [None, 3])
+def test_steps_and_corners_of_a_command_are_no_noise_of_the_input(rounded):
+    # Held levels, ramps and sines as a generator makes them, each step far above a noise.
+    time = SAMPLE_TIME_S * np.arange(1000)
+    commands = [
+        np.repeat(np.random.default_rng(2).uniform(-3, 3, 20), 50),
+        np.interp(time, [0.0, 0.3, 0.6, 1.0], [0.0, 2.0, -2.0, 0.0]),
+        2.0 * np.sin(30.0 * time),
+    ]
+    if rounded is not None:
+        # As files hold them: at most half a step of 1e-3 A is an error.
+        commands = [np.round(one, rounded) for one in commands]
+    found = noise_floor(problem_of([np.sin(one) for one in commands], commands))
+    assert found.input_rms <= (1e-9 if rounded is None else 1e-3)
+
+
+def test_noise_of_an_input_in_steps_is_read():
+    rng = np.random.default_rng(3)
+    levels = [np.repeat(rng.uniform(-3, 3, 20), 50) for _ in range(4)]
+    read = [one + 0.02 * rng.standard_normal(one.size) for one in levels]
+    found = noise_floor(problem_of([np.sin(one) for one in levels], read))
+    # The smallest of the steps are below the limit of jumps, and make it more.
+    assert 0.02 <= found.input_rms <= 1.2 * 0.02

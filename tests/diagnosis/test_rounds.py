@@ -181,6 +181,34 @@ def test_of_many_samples_what_includes_another_one_has_to_bring_more(
     assert kept[("cubic_stiffness",)] == begun
 
 
+@pytest.mark.parametrize("of_hysteresis", [0.99, 0.5])
+def test_a_shape_of_a_law_is_screened_only_where_the_law_has_brought_something(
+    of_hysteresis, monkeypatch
+):
+    # Bouc-Wen friction includes hysteresis, which includes Coulomb friction.
+    turns = Screenings(
+        {
+            "coulomb_friction": 1.0,
+            "hysteresis": of_hysteresis,
+            "hysteresis:bouc_wen": 0.1,
+        }
+    )
+    search = rounds._Search(rounds_of(FRICTION, FEW, run_tasks=turns.run))
+    monkeypatch.setattr(rounds, "MANY_SAMPLES", 1000)
+    found = fit(search.rounds.problem, FRICTION, scales=search.rounds.baseline.scales)
+    search.fits[found.effects] = found
+    monkeypatch.setattr(search, "_few_sse", lambda fit: 10.0)
+    monkeypatch.setattr(search, "_widened", lambda ids, narrow: [])
+    begun = {("hysteresis",): ["a"], ("hysteresis:bouc_wen",): ["b"]}
+
+    kept = search._that_add(begun)
+    screened = [one for turn in turns.turns for one in turn]
+    adds = of_hysteresis == 0.5
+    assert (("hysteresis",) in kept) == adds
+    assert ("hysteresis:bouc_wen" in screened) == adds
+    assert (("hysteresis:bouc_wen",) in kept) == adds
+
+
 def test_a_further_effect_is_measured_by_its_own_part_beside_values_of_recordings():
     # A change between recordings leaves little of what its values are fitted to; friction
     # and a stop leave less of all, and much less than the stop alone.

@@ -261,6 +261,31 @@ def test_complete_is_what_leaves_white_noise():
     assert not CRITERIA.is_complete(made_up(GOOD, np.inf, whiteness=0.5))
 
 
+@pytest.mark.parametrize(
+    ("sse", "holds"),
+    [
+        # 100 samples of noise 1 in each recording; the last three judge.
+        ([100, 100, 100, 100, 100, 100], True),
+        # 1.2 times the noise, and 3 standard deviations of 300 samples: 1.32.
+        ([100, 100, 100, 170, 170, 170], True),
+        ([100, 100, 100, 180, 180, 180], False),
+        # Where all recordings leave more, the noise was taken for smaller than it is.
+        ([180, 180, 180, 180, 180, 180], True),
+        ([180, 180, 180, 400, 400, 400], False),
+        ([180, 180, 180, 20, 20, 20], True),
+    ],
+)
+def test_complete_holds_on_recordings_that_were_held_out(sse, holds):
+    found = made_up(GOOD, sse, whiteness=0.5)
+    assert CRITERIA.is_complete(found) == holds
+
+
+def test_few_samples_that_go_together_say_less_about_completeness():
+    sse = [100, 100, 100, 180, 180, 180]
+    found = made_up(GOOD, sse, whiteness=0.5, neighbour=0.9)
+    assert CRITERIA.is_complete(found)
+
+
 def test_the_table_is_ordered_by_gain_with_the_lost_and_the_waiting_last():
     fits = [
         made_up(("a",), 300.0),
