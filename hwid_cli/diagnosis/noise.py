@@ -23,6 +23,7 @@ from hwid_cli.diagnosis.problem import (
     rest_length,
 )
 from hwid_cli.records.diagnosis import NoiseFloor
+from hwid_cli.records.drive import StandIn
 from hwid_cli.records.units import behind
 from hwid_cli.trust.repeats import is_same_input
 
@@ -507,9 +508,12 @@ def _input_rms(problem: DiagnosisProblem) -> float:
     """Noise that the measured input may hold; a fast command makes it more.
 
     A command that is held or goes in straight lines most of the time has none: its steps
-    and corners are not noise.
+    and corners are not noise. Beside a stand-in they count: it follows
+    a simulation through a step only to a part of a sample, which leaves the same.
     """
     pieces = [one.driven_by[one.skip :] for one in problem.signals]
+    if isinstance(problem.drive, StandIn):
+        return float(_from_differences(pieces, 0.0))
     noisy = [piece for piece in pieces if not _is_mostly_straight(piece)]
     counts = [piece.size for piece in pieces]
     share = sum(piece.size for piece in noisy) / max(sum(counts), 1)

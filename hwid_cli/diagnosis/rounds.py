@@ -9,7 +9,7 @@ given, so that nothing here knows of processes or of a cache. docs/method_diagno
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
@@ -256,30 +256,59 @@ class _Search:
     def round_of(
         self, size: int, parents: Sequence[CandidateFit]
     ) -> CandidateFit | None:
-        """Fit sets of one size on top of smaller ones; return the best of that size."""
+        """Fit sets of one size on top of smaller ones; return the best of that size.
+
+        Plain laws first, then those that include one of them, and so on: what includes
+        another set must be better, and where that leaves nothing it cannot be.
+        """
         if self._has_many and parents:
             self._few = self._worst_of(parents[0])
         name = _name_of(size)
-        screened = self._screen(name, self._proposed(size, parents))
-        if parents:
-            screened = self._screened_on(name, screened, parents[0])
-        chosen = self._chosen(screened)
-        # What includes another candidate must be better; where the simpler one leaves
-        # nothing, it cannot be.
-        wide = {ids for ids in chosen if includes_one_of(ids, chosen)}
-        self._finish(name, {ids: chosen[ids] for ids in chosen if ids not in wide})
-        best = self.best_of_size(size)
-        if best is None or not self.rounds.criteria.is_complete(best):
-            added = self._that_add({ids: chosen[ids] for ids in wide})
-            self._finish(f"{name} that include others", added)
+        screened: dict[Effects, Screened] = {}
+        for depth, level in enumerate(_by_width(self._proposed(size, parents))):
+            may_add = {ids: level[ids] for ids in level if self._may_add(ids, screened)}
+            what = f"{name} that include others" if depth else name
+            new = self._screen(what, may_add)
+            if parents:
+                new = self._screened_on(what, new, parents[0], list(screened.values()))
+            screened.update({one.effects: one for one in new})
+            chosen = self._chosen(list(screened.values()))
+            todo = {ids: chosen[ids] for ids in chosen if ids in may_add}
+            self._finish(what, self._that_add(todo) if depth else todo)
         self._use_again(size)
         self._go_on(size)
         return self.best_of_size(size)
 
+    def _may_add(self, ids: Effects, screened: Mapping[Effects, Screened]) -> bool:
+        """Whether a set may be better than those that it includes.
+
+        Not where one of these leaves nothing but noise, or was a wider one itself and
+        brought nothing: no shape of hysteresis is needed where hysteresis is not.
+        """
+        narrow = [one for one in screened if includes_one_of(ids, [one])]
+        criteria = self.rounds.criteria
+        fits = [self.fits[one] for one in narrow if one in self.fits]
+        if any(criteria.is_complete(one) for one in fits):
+            return False
+        wide = [one for one in narrow if includes_one_of(one, screened)]
+        return not wide or any(self._brought(one, screened) for one in wide)
+
+    def _brought(self, ids: Effects, screened: Mapping[Effects, Screened]) -> bool:
+        """Whether a set got further in its screening than those that it includes."""
+        least = min(
+            one.sse for one in screened.values() if includes_one_of(ids, [one.effects])
+        )
+        whole = self._few_sse(self.rounds.base)
+        return least - screened[ids].sse >= LEAST_ADDED * (whole - screened[ids].sse)
+
     def _screened_on(
-        self, name: str, screened: Sequence[Screened], parent: CandidateFit
+        self,
+        name: str,
+        screened: Sequence[Screened],
+        parent: CandidateFit,
+        others: Sequence[Screened] = (),
     ) -> list[Screened]:
-        """Screen sets again while none of them has got far.
+        """Screen sets again while none of them, or of others, has got far.
 
         All go on that still get further, but for those far behind the smaller set: it
         leaves less than they do, and sets that include it begin there.
@@ -289,7 +318,7 @@ class _Search:
         most = FAR_BEHIND * max(whole - floor, LEAST_LEFT * whole)
         moving = [one for one in screened if one.sse - floor <= most]
         for _ in range(MOST_SCREENINGS):
-            if not moving or self._stands_out(list(reached.values()), parent):
+            if not moving or self._stands_out([*reached.values(), *others], parent):
                 break
             sets = {one.effects: list(one.starts) for one in moving}
             moving = []
@@ -536,18 +565,12 @@ class _Search:
             return dict(sets)
         found: dict[Effects, Sequence[SearchStart]] = {}
         dropped: list[Effects] = []
-        left = dict(sets)
-        while left:
-            now = {
-                ids: starts
-                for ids, starts in left.items()
-                if not includes_one_of(ids, left)
+        for level in _by_width(sets):
+            asked = {
+                ids: level[ids] for ids in level if not includes_one_of(ids, dropped)
             }
-            left = {ids: left[ids] for ids in left if ids not in now}
-            dropped += [ids for ids in now if includes_one_of(ids, dropped)]
-            asked = {ids: now[ids] for ids in now if ids not in dropped}
             adding = self._that_add_here(asked)
-            dropped += [ids for ids in asked if ids not in adding]
+            dropped += [ids for ids in level if ids not in adding]
             found.update(adding)
         return found
 
@@ -839,6 +862,19 @@ class _Search:
     def _is_behind(self, one: CandidateFit, other: CandidateFit) -> bool:
         """Whether a fit has left more of the training recordings than another one."""
         return _train_sse(self.rounds, one) > _train_sse(self.rounds, other)
+
+
+_Starts = TypeVar("_Starts")
+
+
+def _by_width(sets: Mapping[Effects, _Starts]) -> list[dict[Effects, _Starts]]:
+    """Sets in turns: none includes another one of its own turn or of a later one."""
+    left, turns = dict(sets), []
+    while left:
+        now = {ids: left[ids] for ids in left if not includes_one_of(ids, left)}
+        left = {ids: left[ids] for ids in left if ids not in now}
+        turns.append(now)
+    return turns
 
 
 def has_many_samples(problem: DiagnosisProblem) -> bool:

@@ -188,6 +188,12 @@ def is_chosen(candidate: RankedCandidate) -> bool:
     return bool(candidate.effects) and candidate.role == "diagnosis"
 
 
+_NOT_FITTED = (
+    f"{MISSING}: left after its first iterations, where others were better; or not needed, "
+    "because what it includes leaves only noise."
+)
+
+
 def ranking_table(diagnosis: Diagnosis, *, count: int | None = None) -> Table:
     """Show the candidates, the best first.
 
@@ -225,7 +231,6 @@ def ranking_table(diagnosis: Diagnosis, *, count: int | None = None) -> Table:
         )
     mark = " (* the diagnosis)" if diagnosis.effects else ""
     left = [one for one in shown if np.isnan(one.held_out_rms)]
-    why = f"{MISSING}: left after its first iterations, where others were better."
     heads = (
         "forecast",
         "held-out/noise" if has_noise else f"RMS [{diagnosis.output_unit}]",
@@ -242,7 +247,7 @@ def ranking_table(diagnosis: Diagnosis, *, count: int | None = None) -> Table:
             Column("note", is_text=True, is_detail=True),
         ),
         tuple(rows),
-        (why,) if left else (),
+        (_NOT_FITTED,) if left else (),
     )
 
 

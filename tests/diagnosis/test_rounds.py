@@ -125,7 +125,17 @@ def test_every_effect_gets_a_forecast_and_a_screening(friction):
     # A second one of a kind is tried beside its first only.
     alone = {(name,) for name, one in CATALOGUE.items() if not one.beside}
     assert set(friction.found.shares) == alone
-    assert set(friction.effects_of("screen")) - {()} == alone
+    # What includes friction cannot be better than friction, which leaves nothing.
+    wider = {one for one in alone if "coulomb_friction" in CATALOGUE[one[0]].contains}
+    assert set(friction.effects_of("screen")) - {()} == alone - wider
+
+
+@pytest.mark.thorough
+def test_where_something_is_left_what_includes_others_is_screened_too(pair):
+    screened = pair.effects_of("screen")
+    wide = screened.index(("stribeck_friction",))
+    assert screened.index(("coulomb_friction",)) < wide
+    assert ("hysteresis",) in screened
 
 
 @pytest.mark.thorough

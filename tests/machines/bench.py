@@ -22,6 +22,7 @@ SEEDS = {
     "second_reporting": 41_907_263,
     "third_reporting": 63_580_417,
     "fourth_reporting": 18_946_035,
+    "fifth_reporting": 52_718_394,
 }
 # Largest share by which the simulation's parameters are wrong.
 LARGEST_ERROR = 0.3
