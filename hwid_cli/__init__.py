@@ -3,13 +3,14 @@
 The rooms, and the only direction in which they import each other::
 
     cli | python -> stages -> export | report | tasks -> config | store -> data | simulations
-        -> files -> diagnosis -> drive | model -> records -> errors
+        -> files -> diagnosis -> trust -> drive | model -> records -> compiled | errors
+        -> sources
 
-``records`` holds the data handed between rooms; ``model``, ``drive`` and ``diagnosis``
-are pure functions on it; ``files`` to ``export`` turn bytes into records and back;
-``tasks`` runs and memoises work; ``stages`` say what is needed, computed, stored and
-shown; ``report`` makes tables, figures and the page; ``cli`` joins them behind ``hwid``,
-``python`` behind ``from hwid_cli import ...``.
+``records`` holds the data handed between rooms; ``model``, ``drive``, ``trust`` and
+``diagnosis`` are pure functions on it; ``files`` to ``export`` turn bytes into records
+and back; ``tasks`` runs and memoises work; ``stages`` say what is needed, computed,
+stored and shown; ``report`` makes tables, figures and the page; ``cli`` joins them
+behind ``hwid``, ``python`` behind ``from hwid_cli import ...``.
 
 From Python, the names below do on records in memory what the commands do on files.
 

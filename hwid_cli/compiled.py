@@ -9,7 +9,6 @@ is nothing to be found, and older folders are removed.
 
 import atexit
 import os
-import re
 import shutil
 import sys
 from collections.abc import Callable, Iterator
@@ -24,18 +23,14 @@ from numba import config, njit
 from numba.core.caching import FunctionCache
 from numba.core.options import DefaultOptions
 
+from hwid_cli.sources import PACKAGE, checksum_of_files, sources_behind
+
 if sys.platform != "win32":
     import fcntl
 
 HAS_LOCKS = sys.platform != "win32"
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
-
-PACKAGE = Path(__file__).parent
-_IMPORT = re.compile(
-    rf"^\s*(?:from ({PACKAGE.name}[\w.]*) import (\([^)]*\)|.*)|import ({PACKAGE.name}[\w.]*))",
-    re.MULTILINE,
-)
 
 # Entries for C, which nothing calls, take a twentieth of the time to compile.
 _ALWAYS: dict[str, Any] = {"no_cfunc_wrapper": True}
@@ -133,63 +128,13 @@ def folder_of_loops(source: Path) -> Path:
     Path
         Folder that is made where it is missing.
     """
-    checksum = sha256()
-    for path in sorted(sources_behind(source)):
-        checksum.update(path.relative_to(PACKAGE).as_posix().encode())
-        checksum.update(_text_of(path).encode())
+    checksum = checksum_of_files(sources_behind(source))
     name = ".".join(source.relative_to(PACKAGE).with_suffix("").parts)
-    folder = _place() / f"{name}-{checksum.hexdigest()[:16]}"
+    folder = _place() / f"{name}-{checksum[:16]}"
     if not folder.exists():
         for before in folder.parent.glob(f"{name}-*"):
             shutil.rmtree(before, ignore_errors=True)
     return folder
-
-
-def sources_behind(source: Path) -> set[Path]:
-    """Files of this package that a module imports, directly or not, and its own.
-
-    Parameters
-    ----------
-    source : Path
-        File of a module of this package.
-
-    Returns
-    -------
-    set of Path
-    """
-    found, todo = set(), [source]
-    while todo:
-        path = todo.pop()
-        if path not in found:
-            found.add(path)
-            todo += _imports(path)
-    return found
-
-
-@cache
-def _imports(source: Path) -> tuple[Path, ...]:
-    return tuple(
-        path
-        for module in _modules_named(_text_of(source))
-        for path in (
-            PACKAGE.parent.joinpath(*module.split(".")).with_suffix(".py"),
-            PACKAGE.parent.joinpath(*module.split("."), "__init__.py"),
-        )
-        if path.exists()
-    )
-
-
-def _modules_named(text: str) -> Iterator[str]:
-    """Names in import lines, also those that turn out to be no modules."""
-    for package, names, module in _IMPORT.findall(text):
-        yield package or module
-        for name in re.findall(r"\w+", re.sub(r"#.*| as \w+", "", names)):
-            yield f"{package}.{name}"
-
-
-@cache
-def _text_of(source: Path) -> str:
-    return source.read_text(encoding="utf-8")
 
 
 @cache

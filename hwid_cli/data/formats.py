@@ -1,6 +1,7 @@
 """Which reader serves which kind of measurement file: one table.
 
-A new format is a file with its reader, and a line in ``READERS``.
+A new format is a file with its reader, and a line in ``READERS``; what else it touches is in
+docs/architecture.md, "Where to touch what".
 """
 
 import os

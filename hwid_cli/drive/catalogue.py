@@ -2,7 +2,9 @@
 
 The only list: of the declarations in ``effects``, one module for each family. To add an
 effect: its declaration there, its term in a kernel, its test; then
-``make drive-source effects`` for what follows from the declaration.
+``make drive-source effects`` for what follows from the declaration. A force with a
+stiffness or a damping of its own has a line in ``motion.curved.step_limit`` too: without
+it steps are too long for large values, and the motion explodes without a word.
 
 Several entries may have one public id, the part before the colon: with another word of
 the configuration, with a richer law, or a second one of its kind. Effects of the user's

@@ -73,7 +73,8 @@ def offset_is_shared(candidate: Candidate, place: JacobianColumns) -> bool:
     """
     model = candidate.model
     both_free = all(
-        RULES[one.kind].size is not None for one in (model.input_map, model.output_map)
+        static_map.has_free_shape(one.kind)
+        for one in (model.input_map, model.output_map)
     )
     rule = RULES[model.output_map.kind]
     has_positions = rule.n_positions(model.output_map) > 0

@@ -333,8 +333,8 @@ def straightened(static_map: StaticMap, argument: np.ndarray) -> StaticMap:
 
 
 def has_free_shape(kind: str) -> bool:
-    """Tell whether maps of a kind have a gain and an offset of their own."""
-    return RULES[kind].size is not None
+    """Tell whether maps of a kind follow any shape, with gain and offset of their own."""
+    return RULES[kind].follows_shape
 
 
 def parameter_names(static_map: StaticMap) -> tuple[str, ...]:

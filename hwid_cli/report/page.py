@@ -14,12 +14,10 @@ from hwid_cli.report.charts import Chart
 from hwid_cli.report.dots import Dots
 from hwid_cli.report.simulation_note import HUBER_NOTE, simulation_note
 from hwid_cli.report.table import Block, Table, Text
+from hwid_cli.sources import PACKAGE, checksum_of_folder
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-# Raised when a figure changes, so that figures are drawn again.
-FIGURES_VERSION = 1
 
 
 @dataclass(frozen=True)
@@ -139,7 +137,9 @@ class Drawing:
         Values that nothing tells apart reliably give another key each time, and a figure
         that is drawn again.
         """
-        digest = hashlib.blake2b(f"{FIGURES_VERSION} {self.file}".encode())
+        # What draws stands in this room; all that is drawn is handed to it.
+        sources = checksum_of_folder(PACKAGE / "report")
+        digest = hashlib.blake2b(f"{sources} {self.file}".encode())
         _add(digest, self.draw)
         return digest.hexdigest()
 

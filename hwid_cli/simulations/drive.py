@@ -30,7 +30,7 @@ def simulate_recordings(
 
     Returns
     -------
-    tuple of SimulatedRecording
+    tuple of DriveResponse
         In the order of the recordings. NaN where the simulation runs away.
     """
     # As a diagnosis does: its numbers are those of the simulation that it writes.

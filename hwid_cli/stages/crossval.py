@@ -202,7 +202,7 @@ def crossval_key(
         "identified_on": [fit.name for fit in fits],
         "validated_on": [recording.name for recording in recordings],
         "orders": orders,
-        "threshold": options.threshold,
+        "options": options,
     }
     return task_key(NAME, STAGE_VERSION, settings, [])
 

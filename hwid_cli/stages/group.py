@@ -47,9 +47,7 @@ def group_key(plan: GroupPlan) -> str:
         "validate": plan.validate,
         "orders": plan.orders,
         "fit": plan.fit_options,
-        "keep": plan.options.keep,
-        "max_level": plan.options.max_level,
-        "warm_start": plan.options.warm_start,
+        "options": plan.options,
         "threshold": plan.threshold,
     }
     return task_key(NAME, STAGE_VERSION, settings, [])

@@ -9,7 +9,7 @@ import numpy as np
 
 from hwid_cli.model.fit import fit
 from hwid_cli.records.check import StagePlan
-from hwid_cli.records.experiment import Experiment, OrdersOptions
+from hwid_cli.records.experiment import Experiment, IdentifyOptions, OrdersOptions
 from hwid_cli.records.maps import StaticMap
 from hwid_cli.records.model import Fit, FitOptions, HammersteinWiener, Orders
 from hwid_cli.records.recordings import Recording
@@ -108,7 +108,10 @@ def fit_grid(
 
 
 def identify_key(
-    recordings: Sequence[Recording], orders: OrdersOptions, options: FitOptions
+    recordings: Sequence[Recording],
+    orders: OrdersOptions,
+    options: FitOptions,
+    section: IdentifyOptions,
 ) -> str:
     """Content key of the whole stage: its fits and their names."""
     settings = {
@@ -116,6 +119,7 @@ def identify_key(
         "names": [recording.name for recording in recordings],
         "orders": orders,
         "options": options,
+        "section": section,
     }
     return task_key(NAME, STAGE_VERSION, settings, [])
 
@@ -187,13 +191,20 @@ class _Given:
     recordings: tuple[Recording, ...]
     orders: OrdersOptions
     options: FitOptions
+    section: IdentifyOptions
+
+    @property
+    def key(self) -> str:
+        """Content key of all fits."""
+        return identify_key(self.recordings, self.orders, self.options, self.section)
 
 
 def _choose(context: Context) -> _Given:
     experiment = context.experiment
     recordings = context.results["calibrate"].recordings
     chosen = recordings_with_models(recordings, experiment)
-    return _Given(chosen, experiment.orders, experiment.fit)
+    section = experiment.identify or IdentifyOptions()
+    return _Given(chosen, experiment.orders, experiment.fit, section)
 
 
 def recordings_with_models(
@@ -293,7 +304,7 @@ STAGE = Stage(
     needs=("calibrate",),
     sections=("orders", "fit", "identify"),
     choose=_choose,
-    key=lambda given: identify_key(given.recordings, given.orders, given.options),
+    key=lambda given: given.key,
     compute=_compute,
     storage=in_results(NAME, read_fits, _write),
     summary=lambda given, fits, is_stored: (

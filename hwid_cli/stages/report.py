@@ -30,6 +30,7 @@ from hwid_cli.records.report import (
     StoredResults,
 )
 from hwid_cli.records.results import CrossValidation, ModelScore
+from hwid_cli.sources import checksum_of_folder
 from hwid_cli.stages.answer import model_answer
 from hwid_cli.stages.crossval import cross_matrix
 from hwid_cli.stages.model_views import model_views, named_fits
@@ -166,20 +167,19 @@ def chain_on_tests(final: FinalTest) -> ChainOnTests:
     )
 
 
-# Raised when the page changes, so that pages are written again.
-REPORT_VERSION = 6
-
-
 def report_key(stored: StoredResults) -> str:
     """Content key of a page: all that it shows comes from these."""
     # Seconds may be NaN, which no key can hold; as text they can.
     settings = {
+        # A page is derived and no result: any change of any source may write it again. A
+        # version that somebody has to raise would be forgotten.
+        "program": checksum_of_folder(),
         "config": stored.config,
         "stages": [str(run) for run in stored.stages],
         "diagnosis": json.dumps(stored.diagnosis, sort_keys=True),
         "maps": str(stored.chosen_maps),
     }
-    return task_key("report", REPORT_VERSION, settings, ())
+    return task_key("report", 1, settings, ())
 
 
 def changed_sections(

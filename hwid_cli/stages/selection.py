@@ -77,6 +77,6 @@ def named_recordings(experiment: Experiment) -> Iterator[tuple[str, tuple[str, .
 
 
 def _names_recordings(hint: Any) -> bool:
-    """Whether an annotation, or a member of its union, is ``RecordingNames``."""
+    """Whether an annotation, or a member of its union, is marked ``OF_RECORDINGS``."""
     marks = getattr(hint, "__metadata__", ())
     return OF_RECORDINGS in marks or any(map(_names_recordings, get_args(hint)))

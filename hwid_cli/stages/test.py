@@ -228,6 +228,7 @@ def final_test_key(
     recordings: Sequence[Recording],
     tested_on: Sequence[str],
     threshold: float,
+    options: FinalTestOptions,
 ) -> str:
     """Content key of the whole stage: its RMSDs and all that is read off them.
 
@@ -243,6 +244,7 @@ def final_test_key(
         "recordings": [recording.name for recording in recordings],
         "tested_on": sorted(tested_on),
         "threshold": threshold,
+        "options": options,
     }
     return task_key(NAME, STAGE_VERSION, settings, [])
 
@@ -316,12 +318,20 @@ def _assigned(scored: ScoredModels) -> tuple[str, ...]:
 
 @dataclass(frozen=True, eq=False)
 class _Given:
-    """Models, all recordings, those that nothing else has used, and the threshold."""
+    """Models, all recordings, those that nothing else has used, and what was asked."""
 
     models: FinalModels
     recordings: tuple[Recording, ...]
     tested_on: tuple[str, ...]
     threshold: float
+    options: FinalTestOptions
+
+    @property
+    def key(self) -> str:
+        """Content key of the final test."""
+        return final_test_key(
+            self.models, self.recordings, self.tested_on, self.threshold, self.options
+        )
 
 
 def _choose(context: Context) -> _Given:
@@ -340,7 +350,7 @@ def _choose(context: Context) -> _Given:
             "least one to test; widen the orders or change fit"
         )
     names = tuple(recording.name for recording in tested)
-    return _Given(models, recordings, names, crossval.threshold)
+    return _Given(models, recordings, names, crossval.threshold, options)
 
 
 def _options(experiment: Experiment) -> FinalTestOptions:
@@ -437,9 +447,7 @@ STAGE = Stage(
     sections=("test",),
     require=_options,
     choose=_choose,
-    key=lambda given: final_test_key(
-        given.models, given.recordings, given.tested_on, given.threshold
-    ),
+    key=lambda given: given.key,
     compute=_compute,
     storage=in_results(
         NAME,

@@ -48,9 +48,9 @@ class Provenance:
     Parameters
     ----------
     key : str
-        Hash of everything that the stage depends on, see ``campaign.cache.task_key``.
+        Hash of everything that the stage depends on, see ``tasks.cache.task_key``.
     config : mapping
-        Resolved configuration, see ``files.config.describe_experiment``.
+        Resolved configuration, see ``config.load.describe_experiment``.
     inputs : mapping of str to str
         SHA-256 of each recording's file by the recording's name.
     seconds : float, [s]

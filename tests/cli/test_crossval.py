@@ -33,14 +33,6 @@ def test_the_tensor_and_the_tables_are_written(hwid, out):
         assert "identify" in file
     rows = rows_of(out / "crossval.csv")
     assert len(rows) == 18
-    assert list(rows[0]) == [
-        "identified_on",
-        "nb",
-        "nk",
-        "validated_on",
-        "rmsd",
-        "status",
-    ]
     coverage = rows_of(out / "coverage.csv")
     assert len(coverage) == 6
     assert {row["of"] for row in coverage} == {"3"}

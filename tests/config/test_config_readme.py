@@ -1,11 +1,13 @@
 """configs/README.md and the dataclasses may not drift apart."""
 
+import re
 from dataclasses import MISSING, fields, is_dataclass
 from pathlib import Path
 from types import NoneType
 from typing import Literal, get_args, get_origin, get_type_hints
 
 from hwid_cli.records.experiment import Experiment
+from hwid_cli.records.maps import MAP_KINDS
 
 README = Path(__file__).parents[2] / "configs" / "README.md"
 
@@ -90,3 +92,13 @@ def test_every_key_is_documented_with_its_type_default_and_meaning():
 
 def test_no_documented_key_is_unknown_to_the_loader():
     assert set(documented_rows()) <= set(EXPECTED)
+
+
+def test_every_kind_of_map_is_named_in_the_row_of_its_key():
+    _, _, meaning = documented_rows()["", "fit.input_map"]
+    named, _, own = meaning.partition("; ")
+
+    assert set(re.findall(r"`(\w+)`", named)) == {
+        kind for kind, one in MAP_KINDS.items() if not one.has_function
+    }
+    assert "function of your own" in own

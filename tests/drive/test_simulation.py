@@ -2,6 +2,7 @@
 
 import time
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -24,8 +25,10 @@ from tests.drive.drive_cases import (
     EVERY,
     LOAD,
     SAMPLE_TIME_S,
+    SCALES,
     SINGLE,
     STRIBECK,
+    TIMES_S,
     machine_of,
     rms,
     tool,
@@ -53,6 +56,7 @@ MIRRORED = {
     },
     "torque_ripple": {"share": 0.2, "per_turn": 900.0, "phase_rad": np.pi - 0.5},
 }
+BENT_SPRING = {"cubic_stiffness": {"stiffness_N_per_m3": 5e3}}
 # Parameters at which an effect is none.
 NEUTRAL = {
     "coulomb_friction": {"force_N": 0.0},
@@ -337,6 +341,31 @@ def test_every_effect_of_the_catalogue_is_seen_in_the_output():
         change = change - tool({}, **machine).output
         # A ten-thousandth of the motion of 12 mm rms; drift is the smallest.
         assert 1e-6 < rms(change) < 0.1, effect
+
+
+def with_one_at_its_largest(effect):
+    """Values of an effect, each time with another of its parameters very large."""
+    for one in effect.parameters:
+        largest = one.bounds(SCALES)[1]
+        if np.isinf(largest):
+            # Far beyond what a search begins with, as a search may get there.
+            largest = 1e3 * max(map(abs, one.starts(SCALES)))
+        # Those of a change of the drive itself are not among the cases.
+        values = EVERY.get(effect.id, {})
+        yield {**values, one.name: largest}
+
+
+@pytest.mark.parametrize("effect", CATALOGUE.values(), ids=lambda one: one.id)
+def test_motion_stays_finite_however_large_an_effect_is(effect):
+    # A force whose stiffness or damping is missing in curved.step_limit is followed in
+    # steps that are too long for it, and the motion explodes.
+    step = np.where(TIMES_S < 0.05, 0.0, 5.0)
+    # Beside a curved spring, straight forces are followed in steps too.
+    for values, beside in product(with_one_at_its_largest(effect), ({}, BENT_SPRING)):
+        effects = {**beside, effect.id: values}
+        motion = tool(effects, step, **machine_of(effect.id))
+
+        assert np.isfinite(motion.output).all(), values
 
 
 def test_what_may_be_left_out_has_the_default_of_its_declaration():

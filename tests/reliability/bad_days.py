@@ -25,7 +25,9 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+import yaml
 
+from hwid_cli.stages.table import STAGES as STAGES_IN_ORDER
 from tests.reliability import harness, system_faults
 from tests.reliability.warm_process import (
     WarmProcess,
@@ -34,13 +36,9 @@ from tests.reliability.warm_process import (
     draw_nothing,
 )
 
+# Stages that the configuration of a day has a section for, and what is no stage.
 STAGES = (
-    "simulate",
-    "calibrate",
-    "identify",
-    "crossval",
-    "group",
-    "test",
+    *(name for name in STAGES_IN_ORDER if name in yaml.safe_load(harness.CONFIG)),
     "report",
     "run",
 )

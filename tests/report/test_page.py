@@ -23,6 +23,13 @@ def keys():
     return keys_of(everything(6, levels=2))
 
 
+def test_a_change_of_what_draws_gives_each_figure_another_key(keys, monkeypatch):
+    monkeypatch.setattr("hwid_cli.report.page.checksum_of_folder", lambda _: "other")
+
+    changed = keys_of(everything(6, levels=2))
+    assert not set(changed.values()) & set(keys.values())
+
+
 def test_equal_results_give_each_figure_the_same_key(keys):
     assert keys_of(everything(6, levels=2)) == keys
     assert len(set(keys.values())) == len(keys) > 30

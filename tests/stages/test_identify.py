@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hwid_cli.records.experiment import OrdersOptions
+from hwid_cli.records.experiment import IdentifyOptions, OrdersOptions
 from hwid_cli.records.maps import OwnFunction
 from hwid_cli.records.model import FitOptions, Orders
 from hwid_cli.records.recordings import Recording
@@ -169,14 +169,18 @@ def test_the_two_readings_of_the_second_order_share_their_common_fits():
     assert poles == delay
 
 
+def whole_key(recordings=RECORDINGS, grid=GRID, options=QUICK):
+    return identify_key(recordings, grid, options, IdentifyOptions())
+
+
 def test_the_key_of_the_stage_holds_all_that_its_fits_see():
-    whole = identify_key(RECORDINGS, GRID, QUICK)
-    assert whole == identify_key(RECORDINGS, GRID, QUICK)
-    assert whole != identify_key(RECORDINGS[:1], GRID, QUICK)
-    assert whole != identify_key(RECORDINGS, OrdersOptions(nb=(1,), nk=(1,)), QUICK)
-    assert whole != identify_key(RECORDINGS, GRID, replace(QUICK, units=4))
+    whole = whole_key()
+    assert whole == whole_key()
+    assert whole != whole_key(RECORDINGS[:1])
+    assert whole != whole_key(grid=OrdersOptions(nb=(1,), nk=(1,)))
+    assert whole != whole_key(options=replace(QUICK, units=4))
     renamed = (replace(RECORDINGS[0], name="c"), RECORDINGS[1])
-    assert whole != identify_key(renamed, GRID, QUICK)
+    assert whole != whole_key(renamed)
 
 
 def test_more_parameters_never_fit_worse():

@@ -5,7 +5,7 @@ import pytest
 
 from hwid_cli.model.scores import rmsd
 from hwid_cli.records.report import StoredResults
-from hwid_cli.stages.report import changed_sections, report_contents
+from hwid_cli.stages.report import changed_sections, report_contents, report_key
 from tests.report.report_examples import (
     THRESHOLD,
     calibrated_only,
@@ -32,6 +32,14 @@ def test_nothing_stored_gives_nothing_to_show():
     assert contents.grid is None
     assert contents.cross is None
     assert contents.trend is None
+
+
+def test_a_change_of_any_source_gives_the_page_another_key(stored, monkeypatch):
+    key = report_key(stored)
+    assert report_key(stored) == key
+
+    monkeypatch.setattr("hwid_cli.stages.report.checksum_of_folder", lambda: "other")
+    assert report_key(stored) != key
 
 
 def test_recordings_without_any_model_are_named():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hwid_cli.model.simulate import simulate
-from hwid_cli.records.experiment import CrossvalOptions, OrdersOptions
+from hwid_cli.records.experiment import CrossvalOptions, FinalTestOptions, OrdersOptions
 from hwid_cli.records.groups import Group, GroupSearch
 from hwid_cli.records.model import Fit, FitOptions, HammersteinWiener, Orders, StaticMap
 from hwid_cli.records.recordings import Recording
@@ -177,7 +177,8 @@ def test_a_second_judgement_computes_nothing():
 
 def key_of(models=None, recordings=RECORDINGS, tested_on=("t",), threshold=THRESHOLD):
     models = models or final_models(FITS, crossval_of(), search_of(PAIR))
-    return final_test_key(models, recordings, tested_on, threshold)
+    options = FinalTestOptions(tested_on)
+    return final_test_key(models, recordings, tested_on, threshold, options)
 
 
 MODELS = final_models(FITS, crossval_of(), search_of(PAIR))

@@ -244,6 +244,7 @@ RULE = MapRule(
     displaced=displaces(lambda one: slice(0, 2)),
     raised=raises(lambda one: slice(2, None)),
     size=lambda one: mean_slope(one, 2),
+    follows_shape=True,
     n_positions=lambda one: 2,
     settle=_settle,
     corners=knots,

@@ -99,6 +99,7 @@ def network_rule(kind: str, unit: Unit) -> MapRule:
         displaced=displaces(lambda one: slice(0, _count(one))),
         raised=raises(lambda one: slice(-2, None)),
         size=lambda one: _mean_slope(one, differentiate),
+        follows_shape=True,
         n_positions=lambda one: 2 * _count(one),
         settle=_settle,
         repeatable=lambda one, argument: _repeatable(unit, one, argument),

@@ -248,6 +248,7 @@ RULE = MapRule(
     displaced=displaces(lambda one: slice(0, one.parameters.size // 2)),
     raised=raises(lambda one: slice(one.parameters.size // 2, None)),
     size=lambda one: mean_slope(one, one.parameters.size // 2),
+    follows_shape=True,
     n_positions=lambda one: one.parameters.size // 2,
     settle=_settle,
     corners=lambda one: edges_and_levels(one)[0],

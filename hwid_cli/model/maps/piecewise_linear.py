@@ -495,6 +495,7 @@ RULE = MapRule(
     displaced=displaces(lambda one: slice(0, one.parameters.size // 2)),
     raised=raises(lambda one: slice(one.parameters.size // 2, None)),
     size=lambda one: mean_slope(one, one.parameters.size // 2),
+    follows_shape=True,
     n_positions=lambda static_map: static_map.parameters.size // 2,
     settle=_settle,
     corners=lambda static_map: break_points_and_values(outlined(static_map))[0],

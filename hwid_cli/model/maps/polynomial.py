@@ -146,6 +146,7 @@ RULE = MapRule(
     displaced=displaces(lambda one: slice(0, 0)),
     raised=raises(lambda one: slice(0, 1)),
     size=_size,
+    follows_shape=True,
     shifts=True,
     portable=Portable(
         (

@@ -220,6 +220,9 @@ class MapRule:
     size : callable (StaticMap) -> (float, ndarray), or None
         A mean slope that grows in proportion to the values, and its gradient by the
         parameters; None where the kind has no free gain.
+    follows_shape : bool
+        Whether its first start follows any function, so that it has a gain and an offset
+        of its own.
     n_positions : callable (StaticMap) -> int
         Leading parameters that stay fixed in the first phase of a fit.
     settle : callable (old StaticMap, parameters) -> None
@@ -276,6 +279,7 @@ class MapRule:
     passes_constants: bool = False
     raised: Callable[[StaticMap, float], StaticMap] | None = None
     size: Callable[[StaticMap], tuple[float, np.ndarray]] | None = None
+    follows_shape: bool = False
     n_positions: Callable[[StaticMap], int] = lambda one: 0
     settle: Callable[[StaticMap, np.ndarray], None] = lambda old, parameters: None
     corners: Callable[[StaticMap], np.ndarray] = lambda one: np.zeros(0)
