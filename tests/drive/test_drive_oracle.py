@@ -13,6 +13,7 @@ from tests.drive.drive_cases import (
     CORNER_TIMES_S,
     CORNERS,
     COULOMB,
+    CUBIC,
     GEAR,
     LOSS,
     SINGLE,
@@ -94,6 +95,23 @@ def test_variants_and_seconds_follow_the_oracle(effects):
 @pytest.mark.parametrize("effects", TOGETHER, ids="+".join)
 def test_effects_together_follow_the_oracle(effects):
     assert difference(effects) < tolerance(effects)
+
+
+# A stop that turns the drive back within a sample, beside a force that is curved all the
+# time: no step may go in and out again. Twice what Runge-Kutta steps leave.
+STIFF_M = 3e-7
+
+
+@pytest.mark.parametrize("stop", ["end_stop", "one_sided_stop"])
+@pytest.mark.parametrize(
+    "effects", [CUBIC, {"quadratic_drag": SINGLE["quadratic_drag"]}], ids="+".join
+)
+@pytest.mark.parametrize("exponent", [1.0, 1.5])
+def test_stiff_stops_beside_curved_forces_follow_the_oracle(stop, effects, exponent):
+    stiffness = 1.25e7 * 1e-4 ** (1.0 - exponent)
+    place = {"position_m": 0.012, "stiffness_N_per_m": stiffness}
+    bent = {"exponent": exponent} if exponent != 1.0 else {}
+    assert difference({stop: place | bent, **effects}) < STIFF_M
 
 
 @pytest.mark.slow

@@ -25,6 +25,7 @@ from hwid_cli.drive.motion.forces import (
     is_force_curved,
     net_forces,
     own_force,
+    reaches_side,
     resisting,
     ripple,
     spring_rate,
@@ -50,6 +51,8 @@ LONGEST_PHASE = 0.3
 OWN_SHARE, OWN_RATE = 1e-4, 30.0
 # Samples that a bend of such a force is seen ahead: as many as steps go on without a look.
 OWN_AHEAD = 6.0
+# Depth of a contact that is only ahead, [m].
+JUST_IN = 1e-300
 # A contact's force begins with an edge in its slope: its steps are this much shorter.
 CONTACT_FINER = 2.0
 
@@ -102,17 +105,43 @@ def _touches(x: float, p: np.ndarray) -> bool:
 
 
 @compiled(**INNER)
-def _contact_rate(x: float, v: float, mass: float, p: np.ndarray) -> float:
-    """Return how fast the motion in curved contacts turns."""
+def _contact_rate(
+    x: float, low: float, high: float, v: float, mass: float, p: np.ndarray
+) -> float:
+    """Return how fast the motion in curved contacts turns, also in those just ahead."""
     into = beyond(x, p[slots.STOP_POSITION])
+    if into == 0.0 and max(high, -low) > p[slots.STOP_POSITION]:
+        into = JUST_IN
     bend, loss = p[slots.STOP_BEND], p[slots.STOP_LOSS]
     rate = _rate_of_contact(into, v, mass, p[slots.STOP_STIFFNESS], bend, loss)
     into = beyond_side(x, p[slots.SIDE_POSITION])
+    if into == 0.0 and reaches_side(low, high, p[slots.SIDE_POSITION]):
+        into = JUST_IN
     bend, loss = p[slots.SIDE_BEND], p[slots.SIDE_LOSS]
     rate += _rate_of_contact(into, v, mass, p[slots.SIDE_STIFFNESS], bend, loss)
     into = beyond_side(x, p[slots.SECOND_POSITION])
+    if into == 0.0 and reaches_side(low, high, p[slots.SECOND_POSITION]):
+        into = JUST_IN
     bend, loss = p[slots.SECOND_BEND], p[slots.SECOND_LOSS]
     return rate + _rate_of_contact(into, v, mass, p[slots.SECOND_STIFFNESS], bend, loss)
+
+
+@compiled(**INNER)
+def _places_ahead(
+    state: np.ndarray, memory: np.ndarray, push: np.ndarray, done: float, p: np.ndarray
+) -> tuple[float, float]:
+    """Return between which places the drive stays within a sample, where it has stops.
+
+    A step into a stop and out of it would else not be seen to have met one.
+    """
+    x, v = state[X], state[V]
+    stiffness = p[slots.STOP_STIFFNESS] + p[slots.SIDE_STIFFNESS]
+    if stiffness + p[slots.SECOND_STIFFNESS] == 0.0:
+        return x, x
+    time = p[slots.SAMPLE_TIME]
+    ahead = x + time * v
+    further = ahead + 0.5 * time * time * acceleration(state, memory, push, done, p)[0]
+    return min(x, min(ahead, further)), max(x, max(ahead, further))
 
 
 @compiled(**INNER)
@@ -152,7 +181,8 @@ def step_limit(
         mass *= min(p[slots.MOTOR_SHARE], 1.0 - p[slots.MOTOR_SHARE])
     x, v = state[X], state[V]
     speed = abs(v)
-    stiffness = spring_rate(x, p)
+    low, high = _places_ahead(state, memory, push, done, p)
+    stiffness = spring_rate(x, low, high, p)
     damping = p[slots.DAMPING] + 2.0 * abs(p[slots.DRAG]) * speed
     if has_motor and abs(state[2] - x) > p[slots.GEAR_GAP]:
         stiffness += p[slots.GEAR_STIFFNESS]
@@ -173,7 +203,7 @@ def step_limit(
         turning *= 0.12 * speed
     rate = np.sqrt(stiffness / mass) + damping / mass + turning
     if p[slots.HAS_CONTACT] != 0.0:
-        rate += _contact_rate(x, v, mass, p)
+        rate += _contact_rate(x, low, high, v, mass, p)
     if p[slots.MODE_MASS] > 0.0:
         both = 1.0 / p[slots.MODE_MASS] + 1.0 / mass
         rate += np.sqrt(p[slots.MODE_STIFFNESS] * both) + p[slots.MODE_DAMPING] * both

@@ -290,12 +290,14 @@ def further_spring(x: float, p: np.ndarray) -> float:
 
 
 @compiled(**INNER)
-def spring_rate(x: float, p: np.ndarray) -> float:
-    """Return how stiff the springs are here at most but for curved contacts, [N/m].
+def spring_rate(x: float, low: float, high: float, p: np.ndarray) -> float:
+    """Return how stiff the springs are at most but for curved contacts, [N/m].
 
     Parameters
     ----------
     x : float, [m]
+    low, high : float, [m]
+        Between which places the next step stays: a stop in between counts.
     p : ndarray, shape (N_SLOTS,)
     """
     stiffness = p[slots.STIFFNESS]
@@ -303,19 +305,31 @@ def spring_rate(x: float, p: np.ndarray) -> float:
         bend = 3.0 * p[slots.CUBIC] * x + 2.0 * p[slots.QUADRATIC]
         stiffness += abs(bend * x)
     is_plain = p[slots.STOP_BEND] + p[slots.STOP_LOSS] == 0.0
-    if is_plain and abs(x) > p[slots.STOP_POSITION]:
+    if is_plain and max(high, -low) > p[slots.STOP_POSITION]:
         stiffness += p[slots.STOP_STIFFNESS]
     is_plain = p[slots.SIDE_BEND] + p[slots.SIDE_LOSS] == 0.0
-    if is_plain and beyond_side(x, p[slots.SIDE_POSITION]) != 0.0:
+    if is_plain and reaches_side(low, high, p[slots.SIDE_POSITION]):
         stiffness += p[slots.SIDE_STIFFNESS]
     if p[slots.HAS_MORE] != 0.0:
         stiffness += abs(p[slots.GRAVITY_TORQUE])
         stiffness += p[slots.SPRING_SHARE] * p[slots.STIFFNESS]
         if p[slots.SECOND_STIFFNESS] > 0.0:
             is_plain = p[slots.SECOND_BEND] + p[slots.SECOND_LOSS] == 0.0
-            if is_plain and beyond_side(x, p[slots.SECOND_POSITION]) != 0.0:
+            if is_plain and reaches_side(low, high, p[slots.SECOND_POSITION]):
                 stiffness += p[slots.SECOND_STIFFNESS]
     return stiffness
+
+
+@compiled(**INNER)
+def reaches_side(low: float, high: float, position: float) -> bool:
+    """Return whether a stop on one side begins between two places.
+
+    Parameters
+    ----------
+    low, high : float, [m]
+    position : float, [m]
+    """
+    return beyond_side(low, position) != 0.0 or beyond_side(high, position) != 0.0
 
 
 @compiled(**INNER)

@@ -30,7 +30,7 @@ from hwid_cli.drive.motion.pieces import LENGTH, SAMPLE
 from hwid_cli.drive.motion.push import DRIVE, OTHER, shift, turns_sign, value_of
 
 # The limit of curved steps is not looked at again for so many pieces if it was twice
-# the piece: forces that depend on position change little within them.
+# the piece: forces that depend on position change little within them, but for stops.
 FAR_FROM_LIMIT = 4
 # Most steps in one piece; what is faster than that is followed less exactly.
 MOST_STEPS = 400
@@ -176,7 +176,7 @@ def glide_plain(
                     limit = max(limit, length / MOST_STEPS)
                     if limit < left:
                         h = left / np.ceil(left / limit)
-                    elif limit > 2.0 * left and not is_curved_at_times:
+                    elif limit > 2.0 * left and not (is_curved_at_times or has_edges):
                         trusted = j + FAR_FROM_LIMIT
                 x1, v1 = step_plain(x, v, memory, push, done, h, p)
                 if p[slots.DRIVE_SHARE] > 0.0 and turns_sign(push, done, h):

@@ -1338,7 +1338,12 @@ static double drive_moved_mass(double *p)
     return p[MASS];
 }
 
-static double drive_spring_rate(double x, double *p)
+static int drive_reaches_side(double low, double high, double position)
+{
+    return (drive_beyond_side(low, position) != 0.0) || (drive_beyond_side(high, position) != 0.0);
+}
+
+static double drive_spring_rate(double x, double low, double high, double *p)
 {
     double stiffness = 0.0;
     double bend = 0.0;
@@ -1349,11 +1354,11 @@ static double drive_spring_rate(double x, double *p)
         stiffness += fabs(bend * x);
     }
     is_plain = (p[STOP_BEND] + p[STOP_LOSS]) == 0.0;
-    if (is_plain && (fabs(x) > p[STOP_POSITION])) {
+    if (is_plain && (most(high, -low) > p[STOP_POSITION])) {
         stiffness += p[STOP_STIFFNESS];
     }
     is_plain = (p[SIDE_BEND] + p[SIDE_LOSS]) == 0.0;
-    if (is_plain && (drive_beyond_side(x, p[SIDE_POSITION]) != 0.0)) {
+    if (is_plain && drive_reaches_side(low, high, p[SIDE_POSITION])) {
         stiffness += p[SIDE_STIFFNESS];
     }
     if (p[HAS_MORE] != 0.0) {
@@ -1361,7 +1366,7 @@ static double drive_spring_rate(double x, double *p)
         stiffness += p[SPRING_SHARE] * p[STIFFNESS];
         if (p[SECOND_STIFFNESS] > 0.0) {
             is_plain = (p[SECOND_BEND] + p[SECOND_LOSS]) == 0.0;
-            if (is_plain && (drive_beyond_side(x, p[SECOND_POSITION]) != 0.0)) {
+            if (is_plain && drive_reaches_side(low, high, p[SECOND_POSITION])) {
                 stiffness += p[SECOND_STIFFNESS];
             }
         }
@@ -1802,24 +1807,53 @@ static double drive_rate_of_contact(double into, double v, double mass, double s
     return 2.0 * (sqrt((exponent * steep) / mass) + (((loss * steep) * deep) / mass));
 }
 
-static double drive_contact_rate(double x, double v, double mass, double *p)
+static double drive_contact_rate(double x, double low, double high, double v, double mass, double *p)
 {
     double into = 0.0;
     double bend = 0.0;
     double loss = 0.0;
     double rate = 0.0;
     into = drive_beyond(x, p[STOP_POSITION]);
+    if ((into == 0.0) && (most(high, -low) > p[STOP_POSITION])) {
+        into = 1e-300;
+    }
     bend = p[STOP_BEND];
     loss = p[STOP_LOSS];
     rate = drive_rate_of_contact(into, v, mass, p[STOP_STIFFNESS], bend, loss);
     into = drive_beyond_side(x, p[SIDE_POSITION]);
+    if ((into == 0.0) && drive_reaches_side(low, high, p[SIDE_POSITION])) {
+        into = 1e-300;
+    }
     bend = p[SIDE_BEND];
     loss = p[SIDE_LOSS];
     rate += drive_rate_of_contact(into, v, mass, p[SIDE_STIFFNESS], bend, loss);
     into = drive_beyond_side(x, p[SECOND_POSITION]);
+    if ((into == 0.0) && drive_reaches_side(low, high, p[SECOND_POSITION])) {
+        into = 1e-300;
+    }
     bend = p[SECOND_BEND];
     loss = p[SECOND_LOSS];
     return rate + drive_rate_of_contact(into, v, mass, p[SECOND_STIFFNESS], bend, loss);
+}
+
+static tuple_dd drive_places_ahead(double *state, double *memory, double *push, double done, double *p)
+{
+    double x = 0.0;
+    double v = 0.0;
+    double stiffness = 0.0;
+    double time = 0.0;
+    double ahead = 0.0;
+    double further = 0.0;
+    x = state[X];
+    v = state[V];
+    stiffness = p[STOP_STIFFNESS] + p[SIDE_STIFFNESS];
+    if ((stiffness + p[SECOND_STIFFNESS]) == 0.0) {
+        return (tuple_dd){x, x};
+    }
+    time = p[SAMPLE_TIME];
+    ahead = x + (time * v);
+    further = ahead + (((0.5 * time) * time) * drive_acceleration(state, memory, push, done, p).m0);
+    return (tuple_dd){least(x, least(ahead, further)), most(x, most(ahead, further))};
 }
 
 static tuple_dd drive_further_stiffness(double *state, double *push, double done, double *p)
@@ -1936,11 +1970,14 @@ static double drive_step_limit(double *state, double *memory, double *push, doub
     double x = 0.0;
     double v = 0.0;
     double speed = 0.0;
+    tuple_dd t1 = {0};
+    double low = 0.0;
+    double high = 0.0;
     double stiffness = 0.0;
     double damping = 0.0;
     double turn = 0.0;
     double turning = 0.0;
-    tuple_dd t1 = {0};
+    tuple_dd t2 = {0};
     double more = 0.0;
     double rate = 0.0;
     double both = 0.0;
@@ -1954,7 +1991,10 @@ static double drive_step_limit(double *state, double *memory, double *push, doub
     x = state[X];
     v = state[V];
     speed = fabs(v);
-    stiffness = drive_spring_rate(x, p);
+    t1 = drive_places_ahead(state, memory, push, done, p);
+    low = t1.m0;
+    high = t1.m1;
+    stiffness = drive_spring_rate(x, low, high, p);
     damping = p[DAMPING] + ((2.0 * fabs(p[DRAG])) * speed);
     if (has_motor && (fabs(state[2] - x) > p[GEAR_GAP])) {
         stiffness += p[GEAR_STIFFNESS];
@@ -1973,15 +2013,15 @@ static double drive_step_limit(double *state, double *memory, double *push, doub
     }
     turning = 0.0;
     if ((p[HAS_MORE] != 0.0) || (p[DRIVE_VARIES] != 0.0)) {
-        t1 = drive_further_stiffness(state, push, done, p);
-        more = t1.m0;
-        turning = t1.m1;
+        t2 = drive_further_stiffness(state, push, done, p);
+        more = t2.m0;
+        turning = t2.m1;
         stiffness += more;
         turning *= 0.12 * speed;
     }
     rate = (sqrt(stiffness / mass) + (damping / mass)) + turning;
     if (p[HAS_CONTACT] != 0.0) {
-        rate += drive_contact_rate(x, v, mass, p);
+        rate += drive_contact_rate(x, low, high, v, mass, p);
     }
     if (p[MODE_MASS] > 0.0) {
         both = (1.0 / p[MODE_MASS]) + (1.0 / mass);
