@@ -13,6 +13,7 @@ from hwid_cli.report.closing import (
     closing_text,
     diagnosis_sentence,
 )
+from hwid_cli.simulations.kinds import kind_named
 from hwid_cli.stages.best_model import beside_linear, best_model
 from hwid_cli.stages.model_views import named_fits
 from hwid_cli.stages.table import is_named, stage_named
@@ -29,8 +30,6 @@ _NEXT = {
     "crossval": "order",
     "group": "test",
 }
-# Kinds of simulations of the user's own that an export can hold.
-_EXPORTED = ("python", "fmu")
 
 
 def say_end(session: Session, name: str, files: Sequence[str] = ()) -> None:
@@ -132,7 +131,7 @@ def _after_diagnosis(session: Session, diagnosis: Diagnosis) -> str:
         return command_line(session, "report")
     if foreign is None:
         return command_line(session, "export", "--diagnosis", "--format", "fmu")
-    if foreign.kind in _EXPORTED:
+    if "python" in kind_named(foreign.kind).exports:
         return command_line(session, "export", "--diagnosis", "--format", "python")
     return f"look at {session.out / 'extended_simulation.yaml'}"
 

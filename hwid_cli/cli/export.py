@@ -27,6 +27,7 @@ from hwid_cli.records.exported import Exported
 from hwid_cli.records.model import Fit
 from hwid_cli.records.report import StoredResults
 from hwid_cli.report.thesis_names import thesis_name_of
+from hwid_cli.simulations.kinds import KINDS, kind_named
 from hwid_cli.stages.diagnose import extended_options
 from hwid_cli.stages.extended_program import (
     exactness_of,
@@ -38,13 +39,6 @@ from hwid_cli.stages.trust import kept_for_test, trust_of
 from hwid_cli.store.result_files import has_left_results, read_provenance, results_file
 
 _FOLDER = "models"
-# The first of each holds the whole simulation, c and the others the effects alone.
-_ALONE = ("c", "simulink", "modelica")
-PROGRAM_FORMATS = {
-    "python": ("python", *_ALONE),
-    "fmu": ("fmu", "python", *_ALONE),
-    "command": _ALONE,
-}
 
 
 def export(
@@ -73,11 +67,12 @@ def export(
 
 def _export_program(session: Session, kind: str, file_format: str) -> list[Path]:
     """The user's own simulation with what a diagnosis added, or the effects alone."""
-    formats = PROGRAM_FORMATS.get(kind)
-    if formats is None:
+    formats = kind_named(kind).exports
+    if not formats:
+        others = [one for one in KINDS if kind_named(one).exports]
         raise ConfigError(
             f"--diagnosis: simulation.kind is {kind}; expected one of "
-            f"{', '.join(PROGRAM_FORMATS)}, which an effect can act on step by step; use "
+            f"{', '.join(others)}, which an effect can act on step by step; use "
             "extended_simulation.yaml"
         )
     if file_format not in formats:

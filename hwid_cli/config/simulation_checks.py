@@ -24,7 +24,8 @@ from hwid_cli.drive.effect import Stated
 from hwid_cli.records.drive import BASE_PARAMETERS
 from hwid_cli.records.experiment import DiagnoseOptions, Experiment
 from hwid_cli.records.own_effects import is_own
-from hwid_cli.records.programs import OutputsSimulation
+from hwid_cli.records.programs import ForeignSimulation
+from hwid_cli.simulations.kinds import kind_named
 
 # What the electrical circuit has besides its resistance.
 _OF_CIRCUIT = ("inductance_H", "back_emf_V_s_per_m", "back_emf_V_s_per_rad")
@@ -193,7 +194,8 @@ def simulated_faults(experiment: Experiment) -> Iterator[Fault]:
     recordings = experiment.recordings
     if recordings is None:
         return
-    is_asked = isinstance(experiment.simulation, OutputsSimulation)
+    foreign = experiment.foreign_simulation
+    is_asked = foreign is not None and _is_read(foreign)
     place = ("recordings", "columns", "simulated")
     if is_asked and recordings.columns.simulated is None:
         yield missing(
@@ -209,6 +211,11 @@ def simulated_faults(experiment: Experiment) -> Iterator[Fault]:
             "simulation.kind: outputs too, which compares it with the output",
             "add that section or remove this key",
         )
+
+
+def _is_read(simulation: ForeignSimulation) -> bool:
+    """Whether what it gives stands in the recordings, because it cannot be run."""
+    return not kind_named(simulation.kind).capabilities(simulation).run
 
 
 def simulation_faults(experiment: Experiment) -> Iterator[Fault]:

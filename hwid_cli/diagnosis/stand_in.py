@@ -26,6 +26,9 @@ _DEGREE = 5
 # A spring or a damper that gives less of the force than this share is none.
 _LEAST_SHARE = 1e-4
 _LEAST_MASS = 1e-12
+# Nothing in a stand-in runs faster than this many times in a sample: samples do not show
+# it, and each of its curved forces is followed in steps of that size, [-].
+_FASTEST = 10.0
 # A straight spring that leaves less than this share of the balance of forces is enough; a
 # curved one has to leave at most this share of that, and to push back over so many times
 # the way that was seen.
@@ -101,7 +104,8 @@ def fit_stand_in(
     widest = _PUSHES_BACK * max(float(np.max(np.abs(one.output))) for one in runs)
     is_nearer = left > _STRAIGHT and left_then <= _CURVED * left
     is_curved = may_curve and is_nearer and _pushes_back(curved, widest)
-    return _in_free_run(curved if is_curved else straight, signals, runs)
+    drive = _no_faster_than_seen(curved if is_curved else straight, signals)
+    return _in_free_run(drive, signals, runs)
 
 
 def _by_regression(
@@ -195,8 +199,22 @@ def _in_free_run(
     if not np.isfinite(found.sse):
         return drive
     base: dict[str, Any] = base_of(drive_at(problem, fit_layout, found.point))
-    better = replace(drive, **base)
+    # A damper that has grown is as fast as a mass that has shrunk.
+    better = _no_faster_than_seen(replace(drive, **base), signals)
     return in_newtons(better, better.force_constant_N_per_A)
+
+
+def _no_faster_than_seen(drive: StandIn, signals: Sequence[Signals]) -> StandIn:
+    """The same with a mass that samples can show: a simulation may have none.
+
+    A simulation of the first order leaves a mass of rounding errors, which would settle
+    within a thousandth of a sample.
+    """
+    shortest = min(one.sample_time_s for one in signals) / _FASTEST
+    least = max(
+        drive.damping_N_s_per_m * shortest, drive.stiffness_N_per_m * shortest**2
+    )
+    return replace(drive, mass_kg=max(drive.mass_kg, least))
 
 
 def in_newtons(drive: StandIn, force_gain: float) -> StandIn:

@@ -10,8 +10,9 @@ from pathlib import Path
 from hwid_cli import __version__
 from hwid_cli.files.atomic import replace_file
 from hwid_cli.records.drive import Drive
-from hwid_cli.records.programs import FmuSimulation, PythonSimulation
+from hwid_cli.records.programs import Program
 from hwid_cli.simulations.extended import ExtendedSimulation
+from hwid_cli.simulations.kinds import kind_named
 
 # Folder of the copies, beside the module.
 BASE_FOLDER = "simulation_base"
@@ -80,13 +81,11 @@ def write_module(
         If a file cannot be written.
     """
     base = extended.base
-    if not isinstance(base, PythonSimulation | FmuSimulation):
+    files = kind_named(base.kind).files
+    if files is None:
         raise TypeError(f"no file to copy: {base!r}")
-    file = Path(base.file)
-    copied = [file]
-    if isinstance(base, PythonSimulation):
-        # What lies beside a function's file may be imported by it.
-        copied += sorted(one for one in file.parent.glob("*.py") if one != file)
+    copied = files(base)
+    file = copied[0]
     there = folder / BASE_FOLDER
     there.mkdir(parents=True, exist_ok=True)
     contents = {there / one.name: one.read_bytes() for one in copied}
@@ -116,9 +115,7 @@ def _most() -> float:
     return MOST_DISAGREEMENT
 
 
-def _arguments(
-    record: Drive | PythonSimulation | FmuSimulation, leave_out: tuple[str, ...] = ()
-) -> str:
+def _arguments(record: Drive | Program, leave_out: tuple[str, ...] = ()) -> str:
     """Keyword arguments of a record, without those that have their default."""
     lines = []
     for one in fields(record):

@@ -13,14 +13,7 @@ from hwid_cli.records.maps import MAP_KINDS
 from hwid_cli.records.model import FitOptions
 from hwid_cli.records.next import GOALS
 from hwid_cli.records.own_effects import OwnEffect
-from hwid_cli.records.programs import (
-    CommandSimulation,
-    FmuSimulation,
-    ForeignSimulation,
-    ModelSimulation,
-    OutputsSimulation,
-    PythonSimulation,
-)
+from hwid_cli.records.programs import ForeignSimulation
 from hwid_cli.records.recordings import KINDS
 from hwid_cli.records.rules import (
     NO_KEY,
@@ -360,15 +353,7 @@ class Experiment:
     order: OrderOptions | None = None
     group: GroupOptions | None = None
     test: FinalTestOptions | None = None
-    simulation: (
-        SimulationOptions
-        | PythonSimulation
-        | FmuSimulation
-        | CommandSimulation
-        | OutputsSimulation
-        | ModelSimulation
-        | None
-    ) = None
+    simulation: SimulationOptions | ForeignSimulation | None = None
     own_effects: dict[str, OwnEffect] = field(default_factory=dict)
     diagnose: DiagnoseOptions | None = None
     next: NextOptions | None = None

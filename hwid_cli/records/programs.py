@@ -199,7 +199,9 @@ class OutputsSimulation:
 
 
 Program = PythonSimulation | FmuSimulation | CommandSimulation
-ForeignSimulation = Program | ModelSimulation | OutputsSimulation
+# The table of kinds: what ``simulation.kind`` may say beside ``drive``, and how each of
+# them is run says the module of that name in ``simulations``.
+ForeignSimulation = Program | OutputsSimulation | ModelSimulation
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ import signal
 import subprocess
 import tempfile
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -25,7 +26,11 @@ from hwid_cli.records.programs import (
     SimulatorRun,
 )
 from hwid_cli.simulations.answers import checked_run, failed
-from hwid_cli.simulations.simulation import SimulationKind, hash_of_file
+from hwid_cli.simulations.simulation import (
+    EFFECTS_ALONE,
+    SimulationKind,
+    hash_of_file,
+)
 
 FILES = {"inputs": "inputs.csv", "parameters": "parameters.json", "outputs": "out.csv"}
 _LONGEST_TEXT = 300
@@ -146,4 +151,24 @@ def _content(options: CommandSimulation) -> str:
     return whole.hexdigest()
 
 
-KIND = SimulationKind(_capabilities, _run, _content)
+def _placed(options: CommandSimulation, folder: Path) -> CommandSimulation:
+    """Files that its arguments name; programs on the search path stay."""
+    there = [
+        str((folder / one).resolve()) if (folder / one).is_file() else one
+        for one in options.command
+    ]
+    return replace(options, command=tuple(there))
+
+
+def _own_code(options: CommandSimulation) -> str:
+    return " ".join(options.command)
+
+
+KIND = SimulationKind(
+    _capabilities,
+    _run,
+    _content,
+    placed=_placed,
+    own_code=_own_code,
+    exports=EFFECTS_ALONE,
+)

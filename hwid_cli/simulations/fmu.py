@@ -24,7 +24,11 @@ from hwid_cli.records.programs import (
     SimulatorRun,
 )
 from hwid_cli.simulations.answers import checked_run, failed
-from hwid_cli.simulations.simulation import SimulationKind, hash_of_file
+from hwid_cli.simulations.simulation import (
+    EFFECTS_ALONE,
+    SimulationKind,
+    hash_of_file,
+)
 
 if TYPE_CHECKING:
     from hwid_cli.simulations.fmu_unit import FmuUnit
@@ -196,7 +200,17 @@ def _content(options: FmuSimulation) -> str:
     return str(_opened(options)["sha256"])
 
 
-KIND = SimulationKind(_capabilities, _run, _content)
+def _files(options: FmuSimulation) -> list[Path]:
+    return [Path(options.file)]
+
+
+KIND = SimulationKind(
+    _capabilities,
+    _run,
+    _content,
+    files=_files,
+    exports=("fmu", "python", *EFFECTS_ALONE),
+)
 
 if __name__ == "__main__":
     _FOLDERS: set[str] = set()

@@ -12,8 +12,9 @@ s = (1 - q^-1) / T. docs/any_simulation.md.
 
 import hashlib
 import json
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from itertools import product
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -31,7 +32,11 @@ from hwid_cli.records.programs import (
     SimulatorRun,
 )
 from hwid_cli.simulations.answers import checked_run
-from hwid_cli.simulations.simulation import SimulationKind, hash_of_file
+from hwid_cli.simulations.simulation import (
+    SimulationKind,
+    hash_of_file,
+    with_file_placed,
+)
 
 # A model was fitted at its own sample time, and is wrong at another one.
 _SAME = 1e-3
@@ -168,4 +173,39 @@ def _capabilities(options: ModelSimulation) -> Capabilities:
     return Capabilities(run=True, parameters=bool(options.free), force=True)
 
 
-KIND = SimulationKind(_capabilities, _run, _content)
+def _placed(options: ModelSimulation, folder: Path) -> ModelSimulation:
+    if options.results:
+        return replace(options, results=str((folder / options.results).resolve()))
+    placed: ModelSimulation = with_file_placed(options, folder)
+    return placed
+
+
+def _with_model(options: ModelSimulation, model: HammersteinWiener) -> ModelSimulation:
+    """With a model, and those of its parameters that the section does not give."""
+    free = free_parameters(model)
+    unknown = [name for name in options.parameters if name not in free]
+    if unknown:
+        raise SimulationError(
+            f"simulation.parameters.{unknown[0]}: this model has no such parameter; "
+            f"expected {', '.join(free)}"
+        )
+    return replace(
+        options,
+        model=model,
+        model_sample_time_s=model.sample_time_s,
+        parameters={**free, **options.parameters},
+    )
+
+
+def _own_code(options: ModelSimulation) -> str:
+    return f"the model {options.name}" if options.name else options.file
+
+
+KIND = SimulationKind(
+    _capabilities,
+    _run,
+    _content,
+    placed=_placed,
+    own_code=_own_code,
+    with_model=_with_model,
+)

@@ -24,7 +24,11 @@ from hwid_cli.records.programs import (
     SimulatorRun,
 )
 from hwid_cli.simulations.answers import checked_run, failed
-from hwid_cli.simulations.simulation import SimulationKind, hash_of_file
+from hwid_cli.simulations.simulation import (
+    EFFECTS_ALONE,
+    SimulationKind,
+    hash_of_file,
+)
 
 _PROCESS = IsolatedReader("hwid_cli.simulations.python", "the function")
 _ARGUMENTS = 3
@@ -143,16 +147,27 @@ def _capabilities(options: PythonSimulation) -> Capabilities:
 
 
 def _content(options: PythonSimulation) -> str:
-    """Hash of the file and of all Python files beside it, which it may import."""
+    """Hash of all of its files."""
+    _, *beside = _files(options)
     whole = hashlib.sha256(hash_of_file(options.file).encode())
-    beside = sorted(Path(options.file).parent.glob("*.py"))
     for one in beside:
-        if one != Path(options.file):
-            whole.update(one.name.encode() + hash_of_file(str(one)).encode())
+        whole.update(one.name.encode() + hash_of_file(str(one)).encode())
     return whole.hexdigest()
 
 
-KIND = SimulationKind(_capabilities, _run, _content)
+def _files(options: PythonSimulation) -> list[Path]:
+    """The file and all Python files beside it, which it may import."""
+    file = Path(options.file)
+    return [file, *sorted(one for one in file.parent.glob("*.py") if one != file)]
+
+
+KIND = SimulationKind(
+    _capabilities,
+    _run,
+    _content,
+    files=_files,
+    exports=("python", *EFFECTS_ALONE),
+)
 
 if __name__ == "__main__":
     serve(_answer, most_memory=None)

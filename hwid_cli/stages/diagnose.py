@@ -24,7 +24,7 @@ from hwid_cli.records.check import StagePlan
 from hwid_cli.records.diagnosis import Diagnosis
 from hwid_cli.records.drive import DriveResponse, told_apart
 from hwid_cli.records.experiment import DiagnoseOptions, Experiment, SimulationOptions
-from hwid_cli.records.programs import ForeignSimulation, ModelSimulation
+from hwid_cli.records.programs import ForeignSimulation
 from hwid_cli.records.recordings import CalibrationLog, Recording
 from hwid_cli.report.diagnosis import diagnosis_blocks
 from hwid_cli.simulations.drive import simulate_recordings
@@ -62,7 +62,7 @@ from hwid_cli.tasks.runner import RunSettings, Workers, run_tasks
 from hwid_cli.tasks.task import Task, one_thread
 
 NAME = "diagnose"
-STAGE_VERSION = 16
+STAGE_VERSION = 17
 
 _Answer = TypeVar("_Answer")
 
@@ -383,7 +383,8 @@ def simulated_recordings(given: ToDiagnose) -> tuple[DriveResponse, ...]:
 
 def _announcement(simulation: ForeignSimulation) -> str:
     """What is going to run, and what a diagnosis may do with it."""
-    able = kind_named(simulation.kind).capabilities(simulation)
+    kind = kind_named(simulation.kind)
+    able = kind.capabilities(simulation)
     can = [
         word
         for word, is_so in (
@@ -395,11 +396,7 @@ def _announcement(simulation: ForeignSimulation) -> str:
         if is_so
     ]
     words = ", ".join(can) or "nothing: only its outputs are compared"
-    what = getattr(simulation, "file", "") or " ".join(
-        getattr(simulation, "command", ())
-    )
-    if isinstance(simulation, ModelSimulation) and simulation.name:
-        what = f"the model {simulation.name}"
+    what = kind.own_code(simulation)
     runs = f"runs {what}" if able.run and what else "runs nothing of yours"
     return f"simulation.kind {simulation.kind}: {runs}; it can be given {words}"
 

@@ -17,21 +17,13 @@ from hwid_cli.export.loading import check_trust
 from hwid_cli.export.stored_models import read_stored_model
 from hwid_cli.records.diagnosis import Diagnosis
 from hwid_cli.records.drive import DriveResponse, told_apart
-from hwid_cli.records.experiment import DiagnoseOptions
+from hwid_cli.records.experiment import DiagnoseOptions, SimulationOptions
 from hwid_cli.records.exported import ExportedModel
 from hwid_cli.records.model import HammersteinWiener
-from hwid_cli.records.programs import (
-    CommandSimulation,
-    ForeignSimulation,
-    FreeParameter,
-    ModelSimulation,
-    OutputsSimulation,
-    RunRequest,
-)
+from hwid_cli.records.programs import ForeignSimulation, RunRequest
 from hwid_cli.records.recordings import CalibrationLog, Recording
 from hwid_cli.simulations.extended import run_extended
 from hwid_cli.simulations.kinds import kind_named
-from hwid_cli.simulations.model import free_parameters
 from hwid_cli.store.final_test_results import read_final_test
 from hwid_cli.store.result_files import has_left_results
 
@@ -49,35 +41,30 @@ def placed(options: ForeignSimulation, source: str) -> ForeignSimulation:
     ConfigError
         If a file is missing or holds no model.
     """
-    folder = Path(source).parent
-    if isinstance(options, OutputsSimulation):
-        return options
-    if isinstance(options, CommandSimulation):
-        there = [
-            str((folder / one).resolve()) if (folder / one).is_file() else one
-            for one in options.command
-        ]
-        return replace(options, command=tuple(there))
-    if isinstance(options, ModelSimulation) and options.results:
-        results = (folder / options.results).resolve()
-        return _with_result(replace(options, results=str(results)), source)
-    options = replace(options, file=str((folder / options.file).resolve()))
-    return (
-        _with_model(options, source)
-        if isinstance(options, ModelSimulation)
-        else options
-    )
+    kind = kind_named(options.kind)
+    there = kind.placed(options, Path(source).parent)
+    if kind.with_model is not None:
+        if there.results:
+            there, model = _of_results(there, source)
+        else:
+            model = _of_file(there.file, source)
+        try:
+            there = kind.with_model(there, model)
+        except SimulationError as error:
+            raise ConfigError(f"{source}: {error}") from error
+    placed_one: ForeignSimulation = there
+    return placed_one
 
 
-def _with_result(options: ModelSimulation, source: str) -> ModelSimulation:
-    """With the model of a folder of results: the named one, or the widest."""
+def _of_results(options: Any, source: str) -> tuple[Any, HammersteinWiener]:
+    """The model of a folder of results: the named one, or the widest; named then."""
     folder = Path(options.results)
     name = options.name or _widest(folder, source)
     try:
         found = read_stored_model(folder, name)
     except ConfigError as error:
         raise ConfigError(f"{source}: simulation.results: {error}") from error
-    return _filled(replace(options, name=name), found.model, source)
+    return replace(options, name=name), found.model
 
 
 def _widest(folder: Path, source: str) -> str:
@@ -94,46 +81,29 @@ def _widest(folder: Path, source: str) -> str:
     return final.models[int(order[0])]
 
 
-def _with_model(options: ModelSimulation, source: str) -> ModelSimulation:
+def _of_file(file: str, source: str) -> HammersteinWiener:
+    """The model of an exported file."""
     try:
-        found = read_exported(Path(options.file))
+        found = read_exported(Path(file))
         step = "name its file under fit.input_map or fit.output_map"
-        check_trust(found, Path(options.file), is_trusted=False, step=step)
+        check_trust(found, Path(file), is_trusted=False, step=step)
     except ModelFileError as error:
         raise ConfigError(f"{source}: simulation.file: {error}") from error
     if not isinstance(found, ExportedModel):
         raise ConfigError(
-            f"{source}: simulation.file: {options.file} is a physics simulation; "
+            f"{source}: simulation.file: {file} is a physics simulation; "
             "expected a Hammerstein-Wiener model; write its section with kind: drive"
         )
-    model = replace(found.model, sample_time_s=found.sample_time_s)
-    return _filled(options, model, source)
-
-
-def _filled(
-    options: ModelSimulation, model: HammersteinWiener, source: str
-) -> ModelSimulation:
-    """With a model, and those of its parameters that the section does not give."""
-    free = free_parameters(model)
-    unknown = [name for name in options.parameters if name not in free]
-    if unknown:
-        raise ConfigError(
-            f"{source}: simulation.parameters.{unknown[0]}: this model has no such "
-            f"parameter; expected {', '.join(free)}"
-        )
-    return replace(
-        options,
-        model=model,
-        model_sample_time_s=model.sample_time_s,
-        parameters={**free, **options.parameters},
-    )
+    return replace(found.model, sample_time_s=found.sample_time_s)
 
 
 # Fewer recordings than these say too little alone.
 _FEWEST_UNCOVERED = 3
 
 
-def uncovered_by(options: object, known: Sequence[str]) -> tuple[str, ...] | None:
+def uncovered_by(
+    options: SimulationOptions | ForeignSimulation, known: Sequence[str]
+) -> tuple[str, ...] | None:
     """Recordings that the model of a folder of results does not cover.
 
     Parameters
@@ -149,15 +119,18 @@ def uncovered_by(options: object, known: Sequence[str]) -> tuple[str, ...] | Non
         None where all are to be used: another kind of simulation, or hardly any that it
         does not cover.
     """
-    if not isinstance(options, ModelSimulation) or not options.results:
+    is_model = kind_named(options.kind).with_model is not None
+    results = getattr(options, "results", "") if is_model else ""
+    if not results:
         return None
-    path = Path(options.results) / "results.h5"
+    path = Path(results) / "results.h5"
     if not has_left_results(path, "test"):
         return None
     final = read_final_test(path)
-    if options.name not in final.models:
+    name = getattr(options, "name", "")
+    if name not in final.models:
         return None
-    row = final.models.index(options.name)
+    row = final.models.index(name)
     rmsd = np.where(np.isfinite(final.rmsd[row]), final.rmsd[row], np.inf)
     open_ones = {
         name
@@ -195,13 +168,10 @@ def simulator_of(
 ) -> Simulator:
     """What the diagnosis works with."""
     kind = kind_named(options.kind)
-    given = {}
-    if isinstance(options, OutputsSimulation):
-        given = _given_outputs(recordings, logs)
     return Simulator(
         capabilities=kind.capabilities(options),
         run=None if kind.run is None else partial(kind.run, options),
-        given=given,
+        given=_given_outputs(recordings, logs) if kind.run is None else {},
         free=getattr(options, "free", {}),
         values=getattr(options, "values", {}),
         effects=options.effects,
@@ -289,13 +259,7 @@ def extended_foreign(
         )
         for effect in (*diagnosis.present, *diagnosis.effects)
     ]
-    changes: dict[str, Any] = {"effects": told_apart(effects)}
     fitted = {one.name: one.after for one in diagnosis.base}
-    if not isinstance(options, OutputsSimulation):
-        changes["parameters"] = {
-            name: replace(one, value=fitted[name])
-            if isinstance(one, FreeParameter) and name in fitted
-            else one
-            for name, one in options.parameters.items()
-        }
-    return replace(options, **changes)
+    with_them = kind_named(options.kind).with_fitted(options, fitted)
+    extended: ForeignSimulation = replace(with_them, effects=told_apart(effects))
+    return extended

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.signal import lsim
+from scipy.signal import lfilter, lsim
 
 from hwid_cli.diagnosis.problem import Signals
 from hwid_cli.diagnosis.stand_in import (
@@ -70,6 +70,30 @@ def test_a_free_axis_has_a_stand_in_without_a_spring(given):
     found = fit_stand_in(given, runs)
     assert found.stiffness_N_per_m == 0.0
     assert found.damping_N_s_per_m == pytest.approx(DAMPING / GAIN, rel=1e-3)
+
+
+@pytest.mark.parametrize("lag_s", [0.003, 0.05])
+def test_a_simulation_without_inertia_gets_a_mass_that_samples_show(given, lag_s):
+    """Its rest of a mass took a thousand steps for a sample: a diagnosis did not end."""
+    keeps = np.exp(-STEP_S / lag_s)
+    runs = [
+        SimulatorRun(lfilter([1 - keeps], [1, -keeps], 1e-3 * one), NOTHING)
+        for one in INPUTS
+    ]
+    found = fit_stand_in(given, runs)
+    # No faster than a tenth of a sample, and so far below what a lag of three shows.
+    assert found.mass_kg >= 0.099 * STEP_S * found.damping_N_s_per_m
+    assert found.mass_kg >= 0.0099 * STEP_S**2 * found.stiffness_N_per_m
+    settles = found.damping_N_s_per_m / found.stiffness_N_per_m
+    # The filter holds its input, which is half a sample of lag.
+    assert settles == pytest.approx(lag_s, abs=STEP_S)
+    for one, of_simulation in zip(given, runs, strict=True):
+        moved = derived(of_simulation, STEP_S)
+        force = force_along(found, moved, one.driven_by)
+        there = standing_for(one, of_simulation, found, force)
+        size = float(np.std(of_simulation.output))
+        # What the mass adds is made up for by the force along the motion.
+        assert float(np.std(there.offset)) < 1e-2 * size
 
 
 # A drive that is not the simulation, which bends.
