@@ -46,7 +46,7 @@ from hwid_cli.diagnosis.selection import (
     SMALL_REMAINDER,
     TIE,
 )
-from hwid_cli.diagnosis.verdict import DiagnosisVerdict
+from hwid_cli.diagnosis.verdict import DiagnosisVerdict, needs_each
 from hwid_cli.drive.catalogue import CATALOGUE, public_id
 from hwid_cli.drive.simulation import drive_effects
 from hwid_cli.records.axis import unit_on
@@ -154,6 +154,11 @@ def find_law(
         return verdict, found, None
     best = _refined(rounds, best)
     named = _named(rounds, best, found)
+    if named is not None and not needs_each(
+        rounds.criteria, named, found.fits, rounds.base
+    ):
+        # Effects that a set of the catalogue would not be named with.
+        return verdict, found, None
     if named is not None:
         fits = {**found.fits, named.effects: named}
         word = DiagnosisVerdict("named", rounds.criteria.is_complete(named), named, ())

@@ -121,7 +121,7 @@ def decide(
     def may_be_named(one: CandidateFit) -> bool:
         return (
             criteria.may_be_named(one, base)
-            and _needs_each(criteria, one, fits, base)
+            and needs_each(criteria, one, fits, base)
             and not _is_beaten_by_fewer(criteria, one, fits, base)
             and not unclear(one)
         )
@@ -213,13 +213,25 @@ def _changes_freely(found: CandidateFit, effect: str) -> bool:
     return any(one.owner == effect and is_factor(one) for one in found.own_names)
 
 
-def _needs_each(
+def needs_each(
     criteria: SelectionCriteria,
     whole: CandidateFit,
     fits: Mapping[tuple[str, ...], CandidateFit],
     base: CandidateFit,
 ) -> bool:
-    """Whether a set leaves much more without any one of its effects."""
+    """Whether a set leaves much more without any one of its effects.
+
+    Parameters
+    ----------
+    fits : mapping of tuple of str to CandidateFit
+        Of all sets of effects; those that lack one of the set's are looked at.
+    base : CandidateFit
+        Re-fitted, without further effects.
+
+    References
+    ----------
+    docs/method_diagnosis.md, eq. (D24).
+    """
     if len(whole.effects) == 1:
         return True
     is_far = criteria.is_far(whole)

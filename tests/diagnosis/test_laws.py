@@ -12,6 +12,7 @@ from hwid_cli.config.load import experiment_of, load_experiment
 from hwid_cli.diagnosis import laws, rounds
 from hwid_cli.diagnosis.candidate import fit_candidate
 from hwid_cli.diagnosis.laws import _is_wanted
+from hwid_cli.diagnosis.rounds import RoundsResult
 from hwid_cli.diagnosis.verdict import DiagnosisVerdict
 from hwid_cli.stages.diagnose import extended_options
 from tests.diagnosis.made_up_fits import CRITERIA, base, made_up
@@ -139,6 +140,29 @@ def test_a_law_takes_no_name_away_from_what_leaves_hardly_more_than_noise(
     unknown = DiagnosisVerdict("unknown", False, base(3500.0), ())
     assert _is_wanted(rounds, named) is is_wanted
     assert _is_wanted(rounds, unknown)
+
+
+@pytest.mark.parametrize(("of_both", "word"), [(310.0, "named"), (200.0, "both")])
+def test_effects_of_a_law_have_to_be_needed_like_those_of_a_set(
+    of_both, word, monkeypatch
+):
+    # Friction leaves 320 of 9000; what the law adds to it brings much, or next to nothing.
+    friction, hum = made_up(("coulomb_friction",), 320.0), made_up(("hum",), 8000.0)
+    both = made_up(("coulomb_friction", "hum"), of_both)
+    fits = {one.effects: one for one in (friction, hum, both)}
+    of = SimpleNamespace(
+        criteria=CRITERIA, base=base(9000.0), on_round=lambda what, count: None,
+        problem=SimpleNamespace(compares_command=False),
+    )  # fmt: skip
+    for name, answer in {
+        "_likely": [], "_tried": [], "_best": both, "_holds": True, "_refined": both,
+        "_named": both,
+    }.items():  # fmt: skip
+        monkeypatch.setattr(laws, name, lambda *given, answer=answer: answer)
+    given = DiagnosisVerdict("named", False, friction, ())
+    found, _, law = laws.find_law(of, [], [], RoundsResult(fits), given)
+    assert law is None
+    assert found.chosen is (friction if word == "named" else both)
 
 
 @pytest.mark.thorough
