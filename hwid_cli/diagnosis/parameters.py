@@ -24,12 +24,15 @@ from hwid_cli.drive.simulation import (
     set_start,
 )
 from hwid_cli.records.candidates import ParameterRef
-from hwid_cli.records.drive import BASE_PARAMETERS, Drive
+from hwid_cli.records.drive import BASE_PARAMETERS, Drive, StandIn
 
 # Owners beside the effects: the base, and how a recording starts.
 BASE, START = "base", "start"
 # A damping of zero is searched from this share of what halves an oscillation.
 _SMALL_DAMPING = 0.02
+# Damping over mass in a sample, at most: the drive then follows within a tenth of one, and
+# what is faster looks alike and takes hundreds of steps.
+_FASTEST_PER_SAMPLE = 10.0
 # Stands for zero where a value has a logarithm, as a share of its size.
 _NOTHING = 1e-9
 
@@ -166,7 +169,8 @@ def parameter_layout(
     start : mapping of str to mapping of str to float
         Values that the search starts from, which set the sizes.
     """
-    shared = _base_unknowns(problem.drive, problem.known)
+    fastest = min(one.sample_time_s for one in problem.signals)
+    shared = _base_unknowns(problem.drive, problem.known, fastest)
     own: list[Unknown] = []
     present = drive_effects(problem.drive)
     for identifier in effects:
@@ -216,11 +220,15 @@ def _rests_anywhere(problem: DiagnosisProblem) -> bool:
     )
 
 
-def _base_unknowns(drive: Drive, known: Mapping[str, float]) -> list[Unknown]:
+def _base_unknowns(
+    drive: Drive, known: Mapping[str, float], sample_time_s: float
+) -> list[Unknown]:
     """Coordinates of the base; a spring that is not there stays away.
 
-    What is known moves within its tolerance, or is no coordinate at all.
+    What is known moves within its tolerance, or is no coordinate at all. Damping makes
+    the drive no faster than the recordings show; a stand-in sees to that by its mass.
     """
+    fastest = _FASTEST_PER_SAMPLE * drive.mass_kg / sample_time_s
     unknowns = []
     for name in BASE_PARAMETERS:
         value = getattr(drive, name)
@@ -235,6 +243,9 @@ def _base_unknowns(drive: Drive, known: Mapping[str, float]) -> list[Unknown]:
         low, high = (
             (1e-4 * size, 1e4 * size) if value > 0 else (-1e4 * size, -1e-4 * size)
         )
+        is_free = name == "damping_N_s_per_m" and not isinstance(drive, StandIn)
+        if is_free and value > 0:
+            high = max(min(high, fastest), size)
         if name in known:
             reach = known[name] * size
             low, high = max(low, value - reach), min(high, value + reach)

@@ -1,5 +1,7 @@
 """Coordinates of a fit: what is searched, and within which bounds."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -20,7 +22,7 @@ from hwid_cli.diagnosis.parameters import (
 from hwid_cli.drive import slots
 from hwid_cli.drive.simulation import drive_effects
 from hwid_cli.records.experiment import DiagnoseOptions
-from tests.diagnosis.small_drive import DRIVE, problem, recordings, sizes
+from tests.diagnosis.small_drive import DRIVE, STEP_S, problem, recordings, sizes
 
 LOG = Unknown("effect", "force_N", True, 2.0, 0.1, 50.0)
 NEGATIVE = Unknown("base", "force_constant_N_per_A", True, -5.0, -5e4, -5e-4)
@@ -253,7 +255,7 @@ def test_a_known_parameter_stays_within_its_tolerance():
     known = {"force_constant_N_per_A": 0.05}
     low, high = bounds_of("force_constant_N_per_A", known=known)
     assert (low, high) == pytest.approx((5.0 * 0.95, 5.0 * 1.05), rel=1e-12)
-    low, high = bounds_of("damping_N_s_per_m", known=known)
+    low, high = bounds_of("stiffness_N_per_m", known=known)
     assert high / low > 1e7
 
 
@@ -326,3 +328,13 @@ def test_a_winding_of_the_base_has_a_start_of_its_own():
     of = problem(recordings()[:3], options=options, **changes)
     _, found, _ = laid_out(of=of)
     assert [one.name for one in found.own] == ["position", "velocity", "current"]
+
+
+@pytest.mark.parametrize(("given", "largest"), [(13.0, 10 * 0.3 / STEP_S), (9e3, 9e3)])
+def test_damping_makes_a_drive_no_faster_than_the_recordings_show(given, largest):
+    # Unless the configuration itself says more.
+    of = problem(recordings())
+    of = replace(of, drive=replace(of.drive, mass_kg=0.3, damping_N_s_per_m=given))
+    layout = parameter_layout(of, (), {}, sizes(of))
+    (damping,) = [one for one in layout.shared if one.name == "damping_N_s_per_m"]
+    assert damping.high == pytest.approx(largest)
