@@ -242,7 +242,10 @@ class SelectionCriteria:
         ----------
         docs/method_diagnosis.md, eq. (D23a).
         """
-        return found.is_usable and found.whiteness <= 1.0 and self.holds(found)
+        # With effects, noise of the input is no excuse for that much.
+        is_fact = not found.effects or self.ratio(found) <= STILL_LARGE
+        is_white = found.is_usable and found.whiteness <= 1.0
+        return is_white and is_fact and self.holds(found)
 
     def holds(self, found: CandidateFit) -> bool:
         """Whether a candidate leaves hardly more of held-out recordings than of others."""

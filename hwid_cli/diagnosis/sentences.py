@@ -33,6 +33,8 @@ _MOST_NAMED = 6
 _DOUBTFUL = 3.0
 # A ratio to the noise that is taken for 1, [-].
 _NO_MORE_THAN_NOISE = 1.02
+# A delay this near to half a sample may be no delay, [samples].
+_NEAR_HALF = 0.1
 # All move in one direction if the way back is no longer than this share of the way, [-].
 _WAY_BACK = 0.05
 
@@ -112,6 +114,7 @@ def _verdict_in_words(
             f"is explained).{rest}"
         )
     text = _named(problem, criteria, base, verdict, effects)
+    text += _held_command(problem, effects)
     if verdict.word == "ambiguous":
         others = ", ".join(title_of(one) for one in verdict.rivals)
         text += f" These recordings cannot tell it from {others}."
@@ -159,6 +162,26 @@ def _named(
         f"recordings falls from {before:.3g} to {after:.3g} times the noise."
     )
     return f"{text}{_rest(criteria, verdict)}"
+
+
+def _held_command(problem: DiagnosisProblem, effects: tuple[FittedEffect, ...]) -> str:
+    """Say that a delay of half a sample may be how the command is held."""
+    sample_time_s = min(one.sample_time_s for one in problem.signals)
+    delays = [
+        parameter.value / sample_time_s
+        for one in effects
+        if one.id == "input_delay"
+        for parameter in one.parameters
+    ]
+    if problem.drive.hold != "linear" or not any(
+        abs(one - 0.5) <= _NEAR_HALF for one in delays
+    ):
+        return ""
+    return (
+        f" A delay of half a sample ({1e3 * sample_time_s / 2:.3g} ms) is also what a "
+        "command leaves that is held between samples, as controllers do it: set "
+        "simulation.hold: zero and run again."
+    )
 
 
 def _rest(criteria: SelectionCriteria, verdict: DiagnosisVerdict) -> str:

@@ -271,6 +271,8 @@ def test_complete_is_what_leaves_white_noise():
         ([100, 100, 100, 180, 180, 180], False),
         # Where all recordings leave more, the noise was taken for smaller than it is.
         ([180, 180, 180, 180, 180, 180], True),
+        # More than three times the noise is no fact, whatever made it.
+        ([1000, 1000, 1000, 1000, 1000, 1000], False),
         ([180, 180, 180, 400, 400, 400], False),
         ([180, 180, 180, 20, 20, 20], True),
     ],
