@@ -33,8 +33,9 @@ _MOST_NAMED = 6
 _DOUBTFUL = 3.0
 # A ratio to the noise that is taken for 1, [-].
 _NO_MORE_THAN_NOISE = 1.02
-# A delay this near to half a sample may be no delay, [samples].
+# What is late by this near to half a sample may be a command that is held, [samples].
 _NEAR_HALF = 0.1
+_LATE = {"input_delay": ("delay_s",), "actuator_lag": ("time_constant_s",)}
 # All move in one direction if the way back is no longer than this share of the way, [-].
 _WAY_BACK = 0.05
 
@@ -165,21 +166,22 @@ def _named(
 
 
 def _held_command(problem: DiagnosisProblem, effects: tuple[FittedEffect, ...]) -> str:
-    """Say that a delay of half a sample may be how the command is held."""
+    """Say that what is late by half a sample may be how the command is held."""
     sample_time_s = min(one.sample_time_s for one in problem.signals)
-    delays = [
+    late = [
         parameter.value / sample_time_s
         for one in effects
-        if one.id == "input_delay"
+        if one.id in _LATE
         for parameter in one.parameters
+        if parameter.name in _LATE[one.id]
     ]
     if problem.drive.hold != "linear" or not any(
-        abs(one - 0.5) <= _NEAR_HALF for one in delays
+        abs(one - 0.5) <= _NEAR_HALF for one in late
     ):
         return ""
     return (
-        f" A delay of half a sample ({1e3 * sample_time_s / 2:.3g} ms) is also what a "
-        "command leaves that is held between samples, as controllers do it: set "
+        f" Late by half a sample ({1e3 * sample_time_s / 2:.3g} ms) is also a "
+        "command that is held between samples, as controllers do it: set "
         "simulation.hold: zero and run again."
     )
 
