@@ -13,6 +13,7 @@ from hwid_cli.report.closing import (
     closing_text,
     diagnosis_sentence,
     linear_hint,
+    orders_sentence,
 )
 from hwid_cli.simulations.kinds import kind_named
 from hwid_cli.stages.best_model import beside_linear, best_model
@@ -50,6 +51,9 @@ def say_end(session: Session, name: str, files: Sequence[str] = ()) -> None:
     rows = []
     if best is not None:
         rows += [("best model", one) for one in best_model_sentences(best)]
+    advice = session.results.get("order")
+    if advice is not None and name == _RUN:
+        rows.append(("orders", orders_sentence(advice.orders, advice.maps)))
     if diagnosis is not None:
         rows.append(("simulation", diagnosis_sentence(diagnosis)))
     rows += _places(session, name, files)

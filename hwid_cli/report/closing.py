@@ -7,6 +7,7 @@ import numpy as np
 
 from hwid_cli.records.best_model import BestModel
 from hwid_cli.records.diagnosis import Diagnosis
+from hwid_cli.records.order import MapAdvice, OrderAdvice
 from hwid_cli.report.formats import counted, listed, with_unit
 
 # Room for the words on the left, [characters].
@@ -108,6 +109,16 @@ def _beside_threshold(rmsd: float, best: BestModel) -> list[str]:
     side = "below" if rmsd < best.threshold else "NOT below"
     limit = with_unit(best.threshold, best.unit)
     return [f"{side} the {limit} of crossval.threshold"]
+
+
+def orders_sentence(orders: OrderAdvice, maps: MapAdvice | None) -> str:
+    """Recommended orders, and maps where some were compared."""
+    said = f"nb = {orders.overall.nb}, nk = {orders.overall.nk}"
+    if maps is not None:
+        pair = (maps.chosen.input_map, maps.chosen.output_map)
+        named = " and ".join(one.replace("_", " ") for one in pair)
+        said += ", no maps" if set(pair) == {"none"} else f", maps {named}"
+    return f"{said} recommended (hwid order says why)"
 
 
 def linear_hint(source: str) -> str:

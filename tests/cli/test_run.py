@@ -42,6 +42,25 @@ def test_the_better_model_is_exported_next(after_run, hwid, monkeypatch):
     )
 
 
+@pytest.mark.parametrize(
+    ("section", "maps"),
+    [
+        ("order: {tolerance: 1000.0}", ""),
+        ("order: {tolerance: 1000.0, maps: [none]}", ", no maps"),
+    ],
+)
+def test_recommended_orders_stand_in_the_last_block(
+    after_run, hwid, edit, section, maps
+):
+    edit("identify: {}", f"identify: {{}}\n{section}")
+    said = hwid("run").stdout
+
+    # Whatever is within 1000 times the best is good enough: the smallest.
+    line = f"  orders      nb = 1, nk = 1{maps} recommended (hwid order says why)"
+    assert line in said.splitlines()
+    assert len(said.splitlines()) <= 25
+
+
 @pytest.mark.parametrize("command", ["run", "order"])
 def test_the_worse_model_is_not_exported_where_the_linear_one_is_better(
     after_run, hwid, config, monkeypatch, command
