@@ -8,7 +8,7 @@ import pytest
 
 from hwid_cli.records.answer import ChosenMaps
 from hwid_cli.records.diagnosis import BaseParameter, FittedParameter
-from hwid_cli.records.report import ReportContents, StoredResults
+from hwid_cli.records.report import ReportContents, StageRun, StoredResults
 from hwid_cli.report.html import report_page
 from hwid_cli.report.sections.diagnosis_answer import (
     diagnosis_answer,
@@ -309,6 +309,27 @@ def test_a_model_of_all_recordings_says_that_nothing_validates_it(contents):
 
     assert "nothing says yet how good it is elsewhere" in found.verdict
     assert not found.is_settled
+
+
+def test_an_answer_of_other_settings_says_so_first(contents):
+    runs = (
+        StageRun("identify", "a"),
+        StageRun("crossval", "a", changed=("crossval",)),
+        StageRun("diagnose", "a", changed=("recordings", "simulation")),
+    )
+    shown = replace(contents, stored=replace(contents.stored, stages=runs))
+    diagnosis, model = diagnosis_answer(shown), model_answer(shown)
+
+    assert diagnosis.details[0] == (
+        "Made with other settings of recordings and simulation: run hwid diagnose again."
+    )
+    assert model.details[0] == (
+        "Made with other settings of crossval: run hwid crossval again."
+    )
+    assert diagnosis.next_steps[0][1] == "hwid diagnose CONFIG"
+    assert not diagnosis.is_settled
+    assert diagnosis_answer(contents).is_settled
+    assert "other settings" not in " ".join(model_answer(contents).details)
 
 
 def test_two_answers_share_the_first_screen(contents):

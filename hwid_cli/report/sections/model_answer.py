@@ -16,7 +16,7 @@ from hwid_cli.report.charts import (
 from hwid_cli.report.closing import LINEAR_KEYS
 from hwid_cli.report.dots import Dot, DotGroup, DotRow, Dots
 from hwid_cli.report.formats import counted, listed, with_unit
-from hwid_cli.report.page import Answer, PageBlock
+from hwid_cli.report.page import Answer, PageBlock, marked_if_changed
 from hwid_cli.report.simulation_note import simulation_note
 
 # Recordings that the answer draws, and points of its curves.
@@ -25,6 +25,8 @@ _MOST_ROWS, _MOST_POINTS = 6, 2000
 _HEIGHT = 170
 # Shares of samples beyond what the fit has visited that need no word, [-].
 _FEW = 0.005
+# Stages whose results choose the model.
+_STAGES = ("identify", "crossval", "group", "test")
 
 
 def model_answer(contents: ReportContents) -> Answer | None:
@@ -33,7 +35,7 @@ def model_answer(contents: ReportContents) -> Answer | None:
     if found is None:
         return None
     blocks = [one for one in (_errors(found), _overlay(contents, found)) if one]
-    return Answer(
+    answer = Answer(
         "Which model describes the drive, and how well where it was not fitted?",
         _verdict(found),
         is_settled=_is_settled(found),
@@ -41,6 +43,7 @@ def model_answer(contents: ReportContents) -> Answer | None:
         blocks=tuple(blocks),
         next_steps=_next(found, contents),
     )
+    return marked_if_changed(answer, contents, _STAGES)
 
 
 def _is_settled(found: ModelAnswer) -> bool:
