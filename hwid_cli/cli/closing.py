@@ -12,11 +12,13 @@ from hwid_cli.report.closing import (
     best_model_sentences,
     closing_text,
     diagnosis_sentence,
+    linear_hint,
+    orders_sentence,
 )
 from hwid_cli.simulations.kinds import kind_named
 from hwid_cli.stages.best_model import beside_linear, best_model
 from hwid_cli.stages.model_views import named_fits
-from hwid_cli.stages.table import is_named, stage_named
+from hwid_cli.stages.table import is_named, named, stage_named
 from hwid_cli.store.cache import Hdf5Store
 
 PAGE = "report.html"
@@ -49,10 +51,13 @@ def say_end(session: Session, name: str, files: Sequence[str] = ()) -> None:
     rows = []
     if best is not None:
         rows += [("best model", one) for one in best_model_sentences(best)]
+    advice = session.results.get("order")
+    if advice is not None and name == _RUN:
+        rows.append(("orders", orders_sentence(advice.orders, advice.maps)))
     if diagnosis is not None:
         rows.append(("simulation", diagnosis_sentence(diagnosis)))
     rows += _places(session, name, files)
-    if best is not None and name in (_RUN, "test"):
+    if best is not None and name in (_RUN, "test", "order"):
         rows += _hints(session, best)
     rows.append(("next", _next(session, name, best)))
     title = f"{session.experiment.name}: {name} done in {session.timer}"
@@ -85,6 +90,8 @@ def _best(session: Session) -> BestModel | None:
 def _hints(session: Session, best: BestModel) -> list[tuple[str, str]]:
     """What may help a model that is not good enough."""
     experiment = session.experiment
+    if best.is_linear_better:
+        return [("hint", linear_hint(str(experiment.source)))]
     if experiment.group is not None or not best.rmsd >= best.threshold:
         return []
     text = (
@@ -117,6 +124,8 @@ def _next(session: Session, name: str, best: BestModel | None) -> str:
         follows = None
     if follows is not None:
         return command_line(session, follows)
+    if best is not None and best.is_linear_better:
+        return command_line(session, "run" if named(session.experiment) else "crossval")
     if best is not None:
         return command_line(session, "export", "--model", best.name)
     return command_line(session, "run" if name != _RUN else "identify")

@@ -79,3 +79,27 @@ class ModelAnswer:
         """Place of the recording whose fit is the median: one to show."""
         values = np.where(np.isfinite(self.fit_percent), self.fit_percent, -np.inf)
         return int(np.argsort(values)[values.size // 2])
+
+    @property
+    def mean_rmsd(self) -> float:
+        """Mean over the recordings that the fit has not seen, [unit]; NaN without any."""
+        return float(np.mean(self.rmsd)) if self.rmsd.size else np.nan
+
+    @property
+    def linear_mean_rmsd(self) -> float:
+        """The same of the linear model, [unit]; NaN without one."""
+        return float(np.mean(self.linear_rmsd)) if self.linear_rmsd.size else np.nan
+
+    @property
+    def is_linear_better(self) -> bool:
+        """Whether the linear model is closer on recordings that the fit has not seen."""
+        if not np.isfinite(self.linear_mean_rmsd):
+            return False
+        return not self.mean_rmsd <= self.linear_mean_rmsd
+
+    @property
+    def is_usable(self) -> bool:
+        """Whether the better of both is no worse than the mean of these recordings."""
+        values = self.linear_fit_percent if self.is_linear_better else self.fit_percent
+        known = values[np.isfinite(values)]
+        return not (known.size and np.median(known) < 0.0)

@@ -1,6 +1,7 @@
 """The model to take, and how good it is on recordings that it has not seen."""
 
 from dataclasses import dataclass
+from math import isfinite
 
 # What judged a model, the strictest first: recordings that nothing has used; recordings
 # that no group may hold; all but its own; its own, for want of others.
@@ -54,3 +55,10 @@ class BestModel:
     def is_accepted(self) -> bool:
         """Whether its mean RMSD lies below the threshold."""
         return self.rmsd < self.threshold
+
+    @property
+    def is_linear_better(self) -> bool:
+        """Whether the linear model is closer on recordings that the fit has not seen."""
+        if self.judge == "own" or not isfinite(self.linear_rmsd):
+            return False
+        return not self.rmsd <= self.linear_rmsd

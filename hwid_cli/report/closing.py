@@ -7,11 +7,14 @@ import numpy as np
 
 from hwid_cli.records.best_model import BestModel
 from hwid_cli.records.diagnosis import Diagnosis
+from hwid_cli.records.order import MapAdvice, OrderAdvice
 from hwid_cli.report.formats import counted, listed, with_unit
 
 # Room for the words on the left, [characters].
 _LABELS = 12
 _FEW = 3
+# Keys of the configuration that ask for linear models.
+LINEAR_KEYS = "fit: {input_map: none, output_map: none}"
 # Rows that people copy: a line break would spoil them.
 _WHOLE = ("page", "tables", "results", "next")
 
@@ -75,19 +78,52 @@ def best_model_sentences(best: BestModel) -> list[str]:
         "own": f"its own {many} ({which}); no other has judged it",
     }[best.judge]
     mean = "mean RMSD" if len(best.judged_on) > 1 else "RMSD"
+    if best.is_linear_better:
+        return _linear_sentences(best, mean, on)
     said = [f"{best.name}: {mean} {with_unit(best.rmsd, best.unit)} on {on}"]
     if np.isfinite(best.linear_rmsd):
         linear = with_unit(best.linear_rmsd, best.unit)
         said.append(f"linear model of the same orders: {linear}")
-    limit = with_unit(best.threshold, best.unit)
-    if np.isfinite(best.threshold):
-        side = "below" if best.is_accepted else "NOT below"
-        said.append(f"{side} the {limit} of crossval.threshold")
+    said += _beside_threshold(best.rmsd, best)
     if best.single and np.isfinite(best.single_rmsd):
         helps = "helps" if best.rmsd < best.single_rmsd else "does not help"
         single = with_unit(best.single_rmsd, best.unit)
         said.append(f"joining recordings {helps} here: {best.single} alone {single}")
     return said
+
+
+def _linear_sentences(best: BestModel, mean: str, on: str) -> list[str]:
+    """Say that maps make a model worse where its fit has not seen the recordings."""
+    linear, own = (with_unit(rmsd, best.unit) for rmsd in (best.linear_rmsd, best.rmsd))
+    return [
+        f"the linear model of the same orders is better: {mean} {linear} on {on}",
+        f"{best.name}: {own}; maps are not worth it here",
+        *_beside_threshold(best.linear_rmsd, best),
+    ]
+
+
+def _beside_threshold(rmsd: float, best: BestModel) -> list[str]:
+    """On which side of the threshold an RMSD lies; nothing without a threshold."""
+    if not np.isfinite(best.threshold):
+        return []
+    side = "below" if rmsd < best.threshold else "NOT below"
+    limit = with_unit(best.threshold, best.unit)
+    return [f"{side} the {limit} of crossval.threshold"]
+
+
+def orders_sentence(orders: OrderAdvice, maps: MapAdvice | None) -> str:
+    """Recommended orders, and maps where some were compared."""
+    said = f"nb = {orders.overall.nb}, nk = {orders.overall.nk}"
+    if maps is not None:
+        pair = (maps.chosen.input_map, maps.chosen.output_map)
+        named = " and ".join(one.replace("_", " ") for one in pair)
+        said += ", no maps" if set(pair) == {"none"} else f", maps {named}"
+    return f"{said} recommended (hwid order says why)"
+
+
+def linear_hint(source: str) -> str:
+    """Say which keys of the configuration ask for linear models."""
+    return f"for linear models set '{LINEAR_KEYS}' in {source} and run it again"
 
 
 def diagnosis_sentence(diagnosis: Diagnosis) -> str:

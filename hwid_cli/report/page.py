@@ -3,7 +3,7 @@
 import hashlib
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, fields, is_dataclass
+from dataclasses import dataclass, field, fields, is_dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, ClassVar
 
@@ -12,6 +12,7 @@ import numpy as np
 from hwid_cli.records.report import ReportContents
 from hwid_cli.report.charts import Chart
 from hwid_cli.report.dots import Dots
+from hwid_cli.report.formats import listed
 from hwid_cli.report.simulation_note import HUBER_NOTE, simulation_note
 from hwid_cli.report.table import Block, Table, Text
 from hwid_cli.sources import PACKAGE, checksum_of_folder
@@ -195,6 +196,33 @@ def section_notes(contents: ReportContents, *, is_validation: bool) -> list[Text
     if any(one.options.loss == "huber" for one in fits):
         notes.append(HUBER_NOTE)
     return [Text(one, is_note=True) for one in notes]
+
+
+def marked_if_changed(
+    answer: Answer, contents: ReportContents, stages: Sequence[str]
+) -> Answer:
+    """Say first that an answer was made with other settings than those of today.
+
+    Parameters
+    ----------
+    stages : sequence of str
+        Whose results the answer is of.
+    """
+    runs = [one for one in contents.stored.stages if one.stage in stages]
+    changed = tuple(dict.fromkeys(name for one in runs for name in one.changed))
+    if not changed:
+        return answer
+    command = f"hwid {next(one.stage for one in reversed(runs) if one.changed)}"
+    note = f"Made with other settings of {listed(changed)}: run {command} again."
+    return replace(
+        answer,
+        is_settled=False,
+        details=(note, *answer.details),
+        next_steps=(
+            ("With the settings of today:", f"{command} CONFIG"),
+            *answer.next_steps,
+        ),
+    )
 
 
 def collapsed_beyond(most: int, table: Table, summary: str) -> Table | Collapsible:

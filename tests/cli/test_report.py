@@ -203,3 +203,12 @@ def test_the_last_line_stays_one_comment_whatever_figures_are_called(tmp_path):
     assert not _is_complete(tmp_path, page, "other")
     (tmp_path / "figures" / "models" / "a-->b.png").unlink()
     assert not _is_complete(tmp_path, page, "key")
+
+
+def test_an_answer_of_an_older_configuration_is_marked(after_run, hwid, edit, out):
+    edit("threshold: 0.01", "threshold: 0.02")
+    assert hwid("report").exit_code == 0
+
+    page = (out / "report.html").read_text()
+    screen = page[: page.index("</article>")]
+    assert "Made with other settings of crossval: run hwid crossval again." in screen

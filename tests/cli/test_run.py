@@ -1,6 +1,9 @@
 import re
+from dataclasses import replace
 
 import pytest
+
+from hwid_cli.cli import closing
 
 STAGES = ["simulate", "calibrate", "identify", "crossval", "report"]
 
@@ -14,13 +17,65 @@ def test_all_stages_run_in_order_and_the_answer_stands_last(finished):
     for number, line in enumerate(lines[:5], start=1):
         assert line.endswith(f" s (stage {number} of 5)")
     text = "\n".join(lines[5:])
-    (name,) = re.findall(r"best model  (\w+/\d+/\d+): ", text)
-    assert re.search(r"linear model of the same orders: [\d.e-]+\sm", text)
-    assert f"page        {finished / 'report.html'}" in lines[-5:][1]
-    assert re.fullmatch(rf"  next  +hwid export .* --model {name}", lines[-1])
+    # Four iterations end further off than the linear model.
+    better = r"best model  the linear model of the same orders is better: mean RMSD \d"
+    assert re.search(better, text)
+    assert f"page        {finished / 'report.html'}" in text
+    assert re.fullmatch(r"  next  +hwid run .*", lines[-1])
     # Tables are in their file.
     assert "Best models of each recording" in (finished / "tables.txt").read_text()
     assert "Best models of each recording" not in text
+
+
+def test_the_better_model_is_exported_next(after_run, hwid, monkeypatch):
+    monkeypatch.setattr(
+        closing,
+        "beside_linear",
+        lambda best, *_: replace(best, linear_rmsd=2.0 * best.rmsd),
+    )
+    said = hwid("run").stdout
+
+    (name,) = re.findall(r"best model  (\w+/\d+/\d+): ", said)
+    assert re.search(r"linear model of the same orders: [\d.e-]+\sm", said)
+    assert re.fullmatch(
+        rf"  next  +hwid export .* --model {name}", said.splitlines()[-1]
+    )
+
+
+@pytest.mark.parametrize(
+    ("section", "maps"),
+    [
+        ("order: {tolerance: 1000.0}", ""),
+        ("order: {tolerance: 1000.0, maps: [none]}", ", no maps"),
+    ],
+)
+def test_recommended_orders_stand_in_the_last_block(
+    after_run, hwid, edit, section, maps
+):
+    edit("identify: {}", f"identify: {{}}\n{section}")
+    said = hwid("run").stdout
+
+    # Whatever is within 1000 times the best is good enough: the smallest.
+    line = f"  orders      nb = 1, nk = 1{maps} recommended (hwid order says why)"
+    assert line in said.splitlines()
+    assert len(said.splitlines()) <= 25
+
+
+@pytest.mark.parametrize("command", ["run", "order"])
+def test_the_worse_model_is_not_exported_where_the_linear_one_is_better(
+    after_run, hwid, config, monkeypatch, command
+):
+    def half_as_far_off(best, *_):
+        return replace(best, linear_rmsd=0.5 * best.rmsd)
+
+    monkeypatch.setattr(closing, "beside_linear", half_as_far_off)
+    said = hwid(command).stdout
+    words = " ".join(said.split())
+
+    assert "best model the linear model of the same orders is better: " in words
+    assert "'fit: {input_map: none, output_map: none}' in " in words
+    assert re.search(rf"  next  +hwid run {config} ", said.splitlines()[-1])
+    assert "hwid export" not in said
 
 
 def test_tables_are_shown_where_more_is_asked_for(after_run, hwid, out):

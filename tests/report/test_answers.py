@@ -1,5 +1,6 @@
 """The first sentences of the page: what they say of every verdict and model."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -7,7 +8,8 @@ import pytest
 
 from hwid_cli.records.answer import ChosenMaps
 from hwid_cli.records.diagnosis import BaseParameter, FittedParameter
-from hwid_cli.records.report import ReportContents, StoredResults
+from hwid_cli.records.report import ReportContents, StageRun, StoredResults
+from hwid_cli.report.html import report_page
 from hwid_cli.report.sections.diagnosis_answer import (
     diagnosis_answer,
     value_with_interval,
@@ -16,6 +18,7 @@ from hwid_cli.report.sections.diagnosis_answer import (
 from hwid_cli.report.sections.model_answer import model_answer
 from hwid_cli.report.sections.summary import summary_section
 from hwid_cli.stages.report import report_contents
+from hwid_cli.stages.table import STAGES
 from tests.report.diagnosis_examples import named, nothing_missing, unknown
 from tests.report.report_examples import DIAGNOSIS, calibrated_only
 
@@ -162,7 +165,12 @@ def test_results_that_left_a_file_only_have_an_answer_too():
 
 
 def test_the_model_is_named_with_its_fit_beside_the_linear_one(contents):
-    found, record = model_answer(contents), contents.answer
+    better = {
+        "rmsd": 0.5 * contents.answer.linear_rmsd,
+        "fit_percent": np.array([95.0]),
+    }
+    record = replace(contents.answer, **better)
+    found = model_answer(replace(contents, answer=record))
 
     assert found.verdict.startswith(f"Take {record.name}: fit ")
     assert f"{np.median(record.fit_percent):.1f} %" in plain(found.verdict)
@@ -175,6 +183,65 @@ def test_the_model_is_named_with_its_fit_beside_the_linear_one(contents):
 
 def answered(contents, **changes):
     return model_answer(replace(contents, answer=replace(contents.answer, **changes)))
+
+
+def test_a_page_that_linear_models_win_is_not_green(contents):
+    wins = {
+        "rmsd": np.array([1.36e-3]),
+        "linear_rmsd": np.array([9.49e-4]),
+        "linear_fit_percent": np.array([91.5]),
+    }
+    shown = replace(contents, answer=replace(contents.answer, **wins))
+    page = report_page(shown, STAGES).html
+    (answer,) = re.findall(
+        r'<article class="answer((?:(?!<article).)*Which model describes(?:(?!<article).)*)',
+        page,
+        re.S,
+    )
+
+    assert "The linear model of the same orders is better" in answer
+    assert "settled" not in answer.split(">")[0]
+
+
+def test_a_better_linear_model_is_the_answer(contents):
+    found = answered(
+        contents,
+        rmsd=np.array([1.36e-3]),
+        linear_rmsd=np.array([9.49e-4]),
+        fit_percent=np.array([88.2]),
+        linear_fit_percent=np.array([91.5]),
+        threshold=0.01,
+    )
+
+    assert plain(found.verdict) == (
+        "The linear model of the same orders is better: RMSD 0.000949 m, with maps 0.00136 m "
+        "on 1 recording never used. Maps are not worth it here: "
+        "fit: {input_map: none, output_map: none}."
+    )
+    assert not found.is_settled
+    said, command = found.next_steps[0]
+    assert "fit: {input_map: none, output_map: none}" in said
+    assert command == "hwid run CONFIG"
+    assert not any("hwid export" in one for _, one in found.next_steps)
+
+
+@pytest.mark.parametrize(("linear", "rmsd"), [(-3.0, 1e-3), (-30.0, 3e-3)])
+def test_a_model_that_is_worse_than_a_constant_is_not_taken(contents, linear, rmsd):
+    found = answered(
+        contents,
+        rmsd=np.array([2e-3]),
+        linear_rmsd=np.array([rmsd]),
+        fit_percent=np.array([-20.2]),
+        linear_fit_percent=np.array([linear]),
+        threshold=0.01,
+    )
+
+    assert f"has a fit of -20.2 % (linear: {linear:.1f} %) on 1 rec" in plain(
+        found.verdict
+    )
+    assert found.verdict.startswith("No model to take: ")
+    assert not found.is_settled
+    assert not any("hwid export" in one for _, one in found.next_steps)
 
 
 def test_many_recordings_are_those_that_are_worst(contents):
@@ -219,8 +286,9 @@ def test_recommended_orders_and_maps_are_said(contents):
 
 
 def test_a_model_above_the_threshold_is_not_settled(contents):
-    low = answered(contents, rmsd=np.array([1e-3]), threshold=0.01)
-    high = answered(contents, rmsd=np.array([2e-2]), threshold=0.01)
+    fit = {"fit_percent": np.array([95.0]), "linear_rmsd": np.array([3e-2])}
+    low = answered(contents, rmsd=np.array([1e-3]), threshold=0.01, **fit)
+    high = answered(contents, rmsd=np.array([2e-2]), threshold=0.01, **fit)
 
     assert low.is_settled
     assert not high.is_settled
@@ -241,6 +309,27 @@ def test_a_model_of_all_recordings_says_that_nothing_validates_it(contents):
 
     assert "nothing says yet how good it is elsewhere" in found.verdict
     assert not found.is_settled
+
+
+def test_an_answer_of_other_settings_says_so_first(contents):
+    runs = (
+        StageRun("identify", "a"),
+        StageRun("crossval", "a", changed=("crossval",)),
+        StageRun("diagnose", "a", changed=("recordings", "simulation")),
+    )
+    shown = replace(contents, stored=replace(contents.stored, stages=runs))
+    diagnosis, model = diagnosis_answer(shown), model_answer(shown)
+
+    assert diagnosis.details[0] == (
+        "Made with other settings of recordings and simulation: run hwid diagnose again."
+    )
+    assert model.details[0] == (
+        "Made with other settings of crossval: run hwid crossval again."
+    )
+    assert diagnosis.next_steps[0][1] == "hwid diagnose CONFIG"
+    assert not diagnosis.is_settled
+    assert diagnosis_answer(contents).is_settled
+    assert "other settings" not in " ".join(model_answer(contents).details)
 
 
 def test_two_answers_share_the_first_screen(contents):

@@ -34,3 +34,34 @@ def test_a_failure_to_help_is_said():
 def test_a_judge_that_nobody_knows_is_refused():
     with pytest.raises(ValueError, match="judge 'me' is none of"):
         replace(BEST, judge="me")
+
+
+def test_a_linear_model_that_is_better_stands_first():
+    linear = replace(BEST, linear_rmsd=0.008)
+    first, second, third = (
+        one.replace("\xa0", " ") for one in best_model_sentences(linear)
+    )
+
+    assert first == (
+        "the linear model of the same orders is better: mean RMSD 0.008 m on 2 recordings "
+        "never used (c and d)"
+    )
+    assert second == "a+b/2/3: 0.012 m; maps are not worth it here"
+    assert third == "below the 0.01 m of crossval.threshold"
+
+
+@pytest.mark.parametrize(
+    ("changes", "is_better"),
+    [
+        ({"linear_rmsd": 0.0119}, True),
+        ({"linear_rmsd": 0.012}, False),
+        ({"linear_rmsd": float("nan")}, False),
+        ({"linear_rmsd": 0.0119, "rmsd": float("inf")}, True),
+        # A fit that only its own recording judges says nothing of others.
+        ({"linear_rmsd": 0.0119, "judge": "own"}, False),
+    ],
+)
+def test_only_recordings_beyond_the_fit_say_that_the_linear_model_is_better(
+    changes, is_better
+):
+    assert replace(BEST, **changes).is_linear_better is is_better

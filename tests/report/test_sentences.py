@@ -287,3 +287,14 @@ def test_a_long_calibration_table_is_folded(count, is_folded):
     first = calibration_section(ReportContents(stored)).blocks[0]
 
     assert isinstance(first, Collapsible) == is_folded
+
+
+@blank
+def test_what_each_level_of_the_chain_covers_is_said_in_words(contents):
+    trend = replace(contents.trend, covers=np.array([0, 1]))
+    tested = said(final_test_section(replace(contents, trend=trend)))
+
+    assert (
+        "From level 1 to 2 of the chain the models cover (RMSD below the threshold) 0 of 1, "
+        "1 of 1 of these recordings."
+    ) in tested

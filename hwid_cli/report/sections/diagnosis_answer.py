@@ -30,7 +30,7 @@ from hwid_cli.report.diagnosis import quantity_and_unit, shown_value, warning_se
 from hwid_cli.report.dots import Dot, DotGroup, DotRow, Dots
 from hwid_cli.report.figures.diagnosis_curves import telling_stretch
 from hwid_cli.report.formats import counted, listed, percent, with_unit
-from hwid_cli.report.page import Answer, PageBlock
+from hwid_cli.report.page import Answer, PageBlock, marked_if_changed
 
 _QUESTION = "What does the simulation lack?"
 # Names that begin with a capital letter.
@@ -58,7 +58,13 @@ def diagnosis_answer(contents: ReportContents) -> Answer | None:
     """Say in a sentence what is missing, with its size and interval."""
     record, stored = contents.stored.diagnosis_record, contents.stored.diagnosis
     if record is None:
-        return None if stored is None else _answer_of_json(stored)
+        if stored is None:
+            return None
+        return marked_if_changed(_answer_of_json(stored), contents, ("diagnose",))
+    return marked_if_changed(_answer_of_record(record), contents, ("diagnose",))
+
+
+def _answer_of_record(record: Diagnosis) -> Answer:
     blocks: list[PageBlock] = [_gaps(record)]
     forces = [one for one in record.latent_force if one.at.size]
     if forces:

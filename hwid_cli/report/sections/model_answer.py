@@ -13,9 +13,10 @@ from hwid_cli.report.charts import (
     thinned_places,
     thinning,
 )
+from hwid_cli.report.closing import LINEAR_KEYS
 from hwid_cli.report.dots import Dot, DotGroup, DotRow, Dots
 from hwid_cli.report.formats import counted, listed, with_unit
-from hwid_cli.report.page import Answer, PageBlock
+from hwid_cli.report.page import Answer, PageBlock, marked_if_changed
 from hwid_cli.report.simulation_note import simulation_note
 
 # Recordings that the answer draws, and points of its curves.
@@ -24,6 +25,8 @@ _MOST_ROWS, _MOST_POINTS = 6, 2000
 _HEIGHT = 170
 # Shares of samples beyond what the fit has visited that need no word, [-].
 _FEW = 0.005
+# Stages whose results choose the model.
+_STAGES = ("identify", "crossval", "group", "test")
 
 
 def model_answer(contents: ReportContents) -> Answer | None:
@@ -32,7 +35,7 @@ def model_answer(contents: ReportContents) -> Answer | None:
     if found is None:
         return None
     blocks = [one for one in (_errors(found), _overlay(contents, found)) if one]
-    return Answer(
+    answer = Answer(
         "Which model describes the drive, and how well where it was not fitted?",
         _verdict(found),
         is_settled=_is_settled(found),
@@ -40,10 +43,13 @@ def model_answer(contents: ReportContents) -> Answer | None:
         blocks=tuple(blocks),
         next_steps=_next(found, contents),
     )
+    return marked_if_changed(answer, contents, _STAGES)
 
 
 def _is_settled(found: ModelAnswer) -> bool:
     """Whether the model stays below the threshold wherever it was validated."""
+    if found.is_linear_better or not found.is_usable:
+        return False
     if not found.rmsd.size or not np.isfinite(found.rmsd).all():
         return False
     return bool(np.isnan(found.threshold) or (found.rmsd < found.threshold).all())
@@ -57,12 +63,32 @@ def _verdict(found: ModelAnswer) -> str:
         )
     where = counted(len(found.recordings), "recording")
     unused = "never used" if found.is_unused else "that its fit has not seen"
+    if not found.is_usable:
+        return _nothing_to_take(found, f"{where} {unused}")
+    if found.is_linear_better:
+        mean = "mean RMSD" if len(found.recordings) > 1 else "RMSD"
+        linear = with_unit(found.linear_mean_rmsd, found.unit)
+        own = with_unit(found.mean_rmsd, found.unit)
+        return (
+            f"The linear model of the same orders is better: {mean} {linear}, with maps {own} "
+            f"on {where} {unused}. Maps are not worth it here: {LINEAR_KEYS}."
+        )
     sentence = (
         f"Take {found.name}: fit {_median(found.fit_percent)} on {where} {unused}"
     )
     if np.isfinite(found.linear_fit_percent).any():
         sentence += f" (linear: {_median(found.linear_fit_percent)})"
     return f"{sentence}."
+
+
+def _nothing_to_take(found: ModelAnswer, on: str) -> str:
+    """Say that the mean of the output would be closer than any model."""
+    own, linear = _median(found.fit_percent), found.linear_fit_percent
+    also = f" (linear: {_median(linear)})" if np.isfinite(linear).any() else ""
+    return (
+        f"No model to take: {found.name} has a fit of {own}{also} on {on}; a constant has 0 %. "
+        "Are input and output the right columns?"
+    )
 
 
 def _median(values: np.ndarray) -> str:
@@ -146,12 +172,21 @@ def _next(found: ModelAnswer, contents: ReportContents) -> tuple[tuple[str, str]
         steps.append(("Validate all models:", "hwid crossval CONFIG"))
     elif found.maps is None:
         steps.append(("Maps and orders, and why:", "hwid order CONFIG"))
-    steps.append(
-        (
-            "Take it elsewhere:",
-            f"hwid export CONFIG --model {found.name} --format json",
+    if not found.is_usable:
+        steps.append(
+            ("Look at columns and signs, set recordings.columns:", "hwid check CONFIG")
         )
-    )
+    elif found.is_linear_better:
+        steps.insert(
+            0, (f"For linear models set {LINEAR_KEYS}, then", "hwid run CONFIG")
+        )
+    else:
+        steps.append(
+            (
+                "Take it elsewhere:",
+                f"hwid export CONFIG --model {found.name} --format json",
+            )
+        )
     if contents.stored.diagnosis is None:
         steps.append(
             (

@@ -81,12 +81,14 @@ def _chain(contents: ReportContents) -> list[PageBlock]:
 def _trend_sentence(trend: ChainOnTests) -> str:
     first, last = (with_unit(trend.mean[place], trend.unit) for place in (0, -1))
     start = f"The mean RMSD on {listed(trend.recordings)}"
-    covers = f"{', '.join(map(str, trend.covers))} of {len(trend.recordings)}"
+    counts = [f"{one} of {len(trend.recordings)}" for one in trend.covers]
+    covers = ", ".join(counts)
     if len(trend.models) == 1:
         return f"{start} is {first} with {trend.models[0]}, which covers {covers}."
     return (
         f"{start} goes from {first} with {trend.models[0]} to {last} with "
-        f"{trend.models[-1]}; the models cover {covers}."
+        f"{trend.models[-1]}. From level 1 to {len(trend.models)} of the chain the models "
+        f"cover (RMSD below the threshold) {covers} of these recordings."
     )
 
 
