@@ -52,6 +52,7 @@ from hwid_cli.diagnosis.problem import DiagnosisProblem
 from hwid_cli.diagnosis.scales import scales_of_fit
 from hwid_cli.diagnosis.selection import (
     LEAST_ADDED,
+    SMALL_REMAINDER,
     SelectionCriteria,
     is_part_of,
     select_best,
@@ -288,7 +289,9 @@ class _Search:
         narrow = [one for one in screened if includes_one_of(ids, [one])]
         criteria = self.rounds.criteria
         fits = [self.fits[one] for one in narrow if one in self.fits]
-        if any(criteria.is_complete(one) for one in fits):
+        # Beside a small gap much is complete, and the criterion has to choose.
+        is_large = criteria.ratio(self.rounds.base) > SMALL_REMAINDER
+        if is_large and any(criteria.is_complete(one) for one in fits):
             return False
         wide = [one for one in narrow if includes_one_of(one, screened)]
         return not wide or any(self._brought(one, screened) for one in wide)
