@@ -28,8 +28,7 @@ _CONVERTED = {
 _STARTS = {
     "rest": ("# diagnose: {max_effects: 2}",),
     "held": (
-        "# 'cut' takes away the rest before sines and random signals: the drive still "
-        "holds its level.",
+        "# 'cut' takes away the rest before sines: the drive still holds its level.",
         "# diagnose: {max_effects: 2, initial_state: held}",
     ),
     "estimated": (

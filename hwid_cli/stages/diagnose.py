@@ -30,7 +30,12 @@ from hwid_cli.report.diagnosis import diagnosis_blocks
 from hwid_cli.simulations.drive import simulate_recordings
 from hwid_cli.simulations.kinds import kind_named
 from hwid_cli.stages.diagnosis_seconds import time_diagnosis
-from hwid_cli.stages.diagnosis_starts import starts_sentence, unsettled_starts
+from hwid_cli.stages.diagnosis_starts import (
+    moving_sentence,
+    moving_starts,
+    starts_sentence,
+    unsettled_starts,
+)
 from hwid_cli.stages.fit_seconds import counted
 from hwid_cli.stages.foreign_simulation import (
     content_of,
@@ -364,10 +369,16 @@ def _warnings(context: Context, given: ToDiagnose) -> list[str]:
         assumed_units(given.experiment, recordings, given.logs),
         doubtful_sizes(given.experiment, recordings, simulation, options, given.logs),
     ]
-    names = unsettled_starts(recordings, simulation, options)
+    moving = moving_starts(recordings, given.logs, options)
+    names = [
+        name
+        for name in unsettled_starts(recordings, simulation, options)
+        if name not in moving
+    ]
     starts = starts_sentence(names, recordings, given.experiment.calibrate)
-    if starts:
-        said.append(f"{context.experiment.source}: {starts}")
+    for sentence in (moving_sentence(moving, recordings), starts):
+        if sentence:
+            said.append(f"{context.experiment.source}: {sentence}")
     return [one for one in said if one]
 
 

@@ -2,13 +2,15 @@
 
 A recording that was cut at the onset of its excitation begins with an input to which the
 drive has not answered yet; a simulation that starts in equilibrium with that input is off
-from its first sample, and no missing effect explains that.
+from its first sample, and no missing effect explains that. Where the cut went on into the
+motion, as it may in a random signal, the drive is not even at rest.
 """
 
 from collections.abc import Sequence
 
 import numpy as np
 
+from hwid_cli.data.calibration import as_measured
 from hwid_cli.data.signal_features import LEAST_QUIET, find_onset
 from hwid_cli.diagnosis.noise import noise_floor
 from hwid_cli.diagnosis.problem import prepare
@@ -18,7 +20,7 @@ from hwid_cli.records.experiment import (
     DiagnoseOptions,
     SimulationOptions,
 )
-from hwid_cli.records.recordings import Recording
+from hwid_cli.records.recordings import CalibrationLog, Recording
 
 # A first sample is away from the equilibrium beyond this many times the noise, [-] ...
 _AWAY = 5.0
@@ -73,6 +75,70 @@ def unsettled_starts(
         if not rest and is_known and away > max(_AWAY * noise, _AWAY_SHARE * asked):
             found.append(one.name)
     return tuple(found)
+
+
+def moving_starts(
+    recordings: Sequence[Recording],
+    logs: Sequence[CalibrationLog],
+    options: DiagnoseOptions,
+) -> tuple[str, ...]:
+    """Find recordings that a cut begins in mid-motion, where they are taken to rest.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+        As the diagnosis gets them.
+    logs : sequence of CalibrationLog
+        Of these and maybe of others.
+
+    Returns
+    -------
+    tuple of str
+        Names of those whose output leaves its rest before the first sample that was
+        kept. None where a diagnosis fits how recordings start.
+    """
+    if options.initial_state == "estimated":
+        return ()
+    by_name = {log.name: log for log in logs}
+    return tuple(
+        one.name
+        for one in recordings
+        if one.name in by_name and _moves_before(one, by_name[one.name])
+    )
+
+
+def _moves_before(recording: Recording, log: CalibrationLog) -> bool:
+    measured = as_measured(recording, log) if log.first_sample else None
+    if measured is None:
+        return False
+    onset = find_onset(measured[1], quiet_is_rest=True)
+    return onset is not None and LEAST_QUIET <= onset < log.first_sample
+
+
+def moving_sentence(names: Sequence[str], recordings: Sequence[Recording]) -> str:
+    """Say which recordings begin in mid-motion, and what to do.
+
+    Parameters
+    ----------
+    names : sequence of str
+        From ``moving_starts``.
+
+    Returns
+    -------
+    str
+        One line; empty without names.
+    """
+    if not names:
+        return ""
+    kinds = dict.fromkeys(one.kind for one in recordings if one.name in names)
+    where = " and ".join(f"calibrate.{kind}" for kind in kinds)
+    is_one = len(names) == 1
+    return (
+        f"{where}: 'cut' begins {_shown(names)} in mid-motion, but "
+        "diagnose.initial_state 'rest' and 'held' start "
+        f"{'it' if is_one else 'them'} at rest; leave 'cut' out of {where}, or "
+        "write diagnose.initial_state: estimated, which fits the start"
+    )
 
 
 def starts_sentence(

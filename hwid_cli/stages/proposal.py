@@ -24,12 +24,18 @@ _KIND_WORDS = {
     "sine": ("sine", "sin", "sinus"),
     "step": ("step", "sprung", "jump", "schritt", "stufe", "ramp", "rampe"),
 }
-# Recipes of calibration, the best one first; each is tried on the data.
+# Recipes of calibration, the best one first; each is tried on the data. A random signal
+# holds stretches that look like a rest: 'cut' alone may go on into the motion.
 _RECIPES: dict[str, tuple[tuple[str, ...], ...]] = {
     "step": (("cut", "output_offset"), ("cut",)),
     "sine": (("cut",),),
-    "random": (("cut",),),
+    "random": (),
     "other": (),
+}
+# The same for columns of different length: with an offset 'cut' keeps the rest.
+_CUT_RECIPES = {
+    **{kind: (*found, ("cut",)) for kind, found in _RECIPES.items()},
+    "random": (("cut", "output_offset"), ("cut",)),
 }
 # Words of file names that say what a recording is for.
 _TEST_WORDS = (
@@ -187,7 +193,7 @@ def _recipes(
         if not own:
             continue
         needs_cut = any(raw.input.size != raw.output.size for raw in own)
-        candidates = (*_RECIPES[kind], ("cut",)) if needs_cut else _RECIPES[kind]
+        candidates = _CUT_RECIPES[kind] if needs_cut else _RECIPES[kind]
         fitting = [one for one in candidates if _works(one, kind, own)]
         recipes[kind] = fitting[0] if fitting else ()
     some = [
@@ -197,7 +203,10 @@ def _recipes(
         and all(_begins_at_rest(raw) for raw in raws if kinds[raw.name] == kind)
     ]
     if some:
-        return recipes, f"tried: {' and '.join(some)} recordings begin with a rest"
+        reason = f"tried: {' and '.join(some)} recordings begin with a rest"
+        if recipes.get("random") == ():
+            reason += "; random ones are left whole: a cut may begin in mid-motion"
+        return recipes, reason
     if all(_begins_at_rest(raw) for raw in raws):
         return recipes, "nothing is cut: the rest before may be a level of the input"
     return recipes, "no rest is cut: not all recordings begin with one"
@@ -237,8 +246,11 @@ def _initial_state(
     """How a diagnosis must take the recordings to start, rests cut as proposed."""
     if is_cut or not all(_begins_at_rest(raw) for raw in raws):
         return "estimated"
-    # Of these kinds 'cut' keeps no rest: the drive is still where it was before.
-    if any("cut" in recipes.get(kind, ()) for kind in ("sine", "random")):
+    # This leaves a random signal no rest, and may begin it in mid-motion.
+    if recipes.get("random") == ("cut",):
+        return "estimated"
+    # 'cut' keeps no rest before a sine: the drive is still where it was before.
+    if "cut" in recipes.get("sine", ()):
         return "held"
     return "rest"
 

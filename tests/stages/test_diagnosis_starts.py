@@ -9,8 +9,14 @@ import pytest
 from hwid_cli.config.load import load_experiment
 from hwid_cli.records.drive import Controller
 from hwid_cli.records.experiment import CalibrateOptions, DiagnoseOptions
-from hwid_cli.records.recordings import Recording
-from hwid_cli.stages.diagnosis_starts import starts_sentence, unsettled_starts
+from hwid_cli.records.recordings import RawRecording, Recording
+from hwid_cli.stages.calibrate import calibrate_all
+from hwid_cli.stages.diagnosis_starts import (
+    moving_sentence,
+    moving_starts,
+    starts_sentence,
+    unsettled_starts,
+)
 from tests.blind.campaign import measured_case
 from tests.blind.cases import make_case
 from tests.blind.machine import SAMPLE_TIME_S
@@ -85,6 +91,39 @@ def test_the_sentence_is_one_line_with_the_remedies():
     assert "calibrate" not in starts_sentence(names, found, None)
     assert "and 1 more begin within" in starts_sentence(["a"] * 5, found, None)
     assert starts_sentence((), found, None) == ""
+
+
+def random_after_a_rest():
+    """A random current whose beginning looks like a rest of its own, and what moves."""
+    rng = np.random.default_rng(4)
+    steps = rng.standard_normal(600)
+    steps[50:] *= 5.0
+    current = np.r_[np.zeros(LEAD_IN), np.cumsum(steps * 0.95)]
+    output = displacement(current) + NOISE * rng.standard_normal(current.size)
+    return RawRecording("random_1", current, output, STEP_S, kind="random")
+
+
+@pytest.mark.parametrize("rule", ["rest", "held"])
+def test_a_random_signal_that_is_cut_in_mid_motion_is_named(rule):
+    options = DiagnoseOptions(initial_state=rule)
+    cut, logs = calibrate_all(
+        [random_after_a_rest()], CalibrateOptions(random=("cut",))
+    )[:2]
+    assert logs[0].first_sample > LEAD_IN + 20
+
+    assert moving_starts(cut, logs, options) == ("random_1",)
+    text = moving_sentence(("random_1",), cut)
+    for words in ("random_1", "in mid-motion", "calibrate.random", "estimated"):
+        assert words in text
+    assert moving_sentence((), cut) == ""
+
+    fitted = DiagnoseOptions(initial_state="estimated")
+    assert moving_starts(cut, logs, fitted) == ()
+
+
+def test_a_random_signal_that_keeps_its_rest_is_not_in_motion():
+    whole, logs = calibrate_all([random_after_a_rest()], CalibrateOptions())[:2]
+    assert moving_starts(whole, logs, REST) == ()
 
 
 def blind_cases():

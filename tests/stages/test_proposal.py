@@ -74,10 +74,22 @@ def step_and_prbs():
 
 def test_what_is_said_of_rests_and_how_a_diagnosis_starts_agree():
     found = propose([raw(name, one) for name, one in step_and_prbs().items()])
-    assert found.recipe_reason == "tried: step recordings begin with a rest"
+    assert found.recipe_reason == (
+        "tried: step recordings begin with a rest; random ones are left whole: a cut "
+        "may begin in mid-motion"
+    )
     assert found.recipes["step"] == ("cut", "output_offset")
     assert found.recipes["random"] == ()
     # The second one stood still as well, which its output tells.
+    assert found.initial_state == "rest"
+
+
+def test_a_random_recording_after_a_rest_is_not_cut():
+    noise = np.random.default_rng(5).standard_normal((2, 600))
+    found = propose(
+        [raw(f"noise_{n}", after_a_rest(one)) for n, one in enumerate(noise)]
+    )
+    assert found.recipes == {"random": ()}
     assert found.initial_state == "rest"
 
 
