@@ -86,8 +86,8 @@ def reversal_sentence(found: Reversal) -> str:
     return (
         "recordings.input_scale: the output moves against the input: the re-fitted "
         f"simulation errs by {as_percent(found.as_given)} of the motion as it is, and by "
-        f"{as_percent(found.reversed)} with the input turned round; write input_scale: -1, or "
-        "give the force constant the other sign"
+        f"{as_percent(found.reversed)} with the input turned round; write input_scale: -1 "
+        "(where one is given: the same with the other sign), or give the force constant the other sign"
     )
 
 

@@ -407,7 +407,8 @@ def _unclear_terms(rounds: Rounds, one: _Tried) -> list[str]:
         for ref, lowest, highest in zip(fit.names, low, high, strict=True)
         if ref.owner == one.identifier
         and ref.parameter.startswith("c")
-        and not lowest * highest > 0
+        # Their product may be too large for a number.
+        and not np.sign(lowest) * np.sign(highest) > 0
     ]
 
 
