@@ -407,7 +407,8 @@ def _unclear_terms(rounds: Rounds, one: _Tried) -> list[str]:
         for ref, lowest, highest in zip(fit.names, low, high, strict=True)
         if ref.owner == one.identifier
         and ref.parameter.startswith("c")
-        and not lowest * highest > 0
+        # Signs, not a product of the two, which may overflow; NaN has none.
+        and not np.sign(lowest) * np.sign(highest) > 0
     ]
 
 
