@@ -75,7 +75,6 @@ from hwid_cli.diagnosis.zeros import with_zeros
 from hwid_cli.drive.catalogue import CATALOGUE, may_be_added, public_id
 from hwid_cli.drive.effect import Scales
 from hwid_cli.drive.simulation import drive_effects
-from hwid_cli.errors import ConfigError
 from hwid_cli.records.candidates import CandidateFit
 from hwid_cli.records.diagnosis import STILL_LARGE, Diagnosis, NoiseFloor
 from hwid_cli.records.experiment import DiagnoseOptions, SimulationOptions

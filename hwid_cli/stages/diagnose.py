@@ -585,7 +585,9 @@ STAGE = Stage(
         lambda path, given, result, origin: write_diagnosis(path, result, origin),
     ),
     summary=lambda given, result, is_stored: (
-        f"{len(given.recordings)} recordings from the cache" if is_stored else ""
+        f"{counted(len(given.recordings), 'recording')} from the cache"
+        if is_stored
+        else ""
     ),
     write_files=_write_files,
     tables=lambda context, result: diagnosis_blocks(
