@@ -7,6 +7,7 @@ from hwid_cli.cli.driver import result_of, show_blocks
 from hwid_cli.cli.options import Choices
 from hwid_cli.cli.session import Session, Timer, context_of, open_session
 from hwid_cli.report.diagnosis import simulated_table
+from hwid_cli.report.formats import counted
 from hwid_cli.stages.diagnose import choose, simulated_recordings
 from hwid_cli.stages.table import stage_named
 from hwid_cli.store.diagnosis_results import write_simulated_csv
@@ -49,7 +50,7 @@ def _simulate_drive(session: Session) -> None:
     for one in curves:
         columns = (one.time_s, one.input, one.measured, one.simulated)
         write_simulated_csv(folder / f"{one.name}.csv", columns)
-    session.note(f"simulate: {len(curves)} recordings simulated, {timer}")
+    session.note(f"simulate: {counted(len(curves), 'recording')} simulated, {timer}")
     # In a closed loop it is the controller's command that the two are compared by.
     has_controller = getattr(given.simulation, "controller", None) is not None
     side = "input" if has_controller else "output"

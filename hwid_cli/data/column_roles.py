@@ -270,7 +270,7 @@ def guess_signals(columns: Sequence[FoundColumn]) -> SignalGuess:
     )
     able = [one for one in named if one.meaning.role not in ("time", "counter")]
     if len(named) < 2 or not able:
-        raise _too_few(len(able))
+        raise _too_few(len(able), columns)
     first, last, reasons = _pair(named)
     first, twins = _current_of_twins(first, named, reasons)
     if last == first:
@@ -294,10 +294,17 @@ def guess_signals(columns: Sequence[FoundColumn]) -> SignalGuess:
     )
 
 
-def _too_few(count: int) -> MeasurementError:
+def _too_few(count: int, columns: Sequence[FoundColumn]) -> MeasurementError:
+    stuck = "".join(
+        f"; {one.title or one.key!r} is {one.values[np.isfinite(one.values)][0]:g} in "
+        "every row"
+        for one in long_columns(columns)
+        if signs.is_constant(one.values)
+    )
     return MeasurementError(
-        f"has {count} columns of more than {FEWEST_SAMPLES} numbers that change; "
-        "expected at least an input and an output, side by side in one file"
+        f"has {count} column{'s' * (count != 1)} of more than {FEWEST_SAMPLES} numbers "
+        f"that change, time and counters apart{stuck}; expected at least an input and "
+        "an output, side by side in one file"
     )
 
 
@@ -359,7 +366,7 @@ def _pair(named: list[_Named]) -> tuple[_Named, _Named, dict[str, str]]:
     others = [one for one in named if one.meaning.role not in ("time", "counter")]
     pool = free if len(free) > 1 else others
     if len(pool) < 2:
-        raise _too_few(len(pool))
+        raise _too_few(len(pool), [one.column for one in named])
     return _by_content(pool)
 
 

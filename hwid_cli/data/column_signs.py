@@ -136,6 +136,17 @@ def changes(values: np.ndarray) -> bool:
     return known.size >= _FEWEST and bool(np.ptp(known) > 0)
 
 
+def is_constant(values: np.ndarray) -> bool:
+    """Whether a column holds one number in every row that has any.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+    """
+    known = values[np.isfinite(values)]
+    return known.size >= _FEWEST and bool(np.ptp(known) == 0)
+
+
 def held_share(values: np.ndarray) -> float:
     """Share of samples that repeat the one before.
 

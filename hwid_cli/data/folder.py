@@ -229,11 +229,20 @@ def _lacking(files: Sequence[FoundFile], signals: Sequence[FoundColumn]) -> int:
 def _no_signals(files: Sequence[FoundFile]) -> str:
     """What to say of a folder in which no file holds two signals."""
     first = next((one for one in files if not one.problem), files[0])
-    said = first.problem or "holds no two columns of the same table"
+    said = first.problem or _too_short(first.columns)
+    said = said or "holds no two columns of the same table"
     return (
         f"{escaped(first.name)}: {said}; expected a file with an input and an output; "
         "export it again, or write a configuration by hand (configs/README.md)"
     )
+
+
+def _too_short(columns: Sequence[FoundColumn]) -> str:
+    """Say so where columns are too short for a measurement; empty where one is not."""
+    rows = max((one.values.size for one in columns), default=0)
+    if not 1 < rows <= FEWEST_SAMPLES:
+        return ""
+    return f"has {rows} rows, and at least {FEWEST_SAMPLES + 1} are needed"
 
 
 def _sorted_out(
@@ -346,6 +355,9 @@ def _why_not(
     own = {column.place: column for column in long_columns(file.columns)}
     for role, column in roles.items():
         if column.place not in own:
+            short = [one for one in file.columns if one.place == column.place]
+            if _too_short(short):
+                return _too_short(short)
             return f"has no column {column.title or column.key!r} for the {role}"
         of_role = "time" if role == "output_time" else role
         units = [unit_of_column(one, of_role) for one in (own[column.place], column)]

@@ -26,6 +26,10 @@ NEIGHBOURS_AGREE = 0.3
 # ... or by this multiple of what is usual nearby, [-]: in a fast sine the lines from
 # both sides never meet.
 USUAL_DISAGREEMENT = 2.0
+# A mean over up to two samples about a corner lies off both lines by up to a quarter of
+# the change of slope per sample, towards that change, [-]. In a smooth bend a good sample
+# lies off by a third of it: nothing there is taken for a corner. Between these two:
+CORNER_SHARE = 0.3
 # Window of the local error scale, [samples]: much longer than one damaged sample with
 # its neighbours (5), much shorter than a record.
 LOCAL_WINDOW = 41
@@ -70,7 +74,7 @@ def find_damaged(values: np.ndarray) -> np.ndarray:
         Indices of samples that lie far from the cubic through their two neighbours on
         each side, and far beyond the straight lines through the two on the left and the
         two on the right, while these lines agree. Far is measured in usual distances
-        from the cubic.
+        from the cubic. What the rounded corner of a ramp shows is not far.
 
     References
     ----------
@@ -98,7 +102,21 @@ def find_damaged(values: np.ndarray) -> np.ndarray:
     alone = np.zeros(values.size)
     alone[1:-1] = np.minimum(steps[:-1], steps[1:])
     stands_alone = alone > NEIGHBOURS_AGREE * beyond
-    return np.flatnonzero((error > limit) & (beyond > limit) & agree & stands_alone)
+    is_corner = beyond < CORNER_SHARE * _bend(values, from_left, from_right)
+    is_far = (error > limit) & (beyond > limit)
+    return np.flatnonzero(is_far & agree & stands_alone & ~is_corner)
+
+
+def _bend(
+    values: np.ndarray, from_left: np.ndarray, from_right: np.ndarray
+) -> np.ndarray:
+    """Change of slope about each sample where the sample lies towards it, else 0."""
+    slopes = np.diff(values)
+    change = slopes[3:] - slopes[:-3]
+    above = values[2:-2] > np.maximum(from_left, from_right)
+    bend = np.zeros(values.size)
+    bend[2:-2] = np.maximum(np.where(above, change, -change), 0.0)
+    return bend
 
 
 def _local_median(values: np.ndarray) -> np.ndarray:

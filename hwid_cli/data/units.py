@@ -305,6 +305,12 @@ _SUFFIXES = {
     "meters": "m",
     "metres": "m",
 }
+# Counts of encoders and converters, and shares: units between brackets of any kind, though
+# nobody can convert them.
+_COUNTS = (
+    *("%", "cnt", "cnts", "count", "counts", "inc", "incs", "incr", "increments"),
+    *("ink", "inkr", "inkremente"),
+)
 # What is followed by a member is the place in an array: run(2).current.
 _BRACKET = re.compile(r"([\[(])\s*([^\])]*?)\s*[\])](?!\.\w)")
 _LONGEST_FIRST = sorted(_SUFFIXES.items(), key=lambda pair: -len(pair[0]))
@@ -371,7 +377,7 @@ def unit_in_name(title: str, role: str) -> str:
     -------
     str
         Empty where the name says none. One that is not known comes back as it stands, if
-        it is in square brackets.
+        it is in square brackets; counts and percents are in round ones, too.
 
     Examples
     --------
@@ -389,12 +395,15 @@ def unit_in_name(title: str, role: str) -> str:
         return ""
     bracket = _BRACKET.search(title)
     if bracket and bracket[2]:
+        if unit == "1" and title.endswith("(1)") and " " not in title:
+            # The place in an array: u(1).
+            return ""
         if is_unitless(unit):
             return UNITLESS
         if unit in _ARGUMENTS or not re.search(r"[^\W\d]|[%°]", unit):
             return ""
-        is_round = bracket[1] == "("
-        return "" if is_round and not quantity_of(unit) else unit
+        is_known = quantity_of(unit) or unit.lower() in _COUNTS
+        return unit if is_known or bracket[1] == "[" else ""
     if role == "time" and quantity_of(unit) != "time":
         return ""
     symbol = bare.strip().lower()

@@ -22,7 +22,7 @@ from hwid_cli.diagnosis.candidate import (
     start_from,
 )
 from hwid_cli.diagnosis.causes import fit_with_input_noise, without_repeats
-from hwid_cli.diagnosis.direction import find_reversal, reversal_sentence
+from hwid_cli.diagnosis.direction import ReversedInputError, find_reversal
 from hwid_cli.diagnosis.findings import Findings, describe
 from hwid_cli.diagnosis.hidden import HiddenEffect, hidden_effects
 from hwid_cli.diagnosis.intervals import unclear_effects
@@ -75,7 +75,6 @@ from hwid_cli.diagnosis.zeros import with_zeros
 from hwid_cli.drive.catalogue import CATALOGUE, may_be_added, public_id
 from hwid_cli.drive.effect import Scales
 from hwid_cli.drive.simulation import drive_effects
-from hwid_cli.errors import ConfigError
 from hwid_cli.records.candidates import CandidateFit
 from hwid_cli.records.diagnosis import STILL_LARGE, Diagnosis, NoiseFloor
 from hwid_cli.records.experiment import DiagnoseOptions, SimulationOptions
@@ -330,7 +329,7 @@ def _fitted_base(problem: DiagnosisProblem) -> _FittedBase:
         base = _refit_base(problem, scales, noise)
     reversal = find_reversal(problem, base, scales, noise)
     if reversal is not None:
-        raise ConfigError(reversal_sentence(reversal))
+        raise ReversedInputError(reversal)
     base = _with_input_noise(problem, base, scales, noise)
     problem, base = with_zeros(problem, base, scales, noise)
     if base.cause == "zeros":

@@ -13,6 +13,7 @@ from hwid_cli.diagnosis.candidate import SearchStart, base_of, fit_candidate
 from hwid_cli.diagnosis.problem import DiagnosisProblem
 from hwid_cli.drive.effect import Scales
 from hwid_cli.drive.simulation import drive_effects
+from hwid_cli.errors import ConfigError
 from hwid_cli.records.candidates import CandidateFit
 from hwid_cli.records.diagnosis import NoiseFloor
 from hwid_cli.records.units import as_percent
@@ -81,13 +82,32 @@ def find_reversal(
     )
 
 
-def reversal_sentence(found: Reversal) -> str:
-    """Say what was seen and what to do, in one line."""
+class ReversedInputError(ConfigError):
+    """The output moves against the input.
+
+    Parameters
+    ----------
+    found : Reversal
+    """
+
+    def __init__(self, found: Reversal) -> None:
+        super().__init__(reversal_sentence(found))
+        self.found = found
+
+
+def reversal_sentence(found: Reversal, *, input_scale: float = 1.0) -> str:
+    """Say what was seen and what to do, in one line.
+
+    Parameters
+    ----------
+    input_scale : float, [-]
+        ``recordings.input_scale`` as it is: its sign is wrong, not its size.
+    """
     return (
         "recordings.input_scale: the output moves against the input: the re-fitted "
         f"simulation errs by {as_percent(found.as_given)} of the motion as it is, and by "
-        f"{as_percent(found.reversed)} with the input turned round; write input_scale: -1 "
-        "(where one is given: the same with the other sign), or give the force constant the other sign"
+        f"{as_percent(found.reversed)} with the input turned round; write input_scale: "
+        f"{-input_scale:.15g}, or give the force constant the other sign"
     )
 
 

@@ -407,7 +407,7 @@ def _unclear_terms(rounds: Rounds, one: _Tried) -> list[str]:
         for ref, lowest, highest in zip(fit.names, low, high, strict=True)
         if ref.owner == one.identifier
         and ref.parameter.startswith("c")
-        # Their product may be too large for a number.
+        # Signs, not a product of the two, which may overflow; NaN has none.
         and not np.sign(lowest) * np.sign(highest) > 0
     ]
 

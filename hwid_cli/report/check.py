@@ -7,7 +7,7 @@ from typing import Any
 
 from hwid_cli.records.check import FitCost, RecordingFacts, StagePlan
 from hwid_cli.records.units import behind
-from hwid_cli.report.formats import MISSING
+from hwid_cli.report.formats import MISSING, counted
 from hwid_cli.report.table import Column, Table, numbers, texts
 
 _KILO = 1000.0
@@ -33,7 +33,7 @@ def recordings_table(facts: Sequence[RecordingFacts]) -> Table:
         *texts("recording", "kind"),
         *numbers("samples", "used", "step [s]", "input", "output"),
     )
-    caption = f"{len(facts)} recordings (used: after calibration)"
+    caption = f"{counted(len(facts), 'recording')} (used: after calibration)"
     notes = tuple(f"{one.name}: {note}" for one in facts for note in one.notes)
     return Table(caption, columns, rows, notes)
 

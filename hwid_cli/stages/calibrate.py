@@ -255,7 +255,7 @@ def _draw(
 def _summary(given: Measured, result: Calibrated, is_stored: bool) -> str:
     state = "from the cache" if is_stored else "done"
     parts = [_changed(given, result), *_converted(result)]
-    return f"{len(given.recordings)} recordings {state}, {', '.join(parts)}"
+    return f"{counted(len(given.recordings), 'recording')} {state}, {', '.join(parts)}"
 
 
 def _converted(result: Calibrated) -> list[str]:

@@ -15,6 +15,7 @@ import numpy as np
 from hwid_cli.config.extended_simulation import write_extended_simulation
 from hwid_cli.config.simulation_checks import SIMULATION_EXAMPLE
 from hwid_cli.diagnosis import diagnose as pipeline
+from hwid_cli.diagnosis.direction import ReversedInputError, reversal_sentence
 from hwid_cli.diagnosis.foreign import diagnose_foreign
 from hwid_cli.diagnosis.hidden import HiddenEffect
 from hwid_cli.diagnosis.rounds import DiagnosisTask, OnRound, RunTasks
@@ -424,7 +425,11 @@ def _diagnosed(given: ToDiagnose, run: RunTasks, on_round: OnRound) -> Diagnosis
             return pipeline.diagnose(recordings, simulation, options, run, on_round)
         except ConfigError as error:
             source = given.experiment.source
-            raise ConfigError(f"{source}: {error}") from None
+            said = str(error)
+            read = given.experiment.recordings
+            if isinstance(error, ReversedInputError) and read is not None:
+                said = reversal_sentence(error.found, input_scale=read.input_scale)
+            raise ConfigError(f"{source}: {said}") from None
     simulator = simulator_of(simulation, recordings, given.logs)
     return diagnose_foreign(recordings, simulator, options, run, on_round)
 
@@ -580,7 +585,9 @@ STAGE = Stage(
         lambda path, given, result, origin: write_diagnosis(path, result, origin),
     ),
     summary=lambda given, result, is_stored: (
-        f"{len(given.recordings)} recordings from the cache" if is_stored else ""
+        f"{counted(len(given.recordings), 'recording')} from the cache"
+        if is_stored
+        else ""
     ),
     write_files=_write_files,
     tables=lambda context, result: diagnosis_blocks(

@@ -18,6 +18,7 @@ from hwid_cli.records.units import as_percent
 from hwid_cli.simulations.extended import ExtendedRun, ExtendedSimulation, run_extended
 from hwid_cli.simulations.kinds import kind_named
 from hwid_cli.stages.diagnose import ToDiagnose
+from hwid_cli.stages.fit_seconds import counted
 from hwid_cli.stages.foreign_simulation import (
     extended_foreign,
     in_turn,
@@ -137,5 +138,5 @@ def told_difference(program: ExtendedProgram, path: Path) -> str:
         )
     return (
         f"{path.name} differs from the extended simulation by {as_percent(share, 2)} of what the "
-        f"effects do, on {len(program.signals)} recordings"
+        f"effects do, on {counted(len(program.signals), 'recording')}"
     )

@@ -72,6 +72,17 @@ def check_recordings(
     return Checked(tuple(facts), tuple(recordings), tuple(problems), tuple(logs))
 
 
+def _two_digits(number: float) -> str:
+    """Write a number with two digits that count, and without an exponent.
+
+    Examples
+    --------
+    >>> _two_digits(110.4), _two_digits(1234.0), _two_digits(0.153)
+    ('110', '1200', '0.15')
+    """
+    return f"{float(f'{number:.2g}'):.15g}"
+
+
 def _notes(raw: RawRecording, jitter: float) -> tuple[str, ...]:
     notes = [
         f"{side} {note}"
@@ -79,5 +90,7 @@ def _notes(raw: RawRecording, jitter: float) -> tuple[str, ...]:
         for note in quality_notes(values, may_hold=side == "input")
     ]
     if jitter > _NOTED_JITTER:
-        notes.append(f"the clock jitters by up to {100 * jitter:.2g} % of a step")
+        notes.append(
+            f"the clock jitters by up to {_two_digits(100 * jitter)} % of a step"
+        )
     return tuple(notes)

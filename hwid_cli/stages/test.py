@@ -455,7 +455,7 @@ STAGE = Stage(
         lambda path, given, result, origin: write_final_test(path, result, origin),
     ),
     summary=lambda given, final, is_stored: (
-        f"{len(final.recordings)} recordings from the cache, 0 computed"
+        f"{counted(len(final.recordings), 'recording')} from the cache, 0 computed"
         if is_stored
         else ""
     ),

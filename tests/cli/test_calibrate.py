@@ -59,7 +59,7 @@ def test_without_a_recipe_recordings_are_left_as_they_are_and_not_drawn(
     (tmp_path / "a.csv").write_text("\n".join(["t,u,y", *rows]))
     result = hwid("calibrate", path=path)
 
-    assert "1 recordings done, left as they are" in result.stderr
+    assert "1 recording done, left as they are" in result.stderr
     assert not (out / "figures").exists()
 
     path.write_text(f"{path.read_text()}calibrate: {{repair: true, step: [cut]}}\n")

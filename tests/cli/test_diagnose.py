@@ -58,6 +58,16 @@ def contents_of(out):
     }
 
 
+def test_a_scale_with_the_wrong_sign_is_told_with_its_size(config, again):
+    text = CONFIG.replace("recordings:", "recordings:\n  input_scale: -2.0", 1)
+    assert text != CONFIG
+    config.write_text(text)
+    said = again()
+    assert said.exit_code == 1
+    assert "the output moves against the input" in said.stderr
+    assert "; write input_scale: 2, or" in said.stderr
+
+
 def test_the_missing_friction_is_found_and_everything_is_written(first_run):
     folder, said, _ = first_run
     found = found_in(folder / "out")

@@ -142,6 +142,40 @@ def test_a_file_that_cannot_be_used_is_left_out_by_name(folder, tmp_path):
     assert invoke("check", out, "--no-timing").exit_code == 0
 
 
+def rows_of(path):
+    return [row.split(",") for row in path.read_text().splitlines()]
+
+
+def test_a_file_that_is_too_short_is_said_to_be(folder, tmp_path):
+    write_english_csv(folder)
+    short = folder / "step_3.csv"
+    short.write_text("\n".join(short.read_text().splitlines()[:31]))
+    result = invoke("init", folder, "--out", tmp_path / "mine.yaml")
+
+    assert result.exit_code == 0, result.output
+    said = "step_3.csv: has 30 rows, and at least 61 are needed"
+    assert f"skipped: {said}" in result.stdout
+
+    for path in folder.glob("*.csv"):
+        path.write_text("\n".join(path.read_text().splitlines()[:31]))
+    result = invoke("init", folder, "--out", tmp_path / "other.yaml")
+    assert result.exit_code == 1
+    assert ".csv: has 30 rows, and at least 61 are needed; " in result.stderr
+
+
+def test_a_folder_without_a_changing_input_is_told_which_column_stays(folder, tmp_path):
+    write_english_csv(folder)
+    for path in folder.glob("*.csv"):
+        head, *rows = rows_of(path)
+        rows = [[time, "1.5", position] for time, _, position, _ in rows]
+        path.write_text("\n".join(",".join(row) for row in [head[:3], *rows]))
+    result = invoke("init", folder, "--out", tmp_path / "mine.yaml")
+
+    assert result.exit_code == 1
+    assert "has 1 column of more than 60 numbers that change" in result.stderr
+    assert "; 'current_A' is 1.5 in every row; " in result.stderr
+
+
 def test_a_single_file_is_cut_into_one_to_learn_from_and_one_to_judge(folder, tmp_path):
     rng = np.random.default_rng(2)
     u = np.repeat(rng.uniform(-1, 1, 90), 10)

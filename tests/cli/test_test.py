@@ -156,6 +156,8 @@ def test_joining_is_proposed_where_no_single_model_is_good_enough(
     edit("threshold: 0.01", "threshold: 1000.0")
     assert hint not in hwid("test").stdout
     edit("threshold: 1000.0", "threshold: 1.0e-9")
+    # With maps the linear model is the better one here, which is said instead.
+    edit("fit: {units: 3, ", "fit: {input_map: none, output_map: none, ")
     said = hwid("test").stdout
 
     assert hint in said

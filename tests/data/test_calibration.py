@@ -68,6 +68,24 @@ def test_the_edge_of_a_step_is_never_damage(n_ramp, noise):
     assert find_damaged(values).size == 0
 
 
+@pytest.mark.parametrize("width", [4, 10, 20])
+@pytest.mark.parametrize("late", range(10))
+def test_the_corner_of_a_ramp_that_was_averaged_is_not_damage(width, late):
+    # Ten times as many samples as are kept: each one is the mean over up to two of these.
+    fine = np.clip((np.arange(6000) - 2000 - late) / 25.0, 0.0, 1.0)
+    means = np.convolve(fine, np.ones(width) / width, mode="same")
+    for values in (means[::10], -means[::10], 3.0 * means[::-10]):
+        assert find_damaged(values).size == 0
+
+
+def test_damage_beside_the_corner_of_a_ramp_is_found():
+    values = np.clip((np.arange(600) - 200) / 2.5, 0.0, 1.0)
+    for place, error in ((195, 0.05), (210, -0.05), (200, 1.0), (200, -0.5)):
+        damaged = values.copy()
+        damaged[place] += error
+        assert find_damaged(damaged).tolist() == [place]
+
+
 def test_held_random_levels_are_not_damage():
     for hold in (1, 2, 3, 5, 30):
         assert find_damaged(held_levels(2000 // hold, hold, seed=hold)).size == 0

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from hwid_cli.diagnosis.diagnose import diagnose
+from hwid_cli.diagnosis.direction import Reversal, reversal_sentence
 from hwid_cli.errors import ConfigError
 from hwid_cli.records.experiment import DiagnoseOptions
 from tests.diagnosis.small_drive import in_turn, recordings, simulation
@@ -24,6 +25,14 @@ def test_an_output_that_counts_the_other_way_is_refused(effects):
 
     with pytest.raises(ConfigError, match=r"input_scale: the output moves against"):
         found(turned)
+
+
+def test_the_scale_of_the_input_keeps_its_size():
+    reversal = Reversal(as_given=1.0, reversed=0.1)
+    assert "write input_scale: -1, or" in reversal_sentence(reversal)
+    for scale, other in ((10.0, "-10"), (-0.25, "0.25")):
+        text = reversal_sentence(reversal, input_scale=scale)
+        assert f"write input_scale: {other}, or" in text
 
 
 def test_a_force_constant_of_the_other_sign_mends_it():

@@ -199,3 +199,21 @@ def test_a_law_of_a_sensor_is_told_as_what_it_reads():
     assert (term.term, term.unit) == ("abs(x)", "1")
     assert term.value == pytest.approx(0.04, rel=0.05)
     assert told.law.formula.startswith("x + 0.0")
+
+
+@pytest.mark.filterwarnings("error")
+def test_only_an_interval_on_one_side_of_zero_is_clear_however_large(monkeypatch):
+    limits = {
+        "c0": (1e200, 1e300),
+        "c1": (-1e300, -1e200),
+        "c2": (-1e300, 1e200),
+        "c3": (0.0, 1.0),
+        "c4": (np.nan, 1.0),
+    }
+    names = tuple(SimpleNamespace(owner="law", parameter=one) for one in limits)
+    low, high = np.array(list(limits.values())).T
+    monkeypatch.setattr(laws, "intervals", lambda *_: (low, high))
+    rounds_of = SimpleNamespace(problem=None, baseline=SimpleNamespace(scales=None))
+    tried = SimpleNamespace(fit=SimpleNamespace(names=names), identifier="law")
+
+    assert laws._unclear_terms(rounds_of, tried) == ["c2", "c3", "c4"]

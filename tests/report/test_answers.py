@@ -62,6 +62,10 @@ def test_a_named_effect_is_said_with_its_size_and_interval():
     assert "were never trained on" in found.details[0]
     assert "times the noise" in found.details[0]
 
+    held_out = named().held_out[:1]
+    found = answer_to(replace(named(), held_out=held_out))
+    assert "on 1 recording that was never trained on" in found.details[0]
+
 
 def test_the_picture_before_and_after_stands_beside_the_noise():
     record = named()

@@ -197,9 +197,11 @@ def _rms(gap: Gap, diagnosis: Diagnosis) -> float:
 
 def _gap_in_words(diagnosis: Diagnosis) -> str:
     """How the gap falls, and on what."""
+    count = len(diagnosis.held_out)
     on = (
-        f"{counted(len(diagnosis.held_out), 'recording')} that were never trained on"
-        if diagnosis.held_out
+        f"{counted(count, 'recording')} that {'was' if count == 1 else 'were'} never "
+        "trained on"
+        if count
         else "the recordings of the fit (none was held out)"
     )
     arrow = " \N{RIGHTWARDS ARROW} "
