@@ -389,8 +389,8 @@ def _diagnose_lines(layout: FolderLayout, proposal: Proposal) -> list[str]:
         "#   damping_N_s_per_m: 10.0",
         "#   stiffness_N_per_m: 0.0   # 0: no spring",
         "#   force_constant_N_per_A: 10.0",
-        "#   hold: linear             # zero: the command is held between samples, as",
-        "#                            # by a controller, PLC or D/A converter",
+        "#   hold: auto               # linear or zero (held, as by a controller, PLC or",
+        "#                            # D/A converter): say so where you know it",
         *_STARTS[proposal.initial_state],
     ]
 

@@ -24,6 +24,7 @@ from hwid_cli.diagnosis.candidate import (
 from hwid_cli.diagnosis.causes import fit_with_input_noise, without_repeats
 from hwid_cli.diagnosis.direction import ReversedInputError, find_reversal
 from hwid_cli.diagnosis.findings import Findings, describe
+from hwid_cli.diagnosis.held_command import best_of, is_held, with_held_command
 from hwid_cli.diagnosis.hidden import HiddenEffect, hidden_effects
 from hwid_cli.diagnosis.intervals import unclear_effects
 from hwid_cli.diagnosis.latent_force import Smoothed, latent_force
@@ -232,38 +233,87 @@ def find(
     ConfigError
         If the output clearly moves against the input.
     """
+    searched = _searched(problem, options, run_tasks, on_round, given_sse)
+    rounds, found = searched.rounds, searched.found
+    if problem.may_be_held and searched.has_gap and is_held(rounds, found):
+        held = with_held_command(problem)
+        again = _searched(held, options, run_tasks, on_round, given_sse)
+        was = best_of(rounds, found)
+        if rounds.criteria.gain(was, best_of(again.rounds, again.found)) <= 0:
+            searched = again
+    return _judged(searched, options)
+
+
+@dataclass(frozen=True, eq=False)
+class _Searched:
+    """What the search for effects began with, and what it has found.
+
+    Parameters
+    ----------
+    given_sse : ndarray, shape (n_recordings,), [output unit squared]
+        Of the simulation with the parameters that the configuration gives.
+    before : list of Compared
+        Simulations with the re-fitted base.
+    force : list of Smoothed
+        That the re-fitted base lacks.
+    seeds : tuple of CandidateFit
+        Best sets of each size on pieces; empty where these were not asked.
+    """
+
+    rounds: Rounds
+    given_sse: np.ndarray
+    before: list[Compared]
+    force: list[Smoothed]
+    found: RoundsResult
+    seeds: tuple[CandidateFit, ...]
+
+    @property
+    def has_gap(self) -> bool:
+        """Whether the re-fitted base leaves something to explain."""
+        base = self.rounds.base
+        return base.is_usable and not self.rounds.criteria.needs_nothing(base)
+
+
+def _searched(
+    problem: DiagnosisProblem,
+    options: DiagnoseOptions,
+    run_tasks: RunTasks,
+    on_round: OnRound,
+    given_sse: np.ndarray | None,
+) -> _Searched:
+    """Fit the base again, and search for sets of effects."""
     on_round("base", 0)
     fitted = _fitted_base(problem)
-    problem, noise, base, scales = (
-        fitted.problem,
-        fitted.noise,
-        fitted.base,
-        fitted.scales,
-    )
+    problem, noise, base = fitted.problem, fitted.noise, fitted.base
     drive = fitted_drive(problem.drive, base)
-
-    before = compared_with_fit(problem, base, scales)
+    before = compared_with_fit(problem, base, fitted.scales)
     force = latent_force(before, drive, noise)
-    where = places(before, noise, drive, force)
-
-    criteria = SelectionCriteria.of(problem, noise)
     if given_sse is None:
         given_sse = each_sum_of_squares([one.residual for one in fitted.given])
     rounds = Rounds(
         problem,
-        Baseline(drive, scales, noise, problem.drive),
-        criteria,
+        Baseline(drive, fitted.scales, noise, problem.drive),
+        SelectionCriteria.of(problem, noise),
         base,
         allowed_effects(problem, options),
         run_tasks,
         on_round,
     )
     found, seeds = _search(rounds, given_sse, force, options.max_effects)
-    on_round("verdict", 0)
+    return _Searched(rounds, given_sse, before, force, found, seeds)
+
+
+def _judged(searched: _Searched, options: DiagnoseOptions) -> Findings:
+    """Decide, from pieces and formulas where whole recordings and effects do not."""
+    rounds, given_sse, found = searched.rounds, searched.given_sse, searched.found
+    criteria, base, seeds = rounds.criteria, rounds.base, searched.seeds
+    before, force = searched.before, searched.force
+    where = places(before, rounds.baseline.noise, rounds.baseline.drive, force)
+    rounds.on_round("verdict", 0)
     verdict = _decided(rounds, given_sse, found)
     whole = Findings(
-        problem=problem, criteria=criteria, scales=scales, given_sse=given_sse,
-        base=base, before=before, force=force, where=where,
+        problem=rounds.problem, criteria=criteria, scales=rounds.baseline.scales,
+        given_sse=given_sse, base=base, before=before, force=force, where=where,
         found=found, verdict=verdict,
     )  # fmt: skip
     # Where a drive stands for another simulation, that one judges.

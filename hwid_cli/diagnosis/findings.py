@@ -131,7 +131,6 @@ def describe(findings: Findings) -> Diagnosis:
     verdict, noise, scales = findings.verdict, criteria.noise, findings.scales
     chosen, before = verdict.chosen, findings.before
     fits = list(findings.found.fits.values())
-    is_base = chosen is base
     after = findings.after()
     given_sse = findings.given_sse
     from_sse = given_sse if verdict.word in ("parameters", "none") else base.sse
@@ -160,7 +159,7 @@ def describe(findings: Findings) -> Diagnosis:
         candidates=ranked(criteria, fits, base, findings.found.shares, verdict),
         gaps=_recording_gaps(problem, given_sse, base, chosen),
         overlays=_overlays(before, after, noise),
-        latent_force=_force_curves(findings, None if is_base else after),
+        latent_force=_force_curves(findings, None if chosen is base else after),
         present=told[: len(present)],
         reference_current_A=problem.drive.reference_current_A,
         reference_displacement_m=problem.drive.reference_displacement_m,
@@ -168,6 +167,7 @@ def describe(findings: Findings) -> Diagnosis:
         warnings=(*findings.warnings, *doubtful_values(parameters, problem.drive)),
         axis=problem.drive.axis,
         output=problem.drive.output,
+        hold=problem.drive.hold,
         law=None if findings.law is None else _law(findings.law, effects),
         trust=trust,
         bands=bands,

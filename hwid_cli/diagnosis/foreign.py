@@ -33,7 +33,7 @@ from hwid_cli.diagnosis.stand_in import (
     standing_for,
 )
 from hwid_cli.records.diagnosis import BaseParameter, Diagnosis
-from hwid_cli.records.drive import StandIn
+from hwid_cli.records.drive import LINE, StandIn
 from hwid_cli.records.experiment import DiagnoseOptions, SimulationOptions
 from hwid_cli.records.programs import SimulatorRun
 from hwid_cli.records.recordings import Recording
@@ -48,6 +48,8 @@ _MOST_PUSHES = 4
 # Searches, each from where the last one has moved the parameters by more than this.
 _MOST_SEARCHES = 3
 _MOVED = 0.01
+# How a command goes on between samples is the matter of the simulation itself.
+_ITS_OWN = SimulationOptions(hold=LINE)
 
 
 def diagnose_foreign(
@@ -68,7 +70,7 @@ def diagnose_foreign(
         where it kept them.
     """
     held_out = held_out_of(recordings, options)
-    problem = prepare(recordings, SimulationOptions(), options, held_out)
+    problem = prepare(recordings, _ITS_OWN, options, held_out)
     problem = without_repeats(problem)
     runs = Runs(simulator, run_tasks)
     on_round("the simulation as given", len(problem.signals))
@@ -315,7 +317,7 @@ def stand_in_for(
         Whether its spring may be curved.
     """
     held_out = held_out_of(recordings, options)
-    problem = prepare(recordings, SimulationOptions(), options, held_out)
+    problem = prepare(recordings, _ITS_OWN, options, held_out)
     runs = Runs(simulator, run_tasks)
     given = runs.of(problem.signals, simulator.values)
     drive = _standing(problem, given, may_curve=may_curve)

@@ -12,7 +12,7 @@ import scipy
 
 from hwid_cli.drive.simulation import NO_FORCE, refined
 from hwid_cli.records.axis import base_of
-from hwid_cli.records.drive import Drive
+from hwid_cli.records.drive import LINE, UNSAID_HOLD, Drive
 from hwid_cli.records.experiment import DiagnoseOptions, SimulationOptions
 from hwid_cli.records.recordings import Recording
 
@@ -178,6 +178,9 @@ class DiagnosisProblem:
     stand_in_error : float, [output unit squared]
         Sum of squares by which a stand-in that no run corrects may be wrong about what
         lies between simulation and recordings.
+    may_be_held : bool
+        Whether nobody has said how the command goes on between samples, so that the
+        recordings may tell that it is held.
     """
 
     signals: tuple[Signals, ...]
@@ -186,6 +189,7 @@ class DiagnosisProblem:
     unit: str = "m"
     known: Mapping[str, float] = field(default_factory=dict)
     stand_in_error: float = 0.0
+    may_be_held: bool = False
 
     @property
     def compares_command(self) -> bool:
@@ -263,6 +267,7 @@ def prepare(
         if simulation.controller is not None
         else recordings[0].output_unit,
         simulation.known,
+        may_be_held=simulation.hold == UNSAID_HOLD and simulation.controller is None,
     )
 
 
@@ -285,7 +290,7 @@ def drive_of(simulation: SimulationOptions, train: Sequence[Signals]) -> Drive:
         or 1.0,
         resistance_ohm=simulation.resistance_ohm,
         inductance_H=simulation.inductance_H,
-        hold=simulation.hold,
+        hold=LINE if simulation.hold == UNSAID_HOLD else simulation.hold,
         controller=simulation.controller,
         output=simulation.output,
         **base_of(simulation),

@@ -649,26 +649,9 @@ class _Search:
         if not sets:
             return []
         rounds.on_round(what, len(sets))
-        baseline = rounds.baseline
         tasks = [
-            DiagnosisTask(
-                name="+".join(ids),
-                function=fit_candidate,
-                arguments=(
-                    rounds.problem, ids, tuple(starts), baseline.scales, baseline.noise,
-                    most_samples,
-                ),
-                result_type=CandidateFit,
-                content={
-                    "effects": ids,
-                    "starts": list(starts),
-                    "pieces": _starts_of(rounds.problem),
-                    "most_samples": most_samples,
-                },
-                arrays=(rounds.base.values,),
-            )
-            for ids, starts in sets.items()
-        ]  # fmt: skip
+            fit_task(rounds, ids, starts, most_samples) for ids, starts in sets.items()
+        ]
         return rounds.run_tasks(tasks, keep=True)
 
     def _use_again(self, size: int) -> None:
@@ -865,6 +848,32 @@ class _Search:
     def _is_behind(self, one: CandidateFit, other: CandidateFit) -> bool:
         """Whether a fit has left more of the training recordings than another one."""
         return _train_sse(self.rounds, one) > _train_sse(self.rounds, other)
+
+
+def fit_task(
+    rounds: Rounds,
+    ids: Effects,
+    starts: Sequence[SearchStart],
+    most_samples: int | None,
+) -> DiagnosisTask:
+    """Task that fits a set of effects to so many samples, or to all."""
+    problem, baseline = rounds.problem, rounds.baseline
+    return DiagnosisTask(
+        name="+".join(ids) or "base",
+        function=fit_candidate,
+        arguments=(
+            problem, ids, tuple(starts), baseline.scales, baseline.noise, most_samples,
+        ),
+        result_type=CandidateFit,
+        content={
+            "effects": ids,
+            "starts": list(starts),
+            "pieces": _starts_of(problem),
+            "hold": problem.drive.hold,
+            "most_samples": most_samples,
+        },
+        arrays=(rounds.base.values,),
+    )  # fmt: skip
 
 
 _Starts = TypeVar("_Starts")

@@ -15,7 +15,7 @@ from hwid_cli.records.diagnosis import (
     BaseParameter,
     FittedEffect,
 )
-from hwid_cli.records.drive import Drive
+from hwid_cli.records.drive import HELD, LINE, Drive
 
 # What moves and what drives it, by axis.
 _WORDS = {
@@ -61,6 +61,11 @@ def summarise(
     """
     best = lead(criteria, fits, verdict)
     text = _verdict_in_words(problem, criteria, base, verdict, effects)
+    if problem.may_be_held and problem.drive.hold == HELD:
+        text += (
+            " The command is held between samples, as controllers do it: so simulated "
+            "(simulation.hold: zero) it fits better than as a line."
+        )
     return text if best is None else f"{text} {_lead_in_words(criteria, best, verdict)}"
 
 
@@ -175,8 +180,10 @@ def _held_command(problem: DiagnosisProblem, effects: tuple[FittedEffect, ...]) 
         for parameter in one.parameters
         if parameter.name in _LATE[one.id]
     ]
-    if problem.drive.hold != "linear" or not any(
-        abs(one - 0.5) <= _NEAR_HALF for one in late
+    if (
+        problem.may_be_held
+        or problem.drive.hold != LINE
+        or not any(abs(one - 0.5) <= _NEAR_HALF for one in late)
     ):
         return ""
     return (

@@ -6,6 +6,7 @@ from typing import Annotated
 import numpy as np
 
 from hwid_cli.records.candidates import RankedCandidate
+from hwid_cli.records.drive import LINE
 from hwid_cli.records.programs import OF_DRIVE, Capabilities
 from hwid_cli.records.rules import STORED_CURVE, STORED_NUMBERS, STORED_OR_MISSING
 from hwid_cli.records.shown import Shown
@@ -334,6 +335,8 @@ class Diagnosis(Shown):
         What is known of the errors of the simulation with what was found.
     bands : TrustOnTests
         How its bands of 90 % did on held-out recordings, each told by the others.
+    hold : str
+        How the command goes on between samples, as given or as found.
     """
 
     verdict: str
@@ -368,6 +371,7 @@ class Diagnosis(Shown):
     law: Law | None = field(default=None, metadata=ADDED_LATER)
     trust: ModelTrust | None = field(default=None, metadata=ADDED_LATER)
     bands: TrustOnTests = field(default=TrustOnTests(), metadata=ADDED_LATER)
+    hold: str = field(default=LINE, metadata=ADDED_LATER)
 
     @property
     def refitted(self) -> Gap:

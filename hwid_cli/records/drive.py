@@ -20,7 +20,11 @@ from hwid_cli.records.rules import (
 # How recordings start: at rest in equilibrium; at rest wherever friction holds the drive;
 # anyhow, so that position and velocity are found from the recording.
 STARTS = ("rest", "held", "estimated")
-HOLDS = ("linear", "zero", "smooth")
+# How an input goes on between samples: in a line, held, or smoothly.
+LINE, HELD = "linear", "zero"
+HOLDS = (LINE, HELD, "smooth")
+# What a configuration says that leaves it to the recordings.
+UNSAID_HOLD = "auto"
 # What the sensor of the output measures.
 OUTPUTS = ("position", "velocity")
 # Parameters of the base that a re-fit may move; the mass only sets the scale.

@@ -7,7 +7,14 @@ from dataclasses import dataclass, field
 from typing import Annotated, ClassVar, Literal
 
 from hwid_cli.records.axis import ROTARY_NAMES, check_axis
-from hwid_cli.records.drive import HOLDS, OUTPUTS, STARTS, Controller, Repeatable
+from hwid_cli.records.drive import (
+    HOLDS,
+    OUTPUTS,
+    STARTS,
+    UNSAID_HOLD,
+    Controller,
+    Repeatable,
+)
 from hwid_cli.records.machines import GunMachine, ServoMachine
 from hwid_cli.records.maps import MAP_KINDS
 from hwid_cli.records.model import FitOptions
@@ -244,6 +251,8 @@ class SimulationOptions:
     known : dict of str to float, [-]
         Base parameters that a re-fit may not move beyond this share of their value; 0
         holds one fixed.
+    hold : str
+        As for a drive; ``auto`` is a line, unless a diagnosis finds a held command.
     """
 
     # A section without a kind is one of these.
@@ -262,7 +271,7 @@ class SimulationOptions:
     resistance_ohm: Annotated[float | None, POSITIVE] = None
     inductance_H: Annotated[float, NOT_NEGATIVE] = 0.0
     back_emf_V_s_per_m: Annotated[float | None, NOT_NEGATIVE] = None
-    hold: Annotated[str, OneOf(HOLDS)] = "linear"
+    hold: Annotated[str, OneOf((UNSAID_HOLD, *HOLDS))] = UNSAID_HOLD
     controller: Controller | None = None
     known: Annotated[dict[str, float], NamesFor(KNOWN_TOLERANCE)] = field(
         default_factory=dict

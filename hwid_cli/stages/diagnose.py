@@ -23,7 +23,7 @@ from hwid_cli.errors import CacheError, ConfigError
 from hwid_cli.files.figure_files import read_figure, write_figure
 from hwid_cli.records.check import StagePlan
 from hwid_cli.records.diagnosis import Diagnosis
-from hwid_cli.records.drive import DriveResponse, told_apart
+from hwid_cli.records.drive import UNSAID_HOLD, DriveResponse, told_apart
 from hwid_cli.records.experiment import DiagnoseOptions, Experiment, SimulationOptions
 from hwid_cli.records.programs import ForeignSimulation
 from hwid_cli.records.recordings import CalibrationLog, Recording
@@ -68,7 +68,7 @@ from hwid_cli.tasks.runner import RunSettings, Workers, run_tasks
 from hwid_cli.tasks.task import Task, one_thread
 
 NAME = "diagnose"
-STAGE_VERSION = 17
+STAGE_VERSION = 18
 
 _Answer = TypeVar("_Answer")
 
@@ -174,6 +174,7 @@ def extended_options(
         simulation,
         **base,
         effects=told_apart(effects),
+        hold=diagnosis.hold if simulation.hold == UNSAID_HOLD else simulation.hold,
         reference_current_A=diagnosis.reference_current_A,
         reference_displacement_m=diagnosis.reference_displacement_m,
     )

@@ -219,6 +219,7 @@ def _content(diagnosis: Diagnosis) -> dict[str, Any]:
         **({} if diagnosis.law is None else {"law": _law(diagnosis.law)}),
         "axis": diagnosis.axis,
         "output": diagnosis.output,
+        "hold": diagnosis.hold,
         "not_observable": list(diagnosis.not_observable),
         "warnings": list(diagnosis.warnings),
         "next_experiment": asdict(diagnosis.next_experiment),

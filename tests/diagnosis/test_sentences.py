@@ -43,6 +43,6 @@ def delayed(delay_s):
 )  # fmt: skip
 def test_a_delay_of_half_a_sample_may_be_a_held_command(samples, hold, is_said):
     of = problem(recordings())
-    of = replace(of, drive=replace(of.drive, hold=hold))
+    of = replace(of, drive=replace(of.drive, hold=hold), may_be_held=False)
     said = _held_command(of, (delayed(samples * STEP_S),))
     assert ("simulation.hold: zero" in said) == is_said

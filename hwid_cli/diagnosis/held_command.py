@@ -1,0 +1,94 @@
+"""Whether the command is held between samples, where nobody has said so.
+
+Controllers and D/A converters hold what they send. Simulated as a line between samples,
+such a command comes half a sample too early, which looks like a delay or a lag of the
+drive. So what the search has found is fitted once more beside a held command, whole and
+without each of its effects. docs/method_diagnosis.md, eq. (D23b).
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from hwid_cli.diagnosis.candidate import (
+    SearchStart,
+    compared_with_fit,
+    start_from,
+)
+from hwid_cli.diagnosis.effect_sets import Effects
+from hwid_cli.diagnosis.problem import DiagnosisProblem
+from hwid_cli.diagnosis.rounds import Rounds, RoundsResult, fit_task
+from hwid_cli.diagnosis.selection import LEAST_GAIN, count
+from hwid_cli.records.candidates import CandidateFit
+from hwid_cli.records.drive import HELD
+
+# Sets that are tried beside the best one.
+MOST_OTHERS = 4
+
+
+def with_held_command(problem: DiagnosisProblem) -> DiagnosisProblem:
+    """The same recordings, with a command that is held between samples."""
+    return replace(problem, drive=replace(problem.drive, hold=HELD))
+
+
+def best_of(rounds: Rounds, found: RoundsResult) -> CandidateFit:
+    """The largest of the best sets; the base where there is none."""
+    return found.best[-1] if found.best else rounds.base
+
+
+def is_held(rounds: Rounds, found: RoundsResult) -> bool:
+    """Whether a held command does better than a line between samples.
+
+    Parameters
+    ----------
+    found : RoundsResult
+        Beside a command that goes on in a line.
+
+    References
+    ----------
+    docs/method_diagnosis.md, eq. (D23b).
+    """
+    best = best_of(rounds, found)
+    if not (best.is_usable and _matters(rounds, best)):
+        return False
+    criteria, held = rounds.criteria, with_held_command(rounds.problem)
+    sets = _worth_trying(rounds, found, best)
+    rounds.on_round("the command held", len(sets))
+    tasks = [
+        fit_task(replace(rounds, problem=held), ids, [start], None)
+        for ids, start in sets.items()
+    ]
+    fits: list[CandidateFit] = rounds.run_tasks(tasks, keep=True)
+    return any(
+        # What it does without is a reason of its own.
+        criteria.gain(one, best) >= (0.0 if count(one) < count(best) else LEAST_GAIN)
+        for one in fits
+    )
+
+
+def _worth_trying(
+    rounds: Rounds, found: RoundsResult, best: CandidateFit
+) -> dict[Effects, SearchStart]:
+    """The best set, the same without each effect, and the next best ones, with starts."""
+    gain, drive = rounds.criteria.gain, rounds.problem.drive
+    start = start_from(drive, best)
+    sets = {best.effects: start}
+    for left in best.effects:
+        sets[tuple(one for one in best.effects if one != left)] = start
+    near = sorted(found.fits.values(), key=lambda one: -gain(one, best))
+    near = [one for one in near if len(one.effects) <= len(best.effects)]
+    for one in near[: MOST_OTHERS + 1]:
+        sets.setdefault(one.effects, start_from(drive, one))
+    return sets
+
+
+def _matters(rounds: Rounds, best: CandidateFit) -> bool:
+    """Whether the two commands lead to motions that the noise does not hide."""
+    scales = rounds.baseline.scales
+    both = zip(
+        compared_with_fit(rounds.problem, best, scales),
+        compared_with_fit(with_held_command(rounds.problem), best, scales),
+        strict=True,
+    )
+    apart = sum(float(np.sum((one.residual - two.residual) ** 2)) for one, two in both)
+    return apart >= LEAST_GAIN * rounds.baseline.noise.rms**2

@@ -1,0 +1,115 @@
+"""Whether a command is held, told by the recordings: plants solved exactly by scipy."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import scipy
+
+from hwid_cli import Recording, diagnose
+from hwid_cli.records.experiment import DiagnoseOptions, SimulationOptions
+from hwid_cli.stages.diagnose import extended_options
+
+STEP_S, N, NOISE = 1e-3, 600, 2e-5
+SIMULATION = SimulationOptions(
+    mass_kg=0.3,
+    damping_N_s_per_m=15.0,
+    stiffness_N_per_m=1184.0,
+    force_constant_N_per_A=5.0,
+)
+# Few are enough to tell what half a sample looks like.
+EFFECTS = ("input_delay", "actuator_lag", "coulomb_friction")
+
+
+def commands(rng):
+    """Steps, held random levels and sums of sines, each after a rest."""
+    time_s = STEP_S * np.arange(N)
+    for number in range(9):
+        size, moving = rng.uniform(0.5, 3.0), time_s > 0.04
+        if number % 3 == 0:
+            yield f"step_{number}", size * moving * (time_s < 0.4)
+        elif number % 3 == 1:
+            turns = rng.uniform(0, 6, 4)[:, None] + 2 * np.pi * time_s * np.array(
+                [[2.0], [7.0], [13.0], [29.0]]
+            )
+            yield f"sum_{number}", size * np.sin(turns).sum(axis=0) * moving / 2
+        else:
+            levels = rng.uniform(-size, size, N // 30 + 1)
+            yield f"level_{number}", np.repeat(levels, 30)[:N] * moving
+
+
+def plant(lag_s=0.0):
+    """Mass, spring and damper, behind a lag of the amplifier where there is one."""
+    drive = scipy.signal.TransferFunction([5.0], [0.3, 15.0, 1184.0])
+    if not lag_s:
+        return drive
+    return scipy.signal.TransferFunction(drive.num, np.polymul(drive.den, [lag_s, 1.0]))
+
+
+def measured(hold, *, lag_s=0.0, delay=0):
+    """What a sensor reads of a plant whose command is held, or goes on in a line."""
+    rng = np.random.default_rng(5)
+    found = []
+    for name, command in commands(rng):
+        late = np.concatenate((np.zeros(delay), command))[:N]
+        time_s = STEP_S * np.arange(N)
+        interpolates = hold == "linear"
+        output = scipy.signal.lsim(
+            plant(lag_s).to_ss(), late, time_s, interp=interpolates
+        )[1]
+        noise = NOISE * rng.standard_normal(N)
+        found.append(Recording(name, command, output + noise, STEP_S))
+    return found
+
+
+def found_in(recordings, *, hold="auto", effects=EFFECTS):
+    return diagnose(
+        recordings, replace(SIMULATION, hold=hold), DiagnoseOptions(effects=effects)
+    )
+
+
+@pytest.mark.parametrize("hold", ["linear", "zero"])
+def test_a_plant_that_lacks_nothing_lacks_nothing_however_its_command_goes_on(hold):
+    found = found_in(measured(hold))
+    assert found.verdict in ("none", "parameters")
+    assert found.hold == hold
+    assert ("held between samples" in found.summary) == (hold == "zero")
+    assert extended_options(found, SIMULATION).hold == hold
+
+
+@pytest.mark.parametrize("hold", ["linear", "zero"])
+def test_a_lag_beside_a_held_command_is_the_lag(hold):
+    found = found_in(measured(hold, lag_s=4e-3))
+    assert [one.id for one in found.effects] == ["actuator_lag"]
+    (lag,) = found.effects[0].parameters
+    assert lag.value == pytest.approx(4e-3, rel=5e-3)
+    assert found.hold == hold
+
+
+def test_beside_a_long_delay_the_line_stays():
+    found = found_in(measured("linear", delay=3))
+    assert [one.id for one in found.effects] == ["input_delay"]
+    assert found.effects[0].parameters[0].value == pytest.approx(3e-3, rel=5e-3)
+    assert found.hold == "linear"
+
+
+def test_what_is_said_is_not_tried():
+    found = found_in(measured("zero"), hold="linear")
+    assert [one.id for one in found.effects] == ["input_delay"]
+    assert found.hold == "linear"
+    assert "set simulation.hold: zero" in found.summary
+
+
+def test_what_the_noise_hides_is_not_tried(monkeypatch):
+    def refuse(*_):
+        raise AssertionError("tried a held command")
+
+    monkeypatch.setattr("hwid_cli.diagnosis.held_command._worth_trying", refuse)
+    rng, drift = np.random.default_rng(2), 2.0 * STEP_S * np.arange(N)
+    loud = [
+        replace(one, output=one.output + drift + 0.05 * rng.standard_normal(N))
+        for one in measured("zero")
+    ]
+    found = found_in(loud, effects=("sensor_drift",))
+    assert [one.id for one in found.effects] == ["sensor_drift"]
+    assert found.hold == "linear"
