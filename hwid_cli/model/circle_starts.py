@@ -15,12 +15,13 @@ Steiglitz, McBride (1965). docs/method.md, section "Poles on the unit circle".
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
 
 from hwid_cli.model.candidates import FitData, thinned
+from hwid_cli.model.joint_least_squares import Equations, Solution, solved
 from hwid_cli.model.linear_block import is_stable, reflected
 from hwid_cli.model.regression import LARGEST_RADIUS
 from hwid_cli.model.starts import Start
@@ -32,8 +33,6 @@ from hwid_cli.records.model import FitOptions, Orders
 _LASTS = 5.0
 # Iterations, equations of the least squares, and knots of an expanded input.
 _ITERATIONS, _ROWS, _HATS = 3, 1000, 10
-# Added to the diagonal of the scaled products: directions weaker than this are noise.
-_RIDGE = 1e-10
 # Sum of D's coefficients below which it holds an integrator.
 _SINGULAR = 1e-10
 # Starts of each family that are returned.
@@ -165,20 +164,15 @@ class _Iterations:
         self, inputs: Sequence[np.ndarray], rest: np.ndarray, behind: np.ndarray
     ) -> np.ndarray:
         """Rest that follows; all signals pass D, or one, before they are compared."""
-        columns = self._columns(inputs, rest, behind)
-        seen = [
-            scipy.signal.lfilter(behind, rest, one.output) for one in self.experiments
-        ]
-        past = np.vstack(
-            [
-                -_delayed(y[:, None], 1, rest.size - 1)[one.counted]
-                for y, one in zip(seen, self.experiments, strict=True)
-            ]
-        )
-        target = np.concatenate(
-            [y[one.counted] for y, one in zip(seen, self.experiments, strict=True)]
-        )
-        solution, _ = _solved(np.hstack([past, columns]), target)
+        parts = []
+        for one, part in zip(
+            self.experiments, self._parts(inputs, rest, behind), strict=True
+        ):
+            seen = scipy.signal.lfilter(behind, rest, one.output)
+            past = -_delayed(seen[:, None], 1, rest.size - 1)[one.counted]
+            shared = np.hstack([past, part.shared])
+            parts.append(Equations(shared, part.own, seen[one.counted]))
+        solution = solved(parts).shared
         found = np.concatenate([[1.0], solution[: rest.size - 1]])
         if not np.isfinite(found).all():
             return rest
@@ -188,37 +182,37 @@ class _Iterations:
 
     def _start(self, inputs: Sequence[np.ndarray], rest: np.ndarray) -> Start:
         """Best numerator and initial states for a rest."""
-        solution, cost = self._fitted(inputs, rest)
+        found = self._fitted(inputs, rest)
         nb, n_inputs = self.orders.nb, inputs[0].shape[1]
         values = self.points
         if n_inputs > 1:
-            _, _, right = np.linalg.svd(solution[: nb * n_inputs].reshape(nb, n_inputs))
+            gains = found.shared[: nb * n_inputs].reshape(nb, n_inputs)
+            _, _, right = np.linalg.svd(gains)
             values = right[0]
             inputs = [one @ values[:, None] for one in inputs]
-            solution, cost = self._fitted(inputs, rest)
-        n_state = self.orders.n_state
-        states = np.zeros((len(self.experiments), n_state))
-        if self.has_states:
-            states = solution[nb : nb + states.size].reshape(states.shape)
+            found = self._fitted(inputs, rest)
+        states = np.zeros((len(self.experiments), self.orders.n_state))
         return Start(
-            solution[:nb],
+            found.shared[:nb],
             np.convolve(self.factor, rest),
-            cost,
+            found.cost,
             self.points,
             values,
-            float(solution[-1]) if self._has_level else 0.0,
-            states,
+            float(found.shared[-1]) if self._has_level else 0.0,
+            found.own if self.has_states else states,
             delay=self.orders.nk,
         )
 
-    def _fitted(
-        self, inputs: Sequence[np.ndarray], rest: np.ndarray
-    ) -> tuple[np.ndarray, float]:
-        columns = self._columns(inputs, rest)
+    def _fitted(self, inputs: Sequence[np.ndarray], rest: np.ndarray) -> Solution:
+        parts = self._parts(inputs, rest)
         if self._has_level:
-            columns = np.hstack([columns, np.ones((columns.shape[0], 1))])
-        target = np.concatenate([one.output[one.counted] for one in self.experiments])
-        return _solved(columns, target)
+            parts = [
+                replace(
+                    one, shared=np.hstack([one.shared, np.ones((one.target.size, 1))])
+                )
+                for one in parts
+            ]
+        return solved(parts)
 
     @property
     def _has_level(self) -> bool:
@@ -226,31 +220,30 @@ class _Iterations:
         integrates = abs(self.factor.sum()) < _SINGULAR
         return has_free_shape(self.options.output_map) and not integrates
 
-    def _columns(
+    def _parts(
         self,
         inputs: Sequence[np.ndarray],
         rest: np.ndarray,
         behind: np.ndarray = _ONE,
-    ) -> np.ndarray:
-        """Columns of the numerator and of the initial states of all experiments."""
+    ) -> list[Equations]:
+        """Columns of the numerator and of the initial states, by experiment."""
         orders, denominator = self.orders, np.convolve(self.factor, rest)
-        count = len(self.experiments) if self.has_states else 0
-        rows = []
-        for index, (one, signal) in enumerate(
-            zip(self.experiments, inputs, strict=True)
-        ):
+        parts = []
+        for one, signal in zip(self.experiments, inputs, strict=True):
             driven = scipy.signal.lfilter(behind, denominator, signal, axis=0)
-            own = _delayed(driven, orders.nk, orders.nb)
-            free = np.zeros((one.output.size, count, orders.n_state))
-            if count:
+            own = np.zeros((one.output.size, 0))
+            if self.has_states:
                 pulse = scipy.signal.lfilter(
                     behind, denominator, np.eye(1, one.output.size)[0]
                 )
-                free[:, index] = _delayed(pulse[:, None], 0, orders.n_state)
-            rows.append(
-                np.hstack([own, free.reshape(one.output.size, -1)])[one.counted]
+                own = _delayed(pulse[:, None], 0, orders.n_state)
+            shared = _delayed(driven, orders.nk, orders.nb)
+            parts.append(
+                Equations(
+                    shared[one.counted], own[one.counted], one.output[one.counted]
+                )
             )
-        return np.vstack(rows)
+        return parts
 
 
 def _expanded(signal: np.ndarray, points: np.ndarray) -> np.ndarray:
@@ -269,26 +262,3 @@ def _delayed(signals: np.ndarray, first: int, count: int) -> np.ndarray:
         lag = min(first + k, n)
         result[lag:, k * width : (k + 1) * width] = signals[: n - lag]
     return result
-
-
-def _solved(columns: np.ndarray, target: np.ndarray) -> tuple[np.ndarray, float]:
-    """Least squares of scaled columns; the solution and the squared residual."""
-    scale = np.linalg.norm(columns, axis=0)
-    scale[~(scale > 0.0)] = 1.0
-    if not np.isfinite(scale).all():
-        return np.zeros(scale.size), float("inf")
-    scaled = columns / scale
-    # Products of columns are several times faster than their decomposition; what the first
-    # solution leaves is solved for once more.
-    matrix = scaled.T @ scaled
-    matrix.flat[:: scale.size + 1] += _RIDGE
-    factor, info = scipy.linalg.lapack.dpotrf(matrix, lower=1)
-    if info != 0:
-        return np.zeros(scale.size), float("inf")
-    solution = np.zeros(scale.size)
-    for _ in range(2):
-        rest = scaled.T @ (target - scaled @ solution)
-        solution += scipy.linalg.lapack.dpotrs(factor, rest, lower=1)[0]
-    residual = target - scaled @ solution
-    solution /= scale
-    return solution, float(residual @ residual)
