@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy
 
-from hwid_cli.diagnosis.noise import portmanteau, whiteness
 from hwid_cli.diagnosis.parameters import (
     ParameterLayout,
     ParameterPoint,
@@ -21,6 +20,7 @@ from hwid_cli.diagnosis.parameters import (
 )
 from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals
 from hwid_cli.diagnosis.search import within_bounds
+from hwid_cli.diagnosis.whiteness import portmanteau, whiteness
 from hwid_cli.records.diagnosis import NoiseFloor
 from hwid_cli.records.drive import Drive
 

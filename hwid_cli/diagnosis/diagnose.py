@@ -35,7 +35,7 @@ from hwid_cli.diagnosis.next_experiment import (
     undecided_candidates,
     with_best_lead,
 )
-from hwid_cli.diagnosis.noise import noise_floor, residual_noise, whiteness
+from hwid_cli.diagnosis.noise import noise_floor
 from hwid_cli.diagnosis.parameters import (
     compare_at,
     each_sum_of_squares,
@@ -49,6 +49,7 @@ from hwid_cli.diagnosis.problem import (
     held_out_names,
     prepare,
 )
+from hwid_cli.diagnosis.residual_noise import residual_noise
 from hwid_cli.diagnosis.rounds import (
     OnRound,
     Rounds,
@@ -72,6 +73,7 @@ from hwid_cli.diagnosis.selection import (
 )
 from hwid_cli.diagnosis.verdict import DiagnosisVerdict, decide
 from hwid_cli.diagnosis.where import places
+from hwid_cli.diagnosis.whiteness import whiteness
 from hwid_cli.diagnosis.zeros import with_zeros
 from hwid_cli.drive.catalogue import CATALOGUE, may_be_added, public_id
 from hwid_cli.drive.effect import Scales

@@ -19,7 +19,6 @@ from hwid_cli.diagnosis.covariates import (
     variables,
 )
 from hwid_cli.diagnosis.latent_force import Smoothed, finite, latent_force
-from hwid_cli.diagnosis.noise import whiteness
 from hwid_cli.diagnosis.problem import Compared, Signals
 from hwid_cli.diagnosis.segments import (
     PARTS,
@@ -28,6 +27,7 @@ from hwid_cli.diagnosis.segments import (
     harmonic_columns,
     step_parts,
 )
+from hwid_cli.diagnosis.whiteness import whiteness
 from hwid_cli.records.axis import unit_on
 from hwid_cli.records.diagnosis import LatentForce, NoiseFloor, Place
 from hwid_cli.records.drive import Drive

@@ -17,13 +17,13 @@ from hwid_cli.diagnosis.causes import (
     whiteness_with_input_noise,
     without_repeats,
 )
-from hwid_cli.diagnosis.noise import portmanteau, whiteness
 from hwid_cli.diagnosis.parameters import (
     drive_at,
     first_point,
     parameter_layout,
     residuals_at,
 )
+from hwid_cli.diagnosis.whiteness import portmanteau, whiteness
 from hwid_cli.records.drive import Controller
 from tests.diagnosis.small_drive import (
     DRIVE,

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from hwid_cli.diagnosis.noise import noise_floor, noise_levels, whiteness
+from hwid_cli.diagnosis.noise import noise_floor, noise_levels
+from hwid_cli.diagnosis.whiteness import whiteness
 from hwid_cli.drive.simulation import simulate_drive
 from tests.diagnosis.diagnosed import (
     DRIVE,

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hwid_cli.diagnosis.noise import residual_noise, whiteness
+from hwid_cli.diagnosis.residual_noise import residual_noise
+from hwid_cli.diagnosis.whiteness import whiteness
 from tests.diagnosis.noisy_plants import (
     NOISE,
     SIZES,
