@@ -178,6 +178,15 @@ def test_a_unit_that_contradicts_the_simulation_is_refused_in_one_line(
         assert said in result.stderr
 
 
+def test_what_a_later_stage_refuses_is_refused_before_others_compute(tmp_path):
+    first = (("diagnose: {", "identify: {recordings: [step_04]}\ndiagnose: {"),)
+    path = write_experiment(tmp_path, "time_s,current_A,y [inc]", changed=first)
+    result = run("run", path, "--out", str(tmp_path / "out"))
+    assert result.exit_code == 1
+    assert "'y [inc]' says 'inc'" in result.stderr
+    assert not (tmp_path / "out" / "results.h5").exists()
+
+
 def test_other_stages_do_not_mind(tmp_path):
     path = write_experiment(tmp_path, "time_s,current_A,position [inc]")
     assert run("calibrate", path, "--out", str(tmp_path / "out")).exit_code == 0
