@@ -5,6 +5,7 @@ For ``hwid init``.
 
 import glob
 import re
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
@@ -174,16 +175,9 @@ def guess_layout(files: Sequence[FoundFile]) -> FolderLayout:
     alike = _alike(files)
     if not alike:
         raise MeasurementError(_no_signals(files))
-    typical = alike[0]
+    typical, signals = _typical(alike)
     long_ones = _table(typical)
     scalars = [one for one in typical.columns if one.values.size == 1]
-    try:
-        signals = guess_signals(long_ones)
-    except MeasurementError as error:
-        raise MeasurementError(
-            f"{escaped(typical.name)}: {error}; name the columns in a configuration by "
-            "hand (configs/README.md)"
-        ) from error
     clocks = _clocks(signals.input, signals.output, long_ones, scalars)
     roles = {
         "input": signals.input,
@@ -214,6 +208,31 @@ def guess_layout(files: Sequence[FoundFile]) -> FolderLayout:
     if lacks == _SLOW or layout.parts:
         return layout
     return replace(layout, first_sample=lacks)
+
+
+def _typical(alike: Sequence[FoundFile]) -> tuple[FoundFile, SignalGuess]:
+    """The first file that shows input and output, and which columns these are.
+
+    In a recording that failed a signal may stand still: it tells nothing of the others.
+    """
+    changing = {
+        one.name: {c.place for c in _table(one) if signs.changes(c.values)}
+        for one in alike
+    }
+    counts = Counter(place for places in changing.values() for place in places)
+    usual = {place for place, count in counts.items() if 2 * count > len(alike)}
+    whole = [one for one in alike if usual <= changing[one.name]]
+    others = sorted(alike, key=lambda one: -len(changing[one.name]))
+    fault = ""
+    for file in (*whole, *others):
+        try:
+            return file, guess_signals(_table(file))
+        except MeasurementError as error:
+            fault = fault or f"{escaped(file.name)}: {error}"
+    more = f" (nor do the other {len(alike) - 1} files)" * (len(alike) > 1)
+    raise MeasurementError(
+        f"{fault}{more}; name the columns in a configuration by hand (configs/README.md)"
+    )
 
 
 def _lacking(files: Sequence[FoundFile], signals: Sequence[FoundColumn]) -> int:
