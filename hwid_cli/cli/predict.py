@@ -44,9 +44,7 @@ def predict_file(  # noqa: PLR0913 - one for each option of the command
     card = exported.card
     signal = values * card.input_scale
     predicted = predict(exported, signal, initial_state=initial_state, place=str(model))
-    share, lowest, highest = outside_share(
-        signal, card.input_range, same=SAME_LEVEL
-    )
+    share, lowest, highest = outside_share(signal, card.input_range, same=SAME_LEVEL)
     if share > 0.0:
         low, high = card.input_range
         click.echo(

@@ -118,9 +118,7 @@ def test_a_level_with_its_noise_is_no_input_beyond_the_fit(stored):
             else one
             for one in stored.recordings
         ]
-        calibrated = replace(
-            stored.results["calibrate"], recordings=tuple(recordings)
-        )
+        calibrated = replace(stored.results["calibrate"], recordings=tuple(recordings))
         return answer_of(with_results(stored, calibrate=calibrated)).beyond
 
     assert (beyond(high) == 0.0).all()
