@@ -108,7 +108,9 @@ def _data(experiment: Experiment, folder: Path) -> tuple[Checked, tuple[str, ...
     except HwidError as error:
         problems.append(str(error))
     survey = survey_recordings(experiment, folder)
-    checked = check_recordings(survey.recordings, experiment, survey.jitter)
+    checked = check_recordings(
+        survey.recordings, experiment, survey.jitter, survey.missing
+    )
     problems += [*survey.problems, *checked.problems]
     problems += refused_units(experiment, checked.recordings, checked.logs)
     if checked.facts:

@@ -13,6 +13,7 @@ from hwid_cli.report.closing import (
     closing_text,
     diagnosis_sentence,
     linear_hint,
+    nothing_hint,
     orders_sentence,
 )
 from hwid_cli.simulations.kinds import kind_named
@@ -90,6 +91,8 @@ def _best(session: Session) -> BestModel | None:
 def _hints(session: Session, best: BestModel) -> list[tuple[str, str]]:
     """What may help a model that is not good enough."""
     experiment = session.experiment
+    if not best.is_usable:
+        return [("hint", nothing_hint(str(experiment.source)))]
     if best.is_linear_better:
         return [("hint", linear_hint(str(experiment.source)))]
     if experiment.group is not None or not best.rmsd >= best.threshold:
@@ -124,6 +127,8 @@ def _next(session: Session, name: str, best: BestModel | None) -> str:
         follows = None
     if follows is not None:
         return command_line(session, follows)
+    if best is not None and not best.is_usable:
+        return command_line(session, "check")
     if best is not None and best.is_linear_better:
         return command_line(session, "run" if named(session.experiment) else "crossval")
     if best is not None:

@@ -24,7 +24,7 @@ from hwid_cli.errors import CacheError, HwidError
 from hwid_cli.report.progress import StageProgress
 from hwid_cli.report.table import WIDTH, Block, as_text
 from hwid_cli.stages.stage import Stage
-from hwid_cli.stages.table import named, needed, stage_named
+from hwid_cli.stages.table import STAGES, named, needed, stage_named
 from hwid_cli.store.cache import Hdf5Store
 from hwid_cli.store.result_files import Provenance, current_versions, read_provenance
 from hwid_cli.tasks.runner import RunSettings, TaskDone
@@ -49,7 +49,20 @@ def result_of(session: Session, name: str) -> Any:
     for before in (*needed(name, session.experiment), name):
         if before not in session.results:
             session.results[before] = _run(session, stage_named(before))
+            if before == "calibrate":
+                _refuse_early(session)
     return session.results[name]
+
+
+def _refuse_early(session: Session) -> None:
+    """Let later stages refuse what they would, before others have computed for hours."""
+    for name in session.planned:
+        if name not in STAGES or name in session.results:
+            continue
+        stage = stage_named(name)
+        stage.require(session.experiment)
+        if set(needed(name, session.experiment)) <= set(session.results):
+            stage.choose(context_of(session))
 
 
 def run_command(name: str, choices: Choices) -> None:

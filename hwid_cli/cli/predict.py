@@ -9,7 +9,7 @@ from hwid_cli.export.loading import check_trust
 from hwid_cli.export.predict import predict, predict_band
 from hwid_cli.export.prediction import check_target, read_input, write_prediction
 from hwid_cli.files.messages import escaped
-from hwid_cli.model.input_range import outside_share
+from hwid_cli.model.input_range import SAME_LEVEL, outside_share
 from hwid_cli.records.exported import Exported, ExportedModel
 from hwid_cli.records.maps import OwnFunction
 from hwid_cli.records.units import as_percent, behind
@@ -44,7 +44,7 @@ def predict_file(  # noqa: PLR0913 - one for each option of the command
     card = exported.card
     signal = values * card.input_scale
     predicted = predict(exported, signal, initial_state=initial_state, place=str(model))
-    share, lowest, highest = outside_share(signal, card.input_range)
+    share, lowest, highest = outside_share(signal, card.input_range, same=SAME_LEVEL)
     if share > 0.0:
         low, high = card.input_range
         click.echo(

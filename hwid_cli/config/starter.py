@@ -290,7 +290,7 @@ def _clock_lines(layout: FolderLayout, proposal: Proposal) -> list[str]:
             "true would allow one that jitters."
         ]
     if layout.resample:
-        why = "the time column jitters, or a signal has no number in every row"
+        why = "the time column jitters or lacks samples, or a signal does in some rows"
         if layout.output_time is not None:
             why = "input and output are sampled at their own times"
         lines += [f"  resample: true   # {why}"]

@@ -83,8 +83,8 @@ def run_recipe(draft: Draft) -> Draft:
 
 def _repair(draft: Draft) -> Draft:
     log = draft.log
-    values_in, found_in = _repaired(draft.input, log.first_sample)
-    values_out, found_out = _repaired(draft.output, log.first_sample)
+    values_in, found_in = _repaired(draft.input, log.first_sample, may_hold=True)
+    values_out, found_out = _repaired(draft.output, log.first_sample, may_hold=False)
     log = replace(
         log,
         repaired_input=tuple(sorted({*log.repaired_input, *found_in})),
@@ -93,11 +93,13 @@ def _repair(draft: Draft) -> Draft:
     return replace(draft, input=values_in, output=values_out, log=log)
 
 
-def _repaired(values: np.ndarray, first: int) -> tuple[np.ndarray, list[int]]:
+def _repaired(
+    values: np.ndarray, first: int, *, may_hold: bool
+) -> tuple[np.ndarray, list[int]]:
     """Replace damaged samples until none is left: each one widens the scale."""
     indices: list[int] = []
     for _ in range(MOST_ROUNDS):
-        damaged = find_damaged(values)
+        damaged = find_damaged(values, may_hold=may_hold)
         if damaged.size == 0:
             break
         values = replace_damaged(values, damaged)

@@ -25,7 +25,7 @@ from hwid_cli.errors import MeasurementError
 from hwid_cli.records.starter import FoundColumn, Role
 
 # Jitter up to here is rounding of time stamps; more needs resampling, [-].
-_ROUND_STAMPS = 0.009
+ROUND_STAMPS = 0.009
 # Columns that agree so far may both be the input, noise apart (a correlation), [-].
 _TWINS = 0.9999
 _CURRENT_UNITS = ("a", "ma", "ka")
@@ -146,7 +146,7 @@ def guess_time(columns: Sequence[FoundColumn]) -> TimeGuess:
             continue
         named = "named so, and it grows evenly" if meaning.role else "it grows evenly"
         role = Role(column.key, column.title, unit, named + why)
-        is_rough = clock.jitter > _ROUND_STAMPS
+        is_rough = clock.jitter > ROUND_STAMPS
         return TimeGuess(role, None, is_rough, named + why, notes, column)
     for title, step_s in stated:
         return TimeGuess(None, step_s, False, f"the file's {title}")

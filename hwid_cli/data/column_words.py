@@ -107,7 +107,10 @@ _OUTPUT = [
     "tacho",
     "lvdt",
 ]
-_TIME = ["time", "zeit", "t", "timestamp", "tijd", "secs", "seconds", "sekunden", "sec"]
+_TIME = [
+    *("time", "zeit", "t", "timestamp", "tijd", "secs", "seconds", "sekunden", "sec"),
+    "stamp",
+]
 _REFERENCE = [
     "ref",
     "reference",

@@ -23,6 +23,11 @@ import numpy as np
 
 from hwid_cli.data.cells import is_stamp, is_word
 from hwid_cli.data.columns import ROLES, MeasuredColumn
+from hwid_cli.data.header_stamps import (
+    joined_stamp,
+    split_stamps,
+    with_joined_stamps,
+)
 from hwid_cli.data.table_columns import (
     ColumnParts,
     column_named,
@@ -106,18 +111,29 @@ def read_csv_columns(path: Path, columns: Columns) -> list[tuple[str, MeasuredCo
         role: key for role in ROLES if (key := getattr(columns, role)) is not None
     }
     sheet = _read_sheet(path, [key for key in wanted.values() if isinstance(key, str)])
-    places = {role: _find(sheet, key, role) for role, key in wanted.items()}
+    stamps = split_stamps(sheet.head.names)
+    split = {role: stamps[key] for role, key in wanted.items() if key in stamps}
+    places = {
+        role: _find(sheet, key, role)
+        for role, key in wanted.items()
+        if role not in split
+    }
     if sheet.head.body == len(sheet.rows):
         raise MeasurementError(
             f"{path}: holds a header and no rows; expected rows of numbers; "
             "export the measurement again or leave the file out"
         )
     titles = titles_of(wanted, places)
+    for role, pair in split.items():
+        titles |= dict.fromkeys(pair, f"{role} {wanted[role]!r}")
     # Without a clock, nobody can tell whether a second head begins a second recording.
     read = _read_body(sheet, titles, keep_heads="time" not in wanted)
     return [
-        (role, with_unit(path, read[place], role, sheet.head, place))
-        for role, place in places.items()
+        *(
+            (role, with_unit(path, read[place], role, sheet.head, place))
+            for role, place in places.items()
+        ),
+        *((role, joined_stamp(read[s], read[ns])) for role, (s, ns) in split.items()),
     ]
 
 
@@ -141,7 +157,7 @@ def list_csv_columns(path: Path) -> tuple[FoundColumn, ...]:
     width = max(map(len, sheet.rows[head.body :]))
     places = [place for place in range(width) if place not in head.texts]
     read = _read_body(sheet, {place: f"column {place}" for place in places})
-    return found_columns(read, head)
+    return with_joined_stamps(found_columns(read, head))
 
 
 def _read_sheet(path: Path, wanted: Sequence[str]) -> _Sheet:

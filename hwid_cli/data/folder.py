@@ -5,6 +5,7 @@ For ``hwid init``.
 
 import glob
 import re
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
@@ -15,6 +16,7 @@ import numpy as np
 from hwid_cli.data import column_signs as signs
 from hwid_cli.data.column_roles import (
     FEWEST_SAMPLES,
+    ROUND_STAMPS,
     SignalGuess,
     TimeGuess,
     clocks_of,
@@ -26,7 +28,9 @@ from hwid_cli.data.column_roles import (
 )
 from hwid_cli.data.column_words import counts_recordings, meaning_of
 from hwid_cli.data.formats import SUFFIXES, list_columns, reader_of
+from hwid_cli.data.header_stamps import topic_of
 from hwid_cli.data.recording_files import PLAN_NAME
+from hwid_cli.data.sampling import missing_samples
 from hwid_cli.errors import ConfigError, MeasurementError
 from hwid_cli.files.messages import escaped
 from hwid_cli.records.starter import FolderLayout, FoundColumn, FoundFile, Role
@@ -171,16 +175,9 @@ def guess_layout(files: Sequence[FoundFile]) -> FolderLayout:
     alike = _alike(files)
     if not alike:
         raise MeasurementError(_no_signals(files))
-    typical = alike[0]
+    typical, signals = _typical(alike)
     long_ones = _table(typical)
     scalars = [one for one in typical.columns if one.values.size == 1]
-    try:
-        signals = guess_signals(long_ones)
-    except MeasurementError as error:
-        raise MeasurementError(
-            f"{escaped(typical.name)}: {error}; name the columns in a configuration by "
-            "hand (configs/README.md)"
-        ) from error
     clocks = _clocks(signals.input, signals.output, long_ones, scalars)
     roles = {
         "input": signals.input,
@@ -193,6 +190,7 @@ def guess_layout(files: Sequence[FoundFile]) -> FolderLayout:
     used, left = _sorted_out(files, there, typical)
     layout = _layout(signals, clocks, (_patterns(used, files), left))
     layout = _in_parts(layout, used, there.get("time"))
+    layout = _with_lost_samples(layout, used, there.get("time"))
     if layout.variable == STAR:
         note = (
             "a file holds tables with the same columns: each is a recording; if they are "
@@ -210,6 +208,31 @@ def guess_layout(files: Sequence[FoundFile]) -> FolderLayout:
     if lacks == _SLOW or layout.parts:
         return layout
     return replace(layout, first_sample=lacks)
+
+
+def _typical(alike: Sequence[FoundFile]) -> tuple[FoundFile, SignalGuess]:
+    """The first file that shows input and output, and which columns these are.
+
+    In a recording that failed a signal may stand still: it tells nothing of the others.
+    """
+    changing = {
+        one.name: {c.place for c in _table(one) if signs.changes(c.values)}
+        for one in alike
+    }
+    counts = Counter(place for places in changing.values() for place in places)
+    usual = {place for place, count in counts.items() if 2 * count > len(alike)}
+    whole = [one for one in alike if usual <= changing[one.name]]
+    others = sorted(alike, key=lambda one: -len(changing[one.name]))
+    fault = ""
+    for file in (*whole, *others):
+        try:
+            return file, guess_signals(_table(file))
+        except MeasurementError as error:
+            fault = fault or f"{escaped(file.name)}: {error}"
+    more = f" (nor do the other {len(alike) - 1} files)" * (len(alike) > 1)
+    raise MeasurementError(
+        f"{fault}{more}; name the columns in a configuration by hand (configs/README.md)"
+    )
 
 
 def _lacking(files: Sequence[FoundFile], signals: Sequence[FoundColumn]) -> int:
@@ -300,6 +323,31 @@ def _in_parts(
         f"part_{number}": cut for number, cut in enumerate(long_ones, 1)
     }
     return replace(layout, parts=parts, notes=(*layout.notes, note))
+
+
+def _with_lost_samples(
+    layout: FolderLayout, files: Sequence[FoundFile], time: FoundColumn | None
+) -> FolderLayout:
+    """Resample where any file needs it, and say how many samples are missing."""
+    clocks = [
+        (file.name, column.values)
+        for file in files
+        for column in long_columns(file.columns)
+        if time is not None and column.place == time.place
+    ]
+    ticks = [(name, values, signs.clock_of(values)) for name, values in clocks]
+    is_rough = any(one and one.jitter > ROUND_STAMPS for _, _, one in ticks)
+    lost = {
+        name: count
+        for name, values, one in ticks
+        if one is not None and (count := missing_samples(values))
+    }
+    if not lost:
+        return replace(layout, resample=layout.resample or is_rough)
+    shown = ", ".join(f"{n} in {escaped(name)}" for name, n in list(lost.items())[:4])
+    more = f", and some in {len(lost) - 4} more" if len(lost) > 4 else ""
+    note = f"samples are missing: {shown}{more}; straight lines stand for them"
+    return replace(layout, resample=True, notes=(*layout.notes, note))
 
 
 def _layout(
@@ -433,6 +481,11 @@ def _beside(column: FoundColumn, columns: Sequence[FoundColumn]) -> list[FoundCo
     number = next(n for n, one in enumerate(columns) if one is column)
     clocks = [one for one, _, _ in clocks_of(columns)]
     alike = [one for one in clocks if one.values.size == column.values.size]
+    for one in alike:
+        # When its publisher sampled a message, and not when it was recorded.
+        topic = topic_of(one.title)
+        if topic is not None and column.title.startswith(topic):
+            return [one]
     group = _group_of(column)
     own = [one for one in alike if group and _group_of(one) == group]
     if own:

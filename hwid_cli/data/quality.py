@@ -57,9 +57,9 @@ def quality_notes(values: np.ndarray, *, may_hold: bool = False) -> tuple[str, .
             f"{middle / spread:.3g} standard deviations from zero: take the offset off, "
             "fits with few kinds of maps may miss it"
         )
-    damaged = find_damaged(values).size
+    damaged = find_damaged(values, may_hold=may_hold).size
     if damaged:
-        what = "single sample looks" if damaged == 1 else "single samples look"
+        what = "sample looks" if damaged == 1 else "samples look"
         notes.append(f"{damaged} {what} damaged")
     return tuple(notes)
 

@@ -31,7 +31,7 @@ from hwid_cli.data.recording_files import (
     recordings_base,
     recordings_options,
 )
-from hwid_cli.data.sampling import sample_uniformly
+from hwid_cli.data.sampling import missing_samples, sample_uniformly
 from hwid_cli.data.signal_units import (
     converted,
     reference_unit,
@@ -268,12 +268,15 @@ class Survey:
     jitter : dict of str to float, [-]
         Largest deviation of a step of the time column from the median one, as a share of
         it, by name; without recordings that have no time column.
+    missing : dict of str to int, [samples]
+        Samples that a time column ticks for and the file does not hold, by name.
     """
 
     recordings: tuple[RawRecording, ...]
     problems: tuple[str, ...]
     unusable: tuple[str, ...] = ()
     jitter: dict[str, float] = field(default_factory=dict)
+    missing: dict[str, int] = field(default_factory=dict)
 
 
 def survey_recordings(experiment: Experiment, out: Path) -> Survey:
@@ -298,6 +301,7 @@ def survey_recordings(experiment: Experiment, out: Path) -> Survey:
     read: list[RawRecording] = []
     short: list[checks.ShortRecordingError] = []
     jitter: dict[str, float] = {}
+    missing: dict[str, int] = {}
     for path, own in by_path.items():
         columns = plan = None
         with _noting(problems):
@@ -312,21 +316,25 @@ def survey_recordings(experiment: Experiment, out: Path) -> Survey:
                 raw = _read_part(part, table, plan, experiment)
                 read.append(replace(raw, sha256=file_sha256(path)))
                 if (time := cut_part(table, part).time) is not None:
-                    jitter[part.name] = _jitter(time.values)
+                    stamps = time.values[np.isfinite(time.values)]
+                    missing[part.name] = missing_samples(stamps)
+                    jitter[part.name] = _jitter(stamps, has_gaps=missing[part.name] > 0)
     if short:
         problems.append(checks.short_recordings_line(short))
     common = _of_one_clock(read, experiment, problems)
     common.sort(key=lambda recording: KINDS.index(recording.kind))
     good = {recording.name for recording in common}
     bad = tuple(part.name for part in parts if part.name not in good)
-    return Survey(tuple(common), tuple(problems), bad, jitter)
+    return Survey(tuple(common), tuple(problems), bad, jitter, missing)
 
 
-def _jitter(stamps: np.ndarray) -> float:
+def _jitter(stamps: np.ndarray, *, has_gaps: bool) -> float:
     """Largest deviation of a step from the median one, as a share of it."""
-    steps = np.diff(stamps[np.isfinite(stamps)])
-    median = float(np.median(steps))
-    return float(np.max(np.abs(steps - median))) / median
+    steps = np.diff(stamps)
+    steps = steps / float(np.median(steps))
+    # Over a gap, from so many steps as are in there.
+    ticks = np.maximum(np.round(steps), 1.0) if has_gaps else 1.0
+    return float(np.max(np.abs(steps - ticks)))
 
 
 def _of_one_clock(

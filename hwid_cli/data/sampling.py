@@ -95,7 +95,8 @@ def sample_uniformly(
         raise MeasurementError(
             f"{place_of(path, time, index + 1)}: time steps by {steps[index]:.6g} s, "
             f"from {time.values[index]:.9g} s to {time.values[index + 1]:.9g} s; "
-            f"expected {median:.6g} s within {options.sampling_tolerance:.3g} of it; "
+            f"expected {median:.6g} s within {options.sampling_tolerance:.3g} of it"
+            f"{_lost(time.values)}; "
             "set recordings.resample: true, or raise recordings.sampling_tolerance"
         )
     step = options.sample_time_s or _grid_step(time.values, median)
@@ -107,7 +108,48 @@ def sample_uniformly(
         int(jumps.sum()),
         steps.size,
     )
+    if lost := missing_samples(time.values):
+        _log.warning(
+            "%s: %d samples are missing of %d; straight lines stand for them",
+            path,
+            lost,
+            time.values.size + lost,
+        )
     return _resample(columns, time.values, step), step
+
+
+def missing_samples(stamps: np.ndarray) -> int:
+    """Count the samples that a clock has ticked for and a file does not hold.
+
+    Parameters
+    ----------
+    stamps : ndarray, shape (n,), [any unit of time]
+        Growing; of a clock that scatters as well as of one that is exact.
+
+    Returns
+    -------
+    int, [-]
+
+    Examples
+    --------
+    >>> missing_samples(np.array([0.0, 1.0, 2.0, 5.0, 6.0, 7.0, 8.0, 9.0]))
+    2
+    """
+    steps = np.diff(stamps)
+    if steps.size == 0 or not (steps > 0).all():
+        return 0
+    step = _grid_step(stamps, float(np.median(steps)))
+    # A late stamp makes one step long and the next one short: these cancel, but for
+    # their rounding, which the whole duration does not know.
+    single = np.sum(np.round(steps / step) - 1.0)
+    whole = np.round((stamps[-1] - stamps[0]) / step) - steps.size
+    return max(int(min(single, whole)), 0)
+
+
+def _lost(stamps: np.ndarray) -> str:
+    count = missing_samples(stamps)
+    are = "sample is" if count == 1 else "samples are"
+    return f" ({count} {are} missing in the file)" if count else ""
 
 
 def _without_second_clock(columns: FileColumns) -> FileColumns:

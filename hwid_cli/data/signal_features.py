@@ -1,15 +1,18 @@
 """What calibration must know about a signal: damage, onset, period, mean over a period.
 
 A raw record begins with a lead-in at rest, carries constant offsets, and holds a few
-single damaged samples. These functions find them; ``calibration`` makes recipes of them.
+damaged samples, alone or two side by side. These functions find them; ``calibration``
+makes recipes of them.
 
-Limits: two damaged samples side by side are not single and stay; a lead-in shorter
-than ``LEAST_QUIET`` samples is not seen; a period needs two level crossings.
+Limits: three damaged samples side by side stay; a lead-in shorter than ``LEAST_QUIET``
+samples is not seen; a period needs two level crossings.
 docs/method_calibration.md gives the equations and the reasoning.
 """
 
 import numpy as np
 import scipy
+
+from hwid_cli.data.column_signs import held_share
 
 # Median absolute deviation to standard deviation of a normal distribution, [-].
 MAD_TO_SIGMA = 1.4826
@@ -33,6 +36,14 @@ CORNER_SHARE = 0.3
 # Window of the local error scale, [samples]: much longer than one damaged sample with
 # its neighbours (5), much shorter than a record.
 LOCAL_WINDOW = 41
+
+# Weights of the samples at -2, -1, 2 and 3 in the cubic through them at 0, [-]; at 1 they
+# stand in the reverse order.
+PAIR_WEIGHTS = (-0.3, 1.0, 0.5, -0.2)
+# Nearer than this to a pair's first sample others spoil its neighbours, [samples].
+PAIR_REACH = 4
+# A signal that repeats its value for more of the time holds levels, [-].
+HOLDS_LEVELS = 0.5
 
 # 80 % of normal deviates lie within this many standard deviations, [-]. In 20 samples
 # this knows the noise better than their median, and still ignores one damaged sample.
@@ -61,12 +72,82 @@ PERIOD_SPREAD = 0.25
 MISSING_SHARE = 0.02
 
 
-def find_damaged(values: np.ndarray) -> np.ndarray:
-    """Find single damaged samples.
+def find_damaged(values: np.ndarray, *, may_hold: bool = True) -> np.ndarray:
+    """Find damaged samples, alone or two side by side.
 
     Parameters
     ----------
     values : ndarray, shape (n_samples,), [any]
+    may_hold : bool
+        Whether two equal samples may be a short level on purpose, as in an input.
+
+    Returns
+    -------
+    ndarray of int, shape (n_damaged,), [samples]
+        In their order; what is alone does not stand beside a pair.
+
+    References
+    ----------
+    docs/method_calibration.md, eqs. (C1), (C2), (C2a).
+    """
+    single = _single_damaged(values)
+    pairs = _damaged_pairs(values, may_hold=may_hold)
+    # What is found alone is surer: it has good samples on both sides.
+    apart = [
+        first
+        for first in pairs.tolist()
+        if not np.any(np.abs(single - first - 0.5) < PAIR_REACH)
+        and np.sum(np.abs(pairs - first) < PAIR_REACH) == 1
+    ]
+    return np.sort([*single, *apart, *(first + 1 for first in apart)]).astype(int)
+
+
+def _damaged_pairs(values: np.ndarray, *, may_hold: bool) -> np.ndarray:
+    """First samples of damaged pairs: the same conditions as for a single one.
+
+    Both samples lie far from the cubic and from the lines through two good ones on each
+    side.
+    """
+    if values.size < 6:
+        return np.zeros(0, dtype=int)
+    a, b, c, d = values[:-5], values[1:-4], values[4:-1], values[5:]
+    both = np.array([values[2:-3], values[3:-2]])
+    from_left = np.array([2.0 * b - a, 3.0 * b - 2.0 * a])
+    from_right = np.array([3.0 * c - 2.0 * d, 2.0 * c - d])
+    low, high = np.minimum(from_left, from_right), np.maximum(from_left, from_right)
+    # The first and the last samples begin no pair with neighbours.
+    error, beyond, disagreement, bend = np.zeros((4, values.size))
+    inner = slice(2, -3)
+    error[inner] = np.abs(both - _pair_of(values)).min(axis=0)
+    beyond[inner] = np.maximum(both - high, low - both).min(axis=0)
+    disagreement[inner] = (high - low).max(axis=0)
+    bend[inner] = np.abs((d - c) - (b - a))
+    limit = _limit(error, values)
+    agree = disagreement < np.maximum(
+        NEIGHBOURS_AGREE * beyond, USUAL_DISAGREEMENT * _local_median(disagreement)
+    )
+    is_far = (error > limit) & (beyond > limit) & (beyond > CORNER_SHARE * bend)
+    if may_hold or held_share(values) > HOLDS_LEVELS:
+        apart = np.abs(np.diff(values, append=values[-1]))
+        is_far &= apart > NEIGHBOURS_AGREE * beyond
+    return np.flatnonzero(is_far & agree)
+
+
+def _pair_of(values: np.ndarray) -> np.ndarray:
+    """Values of the cubic through i-2, i-1, i+2, i+3 at i and i+1, for every inner i."""
+    around = np.array([values[:-5], values[1:-4], values[4:-1], values[5:]])
+    weights = np.array(PAIR_WEIGHTS)
+    return np.array([weights @ around, weights[::-1] @ around])
+
+
+def _limit(error: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Distance from the cubic beyond which a sample is damaged, at each sample."""
+    scale = MAD_TO_SIGMA * np.maximum(_local_median(error), np.median(error))
+    return np.maximum(DAMAGE_SIGMA * scale, DAMAGE_SHARE * _robust_range(values))
+
+
+def _single_damaged(values: np.ndarray) -> np.ndarray:
+    """Find single damaged samples.
 
     Returns
     -------
@@ -75,10 +156,6 @@ def find_damaged(values: np.ndarray) -> np.ndarray:
         each side, and far beyond the straight lines through the two on the left and the
         two on the right, while these lines agree. Far is measured in usual distances
         from the cubic. What the rounded corner of a ramp shows is not far.
-
-    References
-    ----------
-    docs/method_calibration.md, eqs. (C1), (C2).
     """
     if values.size < 5:
         return np.zeros(0, dtype=int)
@@ -92,8 +169,7 @@ def find_damaged(values: np.ndarray) -> np.ndarray:
         values[2:-2] - np.maximum(from_left, from_right),
         np.minimum(from_left, from_right) - values[2:-2],
     )
-    scale = MAD_TO_SIGMA * np.maximum(_local_median(error), np.median(error))
-    limit = np.maximum(DAMAGE_SIGMA * scale, DAMAGE_SHARE * _robust_range(values))
+    limit = _limit(error, values)
     agree = disagreement < np.maximum(
         NEIGHBOURS_AGREE * beyond, USUAL_DISAGREEMENT * _local_median(disagreement)
     )
@@ -124,7 +200,7 @@ def _local_median(values: np.ndarray) -> np.ndarray:
 
 
 def replace_damaged(values: np.ndarray, damaged: np.ndarray) -> np.ndarray:
-    """Replace single samples by the cubic through two neighbours on each side.
+    """Replace samples by the cubic through two good neighbours on each side.
 
     Parameters
     ----------
@@ -138,6 +214,10 @@ def replace_damaged(values: np.ndarray, damaged: np.ndarray) -> np.ndarray:
     """
     repaired = values.copy()
     repaired[damaged] = _cubic_through_neighbours(values)[damaged - 2]
+    pairs = damaged[:-1][np.diff(damaged) == 1]
+    if pairs.size:
+        first, second = _pair_of(values)
+        repaired[pairs], repaired[pairs + 1] = first[pairs - 2], second[pairs - 2]
     return repaired
 
 

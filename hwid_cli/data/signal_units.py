@@ -5,6 +5,8 @@ units, an attribute, the name of the column), ``recordings.input_unit`` and
 ``output_unit``. Time is always converted to seconds. Input and output are converted where
 the configuration has a simulation, whose numbers are SI, or says ``recordings.units``;
 else units are labels. What cannot be converted keeps its own unit: a diagnosis refuses it.
+A column whose file names a unit of another quantity than ``recordings.units`` is refused:
+most likely another column was meant.
 """
 
 from collections.abc import Sequence
@@ -106,10 +108,16 @@ def signal_unit(
     ----------
     role : str
         ``input`` or ``output``.
+
+    Raises
+    ------
+    MeasurementError
+        If the file and ``recordings.units`` name units of different quantities.
     """
     options, simulation = experiment.recordings, experiment.simulation
     if options is None:
         raise ValueError("an experiment without recordings has no signals")
+    _refuse_other_quantity(column, role, experiment.source, options)
     label = getattr(options, f"{role}_unit")
     given, said_by = _given(column, role, options)
     if given and is_unitless(given):
@@ -125,6 +133,23 @@ def signal_unit(
     if factor is None:
         return SignalUnit(role, given, said_by, given)
     return SignalUnit(role, given, said_by, target, factor)
+
+
+def _refuse_other_quantity(
+    column: MeasuredColumn, role: str, source: str, options: RecordingsOptions
+) -> None:
+    """Refuse a column that measures something else than the configuration says."""
+    stated = getattr(options.units, role)
+    own, wanted = quantity_of(column.unit), quantity_of(stated or "")
+    if not own or not wanted or own == wanted:
+        return
+    raise MeasurementError(
+        f"{source}: recordings.units.{role}: found {stated!r}, but "
+        f"{column.unit_said_by} says that {column.title} is in {column.unit!r}; expected "
+        f"a unit of the same quantity; name another column in recordings.columns, or "
+        f"correct the unit; if the file is wrong, say recordings.{role}_unit: {stated} "
+        "in place of it"
+    )
 
 
 def _unit_of(

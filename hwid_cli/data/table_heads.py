@@ -44,7 +44,7 @@ _SCALE_WORDS = frozenset(
         *("skalierungsfaktor", "umrechnungsfaktor", "resolution", "auflösung", "lsb"),
     ]
 )
-_TIME_WORDS = frozenset(("time", "zeit", "timestamp", "t", "x"))
+_TIME_WORDS = frozenset(("time", "zeit", "timestamp", "t", "x", "xvalue"))
 _INTERVAL_WORDS = frozenset(
     [
         *("ts", "dt", "h", "tsamp", "sampletime", "samplingtime", "samplingperiod"),
@@ -317,6 +317,8 @@ def _name_row(
         key = _letters(next(cell for cell in row if cell))
         # In front of the columns, or of each pair of them, stands what a row is about.
         is_about = bool(row[0]) and (0 not in numeric or row.count(row[0]) > 1)
+        # A word for time in front of each pair is the name of its clock.
+        is_about &= 0 not in numeric or key not in _TIME_WORDS
         is_about |= key in _OTHER_WORDS | _SCALE_WORDS
         states_clock = key in _INTERVAL_WORDS | _RATE_WORDS
         is_about |= states_clock and all(map(is_quantity, filter(None, row[1:])))

@@ -1,7 +1,8 @@
 """Which input would separate two candidates, by simulation of both.
 
 The rival may adapt its parameters: what its derivatives can absorb of the difference
-does not count. The input of the menu that leaves most is proposed.
+does not count. The input of the menu that leaves most is proposed, if a recording of it
+shows that through the noise.
 docs/method_diagnosis.md, eq. (D26).
 """
 
@@ -19,7 +20,7 @@ from hwid_cli.diagnosis.parameters import (
 )
 from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals
 from hwid_cli.diagnosis.search import derivatives
-from hwid_cli.diagnosis.selection import SelectionCriteria, title_of
+from hwid_cli.diagnosis.selection import TIE, SelectionCriteria, title_of
 from hwid_cli.diagnosis.verdict import DiagnosisVerdict
 from hwid_cli.drive.effect import Scales
 from hwid_cli.drive.simulation import Motion
@@ -32,6 +33,8 @@ UNDECIDED = ("ambiguous", "unknown")
 # Samples of a proposed recording.
 _MOST_SAMPLES = 6000
 _PERIODS = 12
+# Share of the sample rate up to which the recordings show a frequency well, [-].
+HIGHEST_SHARE = 0.1
 
 
 def propose(
@@ -51,7 +54,7 @@ def propose(
     Returns
     -------
     NextExperiment
-        With an empty input where none is needed.
+        With an empty input where none is needed, or none would tell.
     """
     if verdict.word not in UNDECIDED:
         return NextExperiment("", "the recordings decide; no further one is needed")
@@ -67,11 +70,63 @@ def propose(
     best = best_separation(problem, models[0], models[1], scales)
     # The dash of a dimensionless output would be a minus behind a number.
     by = f"{best.rms:.2g}{behind(problem.unit)}"
+    names = f"{title_of(pair[0])} and {title_of(pair[1])}"
+    ratio = best.rms / max(criteria.noise.rms, 1e-300)
+    least = least_separation(best.n_samples)
+    if ratio < least:
+        return NextExperiment(
+            "",
+            f"no input of the size of these recordings tells {names} apart through the "
+            f"noise (the best, {best.input}, makes them differ by {ratio:.2g} times the "
+            f"noise; {least:.2g} is needed); larger inputs or a quieter sensor may",
+        )
     return NextExperiment(
         best.input,
-        f"{title_of(pair[0])} and {title_of(pair[1])} then differ by {by} "
-        f"({best.rms / max(criteria.noise.rms, 1e-300):.2g} times the noise) after the "
-        "parameters have been fitted again",
+        f"{names} then differ by {by} ({times_the_noise(ratio, least, best.n_samples)}) "
+        "after the parameters have been fitted again",
+    )
+
+
+def least_separation(n_samples: int) -> float:
+    """Least difference of candidates that a further recording shows through its noise.
+
+    Parameters
+    ----------
+    n_samples : int, [samples]
+        Of that recording.
+
+    Returns
+    -------
+    float, [-]
+        Over the noise of a sample: many samples show what a single one hides.
+
+    References
+    ----------
+    docs/method_diagnosis.md, eq. (D26a).
+
+    Examples
+    --------
+    >>> round(least_separation(600), 2)
+    0.1
+    """
+    return float(np.sqrt(TIE / n_samples))
+
+
+def times_the_noise(ratio: float, least: float, n_samples: int) -> str:
+    """Words for a difference; one below the noise of a sample says why it is seen.
+
+    Examples
+    --------
+    >>> times_the_noise(5.0, 0.11, 500)
+    '5 times the noise'
+    >>> times_the_noise(0.4, 0.11, 500)
+    '0.4 times the noise of a sample; over 500 samples 0.11 times is seen'
+    """
+    if ratio >= 1.0:
+        return f"{ratio:.2g} times the noise"
+    return (
+        f"{ratio:.2g} times the noise of a sample; over {n_samples} samples {least:.2g} "
+        "times is seen"
     )
 
 
@@ -147,10 +202,13 @@ class Separation:
         In words.
     rms : float, [output unit]
         Difference that the rival cannot absorb.
+    n_samples : int, [samples]
+        Of the recording.
     """
 
     input: str
     rms: float
+    n_samples: int
 
 
 def best_separation(
@@ -167,7 +225,7 @@ def best_separation(
         For the drive.
     """
     found = [
-        Separation(name, separation(problem, favourite, rival, command))
+        Separation(name, separation(problem, favourite, rival, command), command.size)
         for name, command in menu(scales).items()
     ]
     return max(found, key=lambda item: item.rms)
@@ -268,15 +326,19 @@ def menu(scales: Scales) -> dict[str, np.ndarray]:
     inputs[f"a slow triangle of {0.3 * size:.3g} A, once to each side"] = (
         0.3 * size * _triangle(n, rest)
     )
+    highest = HIGHEST_SHARE / step
     for factor in (0.15, 0.7, 1.0, 2.5, 6.0):
         frequency = factor * natural
-        if frequency < 0.3 / step:
+        if frequency <= highest:
             inputs[f"a sine of {size:.3g} A at {frequency:.3g} Hz"] = size * np.sin(
                 2 * np.pi * frequency * time
             )
-    inputs[f"a small sine of {0.1 * size:.3g} A at {natural:.3g} Hz"] = (
-        0.1 * size * np.sin(2 * np.pi * natural * time)
-    )
+    if natural <= highest:
+        inputs[f"a small sine of {0.1 * size:.3g} A at {natural:.3g} Hz"] = (
+            0.1 * size * np.sin(2 * np.pi * natural * time)
+        )
+    if 0.7 * natural > highest:
+        return inputs
     biased = 0.6 * size + 0.3 * size * np.sin(2 * np.pi * 0.7 * natural * time)
     inputs[
         f"a sine of {0.3 * size:.3g} A at {0.7 * natural:.3g} Hz around {0.6 * size:.3g} A"

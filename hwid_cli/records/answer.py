@@ -47,7 +47,7 @@ class ModelAnswer:
     input_range : tuple of float, [input unit]
         What the input has visited in the fit.
     beyond : ndarray, shape (m,), [-]
-        Share of the samples whose input lies outside of that.
+        Share of the samples whose input lies outside of that by more than its noise.
     threshold : float, [unit]
         NaN where there is none.
     advice : OrderChoice or None

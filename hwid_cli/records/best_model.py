@@ -34,6 +34,9 @@ class BestModel:
         empty where there is none.
     single_rmsd : float, [unit]
         Its mean over the same recordings.
+    fit_percent, linear_fit_percent : float, [%]
+        Medians over ``judged_on`` of the model and of the linear one; NaN where that is
+        not known.
     """
 
     name: str
@@ -46,6 +49,8 @@ class BestModel:
     linear_rmsd: float = float("nan")
     single: str = ""
     single_rmsd: float = float("nan")
+    fit_percent: float = float("nan")
+    linear_fit_percent: float = float("nan")
 
     def __post_init__(self) -> None:
         if self.judge not in JUDGES:
@@ -62,3 +67,9 @@ class BestModel:
         if self.judge == "own" or not isfinite(self.linear_rmsd):
             return False
         return not self.rmsd <= self.linear_rmsd
+
+    @property
+    def is_usable(self) -> bool:
+        """Whether the better of both is no worse than the mean of these recordings."""
+        fit = self.linear_fit_percent if self.is_linear_better else self.fit_percent
+        return not fit < 0.0

@@ -78,6 +78,8 @@ def best_model_sentences(best: BestModel) -> list[str]:
         "own": f"its own {many} ({which}); no other has judged it",
     }[best.judge]
     mean = "mean RMSD" if len(best.judged_on) > 1 else "RMSD"
+    if not best.is_usable:
+        return _nothing_to_take(best, on)
     if best.is_linear_better:
         return _linear_sentences(best, mean, on)
     said = [f"{best.name}: {mean} {with_unit(best.rmsd, best.unit)} on {on}"]
@@ -90,6 +92,32 @@ def best_model_sentences(best: BestModel) -> list[str]:
         single = with_unit(best.single_rmsd, best.unit)
         said.append(f"joining recordings {helps} here: {best.single} alone {single}")
     return said
+
+
+def _nothing_to_take(best: BestModel, on: str) -> list[str]:
+    """Say that the mean of the output would be closer than any model."""
+    linear = best.linear_fit_percent
+    also = f", the linear one {_percent(linear)}" if np.isfinite(linear) else ""
+    return [
+        f"no model predicts these recordings: {best.name} has a fit of "
+        f"{_percent(best.fit_percent)}{also} on {on}; a constant has 0 %"
+    ]
+
+
+def nothing_hint(source: str) -> str:
+    """Say what to look at where no model predicts anything."""
+    return (
+        f"in {source} look at columns, signs and units (recordings:), at delays and orders "
+        "(fit.delays, orders:), and whether the recordings that judge go where the others "
+        "have never been"
+    )
+
+
+def _percent(value: float) -> str:
+    """Write a share that is a percentage already; an output that is not finite has none."""
+    if not np.isfinite(value):
+        return "no finite output"
+    return f"{value:.1f}\N{NO-BREAK SPACE}%"
 
 
 def _linear_sentences(best: BestModel, mean: str, on: str) -> list[str]:

@@ -64,7 +64,7 @@ def cross_table(matrix: RmsdMatrix) -> Table:
     )
     columns = (*texts("model"), *numbers(*matrix.recordings))
     caption = (
-        f"Widest model of each recording on all recordings: RMSD [{matrix.unit}], * below "
+        f"For each recording its model that covers most: RMSD [{matrix.unit}], * below "
         f"{matrix.threshold:g}"
     )
     return Table(

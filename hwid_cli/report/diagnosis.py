@@ -283,6 +283,8 @@ def closing_sentences(diagnosis: Diagnosis) -> list[str]:
         parts = [one.strip().rstrip(".") for one in (following.input, following.reason)]
         text = " - ".join(part for part in parts if part)
         lines.append(f"Next experiment: {text}.")
+    elif following.reason and diagnosis.verdict in ("ambiguous", "unknown"):
+        lines.append(f"Next experiment: none; {following.reason.strip().rstrip('.')}.")
     if diagnosis.not_observable:
         names = "; ".join(one.rstrip(".") for one in diagnosis.not_observable)
         lines.append(f"Cannot be seen in these recordings: {names}.")

@@ -28,6 +28,7 @@ from hwid_cli.report.page import Answer, Drawing, Section
 from hwid_cli.report.sections.about import about_section
 from hwid_cli.report.sections.summary import summary_section
 from hwid_cli.report.table import shown_part
+from hwid_cli.report.terms import explanation
 
 TEMPLATE = "report.html"
 _SECTIONS = "hwid_cli.report.sections"
@@ -94,6 +95,9 @@ def _html(contents: ReportContents, sections: Iterable[Section]) -> str:
     environment.filters["laid_out"] = dot_drawing
     environment.filters["shown"] = lambda table: shown_part(
         table, is_screen=False, thesis_names=contents.stored.thesis_names
+    )
+    environment.filters["explained"] = lambda table: explanation(
+        table, contents.stored.nk_role
     )
     # Every copy of uPlot carries its licence.
     licence = Markup("/*\n{}\n*/\n").format(_shipped((_LICENCE,)))

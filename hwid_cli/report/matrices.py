@@ -9,6 +9,7 @@ from hwid_cli.records.report import OrderGrid, RmsdMatrix
 from hwid_cli.records.units import behind
 from hwid_cli.report.formats import MISSING
 from hwid_cli.report.table import Cell, Column, Row, Table
+from hwid_cli.report.terms import NK_WORDS
 
 # Digits of a power of ten.
 _RAISED = str.maketrans(
@@ -77,10 +78,10 @@ def order_grid_table(grid: OrderGrid, place: int) -> Table:
         )
         for nb, row in zip(grid.nb, values, strict=True)
     )
-    axis = "poles" if grid.nk_role == "poles" else "delay"
+    axis = NK_WORDS.get(grid.nk_role, grid.nk_role)
     return Table(
-        f"{grid.recordings[place]}: RMSD{unit} on the own recording over nb and nk ({axis}); "
-        "darker is better, the frame is the best",
+        f"{grid.recordings[place]}: RMSD{unit} on the own recording over nb (coefficients of "
+        f"the numerator) and nk ({axis}); darker is better, the frame is the best",
         (
             Column("nb \\ nk", is_text=True),
             *(Column(f"nk = {nk}") for nk in grid.nk),

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from hwid_cli.model.input_range import SAME_LEVEL, outside_share
 from hwid_cli.model.scores import fit_percent, rmsd
 from hwid_cli.model.simulate import validation_output
 from hwid_cli.records.answer import ChosenMaps, ModelAnswer
@@ -147,5 +148,5 @@ def _visited(found: Fit, recordings: Sequence[Recording]) -> tuple[float, float]
 
 
 def _beyond(visited: tuple[float, float], recording: Recording) -> float:
-    low, high = visited
-    return float(np.mean((recording.input < low) | (recording.input > high)))
+    share, *_ = outside_share(recording.input, visited, same=SAME_LEVEL)
+    return share

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from hwid_cli.model.scores import rmsd
+from hwid_cli.model.scores import fit_percent, rmsd
 from hwid_cli.model.simulate import validation_output
 from hwid_cli.records.best_model import BestModel
 from hwid_cli.records.groups import FinalTest, GroupSearch
@@ -152,7 +152,9 @@ def beside_linear(
     recordings: Sequence[Recording],
     store: Store,
 ) -> BestModel:
-    """Put the linear model of the same orders and recordings beside a model.
+    """Put the fit on new recordings, and that of a linear model, beside a model.
+
+    The linear one has the same orders and was fitted to the same recordings.
 
     Parameters
     ----------
@@ -161,12 +163,13 @@ def beside_linear(
     recordings : sequence of Recording
         All of them.
     store : Store
-        Keeps what the linear model gave.
+        Keeps what both gave.
 
     Returns
     -------
     BestModel
-        Without a linear model where its own recording judges, or there is none.
+        As it was where its own recording judges; without a linear model where there is
+        none.
     """
     if best.judge == "own" or best.name not in fits:
         return best
@@ -181,25 +184,40 @@ def beside_linear(
         "orders": fit.orders,
         "options": fit.options,
     }
-    key = task_key("linear_beside", STAGE_VERSION, settings, [])
-    found = remembered(
-        store,
-        key,
-        _LinearModel,
-        lambda: _LinearModel(_mean_rmsd(linear_beside(fit, recordings), judges)),
+    key = task_key("fits_beside", STAGE_VERSION, settings, [])
+
+    def compare() -> _OnJudges:
+        linear, percent = _scores(linear_beside(fit, recordings), judges)
+        return _OnJudges(linear, percent, _scores(fit.model, judges)[1])
+
+    found = remembered(store, key, _OnJudges, compare)
+    beside = replace(best, fit_percent=found.fit_percent)
+    if np.isnan(found.linear_rmsd):
+        return beside
+    return replace(
+        beside,
+        linear_rmsd=found.linear_rmsd,
+        linear_fit_percent=found.linear_fit_percent,
     )
-    return best if np.isnan(found.rmsd) else replace(best, linear_rmsd=found.rmsd)
 
 
 @dataclass(frozen=True)
-class _LinearModel:
-    """Mean RMSD of a linear model on the recordings that judge; NaN without a model."""
+class _OnJudges:
+    """What models do on the recordings that judge; NaN without a model."""
 
-    rmsd: float
+    linear_rmsd: float
+    linear_fit_percent: float
+    fit_percent: float
 
 
-def _mean_rmsd(model: HammersteinWiener | None, judges: Sequence[Recording]) -> float:
+def _scores(
+    model: HammersteinWiener | None, judges: Sequence[Recording]
+) -> tuple[float, float]:
+    """Mean RMSD and median fit percent."""
     if model is None:
-        return np.nan
-    deviations = [rmsd(one.output, validation_output(model, one)) for one in judges]
-    return float(np.mean(deviations))
+        return np.nan, np.nan
+    outputs = [(one.output, validation_output(model, one)) for one in judges]
+    percents = np.array([fit_percent(*one) for one in outputs])
+    known = percents[np.isfinite(percents)]
+    median = float(np.median(known)) if known.size else np.nan
+    return float(np.mean([rmsd(*one) for one in outputs])), median

@@ -1,7 +1,7 @@
 """Stage ``calibrate``: raw measurements in, recordings of equal length out.
 
-Each kind of recording has a recipe of steps (``data/calibration.py``). Single damaged
-samples are replaced before the first step and listed in the log. A recipe is repeated
+Each kind of recording has a recipe of steps (``data/calibration.py``). Damaged samples,
+alone or two side by side, are replaced before the first step and listed in the log. A recipe is repeated
 until it changes nothing, so that calibrating a calibrated recording gives the same
 recording.
 """
@@ -41,7 +41,7 @@ from hwid_cli.store.results import read_calibrated, write_calibrated
 from hwid_cli.tasks.cache import task_key
 
 NAME = "calibrate"
-STAGE_VERSION = 3
+STAGE_VERSION = 4
 
 # Two passes settle nearly every recording (the second one changes nothing); noise at a
 # threshold may take one or two more.

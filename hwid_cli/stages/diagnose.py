@@ -51,6 +51,7 @@ from hwid_cli.stages.simulation_units import (
     assumed_units,
     doubtful_sizes,
     in_simulation_units,
+    refused_sizes,
     refused_units,
 )
 from hwid_cli.stages.stage import Context, Planning, Runner, Stage, in_results
@@ -306,7 +307,18 @@ def choose(context: Context) -> ToDiagnose:
         train on, or a signal is in a unit that contradicts the simulation.
     """
     calibrated = context.results["calibrate"]
-    return given_by(context.experiment, calibrated.recordings, calibrated.logs)
+    given = given_by(context.experiment, calibrated.recordings, calibrated.logs)
+    if isinstance(given.simulation, SimulationOptions):
+        refused = refused_sizes(
+            given.experiment,
+            given.recordings,
+            given.simulation,
+            given.options,
+            given.logs,
+        )
+        if refused:
+            raise ConfigError(refused)
+    return given
 
 
 def given_by(

@@ -19,7 +19,11 @@ import numpy as np
 
 from hwid_cli.data.recording_plan import read_plan
 from hwid_cli.diagnosis.hidden import LEAST_SHOWN, HiddenEffect
-from hwid_cli.diagnosis.next_experiment import UNDECIDED
+from hwid_cli.diagnosis.next_experiment import (
+    UNDECIDED,
+    least_separation,
+    times_the_noise,
+)
 from hwid_cli.errors import ConfigError
 from hwid_cli.model.extrapolation import outlined_model
 from hwid_cli.model.scores import rmsd
@@ -60,10 +64,7 @@ from hwid_cli.trust.designs import LEAST_SAMPLES, designs
 from hwid_cli.trust.visited import N_BANDS
 
 NAME = "next"
-STAGE_VERSION = 3
-# Separation of candidates, in standard deviations of the noise, below which a recording
-# does not tell them apart.
-LEAST_SEPARATION = 0.1
+STAGE_VERSION = 4
 # Hidden effects that a reason names.
 _NAMED_EFFECTS = 3
 
@@ -280,23 +281,28 @@ def _for_diagnosis(given: ToChoose, runner: Runner) -> _Choice:
         return _Choice(float(len(found.titles)), words, sentence, ())
     order = np.argsort(-found.ratios, kind="stable")[: given.options.number]
     names = " and ".join(found.titles)
+    sizes = [one.values.size for one in given.offered]
+    least = [least_separation(size) for size in sizes]
     proposals = tuple(
         _proposal(
             given.offered[place],
-            float(found.ratios[place]),
+            float(ratio),
             "times the noise",
-            f"makes {names} differ by at least {found.ratios[place]:.2g} times the noise "
-            "after their parameters have been fitted again",
+            f"makes {names} differ by at least "
+            f"{times_the_noise(ratio, least[place], sizes[place])} after their parameters "
+            "have been fitted again",
         )
         for place in order
-        if found.ratios[place] >= LEAST_SEPARATION
+        if (ratio := found.ratios[place]) >= least[place]
     )
-    best = float(np.max(found.ratios))
+    top = int(order[0])
+    best = float(found.ratios[top])
     sentence = f"{len(found.titles)} {words} ({names}); " + (
         _are_proposed(len(proposals), "recording")
         if proposals
-        else f"no input on offer brings them {LEAST_SEPARATION:g} of the noise apart "
-        f"(the best {best:.2g}): only other limits can tell them apart"
+        else f"no input on offer shows their difference through the noise (the best "
+        f"{best:.2g} times the noise, and {least[top]:.2g} is needed): only other limits "
+        "can tell them apart"
     )
     return _Choice(float(len(found.titles)), words, sentence, proposals)
 

@@ -33,7 +33,10 @@ class Checked:
 
 
 def check_recordings(
-    raws: Sequence[RawRecording], experiment: Experiment, jitter: dict[str, float]
+    raws: Sequence[RawRecording],
+    experiment: Experiment,
+    jitter: dict[str, float],
+    missing: dict[str, int],
 ) -> Checked:
     """Calibrate in memory, and say what each recording is like.
 
@@ -41,10 +44,13 @@ def check_recordings(
     ----------
     jitter : dict of str to float, [-]
         Largest deviation of a step of the time column by name, as a share of the step.
+    missing : dict of str to int, [samples]
+        Samples that the file lacks, by name.
     """
     facts, recordings, logs, problems = [], [], [], []
     for raw in raws:
-        n_used, notes = 0, _notes(raw, jitter.get(raw.name, 0.0))
+        lost = missing.get(raw.name, 0)
+        n_used, notes = 0, _notes(raw, jitter.get(raw.name, 0.0), lost)
         try:
             (recording,), (log,) = calibrate_all([raw], experiment.calibrate)
         except HwidError as error:
@@ -83,7 +89,7 @@ def _two_digits(number: float) -> str:
     return f"{float(f'{number:.2g}'):.15g}"
 
 
-def _notes(raw: RawRecording, jitter: float) -> tuple[str, ...]:
+def _notes(raw: RawRecording, jitter: float, lost: int) -> tuple[str, ...]:
     notes = [
         f"{side} {note}"
         for side, values in (("input", raw.input), ("output", raw.output))
@@ -93,4 +99,7 @@ def _notes(raw: RawRecording, jitter: float) -> tuple[str, ...]:
         notes.append(
             f"the clock jitters by up to {_two_digits(100 * jitter)} % of a step"
         )
+    if lost:
+        are = "sample is" if lost == 1 else "samples are"
+        notes.append(f"{lost} {are} missing in the file; straight lines stand for them")
     return tuple(notes)

@@ -1,12 +1,12 @@
 """Whether recordings are in the units that a simulation's numbers stand in: SI.
 
 What can be converted was converted when the recordings were read; what is left is
-refused. Where nobody says a unit, that it is taken for SI is said; and where measured
-and simulated sizes differ by powers of ten, the unit that would explain it.
+refused. Where nobody says a unit, that it is taken for SI is said, unless measured and
+simulated sizes differ by powers of ten and another unit explains it: then it is refused.
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -232,14 +232,14 @@ def _in_units_of(recording: Recording, simulation: SimulationOptions) -> Recordi
     return recording
 
 
-def doubtful_sizes(
+def refused_sizes(
     experiment: Experiment,
     recordings: Sequence[Recording],
     simulation: SimulationOptions,
     options: DiagnoseOptions,
     logs: Sequence[CalibrationLog] = (),
 ) -> str:
-    """Say which unit would explain sizes that differ by powers of ten.
+    """Say which unit that nobody states contradicts the sizes of a simulation.
 
     Parameters
     ----------
@@ -249,29 +249,88 @@ def doubtful_sizes(
     Returns
     -------
     str
-        One line; empty where measurement and simulation are of similar size, or no
-        other unit brings them together.
+        One line; empty where sizes are similar, no other unit brings them together, or
+        the unit in question is stated: then somebody has to decide, see
+        ``doubtful_sizes``.
     """
+    doubt = _doubted(recordings, simulation, options, logs)
+    if doubt is None or doubt.is_stated:
+        return ""
+    return (
+        f"{experiment.source}: recordings.units.{doubt.role}: nothing says the unit of "
+        f"the {doubt.role}, and {doubt.now} contradicts the simulation: {doubt.much}; "
+        f"write recordings.units: {{{doubt.role}: {doubt.unit}}} if it is in "
+        f"{doubt.unit}, or {{{doubt.role}: {doubt.now}}} and check the parameters"
+    )
+
+
+def doubtful_sizes(
+    experiment: Experiment,
+    recordings: Sequence[Recording],
+    simulation: SimulationOptions,
+    options: DiagnoseOptions,
+    logs: Sequence[CalibrationLog] = (),
+) -> str:
+    """Say which unit that somebody states would have to be another one.
+
+    Parameters
+    ----------
+    logs : sequence of CalibrationLog
+        Of the recordings; what is missing counts as not known.
+
+    Returns
+    -------
+    str
+        One line; empty where measurement and simulation are of similar size, no other
+        unit brings them together, or ``refused_sizes`` refuses it.
+    """
+    doubt = _doubted(recordings, simulation, options, logs)
+    if doubt is None or not doubt.is_stated:
+        return ""
+    return (
+        f"{experiment.source}: simulation: {doubt.much}; is the {doubt.role} in "
+        f"{doubt.unit}, not {doubt.now}? Then write recordings.units: "
+        f"{{{doubt.role}: {doubt.unit}}}; else check the parameters"
+    )
+
+
+@dataclass(frozen=True)
+class _Doubt:
+    """A unit that does not go with the sizes, and the one that does."""
+
+    role: str
+    now: str
+    unit: str
+    is_stated: bool
+    much: str
+
+
+def _doubted(
+    recordings: Sequence[Recording],
+    simulation: SimulationOptions,
+    options: DiagnoseOptions,
+    logs: Sequence[CalibrationLog],
+) -> _Doubt | None:
     ratio = _size_ratio(recordings, simulation, options)
     if not np.isfinite(ratio) or 1 / _FAR <= ratio <= _FAR:
-        return ""
-    units = _units_of_files(recordings[0], logs)
-    likely = _likely_unit(recordings, simulation, options, units)
+        return None
+    assumed, stated = _units_of_files(recordings[0], logs)
+    likely = _likely_unit(recordings, simulation, options, [*assumed, *stated])
     if likely is None:
-        return ""
+        return None
     role, now, unit = likely
-    much = f"{max(ratio, 1 / ratio):.2g} times {'larger' if ratio > 1 else 'smaller'}"
-    return (
-        f"{experiment.source}: simulation: what was measured is {much} than what the "
-        f"simulation gives with its parameters; is the {role} in {unit}, not {now}? Then "
-        f"write recordings.units: {{{role}: {unit}}}; else check the parameters"
+    much = (
+        f"what was measured is {max(ratio, 1 / ratio):.2g} times "
+        f"{'larger' if ratio > 1 else 'smaller'} than what the simulation gives with "
+        "its parameters"
     )
+    return _Doubt(role, now, unit, (role, now) in stated, much)
 
 
 def _units_of_files(
     first: Recording, logs: Sequence[CalibrationLog]
-) -> list[tuple[str, str]]:
-    """Role and unit of each signal's numbers in the files, what is assumed first."""
+) -> tuple[list[tuple[str, str]], list[tuple[str, str]]]:
+    """Role and unit of each signal's numbers in the files: what is assumed, and stated."""
     assumed, stated = [], []
     for role in ("output", "input", "time"):
         origin = _origin_of(role, first.name, logs)
@@ -280,7 +339,7 @@ def _units_of_files(
         else:
             unit = "s" if role == "time" else getattr(first, f"{role}_unit")
             assumed.append((role, unit))
-    return [*assumed, *stated]
+    return assumed, stated
 
 
 def _likely_unit(

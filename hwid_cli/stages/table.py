@@ -23,9 +23,9 @@ simulated/*.csv and shows the distance to what was measured.
 """,
     "calibrate": """Cut recordings to their useful part and take offsets off.
 
-Reads the raw recordings, applies the recipe of each kind, replaces single
-damaged samples, and writes calibrated.h5 and a figure before/after of each
-recording.
+Reads the raw recordings, applies the recipe of each kind, replaces damaged
+samples (alone or in pairs), and writes calibrated.h5 and a figure before/after
+of each recording.
 """,
     "identify": """Fit a model to every recording for every pair of orders.
 

@@ -18,8 +18,9 @@ _REST = 0.05
 # Fewest samples of a recording, and share of the amplitude that an input must reach.
 LEAST_SAMPLES, LEAST_SHARE = 50, 0.05
 _SIZES = (1.0, 0.5, 0.2)
-# Lines of a multisine, and highest frequency of any design as a share of Nyquist's.
-_LINES, _HIGHEST = 20, 0.4
+# Lines of a multisine, and highest frequency of any design as a share of Nyquist's: at a
+# tenth of the sample rate recordings show a sine well.
+_LINES, _HIGHEST = 20, 0.2
 # Held levels in a recording.
 _LEVELS = (8, 25, 70)
 

@@ -203,6 +203,31 @@ def labview(folder):
         _lines(folder, f"{one.name}.lvm", head + rows)
 
 
+def labview_with_a_clock_for_each(folder):
+    """LabVIEW measurement file with ``X_Columns Multi``: a column X_Value each."""
+    for one in drives():
+        head = [
+            "LabVIEW Measurement\t",
+            "Multi_Headings\tNo",
+            "X_Columns\tMulti",
+            "***End_of_Header***\t",
+            "\t",
+            "Channels\t2\t",
+            f"Samples\t{N}\t\t{N}\t",
+            "Y_Unit_Label\tA\t\tmm\t",
+            "X_Dimension\tTime\t\tTime\t",
+            "X0\t0.0000000000000000E+0\t\t0.0000000000000000E+0\t",
+            f"Delta_X\t{STEP_S}\t\t{STEP_S}\t",
+            "***End_of_Header***\t\t\t\t",
+            "X_Value\tMotor (Filtered)\tX_Value\tPosition\tComment",
+        ]
+        rows = [
+            f"{t:.6f}\t{u:.9f}\t{t:.6f}\t{y:.9f}\t"
+            for t, u, y in zip(one.time, one.current, one.position, strict=True)
+        ]
+        _lines(folder, f"{one.name}.lvm", head + rows, end="\r\n")
+
+
 def dspace(folder):
     """Rows of descriptions with their words in front; the numbers begin one further."""
     for one in drives():
@@ -583,6 +608,10 @@ LAYOUTS = {
     ),
     "blanks in brackets": Layout(blanks_in_brackets, "t [s]", "i [A]", "x [mm]", _SI),
     "labview": Layout(labview, None, "Current", "Position", (None, "A", "mm")),
+    "labview, a clock for each": Layout(
+        *(labview_with_a_clock_for_each, 0, "Motor (Filtered)", "Position"),
+        ("s", "A", "mm"),
+    ),
     "dspace": Layout(
         dspace, "Time", "Model Root/i_act", "Model Root/x_act", _SI, exact=1e-7
     ),

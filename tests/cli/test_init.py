@@ -64,6 +64,32 @@ def test_columns_clock_and_units_are_found(folder, tmp_path, layout):
     assert {tuple(np.round(raw.input, 5)) for raw in raws} == wanted
 
 
+@pytest.mark.parametrize("still", ["input", "output"])
+@pytest.mark.parametrize("count", [1, 4])
+def test_recordings_in_which_a_signal_stands_still_are_named_and_left_out(
+    folder, tmp_path, still, count
+):
+    write_english_csv(folder)
+    for number in range(count):
+        rows = ["time_ms,current_A,position_m,position_ref_m"]
+        for k in range(N):
+            # What stands still in one file may be told from others, by the name even.
+            u, y = (0.0, np.sin(k)) if still == "input" else (np.sin(k), 0.0)
+            rows.append(f"{1e3 * k * STEP_S:.6g},{u},{y},{np.cos(0.1 * k)}")
+        (folder / f"a_failed_{number}.csv").write_text("\n".join(rows))
+    result = invoke("init", folder, "--out", tmp_path / "mine.yaml")
+
+    assert result.exit_code == 0, result.output
+    options = load_experiment(tmp_path / "mine.yaml").recordings
+    assert (options.columns.input, options.columns.output) == (
+        "current_A",
+        "position_m",
+    )
+    assert options.exclude == tuple(f"a_failed_{number}" for number in range(count))
+    assert "a_failed_0.csv" in result.stdout
+    assert "# skipped:" in (tmp_path / "mine.yaml").read_text()
+
+
 def test_the_configuration_is_sound_and_says_why(folder, tmp_path):
     write_german_csv(folder)
     out = tmp_path / "mine.yaml"

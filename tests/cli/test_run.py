@@ -78,6 +78,23 @@ def test_the_worse_model_is_not_exported_where_the_linear_one_is_better(
     assert "hwid export" not in said
 
 
+@pytest.mark.parametrize("command", ["run", "order"])
+def test_no_model_is_exported_where_none_predicts_the_recordings(
+    after_run, hwid, config, monkeypatch, command
+):
+    def worse_than_a_constant(best, *_):
+        return replace(best, fit_percent=-2.0, linear_fit_percent=-60.0)
+
+    monkeypatch.setattr(closing, "beside_linear", worse_than_a_constant)
+    said = hwid(command).stdout
+    words = " ".join(said.split())
+
+    assert "best model no model predicts these recordings: " in words
+    assert "look at columns, signs and units" in words
+    assert re.search(rf"  next  +hwid check {config} ", said.splitlines()[-1])
+    assert "hwid export" not in said
+
+
 def test_tables_are_shown_where_more_is_asked_for(after_run, hwid, out):
     said = hwid("run", "-v").stdout
 

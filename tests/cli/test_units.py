@@ -178,6 +178,15 @@ def test_a_unit_that_contradicts_the_simulation_is_refused_in_one_line(
         assert said in result.stderr
 
 
+def test_what_a_later_stage_refuses_is_refused_before_others_compute(tmp_path):
+    first = (("diagnose: {", "identify: {recordings: [step_04]}\ndiagnose: {"),)
+    path = write_experiment(tmp_path, "time_s,current_A,y [inc]", changed=first)
+    result = run("run", path, "--out", str(tmp_path / "out"))
+    assert result.exit_code == 1
+    assert "'y [inc]' says 'inc'" in result.stderr
+    assert not (tmp_path / "out" / "results.h5").exists()
+
+
 def test_other_stages_do_not_mind(tmp_path):
     path = write_experiment(tmp_path, "time_s,current_A,position [inc]")
     assert run("calibrate", path, "--out", str(tmp_path / "out")).exit_code == 0
@@ -198,18 +207,27 @@ def test_what_nobody_says_is_said_to_be_assumed(tmp_path, section):
     )
 
 
-def test_a_size_that_a_unit_explains_is_asked_about(tmp_path):
+def test_an_unknown_unit_that_the_sizes_contradict_is_refused_in_one_line(tmp_path):
     path = write_experiment(tmp_path, "time_s,current_A,y", (1.0, 1.0, 1e3))
+    said = set()
+    for command in ("check", "diagnose", "simulate"):
+        result = run(command, path, "--out", str(tmp_path / "out"))
+        assert result.exit_code == 1, result.output
+        said.add(result.stderr.splitlines()[-1])
+        assert not (tmp_path / "out" / "diagnosis.json").exists()
+    (line,) = said
+    assert "recordings.units.output: nothing says the unit of the output" in line
+    assert "write recordings.units: {output: mm} if it is in mm" in line
+    # What it proposes is what helps.
+    text = path.read_text()
+    units = "recordings:\n  units: {output: mm}\n"
+    path.write_text(text.replace("recordings:\n", units))
+    assert run("check", path).stderr == ""
+    # Somebody who insists has to look at the parameters, and is warned.
+    path.write_text(text.replace("recordings:\n", units.replace("mm", "m")))
     result = run("check", path)
     assert result.exit_code == 0, result.output
-    assert len(result.stderr.splitlines()) == 2
     assert "is the output in mm, not m?" in result.stderr
-    # What it proposes is what helps.
-    text = path.read_text().replace(
-        "recordings:\n", "recordings:\n  units: {output: mm}\n"
-    )
-    path.write_text(text)
-    assert run("check", path).stderr == ""
 
 
 def test_init_writes_the_units_that_it_reads(tmp_path):

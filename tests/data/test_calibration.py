@@ -65,7 +65,7 @@ def test_damage_is_found_at_every_phase_of_a_fast_sine():
 def test_the_edge_of_a_step_is_never_damage(n_ramp, noise):
     values = with_lead_in(ramp_step(n_ramp, 2000), 200, noise=noise)
 
-    assert find_damaged(values).size == 0
+    assert find_damaged(values, may_hold=False).size == 0
 
 
 @pytest.mark.parametrize("width", [4, 10, 20])
@@ -75,7 +75,7 @@ def test_the_corner_of_a_ramp_that_was_averaged_is_not_damage(width, late):
     fine = np.clip((np.arange(6000) - 2000 - late) / 25.0, 0.0, 1.0)
     means = np.convolve(fine, np.ones(width) / width, mode="same")
     for values in (means[::10], -means[::10], 3.0 * means[::-10]):
-        assert find_damaged(values).size == 0
+        assert find_damaged(values, may_hold=False).size == 0
 
 
 def test_damage_beside_the_corner_of_a_ramp_is_found():
@@ -103,25 +103,79 @@ def test_a_short_level_between_others_is_not_damage(length):
 def test_a_binary_signal_that_may_switch_at_every_sample_is_not_damage():
     values = np.where(np.random.default_rng(2).random(3000) < 0.5, -1.0, 1.0)
 
-    assert find_damaged(values).size == 0
+    assert find_damaged(values, may_hold=False).size == 0
 
 
 def test_normal_noise_after_a_long_quiet_start_is_not_damage():
     rng = np.random.default_rng(4)
     values = np.concatenate([np.zeros(5000), rng.standard_normal(2000)])
 
-    assert find_damaged(values).size == 0
+    assert find_damaged(values, may_hold=False).size == 0
 
 
 def test_flicker_of_the_last_digit_is_not_damage():
     values = with_lead_in(ramp_step(100, 2000), 500)
     values[50:450:7] += 0.01
 
-    assert find_damaged(values).size == 0
+    assert find_damaged(values, may_hold=False).size == 0
 
 
 def test_records_too_short_to_judge_hold_no_damage():
     assert find_damaged(np.array([0.0, 9.0, 0.0, 0.0])).size == 0
+
+
+@pytest.mark.parametrize("may_hold", [True, False])
+@pytest.mark.parametrize("errors", [(0.7, 0.4), (0.7, -0.9), (-3.0, -1.2)])
+def test_two_damaged_samples_side_by_side_are_found_and_replaced(may_hold, errors):
+    values = np.sin(0.05 * np.arange(500))
+    for place in (2, 200, 231, 496):
+        damaged = values.copy()
+        damaged[place : place + 2] += errors
+
+        found = find_damaged(damaged, may_hold=may_hold)
+
+        assert found.tolist() == [place, place + 1]
+        # The cubic over the wider gap errs by (0.05)^4 / 2 of the amplitude.
+        repaired = replace_damaged(damaged, found)
+        np.testing.assert_allclose(repaired, values, atol=5e-6)
+
+
+def test_a_message_that_was_dropped_is_damage_in_an_output_and_a_level_in_an_input():
+    values = 3.0 + np.sin(0.05 * np.arange(500))
+    values[[200, 201]] = 0.0
+
+    assert find_damaged(values, may_hold=False).tolist() == [200, 201]
+    assert find_damaged(values, may_hold=True).size == 0
+    levels = np.repeat(values[::10], 10)
+    levels[[205, 206]] = 0.0
+    assert find_damaged(levels, may_hold=False).size == 0
+
+
+@pytest.mark.parametrize("rad_per_sample", [0.005, 0.11, 0.34, 0.5])
+def test_single_and_paired_damage_in_sines_of_any_frequency(rad_per_sample):
+    rng = np.random.default_rng(3)
+    values = 5.0 * np.sin(rad_per_sample * np.arange(3000))
+    values += 0.004 * rng.standard_normal(values.size)
+    assert find_damaged(values, may_hold=False).size == 0
+    values[[700, 701, 1501, 2222, 2223]] += [9.0, 4.0, -5.0, 7.0, -9.0]
+
+    assert find_damaged(values).tolist() == [700, 701, 1501, 2222, 2223]
+
+
+def test_three_damaged_samples_side_by_side_stay():
+    values = np.sin(0.05 * np.arange(500))
+    values[200:203] += (2.0, 3.0, 2.5)
+    assert find_damaged(values, may_hold=False).size == 0
+
+
+def test_noise_of_an_output_is_no_pair_of_damaged_samples():
+    rng = np.random.default_rng(5)
+    for made in (rng.standard_normal(50_000), rng.laplace(size=5000)):
+        assert find_damaged(made, may_hold=False).size <= find_damaged(made).size
+    # A lightly damped ringing after each of many steps.
+    time = np.arange(400)
+    ring = 1.0 - np.exp(-time / 60.0) * np.cos(0.6 * time)
+    assert find_damaged(np.tile(ring, 5), may_hold=False).size == 0
 
 
 # Onset

@@ -31,7 +31,7 @@ def test_a_sensor_that_stands_still_is_named():
 def test_damaged_samples_are_counted():
     damaged = WAVE.copy()
     damaged[300] += 5.0
-    assert quality_notes(damaged) == ("1 single sample looks damaged",)
+    assert quality_notes(damaged) == ("1 sample looks damaged",)
 
 
 def test_a_signal_far_from_zero_is_named():

@@ -227,6 +227,47 @@ def test_what_a_signal_is_taken_for(
     np.testing.assert_allclose(recording.output, signals[2] * factor, rtol=1e-14)
 
 
+HEADED = "units: {input: mA, output: mm}"
+
+
+@pytest.mark.parametrize("header", ["t,I (mA),y [mm]", "t,i,y\ns,mA,mm"])
+@pytest.mark.parametrize("section", ["", DRIVE])
+def test_exchanged_columns_are_found_by_the_units_of_the_file(
+    tiny, write_csv, header, section
+):
+    write_csv("a.csv", header=header)
+    right, exchanged = (
+        tiny(columns=columns, more=HEADED, sections=section)
+        for columns in (
+            "{time: 0, input: 1, output: 2}",
+            "{time: 0, input: 2, output: 1}",
+        )
+    )
+    assert len(read(right)) == 1
+    match = r"recordings\.units\.input: found 'mA', but .* says that .* is in 'mm'; exp"
+    with pytest.raises(MeasurementError, match=match):
+        read(exchanged)
+    (problem,) = survey_recordings(exchanged, Path("out")).problems
+    assert "name another column" in problem
+
+
+@pytest.mark.parametrize(
+    ("header", "more"),
+    [
+        # Another unit of the same quantity, and what is known not to be a quantity.
+        ("t,u,y_mm", "units: {output: cm}"),
+        ("t,u,y [inc]", "units: {output: mm}"),
+        # A sensor of 5 mm/V: the numbers are in mm behind the scale.
+        ("t,u,y_V", "output_unit: mm\noutput_scale: 5"),
+        ("t,u,y_V", "output_unit: mm"),
+    ],
+)
+def test_a_configuration_may_know_better_than_the_file(tiny, write_csv, header, more):
+    write_csv("a.csv", header=header)
+    (recording,) = read(tiny(columns="{time: t, input: u, output: 2}", more=more))
+    assert recording.output_unit in ("m", "mm")
+
+
 def test_a_voltage_drives_a_circuit(tiny, write_csv, signals):
     write_csv("a.csv", header="t,u_mV,y")
     (recording,) = read(

@@ -1,5 +1,7 @@
 """The input that would separate two candidates."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -8,10 +10,14 @@ from hwid_cli.diagnosis.next_experiment import (
     FittedCandidate,
     Separation,
     best_separation,
+    least_separation,
     menu,
+    propose,
     with_best_lead,
 )
 from hwid_cli.diagnosis.parameters import first_point, parameter_layout
+from hwid_cli.diagnosis.selection import SelectionCriteria
+from hwid_cli.diagnosis.verdict import DiagnosisVerdict
 from hwid_cli.drive.simulation import simulate_drive
 from hwid_cli.records.recordings import Recording
 from tests.diagnosis.made_up_fits import CRITERIA, base, made_up
@@ -23,6 +29,7 @@ from tests.diagnosis.small_drive import (
     problem,
     replace,
     sizes,
+    white,
 )
 
 NAMED = made_up(["periodic_force"], 200.0)
@@ -46,18 +53,19 @@ def rivals():
         given.append(Recording(f"step_{size}", current, read, STEP_S, kind="step"))
     of = problem(given)
     scales = sizes(of)
-    models = []
+    models, fits = [], []
     for effect, start in (
         ("coulomb_friction", {"force_N": 0.4}),
         ("output_backlash", {"half_gap_m": 2e-4}),
     ):
         found = fit(of, {effect: start}, scales=scales)
+        fits.append(found)
         models.append(FittedCandidate(*rebuilt(of, found, scales)))
-    return of, models, scales
+    return of, models, scales, fits
 
 
 def test_friction_and_backlash_are_separated_by_reversals(rivals):
-    of, (coulomb, backlash), scales = rivals
+    of, (coulomb, backlash), scales, _ = rivals
     found = best_separation(of, coulomb, backlash, scales)
     # Ramps to one side say little about either; anything that reverses does.
     assert "sine" in found.input or "triangle" in found.input
@@ -65,13 +73,13 @@ def test_friction_and_backlash_are_separated_by_reversals(rivals):
 
 
 def test_a_candidate_is_not_separated_from_itself(rivals):
-    of, (coulomb, _), scales = rivals
+    of, (coulomb, _), scales, _ = rivals
     # What is simulated is compared with itself.
     assert best_separation(of, coulomb, coulomb, scales).rms < 1e-12
 
 
 def test_what_the_rival_can_absorb_does_not_count(rivals):
-    of, (coulomb, _), scales = rivals
+    of, (coulomb, _), scales, _ = rivals
     point = coulomb.point
     # Another force of friction: a new measurement would only correct it.
     moved = point.shared + np.array([0.0, 0.0, 0.0, 1e-3])
@@ -82,17 +90,18 @@ def test_what_the_rival_can_absorb_does_not_count(rivals):
 
 
 def test_a_rival_that_runs_away_separates_nothing(rivals):
-    of, (coulomb, _), scales = rivals
+    of, (coulomb, _), scales, _ = rivals
     start = {"cubic_stiffness": {"stiffness_N_per_m3": -1e9}}
     lost = parameter_layout(of, ("cubic_stiffness",), start, scales)
     model = FittedCandidate(lost, first_point(of, lost, of.drive, start))
     assert best_separation(of, coulomb, model, scales) == Separation(
-        next(iter(menu(scales))), 0.0
+        *(next(iter(menu(scales))), 0.0),
+        n_samples=next(iter(menu(scales).values())).size,
     )
 
 
 def test_the_menu_stays_within_the_current_that_was_used(rivals):
-    _, _, scales = rivals
+    _, _, scales, _ = rivals
     inputs = menu(scales)
     assert len(inputs) == len(set(inputs)) >= 10
     for name, command in inputs.items():
@@ -104,11 +113,52 @@ def test_the_menu_stays_within_the_current_that_was_used(rivals):
 
 
 def test_the_menu_has_no_frequency_that_the_samples_cannot_follow(rivals):
-    _, _, scales = rivals
+    _, _, scales, _ = rivals
     slow = replace(scales, sample_time_s=0.02)
     fast = [name for name in menu(slow) if "at 60.7 Hz" in name]
     assert fast == []
     assert len(menu(slow)) < len(menu(scales))
+
+
+@pytest.mark.parametrize("step_s", [1e-4, 1e-3, 5e-3, 0.02, 0.1])
+def test_no_sine_of_the_menu_is_above_a_tenth_of_the_sample_rate(rivals, step_s):
+    _, _, scales, _ = rivals
+    found = menu(replace(scales, sample_time_s=step_s))
+    frequencies = [
+        float(one) for name in found for one in re.findall(r"at ([\d.e+]+) Hz", name)
+    ]
+    # Names have three digits.
+    assert all(one <= 0.1 / step_s * 1.005 for one in frequencies)
+    # Steps and a triangle are left wherever the drive's own frequency lies.
+    assert len(found) - len(frequencies) >= 5
+
+
+def proposed(rivals, rms):
+    of, _, scales, (coulomb, backlash) = rivals
+    verdict = DiagnosisVerdict("ambiguous", True, coulomb, (backlash,))
+    criteria = SelectionCriteria.of(of, white(rms))
+    return propose(of, criteria, scales, verdict, (coulomb, backlash))
+
+
+def test_what_the_noise_hides_is_not_proposed_and_said(rivals):
+    seen = proposed(rivals, NOISE)
+    assert seen.input
+    assert "times the noise) after the parameters" in seen.reason
+    hidden = proposed(rivals, 1.0)
+    assert not hidden.input
+    assert "no input of the size of these recordings tells" in hidden.reason
+    assert "through the noise (the best, " in hidden.reason
+
+
+def test_a_difference_below_the_noise_of_a_sample_says_why_it_is_seen(rivals):
+    of, (coulomb, backlash), scales, _ = rivals
+    best = best_separation(of, coulomb, backlash, scales)
+    least = least_separation(best.n_samples)
+    assert least < 1.0
+    assert proposed(rivals, best.rms / (1.01 * least)).input == best.input
+    assert proposed(rivals, best.rms / (0.99 * least)).input == ""
+    said = proposed(rivals, 2 * best.rms).reason
+    assert f"0.5 times the noise of a sample; over {best.n_samples} samples" in said
 
 
 def effects(found):

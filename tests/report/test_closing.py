@@ -51,6 +51,44 @@ def test_a_linear_model_that_is_better_stands_first():
 
 
 @pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        # The linear one is worse still, or better and no good either, or not there.
+        (
+            {"fit_percent": -1.5, "linear_fit_percent": -40.0},
+            "a+b/2/3 has a fit of -1.5 %, the linear one -40.0 % on 2 recordings",
+        ),
+        (
+            {"fit_percent": -70.0, "linear_fit_percent": -3.0, "linear_rmsd": 0.001},
+            "a+b/2/3 has a fit of -70.0 %, the linear one -3.0 % on 2 recordings",
+        ),
+        (
+            {"fit_percent": -5.0, "linear_rmsd": float("nan")},
+            "a+b/2/3 has a fit of -5.0 % on 2 recordings never used (c and d); a constant",
+        ),
+    ],
+)
+def test_where_a_constant_would_be_closer_no_model_is_the_best(changes, said):
+    nothing = replace(BEST, **changes)
+    (sentence,) = best_model_sentences(nothing)
+    assert not nothing.is_usable
+    assert sentence.startswith("no model predicts these recordings: ")
+    assert said in sentence.replace("\xa0", " ")
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"fit_percent": 1.0, "linear_fit_percent": -40.0},
+        {"fit_percent": -1.0, "linear_fit_percent": 2.0, "linear_rmsd": 0.001},
+        {},
+    ],
+)
+def test_a_model_that_is_closer_than_a_constant_is_one_to_take(changes):
+    assert replace(BEST, **changes).is_usable
+
+
+@pytest.mark.parametrize(
     ("changes", "is_better"),
     [
         ({"linear_rmsd": 0.0119}, True),

@@ -210,6 +210,15 @@ def test_the_closing_sentences_end_once():
     assert closing_sentences(silent) == []
 
 
+def test_that_no_experiment_is_proposed_is_said_with_its_reason():
+    hidden = replace(
+        named(),
+        verdict="ambiguous",
+        next_experiment=NextExperiment("", "the noise hides it."),
+    )
+    assert "Next experiment: none; the noise hides it." in closing_sentences(hidden)
+
+
 @pytest.mark.parametrize("width", [80, 100])
 def test_the_screen_shows_everything_that_was_found(width):
     found = named()

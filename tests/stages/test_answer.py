@@ -104,6 +104,27 @@ def test_the_advised_orders_are_those_of_the_command(stored):
     assert answer_of(stored).advice == advice.overall
 
 
+def test_a_level_with_its_noise_is_no_input_beyond_the_fit(stored):
+    found = answer_of(stored)
+    low, high = found.input_range
+    rng = np.random.default_rng(1)
+
+    def beyond(level):
+        recordings = [
+            replace(
+                one, input=level + 1e-3 * (high - low) * rng.normal(size=one.input.size)
+            )
+            if one.name in found.recordings
+            else one
+            for one in stored.recordings
+        ]
+        calibrated = replace(stored.results["calibrate"], recordings=tuple(recordings))
+        return answer_of(with_results(stored, calibrate=calibrated)).beyond
+
+    assert (beyond(high) == 0.0).all()
+    assert (beyond(high + 0.1 * (high - low)) == 1.0).all()
+
+
 @pytest.mark.parametrize(("nb", "is_told"), [(0, True), (1, False)])
 def test_maps_are_told_where_they_belong_to_the_advised_orders(stored, nb, is_told):
     advice = answer_of(stored).advice

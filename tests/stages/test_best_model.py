@@ -1,5 +1,7 @@
 """The model to take, from tables whose answer is seen at a glance."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.optimize import least_squares
@@ -136,6 +138,15 @@ def test_the_linear_model_is_of_the_same_recordings_and_judged_on_the_same():
         for one in recordings[1:]
     ]
     assert after.linear_rmsd == pytest.approx(np.mean(by_hand), rel=1e-3)
+    # Beyond a the saturation goes on as a line, not as it is.
+    assert after.fit_percent > 80.0
+    # Of two recordings the median is the mean.
+    shares = [
+        100 * (1 - one / np.std(other.output))
+        for one, other in zip(by_hand, recordings[1:], strict=True)
+    ]
+    assert after.linear_fit_percent == pytest.approx(np.mean(shares), rel=1e-2)
+    assert after.is_usable
 
 
 def test_a_linear_fit_that_fails_is_no_reason_to_say_nothing():
@@ -145,6 +156,8 @@ def test_a_linear_fit_that_fails_is_no_reason_to_say_nothing():
     fits = {"a/1/1": fit(recordings[:1], Orders(1, 1, 1), linear)}
     gone = {"a/1/1": fit([saturated("z", 2.0)], Orders(1, 1, 1), FitOptions(units=3))}
 
-    assert beside_linear(found, fits, recordings, MemoryStore()) == found
+    after = beside_linear(found, fits, recordings, MemoryStore())
+    assert replace(after, fit_percent=np.nan) == replace(found, fit_percent=np.nan)
+    assert 0.0 < after.fit_percent < 100.0
     assert beside_linear(found, gone, recordings, MemoryStore()) == found
     assert beside_linear(found, {}, recordings, MemoryStore()) == found

@@ -18,6 +18,7 @@ from hwid_cli.stages.simulation_units import (
     assumed_units,
     doubtful_sizes,
     in_simulation_units,
+    refused_sizes,
     refused_units,
 )
 from tests.diagnosis.small_drive import recordings, simulation
@@ -156,21 +157,25 @@ def rescaled(*, current=1.0, displacement=1.0, step=1.0, **changes):
     ]
 
 
-def doubt(found, model=DRIVE, options=REST):
-    return doubtful_sizes(experiment(), found, model, options)
+def doubt(found, model=DRIVE, options=REST, logs=()):
+    asked = (experiment(), found, model, options, logs)
+    refused, warned = refused_sizes(*asked), doubtful_sizes(*asked)
+    assert not (refused and warned)
+    return refused or warned
 
 
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"displacement": 1e3}, "is the output in mm, not m? Then write"),
+        ({"displacement": 1e3}, "{output: mm} if it is in mm, or {output: m}"),
         ({"displacement": 1e6}, "recordings.units: {output: um}"),
-        ({"current": 1e3}, "is the input in mA, not A?"),
+        ({"current": 1e3}, "recordings.units: {input: mA} if"),
     ],
 )
 def test_sizes_that_differ_by_powers_of_ten_give_a_unit_away(changes, words):
     line = doubt(rescaled(**changes))
-    assert line.startswith("a.yaml: simulation: what was measured is")
+    assert line.startswith("a.yaml: recordings.units.")
+    assert "contradicts the simulation: what was measured is" in line
     assert words in line
     assert "\n" not in line
 
@@ -179,7 +184,7 @@ def test_sizes_that_differ_by_powers_of_ten_give_a_unit_away(changes, words):
     ("role", "given", "words"),
     [
         # A name that lies, where the other unit is only assumed, is the last suspect.
-        ("output", "mm", "is the input in mA, not A?"),
+        ("output", "mm", "nothing says the unit of the input, and A contradicts"),
         ("input", "A", "is the output in m, not mm?"),
     ],
 )
@@ -190,7 +195,7 @@ def test_what_somebody_has_stated_is_doubted_last(role, given, words):
         [] if role == "output" else [SignalUnit("output", "mm", "a row", "m", 1e-3)]
     )
     log = CalibrationLog(found[0].name, (), 0, 1, 1, 1, units=(known, *others))
-    assert words in doubtful_sizes(experiment(), found, DRIVE, REST, [log])
+    assert words in doubt(found, logs=[log])
 
 
 def test_milliseconds_give_themselves_away_where_nothing_holds_the_drive():
@@ -201,7 +206,7 @@ def test_milliseconds_give_themselves_away_where_nothing_holds_the_drive():
     way = 5.0 / 0.3 * (0.4 / (2 * np.pi)) * (time - 0.4 / (2 * np.pi) * bump)
     (first, *_) = recordings()
     found = [replace(first, input=bump, output=way, sample_time_s=1.0)]
-    assert "is the time in ms, not s?" in doubt(found, free)
+    assert "{time: ms} if it is in ms" in doubt(found, free)
     assert doubt([replace(found[0], sample_time_s=1e-3)], free) == ""
 
 

@@ -32,6 +32,15 @@ def test_all_kinds_are_designed_and_named_once():
     }  # fmt: skip
 
 
+def test_designs_stay_below_a_tenth_of_the_sample_rate():
+    # A rate that limits nothing.
+    for one in designs(6.0, 1e9, 7.5, 1e-3, "A"):
+        if one.name.startswith(("multisine", "sweep")):
+            power = np.abs(np.fft.rfft(one.values * np.hanning(one.values.size))) ** 2
+            fast = np.fft.rfftfreq(one.values.size, 1e-3) > 101.0
+            assert power[fast].sum() < 1e-3 * power.sum(), one.name
+
+
 def test_designs_begin_and_end_at_rest():
     for one in designs(6.0, 50.0, 7.5, 1e-3, "A"):
         assert np.abs(one.values[[0, -1]]).max() < 1e-9

@@ -35,16 +35,14 @@ def crossval_section(contents: ReportContents) -> Section:
         blocks += section_notes(contents, is_validation=True)
         blocks += [Text(_coverage_sentence(matrix)), rmsd_matrix_table(matrix)]
         widest = cross_table(matrix)
-        blocks.append(
-            Collapsible("The widest model of each recording as a table", (widest,))
-        )
+        blocks.append(Collapsible("The same as a table", (widest,)))
         if contents.scores and contents.stored.crossval is not None:
             found = contents.stored.crossval
             table = coverage_table(contents.scores, found)
             blocks.append(
                 Collapsible("The models that cover the most recordings", (table,))
             )
-    title = "Cross-validation: the widest model of each recording"
+    title = "Cross-validation: for each recording its model that covers most"
     return Section("crossval", title, "Cross-validation", tuple(blocks), missing)
 
 

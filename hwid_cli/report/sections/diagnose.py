@@ -89,7 +89,7 @@ def diagnosis_section(contents: ReportContents) -> Section:
         blocks += [Text(text) for text in where if text]
         following = found.get("next_experiment")
         if isinstance(following, Mapping) and following:
-            text = f"Next experiment: {following.get('input', MISSING)}"
+            text = f"Next experiment: {following.get('input') or 'none'}"
             reason = following.get("reason")
             blocks.append(Text(f"{text} - {reason}" if reason else text))
     title = "Diagnosis of the simulation"

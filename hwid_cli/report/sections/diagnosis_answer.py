@@ -333,6 +333,9 @@ def _next(diagnosis: Diagnosis) -> tuple[tuple[str, str], ...]:
         steps.append(
             (f"Measure: {following.input.strip().rstrip('.')} ({reason}).", "")
         )
+    elif following.reason and diagnosis.verdict in ("ambiguous", "unknown"):
+        reason = following.reason.strip().rstrip(".")
+        steps.append((f"No recording is proposed: {reason}.", ""))
     if diagnosis.verdict in ("named", "parameters", "ambiguous"):
         steps.append(
             (

@@ -18,6 +18,7 @@ from hwid_cli.report.dots import Dot, DotGroup, DotRow, Dots
 from hwid_cli.report.formats import counted, listed, with_unit
 from hwid_cli.report.page import Answer, PageBlock, marked_if_changed
 from hwid_cli.report.simulation_note import simulation_note
+from hwid_cli.report.terms import NK_WORDS
 
 # Recordings that the answer draws, and points of its curves.
 _MOST_ROWS, _MOST_POINTS = 6, 2000
@@ -39,7 +40,10 @@ def model_answer(contents: ReportContents) -> Answer | None:
         "Which model describes the drive, and how well where it was not fitted?",
         _verdict(found),
         is_settled=_is_settled(found),
-        details=(_model(found), f"{_orders(found)} {_trust(found)}".strip()),
+        details=(
+            _model(found),
+            f"{_orders(found, contents.stored.nk_role)} {_trust(found)}".strip(),
+        ),
         blocks=tuple(blocks),
         next_steps=_next(found, contents),
     )
@@ -122,7 +126,8 @@ def _model(found: ModelAnswer) -> str:
         for one in (found.model.input_map, found.model.output_map)
     ]
     text = (
-        f"Orders [nb nf nk] = [{orders.nb} {orders.nf} {orders.nk}], input map {maps[0]}, "
+        f"Orders: nb = {counted(orders.nb, 'coefficient')} of the numerator, nf = "
+        f"{counted(orders.nf, 'pole')}, {counted(orders.nk, 'sample')} of delay; input map {maps[0]}, "
         f"output map {maps[1]}, fitted to {listed(found.own)}."
     )
     if found.rmsd.size and np.isfinite(found.threshold):
@@ -134,12 +139,15 @@ def _model(found: ModelAnswer) -> str:
     return text + _spread(found)
 
 
-def _orders(found: ModelAnswer) -> str:
+def _orders(found: ModelAnswer, nk_role: str) -> str:
     """Recommended orders and maps."""
     if found.advice is None:
         return ""
     one = found.advice
-    text = f"Recommended for new fits: nb = {one.nb}, nk = {one.nk}"
+    text = (
+        f"Recommended for new fits: nb = {one.nb}, nk = {one.nk} "
+        f"{NK_WORDS.get(nk_role, nk_role)}"
+    )
     if (one.best_nb, one.best_nk) != (one.nb, one.nk):
         text += (
             f" (the smallest within {100 * (one.evidence.factor - 1):.2g} % of the best, "

@@ -35,7 +35,7 @@ def trust_section(contents: ReportContents) -> Section:
         # The folded table stands below the answer to the question.
         about = counted(len(crossval.bands.rows), "band")
         table = _without_notes(trust_table(crossval.bands.rows, VALIDATING))
-        blocks.append(Collapsible(f"{about} of the widest models", (table,)))
+        blocks.append(Collapsible(f"{about} of the models that cover most", (table,)))
     if blocks:
         blocks.append(Text(COLUMNS, is_note=True))
     if found is not None:
