@@ -67,7 +67,7 @@ def test_damaged_entries_are_counted_in_one_line_and_computed_again(
 ):
     everything = sorted((out / "cache").glob("??/*.h5"))
     # What is asked for at the end of a run, beside the tasks of any stage.
-    beside = [path for path in everything if record_of(path) == "_LinearModel"]
+    beside = [path for path in everything if record_of(path) == "_OnJudges"]
     tasks = [path for path in everything if path not in beside][::20]
     paths = tasks + beside
     assert beside
