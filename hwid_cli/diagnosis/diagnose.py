@@ -77,6 +77,7 @@ from hwid_cli.drive.effect import Scales
 from hwid_cli.drive.simulation import drive_effects
 from hwid_cli.records.candidates import CandidateFit
 from hwid_cli.records.diagnosis import STILL_LARGE, Diagnosis, NoiseFloor
+from hwid_cli.records.drive import StandIn
 from hwid_cli.records.experiment import DiagnoseOptions, SimulationOptions
 from hwid_cli.records.own_effects import own_ids
 from hwid_cli.records.recordings import Recording
@@ -86,6 +87,10 @@ LINE_SHARE = 0.3
 # Whole recordings cannot judge where the noise of their start alone, sent through the
 # fit, makes up this share of what the fit leaves of them.
 LOST_TO_NOISE = 0.3
+# The base of a free axis imitates what holds it in place where it leaves this share of the
+# motion's squares, or where its damping has grown by this factor.
+IMITATION_LEAVES = 0.5
+IMITATION_DAMPING = 30.0
 
 
 def diagnose(
@@ -258,7 +263,8 @@ def find(
         run_tasks,
         on_round,
     )
-    found, seeds = _search(rounds, given_sse, force, options.max_effects)
+    searched = _search(rounds, given_sse, force, options.max_effects)
+    found, seeds = searched.found, searched.seeds
     on_round("verdict", 0)
     verdict = _decided(rounds, given_sse, found)
     whole = Findings(
@@ -268,7 +274,7 @@ def find(
     )  # fmt: skip
     # Where a drive stands for another simulation, that one judges.
     if _is_lost(criteria, verdict, base) and seeds and criteria.standing is None:
-        judged = _judged_in_pieces(rounds, whole, seeds)
+        judged = _judged_in_pieces(rounds, whole, searched)
         if judged is not None:
             return judged
     # Who asks for some effects only wants no formula instead.
@@ -339,27 +345,65 @@ def _fitted_base(problem: DiagnosisProblem) -> _FittedBase:
     return _FittedBase(problem, noise, given, scales, base)
 
 
-def _search(
-    rounds: Rounds, given_sse: np.ndarray, force: Sequence[Smoothed], max_effects: int
-) -> tuple[RoundsResult, tuple[CandidateFit, ...]]:
+@dataclass(frozen=True, eq=False)
+class _Searched:
     """Sets of effects, from whole recordings and where these are lost from pieces.
 
-    Returns
-    -------
-    RoundsResult
+    Parameters
+    ----------
+    found : RoundsResult
         On whole recordings.
-    tuple of CandidateFit
+    seeds : tuple of CandidateFit
         Best sets of each size on pieces; empty where these were not asked.
+    smoothed : sequence of Smoothed
+        Motion that pieces start from.
     """
+
+    found: RoundsResult
+    seeds: tuple[CandidateFit, ...]
+    smoothed: Sequence[Smoothed]
+
+
+def _search(
+    rounds: Rounds, given_sse: np.ndarray, force: Sequence[Smoothed], max_effects: int
+) -> _Searched:
+    """Look for sets of effects on whole recordings, and on pieces where these fail."""
     base, criteria = rounds.base, rounds.criteria
+    found, seeds = RoundsResult(), tuple[CandidateFit, ...]()
     if not base.is_usable or criteria.needs_nothing(base):
-        return RoundsResult(), ()
-    found = run_rounds(rounds, max_effects)
+        return _Searched(found, seeds, force)
+    known = None
+    if _imitates(rounds):
+        given = compared_as_given(rounds.problem)
+        force = latent_force(given, rounds.problem.drive, rounds.baseline.noise)
+        seeds = _seeds_of_pieces(rounds, force, max_effects)
+        found = continue_rounds(rounds, found, seeds)
+        if found.best and criteria.is_nearly_all(found.best[-1], base):
+            return _Searched(found, seeds, force)
+        if not _is_lost(criteria, _decided(rounds, given_sse, found), base):
+            known = found
+    found = run_rounds(rounds, max_effects, known=known)
     is_lost = _is_lost(criteria, _decided(rounds, given_sse, found), base)
     if not is_lost or rounds.problem.compares_command:
-        return found, ()
-    seeds = _seeds_of_pieces(rounds, force, max_effects)
-    return continue_rounds(rounds, found, seeds), seeds
+        return _Searched(found, seeds, force)
+    seeds = seeds or _seeds_of_pieces(rounds, force, max_effects)
+    return _Searched(continue_rounds(rounds, found, seeds), seeds, force)
+
+
+def _imitates(rounds: Rounds) -> bool:
+    """Whether the base of a free axis imitates what holds it in place.
+
+    Without a spring only a huge damping keeps still. No effect fits from there, and where
+    a force is curved a heavily damped drive takes dozens of steps in a sample. Short
+    pieces leave the base where the configuration has it.
+    """
+    problem, drive = rounds.problem, rounds.problem.drive
+    is_free = drive.stiffness_N_per_m == 0 and not isinstance(drive, StandIn)
+    if problem.compares_command or not is_free:
+        return False
+    damping = rounds.baseline.drive.damping_N_s_per_m
+    is_damped = damping > IMITATION_DAMPING * drive.damping_N_s_per_m > 0
+    return is_damped or rounds.base.sse.sum() > IMITATION_LEAVES * problem.motion
 
 
 def _is_lost(
@@ -439,9 +483,11 @@ def _from_there(
 
 def _rounds_of(rounds: Rounds, pieces: DiagnosisProblem) -> Rounds:
     """The same rounds on pieces of the recordings, with their own base."""
-    baseline = rounds.baseline
-    start = SearchStart(base_of(baseline.drive), drive_effects(pieces.drive))
-    base = fit_candidate(pieces, (), [start], baseline.scales, baseline.noise)
+    baseline, present = rounds.baseline, drive_effects(pieces.drive)
+    starts = [SearchStart(base_of(baseline.drive), present)]
+    if baseline.is_bent:
+        starts.append(SearchStart(base_of(pieces.drive), present))
+    base = fit_candidate(pieces, (), starts, baseline.scales, baseline.noise)
     # Values of each recording would be values of each piece, which imitate anything.
     shared = tuple(
         one
@@ -459,7 +505,7 @@ def _rounds_of(rounds: Rounds, pieces: DiagnosisProblem) -> Rounds:
 
 
 def _judged_in_pieces(
-    rounds: Rounds, whole: Findings, seeds: Sequence[CandidateFit]
+    rounds: Rounds, whole: Findings, searched: _Searched
 ) -> Findings | None:
     """What pieces with free starts name, where whole recordings cannot tell.
 
@@ -467,11 +513,11 @@ def _judged_in_pieces(
     recordings by less than what the named effects leave of them.
     """
     rounds.on_round("pieces with free starts", 0)
-    pieces = in_pieces(rounds.problem, whole.force, are_free=True)
+    pieces = in_pieces(rounds.problem, searched.smoothed, are_free=True)
     of_pieces = _rounds_of(rounds, pieces)
     if not of_pieces.base.is_usable:
         return None
-    found = continue_rounds(of_pieces, RoundsResult(), seeds)
+    found = continue_rounds(of_pieces, RoundsResult(), searched.seeds)
     given = each_sum_of_squares([one.residual for one in compared_as_given(pieces)])
     verdict = _decided(of_pieces, given, found)
     is_near = of_pieces.criteria.ratio(verdict.chosen) <= STILL_LARGE
