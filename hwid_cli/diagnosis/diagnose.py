@@ -23,6 +23,7 @@ from hwid_cli.diagnosis.candidate import (
 )
 from hwid_cli.diagnosis.causes import fit_with_input_noise, without_repeats
 from hwid_cli.diagnosis.direction import ReversedInputError, find_reversal
+from hwid_cli.diagnosis.effect_sets import includes_one_of
 from hwid_cli.diagnosis.findings import Findings, describe
 from hwid_cli.diagnosis.hidden import HiddenEffect, hidden_effects
 from hwid_cli.diagnosis.intervals import unclear_effects
@@ -49,6 +50,7 @@ from hwid_cli.diagnosis.problem import (
     prepare,
 )
 from hwid_cli.diagnosis.rounds import (
+    WORTH_MORE,
     OnRound,
     Rounds,
     RoundsResult,
@@ -87,8 +89,9 @@ LINE_SHARE = 0.3
 # Whole recordings cannot judge where the noise of their start alone, sent through the
 # fit, makes up this share of what the fit leaves of them.
 LOST_TO_NOISE = 0.3
-# The base of a free axis imitates what holds it in place where it leaves this share of the
-# motion's squares, or where its damping has grown by this factor.
+# The base of a free axis imitates what holds it in place where it leaves this share of half
+# of the recordings, or where its damping has grown by this factor. Arms under gravity leave
+# 0.9 and more, machines that other forces act on 0.3 at most.
 IMITATION_LEAVES = 0.5
 IMITATION_DAMPING = 30.0
 
@@ -376,17 +379,18 @@ def _search(
     if _imitates(rounds):
         given = compared_as_given(rounds.problem)
         force = latent_force(given, rounds.problem.drive, rounds.baseline.noise)
-        seeds = _seeds_of_pieces(rounds, force, max_effects)
-        found = continue_rounds(rounds, found, seeds)
-        if found.best and criteria.is_nearly_all(found.best[-1], base):
-            return _Searched(found, seeds, force)
+        seeds, near, wide = _seeds_of_pieces(rounds, force, max_effects)
+        for these in ((*seeds, *near), wide):
+            found = continue_rounds(rounds, found, these)
+            if found.best and criteria.is_nearly_all(found.best[-1], base):
+                return _Searched(found, seeds, force)
         if not _is_lost(criteria, _decided(rounds, given_sse, found), base):
             known = found
     found = run_rounds(rounds, max_effects, known=known)
     is_lost = _is_lost(criteria, _decided(rounds, given_sse, found), base)
     if not is_lost or rounds.problem.compares_command:
         return _Searched(found, seeds, force)
-    seeds = seeds or _seeds_of_pieces(rounds, force, max_effects)
+    seeds = seeds or _seeds_of_pieces(rounds, force, max_effects)[0]
     return _Searched(continue_rounds(rounds, found, seeds), seeds, force)
 
 
@@ -403,7 +407,8 @@ def _imitates(rounds: Rounds) -> bool:
         return False
     damping = rounds.baseline.drive.damping_N_s_per_m
     is_damped = damping > IMITATION_DAMPING * drive.damping_N_s_per_m > 0
-    return is_damped or rounds.base.sse.sum() > IMITATION_LEAVES * problem.motion
+    much = rounds.base.sse > IMITATION_LEAVES * problem.each_motion
+    return is_damped or bool(2 * np.count_nonzero(much) > much.size)
 
 
 def _is_lost(
@@ -455,11 +460,21 @@ def _refit_base(
 
 def _seeds_of_pieces(
     rounds: Rounds, force: Sequence[Smoothed], max_effects: int
-) -> tuple[CandidateFit, ...]:
-    """Best sets of each size on pieces of the recordings."""
+) -> tuple[tuple[CandidateFit, ...], ...]:
+    """Sets that pieces of the recordings lead to.
+
+    Returns
+    -------
+    tuple of CandidateFit
+        The best set of each size.
+    tuple of CandidateFit
+        Others that come near it: whole recordings may choose one of them.
+    tuple of CandidateFit
+        Near ones that include a best set.
+    """
     of_pieces = _rounds_of(rounds, in_pieces(rounds.problem, force))
     if not of_pieces.base.is_usable:
-        return ()
+        return (), (), ()
     free = in_pieces(rounds.problem, force, are_free=True)
     criteria = SelectionCriteria.of(free, rounds.baseline.noise)
 
@@ -467,7 +482,20 @@ def _seeds_of_pieces(
         # What starts that are not exact leave looks as if more were missing.
         return criteria.ratio(_from_there(rounds, free, winner)) <= SMALL_REMAINDER
 
-    return run_rounds(of_pieces, max_effects, is_enough).best
+    found = run_rounds(of_pieces, max_effects, is_enough)
+    excess = of_pieces.criteria.excess
+    most = {len(one.effects): WORTH_MORE * excess(one) for one in found.best}
+    chosen = [one.effects for one in found.best]
+    others = [
+        one
+        for one in found.fits.values()
+        if one.is_usable
+        and one.effects not in chosen
+        and excess(one) <= most.get(len(one.effects), -np.inf)
+    ]
+    wide = [one for one in others if includes_one_of(one.effects, chosen)]
+    near = [one for one in others if one not in wide]
+    return tuple(found.best), tuple(near), tuple(wide)
 
 
 def _from_there(

@@ -54,7 +54,7 @@ def find_reversal(
         None where the direction is right, or cannot be told. Under a controller the
         loop itself tells.
     """
-    motion = problem.motion
+    motion = float(problem.each_motion.sum())
     # Forces along a recording belong to the simulation that they stand in for.
     has_force = any(one.force.size for one in problem.signals)
     if (

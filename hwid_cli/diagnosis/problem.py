@@ -205,10 +205,15 @@ class DiagnosisProblem:
         return sum(one.n_evaluated for one in self.signals)
 
     @property
-    def motion(self) -> float:
-        """Sum of squares of what is compared about each recording's mean."""
+    def each_motion(self) -> np.ndarray:
+        """Sum of squares of what is compared about the mean of each recording.
+
+        Returns
+        -------
+        ndarray, shape (n_recordings,), [output unit squared]
+        """
         parts = [one.compared[one.evaluated] for one in self.signals]
-        return float(sum(np.sum(np.square(one - one.mean())) for one in parts))
+        return np.array([np.sum(np.square(one - one.mean())) for one in parts])
 
     def part(self, *, held_out: bool) -> "DiagnosisProblem":
         """Only the recordings that are held out, or only the others."""
