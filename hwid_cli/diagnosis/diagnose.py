@@ -10,23 +10,23 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from hwid_cli.diagnosis.base_fit import compared_as_given, fitted_base
 from hwid_cli.diagnosis.candidate import (
     Baseline,
-    SearchStart,
-    at_point,
-    base_of,
     compared_with_fit,
-    fit_candidate,
     fitted_drive,
     rebuilt,
-    start_from,
 )
-from hwid_cli.diagnosis.causes import fit_with_input_noise, without_repeats
-from hwid_cli.diagnosis.direction import ReversedInputError, find_reversal
+from hwid_cli.diagnosis.causes import without_repeats
 from hwid_cli.diagnosis.findings import Findings, describe
-from hwid_cli.diagnosis.held_command import best_of, is_held, with_held_command
+from hwid_cli.diagnosis.held_command import (
+    best_of,
+    is_complete_if_held,
+    is_held,
+    with_held_command,
+)
 from hwid_cli.diagnosis.hidden import HiddenEffect, hidden_effects
-from hwid_cli.diagnosis.intervals import unclear_effects
+from hwid_cli.diagnosis.judgement import decided, is_lost
 from hwid_cli.diagnosis.latent_force import Smoothed, latent_force
 from hwid_cli.diagnosis.laws import find_law
 from hwid_cli.diagnosis.next_experiment import (
@@ -35,14 +35,12 @@ from hwid_cli.diagnosis.next_experiment import (
     undecided_candidates,
     with_best_lead,
 )
-from hwid_cli.diagnosis.noise import noise_floor
-from hwid_cli.diagnosis.parameters import (
-    compare_at,
-    each_sum_of_squares,
-    first_point,
-    parameter_layout,
+from hwid_cli.diagnosis.parameters import each_sum_of_squares
+from hwid_cli.diagnosis.pieces_search import (
+    imitates,
+    judged_in_pieces,
+    seeds_of_pieces,
 )
-from hwid_cli.diagnosis.pieces import JudgedPieces, in_pieces
 from hwid_cli.diagnosis.problem import (
     Compared,
     DiagnosisProblem,
@@ -58,37 +56,18 @@ from hwid_cli.diagnosis.rounds import (
     continue_rounds,
     run_rounds,
 )
-from hwid_cli.diagnosis.scales import (
-    line_frequencies,
-    line_share,
-    scales_of_fit,
-    scales_of_recordings,
-)
-from hwid_cli.diagnosis.search import fit_own
-from hwid_cli.diagnosis.selection import (
-    LEAST_GAIN,
-    SMALL_REMAINDER,
-    SelectionCriteria,
-    title_of,
-)
-from hwid_cli.diagnosis.verdict import DiagnosisVerdict, decide
+from hwid_cli.diagnosis.selection import LEAST_GAIN, SelectionCriteria, title_of
+from hwid_cli.diagnosis.verdict import decide
 from hwid_cli.diagnosis.where import places
 from hwid_cli.diagnosis.whiteness import whiteness
-from hwid_cli.diagnosis.zeros import with_zeros
 from hwid_cli.drive.catalogue import CATALOGUE, may_be_added, public_id
-from hwid_cli.drive.effect import Scales
 from hwid_cli.drive.simulation import drive_effects
 from hwid_cli.records.candidates import CandidateFit
-from hwid_cli.records.diagnosis import STILL_LARGE, Diagnosis, NoiseFloor
+from hwid_cli.records.diagnosis import Diagnosis
+from hwid_cli.records.drive import LINE
 from hwid_cli.records.experiment import DiagnoseOptions, SimulationOptions
 from hwid_cli.records.own_effects import own_ids
 from hwid_cli.records.recordings import Recording
-
-# A line that takes this share of what the base leaves is no colour of noise.
-LINE_SHARE = 0.3
-# Whole recordings cannot judge where the noise of their start alone, sent through the
-# fit, makes up this share of what the fit leaves of them.
-LOST_TO_NOISE = 0.3
 
 
 def diagnose(
@@ -243,7 +222,7 @@ def find(
         was = best_of(rounds, found)
         if rounds.criteria.gain(was, best_of(again.rounds, again.found)) <= 0:
             searched = again
-    return _judged(searched, options)
+    return _judged(_with_pieces(searched, options.max_effects), options)
 
 
 @dataclass(frozen=True, eq=False)
@@ -258,8 +237,12 @@ class _Searched:
         Simulations with the re-fitted base.
     force : list of Smoothed
         That the re-fitted base lacks.
+    found : RoundsResult
+        On whole recordings.
     seeds : tuple of CandidateFit
         Best sets of each size on pieces; empty where these were not asked.
+    smoothed : list of Smoothed
+        Motion that pieces start from.
     """
 
     rounds: Rounds
@@ -268,6 +251,7 @@ class _Searched:
     force: list[Smoothed]
     found: RoundsResult
     seeds: tuple[CandidateFit, ...]
+    smoothed: list[Smoothed]
 
     @property
     def has_gap(self) -> bool:
@@ -285,7 +269,7 @@ def _searched(
 ) -> _Searched:
     """Fit the base again, and search for sets of effects."""
     on_round("base", 0)
-    fitted = _fitted_base(problem)
+    fitted = fitted_base(problem)
     problem, noise, base = fitted.problem, fitted.noise, fitted.base
     drive = fitted_drive(problem.drive, base)
     before = compared_with_fit(problem, base, fitted.scales)
@@ -301,8 +285,50 @@ def _searched(
         run_tasks,
         on_round,
     )
-    found, seeds = _search(rounds, given_sse, force, options.max_effects)
-    return _Searched(rounds, given_sse, before, force, found, seeds)
+    searched = _Searched(rounds, given_sse, before, force, RoundsResult(), (), force)
+    return _on_whole_recordings(searched, options.max_effects)
+
+
+def _on_whole_recordings(searched: _Searched, max_effects: int) -> _Searched:
+    """Look for sets of effects; from pieces first where the base imitates."""
+    rounds, found = searched.rounds, searched.found
+    if not searched.has_gap:
+        return searched
+    criteria, known = rounds.criteria, None
+    if imitates(rounds):
+        given = compared_as_given(rounds.problem)
+        smoothed = latent_force(given, rounds.problem.drive, rounds.baseline.noise)
+        seeds, near, wide = seeds_of_pieces(rounds, smoothed, max_effects)
+        searched = replace(searched, seeds=seeds, smoothed=smoothed)
+        for these in ((*seeds, *near), wide):
+            found = continue_rounds(rounds, found, these)
+            if found.best and criteria.is_nearly_all(found.best[-1], rounds.base):
+                return replace(searched, found=found)
+        if not is_lost(
+            criteria, decided(rounds, searched.given_sse, found), rounds.base
+        ):
+            known = found
+    may_be_enough = rounds.problem.may_be_held and rounds.problem.drive.hold == LINE
+
+    def is_enough(winner: CandidateFit) -> bool:
+        return may_be_enough and is_complete_if_held(rounds, winner)
+
+    found = run_rounds(rounds, max_effects, is_enough, known)
+    return replace(searched, found=found)
+
+
+def _with_pieces(searched: _Searched, max_effects: int) -> _Searched:
+    """Look in pieces of the recordings, too, where whole ones settle nothing."""
+    rounds, found = searched.rounds, searched.found
+    if not searched.has_gap or rounds.problem.compares_command:
+        return searched
+    verdict = decided(rounds, searched.given_sse, found)
+    if not is_lost(rounds.criteria, verdict, rounds.base):
+        return searched
+    seeds = searched.seeds
+    if not seeds:
+        seeds, _, _ = seeds_of_pieces(rounds, searched.smoothed, max_effects)
+    return replace(searched, seeds=seeds, found=continue_rounds(rounds, found, seeds))
 
 
 def _judged(searched: _Searched, options: DiagnoseOptions) -> Findings:
@@ -312,15 +338,15 @@ def _judged(searched: _Searched, options: DiagnoseOptions) -> Findings:
     before, force = searched.before, searched.force
     where = places(before, rounds.baseline.noise, rounds.baseline.drive, force)
     rounds.on_round("verdict", 0)
-    verdict = _decided(rounds, given_sse, found)
+    verdict = decided(rounds, given_sse, found)
     whole = Findings(
         problem=rounds.problem, criteria=criteria, scales=rounds.baseline.scales,
         given_sse=given_sse, base=base, before=before, force=force, where=where,
         found=found, verdict=verdict,
     )  # fmt: skip
     # Where a drive stands for another simulation, that one judges.
-    if _is_lost(criteria, verdict, base) and seeds and criteria.standing is None:
-        judged = _judged_in_pieces(rounds, whole, seeds)
+    if is_lost(criteria, verdict, base) and seeds and criteria.standing is None:
+        judged = judged_in_pieces(rounds, whole, seeds, searched.smoothed)
         if judged is not None:
             return judged
     # Who asks for some effects only wants no formula instead.
@@ -349,238 +375,6 @@ def _with_residual_noise(whole: Findings) -> Findings:
     base = replace(base, whiteness=left, cause="coloured_noise")
     verdict = decide(criteria, whole.given_sse, base, {}, (), lambda _: ())
     return replace(whole, criteria=criteria, base=base, verdict=verdict)
-
-
-@dataclass(frozen=True, eq=False)
-class _FittedBase:
-    """The re-fitted base, and the causes beside effects that it has led to.
-
-    Parameters
-    ----------
-    problem : DiagnosisProblem
-        With the zeros of its recordings where these differ.
-    given : list of Compared
-        With the parameters that the configuration gives.
-    """
-
-    problem: DiagnosisProblem
-    noise: NoiseFloor
-    given: list[Compared]
-    scales: Scales
-    base: CandidateFit
-
-
-def _fitted_base(problem: DiagnosisProblem) -> _FittedBase:
-    """Fit the base again, with what measuring alone explains."""
-    noise = noise_floor(problem)
-    given = compared_as_given(problem)
-    scales = scales_of_recordings(problem, [one.velocity for one in given])
-    base = _refit_base(problem, scales, noise)
-    if _shakes_at_rest(problem, base, scales, noise):
-        noise = noise_floor(problem, rests=False)
-        base = _refit_base(problem, scales, noise)
-    reversal = find_reversal(problem, base, scales, noise)
-    if reversal is not None:
-        raise ReversedInputError(reversal)
-    base = _with_input_noise(problem, base, scales, noise)
-    problem, base = with_zeros(problem, base, scales, noise)
-    if base.cause == "zeros":
-        given = compared_as_given(problem)
-    if base.is_usable:
-        scales = scales_of_fit(problem, base, scales, noise)
-    return _FittedBase(problem, noise, given, scales, base)
-
-
-def _search(
-    rounds: Rounds, given_sse: np.ndarray, force: Sequence[Smoothed], max_effects: int
-) -> tuple[RoundsResult, tuple[CandidateFit, ...]]:
-    """Sets of effects, from whole recordings and where these are lost from pieces.
-
-    Returns
-    -------
-    RoundsResult
-        On whole recordings.
-    tuple of CandidateFit
-        Best sets of each size on pieces; empty where these were not asked.
-    """
-    base, criteria = rounds.base, rounds.criteria
-    if not base.is_usable or criteria.needs_nothing(base):
-        return RoundsResult(), ()
-    found = run_rounds(rounds, max_effects)
-    is_lost = _is_lost(criteria, _decided(rounds, given_sse, found), base)
-    if not is_lost or rounds.problem.compares_command:
-        return found, ()
-    seeds = _seeds_of_pieces(rounds, force, max_effects)
-    return continue_rounds(rounds, found, seeds), seeds
-
-
-def _is_lost(
-    criteria: SelectionCriteria, verdict: DiagnosisVerdict, base: CandidateFit
-) -> bool:
-    """Whether whole recordings settle nothing, with much left."""
-    is_open = verdict.word in ("unknown", "ambiguous")
-    if verdict.word == "named":
-        # What all near sets share has a name without being enough.
-        is_open = not criteria.may_be_named(verdict.chosen, base)
-    return is_open and criteria.ratio(verdict.chosen) > STILL_LARGE
-
-
-def _decided(
-    rounds: Rounds, given_sse: np.ndarray, found: RoundsResult
-) -> DiagnosisVerdict:
-    """Weigh what was found."""
-    return decide(
-        rounds.criteria,
-        given_sse,
-        rounds.base,
-        found.fits,
-        found.best,
-        lambda one: unclear_effects(rounds.problem, one, rounds.baseline.scales),
-    )
-
-
-def compared_as_given(problem: DiagnosisProblem) -> list[Compared]:
-    """Simulate with the parameters that the configuration gives.
-
-    What belongs to one recording alone (a start, a phase) is found from it.
-    """
-    present = drive_effects(problem.drive)
-    speeds = [signals.velocity for signals in problem.signals]
-    rough = scales_of_recordings(problem, speeds)
-    fit_layout = parameter_layout(problem, tuple(present), present, rough)
-    point = first_point(problem, fit_layout, problem.drive, present)
-    own = fit_own(problem, fit_layout, point.shared)
-    return compare_at(problem, fit_layout, own)
-
-
-def _refit_base(
-    problem: DiagnosisProblem, scales: Scales, noise: NoiseFloor
-) -> CandidateFit:
-    """Base, and the effects that the simulation has already, fitted again."""
-    start = SearchStart(base_of(problem.drive), drive_effects(problem.drive))
-    return fit_candidate(problem, (), [start], scales, noise)
-
-
-def _seeds_of_pieces(
-    rounds: Rounds, force: Sequence[Smoothed], max_effects: int
-) -> tuple[CandidateFit, ...]:
-    """Best sets of each size on pieces of the recordings."""
-    of_pieces = _rounds_of(rounds, in_pieces(rounds.problem, force))
-    if not of_pieces.base.is_usable:
-        return ()
-    free = in_pieces(rounds.problem, force, are_free=True)
-    criteria = SelectionCriteria.of(free, rounds.baseline.noise)
-
-    def is_enough(winner: CandidateFit) -> bool:
-        # What starts that are not exact leave looks as if more were missing.
-        return criteria.ratio(_from_there(rounds, free, winner)) <= SMALL_REMAINDER
-
-    return run_rounds(of_pieces, max_effects, is_enough).best
-
-
-def _from_there(
-    rounds: Rounds, problem: DiagnosisProblem, found: CandidateFit
-) -> CandidateFit:
-    """The same effects fitted to another problem, from where their fit has ended."""
-    start = start_from(problem.drive, found)
-    baseline = rounds.baseline
-    return fit_candidate(
-        problem, found.effects, [start], baseline.scales, baseline.noise
-    )
-
-
-def _rounds_of(rounds: Rounds, pieces: DiagnosisProblem) -> Rounds:
-    """The same rounds on pieces of the recordings, with their own base."""
-    baseline = rounds.baseline
-    start = SearchStart(base_of(baseline.drive), drive_effects(pieces.drive))
-    base = fit_candidate(pieces, (), [start], baseline.scales, baseline.noise)
-    # Values of each recording would be values of each piece, which imitate anything.
-    shared = tuple(
-        one
-        for one in rounds.allowed
-        if not any(parameter.is_own for parameter in CATALOGUE[one].parameters)
-    )
-    return replace(
-        rounds,
-        problem=pieces,
-        allowed=shared,
-        criteria=SelectionCriteria.of(pieces, baseline.noise),
-        base=base,
-        baseline=replace(baseline, drive=fitted_drive(pieces.drive, base)),
-    )
-
-
-def _judged_in_pieces(
-    rounds: Rounds, whole: Findings, seeds: Sequence[CandidateFit]
-) -> Findings | None:
-    """What pieces with free starts name, where whole recordings cannot tell.
-
-    None where they name nothing, or where a start that is off by the noise changes whole
-    recordings by less than what the named effects leave of them.
-    """
-    rounds.on_round("pieces with free starts", 0)
-    pieces = in_pieces(rounds.problem, whole.force, are_free=True)
-    of_pieces = _rounds_of(rounds, pieces)
-    if not of_pieces.base.is_usable:
-        return None
-    found = continue_rounds(of_pieces, RoundsResult(), seeds)
-    given = each_sum_of_squares([one.residual for one in compared_as_given(pieces)])
-    verdict = _decided(of_pieces, given, found)
-    is_near = of_pieces.criteria.ratio(verdict.chosen) <= STILL_LARGE
-    if verdict.word != "named" or not is_near:
-        return None
-    problem, scales, noise = rounds.problem, whole.scales, rounds.baseline.noise
-    judged = JudgedPieces(problem, pieces, verdict.chosen)
-    spread, left = judged.spread_by_noise(scales, noise.rms)
-    if not spread >= LOST_TO_NOISE * left:
-        return None
-    joined = {name: judged.joined_fit(one) for name, one in found.fits.items()}
-    base = judged.joined_fit(of_pieces.base)
-    return replace(
-        whole,
-        given_sse=judged.joined_sse(given),
-        base=base,
-        before=judged.compared(of_pieces.base, scales),
-        found=replace(
-            found, fits=joined, best=tuple(joined[one.effects] for one in found.best)
-        ),
-        verdict=replace(
-            verdict,
-            chosen=joined[verdict.chosen.effects],
-            rivals=tuple(joined[one.effects] for one in verdict.rivals),
-        ),
-        pieces=judged,
-        warnings=(
-            f"judged in pieces of {judged.longest_s:.2g} s with starts of their own: over "
-            f"whole recordings a start that is off by the noise changes the motion by "
-            f"{spread:.2g} {problem.unit}",
-        ),
-    )
-
-
-def _with_input_noise(
-    problem: DiagnosisProblem, base: CandidateFit, scales: Scales, noise: NoiseFloor
-) -> CandidateFit:
-    """Base as fitted with the input's noise in mind, if nothing else remains then."""
-    may_help = 1.0 < base.whiteness < np.inf and noise.input_rms > 0
-    if not may_help or problem.compares_command:
-        return base
-    fit_layout, point = rebuilt(problem, base, scales)
-    point = fit_with_input_noise(problem, fit_layout, point, noise)
-    found = at_point(problem, base, fit_layout, point, noise)
-    return found if found.cause == "input_noise" else base
-
-
-def _shakes_at_rest(
-    problem: DiagnosisProblem, base: CandidateFit, scales: Scales, noise: NoiseFloor
-) -> bool:
-    """Whether the colour at rest is a line that goes on all the time: motion."""
-    if not (noise.is_coloured and noise.method == "rest" and base.is_usable):
-        return False
-    compared = compared_with_fit(problem, base, scales)
-    white = replace(noise, whitening=(1.0,))
-    line = line_frequencies(compared, white)[0]
-    return line_share(compared, line) > LINE_SHARE
 
 
 def allowed_effects(

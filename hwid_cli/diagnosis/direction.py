@@ -54,7 +54,7 @@ def find_reversal(
         None where the direction is right, or cannot be told. Under a controller the
         loop itself tells.
     """
-    motion = _motion(problem)
+    motion = float(problem.each_motion.sum())
     # Forces along a recording belong to the simulation that they stand in for.
     has_force = any(one.force.size for one in problem.signals)
     if (
@@ -109,12 +109,6 @@ def reversal_sentence(found: Reversal, *, input_scale: float = 1.0) -> str:
         f"{as_percent(found.reversed)} with the input turned round; write input_scale: "
         f"{-input_scale:.15g}, or give the force constant the other sign"
     )
-
-
-def _motion(problem: DiagnosisProblem) -> float:
-    """Sum of squares of the outputs about their means."""
-    parts = [one.compared[one.evaluated] for one in problem.signals]
-    return float(sum(np.sum(np.square(one - one.mean())) for one in parts))
 
 
 def _leaves_much(sse: Sequence[float] | np.ndarray, motion: float) -> bool:

@@ -6,6 +6,7 @@ drive. So what the search has found is fitted once more beside a held command, w
 without each of its effects. docs/method_diagnosis.md, eq. (D23b).
 """
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -49,21 +50,46 @@ def is_held(rounds: Rounds, found: RoundsResult) -> bool:
     docs/method_diagnosis.md, eq. (D23b).
     """
     best = best_of(rounds, found)
+    return bool(_better_if_held(rounds, best, _worth_trying(rounds, found, best)))
+
+
+def is_complete_if_held(rounds: Rounds, best: CandidateFit) -> bool:
+    """Whether nothing remains beside a held command, of a set that leaves something.
+
+    Larger sets are not worth their time then: they would imitate half a sample.
+    """
+    better = _better_if_held(rounds, best, _without_each(rounds, best))
+    return any(rounds.criteria.is_complete(one) for one in better)
+
+
+def _better_if_held(
+    rounds: Rounds, best: CandidateFit, sets: Mapping[Effects, SearchStart]
+) -> list[CandidateFit]:
+    """Fits of sets beside a held command that do better than a set beside a line."""
     if not (best.is_usable and _matters(rounds, best)):
-        return False
+        return []
     criteria, held = rounds.criteria, with_held_command(rounds.problem)
-    sets = _worth_trying(rounds, found, best)
     rounds.on_round("the command held", len(sets))
     tasks = [
         fit_task(replace(rounds, problem=held), ids, [start], None)
         for ids, start in sets.items()
     ]
     fits: list[CandidateFit] = rounds.run_tasks(tasks, keep=True)
-    return any(
-        # What it does without is a reason of its own.
-        criteria.gain(one, best) >= (0.0 if count(one) < count(best) else LEAST_GAIN)
+    return [
+        one
         for one in fits
-    )
+        # What it does without is a reason of its own.
+        if criteria.gain(one, best) >= (0.0 if count(one) < count(best) else LEAST_GAIN)
+    ]
+
+
+def _without_each(rounds: Rounds, best: CandidateFit) -> dict[Effects, SearchStart]:
+    """A set, and the same without each effect, with starts."""
+    start = start_from(rounds.problem.drive, best)
+    sets = {best.effects: start}
+    for left in best.effects:
+        sets[tuple(one for one in best.effects if one != left)] = start
+    return sets
 
 
 def _worth_trying(
@@ -71,10 +97,7 @@ def _worth_trying(
 ) -> dict[Effects, SearchStart]:
     """The best set, the same without each effect, and the next best ones, with starts."""
     gain, drive = rounds.criteria.gain, rounds.problem.drive
-    start = start_from(drive, best)
-    sets = {best.effects: start}
-    for left in best.effects:
-        sets[tuple(one for one in best.effects if one != left)] = start
+    sets = _without_each(rounds, best)
     near = sorted(found.fits.values(), key=lambda one: -gain(one, best))
     near = [one for one in near if len(one.effects) <= len(best.effects)]
     for one in near[: MOST_OTHERS + 1]:

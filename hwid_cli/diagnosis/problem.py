@@ -208,6 +208,17 @@ class DiagnosisProblem:
         """Number of samples that are evaluated in all recordings."""
         return sum(one.n_evaluated for one in self.signals)
 
+    @property
+    def each_motion(self) -> np.ndarray:
+        """Sum of squares of what is compared about the mean of each recording.
+
+        Returns
+        -------
+        ndarray, shape (n_recordings,), [output unit squared]
+        """
+        parts = [one.compared[one.evaluated] for one in self.signals]
+        return np.array([np.sum(np.square(one - one.mean())) for one in parts])
+
     def part(self, *, held_out: bool) -> "DiagnosisProblem":
         """Only the recordings that are held out, or only the others."""
         chosen = tuple(one for one in self.signals if one.is_held_out == held_out)

@@ -186,6 +186,7 @@ def run_rounds(
     rounds: Rounds,
     max_effects: int,
     is_enough: Callable[[CandidateFit], bool] = lambda winner: False,
+    known: RoundsResult | None = None,
 ) -> RoundsResult:
     """Fit single effects, and larger sets while something remains.
 
@@ -193,11 +194,18 @@ def run_rounds(
     ----------
     is_enough : callable
         Whether larger sets than the best one of a size are not worth their time.
+    known : RoundsResult or None
+        Sets that another search has led to: larger ones only, on top of these.
     """
     search = _Search(rounds)
     best: list[CandidateFit] = []
     parents = [rounds.base]
-    for size in range(1, max_effects + 1):
+    if known is not None and known.best:
+        search.fits.update(known.fits)
+        search.shares.update(known.shares)
+        best = list(known.best)
+        parents = search.parents(len(best))
+    for size in range(len(best) + 1, max_effects + 1):
         if not rounds.allowed:
             break
         winner = search.round_of(size, parents)
@@ -339,7 +347,7 @@ class _Search:
         for parent in parents:
             for ids, starts in self._on_top(parent).items():
                 found.setdefault(ids, []).extend(starts)
-        if size == 2:
+        if size == 2 and self._forecasts:
             for ids, start in self._likely_pairs():
                 found.setdefault(ids, []).append(start)
         return found

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from hwid_cli.diagnosis.base_fit import compared_as_given
 from hwid_cli.diagnosis.causes import without_repeats
-from hwid_cli.diagnosis.diagnose import compared_as_given
 from hwid_cli.diagnosis.problem import prepare
 from hwid_cli.records.drive import DriveResponse
 from hwid_cli.records.experiment import DiagnoseOptions, SimulationOptions

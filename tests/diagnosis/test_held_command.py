@@ -104,7 +104,7 @@ def test_what_the_noise_hides_is_not_tried(monkeypatch):
     def refuse(*_):
         raise AssertionError("tried a held command")
 
-    monkeypatch.setattr("hwid_cli.diagnosis.held_command._worth_trying", refuse)
+    monkeypatch.setattr("hwid_cli.diagnosis.held_command.fit_task", refuse)
     rng, drift = np.random.default_rng(2), 2.0 * STEP_S * np.arange(N)
     loud = [
         replace(one, output=one.output + drift + 0.05 * rng.standard_normal(N))

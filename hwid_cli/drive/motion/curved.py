@@ -53,6 +53,9 @@ OWN_SHARE, OWN_RATE = 1e-4, 30.0
 OWN_AHEAD = 6.0
 # Depth of a contact that is only ahead, [m].
 JUST_IN = 1e-300
+# A step within which drag settles so often is taken implicitly: Runge-Kutta steps explode
+# from 2.8 on.
+SETTLES = 2.0
 # A contact's force begins with an edge in its slope: its steps are this much shorter.
 CONTACT_FINER = 2.0
 
@@ -202,6 +205,14 @@ def step_limit(
         stiffness += more
         turning *= 0.12 * speed
     rate = np.sqrt(stiffness / mass) + damping / mass + turning
+    if p[slots.DRAG] != 0.0:
+        # From rest the drive reaches the speed at which the drag holds it so fast.
+        pull = abs(acceleration(state, memory, push, done, p)[0])
+        ahead = acceleration(state, memory, push, p[slots.SAMPLE_TIME], p)[0]
+        fast = 2.0 * np.sqrt(abs(p[slots.DRAG]) * max(pull, abs(ahead)) / mass)
+        # What settles over several samples is told by the speed alone.
+        if fast * p[slots.SAMPLE_TIME] > 1.0:
+            rate += fast
     if p[slots.HAS_CONTACT] != 0.0:
         rate += _contact_rate(x, low, high, v, mass, p)
     if p[slots.MODE_MASS] > 0.0:
@@ -338,6 +349,11 @@ def step_plain(
     first, b, c, d = a0 + a1, b0 + b1, c0 + c1, d0 + d1
     middle = first + half * (b + half * (c + half * d))
     last = first + h * (b + h * (c + h * d))
+    if p[slots.DRAG] > 0.0:
+        free = last - resisting(x, 0.0, memory, p)
+        fast = abs(v) * p[slots.DRAG] + np.sqrt(abs(free) * p[slots.DRAG])
+        if 2.0 * fast * h * inverse > SETTLES:
+            return _step_in_drag(x, v, free, h, p)
     k1 = (first - resisting(x, v, memory, p)) * inverse
     v2 = v + half * k1
     k2 = (middle - resisting(x + half * v, v2, memory, p)) * inverse
@@ -349,6 +365,25 @@ def step_plain(
     return x + sixth * (v + 2.0 * (v2 + v3) + v4), v + sixth * (
         k1 + 2.0 * (k2 + k3) + k4
     )
+
+
+@compiled(**INNER)
+def _step_in_drag(
+    x: float, v: float, free: float, h: float, p: np.ndarray
+) -> tuple[float, float]:
+    """Step within which drag settles: it and the damping act with the speed at the end.
+
+    Parameters
+    ----------
+    free : float, [N]
+        All other forces.
+    """
+    slow = p[slots.MASS] / h
+    impulse = free + slow * v
+    slow += p[slots.DAMPING]
+    root = np.sqrt(slow * slow + 4.0 * p[slots.DRAG] * abs(impulse))
+    speed = 2.0 * impulse / (slow + root)
+    return x + h * speed, speed
 
 
 @compiled(**INNER)

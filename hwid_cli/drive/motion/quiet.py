@@ -152,6 +152,8 @@ def glide_plain(
     done, x, v = 0.0, state[X], state[V]
     n = N_STATE + DRIVEN
     trusted = j
+    # In drag a drive at rest speeds up within a step, as soon as a force comes.
+    is_smooth = not (is_curved_at_times or has_edges or p[slots.DRAG] != 0.0)
     while j < count:
         length = pieces[j, LENGTH]
         push = pushes[j]
@@ -176,7 +178,7 @@ def glide_plain(
                     limit = max(limit, length / MOST_STEPS)
                     if limit < left:
                         h = left / np.ceil(left / limit)
-                    elif limit > 2.0 * left and not (is_curved_at_times or has_edges):
+                    elif limit > 2.0 * left and is_smooth:
                         trusted = j + FAR_FROM_LIMIT
                 x1, v1 = step_plain(x, v, memory, push, done, h, p)
                 if p[slots.DRIVE_SHARE] > 0.0 and turns_sign(push, done, h):

@@ -1980,9 +1980,11 @@ static double drive_step_limit(double *state, double *memory, double *push, doub
     tuple_dd t2 = {0};
     double more = 0.0;
     double rate = 0.0;
+    double pull = 0.0;
+    double ahead = 0.0;
+    double fast = 0.0;
     double both = 0.0;
     double slow = 0.0;
-    double pull = 0.0;
     mass = p[MASS];
     has_motor = p[GEAR_STIFFNESS] > 0.0;
     if (has_motor) {
@@ -2020,6 +2022,14 @@ static double drive_step_limit(double *state, double *memory, double *push, doub
         turning *= 0.12 * speed;
     }
     rate = (sqrt(stiffness / mass) + (damping / mass)) + turning;
+    if (p[DRAG] != 0.0) {
+        pull = fabs(drive_acceleration(state, memory, push, done, p).m0);
+        ahead = drive_acceleration(state, memory, push, p[SAMPLE_TIME], p).m0;
+        fast = 2.0 * sqrt((fabs(p[DRAG]) * most(pull, fabs(ahead))) / mass);
+        if ((fast * p[SAMPLE_TIME]) > 1.0) {
+            rate += fast;
+        }
+    }
     if (p[HAS_CONTACT] != 0.0) {
         rate += drive_contact_rate(x, low, high, v, mass, p);
     }
@@ -2098,6 +2108,20 @@ static tuple_dd drive_step_varying(double x, double v, double *memory, double *p
     return (tuple_dd){x1, v1};
 }
 
+static tuple_dd drive_step_in_drag(double x, double v, double free, double h, double *p)
+{
+    double slow = 0.0;
+    double impulse = 0.0;
+    double root = 0.0;
+    double speed = 0.0;
+    slow = p[MASS] / h;
+    impulse = free + (slow * v);
+    slow += p[DAMPING];
+    root = sqrt((slow * slow) + ((4.0 * p[DRAG]) * fabs(impulse)));
+    speed = (2.0 * impulse) / (slow + root);
+    return (tuple_dd){x + (h * speed), speed};
+}
+
 static tuple_dd drive_step_plain(double x, double v, double *memory, double *push, double done, double h, double *p)
 {
     double half = 0.0;
@@ -2118,6 +2142,8 @@ static tuple_dd drive_step_plain(double x, double v, double *memory, double *pus
     double d = 0.0;
     double middle = 0.0;
     double last = 0.0;
+    double free = 0.0;
+    double fast = 0.0;
     double k1 = 0.0;
     double v2 = 0.0;
     double k2 = 0.0;
@@ -2147,6 +2173,13 @@ static tuple_dd drive_step_plain(double x, double v, double *memory, double *pus
     d = d0 + d1;
     middle = first + (half * (b + (half * (c + (half * d)))));
     last = first + (h * (b + (h * (c + (h * d)))));
+    if (p[DRAG] > 0.0) {
+        free = last - drive_resisting(x, 0.0, memory, p);
+        fast = (fabs(v) * p[DRAG]) + sqrt(fabs(free) * p[DRAG]);
+        if ((((2.0 * fast) * h) * inverse) > 2.0) {
+            return drive_step_in_drag(x, v, free, h, p);
+        }
+    }
     k1 = (first - drive_resisting(x, v, memory, p)) * inverse;
     v2 = v + (half * k1);
     k2 = (middle - drive_resisting(x + (half * v), v2, memory, p)) * inverse;

@@ -1,0 +1,131 @@
+"""The base, fitted again, with what measuring alone explains.
+
+Wrong parameters are not a missing effect, and neither are noise of the input, a base that
+shakes before it is driven, and zeros of a sensor that differ. docs/method_diagnosis.md.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from hwid_cli.diagnosis.candidate import (
+    SearchStart,
+    at_point,
+    base_of,
+    compared_with_fit,
+    fit_candidate,
+    rebuilt,
+)
+from hwid_cli.diagnosis.causes import fit_with_input_noise
+from hwid_cli.diagnosis.direction import ReversedInputError, find_reversal
+from hwid_cli.diagnosis.noise import noise_floor
+from hwid_cli.diagnosis.parameters import compare_at, first_point, parameter_layout
+from hwid_cli.diagnosis.problem import Compared, DiagnosisProblem
+from hwid_cli.diagnosis.scales import (
+    line_frequencies,
+    line_share,
+    scales_of_fit,
+    scales_of_recordings,
+)
+from hwid_cli.diagnosis.search import fit_own
+from hwid_cli.diagnosis.zeros import with_zeros
+from hwid_cli.drive.effect import Scales
+from hwid_cli.drive.simulation import drive_effects
+from hwid_cli.records.candidates import CandidateFit
+from hwid_cli.records.diagnosis import NoiseFloor
+
+# A line that takes this share of what the base leaves is no colour of noise.
+LINE_SHARE = 0.3
+
+
+@dataclass(frozen=True, eq=False)
+class FittedBase:
+    """The re-fitted base, and the causes beside effects that it has led to.
+
+    Parameters
+    ----------
+    problem : DiagnosisProblem
+        With the zeros of its recordings where these differ.
+    given : list of Compared
+        With the parameters that the configuration gives.
+    """
+
+    problem: DiagnosisProblem
+    noise: NoiseFloor
+    given: list[Compared]
+    scales: Scales
+    base: CandidateFit
+
+
+def fitted_base(problem: DiagnosisProblem) -> FittedBase:
+    """Fit the base again, with what measuring alone explains.
+
+    Raises
+    ------
+    ConfigError
+        If the output clearly moves against the input.
+    """
+    noise = noise_floor(problem)
+    given = compared_as_given(problem)
+    scales = scales_of_recordings(problem, [one.velocity for one in given])
+    base = _refit_base(problem, scales, noise)
+    if _shakes_at_rest(problem, base, scales, noise):
+        noise = noise_floor(problem, rests=False)
+        base = _refit_base(problem, scales, noise)
+    reversal = find_reversal(problem, base, scales, noise)
+    if reversal is not None:
+        raise ReversedInputError(reversal)
+    base = _with_input_noise(problem, base, scales, noise)
+    problem, base = with_zeros(problem, base, scales, noise)
+    if base.cause == "zeros":
+        given = compared_as_given(problem)
+    if base.is_usable:
+        scales = scales_of_fit(problem, base, scales, noise)
+    return FittedBase(problem, noise, given, scales, base)
+
+
+def compared_as_given(problem: DiagnosisProblem) -> list[Compared]:
+    """Simulate with the parameters that the configuration gives.
+
+    What belongs to one recording alone (a start, a phase) is found from it.
+    """
+    present = drive_effects(problem.drive)
+    speeds = [signals.velocity for signals in problem.signals]
+    rough = scales_of_recordings(problem, speeds)
+    fit_layout = parameter_layout(problem, tuple(present), present, rough)
+    point = first_point(problem, fit_layout, problem.drive, present)
+    own = fit_own(problem, fit_layout, point.shared)
+    return compare_at(problem, fit_layout, own)
+
+
+def _refit_base(
+    problem: DiagnosisProblem, scales: Scales, noise: NoiseFloor
+) -> CandidateFit:
+    """Base, and the effects that the simulation has already, fitted again."""
+    start = SearchStart(base_of(problem.drive), drive_effects(problem.drive))
+    return fit_candidate(problem, (), [start], scales, noise)
+
+
+def _with_input_noise(
+    problem: DiagnosisProblem, base: CandidateFit, scales: Scales, noise: NoiseFloor
+) -> CandidateFit:
+    """Base as fitted with the input's noise in mind, if nothing else remains then."""
+    may_help = 1.0 < base.whiteness < np.inf and noise.input_rms > 0
+    if not may_help or problem.compares_command:
+        return base
+    fit_layout, point = rebuilt(problem, base, scales)
+    point = fit_with_input_noise(problem, fit_layout, point, noise)
+    found = at_point(problem, base, fit_layout, point, noise)
+    return found if found.cause == "input_noise" else base
+
+
+def _shakes_at_rest(
+    problem: DiagnosisProblem, base: CandidateFit, scales: Scales, noise: NoiseFloor
+) -> bool:
+    """Whether the colour at rest is a line that goes on all the time: motion."""
+    if not (noise.is_coloured and noise.method == "rest" and base.is_usable):
+        return False
+    compared = compared_with_fit(problem, base, scales)
+    white = replace(noise, whitening=(1.0,))
+    line = line_frequencies(compared, white)[0]
+    return line_share(compared, line) > LINE_SHARE
