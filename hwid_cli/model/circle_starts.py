@@ -99,7 +99,9 @@ def circle_starts(
             )
             for factor in factors
         ]
-        chosen += sorted(of_factors, key=lambda one: one.cost)[:_KEPT]
+        # Where the equations have no solution there is nothing to start from.
+        solved_ones = [one for one in of_factors if np.isfinite(one.cost)]
+        chosen += sorted(solved_ones, key=lambda one: one.cost)[:_KEPT]
     return tuple(chosen)
 
 

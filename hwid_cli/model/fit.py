@@ -176,6 +176,9 @@ def _fitted(
         found.problem,
         standard_errors=standard_errors,
     )
+    if not _has_finite_domains(fitted):
+        # A constant behind a signal that runs away still has a finite output.
+        return replace(blank, message="the signal before the output map runs away")
     said = [fitted.message, offset_left(recordings, options), found.outliers_said]
     fitted = replace(fitted, message="; ".join(one for one in said if one))
     return _without_needless_levels(fitted, recordings, standard_errors=standard_errors)
@@ -318,6 +321,15 @@ def _warm_search(
     except np.linalg.LinAlgError:
         return None
     return search if _is_usable(search) else None
+
+
+def _has_finite_domains(fitted: Fit) -> bool:
+    """Tell whether both maps were visited in a finite range, if there is a model."""
+    model = fitted.model
+    if model is None:
+        return True
+    ends = (*model.input_map.domain, *model.output_map.domain)
+    return bool(np.isfinite(ends).all())
 
 
 def _is_usable(search: Search) -> bool:
