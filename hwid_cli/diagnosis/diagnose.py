@@ -48,15 +48,10 @@ from hwid_cli.diagnosis.problem import (
     prepare,
 )
 from hwid_cli.diagnosis.residual_noise import residual_noise
-from hwid_cli.diagnosis.rounds import (
-    OnRound,
-    Rounds,
-    RoundsResult,
-    RunTasks,
-    continue_rounds,
-    run_rounds,
-)
+from hwid_cli.diagnosis.rounds import RoundsResult, continue_rounds, run_rounds
 from hwid_cli.diagnosis.selection import LEAST_GAIN, SelectionCriteria, title_of
+from hwid_cli.diagnosis.set_fits import Rounds
+from hwid_cli.diagnosis.tasks import OnRound, RunTasks
 from hwid_cli.diagnosis.verdict import decide
 from hwid_cli.diagnosis.where import places
 from hwid_cli.diagnosis.whiteness import whiteness

@@ -21,7 +21,6 @@ from hwid_cli.diagnosis.confirmation import (
 from hwid_cli.diagnosis.diagnose import find, held_out_of
 from hwid_cli.diagnosis.findings import Findings, describe
 from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals, prepare
-from hwid_cli.diagnosis.rounds import OnRound, RunTasks
 from hwid_cli.diagnosis.simulator import DIFFERENCE, Runs, Simulator
 from hwid_cli.diagnosis.stand_in import (
     derived,
@@ -32,6 +31,7 @@ from hwid_cli.diagnosis.stand_in import (
     moved_plainly,
     standing_for,
 )
+from hwid_cli.diagnosis.tasks import OnRound, RunTasks
 from hwid_cli.records.diagnosis import BaseParameter, Diagnosis
 from hwid_cli.records.drive import LINE, StandIn
 from hwid_cli.records.experiment import DiagnoseOptions, SimulationOptions

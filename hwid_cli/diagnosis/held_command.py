@@ -18,8 +18,9 @@ from hwid_cli.diagnosis.candidate import (
 )
 from hwid_cli.diagnosis.effect_sets import Effects
 from hwid_cli.diagnosis.problem import DiagnosisProblem
-from hwid_cli.diagnosis.rounds import Rounds, RoundsResult, fit_task
+from hwid_cli.diagnosis.rounds import RoundsResult
 from hwid_cli.diagnosis.selection import LEAST_GAIN, count
+from hwid_cli.diagnosis.set_fits import Rounds, fit_task
 from hwid_cli.records.candidates import CandidateFit
 from hwid_cli.records.drive import HELD
 

@@ -21,9 +21,9 @@ from hwid_cli.diagnosis.findings import Findings
 from hwid_cli.diagnosis.forecast import Linearisation, changed_by, linearise
 from hwid_cli.diagnosis.next_experiment import FittedCandidate, played
 from hwid_cli.diagnosis.problem import DiagnosisProblem
-from hwid_cli.diagnosis.rounds import DiagnosisTask, RunTasks
 from hwid_cli.diagnosis.scales import scales_of_recordings
 from hwid_cli.diagnosis.selection import LEAST_GAIN
+from hwid_cli.diagnosis.tasks import DiagnosisTask, RunTasks
 from hwid_cli.drive.catalogue import CATALOGUE, public_id
 from hwid_cli.drive.simulation import drive_effects
 

@@ -3,8 +3,9 @@
 import numpy as np
 
 from hwid_cli.diagnosis.intervals import unclear_effects
-from hwid_cli.diagnosis.rounds import Rounds, RoundsResult
+from hwid_cli.diagnosis.rounds import RoundsResult
 from hwid_cli.diagnosis.selection import SelectionCriteria
+from hwid_cli.diagnosis.set_fits import Rounds
 from hwid_cli.diagnosis.verdict import DiagnosisVerdict, decide
 from hwid_cli.records.candidates import CandidateFit
 from hwid_cli.records.diagnosis import STILL_LARGE

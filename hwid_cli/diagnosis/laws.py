@@ -34,18 +34,15 @@ from hwid_cli.diagnosis.law_search import (
 )
 from hwid_cli.diagnosis.law_terms import Term, coefficient_unit, library, readings
 from hwid_cli.diagnosis.problem import Compared
-from hwid_cli.diagnosis.rounds import (
-    DiagnosisTask,
-    Rounds,
-    RoundsResult,
-    has_many_samples,
-)
+from hwid_cli.diagnosis.rounds import RoundsResult
 from hwid_cli.diagnosis.selection import (
     LEAST_GAIN,
     LEAST_IMPROVED,
     SMALL_REMAINDER,
     TIE,
 )
+from hwid_cli.diagnosis.set_fits import Rounds, has_many_samples
+from hwid_cli.diagnosis.tasks import DiagnosisTask
 from hwid_cli.diagnosis.verdict import DiagnosisVerdict, needs_each
 from hwid_cli.drive.catalogue import CATALOGUE, public_id
 from hwid_cli.drive.simulation import drive_effects

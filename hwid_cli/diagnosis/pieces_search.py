@@ -24,14 +24,9 @@ from hwid_cli.diagnosis.latent_force import Smoothed
 from hwid_cli.diagnosis.parameters import each_sum_of_squares
 from hwid_cli.diagnosis.pieces import JudgedPieces, in_pieces
 from hwid_cli.diagnosis.problem import DiagnosisProblem
-from hwid_cli.diagnosis.rounds import (
-    WORTH_MORE,
-    Rounds,
-    RoundsResult,
-    continue_rounds,
-    run_rounds,
-)
+from hwid_cli.diagnosis.rounds import RoundsResult, continue_rounds, run_rounds
 from hwid_cli.diagnosis.selection import SMALL_REMAINDER, SelectionCriteria
+from hwid_cli.diagnosis.set_fits import WORTH_MORE, Rounds
 from hwid_cli.drive.catalogue import CATALOGUE
 from hwid_cli.drive.simulation import drive_effects
 from hwid_cli.records.candidates import CandidateFit

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from hwid_cli.diagnosis.problem import Signals
-from hwid_cli.diagnosis.rounds import DiagnosisTask, RunTasks
+from hwid_cli.diagnosis.tasks import DiagnosisTask, RunTasks
 from hwid_cli.drive.simulation import NO_FORCE
 from hwid_cli.records.programs import (
     Capabilities,

@@ -18,7 +18,7 @@ from hwid_cli.diagnosis import diagnose as pipeline
 from hwid_cli.diagnosis.direction import ReversedInputError, reversal_sentence
 from hwid_cli.diagnosis.foreign import diagnose_foreign
 from hwid_cli.diagnosis.hidden import HiddenEffect
-from hwid_cli.diagnosis.rounds import DiagnosisTask, OnRound, RunTasks
+from hwid_cli.diagnosis.tasks import DiagnosisTask, OnRound, RunTasks
 from hwid_cli.errors import CacheError, ConfigError
 from hwid_cli.files.figure_files import read_figure, write_figure
 from hwid_cli.records.check import StagePlan

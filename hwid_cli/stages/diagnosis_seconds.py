@@ -13,15 +13,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from hwid_cli.diagnosis.rounds import (
-    LIKELY_PAIRS,
-    MOST_PARENTS,
-    MOST_SCREENINGS,
-    SCREENED_ON_TOP,
-    DiagnosisTask,
-    OnRound,
-    RunTasks,
-)
+from hwid_cli.diagnosis.proposals import LIKELY_PAIRS, SCREENED_ON_TOP
+from hwid_cli.diagnosis.rounds import MOST_PARENTS, MOST_SCREENINGS
+from hwid_cli.diagnosis.tasks import DiagnosisTask, OnRound, RunTasks
 from hwid_cli.records.programs import SimulatorRun
 
 # Of the tasks of the screening, [tasks].

@@ -1,0 +1,152 @@
+"""Sets of effects that are worth a screening, by what they should explain.
+
+docs/method_diagnosis.md.
+"""
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from hwid_cli.diagnosis.candidate import (
+    SearchStart,
+    base_of,
+    fitted_drive,
+    fitted_start,
+    fitted_values,
+)
+from hwid_cli.diagnosis.effect_sets import (
+    Effects,
+    includes_one_of,
+    is_nested,
+    with_effect,
+)
+from hwid_cli.diagnosis.forecast import (
+    Forecast,
+    Linearisation,
+    forecast,
+    linearise,
+    pair_shares,
+)
+from hwid_cli.diagnosis.problem import DiagnosisProblem
+from hwid_cli.diagnosis.scales import scales_of_fit
+from hwid_cli.diagnosis.set_fits import Rounds
+from hwid_cli.diagnosis.tasks import DiagnosisTask
+from hwid_cli.drive.simulation import drive_effects
+from hwid_cli.records.candidates import CandidateFit
+
+# Candidates on top of a set, by their forecasts, that are screened; among them so many
+# that include no other one, since all shapes of one law may come first.
+SCREENED_ON_TOP = 12
+KINDS_ON_TOP = 8
+LIKELY_PAIRS = 10
+# A pair is likely where it should explain this much more than its better half.
+PROMISING_PAIR = 0.05
+# Starts of one effect that are screened.
+SCREENED_STARTS = 3
+
+
+class Proposals:
+    """Sets to screen, built on smaller ones; the forecasts of single effects so far.
+
+    Parameters
+    ----------
+    shares : mapping of tuple of str to float
+        What each effect alone should explain.
+    """
+
+    def __init__(self, rounds: Rounds) -> None:
+        self.rounds = rounds
+        self.shares: dict[Effects, float] = {}
+        self._forecasts: list[Forecast] = []
+        self._error = np.zeros(0)
+
+    def of_size(
+        self, size: int, parents: Sequence[CandidateFit], few: DiagnosisProblem
+    ) -> dict[Effects, list[SearchStart]]:
+        """Sets of one size that are worth a screening, with their starts."""
+        found: dict[Effects, list[SearchStart]] = {}
+        for parent in parents:
+            for ids, starts in self._on_top(parent, few).items():
+                found.setdefault(ids, []).extend(starts)
+        if size == 2 and self._forecasts:
+            for ids, start in self._likely_pairs():
+                found.setdefault(ids, []).append(start)
+        return found
+
+    def _on_top(
+        self, parent: CandidateFit, few: DiagnosisProblem
+    ) -> dict[Effects, list[SearchStart]]:
+        """Starts of all sets with one effect more than a smaller set."""
+        rounds = self.rounds
+        baseline, present = rounds.baseline, drive_effects(rounds.problem.drive)
+        scales = baseline.scales
+        if parent is not rounds.base:
+            scales = scales_of_fit(rounds.problem, parent, scales, baseline.noise)
+        start = fitted_values(parent, present)
+        drive = fitted_drive(rounds.problem.drive, parent)
+        at = linearise(few, drive, start, scales)
+        others = [
+            one for one in rounds.allowed if not is_nested(one, parent.effects, present)
+        ]
+        found = self._forecast(at, others)
+        if parent is rounds.base:
+            self._forecasts, self._error = found, at.error
+            self.shares.update({(one.effect,): one.share for one in found})
+        else:
+            found = _most_promising(found)
+        pairs = {
+            one.effect: [(base_of(drive), values) for values in one.starts]
+            for one in found
+        }
+        if parent is rounds.base and baseline.given is not None:
+            given = base_of(baseline.given)
+            count = SCREENED_STARTS if baseline.is_bent else 1
+            for one in found:
+                pairs[one.effect] += [(given, values) for values in one.starts[:count]]
+        return {
+            with_effect(parent.effects, effect): [
+                SearchStart(base, {**start, effect: values}) for base, values in several
+            ]
+            for effect, several in pairs.items()
+        }
+
+    def _forecast(self, at: Linearisation, candidates: Sequence[str]) -> list[Forecast]:
+        """Rank candidates by what they should explain; too quick to be kept."""
+        self.rounds.on_round("forecasts", len(candidates))
+        tasks = [
+            DiagnosisTask(one, forecast, (at, one), Forecast, {"effect": one})
+            for one in candidates
+        ]
+        found: list[Forecast] = self.rounds.run_tasks(tasks, keep=False)
+        return sorted(found, key=lambda one: -one.share)
+
+    def _likely_pairs(self) -> Iterable[tuple[Effects, SearchStart]]:
+        """Pairs that should explain much more than their better half."""
+        found = {one.effect: one for one in self._forecasts}
+        present = fitted_start(
+            self.rounds.base, drive_effects(self.rounds.problem.drive)
+        )
+        base = base_of(self.rounds.baseline.drive)
+        likely = [
+            (first, second)
+            for share, first, second in pair_shares(self._forecasts, self._error)
+            if share >= max(found[first].share, found[second].share) + PROMISING_PAIR
+            and not is_nested(first, (second,))
+        ]
+        for first, second in likely[:LIKELY_PAIRS]:
+            both = {one: found[one].starts[0] for one in (first, second)}
+            yield with_effect((first,), second), SearchStart(base, {**present, **both})
+
+
+def _most_promising(found: Sequence[Forecast]) -> list[Forecast]:
+    """The first ones of the forecasts, the best first, of several kinds.
+
+    Parameters
+    ----------
+    found : sequence of Forecast
+        The best first.
+    """
+    ids = [(one.effect,) for one in found]
+    plain = [one for one in found if not includes_one_of((one.effect,), ids)]
+    chosen = {one.effect for one in (*found[:SCREENED_ON_TOP], *plain[:KINDS_ON_TOP])}
+    return [one for one in found if one.effect in chosen]

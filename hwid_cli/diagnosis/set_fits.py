@@ -1,0 +1,316 @@
+"""Fits of sets of effects: all of one search so far, how more are made, which is better.
+
+docs/method_diagnosis.md.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from hwid_cli.diagnosis.candidate import (
+    SCREENING_SAMPLES,
+    Baseline,
+    Screened,
+    SearchStart,
+    fewer_recordings,
+    fit_candidate,
+    residuals_of_few,
+    screen,
+    start_from,
+)
+from hwid_cli.diagnosis.effect_sets import Effects
+from hwid_cli.diagnosis.parameters import is_factor, sum_of_squares
+from hwid_cli.diagnosis.problem import DiagnosisProblem
+from hwid_cli.diagnosis.selection import (
+    LEAST_ADDED,
+    SelectionCriteria,
+    is_part_of,
+    select_best,
+)
+from hwid_cli.diagnosis.tasks import DiagnosisTask, OnRound, RunTasks
+from hwid_cli.records.candidates import CandidateFit
+
+# Sets are fitted to so many samples of the training recordings; the best ones to all.
+MANY_SAMPLES = 40_000
+# Share of what a set leaves that counts as left beyond the noise, at least.
+LEAST_LEFT = 0.02
+# Sets that leave at most so many times what the best one leaves are searched on, at most
+# so many times.
+WORTH_MORE = 2.0
+MOST_TURNS = 3
+# A set is searched on again if it left at most this share of what it left before.
+LEAST_TURN = 0.95
+# A further effect is looked for only if the last one lowered the criterion by this much,
+# and explained this share of what the smaller set left; more where that is so little that
+# only a set which leaves nothing could be named.
+LEAST_STEP = 10.0
+LEAST_FURTHER = 0.25
+LEAST_OF_REST = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class Rounds:
+    """What all rounds of one diagnosis share.
+
+    Parameters
+    ----------
+    baseline : Baseline
+        With the re-fitted base.
+    allowed : tuple of str
+        Ids in the catalogue that may be named.
+    on_round : callable
+        Called with what begins and its number of tasks.
+    """
+
+    problem: DiagnosisProblem
+    baseline: Baseline
+    criteria: SelectionCriteria
+    base: CandidateFit
+    allowed: tuple[str, ...]
+    run_tasks: RunTasks
+    on_round: OnRound
+
+
+class SetFits:
+    """Every fit of one search so far: the best one of each set of effects.
+
+    Parameters
+    ----------
+    few : DiagnosisProblem
+        The recordings that sets are screened on.
+    """
+
+    def __init__(self, rounds: Rounds) -> None:
+        self.rounds = rounds
+        self.found: dict[Effects, CandidateFit] = {}
+        self.train = rounds.problem.part(held_out=False)
+        self.few = fewer_recordings(self.train, SCREENING_SAMPLES)
+        self._tried: set[tuple[Effects, str]] = set()
+
+    def of_size(self, size: int) -> list[CandidateFit]:
+        """All sets of a size."""
+        return [one for one in self.found.values() if len(one.effects) == size]
+
+    def best_of_size(self, size: int) -> CandidateFit | None:
+        """The best set of a size."""
+        return select_best(self.rounds.criteria, self.of_size(size), self.rounds.base)
+
+    def largest_part(self, whole: Effects) -> CandidateFit | None:
+        """The best fit with one effect less; the base for a single effect."""
+        if len(whole) == 1:
+            return self.rounds.base
+        parts = [
+            self.found[left]
+            for effect in whole
+            if (left := tuple(one for one in whole if one != effect)) in self.found
+        ]
+        usable = [one for one in parts if one.is_usable]
+        return min(usable, key=self.train_sse, default=None)
+
+    def train_sse(self, one: CandidateFit) -> float:
+        """Sum of squares of the training recordings."""
+        rows = [not signals.is_held_out for signals in self.rounds.problem.signals]
+        return float(one.sse[rows].sum())
+
+    def is_behind(self, one: CandidateFit, other: CandidateFit) -> bool:
+        """Whether a fit has left more of the training recordings than another one."""
+        return self.train_sse(one) > self.train_sse(other)
+
+    def is_better(self, larger: CandidateFit, smaller: CandidateFit) -> bool:
+        """Whether a further effect is worth looking for more."""
+        criteria = self.rounds.criteria
+        gain, part = criteria.gain(larger, smaller), smaller
+        if any(is_factor(one) for one in smaller.own_names):
+            # Its values for the held-out recordings are of these: no measure for others.
+            part = self.largest_part(larger.effects) or smaller
+        explained = criteria.evidence(larger, part).explained
+        # Too little for a name unless nothing is left: then a few effects share it.
+        is_rest = criteria.is_small_part(smaller, self.rounds.base)
+        is_rest = is_rest and not criteria.is_complete(larger)
+        least = LEAST_OF_REST if is_rest else LEAST_FURTHER
+        return gain >= LEAST_STEP and explained >= least
+
+    def is_more(self, found: CandidateFit) -> bool:
+        """Whether a set of several effects has got further than a smaller one in it."""
+        part = self.largest_part(found.effects)
+        return len(found.effects) == 1 or part is None or self.is_better(found, part)
+
+    def adds_enough(self, wide: CandidateFit) -> bool:
+        """Whether a set brings more than the sets of its size that it includes."""
+        excess, whole = self.rounds.criteria.excess, self.rounds.base
+        gained = excess(whole) - excess(wide)
+        return all(
+            excess(one) - excess(wide) >= LEAST_ADDED * gained
+            for one in self.of_size(len(wide.effects))
+            if one is not wide and is_part_of(one, wide)
+        )
+
+    @property
+    def has_many(self) -> bool:
+        """Whether sets are fitted to a part of the samples first."""
+        return has_many_samples(self.rounds.problem)
+
+    def few_sse(self, found: CandidateFit) -> float:
+        """Sum of squares on the recordings of the screening."""
+        rounds = self.rounds
+        return sum_of_squares(
+            residuals_of_few(self.few, rounds.problem, found, rounds.baseline.scales)
+        )
+
+    def floor(self) -> float:
+        """Sum of squares of the noise on these recordings."""
+        return self.few.n_evaluated * self.rounds.baseline.noise.rms**2
+
+    def screen(
+        self, name: str, proposed: Mapping[Effects, list[SearchStart]]
+    ) -> list[Screened]:
+        """Fit all proposed sets cheaply."""
+        if not proposed:
+            return []
+        self.rounds.on_round(f"{name}, screening", len(proposed))
+        scales = self.rounds.baseline.scales
+        tasks = [
+            DiagnosisTask(
+                "+".join(ids) or "base", screen, (self.few, ids, starts, scales),
+                Screened, {"effects": ids},
+            )
+            for ids, starts in proposed.items()
+        ]  # fmt: skip
+        found: list[Screened] = self.rounds.run_tasks(tasks, keep=False)
+        return found
+
+    def finish(self, what: str, sets: Mapping[Effects, Sequence[SearchStart]]) -> None:
+        """Fit sets of effects to the end; keep what is better than before.
+
+        Of many samples, only sets that come near the best one are fitted to all, and of
+        several effects only those that have got further than what they are built on.
+        """
+        if not self.has_many:
+            self.keep(self.fitted(what, sets, None))
+            return
+        found = self.fitted(what, sets, MANY_SAMPLES)
+        self.keep(found)
+        excess = self.rounds.criteria.excess
+        sizes = {len(one.effects) for one in found}
+        least = min(
+            (excess(one) for size in sizes for one in self.of_size(size)), default=0.0
+        )
+        near = {
+            one.effects: [start_from(self.rounds.problem.drive, one)]
+            for one in found
+            if one.is_usable
+            and excess(one) <= WORTH_MORE * least
+            and self.adds_enough(one)
+            and self.is_more(one)
+        }
+        self.keep(self.fitted(f"{what}, all recordings", near, None))
+
+    def keep(self, found: Sequence[CandidateFit]) -> None:
+        """Keep fits that are better than before."""
+        for one in found:
+            before = self.found.get(one.effects)
+            if before is None or self.is_behind(before, one):
+                self.found[one.effects] = one
+
+    def fitted(
+        self,
+        what: str,
+        sets: Mapping[Effects, Sequence[SearchStart]],
+        most_samples: int | None,
+    ) -> list[CandidateFit]:
+        """Fit sets of effects to so many samples, or to all."""
+        rounds = self.rounds
+        if not sets:
+            return []
+        rounds.on_round(what, len(sets))
+        tasks = [
+            fit_task(rounds, ids, starts, most_samples) for ids, starts in sets.items()
+        ]
+        return rounds.run_tasks(tasks, keep=True)
+
+    def go_on(self, size: int) -> None:
+        """Search on where the best sets stopped at the limit of iterations."""
+        excess = self.rounds.criteria.excess
+        before: dict[Effects, float] = {}
+        for _ in range(MOST_TURNS):
+            best = self.best_of_size(size)
+            if best is None:
+                return
+            unfinished = [
+                one
+                for one in self.of_size(size)
+                if not one.has_converged
+                and one.is_usable
+                and excess(one) <= WORTH_MORE * excess(best)
+                and excess(one) <= LEAST_TURN * before.get(one.effects, np.inf)
+            ]
+            before = {one.effects: excess(one) for one in unfinished}
+            sets = {
+                one.effects: self.unless_tried(
+                    one.effects,
+                    [start_from(self.rounds.problem.drive, one)],
+                )
+                for one in unfinished
+            }
+            sets = {ids: starts for ids, starts in sets.items() if starts}
+            if not sets:
+                return
+            self.keep(self.fitted(f"{name_of(size)}, going on", sets, None))
+
+    def unless_tried(
+        self, ids: Effects, starts: Sequence[SearchStart]
+    ) -> list[SearchStart]:
+        """Starts of a set that were not asked for before."""
+        fresh = []
+        for one in starts:
+            key = (ids, repr(one))
+            if key not in self._tried:
+                self._tried.add(key)
+                fresh.append(one)
+        return fresh
+
+
+def fit_task(
+    rounds: Rounds,
+    ids: Effects,
+    starts: Sequence[SearchStart],
+    most_samples: int | None,
+) -> DiagnosisTask:
+    """Task that fits a set of effects to so many samples, or to all."""
+    problem, baseline = rounds.problem, rounds.baseline
+    return DiagnosisTask(
+        name="+".join(ids) or "base",
+        function=fit_candidate,
+        arguments=(
+            problem, ids, tuple(starts), baseline.scales, baseline.noise, most_samples,
+        ),
+        result_type=CandidateFit,
+        content={
+            "effects": ids,
+            "starts": list(starts),
+            "pieces": _starts_of(problem),
+            "hold": problem.drive.hold,
+            "most_samples": most_samples,
+        },
+        arrays=(rounds.base.values,),
+    )  # fmt: skip
+
+
+def has_many_samples(problem: DiagnosisProblem) -> bool:
+    """Whether first fits are made to a part of the training samples."""
+    counts = [one.n_evaluated for one in problem.signals if not one.is_held_out]
+    return sum(counts) > MANY_SAMPLES
+
+
+def name_of(size: int) -> str:
+    """What sets of one size are called on screens."""
+    return "single effects" if size == 1 else f"sets of {size} effects"
+
+
+def _starts_of(problem: DiagnosisProblem) -> str:
+    """How pieces of recordings start, for the keys of their tasks; empty for whole ones."""
+    if problem.has_starts:
+        return "given"
+    are_pieces = any(one.start is not None for one in problem.signals)
+    return "free" if are_pieces else ""
