@@ -57,6 +57,9 @@ _SENTENCE = "a law that was found in the recordings"
 # best one on all. A regression on all samples says where each one starts.
 _SIMULATED = 2
 _FEW_SAMPLES = 10_000
+# Thresholds, periods and exponents stay within this factor of where the regression has
+# them. A frequency far above the sample rate changes nothing and takes many short steps.
+_SHAPE_FACTOR = 4.0
 # Share of the held-out excess over the noise that a law must explain.
 LEAST_EXPLAINED_LAW = 0.8
 # What a law may leave of what effects of the catalogue leave, where it is not complete.
@@ -292,7 +295,10 @@ def _effect(
             shape = shapes.setdefault((key, value), f"{key}{len(shapes) + 1}")
             text = _renamed(text, key, shape)
             stated = shape_unit or source
-            parameters[shape] = OwnParameter(stated, positive=True, start=value)
+            bounds = (value / _SHAPE_FACTOR, value * _SHAPE_FACTOR)
+            parameters[shape] = OwnParameter(
+                stated, positive=True, bounds=bounds, start=value
+            )
             values[shape] = value
         parts.append(f"{name}*{text}")
     formula = " + ".join(parts)

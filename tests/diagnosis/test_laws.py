@@ -9,15 +9,20 @@ import sympy
 from hwid_cli import DiagnoseOptions, Recording, SimulationOptions, diagnose
 from hwid_cli.config.extended_simulation import write_extended_simulation
 from hwid_cli.config.load import experiment_of, load_experiment
-from hwid_cli.diagnosis import laws, rounds
+from hwid_cli.diagnosis import laws, set_fits
 from hwid_cli.diagnosis.candidate import fit_candidate
+from hwid_cli.diagnosis.law_terms import Term
 from hwid_cli.diagnosis.laws import _is_wanted
 from hwid_cli.diagnosis.rounds import RoundsResult
+from hwid_cli.diagnosis.set_fits import fit_task
 from hwid_cli.diagnosis.verdict import DiagnosisVerdict
+from hwid_cli.records.own_effects import own_id
 from hwid_cli.stages.diagnose import extended_options
 from tests.diagnosis.made_up_fits import CRITERIA, base, made_up
-from tests.diagnosis.small_drive import NOISE, STEP_S, inputs
+from tests.diagnosis.small_drive import NOISE, STEP_S, inputs, search_start
+from tests.diagnosis.small_rounds import rounds_of
 from tests.laws.machine import Base, Hidden, measured
+from tests.stages.diagnosed_drive import FRICTION
 
 SIMULATION = SimulationOptions(
     mass_kg=0.3,
@@ -72,7 +77,7 @@ def test_a_law_of_two_terms_is_found_with_units_intervals_and_inclusion(found):
 @pytest.mark.thorough
 def test_of_many_samples_a_part_leads_to_the_same_law_fitted_to_all(found, monkeypatch):
     recordings, of_all = found
-    monkeypatch.setattr(rounds, "MANY_SAMPLES", 1000)
+    monkeypatch.setattr(set_fits, "MANY_SAMPLES", 1000)
     monkeypatch.setattr(laws, "_FEW_SAMPLES", 1000)
     sizes = []
 
@@ -217,3 +222,21 @@ def test_only_an_interval_on_one_side_of_zero_is_clear_however_large(monkeypatch
     tried = SimpleNamespace(fit=SimpleNamespace(names=names), identifier="law")
 
     assert laws._unclear_terms(rounds_of, tried) == ["c2", "c3", "c4"]
+
+
+def test_a_period_in_time_cannot_leave_what_the_recordings_show():
+    # Hardly anything swings: the best frequency is any that does not matter.
+    of = rounds_of(FRICTION, ())
+    term = Term("sin(2*pi*f*t)", (0, 0, 0), {"f": (20.0, "1/s")}, "swing sin")
+    effect, values = laws._effect((term,), np.array([1e-3]), "force", ("N", "m", "A"))
+    # Nor where a search has come to be far beyond it.
+    identifier = own_id("law", effect)
+    start = search_start(of.problem, {identifier: {**values, "f1": 1e5}})
+    task = fit_task(of, (identifier,), [start], None)
+    found = fit_candidate(*task.arguments)
+    (frequency,) = [
+        value
+        for ref, value in zip(found.names, found.values, strict=True)
+        if ref.parameter == "f1"
+    ]
+    assert 5.0 <= frequency <= 80.0
