@@ -1,6 +1,6 @@
 """What a diagnosis says in words: the summary, and what recordings cannot show."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
@@ -31,6 +31,10 @@ _FEW = 1 / 3
 _MOST_NAMED = 6
 # A value off by more than this factor is a wrong one, not an inaccurate one, [-].
 _DOUBTFUL = 3.0
+# Values that a wrong mass moves, in a drive with a spring; and how far apart they may
+# have moved, [-].
+_PROPORTIONAL = 3
+_SAME_FACTOR = 1.5
 # A ratio to the noise that is taken for 1, [-].
 _NO_MORE_THAN_NOISE = 1.02
 # What is late by this near to half a sample may be a command that is held, [samples].
@@ -240,20 +244,49 @@ def _rows_of_gap(excess: np.ndarray, kinds: list[str]) -> list[int]:
 
 def doubtful_values(base: Sequence[BaseParameter], drive: Drive) -> tuple[str, ...]:
     """Question the parameters that the last fit moved far away from what was given."""
+    moved = {
+        one: one.after / one.before
+        for one in base
+        if one.before * one.after > 0 and np.isfinite(one.after)
+    }
+    doubtful = {
+        one: ratio for one, ratio in moved.items() if max(ratio, 1 / ratio) > _DOUBTFUL
+    }
+    if not doubtful:
+        return ()
+    if _is_the_mass(moved, drive):
+        return (_questioned_mass(moved, drive),)
     held, known = _held_and_known(drive)
     names = " and ".join(name_on(drive.axis, one) for one in held)
-    texts = []
-    for one in base:
-        if one.before * one.after <= 0 or not np.isfinite(one.after):
-            continue
-        ratio = one.after / one.before
-        if max(ratio, 1 / ratio) > _DOUBTFUL:
-            texts.append(
-                f"{one.name} was {one.before:.3g} and is fitted as {one.after:.3g}: "
-                "check its value, or the units of the recordings; simulation.known: "
-                f"[{one.name}] holds it; it rests on the given {names}: {known}"
-            )
-    return tuple(texts)
+    return tuple(
+        f"{one.name} was {one.before:.3g} and is fitted as {one.after:.3g}: "
+        "check its value, or the units of the recordings; simulation.known: "
+        f"[{one.name}] holds it; it rests on the given {names}: {known}"
+        for one in doubtful
+    )
+
+
+def _is_the_mass(moved: Mapping[BaseParameter, float], drive: Drive) -> bool:
+    """Whether all that is known in proportion to the mass has moved by one factor.
+
+    Two values alone may go together by chance, and with a spring there are three.
+    """
+    if drive.resistance_ohm is not None or len(moved) < _PROPORTIONAL:
+        return False
+    return max(moved.values()) <= _SAME_FACTOR * min(moved.values())
+
+
+def _questioned_mass(moved: Mapping[BaseParameter, float], drive: Drive) -> str:
+    factor = float(np.median(list(moved.values())))
+    mass, constant = _WORDS[drive.axis]
+    size, word = (factor, "large") if factor > 1 else (1 / factor, "small")
+    name = name_on(drive.axis, "mass_kg")
+    return (
+        f"{name} is {drive.mass_kg:.3g}, probably {size:.2g} times too {word}: "
+        f"{constant}, damping and stiffness are known only in proportion to the {mass}, "
+        f"and all are fitted as about {factor:.2g} times what was given; with {name} "
+        f"{drive.mass_kg / factor:.3g} they would be near it"
+    )
 
 
 def _held_and_known(drive: Drive) -> tuple[tuple[str, ...], str]:

@@ -1,14 +1,15 @@
 """What is said of the rest that a verdict leaves."""
 
+import re
 from dataclasses import replace
 
 import pytest
 
-from hwid_cli.diagnosis.sentences import _held_command, _rest
+from hwid_cli.diagnosis.sentences import _held_command, _rest, doubtful_values
 from hwid_cli.diagnosis.verdict import DiagnosisVerdict
-from hwid_cli.records.diagnosis import FittedEffect, FittedParameter
+from hwid_cli.records.diagnosis import BaseParameter, FittedEffect, FittedParameter
 from tests.diagnosis.made_up_fits import CRITERIA, made_up
-from tests.diagnosis.small_drive import STEP_S, problem, recordings
+from tests.diagnosis.small_drive import DRIVE, STEP_S, problem, recordings
 
 
 @pytest.mark.parametrize(
@@ -46,3 +47,40 @@ def test_a_delay_of_half_a_sample_may_be_a_held_command(samples, hold, is_said):
     of = replace(of, drive=replace(of.drive, hold=hold), may_be_held=False)
     said = _held_command(of, (delayed(samples * STEP_S),))
     assert ("simulation.hold: zero" in said) == is_said
+
+
+def moved(**ratios):
+    """Parameters that a fit has moved by these factors."""
+    return [
+        BaseParameter(name, given, given, ratio * given)
+        for (name, ratio), given in zip(
+            ratios.items(), (15.0, 1184.0, 5.0), strict=True
+        )
+    ]
+
+
+ALL = ("damping_N_s_per_m", "stiffness_N_per_m", "force_constant_N_per_A")
+
+
+@pytest.mark.parametrize(
+    ("factor", "said"),
+    [(10.0, "10 times too large"), (0.1, "10 times too small")],
+)
+def test_what_moves_by_one_factor_altogether_questions_the_mass(factor, said):
+    # The mass is 0.3 kg; damping moves a little further, as it does beside friction.
+    ratios = dict.fromkeys(ALL, factor) | {"damping_N_s_per_m": 1.1 * factor}
+    (text,) = doubtful_values(moved(**ratios), DRIVE)
+    assert text.startswith(f"mass_kg is 0.3, probably {said}: ")
+    (value,) = [float(one) for one in re.findall(r"with mass_kg ([\d.]+)", text)]
+    assert value == pytest.approx(0.3 / factor, rel=0.05)
+
+
+def test_what_moves_apart_is_questioned_for_itself():
+    texts = doubtful_values(
+        moved(**dict(zip(ALL, (10.0, 10.0, 1.0), strict=True))), DRIVE
+    )
+    assert [text.split()[0] for text in texts] == list(ALL[:2])
+    assert doubtful_values(moved(**dict.fromkeys(ALL, 1.4)), DRIVE) == ()
+    # A resistance that is off scales other quotients.
+    driven = replace(DRIVE, resistance_ohm=1.0)
+    assert len(doubtful_values(moved(**dict.fromkeys(ALL, 10.0)), driven)) == 3
