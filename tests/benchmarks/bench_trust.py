@@ -124,8 +124,10 @@ def plant(seed: int, structure: str, moving: float | None) -> dict[str, list[Row
     return found
 
 
-def plants(count: int, first: int, keep: Path | None, moving: float | None) -> None:
-    """Random plants, right and wrong structure in turn."""
+def plants(
+    count: int, first: int, keep: Path | None, moving: float | None
+) -> dict[str, list[Row]]:
+    """Random plants, right and wrong structure in turn; the rows of each line."""
     wrong = STRUCTURES[1:]
     known = {}
     if keep is not None and keep.is_file():
@@ -152,6 +154,29 @@ def plants(count: int, first: int, keep: Path | None, moving: float | None) -> N
                 f"  half of these hold {np.median(coverage):.3f} or more, "
                 f"{np.mean(coverage == 1.0):.0%} hold every sample"
             )
+    return found
+
+
+def show_chance(who: str, count: int, plants_of: dict[str, list[Row]]) -> None:
+    """What so few recordings of the random plants hold on average, by chance.
+
+    Recordings of its own kind, with a right and a wrong structure, judged by as much.
+    """
+    coverage = np.array(
+        [
+            row[0]
+            for word in ("right", "wrong")
+            for row in plants_of[f"{who}, {word}, same"]
+        ]
+    )
+    rng = np.random.default_rng(26)
+    means = rng.choice(coverage, (10_000, count)).mean(axis=1)
+    low, high = np.quantile(means, [0.025, 0.975])
+    print(
+        f"  {count} of {coverage.size} such recordings of the plants, which hold "
+        f"{coverage.mean():.3f}: {low:.2f} to {high:.3f} (95 % of draws)",
+        flush=True,
+    )
 
 
 def hsm150() -> list[Row]:
@@ -244,15 +269,21 @@ def main() -> None:
     parser.add_argument("--moving", type=float, metavar="DRIFT")
     parser.add_argument("--only", choices=["plants", "real", "gun"])
     chosen = parser.parse_args()
+    found: dict[str, list[Row]] = {}
     if chosen.only in (None, "plants"):
         first = CHOOSING if chosen.choose else REPORTING
-        plants(chosen.plants, first, chosen.keep, chosen.moving)
+        found = plants(chosen.plants, first, chosen.keep, chosen.moving)
     if chosen.only in (None, "real"):
         print(f"\nmeasured\n{HEAD}")
         if folder().is_dir():
-            show("HSM150", hsm150())
-            show("CED", public(ced))
-            show("cascaded tanks", public(tanks))
+            for name, rows, who in (
+                ("HSM150", hsm150(), "two of its kind"),
+                ("CED", public(ced), "none"),
+                ("cascaded tanks", public(tanks), "none"),
+            ):
+                show(name, rows)
+                if found:
+                    show_chance(who, len(rows), found)
         else:
             print("no data: set HWID_REALDATA")
     if chosen.only in (None, "gun"):

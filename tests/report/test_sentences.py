@@ -298,3 +298,14 @@ def test_what_each_level_of_the_chain_covers_is_said_in_words(contents):
         "From level 1 to 2 of the chain the models cover (RMSD below the threshold) 0 of 1, "
         "1 of 1 of these recordings."
     ) in tested
+
+
+@blank
+def test_the_chosen_models_begin_with_the_winner_of_the_chain(contents):
+    *_, winner = contents.stored.search.chain
+    section = models_section(contents)
+    (picker,) = [one for one in section.blocks if one.kind == "picker"]
+    assert len(picker.items) > 1
+    assert picker.items[0][0] == contents.models[-1].model
+    assert picker.items[0][0].startswith(winner)
+    assert "The chain of groups, the winner first." in said(section)

@@ -32,13 +32,15 @@ def models_section(contents: ReportContents) -> Section:
     blocks: list[PageBlock] = []
     missing = "" if contents.models else _why_none(contents)
     if contents.models:
+        is_chain = contents.stored.search is not None
         which = (
-            "The chain of groups, from one recording to the winner."
-            if contents.stored.search is not None
+            "The chain of groups, the winner first."
+            if is_chain
             else "The models that cover the most recordings."
         )
+        views = contents.models[::-1] if is_chain else contents.models
         blocks += [Text(which), *section_notes(contents, is_validation=True)]
-        items = [(view.model, _model_blocks(view)) for view in contents.models]
+        items = [(view.model, _model_blocks(view)) for view in views]
         blocks.append(Picker("model", tuple(items)))
     return Section("models", "The chosen models", "Models", tuple(blocks), missing)
 
