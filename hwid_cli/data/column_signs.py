@@ -281,6 +281,30 @@ def memory_samples(values: np.ndarray) -> int:
     return int(below[0]) if below.size else int(centred.size)
 
 
+def shared_power(one: np.ndarray, other: np.ndarray) -> float:
+    """How much of the power of two signals lies in the same third octaves.
+
+    Parameters
+    ----------
+    one, other : ndarray, shape (n,)
+
+    Returns
+    -------
+    float, [-]
+        From 0 to 1, where both have the same share of their power in each; 1 where a
+        signal stands still.
+    """
+    shares = []
+    for values in (one, other):
+        power = np.abs(np.fft.rfft(values - np.mean(values))[1:]) ** 2
+        octave = np.log2(np.arange(1, power.size + 1))
+        bands = np.bincount(np.round(3.0 * octave).astype(int), power)
+        if not bands.sum() > 0:
+            return 1.0
+        shares.append(bands / bands.sum())
+    return float(np.minimum(*shares).sum())
+
+
 def runs_away(values: np.ndarray) -> bool:
     """Whether a signal mostly moves in one direction, as an integrator does.
 

@@ -146,6 +146,11 @@ _COUNTER = [
     "row",
     "id",
 ]
+# What tells how a machine is and not how it moves; with a unit it may be a signal.
+_STATES = [
+    *("state", "status", "mode", "flag", "flags", "enable", "enabled", "ready", "bit"),
+    *("zustand", "modus", "freigabe", "fault"),
+]
 # What a unit in brackets says of the role, by its first word.
 _INPUT_UNITS = {"a", "ma", "ka", "v", "mv", "kv", "n", "kn", "nm", "n m", "mnm", "%"}
 _OUTPUT_UNITS = {
@@ -225,6 +230,8 @@ def meaning_of(title: str, stated: str = "") -> Meaning:
     ('input', 'output')
     >>> meaning_of("pos_ref_rad").role, meaning_of("u2").rest
     ('reference', '2')
+    >>> meaning_of("DriveState").role, meaning_of("drive_current").role
+    ('counter', 'input')
     """
     bare, unit = split_unit(title)
     words = _words(bare)
@@ -241,6 +248,8 @@ def meaning_of(title: str, stated: str = "") -> Meaning:
             found = _rank(word, known)
             if found is not None and not role:
                 role, rank, used = name, found, word
+    if not unit and any(word in _STATES for word in words):
+        role, rank, used = "counter", 99, ""
     if unit and (not role or _is_contradicted(role, used, unit)):
         role, rank, used = _role_of_unit(unit), 99, ""
     is_wanted = any(word in _WANTED and word != used for word in words)

@@ -123,6 +123,7 @@ def _with_starred_tables(file: FoundFile) -> FoundFile:
                 continue
             if len(alike) > 1 or name == stem:
                 beside = [one for one in file.columns if _is_beside(one, tables)]
+                beside += _shared_settings(file.columns, tables, depth)
                 starred = [
                     replace(one, key=key, variable=STAR) for key, one in members.items()
                 ]
@@ -139,6 +140,23 @@ def _split_at(column: FoundColumn, depth: int) -> tuple[str, str | int] | None:
         return None
     key = str(column.key)
     return key[: marks[depth - 1]], key[marks[depth - 1] + 1 :]
+
+
+def _shared_settings(
+    columns: Iterable[FoundColumn], tables: Mapping[str, object], depth: int
+) -> list[FoundColumn]:
+    """Single numbers inside tables that are the same in all of them, once each."""
+    found: dict[str | int, dict[str, FoundColumn]] = {}
+    for one in columns:
+        place = _split_at(one, depth) if one.values.size == 1 else None
+        if place is not None and place[0] in tables:
+            found.setdefault(place[1], {})[place[0]] = one
+    return [
+        next(iter(own.values()))
+        for own in found.values()
+        if len(own) == len(tables)
+        and len({float(one.values[0]) for one in own.values()}) == 1
+    ]
 
 
 def _is_beside(column: FoundColumn, tables: Mapping[str, object]) -> bool:
@@ -452,7 +470,8 @@ def _belongs(column: FoundColumn, variable: str | None) -> bool:
 
 
 def _worth(found: Sequence[FoundColumn]) -> tuple[bool, int]:
-    roles = {meaning_of(one.title, one.unit).role for one in found}
+    changing = [one for one in found if signs.changes(one.values)]
+    roles = {meaning_of(one.title, one.unit).role for one in changing}
     return {"input", "output"} <= roles, len(found)
 
 

@@ -61,6 +61,7 @@ _RATE_WORDS = frozenset(
         *("abtastrate", "abtastfrequenz", "fabtast", "scanrate", "datarate"),
     ]
 )
+_TIME_ENDINGS = ("s", "ms", "us")
 _RATE_UNITS = {
     **dict.fromkeys(("hz", "s/s", "sa/s", "1/s"), 1.0),
     **dict.fromkeys(("khz", "ks/s", "ksa/s"), 1e3),
@@ -129,8 +130,13 @@ def sample_time_named(title: str, value: float, unit: str = "") -> float | None:
     (0.005, None)
     >>> sample_time_named("Sampling time interval(ms)", 0.5)
     0.0005
+    >>> sample_time_named("sample_rate_Hz", 500.0), sample_time_named("dt_ms", 2.0)
+    (0.002, 0.002)
     """
     bare, in_title = split_unit(title.split(".")[-1])
+    stem, _, last = bare.rpartition("_")
+    if stem and not in_title and (last.lower() in _RATE_UNITS or last in _TIME_ENDINGS):
+        bare, in_title = stem, last
     word = re.sub(r"[^a-zäöü]", "", bare.lower())
     said = (unit or in_title).strip()
     if not 0 < value < float("inf"):

@@ -125,8 +125,8 @@ def _linear_sentences(best: BestModel, mean: str, on: str) -> list[str]:
     linear, own = (with_unit(rmsd, best.unit) for rmsd in (best.linear_rmsd, best.rmsd))
     return [
         f"the linear model of the same orders is better: {mean} {linear} on {on}",
-        f"{best.name}: {own}; maps are not worth it here",
         *_beside_threshold(best.linear_rmsd, best),
+        f"{best.name}: {own}; maps are not worth it here",
     ]
 
 

@@ -47,6 +47,9 @@ _TRAIN_WORDS = ("train", "training", "est", "estimation", "ident", "learn")
 _ALIKE = 0.2
 # The same of their lengths.
 _ALIKE_LENGTH = 0.8
+# Least power in the same third octaves, [-]: a multisine of other phases has nearly all,
+# sines of other frequencies have none.
+_ALIKE_SPECTRA = 0.5
 # A recipe that keeps less than this share of a recording has misjudged it, [-].
 _LEAST_KEPT = 0.5
 # Fits that a first run may take without asking, [-].
@@ -309,7 +312,8 @@ def _is_repeat(one: RawRecording, other: RawRecording) -> bool:
     """Whether two recordings have one input, noise and a cut end apart.
 
     Names that differ in their last number alone may be repeats of an input that is
-    measured, and so never the same: then its level, size and memory must be alike.
+    measured, and so never the same: then its level, size, memory and spectrum must be
+    alike.
     """
     n = min(one.input.size, other.input.size)
     if n < _ALIKE_LENGTH * max(one.input.size, other.input.size):
@@ -327,6 +331,7 @@ def _is_repeat(one: RawRecording, other: RawRecording) -> bool:
         len(stems) == 1
         and sizes[0] >= (1.0 - _ALIKE) * sizes[1]
         and memories[0] >= 0.5 * memories[1]
+        and signs.shared_power(a, b) >= _ALIKE_SPECTRA
     )
 
 

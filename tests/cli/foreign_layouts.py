@@ -390,7 +390,7 @@ def tdms(folder):
 
 
 def mdf(folder):
-    """asammdf: two groups with clocks of their own, the position at half the rate."""
+    """asammdf: two clocks, the position at half the rate beside a state of the drive."""
     from asammdf import MDF, Signal
 
     for one in drives():
@@ -399,8 +399,13 @@ def mdf(folder):
             [Signal(one.current, one.time, name="I_mot", unit="A")], acq_name="fast"
         )
         slow = slice(None, None, 2)
+        t = one.time[slow]
+        states = (np.arange(t.size) // 7 % 2).astype("u1")
         file.append(
-            [Signal(one.position[slow], one.time[slow], name="x_act", unit="mm")],
+            [
+                Signal(one.position[slow], t, name="x_act", unit="mm"),
+                Signal(states, t, name="DriveState"),
+            ],
             acq_name="slow",
         )
         file.save(folder / f"{one.name}.mf4", overwrite=True)

@@ -508,6 +508,20 @@ def a_rate_as_attribute_of_hdf5(folder):
 
 
 @layout
+def a_rate_as_attribute_of_each_group_of_hdf5(folder):
+    import h5py
+
+    with h5py.File(folder / "all.h5", "w") as file:
+        file.attrs["rig"] = "voice coil"
+        for name, (_, u, y) in zip(NAMES, RUNS, strict=True):
+            group = file.create_group(name)
+            group.attrs["sample_rate_Hz"] = 500.0
+            group["current"], group["position"] = u, y
+            group["current"].attrs["unit"], group["position"].attrs["unit"] = "A", "mm"
+    return _expected()
+
+
+@layout
 def recordings_in_groups_of_mdf(folder):
     from asammdf import MDF, Signal
 

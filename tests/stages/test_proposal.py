@@ -112,3 +112,26 @@ def test_a_rest_that_is_not_cut_is_no_missing_rest():
     assert found.recipes == {"random": ()}
     assert found.recipe_reason.startswith("nothing is cut: the rest before")
     assert found.initial_state == "rest"
+
+
+def test_sines_of_other_frequencies_are_no_repeats_and_multisines_of_other_phases_are():
+    time = 1e-3 * np.arange(600)
+    sines = [
+        raw(f"sine_{number}", size * np.sin(2 * np.pi * frequency * time))
+        for number, (size, frequency) in enumerate(
+            ((1.5, 10.0), (2.5, 14.0), (2.3, 12.0))
+        )
+    ]
+    assert held_out(*sines)[1] != "the last repeat of each input"
+    rng = np.random.default_rng(2)
+    several = [
+        raw(
+            f"multi_{number}",
+            sum(
+                np.cos(2 * np.pi * (line / 0.6 * time + rng.uniform()))
+                for line in range(1, 40)
+            ),
+        )
+        for number in (1, 2, 3)
+    ]
+    assert held_out(*several) == (("multi_3",), "the last repeat of each input")
