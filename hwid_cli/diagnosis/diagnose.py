@@ -21,6 +21,7 @@ from hwid_cli.diagnosis.causes import without_repeats
 from hwid_cli.diagnosis.findings import Findings, describe
 from hwid_cli.diagnosis.held_command import (
     best_of,
+    does_as_well,
     is_complete_if_held,
     is_held,
     with_held_command,
@@ -214,8 +215,8 @@ def find(
     if problem.may_be_held and searched.has_gap and is_held(rounds, found):
         held = with_held_command(problem)
         again = _searched(held, options, run_tasks, on_round, given_sse)
-        was = best_of(rounds, found)
-        if rounds.criteria.gain(was, best_of(again.rounds, again.found)) <= 0:
+        best = best_of(again.rounds, again.found)
+        if does_as_well(rounds, best, best_of(rounds, found)):
             searched = again
     return _judged(_with_pieces(searched, options.max_effects), options)
 

@@ -19,7 +19,7 @@ from hwid_cli.diagnosis.candidate import (
 from hwid_cli.diagnosis.effect_sets import Effects
 from hwid_cli.diagnosis.problem import DiagnosisProblem
 from hwid_cli.diagnosis.rounds import RoundsResult
-from hwid_cli.diagnosis.selection import LEAST_GAIN, count
+from hwid_cli.diagnosis.selection import LEAST_GAIN, TIE, count
 from hwid_cli.diagnosis.set_fits import Rounds, fit_task
 from hwid_cli.records.candidates import CandidateFit
 from hwid_cli.records.drive import HELD
@@ -54,6 +54,12 @@ def is_held(rounds: Rounds, found: RoundsResult) -> bool:
     return bool(_better_if_held(rounds, best, _worth_trying(rounds, found, best)))
 
 
+def does_as_well(rounds: Rounds, held: CandidateFit, line: CandidateFit) -> bool:
+    """Whether the best set beside a held command does as well as that beside a line."""
+    lead = rounds.criteria.gain(line, held)
+    return lead <= (TIE if count(held) < count(line) else 0.0)
+
+
 def is_complete_if_held(rounds: Rounds, best: CandidateFit) -> bool:
     """Whether nothing remains beside a held command, of a set that leaves something.
 
@@ -79,8 +85,9 @@ def _better_if_held(
     return [
         one
         for one in fits
-        # What it does without is a reason of its own.
-        if criteria.gain(one, best) >= (0.0 if count(one) < count(best) else LEAST_GAIN)
+        # What it does without is a reason of its own: ties go to the simpler set.
+        if criteria.gain(one, best)
+        >= (-TIE if count(one) < count(best) else LEAST_GAIN)
     ]
 
 

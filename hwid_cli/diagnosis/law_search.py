@@ -142,8 +142,9 @@ def _columns(
         moved = np.column_stack([moved[:, : len(base)], *plain])
     columns = np.column_stack([moved, error])[signals.evaluated]
     free = responses.free(n)[signals.evaluated]
-    # How the recording starts is its own affair.
-    along = np.linalg.qr(free / np.max(np.abs(free), axis=0))[0]
+    # How the recording starts is its own affair; a speed does not show where that was.
+    sizes = np.max(np.abs(free), axis=0)
+    along = np.linalg.qr(free[:, sizes > 0] / sizes[sizes > 0])[0]
     return np.asarray(columns - along @ (along.T @ columns))
 
 

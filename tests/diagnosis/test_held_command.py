@@ -1,14 +1,17 @@
 """Whether a command is held, told by the recordings: plants solved exactly by scipy."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import scipy
 
 from hwid_cli import Recording, diagnose
+from hwid_cli.diagnosis.held_command import does_as_well
 from hwid_cli.records.experiment import DiagnoseOptions, SimulationOptions
 from hwid_cli.stages.diagnose import extended_options
+from tests.diagnosis.made_up_fits import CRITERIA, made_up
 
 STEP_S, N, NOISE = 1e-3, 600, 2e-5
 SIMULATION = SimulationOptions(
@@ -113,3 +116,20 @@ def test_what_the_noise_hides_is_not_tried(monkeypatch):
     found = found_in(loud, effects=("sensor_drift",))
     assert [one.id for one in found.effects] == ["sensor_drift"]
     assert found.hold == "linear"
+
+
+@pytest.mark.parametrize(
+    ("held_sse", "effects", "stands"),
+    [
+        # A slow drive with friction hardly tells a held command from half a sample.
+        (101.0, ("coulomb_friction",), True),
+        (115.0, ("coulomb_friction",), False),
+        (101.0, ("coulomb_friction", "input_delay"), False),
+        (99.0, ("coulomb_friction", "input_delay"), True),
+    ],
+)
+def test_ties_go_to_the_set_that_needs_no_delay(held_sse, effects, stands):
+    line = made_up(("coulomb_friction", "input_delay"), 100.0, parameters=2)
+    held = made_up(effects, held_sse, parameters=len(effects))
+    rounds = SimpleNamespace(criteria=CRITERIA)
+    assert does_as_well(rounds, held, line) == stands

@@ -1,5 +1,7 @@
 """Subsets of named terms, on forces that are known and put through another integration."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.signal import lsim
@@ -139,3 +141,25 @@ def test_a_term_has_the_values_of_its_formula():
     term = Term("Max(x - a, 0)*v", (2, -1, 0), {"a": (0.1, "m")})
     assert term.values(at) == pytest.approx([0.4, 0.0])
     assert term.variables == {"x", "v"}
+
+
+def test_a_law_is_found_in_the_speed_of_a_free_axis():
+    # Where it started does not show in its speed.
+    free = replace(DRIVE, stiffness_N_per_m=0.0, output="velocity")
+    rng = np.random.default_rng(3)
+    compared, smoothed = [], []
+    for number in range(4):
+        turns = 2 * np.pi * rng.uniform(1, 6, 3)[:, None] * TIME
+        v = (0.2 * np.sin(turns + rng.uniform(0, 6, 3)[:, None])).sum(axis=0)
+        x = np.cumsum(v) * DT
+        u = 2 * np.sin(2 * np.pi * rng.uniform(1, 5) * TIME)
+        system = ([1.0], [free.mass_kg, free.damping_N_s_per_m])
+        error = lsim(system, -3.0 * v * np.abs(v), TIME)[1]
+        signals = Signals(f"r{number}", "sine", u, v, u, v, DT)
+        compared.append(Compared(signals, v - error, x, v - error))
+        smoothed.append(Smoothed(np.zeros(N), x, v, np.zeros(N)))
+    found = regression(compared, smoothed, free, TERMS, through=True)
+    assert np.isfinite(found.grams).all()
+    assert found_terms(found, 1) == {"v*abs(v)"}
+    of_terms, _ = coefficients(found, best_subsets(found)[0][0].places)
+    assert of_terms[0] == pytest.approx(-3.0, rel=0.02)
