@@ -292,12 +292,16 @@ def best_single(final: FinalTest) -> int:
     int
         Place among the models: the one that covers the largest share of the recordings
         that are neither its own nor for the test; of these the lowest mean logarithm of
-        the RMSD there. -1 where there is none.
+        the RMSD there. Where nothing but the test was left out of the fits, the lowest
+        RMSD on its own recording. -1 where there is none.
     """
     is_known = ~np.isin(final.recordings, final.tested_on)
+    # Of one recording all models are, and it alone can choose.
+    is_alone = np.count_nonzero(is_known) == 1
     found = []
     for place in np.flatnonzero(final.is_own.sum(axis=1) == 1):
-        others = final.rmsd[place, is_known & ~final.is_own[place]]
+        is_judge = is_known if is_alone else is_known & ~final.is_own[place]
+        others = final.rmsd[place, is_judge]
         if others.size and np.isfinite(others).all():
             share = float(np.mean(others < final.threshold))
             # An RMSD of zero is the best there is.

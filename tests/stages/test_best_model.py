@@ -85,6 +85,20 @@ def test_test_recordings_judge_and_do_not_choose():
     assert not found.is_accepted
 
 
+def test_with_one_recording_for_the_fits_the_test_recordings_judge_its_best_model():
+    # What the tests say of it stands first, however good it is on its own.
+    table = final(
+        ("a/1/1", "a/2/2"), [[0.5, 3, 5, 4], [0.1, 4, 6, 8]], [[1, 0, 0, 0]] * 2
+    )
+    table = replace(table, tested_on=("b", "c", "d"))
+    found = best_model({"test": table})
+
+    assert (found.name, found.judge) == ("a/2/2", "test")
+    assert found.judged_on == ("b", "c", "d")
+    assert found.rmsd == pytest.approx(6.0)
+    assert not found.is_accepted
+
+
 def test_a_group_stands_beside_the_best_single_model():
     models = ("a/1/1", "a+b/1/1")
     table = final(
