@@ -385,14 +385,34 @@ def _diagnose_lines(layout: FolderLayout, proposal: Proposal) -> list[str]:
     return [
         *lines,
         "# simulation:",
-        "#   mass_kg: 1.0",
-        "#   damping_N_s_per_m: 10.0",
-        "#   stiffness_N_per_m: 0.0   # 0: no spring",
-        "#   force_constant_N_per_A: 10.0",
+        *_drive_lines(_units(layout).get("output", "")),
         "#   hold: auto               # linear or zero (held, as by a controller, PLC or",
         "#                            # D/A converter): say so where you know it",
         *_STARTS[proposal.initial_state],
     ]
+
+
+def _drive_lines(output_unit: str) -> list[str]:
+    """Parameters of a drive whose output is measured in a unit."""
+    quantity = quantity_of(output_unit) if output_unit else ""
+    lines = (
+        [
+            "#   inertia_kg_m2: 0.01",
+            "#   damping_N_m_s_per_rad: 0.1",
+            "#   stiffness_N_m_per_rad: 0.0   # 0: no spring",
+            "#   torque_constant_N_m_per_A: 0.1",
+        ]
+        if quantity in ("angle", "angular velocity")
+        else [
+            "#   mass_kg: 1.0",
+            "#   damping_N_s_per_m: 10.0",
+            "#   stiffness_N_per_m: 0.0   # 0: no spring",
+            "#   force_constant_N_per_A: 10.0",
+        ]
+    )
+    if quantity in ("velocity", "angular velocity"):
+        lines.append("#   output: velocity")
+    return lines
 
 
 def _wrapped(text: str) -> list[str]:

@@ -227,9 +227,14 @@ def gap_sentences(final: FinalTest) -> tuple[Text, ...]:
     else:
         found = ["Every recording is covered by some model."]
     if hard:
+        at = [final.recordings.index(name) for name in hard]
+        who = (
+            "Fewer than a tenth of the other models cover"
+            if final.covered_by[at].any()
+            else "No other model covers"
+        )
         found.append(
-            f"Fewer than a tenth of the other models cover {len(hard)} of "
-            f"{counted(n_all, 'recording')}: {', '.join(hard)}."
+            f"{who} {len(hard)} of {counted(n_all, 'recording')}: {', '.join(hard)}."
         )
     return tuple(map(Text, found))
 

@@ -22,14 +22,19 @@ _RAISED = str.maketrans(
 _DIGITS = 2
 
 
-def rmsd_matrix_table(matrix: RmsdMatrix) -> Table:
+def rmsd_matrix_table(matrix: RmsdMatrix, count: str = "covers") -> Table:
     """Show some models on some recordings; dark is a low RMSD, whatever the rest.
+
+    Parameters
+    ----------
+    count : str
+        What the last column counts: with the model's own recordings or without.
 
     Returns
     -------
     Table
         Models in the rows; what lies below the threshold and a model's own recordings are
-        set apart. The last column counts what a model covers.
+        set apart.
     """
     factor, unit = _scale(matrix.rmsd, matrix.unit)
     depth = _depths(matrix.rmsd)
@@ -52,7 +57,7 @@ def rmsd_matrix_table(matrix: RmsdMatrix) -> Table:
         (
             Column("model", is_text=True),
             *(Column(name) for name in matrix.recordings),
-            Column("covers"),
+            Column(count),
         ),
         tuple(rows),
         is_matrix=True,

@@ -57,6 +57,8 @@ def _time(layout: FolderLayout, proposal: Proposal) -> str:
         repr(layout.time.title) if layout.time.title else f"column {layout.time.key}"
     )
     more = "; jitters, so it is resampled" if layout.resample else ""
+    if layout.output_time is not None:
+        more = "; the output has a clock of its own: both are put on one"
     step = f"{proposal.sample_time_s:g} s"
     return f"{called}, a sample every {step}: {layout.time.reason}{more}"
 

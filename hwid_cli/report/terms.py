@@ -4,6 +4,10 @@ from hwid_cli.report.table import Table
 
 _TERMS = {
     "covers": "covers: recordings on which the model's RMSD lies below the threshold",
+    "covers others": (
+        "covers others: recordings that the model's fit has not seen on which its RMSD lies "
+        "below the threshold"
+    ),
     "own RMSD": "own RMSD: on the recordings that the model was fitted to",
     "base": "base: the group that a recording joins, which stands above its column",
     "widest": "widest: the most recordings that one of these groups covers",

@@ -467,3 +467,35 @@ def test_kinds_of_a_plan_do_not_ask_for_columns_of_one_length(tmp_path):
 
     assert done.exit_code == 0, done.output
     assert out.is_file()
+
+
+@pytest.mark.parametrize(
+    ("column", "said"),
+    [
+        ("speed_rpm", ("inertia_kg_m2: 0.01", "output: velocity")),
+        ("angle_deg", ("torque_constant_N_m_per_A: 0.1",)),
+        ("speed [mm/s]", ("mass_kg: 1.0", "output: velocity")),
+        ("position_mm", ("force_constant_N_per_A: 10.0",)),
+    ],
+)
+def test_the_starting_simulation_is_of_the_axis_that_is_measured(
+    tmp_path, column, said
+):
+    rng = np.random.default_rng(2)
+    (tmp_path / "runs").mkdir()
+    for number in range(3):
+        u = np.repeat(rng.uniform(-1, 1, 60), 10)
+        y = np.convolve(u, np.exp(-np.arange(80) / 20))[: u.size]
+        rows = np.column_stack([1e-3 * np.arange(u.size), u, y])
+        np.savetxt(
+            tmp_path / f"runs/run_{number}.csv", rows, delimiter=",", comments="",
+            header=f"time_s,current_A,{column}",
+        )  # fmt: skip
+    out = tmp_path / "mine.yaml"
+    result = CliRunner().invoke(
+        main, ["init", str(tmp_path / "runs"), "--out", str(out)]
+    )
+    assert result.exit_code == 0, result.output
+    text = out.read_text()
+    assert all(f"#   {one}\n" in text for one in said)
+    assert ("output: velocity" in text) == column.startswith("speed")

@@ -281,12 +281,16 @@ def test_where_to_trust_it_is_said(contents):
 def test_recommended_orders_and_maps_are_said(contents):
     advice = contents.answer.advice
     maps = ChosenMaps(advice.nb, advice.nk, "saturation", "none")
-    told = plain(answered(contents, maps=maps).details[1])
+    worse = {"linear_rmsd": 2.0 * contents.answer.rmsd}
+    told = plain(answered(contents, maps=maps, **worse).details[1])
 
     assert f"Recommended for new fits: nb = {advice.nb}, nk = {advice.nk}" in told
     assert "maps: saturation and none" in told
     none = ChosenMaps(advice.nb, advice.nk, "none", "none")
-    assert "; no maps." in plain(answered(contents, maps=none).details[1])
+    assert "; no maps." in plain(answered(contents, maps=none, **worse).details[1])
+    # Above it stands that maps are not worth it here.
+    better = {"linear_rmsd": 0.5 * contents.answer.rmsd}
+    assert "maps" not in plain(answered(contents, maps=maps, **better).details[1])
 
 
 def test_a_model_above_the_threshold_is_not_settled(contents):

@@ -10,6 +10,7 @@ import pytest
 from hwid_cli.records.groups import Group, GroupSearch, Join
 from hwid_cli.records.model import Information
 from hwid_cli.records.report import ReportContents
+from hwid_cli.report.final_test import gap_sentences
 from hwid_cli.report.page import Collapsible
 from hwid_cli.report.sections.about import about_section
 from hwid_cli.report.sections.calibrate import calibration_section
@@ -198,6 +199,12 @@ def test_a_recording_that_nobody_covers_is_not_listed_twice(contents):
     assert text.count("step_03") == text.count("step_01") == 2
     assert "not even their own: step_03." in text
     assert "cover 1 of 6 recordings: step_01." in text
+    # A tenth of a few models is none of them.
+    final = contents.stored.final_test
+    alone = replace(final, covered_by=0 * final.covered_by)
+    assert "No other model covers 1 of 6 recordings: step_01." in [
+        one.text for one in gap_sentences(alone)
+    ]
 
 
 @blank

@@ -227,7 +227,7 @@ def _candidate_dots(diagnosis: Diagnosis) -> Dots:
     return Dots(
         label="share of the excess error explained on held-out recordings [%]",
         groups=(DotGroup("", tuple(rows)),),
-        sentence="The best candidates that were fitted, and the simulation alone.",
+        sentence="The best candidates that were fitted; 0 % is the re-fitted simulation alone.",
         alt="Explained share and held-out error of the candidates",
         legend=tuple(keys),
         is_bar=True,

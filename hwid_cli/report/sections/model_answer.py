@@ -153,7 +153,8 @@ def _orders(found: ModelAnswer, nk_role: str) -> str:
             f" (the smallest within {100 * (one.evidence.factor - 1):.2g} % of the best, "
             f"{one.best_nb}/{one.best_nk})"
         )
-    if found.maps is not None:
+    # What is said of maps on the recordings that judge is not contradicted.
+    if found.maps is not None and not found.is_linear_better:
         pair = (found.maps.input_map, found.maps.output_map)
         text += (
             "; no maps" if set(pair) == {"none"} else f"; maps: {pair[0]} and {pair[1]}"

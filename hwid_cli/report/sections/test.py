@@ -44,7 +44,10 @@ def final_test_section(contents: ReportContents) -> Section:
     if trend is None or matrix is None:
         missing = _NOT_RUN
     elif not trend.models:
-        missing = "there is no chain of groups to test."
+        missing = (
+            "no chain of groups was tested; what the models do on the test recordings "
+            "stands under Coverage."
+        )
     else:
         blocks += section_notes(contents, is_validation=True)
         if trend.recordings:
@@ -56,7 +59,11 @@ def final_test_section(contents: ReportContents) -> Section:
             f"On all {len(matrix.recordings)} recordings the chain's {ways[0]} "
             f"{covers}, {ways[1]} own left out."
         )
-        blocks += [Text(sentence), rmsd_matrix_table(matrix), *_chain(contents)]
+        blocks += [
+            Text(sentence),
+            rmsd_matrix_table(matrix, "covers others"),
+            *_chain(contents),
+        ]
     title = "Test: the chain of groups on recordings that nothing else has used"
     return Section("test", title, "Test", tuple(blocks), missing)
 
@@ -121,7 +128,10 @@ def coverage_section(contents: ReportContents) -> Section:
         missing = _NOT_RUN
     else:
         blocks += section_notes(contents, is_validation=True)
-        blocks += [Text(_matrix_sentence(matrix)), rmsd_matrix_table(matrix)]
+        blocks += [
+            Text(_matrix_sentence(matrix)),
+            rmsd_matrix_table(matrix, "covers others"),
+        ]
         blocks += gap_sentences(final)
         table = coverage_matrix_table(final)
         blocks.append(Collapsible("The coverage as a table", (table,)))

@@ -218,7 +218,7 @@ class Chart {
     const range = panel.range;
     const plot = new uPlot({
       ...size, series, bands,
-      padding: [8, 10, isLast ? 0 : 4, 0],
+      padding: [8, 16, isLast ? 0 : 4, 0],
       legend: { show: false },
       cursor: {
         sync: { key: this.sync.key, setSeries: false, scales: ["x", null] },
