@@ -34,8 +34,8 @@ from hwid_cli.records.diagnosis import STILL_LARGE
 _NEARLY_WHITE = 2.0
 # Share that each of several rivals explains of what none of them explains for the most.
 LEAST_OF_RIVALS = 0.35
-# Sets that leave at most so many times what the best one leaves count as near it, and
-# what at least so many near sets share is there, whatever the rest is.
+# Sets that leave at most so many times what the best one leaves count as near it, so many
+# at least; what all near sets share is there, whatever the rest is.
 NEAR_BEST, LEAST_SHARING = 2.0, 10
 # Share of what a verdict leaves that makes a set worth following.
 LEAST_LEAD = 0.25
@@ -187,12 +187,18 @@ def _shared_by_best(
     """
     # Values of each recording make up for anything, and so measure nothing.
     usable = [one for one in fits.values() if one.is_usable and not has_own_values(one)]
-    left = [1.0 - criteria.evidence(one, base).explained for one in usable]
-    most = NEAR_BEST * min(left, default=0.0)
-    near = [one for one, rest in zip(usable, left, strict=True) if rest <= most]
-    if len(near) < LEAST_SHARING:
+    left = sorted(
+        ((1.0 - criteria.evidence(one, base).explained, one) for one in usable),
+        key=lambda pair: pair[0],
+    )
+    if len(left) < LEAST_SHARING:
         return None
+    most = max(NEAR_BEST * left[0][0], left[LEAST_SHARING - 1][0])
+    near = [one for rest, one in left if rest <= most]
     shared = set.intersection(*(set(names_of(one)) for one in near))
+    # What is shared is no witness of itself.
+    if sum(set(names_of(one)) != shared for one in near) < LEAST_SHARING:
+        return None
     for one in sorted(usable, key=lambda one: -criteria.gain(one, base)):
         against = criteria.evidence(one, base)
         is_clear = against.gain >= LEAST_GAIN and against.improved >= LEAST_IMPROVED

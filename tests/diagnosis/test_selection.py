@@ -758,6 +758,23 @@ def test_what_one_near_set_does_without_is_not_named():
     assert decided(base(4e5), [core, *sets], [core, sets[0]]).word == "unknown"
 
 
+@pytest.mark.parametrize(("place", "word"), [(11, "named"), (7, "unknown")])
+def test_the_first_ten_sets_tell_what_is_shared_where_one_is_far_ahead(place, word):
+    # The best one leaves a quarter of what the next ones do.
+    core = made_up(("end_stop",), 1.8e5, whiteness=9.0)
+    sets = near_sets(12)
+    sets = [replace(one, sse=one.sse + 500.0 * n) for n, one in enumerate(sets)]
+    best = replace(sets[0], sse=0.25 * sets[0].sse)
+    sse = 4e4 + 500.0 * place - 250.0
+    without = made_up(
+        ("coulomb_friction", "hysteresis"), sse, parameters=2, whiteness=9.0
+    )
+    fits = [core, best, *sets[1:], without]
+    found = decided(base(4e5), fits, [core, best], unclear=("end_stop",))
+    assert found.word == word
+    assert found.chosen is core or word == "unknown"
+
+
 def test_a_shared_law_that_may_be_a_simpler_one_is_not_named():
     # Nothing tells this excess at rest from plain friction.
     core = made_up(("stribeck_friction",), 1.8e5, whiteness=9.0)
