@@ -4,7 +4,7 @@ import shlex
 from collections.abc import Sequence
 
 from hwid_cli.cli.session import Session, say_damaged, screen_width
-from hwid_cli.records.best_model import BestModel
+from hwid_cli.records.best_model import LINEAR, BestModel
 from hwid_cli.records.diagnosis import Diagnosis
 from hwid_cli.records.experiment import CrossvalOptions
 from hwid_cli.records.report import StoredResults
@@ -19,7 +19,7 @@ from hwid_cli.report.closing import (
 from hwid_cli.simulations.kinds import kind_named
 from hwid_cli.stages.best_model import beside_linear, best_model
 from hwid_cli.stages.model_views import named_fits
-from hwid_cli.stages.table import is_named, named, stage_named
+from hwid_cli.stages.table import is_named, stage_named
 from hwid_cli.store.cache import Hdf5Store
 
 PAGE = "report.html"
@@ -130,7 +130,7 @@ def _next(session: Session, name: str, best: BestModel | None) -> str:
     if best is not None and not best.is_usable:
         return command_line(session, "check")
     if best is not None and best.is_linear_better:
-        return command_line(session, "run" if named(session.experiment) else "crossval")
+        return command_line(session, "export", "--model", f"{LINEAR}{best.name}")
     if best is not None:
         return command_line(session, "export", "--model", best.name)
     return command_line(session, "run" if name != _RUN else "identify")

@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from math import isfinite
 
+# In front of a model's name: the linear one of its orders and recordings.
+LINEAR = "linear:"
 # What judged a model, the strictest first: recordings that nothing has used; recordings
 # that no group may hold; all but its own; its own, for want of others.
 JUDGES = ("test", "unseen", "others", "own")

@@ -109,6 +109,12 @@ def fit_linear(
 def linear_beside(
     found: Fit, recordings: Sequence[Recording]
 ) -> HammersteinWiener | None:
+    """The model of ``linear_fit_beside``; None where there is none, or its fit fails."""
+    beside = linear_fit_beside(found, recordings)
+    return None if beside is None else beside.model
+
+
+def linear_fit_beside(found: Fit, recordings: Sequence[Recording]) -> Fit | None:
     """Fit the linear model beside a nonlinear one: same orders, recordings and options.
 
     Parameters
@@ -118,8 +124,8 @@ def linear_beside(
 
     Returns
     -------
-    HammersteinWiener or None
-        None where the model is linear itself, a recording is gone, or the fit fails.
+    Fit or None
+        None where the model is linear itself, or a recording is gone.
     """
     by_name = {one.name: one for one in recordings}
     has_maps = {found.options.input_map, found.options.output_map} != {"none"}
@@ -127,7 +133,7 @@ def linear_beside(
         return None
     own = [by_name[name] for name in found.identified_on]
     with one_thread():
-        return fit(own, found.orders, linear_options(found.options)).model
+        return fit(own, found.orders, linear_options(found.options))
 
 
 def _outputs(models: Sequence[NamedModel], recording: Recording) -> list[np.ndarray]:

@@ -16,6 +16,7 @@ from hwid_cli.data.signal_features import find_period
 from hwid_cli.model.scores import coverage, fit_percent, rmsd
 from hwid_cli.model.simulate import validation_output
 from hwid_cli.records.answer import ModelAnswer
+from hwid_cli.records.best_model import LINEAR
 from hwid_cli.records.groups import FinalTest
 from hwid_cli.records.model import Fit, HammersteinWiener
 from hwid_cli.records.recordings import Recording
@@ -329,7 +330,7 @@ def _others(
     if answer.name != name:
         found.append((answer.name, False, answer.model))
     if answer.linear is not None:
-        found.append((f"linear:{answer.name}", True, answer.linear))
+        found.append((f"{LINEAR}{answer.name}", True, answer.linear))
     outputs = []
     for model, is_linear, one in found:
         output = validation_output(one, recording)

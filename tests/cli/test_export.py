@@ -69,6 +69,27 @@ def test_a_group_is_exported_under_its_own_name(after_run, hwid, config, out):
     assert about["stage"] == "group"
 
 
+def test_the_linear_model_beside_a_model_is_exported(after_run, hwid, out):
+    result = hwid("export", "--model", "linear:step_02/1/2", "-q")
+    path = out / "models" / "linear_step_02_1_2.json"
+    assert result.stdout.splitlines() == [str(path)]
+
+    (fit,) = [
+        one
+        for one in read_fits(out / "results.h5")
+        if one.name == "step_02" and one.orders.nf == 2
+    ]
+    model = load_model(path)
+    assert model.input_map.kind == model.output_map.kind == "none"
+    assert model.denominator.size == fit.model.denominator.size
+    content = json.loads(path.read_text())
+    assert content["name"] == "linear:step_02/1/2"
+    # What `run` and the tables say of it.
+    about = content["provenance"]["fit"]
+    assert about["rmsd"] == pytest.approx(fit.linear_rmsd, rel=1e-6)
+    assert about["options"]["input_map"] == "none"
+
+
 def test_a_model_that_is_not_there_is_one_line(after_run, hwid):
     result = hwid("export", "--model", "step_02/1/3", "-q")
 

@@ -21,7 +21,7 @@ def test_all_stages_run_in_order_and_the_answer_stands_last(finished):
     better = r"best model  the linear model of the same orders is better: mean RMSD \d"
     assert re.search(better, text)
     assert f"page        {finished / 'report.html'}" in text
-    assert re.fullmatch(r"  next  +hwid run .*", lines[-1])
+    assert re.fullmatch(r"  next  +hwid export .* --model linear:\S+", lines[-1])
     # Tables are in their file.
     assert "Best models of each recording" in (finished / "tables.txt").read_text()
     assert "Best models of each recording" not in text
@@ -62,7 +62,7 @@ def test_recommended_orders_stand_in_the_last_block(
 
 
 @pytest.mark.parametrize("command", ["run", "order"])
-def test_the_worse_model_is_not_exported_where_the_linear_one_is_better(
+def test_the_linear_model_is_exported_where_it_is_better(
     after_run, hwid, config, monkeypatch, command
 ):
     def half_as_far_off(best, *_):
@@ -74,8 +74,8 @@ def test_the_worse_model_is_not_exported_where_the_linear_one_is_better(
 
     assert "best model the linear model of the same orders is better: " in words
     assert "'fit: {input_map: none, output_map: none}' in " in words
-    assert re.search(rf"  next  +hwid run {config} ", said.splitlines()[-1])
-    assert "hwid export" not in said
+    last = said.splitlines()[-1]
+    assert re.search(rf"  next  +hwid export {config} .*--model linear:step_", last)
 
 
 @pytest.mark.parametrize("command", ["run", "order"])

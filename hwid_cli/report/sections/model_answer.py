@@ -3,6 +3,7 @@
 import numpy as np
 
 from hwid_cli.records.answer import ModelAnswer
+from hwid_cli.records.best_model import LINEAR
 from hwid_cli.records.report import ReportContents, SimulatedRecording
 from hwid_cli.report.charts import (
     Chart,
@@ -189,6 +190,8 @@ def _next(found: ModelAnswer, contents: ReportContents) -> tuple[tuple[str, str]
         steps.insert(
             0, (f"For linear models set {LINEAR_KEYS}, then", "hwid run CONFIG")
         )
+        linear = f"hwid export CONFIG --model {LINEAR}{found.name} --format json"
+        steps.insert(1, ("Take the linear model elsewhere:", linear))
     else:
         steps.append(
             (
