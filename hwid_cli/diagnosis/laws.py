@@ -457,6 +457,7 @@ def _refined(rounds: Rounds, one: _Tried) -> _Tried:
         ):
             continue
         plain = round(found / _PLAIN_STEP) * _PLAIN_STEP
+        has_sign = any(other.formula == f"sign({name})" for other in one.terms)
         candidates = [
             _replaced(
                 rounds, one, place,
@@ -464,8 +465,8 @@ def _refined(rounds: Rounds, one: _Tried) -> _Tried:
                 size ** (power - p),
             )
             for p in (plain, round(found, 2))
-            # The first power is the base's.
-            if p > 0 and p != 1
+            # The first power is the base's; the power 0 is the sign alone.
+            if (p > 0 and p != 1) or (p == 0 and not has_sign)
         ]  # fmt: skip
         done = _simulated(rounds, candidates, "the exponent")
         for other in done:
@@ -476,6 +477,8 @@ def _refined(rounds: Rounds, one: _Tried) -> _Tried:
 
 
 def _power_text(name: str, power: float) -> str:
+    if power == 0:
+        return f"sign({name})"
     if power == 2:
         return f"{name}*abs({name})"
     if power in (1, 3, 5):

@@ -71,8 +71,8 @@ def test_the_emps_lacks_dry_friction_of_the_published_size(diagnosed, options):
 def test_the_force_feedback_wheel_lacks_its_stops(diagnosed):
     found = diagnosed("ffwheel", "ffwheel_motor")
     assert found["verdict"] == "named"
-    # The wheel turns from -1 to 1.
-    assert values(found, "end_stop")["position_m"] == pytest.approx(1.0, abs=0.03)
+    # The wheel turns from -1 to 1; a soft stop begins before it ends.
+    assert 0.9 < values(found, "end_stop")["position_m"] < 1.03
 
 
 @pytest.mark.slow

@@ -1,5 +1,6 @@
 """Laws that no catalogue holds, in a machine with an integrator of its own."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -240,3 +241,32 @@ def test_a_period_in_time_cannot_leave_what_the_recordings_show():
         if ref.parameter == "f1"
     ]
     assert 5.0 <= frequency <= 80.0
+
+
+def test_a_power_that_is_hardly_one_is_tried_as_the_sign_alone(monkeypatch):
+    # Near rest noise hides the direction of motion, and a steep power does as well.
+    of = rounds_of(FRICTION, ())
+    term = Term("abs(v)**0.5*sign(v)", (0.5, -0.5, 0), family="power of v")
+    tried = SimpleNamespace(terms=(term,))
+    asked = []
+
+    def replaced(_, one, place, free, factor):
+        asked.append((free.formula, factor))
+        return SimpleNamespace(terms=(free,))
+
+    monkeypatch.setattr(laws, "_replaced", replaced)
+    monkeypatch.setattr(laws, "_simulated", lambda _, several, what: several)
+    monkeypatch.setattr(laws, "_value_of", lambda one, start: 0.12)
+    monkeypatch.setattr(laws, "_fit", lambda one: one)
+    gain = {"sign(v)": 100.0, "abs(v)**0.12*sign(v)": 90.0}
+    rounds = replace(
+        of,
+        criteria=SimpleNamespace(
+            gain=lambda one, other: gain.get(one.terms[0].formula, 50.0)
+        ),
+    )
+    found = laws._refined(rounds, tried)
+    assert [one.formula for one in found.terms] == ["sign(v)"]
+    size = of.baseline.scales.velocity_m_per_s
+    (factor,) = [factor for formula, factor in asked if formula == "sign(v)"]
+    assert factor == pytest.approx(size**0.5, rel=1e-5)
