@@ -15,6 +15,7 @@ from hwid_cli.export.stored_models import (
 )
 from hwid_cli.files.atomic import replace_file
 from hwid_cli.files.csv_tables import write_compare_csv
+from hwid_cli.records.best_model import LINEAR
 from hwid_cli.records.comparison import Comparison, NamedModel
 from hwid_cli.records.model import Fit, Orders
 from hwid_cli.report.comparison import comparison_tables
@@ -28,7 +29,6 @@ from hwid_cli.stages.own_functions import (
 )
 from hwid_cli.stages.selection import select_recordings
 
-_LINEAR = "linear:"
 # Exported models that say less than their JSON.
 _OTHER_FORMATS = (".c", ".m", ".mat", ".fmu")
 
@@ -69,7 +69,7 @@ def _compared(
 
 def _model(session: Session, text: str) -> NamedModel:
     """Model that a word of the command line names."""
-    if text.startswith(_LINEAR):
+    if text.startswith(LINEAR):
         return _linear(session, text)
     if text.lower().endswith(".json"):
         return read_exported_model(Path(text))
@@ -117,7 +117,7 @@ def _linear(session: Session, text: str) -> NamedModel:
 
 def _split(session: Session, text: str) -> tuple[str, Orders]:
 
-    parts = text.removeprefix(_LINEAR).rsplit("/", 2)
+    parts = text.removeprefix(LINEAR).rsplit("/", 2)
     if len(parts) != 3 or not all(part.isdecimal() for part in parts[1:]):
         raise ConfigError(
             f"{text}: expected linear:RECORDING/NB/NK, such as linear:step_06/2/3"

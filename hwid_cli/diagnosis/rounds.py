@@ -225,13 +225,13 @@ class _Search:
         self, screened: Sequence[Screened]
     ) -> Mapping[Effects, Sequence[SearchStart]]:
         """Sets whose fits are finished."""
-        chosen = _promising(self.rounds, self.fits.few, screened)
+        chosen = _promising(self.fits, screened)
         if not self.fits.has_many:
             return chosen
         # Most of the first ones may be wide, and fall away.
         every = [one.effects for one in screened]
         plain = [one for one in screened if not includes_one_of(one.effects, every)]
-        return {**chosen, **_promising(self.rounds, self.fits.few, plain)}
+        return {**chosen, **_promising(self.fits, plain)}
 
     def _worst_of(self, parent: CandidateFit) -> DiagnosisProblem:
         """Few recordings, those first of which a set leaves most."""
@@ -322,14 +322,14 @@ class _Search:
 
 
 def _promising(
-    rounds: Rounds, few: DiagnosisProblem, screened: Sequence[Screened]
+    fits: SetFits, screened: Sequence[Screened]
 ) -> dict[Effects, Sequence[SearchStart]]:
     """Sets whose fits are finished: the first ones of the screening, and their kin."""
     ranked = sorted(screened, key=lambda one: one.sse)
     usable = [one for one in ranked if np.isfinite(one.sse)]
     if not usable:
         return {}
-    floor = few.n_evaluated * rounds.baseline.noise.rms**2
+    floor = fits.floor()
     least = max(usable[0].sse - floor, LEAST_LEFT * usable[0].sse)
     chosen = {
         one.effects

@@ -52,7 +52,7 @@ from hwid_cli.tasks.runner import RunSettings, Task, run_tasks
 from hwid_cli.trust.input_distance import input_distances
 
 NAME = "test"
-STAGE_VERSION = 4
+STAGE_VERSION = 5
 
 
 @dataclass(frozen=True, eq=False)

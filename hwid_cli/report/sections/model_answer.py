@@ -262,7 +262,7 @@ def _overlay_chart(one: SimulatedRecording, found: ModelAnswer) -> Chart | None:
     }
     curves = [Curve("measured", thinned(recording.output, chosen), "measured")]
     for model, role, label in (
-        (f"linear:{found.name}", "linear", "linear"),
+        (f"{LINEAR}{found.name}", "linear", "linear"),
         (found.name, "taken", "this model"),
     ):
         if model in outputs and np.isfinite(outputs[model]).all():
