@@ -2,6 +2,7 @@
 
 import json
 import sys
+import time
 from collections.abc import Sequence
 from contextlib import nullcontext, redirect_stdout
 from pathlib import Path
@@ -23,7 +24,13 @@ from hwid_cli.records.experiment import Experiment
 from hwid_cli.records.recordings import Calibrated
 from hwid_cli.report.check import check_document, recordings_table, stages_table
 from hwid_cli.report.table import as_text
-from hwid_cli.stages.fit_seconds import MEASURED, compiled_loops_place, time_fits
+from hwid_cli.stages.fit_seconds import (
+    MEASURED,
+    compiled_loops_place,
+    page_plan,
+    time_fits,
+    with_start,
+)
 from hwid_cli.stages.own_functions import check_own_functions
 from hwid_cli.stages.recording_facts import Checked, check_recordings
 from hwid_cli.stages.selection import named_recordings
@@ -68,11 +75,13 @@ def _checked(
     folder = out or Path("results") / experiment.name
     if not problems and _is_waiting(experiment, folder):
         return None
+    begun = time.perf_counter()
     checked, more = _data(experiment, folder)
+    reading_seconds = time.perf_counter() - begun
     if problems or more:
         _end_with((*problems, *more))
     _show_warnings(experiment, checked, folder)
-    how = (cache or folder / "cache", jobs, timing)
+    how = (cache or folder / "cache", jobs, timing, reading_seconds)
     return checked.facts, *_show_plan(experiment, checked, how)
 
 
@@ -147,22 +156,32 @@ def _show_warnings(experiment: Experiment, checked: Checked, out: Path) -> None:
 def _show_plan(
     experiment: Experiment,
     checked: Checked,
-    how: tuple[Path, int | None, bool],
+    how: tuple[Path, int | None, bool, float],
 ) -> tuple[list[StagePlan], int]:
 
-    cache, jobs, timing = how
+    cache, jobs, timing, reading_seconds = how
     with one_thread():
         cost = _cost(experiment, checked, timing=timing)
         store = Hdf5Store(cache, sets_aside=False)
         workers = Workers(jobs).count
         planning = Planning(
-            experiment, checked.recordings, cost, store, workers, checked.logs
+            experiment,
+            checked.recordings,
+            cost,
+            store,
+            workers,
+            checked.logs,
+            reading_seconds,
         )
-        plans = [
-            plan
-            for name in to_run(experiment)
-            for plan in stage_named(name).plan(planning)
-        ]
+        plans = with_start(
+            [
+                plan
+                for name in to_run(experiment)
+                for plan in stage_named(name).plan(planning)
+            ]
+            + [page_plan(len(checked.recordings))],
+            workers,
+        )
     click.echo(f"\n{as_text([stages_table(plans, cost, workers)])}")
     return plans, workers
 

@@ -54,6 +54,8 @@ class StagePlan:
         Where the work depends on what is found; NaN where ``seconds`` says it all.
     most_reason : str
         When it takes that long, in words.
+    is_shared : bool
+        Whether several processes share its tasks, which have to be started once.
     """
 
     stage: str
@@ -64,6 +66,12 @@ class StagePlan:
     size_bytes: float
     most_seconds: float = nan
     most_reason: str = ""
+    is_shared: bool = False
+
+    @property
+    def waits_for_processes(self) -> bool:
+        """Whether there is something left that processes share."""
+        return self.is_shared and self.cached != self.tasks
 
     @property
     def longest_seconds(self) -> float:

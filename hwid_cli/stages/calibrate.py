@@ -290,7 +290,8 @@ def _plan(planning: Planning) -> tuple[StagePlan, ...]:
     samples = sum(one.n_samples for one in planning.recordings)
     what = f"{counted(n, 'recording')}, {counted(samples, 'sample')}"
     size = _SAMPLE_BYTES * samples + _FIGURE_BYTES * n + _PAGE_BYTES
-    return (StagePlan(NAME, what, n, None, _DRAWING_S * n, size),)
+    seconds = planning.reading_seconds + _DRAWING_S * n
+    return (StagePlan(NAME, what, n, None, seconds, size),)
 
 
 STAGE = Stage(

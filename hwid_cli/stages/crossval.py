@@ -373,7 +373,8 @@ def _plan(planning: Planning) -> tuple[StagePlan, ...]:
     )
     seconds = SECONDS_PER_SIMULATED_SAMPLE * samples + TASK_SECONDS * (pairs - done)
     seconds /= min(planning.workers, pairs)
-    return (StagePlan(NAME, what, pairs, done, seconds, PAIR_BYTES * pairs),)
+    size = PAIR_BYTES * pairs
+    return (StagePlan(NAME, what, pairs, done, seconds, size, is_shared=True),)
 
 
 STAGE = Stage(

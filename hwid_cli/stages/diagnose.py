@@ -573,15 +573,25 @@ def _plan(planning: Planning) -> tuple[StagePlan, ...]:
         lambda run, on_round: _diagnosed(given, run, on_round),
         n,
         given.options.max_effects,
+        planning.workers,
     )
     what = f"{counted(n, 'recording')} x {counted(found.n_tasks, 'effect')}"
     if not found.n_tasks:
         what = f"{counted(n, 'recording')}; no effect is looked for"
-    least, most = (
-        one / planning.workers for one in (found.seconds, found.most_seconds)
-    )
     why = "one effect is not enough"
-    return (StagePlan(NAME, what, found.n_tasks, None, least, 1e6, most, why),)
+    return (
+        StagePlan(
+            NAME,
+            what,
+            found.n_tasks,
+            None,
+            found.seconds,
+            1e6,
+            found.most_seconds,
+            why,
+            is_shared=True,
+        ),
+    )
 
 
 STAGE = Stage(

@@ -17,6 +17,7 @@ from hwid_cli.diagnosis.proposals import LIKELY_PAIRS, SCREENED_ON_TOP
 from hwid_cli.diagnosis.rounds import MOST_PARENTS, MOST_SCREENINGS
 from hwid_cli.diagnosis.tasks import DiagnosisTask, OnRound, RunTasks
 from hwid_cli.records.programs import SimulatorRun
+from hwid_cli.stages.fit_seconds import LOADING_SECONDS
 
 # Of the tasks of the screening, [tasks].
 _EACH = 4
@@ -32,6 +33,9 @@ _MOST_RUN_S = 30.0
 
 # Drawing what was found, [s].
 _FIGURES_S = 0.7
+# What of a round is left of the gain of several processes: they wait for its longest task
+# and for the first one, which runs alone (docs/benchmarks.md), [-].
+_SHARED = 0.8
 
 Diagnose = Callable[[RunTasks, OnRound], Any]
 
@@ -89,7 +93,7 @@ class _Sampler:
 
 @dataclass(frozen=True)
 class DiagnosisTime:
-    """How long a diagnosis takes on one core.
+    """How long a diagnosis takes.
 
     Parameters
     ----------
@@ -108,7 +112,7 @@ class DiagnosisTime:
 
 
 def time_diagnosis(
-    diagnose: Diagnose, n_recordings: int, max_effects: int
+    diagnose: Diagnose, n_recordings: int, max_effects: int, workers: int
 ) -> DiagnosisTime:
     """Time the beginning of a diagnosis, and count the rounds that may follow.
 
@@ -119,6 +123,8 @@ def time_diagnosis(
     n_recordings : int, [-]
     max_effects : int, [-]
         Of the largest set that is searched for.
+    workers : int, [-]
+        Processes that share its rounds.
     """
     sampler = _Sampler()
     start = time.process_time()
@@ -132,11 +138,21 @@ def time_diagnosis(
     if sampler.runs and sampler.n_tasks:
         each = sampler.run_seconds / sampler.runs
         confirming = _CONFIRMING_RUNS * n_recordings * each
-    fixed = spent + sampler.run_seconds + confirming + _FIGURES_S
-    single = _SINGLE_EFFECTS * sampler.screening
+    # The user's own simulations run side by side, all at once; what comes before the
+    # screening waits for each of its steps.
+    running = (sampler.run_seconds + confirming) / workers
+    fixed = spent + running + LOADING_SECONDS + _FIGURES_S
+    single = _SINGLE_EFFECTS * sampler.screening / _gain(sampler.n_tasks, workers)
     rounds = 1 + MOST_SCREENINGS
     most = rounds * single * (1.0 + _sets_for_one(sampler.n_tasks, max_effects))
     return DiagnosisTime(fixed + single, fixed + most, sampler.n_tasks)
+
+
+def _gain(n_tasks: int, workers: int) -> float:
+    """How many times a round of tasks is faster on several processes, [-]."""
+    if n_tasks == 0 or workers == 1:
+        return 1.0
+    return max(_SHARED * n_tasks / math.ceil(n_tasks / workers), 1.0)
 
 
 def _sets_for_one(n_tasks: int, max_effects: int) -> float:

@@ -9,9 +9,11 @@ import time
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from hwid_cli.model.derivative_rows import derivative_rows
 from hwid_cli.model.fit import fit
-from hwid_cli.records.check import FitCost
+from hwid_cli.records.check import FitCost, StagePlan
 from hwid_cli.records.experiment import Experiment, GroupOptions, OrdersOptions
 from hwid_cli.records.model import FitOptions, HammersteinWiener, Orders
 from hwid_cli.records.recordings import Recording
@@ -38,7 +40,12 @@ _MOST_TIMED = 10_000
 _SEARCHED, _CONTINUED, _WARM_SEARCHED, _WARM_CONTINUED = 0.5, 0.2, 0.25, 0.1
 # Time of a fit of maps that are compared against one with middle orders and the usual
 # maps: the recommended orders and most of the maps are smaller (docs/benchmarks.md), [-].
-_MAP_SHARE = 0.65
+_MAP_SHARE = 0.45
+# Reading the compiled loops of what the first tasks need, and starting processes that do
+# so too, once for all stages (docs/benchmarks.md, "What hwid check forecasts"), [s].
+LOADING_SECONDS, _START_SECONDS = 0.6, 1.6
+# Writing the page, and drawing its figures for each recording, [s].
+_PAGE_SECONDS, _FIGURES_SECONDS = 0.8, 0.35
 # Keeping the result of a task, [s].
 TASK_SECONDS = 0.005
 # Simulating one model on one sample, its initial state included (docs/benchmarks.md: 1 ms
@@ -118,18 +125,24 @@ def _one_of_each_kind(recordings: Sequence[Recording]) -> list[Recording]:
     groups.sort(key=len, reverse=True)
     found = []
     for group in groups:
-        whole = group[len(group) // 2]
-        n = min(whole.n_samples, _MOST_TIMED)
-        reference = None if whole.reference is None else whole.reference[:n]
-        found.append(
-            replace(
-                whole,
-                input=whole.input[:n],
-                output=whole.output[:n],
-                reference=reference,
-            )
-        )
+        found.append(_livelier_part(group[len(group) // 2]))
     return found
+
+
+def _livelier_part(whole: Recording) -> Recording:
+    """As many samples as are timed, from where the input moves: a rest is fitted at once."""
+    n = min(whole.n_samples, _MOST_TIMED)
+    # Of the first or the last samples, and of those between.
+    firsts = range(0, whole.n_samples - n + 1, max(n // 4, 1))
+    first = max(firsts, key=lambda one: float(np.var(whole.input[one : one + n])))
+    part = slice(first, first + n)
+    reference = None if whole.reference is None else whole.reference[part]
+    return replace(
+        whole,
+        input=whole.input[part],
+        output=whole.output[part],
+        reference=reference,
+    )
 
 
 def _round_seconds(
@@ -318,6 +331,39 @@ def map_seconds(
         for one in recordings
         for options in maps
     )
+
+
+def page_plan(n_recordings: int) -> StagePlan:
+    """What it takes to write the page and to draw its figures.
+
+    Parameters
+    ----------
+    n_recordings : int, [-]
+    """
+    seconds = _PAGE_SECONDS + _FIGURES_SECONDS * n_recordings
+    return StagePlan("report", "the page and its figures", 1, None, seconds, 0.0)
+
+
+def with_start(plans: Sequence[StagePlan], workers: int) -> list[StagePlan]:
+    """Add to the first stage whose tasks are shared what it takes to begin with them.
+
+    Parameters
+    ----------
+    workers : int, [-]
+        Processes that share the work; one alone need not be started.
+    """
+    seconds = LOADING_SECONDS + (_START_SECONDS if workers > 1 else 0.0)
+    first = next((one for one in plans if one.waits_for_processes), None)
+    return [
+        replace(
+            one,
+            seconds=one.seconds + seconds,
+            most_seconds=one.most_seconds + seconds,
+        )
+        if one is first
+        else one
+        for one in plans
+    ]
 
 
 def middle_orders(orders: OrdersOptions) -> Orders:

@@ -208,6 +208,7 @@ def _plan(planning: Planning) -> tuple[StagePlan, ...]:
         FIT_BYTES * fits + PAIR_BYTES * sum(bounds) * n_validate,
         sum(of_levels),
         "the search goes on to the last level",
+        is_shared=True,
     )
     return (plan,)
 

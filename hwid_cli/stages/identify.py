@@ -263,7 +263,7 @@ def _plan(planning: Planning) -> tuple[StagePlan, ...]:
     )
     size = FIT_BYTES * (2 * total - n_cached)
     left = seconds * (1 - n_cached / total)
-    return (StagePlan(NAME, what, total, n_cached, left, size),)
+    return (StagePlan(NAME, what, total, n_cached, left, size, is_shared=True),)
 
 
 def stored_fits(

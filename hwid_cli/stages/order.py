@@ -339,7 +339,8 @@ def _plan(planning: Planning) -> tuple[StagePlan, ...]:
         f"{counted(total, 'fit')}"
     )
     per_process = seconds / planning.workers
-    return (StagePlan("order", what, total, None, per_process, FIT_BYTES * total),)
+    size = FIT_BYTES * total
+    return (StagePlan("order", what, total, None, per_process, size, is_shared=True),)
 
 
 STAGE = Stage(

@@ -108,6 +108,8 @@ class Planning:
         Processes that share the work.
     logs : tuple of CalibrationLog
         In the order of the recordings.
+    reading_seconds : float, [s]
+        What it took to read and calibrate them.
     """
 
     experiment: Experiment
@@ -116,6 +118,7 @@ class Planning:
     store: Store
     workers: int = 1
     logs: tuple[CalibrationLog, ...] = ()
+    reading_seconds: float = 0.0
 
 
 def _nothing(*_: Any) -> tuple[Any, ...]:

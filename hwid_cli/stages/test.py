@@ -31,8 +31,14 @@ from hwid_cli.stages.coverage_matrix import (
     smallest_set,
 )
 from hwid_cli.stages.crossval import deviation_tasks
-from hwid_cli.stages.fit_seconds import PAIR_BYTES, counted
-from hwid_cli.stages.identify import recording_key
+from hwid_cli.stages.fit_seconds import (
+    PAIR_BYTES,
+    TASK_SECONDS,
+    counted,
+    fit_seconds,
+    middle_orders,
+)
+from hwid_cli.stages.identify import recording_key, recordings_with_models
 from hwid_cli.stages.predictions import predict_all
 from hwid_cli.stages.ranking import best_of_each, score_models
 from hwid_cli.stages.selection import select_recordings
@@ -50,6 +56,7 @@ from hwid_cli.store.result_files import Provenance
 from hwid_cli.tasks.cache import task_key
 from hwid_cli.tasks.runner import RunSettings, Task, run_tasks
 from hwid_cli.trust.input_distance import input_distances
+from hwid_cli.trust.judged import PARTS
 
 NAME = "test"
 STAGE_VERSION = 5
@@ -440,8 +447,22 @@ def _tables(context: Context, final: FinalTest) -> list[Block]:
 
 
 def _plan(planning: Planning) -> tuple[StagePlan, ...]:
-    n = len(planning.recordings)
-    return (StagePlan(NAME, counted(n, "recording"), n, None, 0.0, n * PAIR_BYTES),)
+    experiment, n = planning.experiment, len(planning.recordings)
+    used = recordings_with_models(planning.recordings, experiment)
+    # Nothing but parts of a single recording can judge how far its model is right.
+    seconds = (
+        PARTS
+        * fit_seconds(
+            planning.cost,
+            middle_orders(experiment.orders),
+            used[0].n_samples,
+            units=experiment.fit.units,
+        )
+        if len(used) == 1
+        else TASK_SECONDS * n
+    )
+    what, size = counted(n, "recording"), n * PAIR_BYTES
+    return (StagePlan(NAME, what, n, None, seconds, size),)
 
 
 STAGE = Stage(

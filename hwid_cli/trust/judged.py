@@ -52,7 +52,7 @@ _DIVERGED = 1e12
 # Share of the largest output below which an error is none: that of a noise-free fit.
 _ROUNDING = 1e-12
 # Parts into which a single recording is cut.
-_PARTS = 3
+PARTS = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -336,7 +336,7 @@ def left_out(fit: Fit, own: Sequence[Recording]) -> list[Judgement]:
 
 def _parts(whole: Recording) -> list[Recording]:
     """Thirds of a recording, as recordings."""
-    edges = np.linspace(0, whole.n_samples, _PARTS + 1).astype(int)
+    edges = np.linspace(0, whole.n_samples, PARTS + 1).astype(int)
     return [
         replace(
             whole,

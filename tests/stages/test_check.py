@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from hwid_cli.records.check import StagePlan
 from hwid_cli.records.experiment import GroupOptions, OrdersOptions
 from hwid_cli.records.groups import Group
 from hwid_cli.records.model import FitOptions, LinearBlock, Orders
@@ -13,6 +14,7 @@ from hwid_cli.stages.fit_seconds import (
     fit_seconds,
     share_of_round,
     time_fits,
+    with_start,
 )
 from hwid_cli.stages.group import group_bound
 from hwid_cli.stages.group_search import search_groups
@@ -102,3 +104,31 @@ def test_a_fit_that_keeps_a_block_is_timed_with_the_orders_of_that_block():
     assert cost.seconds > 0.0
     assert all(one > 0.0 for one in cost.rounds)
     assert "orders 2 2 1" in cost.source
+
+
+def test_a_long_rest_before_the_motion_is_not_what_is_timed():
+    rng = np.random.default_rng(2)
+    u = np.concatenate([np.zeros(12_000), np.repeat(rng.uniform(-1.0, 1.0, 80), 100)])
+    y = lfilter([0.0, 0.1, 0.05], [1.0, -1.5, 0.6], np.tanh(u))
+    moving = Recording("r", u[-10_000:], y[-10_000:], 1e-3)
+    orders = OrdersOptions(nb=(2,), nk=(2,))
+
+    rested = time_fits([Recording("r", u, y, 1e-3)], orders, FitOptions())
+
+    # A fit to the rest alone fails at once.
+    assert rested.seconds > 0.2 * time_fits([moving], orders, FitOptions()).seconds
+
+
+def test_the_first_stage_with_something_to_share_waits_for_its_processes():
+    plans = [
+        StagePlan("calibrate", "3 recordings", 3, None, 1.0, 0.0),
+        StagePlan("identify", "8 fits", 8, 8, 0.0, 0.0, is_shared=True),
+        StagePlan("order", "4 fits", 4, None, 2.0, 0.0, is_shared=True),
+        StagePlan("group", "2 groups", 2, None, 3.0, 0.0, 5.0, is_shared=True),
+    ]
+
+    alone, shared = with_start(plans, 1), with_start(plans, 2)
+
+    assert [one.seconds for one in alone] == [1.0, 0.0, 2.0 + 0.6, 3.0]
+    assert [one.seconds for one in shared] == [1.0, 0.0, 2.0 + 0.6 + 1.6, 3.0]
+    assert shared[3].longest_seconds == 5.0

@@ -44,11 +44,11 @@ def test_a_search_is_scaled_from_some_of_its_tasks(clock):
         run([task(clock, 0.5) for _ in range(40)], keep=True)
         ended.append(True)
 
-    found = time_diagnosis(diagnose, 6, 1)
+    found = time_diagnosis(diagnose, 6, 1, 1)
     # 2 s of the base, 40 tasks with a fifth for what is finished, figures.
-    assert found.seconds == pytest.approx(2.0 + 1.2 * 20.0 + 0.7)
+    assert found.seconds == pytest.approx(2.0 + 1.2 * 20.0 + 0.6 + 0.7)
     # At most they are screened three times.
-    assert found.most_seconds == pytest.approx(2.0 + 3 * 1.2 * 20.0 + 0.7)
+    assert found.most_seconds == pytest.approx(2.0 + 3 * 1.2 * 20.0 + 0.6 + 0.7)
     assert clock.now == pytest.approx(100.0 + 2.0 + 11 * 0.5)
     assert (found.n_tasks, ended) == (40, [])
 
@@ -58,11 +58,11 @@ def test_sets_of_effects_are_the_longer_end(clock):
         on_round("single effects, screening", 40)
         run([task(clock, 0.5) for _ in range(40)], keep=True)
 
-    two, three = (time_diagnosis(diagnose, 6, most) for most in (2, 3))
-    assert two.seconds == three.seconds == pytest.approx(1.2 * 20.0 + 0.7)
+    two, three = (time_diagnosis(diagnose, 6, most, 1) for most in (2, 3))
+    assert two.seconds == three.seconds == pytest.approx(1.2 * 20.0 + 0.6 + 0.7)
     # On top of two sets 12 effects each, and 10 pairs; each half as long again.
     pairs = 3 * 1.2 * 0.5 * 1.5 * (2 * 12 + 10)
-    assert two.most_seconds == pytest.approx(3 * 1.2 * 20.0 + pairs + 0.7)
+    assert two.most_seconds == pytest.approx(3 * 1.2 * 20.0 + pairs + 0.6 + 0.7)
     triples = 3 * 1.2 * 0.5 * 1.5 * 2 * 12
     assert three.most_seconds == pytest.approx(two.most_seconds + triples)
 
@@ -72,8 +72,8 @@ def test_nothing_to_search_for_takes_what_the_beginning_took(clock):
         on_round("base", 0)
         clock.now += 2.0
 
-    found = time_diagnosis(diagnose, 6, 3)
-    assert found.seconds == found.most_seconds == pytest.approx(2.7)
+    found = time_diagnosis(diagnose, 6, 3, 1)
+    assert found.seconds == found.most_seconds == pytest.approx(2.0 + 0.6 + 0.7)
     assert found.n_tasks == 0
 
 
@@ -84,9 +84,9 @@ def test_runs_of_the_users_simulation_come_again_at_the_end(clock):
         on_round("single effects, screening", 4)
         run([task(clock, 0.0) for _ in range(4)], keep=True)
 
-    found = time_diagnosis(diagnose, 3, 2)
+    found = time_diagnosis(diagnose, 3, 2, 1)
     # The fake clock counts a run on both clocks.
-    assert found.seconds == pytest.approx(3.0 + 3.0 + 9 * 3 * 1.0 + 0.7)
+    assert found.seconds == pytest.approx(3.0 + 3.0 + 9 * 3 * 1.0 + 0.6 + 0.7)
 
 
 def test_a_slow_simulation_is_not_run_to_the_end_for_a_forecast(clock):
@@ -94,7 +94,18 @@ def test_a_slow_simulation_is_not_run_to_the_end_for_a_forecast(clock):
         on_round("the simulation as given", 9)
         run([task(clock, 20.0, SimulatorRun) for _ in range(9)], keep=True)
 
-    found = time_diagnosis(diagnose, 9, 2)
+    found = time_diagnosis(diagnose, 9, 2, 1)
     assert math.isnan(found.seconds)
     assert found.n_tasks == 0
     assert clock.now == 100.0 + 2 * 20.0
+
+
+def test_a_round_of_few_tasks_gains_little_from_several_processes(clock):
+    def diagnose(run, on_round):
+        on_round("single effects, screening", 5)
+        run([task(clock, 0.5) for _ in range(5)], keep=True)
+
+    alone, shared = (time_diagnosis(diagnose, 6, 1, count) for count in (1, 2))
+    # Five tasks on two processes take as long as three; a fifth is lost besides.
+    assert alone.seconds == pytest.approx(1.2 * 2.5 + 0.6 + 0.7)
+    assert shared.seconds == pytest.approx(1.2 * 1.5 / 0.8 + 0.6 + 0.7)
