@@ -579,6 +579,8 @@ def _plan(planning: Planning) -> tuple[StagePlan, ...]:
     if not found.n_tasks:
         what = f"{counted(n, 'recording')}; no effect is looked for"
     why = "one effect is not enough"
+    if given.options.laws != "never":
+        why += ", several times that if no effect is and laws are searched for"
     return (
         StagePlan(
             NAME,

@@ -5,6 +5,7 @@ the larger half. An estimate to a factor of two: the number of iterations depend
 data.
 """
 
+import math
 import time
 from collections.abc import Sequence
 from dataclasses import replace
@@ -38,9 +39,8 @@ _MOST_TIMED = 10_000
 # are searched for too, in the later ones, and both for groups that begin with the models
 # of their members (docs/benchmarks.md, "A campaign" and "Groups of recordings"), [-].
 _SEARCHED, _CONTINUED, _WARM_SEARCHED, _WARM_CONTINUED = 0.5, 0.2, 0.25, 0.1
-# Time of a fit of maps that are compared against one with middle orders and the usual
-# maps: the recommended orders and most of the maps are smaller (docs/benchmarks.md), [-].
-_MAP_SHARE = 0.45
+# So many fits of maps that are compared are timed, [-].
+_TIMED_MAPS = 5
 # Reading the compiled loops of what the first tasks need, and starting processes that do
 # so too, once for all stages (docs/benchmarks.md, "What hwid check forecasts"), [s].
 LOADING_SECONDS, _START_SECONDS = 0.6, 1.6
@@ -316,21 +316,41 @@ def map_seconds(
 ) -> float:
     """Time of fits with several pairs of maps on one core; their orders are not known yet.
 
+    Where fits are timed, so are some of these, each on a recording of its own: how often
+    one is searched again depends on both.
+
     Returns
     -------
     float, [s]
     """
     middle = middle_orders(orders)
-    return _MAP_SHARE * sum(
-        fit_seconds(
-            cost,
-            middle,
-            one.n_samples,
-            units=(options.of_input.units + options.of_output.units) / 2,
+    if not cost.rounds:
+        return sum(
+            fit_seconds(
+                cost,
+                middle,
+                one.n_samples,
+                units=(options.of_input.units + options.of_output.units) / 2,
+            )
+            for one in recordings
+            for options in maps
         )
-        for one in recordings
-        for options in maps
-    )
+    each = [
+        _seconds_per_work(recordings[number % len(recordings)], middle, options)
+        for number, options in enumerate(maps[:: math.ceil(len(maps) / _TIMED_MAPS)])
+    ]
+    works = [_work(one.n_samples) for one in recordings]
+    return sum(each) / len(each) * sum(works) * len(maps)
+
+
+def _seconds_per_work(
+    recording: Recording, orders: Orders, options: FitOptions
+) -> float:
+    """Time a fit, as a part of what a recording of its length is to take."""
+    part = _livelier_part(recording)
+    start = time.process_time()
+    fit([part], orders, replace(options, join=FitOptions().join))
+    return (time.process_time() - start) / _work(part.n_samples)
 
 
 def page_plan(n_recordings: int) -> StagePlan:

@@ -28,7 +28,8 @@ def compare(config: str, out: Path) -> None:
     taken = {name: float(seconds) for name, seconds in _DONE.findall(run.stderr)}
     for plan in said["stages"]:
         name, least, most = plan["stage"], plan["seconds"], plan["most_seconds"]
-        if least is not None and name in taken:
+        # The figures beside the page are drawn after its line.
+        if least is not None and name in taken and name != "report":
             _show(name, least, most, taken[name])
     _show("all", said["seconds"], said["most_seconds"], wall)
 

@@ -12,6 +12,7 @@ from hwid_cli.records.recordings import Recording
 from hwid_cli.stages.fit_seconds import (
     MEASURED,
     fit_seconds,
+    map_seconds,
     share_of_round,
     time_fits,
     with_start,
@@ -132,3 +133,26 @@ def test_the_first_stage_with_something_to_share_waits_for_its_processes():
     assert [one.seconds for one in alone] == [1.0, 0.0, 2.0 + 0.6, 3.0]
     assert [one.seconds for one in shared] == [1.0, 0.0, 2.0 + 0.6 + 1.6, 3.0]
     assert shared[3].longest_seconds == 5.0
+
+
+def test_some_fits_of_maps_are_timed_each_on_a_recording_of_its_own(monkeypatch):
+    timed = []
+
+    def fit(recordings, orders, options):
+        timed.append((recordings[0].name, options.input_units))
+
+    monkeypatch.setattr("hwid_cli.stages.fit_seconds.fit", fit)
+    seconds = iter([0.0, 1.0, 10.0, 12.0, 20.0, 23.0, 30.0, 34.0, 40.0, 45.0])
+    monkeypatch.setattr(
+        "hwid_cli.stages.fit_seconds.time.process_time", lambda: next(seconds)
+    )
+    u = np.sin(np.arange(2000.0))
+    recordings = [Recording(name, u, u, 1e-3) for name in "ab"]
+    maps = [FitOptions(input_units=2 + number) for number in range(10)]
+    cost = replace(MEASURED, rounds=(1.0, 1.0, 1.0))
+
+    found = map_seconds(cost, OrdersOptions(nb=(2,), nk=(2,)), recordings, maps)
+
+    assert timed == [("a", 2), ("b", 4), ("a", 6), ("b", 8), ("a", 10)]
+    # 3 s on the mean, of two recordings with ten pairs of maps each.
+    assert found == pytest.approx(3.0 * 2 * 10)
