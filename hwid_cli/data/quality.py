@@ -14,6 +14,10 @@ from hwid_cli.data.signal_features import find_damaged
 _HOLDS = 0.5
 # Fewest samples in a row at the largest or smallest value that are no coincidence, [-].
 _LIMIT_RUN = 5
+# A signal that is cut at its limits for most of the time is between them for this share
+# at least, leaves a limit so often, and bends by more than this share of its range from
+# sample to sample, [-].
+_INSIDE_SHARE, _LEAST_VISITS, _STRAIGHT = 0.1, 3, 1e-6
 # Share of a recording that a stretch without change must take to be named, [-].
 _DEAD_SHARE = 0.05
 # Standard deviations from zero beyond which a fit without maps that shift ends in poor
@@ -38,7 +42,9 @@ def quality_notes(values: np.ndarray, *, may_hold: bool = False) -> tuple[str, .
     ('at its largest value 0.8 for 20 % of the time: clipped?',)
     """
     notes = []
-    if held_share(values) < _HOLDS:
+    inside = (values != values.max()) & (values != values.min())
+    holds = held_share(values) >= _HOLDS
+    if not holds or _comes_back_from_limits(values, inside):
         for word, limit in (("largest", values.max()), ("smallest", values.min())):
             at_limit = values == limit
             if longest_run(at_limit) >= _LIMIT_RUN:
@@ -47,7 +53,7 @@ def quality_notes(values: np.ndarray, *, may_hold: bool = False) -> tuple[str, .
                     f"at its {word} value {limit:.4g} for {share:.2g} % of the time: "
                     "clipped?"
                 )
-        inside = (values != values.max()) & (values != values.min())
+    if not holds:
         run = longest_run((np.diff(values) == 0) & inside[1:])
         if not may_hold and run >= _DEAD_SHARE * values.size:
             notes.append(f"does not change for {run + 1} samples in a row")
@@ -62,6 +68,27 @@ def quality_notes(values: np.ndarray, *, may_hold: bool = False) -> tuple[str, .
         what = "sample looks" if damaged == 1 else "samples look"
         notes.append(f"{damaged} {what} damaged")
     return tuple(notes)
+
+
+def _comes_back_from_limits(values: np.ndarray, inside: np.ndarray) -> bool:
+    """Whether a signal that mostly holds is a moving one, cut at both its limits.
+
+    Then it changes wherever it is not at a limit, along curves, and more than once. A
+    ramp between two levels is no curve, a step goes there and stays.
+    """
+    if np.mean(inside) < _INSIDE_SHARE:
+        return False
+    visits = int(np.count_nonzero(np.diff(inside.astype(int)) == 1))
+    within = inside[2:] & inside[1:-1] & inside[:-2]
+    bends = np.abs(np.diff(values, 2))[within]
+    straight = _STRAIGHT * float(np.ptp(values))
+    moves = np.diff(values)[inside[1:] & inside[:-1]] != 0.0
+    return bool(
+        visits >= _LEAST_VISITS
+        and bends.size
+        and np.mean(bends > straight) > _HOLDS
+        and np.mean(moves) > _HOLDS
+    )
 
 
 def longest_run(flags: np.ndarray) -> int:

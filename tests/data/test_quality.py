@@ -1,4 +1,5 @@
 import numpy as np
+import pytest
 
 from hwid_cli.data.quality import quality_notes
 
@@ -38,3 +39,28 @@ def test_a_signal_far_from_zero_is_named():
     (note,) = quality_notes(293.0 + 0.5 * WAVE)
     assert "standard deviations from zero: take the offset off" in note
     assert quality_notes(3.0 + WAVE) == ()
+
+
+@pytest.mark.parametrize("level", [0.9, 0.6, 0.3])
+def test_a_sine_that_is_cut_on_both_sides_is_named_however_much_is_lost(level):
+    sine = np.sin(2 * np.pi * 5 * np.arange(2000) / 2000)
+    notes = quality_notes(np.clip(sine, -level, level), may_hold=True)
+    assert [note.split(" for ")[0] for note in notes] == [
+        f"at its largest value {level}",
+        f"at its smallest value -{level}",
+    ]
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        # Trapezoids, a square wave, a staircase, a move that begins and ends at rest.
+        np.clip(3 * np.abs((np.arange(2000) % 400) / 200 - 1) - 1, 0, 1),
+        np.sign(np.sin(np.arange(2000) / 50)),
+        np.repeat(np.arange(20.0) % 7, 100),
+        np.clip((np.arange(2000) - 700) / 500, 0, 1) ** 2,
+    ],
+    ids=["trapezoids", "square", "staircase", "one move"],
+)
+def test_what_holds_its_levels_on_purpose_is_not_called_cut(values):
+    assert not any("clipped" in note for note in quality_notes(values, may_hold=True))
