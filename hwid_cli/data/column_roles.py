@@ -29,6 +29,8 @@ ROUND_STAMPS = 0.009
 # Columns that agree so far may both be the input, noise apart (a correlation), [-].
 _TWINS = 0.9999
 _CURRENT_UNITS = ("a", "ma", "ka")
+# A name with a number at its end: u2.
+_NUMBERED = re.compile(r"(.*\D)(\d+)")
 # A member of an element of MATLAB's array of structures: run(2).current.
 _ELEMENT = re.compile(r"(.+)\((\d+)\)\.([^()]+)")
 # Rank up to which words of an input say a current.
@@ -275,10 +277,13 @@ def guess_signals(columns: Sequence[FoundColumn]) -> SignalGuess:
     first, twins = _current_of_twins(first, named, reasons)
     if last == first:
         last = next(one for one in named if one != first)
-    repeats = _other_elements(named, first, last)
+    elements = _other_elements(named, first, last)
+    pairs = _other_pairs(named, first, last)
+    repeats = [*elements, *(one for pair in pairs for one in pair)]
     notes = [
         *_order_notes(first, last, reasons),
-        *_array_notes(first, repeats),
+        *_array_notes(first, elements),
+        *_pair_notes(pairs),
         *_twin_notes(first, [one for one in twins if one not in (last, *repeats)]),
         *_other_columns([one for one in named if one not in repeats], first, last),
         *_scale_notes(first.column, last.column),
@@ -515,6 +520,48 @@ def _array_notes(first: _Named, repeats: list[_Named]) -> list[str]:
         f"{name!r} is an array of {len(numbers) + 1} structures, of which this uses one; "
         f"a file is one recording: in MATLAB, for k = 1:numel({name}), s = {name}(k); "
         f"save(sprintf('recording_%02d.mat', k), '-struct', 's'); end"
+    ]
+
+
+def _other_pairs(
+    named: list[_Named], first: _Named, last: _Named
+) -> list[tuple[_Named, _Named]]:
+    """Columns that are called like input and output, with another number at the end."""
+    own = [_NUMBERED.fullmatch(_title(one)) for one in (first, last)]
+    if own[0] is None or own[1] is None or own[0][2] != own[1][2]:
+        return []
+    stems = own[0][1], own[1][1]
+    by_title = {_title(one): one for one in named}
+    numbers = [
+        found[2]
+        for title in by_title
+        if (found := _NUMBERED.fullmatch(title)) is not None
+        and found[1] == stems[0]
+        and found[2] != own[0][2]
+    ]
+    return [
+        (by_title[stems[0] + number], by_title[stems[1] + number])
+        for number in numbers
+        if stems[1] + number in by_title
+    ]
+
+
+def _title(one: _Named) -> str:
+    return str(one.column.title or one.column.key)
+
+
+def _pair_notes(pairs: list[tuple[_Named, _Named]]) -> list[str]:
+    """Say that there are more recordings, or more axes, than the one that is used."""
+    if not pairs:
+        return []
+    shown = ", ".join(
+        f"{_called(one.column)} and {_called(other.column)}" for one, other in pairs[:8]
+    )
+    more = ", ..." if len(pairs) > 8 else ""
+    return [
+        f"NOT USED: {shown}{more} look like further recordings, or other axes; a file "
+        "is one recording of one axis: save each pair in a file of its own, under the "
+        "same two names"
     ]
 
 

@@ -158,3 +158,24 @@ def test_signals_of_one_recording_in_an_array_are_no_recordings():
         ("i", CURRENT, "", "signals(3).values"),
     )
     assert not [note for note in guess.notes if "array" in note]
+
+
+def test_numbered_pairs_in_a_file_are_said_to_be_recordings_of_their_own():
+    found = []
+    for number in (1, 2, 3):
+        voltage, _, _, position = plant(number)
+        found += [(f"u{number}", voltage, ""), (f"z{number}", position, "")]
+    first, last, guess = guessed(*found)
+    assert (first[0], last[0]) == ("u", "z")
+    (note,) = [one for one in guess.notes if one.startswith("NOT USED")]
+    others = [f"'u{n}' and 'z{n}'" for n in (1, 2, 3) if str(n) != first[1]]
+    assert note.startswith(f"NOT USED: {others[0]}, {others[1]} look like further")
+    assert not [one for one in guess.notes if one.startswith("other columns")]
+
+
+def test_columns_of_one_recording_that_are_numbered_are_no_pairs():
+    voltage, _, current, position = plant(1)
+    *_, guess = guessed(
+        ("u1", voltage, ""), ("y1", position, ""), ("current2", current, "")
+    )
+    assert not [one for one in guess.notes if one.startswith("NOT USED")]
