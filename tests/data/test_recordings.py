@@ -201,6 +201,7 @@ def test_matlab_recordings_are_read(tiny, signals, tmp_path):
         read(experiment)
 
 
+@pytest.mark.thorough
 @pytest.mark.skipif(
     not (REAL_DATA / "hsm150_motor").is_dir(),
     reason=f"no real data: put hsm150_motor into {REAL_DATA} or set HWID_REALDATA",

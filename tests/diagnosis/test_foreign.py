@@ -161,10 +161,8 @@ def beside_amplified_outputs(options):
     )  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    "tempting",
-    ["parameter_change", pytest.param("supply_sag", marks=pytest.mark.thorough)],
-)
+@pytest.mark.thorough
+@pytest.mark.parametrize("tempting", ["parameter_change", "supply_sag"])
 def test_of_outputs_alone_no_name_rests_on_the_error_of_the_stand_in(tempting):
     # No plain drive has such an amplifier, and either effect takes nearly all that it leaves.
     options = DiagnoseOptions(effects=(tempting, "coulomb_friction"))

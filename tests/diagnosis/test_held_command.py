@@ -80,6 +80,7 @@ def test_a_plant_that_lacks_nothing_lacks_nothing_however_its_command_goes_on(ho
     assert extended_options(found, SIMULATION).hold == hold
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("hold", ["linear", "zero"])
 def test_a_lag_beside_a_held_command_is_the_lag(hold):
     found = found_in(measured(hold, lag_s=4e-3))

@@ -25,7 +25,7 @@ def rms(compared):
     return np.sqrt(np.mean(np.concatenate([one.residual for one in compared]) ** 2))
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.thorough)])
 @pytest.mark.parametrize("coefficient", [0.3, 0.5, 0.7, 0.9])
 @pytest.mark.parametrize(("spring", "loop"), LOOPS)
 def test_coloured_noise_under_a_controller_is_told(spring, loop, coefficient, seed):
@@ -61,7 +61,8 @@ def test_where_a_rest_tells_the_colour_residuals_are_not_asked(spring, coefficie
 
 @pytest.mark.parametrize("hides", SIZES[True, True])
 @pytest.mark.parametrize(("spring", "loop", "coefficient"),
-    [(*one, 0.0) for one in PLANTS] + [(*one, 0.5) for one in LOOPS])  # fmt: skip
+    [(*one, 0.0) for one in PLANTS]
+    + [pytest.param(*one, 0.5, marks=pytest.mark.thorough) for one in LOOPS])  # fmt: skip
 def test_what_a_small_hidden_effect_leaves_is_no_noise(
     spring, loop, coefficient, hides
 ):

@@ -72,6 +72,7 @@ def test_a_free_axis_has_a_stand_in_without_a_spring(given):
     assert found.damping_N_s_per_m == pytest.approx(DAMPING / GAIN, rel=1e-3)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("lag_s", [0.003, 0.05])
 def test_a_simulation_without_inertia_gets_a_mass_that_samples_show(given, lag_s):
     """Its rest of a mass took a thousand steps for a sample: a diagnosis did not end."""

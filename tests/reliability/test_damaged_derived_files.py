@@ -103,6 +103,7 @@ def test_a_page_leaves_the_figures_of_calibration_alone(config, out, undisturbed
     assert {path: path.read_bytes() for path in before} == before
 
 
+@pytest.mark.thorough
 def test_figure_of_another_recording_is_not_shown(config, out, reported):
     shutil.copytree(reported, out)
     folder = out / "figures" / "calibrate"
@@ -112,6 +113,7 @@ def test_figure_of_another_recording_is_not_shown(config, out, reported):
     assert derived(out) == derived(reported)
 
 
+@pytest.mark.thorough
 def test_damaged_figure_is_drawn_again_without_the_measurements(config, out, reported):
     shutil.copytree(reported, out)
     (out / "figures" / "calibrate" / "step_02.png").write_bytes(b"")

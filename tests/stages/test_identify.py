@@ -75,11 +75,8 @@ def test_every_recording_gets_a_fit_for_every_pair_of_orders():
     assert all(np.isfinite(fit.rmsd) for fit in fits)
 
 
-@pytest.mark.parametrize(
-    "options",
-    [QUICK, pytest.param(OWN, marks=pytest.mark.thorough)],
-    ids=["default", "own_function"],
-)
+@pytest.mark.thorough
+@pytest.mark.parametrize("options", [QUICK, OWN], ids=["default", "own_function"])
 def test_the_number_of_workers_changes_no_number(options):
     one, two = (
         identify_all(
