@@ -48,6 +48,8 @@ _MOST_PUSHES = 4
 # Searches, each from where the last one has moved the parameters by more than this.
 _MOST_SEARCHES = 3
 _MOVED = 0.01
+# Fitting its parameters has helped little where this share of the squares is left.
+_LITTLE_HELP = 0.25
 # How a command goes on between samples is the matter of the simulation itself.
 _ITS_OWN = SimulationOptions(hold=LINE)
 
@@ -84,6 +86,11 @@ def diagnose_foreign(
         values = _fit_parameters(runs, problem, values)
         given = runs.of(problem.signals, values)
     refitted = values
+    fitted_sse = _sse(problem.signals, given)
+    has_helped_little = given_sse is not None and bool(
+        fitted_sse.sum() > _LITTLE_HELP * given_sse.sum()
+    )
+    kept: tuple[Findings, bool, dict[str, float]] | None = None
     for search in range(_MOST_SEARCHES):
         drive = _standing(problem, given)
         drive = _in_newtons(runs, problem.signals, given, values, drive)
@@ -99,13 +106,24 @@ def diagnose_foreign(
         )
         chosen, criteria = found.verdict.chosen, found.criteria
         is_done = is_confirmed and criteria.is_nearly_all(chosen, found.base)
-        has_moved = have_moved(values, moved, _MOVED)
-        before, values = values, moved
-        if is_done or not has_moved:
+        if kept is None or is_confirmed or search < _MOST_SEARCHES - 1:
+            kept = found, is_confirmed, moved if is_confirmed else values
+        if is_done:
             break
-        # Parameters that imitated what is missing have led elsewhere.
+        # Parameters that imitated what is missing have led elsewhere; where nothing holds
+        # in the simulation, the given ones have imitated nothing yet.
+        is_turn_of_given = search == (0 if has_helped_little else _MOST_SEARCHES - 2)
+        following = moved
+        if is_turn_of_given and not is_confirmed:
+            following = dict(simulator.values)
+        if not have_moved(values, following, _MOVED):
+            break
+        values = following
         given = runs.of(problem.signals, values)
-    told = _told(found, simulator, (refitted, values if is_confirmed else before))
+    if kept is None:
+        raise ValueError("no search was made")
+    found, is_confirmed, values = kept
+    told = _told(found, simulator, (refitted, values))
     confirmed = "simulation" if is_confirmed else "surrogate"
     return replace(told, confirmed=confirmed)
 

@@ -64,6 +64,9 @@ _SHAPE_FACTOR = 4.0
 LEAST_EXPLAINED_LAW = 0.8
 # What a law may leave of what effects of the catalogue leave, where it is not complete.
 _MOST_OF_NAMED = 0.5
+# What a law leaves of held-out recordings against what it leaves of its own, in what the
+# base leaves there.
+_MOST_ELSEWHERE = 2.0
 # A further term must take this share off what is left beyond the noise.
 _LEAST_OF_TERM = 0.25
 _DRAWS = 100
@@ -424,6 +427,7 @@ def _holds(rounds: Rounds, one: _Tried, verdict: DiagnosisVerdict) -> bool:
         and against.explained >= LEAST_EXPLAINED_LAW
         and against.improved >= LEAST_IMPROVED
         and criteria.is_beyond_stand_in(fit, rounds.base)
+        and _is_as_good_elsewhere(rounds, fit)
         and not _unclear_terms(rounds, one)
     )
     if not verdict.chosen.effects or not holds:
@@ -432,6 +436,21 @@ def _holds(rounds: Rounds, one: _Tried, verdict: DiagnosisVerdict) -> bool:
     is_better = criteria.gain(fit, verdict.chosen) >= LEAST_GAIN
     is_better = is_better and criteria.is_beyond_stand_in(fit, verdict.chosen)
     return is_better and (rest <= _MOST_OF_NAMED or criteria.is_complete(fit))
+
+
+def _is_as_good_elsewhere(rounds: Rounds, fit: CandidateFit) -> bool:
+    """Whether it leaves about as much of held-out recordings as of its own.
+
+    A formula of many terms follows anything along the motion that it was made from.
+    """
+
+    def share(one: CandidateFit) -> float:
+        criteria = rounds.criteria
+        least = criteria.noise.rms
+        own = max(criteria.rms(one, held_out=False), least)
+        return max(criteria.rms(one, held_out=True), least) / own
+
+    return share(fit) <= _MOST_ELSEWHERE * max(share(rounds.base), 1.0)
 
 
 def _refined(rounds: Rounds, one: _Tried) -> _Tried:

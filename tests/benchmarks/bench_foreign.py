@@ -17,7 +17,7 @@ from tests.black_boxes import run_boxes
 from tests.black_boxes.plants import PLANTS, hidden_in
 
 N = 2222
-NOTED = '''
+NOTED = """
 
 import time as _time
 
@@ -30,7 +30,7 @@ def simulate(*arguments):
     with open(__file__ + ".seconds", "a") as file:
         file.write(f"{_time.perf_counter() - began}\\n")
     return found
-'''
+"""
 DEFAULT = ("stage/coulomb", "hardening/coulomb", "pendulum/delay")
 
 
