@@ -15,6 +15,7 @@ import json
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from itertools import permutations
 from pathlib import Path
 
 import numpy as np
@@ -179,8 +180,14 @@ def show_chance(who: str, count: int, plants_of: dict[str, list[Row]]) -> None:
     )
 
 
-def hsm150() -> list[Row]:
-    """The first repeat of each level is the model's, the second judges, the third tests."""
+def hsm150(order: tuple[int, ...]) -> list[Row]:
+    """A repeat of each level is the model's, another one judges, the last one tests.
+
+    Parameters
+    ----------
+    order : tuple of int
+        Numbers of the three repeats in these roles.
+    """
     recordings = {}
     for path in sorted((folder() / "hsm150_motor").glob("*.mat")):
         rows = loadmat(path)["data"]
@@ -192,15 +199,47 @@ def hsm150() -> list[Row]:
         recordings[path.stem] = Recording(path.stem, u, y, step)
     found = []
     options = FitOptions(units=3, initial_state="steady")
+    fitted, judge, test = (f"_{number}" for number in order)
     for name, own in recordings.items():
-        if not name.endswith("_1"):
+        if not name.endswith(fitted):
             continue
         sign = re.match("idf_[a-z]+", name)[0]
         same = [k for k in recordings if k.startswith(sign) and k != name]
-        judges = [recordings[k] for k in same if k.endswith("_2")]
-        tests = [recordings[k] for k in same if k.endswith("_3")]
+        judges = [recordings[k] for k in same if k.endswith(judge)]
+        tests = [recordings[k] for k in same if k.endswith(test)]
         model = fit([own], Orders(1, 1, 1), options)
         found += judged(model, [own], judges, tests)
+    return found
+
+
+def coupled_drives() -> dict[str, list[Row]]:
+    """Each of the five recordings of CED is a model's, and each other one tests."""
+    read = [loadmat(folder() / "ced" / f"DATA{name}.MAT") for name in ("PRBS", "UNIF")]
+    recordings = [
+        Recording(name, data[f"u{at}"].ravel(), data[f"z{at}"].ravel(), 0.02)
+        for name, data, places in zip(
+            "PU", read, (("1", "2", "3"), ("11", "12")), strict=True
+        )
+        for at in places
+    ]
+    found: dict[str, list[Row]] = {"same": [], "other": []}
+    for own in recordings:
+        model = fit([own], Orders(2, 3, 1), FitOptions(units=5))
+        for one in recordings:
+            if one is not own:
+                kind = "same" if one.name == own.name else "other"
+                found[kind] += judged(model, [own], [], [one])
+    return found
+
+
+def both_tanks() -> list[Row]:
+    """Each of the two recordings of the tanks is a model's, and the other one tests."""
+    data = tanks(folder())
+    pair = data.train[0], data.exams[0].recording
+    found = []
+    for own, one in (pair, pair[::-1]):
+        model = fit([own], Orders(2, 3, 1), FitOptions(units=5))
+        found += judged(model, [own], [], [one])
     return found
 
 
@@ -219,6 +258,19 @@ def public(benchmark: Callable) -> list[Row]:
         )
         found += judged(model, [own], [], [unseen])
     return found
+
+
+def every_split() -> dict[str, list[Row]]:
+    """The same recordings in every other role: more of them, which are not independent."""
+    drives = coupled_drives()
+    return {
+        "HSM150, repeats in all six orders": [
+            row for order in permutations((1, 2, 3)) for row in hsm150(order)
+        ],
+        "CED, one for another of its kind": drives["same"],
+        "CED, one for another of the other kind": drives["other"],
+        "cascaded tanks, either for the other": both_tanks(),
+    }
 
 
 def gun() -> dict[str, list[Row]]:
@@ -277,13 +329,15 @@ def main() -> None:
         print(f"\nmeasured\n{HEAD}")
         if folder().is_dir():
             for name, rows, who in (
-                ("HSM150", hsm150(), "two of its kind"),
+                ("HSM150", hsm150((1, 2, 3)), "two of its kind"),
                 ("CED", public(ced), "none"),
                 ("cascaded tanks", public(tanks), "none"),
             ):
                 show(name, rows)
                 if found:
                     show_chance(who, len(rows), found)
+            for name, rows in every_split().items():
+                show(name, rows)
         else:
             print("no data: set HWID_REALDATA")
     if chosen.only in (None, "gun"):
