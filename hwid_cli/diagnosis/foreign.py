@@ -48,8 +48,6 @@ _MOST_PUSHES = 4
 # Searches, each from where the last one has moved the parameters by more than this.
 _MOST_SEARCHES = 3
 _MOVED = 0.01
-# Fitting its parameters has helped little where this share of the squares is left.
-_LITTLE_HELP = 0.25
 # How a command goes on between samples is the matter of the simulation itself.
 _ITS_OWN = SimulationOptions(hold=LINE)
 
@@ -86,10 +84,6 @@ def diagnose_foreign(
         values = _fit_parameters(runs, problem, values)
         given = runs.of(problem.signals, values)
     refitted = values
-    fitted_sse = _sse(problem.signals, given)
-    has_helped_little = given_sse is not None and bool(
-        fitted_sse.sum() > _LITTLE_HELP * given_sse.sum()
-    )
     kept: tuple[Findings, bool, dict[str, float]] | None = None
     for search in range(_MOST_SEARCHES):
         drive = _standing(problem, given)
@@ -110,12 +104,10 @@ def diagnose_foreign(
             kept = found, is_confirmed, moved if is_confirmed else values
         if is_done:
             break
-        # Parameters that imitated what is missing have led elsewhere; where nothing holds
-        # in the simulation, the given ones have imitated nothing yet.
-        is_turn_of_given = search == (0 if has_helped_little else _MOST_SEARCHES - 2)
-        following = moved
-        if is_turn_of_given and not is_confirmed:
-            following = dict(simulator.values)
+        # Parameters that imitated what is missing have led elsewhere; or to where nothing
+        # holds in the simulation: the given ones have imitated nothing yet.
+        is_in_vain = search == _MOST_SEARCHES - 2 and not is_confirmed
+        following = dict(simulator.values) if is_in_vain else moved
         if not have_moved(values, following, _MOVED):
             break
         values = following
