@@ -1,12 +1,14 @@
 """Diagnosis of simulations that cannot be opened, against machines of their own making."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy.signal import lsim
 
 from hwid_cli import Recording
+from hwid_cli.diagnosis import foreign
 from hwid_cli.diagnosis.foreign import diagnose_foreign, stand_in_for
 from hwid_cli.diagnosis.simulator import Simulator
 from hwid_cli.records.experiment import DiagnoseOptions
@@ -347,3 +349,51 @@ def test_the_simulation_decides_between_an_effect_and_what_makes_up_for_it(
     assert [one["id"] for one in found["effects"]] == [true]
     assert found["complete"]
     assert runs_of(tmp_path) <= 800
+
+
+@pytest.mark.parametrize(
+    ("confirmed", "searched", "told"),
+    [
+        # Parameters that are fitted, where the search has moved them, and the given ones.
+        ((False, False, False), [20.0, 21.0, 14.0], (False, 21.0)),
+        ((False, False, True), [20.0, 21.0, 14.0], (True, 15.0)),
+        ((False, True, False), [20.0, 21.0, 22.0], (True, 22.0)),
+    ],
+)
+def test_the_given_parameters_come_last_where_nothing_was_confirmed(
+    monkeypatch, confirmed, searched, told
+):
+    def stub(is_confirmed):
+        fits = SimpleNamespace(chosen=None), SimpleNamespace(is_nearly_all=lambda *_: 0)
+        return SimpleNamespace(
+            verdict=fits[0], criteria=fits[1], base=None, is_confirmed=is_confirmed
+        )
+
+    begun, results = [], iter(confirmed)
+
+    def found(standing, options, simulation, *_, **__):
+        _, values = simulation
+        begun.append(values["c"])
+        is_confirmed = next(results)
+        return stub(is_confirmed), {**values, "c": values["c"] + 1.0}, is_confirmed
+
+    @dataclass(frozen=True)
+    class Told:
+        findings: object
+        values: float
+        confirmed: str = ""
+
+    monkeypatch.setattr(foreign, "_found", found)
+    monkeypatch.setattr(
+        foreign, "_fit_parameters", lambda runs, problem, values: {**values, "c": 20.0}
+    )
+    monkeypatch.setattr(
+        foreign, "_told", lambda found, simulator, values: Told(found, values[1]["c"])
+    )
+    able = Capabilities(run=True, parameters=True, force=True)
+    seen, _ = diagnosis(Simulator(able, simulate, {}, FREE, GIVEN))
+
+    assert begun == searched
+    is_confirmed, value = told
+    assert seen.values == value
+    assert seen.confirmed == ("simulation" if is_confirmed else "surrogate")

@@ -270,3 +270,25 @@ def test_a_power_that_is_hardly_one_is_tried_as_the_sign_alone(monkeypatch):
     size = of.baseline.scales.velocity_m_per_s
     (factor,) = [factor for formula, factor in asked if formula == "sign(v)"]
     assert factor == pytest.approx(size**0.5, rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("own", "elsewhere", "agrees"),
+    [
+        (10.0, 15.0, True),
+        # A formula that follows its own recordings and no others.
+        (10.0, 29.0, False),
+        # Below the noise nothing is better or worse.
+        (0.1, 1.5, True),
+    ],
+)
+def test_a_law_leaves_of_other_recordings_what_it_leaves_of_its_own(
+    own, elsewhere, agrees
+):
+    left = {"law": (own, elsewhere), "base": (100.0, 110.0)}
+    criteria = SimpleNamespace(
+        noise=SimpleNamespace(rms=1.0),
+        rms=lambda fit, held_out: left[fit][held_out],
+    )
+    rounds = SimpleNamespace(criteria=criteria, base="base")
+    assert laws._is_as_good_elsewhere(rounds, "law") == agrees
