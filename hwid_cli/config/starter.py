@@ -382,32 +382,45 @@ def _diagnose_lines(layout: FolderLayout, proposal: Proposal) -> list[str]:
     ]
     if "output" not in _units(layout):
         lines += ["# (The unit of the output must be known then: recordings.units.)"]
+    unit = _si_unit(layout.input)
+    push = unit if unit and quantity_of(unit) in ("force", "torque") else ""
+    if push:
+        lines += [
+            f"# (The input is a {quantity_of(unit)}: also put  input_unit: {unit}  under "
+            "recordings.)"
+        ]
     return [
         *lines,
         "# simulation:",
-        *_drive_lines(_units(layout).get("output", "")),
+        *_drive_lines(_units(layout).get("output", ""), pushes=bool(push)),
         "#   hold: auto               # linear or zero (held, as by a controller, PLC or",
         "#                            # D/A converter): say so where you know it",
         *_STARTS[proposal.initial_state],
     ]
 
 
-def _drive_lines(output_unit: str) -> list[str]:
-    """Parameters of a drive whose output is measured in a unit."""
+def _drive_lines(output_unit: str, *, pushes: bool) -> list[str]:
+    """Parameters of a drive whose output is measured in a unit.
+
+    Parameters
+    ----------
+    pushes : bool
+        Whether the input is a force or a torque itself.
+    """
     quantity = quantity_of(output_unit) if output_unit else ""
     lines = (
         [
             "#   inertia_kg_m2: 0.01",
             "#   damping_N_m_s_per_rad: 0.1",
             "#   stiffness_N_m_per_rad: 0.0   # 0: no spring",
-            "#   torque_constant_N_m_per_A: 0.1",
+            f"#   torque_constant_N_m_per_A: {1.0 if pushes else 0.1}",
         ]
         if quantity in ("angle", "angular velocity")
         else [
             "#   mass_kg: 1.0",
             "#   damping_N_s_per_m: 10.0",
             "#   stiffness_N_per_m: 0.0   # 0: no spring",
-            "#   force_constant_N_per_A: 10.0",
+            f"#   force_constant_N_per_A: {1.0 if pushes else 10.0}",
         ]
     )
     if quantity in ("velocity", "angular velocity"):

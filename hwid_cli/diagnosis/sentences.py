@@ -312,7 +312,7 @@ def hidden_from_view(problem: DiagnosisProblem) -> tuple[str, ...]:
     if drive.resistance_ohm is None:
         texts.append(
             "what happens before the current (resistance, inductance, brush drop, "
-            "supply voltage), because the current is the input"
+            "supply voltage), because the input comes after it"
         )
     held, known = _held_and_known(drive)
     mass, _ = _WORDS[drive.axis]

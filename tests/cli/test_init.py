@@ -331,6 +331,14 @@ def write_sines(folder, *, rest):
         )
 
 
+def without_marks(text):
+    """The sections that a starter configuration proposes, as a user turns them on."""
+    return "\n".join(
+        line if "begin with" in line or "'cut'" in line else line.removeprefix("# ")
+        for line in text.splitlines()
+    )
+
+
 @pytest.mark.parametrize(("rest", "rule"), [(60, "held"), (0, "estimated")])
 def test_the_diagnosis_begins_as_the_recordings_do(folder, tmp_path, rest, rule):
     write_sines(folder, rest=rest)
@@ -341,11 +349,7 @@ def test_the_diagnosis_begins_as_the_recordings_do(folder, tmp_path, rest, rule)
     assert f"# diagnose: {{max_effects: 2, initial_state: {rule}}}" in text
     # As a user does: the marks away.
     start = text.index("# simulation:")
-    simulation = [
-        line if "begin with" in line or "'cut'" in line else line.removeprefix("# ")
-        for line in text[start:].splitlines()
-    ]
-    out.write_text("\n".join([text[:start], *simulation]))
+    out.write_text(text[:start] + without_marks(text[start:]))
     assert load_experiment(out).diagnose.initial_state == rule
 
 
@@ -470,16 +474,19 @@ def test_kinds_of_a_plan_do_not_ask_for_columns_of_one_length(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("column", "said"),
+    ("source", "column", "said"),
     [
-        ("speed_rpm", ("inertia_kg_m2: 0.01", "output: velocity")),
-        ("angle_deg", ("torque_constant_N_m_per_A: 0.1",)),
-        ("speed [mm/s]", ("mass_kg: 1.0", "output: velocity")),
-        ("position_mm", ("force_constant_N_per_A: 10.0",)),
+        ("current_A", "speed_rpm", ("inertia_kg_m2: 0.01", "output: velocity")),
+        ("current_A", "angle_deg", ("torque_constant_N_m_per_A: 0.1",)),
+        ("current_A", "speed [mm/s]", ("mass_kg: 1.0", "output: velocity")),
+        ("current_A", "position_mm", ("force_constant_N_per_A: 10.0",)),
+        # What pushes by itself needs no constant.
+        ("torque [Nm]", "angle_deg", ("torque_constant_N_m_per_A: 1.0",)),
+        ("force_kN", "position_mm", ("force_constant_N_per_A: 1.0",)),
     ],
 )
 def test_the_starting_simulation_is_of_the_axis_that_is_measured(
-    tmp_path, column, said
+    tmp_path, source, column, said
 ):
     rng = np.random.default_rng(2)
     (tmp_path / "runs").mkdir()
@@ -489,7 +496,7 @@ def test_the_starting_simulation_is_of_the_axis_that_is_measured(
         rows = np.column_stack([1e-3 * np.arange(u.size), u, y])
         np.savetxt(
             tmp_path / f"runs/run_{number}.csv", rows, delimiter=",", comments="",
-            header=f"time_s,current_A,{column}",
+            header=f"time_s,{source},{column}",
         )  # fmt: skip
     out = tmp_path / "mine.yaml"
     result = CliRunner().invoke(
@@ -499,3 +506,17 @@ def test_the_starting_simulation_is_of_the_axis_that_is_measured(
     text = out.read_text()
     assert all(f"#   {one}\n" in text for one in said)
     assert ("output: velocity" in text) == column.startswith("speed")
+    pushes = {"torque [Nm]": "N m", "force_kN": "N"}
+    assert ("# (The input is a " in text) == (source in pushes)
+    if source not in pushes:
+        return
+    # As the line says, and with the marks away: the units are those of the simulation.
+    assert f"also put  input_unit: {pushes[source]}  under" in text
+    start = text.index("# simulation:")
+    simulation = without_marks(text[start:])
+    text = text[:start].replace(
+        "recordings:\n", f"recordings:\n  input_unit: {pushes[source]}\n", 1
+    )
+    out.write_text(text + simulation)
+    done = CliRunner().invoke(main, ["check", str(out), "--no-timing"])
+    assert done.exit_code == 0, done.output + out.read_text()
