@@ -278,9 +278,13 @@ def _held_out(
     if named and len(named) < len(names):
         return named, "named so"
     free = [name for name in names if not _is_word_in(name, _TRAIN_WORDS)]
-    repeats = tuple(name for name in _repeats(raws) if name in free)
-    if repeats:
-        return repeats, "the last repeat of each input"
+    families = [one for one in _families(raws) if one[-1].name in free]
+    if families:
+        are_the_same = all(_is_same_input(one[0], one[-1]) for one in families)
+        which = (
+            "repeat of each input" if are_the_same else "of the inputs that are alike"
+        )
+        return tuple(one[-1].name for one in families), f"the last {which}"
     # About a quarter of each kind, neither the first nor the last: often extremes.
     chosen = [
         name
@@ -296,8 +300,8 @@ def _is_word_in(name: str, known: Sequence[str]) -> bool:
     return any(word in known for word in re.findall(r"[a-zäöü]+", name.lower()))
 
 
-def _repeats(raws: Sequence[RawRecording]) -> tuple[str, ...]:
-    """The last recording of each input that occurs more than once."""
+def _families(raws: Sequence[RawRecording]) -> list[list[RawRecording]]:
+    """Recordings of each input that occurs more than once, or has others like it."""
     families: list[list[RawRecording]] = []
     for raw in raws:
         own = next((one for one in families if _is_repeat(one[0], raw)), None)
@@ -305,25 +309,31 @@ def _repeats(raws: Sequence[RawRecording]) -> tuple[str, ...]:
             families.append([raw])
         else:
             own.append(raw)
-    return tuple(one[-1].name for one in families if len(one) > 1)
+    return [one for one in families if len(one) > 1]
+
+
+def _is_same_input(one: RawRecording, other: RawRecording) -> bool:
+    """Whether two recordings have one input, noise and a cut end apart."""
+    parts = _as_long_and_high(one, other)
+    if parts is None:
+        return False
+    a, b = parts
+    return float(np.std(a - b)) <= _ALIKE * max(float(np.std(a)), float(np.std(b)))
 
 
 def _is_repeat(one: RawRecording, other: RawRecording) -> bool:
-    """Whether two recordings have one input, noise and a cut end apart.
+    """Whether two recordings have one input, or may have.
 
     Names that differ in their last number alone may be repeats of an input that is
     measured, and so never the same: then its level, size, memory and spectrum must be
     alike.
     """
-    n = min(one.input.size, other.input.size)
-    if n < _ALIKE_LENGTH * max(one.input.size, other.input.size):
+    parts = _as_long_and_high(one, other)
+    if parts is None:
         return False
-    a, b = one.input[:n], other.input[:n]
-    spread = max(float(np.std(a)), float(np.std(b)))
-    if abs(float(np.mean(a) - np.mean(b))) > _ALIKE * spread:
-        return False
-    if float(np.std(a - b)) <= _ALIKE * spread:
+    if _is_same_input(one, other):
         return True
+    a, b = parts
     stems = {re.sub(r"\d+$", "", raw.name) for raw in (one, other)}
     sizes = sorted((float(np.std(a)), float(np.std(b))))
     memories = sorted((signs.memory_samples(a), signs.memory_samples(b)))
@@ -333,6 +343,19 @@ def _is_repeat(one: RawRecording, other: RawRecording) -> bool:
         and memories[0] >= 0.5 * memories[1]
         and signs.shared_power(a, b) >= _ALIKE_SPECTRA
     )
+
+
+def _as_long_and_high(
+    one: RawRecording, other: RawRecording
+) -> tuple[np.ndarray, np.ndarray] | None:
+    """Both inputs as far as they go together; None where lengths or levels differ."""
+    n = min(one.input.size, other.input.size)
+    if n < _ALIKE_LENGTH * max(one.input.size, other.input.size):
+        return None
+    a, b = one.input[:n], other.input[:n]
+    spread = max(float(np.std(a)), float(np.std(b)))
+    is_as_high = abs(float(np.mean(a) - np.mean(b))) <= _ALIKE * spread
+    return (a, b) if is_as_high else None
 
 
 def _parts(raws: Sequence[RawRecording]) -> dict[str, tuple[int, ...]]:
