@@ -85,6 +85,8 @@ def candidate_name(effects: Sequence[str]) -> str:
     return AND.join(effects) or NO_EFFECT
 
 
+# No measurement tells more, [-].
+_MOST_DIGITS = 9
 # Where something else remains, an effect also takes up some of that.
 INTERVALS_OF_A_PART = "intervals hold as if nothing else were missing"
 
@@ -117,7 +119,7 @@ def _interval(parameter: FittedParameter) -> str:
     bounds = (parameter.low, parameter.high)
     if not np.isfinite(bounds).all():
         return MISSING
-    return " to ".join(_value(one, parameter.name) for one in bounds)
+    return shown_interval(parameter.low, parameter.high, parameter.name)
 
 
 def gap_table(diagnosis: Diagnosis) -> Table:
@@ -356,6 +358,27 @@ def shown_value(value: float, name: str = "") -> str:
     ('0.8123', '1.000120')
     """
     return f"{value:.6f}" if name == "ratio" else f"{value:.4g}"
+
+
+def shown_interval(low: float, high: float, name: str = "") -> str:
+    """Write an interval, with more digits where its ends would read alike.
+
+    Parameters
+    ----------
+    name : str
+        Of the parameter.
+
+    Examples
+    --------
+    >>> shown_interval(0.79737, 0.80052), shown_interval(3.199871, 3.200122)
+    ('0.7974 to 0.8005', '3.1999 to 3.2001')
+    """
+    ends = [shown_value(one, name) for one in (low, high)]
+    digits = 5
+    while ends[0] == ends[1] and low < high and digits < _MOST_DIGITS:
+        ends = [f"{one:.{digits}g}" for one in (low, high)]
+        digits += 1
+    return " to ".join(ends)
 
 
 def _ratio(value: float) -> str:

@@ -19,6 +19,7 @@ from hwid_cli.report.diagnosis import (
     is_chosen,
     ranking_table,
     recordings_table,
+    shown_interval,
     shown_value,
     used_sentence,
     warning_sentences,
@@ -320,7 +321,12 @@ def _value(parameter: object, name: str) -> str:
 
 def _interval(parameter: object, name: str) -> str:
     bounds = parameter.get("ci95") if isinstance(parameter, Mapping) else None
-    return " to ".join(_text(one, name) for one in bounds) if bounds else MISSING
+    if not bounds:
+        return MISSING
+    low, high = bounds
+    if isinstance(low, int | float) and isinstance(high, int | float):
+        return shown_interval(low, high, name)
+    return f"{_text(low, name)} to {_text(high, name)}"
 
 
 def _gap_table(found: Mapping[str, Any]) -> Table | None:
