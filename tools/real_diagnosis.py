@@ -15,6 +15,8 @@ from pathlib import Path
 import numpy as np
 from scipy import io, signal
 
+from hwid_cli.stages.diagnose import STAGE_VERSION
+
 NAMES = (
     "emps", "silverbox", "ffwheel", "hsm150", "shaking_table", "pick_place", "rack_drive"
 )  # fmt: skip
@@ -27,7 +29,8 @@ HEAD = """# Diagnoses of real measurements
 
 Written by `make real` (needs the data, see [configs/README.md](../configs/README.md)); the configurations are
 `configs/diagnose_*.yaml`. Each simulation is deliberately poor: inertia and viscous friction, or a linear oscillator. The table says
-which effects are named, with which parameters, and how far the error falls on held-out recordings:
+which effects are named, with which parameters, and how far the error falls on held-out recordings (stage version {version}, seconds of
+two processes). Where nothing is named, the sentence below the table has the best lead:
 """
 
 
@@ -35,7 +38,7 @@ def main() -> None:
     """Print the document."""
     results = Path(sys.argv[1])
     found = {name: read(results / f"diagnose_{name}") for name in NAMES}
-    out = [HEAD, overview(found)]
+    out = [HEAD.format(version=STAGE_VERSION), overview(found)]
     if found["emps"] is not None:
         out.append(emps(found["emps"]))
     if found["silverbox"] is not None:
@@ -75,10 +78,10 @@ def overview(found: dict[str, dict | None]) -> str:
             verdict += ", complete" if one["complete"] else ", something remains"
         gap = one["gap"]
         lines.append(
-            f"| {name} | {verdict} | {'; '.join(effect(item) for item in one['effects']) or '-'} "
-            f"| {gap['before']['held_out_rms']:.3g} {gap['unit']} "
-            f"| {gap['after']['held_out_rms']:.3g} | {gap['noise_rms']:.2g} "
-            f"| {gap['explained_share']:.0%} | {one['seconds']:.0f} |"
+            f"| {name} | {verdict} | {effects(one)} "
+            f"| {number(gap['before']['held_out_rms'])} {gap['unit']} "
+            f"| {number(gap['after']['held_out_rms'])} | {gap['noise_rms']:.2g} "
+            f"| {number(gap['explained_share'], '.0%')} | {one['seconds']:.0f} |"
         )
     lines.append("")
     for name, one in found.items():
@@ -87,6 +90,19 @@ def overview(found: dict[str, dict | None]) -> str:
                 f"- **{name}**: {one['summary']} Where: {one['where'][0]['sentence']}."
             ]
     return "\n".join([*lines, ""])
+
+
+def number(value: float | None, form: str = ".3g") -> str:
+    """A number; a dash where there is none, as where nothing was named."""
+    return "-" if value is None else format(value, form)
+
+
+def effects(found: dict) -> str:
+    """What was named, in one cell: effects with their parameters, or the formula."""
+    if found["verdict"] == "law":
+        formula = found["law"]["formula"].replace("|", "\\|")
+        return f"{found['law']['acts_on']}: `{formula}`"
+    return "; ".join(effect(item) for item in found["effects"]) or "-"
 
 
 def effect(item: dict) -> str:

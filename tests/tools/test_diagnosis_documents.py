@@ -83,3 +83,26 @@ def test_machines_without_results_are_said_to_have_none(results, monkeypatch, ca
     assert "| hsm150 | named, something remains | `coulomb_friction`" in said
     assert "## HSM150: each recording" in said
     assert "## EMPS" not in said
+
+
+def test_what_has_no_name_and_what_is_a_law_have_rows_as_well():
+    nothing = {
+        **FOUND,
+        "verdict": "unknown",
+        "effects": [],
+        "gap": {
+            **FOUND["gap"],
+            "after": {"held_out_rms": None},
+            "explained_share": None,
+        },
+    }
+    law = {
+        **FOUND,
+        "verdict": "law",
+        "law": {"acts_on": "force", "formula": "-17.1*abs(x)*v"},
+    }
+
+    said = real_diagnosis.overview({"table": nothing, "oscillator": law})
+
+    assert "| table | unknown | - | 0.0025 m | - | 0.0001 | - | 12 |" in said
+    assert "| oscillator | law | force: `-17.1*abs(x)*v` | 0.0025 m |" in said
