@@ -86,15 +86,7 @@ def diagnose_foreign(
     refitted = values
     kept: tuple[Findings, bool, dict[str, float]] | None = None
     for search in range(_MOST_SEARCHES):
-        drive = _standing(problem, given)
-        drive = _in_newtons(runs, problem.signals, given, values, drive)
-        drive = replace(
-            drive, effects={k: dict(v) for k, v in simulator.effects.items()}
-        )
-        standing = _with_stand_in(problem, drive, given)
-        if simulator.run is None:
-            error = error_of(drive, problem.signals, given)
-            standing = replace(standing, stand_in_error=error)
+        standing = _beside(runs, problem, given, values)
         found, moved, is_confirmed = _found(
             standing, options, (runs, values), on_round, given_sse, is_first=search == 0
         )
@@ -118,6 +110,30 @@ def diagnose_foreign(
     told = _told(found, simulator, (refitted, values))
     confirmed = "simulation" if is_confirmed else "surrogate"
     return replace(told, confirmed=confirmed)
+
+
+def _beside(
+    runs: Runs,
+    problem: DiagnosisProblem,
+    given: Sequence[SimulatorRun],
+    values: Mapping[str, float],
+) -> DiagnosisProblem:
+    """The problem of the drive that stands for the simulation with these parameters.
+
+    Parameters
+    ----------
+    given : sequence of SimulatorRun
+        What the simulation gives with them.
+    """
+    simulator = runs.simulator
+    drive = _standing(problem, given)
+    drive = _in_newtons(runs, problem.signals, given, values, drive)
+    drive = replace(drive, effects={k: dict(v) for k, v in simulator.effects.items()})
+    standing = _with_stand_in(problem, drive, given)
+    if simulator.run is not None:
+        return standing
+    error = error_of(drive, problem.signals, given)
+    return replace(standing, stand_in_error=error)
 
 
 def _found(
