@@ -15,6 +15,7 @@ from hwid_cli.report.closing import (
     linear_hint,
     nothing_hint,
     orders_sentence,
+    recordings_sentence,
 )
 from hwid_cli.simulations.kinds import kind_named
 from hwid_cli.stages.best_model import beside_linear, best_model
@@ -57,6 +58,9 @@ def say_end(session: Session, name: str, files: Sequence[str] = ()) -> None:
         rows.append(("orders", orders_sentence(advice.orders, advice.maps)))
     if diagnosis is not None:
         rows.append(("simulation", diagnosis_sentence(diagnosis)))
+    wanted = session.results.get("next")
+    if wanted is not None:
+        rows.append(("record", recordings_sentence(wanted, session.out / "next")))
     rows += _places(session, name, files)
     if best is not None and name in (_RUN, "test", "order"):
         rows += _hints(session, best)
@@ -119,7 +123,10 @@ def _places(session: Session, name: str, files: Sequence[str]) -> list[tuple[str
 
 def _next(session: Session, name: str, best: BestModel | None) -> str:
     """The command that a user would give next."""
-    diagnosis = session.results.get("diagnose")
+    diagnosis, wanted = (session.results.get(one) for one in ("diagnose", "next"))
+    if name == "next" and wanted is not None and wanted.proposals:
+        # The loop: what is new in the folder is taken up from the cache.
+        return f"record them, then {command_line(session, 'next')}"
     if diagnosis is not None and (best is None or name == "diagnose"):
         return _after_diagnosis(session, diagnosis)
     follows = _NEXT.get(name)

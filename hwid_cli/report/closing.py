@@ -2,11 +2,13 @@
 
 import textwrap
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 
 from hwid_cli.records.best_model import BestModel
 from hwid_cli.records.diagnosis import Diagnosis
+from hwid_cli.records.next import NextRecordings
 from hwid_cli.records.order import MapAdvice, OrderAdvice
 from hwid_cli.report.formats import counted, listed, with_unit
 
@@ -147,6 +149,21 @@ def orders_sentence(orders: OrderAdvice, maps: MapAdvice | None) -> str:
         named = " and ".join(one.replace("_", " ") for one in pair)
         said += ", no maps" if set(pair) == {"none"} else f", maps {named}"
     return f"{said} recommended (hwid order says why)"
+
+
+def recordings_sentence(found: NextRecordings, folder: Path) -> str:
+    """Which recordings to take next, and where their inputs are; or that none is needed.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the files that can be played.
+    """
+    if found.is_enough or not found.proposals:
+        return "enough is known: no further recording is proposed"
+    first, *others = found.proposals
+    more = f" and {len(others)} more" if others else ""
+    return f"{first.name}{more}; files to play: {folder} (hwid next says why)"
 
 
 def linear_hint(source: str) -> str:

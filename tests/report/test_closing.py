@@ -1,9 +1,15 @@
 from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from hwid_cli.records.best_model import BestModel
-from hwid_cli.report.closing import best_model_sentences, closing_text
+from hwid_cli.report.closing import (
+    best_model_sentences,
+    closing_text,
+    recordings_sentence,
+)
 
 BEST = BestModel(
     *("a+b/2/3", "test", ("c", "d"), 0.012, "m", 0.01),
@@ -104,3 +110,21 @@ def test_only_recordings_beyond_the_fit_say_that_the_linear_model_is_better(
     changes, is_better
 ):
     assert replace(BEST, **changes).is_linear_better is is_better
+
+
+@pytest.mark.parametrize(
+    ("names", "is_enough", "said"),
+    [
+        (("levels_8", "sweep"), False, "levels_8 and 1 more; files to play: out/next"),
+        (("levels_8",), False, "levels_8; files to play: out/next"),
+        ((), False, "enough is known"),
+        (("levels_8",), True, "enough is known"),
+    ],
+)
+def test_recordings_to_take_are_named_with_the_place_of_their_files(
+    names, is_enough, said
+):
+    found = SimpleNamespace(
+        is_enough=is_enough, proposals=[SimpleNamespace(name=one) for one in names]
+    )
+    assert recordings_sentence(found, Path("out/next")).startswith(said)
