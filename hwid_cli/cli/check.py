@@ -24,15 +24,10 @@ from hwid_cli.records.experiment import Experiment
 from hwid_cli.records.recordings import Calibrated
 from hwid_cli.report.check import check_document, recordings_table, stages_table
 from hwid_cli.report.table import as_text
-from hwid_cli.stages.fit_seconds import (
-    MEASURED,
-    compiled_loops_place,
-    page_plan,
-    time_fits,
-    with_start,
-)
+from hwid_cli.stages.fit_seconds import MEASURED, compiled_loops_place, time_fits
 from hwid_cli.stages.own_functions import check_own_functions
 from hwid_cli.stages.recording_facts import Checked, check_recordings
+from hwid_cli.stages.run_seconds import page_plan, with_start
 from hwid_cli.stages.selection import named_recordings
 from hwid_cli.stages.simulation_units import refused_units
 from hwid_cli.stages.stage import Context, Planning

@@ -92,7 +92,7 @@ def diagnose_foreign(
         )
         chosen, criteria = found.verdict.chosen, found.criteria
         is_done = is_confirmed and criteria.is_nearly_all(chosen, found.base)
-        if kept is None or is_confirmed or search < _MOST_SEARCHES - 1:
+        if is_confirmed or search < _MOST_SEARCHES - 1:
             kept = found, is_confirmed, moved if is_confirmed else values
         if is_done:
             break

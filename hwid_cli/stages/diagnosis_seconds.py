@@ -17,7 +17,7 @@ from hwid_cli.diagnosis.proposals import LIKELY_PAIRS, SCREENED_ON_TOP
 from hwid_cli.diagnosis.rounds import MOST_PARENTS, MOST_SCREENINGS
 from hwid_cli.diagnosis.tasks import DiagnosisTask, OnRound, RunTasks
 from hwid_cli.records.programs import SimulatorRun
-from hwid_cli.stages.fit_seconds import LOADING_SECONDS
+from hwid_cli.stages.run_seconds import LOADING_SECONDS
 
 # Of the tasks of the screening, [tasks].
 _EACH = 4

@@ -14,7 +14,7 @@ import numpy as np
 
 from hwid_cli.model.derivative_rows import derivative_rows
 from hwid_cli.model.fit import fit
-from hwid_cli.records.check import FitCost, StagePlan
+from hwid_cli.records.check import FitCost
 from hwid_cli.records.experiment import Experiment, GroupOptions, OrdersOptions
 from hwid_cli.records.model import FitOptions, HammersteinWiener, Orders
 from hwid_cli.records.recordings import Recording
@@ -41,11 +41,6 @@ _MOST_TIMED = 10_000
 _SEARCHED, _CONTINUED, _WARM_SEARCHED, _WARM_CONTINUED = 0.5, 0.2, 0.25, 0.1
 # So many fits of maps that are compared are timed, [-].
 _TIMED_MAPS = 5
-# Reading the compiled loops of what the first tasks need, and starting processes that do
-# so too, once for all stages (docs/benchmarks.md, "What hwid check forecasts"), [s].
-LOADING_SECONDS, _START_SECONDS = 0.6, 1.6
-# Writing the page, and drawing its figures for each recording, [s].
-_PAGE_SECONDS, _FIGURES_SECONDS = 0.8, 0.35
 # Keeping the result of a task, [s].
 TASK_SECONDS = 0.005
 # Simulating one model on one sample, its initial state included (docs/benchmarks.md: 1 ms
@@ -351,39 +346,6 @@ def _seconds_per_work(
     start = time.process_time()
     fit([part], orders, replace(options, join=FitOptions().join))
     return (time.process_time() - start) / _work(part.n_samples)
-
-
-def page_plan(n_recordings: int) -> StagePlan:
-    """What it takes to write the page and to draw its figures.
-
-    Parameters
-    ----------
-    n_recordings : int, [-]
-    """
-    seconds = _PAGE_SECONDS + _FIGURES_SECONDS * n_recordings
-    return StagePlan("report", "the page and its figures", 1, None, seconds, 0.0)
-
-
-def with_start(plans: Sequence[StagePlan], workers: int) -> list[StagePlan]:
-    """Add to the first stage whose tasks are shared what it takes to begin with them.
-
-    Parameters
-    ----------
-    workers : int, [-]
-        Processes that share the work; one alone need not be started.
-    """
-    seconds = LOADING_SECONDS + (_START_SECONDS if workers > 1 else 0.0)
-    first = next((one for one in plans if one.waits_for_processes), None)
-    return [
-        replace(
-            one,
-            seconds=one.seconds + seconds,
-            most_seconds=one.most_seconds + seconds,
-        )
-        if one is first
-        else one
-        for one in plans
-    ]
 
 
 def middle_orders(orders: OrdersOptions) -> Orders:

@@ -16,10 +16,10 @@ from hwid_cli.stages.fit_seconds import (
     map_seconds,
     share_of_round,
     time_fits,
-    with_start,
 )
 from hwid_cli.stages.group import group_bound
 from hwid_cli.stages.group_search import search_groups
+from hwid_cli.stages.run_seconds import with_start
 
 NAMES = tuple("abcdefg")
 
