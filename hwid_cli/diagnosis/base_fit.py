@@ -18,6 +18,7 @@ from hwid_cli.diagnosis.candidate import (
 )
 from hwid_cli.diagnosis.causes import fit_with_input_noise
 from hwid_cli.diagnosis.direction import ReversedInputError, find_reversal
+from hwid_cli.diagnosis.growing import fit_grown, grown_starts, is_rugged
 from hwid_cli.diagnosis.noise import noise_floor
 from hwid_cli.diagnosis.parameters import compare_at, first_point, parameter_layout
 from hwid_cli.diagnosis.problem import Compared, DiagnosisProblem
@@ -102,8 +103,14 @@ def _refit_base(
     problem: DiagnosisProblem, scales: Scales, noise: NoiseFloor
 ) -> CandidateFit:
     """Base, and the effects that the simulation has already, fitted again."""
-    start = SearchStart(base_of(problem.drive), drive_effects(problem.drive))
-    return fit_candidate(problem, (), [start], scales, noise)
+    present = drive_effects(problem.drive)
+    start = SearchStart(base_of(problem.drive), present)
+    found = fit_candidate(problem, (), [start], scales, noise)
+    if not is_rugged(tuple(present)) or found.whiteness <= 1.0:
+        return found
+    starts = grown_starts(start, tuple(present), scales)
+    grown = fit_grown(problem, (), starts, scales, noise)
+    return grown if grown.sse.sum() < found.sse.sum() else found
 
 
 def _with_input_noise(

@@ -9,12 +9,12 @@ Below it, what a fit stands for: its drive, its effects, its point of a search.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import zip_longest
 from typing import Any
 
 import numpy as np
 
 from hwid_cli.diagnosis.causes import left_over
+from hwid_cli.diagnosis.few_samples import fewer_recordings
 from hwid_cli.diagnosis.parameters import (
     BASE,
     START,
@@ -29,12 +29,7 @@ from hwid_cli.diagnosis.parameters import (
     residuals_at,
     sum_of_squares,
 )
-from hwid_cli.diagnosis.problem import (
-    Compared,
-    DiagnosisProblem,
-    Signals,
-    rest_length,
-)
+from hwid_cli.diagnosis.problem import Compared, DiagnosisProblem
 from hwid_cli.diagnosis.search import (
     SearchResult,
     cross_fitted,
@@ -52,9 +47,6 @@ Start = Mapping[str, Mapping[str, float]]
 
 # Samples that the screening of starts looks at.
 SCREENING_SAMPLES = 6000
-# Recordings that few samples are taken of, at least, and samples of each.
-FEWEST_RECORDINGS = 6
-SHORTEST_PART = 1500
 # Iterations from every start, then from the two best. A second start is worth further
 # time only where its sum of squares is within the factor.
 SCREENING = ((2, 2.0), (3, 1.2))
@@ -137,70 +129,6 @@ class Screened:
     starts: tuple[SearchStart, ...]
 
 
-def fewer_recordings(
-    problem: DiagnosisProblem, most_samples: int, left: np.ndarray | None = None
-) -> DiagnosisProblem:
-    """Problem with so few recordings that they have about ``most_samples``.
-
-    Takes the recordings in turn from each kind, the largest outputs first, and those
-    with the largest and the smallest inputs however long they are: what acts on the
-    command shows only beside inputs of other sizes. Where long ones are too few to show
-    what differs between recordings, more are taken, and of each the first part.
-
-    Parameters
-    ----------
-    left : ndarray, shape (n_recordings,), or None, [output unit]
-        RMS that a fit leaves of each recording; the largest come first then.
-    """
-    if problem.n_evaluated <= most_samples:
-        return problem
-    if left is None:
-        left = np.array([np.max(np.abs(one.output)) for one in problem.signals])
-    order = _in_turn(problem, left)
-    counts = np.array([problem.signals[row].n_evaluated for row in order])
-    n_enough = int(np.searchsorted(np.cumsum(counts), most_samples)) + 1
-    n_enough = max(n_enough, len(_of_extreme_inputs(problem)))
-    longest = max(most_samples // FEWEST_RECORDINGS, SHORTEST_PART)
-    if n_enough < FEWEST_RECORDINGS and max(counts[:n_enough]) > longest:
-        parts = [_first_part(one, longest) for one in problem.signals]
-        rows = order[:FEWEST_RECORDINGS]
-    else:
-        parts, rows = list(problem.signals), order[:n_enough]
-    return replace(problem, signals=tuple(parts[row] for row in sorted(rows)))
-
-
-def _first_part(signals: Signals, n_samples: int) -> Signals:
-    """What a recording holds until it has moved for so many samples."""
-    still = min(rest_length(signals.driven_by), n_samples)
-    last = max(signals.skip, still) + n_samples
-    return signals if last >= signals.driven_by.size else signals.part(0, last)
-
-
-def _in_turn(problem: DiagnosisProblem, sizes: np.ndarray) -> list[int]:
-    """Rows of the recordings: extreme inputs, then the largest sizes of each kind."""
-    kinds: dict[str, list[int]] = {}
-    for row in np.argsort(sizes)[::-1]:
-        kinds.setdefault(problem.signals[row].kind, []).append(int(row))
-    # Every second one first, so that small and large ones are both there.
-    queues = [rows[::2] + rows[1::2] for rows in kinds.values()]
-    turns = [row for turn in zip_longest(*queues) for row in turn if row is not None]
-    return list(dict.fromkeys((*_of_extreme_inputs(problem), *turns)))
-
-
-def _of_extreme_inputs(problem: DiagnosisProblem) -> list[int]:
-    """Rows of the recordings whose inputs are the largest and the smallest."""
-    sizes = [
-        float(np.max(np.abs(one.driven_by - one.driven_by[0])))
-        for one in problem.signals
-    ]
-    moving = [row for row, size in enumerate(sizes) if size > 0]
-    if not moving:
-        return []
-    largest = max(moving, key=lambda row: sizes[row])
-    smallest = min(moving, key=lambda row: sizes[row])
-    return list(dict.fromkeys((largest, smallest)))
-
-
 def screen(
     few: DiagnosisProblem,
     effects: tuple[str, ...],
@@ -222,13 +150,13 @@ def screen(
     reached = list(starts)
     for iterations, close in SCREENING:
         found = [
-            _fit_from(few, everything, start, scales, iterations) for start in reached
+            fit_from(few, everything, start, scales, iterations) for start in reached
         ]
         found.sort(key=lambda one: one.sse)
         if not np.isfinite(found[0].sse):
             return Screened(effects, float("inf"), (starts[0],))
         reached = [
-            _reached(few, one)
+            reached_by(few, one)
             for one in found[:SCREENED_STARTS]
             if one.sse <= close * found[0].sse
         ]
@@ -238,7 +166,7 @@ def screen(
     return Screened(effects, found[0].sse, tuple(kept))
 
 
-def _reached(problem: DiagnosisProblem, found: SearchResult) -> SearchStart:
+def reached_by(problem: DiagnosisProblem, found: SearchResult) -> SearchStart:
     """Where a search came to, for another one to go on."""
     drive = drive_at(problem, found.layout, found.point)
     return SearchStart(base_of(drive), effects_at(found.layout, found.point))
@@ -276,7 +204,7 @@ def fit_candidate(
     everything = (*drive_effects(problem.drive), *effects)
     near = train.n_evaluated * (STILL_LARGE * noise.rms) ** 2
     best = _best_from(train, everything, starts, scales, near)
-    return _evaluated(problem, effects, best, train, noise)
+    return evaluated(problem, effects, best, train, noise)
 
 
 def _best_from(
@@ -288,9 +216,7 @@ def _best_from(
 ) -> SearchResult:
     """Search from several starts; those that fall behind stop early."""
     first = MOST_ITERATIONS if len(starts) == 1 else FIRST_ITERATIONS
-    found = [
-        _fit_from(problem, effects, start, scales, first, near) for start in starts
-    ]
+    found = [fit_from(problem, effects, start, scales, first, near) for start in starts]
     if len(starts) > 1:
         least = min(one.sse for one in found)
         first_ones = [one for one in found if one.sse <= WITHIN_BEST * least]
@@ -320,7 +246,7 @@ def _is_same(one: Start, other: Start) -> bool:
     )
 
 
-def _fit_from(
+def fit_from(
     problem: DiagnosisProblem,
     effects: tuple[str, ...],
     start: SearchStart,
@@ -328,6 +254,15 @@ def _fit_from(
     max_iterations: int,
     near: float = np.inf,
 ) -> SearchResult:
+    """Search from one start.
+
+    Parameters
+    ----------
+    effects : tuple of str
+        Ids in the catalogue, those of the simulation included.
+    near : float
+        Sum of squares below which it is followed to the end.
+    """
     base: dict[str, Any] = dict(start.base)
     drive = replace(problem.drive, **base)
     fit_layout = parameter_layout(problem, effects, start.effects, scales)
@@ -338,14 +273,22 @@ def _fit_from(
     )
 
 
-def _evaluated(
+def evaluated(
     problem: DiagnosisProblem,
     effects: tuple[str, ...],
     best: SearchResult,
     fitted_to: DiagnosisProblem,
     noise: NoiseFloor,
 ) -> CandidateFit:
-    """Simulate all recordings with what was fitted to some."""
+    """Simulate all recordings with what was fitted to some.
+
+    Parameters
+    ----------
+    effects : tuple of str
+        Ids in the catalogue, without those that the simulation has.
+    fitted_to : DiagnosisProblem
+        The recordings, or parts of them, that the search has ended on.
+    """
     names = [one.name for one in fitted_to.signals]
     numbered = list(enumerate(problem.signals))
     rows = [row for row, one in numbered if one.name in names]
@@ -497,6 +440,7 @@ def at_point(
         whiteness=white,
         neighbour=_neighbour(parts),
         cause=cause,
+        valleys=np.zeros((0, 0)),
     )
 
 

@@ -160,7 +160,7 @@ def describe(findings: Findings) -> Diagnosis:
         gaps=_recording_gaps(problem, given_sse, base, chosen),
         overlays=_overlays(before, after, noise),
         latent_force=_force_curves(findings, None if chosen is base else after),
-        present=told[: len(present)],
+        present=_beside_given(problem.drive, base, told[: len(present)]),
         reference_current_A=problem.drive.reference_current_A,
         reference_displacement_m=problem.drive.reference_displacement_m,
         output_unit=problem.unit,
@@ -355,6 +355,30 @@ def _fitted_effects_of(
                 column = found.own_names.index(own)
                 parameters[identifier].append(_spread(np.exp(found.own[:, column])))
     return tuple(_described(one, parameters[one]) for one in ids)
+
+
+def _beside_given(
+    drive: Drive, base: CandidateFit, present: Sequence[FittedEffect]
+) -> tuple[FittedEffect, ...]:
+    """Effects of the simulation beside what they were given as, and re-fitted."""
+    stated = drive_effects(drive)
+    refitted = dict(zip(base.names, base.values, strict=True))
+    return tuple(
+        replace(
+            effect,
+            parameters=tuple(
+                replace(
+                    one,
+                    before=values.get(one.name, one.before),
+                    refitted=float(
+                        refitted.get(ParameterRef(identifier, one.name), np.nan)
+                    ),
+                )
+                for one in effect.parameters
+            ),
+        )
+        for effect, (identifier, values) in zip(present, stated.items(), strict=True)
+    )
 
 
 def _unit_of(ref: ParameterRef) -> str:

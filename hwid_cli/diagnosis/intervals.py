@@ -42,12 +42,12 @@ def unclear_effects(
     if not found.is_usable:
         return found.effects
     fit_layout, point = rebuilt(problem, found, scales)
-    deviations = _standard_errors(problem, found, fit_layout, point)
+    reaches = _reaches(problem, found, fit_layout, point)
 
     def is_clear(ref: ParameterRef) -> bool:
         column = found.names.index(ref)
         unknown, q = fit_layout.shared[column], point.shared[column]
-        reach = _QUANTILE * float(deviations[column])
+        reach = float(reaches[column])
         # Of a logarithm linearised: a relative deviation of the value itself.
         return reach < 1.0 if unknown.is_log else abs(q) > reach
 
@@ -86,14 +86,14 @@ def intervals(
         nothing = np.full(found.values.size, np.nan)
         return nothing, nothing
     fit_layout, point = rebuilt(problem, found, scales)
-    deviations = _standard_errors(problem, found, fit_layout, point)
+    reaches = _reaches(problem, found, fit_layout, point)
     with np.errstate(over="ignore"):
         ends = np.array(
             [
                 [
-                    one.value(q + sign * _QUANTILE * deviation)
-                    for one, q, deviation in zip(
-                        fit_layout.shared, point.shared, deviations, strict=True
+                    one.value(q + sign * reach)
+                    for one, q, reach in zip(
+                        fit_layout.shared, point.shared, reaches, strict=True
                     )
                 ]
                 for sign in (-1.0, 1.0)
@@ -102,15 +102,32 @@ def intervals(
     return ends.min(axis=0), ends.max(axis=0)
 
 
-def _standard_errors(
+def _reaches(
     problem: DiagnosisProblem,
     found: CandidateFit,
     fit_layout: ParameterLayout,
     point: ParameterPoint,
 ) -> np.ndarray:
-    """Standard errors of the shared coordinates."""
+    """How far the intervals of the shared coordinates reach.
+
+    Where the error has many valleys its shape in one of them says nothing of the others:
+    the interval reaches twice as far as the farthest of all that are as likely.
+    """
     covariance, scale = shared_covariance(problem, found, fit_layout, point)
-    return np.sqrt(np.maximum(np.diag(covariance), 0.0)) / scale
+    deviations = np.sqrt(np.maximum(np.diag(covariance), 0.0)) / scale
+    if found.valleys.size:
+        away = [
+            [
+                one.coordinate(value) - q
+                for one, value, q in zip(
+                    fit_layout.shared, valley, point.shared, strict=True
+                )
+            ]
+            for valley in found.valleys
+        ]
+        farthest = np.max(np.abs(away), axis=0)
+        return np.asarray(np.hypot(_QUANTILE * deviations, 2 * farthest))
+    return np.asarray(_QUANTILE * deviations)
 
 
 def shared_covariance(

@@ -15,10 +15,10 @@ from hwid_cli.diagnosis.candidate import (
     SCREENING_SAMPLES,
     Screened,
     SearchStart,
-    fewer_recordings,
     start_from,
 )
 from hwid_cli.diagnosis.effect_sets import Effects, includes_one_of
+from hwid_cli.diagnosis.few_samples import fewer_recordings
 from hwid_cli.diagnosis.problem import DiagnosisProblem
 from hwid_cli.diagnosis.proposals import Proposals
 from hwid_cli.diagnosis.related_sets import (
@@ -30,7 +30,14 @@ from hwid_cli.diagnosis.related_sets import (
     without_each,
 )
 from hwid_cli.diagnosis.selection import LEAST_ADDED, SMALL_REMAINDER, is_part_of
-from hwid_cli.diagnosis.set_fits import LEAST_LEFT, LEAST_TURN, Rounds, SetFits, name_of
+from hwid_cli.diagnosis.set_fits import (
+    FAR_BEHIND,
+    LEAST_LEFT,
+    LEAST_TURN,
+    Rounds,
+    SetFits,
+    name_of,
+)
 from hwid_cli.records.candidates import CandidateFit
 
 # Candidates whose fit is finished: the first ones of the screening, more while what they
@@ -39,10 +46,9 @@ FEWEST_FINISHED = 4
 MOST_FINISHED = 10
 WITHIN_REACH = 4.0
 # Sets are screened again, at most so often, until one of them explains this share of what
-# the smaller set leaves; not those that leave more than so many times as much.
+# the smaller set leaves; not those that are far behind.
 MOST_SCREENINGS = 2
 STANDS_OUT = 0.5
-FAR_BEHIND = 10.0
 # Sets that the next larger ones are built on, each of which explains this share.
 MOST_PARENTS = 2
 LEAST_OF_PARENT = 0.1
@@ -166,6 +172,7 @@ class _Search:
             chosen = self._chosen(list(screened.values()))
             todo = {ids: chosen[ids] for ids in chosen if ids in may_add}
             self.fits.finish(what, that_add(self.fits, todo) if depth else todo)
+        self.fits.grow(size)
         self._use_again(size)
         self.fits.go_on(size)
         return self.fits.best_of_size(size)

@@ -13,13 +13,19 @@ from hwid_cli.diagnosis.candidate import (
     Baseline,
     Screened,
     SearchStart,
-    fewer_recordings,
     fit_candidate,
     residuals_of_few,
     screen,
     start_from,
 )
 from hwid_cli.diagnosis.effect_sets import Effects
+from hwid_cli.diagnosis.few_samples import fewer_recordings
+from hwid_cli.diagnosis.growing import (
+    fit_grown,
+    grown_starts,
+    is_rugged,
+    with_valleys_of,
+)
 from hwid_cli.diagnosis.parameters import is_factor, sum_of_squares
 from hwid_cli.diagnosis.problem import DiagnosisProblem
 from hwid_cli.diagnosis.selection import (
@@ -47,6 +53,8 @@ LEAST_TURN = 0.95
 LEAST_STEP = 10.0
 LEAST_FURTHER = 0.25
 LEAST_OF_REST = 0.5
+# Sets that leave more than so many times what the best one leaves are far behind it.
+FAR_BEHIND = 10.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -210,8 +218,10 @@ class SetFits:
         """Keep fits that are better than before."""
         for one in found:
             before = self.found.get(one.effects)
-            if before is None or self.is_behind(before, one):
+            if before is None:
                 self.found[one.effects] = one
+            elif self.is_behind(before, one):
+                self.found[one.effects] = with_valleys_of(one, before)
 
     def fitted(
         self,
@@ -258,6 +268,32 @@ class SetFits:
                 return
             self.keep(self.fitted(f"{name_of(size)}, going on", sets, None))
 
+    def grow(self, size: int) -> None:
+        """Fit the best rugged set of a size to growing parts.
+
+        The best set itself even where it is complete: how sure its values are shows in the
+        other valleys only. Another set where the best one leaves something.
+        """
+        best, criteria = self.best_of_size(size), self.rounds.criteria
+        are_pieces = any(one.start is not None for one in self.rounds.problem.signals)
+        if best is None or not best.is_usable or are_pieces:
+            return
+        chosen = best
+        if not is_rugged(best.effects):
+            most = FAR_BEHIND * criteria.excess(best)
+            near = [
+                one
+                for one in self.of_size(size)
+                if is_rugged(one.effects) and criteria.excess(one) <= most
+            ]
+            if criteria.is_complete(best) or not near:
+                return
+            chosen = min(near, key=criteria.excess)
+        self.rounds.on_round(f"{name_of(size)}, growing parts", 1)
+        self.keep(
+            self.rounds.run_tasks([_growing_task(self.rounds, chosen)], keep=True)
+        )
+
     def unless_tried(
         self, ids: Effects, starts: Sequence[SearchStart]
     ) -> list[SearchStart]:
@@ -292,6 +328,24 @@ def fit_task(
             "pieces": _starts_of(problem),
             "hold": problem.drive.hold,
             "most_samples": most_samples,
+        },
+        arrays=(rounds.base.values,),
+    )  # fmt: skip
+
+
+def _growing_task(rounds: Rounds, found: CandidateFit) -> DiagnosisTask:
+    """Task that fits a set again, to growing parts of the recordings."""
+    problem, baseline = rounds.problem, rounds.baseline
+    start = start_from(problem.drive, found)
+    starts = grown_starts(start, found.effects, baseline.scales)
+    return DiagnosisTask(
+        name="+".join(found.effects),
+        function=fit_grown,
+        arguments=(problem, found.effects, starts, baseline.scales, baseline.noise),
+        result_type=CandidateFit,
+        content={
+            "effects": found.effects, "starts": starts, "hold": problem.drive.hold,
+            "grown": True,
         },
         arrays=(rounds.base.values,),
     )  # fmt: skip

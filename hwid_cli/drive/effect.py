@@ -337,6 +337,9 @@ class Effect:
         show, say. Where there are some they stand in for the parameters' own.
     stated : tuple of Stated
         What a configuration states where that is not the parameters.
+    is_rugged : bool
+        Whether its motion remembers every impact, so that the error over long recordings
+        has many valleys.
     moves_at_rest : bool
         Whether the drive moves before its input does, so that recordings start in motion.
     strength : str
@@ -366,6 +369,7 @@ class Effect:
     needs_circuit: bool = False
     seen: Callable[[Scales], tuple[dict[str, float], ...]] | None = None
     stated: tuple[Stated, ...] = ()
+    is_rugged: bool = False
     moves_at_rest: bool = False
     strength: str = ""
     told_by: str = ""

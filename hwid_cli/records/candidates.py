@@ -119,6 +119,9 @@ class CandidateFit:
     cause : str
         What beside the noise of the output makes up what is left, one of ``CAUSES``;
         empty where that noise is all, or something remains.
+    valleys : ndarray, shape (n_valleys, n_names)
+        Values at which other searches have ended that are as likely; empty where one
+        search is enough.
     """
 
     effects: tuple[str, ...]
@@ -132,6 +135,9 @@ class CandidateFit:
     iterations: int
     has_converged: bool
     cause: str = ""
+    valleys: np.ndarray = field(
+        default_factory=lambda: np.zeros((0, 0)), metadata=ADDED_LATER
+    )
 
     @property
     def is_usable(self) -> bool:

@@ -32,6 +32,9 @@ class FittedParameter:
         In place of a number where the parameter is a word; else empty.
     unit : str
         Where the name does not say it.
+    before, refitted : float
+        Of an effect that the simulation has: as given, and fitted without further effects;
+        NaN elsewhere.
     """
 
     name: str
@@ -40,6 +43,8 @@ class FittedParameter:
     high: float = float("nan")
     text: str = ""
     unit: str = field(default="", metadata=ADDED_LATER)
+    before: float = field(default=float("nan"), metadata=ADDED_LATER)
+    refitted: float = field(default=float("nan"), metadata=ADDED_LATER)
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,8 @@ import numpy as np
 
 from hwid_cli.records.axis import unit_of_effect
 from hwid_cli.records.diagnosis import (
-    BaseParameter,
     Diagnosis,
+    FittedEffect,
     FittedParameter,
     Gap,
     Law,
@@ -97,10 +97,7 @@ def effects_table(diagnosis: Diagnosis) -> Table:
     for effect in diagnosis.effects:
         name = effect.id
         for parameter in effect.parameters:
-            quantity, unit = quantity_and_unit(parameter.name)
-            unit = parameter.unit or unit_of_effect(
-                effect.id, unit, axis=diagnosis.axis, output=diagnosis.output
-            )
+            quantity, unit = _told_as(diagnosis, effect, parameter)
             value = parameter.text or _value(parameter.value, parameter.name)
             rows.append((name, quantity, value, _interval(parameter), unit))
             name = ""
@@ -113,6 +110,17 @@ def effects_table(diagnosis: Diagnosis) -> Table:
         *texts("unit"),
     )
     return Table(title, columns, tuple(rows))
+
+
+def _told_as(
+    diagnosis: Diagnosis, effect: FittedEffect, parameter: FittedParameter
+) -> tuple[str, str]:
+    """Quantity of an effect's parameter in words, and its unit on this axis."""
+    quantity, unit = quantity_and_unit(parameter.name)
+    axis, output = diagnosis.axis, diagnosis.output
+    return quantity, parameter.unit or unit_of_effect(
+        effect.id, unit, axis=axis, output=output
+    )
 
 
 def _interval(parameter: FittedParameter) -> str:
@@ -164,25 +172,36 @@ def base_table(diagnosis: Diagnosis) -> Table:
     Returns
     -------
     Table
-        Its last column is how far the last fit moved each of them.
+        Base first, then the effects that it has; the last column but the unit is how far
+        the last fit moved each of them.
     """
     heads = ["parameter", "given", "re-fitted", "with the effects", "shift", "unit"]
     if not diagnosis.effects:
         heads.remove("with the effects")
     rows = []
-    for one in diagnosis.base:
-        quantity, unit = quantity_and_unit(one.name)
-        values = [one.before, one.refitted, one.after][: len(heads) - 3]
-        rows.append((quantity, *map(_value, values), _shift(one, values[-1]), unit))
+    moved = [
+        (*quantity_and_unit(one.name), one.before, one.refitted, one.after)
+        for one in diagnosis.base
+    ]
+    for effect in diagnosis.present:
+        for parameter in effect.parameters:
+            quantity, unit = _told_as(diagnosis, effect, parameter)
+            steps = (parameter.before, parameter.refitted, parameter.value)
+            if np.isfinite(steps).all():
+                moved.append((f"{effect.id}: {quantity}", unit, *steps))
+    for quantity, unit, before, refitted, after in moved:
+        values = [before, refitted, after][: len(heads) - 3]
+        shift = _shift(before, values[-1])
+        rows.append((quantity, *map(_value, values), shift, unit))
     columns = (*texts(heads[0]), *numbers(*heads[1:-1]), *texts(heads[-1]))
     caption = "Parameters of the simulation; shift: from given to the last"
     return Table(caption, columns, tuple(rows))
 
 
-def _shift(one: BaseParameter, fitted: float) -> str:
-    if one.before == 0.0 or not np.isfinite(fitted / one.before):
+def _shift(given: float, fitted: float) -> str:
+    if given == 0.0 or not np.isfinite(fitted / given):
         return MISSING
-    return f"{100.0 * (fitted / one.before - 1.0):+.1f} %"
+    return f"{100.0 * (fitted / given - 1.0):+.1f} %"
 
 
 def is_chosen(candidate: RankedCandidate) -> bool:

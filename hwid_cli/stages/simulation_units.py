@@ -12,7 +12,7 @@ import numpy as np
 
 from hwid_cli.data.units import factor_between, is_unitless, quantity_of
 from hwid_cli.diagnosis.base_fit import compared_as_given
-from hwid_cli.diagnosis.candidate import fewer_recordings
+from hwid_cli.diagnosis.few_samples import fewer_recordings
 from hwid_cli.diagnosis.problem import Compared, prepare
 from hwid_cli.errors import ConfigError
 from hwid_cli.records.experiment import (

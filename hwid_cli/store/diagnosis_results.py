@@ -240,10 +240,17 @@ def _effect(effect: FittedEffect) -> dict[str, Any]:
                 "value": one.text or one.value,
                 "ci95": _interval(one),
                 **({"unit": one.unit} if one.unit else {}),
+                **_beside(one),
             }
             for one in effect.parameters
         },
     }
+
+
+def _beside(one: FittedParameter) -> dict[str, float]:
+    """What a parameter was before, of an effect that the simulation has."""
+    before = {"given": one.before, "refitted": one.refitted}
+    return {name: value for name, value in before.items() if math.isfinite(value)}
 
 
 def _law(law: Law) -> dict[str, Any]:

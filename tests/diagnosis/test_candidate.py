@@ -8,13 +8,13 @@ import pytest
 from hwid_cli.diagnosis.candidate import (
     MOST_ITERATIONS,
     SCREENING_SAMPLES,
-    fewer_recordings,
     fitted_drive,
     fitted_effects,
     fitted_start,
     rebuilt,
     screen,
 )
+from hwid_cli.diagnosis.few_samples import fewer_recordings
 from hwid_cli.diagnosis.parameters import (
     first_point,
     parameter_layout,

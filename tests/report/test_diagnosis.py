@@ -119,6 +119,22 @@ def test_the_shift_is_that_of_the_last_fit_and_needs_something_to_shift():
     assert rows[2][4] == "-"
 
 
+def test_effects_that_the_simulation_has_are_shown_with_what_they_were_given_as():
+    play = FittedParameter(
+        "half_gap_m", 2e-4, 1.9e-4, 2.1e-4, before=1e-4, refitted=3e-4
+    )
+    word = FittedParameter("sensor", NAN, text="motor")
+    present = FittedEffect("gear_backlash", "", "", (play, word))
+    found = base_table(replace(unknown(), present=(present,))).rows
+    rows = base_table(replace(named(), present=(present,), axis="rotary")).rows
+
+    shown = ("0.0001", "0.0002", "+100.0 %")
+    assert found[-1] == ("gear_backlash: half gap", "0.0001", "0.0003", "+200.0 %", "m")
+    assert rows[-1] == (
+        "gear_backlash: half gap", "0.0001", "0.0003", *shown[1:], "rad"
+    )  # fmt: skip
+
+
 def test_the_ranking_marks_the_chosen_candidate_only():
     rows = ranking_table(named()).rows
 

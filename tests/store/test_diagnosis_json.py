@@ -128,6 +128,17 @@ def test_effects_that_were_there_and_references_are_told(written):
     assert found["reference"] == {"current_A": 4.5, "displacement_m": 0.02}
 
 
+def test_effects_that_were_there_have_the_values_that_they_were_given_as(written):
+    (effect,) = named().effects
+    (parameter,) = effect.parameters
+    moved = replace(parameter, before=0.5, refitted=0.9)
+    present = replace(effect, parameters=(moved,))
+    found = written(replace(named(), present=(present,)))["present"][0]["parameters"]
+
+    assert found["force_N"]["given"] == 0.5
+    assert found["force_N"]["refitted"] == 0.9
+
+
 def test_all_places_are_there_in_their_order(written):
     found = written(named())["where"]
 

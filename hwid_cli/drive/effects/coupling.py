@@ -43,9 +43,26 @@ def _turn(value: Values) -> float:
 def _coupling_stiffness(scales: Scales) -> tuple[float, float]:
     """Softer is no drive any more; what swings faster than is sampled is one mass."""
     low, high = (share * scales.stiffness_N_per_m for share in (0.5, 1e5))
-    # Two equal masses then swing once in two samples.
-    fastest = 0.25 * scales.mass_kg * (pi / scales.sample_time_s) ** 2
-    return low, min(high, max(fastest, 10 * low))
+    return low, min(high, max(_fastest(scales), 10 * low))
+
+
+def _fastest(scales: Scales) -> float:
+    """Stiffness between two equal masses that swing once in two samples."""
+    return 0.25 * scales.mass_kg * (pi / scales.sample_time_s) ** 2
+
+
+def _teeth_starts(scales: Scales) -> tuple[float, ...]:
+    """Teeth are much stiffer than what else swings the mass."""
+    low, high = _teeth_bounds(scales)
+    swing = scales.mass_kg * (2 * pi * scales.natural_Hz) ** 2
+    usual = 50 * max(scales.stiffness_N_per_m, swing)
+    return (min(max(usual, low), high),)
+
+
+def _teeth_bounds(scales: Scales) -> tuple[float, float]:
+    # On an axis that goes far, force over displacement says nothing of teeth.
+    low = 3 * scales.stiffness_N_per_m
+    return low, max(_fastest(scales), 10 * low)
 
 
 # The load has the rest.
@@ -60,15 +77,16 @@ GEAR = Effect(
     parameters=(
         Parameter(
             "half_gap_m",
-            shares_of("displacement_m", 0.003, 0.012, 0.04),
+            # On an axis that goes far a gap is tiny beside the way.
+            shares_of("displacement_m", 0.0005, 0.003, 0.012, 0.04),
             span_of("displacement_m", 1e-5, 0.5),
             places=("GEAR_GAP",),
             limits=(POSITIVE,),
         ),
         Parameter(
             "stiffness_N_per_m",
-            shares_of("stiffness_N_per_m", 50),
-            span_of("stiffness_N_per_m", 3, 2000),
+            _teeth_starts,
+            _teeth_bounds,
             places=("GEAR_STIFFNESS",),
             limits=(POSITIVE,),
         ),
@@ -94,6 +112,7 @@ GEAR = Effect(
         "output_backlash": "reversals with the spring unloaded",
         "input_delay": "large and small reversals",
     },
+    is_rugged=True,
     # Without a gap and without damping in contact, where teeth do not pull.
     contains=("elastic_coupling:load",),
 )

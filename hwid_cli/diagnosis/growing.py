@@ -1,0 +1,255 @@
+"""Fits of effects whose motion remembers every impact, to growing parts of recordings.
+
+Teeth that let go and hit again send a small error of a parameter on to all later impacts.
+Over a whole recording the error then has a valley beside every other one, and a fit stops
+in the first. In a first part few impacts have happened, and a fit from almost anywhere
+finds the values; a longer part begins where the shorter one has ended. Several fits go
+this way side by side: valleys that a short part cannot tell apart are all followed. A
+continuation in the length of the recordings. docs/method_diagnosis.md, eq. (D18c).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from hwid_cli.diagnosis.candidate import (
+    MOST_ITERATIONS,
+    SearchStart,
+    evaluated,
+    fit_from,
+    reached_by,
+)
+from hwid_cli.diagnosis.few_samples import fewer_recordings, first_parts
+from hwid_cli.diagnosis.parameters import BASE, ParameterLayout, ParameterPoint
+from hwid_cli.diagnosis.problem import DiagnosisProblem
+from hwid_cli.diagnosis.search import SearchResult, fit_point, within_bounds
+from hwid_cli.drive.catalogue import CATALOGUE
+from hwid_cli.drive.effect import Scales
+from hwid_cli.drive.simulation import drive_effects
+from hwid_cli.records.candidates import CandidateFit
+from hwid_cli.records.diagnosis import NoiseFloor
+
+# Samples that grow; the end is fitted to all.
+GROWN_SAMPLES = 12_000
+# The first part, as a share of the longest recording.
+FIRST_SHARE = 0.04
+# Fits side by side; the better half goes on, the others begin beside it, by about this
+# standard deviation of the effects' coordinates.
+SIDE_BY_SIDE = 8
+BESIDE = 0.002
+SEED = 1
+ITERATIONS = 4
+# A longer part has so many times the samples at most, and less where the best mean square
+# has risen by the factor: the way was lost in between. Growth that went well grows, by the
+# exponent.
+MOST_GROWTH, LEAST_GROWTH = 1.3, 1.07
+MOST_RISE = 1.06
+BOLDER = 1.4
+# Points whose coordinates differ by less are one.
+SAME_POINT = 1e-4
+# Valleys that leave at most so many times the RMS of the deepest one are as likely.
+AS_LIKELY = 1.2
+
+
+def is_rugged(effects: Sequence[str]) -> bool:
+    """Whether some of the effects need growing parts."""
+    return any(CATALOGUE[one].is_rugged for one in effects)
+
+
+def grown_starts(
+    start: SearchStart, effects: Sequence[str], scales: Scales
+) -> list[SearchStart]:
+    """A start, and others with the rugged effects elsewhere.
+
+    Parameters
+    ----------
+    start : SearchStart
+        Where a fit to whole recordings has stopped.
+    effects : sequence of str
+        Ids in the catalogue.
+    """
+    starts = [start]
+    for effect in effects:
+        if CATALOGUE[effect].is_rugged:
+            starts += [
+                replace(start, effects={**start.effects, effect: values})
+                for values in CATALOGUE[effect].starts(scales)
+            ]
+    return starts
+
+
+def with_valleys_of(found: CandidateFit, before: CandidateFit) -> CandidateFit:
+    """A better fit of the same effects, which knows the valleys of the former one.
+
+    Parameters
+    ----------
+    before : CandidateFit
+        Its own place is a further valley where it has some.
+    """
+    if not before.valleys.size:
+        return found
+    valleys = [*found.valleys, *before.valleys, before.values]
+    return replace(found, valleys=np.array(valleys))
+
+
+def fit_grown(
+    problem: DiagnosisProblem,
+    effects: tuple[str, ...],
+    starts: Sequence[SearchStart],
+    scales: Scales,
+    noise: NoiseFloor,
+) -> CandidateFit:
+    """Fit the base with effects to growing parts of the training recordings.
+
+    Parameters
+    ----------
+    effects : tuple of str
+        Ids in the catalogue, without those that the simulation has.
+    starts : sequence of SearchStart
+        At least one.
+    """
+    train = problem.part(held_out=False)
+    everything = (*drive_effects(problem.drive), *effects)
+    few = fewer_recordings(train, GROWN_SAMPLES)
+    n_first = int(FIRST_SHARE * _longest(few))
+    first = first_parts(few, n_first)
+    begun = [
+        fit_from(first, everything, one, scales, MOST_ITERATIONS) for one in starts
+    ]
+    growth = _Growth(few, begun[0].layout, noise)
+    found = growth.through([_Reached.of(one) for one in begun], n_first)
+    start = reached_by(few, growth.whole(found[0]))
+    best = fit_from(train, everything, start, scales, MOST_ITERATIONS)
+    fit = evaluated(problem, effects, best, train, noise)
+    return replace(fit, valleys=growth.valleys(found))
+
+
+def _longest(problem: DiagnosisProblem) -> int:
+    return max(one.driven_by.size for one in problem.signals)
+
+
+@dataclass(frozen=True, eq=False)
+class _Reached:
+    """Where a fit to first parts has come."""
+
+    point: ParameterPoint
+    sse: float
+
+    @classmethod
+    def of(cls, found: SearchResult) -> "_Reached":
+        return cls(found.point, found.sse)
+
+
+class _Growth:
+    """Fits side by side to longer and longer parts of some recordings."""
+
+    def __init__(
+        self, few: DiagnosisProblem, fit_layout: ParameterLayout, noise: NoiseFloor
+    ) -> None:
+        self.few = few
+        self.layout = fit_layout
+        self.noise = noise
+        self._rng = np.random.default_rng(SEED)
+        self._widths = np.array(
+            [0.0 if one.owner == BASE else BESIDE for one in fit_layout.shared]
+        )
+
+    def through(self, begun: Sequence[_Reached], n_samples: int) -> list[_Reached]:
+        """Grow from parts of so many samples to whole recordings.
+
+        Returns
+        -------
+        list of _Reached
+            On whole recordings, the best first.
+        """
+        kept = _distinct(begun, SIDE_BY_SIDE)
+        n, growth, before = n_samples, MOST_GROWTH, 1.0
+        while True:
+            longer = min(max(int(growth * n), n + 1), _longest(self.few))
+            part = first_parts(self.few, longer)
+            there = self._fitted(part, [*kept, *self._beside(kept, len(kept))])
+            now = self._over_noise(part, there)
+            is_lost = now > MOST_RISE * max(before, 1.0)
+            if is_lost and growth > LEAST_GROWTH:
+                growth = max(growth**0.5, LEAST_GROWTH)
+                continue
+            if is_lost:
+                there += self._fitted(part, self._beside(kept, 0))
+                now = self._over_noise(part, there)
+            n, before, growth = longer, now, min(growth**BOLDER, MOST_GROWTH)
+            if n >= _longest(self.few):
+                return _distinct(there, len(there))
+            kept = _distinct(there, SIDE_BY_SIDE // 2)
+
+    def whole(self, here: _Reached) -> SearchResult:
+        """A fit to whole recordings, to its end."""
+        return fit_point(
+            self.few, self.layout, here.point, max_iterations=MOST_ITERATIONS
+        )
+
+    def valleys(self, found: Sequence[_Reached]) -> np.ndarray:
+        """Shared values of all that are as likely as the best one.
+
+        Parameters
+        ----------
+        found : sequence of _Reached
+            On whole recordings, the best first.
+
+        Returns
+        -------
+        ndarray, shape (n_valleys, n_shared)
+        """
+        floor = self.few.n_evaluated * self.noise.rms**2
+        most = AS_LIKELY**2 * max(found[0].sse, floor)
+        return np.array(
+            [
+                [
+                    one.value(q)
+                    for one, q in zip(self.layout.shared, at.point.shared, strict=True)
+                ]
+                for at in found
+                if at.sse <= most
+            ]
+        )
+
+    def _fitted(
+        self, part: DiagnosisProblem, points: Sequence[_Reached]
+    ) -> list[_Reached]:
+        """Fits to parts of the recordings, from where others have ended."""
+        return [
+            _Reached.of(
+                fit_point(part, self.layout, one.point, max_iterations=ITERATIONS)
+            )
+            for one in points
+        ]
+
+    def _beside(self, kept: Sequence[_Reached], n_there: int) -> list[_Reached]:
+        """Points near some, in turn, that bring their number to that side by side."""
+        near = []
+        for number in range(max(SIDE_BY_SIDE - n_there, 0)):
+            one = kept[number % len(kept)]
+            # Near ones and far ones: how far the next valley is, nobody knows.
+            far = np.exp(self._rng.normal())
+            away = far * self._widths * self._rng.normal(size=self._widths.size)
+            point = replace(one.point, shared=one.point.shared + away)
+            near.append(replace(one, point=within_bounds(self.layout, point)))
+        return near
+
+    def _over_noise(self, part: DiagnosisProblem, there: Sequence[_Reached]) -> float:
+        """Mean square of the best one, over that of the noise, [-]."""
+        floor = part.n_evaluated * self.noise.rms**2
+        return min(one.sse for one in there) / max(floor, np.finfo(float).tiny)
+
+
+def _distinct(found: Sequence[_Reached], most: int) -> list[_Reached]:
+    """The best of the points that differ, so many at most."""
+    chosen: list[_Reached] = []
+    for one in sorted(found, key=lambda one: one.sse):
+        is_new = all(
+            np.max(np.abs(one.point.shared - other.point.shared)) > SAME_POINT
+            for other in chosen
+        )
+        if is_new and len(chosen) < most:
+            chosen.append(one)
+    return chosen
