@@ -21,7 +21,8 @@ from hwid_cli.drive.catalogue import (
     public_id,
 )
 from hwid_cli.drive.effect import Stated
-from hwid_cli.records.drive import BASE_PARAMETERS
+from hwid_cli.records.axis import axis_of, name_on
+from hwid_cli.records.drive import BASE_AND_MASS, BASE_PARAMETERS, FORCES
 from hwid_cli.records.experiment import DiagnoseOptions, Experiment
 from hwid_cli.records.own_effects import is_own
 from hwid_cli.records.programs import ForeignSimulation
@@ -90,10 +91,17 @@ def controller_faults(experiment: Experiment) -> Iterator[Fault]:
 def known_faults(experiment: Experiment) -> Iterator[Fault]:
     """Known parameters that no re-fit moves, and tolerances that are none."""
     options = experiment.drive_simulation
-    for name, tolerance in (options.known if options else {}).items():
+    if options is None:
+        return
+    recordings = experiment.recordings
+    # Where the input is the force itself the mass is fitted.
+    is_force = recordings is not None and recordings.input_unit in FORCES
+    inside = BASE_AND_MASS if is_force else BASE_PARAMETERS
+    names = [name_on(axis_of(options), one) for one in inside]
+    for name, tolerance in options.known.items():
         place = ("simulation", "known")
-        if name not in BASE_PARAMETERS:
-            yield wrong_word(place, name, BASE_PARAMETERS)
+        if name not in (*names, *inside):
+            yield wrong_word(place, name, names)
         elif not 0 <= tolerance <= _LARGEST_TOLERANCE:
             yield wrong((*place, name), tolerance, "a share from 0 to 1, such as 0.05")
 

@@ -41,7 +41,7 @@ from hwid_cli.drive.effect import Scales
 from hwid_cli.drive.simulation import drive_effects
 from hwid_cli.records.candidates import CandidateFit
 from hwid_cli.records.diagnosis import STILL_LARGE, NoiseFloor
-from hwid_cli.records.drive import BASE_PARAMETERS, Drive
+from hwid_cli.records.drive import BASE_AND_MASS, Drive
 
 Start = Mapping[str, Mapping[str, float]]
 
@@ -86,7 +86,7 @@ class Baseline:
             return False
         pairs = [
             (getattr(self.given, one), getattr(self.drive, one))
-            for one in BASE_PARAMETERS
+            for one in BASE_AND_MASS
         ]
         return any(
             abs(one) > BENT * abs(other) or abs(other) > BENT * abs(one)
@@ -174,7 +174,7 @@ def reached_by(problem: DiagnosisProblem, found: SearchResult) -> SearchStart:
 
 def base_of(drive: Drive) -> dict[str, float]:
     """Parameters of a drive's base, by name."""
-    return {one: float(getattr(drive, one)) for one in BASE_PARAMETERS}
+    return {one: float(getattr(drive, one)) for one in BASE_AND_MASS}
 
 
 def fit_candidate(

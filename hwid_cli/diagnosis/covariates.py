@@ -8,7 +8,7 @@ import numpy as np
 from hwid_cli.diagnosis.latent_force import Smoothed
 from hwid_cli.diagnosis.problem import Compared
 from hwid_cli.records.axis import unit_on
-from hwid_cli.records.drive import Drive
+from hwid_cli.records.drive import SOURCES, Drive
 
 # Bins of equal count for the shares; finer ones for the curves.
 _BINS = 16
@@ -59,9 +59,7 @@ def variables(
         one.signals.sample_time_s * np.arange(one.signals.input.size)
         for one in compared
     ]
-    source, unit = (
-        ("current", "A") if drive.resistance_ohm is None else ("voltage", "V")
-    )
+    source, unit = drive.source, drive.source_unit
     fast = float(np.quantile(np.abs(velocity), 0.99)) if velocity.size else 0.0
     direction = np.sign(velocity) * (np.abs(velocity) > _STANDING * fast)
     return (
@@ -128,7 +126,7 @@ def shares(
     linear = [
         one
         for one, variable in zip(values, all_variables, strict=True)
-        if variable.name in ("displacement", "velocity", "current", "voltage")
+        if variable.name in ("displacement", "velocity", *SOURCES.values())
     ]
     columns = np.column_stack([np.ones(force.size), *linear])
     size = np.sqrt(np.mean(np.square(columns), axis=0))

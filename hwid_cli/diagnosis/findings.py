@@ -50,7 +50,7 @@ from hwid_cli.records.diagnosis import (
     Place,
     RecordingGap,
 )
-from hwid_cli.records.drive import BASE_PARAMETERS, Drive
+from hwid_cli.records.drive import Drive
 from hwid_cli.records.own_effects import is_own, own_of
 from hwid_cli.records.trust import ModelTrust, TrustOnTests
 from hwid_cli.records.units import behind
@@ -101,6 +101,14 @@ class Findings:
             problem, chosen = pieces.problem, pieces.chosen
         return _fitted_effects_of(problem, chosen, self.scales, ids)
 
+    def described_effects(self) -> tuple[tuple[FittedEffect, ...], ...]:
+        """Effects that the simulation has, and those that it lacks."""
+        drive, base = self.problem.drive, self.base
+        present = tuple(drive_effects(drive))
+        told = self.intervals_of((*present, *self.verdict.chosen.effects))
+        n = len(present)
+        return _beside_given(drive, base, told[:n]), told[n:]
+
     def after(self) -> list[Compared]:
         """Simulations with the chosen effects, beside the measurements."""
         chosen = self.verdict.chosen
@@ -134,10 +142,8 @@ def describe(findings: Findings) -> Diagnosis:
     after = findings.after()
     given_sse = findings.given_sse
     from_sse = given_sse if verdict.word in ("parameters", "none") else base.sse
-    present = tuple(drive_effects(problem.drive))
     parameters = _base(problem.drive, base, chosen)
-    told = findings.intervals_of((*present, *chosen.effects))
-    effects = told[len(present) :]
+    present, effects = findings.described_effects()
     trust, bands = findings.trust()
     return Diagnosis(
         verdict=verdict.word,
@@ -160,12 +166,13 @@ def describe(findings: Findings) -> Diagnosis:
         gaps=_recording_gaps(problem, given_sse, base, chosen),
         overlays=_overlays(before, after, noise),
         latent_force=_force_curves(findings, None if chosen is base else after),
-        present=_beside_given(problem.drive, base, told[: len(present)]),
+        present=present,
         reference_current_A=problem.drive.reference_current_A,
         reference_displacement_m=problem.drive.reference_displacement_m,
         output_unit=problem.unit,
         warnings=(*findings.warnings, *doubtful_values(parameters, problem.drive)),
         axis=problem.drive.axis,
+        input_unit=problem.drive.source_unit,
         output=problem.drive.output,
         hold=problem.drive.hold,
         law=None if findings.law is None else _law(findings.law, effects),
@@ -270,7 +277,7 @@ def _base(
             getattr(refitted, name),
             getattr(after, name) * _mean_factor(chosen, name),
         )
-        for name in BASE_PARAMETERS
+        for name in drive.fitted_base
     )
 
 

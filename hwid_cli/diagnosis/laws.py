@@ -38,7 +38,6 @@ from hwid_cli.diagnosis.rounds import RoundsResult
 from hwid_cli.diagnosis.selection import (
     LEAST_GAIN,
     LEAST_IMPROVED,
-    SMALL_REMAINDER,
     TIE,
 )
 from hwid_cli.diagnosis.set_fits import Rounds, has_many_samples
@@ -48,6 +47,7 @@ from hwid_cli.drive.catalogue import CATALOGUE, public_id
 from hwid_cli.drive.simulation import drive_effects
 from hwid_cli.records.axis import unit_on
 from hwid_cli.records.candidates import CandidateFit
+from hwid_cli.records.diagnosis import SMALL_REMAINDER
 from hwid_cli.records.own_effects import OwnEffect, OwnParameter, own_id, own_of
 
 # The verdict, and the name of the effect that holds a law.
@@ -271,8 +271,7 @@ def _near(value: float, change: float) -> float:
 def _units(rounds: Rounds) -> tuple[str, str, str]:
     """Units of force, reading and input."""
     drive = rounds.problem.drive
-    source = "A" if drive.resistance_ohm is None else "V"
-    return unit_on(drive.axis, "N"), unit_on(drive.axis, "m"), source
+    return unit_on(drive.axis, "N"), unit_on(drive.axis, "m"), drive.source_unit
 
 
 def _effect(

@@ -226,7 +226,7 @@ def best_separation(
     """
     found = [
         Separation(name, separation(problem, favourite, rival, command), command.size)
-        for name, command in menu(scales).items()
+        for name, command in menu(scales, problem.drive.source_unit).items()
     ]
     return max(found, key=lambda item: item.rms)
 
@@ -304,12 +304,17 @@ def _left_over(asked: DiagnosisProblem, rival: FittedCandidate) -> float:
     return float(np.sqrt(np.mean(left**2)))
 
 
-def menu(scales: Scales) -> dict[str, np.ndarray]:
+def menu(scales: Scales, unit: str) -> dict[str, np.ndarray]:
     """Inputs that could be measured next.
+
+    Parameters
+    ----------
+    unit : str
+        Of the input, for the descriptions.
 
     Returns
     -------
-    dict of str to ndarray, shape (n_samples,), [A]
+    dict of str to ndarray, shape (n_samples,), [unit]
         By their description.
     """
     step, size, natural = scales.sample_time_s, scales.current_A, scales.natural_Hz
@@ -320,28 +325,28 @@ def menu(scales: Scales) -> dict[str, np.ndarray]:
     for sign, word in ((1, "positive"), (-1, "negative")):
         for share in (1.0, 0.15):
             value = sign * share * size
-            inputs[f"a {word} step of {abs(value):.3g} A, held and taken back"] = _step(
-                n, rest, value
+            inputs[f"a {word} step of {abs(value):.3g} {unit}, held and taken back"] = (
+                _step(n, rest, value)
             )
-    inputs[f"a slow triangle of {0.3 * size:.3g} A, once to each side"] = (
+    inputs[f"a slow triangle of {0.3 * size:.3g} {unit}, once to each side"] = (
         0.3 * size * _triangle(n, rest)
     )
     highest = HIGHEST_SHARE / step
     for factor in (0.15, 0.7, 1.0, 2.5, 6.0):
         frequency = factor * natural
         if frequency <= highest:
-            inputs[f"a sine of {size:.3g} A at {frequency:.3g} Hz"] = size * np.sin(
-                2 * np.pi * frequency * time
+            inputs[f"a sine of {size:.3g} {unit} at {frequency:.3g} Hz"] = (
+                size * np.sin(2 * np.pi * frequency * time)
             )
     if natural <= highest:
-        inputs[f"a small sine of {0.1 * size:.3g} A at {natural:.3g} Hz"] = (
+        inputs[f"a small sine of {0.1 * size:.3g} {unit} at {natural:.3g} Hz"] = (
             0.1 * size * np.sin(2 * np.pi * natural * time)
         )
     if 0.7 * natural > highest:
         return inputs
     biased = 0.6 * size + 0.3 * size * np.sin(2 * np.pi * 0.7 * natural * time)
     inputs[
-        f"a sine of {0.3 * size:.3g} A at {0.7 * natural:.3g} Hz around {0.6 * size:.3g} A"
+        f"a sine of {0.3 * size:.3g} {unit} at {0.7 * natural:.3g} Hz around {0.6 * size:.3g} {unit}"
     ] = biased * np.minimum(1.0, np.arange(n) / max(rest, 1))
     return inputs
 

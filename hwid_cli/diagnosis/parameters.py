@@ -24,7 +24,7 @@ from hwid_cli.drive.simulation import (
     set_start,
 )
 from hwid_cli.records.candidates import ParameterRef
-from hwid_cli.records.drive import BASE_PARAMETERS, Drive, StandIn
+from hwid_cli.records.drive import Drive, StandIn
 
 # Owners beside the effects: the base, and how a recording starts.
 BASE, START = "base", "start"
@@ -230,7 +230,7 @@ def _base_unknowns(
     """
     fastest = _FASTEST_PER_SAMPLE * drive.mass_kg / sample_time_s
     unknowns = []
-    for name in BASE_PARAMETERS:
+    for name in drive.fitted_base:
         value = getattr(drive, name)
         if name == "stiffness_N_per_m" and value == 0:
             continue

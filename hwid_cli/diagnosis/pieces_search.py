@@ -25,12 +25,12 @@ from hwid_cli.diagnosis.parameters import each_sum_of_squares
 from hwid_cli.diagnosis.pieces import JudgedPieces, in_pieces
 from hwid_cli.diagnosis.problem import DiagnosisProblem
 from hwid_cli.diagnosis.rounds import RoundsResult, continue_rounds, run_rounds
-from hwid_cli.diagnosis.selection import SMALL_REMAINDER, SelectionCriteria
+from hwid_cli.diagnosis.selection import SelectionCriteria
 from hwid_cli.diagnosis.set_fits import WORTH_MORE, Rounds
 from hwid_cli.drive.catalogue import CATALOGUE
 from hwid_cli.drive.simulation import drive_effects
 from hwid_cli.records.candidates import CandidateFit
-from hwid_cli.records.diagnosis import STILL_LARGE
+from hwid_cli.records.diagnosis import SMALL_REMAINDER, STILL_LARGE
 from hwid_cli.records.drive import StandIn
 
 # Whole recordings cannot judge where the noise of their start alone, sent through the

@@ -11,8 +11,8 @@ import numpy as np
 import scipy
 
 from hwid_cli.drive.simulation import NO_FORCE, refined
-from hwid_cli.records.axis import base_of
-from hwid_cli.records.drive import LINE, UNSAID_HOLD, Drive
+from hwid_cli.records.axis import base_of, name_inside
+from hwid_cli.records.drive import LINE, SOURCES, UNSAID_HOLD, Drive
 from hwid_cli.records.experiment import DiagnoseOptions, SimulationOptions
 from hwid_cli.records.recordings import Recording
 
@@ -272,21 +272,25 @@ def prepare(
     train = [one for one in signals if not one.is_held_out] or list(signals)
     return DiagnosisProblem(
         signals,
-        drive_of(simulation, train),
+        drive_of(simulation, train, recordings[0].input_unit),
         options.initial_state,
         recordings[0].input_unit
         if simulation.controller is not None
         else recordings[0].output_unit,
-        simulation.known,
+        {name_inside(name): share for name, share in simulation.known.items()},
         may_be_held=simulation.hold == UNSAID_HOLD and simulation.controller is None,
     )
 
 
-def drive_of(simulation: SimulationOptions, train: Sequence[Signals]) -> Drive:
+def drive_of(
+    simulation: SimulationOptions, train: Sequence[Signals], input_unit: str = ""
+) -> Drive:
     """Drive that a configuration describes.
 
     Parameters
     ----------
+    input_unit : str
+        Of the recordings; what is none of ``SOURCES`` stands for that of the simulation.
     train : sequence of Signals
         Training recordings, whose largest magnitudes are the references where the
         configuration gives none.
@@ -304,8 +308,15 @@ def drive_of(simulation: SimulationOptions, train: Sequence[Signals]) -> Drive:
         hold=LINE if simulation.hold == UNSAID_HOLD else simulation.hold,
         controller=simulation.controller,
         output=simulation.output,
+        input_unit=_source_unit(simulation, input_unit),
         **base_of(simulation),
     )
+
+
+def _source_unit(simulation: SimulationOptions, unit: str) -> str:
+    """Unit of the input; a circuit has a voltage at its input, whatever is written."""
+    is_source = unit in SOURCES and simulation.resistance_ohm is None
+    return unit if is_source else ""
 
 
 def _signals(

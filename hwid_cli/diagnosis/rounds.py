@@ -29,7 +29,7 @@ from hwid_cli.diagnosis.related_sets import (
     that_add,
     without_each,
 )
-from hwid_cli.diagnosis.selection import LEAST_ADDED, SMALL_REMAINDER, is_part_of
+from hwid_cli.diagnosis.selection import LEAST_ADDED, is_part_of
 from hwid_cli.diagnosis.set_fits import (
     FAR_BEHIND,
     LEAST_LEFT,
@@ -39,6 +39,7 @@ from hwid_cli.diagnosis.set_fits import (
     name_of,
 )
 from hwid_cli.records.candidates import CandidateFit
+from hwid_cli.records.diagnosis import SMALL_REMAINDER
 
 # Candidates whose fit is finished: the first ones of the screening, more while what they
 # leave beyond the noise is at most so many times what the best one leaves.

@@ -136,8 +136,7 @@ def missing_along(
         for one in variables(of, [force for _, force in pairs], drive)
     }
     every = max(1, -(-found["time"].size // _MOST_OF_STARTS))
-    source = "current" if drive.resistance_ohm is None else "voltage"
-    names = {"x": "displacement", "v": "velocity", "u": source, "t": "time"}
+    names = {"x": "displacement", "v": "velocity", "u": drive.source, "t": "time"}
     reading = joined(of, [finite(one.signals.compared - one.simulated) for one in of])
     gain = drive.force_constant_N_per_A / (drive.resistance_ohm or 1.0)
     return Missing(

@@ -19,7 +19,7 @@ from hwid_cli.diagnosis.parameters import BASE, START, is_factor
 from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals
 from hwid_cli.drive.catalogue import CATALOGUE, public_id
 from hwid_cli.records.candidates import CandidateFit
-from hwid_cli.records.diagnosis import STILL_LARGE, NoiseFloor
+from hwid_cli.records.diagnosis import SMALL_REMAINDER, STILL_LARGE, NoiseFloor
 from hwid_cli.records.drive import StandIn
 
 # A set of effects must lower the criterion by this much against the smaller one.
@@ -57,9 +57,6 @@ LEAST_SPREAD = 0.01
 LEAST_PIECES = 10
 # Ratio to the noise up to which what remains is of no account.
 CLOSE_TO_NOISE = 1.03
-# Ratio up to which a remainder that no effect explains is no missing effect: the logger,
-# a timer, a cable.
-SMALL_REMAINDER = 1.2
 # Standard deviations of a ratio of few samples that count as chance.
 LEAST_SURE = 3.0
 # Candidates closer than this are not told apart.

@@ -11,6 +11,7 @@ from hwid_cli.drive.catalogue import CATALOGUE, public_id
 from hwid_cli.records.axis import name_on
 from hwid_cli.records.candidates import CAUSES, CandidateFit
 from hwid_cli.records.diagnosis import (
+    SMALL_REMAINDER,
     STILL_LARGE,
     BaseParameter,
     FittedEffect,
@@ -21,6 +22,13 @@ from hwid_cli.records.drive import HELD, LINE, Drive
 _WORDS = {
     "linear": ("mass", "force constant"),
     "rotary": ("inertia", "torque constant"),
+}
+# What makes the input, where that is measured.
+_BEFORE = {
+    "current": "resistance, inductance, brush drop, supply voltage",
+    "voltage": "controller, supply",
+    "force": "controller, amplifier, motor",
+    "torque": "controller, amplifier, motor",
 }
 # Share of the largest displacement that counts as motion to one side.
 _ONE_SIDE = 0.05
@@ -203,8 +211,10 @@ def _rest(criteria: SelectionCriteria, verdict: DiagnosisVerdict) -> str:
         return ""
     if criteria.ratio(verdict.chosen) > STILL_LARGE:
         return " What remains is not explained."
-    if criteria.ratio(verdict.chosen) > _NO_MORE_THAN_NOISE:
+    if criteria.ratio(verdict.chosen) > SMALL_REMAINDER:
         return " Something smaller remains."
+    if criteria.ratio(verdict.chosen) > _NO_MORE_THAN_NOISE:
+        return " Little more than the noise remains."
     return " What remains is no larger than the noise, but not as random."
 
 
@@ -256,12 +266,15 @@ def doubtful_values(base: Sequence[BaseParameter], drive: Drive) -> tuple[str, .
         return ()
     if _is_the_mass(moved, drive):
         return (_questioned_mass(moved, drive),)
-    held, known = _held_and_known(drive)
-    names = " and ".join(name_on(drive.axis, one) for one in held)
+    rests = ""
+    if not drive.is_driven_by_force:
+        held, known = _held_and_known(drive)
+        names = " and ".join(name_on(drive.axis, one) for one in held)
+        rests = f"; it rests on the given {names}: {known}"
     return tuple(
         f"{one.name} was {one.before:.3g} and is fitted as {one.after:.3g}: "
         "check its value, or the units of the recordings; simulation.known: "
-        f"[{one.name}] holds it; it rests on the given {names}: {known}"
+        f"[{one.name}] holds it{rests}"
         for one in doubtful
     )
 
@@ -271,7 +284,8 @@ def _is_the_mass(moved: Mapping[BaseParameter, float], drive: Drive) -> bool:
 
     Two values alone may go together by chance, and with a spring there are three.
     """
-    if drive.resistance_ohm is not None or len(moved) < _PROPORTIONAL:
+    is_held = drive.resistance_ohm is None and not drive.is_driven_by_force
+    if not is_held or len(moved) < _PROPORTIONAL:
         return False
     return max(moved.values()) <= _SAME_FACTOR * min(moved.values())
 
@@ -311,15 +325,18 @@ def hidden_from_view(problem: DiagnosisProblem) -> tuple[str, ...]:
     drive, texts = problem.drive, []
     if drive.resistance_ohm is None:
         texts.append(
-            "what happens before the current (resistance, inductance, brush drop, "
-            "supply voltage), because the input comes after it"
+            f"what happens before the {drive.source} ({_BEFORE[drive.source]}), because "
+            "the input comes after it"
         )
-    held, known = _held_and_known(drive)
-    mass, _ = _WORDS[drive.axis]
-    which = (
-        f"{mass} itself" if len(held) == 1 else f"{mass} and the resistance themselves"
-    )
-    texts.append(f"the {which}: {known}")
+    if not drive.is_driven_by_force:
+        held, known = _held_and_known(drive)
+        mass, _ = _WORDS[drive.axis]
+        which = (
+            f"{mass} itself"
+            if len(held) == 1
+            else f"{mass} and the resistance themselves"
+        )
+        texts.append(f"the {which}: {known}")
     if drive.output == "velocity":
         texts.append("where the drive is, because its velocity is measured")
     else:

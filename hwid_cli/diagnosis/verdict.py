@@ -18,7 +18,6 @@ from hwid_cli.diagnosis.selection import (
     LEAST_GAIN,
     LEAST_IMPROVED,
     LEAST_LAST_CONTRIBUTION,
-    SMALL_REMAINDER,
     SelectionCriteria,
     has_own_values,
     has_size,
@@ -28,7 +27,7 @@ from hwid_cli.diagnosis.selection import (
 )
 from hwid_cli.drive.catalogue import CATALOGUE
 from hwid_cli.records.candidates import CandidateFit
-from hwid_cli.records.diagnosis import STILL_LARGE
+from hwid_cli.records.diagnosis import SMALL_REMAINDER, STILL_LARGE
 
 # Whiteness up to which a small remainder counts as noise that is not quite white.
 _NEARLY_WHITE = 2.0
@@ -325,6 +324,10 @@ def _without_effect(
     before, after = float(given_sse.sum()), float(base.sse.sum())
     if not np.isfinite(before):
         return "parameters"
+    floor = float(criteria.floors.sum())
+    if before <= CLOSE_TO_NOISE**2 * floor:
+        # What a fit of that little moves, no measurement tells.
+        return "none"
     n = float(criteria.n_samples.sum())
     gain = n * np.log(max(before, 1e-300) / max(after, 1e-300))
     least = LEAST_GAIN + base.values.size * np.log(n)

@@ -368,7 +368,7 @@ def _input_unit(drive: Drive) -> str:
     """Unit of what drives a recording."""
     if drive.controller is not None:
         return unit_on(drive.axis, "m" if drive.output == "position" else "m/s")
-    return "A" if drive.resistance_ohm is None else "V"
+    return drive.source_unit
 
 
 def _plural(kind: str) -> str:

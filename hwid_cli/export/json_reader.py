@@ -239,7 +239,9 @@ def _drive(path: Path, given: Mapping[str, Any]) -> Drive:
         if name_on(base["axis"], name) not in given:
             place = ("simulation", name_on(base["axis"], name))
             refuse(path, place, None, "a finite number")
-    others = set(Drive.__dataclass_fields__) - set(ROTARY_NAMES) - {"axis"}
+    others = (
+        set(Drive.__dataclass_fields__) - set(ROTARY_NAMES) - {"axis", "input_unit"}
+    )
     return Drive(**base, **{name: getattr(read, name) for name in others})
 
 

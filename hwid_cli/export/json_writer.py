@@ -130,7 +130,7 @@ def plain_drive(drive: Drive) -> dict[str, Any]:
     content = {
         name_on(drive.axis, name): getattr(drive, name)
         for name in Drive.__dataclass_fields__
-        if name not in ("effects", "controller", "axis")
+        if name not in ("effects", "controller", "axis", "input_unit")
     }
     content["effects"] = as_written(
         {identifier: dict(values) for identifier, values in drive.effects.items()}

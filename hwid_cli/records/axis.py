@@ -115,7 +115,9 @@ def _rotary(product: str) -> str:
     return " ".join(found)
 
 
-def unit_of_effect(identifier: str, unit: str, *, axis: str, output: str) -> str:
+def unit_of_effect(
+    identifier: str, unit: str, *, axis: str, output: str, source: str = "A"
+) -> str:
     """Unit of a parameter of an effect, from that at the end of its name.
 
     Parameters
@@ -124,9 +126,14 @@ def unit_of_effect(identifier: str, unit: str, *, axis: str, output: str) -> str
         Id of the effect.
     output : str
         What is measured; one of ``drive.OUTPUTS``.
+    source : str
+        Unit of the input; one of ``drive.SOURCES``.
 
     Examples
     --------
+    >>> unit_of_effect("input_dead_zone", "A", axis="rotary", output="position",
+    ...                source="N m")
+    'N m'
     >>> unit_of_effect("sensor_drift", "m/s", axis="linear", output="velocity")
     'm/s^2'
     >>> unit_of_effect("end_stop", "N/m", axis="rotary", output="velocity")
@@ -134,7 +141,8 @@ def unit_of_effect(identifier: str, unit: str, *, axis: str, output: str) -> str
     """
     if output == "velocity" and identifier in _OF_READING:
         unit = {"m": "m/s", "m/s": "m/s^2"}.get(unit, unit)
-    return unit_on(axis, unit)
+    words = [source if one == "A" else one for one in unit_on(axis, unit).split("/")]
+    return "/".join(words)
 
 
 def units_note(*, axis: str, output: str) -> str:

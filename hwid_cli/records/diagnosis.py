@@ -15,6 +15,9 @@ from hwid_cli.records.trust import ModelTrust, TrustOnTests
 
 # What leaves more than so many times the noise is a part of what is missing, no fact.
 STILL_LARGE = 3.0
+# Ratio to the noise up to which a remainder that no effect explains is no missing effect:
+# the logger, a timer, a cable.
+SMALL_REMAINDER = 1.2
 VERDICTS = ("named", "ambiguous", "law", "parameters", "unknown", "none")
 
 
@@ -370,6 +373,7 @@ class Diagnosis(Shown):
     output_unit: str = "m"
     warnings: tuple[str, ...] = field(default=(), metadata=ADDED_LATER)
     axis: str = field(default="linear", metadata=ADDED_LATER)
+    input_unit: str = field(default="A", metadata=ADDED_LATER)
     output: str = field(default="position", metadata=ADDED_LATER)
     confirmed: str = field(default="simulation", metadata=ADDED_LATER)
     capabilities: Capabilities = field(default=OF_DRIVE, metadata=ADDED_LATER)

@@ -33,6 +33,13 @@ BASE_PARAMETERS = (
     "stiffness_N_per_m",
     "force_constant_N_per_A",
 )
+# Where the input is the force itself, that sets the scale.
+BASE_UNDER_FORCE = ("mass_kg", "damping_N_s_per_m", "stiffness_N_per_m")
+# All that the motion of the base depends on.
+BASE_AND_MASS = ("mass_kg", *BASE_PARAMETERS)
+# What the input of a simulation may be, by the unit of its numbers; a force as it acts.
+SOURCES = {"A": "current", "V": "voltage", "N": "force", "N m": "torque"}
+FORCES = ("N", "N m")
 # Keys of a controller that is a cascade, and of a PID controller; the needed ones first.
 CASCADE_KEYS = ("position_gain_per_s", "velocity_gain", "reset_rate_per_s")
 PID_KEYS = ("proportional_gain", "integral_gain", "derivative_gain")
@@ -196,6 +203,9 @@ class Drive:
         One of ``OUTPUTS``: what is measured.
     axis : str
         One of ``AXES``: rotating where m stands for rad, N for N m and kg for kg m^2.
+    input_unit : str
+        One of ``SOURCES``; empty for A, or V where there is a circuit. Under N and N m the
+        force constant is a number without unit, and exact.
     """
 
     mass_kg: Annotated[float, POSITIVE] = 1.0
@@ -212,9 +222,30 @@ class Drive:
     controller: Controller | None = None
     output: Annotated[str, OneOf(OUTPUTS)] = "position"
     axis: Annotated[str, OneOf(AXES)] = "linear"
+    input_unit: Annotated[str, OneOf(("", *SOURCES))] = ""
 
     def __post_init__(self) -> None:
         check_fields(self)
+
+    @property
+    def source_unit(self) -> str:
+        """Unit of the input, one of ``SOURCES``."""
+        return self.input_unit or ("A" if self.resistance_ohm is None else "V")
+
+    @property
+    def source(self) -> str:
+        """What the input is, in words."""
+        return SOURCES[self.source_unit]
+
+    @property
+    def is_driven_by_force(self) -> bool:
+        """Whether the input is the force, or the torque, as it acts."""
+        return self.source_unit in FORCES
+
+    @property
+    def fitted_base(self) -> tuple[str, ...]:
+        """Parameters of the base that a re-fit may move; the other one sets the scale."""
+        return BASE_UNDER_FORCE if self.is_driven_by_force else BASE_PARAMETERS
 
 
 @dataclass(frozen=True)

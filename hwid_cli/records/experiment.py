@@ -249,8 +249,9 @@ class SimulationOptions:
     Parameters
     ----------
     known : dict of str to float, [-]
-        Base parameters that a re-fit may not move beyond this share of their value; 0
-        holds one fixed.
+        Base parameters, by the names of either axis, that a re-fit may not move beyond
+        this share of their value; 0 holds one fixed. The mass is held anyway, but where
+        the input is the force itself.
     hold : str
         As for a drive; ``auto`` is a line, unless a diagnosis finds a held command.
     """

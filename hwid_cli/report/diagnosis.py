@@ -1,11 +1,13 @@
 """A diagnosis as tables and sentences, and all that the screen shows of it."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from hwid_cli.records.axis import unit_of_effect
 from hwid_cli.records.diagnosis import (
+    SMALL_REMAINDER,
     Diagnosis,
     FittedEffect,
     FittedParameter,
@@ -117,9 +119,12 @@ def _told_as(
 ) -> tuple[str, str]:
     """Quantity of an effect's parameter in words, and its unit on this axis."""
     quantity, unit = quantity_and_unit(parameter.name)
-    axis, output = diagnosis.axis, diagnosis.output
     return quantity, parameter.unit or unit_of_effect(
-        effect.id, unit, axis=axis, output=output
+        effect.id,
+        unit,
+        axis=diagnosis.axis,
+        output=diagnosis.output,
+        source=diagnosis.input_unit,
     )
 
 
@@ -166,6 +171,38 @@ def _gap_row(label: str, gap: Gap) -> tuple[str, ...]:
     return (label, *values, _ratio(gap.ratio_to_noise))
 
 
+@dataclass(frozen=True)
+class Moved:
+    """A parameter of the simulation, of its base or of an effect that it has.
+
+    Parameters
+    ----------
+    before, refitted, after : float, [unit]
+        As given; fitted without further effects; fitted with them.
+    """
+
+    quantity: str
+    unit: str
+    before: float
+    refitted: float
+    after: float
+
+
+def moved_parameters(diagnosis: Diagnosis) -> list[Moved]:
+    """List the parameters of the simulation, the base first."""
+    moved = [
+        Moved(*quantity_and_unit(one.name), one.before, one.refitted, one.after)
+        for one in diagnosis.base
+    ]
+    for effect in diagnosis.present:
+        for parameter in effect.parameters:
+            quantity, unit = _told_as(diagnosis, effect, parameter)
+            steps = (parameter.before, parameter.refitted, parameter.value)
+            if np.isfinite(steps).all():
+                moved.append(Moved(f"{effect.id}: {quantity}", unit, *steps))
+    return moved
+
+
 def base_table(diagnosis: Diagnosis) -> Table:
     """Show the parameters of the simulation as given and as fitted.
 
@@ -179,20 +216,10 @@ def base_table(diagnosis: Diagnosis) -> Table:
     if not diagnosis.effects:
         heads.remove("with the effects")
     rows = []
-    moved = [
-        (*quantity_and_unit(one.name), one.before, one.refitted, one.after)
-        for one in diagnosis.base
-    ]
-    for effect in diagnosis.present:
-        for parameter in effect.parameters:
-            quantity, unit = _told_as(diagnosis, effect, parameter)
-            steps = (parameter.before, parameter.refitted, parameter.value)
-            if np.isfinite(steps).all():
-                moved.append((f"{effect.id}: {quantity}", unit, *steps))
-    for quantity, unit, before, refitted, after in moved:
-        values = [before, refitted, after][: len(heads) - 3]
-        shift = _shift(before, values[-1])
-        rows.append((quantity, *map(_value, values), shift, unit))
+    for one in moved_parameters(diagnosis):
+        values = [one.before, one.refitted, one.after][: len(heads) - 3]
+        shift = _shift(one.before, values[-1])
+        rows.append((one.quantity, *map(_value, values), shift, one.unit))
     columns = (*texts(heads[0]), *numbers(*heads[1:-1]), *texts(heads[-1]))
     caption = "Parameters of the simulation; shift: from given to the last"
     return Table(caption, columns, tuple(rows))
@@ -427,12 +454,23 @@ _MOST_SHOWN = 5
 _SHORT = ("none", "parameters")
 
 
+def leaves_little(diagnosis: Diagnosis) -> bool:
+    """Whether what stays unexplained is hardly more than the noise."""
+    return diagnosis.after.ratio_to_noise <= SMALL_REMAINDER
+
+
 def verdict_sentence(diagnosis: Diagnosis) -> str:
     """Say the verdict in a few words."""
     line = f"Verdict: {diagnosis.verdict}"
     if diagnosis.effects:
         names = candidate_name([effect.id for effect in diagnosis.effects])
-        rest = "complete" if diagnosis.complete else "a part stays unexplained"
+        rest = "complete"
+        if not diagnosis.complete:
+            rest = (
+                "little more than the noise remains"
+                if leaves_little(diagnosis)
+                else "a part stays unexplained"
+            )
         line += f", {names} ({rest})"
     return line
 

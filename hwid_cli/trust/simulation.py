@@ -16,7 +16,7 @@ import numpy as np
 
 from hwid_cli.drive.catalogue import entry_of
 from hwid_cli.drive.simulation import simulate_drive
-from hwid_cli.records.drive import BASE_PARAMETERS, Drive, EffectValues
+from hwid_cli.records.drive import BASE_AND_MASS, Drive, EffectValues
 from hwid_cli.records.trust import Band, ModelTrust
 from hwid_cli.trust.band import ErrorTerms, band_of
 from hwid_cli.trust.visited import inside
@@ -68,7 +68,7 @@ def moved(drive: Drive, parameters: Sequence[str], step: np.ndarray) -> Drive:
     places = {_entry(one, values): values for one, values in effects.items()}
     for parameter, by in zip(parameters, step.tolist(), strict=True):
         owner, _, name = parameter.rpartition(".")
-        if owner == BASE and name in BASE_PARAMETERS:
+        if owner == BASE and name in BASE_AND_MASS:
             base[name] = getattr(drive, name) + by
         elif owner in places and isinstance(places[owner].get(name), int | float):
             places[owner][name] = float(places[owner][name]) + by

@@ -394,6 +394,27 @@ def test_known_parameters_may_be_a_list_or_have_tolerances(load, text, expected)
     assert load(f"simulation: {{known: {text}}}").simulation.known == expected
 
 
+TORQUE = (
+    "recordings: {files: x.csv, columns: {input: u, output: y}, sample_time_s: 0.001, "
+    "input_unit: N m}"
+)
+
+
+def test_a_mass_may_be_known_where_the_input_is_the_force(load):
+    text = "simulation: {inertia_kg_m2: 1, known: {inertia_kg_m2: 0.1}}"
+    assert load(f"{TORQUE}\n{text}").simulation.known == {"inertia_kg_m2": 0.1}
+    with pytest.raises(ConfigError, match="expected one of damping_N_m_s_per_rad"):
+        load(text)
+
+
+@pytest.mark.parametrize(
+    "name", ["torque_constant_N_m_per_A", "force_constant_N_per_A"]
+)
+def test_what_is_known_of_a_rotating_axis_has_its_names_too(load, name):
+    text = f"simulation: {{inertia_kg_m2: 1, known: {{{name}: 0}}}}"
+    assert load(text).simulation.known == {name: 0.0}
+
+
 @pytest.mark.parametrize(
     ("text", "match"),
     [

@@ -95,14 +95,14 @@ def test_a_rival_that_runs_away_separates_nothing(rivals):
     lost = parameter_layout(of, ("cubic_stiffness",), start, scales)
     model = FittedCandidate(lost, first_point(of, lost, of.drive, start))
     assert best_separation(of, coulomb, model, scales) == Separation(
-        *(next(iter(menu(scales))), 0.0),
-        n_samples=next(iter(menu(scales).values())).size,
+        *(next(iter(menu(scales, "A"))), 0.0),
+        n_samples=next(iter(menu(scales, "A").values())).size,
     )
 
 
 def test_the_menu_stays_within_the_current_that_was_used(rivals):
     _, _, scales, _ = rivals
-    inputs = menu(scales)
+    inputs = menu(scales, "A")
     assert len(inputs) == len(set(inputs)) >= 10
     for name, command in inputs.items():
         assert np.abs(command).max() <= scales.current_A * (1 + 1e-12), name
@@ -115,15 +115,15 @@ def test_the_menu_stays_within_the_current_that_was_used(rivals):
 def test_the_menu_has_no_frequency_that_the_samples_cannot_follow(rivals):
     _, _, scales, _ = rivals
     slow = replace(scales, sample_time_s=0.02)
-    fast = [name for name in menu(slow) if "at 60.7 Hz" in name]
+    fast = [name for name in menu(slow, "A") if "at 60.7 Hz" in name]
     assert fast == []
-    assert len(menu(slow)) < len(menu(scales))
+    assert len(menu(slow, "A")) < len(menu(scales, "A"))
 
 
 @pytest.mark.parametrize("step_s", [1e-4, 1e-3, 5e-3, 0.02, 0.1])
 def test_no_sine_of_the_menu_is_above_a_tenth_of_the_sample_rate(rivals, step_s):
     _, _, scales, _ = rivals
-    found = menu(replace(scales, sample_time_s=step_s))
+    found = menu(replace(scales, sample_time_s=step_s), "A")
     frequencies = [
         float(one) for name in found for one in re.findall(r"at ([\d.e+]+) Hz", name)
     ]

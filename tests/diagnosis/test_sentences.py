@@ -21,6 +21,7 @@ from tests.diagnosis.small_drive import DRIVE, STEP_S, problem, recordings
             False,
             " What remains is no larger than the noise, but not as random.",
         ),
+        (1.1, False, " Little more than the noise remains."),
         (2.0, False, " Something smaller remains."),
         (10.0, False, " What remains is not explained."),
     ],

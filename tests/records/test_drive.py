@@ -53,6 +53,23 @@ def test_a_controller_needs_no_limit():
     assert Controller(1.0, 1.0).limit is None
 
 
+@pytest.mark.parametrize(
+    ("drive", "source", "is_force"),
+    [
+        (Drive(), "current", False),
+        (Drive(resistance_ohm=2.0), "voltage", False),
+        (Drive(input_unit="V"), "voltage", False),
+        (Drive(input_unit="N"), "force", True),
+        (Drive(input_unit="N m", axis="rotary"), "torque", True),
+    ],
+)
+def test_what_drives_it_says_what_sets_the_scale(drive, source, is_force):
+    assert drive.source == source
+    assert drive.is_driven_by_force == is_force
+    assert ("mass_kg" in drive.fitted_base) == is_force
+    assert ("force_constant_N_per_A" in drive.fitted_base) == (not is_force)
+
+
 def test_what_is_fitted_are_fields_of_the_drive():
     assert set(BASE_PARAMETERS) <= set(vars(Drive()))
     assert "mass_kg" not in BASE_PARAMETERS

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from hwid_cli.records.answer import ChosenMaps
-from hwid_cli.records.diagnosis import BaseParameter, FittedParameter
+from hwid_cli.records.diagnosis import BaseParameter, FittedParameter, Gap
 from hwid_cli.records.report import ReportContents, StageRun, StoredResults
 from hwid_cli.report.html import report_page
 from hwid_cli.report.sections.diagnosis_answer import (
@@ -110,7 +110,16 @@ def test_force_and_overlay_stand_beside_it():
 @pytest.mark.parametrize(
     ("changes", "words", "is_settled"),
     [
-        ({"complete": False}, "A part of the gap stays unexplained.", False),
+        (
+            {"complete": False, "after": Gap(2e-5, 3e-5, 1.5)},
+            "A part of the gap stays unexplained.",
+            False,
+        ),
+        (
+            {"complete": False, "after": Gap(2e-5, 3e-5, 1.1)},
+            "Little more than the noise remains.",
+            False,
+        ),
         (
             {"verdict": "ambiguous", "ambiguous_with": ("stribeck_friction",)},
             "or instead Stribeck friction: these recordings cannot tell them apart",

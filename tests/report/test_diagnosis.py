@@ -4,7 +4,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hwid_cli.records.diagnosis import FittedEffect, FittedParameter, NextExperiment
+from hwid_cli.records.diagnosis import (
+    FittedEffect,
+    FittedParameter,
+    Gap,
+    NextExperiment,
+)
 from hwid_cli.report.diagnosis import (
     base_table,
     closing_sentences,
@@ -276,10 +281,15 @@ def test_a_set_of_effects_that_is_too_wide_goes_on_in_the_next_row():
 
 
 def test_an_incomplete_diagnosis_says_so():
-    text = diagnosis_text(replace(named(), complete=False), width=80)
+    large = replace(named(), complete=False, after=Gap(2e-5, 3e-5, 1.5))
+    small = replace(large, after=Gap(2e-5, 2e-5, 1.1))
+    start = "Verdict: named, coulomb_friction"
 
-    assert text.startswith(
-        "Verdict: named, coulomb_friction (a part stays unexplained)"
+    assert diagnosis_text(large, width=80).startswith(
+        f"{start} (a part stays unexplained)"
+    )
+    assert diagnosis_text(small, width=80).startswith(
+        f"{start} (little more than the noise remains)"
     )
 
 

@@ -345,6 +345,23 @@ def test_all_of_the_base_may_be_known():
     assert parameters(found.effects[0])["force_N"] == pytest.approx(0.8, rel=0.01)
 
 
+def test_under_a_measured_force_the_mass_is_found_and_friction_is_not_scaled():
+    """Force constant 5 N/A times the current is the force; the mass is given 17 % low."""
+    force = [
+        replace(one, input=5.0 * one.input, input_unit="N")
+        for one in recordings(FRICTION)
+    ]
+    given = simulation(mass_kg=0.25, force_constant_N_per_A=1.0)
+    found = diagnosed(force, given)
+    assert found.verdict == "named"
+    assert parameters(found.effects[0])["force_N"] == pytest.approx(0.8, rel=0.01)
+    after = {one.name: one.after for one in found.base}
+    assert after["mass_kg"] == pytest.approx(0.3, rel=0.01)
+    assert "force_constant_N_per_A" not in after
+    assert extended_options(found, given).mass_kg == after["mass_kg"]
+    assert not any("mass" in one for one in found.not_observable)
+
+
 def test_keys_of_diagnoses_without_known_parameters_are_those_of_before():
     given, options = recordings(), DiagnoseOptions()
     model = asdict(simulation())

@@ -26,7 +26,13 @@ from hwid_cli.report.charts import (
     thinned_places,
     thinning,
 )
-from hwid_cli.report.diagnosis import quantity_and_unit, shown_value, warning_sentences
+from hwid_cli.report.diagnosis import (
+    leaves_little,
+    moved_parameters,
+    quantity_and_unit,
+    shown_value,
+    warning_sentences,
+)
 from hwid_cli.report.dots import Dot, DotGroup, DotRow, Dots
 from hwid_cli.report.figures.diagnosis_curves import telling_stretch
 from hwid_cli.report.formats import counted, listed, percent, with_unit
@@ -94,8 +100,7 @@ def verdict_in_words(diagnosis: Diagnosis) -> str:
         )
         return text[:1].upper() + text[1:]
     if diagnosis.verdict == "named" and found:
-        rest = "" if diagnosis.complete else " A part of the gap stays unexplained."
-        return f"The simulation lacks {listed(found)}.{rest}"
+        return f"The simulation lacks {listed(found)}.{_rest(diagnosis)}"
     if diagnosis.verdict == "ambiguous" and found:
         others = [effect_name(one) for one in diagnosis.ambiguous_with]
         return (
@@ -111,13 +116,26 @@ def verdict_in_words(diagnosis: Diagnosis) -> str:
     return diagnosis.summary
 
 
+def _rest(diagnosis: Diagnosis) -> str:
+    """What stays unexplained beside the effects; empty for nothing."""
+    if diagnosis.complete:
+        return ""
+    if leaves_little(diagnosis):
+        return " Little more than the noise remains."
+    return " A part of the gap stays unexplained."
+
+
 def _effect_in_words(effect: FittedEffect, diagnosis: Diagnosis) -> str:
     """``Coulomb friction: 0.799 N [0.797, 0.801]``."""
     values = []
     for one in effect.parameters:
         quantity, unit = quantity_and_unit(one.name)
         unit = unit_of_effect(
-            effect.id, unit, axis=diagnosis.axis, output=diagnosis.output
+            effect.id,
+            unit,
+            axis=diagnosis.axis,
+            output=diagnosis.output,
+            source=diagnosis.input_unit,
         )
         name = f"{quantity} " if len(effect.parameters) > 1 else ""
         values.append(f"{name}{value_with_interval(one, unit)}")
@@ -159,17 +177,16 @@ def _largest_shift(diagnosis: Diagnosis) -> str:
     """The parameter that moved most, in words."""
     moved = [
         (abs(one.refitted / one.before - 1.0), one)
-        for one in diagnosis.base
+        for one in moved_parameters(diagnosis)
         if one.before != 0.0 and isfinite(one.refitted / one.before)
     ]
     if not moved:
         return ""
     _, most = max(moved, key=lambda pair: pair[0])
-    quantity, unit = quantity_and_unit(most.name)
-    behind = "" if unit == "-" else f"\N{NO-BREAK SPACE}{unit}"
+    behind = "" if most.unit == "-" else f"\N{NO-BREAK SPACE}{most.unit}"
     share = 100.0 * (most.refitted / most.before - 1.0)
     return (
-        f", most of all the {quantity}: {most.before:.4g} given, {most.refitted:.4g}{behind} "
+        f", most of all the {most.quantity}: {most.before:.4g} given, {most.refitted:.4g}{behind} "
         f"fitted ({share:+.1f}\N{NO-BREAK SPACE}%)"
     )
 
