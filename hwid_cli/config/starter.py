@@ -28,7 +28,7 @@ _CONVERTED = {
 _STARTS = {
     "rest": ("# diagnose: {max_effects: 2}",),
     "held": (
-        "# 'cut' takes away the rest before sines: the drive still holds its level.",
+        "# Sines begin with a rest, where friction may hold the drive at any level.",
         "# diagnose: {max_effects: 2, initial_state: held}",
     ),
     "estimated": (

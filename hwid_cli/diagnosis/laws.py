@@ -48,6 +48,7 @@ from hwid_cli.drive.simulation import drive_effects
 from hwid_cli.records.axis import unit_on
 from hwid_cli.records.candidates import CandidateFit
 from hwid_cli.records.diagnosis import SMALL_REMAINDER
+from hwid_cli.records.drive import BASE_PARAMETERS
 from hwid_cli.records.own_effects import OwnEffect, OwnParameter, own_id, own_of
 
 # The verdict, and the name of the effect that holds a law.
@@ -240,10 +241,17 @@ def _as_effect(
     """A subset as an effect with a parameter for each coefficient and shape."""
     weights, of_base = coefficients(columns, subset.places)
     terms = tuple(columns.terms[place] for place in subset.places)
-    base = base_of(rounds.baseline.drive)
+    drive = rounds.baseline.drive
+    base = base_of(drive)
     if acts_on == "force":
-        changes = dict(zip(base, (-of_base[2], -of_base[1], of_base[3]), strict=True))
-        base = {name: _near(base[name], changes[name]) for name in base}
+        changes = (-of_base[2], -of_base[1], of_base[3])
+        for name, change in zip(BASE_PARAMETERS, changes, strict=True):
+            base[name] = _near(base[name], change)
+        if drive.is_driven_by_force:
+            # The regression holds the mass; here the force sets the scale.
+            share = drive.force_constant_N_per_A / base["force_constant_N_per_A"]
+            base = {name: share * value for name, value in base.items()}
+            weights = share * weights
         variables = set().union(*(one.variables for one in terms))
         if "u" in variables and variables <= {"u", "t"}:
             # As a force it would be the same; it is said where it acts.

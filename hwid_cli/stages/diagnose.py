@@ -36,6 +36,7 @@ from hwid_cli.stages.diagnosis_starts import (
     moving_starts,
     starts_sentence,
     unsettled_starts,
+    with_rests,
 )
 from hwid_cli.stages.fit_seconds import counted
 from hwid_cli.stages.foreign_simulation import (
@@ -350,6 +351,8 @@ def given_by(
             )
     for refused in refused_units(experiment, recordings, logs):
         raise ConfigError(refused)
+    if isinstance(simulation, SimulationOptions):
+        recordings = tuple(with_rests(recordings, logs))
     return ToDiagnose(experiment, recordings, simulation, options, logs)
 
 

@@ -1,5 +1,8 @@
 """Whether recordings can start as a diagnosis takes them to: at rest, in equilibrium.
 
+Models need no rest before an excitation, and `cut` takes it away. A simulation starts from
+it: the last of it is given back where the log has it.
+
 A recording that was cut at the onset of its excitation begins with an input to which the
 drive has not answered yet; a simulation that starts in equilibrium with that input is off
 from its first sample, and no missing effect explains that. Where the cut went on into the
@@ -7,6 +10,7 @@ motion, as it may in a random signal, the drive is not even at rest.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -28,6 +32,49 @@ _AWAY = 5.0
 # not off by so much, [-].
 _AWAY_SHARE = 0.5
 _MOST_NAMED = 4
+# So much of a rest is given back, enough to be one, [samples].
+_KEPT_REST = 2 * LEAST_QUIET
+
+
+def with_rests(
+    recordings: Sequence[Recording], logs: Sequence[CalibrationLog]
+) -> list[Recording]:
+    """Recordings with the last of the rest that was cut before their excitation.
+
+    An onset is found where the input is clearly away from its rest, and its first samples
+    are cut as well: a drive that starts there starts too late.
+
+    Parameters
+    ----------
+    logs : sequence of CalibrationLog
+        Of these and maybe of others. What one does not hold is not given back.
+    """
+    by_name = {log.name: log for log in logs}
+    return [
+        _with_rest(one, by_name[one.name]) if one.name in by_name else one
+        for one in recordings
+    ]
+
+
+def _with_rest(recording: Recording, log: CalibrationLog) -> Recording:
+    first = log.first_sample
+    measured = as_measured(recording, log) if first else None
+    if measured is None or recording.reference is not None:
+        return recording
+    # Other cuts begin in mid-motion, or keep a rest.
+    is_rest = find_onset(measured[0], quiet_is_rest=True) == first
+    if not is_rest or _moves_before(recording, log):
+        return recording
+    kept = slice(max(first - _KEPT_REST, 0), first)
+    rest_input = measured[0][kept] - log.input_offset
+    rest_output = measured[1][kept] - log.output_offset
+    if not (np.isfinite(rest_input).all() and np.isfinite(rest_output).all()):
+        return recording
+    return replace(
+        recording,
+        input=np.r_[rest_input, recording.input],
+        output=np.r_[rest_output, recording.output],
+    )
 
 
 def unsettled_starts(
@@ -108,8 +155,10 @@ def moving_starts(
 
 
 def _moves_before(recording: Recording, log: CalibrationLog) -> bool:
-    measured = as_measured(recording, log) if log.first_sample else None
+    is_cut = log.first_sample > 0 and recording.n_samples == log.n_samples
+    measured = as_measured(recording, log) if is_cut else None
     if measured is None:
+        # Of others the rest was not cut, or was given back.
         return False
     onset = find_onset(measured[1], quiet_is_rest=True)
     return onset is not None and LEAST_QUIET <= onset < log.first_sample

@@ -16,6 +16,7 @@ from hwid_cli.stages.diagnosis_starts import (
     moving_starts,
     starts_sentence,
     unsettled_starts,
+    with_rests,
 )
 from tests.blind.campaign import measured_case
 from tests.blind.cases import make_case
@@ -124,6 +125,41 @@ def test_a_random_signal_that_is_cut_in_mid_motion_is_named(rule):
 def test_a_random_signal_that_keeps_its_rest_is_not_in_motion():
     whole, logs = calibrate_all([random_after_a_rest()], CalibrateOptions())[:2]
     assert moving_starts(whole, logs, REST) == ()
+
+
+def sines_after_a_rest():
+    """As measured: a zero of 2 A and of the output, sines after a rest."""
+    return [
+        RawRecording(
+            one.name, one.input + 2.0, one.output + 1e-3, STEP_S, kind=one.kind
+        )
+        for one in with_lead_in(cut=False)
+        if one.name.startswith("sine")
+    ]
+
+
+def test_the_rest_that_was_cut_is_given_back_to_a_simulation():
+    offsets = CalibrateOptions(sine=("cut", "input_offset"))
+    raws = sines_after_a_rest()
+    cut, logs = calibrate_all(raws, offsets)[:2]
+    given = with_rests(cut, logs)
+    for raw, before, one, log in zip(raws, cut, given, logs, strict=True):
+        assert one.n_samples == before.n_samples + 40
+        first = log.first_sample - 40
+        assert one.input == pytest.approx(raw.input[first:] - log.input_offset)
+        assert one.output == pytest.approx(raw.output[first:])
+        assert one.input[:38] == pytest.approx(np.full(38, 2.0 - log.input_offset))
+    assert moving_starts(given, logs, REST) == ()
+
+
+def test_what_was_cut_in_mid_motion_or_not_at_all_stays_as_it_is():
+    cut, logs = calibrate_all(
+        [random_after_a_rest()], CalibrateOptions(random=("cut",))
+    )[:2]
+    assert with_rests(cut, logs) == list(cut)
+    whole, logs = calibrate_all(sines_after_a_rest(), CalibrateOptions())[:2]
+    assert with_rests(whole, logs) == list(whole)
+    assert with_rests(whole, ()) == list(whole)
 
 
 def blind_cases():
