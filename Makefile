@@ -277,7 +277,7 @@ blind: $(DEV)  ## blind test with effects hidden by a separate generator, and do
 	  --number $(BLIND_NUMBER) --jobs 2 --work $(BLIND) --write docs/blind_test.md
 
 # Independent equations and integrators. Each of the seeds for reports is for one of them.
-MACHINE_SEEDS := fifth_reporting
+MACHINE_SEEDS := sixth_reporting
 machines: $(DEV)  ## diagnosis of machines of independent making, and a simple peer on the same: an hour
 	$(BIN)/python -m tests.machines.run_machines --seeds $(MACHINE_SEEDS) --jobs 2 \
 	  --work results/machines --write results/machines/table.md

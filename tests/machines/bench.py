@@ -23,6 +23,7 @@ SEEDS = {
     "third_reporting": 63_580_417,
     "fourth_reporting": 18_946_035,
     "fifth_reporting": 52_718_394,
+    "sixth_reporting": 87_205_631,
 }
 # Largest share by which the simulation's parameters are wrong.
 LARGEST_ERROR = 0.3
