@@ -141,11 +141,13 @@ def _show_warnings(experiment: Experiment, checked: Checked, out: Path) -> None:
     context = Context(experiment, out, {"calibrate": calibrated})
     # What a simulation is compared with needs no section 'diagnose' to be looked at.
     extra = () if experiment.simulation is None else ("diagnose",)
+    said: list[str] = []
     for name in dict.fromkeys((*named(experiment), *extra)):
         stage = stage_named(name)
         if stage.needs == ("calibrate",):
-            for warning in stage.warnings(context, stage.choose(context)):
-                click.echo(f"hwid: {warning}", err=True)
+            said += stage.warnings(context, stage.choose(context))
+    for warning in dict.fromkeys(said):
+        click.echo(f"hwid: {warning}", err=True)
 
 
 def _show_plan(

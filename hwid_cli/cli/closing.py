@@ -26,6 +26,10 @@ from hwid_cli.store.cache import Hdf5Store
 PAGE = "report.html"
 TABLES = "tables.txt"
 _RUN = "run"
+# Stages whose results are easier read on the page, where there is none yet.
+_WITH_PAGE = ("diagnose", "test")
+# Of a diagnosis; the page has all.
+_MOST_WARNINGS = 2
 # What follows a stage, unless its results say more.
 _NEXT = {
     "simulate": "run",
@@ -58,6 +62,7 @@ def say_end(session: Session, name: str, files: Sequence[str] = ()) -> None:
         rows.append(("orders", orders_sentence(advice.orders, advice.maps)))
     if diagnosis is not None:
         rows.append(("simulation", diagnosis_sentence(diagnosis)))
+        rows += [("warning", one) for one in diagnosis.warnings[:_MOST_WARNINGS]]
     wanted = session.results.get("next")
     if wanted is not None:
         rows.append(("record", recordings_sentence(wanted, session.out / "next")))
@@ -113,6 +118,8 @@ def _places(session: Session, name: str, files: Sequence[str]) -> list[tuple[str
     out, rows = session.out, []
     if (out / PAGE).is_file():
         rows.append(("page", str(out / PAGE)))
+    elif name in _WITH_PAGE:
+        rows.append(("page", f"{command_line(session, 'report')} draws it"))
     if name == _RUN and (out / TABLES).is_file():
         rows.append(("tables", str(out / TABLES)))
     known = files or (() if name == _RUN else stage_named(name).files)

@@ -56,6 +56,7 @@ from hwid_cli.stages.simulation_units import (
     refused_units,
 )
 from hwid_cli.stages.stage import Context, Planning, Runner, Stage, in_results
+from hwid_cli.stages.swapped_signals import swapped_sentence
 from hwid_cli.store.diagnosis_results import (
     read_diagnosis,
     read_diagnosis_record,
@@ -396,6 +397,8 @@ def _warnings(context: Context, given: ToDiagnose) -> list[str]:
     for sentence in (moving_sentence(moving, recordings), starts):
         if sentence:
             said.append(f"{context.experiment.source}: {sentence}")
+    if simulation.controller is None and "identify" not in context.results:
+        said.append(swapped_sentence(recordings, str(context.experiment.source)))
     return [one for one in said if one]
 
 

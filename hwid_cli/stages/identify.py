@@ -22,6 +22,7 @@ from hwid_cli.stages.ranking import best_fits, count_statuses
 from hwid_cli.stages.residuals import own_residuals
 from hwid_cli.stages.selection import select_recordings
 from hwid_cli.stages.stage import Context, Planning, Runner, Stage, in_results
+from hwid_cli.stages.swapped_signals import swapped_sentence
 from hwid_cli.store.result_files import Provenance
 from hwid_cli.store.results import read_fits, write_fits
 from hwid_cli.tasks.cache import Store, model_key, recording_key, task_key
@@ -299,6 +300,12 @@ def _absent(task: Task) -> Fit:
     return Fit((recording.name,), orders, options, nobody, "stalled", "not stored")
 
 
+def _warnings(context: Context, given: _Given) -> list[str]:
+    """Whether input and output may be swapped."""
+    said = swapped_sentence(given.recordings, str(context.experiment.source))
+    return [said] if said else []
+
+
 STAGE = Stage(
     name=NAME,
     needs=("calibrate",),
@@ -313,4 +320,5 @@ STAGE = Stage(
     tables=_tables,
     files=("results.h5",),
     plan=_plan,
+    warnings=_warnings,
 )

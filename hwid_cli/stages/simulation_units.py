@@ -46,6 +46,9 @@ _LADDERS = (
     ("mN", "N", "kN"),
     ("mN m", "N m", "kN m"),
     ("us", "ms", "s"),
+    ("mm/s", "m/s"),
+    ("mrad", "rad"),
+    ("mrad/s", "rad/s"),
 )
 
 
