@@ -109,7 +109,7 @@ def _refit_base(
     if not is_rugged(tuple(present)) or found.whiteness <= 1.0:
         return found
     starts = grown_starts(start, tuple(present), scales)
-    grown = fit_grown(problem, (), starts, scales, noise)
+    grown = fit_grown(problem, found, starts, scales, noise)
     return grown if grown.sse.sum() < found.sse.sum() else found
 
 

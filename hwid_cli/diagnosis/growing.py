@@ -10,6 +10,7 @@ continuation in the length of the recordings. docs/method_diagnosis.md, eq. (D18
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -21,9 +22,17 @@ from hwid_cli.diagnosis.candidate import (
     reached_by,
 )
 from hwid_cli.diagnosis.few_samples import fewer_recordings, first_parts
-from hwid_cli.diagnosis.parameters import BASE, ParameterLayout, ParameterPoint
+from hwid_cli.diagnosis.parameters import (
+    BASE,
+    ParameterLayout,
+    ParameterPoint,
+    first_point,
+    residuals_at,
+    sum_of_squares,
+)
 from hwid_cli.diagnosis.problem import DiagnosisProblem
-from hwid_cli.diagnosis.search import SearchResult, fit_point, within_bounds
+from hwid_cli.diagnosis.search import SearchResult, fit_own, fit_point, within_bounds
+from hwid_cli.diagnosis.whiteness import whiteness
 from hwid_cli.drive.catalogue import CATALOGUE
 from hwid_cli.drive.effect import Scales
 from hwid_cli.drive.simulation import drive_effects
@@ -46,6 +55,14 @@ ITERATIONS = 4
 MOST_GROWTH, LEAST_GROWTH = 1.3, 1.07
 MOST_RISE = 1.06
 BOLDER = 1.4
+# Where nothing else is missing, early parts leave noise: a set that leaves this mean square
+# over it twice in a row, of less than that share of the recordings, grows no further. Nor
+# does one that has lost its way so often there, or that does no better there, by this
+# factor, than the fit to whole recordings.
+NO_HOPE = 2.0
+EARLY = 0.3
+MOST_LOST = 5
+LEAST_BETTER = 1.02
 # Points whose coordinates differ by less are one.
 SAME_POINT = 1e-4
 # Valleys that leave at most so many times the RMS of the deepest one are as likely.
@@ -95,7 +112,7 @@ def with_valleys_of(found: CandidateFit, before: CandidateFit) -> CandidateFit:
 
 def fit_grown(
     problem: DiagnosisProblem,
-    effects: tuple[str, ...],
+    standing: CandidateFit,
     starts: Sequence[SearchStart],
     scales: Scales,
     noise: NoiseFloor,
@@ -104,13 +121,18 @@ def fit_grown(
 
     Parameters
     ----------
-    effects : tuple of str
-        Ids in the catalogue, without those that the simulation has.
+    standing : CandidateFit
+        Where a fit to whole recordings has stopped.
     starts : sequence of SearchStart
-        At least one.
+        That place first.
+
+    Returns
+    -------
+    CandidateFit
+        Of the same effects; the standing one where growth leads nowhere.
     """
     train = problem.part(held_out=False)
-    everything = (*drive_effects(problem.drive), *effects)
+    everything = (*drive_effects(problem.drive), *standing.effects)
     few = fewer_recordings(train, GROWN_SAMPLES)
     n_first = int(FIRST_SHARE * _longest(few))
     first = first_parts(few, n_first)
@@ -118,10 +140,12 @@ def fit_grown(
         fit_from(first, everything, one, scales, MOST_ITERATIONS) for one in starts
     ]
     growth = _Growth(few, begun[0].layout, noise)
-    found = growth.through([_Reached.of(one) for one in begun], n_first)
+    found = growth.through([_Reached.of(one) for one in begun], n_first, starts[0])
+    if not found:
+        return standing
     start = reached_by(few, growth.whole(found[0]))
     best = fit_from(train, everything, start, scales, MOST_ITERATIONS)
-    fit = evaluated(problem, effects, best, train, noise)
+    fit = evaluated(problem, standing.effects, best, train, noise)
     return replace(fit, valleys=growth.valleys(found))
 
 
@@ -155,16 +179,25 @@ class _Growth:
             [0.0 if one.owner == BASE else BESIDE for one in fit_layout.shared]
         )
 
-    def through(self, begun: Sequence[_Reached], n_samples: int) -> list[_Reached]:
+    def through(
+        self, begun: Sequence[_Reached], n_samples: int, standing: SearchStart
+    ) -> list[_Reached]:
         """Grow from parts of so many samples to whole recordings.
+
+        Parameters
+        ----------
+        standing : SearchStart
+            Where a fit to whole recordings has stopped.
 
         Returns
         -------
         list of _Reached
-            On whole recordings, the best first.
+            On whole recordings, the best first; empty where early parts leave more than
+            noise, or nothing is gained there.
         """
         kept = _distinct(begun, SIDE_BY_SIDE)
         n, growth, before = n_samples, MOST_GROWTH, 1.0
+        early, n_lost = int(EARLY * _longest(self.few)), 0
         while True:
             longer = min(max(int(growth * n), n + 1), _longest(self.few))
             part = first_parts(self.few, longer)
@@ -175,12 +208,32 @@ class _Growth:
                 growth = max(growth**0.5, LEAST_GROWTH)
                 continue
             if is_lost:
+                n_lost += 1
                 there += self._fitted(part, self._beside(kept, 0))
                 now = self._over_noise(part, there)
+            is_hopeless = n_lost > MOST_LOST or min(before, now) > NO_HOPE
+            if longer < early and is_hopeless:
+                return []
+            if n < early <= longer and not self._gains(part, now, standing):
+                return []
             n, before, growth = longer, now, min(growth**BOLDER, MOST_GROWTH)
             if n >= _longest(self.few):
                 return _distinct(there, len(there))
             kept = _distinct(there, SIDE_BY_SIDE // 2)
+
+    def _gains(self, part: DiagnosisProblem, now: float, standing: SearchStart) -> bool:
+        """Whether growth leaves less of early parts than the fit to whole recordings.
+
+        Where that left nothing but noise, the other valleys are worth knowing.
+        """
+        base: dict[str, Any] = dict(standing.base)
+        drive = replace(self.few.drive, **base)
+        shared = first_point(self.few, self.layout, drive, standing.effects).shared
+        point = fit_own(self.few, self.layout, shared)
+        if whiteness(residuals_at(self.few, self.layout, point), self.noise) <= 1.0:
+            return True
+        left = sum_of_squares(residuals_at(part, self.layout, point))
+        return self._over_noise(part, [_Reached(point, left)]) > LEAST_BETTER * now
 
     def whole(self, here: _Reached) -> SearchResult:
         """A fit to whole recordings, to its end."""

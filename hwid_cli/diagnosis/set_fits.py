@@ -272,7 +272,7 @@ class SetFits:
         """Fit the best rugged set of a size to growing parts.
 
         The best set itself even where it is complete: how sure its values are shows in the
-        other valleys only. Another set where the best one leaves something.
+        other valleys only. Another single effect where the best one leaves something.
         """
         best, criteria = self.best_of_size(size), self.rounds.criteria
         are_pieces = any(one.start is not None for one in self.rounds.problem.signals)
@@ -286,7 +286,8 @@ class SetFits:
                 for one in self.of_size(size)
                 if is_rugged(one.effects) and criteria.excess(one) <= most
             ]
-            if criteria.is_complete(best) or not near:
+            # Larger sets begin with what was found for single effects.
+            if size > 1 or criteria.is_complete(best) or not near:
                 return
             chosen = min(near, key=criteria.excess)
         self.rounds.on_round(f"{name_of(size)}, growing parts", 1)
@@ -341,13 +342,13 @@ def _growing_task(rounds: Rounds, found: CandidateFit) -> DiagnosisTask:
     return DiagnosisTask(
         name="+".join(found.effects),
         function=fit_grown,
-        arguments=(problem, found.effects, starts, baseline.scales, baseline.noise),
+        arguments=(problem, found, starts, baseline.scales, baseline.noise),
         result_type=CandidateFit,
         content={
             "effects": found.effects, "starts": starts, "hold": problem.drive.hold,
             "grown": True,
         },
-        arrays=(rounds.base.values,),
+        arrays=(rounds.base.values, found.values, found.own, found.sse),
     )  # fmt: skip
 
 
