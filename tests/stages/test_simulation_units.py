@@ -11,6 +11,7 @@ from hwid_cli.records.experiment import (
     DiagnoseOptions,
     Experiment,
     RecordingsOptions,
+    SimulationOptions,
 )
 from hwid_cli.records.recordings import CalibrationLog, SignalUnit
 from hwid_cli.stages.diagnose import diagnose
@@ -208,6 +209,28 @@ def test_milliseconds_give_themselves_away_where_nothing_holds_the_drive():
     found = [replace(first, input=bump, output=way, sample_time_s=1.0)]
     assert "{time: ms} if it is in ms" in doubt(found, free)
     assert doubt([replace(found[0], sample_time_s=1e-3)], free) == ""
+
+
+@pytest.mark.parametrize("unit", ["m/s", "rad/s"])
+def test_a_speed_in_thousandths_gives_itself_away(unit):
+    """A speed in mm/s, or mrad/s, where nobody says a unit."""
+    axis = {
+        "mass_kg": "inertia_kg_m2", "damping_N_s_per_m": "damping_N_m_s_per_rad",
+        "stiffness_N_per_m": "stiffness_N_m_per_rad",
+        "force_constant_N_per_A": "torque_constant_N_m_per_A",
+    }  # fmt: skip
+    base = {name: getattr(DRIVE, name) for name in axis}
+    turning = {axis[name]: value for name, value in base.items()}
+    model = SimulationOptions(
+        **(turning if unit == "rad/s" else base), output="velocity"
+    )
+    found = [
+        replace(one, output=1e3 * np.gradient(one.output, 1e-3), output_unit=unit)
+        for one in recordings()
+    ]
+    assert f"{{output: m{unit}}} if it is in m{unit}" in doubt(found, model)
+    right = [replace(one, output=one.output / 1e3) for one in found]
+    assert doubt(right, model) == ""
 
 
 @pytest.mark.parametrize("factor", [1.0, 250.0, 1 / 250.0])
