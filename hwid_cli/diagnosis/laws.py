@@ -48,7 +48,7 @@ from hwid_cli.drive.simulation import drive_effects
 from hwid_cli.records.axis import unit_on
 from hwid_cli.records.candidates import CandidateFit
 from hwid_cli.records.diagnosis import SMALL_REMAINDER
-from hwid_cli.records.drive import BASE_PARAMETERS
+from hwid_cli.records.drive import BASE_PARAMETERS, BASE_UNDER_FORCE
 from hwid_cli.records.own_effects import OwnEffect, OwnParameter, own_id, own_of
 
 # The verdict, and the name of the effect that holds a law.
@@ -250,7 +250,8 @@ def _as_effect(
         if drive.is_driven_by_force:
             # The regression holds the mass; here the force sets the scale.
             share = drive.force_constant_N_per_A / base["force_constant_N_per_A"]
-            base = {name: share * value for name, value in base.items()}
+            scaled = {name: share * base[name] for name in BASE_UNDER_FORCE}
+            base = {**base_of(drive), **scaled}
             weights = share * weights
         variables = set().union(*(one.variables for one in terms))
         if "u" in variables and variables <= {"u", "t"}:

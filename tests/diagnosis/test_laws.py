@@ -11,7 +11,12 @@ from hwid_cli import DiagnoseOptions, Recording, SimulationOptions, diagnose
 from hwid_cli.config.extended_simulation import write_extended_simulation
 from hwid_cli.config.load import experiment_of, load_experiment
 from hwid_cli.diagnosis import laws, set_fits
-from hwid_cli.diagnosis.candidate import fit_candidate
+from hwid_cli.diagnosis.candidate import (
+    compared_with_fit,
+    fit_candidate,
+    fitted_drive,
+)
+from hwid_cli.diagnosis.latent_force import latent_force
 from hwid_cli.diagnosis.law_terms import Term
 from hwid_cli.diagnosis.laws import _is_wanted
 from hwid_cli.diagnosis.rounds import RoundsResult
@@ -20,7 +25,17 @@ from hwid_cli.diagnosis.verdict import DiagnosisVerdict
 from hwid_cli.records.own_effects import own_id
 from hwid_cli.stages.diagnose import extended_options
 from tests.diagnosis.made_up_fits import CRITERIA, base, made_up
-from tests.diagnosis.small_drive import NOISE, STEP_S, inputs, search_start
+from tests.diagnosis.small_drive import (
+    NOISE,
+    STEP_S,
+    fit,
+    inputs,
+    problem,
+    recordings,
+    search_start,
+    sizes,
+    white,
+)
 from tests.diagnosis.small_rounds import rounds_of
 from tests.laws.machine import Base, Hidden, measured
 from tests.stages.diagnosed_drive import FRICTION
@@ -292,3 +307,34 @@ def test_a_law_leaves_of_other_recordings_what_it_leaves_of_its_own(
     )
     rounds = SimpleNamespace(criteria=criteria, base="base")
     assert laws._is_as_good_elsewhere(rounds, "law") == agrees
+
+
+@pytest.mark.parametrize("is_force", [False, True])
+def test_what_sets_the_scale_stays_where_a_law_begins(is_force):
+    """Under a current the mass, and under a force its constant: the mass is found."""
+    measured = recordings({"cubic_stiffness": {"stiffness_N_per_m3": 8e5}})
+    if is_force:
+        measured = [
+            replace(one, input=5.0 * one.input, input_unit="N") for one in measured
+        ]
+    of = problem(
+        measured, mass_kg=0.27, force_constant_N_per_A=1.0 if is_force else 5.0
+    )
+    rounds = rounds_of(FRICTION, (), problem=of, base=fit(of))
+    drive = fitted_drive(of.drive, rounds.base)
+    rounds = replace(rounds, baseline=replace(rounds.baseline, drive=drive))
+    before = compared_with_fit(of, rounds.base, sizes(of))
+    tried = laws._likely(rounds, before, latent_force(before, drive, white()))
+
+    held = "force_constant_N_per_A" if is_force else "mass_kg"
+    moved = "mass_kg" if is_force else "force_constant_N_per_A"
+    as_forces = [one.start.base for one in tried if one.acts_on == "force"]
+    assert as_forces
+    assert {one[held] for one in as_forces} == {getattr(drive, held)}
+    assert any(one[moved] != getattr(drive, moved) for one in as_forces)
+    # Ratios to the mass alone are known: 1184 N/m over 0.3 kg.
+    nearest = min(
+        abs(one["stiffness_N_per_m"] / one["mass_kg"] - 1184.0 / 0.3)
+        for one in as_forces
+    )
+    assert nearest < 0.1 * 1184.0 / 0.3
