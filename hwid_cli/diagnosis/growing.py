@@ -9,7 +9,7 @@ continuation in the length of the recordings. docs/method_diagnosis.md, eq. (D18
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -25,7 +25,6 @@ from hwid_cli.diagnosis.few_samples import fewer_recordings, first_parts
 from hwid_cli.diagnosis.parameters import (
     BASE,
     ParameterLayout,
-    ParameterPoint,
     first_point,
     residuals_at,
     sum_of_squares,
@@ -140,7 +139,7 @@ def fit_grown(
         fit_from(first, everything, one, scales, MOST_ITERATIONS) for one in starts
     ]
     growth = _Growth(few, begun[0].layout, noise)
-    found = growth.through([_Reached.of(one) for one in begun], n_first, starts[0])
+    found = growth.through(begun, n_first, starts[0])
     if not found:
         return standing
     start = reached_by(few, growth.whole(found[0]))
@@ -151,18 +150,6 @@ def fit_grown(
 
 def _longest(problem: DiagnosisProblem) -> int:
     return max(one.driven_by.size for one in problem.signals)
-
-
-@dataclass(frozen=True, eq=False)
-class _Reached:
-    """Where a fit to first parts has come."""
-
-    point: ParameterPoint
-    sse: float
-
-    @classmethod
-    def of(cls, found: SearchResult) -> "_Reached":
-        return cls(found.point, found.sse)
 
 
 class _Growth:
@@ -180,8 +167,8 @@ class _Growth:
         )
 
     def through(
-        self, begun: Sequence[_Reached], n_samples: int, standing: SearchStart
-    ) -> list[_Reached]:
+        self, begun: Sequence[SearchResult], n_samples: int, standing: SearchStart
+    ) -> list[SearchResult]:
         """Grow from parts of so many samples to whole recordings.
 
         Parameters
@@ -191,7 +178,7 @@ class _Growth:
 
         Returns
         -------
-        list of _Reached
+        list of SearchResult
             On whole recordings, the best first; empty where early parts leave more than
             noise, or nothing is gained there.
         """
@@ -233,28 +220,27 @@ class _Growth:
         if whiteness(residuals_at(self.few, self.layout, point), self.noise) <= 1.0:
             return True
         left = sum_of_squares(residuals_at(part, self.layout, point))
-        return self._over_noise(part, [_Reached(point, left)]) > LEAST_BETTER * now
+        return left / self._floor(part) > LEAST_BETTER * now
 
-    def whole(self, here: _Reached) -> SearchResult:
+    def whole(self, here: SearchResult) -> SearchResult:
         """A fit to whole recordings, to its end."""
         return fit_point(
             self.few, self.layout, here.point, max_iterations=MOST_ITERATIONS
         )
 
-    def valleys(self, found: Sequence[_Reached]) -> np.ndarray:
+    def valleys(self, found: Sequence[SearchResult]) -> np.ndarray:
         """Shared values of all that are as likely as the best one.
 
         Parameters
         ----------
-        found : sequence of _Reached
+        found : sequence of SearchResult
             On whole recordings, the best first.
 
         Returns
         -------
         ndarray, shape (n_valleys, n_shared)
         """
-        floor = self.few.n_evaluated * self.noise.rms**2
-        most = AS_LIKELY**2 * max(found[0].sse, floor)
+        most = AS_LIKELY**2 * max(found[0].sse, self._floor(self.few))
         return np.array(
             [
                 [
@@ -267,17 +253,15 @@ class _Growth:
         )
 
     def _fitted(
-        self, part: DiagnosisProblem, points: Sequence[_Reached]
-    ) -> list[_Reached]:
+        self, part: DiagnosisProblem, points: Sequence[SearchResult]
+    ) -> list[SearchResult]:
         """Fits to parts of the recordings, from where others have ended."""
         return [
-            _Reached.of(
-                fit_point(part, self.layout, one.point, max_iterations=ITERATIONS)
-            )
+            fit_point(part, self.layout, one.point, max_iterations=ITERATIONS)
             for one in points
         ]
 
-    def _beside(self, kept: Sequence[_Reached], n_there: int) -> list[_Reached]:
+    def _beside(self, kept: Sequence[SearchResult], n_there: int) -> list[SearchResult]:
         """Points near some, in turn, that bring their number to that side by side."""
         near = []
         for number in range(max(SIDE_BY_SIDE - n_there, 0)):
@@ -289,15 +273,21 @@ class _Growth:
             near.append(replace(one, point=within_bounds(self.layout, point)))
         return near
 
-    def _over_noise(self, part: DiagnosisProblem, there: Sequence[_Reached]) -> float:
+    def _over_noise(
+        self, part: DiagnosisProblem, there: Sequence[SearchResult]
+    ) -> float:
         """Mean square of the best one, over that of the noise, [-]."""
+        return min(one.sse for one in there) / self._floor(part)
+
+    def _floor(self, part: DiagnosisProblem) -> float:
+        """Sum of squares of the noise."""
         floor = part.n_evaluated * self.noise.rms**2
-        return min(one.sse for one in there) / max(floor, np.finfo(float).tiny)
+        return max(floor, float(np.finfo(float).tiny))
 
 
-def _distinct(found: Sequence[_Reached], most: int) -> list[_Reached]:
+def _distinct(found: Sequence[SearchResult], most: int) -> list[SearchResult]:
     """The best of the points that differ, so many at most."""
-    chosen: list[_Reached] = []
+    chosen: list[SearchResult] = []
     for one in sorted(found, key=lambda one: one.sse):
         is_new = all(
             np.max(np.abs(one.point.shared - other.point.shared)) > SAME_POINT
