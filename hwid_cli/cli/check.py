@@ -176,7 +176,7 @@ def _show_plan(
                 for name in to_run(experiment)
                 for plan in stage_named(name).plan(planning)
             ]
-            + [page_plan(len(checked.recordings))],
+            + [page_plan(planning)],
             workers,
         )
     click.echo(f"\n{as_text([stages_table(plans, cost, workers)])}")

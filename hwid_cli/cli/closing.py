@@ -3,8 +3,9 @@
 import shlex
 from collections.abc import Sequence
 
-from hwid_cli.cli.session import Session, say_damaged, screen_width
-from hwid_cli.records.best_model import LINEAR, BestModel
+from hwid_cli.cli.session import Session, Timer, screen_width
+from hwid_cli.cli.stage_runner import LinearRunner
+from hwid_cli.records.best_model import BestModel
 from hwid_cli.records.diagnosis import Diagnosis
 from hwid_cli.records.experiment import CrossvalOptions
 from hwid_cli.records.report import StoredResults
@@ -21,7 +22,6 @@ from hwid_cli.simulations.kinds import kind_named
 from hwid_cli.stages.best_model import beside_linear, best_model
 from hwid_cli.stages.model_views import named_fits
 from hwid_cli.stages.table import is_named, stage_named
-from hwid_cli.store.cache import Hdf5Store
 
 PAGE = "report.html"
 TABLES = "tables.txt"
@@ -59,7 +59,8 @@ def say_end(session: Session, name: str, files: Sequence[str] = ()) -> None:
         rows += [("best model", one) for one in best_model_sentences(best)]
     advice = session.results.get("order")
     if advice is not None and name == _RUN:
-        rows.append(("orders", orders_sentence(advice.orders, advice.maps)))
+        maps = advice.maps if best is None or best.is_usable else None
+        rows.append(("orders", orders_sentence(advice.orders, maps)))
     if diagnosis is not None:
         rows.append(("simulation", diagnosis_sentence(diagnosis)))
         rows += [("warning", one) for one in diagnosis.warnings[:_MOST_WARNINGS]]
@@ -90,10 +91,16 @@ def _best(session: Session) -> BestModel | None:
         results={one: results.get(one) for one in ("group",)}
         | {"identify": results["identify"]},
     )
-    store = Hdf5Store(session.cache)
-    recordings = results["calibrate"].recordings
-    found = beside_linear(best, named_fits(stored), recordings, store)
-    say_damaged("best model", store)
+    run, timer = LinearRunner(session, "best model"), Timer()
+    found = beside_linear(
+        best,
+        named_fits(stored),
+        results["calibrate"].recordings,
+        run,
+        nk_role=experiment.orders.nk_role,
+    )
+    if run.has_computed:
+        session.note(f"linear models: {run.counted}, {timer}")
     return found
 
 
@@ -103,7 +110,12 @@ def _hints(session: Session, best: BestModel) -> list[tuple[str, str]]:
     if not best.is_usable:
         return [("hint", nothing_hint(str(experiment.source)))]
     if best.is_linear_better:
-        return [("hint", linear_hint(str(experiment.source)))]
+        # Where maps were compared, and some are better than none, the orders' row says which.
+        maps = getattr(session.results.get("order"), "maps", None)
+        has_better_maps = maps is not None and maps.chosen.has_maps
+        return (
+            [] if has_better_maps else [("hint", linear_hint(str(experiment.source)))]
+        )
     if experiment.group is not None or not best.rmsd >= best.threshold:
         return []
     text = (
@@ -144,7 +156,7 @@ def _next(session: Session, name: str, best: BestModel | None) -> str:
     if best is not None and not best.is_usable:
         return command_line(session, "check")
     if best is not None and best.is_linear_better:
-        return command_line(session, "export", "--model", f"{LINEAR}{best.name}")
+        return command_line(session, "export", "--model", best.linear_name)
     if best is not None:
         return command_line(session, "export", "--model", best.name)
     return command_line(session, "run" if name != _RUN else "identify")

@@ -3,7 +3,8 @@
 from pathlib import Path
 from typing import Any
 
-from hwid_cli.cli.driver import StageRunner, result_of, show_blocks
+from hwid_cli.cli.driver import result_of, show_blocks
+from hwid_cli.cli.linear_models import linear_model
 from hwid_cli.cli.options import Choices
 from hwid_cli.cli.session import Session, open_session
 from hwid_cli.errors import ConfigError, UntrustedFunctionError
@@ -17,11 +18,11 @@ from hwid_cli.files.atomic import replace_file
 from hwid_cli.files.csv_tables import write_compare_csv
 from hwid_cli.records.best_model import LINEAR
 from hwid_cli.records.comparison import Comparison, NamedModel
-from hwid_cli.records.model import Fit, Orders
+from hwid_cli.records.model import Fit
 from hwid_cli.report.comparison import comparison_tables
 from hwid_cli.report.figures.comparison import comparison_figure
 from hwid_cli.report.figures.style import as_png
-from hwid_cli.stages.compare import compare_models, fit_linear
+from hwid_cli.stages.compare import compare_models
 from hwid_cli.stages.own_functions import (
     allow_all_functions,
     described,
@@ -70,7 +71,8 @@ def _compared(
 def _model(session: Session, text: str) -> NamedModel:
     """Model that a word of the command line names."""
     if text.startswith(LINEAR):
-        return _linear(session, text)
+        found = linear_model(session, text, "compare")
+        return chosen_model({text: found}, text, text)
     if text.lower().endswith(".json"):
         return read_exported_model(Path(text))
     if text.lower().endswith(_OTHER_FORMATS):
@@ -102,31 +104,6 @@ def _own_fits(session: Session, name: str) -> dict[str, Fit]:
     else:
         fits = result_of(session, "identify")
     return {fit_name(one, nk_role): one for one in fits if one is not None}
-
-
-def _linear(session: Session, text: str) -> NamedModel:
-    """Linear model of one or several recordings of the configuration, fitted now."""
-    name, orders = _split(session, text)
-    chosen = select_recordings(
-        result_of(session, "calibrate").recordings, name.split("+"), key=text
-    )
-    with StageRunner(session, "compare").tasks(1, "fits", part="linear") as settings:
-        found = fit_linear(chosen, orders, session.experiment.fit, settings)
-    return chosen_model({text: found}, text, text)
-
-
-def _split(session: Session, text: str) -> tuple[str, Orders]:
-
-    parts = text.removeprefix(LINEAR).rsplit("/", 2)
-    if len(parts) != 3 or not all(part.isdecimal() for part in parts[1:]):
-        raise ConfigError(
-            f"{text}: expected linear:RECORDING/NB/NK, such as linear:step_06/2/3"
-        )
-    nb, nk = int(parts[1]), int(parts[2])
-    grid = session.experiment.orders
-    if grid.nk_role == "delay":
-        return parts[0], Orders(nb, grid.nf or 0, nk)
-    return parts[0], Orders(nb, nk, 1)
 
 
 def _write(session: Session, comparison: Comparison) -> None:

@@ -1,12 +1,12 @@
 """``hwid export``: a model as a file that runs elsewhere."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import click
 
 from hwid_cli.cli.driver import result_of
+from hwid_cli.cli.linear_models import linear_model
 from hwid_cli.cli.options import Choices
 from hwid_cli.cli.session import Session, open_session
 from hwid_cli.data.recording_files import recordings_options
@@ -27,11 +27,9 @@ from hwid_cli.records.best_model import LINEAR
 from hwid_cli.records.experiment import RecordingsOptions
 from hwid_cli.records.exported import Exported
 from hwid_cli.records.model import Fit
-from hwid_cli.records.recordings import Recording
 from hwid_cli.records.report import StoredResults
 from hwid_cli.report.thesis_names import thesis_name_of
 from hwid_cli.simulations.kinds import KINDS, kind_named
-from hwid_cli.stages.compare import linear_fit_beside
 from hwid_cli.stages.diagnose import extended_options
 from hwid_cli.stages.extended_program import (
     exactness_of,
@@ -123,47 +121,51 @@ def chosen_model(session: Session, asked: str, *, with_trust: bool = False) -> E
     """
     if asked == SIMULATION:
         return _simulation(session)
+    if asked.startswith(LINEAR):
+        fit = linear_model(session, asked, "export")
+        title = f"{LINEAR}{thesis_name_of(fit.name, fit.orders)}"
+        return _exported(session, fit, (asked, title), "calibrate", with_trust)
     named, stage = _named_fits(session, asked)
     titles = {
         thesis_name_of(name.rsplit("/", 2)[0], fit.orders): name
         for name, fit in named.items()
     }
-    name, fit = find_fit(asked.removeprefix(LINEAR), named, titles)
-    recordings = result_of(session, "calibrate").recordings
+    name, fit = find_fit(asked, named, titles)
     title = next(title for title, known in titles.items() if known == name)
-    if asked.startswith(LINEAR):
-        fit = _linear_fit(asked, name, fit, recordings)
-        name, title = f"{LINEAR}{name}", f"{LINEAR}{title}"
+    made_by = stage if "+" in name else "identify"
+    return _exported(session, fit, (name, title), made_by, with_trust)
+
+
+def _exported(
+    session: Session,
+    fit: Fit,
+    names: tuple[str, str],
+    stage: str,
+    with_trust: bool,
+) -> Exported:
+    """A fit as a file holds it.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Of the model, and its title.
+    stage : str
+        Whose settings and versions made it.
+    """
+    recordings = result_of(session, "calibrate").recordings
+    name, title = names
     exported = export_model(
         fit,
         recordings,
         _options(session),
         name=name,
         title=title,
-        origin=_origin(session, stage if "+" in name else "identify"),
+        origin=_origin(session, stage),
     )
     if not with_trust:
         return exported
     kept = kept_for_test(session.experiment)
     return replace(exported, trust=trust_of(fit, recordings, kept))
-
-
-def _linear_fit(
-    asked: str, name: str, fit: Fit, recordings: Sequence[Recording]
-) -> Fit:
-    """The linear model beside a model, as `run` and the page compare them."""
-    beside = linear_fit_beside(fit, recordings)
-    if beside is None:
-        raise ConfigError(
-            f"--model {asked}: {name} has no maps; expected a model with maps behind "
-            f"{LINEAR!r}; take {name} itself"
-        )
-    if beside.model is None:
-        raise ConfigError(
-            f"--model {asked}: its fit failed ({beside.message}); expected a model; "
-            "choose another one"
-        )
-    return beside
 
 
 def _named_fits(session: Session, asked: str) -> tuple[dict[str, Fit], str]:
@@ -174,7 +176,7 @@ def _named_fits(session: Session, asked: str) -> tuple[dict[str, Fit], str]:
         session.out / results_file("group"), "group"
     )
     # The search takes long: a name of a single recording does not start it.
-    is_single = asked.removeprefix(LINEAR).rsplit("/", 2)[0] in {
+    is_single = asked.rsplit("/", 2)[0] in {
         recording.name for recording in result_of(session, "calibrate").recordings
     }
     search = result_of(session, "group") if has_groups and not is_single else None

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from hwid_cli.cli.options import Choices
 from hwid_cli.cli.progress_lines import ProgressLines
 from hwid_cli.cli.session import Session, Timer, open_session
+from hwid_cli.cli.stage_runner import LinearRunner
 from hwid_cli.config.load import describe_experiment
 from hwid_cli.errors import ConfigError
 from hwid_cli.files.atomic import replace_file
@@ -75,11 +76,13 @@ def write_report(session: Session) -> Path:
     # What draws is loaded where something is drawn.
     from hwid_cli.report.html import report_page
 
-    page = report_page(report_contents(stored), STAGES)
+    linear = LinearRunner(session, "report")
+    page = report_page(report_contents(stored, linear), STAGES)
     keys = {one.file: one.key for one in page.drawings}
     # The page before the figures beside it: it is what people wait for.
     replace_file(path, _signed(page.html + _last_line(key, keys)))
-    session.note_end("report", f"{path} shows {stages}", timer)
+    fits = f"{linear.counted}, " if linear.counted else ""
+    session.note_end("report", f"{fits}{path} shows {stages}", timer)
     _draw(session, page.drawings, keys)
     return path
 

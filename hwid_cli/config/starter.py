@@ -352,7 +352,8 @@ def _validation_lines(layout: FolderLayout, proposal: Proposal) -> list[str]:
         f"# A model covers a recording when its RMSD lies below, in {unit}:",
         f"# {proposal.threshold_reason}. Put the deviation that you can live with.",
         f"crossval: {{threshold: {proposal.threshold!r}}}",
-        "# Which orders to take, which maps and how many break-points, and why.",
+        "# Which orders to take, which maps and how many break-points, and why. Other maps to",
+        "# compare: saturation, dead_zone, polynomial, sigmoid_network, wavelet_network.",
         "order: {maps: [none], units: [3, 5]}",
     ]
     if proposal.held_out:

@@ -16,12 +16,21 @@ class ChosenMaps:
     ----------
     nb, nk : int, [-]
         Place in the order grid.
+    input_units, output_units : int, [-]
+        Sizes; 0 for kinds that have none.
     """
 
     nb: int
     nk: int
     input_map: str
     output_map: str
+    input_units: int = 0
+    output_units: int = 0
+
+    @property
+    def has_maps(self) -> bool:
+        """Whether it is a nonlinear model."""
+        return {self.input_map, self.output_map} != {"none"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,8 +42,8 @@ class ModelAnswer:
     name : str
         ``step_06+step_09/3/7``.
     linear : HammersteinWiener or None
-        Linear output-error model of the same orders and recordings; None where the model
-        itself is linear or the fit failed.
+        The best linear output-error model of the same recordings and order grid; None where
+        the model itself is linear or all linear fits failed.
     chosen_on : tuple of str
         Recordings that chose it among others; empty where its own fit did.
     recordings : tuple of str, length m
@@ -50,10 +59,17 @@ class ModelAnswer:
         Share of the samples whose input lies outside of that by more than its noise.
     threshold : float, [unit]
         NaN where there is none.
+    linear_name : str
+        ``linear:step_06/2/4``; empty without a linear model.
     advice : OrderChoice or None
         Recommended orders; None without a cross-validation.
     maps : ChosenMaps or None
         Recommended maps; None where nobody has compared any at the recommended orders.
+    has_these_maps : bool
+        Whether the model has the recommended maps.
+    advised_rmsd : float, [unit]
+        Mean over ``recordings`` of the model of the same recordings at the recommended
+        orders; NaN where there is none.
     """
 
     name: str
@@ -71,8 +87,11 @@ class ModelAnswer:
     beyond: np.ndarray
     unit: str
     threshold: float
+    linear_name: str = ""
     advice: OrderChoice | None = None
     maps: ChosenMaps | None = None
+    has_these_maps: bool = True
+    advised_rmsd: float = float("nan")
 
     @property
     def median_place(self) -> int:

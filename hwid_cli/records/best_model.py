@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from math import isfinite
 
-# In front of a model's name: the linear one of its orders and recordings.
+# In front of a model's name: the linear one of these orders and recordings.
 LINEAR = "linear:"
 # What judged a model, the strictest first: recordings that nothing has used; recordings
 # that no group may hold; all but its own; its own, for want of others.
@@ -23,8 +23,8 @@ class BestModel:
     judged_on : tuple of str
         Their names.
     rmsd, linear_rmsd : float, [unit]
-        Mean over these recordings: of the model, and of the linear output-error model of
-        the same orders and recordings; NaN where that is not known.
+        Mean over these recordings: of the model, and of the best linear output-error model
+        of the same recordings and order grid; NaN where that is not known.
     unit : str
         Of the output.
     threshold : float, [unit]
@@ -39,6 +39,8 @@ class BestModel:
     fit_percent, linear_fit_percent : float, [%]
         Medians over ``judged_on`` of the model and of the linear one; NaN where that is
         not known.
+    linear_name : str
+        Of that linear model, ``linear:step_06/2/4``; empty where there is none.
     """
 
     name: str
@@ -53,6 +55,7 @@ class BestModel:
     single_rmsd: float = float("nan")
     fit_percent: float = float("nan")
     linear_fit_percent: float = float("nan")
+    linear_name: str = ""
 
     def __post_init__(self) -> None:
         if self.judge not in JUDGES:

@@ -11,6 +11,7 @@ from hwid_cli.records.diagnosis import Diagnosis
 from hwid_cli.records.next import NextRecordings
 from hwid_cli.records.order import MapAdvice, OrderAdvice
 from hwid_cli.report.formats import counted, listed, with_unit
+from hwid_cli.report.map_words import fit_keys
 
 # Room for the words on the left, [characters].
 _LABELS = 12
@@ -64,11 +65,12 @@ def best_model_sentences(best: BestModel) -> list[str]:
 
     Examples
     --------
-    >>> found = BestModel("a/2/3", "test", ("c",), 0.002, "m", 0.01, linear_rmsd=0.03)
+    >>> found = BestModel("a/2/3", "test", ("c",), 0.002, "m", 0.01, linear_rmsd=0.03,
+    ...                   linear_name="linear:a/1/2")
     >>> for said in best_model_sentences(found):
     ...     print(*said.split())
     a/2/3: RMSD 0.002 m on 1 recording never used (c)
-    linear model of the same orders: 0.03 m
+    best linear model, linear:a/1/2: 0.03 m
     below the 0.01 m of crossval.threshold
     """
     which = listed(best.judged_on, most=_FEW)
@@ -87,7 +89,7 @@ def best_model_sentences(best: BestModel) -> list[str]:
     said = [f"{best.name}: {mean} {with_unit(best.rmsd, best.unit)} on {on}"]
     if np.isfinite(best.linear_rmsd):
         linear = with_unit(best.linear_rmsd, best.unit)
-        said.append(f"linear model of the same orders: {linear}")
+        said.append(f"best linear model, {best.linear_name}: {linear}")
     said += _beside_threshold(best.rmsd, best)
     if best.single and np.isfinite(best.single_rmsd):
         helps = "helps" if best.rmsd < best.single_rmsd else "does not help"
@@ -126,9 +128,9 @@ def _linear_sentences(best: BestModel, mean: str, on: str) -> list[str]:
     """Say that maps make a model worse where its fit has not seen the recordings."""
     linear, own = (with_unit(rmsd, best.unit) for rmsd in (best.linear_rmsd, best.rmsd))
     return [
-        f"the linear model of the same orders is better: {mean} {linear} on {on}",
+        f"a linear model is better, {best.linear_name}: {mean} {linear} on {on}",
         *_beside_threshold(best.linear_rmsd, best),
-        f"{best.name}: {own}; maps are not worth it here",
+        f"{best.name}: {own}; these maps are not worth it here",
     ]
 
 
@@ -148,7 +150,10 @@ def orders_sentence(orders: OrderAdvice, maps: MapAdvice | None) -> str:
         pair = (maps.chosen.input_map, maps.chosen.output_map)
         named = " and ".join(one.replace("_", " ") for one in pair)
         said += ", no maps" if set(pair) == {"none"} else f", maps {named}"
-    return f"{said} recommended (hwid order says why)"
+    said += " recommended (hwid order says why)"
+    if maps is not None and maps.chosen != maps.given:
+        said += f"; for these maps set {fit_keys(maps.chosen)}"
+    return said
 
 
 def recordings_sentence(found: NextRecordings, folder: Path) -> str:

@@ -8,6 +8,7 @@ from hwid_cli.records.order import (
     SelectionEvidence,
 )
 from hwid_cli.report.formats import MISSING, counted, decimals, number
+from hwid_cli.report.map_words import fit_keys, map_words
 from hwid_cli.report.table import Table, Text, numbers, texts
 
 # Maps that are shown; maps.csv has all.
@@ -76,8 +77,8 @@ def map_table(advice: MapAdvice) -> Table:
     rows = tuple(
         (
             _mark(one, advice),
-            _map(one.input_map, one.input_units),
-            _map(one.output_map, one.output_units),
+            map_words(one.input_map, one.input_units),
+            map_words(one.output_map, one.output_units),
             str(one.n_parameters or MISSING),
             number(one.rmsd),
             f"{one.factor:.2f}",
@@ -106,15 +107,15 @@ def map_reasons(advice: MapAdvice) -> tuple[Text, ...]:
 
 def _map_recommendation(advice: MapAdvice) -> str:
     one, best = advice.chosen, advice.candidates[0]
-    take = f"Take fit: {{{_keys(one)}}}: "
+    take = f"Take {fit_keys(one)}: "
     if not advice.evidence.n_validation:
         return (
             f"{take}they have the lowest BIC. There is no validation recording, and BIC takes "
             "residuals for white; cut the recording into several (recordings.parts) to "
             "validate on data that were not fitted."
         )
-    words = f"maps, {_map(best.input_map, best.input_units)} and "
-    words += _map(best.output_map, best.output_units)
+    words = f"maps, {map_words(best.input_map, best.input_units)} and "
+    words += map_words(best.output_map, best.output_units)
     reason = _reason_to_take(
         advice.evidence, advice.tolerance, "maps", None if one == best else words
     )
@@ -128,25 +129,10 @@ def _map_recommendation(advice: MapAdvice) -> str:
     )
 
 
-def _keys(one: MapCandidate) -> str:
-    """The keys of the configuration that ask for these maps."""
-    keys = []
-    for side in ("input", "output"):
-        keys.append(f"{side}_map: {getattr(one, f'{side}_map')}")
-        if units := getattr(one, f"{side}_units"):
-            keys.append(f"{side}_units: {units}")
-    return ", ".join(keys)
-
-
 def _mark(one: MapCandidate, advice: MapAdvice) -> str:
     if one == advice.chosen:
         return "take"
     return "yours" if one == advice.given else ""
-
-
-def _map(kind: str, units: int) -> str:
-    words = kind.replace("_", " ")
-    return f"{words}, {units}" if units else words
 
 
 def order_table(advice: OrderAdvice) -> Table:

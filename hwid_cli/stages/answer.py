@@ -12,19 +12,22 @@ from hwid_cli.model.scores import fit_percent, rmsd
 from hwid_cli.model.simulate import validation_output
 from hwid_cli.records.answer import ChosenMaps, ModelAnswer
 from hwid_cli.records.experiment import OrderOptions
+from hwid_cli.records.groups import FinalTest
 from hwid_cli.records.model import Fit, HammersteinWiener
 from hwid_cli.records.order import OrderChoice
 from hwid_cli.records.recordings import Recording
 from hwid_cli.records.report import StoredResults
 from hwid_cli.records.results import CrossValidation
 from hwid_cli.stages.best_model import best_model
-from hwid_cli.stages.compare import linear_beside
+from hwid_cli.stages.identify import Run
+from hwid_cli.stages.linear_reference import linear_reference
 from hwid_cli.stages.model_views import named_fits
 from hwid_cli.stages.order import recommend_overall
+from hwid_cli.stages.order_grid import grid_place
 
 
 def model_answer(
-    stored: StoredResults, crossval: CrossValidation | None
+    stored: StoredResults, crossval: CrossValidation | None, run: Run
 ) -> ModelAnswer | None:
     """Choose a model, and simulate it and a linear one where it was not fitted.
 
@@ -32,6 +35,8 @@ def model_answer(
     ----------
     crossval : CrossValidation or None
         Of the stored models; None where there is none.
+    run : callable
+        Runs the fits of linear models.
 
     Returns
     -------
@@ -49,23 +54,23 @@ def model_answer(
     if found.model is None:
         return None
     own = found.identified_on
-    linear = linear_beside(found, stored.recordings)
+    beside = linear_reference(
+        found, named.values(), stored.recordings, chosen_on, run, nk_role=stored.nk_role
+    )
     final = stored.final_test
     tested = () if final is None else final.tested_on
-    unseen = [
-        one
-        for one in stored.recordings
-        if one.name not in own and (not tested or one.name in tested)
-    ]
-    judged = crossval or final
-    threshold = np.nan if judged is None else judged.threshold
+    unseen = _unseen(stored.recordings, own, tested)
     deviation, percent = _scores(found.model, unseen)
-    linear_deviation, linear_percent = _scores(linear, unseen)
+    linear_deviation, linear_percent = _scores(
+        beside.fit.model if beside else None, unseen
+    )
+    maps = _maps(stored, advice)
     visited = _visited(found, stored.recordings)
     return ModelAnswer(
         name=name,
         model=found.model,
-        linear=linear,
+        linear=beside.fit.model if beside else None,
+        linear_name=beside.name if beside else "",
         own=own,
         chosen_on=chosen_on,
         recordings=tuple(one.name for one in unseen),
@@ -77,10 +82,27 @@ def model_answer(
         input_range=visited,
         beyond=np.array([_beyond(visited, one) for one in unseen]),
         unit=stored.recordings[0].output_unit,
-        threshold=threshold,
+        threshold=_threshold(crossval or final),
         advice=advice,
-        maps=_maps(stored, advice),
+        maps=maps,
+        has_these_maps=maps is None or _has_maps(found, maps),
+        advised_rmsd=_at(advice, found, named, unseen, stored.nk_role),
     )
+
+
+def _threshold(judged: CrossValidation | FinalTest | None) -> float:
+    return np.nan if judged is None else judged.threshold
+
+
+def _unseen(
+    recordings: Sequence[Recording], own: Sequence[str], tested: Sequence[str]
+) -> list[Recording]:
+    """Recordings that the fit has not used; those of the final test, where there are some."""
+    return [
+        one
+        for one in recordings
+        if one.name not in own and (not tested or one.name in tested)
+    ]
 
 
 def _maps(stored: StoredResults, advice: OrderChoice | None) -> ChosenMaps | None:
@@ -89,6 +111,36 @@ def _maps(stored: StoredResults, advice: OrderChoice | None) -> ChosenMaps | Non
     if advice is None or maps is None or (maps.nb, maps.nk) != _place(advice):
         return None
     return maps
+
+
+def _has_maps(found: Fit, maps: ChosenMaps) -> bool:
+    """Whether a fit has maps of these kinds and sizes."""
+    own = found.options.of_input, found.options.of_output
+    wanted = (
+        (maps.input_map, maps.input_units),
+        (maps.output_map, maps.output_units),
+    )
+    return all(
+        one.kind == kind and (one.units == units or not units)
+        for one, (kind, units) in zip(own, wanted, strict=True)
+    )
+
+
+def _at(
+    advice: OrderChoice | None,
+    found: Fit,
+    named: Mapping[str, Fit],
+    unseen: Sequence[Recording],
+    nk_role: str,
+) -> float:
+    """Mean RMSD of the model of the same recordings at the recommended orders, [unit]."""
+    if advice is None or not unseen:
+        return np.nan
+    for one in named.values():
+        is_same = one.identified_on == found.identified_on
+        if is_same and grid_place(one, nk_role) == _place(advice):
+            return float(np.mean(_scores(one.model, unseen)[0]))
+    return np.nan
 
 
 def _place(advice: OrderChoice) -> tuple[int, int]:

@@ -6,7 +6,7 @@ recordings of the final test.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -18,12 +18,11 @@ from hwid_cli.records.groups import FinalTest, GroupSearch
 from hwid_cli.records.model import Fit, HammersteinWiener
 from hwid_cli.records.recordings import Recording
 from hwid_cli.records.results import CrossValidation
-from hwid_cli.stages.compare import linear_beside
-from hwid_cli.stages.identify import STAGE_VERSION
+from hwid_cli.stages.identify import Run
+from hwid_cli.stages.linear_reference import linear_reference
 from hwid_cli.stages.order_grid import grid_place
 from hwid_cli.stages.ranking import best_fits, widest_model
 from hwid_cli.stages.test import best_single, taken_model
-from hwid_cli.tasks.cache import Store, recording_key, remembered, task_key
 
 
 def best_model(
@@ -150,11 +149,11 @@ def beside_linear(
     best: BestModel,
     fits: Mapping[str, Fit],
     recordings: Sequence[Recording],
-    store: Store,
+    run: Run,
+    *,
+    nk_role: str,
 ) -> BestModel:
-    """Put the fit on new recordings, and that of a linear model, beside a model.
-
-    The linear one has the same orders and was fitted to the same recordings.
+    """Put the fit on new recordings, and that of the best linear model, beside a model.
 
     Parameters
     ----------
@@ -162,8 +161,10 @@ def beside_linear(
         By the names of their models.
     recordings : sequence of Recording
         All of them.
-    store : Store
-        Keeps what both gave.
+    run : callable
+        Runs the fits of linear models.
+    nk_role : str
+        What the second axis of the order grid means.
 
     Returns
     -------
@@ -173,41 +174,25 @@ def beside_linear(
     """
     if best.judge == "own" or best.name not in fits:
         return best
-    fit = fits[best.name]
+    found = fits[best.name]
     by_name = {one.name: one for one in recordings}
-    if not set(fit.identified_on) <= set(by_name):
+    if not set(found.identified_on) <= set(by_name):
         return best
     judges = [by_name[name] for name in best.judged_on]
-    settings = {
-        "fitted_to": [recording_key(by_name[name]) for name in fit.identified_on],
-        "judges": [recording_key(one) for one in judges],
-        "orders": fit.orders,
-        "options": fit.options,
-    }
-    key = task_key("fits_beside", STAGE_VERSION, settings, [])
-
-    def compare() -> _OnJudges:
-        linear, percent = _scores(linear_beside(fit, recordings), judges)
-        return _OnJudges(linear, percent, _scores(fit.model, judges)[1])
-
-    found = remembered(store, key, _OnJudges, compare)
-    beside = replace(best, fit_percent=found.fit_percent)
-    if np.isnan(found.linear_rmsd):
+    _, percent = _scores(found.model, judges)
+    beside = replace(best, fit_percent=percent)
+    linear = linear_reference(
+        found, fits.values(), recordings, best.chosen_on, run, nk_role=nk_role
+    )
+    if linear is None:
         return beside
+    deviation, percent = _scores(linear.fit.model, judges)
     return replace(
         beside,
-        linear_rmsd=found.linear_rmsd,
-        linear_fit_percent=found.linear_fit_percent,
+        linear_rmsd=deviation,
+        linear_fit_percent=percent,
+        linear_name=linear.name,
     )
-
-
-@dataclass(frozen=True)
-class _OnJudges:
-    """What models do on the recordings that judge; NaN without a model."""
-
-    linear_rmsd: float
-    linear_fit_percent: float
-    fit_percent: float
 
 
 def _scores(

@@ -1,20 +1,14 @@
 """``compare``: several models, wherever they come from, on the same recordings."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
 from hwid_cli.errors import ConfigError
-from hwid_cli.model.fit import fit
 from hwid_cli.model.scores import fit_percent, rmsd
 from hwid_cli.model.simulate import validation_output
 from hwid_cli.records.comparison import Comparison, NamedModel, ShownRecording
-from hwid_cli.records.experiment import OrdersOptions
-from hwid_cli.records.model import Fit, FitOptions, HammersteinWiener, Orders
 from hwid_cli.records.recordings import Recording
-from hwid_cli.stages.identify import fit_grid
-from hwid_cli.tasks.runner import RunSettings, run_tasks
 from hwid_cli.tasks.task import one_thread
 
 # Sample times that differ by less are the same clock, [-].
@@ -68,72 +62,6 @@ def compare_models(
         output_unit=recordings[0].output_unit,
         shown=shown,
     )
-
-
-def linear_options(options: FitOptions) -> FitOptions:
-    """Give the options of a linear model beside a nonlinear one: the same, without maps."""
-    return replace(
-        options,
-        input_map="none",
-        output_map="none",
-        input_function=None,
-        output_function=None,
-        linear_block=None,
-    )
-
-
-def fit_linear(
-    recordings: Sequence[Recording],
-    orders: Orders,
-    options: FitOptions,
-    settings: RunSettings,
-) -> Fit:
-    """Fit a linear output-error model: the same options, without maps.
-
-    Parameters
-    ----------
-    settings : RunSettings
-        A model of one recording is kept in the store, as ``identify`` keeps it.
-    """
-    linear = linear_options(options)
-    if len(recordings) > 1:
-        with one_thread():
-            return fit(recordings, orders, linear)
-    grid = OrdersOptions((orders.nb,), (orders.nk,), "delay", orders.nf)
-    (found,) = fit_grid(
-        recordings, grid, linear, lambda tasks: run_tasks(tasks, settings)
-    )
-    return found
-
-
-def linear_beside(
-    found: Fit, recordings: Sequence[Recording]
-) -> HammersteinWiener | None:
-    """The model of ``linear_fit_beside``; None where there is none, or its fit fails."""
-    beside = linear_fit_beside(found, recordings)
-    return None if beside is None else beside.model
-
-
-def linear_fit_beside(found: Fit, recordings: Sequence[Recording]) -> Fit | None:
-    """Fit the linear model beside a nonlinear one: same orders, recordings and options.
-
-    Parameters
-    ----------
-    recordings : sequence of Recording
-        Those of the fit among them.
-
-    Returns
-    -------
-    Fit or None
-        None where the model is linear itself, or a recording is gone.
-    """
-    by_name = {one.name: one for one in recordings}
-    has_maps = {found.options.input_map, found.options.output_map} != {"none"}
-    if not has_maps or not set(found.identified_on) <= set(by_name):
-        return None
-    own = [by_name[name] for name in found.identified_on]
-    with one_thread():
-        return fit(own, found.orders, linear_options(found.options))
 
 
 def _outputs(models: Sequence[NamedModel], recording: Recording) -> list[np.ndarray]:

@@ -16,7 +16,6 @@ from hwid_cli.data.signal_features import find_period
 from hwid_cli.model.scores import coverage, fit_percent, rmsd
 from hwid_cli.model.simulate import validation_output
 from hwid_cli.records.answer import ModelAnswer
-from hwid_cli.records.best_model import LINEAR
 from hwid_cli.records.groups import FinalTest
 from hwid_cli.records.model import Fit, HammersteinWiener
 from hwid_cli.records.recordings import Recording
@@ -34,6 +33,7 @@ from hwid_cli.records.results import CrossValidation, ModelScore
 from hwid_cli.sources import checksum_of_folder
 from hwid_cli.stages.answer import model_answer
 from hwid_cli.stages.crossval import cross_matrix
+from hwid_cli.stages.identify import Run
 from hwid_cli.stages.model_views import model_views, named_fits
 from hwid_cli.stages.order_grid import grid_place
 from hwid_cli.stages.ranking import (
@@ -45,7 +45,9 @@ from hwid_cli.stages.ranking import (
 from hwid_cli.stages.residuals import examined_residual
 from hwid_cli.stages.table import needed, stage_named
 from hwid_cli.stages.test import chain_trend
-from hwid_cli.tasks.cache import task_key
+from hwid_cli.tasks.cache import MemoryStore, task_key
+from hwid_cli.tasks.runner import RunSettings, TaskDone, run_tasks
+from hwid_cli.tasks.task import Task
 
 # The output has begun to move, and has moved most of its way, at these shares of its
 # largest distance from where it started, [-].
@@ -217,8 +219,14 @@ def _agrees(now: Any, stored: Any) -> bool:
     return bool(now == stored)
 
 
-def report_contents(stored: StoredResults) -> ReportContents:
-    """Work out everything that a report shows."""
+def report_contents(stored: StoredResults, run: Run | None = None) -> ReportContents:
+    """Work out everything that a report shows.
+
+    Parameters
+    ----------
+    run : callable or None
+        Runs the fits of linear models; None runs them here and keeps none.
+    """
     crossval, final = stored.crossval, stored.final_test
     is_fresh = crossval is None or _belongs(stored.fits, crossval)
     scores: tuple[ModelScore, ...] = ()
@@ -227,7 +235,7 @@ def report_contents(stored: StoredResults) -> ReportContents:
         scores = tuple(score_models(stored.fits, crossval))
         widest = best_of_each(scores, crossval.identified_on)
     fresh = crossval if is_fresh else None
-    answer = model_answer(stored, fresh)
+    answer = model_answer(stored, fresh, run or _run_here)
     simulated = _simulated(stored, fresh, answer)
     covered = {one.recording.name for one in simulated}
     kinds = {recording.name: recording.kind for recording in stored.recordings}
@@ -249,6 +257,10 @@ def report_contents(stored: StoredResults) -> ReportContents:
         answer=answer,
         outdated=() if is_fresh else ("crossval",),
     )
+
+
+def _run_here(tasks: Sequence[Task]) -> Sequence[TaskDone]:
+    return run_tasks(tasks, RunSettings(MemoryStore()))
 
 
 def _belongs(fits: Sequence[Fit], crossval: CrossValidation) -> bool:
@@ -330,7 +342,7 @@ def _others(
     if answer.name != name:
         found.append((answer.name, False, answer.model))
     if answer.linear is not None:
-        found.append((f"{LINEAR}{answer.name}", True, answer.linear))
+        found.append((answer.linear_name, True, answer.linear))
     outputs = []
     for model, is_linear, one in found:
         output = validation_output(one, recording)

@@ -7,23 +7,39 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from hwid_cli.records.check import StagePlan
+from hwid_cli.stages.fit_seconds import grid_seconds
+from hwid_cli.stages.stage import Planning
 
 # Reading the compiled loops of what the first tasks need, and starting processes that do
 # so too, once for all stages, [s].
 LOADING_SECONDS, _START_SECONDS = 0.6, 1.6
 # Writing the page, and drawing its figures for each recording, [s].
 _PAGE_SECONDS, _FIGURES_SECONDS = 0.8, 0.35
+# A grid of linear models, each fitted from nothing, against that of a recording with maps:
+# 0.2 to 0.7 for a model of one recording, 1.5 for one of three (demo, HSM150), [-].
+_LINEAR_SHARE = 0.7
 
 
-def page_plan(n_recordings: int) -> StagePlan:
-    """What it takes to write the page and to draw its figures.
+def page_plan(planning: Planning) -> StagePlan:
+    """What it takes to fit linear models, to write the page and to draw its figures."""
+    seconds = _PAGE_SECONDS + _FIGURES_SECONDS * len(planning.recordings)
+    what = "the page and its figures"
+    if {planning.experiment.fit.input_map, planning.experiment.fit.output_map} != {
+        "none"
+    }:
+        what = "linear models, the page and its figures"
+        seconds += _linear_seconds(planning)
+    return StagePlan("report", what, 1, None, seconds, 0.0)
 
-    Parameters
-    ----------
-    n_recordings : int, [-]
-    """
-    seconds = _PAGE_SECONDS + _FIGURES_SECONDS * n_recordings
-    return StagePlan("report", "the page and its figures", 1, None, seconds, 0.0)
+
+def _linear_seconds(planning: Planning) -> float:
+    """Time of the grid of linear models beside the model to take, of a typical recording."""
+    by_length = sorted(planning.recordings, key=lambda one: one.n_samples)
+    if not by_length:
+        return 0.0
+    typical = by_length[len(by_length) // 2]
+    speed = planning.cost, planning.workers
+    return _LINEAR_SHARE * grid_seconds(planning.experiment, [typical], speed)
 
 
 def with_start(plans: Sequence[StagePlan], workers: int) -> list[StagePlan]:

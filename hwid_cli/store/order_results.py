@@ -100,14 +100,14 @@ def read_chosen_maps(folder: Path) -> ChosenMaps | None:
         orders = _rows(folder / "order.csv")
         maps = _rows(folder / "maps.csv")
         (taken,) = (row for row in maps if row["take"] == "1")
-        sides = [
-            f"{taken[side].replace('_', ' ')} {taken[units]}".strip()
-            for side, units in (
-                ("input_map", "input_units"),
-                ("output_map", "output_units"),
-            )
-        ]
-        return ChosenMaps(int(orders[0]["nb"]), int(orders[0]["nk"]), *sides)
+        return ChosenMaps(
+            int(orders[0]["nb"]),
+            int(orders[0]["nk"]),
+            taken["input_map"],
+            taken["output_map"],
+            int(taken["input_units"] or 0),
+            int(taken["output_units"] or 0),
+        )
     except (OSError, ValueError, KeyError, IndexError, csv.Error):
         return None
 

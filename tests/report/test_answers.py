@@ -212,7 +212,7 @@ def test_a_page_that_linear_models_win_is_not_green(contents):
         re.S,
     )
 
-    assert "The linear model of the same orders is better" in answer
+    assert "A linear model is better" in answer
     assert "settled" not in answer.split(">")[0]
 
 
@@ -221,14 +221,15 @@ def test_a_better_linear_model_is_the_answer(contents):
         contents,
         rmsd=np.array([1.36e-3]),
         linear_rmsd=np.array([9.49e-4]),
+        linear_name="linear:step_02/1/1",
         fit_percent=np.array([88.2]),
         linear_fit_percent=np.array([91.5]),
         threshold=0.01,
     )
 
     assert plain(found.verdict) == (
-        "The linear model of the same orders is better: RMSD 0.000949 m, with maps 0.00136 m "
-        "on 1 recording never used. Maps are not worth it here: "
+        "A linear model is better, linear:step_02/1/1: RMSD 0.000949 m, with maps 0.00136 m "
+        "on 1 recording never used. These maps are not worth it here: "
         "fit: {input_map: none, output_map: none}."
     )
     assert not found.is_settled
@@ -237,7 +238,7 @@ def test_a_better_linear_model_is_the_answer(contents):
     assert command == "hwid run CONFIG"
     exports = [one for _, one in found.next_steps if "hwid export" in one]
     (only,) = exports
-    assert "--model linear:" in only
+    assert "--model linear:step_02/1/1 " in only
 
 
 @pytest.mark.parametrize(("linear", "rmsd"), [(-3.0, 1e-3), (-30.0, 3e-3)])
@@ -292,16 +293,28 @@ def test_where_to_trust_it_is_said(contents):
 def test_recommended_orders_and_maps_are_said(contents):
     advice = contents.answer.advice
     maps = ChosenMaps(advice.nb, advice.nk, "saturation", "none")
-    worse = {"linear_rmsd": 2.0 * contents.answer.rmsd}
+    good = {name: np.array([90.0]) for name in ("fit_percent", "linear_fit_percent")}
+    worse = {"linear_rmsd": 2.0 * contents.answer.rmsd, **good}
     told = plain(answered(contents, maps=maps, **worse).details[1])
 
     assert f"Recommended for new fits: nb = {advice.nb}, nk = {advice.nk}" in told
     assert "maps: saturation and none" in told
     none = ChosenMaps(advice.nb, advice.nk, "none", "none")
     assert "; no maps." in plain(answered(contents, maps=none, **worse).details[1])
-    # Above it stands that maps are not worth it here.
-    better = {"linear_rmsd": 0.5 * contents.answer.rmsd}
-    assert "maps" not in plain(answered(contents, maps=maps, **better).details[1])
+    # A page that recommends other maps than it shows says how to get them.
+    steps = answered(contents, maps=maps, has_these_maps=False, **worse).next_steps
+    keys = "fit: {input_map: saturation, output_map: none}"
+    assert [one for said, one in steps if keys in said] == ["hwid run CONFIG"]
+    steps = answered(contents, maps=maps, **worse).next_steps
+    assert not any("recommended maps" in said for said, _ in steps)
+    # Where a linear model is better than the maps it has, those recommended come first.
+    better = {"linear_rmsd": 0.5 * contents.answer.rmsd, **good}
+    other = answered(contents, maps=maps, has_these_maps=False, **better)
+    assert f"These maps are not worth it here: {keys}." in plain(other.verdict)
+    assert keys in other.next_steps[0][0]
+    assert "maps: saturation and none" in plain(other.details[1])
+    given = answered(contents, maps=none, has_these_maps=False, **better)
+    assert "fit: {input_map: none, output_map: none}" in given.next_steps[0][0]
 
 
 def test_a_model_above_the_threshold_is_not_settled(contents):

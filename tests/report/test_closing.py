@@ -43,18 +43,18 @@ def test_a_judge_that_nobody_knows_is_refused():
 
 
 def test_a_linear_model_that_is_better_stands_first():
-    linear = replace(BEST, linear_rmsd=0.008)
+    linear = replace(BEST, linear_rmsd=0.008, linear_name="linear:a+b/1/3")
     first, second, third = (
         one.replace("\xa0", " ") for one in best_model_sentences(linear)
     )
 
     assert first == (
-        "the linear model of the same orders is better: mean RMSD 0.008 m on 2 recordings "
+        "a linear model is better, linear:a+b/1/3: mean RMSD 0.008 m on 2 recordings "
         "never used (c and d)"
     )
     # The limit stands behind the model that it is about.
     assert second == "below the 0.01 m of crossval.threshold"
-    assert third == "a+b/2/3: 0.012 m; maps are not worth it here"
+    assert third == "a+b/2/3: 0.012 m; these maps are not worth it here"
 
 
 @pytest.mark.parametrize(

@@ -12,6 +12,8 @@ from hwid_cli.records.order import OrderAdvice
 from hwid_cli.records.report import StoredResults
 from hwid_cli.stages.answer import model_answer
 from hwid_cli.stages.order import recommend_orders
+from hwid_cli.tasks.cache import MemoryStore
+from hwid_cli.tasks.runner import RunSettings, run_tasks
 from tests.report.report_examples import (
     calibrated,
     calibrated_only,
@@ -20,13 +22,17 @@ from tests.report.report_examples import (
 )
 
 
+def run_here(tasks):
+    return run_tasks(tasks, RunSettings(MemoryStore()))
+
+
 @pytest.fixture(scope="module")
 def stored():
     return everything(6, levels=2)
 
 
 def answer_of(stored):
-    return model_answer(stored, stored.crossval)
+    return model_answer(stored, stored.crossval, run_here)
 
 
 def without(stored, *stages):
@@ -164,7 +170,7 @@ def of_saturation():
     found = fit([known], Orders(1, 1, 1), maps)
     results = {"calibrate": replace(calibrated(("x",)), recordings=(known, wider))}
     stored = StoredResults("s", "{}", "poles", results=results | {"identify": (found,)})
-    return model_answer(stored, None), known, wider
+    return model_answer(stored, None, run_here), known, wider
 
 
 def test_the_linear_model_beside_it_misses_the_saturation(of_saturation):
@@ -196,7 +202,7 @@ def test_a_linear_model_has_none_beside_it():
     )
     results = {"calibrate": replace(calibrated(("x",)), recordings=(known, other))}
     stored = StoredResults("s", "{}", "poles", results=results | {"identify": (found,)})
-    found = model_answer(stored, None)
+    found = model_answer(stored, None, run_here)
 
     assert found.linear is None
     assert np.isnan(found.linear_rmsd).all()

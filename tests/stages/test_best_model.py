@@ -14,6 +14,7 @@ from hwid_cli.records.results import CrossValidation
 from hwid_cli.stages.best_model import beside_linear
 from hwid_cli.stages.best_model import best_model as choose
 from hwid_cli.tasks.cache import MemoryStore
+from hwid_cli.tasks.runner import RunSettings, run_tasks
 
 
 def best_model(results):
@@ -117,6 +118,10 @@ def test_nothing_is_recommended_where_nothing_has_run():
     assert best_model({"calibrate": None}) is None
 
 
+def run_here(tasks):
+    return run_tasks(tasks, RunSettings(MemoryStore()))
+
+
 def saturated(name, largest):
     """A lag behind a saturation, by a loop of its own."""
     rng = np.random.default_rng(len(name) + int(10 * largest))
@@ -135,7 +140,7 @@ def test_the_linear_model_is_of_the_same_recordings_and_judged_on_the_same():
     )
     fits = {"a/1/1": fit(recordings[:1], Orders(1, 1, 1), options)}
     found = best_model({"crossval": crossval([[[0.0, 0.5, 0.5]]], ("a",))})
-    after = beside_linear(found, fits, recordings, MemoryStore())
+    after = beside_linear(found, fits, recordings, run_here, nk_role="poles")
 
     # y[k] = p y[k-1] + b u[k-1] by hand: the best p and b on a alone, judged on b and c.
     def simulated(p, b, u):
@@ -170,8 +175,8 @@ def test_a_linear_fit_that_fails_is_no_reason_to_say_nothing():
     fits = {"a/1/1": fit(recordings[:1], Orders(1, 1, 1), linear)}
     gone = {"a/1/1": fit([saturated("z", 2.0)], Orders(1, 1, 1), FitOptions(units=3))}
 
-    after = beside_linear(found, fits, recordings, MemoryStore())
+    after = beside_linear(found, fits, recordings, run_here, nk_role="poles")
     assert replace(after, fit_percent=np.nan) == replace(found, fit_percent=np.nan)
     assert 0.0 < after.fit_percent < 100.0
-    assert beside_linear(found, gone, recordings, MemoryStore()) == found
-    assert beside_linear(found, {}, recordings, MemoryStore()) == found
+    assert beside_linear(found, gone, recordings, run_here, nk_role="poles") == found
+    assert beside_linear(found, {}, recordings, run_here, nk_role="poles") == found

@@ -3,7 +3,6 @@
 import numpy as np
 
 from hwid_cli.records.answer import ModelAnswer
-from hwid_cli.records.best_model import LINEAR
 from hwid_cli.records.report import ReportContents, SimulatedRecording
 from hwid_cli.report.charts import (
     Chart,
@@ -17,6 +16,7 @@ from hwid_cli.report.charts import (
 from hwid_cli.report.closing import LINEAR_KEYS
 from hwid_cli.report.dots import Dot, DotGroup, DotRow, Dots
 from hwid_cli.report.formats import counted, listed, with_unit
+from hwid_cli.report.map_words import fit_keys, map_words
 from hwid_cli.report.page import Answer, PageBlock, marked_if_changed
 from hwid_cli.report.simulation_note import simulation_note
 from hwid_cli.report.terms import NK_WORDS
@@ -75,8 +75,8 @@ def _verdict(found: ModelAnswer) -> str:
         linear = with_unit(found.linear_mean_rmsd, found.unit)
         own = with_unit(found.mean_rmsd, found.unit)
         return (
-            f"The linear model of the same orders is better: {mean} {linear}, with maps {own} "
-            f"on {where} {unused}. Maps are not worth it here: {LINEAR_KEYS}."
+            f"A linear model is better, {found.linear_name}: {mean} {linear}, with maps {own} "
+            f"on {where} {unused}. These maps are not worth it here: {_better_keys(found)}."
         )
     sentence = (
         f"Take {found.name}: fit {_median(found.fit_percent)} on {where} {unused}"
@@ -84,6 +84,13 @@ def _verdict(found: ModelAnswer) -> str:
     if np.isfinite(found.linear_fit_percent).any():
         sentence += f" (linear: {_median(found.linear_fit_percent)})"
     return f"{sentence}."
+
+
+def _better_keys(found: ModelAnswer) -> str:
+    """Keys of the configuration where a linear model is better than the maps that it has."""
+    if found.maps is not None and found.maps.has_maps and not found.has_these_maps:
+        return fit_keys(found.maps)
+    return LINEAR_KEYS
 
 
 def _nothing_to_take(found: ModelAnswer, on: str) -> str:
@@ -109,7 +116,7 @@ def _spread(found: ModelAnswer) -> str:
     ranges = []
     for name, values in (
         ("this model", found.fit_percent),
-        ("linear, same orders", found.linear_fit_percent),
+        ("the best linear one", found.linear_fit_percent),
     ):
         known = values[np.isfinite(values)]
         if known.size > 1:
@@ -154,13 +161,28 @@ def _orders(found: ModelAnswer, nk_role: str) -> str:
             f" (the smallest within {100 * (one.evidence.factor - 1):.2g} % of the best, "
             f"{one.best_nb}/{one.best_nk})"
         )
-    # What is said of maps on the recordings that judge is not contradicted.
-    if found.maps is not None and not found.is_linear_better:
-        pair = (found.maps.input_map, found.maps.output_map)
-        text += (
-            "; no maps" if set(pair) == {"none"} else f"; maps: {pair[0]} and {pair[1]}"
+    if found.maps is not None and found.is_usable:
+        pair = (
+            map_words(found.maps.input_map, found.maps.input_units),
+            map_words(found.maps.output_map, found.maps.output_units),
         )
-    return f"{text}."
+        text += (
+            f"; maps: {pair[0]} and {pair[1]}" if found.maps.has_maps else "; no maps"
+        )
+    return f"{text}.{_at_these(found)}"
+
+
+def _at_these(found: ModelAnswer) -> str:
+    """How far off the recommended orders are on the recordings that judge the model."""
+    if not np.isfinite(found.advised_rmsd):
+        return ""
+    if found.advised_rmsd == found.mean_rmsd:
+        return " Those of this model."
+    advised, own = (
+        with_unit(one, found.unit) for one in (found.advised_rmsd, found.mean_rmsd)
+    )
+    mean = "mean RMSD" if len(found.recordings) > 1 else "RMSD"
+    return f" At these orders the {mean} is {advised}, that of this model {own}."
 
 
 def _trust(found: ModelAnswer) -> str:
@@ -182,15 +204,22 @@ def _next(found: ModelAnswer, contents: ReportContents) -> tuple[tuple[str, str]
         steps.append(("Validate all models:", "hwid crossval CONFIG"))
     elif found.maps is None:
         steps.append(("Maps and orders, and why:", "hwid order CONFIG"))
+    elif found.is_usable and not found.has_these_maps and not found.is_linear_better:
+        steps.append(
+            (
+                f"For the recommended maps set {fit_keys(found.maps)}, then",
+                "hwid run CONFIG",
+            )
+        )
     if not found.is_usable:
         steps.append(
             ("Look at columns and signs, set recordings.columns:", "hwid check CONFIG")
         )
     elif found.is_linear_better:
         steps.insert(
-            0, (f"For linear models set {LINEAR_KEYS}, then", "hwid run CONFIG")
+            0, (f"For better models set {_better_keys(found)}, then", "hwid run CONFIG")
         )
-        linear = f"hwid export CONFIG --model {LINEAR}{found.name} --format json"
+        linear = f"hwid export CONFIG --model {found.linear_name} --format json"
         steps.insert(1, ("Take the linear model elsewhere:", linear))
     else:
         steps.append(
@@ -226,7 +255,7 @@ def _errors(found: ModelAnswer) -> Dots | None:
     worst = f"The {_MOST_ROWS} worst; {left_out} more lie below. " if left_out else ""
     legend = [("taken", "this model")]
     if np.isfinite(found.linear_rmsd).any():
-        legend.append(("linear", "linear, same orders"))
+        legend.append(("linear", "the best linear model"))
     note = simulation_note(found.model.initial_state, is_validation=True)
     reference, said = None, ""
     if np.isfinite(found.threshold):
@@ -262,7 +291,7 @@ def _overlay_chart(one: SimulatedRecording, found: ModelAnswer) -> Chart | None:
     }
     curves = [Curve("measured", thinned(recording.output, chosen), "measured")]
     for model, role, label in (
-        (f"{LINEAR}{found.name}", "linear", "linear"),
+        (found.linear_name, "linear", "linear"),
         (found.name, "taken", "this model"),
     ):
         if model in outputs and np.isfinite(outputs[model]).all():

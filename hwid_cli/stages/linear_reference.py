@@ -1,0 +1,163 @@
+"""The linear model beside the model to take: the best of the same order grid.
+
+The linear model of the same orders would flatter the maps: orders that suit a model with
+maps may suit no linear one. So the linear model is chosen as the other one was, out of the
+same orders, by the same recordings, and fitted to the same data.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from hwid_cli.model.fit import fit
+from hwid_cli.model.scores import rmsd
+from hwid_cli.model.simulate import validation_output
+from hwid_cli.records.best_model import LINEAR
+from hwid_cli.records.model import Fit, FitOptions, Orders
+from hwid_cli.records.recordings import Recording
+from hwid_cli.stages.identify import STAGE_VERSION, Run
+from hwid_cli.stages.order_grid import grid_place
+from hwid_cli.tasks.cache import recording_key, task_key
+from hwid_cli.tasks.task import Task
+
+# Of models that are as good within this share, the one of the fewest coefficients, [-].
+_AS_GOOD = 0.01
+
+
+@dataclass(frozen=True, eq=False)
+class LinearReference:
+    """The linear model of the best orders.
+
+    Parameters
+    ----------
+    name : str
+        ``linear:step_06/3/7``, by which it is exported and compared.
+    fit : Fit
+        With a model.
+    """
+
+    name: str
+    fit: Fit
+
+
+def linear_options(options: FitOptions) -> FitOptions:
+    """Give the options of a linear model beside a nonlinear one: the same, without maps."""
+    return replace(
+        options,
+        input_map="none",
+        output_map="none",
+        input_function=None,
+        output_function=None,
+        linear_block=None,
+    )
+
+
+def linear_fits(
+    recordings: Sequence[Recording],
+    grid: Sequence[Orders],
+    options: FitOptions,
+    run: Run,
+) -> tuple[Fit, ...]:
+    """Fit linear output-error models to all of these recordings together.
+
+    Parameters
+    ----------
+    options : FitOptions
+        Of a model with maps; all but the maps is kept.
+    run : callable
+        Runs the tasks, one for each of the orders.
+
+    Returns
+    -------
+    tuple of Fit
+        In the order of ``grid``; one that failed has no model.
+    """
+    own = tuple(recordings)
+    linear = linear_options(options)
+    if len(own) == 1:
+        # A rule for joining recordings does nothing to one and is no part of its fit.
+        linear = replace(linear, join=FitOptions().join)
+    contents = [recording_key(one) for one in own]
+    named = "+".join(one.name for one in own)
+    tasks = [
+        Task(
+            key=task_key(
+                "linear",
+                STAGE_VERSION,
+                {"recordings": contents, "orders": orders, "options": linear},
+                [],
+            ),
+            name=f"{LINEAR}{named}, {orders.nb} and {orders.nf}",
+            function=fit,
+            arguments=(own, orders, linear),
+            result_type=Fit,
+        )
+        for orders in grid
+    ]
+    # A fit is cached by content; its names may be those of another day.
+    names = tuple(one.name for one in own)
+    return tuple(replace(one.result, identified_on=names) for one in run(tasks))
+
+
+def linear_reference(
+    found: Fit,
+    fits: Iterable[Fit],
+    recordings: Sequence[Recording],
+    choosers: Sequence[str],
+    run: Run,
+    *,
+    nk_role: str,
+) -> LinearReference | None:
+    """Choose the linear model that stands beside a model with maps.
+
+    Parameters
+    ----------
+    found : Fit
+        The model with maps.
+    fits : iterable of Fit
+        Of the grid that it was chosen from: their orders are tried.
+    recordings : sequence of Recording
+        Those of the fit among them.
+    choosers : sequence of str
+        Recordings that chose ``found``, which choose here too; those of its own fit where
+        there are no others.
+    run : callable
+        Runs tasks.
+    nk_role : str
+        What the second axis of the order grid means.
+
+    Returns
+    -------
+    LinearReference or None
+        None where the model is linear itself, a recording is gone, or all fits fail.
+    """
+    by_name = {one.name: one for one in recordings}
+    has_maps = {found.options.input_map, found.options.output_map} != {"none"}
+    if not has_maps or not set(found.identified_on) <= set(by_name):
+        return None
+    own = [by_name[name] for name in found.identified_on]
+    places = {grid_place(one, nk_role): one.orders for one in (found, *fits)}
+    grid = [places[place] for place in sorted(places)]
+    linear = linear_fits(own, grid, found.options, run)
+    judges = [
+        by_name[name] for name in choosers if name not in found.identified_on
+    ] or own
+    means = np.array([_mean_rmsd(one, judges) for one in linear])
+    if not np.isfinite(means).any():
+        return None
+    good = np.flatnonzero(means <= (1.0 + _AS_GOOD) * np.nanmin(means))
+    chosen = linear[
+        min(good, key=lambda place: (grid[place].nb + grid[place].nf, means[place]))
+    ]
+    nb, nk = grid_place(chosen, nk_role)
+    return LinearReference(f"{LINEAR}{chosen.name}/{nb}/{nk}", chosen)
+
+
+def _mean_rmsd(one: Fit, judges: Sequence[Recording]) -> float:
+    """Mean over recordings, [unit]; NaN without a model or with an output that runs away."""
+    if one.model is None:
+        return float("nan")
+    each = [rmsd(judge.output, validation_output(one.model, judge)) for judge in judges]
+    mean = float(np.mean(each))
+    return mean if np.isfinite(mean) else float("nan")
