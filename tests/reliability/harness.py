@@ -40,7 +40,7 @@ test: {recordings: [random_02]}
 # Arrays that say what a campaign found; they must be the same bit by bit.
 ARRAYS = ("crossval/rmsd", "group/rmsd", "group/groups/coverage", "test/rmsd")
 # Records that are kept for tables and sentences, which no task counts.
-BESIDE_TASKS = (b"_Examined", b"_OnJudges")
+BESIDE_TASKS = (b"_Examined",)
 TABLES = ("crossval", "coverage", "groups", "test", "assignment", "coverage_matrix")
 
 
