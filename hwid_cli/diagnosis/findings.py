@@ -170,6 +170,7 @@ def describe(findings: Findings) -> Diagnosis:
         reference_current_A=problem.drive.reference_current_A,
         reference_displacement_m=problem.drive.reference_displacement_m,
         output_unit=problem.unit,
+        compared="command u" if problem.compares_command else "output y",
         warnings=(*findings.warnings, *doubtful_values(parameters, problem.drive)),
         axis=problem.drive.axis,
         input_unit=problem.drive.source_unit,

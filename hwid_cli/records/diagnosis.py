@@ -345,6 +345,8 @@ class Diagnosis(Shown):
         How its bands of 90 % did on held-out recordings, each told by the others.
     hold : str
         How the command goes on between samples, as given or as found.
+    compared : str
+        The signal that is compared: ``output y``, or ``command u`` beside a controller.
     """
 
     verdict: str
@@ -381,6 +383,7 @@ class Diagnosis(Shown):
     trust: ModelTrust | None = field(default=None, metadata=ADDED_LATER)
     bands: TrustOnTests = field(default=TrustOnTests(), metadata=ADDED_LATER)
     hold: str = field(default=LINE, metadata=ADDED_LATER)
+    compared: str = field(default="output y", metadata=ADDED_LATER)
 
     @property
     def refitted(self) -> Gap:

@@ -243,7 +243,7 @@ _NOT_FITTED = (
 
 
 def ranking_table(diagnosis: Diagnosis, *, count: int | None = None) -> Table:
-    """Show the candidates, the best first.
+    """Show the candidates, the largest gain of the criterion first.
 
     Parameters
     ----------
@@ -287,8 +287,9 @@ def ranking_table(diagnosis: Diagnosis, *, count: int | None = None) -> Table:
         "BIC gain",
     )
     return Table(
-        f"Candidates, the best first{mark}; forecast, explained and improved are shares of "
-        "the error, of its excess over the noise, and of the recordings",
+        f"Candidates, the largest gain of the criterion (BIC) first{mark}; forecast, explained "
+        "and improved are shares of the error, of its excess over the noise, and of the "
+        "recordings",
         (
             Column("added to the simulation", is_text=True, joint=AND),
             *numbers(*heads),

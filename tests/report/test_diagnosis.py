@@ -259,7 +259,7 @@ def test_the_screen_shows_everything_that_was_found(width):
         assert part in text
     assert found.summary in re.sub(r"\s+", " ", text)
     assert text.count("\n- ") == 5
-    ranking = text[text.index("Candidates, the best first") :]
+    ranking = text[text.index("Candidates, the largest gain") :]
     assert [name in ranking for name in ("hysteresis", "output_backlash")] == [
         True,
         False,

@@ -6,6 +6,7 @@ from hwid_cli.records.report import ReportContents, StoredResults
 from hwid_cli.report.diagnosis import diagnosis_blocks
 from hwid_cli.report.page import Collapsible
 from hwid_cli.report.sections.diagnose import diagnosis_drawings, diagnosis_section
+from hwid_cli.report.sections.diagnosis_answer import overlay_chart
 from hwid_cli.report.table import Heading, Table, Text
 from tests.conftest import leave_figures_blank
 from tests.report.diagnosis_examples import NAN, named, nothing_missing, unknown
@@ -83,6 +84,13 @@ def test_each_recording_of_the_overlay_can_be_picked(of_nine):
     assert [name for name, _ in picker.items] == [one.name for one in named().overlays]
     chart = picker.items[0][1][0]
     assert [one.label for one in chart.panels] == ["output y [m]", "residual e [m]"]
+
+
+def test_a_command_that_is_compared_is_called_so():
+    of_loop = replace(named(), compared="command u", output_unit="A")
+    chart = overlay_chart(of_loop.overlays[0], of_loop)
+
+    assert [one.label for one in chart.panels] == ["command u [A]", "residual e [A]"]
 
 
 def with_gaps_alone(**changes):

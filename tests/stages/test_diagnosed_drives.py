@@ -169,6 +169,7 @@ def test_under_a_controller_the_command_tells():
     # Noise of 0.01 A is 0.05 N, in 2400 samples.
     assert parameters(found.effects[0])["force_N"] == pytest.approx(0.8, rel=0.02)
     assert found.output_unit != "m"
+    assert found.compared == "command u"
     # What only the sensor sees, the loop would have answered.
     assert ("output_backlash",) not in {one.effects for one in found.candidates}
 

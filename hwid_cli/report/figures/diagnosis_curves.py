@@ -154,7 +154,7 @@ def _draw_overlay(axes: list[Axes], overlay: Overlay, diagnosis: Diagnosis) -> N
     is_cut = end - first < overlay.measured.size
     # At the right: the scale of the axis stands at the left.
     axes[0].set_title(f"{title} (detail)" if is_cut else title, loc="right", pad=5)
-    _label_overlay(axes, time, diagnosis.output_unit)
+    _label_overlay(axes, time, diagnosis)
 
 
 def _draw_noise(axes: Axes, noise: float) -> None:
@@ -164,8 +164,9 @@ def _draw_noise(axes: Axes, noise: float) -> None:
     axes.axhline(0.0, color="#555555", lw=0.7)
 
 
-def _label_overlay(axes: list[Axes], time: np.ndarray, unit: str) -> None:
-    axes[0].set_ylabel(f"output y [{unit}]")
+def _label_overlay(axes: list[Axes], time: np.ndarray, diagnosis: Diagnosis) -> None:
+    unit = diagnosis.output_unit
+    axes[0].set_ylabel(f"{diagnosis.compared} [{unit}]")
     for place in axes[1:]:
         place.set_ylabel(f"residual e [{unit}]")
     axes[-1].set_xlabel("time t [s]")

@@ -323,7 +323,7 @@ def overlay_chart(
     unit = diagnosis.output_unit
     height = (_HEIGHT if is_small else 240, 150)
     panels = [
-        Panel(f"output y [{unit}]", tuple(outputs), height[0]),
+        Panel(f"{diagnosis.compared} [{unit}]", tuple(outputs), height[0]),
         Panel(f"residual e [{unit}]", tuple(left), height[1], lines=(0.0,)),
     ]
     window = (float(one.time_s[first]), float(one.time_s[end - 1]))
