@@ -10,14 +10,16 @@ from hwid_cli.records.diagnosis import Diagnosis
 from hwid_cli.records.experiment import CrossvalOptions
 from hwid_cli.records.report import StoredResults
 from hwid_cli.report.closing import (
+    LINEAR_KEYS,
     best_model_sentences,
     closing_text,
     diagnosis_sentence,
-    linear_hint,
+    keys_hint,
     nothing_hint,
     orders_sentence,
     recordings_sentence,
 )
+from hwid_cli.report.map_words import fit_keys
 from hwid_cli.simulations.kinds import kind_named
 from hwid_cli.stages.best_model import beside_linear, best_model
 from hwid_cli.stages.model_views import named_fits
@@ -69,7 +71,7 @@ def say_end(session: Session, name: str, files: Sequence[str] = ()) -> None:
         rows.append(("record", recordings_sentence(wanted, session.out / "next")))
     rows += _places(session, name, files)
     if best is not None and name in (_RUN, "test", "order"):
-        rows += _hints(session, best)
+        rows += _hints(session, best, name)
     rows.append(("next", _next(session, name, best)))
     title = f"{session.experiment.name}: {name} done in {session.timer}"
     session.say(closing_text(f"\n{title}", rows, screen_width()))
@@ -104,18 +106,13 @@ def _best(session: Session) -> BestModel | None:
     return found
 
 
-def _hints(session: Session, best: BestModel) -> list[tuple[str, str]]:
+def _hints(session: Session, best: BestModel, name: str) -> list[tuple[str, str]]:
     """What may help a model that is not good enough."""
     experiment = session.experiment
     if not best.is_usable:
         return [("hint", nothing_hint(str(experiment.source)))]
     if best.is_linear_better:
-        # Where maps were compared, and some are better than none, the orders' row says which.
-        maps = getattr(session.results.get("order"), "maps", None)
-        has_better_maps = maps is not None and maps.chosen.has_maps
-        return (
-            [] if has_better_maps else [("hint", linear_hint(str(experiment.source)))]
-        )
+        return _better_maps(session, name)
     if experiment.group is not None or not best.rmsd >= best.threshold:
         return []
     text = (
@@ -123,6 +120,16 @@ def _hints(session: Session, best: BestModel) -> list[tuple[str, str]]:
         f"{experiment.source} and run it again"
     )
     return [("hint", text)]
+
+
+def _better_maps(session: Session, name: str) -> list[tuple[str, str]]:
+    """What to set where a linear model is better than the maps of the configuration."""
+    source = str(session.experiment.source)
+    maps = getattr(session.results.get("order"), "maps", None)
+    if maps is None or maps.chosen == maps.given:
+        return [("hint", keys_hint(LINEAR_KEYS, source))]
+    # The orders' row of a run says it already.
+    return [] if name == _RUN else [("hint", keys_hint(fit_keys(maps.chosen), source))]
 
 
 def _places(session: Session, name: str, files: Sequence[str]) -> list[tuple[str, str]]:

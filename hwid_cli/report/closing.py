@@ -152,7 +152,7 @@ def orders_sentence(orders: OrderAdvice, maps: MapAdvice | None) -> str:
         said += ", no maps" if set(pair) == {"none"} else f", maps {named}"
     said += " recommended (hwid order says why)"
     if maps is not None and maps.chosen != maps.given:
-        said += f"; for these maps set {fit_keys(maps.chosen)}"
+        said += f": set {fit_keys(maps.chosen)}"
     return said
 
 
@@ -171,9 +171,9 @@ def recordings_sentence(found: NextRecordings, folder: Path) -> str:
     return f"{first.name}{more}; files to play: {folder} (hwid next says why)"
 
 
-def linear_hint(source: str) -> str:
-    """Say which keys of the configuration ask for linear models."""
-    return f"for linear models set '{LINEAR_KEYS}' in {source} and run it again"
+def keys_hint(keys: str, source: str) -> str:
+    """Say which keys of the configuration ask for better models."""
+    return f"for better models set '{keys}' in {source} and run it again"
 
 
 def diagnosis_sentence(diagnosis: Diagnosis) -> str:

@@ -61,7 +61,7 @@ def test_recommended_orders_stand_in_the_last_block(
     assert len(said.splitlines()) <= 25
     words = " ".join(said.split())
     told = f"orders nb = 1, nk = 1{maps} recommended (hwid order says why)"
-    keys = "; for these maps set fit: {input_map: none, output_map: none}" * bool(maps)
+    keys = ": set fit: {input_map: none, output_map: none}" * bool(maps)
     assert f"{told}{keys} page" in words
 
 
