@@ -134,7 +134,7 @@ def _model(found: ModelAnswer) -> str:
         for one in (found.model.input_map, found.model.output_map)
     ]
     text = (
-        f"Orders: nb = {counted(orders.nb, 'coefficient')} of the numerator, nf = "
+        f"{found.name}: nb = {counted(orders.nb, 'coefficient')} of the numerator, nf = "
         f"{counted(orders.nf, 'pole')}, {counted(orders.nk, 'sample')} of delay; input map {maps[0]}, "
         f"output map {maps[1]}, fitted to {listed(found.own)}."
     )
