@@ -42,7 +42,7 @@ def in_pieces(
     pieces = [
         piece
         for signals, motion in zip(problem.signals, smoothed, strict=True)
-        for piece in _cut(signals, motion)
+        for piece in _cut(_with_zero(problem, signals, motion), motion)
     ]
     start = "estimated" if are_free else "rest"
     return replace(problem, signals=tuple(pieces), start=start)
@@ -145,6 +145,17 @@ def count_pieces(signals: Signals) -> int:
     """Into how many pieces a recording is cut."""
     size = signals.driven_by.size
     return int(np.clip(size // _FEWEST_SAMPLES, 1, _PIECES))
+
+
+def _with_zero(
+    problem: DiagnosisProblem, signals: Signals, motion: Smoothed
+) -> Signals:
+    """A recording whose zero is free, with the zero that its smoothed motion counts from."""
+    if problem.start != "held" or signals.is_velocity:
+        return signals
+    zero = float(np.mean(signals.output - motion.position))
+    given = 0.0 if signals.offset is None else signals.offset
+    return replace(signals, offset=np.full(signals.output.size, zero) + given)
 
 
 def _cut(signals: Signals, motion: Smoothed) -> list[Signals]:

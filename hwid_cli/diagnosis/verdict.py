@@ -19,6 +19,7 @@ from hwid_cli.diagnosis.selection import (
     LEAST_IMPROVED,
     LEAST_LAST_CONTRIBUTION,
     SelectionCriteria,
+    count,
     has_own_values,
     has_size,
     is_part_of,
@@ -163,13 +164,24 @@ def _as_winner(
     same_size: Sequence[CandidateFit],
     base: CandidateFit,
 ) -> list[CandidateFit]:
-    """The winner of a size, its limit cases, and what it is a limit case of."""
+    """The winner of a size, its limit cases, simpler ones, and what it is a limit case of.
+
+    Simpler ones only where either leaves hardly more than the noise: a winner that is no
+    clear effect imitates one of them.
+    """
     others = [one for one in same_size if one is not winner]
     simpler = [one for one in others if is_part_of(one, winner)]
     # It explains a little more, which the winner may lack for a name.
     wider = [one for one in others if one.is_usable and is_part_of(winner, one)]
     wider.sort(key=lambda one: -criteria.gain(one, base))
-    return [winner, *simpler, *wider]
+    plain = [
+        one
+        for one in others
+        if count(one) < count(winner)
+        and max(map(criteria.ratio, (one, winner))) <= CLOSE_TO_NOISE
+    ]
+    plain.sort(key=lambda one: -criteria.gain(one, base))
+    return [winner, *simpler, *plain, *wider]
 
 
 def _shared_by_best(

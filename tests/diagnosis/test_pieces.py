@@ -4,6 +4,11 @@ import numpy as np
 import pytest
 
 from hwid_cli import DiagnoseOptions, Recording, SimulationOptions, diagnose
+from hwid_cli.diagnosis.base_fit import compared_as_given
+from hwid_cli.diagnosis.latent_force import latent_force
+from hwid_cli.diagnosis.noise import noise_floor
+from hwid_cli.diagnosis.pieces import in_pieces
+from hwid_cli.diagnosis.problem import prepare
 
 STEP_S, NOISE = 2e-3, 2e-5
 MASS, DAMPING, CONSTANT = 4.0, 8.0, 25.0
@@ -104,3 +109,47 @@ def test_recordings_keep_their_names_and_their_lengths(diagnosis):
     assert names == ["wave_1", "wave_2", "ramps_3", "ramps_4", "wave_5"]
     assert set(diagnosis.train) | set(diagnosis.held_out) == set(names)
     assert all(one.measured.size == 900 for one in diagnosis.overlays)
+
+
+def held_by_friction(noise):
+    """Mass on a spring that friction holds 2 mm away from it; the sensor reads 0 there.
+
+    Semi-implicit Euler on fine steps, as in the tutorial.
+    """
+    fine, rest, force, friction, stiffness = 50, 2e-3, 5.0, 3.0, 1200.0
+    t = STEP_S * np.arange(600)
+    current = 4.0 * np.sin(2 * np.pi * 3.0 * np.maximum(t - 0.1, 0.0))
+    x, v, found = rest, 0.0, []
+    for i in np.repeat(current, fine):
+        found.append(x)
+        dv = (force * i - stiffness * x - 20.0 * v) * STEP_S / fine / 0.3
+        stop = friction * STEP_S / fine / 0.3
+        v = v + dv - np.clip(v + dv, -stop, stop)
+        x += v * STEP_S / fine
+    position = np.array(found[::fine])
+    simulation = SimulationOptions(
+        mass_kg=0.3,
+        damping_N_s_per_m=20.0,
+        stiffness_N_per_m=stiffness,
+        force_constant_N_per_A=force,
+        hold="zero",
+        effects={"coulomb_friction": {"force_N": friction}},
+    )
+    return Recording("held", current, position - rest + noise, STEP_S), simulation
+
+
+def test_pieces_of_a_recording_whose_zero_is_free_count_from_the_same_zero():
+    noise = NOISE * np.random.default_rng(3).standard_normal(600)
+    recording, simulation = held_by_friction(noise)
+    problem = prepare(
+        [recording], simulation, DiagnoseOptions(initial_state="held"), ()
+    )
+    given = compared_as_given(problem)
+    smoothed = latent_force(given, problem.drive, noise_floor(problem))
+    pieces = in_pieces(problem, smoothed)
+
+    # The mass moves 2 mm away from what the sensor calls 0: pieces that start at the
+    # position and are read at the sensor must not be apart by it.
+    for whole in (given, compared_as_given(pieces)):
+        left = np.concatenate([one.residual for one in whole])
+        assert np.sqrt(np.mean(left**2)) < 5.0 * NOISE

@@ -53,8 +53,6 @@ def test_the_answer_and_the_grids_say_what_orders_count(role, said):
     html = report_page(report_contents(stored), STAGES).html
     text = re.sub(r"\s+", " ", re.sub(r"<[^>]+>", "", html))
     assert f"over nb (coefficients of the numerator) and nk ({said});" in text
-    assert re.search(
-        r"\S+: nb = \d+ coefficients? of the numerator, nf = \d+ ", text
-    )
+    assert re.search(r"\S+: nb = \d+ coefficients? of the numerator, nf = \d+ ", text)
     assert "[nb nf nk]" not in text
     assert "The widest model" not in text

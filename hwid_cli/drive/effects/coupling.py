@@ -183,6 +183,14 @@ PERIODIC = Effect(
 )
 
 
+_ELASTIC_STATED = (
+    Stated("stiffness_N_per_m", (POSITIVE,)),
+    Stated("sensor", words=("motor", "load")),
+    Stated("motor_share", (POSITIVE, _BELOW_WHOLE), is_needed=False),
+    Stated("damping_ratio", (NOT_NEGATIVE,), is_needed=False),
+)
+
+
 def _elastic(sensor: str, looks_like: dict[str, str]) -> Effect:
     """One entry of the elastic coupling, by the place of the sensor."""
     return Effect(
@@ -220,14 +228,11 @@ def _elastic(sensor: str, looks_like: dict[str, str]) -> Effect:
             ),
         ),
         derived={"SENSOR_AT_MOTOR": lambda value: float(sensor == "motor")},
-        stated=(
-            Stated("stiffness_N_per_m", (POSITIVE,)),
-            Stated("sensor", words=("motor", "load")),
-            Stated("motor_share", (POSITIVE, _BELOW_WHOLE), is_needed=False),
-            Stated("damping_ratio", (NOT_NEGATIVE,), is_needed=False),
-        ),
+        stated=_ELASTIC_STATED,
         words={"sensor": sensor},
         confused_with=looks_like,
+        # A motor without an inertia of its own is a lag.
+        told_by="motor_share",
     )
 
 
