@@ -254,6 +254,12 @@ _STARTS = ("fitted", "steady", "empty")
     help="Add the columns lower and upper: a band that holds 90 % of what would be "
     "measured, and say how much of the prediction rests on data.",
 )
+@click.option(
+    "--table",
+    metavar="NAME",
+    help="Sheet, group, struct or array of the file that holds the input, where there are "
+    "several.",
+)
 def predict(*values: Any, **options: Any) -> None:
     """Predict the output for an input, with an exported model.
 

@@ -33,13 +33,14 @@ def predict_file(  # noqa: PLR0913 - one for each option of the command
     force: bool,
     run_own_functions: bool,
     band: bool,
+    table: str | None,
 ) -> None:
     """Predict the output for an input, with an exported model."""
     exported = read_exported(model)
     check_trust(exported, model, is_trusted=run_own_functions)
     for function in _functions(exported):
         click.echo(f"{escaped(str(model))}: runs {described(function)}")
-    time, values = read_input(input_file, exported)
+    time, values = read_input(input_file, exported, table)
     check_target(out, (model, input_file), is_forced=force)
     card = exported.card
     signal = values * card.input_scale

@@ -12,6 +12,7 @@ from hwid_cli.drive.simulation import drive_effects, parameter_vector
 from hwid_cli.errors import ConfigError, ModelFileError
 from hwid_cli.model.extrapolation import outlined_model
 from hwid_cli.model.linear_block import poles, static_gain
+from hwid_cli.model.pole_bound import is_within
 from hwid_cli.records.experiment import (
     DiagnoseOptions,
     RecordingsOptions,
@@ -27,8 +28,6 @@ SIMULATION = "simulation"
 _TITLE = "NLHW"
 # Names that are listed where the asked one is not there.
 _LISTED = 3
-# A pole may lie on the unit circle (a free axis), but for rounding no further out.
-_LARGEST_POLE = 1.0 + 1e-6
 
 
 def find_fit(
@@ -235,8 +234,9 @@ def check_stability(model: HammersteinWiener, place: str) -> None:
     ModelFileError
         With the pole that lies furthest out.
     """
-    found = poles(model.denominator)
-    if found.size and not abs(found[0]) <= _LARGEST_POLE:
+    # As the fit has it: poles that lie together at 1, as of a free axis, are not sharp.
+    if not is_within(model.denominator, 1.0):
+        found = poles(model.denominator)
         raise ModelFileError(
             f"{place}: linear_block.denominator: has a pole of magnitude "
             f"{abs(found[0]):.6g}; expected all inside the unit circle; choose a stable "

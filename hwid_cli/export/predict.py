@@ -14,6 +14,9 @@ from hwid_cli.records.trust import Band
 from hwid_cli.trust.band import prediction_band
 from hwid_cli.trust.simulation import simulation_band
 
+# A model whose F(1) is below this share of its coefficients integrates, [-].
+_INTEGRATES = 1e-9
+
 
 def predict(
     exported: Exported,
@@ -67,6 +70,7 @@ def _output(
         step = exported.sample_time_s
         return simulate_drive(signal, exported.drive, sample_time_s=step).output
     check_stability(exported.model, place)
+    _check_start(exported.model, initial_state, place)
     return simulate(_started(exported.model, initial_state), signal)
 
 
@@ -110,8 +114,19 @@ def predict_band(
             exported.drive, exported.trust, signal, sample_time_s=step
         )
     check_stability(exported.model, place)
+    _check_start(exported.model, initial_state, place)
     model = _started(exported.model, initial_state)
     return prediction_band(model, exported.trust, signal)
+
+
+def _check_start(model: HammersteinWiener, word: str, place: str) -> None:
+    """Refuse a steady start of a model that integrates: no level is its own."""
+    sizes = np.abs(model.denominator)
+    if word == "steady" and abs(model.denominator.sum()) <= _INTEGRATES * sizes.sum():
+        raise ModelFileError(
+            f"--initial-state {word}: {place} integrates (it has a pole at 1), so that no "
+            "input holds its output still; expected fitted or empty; take one of them"
+        )
 
 
 def _started(model: HammersteinWiener, word: str) -> HammersteinWiener:

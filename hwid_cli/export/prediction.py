@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from hwid_cli.data.columns import MeasuredColumn, keep_rows, place_of
-from hwid_cli.data.formats import read_columns
+from hwid_cli.data.formats import read_columns, tables_of
 from hwid_cli.data.units import factor_between, in_unit, is_unitless
 from hwid_cli.errors import ConfigError, MeasurementError
 from hwid_cli.files.csv_tables import write_table_csv
@@ -18,17 +18,24 @@ from hwid_cli.records.trust import Band
 
 # A time column may jitter by this share of a step, and differ so much in its mean step.
 _TOLERANCE = 0.01
+# Names that are listed where one has to be chosen.
+_LISTED = 3
 # So much of a file's first line tells whether it is a prediction, [characters].
 _LONGEST_HEADER = 10_000
 
 
-def read_input(path: Path, exported: Exported) -> tuple[np.ndarray, np.ndarray]:
+def read_input(
+    path: Path, exported: Exported, table: str | None = None
+) -> tuple[np.ndarray, np.ndarray]:
     """Read time and input as a model's file names them.
 
     Parameters
     ----------
     path : Path
         CSV, MAT, NPZ or H5.
+    table : str or None
+        Sheet, group, struct or array of it; None takes that of the model's own files, or
+        the only one.
 
     Returns
     -------
@@ -42,7 +49,8 @@ def read_input(path: Path, exported: Exported) -> tuple[np.ndarray, np.ndarray]:
     ------
     MeasurementError
         If the file or a column is missing, a value no finite number, a unit none of what
-        the model takes, or the sample time another one than the model's.
+        the model takes, the sample time another one than the model's, or it is open which
+        of several tables is meant.
     """
     if not path.is_file():
         raise MeasurementError(
@@ -56,7 +64,7 @@ def read_input(path: Path, exported: Exported) -> tuple[np.ndarray, np.ndarray]:
         time=columns.time,
         variable=columns.variable,
     )
-    found = read_columns(path, wanted)
+    found = read_columns(path, _in_table(path, wanted, table))
     _check_numbers(path, found.input)
     values = _as_in_its_files(path, found.input, exported.card)
     if found.time is None:
@@ -72,6 +80,25 @@ def read_input(path: Path, exported: Exported) -> tuple[np.ndarray, np.ndarray]:
     _check_numbers(path, time)
     _check_steps(path, time, step)
     return time.values, values
+
+
+def _in_table(path: Path, wanted: Columns, table: str | None) -> Columns:
+    """The columns in one table of a file, where the model's own files held several."""
+    if table is not None:
+        return replace(wanted, variable=table)
+    if "*" not in str(wanted.variable or ""):
+        return wanted
+    try:
+        names = tables_of(path, wanted)
+    except MeasurementError:
+        # Without tables the columns stand alone.
+        return replace(wanted, variable=None)
+    if len(names) > 1:
+        raise MeasurementError(
+            f"{path}: holds {len(names)} tables with an input, {', '.join(names[:_LISTED])}"
+            f"{', ...' * (len(names) > _LISTED)}; expected one; choose it with --table NAME"
+        )
+    return replace(wanted, variable=names[0])
 
 
 def _as_in_its_files(path: Path, column: MeasuredColumn, card: ModelCard) -> np.ndarray:

@@ -17,7 +17,7 @@ from hwid_cli.report.map_words import fit_keys
 _LABELS = 12
 _FEW = 3
 # Keys of the configuration that ask for linear models.
-LINEAR_KEYS = "fit: {input_map: none, output_map: none}"
+LINEAR_KEYS = "input_map: none, output_map: none"
 # Rows that people copy: a line break would spoil them.
 _WHOLE = ("page", "tables", "results", "next")
 
@@ -152,7 +152,7 @@ def orders_sentence(orders: OrderAdvice, maps: MapAdvice | None) -> str:
         said += ", no maps" if set(pair) == {"none"} else f", maps {named}"
     said += " recommended (hwid order says why)"
     if maps is not None and maps.chosen != maps.given:
-        said += f": set {fit_keys(maps.chosen)}"
+        said += f": put {fit_keys(maps.chosen)} into fit"
     return said
 
 
@@ -173,7 +173,7 @@ def recordings_sentence(found: NextRecordings, folder: Path) -> str:
 
 def keys_hint(keys: str, source: str) -> str:
     """Say which keys of the configuration ask for better models."""
-    return f"for better models set '{keys}' in {source} and run it again"
+    return f"for better models put '{keys}' into fit in {source} and run it again"
 
 
 def diagnosis_sentence(diagnosis: Diagnosis) -> str:

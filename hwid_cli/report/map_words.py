@@ -17,10 +17,13 @@ def map_words(kind: str, units: int) -> str:
 
 
 def fit_keys(pair: MapCandidate | ChosenMaps) -> str:
-    """The section of the configuration that asks for these maps."""
+    """Keys of the section ``fit`` that ask for these maps.
+
+    Not the section itself: who copies it would lose the other keys.
+    """
     keys = []
     for side in ("input", "output"):
         keys.append(f"{side}_map: {getattr(pair, f'{side}_map')}")
         if units := getattr(pair, f"{side}_units"):
             keys.append(f"{side}_units: {units}")
-    return f"fit: {{{', '.join(keys)}}}"
+    return ", ".join(keys)

@@ -107,7 +107,7 @@ def map_reasons(advice: MapAdvice) -> tuple[Text, ...]:
 
 def _map_recommendation(advice: MapAdvice) -> str:
     one, best = advice.chosen, advice.candidates[0]
-    take = f"Take {fit_keys(one)}: "
+    take = f"Put {fit_keys(one)} into fit: "
     if not advice.evidence.n_validation:
         return (
             f"{take}they have the lowest BIC. There is no validation recording, and BIC takes "

@@ -20,7 +20,7 @@ from hwid_cli.records.report import StoredResults
 from hwid_cli.records.results import CrossValidation
 from hwid_cli.stages.best_model import best_model
 from hwid_cli.stages.identify import Run
-from hwid_cli.stages.linear_reference import linear_reference
+from hwid_cli.stages.linear_reference import Roles, linear_reference
 from hwid_cli.stages.model_views import named_fits
 from hwid_cli.stages.order import recommend_overall
 from hwid_cli.stages.order_grid import grid_place
@@ -54,12 +54,12 @@ def model_answer(
     if found.model is None:
         return None
     own = found.identified_on
-    beside = linear_reference(
-        found, named.values(), stored.recordings, chosen_on, run, nk_role=stored.nk_role
-    )
     final = stored.final_test
-    tested = () if final is None else final.tested_on
-    unseen = _unseen(stored.recordings, own, tested)
+    unseen = _unseen(stored.recordings, own, final)
+    roles = Roles(chosen_on, tuple(one.name for one in unseen))
+    beside = linear_reference(
+        found, named.values(), stored.recordings, roles, run, nk_role=stored.nk_role
+    )
     deviation, percent = _scores(found.model, unseen)
     linear_deviation, linear_percent = _scores(
         beside.fit.model if beside else None, unseen
@@ -74,7 +74,7 @@ def model_answer(
         own=own,
         chosen_on=chosen_on,
         recordings=tuple(one.name for one in unseen),
-        is_unused=bool(tested),
+        is_unused=final is not None and bool(final.tested_on),
         rmsd=deviation,
         linear_rmsd=linear_deviation,
         fit_percent=percent,
@@ -95,9 +95,10 @@ def _threshold(judged: CrossValidation | FinalTest | None) -> float:
 
 
 def _unseen(
-    recordings: Sequence[Recording], own: Sequence[str], tested: Sequence[str]
+    recordings: Sequence[Recording], own: Sequence[str], final: FinalTest | None
 ) -> list[Recording]:
     """Recordings that the fit has not used; those of the final test, where there are some."""
+    tested = () if final is None else final.tested_on
     return [
         one
         for one in recordings

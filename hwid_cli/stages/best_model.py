@@ -19,7 +19,7 @@ from hwid_cli.records.model import Fit, HammersteinWiener
 from hwid_cli.records.recordings import Recording
 from hwid_cli.records.results import CrossValidation
 from hwid_cli.stages.identify import Run
-from hwid_cli.stages.linear_reference import linear_reference
+from hwid_cli.stages.linear_reference import Roles, linear_reference
 from hwid_cli.stages.order_grid import grid_place
 from hwid_cli.stages.ranking import best_fits, widest_model
 from hwid_cli.stages.test import best_single, taken_model
@@ -182,7 +182,12 @@ def beside_linear(
     _, percent = _scores(found.model, judges)
     beside = replace(best, fit_percent=percent)
     linear = linear_reference(
-        found, fits.values(), recordings, best.chosen_on, run, nk_role=nk_role
+        found,
+        fits.values(),
+        recordings,
+        Roles(best.chosen_on, best.judged_on),
+        run,
+        nk_role=nk_role,
     )
     if linear is None:
         return beside

@@ -1,8 +1,9 @@
 """The linear model beside the model to take: the best of the same order grid.
 
 The linear model of the same orders would flatter the maps: orders that suit a model with
-maps may suit no linear one. So the linear model is chosen as the other one was, out of the
-same orders, by the same recordings, and fitted to the same data.
+maps may suit no linear one, and so may the one recording of its fit. So the linear model is
+chosen as the other one was, out of the same orders and by the same recordings. It is fitted
+to the same data, or to all that others judge: few coefficients make much of many recordings.
 """
 
 from collections.abc import Iterable, Sequence
@@ -21,6 +22,8 @@ from hwid_cli.stages.order_grid import grid_place
 from hwid_cli.tasks.cache import recording_key, task_key
 from hwid_cli.tasks.task import Task
 
+# Recordings of a joint fit at most: more change few coefficients hardly.
+_MOST_JOINED = 8
 # Of models that are as good within this share, the one of the fewest coefficients, [-].
 _AS_GOOD = 0.01
 
@@ -39,6 +42,22 @@ class LinearReference:
 
     name: str
     fit: Fit
+
+
+@dataclass(frozen=True)
+class Roles:
+    """Which recordings chose a model, and which judge it.
+
+    Parameters
+    ----------
+    choosing : tuple of str
+        They choose the linear model too; those of the fit where there are no others.
+    judging : tuple of str
+        No linear model is fitted to them.
+    """
+
+    choosing: tuple[str, ...] = ()
+    judging: tuple[str, ...] = ()
 
 
 def linear_options(options: FitOptions) -> FitOptions:
@@ -104,7 +123,7 @@ def linear_reference(
     found: Fit,
     fits: Iterable[Fit],
     recordings: Sequence[Recording],
-    choosers: Sequence[str],
+    roles: Roles,
     run: Run,
     *,
     nk_role: str,
@@ -116,12 +135,12 @@ def linear_reference(
     found : Fit
         The model with maps.
     fits : iterable of Fit
-        Of the grid that it was chosen from: their orders are tried.
+        Of the grid that it was chosen from: their orders are tried, and their recordings
+        together.
     recordings : sequence of Recording
         Those of the fit among them.
-    choosers : sequence of str
-        Recordings that chose ``found``, which choose here too; those of its own fit where
-        there are no others.
+    roles : Roles
+        Of the recordings for ``found``.
     run : callable
         Runs tasks.
     nk_role : str
@@ -137,21 +156,38 @@ def linear_reference(
     if not has_maps or not set(found.identified_on) <= set(by_name):
         return None
     own = [by_name[name] for name in found.identified_on]
-    places = {grid_place(one, nk_role): one.orders for one in (found, *fits)}
+    tried = (found, *fits)
+    places = {grid_place(one, nk_role): one.orders for one in tried}
     grid = [places[place] for place in sorted(places)]
     linear = linear_fits(own, grid, found.options, run)
-    judges = [
-        by_name[name] for name in choosers if name not in found.identified_on
+    choosing = [
+        by_name[name] for name in roles.choosing if name not in found.identified_on
     ] or own
-    means = np.array([_mean_rmsd(one, judges) for one in linear])
+    known = dict.fromkeys(name for one in tried for name in one.identified_on)
+    if (
+        len(known) > len(own)
+        and not set(known) & set(roles.judging)
+        and set(known) <= set(by_name)
+    ):
+        joined = _evenly([by_name[name] for name in known])
+        linear += linear_fits(joined, grid, found.options, run)
+        # Both kinds on all of them: each has seen a part.
+        choosing = [by_name[name] for name in known]
+    means = np.array([_mean_rmsd(one, choosing) for one in linear])
     if not np.isfinite(means).any():
         return None
     good = np.flatnonzero(means <= (1.0 + _AS_GOOD) * np.nanmin(means))
-    chosen = linear[
-        min(good, key=lambda place: (grid[place].nb + grid[place].nf, means[place]))
-    ]
+    sizes = [one.orders.nb + one.orders.nf for one in linear]
+    chosen = linear[min(good, key=lambda place: (sizes[place], means[place]))]
     nb, nk = grid_place(chosen, nk_role)
     return LinearReference(f"{LINEAR}{chosen.name}/{nb}/{nk}", chosen)
+
+
+def _evenly(recordings: Sequence[Recording]) -> list[Recording]:
+    """So many of them as are joined, evenly chosen."""
+    count = min(len(recordings), _MOST_JOINED)
+    at = np.linspace(0, len(recordings) - 1, count)
+    return [recordings[round(place)] for place in at]
 
 
 def _mean_rmsd(one: Fit, judges: Sequence[Recording]) -> float:

@@ -100,7 +100,7 @@ def test_maps_are_recommended_and_come_from_the_cache_the_second_time(
     # Sizes 3 and 2, and none, on both sides; three recordings.
     assert "order maps: 0 fits from the cache, 27 computed" in result.stderr
     assert "order maps: 0 pairs from the cache, 9 computed" in result.stderr
-    assert "Take fit: {input_map: " in result.stdout
+    assert "Put input_map: " in result.stdout
     assert "order.csv, maps.csv" in result.stdout
     rows = rows_of(out / "maps.csv")
     assert (len(rows), [row["take"] for row in rows].count("1")) == (9, 1)

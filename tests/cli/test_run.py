@@ -61,7 +61,7 @@ def test_recommended_orders_stand_in_the_last_block(
     assert len(said.splitlines()) <= 25
     words = " ".join(said.split())
     told = f"orders nb = 1, nk = 1{maps} recommended (hwid order says why)"
-    keys = ": set fit: {input_map: none, output_map: none}" * bool(maps)
+    keys = ": put input_map: none, output_map: none into fit" * bool(maps)
     assert f"{told}{keys} page" in words
 
 
@@ -79,7 +79,7 @@ def test_the_linear_model_is_exported_where_it_is_better(
     words = " ".join(said.split())
 
     assert "best model a linear model is better, linear:step_02/1/2: " in words
-    assert "'fit: {input_map: none, output_map: none}' in " in words
+    assert "'input_map: none, output_map: none' into fit in " in words
     last = said.splitlines()[-1]
     assert re.search(rf"  next  +hwid export {config} .*--model linear:step_", last)
 
@@ -151,7 +151,7 @@ def test_a_second_run_computes_nothing_and_force_computes_all(after_run, hwid, e
     done = hwid("run", "--force", "-v")
     text = done.stdout
     assert "Take nb = 1" in text
-    assert "Take fit: {input_map: " in text
+    assert "Put input_map: " in text
     text = done.stderr
     # All stages that the table lists are forced, not only some of them.
     assert "order maps: 0 fits from the cache, 12 computed" in text

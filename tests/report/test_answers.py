@@ -228,13 +228,12 @@ def test_a_better_linear_model_is_the_answer(contents):
     )
 
     assert plain(found.verdict) == (
-        "A linear model is better, linear:step_02/1/1: RMSD 0.000949 m, with maps 0.00136 m "
-        "on 1 recording never used. These maps are not worth it here: "
-        "fit: {input_map: none, output_map: none}."
+        "A linear model is better, linear:step_02/1/1: RMSD 0.000949 m, with the maps of the "
+        "configuration 0.00136 m, on 1 recording never used. Those are not worth it here."
     )
     assert not found.is_settled
     said, command = found.next_steps[0]
-    assert "fit: {input_map: none, output_map: none}" in said
+    assert "put input_map: none, output_map: none into fit" in said
     assert command == "hwid run CONFIG"
     exports = [one for _, one in found.next_steps if "hwid export" in one]
     (only,) = exports
@@ -303,18 +302,18 @@ def test_recommended_orders_and_maps_are_said(contents):
     assert "; no maps." in plain(answered(contents, maps=none, **worse).details[1])
     # A page that recommends other maps than it shows says how to get them.
     steps = answered(contents, maps=maps, has_these_maps=False, **worse).next_steps
-    keys = "fit: {input_map: saturation, output_map: none}"
+    keys = "put input_map: saturation, output_map: none into fit"
     assert [one for said, one in steps if keys in said] == ["hwid run CONFIG"]
     steps = answered(contents, maps=maps, **worse).next_steps
     assert not any("recommended maps" in said for said, _ in steps)
     # Where a linear model is better than the maps it has, those recommended come first.
     better = {"linear_rmsd": 0.5 * contents.answer.rmsd, **good}
     other = answered(contents, maps=maps, has_these_maps=False, **better)
-    assert f"These maps are not worth it here: {keys}." in plain(other.verdict)
+    assert "Those are not worth it here." in plain(other.verdict)
     assert keys in other.next_steps[0][0]
     assert "maps: saturation and none" in plain(other.details[1])
     given = answered(contents, maps=none, has_these_maps=False, **better)
-    assert "fit: {input_map: none, output_map: none}" in given.next_steps[0][0]
+    assert "input_map: none, output_map: none" in given.next_steps[0][0]
 
 
 def test_a_model_above_the_threshold_is_not_settled(contents):

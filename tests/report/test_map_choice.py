@@ -53,7 +53,7 @@ def test_the_recommendation_can_be_pasted_and_says_why():
     text = said()
 
     assert text.startswith(
-        "Take fit: {input_map: piecewise_linear, input_units: 3, output_map: none}: on "
+        "Put input_map: piecewise_linear, input_units: 3, output_map: none into fit: on "
     )
     assert "3 % further off than the best maps, piecewise linear, 5 and none" in text
     assert "Those of the configuration are 1.62 times as far off as the best." in text

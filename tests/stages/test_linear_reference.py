@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import lfilter
 
 from hwid_cli import FitOptions, Orders, Recording, fit
-from hwid_cli.stages.linear_reference import linear_fits, linear_reference
+from hwid_cli.stages.linear_reference import Roles, linear_fits, linear_reference
 from hwid_cli.tasks.cache import MemoryStore
 from hwid_cli.tasks.runner import RunSettings, TaskDone, run_tasks
 
@@ -38,7 +38,12 @@ def test_the_best_orders_of_the_grid_are_taken_not_those_of_the_model(recordings
         for orders in (Orders(1, 1, 1), Orders(1, 2, 1))
     )
     found = linear_reference(
-        one_pole, [one_pole, two_poles], recordings, ("b",), run_here, nk_role="poles"
+        one_pole,
+        [one_pole, two_poles],
+        recordings,
+        Roles(("b",), ("c",)),
+        run_here,
+        nk_role="poles",
     )
 
     assert found.name == "linear:a/1/2"
@@ -77,7 +82,7 @@ def test_the_recordings_that_chose_the_model_choose(recordings):
         ]
 
     def chosen(*by):
-        return linear_reference(bent, grid, known, by, run, nk_role="poles").name
+        return linear_reference(bent, grid, known, Roles(by), run, nk_role="poles").name
 
     assert chosen("b") == "linear:a/1/2"
     assert chosen("c") == "linear:a/2/2"
@@ -89,7 +94,12 @@ def test_of_equals_the_smallest_is_taken(recordings):
     bent = fit(recordings[:1], Orders(3, 3, 1), OPTIONS)
     smaller = fit(recordings[:1], Orders(1, 2, 1), OPTIONS)
     found = linear_reference(
-        bent, [bent, smaller], recordings, ("b", "c"), run_here, nk_role="poles"
+        bent,
+        [bent, smaller],
+        recordings,
+        Roles(("b", "c"), ("b", "c")),
+        run_here,
+        nk_role="poles",
     )
 
     assert found.name == "linear:a/1/2"
@@ -100,9 +110,12 @@ def test_there_is_none_beside_a_linear_model_or_one_of_a_lost_recording(recordin
     own = fit(recordings[:1], Orders(1, 2, 1), linear)
     bent = fit(recordings[:1], Orders(1, 2, 1), OPTIONS)
 
-    assert linear_reference(own, [], recordings, (), run_here, nk_role="poles") is None
     assert (
-        linear_reference(bent, [], recordings[1:], (), run_here, nk_role="poles")
+        linear_reference(own, [], recordings, Roles(), run_here, nk_role="poles")
+        is None
+    )
+    assert (
+        linear_reference(bent, [], recordings[1:], Roles(), run_here, nk_role="poles")
         is None
     )
 
@@ -120,4 +133,20 @@ def test_a_grid_whose_linear_fits_all_fail_gives_none(recordings):
             for done in run_here(tasks)
         ]
 
-    assert linear_reference(bent, [], recordings, (), run, nk_role="poles") is None
+    assert linear_reference(bent, [], recordings, Roles(), run, nk_role="poles") is None
+
+
+def test_all_recordings_that_do_not_judge_are_fitted_together(recordings):
+    """One recording of little motion and much noise tells less than two."""
+    loud = two_lags("a", 0, noise=0.2)
+    known = [loud, *recordings[1:]]
+    fits = [fit([one], Orders(1, 2, 1), OPTIONS) for one in known[:2]]
+
+    def chosen(judges):
+        return linear_reference(
+            fits[0], fits, known, Roles(("b",), judges), run_here, nk_role="poles"
+        ).name
+
+    assert chosen(("c",)) == "linear:a+b/1/2"
+    # A recording that judges is never part of a fit.
+    assert chosen(("b", "c")) == "linear:a/1/2"

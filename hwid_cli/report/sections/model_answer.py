@@ -75,8 +75,8 @@ def _verdict(found: ModelAnswer) -> str:
         linear = with_unit(found.linear_mean_rmsd, found.unit)
         own = with_unit(found.mean_rmsd, found.unit)
         return (
-            f"A linear model is better, {found.linear_name}: {mean} {linear}, with maps {own} "
-            f"on {where} {unused}. These maps are not worth it here: {_better_keys(found)}."
+            f"A linear model is better, {found.linear_name}: {mean} {linear}, with the maps of "
+            f"the configuration {own}, on {where} {unused}. Those are not worth it here."
         )
     sentence = (
         f"Take {found.name}: fit {_median(found.fit_percent)} on {where} {unused}"
@@ -207,7 +207,7 @@ def _next(found: ModelAnswer, contents: ReportContents) -> tuple[tuple[str, str]
     elif found.is_usable and not found.has_these_maps and not found.is_linear_better:
         steps.append(
             (
-                f"For the recommended maps set {fit_keys(found.maps)}, then",
+                f"For the recommended maps put {fit_keys(found.maps)} into fit, then",
                 "hwid run CONFIG",
             )
         )
@@ -217,7 +217,11 @@ def _next(found: ModelAnswer, contents: ReportContents) -> tuple[tuple[str, str]
         )
     elif found.is_linear_better:
         steps.insert(
-            0, (f"For better models set {_better_keys(found)}, then", "hwid run CONFIG")
+            0,
+            (
+                f"For better models put {_better_keys(found)} into fit, then",
+                "hwid run CONFIG",
+            ),
         )
         linear = f"hwid export CONFIG --model {found.linear_name} --format json"
         steps.insert(1, ("Take the linear model elsewhere:", linear))
