@@ -41,6 +41,9 @@ class BestModel:
         not known.
     linear_name : str
         Of that linear model, ``linear:step_06/2/4``; empty where there is none.
+    has_estimated_starts : bool
+        Whether each simulation started from a state that its measured output told: a
+        prediction has none.
     """
 
     name: str
@@ -56,6 +59,7 @@ class BestModel:
     fit_percent: float = float("nan")
     linear_fit_percent: float = float("nan")
     linear_name: str = ""
+    has_estimated_starts: bool = False
 
     def __post_init__(self) -> None:
         if self.judge not in JUDGES:

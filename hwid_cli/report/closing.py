@@ -81,6 +81,8 @@ def best_model_sentences(best: BestModel) -> list[str]:
         "others": f"{many} besides its own ({which})",
         "own": f"its own {many} ({which}); no other has judged it",
     }[best.judge]
+    if best.has_estimated_starts:
+        on = f"{on}, starts estimated from the measured output"
     mean = "mean RMSD" if len(best.judged_on) > 1 else "RMSD"
     if not best.is_usable:
         return _nothing_to_take(best, on)

@@ -180,7 +180,8 @@ def beside_linear(
         return best
     judges = [by_name[name] for name in best.judged_on]
     _, percent = _scores(found.model, judges)
-    beside = replace(best, fit_percent=percent)
+    is_estimated = found.options.initial_state == "estimated"
+    beside = replace(best, fit_percent=percent, has_estimated_starts=is_estimated)
     linear = linear_reference(
         found,
         fits.values(),

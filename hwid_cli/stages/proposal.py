@@ -2,6 +2,7 @@
 
 import glob
 import re
+from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
@@ -121,6 +122,10 @@ def propose(
     )
 
 
+# What numbers recordings: digits, or one letter behind a line.
+_NUMBER = re.compile(r"[\W_]*\d+$|[\W_]+[A-Za-z]$")
+
+
 def kind_named(name: str) -> str:
     """Kind that the name of a file says.
 
@@ -149,9 +154,30 @@ def _kinds(raws: Sequence[RawRecording]) -> tuple[dict[str, str], str]:
     if all(by_name.values()):
         return by_name, "told from the names of the files"
     found = {raw.name: by_name[raw.name] or _kind_of_signal(raw.input) for raw in raws}
+    found = _alike_in_families(found)
     if any(by_name.values()):
         return found, "told from the names of the files, else from the inputs"
     return found, "told from the inputs"
+
+
+def _alike_in_families(kinds: dict[str, str]) -> dict[str, str]:
+    """One kind for recordings that are numbered alike: that of most of them.
+
+    Else a recipe would be for some of them, and shift these against the others.
+
+    Examples
+    --------
+    >>> _alike_in_families({"move_a": "other", "move_b": "step", "move_c": "step"})
+    {'move_a': 'step', 'move_b': 'step', 'move_c': 'step'}
+    """
+    stems = {name: _NUMBER.sub("", name) for name in kinds}
+    found = dict(kinds)
+    for stem in set(stems.values()):
+        family = [name for name in kinds if stems[name] == stem]
+        kind, count = Counter(kinds[name] for name in family).most_common(1)[0]
+        if stem and len(family) > 2 and 2 * count > len(family):
+            found |= dict.fromkeys(family, kind)
+    return found
 
 
 def _kind_of_signal(values: np.ndarray) -> str:

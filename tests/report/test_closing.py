@@ -128,3 +128,8 @@ def test_recordings_to_take_are_named_with_the_place_of_their_files(
         is_enough=is_enough, proposals=[SimpleNamespace(name=one) for one in names]
     )
     assert recordings_sentence(found, Path("out/next")).startswith(said)
+
+
+def test_starts_that_a_prediction_does_not_have_are_told():
+    (first, *_) = best_model_sentences(replace(BEST, has_estimated_starts=True))
+    assert first.endswith("(c and d), starts estimated from the measured output")

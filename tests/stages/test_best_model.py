@@ -176,7 +176,9 @@ def test_a_linear_fit_that_fails_is_no_reason_to_say_nothing():
     gone = {"a/1/1": fit([saturated("z", 2.0)], Orders(1, 1, 1), FitOptions(units=3))}
 
     after = beside_linear(found, fits, recordings, run_here, nk_role="poles")
-    assert replace(after, fit_percent=np.nan) == replace(found, fit_percent=np.nan)
+    assert after.has_estimated_starts
+    same = {"fit_percent": np.nan, "has_estimated_starts": False}
+    assert replace(after, **same) == replace(found, **same)
     assert 0.0 < after.fit_percent < 100.0
     assert beside_linear(found, gone, recordings, run_here, nk_role="poles") == found
     assert beside_linear(found, {}, recordings, run_here, nk_role="poles") == found
