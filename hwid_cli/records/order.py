@@ -156,11 +156,6 @@ class MapCandidate:
     factor: float
     bic: float
 
-    @property
-    def has_maps(self) -> bool:
-        """Whether it is a nonlinear model."""
-        return {self.input_map, self.output_map} != {"none"}
-
 
 @dataclass(frozen=True)
 class MapAdvice:
