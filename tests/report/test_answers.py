@@ -228,7 +228,7 @@ def test_a_better_linear_model_is_the_answer(contents):
     )
 
     assert plain(found.verdict) == (
-        "A linear model is better, linear:step_02/1/1: RMSD 0.000949 m, with the maps of the "
+        "A linear model is better: RMSD 0.000949 m, with the maps of the "
         "configuration 0.00136 m, on 1 recording never used. Those are not worth it here."
     )
     assert not found.is_settled

@@ -75,7 +75,7 @@ def _verdict(found: ModelAnswer) -> str:
         linear = with_unit(found.linear_mean_rmsd, found.unit)
         own = with_unit(found.mean_rmsd, found.unit)
         return (
-            f"A linear model is better, {found.linear_name}: {mean} {linear}, with the maps of "
+            f"A linear model is better: {mean} {linear}, with the maps of "
             f"the configuration {own}, on {where} {unused}. Those are not worth it here."
         )
     sentence = (
