@@ -319,6 +319,11 @@ class FitOptions:
         return self.linear_block is not None and self.linear_block.frozen
 
     @property
+    def has_maps(self) -> bool:
+        """Whether a nonlinear model is asked for."""
+        return {self.input_map, self.output_map} != {"none"}
+
+    @property
     def of_input(self) -> MapOptions:
         """What is asked of the input map."""
         units = self.units if self.input_units is None else self.input_units

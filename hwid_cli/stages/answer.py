@@ -43,9 +43,8 @@ def model_answer(
     ModelAnswer or None
         None without any model.
     """
-    named = {
-        name: one for name, one in named_fits(stored).items() if one.model is not None
-    }
+    fits = named_fits(stored)
+    named = {name: one for name, one in fits.items() if one.model is not None}
     advice = _advice(stored, crossval)
     name, chosen_on = _chosen(stored, crossval, named)
     if not name or not stored.recordings:
@@ -58,7 +57,7 @@ def model_answer(
     unseen = _unseen(stored.recordings, own, final)
     roles = Roles(chosen_on, tuple(one.name for one in unseen))
     beside = linear_reference(
-        found, named.values(), stored.recordings, roles, run, nk_role=stored.nk_role
+        found, fits.values(), stored.recordings, roles, run, nk_role=stored.nk_role
     )
     deviation, percent = _scores(found.model, unseen)
     linear_deviation, linear_percent = _scores(

@@ -152,8 +152,7 @@ def linear_reference(
         None where the model is linear itself, a recording is gone, or all fits fail.
     """
     by_name = {one.name: one for one in recordings}
-    has_maps = {found.options.input_map, found.options.output_map} != {"none"}
-    if not has_maps or not set(found.identified_on) <= set(by_name):
+    if not found.options.has_maps or not set(found.identified_on) <= set(by_name):
         return None
     own = [by_name[name] for name in found.identified_on]
     tried = (found, *fits)
@@ -162,25 +161,32 @@ def linear_reference(
     linear = linear_fits(own, grid, found.options, run)
     choosing = [
         by_name[name] for name in roles.choosing if name not in found.identified_on
-    ] or own
-    known = dict.fromkeys(name for one in tried for name in one.identified_on)
+    ]
+    together = dict.fromkeys(name for one in tried for name in one.identified_on)
+    are_there = set(together) <= set(by_name)
     if (
-        len(known) > len(own)
-        and not set(known) & set(roles.judging)
-        and set(known) <= set(by_name)
+        are_there
+        and len(together) > len(own)
+        and not set(together) & set(roles.judging)
     ):
-        joined = _evenly([by_name[name] for name in known])
-        linear += linear_fits(joined, grid, found.options, run)
-        # Both kinds on all of them: each has seen a part.
-        choosing = [by_name[name] for name in known]
+        # Both kinds are chosen on all of them: each was fitted to a part.
+        choosing = [by_name[name] for name in together]
+        linear += linear_fits(_evenly(choosing), grid, found.options, run)
+    chosen = _smallest_good(linear, choosing or own)
+    if chosen is None:
+        return None
+    nb, nk = grid_place(chosen, nk_role)
+    return LinearReference(f"{LINEAR}{chosen.name}/{nb}/{nk}", chosen)
+
+
+def _smallest_good(linear: Sequence[Fit], choosing: Sequence[Recording]) -> Fit | None:
+    """The smallest of those that are about as good as the best; None without a model."""
     means = np.array([_mean_rmsd(one, choosing) for one in linear])
     if not np.isfinite(means).any():
         return None
     good = np.flatnonzero(means <= (1.0 + _AS_GOOD) * np.nanmin(means))
     sizes = [one.orders.nb + one.orders.nf for one in linear]
-    chosen = linear[min(good, key=lambda place: (sizes[place], means[place]))]
-    nb, nk = grid_place(chosen, nk_role)
-    return LinearReference(f"{LINEAR}{chosen.name}/{nb}/{nk}", chosen)
+    return linear[int(min(good, key=lambda place: (sizes[place], means[place])))]
 
 
 def _evenly(recordings: Sequence[Recording]) -> list[Recording]:

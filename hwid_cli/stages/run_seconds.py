@@ -24,9 +24,7 @@ def page_plan(planning: Planning) -> StagePlan:
     """What it takes to fit linear models, to write the page and to draw its figures."""
     seconds = _PAGE_SECONDS + _FIGURES_SECONDS * len(planning.recordings)
     what = "the page and its figures"
-    if {planning.experiment.fit.input_map, planning.experiment.fit.output_map} != {
-        "none"
-    }:
+    if planning.experiment.fit.has_maps:
         what = "linear models, the page and its figures"
         seconds += _linear_seconds(planning)
     return StagePlan("report", what, 1, None, seconds, 0.0)

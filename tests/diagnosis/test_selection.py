@@ -22,6 +22,7 @@ from hwid_cli.diagnosis.selection import (
     select_best,
 )
 from hwid_cli.diagnosis.verdict import DiagnosisVerdict, decide, lead
+from hwid_cli.drive.catalogue import CATALOGUE
 from hwid_cli.records.candidates import ParameterRef
 from hwid_cli.records.diagnosis import VERDICTS
 from hwid_cli.records.drive import StandIn
@@ -818,3 +819,35 @@ def test_a_set_is_not_named_where_fewer_effects_leave_less(of_fewer, whiteness, 
     fits = {one.effects: one for one in (*singles, pair)}
     found = decide(CRITERIA, start.sse, start, fits, (fewer, pair), lambda _: ())
     assert found.chosen.effects == chosen
+
+
+@pytest.mark.parametrize(
+    ("of_plain", "chosen"),
+    [
+        (101.0, ("winding_inductance",)),
+        # The simpler one leaves more than 1.03 times the noise.
+        (112.0, ("gear_backlash",)),
+    ],
+)
+def test_what_is_no_clear_effect_imitates_a_simpler_one(of_plain, chosen):
+    """A coupling without an inertia of the motor is a lag, not teeth with play."""
+    coupling = made_up(("elastic_coupling:load",), 100.0, parameters=3)
+    teeth = made_up(("gear_backlash",), 105.0, parameters=4)
+    plain = made_up(("winding_inductance",), of_plain)
+    start = base(1e4)
+    fits = {one.effects: one for one in (coupling, teeth, plain)}
+
+    found = decide(
+        CRITERIA,
+        start.sse,
+        start,
+        fits,
+        (coupling,),
+        lambda one: one.effects if one is coupling else (),
+    )
+    assert found.chosen.effects == chosen
+
+
+@pytest.mark.parametrize("sensor", ["motor", "load"])
+def test_a_coupling_is_told_by_the_inertia_of_the_motor(sensor):
+    assert CATALOGUE[f"elastic_coupling:{sensor}"].told_by == "motor_share"

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from hwid_cli import FitOptions, Orders, Recording, fit
+from hwid_cli.model.simulate import validation_output
 from hwid_cli.records.answer import ChosenMaps
 from hwid_cli.records.experiment import OrderOptions, OrdersOptions
 from hwid_cli.records.order import OrderAdvice
@@ -138,6 +139,38 @@ def test_maps_are_told_where_they_belong_to_the_advised_orders(stored, nb, is_to
 
     found = answer_of(replace(stored, chosen_maps=maps))
     assert (found.maps == maps) == is_told
+
+
+def test_whether_the_model_has_the_recommended_maps_is_told(stored):
+    advice, asked = answer_of(stored).advice, stored.fits[0].options
+    of_input, of_output = asked.of_input.kind, asked.of_output.kind
+
+    def has_them(*maps):
+        chosen = ChosenMaps(advice.nb, advice.nk, *maps)
+        return answer_of(replace(stored, chosen_maps=chosen)).has_these_maps
+
+    assert has_them(of_input, of_output)
+    assert not has_them("dead_zone", of_output)
+    # The same kinds of another size are other maps.
+    assert not has_them(of_input, of_output, 29, 29)
+
+
+def test_the_recommended_orders_are_judged_where_the_model_is(stored):
+    few = without(stored, "test", "group")
+    found = answer_of(few)
+    place = found.advice.nb, found.advice.nk
+    own = [
+        one
+        for one in few.fits
+        if one.identified_on == found.own and (one.orders.nb, one.orders.nf) == place
+    ]
+    judges = [one for one in few.recordings if one.name in found.recordings]
+    by_hand = [
+        np.sqrt(np.mean((one.output - validation_output(own[0].model, one)) ** 2))
+        for one in judges
+    ]
+
+    assert found.advised_rmsd == pytest.approx(np.mean(by_hand), rel=1e-12)
 
 
 def test_without_a_tensor_the_best_fit_is_taken_and_simulated_elsewhere(stored):
