@@ -37,6 +37,8 @@ from hwid_cli.records.diagnosis import NoiseFloor
 
 # A line that takes this share of what the base leaves is no colour of noise.
 LINE_SHARE = 0.3
+# What a fit leaves is at least this share of the noise: it has few parameters.
+_LEAST_OF_NOISE = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +72,9 @@ def fitted_base(problem: DiagnosisProblem) -> FittedBase:
     given = compared_as_given(problem)
     scales = scales_of_recordings(problem, [one.velocity for one in given])
     base = _refit_base(problem, scales, noise)
-    if _shakes_at_rest(problem, base, scales, noise):
+    if _is_too_much(base, noise, problem.n_evaluated) or _shakes_at_rest(
+        problem, base, scales, noise
+    ):
         noise = noise_floor(problem, rests=False)
         base = _refit_base(problem, scales, noise)
     reversal = find_reversal(problem, base, scales, noise)
@@ -124,6 +128,16 @@ def _with_input_noise(
     point = fit_with_input_noise(problem, fit_layout, point, noise)
     found = at_point(problem, base, fit_layout, point, noise)
     return found if found.cause == "input_noise" else base
+
+
+def _is_too_much(base: CandidateFit, noise: NoiseFloor, n_samples: int) -> bool:
+    """Whether a fit leaves far less than what was read at rest: that was motion.
+
+    A drive that settles, such as a load when its brake opens, moves in every recording
+    before the input does.
+    """
+    left = np.sqrt(base.sse.sum() / n_samples)
+    return noise.method == "rest" and bool(left < _LEAST_OF_NOISE * noise.rms)
 
 
 def _shakes_at_rest(

@@ -16,6 +16,7 @@ from hwid_cli.diagnosis.candidate import at_point, fitted_drive, rebuilt
 from hwid_cli.diagnosis.causes import left_over
 from hwid_cli.diagnosis.findings import Findings
 from hwid_cli.diagnosis.intervals import unclear_effects
+from hwid_cli.diagnosis.noise import measured_input_rms
 from hwid_cli.diagnosis.parameters import (
     BASE,
     ParameterLayout,
@@ -706,7 +707,7 @@ def _evaluated(
 def _with_run(findings: Findings, turn: _Turn) -> Findings:
     """Findings with what the simulation itself has left with the effect in it."""
     fit = _fit_of_run(findings, turn)
-    is_complete = findings.verdict.is_complete or findings.criteria.is_complete(fit)
+    is_complete = findings.criteria.is_complete(fit)
     verdict = replace(findings.verdict, chosen=fit, is_complete=is_complete)
     problem = replace(turn.problem, known={})
     return replace(findings, problem=problem, verdict=verdict)
@@ -727,8 +728,9 @@ def _fit_of_run(findings: Findings, turn: _Turn) -> CandidateFit:
             names=(*(ParameterRef(BASE, name) for name in names), *fit.names),
             values=np.r_[[getattr(drive, name) for name in names], fit.values],
         )
-    white, cause = left_over(
-        turn.left, replace(turn.problem, known={}), fitted_drive(drive, fit),
-        findings.criteria.noise,
-    )  # fmt: skip
+    # The simulation itself is no stand-in, which may be late at a step.
+    noise = findings.criteria.noise
+    noise = replace(noise, input_rms=measured_input_rms(turn.problem))
+    problem = replace(turn.problem, known={})
+    white, cause = left_over(turn.left, problem, fitted_drive(drive, fit), noise)
     return replace(fit, sse=turn.sse, whiteness=white, cause=cause)

@@ -72,7 +72,7 @@ class Linearisation:
     present : mapping
         Effects that the base has already, as fitted.
     own : mapping of ParameterRef to ndarray, shape (n_recordings,)
-        Coordinates of what each recording has for itself of these effects.
+        Coordinates of what each recording has for itself: of these effects, its start.
     parts : list of ndarray
         Error of the base in each recording.
     absorbed : ndarray, shape (n_samples, n_absorbed)
@@ -115,15 +115,14 @@ def linearise(
     """Simulate the base and its derivatives."""
     fit_layout = parameter_layout(problem, tuple(present), present, scales)
     point = first_point(problem, fit_layout, drive, present)
-    of_effects = [j for j, one in enumerate(fit_layout.own) if one.owner != START]
-    if of_effects:
+    if any(one.owner != START for one in fit_layout.own):
         point = fit_own(problem, fit_layout, point.shared)
     parts = residuals_at(problem, fit_layout, point)
     jacobians = derivatives(problem, fit_layout, point, parts)
     absorbed = _orthonormal(_whole(jacobians, len(fit_layout.shared)))
     error = np.concatenate(parts)
     error = error - absorbed @ (absorbed.T @ error)
-    own = {fit_layout.own[j].ref: point.own[:, j] for j in of_effects}
+    own = {one.ref: point.own[:, j] for j, one in enumerate(fit_layout.own)}
     return Linearisation(problem, drive, present, scales, own, parts, absorbed, error)
 
 

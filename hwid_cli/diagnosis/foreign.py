@@ -20,7 +20,9 @@ from hwid_cli.diagnosis.confirmation import (
 )
 from hwid_cli.diagnosis.diagnose import find, held_out_of
 from hwid_cli.diagnosis.findings import Findings, describe
+from hwid_cli.diagnosis.laws import MOST_OF_NAMED
 from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals, prepare
+from hwid_cli.diagnosis.selection import LEAST_GAIN
 from hwid_cli.diagnosis.simulator import DIFFERENCE, Runs, Simulator
 from hwid_cli.diagnosis.stand_in import (
     derived,
@@ -32,6 +34,7 @@ from hwid_cli.diagnosis.stand_in import (
     standing_for,
 )
 from hwid_cli.diagnosis.tasks import OnRound, RunTasks
+from hwid_cli.diagnosis.verdict import DiagnosisVerdict
 from hwid_cli.records.diagnosis import BaseParameter, Diagnosis
 from hwid_cli.records.drive import LINE, StandIn
 from hwid_cli.records.experiment import DiagnoseOptions, SimulationOptions
@@ -107,6 +110,9 @@ def diagnose_foreign(
     if kept is None:
         raise ValueError("no search was made")
     found, is_confirmed, values = kept
+    if is_confirmed:
+        law = _law_instead(runs, problem, found.verdict, refitted, options, on_round)
+        found, values = law or (found, values)
     told = _told(found, simulator, (refitted, values))
     confirmed = "simulation" if is_confirmed else "surrogate"
     return replace(told, confirmed=confirmed)
@@ -173,6 +179,43 @@ def _found(
     found = find(standing, options, runs.run_tasks, on_round, given_sse)
     on_round("the effect in the simulation", 0)
     return confirm(found, runs, values)
+
+
+def _law_instead(
+    runs: Runs,
+    problem: DiagnosisProblem,
+    verdict: DiagnosisVerdict,
+    values: dict[str, float],
+    options: DiagnoseOptions,
+    on_round: OnRound,
+) -> tuple[Findings, dict[str, float]] | None:
+    """A law as short as what is named that leaves far less, if there is one.
+
+    A stand-in that is late at a step may take what is left for its own error; only the
+    simulation's run with the effect shows it.
+
+    Parameters
+    ----------
+    verdict : DiagnosisVerdict
+        On the simulation's run.
+    values : dict of str to float
+        Parameters of the simulation that no effect has moved.
+    """
+    is_open = options.laws == "auto" and options.effects is None
+    if not is_open or verdict.word != "named" or verdict.is_complete:
+        return None
+    on_round("a law instead", 0)
+    standing = _beside(runs, problem, runs.of(problem.signals, values), values)
+    only = replace(options, laws="only")
+    found = find(standing, only, runs.run_tasks, on_round)
+    if found.law is None or len(found.law.terms) > len(verdict.chosen.effects):
+        return None
+    told, moved, is_confirmed = confirm(found, runs, values)
+    criteria, law = told.criteria, told.verdict.chosen
+    is_better = criteria.gain(law, verdict.chosen) >= LEAST_GAIN
+    least = MOST_OF_NAMED * criteria.excess(verdict.chosen)
+    is_clear = told.verdict.is_complete or criteria.excess(law) <= least
+    return (told, moved) if is_confirmed and is_better and is_clear else None
 
 
 def _with_nearer_spring(

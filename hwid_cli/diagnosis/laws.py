@@ -25,6 +25,7 @@ from hwid_cli.diagnosis.candidate import (
 from hwid_cli.diagnosis.intervals import intervals, unclear_effects
 from hwid_cli.diagnosis.latent_force import Smoothed
 from hwid_cli.diagnosis.law_search import (
+    MOST_TERMS,
     Regression,
     Subset,
     best_subsets,
@@ -64,7 +65,7 @@ _SHAPE_FACTOR = 4.0
 # Share of the held-out excess over the noise that a law must explain.
 LEAST_EXPLAINED_LAW = 0.8
 # What a law may leave of what effects of the catalogue leave, where it is not complete.
-_MOST_OF_NAMED = 0.5
+MOST_OF_NAMED = 0.5
 # What a law leaves of held-out recordings against what it leaves of its own, in what the
 # base leaves there.
 _MOST_ELSEWHERE = 2.0
@@ -150,10 +151,14 @@ def find_law(
         With the fits of laws.
     law : LawFound or None
     """
-    if not _is_wanted(rounds, verdict):
+    most = _most_terms(rounds, verdict)
+    if most == 0:
         return verdict, found, None
     rounds.on_round("laws", 0)
-    best = _best(rounds, _tried(rounds, _likely(rounds, compared, smoothed)))
+    likely = _likely(rounds, compared, smoothed)
+    best = _best(
+        rounds, _tried(rounds, [one for one in likely if len(one.terms) <= most])
+    )
     if best is None or not _holds(rounds, best, verdict):
         return verdict, found, None
     best = _refined(rounds, best)
@@ -175,16 +180,22 @@ def find_law(
     return word, replace(found, fits=fits), _described(best)
 
 
-def _is_wanted(rounds: Rounds, verdict: DiagnosisVerdict) -> bool:
-    """Whether something is left that a law may hold.
+def _most_terms(rounds: Rounds, verdict: DiagnosisVerdict) -> int:
+    """How many terms a law may have that something is left for; 0 where nothing is.
 
-    What a named effect leaves beside the noise is no reason to take its name away.
+    What a named effect leaves near the noise is no reason to take its name away, unless
+    a law as short as that leaves nothing.
     """
+    is_open = rounds.base.is_usable and not rounds.problem.compares_command
+    if verdict.is_complete or not is_open:
+        return 0
+    return _as_short(rounds, verdict) or MOST_TERMS
+
+
+def _as_short(rounds: Rounds, verdict: DiagnosisVerdict) -> int:
+    """Number of effects that are named and leave little; 0 where none do."""
     is_small = rounds.criteria.ratio(verdict.chosen) <= SMALL_REMAINDER
-    is_open = not verdict.is_complete
-    if verdict.word == "named" and is_small:
-        is_open = False
-    return is_open and rounds.base.is_usable and not rounds.problem.compares_command
+    return len(verdict.chosen.effects) if verdict.word == "named" and is_small else 0
 
 
 def _tried(rounds: Rounds, likely: Sequence[_Tried]) -> list[_Tried]:
@@ -443,7 +454,9 @@ def _holds(rounds: Rounds, one: _Tried, verdict: DiagnosisVerdict) -> bool:
     rest = criteria.excess(fit) / max(criteria.excess(verdict.chosen), 1e-300)
     is_better = criteria.gain(fit, verdict.chosen) >= LEAST_GAIN
     is_better = is_better and criteria.is_beyond_stand_in(fit, verdict.chosen)
-    return is_better and (rest <= _MOST_OF_NAMED or criteria.is_complete(fit))
+    if _as_short(rounds, verdict):
+        return is_better and criteria.is_complete(fit)
+    return is_better and (rest <= MOST_OF_NAMED or criteria.is_complete(fit))
 
 
 def _is_as_good_elsewhere(rounds: Rounds, fit: CandidateFit) -> bool:

@@ -135,15 +135,28 @@ class Stretch:
 
 
 def _input_rms(problem: DiagnosisProblem) -> float:
+    """Noise of the input that may show in what a simulation leaves.
+
+    Beside a stand-in steps and corners count as well: it follows a simulation through
+    a step only to a part of a sample, which leaves the same.
+    """
+    if isinstance(problem.drive, StandIn):
+        pieces = [one.driven_by[one.skip :] for one in problem.signals]
+        return float(_from_differences(pieces, 0.0))
+    return measured_input_rms(problem)
+
+
+def measured_input_rms(problem: DiagnosisProblem) -> float:
     """Noise that the measured input may hold; a fast command makes it more.
 
     A command that is held or goes in straight lines most of the time has none: its steps
-    and corners are not noise. Beside a stand-in they count: it follows
-    a simulation through a step only to a part of a sample, which leaves the same.
+    and corners are not noise.
+
+    Returns
+    -------
+    float, [input unit]
     """
     pieces = [one.driven_by[one.skip :] for one in problem.signals]
-    if isinstance(problem.drive, StandIn):
-        return float(_from_differences(pieces, 0.0))
     noisy = [piece for piece in pieces if not _is_mostly_straight(piece)]
     counts = [piece.size for piece in pieces]
     share = sum(piece.size for piece in noisy) / max(sum(counts), 1)

@@ -101,7 +101,9 @@ def run_rounds(
         if not rounds.allowed:
             break
         winner = search.round_of(size, parents)
-        if winner is None or (best and not search.fits.is_better(winner, best[-1])):
+        if not search.goes_on(winner, best):
+            winner = search.look_closer(size, parents)
+        if winner is None or not search.goes_on(winner, best):
             break
         best.append(winner)
         if rounds.criteria.is_nearly_all(winner, rounds.base):
@@ -176,6 +178,30 @@ class _Search:
         self.fits.grow(size)
         self._use_again(size)
         self.fits.go_on(size)
+        return self.fits.best_of_size(size)
+
+    def goes_on(
+        self, winner: CandidateFit | None, best: Sequence[CandidateFit]
+    ) -> bool:
+        """Whether the best set of a size is worth more than the one before."""
+        if winner is None:
+            return False
+        return not best or self.fits.is_better(winner, best[-1])
+
+    def look_closer(
+        self, size: int, parents: Sequence[CandidateFit]
+    ) -> CandidateFit | None:
+        """Fit what all samples promise, before a search ends that has screened few.
+
+        In few recordings, what is there can take over for what is missing: a stop for a
+        limit that one of them exceeds, where others pin the stop.
+        """
+        if self.fits.has_many and parents:
+            sets = self.proposals.of_size(size, parents[:1], self.fits.train)
+            plain = [ids for ids in sets if not includes_one_of(ids, list(sets))]
+            first = {ids: sets[ids] for ids in plain[:FEWEST_FINISHED]}
+            self.fits.finish(f"{name_of(size)}, of all samples", first)
+            self.fits.go_on(size)
         return self.fits.best_of_size(size)
 
     def _may_add(self, ids: Effects, screened: Mapping[Effects, Screened]) -> bool:

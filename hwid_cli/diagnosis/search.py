@@ -124,7 +124,7 @@ def fit_point(
     free = _free(fit_layout, len(problem.signals), own_columns)
     if not np.isfinite(place.sse) or not free.any():
         return SearchResult(fit_layout, point, place.sse, 0, False)
-    descent = _Descent(problem, fit_layout, free, near)
+    descent = _Descent(problem, fit_layout, free, own_columns, near)
     small = 0
     for iteration in range(max_iterations):
         better = descent.advance(place)
@@ -146,13 +146,22 @@ class _Descent:
         problem: DiagnosisProblem,
         fit_layout: ParameterLayout,
         free: np.ndarray,
+        own_columns: Sequence[int] | None,
         near: float,
     ) -> None:
         self.problem = problem
         self.layout = fit_layout
         self.free = free
+        self.own_columns = own_columns
         self.near = near
         self.damping = _FIRST_DAMPING
+
+    @property
+    def n_simulations(self) -> int:
+        """Simulations of all recordings that fresh derivatives take."""
+        if self.own_columns is not None:
+            return len(self.own_columns)
+        return len(self.layout.shared) + len(self.layout.own)
 
     def least_gain(self, place: _Iterate) -> float:
         """Share of the sum of squares that a step has to gain."""
@@ -163,14 +172,14 @@ class _Descent:
 
         None where not even a short step lowers the sum of squares.
         """
-        jacobians = derivatives(self.problem, self.layout, place.point, place.parts)
+        jacobians = derivatives(
+            self.problem, self.layout, place.point, place.parts, self.own_columns
+        )
         taken = self._damped(place, jacobians)
         if taken is None:
             return None
-        # Fresh derivatives take one simulation for each unknown.
-        n_unknowns = len(self.layout.shared) + len(self.layout.own)
-        worth = (place.sse - taken.place.sse) / (n_unknowns + 1)
-        for _ in range(n_unknowns):
+        worth = (place.sse - taken.place.sse) / (self.n_simulations + 1)
+        for _ in range(self.n_simulations):
             gain = place.sse - taken.place.sse
             is_poor = (
                 taken.ratio < _LEAST_RATIO or gain < self.least_gain(place) * place.sse
@@ -265,6 +274,7 @@ def derivatives(
     fit_layout: ParameterLayout,
     point: ParameterPoint,
     parts: list[np.ndarray],
+    own_columns: Sequence[int] | None = None,
 ) -> list[np.ndarray]:
     """Derivatives of each recording's simulation by all coordinates that touch it.
 
@@ -272,36 +282,40 @@ def derivatives(
     ----------
     parts : list of ndarray
         Residuals at the point.
+    own_columns : sequence of int or None
+        By these of each recording's own coordinates alone; None derives by all.
 
     Returns
     -------
     list of ndarray, shape (n_samples, n_shared + n_own)
-        0 where a simulation ran away.
+        0 where a simulation ran away, and by what is not asked for.
     """
-    columns: list[list[np.ndarray]] = [[] for _ in problem.signals]
+    n_shared = len(fit_layout.shared)
+    size = n_shared + len(fit_layout.own)
+    found = [np.zeros((part.size, size)) for part in parts]
     unknowns: list[tuple[Unknown, int, bool]] = [
-        *((one, j, False) for j, one in enumerate(fit_layout.shared)),
-        *((one, j, True) for j, one in enumerate(fit_layout.own)),
+        (one, j, True)
+        for j, one in enumerate(fit_layout.own)
+        if own_columns is None or j in own_columns
     ]
+    if own_columns is None:
+        unknowns += [(one, j, False) for j, one in enumerate(fit_layout.shared)]
     for unknown, column, is_own in unknowns:
         shared, own = point.shared.copy(), point.own.copy()
         # Look inwards at a bound.
         width = _DIFFERENCE
-        at = own[0, column] if is_own else shared[column]
-        if unknown.value(at + width) > unknown.high:
+        place = own[0, column] if is_own else shared[column]
+        if unknown.value(place + width) > unknown.high:
             width = -width
         if is_own:
             own[:, column] += width
         else:
             shared[column] += width
         shifted = residuals_at(problem, fit_layout, ParameterPoint(shared, own))
-        for row, (before, after) in enumerate(zip(parts, shifted, strict=True)):
-            columns[row].append((before - after) / width)
-    # All of the base may be known, so that there is nothing to derive by.
-    return [
-        np.nan_to_num(np.column_stack(one)) if one else np.zeros((part.size, 0))
-        for one, part in zip(columns, parts, strict=True)
-    ]
+        at = n_shared + column if is_own else column
+        for jacobian, before, after in zip(found, parts, shifted, strict=True):
+            jacobian[:, at] = np.nan_to_num((before - after) / width)
+    return found
 
 
 def local_matrix(
@@ -443,14 +457,26 @@ def fit_own(
     start = {one: dict[str, float]() for one in fit_layout.effects}
     first = first_point(problem, _only_own(fit_layout), problem.drive, start)
     point = with_own_trials(problem, fit_layout, ParameterPoint(shared, first.own))
-    found = fit_point(
-        problem,
-        fit_layout,
-        point,
-        max_iterations=OWN_ITERATIONS,
-        own_columns=range(len(fit_layout.own)),
-    )
-    return found.point
+    return _fit_each(problem, fit_layout, point, range(len(fit_layout.own)))
+
+
+def _fit_each(
+    problem: DiagnosisProblem,
+    fit_layout: ParameterLayout,
+    point: ParameterPoint,
+    own_columns: Sequence[int],
+) -> ParameterPoint:
+    """Find own values of every recording by a search of its own, which ends by itself."""
+    own = point.own.copy()
+    for row, one in enumerate(problem.signals):
+        own[row] = fit_point(
+            replace(problem, signals=(one,)),
+            fit_layout,
+            ParameterPoint(point.shared, point.own[[row]]),
+            max_iterations=OWN_ITERATIONS,
+            own_columns=own_columns,
+        ).point.own[0]
+    return ParameterPoint(point.shared, own)
 
 
 def cross_fitted(
@@ -482,14 +508,8 @@ def cross_fitted(
             one.only(turn == is_first)
             for one, turn in zip(problem.signals, turns, strict=True)
         )
-        found = fit_point(
-            replace(problem, signals=signals),
-            fit_layout,
-            point,
-            max_iterations=OWN_ITERATIONS,
-            own_columns=columns,
-        )
-        others = residuals_at(problem, fit_layout, found.point)
+        found = _fit_each(replace(problem, signals=signals), fit_layout, point, columns)
+        others = residuals_at(problem, fit_layout, found)
         for row, (one, turn) in enumerate(zip(problem.signals, turns, strict=True)):
             judged = (turn != is_first)[one.evaluated]
             parts[row] = np.where(judged, others[row], parts[row])

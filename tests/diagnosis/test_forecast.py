@@ -7,8 +7,15 @@ import numpy as np
 import pytest
 
 from hwid_cli.diagnosis.candidate import fitted_drive, fitted_values
-from hwid_cli.diagnosis.forecast import Forecast, forecast, linearise, pair_shares
+from hwid_cli.diagnosis.forecast import (
+    Forecast,
+    changed_by,
+    forecast,
+    linearise,
+    pair_shares,
+)
 from hwid_cli.drive.catalogue import CATALOGUE
+from hwid_cli.records.experiment import DiagnoseOptions
 from tests.diagnosis.small_drive import fit, problem, recordings, sizes
 
 HIDDEN = {
@@ -142,3 +149,12 @@ def test_two_columns_of_one_direction_explain_no_more_than_one():
     same = [Forecast(name, 0.0, ({},), column) for name in "ab"]
     ((share, _, _),) = pair_shares(same, np.array([0.6, 0.8]))
     assert share == pytest.approx(0.0, abs=1e-9) or share == pytest.approx(1.0)
+
+
+def test_a_limit_that_is_never_reached_changes_nothing_beside_own_values_and_starts():
+    # Starts are free, and each recording has a stiffness of its own: both as fitted.
+    of = problem(recordings(), options=DiagnoseOptions(initial_state="estimated"))
+    present = {"parameter_change:stiffness": {"log_stiffness": 0.0}}
+    at_base = linearise(of, of.drive, present, sizes(of))
+    changed = changed_by(at_base, "input_saturation", {"limit_A": 50.0})
+    np.testing.assert_allclose(changed, 0.0, atol=1e-12)

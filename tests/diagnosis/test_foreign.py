@@ -364,9 +364,10 @@ def test_the_given_parameters_come_last_where_nothing_was_confirmed(
     monkeypatch, confirmed, searched, told
 ):
     def stub(is_confirmed):
-        fits = SimpleNamespace(chosen=None), SimpleNamespace(is_nearly_all=lambda *_: 0)
+        verdict = SimpleNamespace(chosen=None, word="unknown")
+        criteria = SimpleNamespace(is_nearly_all=lambda *_: False)
         return SimpleNamespace(
-            verdict=fits[0], criteria=fits[1], base=None, is_confirmed=is_confirmed
+            verdict=verdict, criteria=criteria, base=None, is_confirmed=is_confirmed
         )
 
     begun, results = [], iter(confirmed)

@@ -17,8 +17,9 @@ from hwid_cli.diagnosis.candidate import (
     fitted_drive,
 )
 from hwid_cli.diagnosis.latent_force import latent_force
+from hwid_cli.diagnosis.law_search import MOST_TERMS
 from hwid_cli.diagnosis.law_terms import Term
-from hwid_cli.diagnosis.laws import _is_wanted
+from hwid_cli.diagnosis.laws import _most_terms
 from hwid_cli.diagnosis.rounds import RoundsResult
 from hwid_cli.diagnosis.set_fits import fit_task
 from hwid_cli.diagnosis.verdict import DiagnosisVerdict
@@ -148,10 +149,10 @@ def test_a_law_that_is_an_effect_of_the_catalogue_gets_its_name():
 
 
 @pytest.mark.parametrize(
-    ("left", "is_wanted"), [(110.0, False), (300.0, True)], ids=["little", "much"]
+    ("left", "most"), [(110.0, 1), (300.0, MOST_TERMS)], ids=["little", "much"]
 )
-def test_a_law_takes_no_name_away_from_what_leaves_hardly_more_than_noise(
-    left, is_wanted
+def test_only_a_law_as_short_competes_with_what_leaves_hardly_more_than_noise(
+    left, most
 ):
     # 1.05 and 1.7 times the noise.
     one = made_up(("stribeck_friction",), left, whiteness=20.0)
@@ -159,8 +160,9 @@ def test_a_law_takes_no_name_away_from_what_leaves_hardly_more_than_noise(
     rounds = SimpleNamespace(criteria=CRITERIA, base=base(3500.0), problem=of)
     named = DiagnosisVerdict("named", False, one, ())
     unknown = DiagnosisVerdict("unknown", False, base(3500.0), ())
-    assert _is_wanted(rounds, named) is is_wanted
-    assert _is_wanted(rounds, unknown)
+    assert _most_terms(rounds, named) == most
+    assert _most_terms(rounds, unknown) == MOST_TERMS
+    assert _most_terms(rounds, replace(named, is_complete=True)) == 0
 
 
 @pytest.mark.parametrize(("of_both", "word"), [(310.0, "named"), (200.0, "both")])

@@ -229,3 +229,29 @@ def test_without_candidates_nothing_is_fitted(allowed, most):
     assert (watched.found.fits, watched.found.best) == ({}, ())
     assert watched.found.shares == {}
     assert watched.tasks == []
+
+
+def test_before_a_search_ends_all_samples_say_what_to_fit(monkeypatch):
+    # The few samples of the screening promise nothing; all of them promise the stiffness.
+    of = rounds_of(FRICTION | STIFFNESS, ("coulomb_friction", "cubic_stiffness"))
+    search = rounds._Search(of)
+    monkeypatch.setattr(rounds.SetFits, "has_many", True)
+    promised = search.proposals.of_size(1, [of.base], search.fits.train)
+    asked = []
+
+    def of_size(size, parents, problem):
+        asked.append(problem)
+        return promised
+
+    monkeypatch.setattr(search.proposals, "of_size", of_size)
+    best = search.look_closer(1, [of.base])
+    assert asked == [search.fits.train]
+    assert best is not None
+    assert set(search.fits.found) == set(promised)
+
+
+def test_a_search_of_few_samples_looks_no_closer():
+    of = rounds_of(FRICTION, ("coulomb_friction",))
+    search = rounds._Search(of)
+    assert search.look_closer(1, [of.base]) is None
+    assert not search.fits.found

@@ -383,3 +383,35 @@ def test_every_own_parameter_has_values_to_try(which):
     of = problem(recordings()[:2])
     found, point = begun(of, {f"parameter_change:{which}": {f"log_{which}": 0.0}})
     assert with_own_trials(of, found, point).own.shape == (2, 1)
+
+
+def test_own_values_are_found_without_derivatives_by_shared_ones(monkeypatch):
+    of = problem(recordings(own=pushed, noise=0.0))
+    found, point = begun(of, START)
+    parts = residuals_at(of, found, point)
+    whole = derivatives(of, found, point, parts)
+    simulated = []
+
+    def counted(*given):
+        simulated.append(given[0])
+        return residuals_at(*given)
+
+    monkeypatch.setattr(search, "residuals_at", counted)
+    only = derivatives(of, found, point, parts, [0])
+    assert len(simulated) == 1
+    n_shared = len(found.shared)
+    for one, other in zip(only, whole, strict=True):
+        np.testing.assert_array_equal(one[:, :n_shared], 0.0)
+        np.testing.assert_array_equal(one[:, n_shared], other[:, n_shared])
+
+
+def test_a_recording_that_runs_away_does_not_keep_others_from_their_own_values():
+    # A joint search has an infinite sum then, and leaves every recording as it was.
+    of = problem(recordings(own=pushed, noise=0.0))
+    first, *others = of.signals
+    spoilt = replace(first, compared=np.full_like(first.compared, np.nan))
+    found, point = begun(of, START)
+    of = replace(of, signals=(spoilt, *others))
+    own = fit_own(of, found, point.shared).own[1:, 0] * found.own[0].scale
+    apart = np.angle(np.exp(1j * (own - 0.4 - 0.9 * np.arange(1, 9))))
+    np.testing.assert_allclose(apart, 0.0, atol=1e-5)
