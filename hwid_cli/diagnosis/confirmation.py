@@ -58,6 +58,8 @@ _AGREEMENT = 0.1
 _MOST_IN_VAIN = 3
 _WORTH_A_TURN = 0.95
 _TURN_ITERATIONS = 10
+# Over the noise, what a run may leave because its effect is a little late at corners.
+_LATE_AT_CORNERS = 1.1
 # Derivatives by the simulation's parameters are found again where one of these has moved by
 # more than this share.
 _SAME_SLOPES = 0.02
@@ -423,6 +425,8 @@ def _next_turn(findings: Findings, turn: _Turn, runs: Runs) -> _Turn | None:
         return None
     push = partial(_pushed, runs, problem, forces, turn.at_force)
     found = push(turn.values)
+    if found is None:
+        return None
     late = [
         run.output - motion.position - (0.0 if one.offset is None else one.offset)
         for one, motion, run in zip(problem.signals, motions, found, strict=True)
@@ -531,7 +535,7 @@ def _corrected(
 
 def _slopes(
     runs: Runs,
-    push: Callable[[dict[str, float]], list[SimulatorRun]],
+    push: Callable[[dict[str, float]], list[SimulatorRun] | None],
     values: dict[str, float],
     found: Sequence[SimulatorRun],
 ) -> list[np.ndarray]:
@@ -546,7 +550,8 @@ def _slopes(
         step = DIFFERENCE * (abs(values[name]) or abs(one.value) or 1.0)
         if one.bounds and values[name] + step > one.bounds[1]:
             step = -step
-        there = push({**values, name: values[name] + step})
+        # Where it cannot be run with more of a parameter, that one stays.
+        there = push({**values, name: values[name] + step}) or found
         for row, (after, before) in enumerate(zip(there, found, strict=True)):
             columns[row].append((after.output - before.output) / step)
     return [np.column_stack(one) for one in columns]
@@ -659,16 +664,19 @@ def _pushed(
     forces: Sequence[np.ndarray],
     at_force: bool,
     values: Mapping[str, float],
-) -> list[SimulatorRun]:
-    """Run the simulation with forces, at its force input or through its input's gain."""
+) -> list[SimulatorRun] | None:
+    """Run the simulation with forces, at its force input or through its input's gain.
+
+    None where a run gives no answer: the force may lead where the simulation ends.
+    """
     if at_force:
-        return runs.of(problem.signals, values, forces)
+        return runs.tried(problem.signals, values, forces)
     gain = problem.drive.force_constant_N_per_A
     inputs = [
         one.driven_by + force / gain
         for one, force in zip(problem.signals, forces, strict=True)
     ]
-    return runs.of(problem.signals, values, (), inputs)
+    return runs.tried(problem.signals, values, (), inputs)
 
 
 def _fitted_again(
@@ -728,9 +736,12 @@ def _fit_of_run(findings: Findings, turn: _Turn) -> CandidateFit:
             names=(*(ParameterRef(BASE, name) for name in names), *fit.names),
             values=np.r_[[getattr(drive, name) for name in names], fit.values],
         )
-    # The simulation itself is no stand-in, which may be late at a step.
+    fit = replace(fit, sse=turn.sse)
+    # At corners a force between samples is late as an input is, by a little.
+    is_late = findings.criteria.ratio(fit) <= _LATE_AT_CORNERS
     noise = findings.criteria.noise
-    noise = replace(noise, input_rms=measured_input_rms(turn.problem))
+    if not is_late:
+        noise = replace(noise, input_rms=measured_input_rms(turn.problem))
     problem = replace(turn.problem, known={})
     white, cause = left_over(turn.left, problem, fitted_drive(drive, fit), noise)
-    return replace(fit, sse=turn.sse, whiteness=white, cause=cause)
+    return replace(fit, whiteness=white, cause=cause)

@@ -295,14 +295,16 @@ def _fit_parameters(
     sizes = np.array([abs(one.value) or 1.0 for one in free.values()])
     limits = [one.bounds or (-np.inf, np.inf) for one in free.values()]
     low, high = (np.array(ends) / sizes for ends in zip(*limits, strict=True))
+    n_errors = sum(one.n_evaluated for one in chosen)
 
     def at(coordinates: np.ndarray) -> dict[str, float]:
         new = (coordinates * sizes).tolist()
         return {**values, **dict(zip(free, new, strict=True))}
 
     def errors(coordinates: np.ndarray) -> np.ndarray:
-        found = runs.of(chosen, at(coordinates))
-        return _errors(chosen, found)
+        found = runs.tried(chosen, at(coordinates))
+        # From there the search takes a shorter step.
+        return np.full(n_errors, np.inf) if found is None else _errors(chosen, found)
 
     def slopes(coordinates: np.ndarray) -> np.ndarray:
         here = errors(coordinates)
@@ -315,7 +317,9 @@ def _fit_parameters(
             )
             moved = coordinates.copy()
             moved[column] += step
-            columns.append((errors(moved) - here) / step)
+            slope = (errors(moved) - here) / step
+            # At the edge of what it can be run with, a parameter stays.
+            columns.append(slope if np.isfinite(slope).all() else np.zeros(n_errors))
         return np.column_stack(columns)
 
     start = np.array([values[name] for name in free]) / sizes

@@ -8,6 +8,7 @@ import numpy as np
 from hwid_cli.diagnosis.problem import Signals
 from hwid_cli.diagnosis.tasks import DiagnosisTask, RunTasks
 from hwid_cli.drive.simulation import NO_FORCE
+from hwid_cli.errors import SimulationError
 from hwid_cli.records.programs import (
     Capabilities,
     FreeParameter,
@@ -91,3 +92,20 @@ class Runs:
                 )
             )  # fmt: skip
         return list(self.run_tasks(tasks, keep=True))
+
+    def tried(
+        self,
+        signals: Sequence[Signals],
+        values: Mapping[str, float],
+        forces: Sequence[np.ndarray] = (),
+        inputs: Sequence[np.ndarray] = (),
+    ) -> list[SimulatorRun] | None:
+        """The same with what a search has chosen; None where a run gives no answer.
+
+        A trial may leave what the simulation was made for: a capacity below 0, a voltage
+        that no supply gives.
+        """
+        try:
+            return self.of(signals, values, forces, inputs)
+        except SimulationError:
+            return None

@@ -10,7 +10,8 @@ from scipy.signal import lsim
 from hwid_cli import Recording
 from hwid_cli.diagnosis import foreign
 from hwid_cli.diagnosis.foreign import diagnose_foreign, stand_in_for
-from hwid_cli.diagnosis.simulator import Simulator
+from hwid_cli.diagnosis.simulator import Runs, Simulator
+from hwid_cli.errors import SimulationError
 from hwid_cli.records.experiment import DiagnoseOptions
 from hwid_cli.records.programs import Capabilities, FreeParameter, SimulatorRun
 from tests.black_boxes.plants import (
@@ -398,3 +399,42 @@ def test_the_given_parameters_come_last_where_nothing_was_confirmed(
     is_confirmed, value = told
     assert seen.values == value
     assert seen.confirmed == ("simulation" if is_confirmed else "surrogate")
+
+
+def test_a_trial_without_an_answer_ends_no_search_for_the_parameters():
+    refused = []
+
+    def fragile(request):
+        # Beyond this it gives no numbers, as with a capacity below 0; 9 would fit best.
+        if request.parameters["kt"] > 8.3:
+            refused.append(request.parameters["kt"])
+            raise SimulationError("gave nan")
+        return simulate(request)
+
+    of = foreign.prepare(recordings(), foreign._ITS_OWN, DiagnoseOptions(), ())
+    able = Capabilities(run=True, parameters=True)
+    runs = Runs(Simulator(able, fragile, {}, FREE, GIVEN), Count())
+    found = foreign._fit_parameters(runs, of, GIVEN)
+    assert refused
+    assert 8.0 <= found["kt"] <= 8.3
+    before, after = (
+        foreign._sse(of.signals, runs.of(of.signals, one)).sum()
+        for one in (GIVEN, found)
+    )
+    assert after < before
+
+
+@pytest.mark.thorough
+def test_an_effect_that_the_simulation_cannot_be_run_with_is_not_confirmed():
+    own = {one.input.tobytes() for one in recordings()}
+
+    def fragile(request):
+        if request.input.tobytes() not in own:
+            raise SimulationError("gave nan")
+        return simulate(request)
+
+    able = Capabilities(run=True, parameters=True)
+    found, _ = diagnosis(
+        Simulator(able, fragile, {}, FREE, GIVEN), effects=("coulomb_friction",)
+    )
+    assert (found.verdict, found.confirmed) == ("unknown", "surrogate")
