@@ -283,7 +283,8 @@ _SUFFIXES = {
     for unit in [
         *("A", "mA", "uA", "kA", "V", "mV", "kV", "N", "mN", "kN", "Nm", "mNm", "Ncm"),
         *("m", "mm", "cm", "um", "µm", "rad", "mrad", "deg"),
-        *("s", "ms", "us", "µs", "rpm", "bar", "Pa", "K"),
+        *("s", "ms", "us", "µs", "rpm", "bar", "mbar", "Pa", "hPa", "kPa", "MPa", "K"),
+        *("m/s", "mm/s", "rad/s", "deg/s", "1/s", "1/min", "m/s^2"),
     ]
 } | {
     "rad_s": "rad/s",
@@ -294,6 +295,7 @@ _SUFFIXES = {
     "mm_per_s": "mm/s",
     "rad_per_s": "rad/s",
     "deg_per_s": "deg/s",
+    "m/s2": "m/s^2",
     "N_m": "N m",
     "sec": "s",
     "seconds": "s",
@@ -350,18 +352,20 @@ def split_unit(title: str) -> tuple[str, str]:
     --------
     >>> split_unit("current [mA]"), split_unit("t_ms"), split_unit("U/V")
     (('current ', 'mA'), ('t', 'ms'), ('U', 'V'))
+    >>> split_unit("speed_m/s"), split_unit("pressure_kPa")
+    (('speed', 'm/s'), ('pressure', 'kPa'))
     >>> split_unit("run(1).current")
     ('run(1).current', '')
     """
     bracket = _BRACKET.search(title)
     if bracket and bracket[2]:
         return title[: bracket.start()] + title[bracket.end() :], bracket[2]
-    worded = _BEHIND.search(title)
-    if worded and worded[1] in _SUFFIXES:
-        return title[: worded.start()], worded[1]
     for suffix, unit in _LONGEST_FIRST:
         if title.endswith(f"_{suffix}") and len(title) > len(suffix) + 1:
             return title[: -len(suffix) - 1], unit
+    worded = _BEHIND.search(title)
+    if worded and worded[1] in _SUFFIXES:
+        return title[: worded.start()], worded[1]
     return title, ""
 
 

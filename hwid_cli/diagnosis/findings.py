@@ -26,6 +26,7 @@ from hwid_cli.diagnosis.sentences import (
     hidden_from_view,
     summarise,
     taken_up,
+    unseen_beside,
 )
 from hwid_cli.diagnosis.simulation_trust import simulation_trust
 from hwid_cli.diagnosis.verdict import DiagnosisVerdict
@@ -158,7 +159,11 @@ def describe(findings: Findings) -> Diagnosis:
         explained_share=_explained(criteria, chosen.sse, from_sse),
         base=parameters,
         places=findings.where,
-        not_observable=(*hidden_from_view(problem), *findings.absorbed()),
+        not_observable=(
+            *unseen_beside(chosen.effects, problem),
+            *hidden_from_view(problem),
+            *findings.absorbed(),
+        ),
         next_experiment=propose(problem, criteria, scales, verdict, fits),
         train=tuple(one.name for one in problem.signals if not one.is_held_out),
         held_out=tuple(one.name for one in problem.signals if one.is_held_out),

@@ -1,5 +1,6 @@
 """What a diagnosis says in words: the summary, and what recordings cannot show."""
 
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
@@ -16,7 +17,7 @@ from hwid_cli.records.diagnosis import (
     BaseParameter,
     FittedEffect,
 )
-from hwid_cli.records.drive import HELD, LINE, Drive
+from hwid_cli.records.drive import HELD, LINE, Drive, StandIn
 
 # What moves and what drives it, by axis.
 _WORDS = {
@@ -164,8 +165,9 @@ def _named(
 ) -> str:
     """Say what was found as a fact, or as a part where much remains."""
     before, after = criteria.ratio(base), criteria.ratio(verdict.chosen)
-    names = " and ".join(one.id for one in effects)
-    meaning = "; ".join(one.sentence for one in effects)
+    names = _names(effects)
+    meaning = "; ".join(dict.fromkeys(one.sentence for one in effects))
+    them = "it" if len(effects) == 1 else "them"
     on = "held-out" if problem.part(held_out=True).signals else "these"
     # What leaves that much is no fact, but a part of what is missing.
     if after > STILL_LARGE:
@@ -176,10 +178,16 @@ def _named(
             f"{after:.3g} times the noise. What remains is not explained."
         )
     text = (
-        f"The simulation lacks {names} ({meaning}): with it the error on {on} "
+        f"The simulation lacks {names} ({meaning}): with {them} the error on {on} "
         f"recordings falls from {before:.3g} to {after:.3g} times the noise."
     )
     return f"{text}{_rest(criteria, verdict)}"
+
+
+def _names(effects: Sequence[FittedEffect]) -> str:
+    """Ids of effects, each once."""
+    counts = Counter(one.id for one in effects)
+    return " and ".join(one if n == 1 else f"{one} twice" for one, n in counts.items())
 
 
 def _held_command(problem: DiagnosisProblem, effects: tuple[FittedEffect, ...]) -> str:
@@ -323,12 +331,14 @@ def _held_and_known(drive: Drive) -> tuple[tuple[str, ...], str]:
 def hidden_from_view(problem: DiagnosisProblem) -> tuple[str, ...]:
     """Say what these recordings cannot show, whatever the drive does."""
     drive, texts = problem.drive, []
-    if drive.resistance_ohm is None:
+    # What a simulation of one's own holds, a circuit say, nobody knows here.
+    is_known = not isinstance(drive, StandIn)
+    if is_known and drive.resistance_ohm is None:
         texts.append(
             f"what happens before the {drive.source} ({_BEFORE[drive.source]}), because "
             "the input comes after it"
         )
-    if not drive.is_driven_by_force:
+    if is_known and not drive.is_driven_by_force:
         held, known = _held_and_known(drive)
         mass, _ = _WORDS[drive.axis]
         which = (
@@ -354,6 +364,21 @@ def hidden_from_view(problem: DiagnosisProblem) -> tuple[str, ...]:
     if len(problem.part(held_out=True).signals) == 0:
         texts.append("how the result does on other recordings: there is only one")
     return tuple(texts)
+
+
+def unseen_beside(named: Sequence[str], problem: DiagnosisProblem) -> tuple[str, ...]:
+    """Say what gives the same output as an effect that is named.
+
+    Parameters
+    ----------
+    named : sequence of str
+        Ids in the catalogue.
+    """
+    # Under a controller what is late acts on the command, which is compared.
+    if problem.compares_command:
+        return ()
+    found = (CATALOGUE[one].unseen for one in named)
+    return tuple(dict.fromkeys(text for text in found if text))
 
 
 def taken_up(effects: Sequence[str], named: Sequence[str]) -> tuple[str, ...]:

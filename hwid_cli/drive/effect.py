@@ -355,6 +355,8 @@ class Effect:
         Id of the entry of which this is the second one; without that it means nothing.
     formula : Formula or None
         Its law where it is one of the user's own.
+    unseen : str
+        What gives the same output without being in the catalogue, where there is such.
     """
 
     id: str
@@ -377,6 +379,7 @@ class Effect:
     is_possible: Callable[[Values], bool] | None = None
     beside: str = ""
     formula: Formula | None = None
+    unseen: str = ""
 
     @property
     def strongest(self) -> Parameter:

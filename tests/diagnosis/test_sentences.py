@@ -5,10 +5,18 @@ from dataclasses import replace
 
 import pytest
 
-from hwid_cli.diagnosis.sentences import _held_command, _rest, doubtful_values
+from hwid_cli.diagnosis.sentences import (
+    _held_command,
+    _named,
+    _rest,
+    doubtful_values,
+    hidden_from_view,
+    unseen_beside,
+)
 from hwid_cli.diagnosis.verdict import DiagnosisVerdict
 from hwid_cli.records.diagnosis import BaseParameter, FittedEffect, FittedParameter
-from tests.diagnosis.made_up_fits import CRITERIA, made_up
+from hwid_cli.records.drive import StandIn
+from tests.diagnosis.made_up_fits import CRITERIA, base, made_up
 from tests.diagnosis.small_drive import DRIVE, STEP_S, problem, recordings
 
 
@@ -85,3 +93,34 @@ def test_what_moves_apart_is_questioned_for_itself():
     # A resistance that is off scales other quotients.
     driven = replace(DRIVE, resistance_ohm=1.0)
     assert len(doubtful_values(moved(**dict.fromkeys(ALL, 10.0)), driven)) == 3
+
+
+@pytest.mark.parametrize(
+    ("ids", "said"),
+    [
+        (("cogging",), "lacks cogging (a force along the way): with it the error"),
+        (
+            ("cogging",) * 2,
+            "cogging twice (a force along the way): with them the error",
+        ),
+    ],
+)
+def test_an_effect_that_is_there_twice_is_named_once(ids, said):
+    effects = tuple(FittedEffect(one, "a force along the way", "", ()) for one in ids)
+    verdict = DiagnosisVerdict("named", True, made_up(ids, 100.0), ())
+    assert said in _named(problem(), CRITERIA, base(), verdict, effects)
+
+
+def test_a_lag_may_be_one_of_the_sensor():
+    of = problem(recordings()[:3])
+    (text,) = unseen_beside(("actuator_lag", "input_delay", "coulomb_friction"), of)
+    assert "sensor" in text
+    assert unseen_beside(("coulomb_friction",), of) == ()
+
+
+def test_what_a_simulation_of_ones_own_holds_is_not_said_to_be_unseen():
+    of = problem(recordings()[:3])
+    own = replace(of, drive=StandIn(**vars(of.drive)))
+    assert any("brush" in text for text in hidden_from_view(of))
+    texts = hidden_from_view(own)
+    assert not any("brush" in text or "mass" in text for text in texts)

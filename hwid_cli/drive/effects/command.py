@@ -89,6 +89,12 @@ RATE_LIMIT = Effect(
     confused_with={"actuator_lag": "fast changes of several sizes"},
 )
 
+# A drive that is linear otherwise gives the same whichever comes first.
+_OF_SENSOR = (
+    "whether what is late comes before or behind the mechanics: a filter or delay of the "
+    "sensor gives the same output where the drive is linear otherwise"
+)
+
 DELAY = Effect(
     id="input_delay",
     sentence="the current acts later than it was commanded",
@@ -100,6 +106,7 @@ DELAY = Effect(
         ),
     ),
     confused_with={"actuator_lag": "a sine far above the natural frequency"},
+    unseen=_OF_SENSOR,
 )
 
 _TIME_CONSTANT = Parameter(
@@ -116,6 +123,7 @@ LAG = Effect(
         "input_delay": "a sine far above the natural frequency",
         "winding_inductance": "fast motion without voltage, such as after a release",
     },
+    unseen=_OF_SENSOR,
 )
 
 SECOND_ORDER_LAG = Effect(
@@ -142,6 +150,7 @@ SECOND_ORDER_LAG = Effect(
         "input_delay": "a sine far above the natural frequency",
         "elastic_coupling": "a sensor at the motor beside that at the load",
     },
+    unseen=_OF_SENSOR,
 )
 
 CONSTANT_SATURATION = Effect(
