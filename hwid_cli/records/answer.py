@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hwid_cli.records.best_model import is_linear_preferred
 from hwid_cli.records.model import HammersteinWiener
 from hwid_cli.records.order import OrderChoice
 
@@ -61,6 +62,9 @@ class ModelAnswer:
         NaN where there is none.
     linear_name : str
         ``linear:step_06/2/4``; empty without a linear model.
+    linear_ratio : float, [-]
+        RMSD over the linear one's: geometric mean over all recordings that chose or judge;
+        NaN where that is not known.
     advice : OrderChoice or None
         Recommended orders; None without a cross-validation.
     maps : ChosenMaps or None
@@ -88,6 +92,7 @@ class ModelAnswer:
     unit: str
     threshold: float
     linear_name: str = ""
+    linear_ratio: float = float("nan")
     advice: OrderChoice | None = None
     maps: ChosenMaps | None = None
     has_these_maps: bool = True
@@ -112,9 +117,9 @@ class ModelAnswer:
     @property
     def is_linear_better(self) -> bool:
         """Whether the linear model is closer on recordings that the fit has not seen."""
-        if not np.isfinite(self.linear_mean_rmsd):
-            return False
-        return not self.mean_rmsd <= self.linear_mean_rmsd
+        return is_linear_preferred(
+            self.mean_rmsd, self.linear_mean_rmsd, self.rmsd.size, self.linear_ratio
+        )
 
     @property
     def is_usable(self) -> bool:

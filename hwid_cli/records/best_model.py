@@ -8,6 +8,29 @@ LINEAR = "linear:"
 # What judged a model, the strictest first: recordings that nothing has used; recordings
 # that no group may hold; all but its own; its own, for want of others.
 JUDGES = ("test", "unseen", "others", "own")
+# Fewer recordings alone do not say that a linear model is better.
+FEWEST_TO_REFUSE_MAPS = 3
+
+
+def is_linear_preferred(
+    rmsd: float, linear_rmsd: float, n_judges: int, ratio: float
+) -> bool:
+    """Whether a linear model is better than one with maps.
+
+    It has to be closer on the recordings that judge and, where these are few, over all
+    but those of the other fit: one step farther than all others says little of maps.
+
+    Parameters
+    ----------
+    rmsd, linear_rmsd : float, [unit]
+        Mean over the recordings that judge.
+    ratio : float, [-]
+        RMSD of the model with maps over the linear one's, over all recordings but those of
+        its fit; NaN where that is not known.
+    """
+    if not isfinite(linear_rmsd) or rmsd <= linear_rmsd:
+        return False
+    return n_judges >= FEWEST_TO_REFUSE_MAPS or not ratio < 1.0
 
 
 @dataclass(frozen=True)
@@ -41,6 +64,9 @@ class BestModel:
         not known.
     linear_name : str
         Of that linear model, ``linear:step_06/2/4``; empty where there is none.
+    linear_ratio : float, [-]
+        RMSD over the linear one's: geometric mean over all recordings that chose or judge;
+        NaN where that is not known.
     has_estimated_starts : bool
         Whether each simulation started from a state that its measured output told: a
         prediction has none.
@@ -59,6 +85,7 @@ class BestModel:
     fit_percent: float = float("nan")
     linear_fit_percent: float = float("nan")
     linear_name: str = ""
+    linear_ratio: float = float("nan")
     has_estimated_starts: bool = False
 
     def __post_init__(self) -> None:
@@ -73,9 +100,11 @@ class BestModel:
     @property
     def is_linear_better(self) -> bool:
         """Whether the linear model is closer on recordings that the fit has not seen."""
-        if self.judge == "own" or not isfinite(self.linear_rmsd):
+        if self.judge == "own":
             return False
-        return not self.rmsd <= self.linear_rmsd
+        return is_linear_preferred(
+            self.rmsd, self.linear_rmsd, len(self.judged_on), self.linear_ratio
+        )
 
     @property
     def is_usable(self) -> bool:

@@ -12,6 +12,7 @@ from hwid_cli.records.next import NextRecordings
 from hwid_cli.records.order import MapAdvice, OrderAdvice
 from hwid_cli.report.formats import counted, listed, with_unit
 from hwid_cli.report.map_words import fit_keys
+from hwid_cli.report.orders import axes_to_widen
 
 # Room for the words on the left, [characters].
 _LABELS = 12
@@ -92,6 +93,12 @@ def best_model_sentences(best: BestModel) -> list[str]:
     if np.isfinite(best.linear_rmsd):
         linear = with_unit(best.linear_rmsd, best.unit)
         said.append(f"best linear model, {best.linear_name}: {linear}")
+        if best.linear_rmsd < best.rmsd:
+            # Few recordings, and the others speak for the maps.
+            said[-1] += (
+                f"; over all recordings but its own {best.name} leaves "
+                f"{best.linear_ratio:.2g} times as much as that"
+            )
     said += _beside_threshold(best.rmsd, best)
     if best.single and np.isfinite(best.single_rmsd):
         helps = "helps" if best.rmsd < best.single_rmsd else "does not help"
@@ -155,6 +162,9 @@ def orders_sentence(orders: OrderAdvice, maps: MapAdvice | None) -> str:
     said += " recommended (hwid order says why)"
     if maps is not None and maps.chosen != maps.given:
         said += f": put {fit_keys(maps.chosen)} into fit"
+    axes = axes_to_widen(orders, orders.overall.nb, orders.overall.nk)
+    if axes:
+        said += f"; they lie at the edge of the grid: widen {' and '.join(axes)}"
     return said
 
 

@@ -216,16 +216,17 @@ def _criteria(one: OrderChoice) -> str:
     )
 
 
-def _edges(advice: OrderAdvice) -> str:
-    one = advice.overall
-    axes = [
+def axes_to_widen(advice: OrderAdvice, nb: int, nk: int) -> list[str]:
+    """Keys of the grid whose largest value some orders have."""
+    return [
         f"orders.{name} (beyond {max(axis)})"
-        for name, value, axis in (
-            ("nb", one.best_nb, advice.nb),
-            ("nk", one.best_nk, advice.nk),
-        )
+        for name, value, axis in (("nb", nb, advice.nb), ("nk", nk, advice.nk))
         if len(axis) > 1 and value == max(axis)
     ]
+
+
+def _edges(advice: OrderAdvice) -> str:
+    axes = axes_to_widen(advice, advice.overall.best_nb, advice.overall.best_nk)
     if not axes:
         return ""
     return (

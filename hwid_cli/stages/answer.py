@@ -70,6 +70,7 @@ def model_answer(
         model=found.model,
         linear=beside.fit.model if beside else None,
         linear_name=beside.name if beside else "",
+        linear_ratio=beside.ratio if beside else np.nan,
         own=own,
         chosen_on=chosen_on,
         recordings=tuple(one.name for one in unseen),

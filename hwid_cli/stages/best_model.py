@@ -198,6 +198,7 @@ def beside_linear(
         linear_rmsd=deviation,
         linear_fit_percent=percent,
         linear_name=linear.name,
+        linear_ratio=linear.ratio,
     )
 
 

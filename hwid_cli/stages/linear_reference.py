@@ -38,10 +38,14 @@ class LinearReference:
         ``linear:step_06/3/7``, by which it is exported and compared.
     fit : Fit
         With a model.
+    ratio : float, [-]
+        RMSD of the model with maps over that of this one: geometric mean over all
+        recordings that choose or judge and are not those of its fit; NaN without any.
     """
 
     name: str
     fit: Fit
+    ratio: float
 
 
 @dataclass(frozen=True)
@@ -176,7 +180,20 @@ def linear_reference(
     if chosen is None:
         return None
     nb, nk = grid_place(chosen, nk_role)
-    return LinearReference(f"{LINEAR}{chosen.name}/{nb}/{nk}", chosen)
+    asked = dict.fromkeys((*roles.choosing, *roles.judging))
+    others = [by_name[one] for one in asked if one not in found.identified_on]
+    return LinearReference(
+        f"{LINEAR}{chosen.name}/{nb}/{nk}", chosen, _ratio(found, chosen, others)
+    )
+
+
+def _ratio(one: Fit, other: Fit, recordings: Sequence[Recording]) -> float:
+    """Geometric mean of the RMSD of one model over that of another; NaN without any."""
+    if not recordings:
+        return np.nan
+    mine, yours = ([_mean_rmsd(fit, [at]) for at in recordings] for fit in (one, other))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return float(np.exp(np.mean(np.log(mine) - np.log(yours))))
 
 
 def _smallest_good(linear: Sequence[Fit], choosing: Sequence[Recording]) -> Fit | None:

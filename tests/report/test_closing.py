@@ -104,12 +104,25 @@ def test_a_model_that_is_closer_than_a_constant_is_one_to_take(changes):
         ({"linear_rmsd": 0.0119, "rmsd": float("inf")}, True),
         # A fit that only its own recording judges says nothing of others.
         ({"linear_rmsd": 0.0119, "judge": "own"}, False),
+        # Two recordings say so, all others beside them do not; three would do.
+        ({"linear_rmsd": 0.0119, "linear_ratio": 0.9}, False),
+        ({"linear_rmsd": 0.0119, "linear_ratio": 1.1}, True),
+        (
+            {"linear_rmsd": 0.0119, "linear_ratio": 0.9, "judged_on": ("c", "d", "e")},
+            True,
+        ),
     ],
 )
 def test_only_recordings_beyond_the_fit_say_that_the_linear_model_is_better(
     changes, is_better
 ):
     assert replace(BEST, **changes).is_linear_better is is_better
+
+
+def test_a_linear_model_that_is_closer_on_few_recordings_only_is_said_beside():
+    said = best_model_sentences(replace(BEST, linear_rmsd=0.0119, linear_ratio=0.4))
+    assert said[0].startswith("a+b/2/3: ")
+    assert "over all recordings but its own a+b/2/3 leaves 0.4 times" in said[1]
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from hwid_cli import FitOptions, Orders, Recording, fit
+from hwid_cli import FitOptions, Orders, Recording, fit, rmsd
+from hwid_cli.model.simulate import validation_output
 from hwid_cli.stages.linear_reference import Roles, linear_fits, linear_reference
 from hwid_cli.tasks.cache import MemoryStore
 from hwid_cli.tasks.runner import RunSettings, TaskDone, run_tasks
@@ -150,3 +151,16 @@ def test_all_recordings_that_do_not_judge_are_fitted_together(recordings):
     assert chosen(("c",)) == "linear:a+b/1/2"
     # A recording that judges is never part of a fit.
     assert chosen(("b", "c")) == "linear:a/1/2"
+
+
+def test_the_ratio_is_over_all_recordings_but_those_of_the_fit(recordings):
+    fits = [fit([one], Orders(1, 2, 1), OPTIONS) for one in recordings[:2]]
+    found = linear_reference(
+        fits[0], fits, recordings, Roles(("a", "b"), ("c",)), run_here, nk_role="poles"
+    )
+    errors = [
+        [rmsd(one.output, validation_output(model, one)) for one in recordings[1:]]
+        for model in (fits[0].model, found.fit.model)
+    ]
+    expected = np.exp(np.mean(np.log(errors[0]) - np.log(errors[1])))
+    assert found.ratio == pytest.approx(expected)
