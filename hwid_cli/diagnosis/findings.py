@@ -119,7 +119,15 @@ class Findings:
             return self.pieces.compared(self.pieces.chosen, self.scales)
         return compared_with_fit(self.problem, chosen, self.scales)
 
-    def absorbed(self) -> tuple[str, ...]:
+    def unseen(self) -> tuple[str, ...]:
+        """What these recordings cannot show, in words."""
+        return (
+            *unseen_beside(self.verdict.chosen.effects, self.problem),
+            *hidden_from_view(self.problem),
+            *self._absorbed(),
+        )
+
+    def _absorbed(self) -> tuple[str, ...]:
         """What the recordings' own zeros take up, in words."""
         if self.pieces is not None:
             return ()
@@ -159,11 +167,7 @@ def describe(findings: Findings) -> Diagnosis:
         explained_share=_explained(criteria, chosen.sse, from_sse),
         base=parameters,
         places=findings.where,
-        not_observable=(
-            *unseen_beside(chosen.effects, problem),
-            *hidden_from_view(problem),
-            *findings.absorbed(),
-        ),
+        not_observable=findings.unseen(),
         next_experiment=propose(problem, criteria, scales, verdict, fits),
         train=tuple(one.name for one in problem.signals if not one.is_held_out),
         held_out=tuple(one.name for one in problem.signals if one.is_held_out),
