@@ -11,6 +11,7 @@ from hwid_cli import Recording
 from hwid_cli.diagnosis import foreign
 from hwid_cli.diagnosis.foreign import diagnose_foreign, stand_in_for
 from hwid_cli.diagnosis.simulator import Runs, Simulator
+from hwid_cli.diagnosis.verdict import DiagnosisVerdict
 from hwid_cli.errors import SimulationError
 from hwid_cli.records.experiment import DiagnoseOptions
 from hwid_cli.records.programs import Capabilities, FreeParameter, SimulatorRun
@@ -23,6 +24,7 @@ from tests.black_boxes.plants import (
     integrate,
 )
 from tests.black_boxes.run_boxes import diagnose, runs_of, write_case
+from tests.diagnosis.made_up_fits import CRITERIA, made_up
 
 STEP_S, N = 1e-3, 500
 TIME = STEP_S * np.arange(N)
@@ -438,3 +440,44 @@ def test_an_effect_that_the_simulation_cannot_be_run_with_is_not_confirmed():
         Simulator(able, fragile, {}, FREE, GIVEN), effects=("coulomb_friction",)
     )
     assert (found.verdict, found.confirmed) == ("unknown", "surrogate")
+
+
+@pytest.mark.parametrize(
+    ("changes", "is_taken"),
+    [
+        ({}, True),
+        # Longer than what is named, not borne out, hardly better, or nothing to look for.
+        ({"n_terms": 2}, False),
+        ({"is_confirmed": False}, False),
+        ({"left": 120.0}, False),
+        ({"is_complete": True}, False),
+        ({"laws": "never"}, False),
+    ],
+)
+def test_a_law_takes_the_place_of_a_name_that_leaves_far_more(
+    monkeypatch, changes, is_taken
+):
+    case = {"n_terms": 1, "is_confirmed": True, "left": 104.0, "is_complete": False}
+    case |= {"laws": "auto"} | changes
+    law = made_up(("law",), case["left"])
+    found = SimpleNamespace(
+        law=SimpleNamespace(terms=range(case["n_terms"])),
+        verdict=DiagnosisVerdict("law", False, law, ()),
+        criteria=CRITERIA,
+    )
+    monkeypatch.setattr(foreign, "_beside", lambda *_: None)
+    monkeypatch.setattr(foreign, "find", lambda *_: found)
+    monkeypatch.setattr(
+        foreign, "confirm", lambda one, *_: (one, {"kt": 2.0}, case["is_confirmed"])
+    )
+    # 1.12 times the noise, and 1.02 with the law.
+    named = made_up(("quadratic_drag",), 125.0)
+    told = foreign._law_instead(
+        SimpleNamespace(of=lambda *_: [], run_tasks=None),
+        SimpleNamespace(signals=()),
+        DiagnosisVerdict("named", case["is_complete"], named, ()),
+        {"kt": 1.0},
+        DiagnoseOptions(laws=case["laws"]),
+        lambda *_: None,
+    )
+    assert told == ((found, {"kt": 2.0}) if is_taken else None)
