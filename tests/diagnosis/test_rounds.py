@@ -6,6 +6,7 @@ import pytest
 
 from hwid_cli.diagnosis import rounds
 from hwid_cli.diagnosis.candidate import Screened
+from hwid_cli.diagnosis.few_samples import first_parts
 from hwid_cli.diagnosis.proposals import SCREENED_ON_TOP
 from hwid_cli.diagnosis.rounds import FEWEST_FINISHED, MOST_FINISHED, run_rounds
 from hwid_cli.drive.catalogue import CATALOGUE
@@ -237,6 +238,7 @@ def test_before_a_search_ends_all_samples_say_what_to_fit(monkeypatch):
     search = rounds._Search(of)
     monkeypatch.setattr(rounds.SetFits, "has_many", True)
     promised = search.proposals.of_size(1, [of.base], search.fits.train)
+    search.fits.few = first_parts(search.fits.train, 50)
     asked = []
 
     def of_size(size, parents, problem):

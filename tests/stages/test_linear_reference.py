@@ -154,13 +154,16 @@ def test_all_recordings_that_do_not_judge_are_fitted_together(recordings):
 
 
 def test_the_ratio_is_over_all_recordings_but_those_of_the_fit(recordings):
-    fits = [fit([one], Orders(1, 2, 1), OPTIONS) for one in recordings[:2]]
+    # Large inputs count less: a map is worth having, on each recording in its own measure.
+    bent = [replace(one, input=np.arctanh(0.95 * one.input)) for one in recordings]
+    fits = [fit([one], Orders(1, 2, 1), OPTIONS) for one in bent[:2]]
     found = linear_reference(
-        fits[0], fits, recordings, Roles(("a", "b"), ("c",)), run_here, nk_role="poles"
+        fits[0], fits, bent, Roles(("a", "b"), ("c",)), run_here, nk_role="poles"
     )
     errors = [
-        [rmsd(one.output, validation_output(model, one)) for one in recordings[1:]]
+        [rmsd(one.output, validation_output(model, one)) for one in bent[1:]]
         for model in (fits[0].model, found.fit.model)
     ]
     expected = np.exp(np.mean(np.log(errors[0]) - np.log(errors[1])))
+    assert expected < 0.9
     assert found.ratio == pytest.approx(expected)
