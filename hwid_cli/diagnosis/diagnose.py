@@ -24,6 +24,7 @@ from hwid_cli.diagnosis.held_command import (
     does_as_well,
     is_complete_if_held,
     is_held,
+    other_command,
     with_held_command,
 )
 from hwid_cli.diagnosis.hidden import HiddenEffect, hidden_effects
@@ -218,7 +219,11 @@ def find(
         best = best_of(again.rounds, again.found)
         if does_as_well(rounds, best, best_of(rounds, found)):
             searched = again
-    return _judged(_with_pieces(searched, options.max_effects), options)
+    searched = _with_pieces(searched, options.max_effects)
+    whole = _judged(searched, options)
+    if whole.pieces is not None or whole.law is not None:
+        return whole
+    return replace(whole, other=other_command(searched.rounds, whole.verdict.chosen))
 
 
 @dataclass(frozen=True, eq=False)

@@ -67,14 +67,38 @@ def relatives(effect: str) -> list[str]:
     """Effects that an effect contains, that contain it, or that look like it."""
     contained = CATALOGUE[effect].contains
     containing = [name for name, one in CATALOGUE.items() if effect in one.contains]
-    alike = [name for name in CATALOGUE[effect].confused_with if name in CATALOGUE]
+    alike = [
+        _of_same_law(effect, _firsts(public), public)
+        for public in CATALOGUE[effect].confused_with
+        if public in CATALOGUE
+    ]
     return list(dict.fromkeys((*contained, *containing, *alike)))
 
 
 def second_of(effect: str) -> str:
     """The second one of an effect, where the catalogue has one; else the effect."""
-    seconds = [name for name, one in CATALOGUE.items() if one.beside == effect]
-    return seconds[0] if seconds else effect
+    seconds = [
+        name for name, one in CATALOGUE.items() if one.beside == public_id(effect)
+    ]
+    return _of_same_law(effect, seconds, effect)
+
+
+def _firsts(public: str) -> list[str]:
+    """Entries that share a public id, none of which is a second one."""
+    return [
+        name
+        for name, one in CATALOGUE.items()
+        if public_id(name) == public and not one.beside
+    ]
+
+
+def _of_same_law(effect: str, others: Sequence[str], plain: str) -> str:
+    """Of some effects, the one with the parameters of another: a contact for a contact."""
+    names = {one.name for one in CATALOGUE[effect].parameters}
+    for other in others:
+        if {one.name for one in CATALOGUE[other].parameters} == names:
+            return other
+    return plain
 
 
 def translated(effect: str, values: Values, scales: Scales) -> list[dict[str, float]]:

@@ -10,12 +10,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hwid_cli.diagnosis.candidate import compared_with_fit, fitted_drive
+from hwid_cli.diagnosis.held_command import OtherCommand
 from hwid_cli.diagnosis.intervals import intervals
 from hwid_cli.diagnosis.latent_force import Smoothed
 from hwid_cli.diagnosis.laws import LawFound
 from hwid_cli.diagnosis.next_experiment import propose
 from hwid_cli.diagnosis.observability import absorbed_effects
-from hwid_cli.diagnosis.parameters import is_factor
+from hwid_cli.diagnosis.parameters import BASE, is_factor
 from hwid_cli.diagnosis.pieces import JudgedPieces
 from hwid_cli.diagnosis.problem import Compared, DiagnosisProblem
 from hwid_cli.diagnosis.ranking import ranked
@@ -27,6 +28,7 @@ from hwid_cli.diagnosis.sentences import (
     summarise,
     taken_up,
     unseen_beside,
+    untold_command,
 )
 from hwid_cli.diagnosis.simulation_trust import simulation_trust
 from hwid_cli.diagnosis.verdict import DiagnosisVerdict
@@ -75,6 +77,9 @@ class Findings:
         That the re-fitted base lacks.
     pieces : JudgedPieces or None
         Fits that all of this was joined from, where whole recordings cannot judge.
+    other : OtherCommand or None
+        The chosen effects beside the command that was not taken, where the recordings do
+        not tell whether it is held between samples.
     warnings : tuple of str
         What a reader has to know of how it was judged.
     """
@@ -91,16 +96,36 @@ class Findings:
     verdict: DiagnosisVerdict
     law: LawFound | None = None
     pieces: JudgedPieces | None = None
+    other: OtherCommand | None = None
     warnings: tuple[str, ...] = ()
 
     def intervals_of(self, ids: Sequence[str]) -> tuple[FittedEffect, ...]:
-        """The chosen effects with intervals, as the fit that judges gives them."""
+        """The chosen effects with intervals, as the fit that judges gives them.
+
+        Where another command does as well, the intervals hold what is found beside it.
+        """
         pieces = self.pieces
         if pieces is None:
             problem, chosen = self.problem, self.verdict.chosen
         else:
             problem, chosen = pieces.problem, pieces.chosen
-        return _fitted_effects_of(problem, chosen, self.scales, ids)
+        if not ids:
+            return ()
+        ends = intervals(problem, chosen, self.scales)
+        if self.other is not None:
+            beside = intervals(self.other.problem, self.other.fit, self.scales)
+            ends = np.fmin(ends[0], beside[0]), np.fmax(ends[1], beside[1])
+        return _fitted_effects_of(chosen, ends, ids)
+
+    @property
+    def is_untold(self) -> bool:
+        """Whether effects have other values beside another command that does as well."""
+        if self.other is None:
+            return False
+        low, high = intervals(self.problem, self.verdict.chosen, self.scales)
+        beside = self.other.fit.values
+        of_effects = [one.owner != BASE for one in self.verdict.chosen.names]
+        return bool(((beside < low) | (beside > high))[of_effects].any())
 
     def described_effects(self) -> tuple[tuple[FittedEffect, ...], ...]:
         """Effects that the simulation has, and those that it lacks."""
@@ -134,6 +159,14 @@ class Findings:
         chosen, noise = self.verdict.chosen, self.criteria.noise
         found = absorbed_effects(self.problem, chosen, self.scales, noise.rms)
         return taken_up(found, [public_id(one) for one in chosen.effects])
+
+    def all_warnings(self, parameters: Sequence[BaseParameter]) -> tuple[str, ...]:
+        """What a reader has to know, of how it was judged and of the values."""
+        return (
+            *self.warnings,
+            *untold_command(self.problem, self.is_untold),
+            *doubtful_values(parameters, self.problem.drive),
+        )
 
     def trust(self) -> tuple[ModelTrust | None, TrustOnTests]:
         """What is known of the errors on whole recordings, if these can be predicted."""
@@ -180,7 +213,7 @@ def describe(findings: Findings) -> Diagnosis:
         reference_displacement_m=problem.drive.reference_displacement_m,
         output_unit=problem.unit,
         compared="command u" if problem.compares_command else "output y",
-        warnings=(*findings.warnings, *doubtful_values(parameters, problem.drive)),
+        warnings=findings.all_warnings(parameters),
         axis=problem.drive.axis,
         input_unit=problem.drive.source_unit,
         output=problem.drive.output,
@@ -346,14 +379,18 @@ def _overlays(
 
 
 def _fitted_effects_of(
-    problem: DiagnosisProblem, found: CandidateFit, scales: Scales, ids: Sequence[str]
+    found: CandidateFit, ends: tuple[np.ndarray, np.ndarray], ids: Sequence[str]
 ) -> tuple[FittedEffect, ...]:
-    """Describe effects of a fit, by their ids in the catalogue."""
-    if not ids:
-        return ()
+    """Describe effects of a fit, by their ids in the catalogue.
+
+    Parameters
+    ----------
+    ends : tuple of ndarray, each shape (n_names,)
+        Lower and upper ends of the intervals of what all recordings share.
+    """
     parameters: dict[str, list[FittedParameter]] = {one: [] for one in ids}
-    ends = zip(*intervals(problem, found, scales), strict=True)
-    for one, value, (low, high) in zip(found.names, found.values, ends, strict=True):
+    each = zip(found.names, found.values, *ends, strict=True)
+    for one, value, low, high in each:
         if one.owner in parameters:
             parameters[one.owner].append(
                 FittedParameter(

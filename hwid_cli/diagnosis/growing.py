@@ -115,6 +115,8 @@ def fit_grown(
     starts: Sequence[SearchStart],
     scales: Scales,
     noise: NoiseFloor,
+    *,
+    to_the_end: bool = False,
 ) -> CandidateFit:
     """Fit the base with effects to growing parts of the training recordings.
 
@@ -124,6 +126,9 @@ def fit_grown(
         Where a fit to whole recordings has stopped.
     starts : sequence of SearchStart
         That place first.
+    to_the_end : bool
+        Grow on where early parts gain nothing: of what bounces seldom, the other valley
+        may show late.
 
     Returns
     -------
@@ -139,7 +144,8 @@ def fit_grown(
         fit_from(first, everything, one, scales, MOST_ITERATIONS) for one in starts
     ]
     growth = _Growth(few, begun[0].layout, noise)
-    found = growth.through(begun, n_first, starts[0])
+    must_gain = None if to_the_end else starts[0]
+    found = growth.through(begun, n_first, must_gain)
     if not found:
         return standing
     start = reached_by(few, growth.whole(found[0]))
@@ -167,14 +173,18 @@ class _Growth:
         )
 
     def through(
-        self, begun: Sequence[SearchResult], n_samples: int, standing: SearchStart
+        self,
+        begun: Sequence[SearchResult],
+        n_samples: int,
+        standing: SearchStart | None,
     ) -> list[SearchResult]:
         """Grow from parts of so many samples to whole recordings.
 
         Parameters
         ----------
-        standing : SearchStart
-            Where a fit to whole recordings has stopped.
+        standing : SearchStart or None
+            Where a fit to whole recordings has stopped, which early parts have to leave
+            behind; None where they need not.
 
         Returns
         -------
@@ -208,11 +218,15 @@ class _Growth:
                 return _distinct(there, len(there))
             kept = _distinct(there, SIDE_BY_SIDE // 2)
 
-    def _gains(self, part: DiagnosisProblem, now: float, standing: SearchStart) -> bool:
+    def _gains(
+        self, part: DiagnosisProblem, now: float, standing: SearchStart | None
+    ) -> bool:
         """Whether growth leaves less of early parts than the fit to whole recordings.
 
         Where that left nothing but noise, the other valleys are worth knowing.
         """
+        if standing is None:
+            return True
         base: dict[str, Any] = dict(standing.base)
         drive = replace(self.few.drive, **base)
         shared = first_point(self.few, self.layout, drive, standing.effects).shared

@@ -7,7 +7,7 @@ without each of its effects. docs/method_diagnosis.md, eq. (D23b).
 """
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -22,15 +22,69 @@ from hwid_cli.diagnosis.rounds import RoundsResult
 from hwid_cli.diagnosis.selection import LEAST_GAIN, TIE, count
 from hwid_cli.diagnosis.set_fits import Rounds, fit_task
 from hwid_cli.records.candidates import CandidateFit
-from hwid_cli.records.drive import HELD
+from hwid_cli.records.drive import HELD, LINE
 
 # Sets that are tried beside the best one.
 MOST_OTHERS = 4
 
 
+@dataclass(frozen=True, eq=False)
+class OtherCommand:
+    """A set of effects beside the command that was not taken, and does as well.
+
+    Parameters
+    ----------
+    problem : DiagnosisProblem
+        The same recordings, with that command.
+    fit : CandidateFit
+        Of the same effects.
+    """
+
+    problem: DiagnosisProblem
+    fit: CandidateFit
+
+
 def with_held_command(problem: DiagnosisProblem) -> DiagnosisProblem:
     """The same recordings, with a command that is held between samples."""
-    return replace(problem, drive=replace(problem.drive, hold=HELD))
+    return _with_command(problem, HELD)
+
+
+def other_command(rounds: Rounds, chosen: CandidateFit) -> OtherCommand | None:
+    """The chosen set beside the other command, if the recordings do not tell them apart.
+
+    Half a sample changes what is fast, the stiffness of a coupling say: then the values
+    beside one command alone are surer than the recordings make them.
+
+    Parameters
+    ----------
+    chosen : CandidateFit
+        Beside the command of the problem.
+
+    References
+    ----------
+    docs/method_diagnosis.md, eq. (D23b).
+    """
+    problem = rounds.problem
+    if not (problem.may_be_held and chosen.effects and chosen.is_usable):
+        return None
+    if not _matters(rounds, chosen):
+        return None
+    other = _with_command(problem, LINE if problem.drive.hold == HELD else HELD)
+    rounds.on_round("the other command", 1)
+    task = fit_task(
+        replace(rounds, problem=other),
+        chosen.effects,
+        [start_from(problem.drive, chosen)],
+        None,
+    )
+    fits: list[CandidateFit] = rounds.run_tasks([task], keep=True)
+    if rounds.criteria.gain(fits[0], chosen) < -TIE:
+        return None
+    return OtherCommand(other, fits[0])
+
+
+def _with_command(problem: DiagnosisProblem, hold: str) -> DiagnosisProblem:
+    return replace(problem, drive=replace(problem.drive, hold=hold))
 
 
 def best_of(rounds: Rounds, found: RoundsResult) -> CandidateFit:

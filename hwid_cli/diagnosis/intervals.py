@@ -3,6 +3,7 @@
 docs/method_diagnosis.md, eq. (D20).
 """
 
+from dataclasses import dataclass
 from math import inf
 
 import numpy as np
@@ -24,6 +25,8 @@ from hwid_cli.records.candidates import CandidateFit, ParameterRef
 _QUANTILE = 1.96
 # Share of the best determined direction below which one counts as undetermined.
 _DETERMINED = 1e-12
+# Difference for derivatives of an effect's size, in coordinates.
+_STEP = 1e-4
 
 
 def unclear_effects(
@@ -42,20 +45,61 @@ def unclear_effects(
     if not found.is_usable:
         return found.effects
     fit_layout, point = rebuilt(problem, found, scales)
-    reaches = _reaches(problem, found, fit_layout, point)
+    spread = _spread(problem, found, fit_layout, point)
 
     def is_clear(ref: ParameterRef) -> bool:
         column = found.names.index(ref)
         unknown, q = fit_layout.shared[column], point.shared[column]
-        reach = float(reaches[column])
+        if not unknown.is_log:
+            return bool(abs(q) > spread.reaches()[column])
         # Of a logarithm linearised: a relative deviation of the value itself.
-        return reach < 1.0 if unknown.is_log else abs(q) > reach
+        direction = _direction_of_size(ref, fit_layout, point, scales)
+        return spread.reach(direction) < 1.0
 
     return tuple(
         effect
         for effect in found.effects
         if not all(map(is_clear, _telling(effect, found.names)))
     )
+
+
+def _direction_of_size(
+    ref: ParameterRef,
+    fit_layout: ParameterLayout,
+    point: ParameterPoint,
+    scales: Scales,
+) -> np.ndarray:
+    """How the logarithm of an effect's size changes with the shared coordinates.
+
+    Returns
+    -------
+    ndarray, shape (n_shared,)
+        Of the parameter itself where that alone says how large the effect is.
+    """
+    effect = CATALOGUE[ref.owner]
+    size = effect.size if ref.parameter == effect.strongest.name else None
+    if size is None:
+        return np.array([float(one.ref == ref) for one in fit_layout.shared])
+    columns = [
+        column for column, one in enumerate(fit_layout.shared) if one.owner == ref.owner
+    ]
+
+    def log_size(shared: np.ndarray) -> float:
+        values = {
+            fit_layout.shared[column].name: fit_layout.shared[column].value(
+                shared[column]
+            )
+            for column in columns
+        }
+        return float(np.log(size(values, scales)))
+
+    direction = np.zeros(len(fit_layout.shared))
+    for column in columns:
+        away = np.zeros(direction.size)
+        away[column] = _STEP
+        both = log_size(point.shared + away), log_size(point.shared - away)
+        direction[column] = (both[0] - both[1]) / (2 * _STEP)
+    return direction
 
 
 def _telling(effect: str, names: tuple[ParameterRef, ...]) -> tuple[ParameterRef, ...]:
@@ -86,7 +130,7 @@ def intervals(
         nothing = np.full(found.values.size, np.nan)
         return nothing, nothing
     fit_layout, point = rebuilt(problem, found, scales)
-    reaches = _reaches(problem, found, fit_layout, point)
+    reaches = _spread(problem, found, fit_layout, point).reaches()
     with np.errstate(over="ignore"):
         ends = np.array(
             [
@@ -102,32 +146,54 @@ def intervals(
     return ends.min(axis=0), ends.max(axis=0)
 
 
-def _reaches(
+@dataclass(frozen=True, eq=False)
+class _Spread:
+    """How far the shared coordinates may be off.
+
+    Where the error has many valleys its shape in one of them says nothing of the others:
+    an interval reaches twice as far as the farthest of all that are as likely.
+
+    Parameters
+    ----------
+    covariance : ndarray, shape (n_shared, n_shared)
+    away : ndarray, shape (n_valleys, n_shared)
+        Of other valleys.
+    """
+
+    covariance: np.ndarray
+    away: np.ndarray
+
+    def reach(self, direction: np.ndarray) -> float:
+        """Half of the 95 % interval of a sum of coordinates, with these weights."""
+        variance = max(float(direction @ self.covariance @ direction), 0.0)
+        farthest = np.max(np.abs(self.away @ direction), initial=0.0)
+        return float(np.hypot(_QUANTILE * np.sqrt(variance), 2 * farthest))
+
+    def reaches(self) -> np.ndarray:
+        """Of each coordinate alone."""
+        return np.array([self.reach(one) for one in np.eye(len(self.covariance))])
+
+
+def _spread(
     problem: DiagnosisProblem,
     found: CandidateFit,
     fit_layout: ParameterLayout,
     point: ParameterPoint,
-) -> np.ndarray:
-    """How far the intervals of the shared coordinates reach.
-
-    Where the error has many valleys its shape in one of them says nothing of the others:
-    the interval reaches twice as far as the farthest of all that are as likely.
-    """
+) -> _Spread:
     covariance, scale = shared_covariance(problem, found, fit_layout, point)
-    deviations = np.sqrt(np.maximum(np.diag(covariance), 0.0)) / scale
-    if found.valleys.size:
-        away = [
-            [
-                one.coordinate(value) - q
-                for one, value, q in zip(
-                    fit_layout.shared, valley, point.shared, strict=True
-                )
-            ]
-            for valley in found.valleys
+    away = [
+        [
+            one.coordinate(value) - q
+            for one, value, q in zip(
+                fit_layout.shared, valley, point.shared, strict=True
+            )
         ]
-        farthest = np.max(np.abs(away), axis=0)
-        return np.asarray(np.hypot(_QUANTILE * deviations, 2 * farthest))
-    return np.asarray(_QUANTILE * deviations)
+        for valley in found.valleys
+    ]
+    return _Spread(
+        covariance / np.outer(scale, scale),
+        np.reshape(np.array(away), (len(away), scale.size)),
+    )
 
 
 def shared_covariance(

@@ -42,6 +42,10 @@ def from_related(fits: SetFits, size: int) -> dict[Effects, list[SearchStart]]:
     if best is None or not np.isfinite(fits.train_sse(best)):
         return {}
     sets = _from_best(fits, best)
+    lowest = fits.lowest_of_size(size)
+    if lowest is not best:
+        # A wider law that brings too little to be preferred may still lead further.
+        sets = {**_from_best(fits, lowest), **sets}
     if not fits.rounds.criteria.is_complete(best):
         for ids, start in _from_parts(fits, size):
             sets.setdefault(ids, []).extend(fits.unless_tried(ids, [start]))
@@ -51,7 +55,8 @@ def from_related(fits: SetFits, size: int) -> dict[Effects, list[SearchStart]]:
 def _from_best(fits: SetFits, best: CandidateFit) -> dict[Effects, list[SearchStart]]:
     """Starts where the best set ended, with a relative in the place of an effect.
 
-    Where the best set is complete, simpler relatives only.
+    Where the best set is complete, simpler relatives only, or one that it has already:
+    the same kind twice.
     """
     rounds, present = fits.rounds, drive_effects(fits.rounds.problem.drive)
     is_complete = rounds.criteria.is_complete(best)
@@ -59,8 +64,7 @@ def _from_best(fits: SetFits, best: CandidateFit) -> dict[Effects, list[SearchSt
     sets: dict[Effects, list[SearchStart]] = {}
     for effect in best.effects:
         others = tuple(one for one in best.effects if one != effect)
-        kin = CATALOGUE[effect].contains if is_complete else relatives(effect)
-        for one in kin:
+        for one in _to_try(effect, others, is_complete):
             relative = second_of(one) if one in others else one
             ids = with_effect(others, relative)
             if relative not in rounds.allowed or not may_stand(ids, present):
@@ -77,6 +81,15 @@ def _from_best(fits: SetFits, best: CandidateFit) -> dict[Effects, list[SearchSt
                 starts.append(SearchStart(base, fitted_values(here, present)))
             sets[ids] = fits.unless_tried(ids, starts)
     return sets
+
+
+def _to_try(effect: str, others: Effects, is_complete: bool) -> list[str]:
+    """Relatives that may take the place of an effect beside others."""
+    kin = relatives(effect)
+    if not is_complete:
+        return kin
+    simpler = CATALOGUE[effect].contains
+    return [one for one in kin if one in simpler or one in others]
 
 
 def _from_parts(fits: SetFits, size: int) -> Iterable[tuple[Effects, SearchStart]]:

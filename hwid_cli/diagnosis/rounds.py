@@ -178,6 +178,8 @@ class _Search:
         self.fits.grow(size)
         self._use_again(size)
         self.fits.go_on(size)
+        if self.fits.grow_bouncing(size):
+            self._use_again(size)
         return self.fits.best_of_size(size)
 
     def goes_on(

@@ -72,6 +72,8 @@ _OF_SIMULATION = ("stiffness_N_per_m", "force_constant_N_per_A")
 LEAST_OVER_STAND_IN = 10.0
 # An effect that includes another one must add this share of what both gain.
 LEAST_ADDED = 0.03
+# Or it brings this share of what the included one leaves, where that is much.
+NEARLY_THE_REST = 0.9
 
 
 @dataclass(frozen=True)
@@ -516,7 +518,19 @@ def _adds_enough(
     added = smaller.sse.sum() - larger.sse.sum()
     together = base.sse.sum() - larger.sse.sum()
     is_clear = criteria.is_complete(larger) and not criteria.is_complete(smaller)
+    is_clear = is_clear or _takes_the_rest(criteria, larger, smaller)
     return bool(added >= LEAST_ADDED * together or is_clear)
+
+
+def _takes_the_rest(
+    criteria: SelectionCriteria, larger: CandidateFit, smaller: CandidateFit
+) -> bool:
+    """Whether a set takes nearly all of a large remainder that a smaller one leaves."""
+    left = _excess_of_held_out(criteria, smaller)
+    return (
+        criteria.ratio(smaller) > SMALL_REMAINDER
+        and _excess_of_held_out(criteria, larger) <= (1 - NEARLY_THE_REST) * left
+    )
 
 
 def rivals(
@@ -526,7 +540,7 @@ def rivals(
 
     Where the best one leaves nothing but noise, its criterion decides. Where it leaves
     more, its law is not quite the machine's, and neither is a rival's: those that leave
-    about as much are as likely.
+    about as much are as likely, of all recordings or of those that judge.
 
     Returns
     -------
@@ -538,6 +552,12 @@ def rivals(
     is_complete = criteria.is_complete(best)
     left = criteria.excess(best)
     most = max(WITHIN_REACH * left, left + criteria.stand_in_error)
+    judged = _excess_of_held_out(criteria, best)
+
+    def leaves_as_little(one: CandidateFit) -> bool:
+        there = _excess_of_held_out(criteria, one)
+        return criteria.excess(one) <= most or 0 < there <= WITHIN_REACH * judged
+
     return [
         one
         for one in found
@@ -549,9 +569,14 @@ def rivals(
         and not _has_fewer_kinds(best, one)
         and (
             criteria.gain(best, one) < TIE
-            or (not is_complete and criteria.excess(one) <= most)
+            or (not is_complete and leaves_as_little(one))
         )
     ]
+
+
+def _excess_of_held_out(criteria: SelectionCriteria, found: CandidateFit) -> float:
+    """Mean square beyond the noise of the recordings that judge, over the noise's, [-]."""
+    return criteria.ratio(found) ** 2 - 1.0
 
 
 def title_of(found: CandidateFit) -> str:

@@ -213,6 +213,19 @@ def _held_command(problem: DiagnosisProblem, effects: tuple[FittedEffect, ...]) 
     )
 
 
+def untold_command(problem: DiagnosisProblem, is_untold: bool) -> tuple[str, ...]:
+    """Say that values hang on how the command goes on between samples."""
+    if not is_untold:
+        return ()
+    ways = ["goes on in a line", "is held"]
+    taken, other = ways[:: -1 if problem.drive.hold == HELD else 1]
+    return (
+        f"Between samples the command {taken} here; that it {other} does as well, with "
+        "other values. The intervals hold both: set simulation.hold to zero (held, as "
+        "controllers and D/A converters do it) or linear, and run again.",
+    )
+
+
 def _rest(criteria: SelectionCriteria, verdict: DiagnosisVerdict) -> str:
     """Say what remains beside what was found; nothing where it is complete."""
     if verdict.is_complete:

@@ -5,6 +5,7 @@ docs/method_diagnosis.md.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -35,7 +36,9 @@ from hwid_cli.diagnosis.selection import (
     select_best,
 )
 from hwid_cli.diagnosis.tasks import DiagnosisTask, OnRound, RunTasks
+from hwid_cli.drive.catalogue import CATALOGUE
 from hwid_cli.records.candidates import CandidateFit
+from hwid_cli.records.diagnosis import SMALL_REMAINDER
 
 # Sets are fitted to so many samples of the training recordings; the best ones to all.
 MANY_SAMPLES = 40_000
@@ -104,6 +107,11 @@ class SetFits:
         """The best set of a size."""
         return select_best(self.rounds.criteria, self.of_size(size), self.rounds.base)
 
+    def lowest_of_size(self, size: int) -> CandidateFit:
+        """The set of a size with the lowest criterion, however much it brings."""
+        gain, base = self.rounds.criteria.gain, self.rounds.base
+        return max(self.of_size(size), key=lambda one: gain(one, base))
+
     def largest_part(self, whole: Effects) -> CandidateFit | None:
         """The best fit with one effect less; the base for a single effect."""
         if len(whole) == 1:
@@ -158,6 +166,11 @@ class SetFits:
     def has_many(self) -> bool:
         """Whether sets are fitted to a part of the samples first."""
         return has_many_samples(self.rounds.problem)
+
+    @property
+    def are_pieces(self) -> bool:
+        """Whether pieces of recordings are fitted, which are short already."""
+        return any(one.start is not None for one in self.rounds.problem.signals)
 
     def few_sse(self, found: CandidateFit) -> float:
         """Sum of squares on the recordings of the screening."""
@@ -275,8 +288,7 @@ class SetFits:
         other valleys only. Another single effect where the best one leaves something.
         """
         best, criteria = self.best_of_size(size), self.rounds.criteria
-        are_pieces = any(one.start is not None for one in self.rounds.problem.signals)
-        if best is None or not best.is_usable or are_pieces:
+        if best is None or not best.is_usable or self.are_pieces:
             return
         chosen = best
         if not is_rugged(best.effects):
@@ -290,9 +302,37 @@ class SetFits:
             if size > 1 or criteria.is_complete(best) or not near:
                 return
             chosen = min(near, key=criteria.excess)
-        self.rounds.on_round(f"{name_of(size)}, growing parts", 1)
+        self._grow(chosen)
+
+    def grow_bouncing(self, size: int) -> bool:
+        """Fit the best set of a size to growing parts where a bounce may mislead it.
+
+        One that leaves hardly more than noise: a bounce more or less in one recording
+        holds a fit beside the values at which nothing would be left.
+
+        Returns
+        -------
+        bool
+            Whether that got further.
+        """
+        best, criteria = self.best_of_size(size), self.rounds.criteria
+        if best is None or self.are_pieces:
+            return False
+        if not any(CATALOGUE[one].bounces for one in best.effects):
+            return False
+        is_near = criteria.ratio(best) <= SMALL_REMAINDER
+        if not is_near or criteria.is_complete(best) or is_rugged(best.effects):
+            return False
+        self._grow(best, to_the_end=True)
+        return self.is_behind(best, self.found[best.effects])
+
+    def _grow(self, chosen: CandidateFit, *, to_the_end: bool = False) -> None:
+        """Fit a set to growing parts of the recordings."""
+        self.rounds.on_round(f"{name_of(len(chosen.effects))}, growing parts", 1)
         self.keep(
-            self.rounds.run_tasks([_growing_task(self.rounds, chosen)], keep=True)
+            self.rounds.run_tasks(
+                [_growing_task(self.rounds, chosen, to_the_end)], keep=True
+            )
         )
 
     def unless_tried(
@@ -334,19 +374,21 @@ def fit_task(
     )  # fmt: skip
 
 
-def _growing_task(rounds: Rounds, found: CandidateFit) -> DiagnosisTask:
+def _growing_task(
+    rounds: Rounds, found: CandidateFit, to_the_end: bool
+) -> DiagnosisTask:
     """Task that fits a set again, to growing parts of the recordings."""
     problem, baseline = rounds.problem, rounds.baseline
     start = start_from(problem.drive, found)
     starts = grown_starts(start, found.effects, baseline.scales)
     return DiagnosisTask(
         name="+".join(found.effects),
-        function=fit_grown,
+        function=partial(fit_grown, to_the_end=to_the_end),
         arguments=(problem, found, starts, baseline.scales, baseline.noise),
         result_type=CandidateFit,
         content={
             "effects": found.effects, "starts": starts, "hold": problem.drive.hold,
-            "grown": True,
+            "grown": "to the end" if to_the_end else "where early parts gain",
         },
         arrays=(rounds.base.values, found.values, found.own, found.sse),
     )  # fmt: skip

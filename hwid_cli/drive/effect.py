@@ -340,11 +340,16 @@ class Effect:
     is_rugged : bool
         Whether its motion remembers every impact, so that the error over long recordings
         has many valleys.
+    bounces : bool
+        Whether the drive may bounce off it: the error may then have further valleys.
     moves_at_rest : bool
         Whether the drive moves before its input does, so that recordings start in motion.
     strength : str
         Name of the parameter without which the effect is not there: where it is zero,
         or for a limit beyond all that it limits. Empty means the first one.
+    size : callable or None
+        How large its usual force is, from its values, where another parameter changes
+        what the strength means.
     told_by : str
         Name of the parameter that tells it from the effects that it contains.
     words : mapping of str to str
@@ -372,8 +377,10 @@ class Effect:
     seen: Callable[[Scales], tuple[dict[str, float], ...]] | None = None
     stated: tuple[Stated, ...] = ()
     is_rugged: bool = False
+    bounces: bool = False
     moves_at_rest: bool = False
     strength: str = ""
+    size: Callable[[Values, Scales], float] | None = None
     told_by: str = ""
     words: Mapping[str, str] = field(default_factory=dict)
     is_possible: Callable[[Values], bool] | None = None

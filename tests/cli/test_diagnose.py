@@ -88,7 +88,8 @@ def test_the_missing_friction_is_found_and_everything_is_written(first_run):
     for name in figures:
         png = (folder / "out" / "figures" / name).read_bytes()
         assert png.startswith(b"\x89PNG")
-    assert "diagnose: 0 tasks from the cache" in first_run[2]
+    # A run may ask for one fit twice.
+    assert re.search(r"diagnose: [01] tasks from the cache, 9 computed", first_run[2])
     assert found["summary"].split()[0] in said
 
 
@@ -143,7 +144,8 @@ def test_lost_results_are_made_from_the_cache(again, out):
 
 @pytest.mark.thorough
 def test_force_diagnoses_again(again):
-    assert "diagnose: 0 tasks from the cache" in again("--force").stderr
+    forced = again("--force").stderr
+    assert re.search(r"diagnose: [01] tasks from the cache, 9 computed", forced)
 
 
 @pytest.mark.thorough

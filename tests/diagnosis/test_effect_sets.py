@@ -6,6 +6,7 @@ from hwid_cli.diagnosis.effect_sets import (
     is_nested,
     may_stand,
     moved_up,
+    relatives,
     second_of,
     translated,
 )
@@ -72,8 +73,15 @@ def test_a_second_one_without_its_first_becomes_the_first():
 
 def test_in_the_place_of_a_stop_on_both_sides_a_second_one_starts_on_each():
     assert second_of(STOP) == SECOND
+    assert second_of("one_sided_stop:contact") == "one_sided_stop:second_contact"
     assert second_of("gravity") == "gravity"
     both_sides = {"position_m": 0.012, "stiffness_N_per_m": 1e4}
     found = translated(SECOND, both_sides, sizes(problem()))
     assert [one["position_m"] for one in found] == [0.012, -0.012]
     assert {one["stiffness_N_per_m"] for one in found} == {1e4}
+
+
+def test_in_the_place_of_a_contact_stands_another_contact():
+    assert "one_sided_stop:contact" in relatives("end_stop:contact")
+    assert "one_sided_stop" not in relatives("end_stop:contact")
+    assert "one_sided_stop" in relatives("end_stop")

@@ -90,11 +90,30 @@ def test_a_lag_beside_a_held_command_is_the_lag(hold):
     assert found.hold == hold
 
 
-def test_beside_a_long_delay_the_line_stays():
+def test_beside_a_long_delay_the_line_stays_and_the_interval_holds_both():
     found = found_in(measured("linear", delay=3))
     assert [one.id for one in found.effects] == ["input_delay"]
-    assert found.effects[0].parameters[0].value == pytest.approx(3e-3, rel=5e-3)
+    (delay,) = found.effects[0].parameters
+    assert delay.value == pytest.approx(3e-3, rel=5e-3)
     assert found.hold == "linear"
+    assert 2.45e-3 < delay.low < 2.5e-3
+    assert 3e-3 < delay.high < 3.05e-3
+
+
+def test_where_both_commands_do_as_well_the_truth_is_in_the_interval():
+    found = found_in(measured("zero", delay=3))
+    (delay,) = found.effects[0].parameters
+    assert delay.value == pytest.approx(3.5e-3, rel=5e-3)
+    assert delay.low < 3e-3
+    assert delay.high < 3.55e-3
+    assert any("that it is held does as well" in one for one in found.warnings)
+
+
+def test_a_command_that_is_said_leaves_narrow_intervals():
+    found = found_in(measured("zero", delay=3), hold="zero")
+    (delay,) = found.effects[0].parameters
+    assert 2.95e-3 < delay.low < 3e-3 < delay.high < 3.05e-3
+    assert found.warnings == ()
 
 
 def test_what_is_said_is_not_tried():

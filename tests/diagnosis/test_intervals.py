@@ -1,8 +1,10 @@
 """Which effects of a fit the recordings leave open."""
 
+import numpy as np
 import pytest
 
-from hwid_cli.diagnosis.intervals import unclear_effects
+from hwid_cli.diagnosis.intervals import intervals, unclear_effects
+from hwid_cli.records.candidates import ParameterRef
 from tests.diagnosis.small_drive import fit, problem, recordings, sizes
 
 STRIBECK = {"force_N": 0.6, "static_excess_N": 0.5, "velocity_m_per_s": 0.02}
@@ -24,3 +26,37 @@ def test_a_law_that_may_be_the_simpler_one_is_left_open(true, unclear):
 
     assert found.is_usable
     assert unclear_effects(given, found, scales) == unclear
+
+
+CONTACT = "one_sided_stop:contact"
+
+
+def test_a_contact_is_there_whatever_its_exponent_makes_of_its_stiffness():
+    """The stiffness is open by more than a factor of e, the force at a depth is not."""
+    stop = {
+        "position_m": 5e-3,
+        "stiffness_N_per_m": 1e5,
+        "exponent": 1.5,
+        "damping_s_per_m": 0.5,
+    }
+    given = problem(recordings({CONTACT: stop}, noise=8e-4))
+    scales = sizes(problem())
+    found = fit(given, {CONTACT: stop}, scales=scales)
+
+    low, high = intervals(given, found, scales)
+    column = found.names.index(ParameterRef(CONTACT, "stiffness_N_per_m"))
+    assert high[column] > np.e**2 * low[column]
+    assert unclear_effects(given, found, scales) == ()
+
+
+def test_a_contact_that_nothing_reaches_is_open():
+    far = {
+        "position_m": 1.0,
+        "stiffness_N_per_m": 1e5,
+        "exponent": 1.5,
+        "damping_s_per_m": 0.5,
+    }
+    given = problem(recordings())
+    scales = sizes(problem())
+    found = fit(given, {CONTACT: far}, scales=scales)
+    assert unclear_effects(given, found, scales) == (CONTACT,)

@@ -393,6 +393,18 @@ def test_an_effect_that_includes_another_must_add_enough():
     assert select_best(CRITERIA, fits, base()).effects == STRIBECK
 
 
+@pytest.mark.parametrize(("rest", "preferred"), [(120.0, STRIBECK), (145.0, COULOMB)])
+def test_what_takes_nearly_all_that_the_included_one_leaves_is_preferred(
+    rest, preferred
+):
+    """Of a large gap that may be next to nothing: a contact for a plain stop."""
+    smaller = made_up(COULOMB, 400.0)
+    larger = made_up(STRIBECK, rest, parameters=3)
+    far = base(40_000.0)
+    assert 400.0 - rest < LEAST_ADDED * (40_000.0 - rest)
+    assert select_best(CRITERIA, [larger, smaller], far).effects == preferred
+
+
 def test_it_wins_without_where_it_alone_leaves_white_noise():
     fits = larger_by(0.9 * LEAST_ADDED, whiteness=0.5)
     assert select_best(CRITERIA, fits, base()).effects == STRIBECK
@@ -430,6 +442,20 @@ def test_rivals_are_those_that_cannot_be_told_apart():
     far = after(-TIE - 0.5, DEAD_ZONE)
     lost = made_up(("quadratic_drag",), np.inf)
     assert rivals(CRITERIA, [best, near, far, lost], best) == [near]
+
+
+@pytest.mark.parametrize(("judged", "is_rival"), [(250.0, True), (270.0, False)])
+def test_what_is_better_on_training_recordings_alone_has_rivals(judged, is_rival):
+    best = made_up(COULOMB, [110.0] * 3 + [225.0] * 3)
+    other = made_up(DEAD_ZONE, [150.0] * 3 + [judged] * 3)
+    assert CRITERIA.gain(best, other) > TIE
+    assert rivals(CRITERIA, [best, other], best) == [other] * is_rival
+
+
+def test_where_nothing_is_left_of_what_judges_the_criterion_decides():
+    best = made_up(COULOMB, [150.0] * 3 + [95.0] * 3)
+    other = made_up(DEAD_ZONE, [250.0] * 3 + [95.0] * 3)
+    assert rivals(CRITERIA, [best, other], best) == []
 
 
 def test_what_includes_the_best_one_is_no_rival():

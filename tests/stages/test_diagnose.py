@@ -266,6 +266,7 @@ def test_the_stages_are_announced(with_friction):
         # The best one, without it, and the other two.
         ("the command held", 4),
         ("verdict", 0),
+        ("the other command", 1),
     ]
 
 

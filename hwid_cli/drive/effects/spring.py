@@ -11,6 +11,7 @@ from hwid_cli.drive.effect import (
     Effect,
     Parameter,
     Scales,
+    Values,
     bend,
     shares_of,
     span_of,
@@ -110,6 +111,7 @@ END_STOP = Effect(
         "input_saturation": "a sine near resonance at full amplitude",
         "one_sided_stop": "a step of the other sign",
     },
+    bounces=True,
     # Where the main spring vanishes.
     contains=("spring_gap",),
 )
@@ -140,6 +142,7 @@ ONE_SIDED = Effect(
         "end_stop": "a step of the other sign",
         "quadratic_stiffness": "small and full amplitude",
     },
+    bounces=True,
 )
 
 
@@ -172,10 +175,20 @@ def _contact(stop: Effect, slots: str, sentence: str) -> Effect:
             ),
         ),
         derived={f"{slots}_BEND": bend},
-        confused_with={"cubic_stiffness": "hits at several speeds"},
+        confused_with={
+            **stop.confused_with,
+            "cubic_stiffness": "hits at several speeds",
+        },
         contains=(stop.id, *stop.contains),
+        size=_usual_force,
         seen=partial(_contact_starts, stop),
     )
+
+
+def _usual_force(values: Values, scales: Scales) -> float:
+    """Of a contact at a usual depth, [N]."""
+    depth = _USUAL_DEPTH * scales.displacement_m
+    return values["stiffness_N_per_m"] * depth ** values["exponent"]
 
 
 def _contact_starts(stop: Effect, scales: Scales) -> tuple[dict[str, float], ...]:
