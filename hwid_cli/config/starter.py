@@ -8,7 +8,7 @@ from typing import Any
 import yaml
 
 from hwid_cli.config.load import experiment_of
-from hwid_cli.data.units import QUANTITIES, quantity_of
+from hwid_cli.data.units import QUANTITIES, quantity_of, readings_of
 from hwid_cli.errors import ConfigError
 from hwid_cli.files.atomic import replace_file
 from hwid_cli.files.messages import escaped, is_plain
@@ -318,6 +318,8 @@ def _unit_lines(layout: FolderLayout) -> list[str]:
         why = f"no name says it; put yours as units: {{{name}: ...}}"
         if role.unit:
             why = "as the file says; numbers stay as they are"
+        if readings := readings_of(role.unit):
+            why = f"may be {' or '.join(readings)}: say which as units: {{{name}: ...}}"
         lines += [f"  {name}_unit: {_flow(role.unit or _UNKNOWN_UNIT)}   # {why}"]
     return lines
 

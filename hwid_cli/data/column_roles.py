@@ -20,7 +20,7 @@ from hwid_cli.data.column_words import (
     place_in_chain,
 )
 from hwid_cli.data.table_heads import sample_time_named
-from hwid_cli.data.units import factor_between, unit_in_name, unit_of_dates
+from hwid_cli.data.units import factor_between, split_unit, unit_in_name, unit_of_dates
 from hwid_cli.errors import MeasurementError
 from hwid_cli.records.starter import FoundColumn, Role
 
@@ -228,8 +228,9 @@ def _unit_of_clock(
     is_whole = bool((column.values == np.round(column.values)).all())
     if clock.step < 1.0 or not is_whole:
         return "", "", _slow_note(clock.step)
-    if meaning_of(column.title).role != "time":
-        # A counter of samples.
+    is_counter = column.title or clock.step == 1.0
+    if meaning_of(column.title).role != "time" and is_counter:
+        # Of samples.
         return "", "", ()
     unit = next(unit for least, unit in reversed(_WHOLE_STEPS) if clock.step >= least)
     note = (
@@ -287,6 +288,7 @@ def guess_signals(columns: Sequence[FoundColumn]) -> SignalGuess:
         *_twin_notes(first, [one for one in twins if one not in (last, *repeats)]),
         *_other_columns([one for one in named if one not in repeats], first, last),
         *_scale_notes(first.column, last.column),
+        *_two_units_notes(first.column, last.column),
     ]
     wanted = (one for one in _of_role(named, "reference") if one not in (first, last))
     reference = next(wanted, None)
@@ -351,8 +353,9 @@ def _pair(named: list[_Named]) -> tuple[_Named, _Named, dict[str, str]]:
     """Input, output, and why."""
     inputs, outputs = _of_role(named, "input"), _of_role(named, "output")
     if inputs and outputs:
-        last, why = _chosen_output(inputs[0], outputs)
-        return inputs[0], last, {"input": _by(inputs[0]), "output": why}
+        first, reason = _chosen_input(inputs, outputs[0])
+        last, why = _chosen_output(first, outputs)
+        return first, last, {"input": reason, "output": why}
     free = [one for one in named if not one.meaning.role]
     if inputs and free:
         last = max(free, key=lambda one: _answer(inputs[0], one))
@@ -384,6 +387,21 @@ def _answer(first: _Named, last: _Named) -> float:
     if signs.are_same(first.values, last.values):
         return -2.0
     return signs.answers(first.values, last.values)
+
+
+def _chosen_input(inputs: list[_Named], last: _Named) -> tuple[_Named, str]:
+    """The best name, unless it has nothing to do with an output that answers to another.
+
+    The voltage of a supply, beside a torque.
+    """
+    first = inputs[0]
+    if not signs.are_unrelated(first.values, last.values):
+        return first, _by(first)
+    for other in inputs[1:]:
+        if _answer(other, last) > _CLEAR:
+            why = f"{_called(first.column)} has nothing to do with the output"
+            return other, f"{_by(other)}; {why}"
+    return first, _by(first)
 
 
 def _chosen_output(first: _Named, outputs: list[_Named]) -> tuple[_Named, str]:
@@ -583,6 +601,20 @@ def _scale_notes(first: FoundColumn, last: FoundColumn) -> list[str]:
         for role, one in found.items()
         if one.scale != 1.0 and _is_whole(one.values)
     ]
+
+
+def _two_units_notes(first: FoundColumn, last: FoundColumn) -> list[str]:
+    """Say that the file names two units of a column that do not go into each other."""
+    notes = []
+    for role, one in (("input", first), ("output", last)):
+        named = split_unit(one.title)[1]
+        if named and one.unit and factor_between(named, one.unit) is None:
+            notes.append(
+                f"NOT SURE: {_called(one)} says {named!r} and the row of units "
+                f"{one.unit!r}, which is taken; if the other one holds, write "
+                f"{role}_unit: {named}"
+            )
+    return notes
 
 
 def _is_whole(values: np.ndarray) -> bool:

@@ -204,8 +204,25 @@ def answers(first: np.ndarray, second: np.ndarray) -> float:
     -------
     float, [-]
         From 1, where only the second answers to the first, to -1, where only the first
-        answers to the second; near 0 where the numbers do not tell.
+        first answers to the second; near 0 where the numbers do not tell.
     """
+    forward, backward, chance = _gains(first, second)
+    return (forward - backward) / (forward + backward + chance)
+
+
+def are_unrelated(first: np.ndarray, second: np.ndarray) -> bool:
+    """Whether neither of two columns tells more of the other than chance does.
+
+    Parameters
+    ----------
+    first, second : ndarray, shape (n,)
+    """
+    forward, backward, chance = _gains(first, second)
+    return forward + backward < chance
+
+
+def _gains(first: np.ndarray, second: np.ndarray) -> tuple[float, float, float]:
+    """What each column tells of the other, and what past values without meaning would."""
     known = np.isfinite(first[: second.size]) & np.isfinite(second[: first.size])
     # Of a long record means: the signals may begin to move late.
     block = -(-int(known.sum()) // _LONGEST)
@@ -222,7 +239,7 @@ def answers(first: np.ndarray, second: np.ndarray) -> float:
         backward += _gain(a, b)
         # Past values without any meaning give a quarter of this.
         chance += 4.0 * _LAGS / max(count, 1)
-    return (forward - backward) / (forward + backward + chance)
+    return forward, backward, chance
 
 
 def is_stepwise(values: np.ndarray) -> bool:

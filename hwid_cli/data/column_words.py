@@ -95,18 +95,15 @@ _OUTPUT = [
     "acceleration",
     "beschleunigung",
     "acc",
-    "measured",
-    "measurement",
-    "istwert",
     "velo",
-    "fb",
-    "feedback",
     "n",
     "encoder",
     "resolver",
     "tacho",
     "lvdt",
 ]
+# Words that say that something was measured: another word, or the unit, says what.
+_MEASURED = ["measured", "measurement", "istwert", "fb", "feedback"]
 _TIME = [
     *("time", "zeit", "t", "timestamp", "tijd", "secs", "seconds", "sekunden", "sec"),
     "stamp",
@@ -160,6 +157,8 @@ _OUTPUT_UNITS = {
 # Words that name a plug of an instrument and not a quantity, and units that do say it.
 _PLUGS = {"in", "input", "eingang", "out", "output", "ausgang", "amp"}
 _CURRENT_UNITS = {"a", "ma", "ka"}
+# What drives, wherever it is plugged in; a voltage may be that of any sensor.
+_DRIVING_UNITS = {*_CURRENT_UNITS, "n", "kn", "nm", "n m", "mnm"}
 # The same of a time.
 _TIME_UNITS = {"s", "sec", "sek", "ms", "us", "µs"}
 
@@ -237,11 +236,14 @@ def meaning_of(title: str, stated: str = "") -> Meaning:
     words = _words(bare)
     unit = stated or unit
     is_reference = any(_rank(word, _REFERENCE) is not None for word in words)
+    # The port of a block, of which the path says the name: Ref/Out1.
+    is_reference |= any(word in _REFERENCE for word in _words_of_path(bare))
     role, rank, used = "", 99, ""
     for name, known in (
         ("time", _TIME),
         ("output", _OUTPUT),
         ("input", _INPUT),
+        ("output", _MEASURED),
         ("counter", _COUNTER),
     ):
         for word in words:
@@ -283,7 +285,7 @@ def _role_of_unit(unit: str) -> str:
 
 def _is_contradicted(role: str, word: str, unit: str) -> bool:
     """Whether a current leaves a plug ``out``, or a position comes in at one."""
-    says = "input" if unit.lower() in _CURRENT_UNITS else ""
+    says = "input" if unit.lower() in _DRIVING_UNITS and unit != "nm" else ""
     says = "output" if unit.lower() in _OUTPUT_UNITS else says
     # A letter stands for many things; what is measured in A is none of them but a current.
     return (word in _PLUGS or len(word) == 1) and says not in ("", role)
@@ -294,6 +296,12 @@ def _words(title: str) -> list[str]:
     member = title.replace("/", ".").rstrip(". ").split(".")[-1]
     spaced = re.sub(r"([a-zäöü])([A-ZÄÖÜ])", r"\1 \2", member)
     return [word.lower() for word in re.findall(r"[^\W\d_]+|\d+", spaced)]
+
+
+def _words_of_path(title: str) -> list[str]:
+    """Lower-case words of the members above the last one."""
+    above = title.split("/")[:-1]
+    return [word for member in above for word in _words(member)]
 
 
 def _rank(word: str, known: list[str]) -> int | None:

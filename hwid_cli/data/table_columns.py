@@ -272,7 +272,8 @@ def found_columns(
             key = title if is_name else place
             unit = head.units.get(place, column.unit)
             scale = head.scales.get(place, 1.0)
-            found.append(FoundColumn(title, key, column.values, variable, unit, scale))
+            said = f"{title}: {head.said[place]}" if place in head.said else title
+            found.append(FoundColumn(said, key, column.values, variable, unit, scale))
     for title, step_s in head.settings:
         found.append(FoundColumn(title, title, np.array([step_s]), variable, "s"))
     return tuple(found)

@@ -68,6 +68,7 @@ _RATE_UNITS = {
     **dict.fromkeys(("mhz", "ms/s", "msa/s"), 1e6),
 }
 _SETTING = re.compile(r"\s*(.{1,60}?)\s*[:=]\s*([-+0-9.,eE]+)\s*([A-Za-zµμ/]{0,6})\s*")
+_SAID = re.compile(r"(\w[\w .]{0,20}?)\s*[:=]\s*(\S.{1,80})")
 # Rows below the first one of a table, and how many of them may be damaged.
 _ROWS_BELOW, _MOST_DAMAGED = 5, 1
 # Rows of a table's beginning in which settings may stand beside the numbers.
@@ -96,6 +97,8 @@ class TableHead:
         Sample times that the rows state, with the words in front of them.
     scales : dict of int to float
         By column, where a row of factors states another one than 1.
+    said : dict of int to str
+        By column, what a row above says of it: of ``CH1`` that it is the current.
     """
 
     body: int
@@ -106,6 +109,7 @@ class TableHead:
     units: dict[int, str] = field(default_factory=dict)
     settings: tuple[tuple[str, float], ...] = ()
     scales: dict[int, float] = field(default_factory=dict)
+    said: dict[int, str] = field(default_factory=dict)
 
 
 def sample_time_named(title: str, value: float, unit: str = "") -> float | None:
@@ -220,11 +224,42 @@ def read_head(
         names = _named(rows, name_row, numeric, units)
         if not units and _are_rows_named(rows[body:], len(names)):
             names = ["", *names]
-    settings = _settings(rows, body, numeric)
-    scales = _scales(rows[:body], numeric)
+    said = _said_of(rows[:body], names)
+    for place, text in said.items():
+        if place in numeric and (unit := split_unit(text)[1]):
+            units.setdefault(place, unit)
     return TableHead(
-        body, numeric, texts, tuple(names), name_row, units, settings, scales
+        body,
+        numeric,
+        texts,
+        tuple(names),
+        name_row,
+        units,
+        settings=_settings(rows, body, numeric),
+        scales=_scales(rows[:body], numeric),
+        said=said,
     )
+
+
+def _said_of(rows: Sequence[Sequence[str]], names: Sequence[str]) -> dict[int, str]:
+    """What rows such as ``CH1: current [mA]`` say of columns, by column."""
+    found: dict[int, str] = {}
+    for row in rows:
+        cells = [cell for cell in row if cell]
+        written = _SAID.fullmatch(cells[0]) if len(cells) == 1 else None
+        # A setting is a number, a name has letters.
+        if written is None or not re.search(r"[^\W\d]", written[2]):
+            continue
+        for place, name in enumerate(names):
+            if name and _channel(name) == _channel(written[1]):
+                found.setdefault(place, written[2])
+    return found
+
+
+def _channel(name: str) -> str:
+    """Name of a channel without the word for it, in small letters: CH1, Channel 1, 1."""
+    bare = split_unit(name)[0].strip().lower()
+    return re.sub(r"^(?:channel|kanal|chan|ch)[\s_.]*(?=\w)", "", bare)
 
 
 def _are_rows_named(body: Sequence[Sequence[str]], names: int) -> bool:

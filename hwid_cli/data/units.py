@@ -55,14 +55,23 @@ _SPELLINGS = {
     "U/min": "rpm",
     "r/min": "rpm",
     "rev/min": "rpm",
+    "RPM": "rpm",
+    "Rpm": "rpm",
+    "dps": "deg/s",
+    "DEG": "deg",
     "rev": "turn",
     "mps": "m/s",
     "100ns": "tick_of_windows",
     "%": "percent",
 }
-# Degrees in German, gradians to pint: nobody can tell.
-_AMBIGUOUS = ("grad", "Grad", "gr")
+# What nobody can tell, and what it may be.
+_GRAD, _MIL = ("deg", "gon"), ("thou", "mrad")
+_AMBIGUOUS = {
+    **dict.fromkeys(("grad", "Grad", "gr"), _GRAD),
+    **dict.fromkeys(("mil", "mils", "Mil", "Mils"), _MIL),
+}
 _UNITLESS_WORDS = ("", "-", "1", "none", "unitless", "dimensionless")
+_RAISED = str.maketrans({"²": "^2", "³": "^3", "⁴": "^4", "⁻": "-", "¹": "1"})
 _SYMBOL = r"[A-Za-z_\u00b5\u03bc°Ωµ]+(?:(?:\^|\*\*)?-?[1-4])?"
 _FORM = re.compile(rf"{_SYMBOL}(?:[ */·.]{_SYMBOL}){{0,5}}")
 _LONGEST = 40
@@ -130,6 +139,17 @@ def factor_between(unit: str, target: str) -> float | None:
 def is_unitless(unit: str) -> bool:
     """Whether a text says that numbers have no unit."""
     return unit.strip() in _UNITLESS_WORDS
+
+
+def readings_of(unit: str) -> tuple[str, ...]:
+    """Units that a text may mean, where it means several; empty where it does not.
+
+    Examples
+    --------
+    >>> readings_of("mils"), readings_of("mm")
+    (('thou', 'mrad'), ())
+    """
+    return _AMBIGUOUS.get(unit.strip(), ())
 
 
 def in_unit(values: Any, unit: str, target: str) -> Any:
@@ -216,7 +236,8 @@ def _registry() -> Any:
 
 def _spelt(unit: str) -> str:
     """A unit as pint reads it."""
-    text = _SPELLINGS.get(unit.strip(), unit.strip())
+    text = unit.strip().translate(_RAISED)
+    text = _SPELLINGS.get(text, text)
     text = re.sub(r"(?<=[A-Za-z\u00b5\u03bc°Ω])(?:\^|\*\*)?(-?\d)", r"**\1", text)
     return re.sub(r"(?<=\D)[·.](?=\D)", "*", text)
 
@@ -224,7 +245,7 @@ def _spelt(unit: str) -> str:
 @cache
 def _roots(unit: str) -> str | None:
     """The unit in base units; None where it is not known."""
-    text = unit.strip()
+    text = unit.strip().translate(_RAISED)
     if len(text) > _LONGEST or text in _AMBIGUOUS:
         return None
     text = _SPELLINGS.get(text, text)
@@ -312,6 +333,25 @@ _SUFFIXES = {
 _COUNTS = (
     *("%", "cnt", "cnts", "count", "counts", "inc", "incs", "incr", "increments"),
     *("ink", "inkr", "inkremente"),
+)
+# What is measured beside a drive: units between round brackets too, as labels.
+_LABELS = (
+    *("°c", "degc", "deg c", "celsius", "°f", "degf", "k", "g", "mg", "kg"),
+    *("l/min", "l/h", "l/s", "ml/min", "m3/h", "m³/h", "slpm", "sccm", "gpm"),
+    *("%fs", "% fs", "%fso", "ppm", "db", "hz", "khz", "w", "kw", "va", "ohm", "ω"),
+    *(
+        "mv/v",
+        "µstrain",
+        "ustrain",
+        "µe",
+        "µm/m",
+        "strain",
+        "t/cm",
+        "mt",
+        "gauss",
+        "lx",
+    ),
+    *("mil", "mils", "grad", "cts", "lsb", "digits", "pulses", "ticks", "steps"),
 )
 # What is followed by a member is the place in an array: run(2).current.
 _BRACKET = re.compile(r"([\[(])\s*([^\])]*?)\s*[\])](?!\.\w)")
@@ -406,7 +446,7 @@ def unit_in_name(title: str, role: str) -> str:
             return UNITLESS
         if unit in _ARGUMENTS or not re.search(r"[^\W\d]|[%°]", unit):
             return ""
-        is_known = quantity_of(unit) or unit.lower() in _COUNTS
+        is_known = quantity_of(unit) or unit.lower() in (*_COUNTS, *_LABELS)
         return unit if is_known or bracket[1] == "[" else ""
     if role == "time" and quantity_of(unit) != "time":
         return ""

@@ -51,6 +51,8 @@ _ALIKE_LENGTH = 0.8
 # Least power in the same third octaves, [-]: a multisine of other phases has nearly all,
 # sines of other frequencies have none.
 _ALIKE_SPECTRA = 0.5
+# Levels of rest that differ by less than this share of the output's swing are one, [-].
+_ALIKE_LEVELS = 0.05
 # A recipe that keeps less than this share of a recording has misjudged it, [-].
 _LEAST_KEPT = 0.5
 # Fits that a first run may take without asking, [-].
@@ -225,6 +227,7 @@ def _recipes(
         candidates = _CUT_RECIPES[kind] if needs_cut else _RECIPES[kind]
         fitting = [one for one in candidates if _works(one, kind, own)]
         recipes[kind] = fitting[0] if fitting else ()
+    recipes, level = _with_common_level(raws, kinds, recipes)
     some = [
         kind
         for kind, recipe in recipes.items()
@@ -235,10 +238,48 @@ def _recipes(
         reason = f"tried: {' and '.join(some)} recordings begin with a rest"
         if recipes.get("random") == ():
             reason += "; random ones are left whole: a cut may begin in mid-motion"
-        return recipes, reason
+        return recipes, reason + level
     if all(_begins_at_rest(raw) for raw in raws):
         return recipes, "nothing is cut: the rest before may be a level of the input"
     return recipes, "no rest is cut: not all recordings begin with one"
+
+
+def _with_common_level(
+    raws: Sequence[RawRecording],
+    kinds: dict[str, str],
+    recipes: dict[str, tuple[str, ...]],
+) -> tuple[dict[str, tuple[str, ...]], str]:
+    """Recipes that leave a level at which all rest, where some kinds would keep it.
+
+    A room's temperature, say: subtracted from steps alone, it shifts these against
+    all others. A zero that is another one in each recording is subtracted.
+
+    Returns
+    -------
+    recipes : dict
+    reason : str
+        What stays and why; empty where nothing was to decide.
+    """
+    own = [raw for raw in raws if "output_offset" in recipes[kinds[raw.name]]]
+    if not own or len(own) == len(raws):
+        return recipes, ""
+    swing = float(np.median([np.nanmax(r.output) - np.nanmin(r.output) for r in raws]))
+    levels = np.array([_rest_level(raw) for raw in own])
+    is_common = np.ptp(levels) <= _ALIKE_LEVELS * swing
+    if not is_common or abs(np.mean(levels)) <= _ALIKE_LEVELS * swing:
+        return recipes, ""
+    kept = {
+        kind: tuple(step for step in recipe if step != "output_offset")
+        for kind, recipe in recipes.items()
+    }
+    level = f"{np.mean(levels):.3g}{behind(raws[0].output_unit)}"
+    return kept, f"; the level at which the output rests, {level}, stays in all of them"
+
+
+def _rest_level(raw: RawRecording) -> float:
+    """Mean of the output before the input moves."""
+    onset = find_onset(raw.input[np.isfinite(raw.input)], quiet_is_rest=True)
+    return float(np.nanmean(raw.output[:onset]))
 
 
 def _works(recipe: tuple[str, ...], kind: str, raws: Sequence[RawRecording]) -> bool:

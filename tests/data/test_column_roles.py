@@ -68,6 +68,38 @@ def test_units_say_the_roles_of_channels():
     assert found[2].reasons["input"] == "by its unit, A"
 
 
+def test_a_measured_torque_drives_and_a_wanted_speed_does_not():
+    """As drives log themselves: what was wanted, the speed and the torque that was."""
+    titles = ("n_soll [1/min]", "Drehzahlistwert [1/min]", "Drehmomentistwert [Nm]")
+    wanted = np.roll(SPEED, -9)
+    found = guessed(*zip(titles, (wanted, SPEED, CURRENT), strict=True))
+    assert found[:2] == (titles[2], titles[1])
+
+
+def test_the_path_of_a_port_says_that_it_is_a_reference():
+    found = guessed(
+        ("Model/Ref/Out1", np.roll(POSITION, -9), "mm"),
+        ("Model/Plant/Out1", POSITION, "mm"),
+        ("Model/Ctrl/Out1", CURRENT, "Nm"),
+    )
+    assert found[:2] == ("Model/Ctrl/Out1", "Model/Plant/Out1")
+
+
+def test_a_supply_that_the_output_does_not_answer_to_is_no_input():
+    supply = 48.0 + 0.1 * np.random.default_rng(8).standard_normal(N)
+    found = guessed(("BusVoltage", supply), ("Torque", CURRENT), ("Angle", POSITION))
+    assert found[:2] == ("Torque", "Angle")
+    assert "'BusVoltage' has nothing to do" in found[2].reasons["input"]
+
+
+def test_two_units_of_one_column_are_said():
+    *_, found = guessed(
+        ("1: Current [mA]", CURRENT, "A"), ("2: Way [mm]", POSITION, "Volt")
+    )
+    (note,) = [note for note in found.notes if "NOT SURE" in note]
+    assert "write output_unit: mm" in note
+
+
 @pytest.mark.parametrize("order", [(0, 1), (1, 0)])
 def test_content_says_what_drives_what_where_no_name_does(order):
     columns = [("AI0", VOLTAGE, "V"), ("AI1", SPEED, "V")]
@@ -113,6 +145,23 @@ def test_the_unit_of_a_time_is_told_from_its_size_and_doubts_are_said(
     assert found.role.unit == wanted
     assert (found.notes == ()) is is_sure
     assert all("NOT SURE" in note and "units: {time:" in note for note in found.notes)
+
+
+@pytest.mark.parametrize(
+    ("step", "wanted", "is_sure"),
+    [
+        (20.0, "ms", False),
+        # Of samples, one by one.
+        (1.0, "", True),
+    ],
+)
+def test_whole_numbers_without_a_name_are_a_clock_of_milliseconds(
+    step, wanted, is_sure
+):
+    ticks = 1043 + step * np.arange(N)
+    found = guess_time([column("", ticks, key=0), column("u", VOLTAGE)])
+    assert (found.role.unit if found.role else "") == wanted
+    assert (found.notes == ()) is is_sure
 
 
 def test_a_stated_interval_says_the_unit_of_the_time():

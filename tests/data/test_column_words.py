@@ -49,3 +49,11 @@ def test_a_measured_current_comes_before_a_wanted_one():
 )
 def test_settings_may_state_the_sample_time(title, value, step):
     assert sample_time_named(title, value) == step
+
+
+def test_what_was_measured_is_said_by_another_word_or_it_is_the_output():
+    assert meaning_of("Istwert").role == "output"
+    assert meaning_of("measured").role == "output"
+    assert meaning_of("measured_current").role == "input"
+    assert meaning_of("Drehmomentistwert").role == "input"
+    assert meaning_of("Drehzahlistwert").role == "output"

@@ -110,3 +110,22 @@ def test_sample_times_are_told_by_their_words(title, value, unit, step_s):
 def test_a_setting_may_stand_in_one_cell():
     found = head(["Sampling rate: 250 Hz"], ["t", "u", "y"])
     assert found.settings == (("Sampling rate", 0.004),)
+
+
+@pytest.mark.parametrize(
+    "said", ["CH1: motor current [mA]", "Channel 1 = motor current [mA]"]
+)
+def test_a_preamble_says_what_channels_are(said):
+    found = head([said], ["Operator: Meyer"], ["Time", "CH1", "CH2"])
+    assert found.said == {1: "motor current [mA]"}
+    assert found.units == {1: "mA"}
+
+
+def test_a_row_of_units_holds_whatever_a_preamble_says():
+    found = head(["CH1: way [mm]"], ["Time", "CH1", "CH2"], ["s", "V", "V"])
+    assert found.said == {1: "way [mm]"}
+    assert found.units == {0: "s", 1: "V", 2: "V"}
+
+
+def test_a_setting_of_a_channel_is_no_name():
+    assert head(["CH1: 20"], ["Time", "CH1", "CH2"]).said == {}

@@ -14,6 +14,7 @@ from hwid_cli.data.units import (
     is_unitless,
     looks_like_unit,
     quantity_of,
+    readings_of,
     unit_in_name,
 )
 
@@ -63,6 +64,9 @@ def test_factors_are_those_of_another_library(unit, target, factor):
         ("rad", "-"),
         # Degrees or gradians?
         ("grad", "rad"),
+        # Of an inch or of a radian?
+        ("mils", "rad"),
+        ("mil", "m"),
         # Zero lies elsewhere.
         ("degC", "K"),
         ("inc", "m"),
@@ -154,3 +158,22 @@ def test_plain_units_do_not_load_the_library():
         "assert 'pint' not in sys.modules\n"
     )
     subprocess.run([sys.executable, "-c", script], check=True)
+
+
+def test_what_nobody_can_tell_has_readings():
+    assert readings_of("mils") == ("thou", "mrad")
+    assert readings_of("Grad") == ("deg", "gon")
+    assert all(quantity_of(one) for one in (*readings_of("mils"), *readings_of("grad")))
+    assert readings_of("mm") == ()
+
+
+@pytest.mark.parametrize("unit", ["degC", "°C", "K", "g", "l/min", "%FS", "mils"])
+def test_what_is_measured_beside_a_drive_keeps_its_unit_as_a_label(unit):
+    assert unit_in_name(f"Response ({unit})", "output") == unit
+    assert quantity_of(unit) == ""
+
+
+def test_units_may_be_written_with_raised_digits_and_capitals():
+    assert quantity_of("m/s²") == "acceleration"
+    assert factor_between("RPM", "rpm") == pytest.approx(1.0)
+    assert factor_between("dps", "deg/s") == pytest.approx(1.0)

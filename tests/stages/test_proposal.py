@@ -135,3 +135,36 @@ def test_sines_of_other_frequencies_are_no_repeats_and_multisines_of_other_phase
         for number in (1, 2, 3)
     ]
     assert held_out(*several) == (("multi_3",), "the last of the inputs that are alike")
+
+
+def around(level, name, values):
+    """A recording of a room that is so warm before anything happens."""
+    found = raw(name, values)
+    return RawRecording(name, values, found.output + level, 1e-3)
+
+
+def test_a_level_at_which_all_rest_stays_in_all_of_them():
+    noise = after_a_rest(levels(4, 600))
+    step = after_a_rest(np.ones(600))
+    found = propose(
+        [
+            around(21.0, "step_1", step),
+            around(21.01, "step_2", -step),
+            around(21.0, "noise_1", noise),
+        ]
+    )
+    assert found.recipes["step"] == ("cut",)
+    assert "the level at which the output rests, 21 m, stays" in found.recipe_reason
+
+
+def test_a_zero_that_differs_between_recordings_is_subtracted():
+    noise = after_a_rest(levels(4, 600))
+    step = after_a_rest(np.ones(600))
+    found = propose(
+        [
+            around(21.0, "step_1", step),
+            around(17.0, "step_2", -step),
+            around(21.0, "noise_1", noise),
+        ]
+    )
+    assert found.recipes["step"] == ("cut", "output_offset")
