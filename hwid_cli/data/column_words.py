@@ -92,6 +92,7 @@ _OUTPUT = [
     "druck",
     "temperature",
     "temperatur",
+    "temp",
     "acceleration",
     "beschleunigung",
     "acc",

@@ -436,7 +436,8 @@ def _table(file: FoundFile) -> list[FoundColumn]:
     """Long columns that belong together: one table, or vectors of one length.
 
     Columns of a text file may end early and stay together. Signals of several lengths
-    belong together where each has a clock, and no set of one length has both signals.
+    belong together where each has a clock, and no set of one length has both signals, or
+    more than one.
     """
     columns = long_columns(file.columns)
     if reader_of(Path(file.name)).is_one_table:
@@ -457,9 +458,8 @@ def _table(file: FoundFile) -> list[FoundColumn]:
     timed = [one for found in usable if clocks_of(found) for one in found]
     both = [one for one in columns if any(one is other for other in timed)]
     plain = all(one.variable is None for one in both)
-    if plain and len(usable) > 1 and _worth(both)[0] > _worth(best)[0]:
-        return both
-    return best
+    is_better = _worth(both)[0] > _worth(best)[0] or not _holds_signals(best)
+    return both if plain and len(usable) > 1 and is_better else best
 
 
 def _belongs(column: FoundColumn, variable: str | None) -> bool:

@@ -412,6 +412,29 @@ def mdf(folder):
         file.close()
 
 
+def mdf_of_two_signals(folder):
+    """asammdf: one signal for each clock, of which no name says an output."""
+    from asammdf import MDF, Signal
+
+    for one in drives():
+        file = MDF(version="4.10")
+        file.append([Signal(one.current, one.time, name="Duty", unit="%")])
+        slow = slice(None, None, 2)
+        answer = Signal(one.position[slow], one.time[slow], name="Probe 7", unit="degC")
+        file.append([answer])
+        file.save(folder / f"{one.name}.mf4", overwrite=True)
+        file.close()
+
+
+def described(folder):
+    """A logger whose preamble says what its numbered channels are."""
+    for one in drives():
+        head = ["# CH1: position [um]", "# CH2: motor current [mA]", "time,CH1,CH2"]
+        rows = zip(one.time, 1e3 * one.position, 1e3 * one.current, strict=True)
+        lines = [f"{t:.6f},{x:.9g},{u:.9g}" for t, x, u in rows]
+        _lines(folder, f"{one.name}.csv", [*head, *lines])
+
+
 def parquet(folder):
     """pandas and pyarrow: an index of dates, as a data base gives it."""
     import pandas as pd
@@ -657,6 +680,16 @@ LAYOUTS = {
     "tdms": Layout(tdms, "time", "Motorstrom", "Weg", _SI),
     "mdf": Layout(
         *(mdf, "fast/time", "fast/I_mot", "slow/x_act", _SI), step_s=2 * STEP_S
+    ),
+    "mdf of two signals": Layout(
+        *(mdf_of_two_signals, "group 0/time", "group 0/Duty", "group 1/Probe 7"),
+        ("s", None, None),
+        step_s=2 * STEP_S,
+    ),
+    "described": Layout(
+        *(described, "time", "CH2", "CH1", (None, "mA", "um")),
+        scale=(1e-3, 1e-3),
+        exact=1e-6,
     ),
     "parquet": Layout(parquet, "when", "cmd_current [A]", "act_pos [mm]", _SI),
     "feather": Layout(feather, "time", "motor_current", "deflection", _SI),
