@@ -50,6 +50,8 @@ _HEAD_LINES = 1000
 _PLAIN_LINES = 24
 # Lines that are taken at once.
 _BLOCK_LINES = 4096
+# Rows that end early are torn while they are fewer than this share, [-].
+_MOST_TORN = 0.02
 # The csv module reads no longer cell, and says so.
 _LONGEST_LINE = 2**16
 _READ_BYTES = 2**20
@@ -405,9 +407,29 @@ def _read_body(
             inside = _while_inside(rows, number + len(lines))
             block = [(end, row) for end, row in inside if row[0] not in begins]
             _check_widths(sheet, block)
-            parts.add_cells(block)
+            parts.add_cells(_without_torn_cells(block, sheet.width))
             number += source.count
     return parts.columns()
+
+
+def _without_torn_cells(
+    block: Sequence[tuple[int, list[str]]], width: int
+) -> list[tuple[int, list[str]]]:
+    """Rows without the last number of those that end early, as a lost byte tears them.
+
+    Of 92 a torn row has kept 9. Where many rows are short, a slow column has no cell in
+    them; where all from one on are, a column has ended.
+    """
+    whole = [n for n, (_, row) in enumerate(block) if len(row) >= width]
+    last = whole[-1] if whole else 0
+    torn = [n for n, (_, row) in enumerate(block[:last]) if 1 < len(row) < width]
+    if len(torn) > _MOST_TORN * len(block):
+        return list(block)
+    rows = list(block)
+    for n in torn:
+        line, row = rows[n]
+        rows[n] = (line, [*row[:-1], ""])
+    return rows
 
 
 def _stamped(sheet: _Sheet, places: Iterable[int]) -> set[int]:

@@ -20,6 +20,7 @@ def starter_summary(path: str, layout: FolderLayout, proposal: Proposal) -> Code
         f"input: {_role(layout.input)}",
         f"output: {_role(layout.output)}",
         *(f"note: {note}" for note in layout.notes),
+        *(f"note: NOT SURE: {note}" for note in proposal.notes),
         *(f"skipped: {escaped(name)}: {why}" for name, why in layout.left),
         *(f"left out: {problem}" for problem in proposal.problems),
         f"kinds: {_kinds(proposal)}",

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from hwid_cli.data.calibration import OFFSETS, Draft, removed_samples, run_recipe
+from hwid_cli.data.odd_scales import odd_scales
 from hwid_cli.data.recording_files import (
     find_files,
     missing_files_message,
@@ -285,6 +286,13 @@ def _changed(given: Measured, result: Calibrated) -> str:
     return f"{changed}, some left as they are ({left})" if bare else changed
 
 
+def _warnings(context: Context, given: Measured) -> list[str]:
+    """Recordings that seem to be in another unit than the others."""
+    source = str(context.experiment.source)
+    odd = odd_scales(given.recordings)
+    return [f"{source}: recordings: {name}: {said}" for name, said in odd.items()]
+
+
 def _plan(planning: Planning) -> tuple[StagePlan, ...]:
     n = len(planning.recordings)
     samples = sum(one.n_samples for one in planning.recordings)
@@ -305,6 +313,7 @@ STAGE = Stage(
     summary=_summary,
     write_files=_draw,
     tables=lambda context, result: [calibration_table(result.logs)],
+    warnings=_warnings,
     is_shown_in_run=False,
     files=("calibrated.h5", "figures"),
     plan=_plan,

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from hwid_cli.data import column_signs as signs
+from hwid_cli.data.odd_scales import odd_scales
 from hwid_cli.data.signal_features import LEAST_QUIET, find_onset
 from hwid_cli.errors import HwidError
 from hwid_cli.records.experiment import CalibrateOptions
@@ -118,6 +119,7 @@ def propose(
         held_out=held_out,
         held_out_reason=held_out_reason,
         names=tuple(names),
+        notes=tuple(f"{one}: {note}" for one, note in odd_scales(raws).items()),
         problems=tuple(problems),
         average=max(1, memory // _ENOUGH_SAMPLES),
         initial_state=_initial_state(raws, recipes, is_cut=bool(parts)),

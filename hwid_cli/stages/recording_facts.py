@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from hwid_cli.data.odd_scales import odd_scales
 from hwid_cli.data.quality import quality_notes
 from hwid_cli.errors import HwidError
 from hwid_cli.records.check import RecordingFacts
@@ -48,9 +49,11 @@ def check_recordings(
         Samples that the file lacks, by name.
     """
     facts, recordings, logs, problems = [], [], [], []
+    odd = odd_scales(raws)
     for raw in raws:
         lost = missing.get(raw.name, 0)
         n_used, notes = 0, _notes(raw, jitter.get(raw.name, 0.0), lost)
+        notes += (odd[raw.name],) if raw.name in odd else ()
         try:
             (recording,), (log,) = calibrate_all([raw], experiment.calibrate)
         except HwidError as error:

@@ -79,6 +79,27 @@ def test_columns_that_end_in_blank_cells_are_shorter(tmp_path):
     assert found.output.values.tolist() == [5]
 
 
+def test_the_last_number_of_a_torn_row_is_none(tmp_path):
+    """A byte that a serial line has lost tears 92 into 9, and takes what follows."""
+    rows = [f"{20 * k},92,{k}" for k in range(200)]
+    rows[70] = "1400,9"
+    path = tmp_path / "log.txt"
+    path.write_text("\n".join(rows))
+    found = read_columns(path, BY_NUMBER)
+    assert np.flatnonzero(np.isnan(found.input.values)).tolist() == [70]
+    assert np.flatnonzero(np.isnan(found.output.values)).tolist() == [70]
+    assert found.time.values[70] == 1400
+
+
+def test_rows_without_a_cell_for_a_slow_column_are_whole(tmp_path):
+    rows = [f"{k},{k}" + (f",{k}" if k % 4 == 0 else "") for k in range(200)]
+    path = tmp_path / "log.txt"
+    path.write_text("\n".join(["t,u,y", *rows]))
+    found = read_columns(path, BY_NAME)
+    assert found.input.values.tolist() == list(range(200))
+    assert np.isfinite(found.output.values).sum() == 50
+
+
 def test_rows_are_lines_of_the_file_counted_from_one(tmp_path):
     path = tmp_path / "run.csv"
     path.write_text('# note\n"t\nx",u,y\n\n0,1,5\n# pause\n1,2,6\n')

@@ -1,5 +1,7 @@
 """The answer of an identification: which model to take, and how good it is elsewhere."""
 
+from shlex import quote
+
 import numpy as np
 
 from hwid_cli.records.answer import ModelAnswer
@@ -223,13 +225,13 @@ def _next(found: ModelAnswer, contents: ReportContents) -> tuple[tuple[str, str]
                 "hwid run CONFIG",
             ),
         )
-        linear = f"hwid export CONFIG --model {found.linear_name} --format json"
+        linear = f"hwid export CONFIG --model {quote(found.linear_name)} --format json"
         steps.insert(1, ("Take the linear model elsewhere:", linear))
     else:
         steps.append(
             (
                 "Take it elsewhere:",
-                f"hwid export CONFIG --model {found.name} --format json",
+                f"hwid export CONFIG --model {quote(found.name)} --format json",
             )
         )
     if contents.stored.diagnosis is None:
