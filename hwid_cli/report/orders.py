@@ -1,5 +1,7 @@
 """Recommended orders and maps as tables, and the reasons as sentences."""
 
+from collections.abc import Sequence
+
 from hwid_cli.records.order import (
     MapAdvice,
     MapCandidate,
@@ -225,6 +227,17 @@ def axes_to_widen(advice: OrderAdvice, nb: int, nk: int) -> list[str]:
     ]
 
 
+def delays_to_try(advice: OrderAdvice) -> tuple[int, ...]:
+    """Delays for ``fit.delays``, where recordings allow a longer one than the grid reaches.
+
+    Leading coefficients of B make up for some samples, so the grid reaches as far as nb.
+    """
+    reach = _GRID_DELAY + max(advice.nb)
+    if advice.nk_role == "delay" or advice.tried_delays or advice.delay <= reach:
+        return ()
+    return (_GRID_DELAY, (_GRID_DELAY + advice.delay) // 2, advice.delay)
+
+
 def _edges(advice: OrderAdvice) -> str:
     axes = axes_to_widen(advice, advice.overall.best_nb, advice.overall.best_nk)
     if not axes:
@@ -253,11 +266,20 @@ def _delays(advice: OrderAdvice) -> str:
     if advice.delay > _GRID_DELAY:
         text += (
             f" The grid takes {_GRID_DELAY}; leading coefficients of B make up for more, "
-            "so nb must reach further, or set orders.nk_role: delay."
+            f"up to {_GRID_DELAY + max(advice.nb)}."
+        )
+    if tried := delays_to_try(advice):
+        text += (
+            f" Put {delay_keys(tried)} into fit, and every fit takes the best of them."
         )
     if advice.delay < _GRID_DELAY:
         text += f" The grid takes {_GRID_DELAY}: set orders.nk_role: delay to try 0."
     return text
+
+
+def delay_keys(delays: Sequence[int]) -> str:
+    """The key of ``fit`` that asks for some delays."""
+    return f"delays: [{', '.join(map(str, delays))}]"
 
 
 def _tried(advice: OrderAdvice) -> str:

@@ -232,12 +232,44 @@ def test_a_better_linear_model_is_the_answer(contents):
         "configuration 0.00136 m, on 1 recording never used. Those are not worth it here."
     )
     assert not found.is_settled
-    said, command = found.next_steps[0]
-    assert "put input_map: none, output_map: none into fit" in said
+    said, command = found.next_steps[1]
+    assert (
+        said == "For linear models put input_map: none, output_map: none into fit, then"
+    )
     assert command == "hwid run CONFIG"
     exports = [one for _, one in found.next_steps if "hwid export" in one]
     (only,) = exports
+    assert only == found.next_steps[0][1]
     assert "--model linear:step_02/1/1 " in only
+
+
+def test_a_name_with_blanks_is_one_word_of_a_command(contents):
+    found = answered(contents, linear_name="linear:Sine 3Hz/3/4")
+    assert "--model 'linear:Sine 3Hz/3/4' " in found.next_steps[0][1]
+    worse = 2.0 * contents.answer.rmsd
+    fits = {
+        "fit_percent": np.array([90.0]),
+        "linear_fit_percent": np.array([80.0]),
+        "linear_ratio": 0.5,
+    }
+    found = answered(contents, name="Sine 3Hz/3/4", linear_rmsd=worse, **fits)
+    assert any("--model 'Sine 3Hz/3/4' " in one for _, one in found.next_steps)
+
+
+def test_why_maps_are_taken_that_one_recording_speaks_against_is_said(contents):
+    one = np.array([1.0e-3])
+    found = answered(
+        contents,
+        rmsd=1.1 * one,
+        linear_rmsd=one,
+        linear_ratio=0.4,
+        fit_percent=np.array([71.1]),
+        linear_fit_percent=np.array([72.4]),
+    )
+    assert plain(found.verdict).endswith(
+        "(linear: 72.4 %); over all recordings but its own it leaves 0.4 times as much as "
+        "the linear model."
+    )
 
 
 @pytest.mark.parametrize(("linear", "rmsd"), [(-3.0, 1e-3), (-30.0, 3e-3)])
@@ -306,14 +338,17 @@ def test_recommended_orders_and_maps_are_said(contents):
     assert [one for said, one in steps if keys in said] == ["hwid run CONFIG"]
     steps = answered(contents, maps=maps, **worse).next_steps
     assert not any("recommended maps" in said for said, _ in steps)
-    # Where a linear model is better than the maps it has, those recommended come first.
+    # Where a linear model is better than the maps it has, others are worth a try.
     better = {"linear_rmsd": 0.5 * contents.answer.rmsd, **good}
     other = answered(contents, maps=maps, has_these_maps=False, **better)
     assert "Those are not worth it here." in plain(other.verdict)
-    assert keys in other.next_steps[0][0]
-    assert "maps: saturation and none" in plain(other.details[1])
+    assert other.next_steps[1][0] == f"To try other maps {keys}, then"
+    assert (
+        "maps: saturation and none (chosen on other recordings than those that judge"
+        in plain(other.details[1])
+    )
     given = answered(contents, maps=none, has_these_maps=False, **better)
-    assert "input_map: none, output_map: none" in given.next_steps[0][0]
+    assert "input_map: none, output_map: none" in given.next_steps[1][0]
 
 
 def test_a_model_above_the_threshold_is_not_settled(contents):

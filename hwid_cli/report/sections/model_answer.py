@@ -85,6 +85,11 @@ def _verdict(found: ModelAnswer) -> str:
     )
     if np.isfinite(found.linear_fit_percent).any():
         sentence += f" (linear: {_median(found.linear_fit_percent)})"
+    if found.linear_mean_rmsd < found.mean_rmsd:
+        sentence += (
+            "; over all recordings but its own it leaves "
+            f"{found.linear_ratio:.2g} times as much as the linear model"
+        )
     return f"{sentence}."
 
 
@@ -171,6 +176,8 @@ def _orders(found: ModelAnswer, nk_role: str) -> str:
         text += (
             f"; maps: {pair[0]} and {pair[1]}" if found.maps.has_maps else "; no maps"
         )
+        if found.maps.has_maps and found.is_linear_better:
+            text += " (chosen on other recordings than those that judge here)"
     return f"{text}.{_at_these(found)}"
 
 
@@ -218,15 +225,13 @@ def _next(found: ModelAnswer, contents: ReportContents) -> tuple[tuple[str, str]
             ("Look at columns and signs, set recordings.columns:", "hwid check CONFIG")
         )
     elif found.is_linear_better:
-        steps.insert(
-            0,
-            (
-                f"For better models put {_better_keys(found)} into fit, then",
-                "hwid run CONFIG",
-            ),
-        )
         linear = f"hwid export CONFIG --model {quote(found.linear_name)} --format json"
-        steps.insert(1, ("Take the linear model elsewhere:", linear))
+        keys = _better_keys(found)
+        why = "For linear models" if keys == LINEAR_KEYS else "To try other maps"
+        steps[:0] = [
+            ("Take the linear model elsewhere:", linear),
+            (f"{why} put {keys} into fit, then", "hwid run CONFIG"),
+        ]
     else:
         steps.append(
             (
