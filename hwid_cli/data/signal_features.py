@@ -23,6 +23,11 @@ DAMAGE_SIGMA = 8.0
 # ... and beyond this share of the signal's range, [-]: flicker of the last digit of a
 # converter on an otherwise constant signal is not damage.
 DAMAGE_SHARE = 0.01
+# ... and so many of its smallest steps, [-]: eight bits are fewer steps than a share tells.
+# Steps below the second share of the range are rounding.
+DAMAGE_STEPS = 2.0
+ROUNDING_SHARE = 1e-6
+OFTEN = 10
 # Lines from the left and from the right may differ by this share of the distance, [-]:
 # at the edge of a step they differ by its height, around damage they agree.
 NEIGHBOURS_AGREE = 0.3
@@ -143,7 +148,20 @@ def _pair_of(values: np.ndarray) -> np.ndarray:
 def _limit(error: np.ndarray, values: np.ndarray) -> np.ndarray:
     """Distance from the cubic beyond which a sample is damaged, at each sample."""
     scale = MAD_TO_SIGMA * np.maximum(_local_median(error), np.median(error))
-    return np.maximum(DAMAGE_SIGMA * scale, DAMAGE_SHARE * _robust_range(values))
+    least = max(
+        DAMAGE_SHARE * _robust_range(values), DAMAGE_STEPS * _resolution(values)
+    )
+    return np.maximum(DAMAGE_SIGMA * scale, least)
+
+
+def _resolution(values: np.ndarray) -> float:
+    """Smallest step from sample to sample, if it comes again and again; else 0."""
+    steps = np.abs(np.diff(values))
+    steps = steps[steps > ROUNDING_SHARE * np.ptp(values)]
+    if not steps.size:
+        return 0.0
+    least = float(steps.min())
+    return least if np.sum(steps < 1.5 * least) >= OFTEN else 0.0
 
 
 def _single_damaged(values: np.ndarray) -> np.ndarray:

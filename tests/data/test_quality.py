@@ -64,3 +64,13 @@ def test_a_sine_that_is_cut_on_both_sides_is_named_however_much_is_lost(level):
 )
 def test_what_holds_its_levels_on_purpose_is_not_called_cut(values):
     assert not any("clipped" in note for note in quality_notes(values, may_hold=True))
+
+
+def test_flicker_of_the_last_bit_is_no_damage_and_a_spike_is():
+    """Eight bits, of which the signal takes sixty steps, on three levels."""
+    rng = np.random.default_rng(4)
+    level = np.repeat([0.0, 40.0, -20.0], 300)
+    flicker = level + (rng.random(900) < 0.05) * rng.choice([-1.0, 1.0], 900)
+    assert quality_notes(0.04 * flicker, may_hold=True) == ()
+    flicker[450] += 5.0
+    assert quality_notes(0.04 * flicker, may_hold=True) == ("1 sample looks damaged",)
