@@ -13,17 +13,14 @@ import numpy as np
 import scipy
 
 from hwid_cli.diagnosis.causes import without_repeats
-from hwid_cli.diagnosis.confirmation import (
-    confirm,
-    have_moved,
-    single_in_simulation,
-)
+from hwid_cli.diagnosis.confirmation import confirm
 from hwid_cli.diagnosis.diagnose import find, held_out_of
 from hwid_cli.diagnosis.findings import Findings, describe
 from hwid_cli.diagnosis.laws import MOST_OF_NAMED
 from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals, prepare
 from hwid_cli.diagnosis.selection import LEAST_GAIN
 from hwid_cli.diagnosis.simulator import DIFFERENCE, Runs, Simulator
+from hwid_cli.diagnosis.single_effects import single_in_simulation
 from hwid_cli.diagnosis.stand_in import (
     derived,
     error_of,
@@ -34,6 +31,7 @@ from hwid_cli.diagnosis.stand_in import (
     standing_for,
 )
 from hwid_cli.diagnosis.tasks import OnRound, RunTasks
+from hwid_cli.diagnosis.turns import have_moved
 from hwid_cli.diagnosis.verdict import DiagnosisVerdict
 from hwid_cli.records.diagnosis import BaseParameter, Diagnosis
 from hwid_cli.records.drive import LINE, StandIn

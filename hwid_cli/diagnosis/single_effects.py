@@ -1,0 +1,181 @@
+"""Single effects in the simulation itself: its runs choose among the likely ones.
+
+Where a simulation is not linear, what the stand-in leaves of a large effect is its own
+error as well: sets of effects would be found that make up for it.
+docs/method_diagnosis.md, eq. (D33).
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+from hwid_cli.diagnosis.findings import Findings
+from hwid_cli.diagnosis.intervals import unclear_effects
+from hwid_cli.diagnosis.selection import (
+    LEAST_EXPLAINED,
+    WITHIN_REACH,
+    count,
+    is_part_of,
+    select_best,
+)
+from hwid_cli.diagnosis.simulator import Runs
+from hwid_cli.diagnosis.turns import Turn, fit_of_run, settled
+from hwid_cli.diagnosis.verdict import decide
+from hwid_cli.records.candidates import CandidateFit
+
+# Single effects that the simulation is run with: at most so many, of those that leave at
+# most so many times what the best one leaves beside the stand-in, which counts as at least
+# this share of what the base leaves.
+_MOST_SINGLES = 4
+_LIKELY = 4.0
+_LEAST_LEFT = 0.01
+
+
+def single_in_simulation(
+    findings: Findings, runs: Runs, values: dict[str, float]
+) -> tuple[Findings | None, dict[str, float]]:
+    """Put the likely single effects into the simulation, and let its runs decide.
+
+    Where the simulation is not linear, what the stand-in leaves of a large effect is its
+    own error as well: sets of effects would be found that make up for it.
+
+    Parameters
+    ----------
+    findings : Findings
+        Of single effects.
+
+    Returns
+    -------
+    Findings or None
+        None where no single effect leaves so little in the simulation that a further
+        one could not be named.
+    dict of str to float
+        Parameters of the simulation at the run that decides; without one, at the best run
+        of an effect that explains most, which the parameters may have imitated.
+    """
+    if not findings.base.is_usable:
+        return None, values
+    alone = _base_in_simulation(findings, runs, values)
+    if alone is not None:
+        return alone
+    tried: dict[tuple[str, ...], Turn] = {}
+    fits: dict[tuple[str, ...], CandidateFit] = {}
+    for one in _likely(findings):
+        if _is_settled_by(findings, one, list(fits.values())):
+            continue
+        turn = settled(findings, one, runs, values)
+        if turn is not None:
+            tried[one.effects], fits[one.effects] = turn, fit_of_run(findings, turn)
+    decided = _decided(findings, tried, fits)
+    if decided is not None:
+        return decided
+    return None, _moved_by_best(findings, tried, fits, values)
+
+
+def _moved_by_best(
+    findings: Findings,
+    tried: Mapping[tuple[str, ...], Turn],
+    fits: Mapping[tuple[str, ...], CandidateFit],
+    values: dict[str, float],
+) -> dict[str, float]:
+    """Parameters at the best run, where its effect explains most; the given ones else."""
+    best = select_best(findings.criteria, list(fits.values()), findings.base)
+    if best is None:
+        return values
+    explained = findings.criteria.evidence(best, findings.base).explained
+    return tried[best.effects].values_of_run if explained >= LEAST_EXPLAINED else values
+
+
+def _base_in_simulation(
+    findings: Findings, runs: Runs, values: dict[str, float]
+) -> tuple[Findings, dict[str, float]] | None:
+    """The changed base of the stand-in, put into a simulation without parameters.
+
+    The simulation answers in its own way to a gain that has changed: what the stand-in
+    leaves then is its own error.
+    """
+    if runs.simulator.free:
+        return None
+    turn = settled(findings, findings.base, runs, values)
+    base = None if turn is None else fit_of_run(findings, turn)
+    if turn is None or base is None or not findings.criteria.is_complete(base):
+        return None
+    criteria = findings.criteria
+    verdict = decide(criteria, findings.given_sse, base, {}, (), lambda _: ())
+    problem = replace(turn.problem, known={})
+    told = replace(findings, problem=problem, base=base, verdict=verdict)
+    return told, turn.values_of_run
+
+
+def _likely(findings: Findings) -> list[CandidateFit]:
+    """Single effects that leave least beside the stand-in, limit cases first."""
+    criteria = findings.criteria
+    usable = [one for one in findings.found.fits.values()
+              if one.is_usable and len(one.effects) == 1
+              and not criteria.replaces(one)]  # fmt: skip
+    usable.sort(key=criteria.excess)
+    if not usable:
+        return []
+    least = max(
+        criteria.excess(usable[0]), _LEAST_LEFT * criteria.excess(findings.base)
+    )
+    near = [one for one in usable if criteria.excess(one) <= _LIKELY * least]
+    first = near[:_MOST_SINGLES]
+    # What leaves little more with fewer parameters may be all of it.
+    limits = [one for one in near if one not in first
+              and any(is_part_of(one, wide) for wide in first)]  # fmt: skip
+    return sorted([*first, *limits], key=lambda one: -_n_including(one, near))
+
+
+def _n_including(one: CandidateFit, others: Sequence[CandidateFit]) -> int:
+    """Of how many others an effect is a limit case."""
+    return sum(is_part_of(one, other) for other in others if other is not one)
+
+
+def _is_settled_by(
+    findings: Findings, one: CandidateFit, fits: Sequence[CandidateFit]
+) -> bool:
+    """Whether runs with other effects leave nothing that an effect could explain.
+
+    Of effects with fewer parameters the simulation itself decides: what the stand-in leaves
+    of them more than of others may be its own error.
+    """
+    criteria = findings.criteria
+    if any(criteria.is_complete(fit) and is_part_of(fit, one) for fit in fits):
+        return True
+    done = [fit for fit in fits if criteria.is_nearly_all(fit, findings.base)]
+    is_simpler = any(is_part_of(one, fit) or count(one) < count(fit) for fit in done)
+    return bool(done) and not is_simpler and not _is_near(findings, one, done)
+
+
+def _is_near(
+    findings: Findings, one: CandidateFit, done: Sequence[CandidateFit]
+) -> bool:
+    """Whether the stand-in takes an effect for about as good as one that is enough."""
+    said = findings.found.fits
+    least = min(findings.criteria.excess(said[fit.effects]) for fit in done)
+    return findings.criteria.excess(one) <= WITHIN_REACH * least
+
+
+def _decided(
+    findings: Findings,
+    tried: Mapping[tuple[str, ...], Turn],
+    fits: Mapping[tuple[str, ...], CandidateFit],
+) -> tuple[Findings, dict[str, float]] | None:
+    """The verdict by runs of the simulation, if one of its effects is all."""
+    criteria, base = findings.criteria, findings.base
+    best = select_best(criteria, list(fits.values()), base)
+    if best is None:
+        return None
+
+    def unclear(one: CandidateFit) -> tuple[str, ...]:
+        problem = replace(tried[one.effects].problem, known={})
+        return unclear_effects(problem, one, findings.scales)
+
+    verdict = decide(criteria, findings.given_sse, base, fits, (best,), unclear)
+    if not verdict.chosen.effects or not criteria.is_nearly_all(verdict.chosen, base):
+        return None
+    turn = tried[verdict.chosen.effects]
+    found = replace(findings.found, fits={**findings.found.fits, **fits})
+    problem = replace(turn.problem, known={})
+    told = replace(findings, problem=problem, verdict=verdict, found=found)
+    return told, turn.values_of_run

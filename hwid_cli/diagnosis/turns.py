@@ -1,0 +1,374 @@
+"""Stand-in and simulation in turns, until both agree.
+
+An effect becomes a force along the simulation's motion; the run with it corrects the
+stand-in, to which effects and the simulation's own parameters are fitted again.
+docs/method_diagnosis.md, eq. (D32).
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+
+import numpy as np
+
+from hwid_cli.diagnosis.candidate import fitted_drive, rebuilt
+from hwid_cli.diagnosis.causes import left_over
+from hwid_cli.diagnosis.findings import Findings
+from hwid_cli.diagnosis.joint_fit import fitted_again, fitted_together, pushes_of
+from hwid_cli.diagnosis.noise import measured_input_rms
+from hwid_cli.diagnosis.parameters import BASE, each_sum_of_squares, simulate_at
+from hwid_cli.diagnosis.problem import DiagnosisProblem
+from hwid_cli.diagnosis.simulator import DIFFERENCE, Runs
+from hwid_cli.diagnosis.stand_in import corrected, force_of_motion
+from hwid_cli.drive.catalogue import CATALOGUE
+from hwid_cli.drive.simulation import Motion
+from hwid_cli.records.candidates import CandidateFit, ParameterRef
+from hwid_cli.records.drive import BASE_PARAMETERS
+from hwid_cli.records.programs import SimulatorRun
+
+# Runs with the effect, and the share of what remains (or of the noise) by which loop and
+# simulation may differ.
+_MOST_TURNS = 8
+_AGREEMENT = 0.1
+# Turns in a row that leave more than the stand-in said, and more than this share of the best
+# run before: there it does not settle.
+_MOST_IN_VAIN = 3
+_WORTH_A_TURN = 0.95
+# Over the noise, what a run may leave because its effect is a little late at corners.
+_LATE_AT_CORNERS = 1.1
+# Derivatives by the simulation's parameters are found again where one of these has moved by
+# more than this share.
+_SAME_SLOPES = 0.02
+# What is confirmed leaves at most so many times the squares that the stand-in left.
+_NO_WORSE = 1.2
+# The simulation's own parameters rather than further forces, if no more squares are left.
+_PREFERRED = 2.0
+# An effect through the input that leaves more than this share of what the base leaves is
+# tried at the force input as well.
+_CUT_OFF = 0.9
+
+
+@dataclass(frozen=True, eq=False)
+class Turn:
+    """A fit of the chosen set, and how the simulation's own run with it differs.
+
+    Parameters
+    ----------
+    problem : DiagnosisProblem
+        Of the stand-in as it was corrected last.
+    fit : CandidateFit
+        To it.
+    values : dict of str to float
+        Parameters of the simulation that go with it.
+    said : float
+        Sum of squares that the stand-in alone left.
+    at_force : bool
+        Whether forces act at the simulation's force input, not through its input.
+    tried : tuple of CandidateFit and dict of str to float, or None
+        What the simulation itself was run with.
+    slopes : tuple of ndarray, shape (n_samples, n_free)
+        Derivatives of each recording's output by the simulation's parameters.
+    slopes_at : dict of str to float
+        Parameters that they were found at.
+    left : tuple of ndarray, shape (n_evaluated,), [output unit]
+        What that run left of each recording.
+    disagreement : float, [output unit]
+        RMS between that run and what the stand-in had said.
+    """
+
+    problem: DiagnosisProblem
+    fit: CandidateFit
+    values: dict[str, float]
+    said: float
+    at_force: bool
+    tried: tuple[CandidateFit, dict[str, float]] | None = None
+    slopes: tuple[np.ndarray, ...] = ()
+    slopes_at: dict[str, float] = field(default_factory=dict)
+    left: tuple[np.ndarray, ...] = ()
+    disagreement: float = np.inf
+
+    @property
+    def sse(self) -> np.ndarray:
+        """Sum of squares of each recording that the run left; infinite without one."""
+        return each_sum_of_squares(self.left) if self.left else np.array([np.inf])
+
+    @property
+    def values_of_run(self) -> dict[str, float]:
+        """Parameters of the simulation's run."""
+        return self.values if self.tried is None else self.tried[1]
+
+
+def settled(
+    findings: Findings, fit: CandidateFit, runs: Runs, values: dict[str, float]
+) -> Turn | None:
+    """Best run of the simulation with a set of effects; None if it is no better."""
+    has_force = runs.simulator.capabilities.force
+    enters = {CATALOGUE[one].enters for one in fit.effects}
+    at_force = has_force and bool(enters - {"command", "output"})
+    said = float(fit.sse.sum())
+    turn = Turn(findings.problem, fit, values, said, at_force)
+    best = _best_of(findings, turn, runs)
+    without = float(findings.base.sse.sum())
+    if (
+        fit.effects
+        and has_force
+        and not at_force
+        and best.sse.sum() > _CUT_OFF * without
+    ):
+        # A map of the simulation may cut off what should come through its input.
+        other = _best_of(findings, replace(turn, at_force=True), runs)
+        best = min(best, other, key=lambda one: float(one.sse.sum()))
+    # A run that is worse than without the effect says nothing of it.
+    is_worse = bool(fit.effects) and float(best.sse.sum()) >= without
+    return None if best.tried is None or is_worse else best
+
+
+def _best_of(findings: Findings, turn: Turn, runs: Runs) -> Turn:
+    """Best turn, of those in which the simulation's own parameters may do enough.
+
+    They do what the stand-in's base did; where they cannot, forces that go with
+    displacement, velocity and input do it.
+    """
+    best = None
+    if runs.simulator.free:
+        held = replace(turn, problem=_held(findings.problem))
+        best = _best_turn(findings, held, runs)
+    if best is None or not is_as_good(best):
+        other = _best_turn(findings, turn, runs)
+        if best is None or other.sse.sum() * _PREFERRED < best.sse.sum():
+            best = other
+    return best
+
+
+def _held(problem: DiagnosisProblem) -> DiagnosisProblem:
+    """The same with a base that no fit moves."""
+    return replace(problem, known=dict.fromkeys(BASE_PARAMETERS, 0.0))
+
+
+def _best_turn(findings: Findings, turn: Turn, runs: Runs) -> Turn:
+    """Turn after turn until stand-in and simulation agree; the best of the runs.
+
+    Agreement within a part of the noise still shows beside many samples: while something
+    remains, one more turn follows.
+    """
+    best, agreed, in_vain = turn, 0, 0
+    for _ in range(_MOST_TURNS):
+        following = _next_turn(findings, turn, runs)
+        if following is None:
+            break
+        turn = following
+        is_worth_it = turn.sse.sum() < _WORTH_A_TURN * best.sse.sum()
+        in_vain = 0 if is_worth_it or is_as_good(turn) else in_vain + 1
+        if turn.sse.sum() < best.sse.sum():
+            best = turn
+        agreed = agreed + 1 if _agrees(findings, turn) and is_as_good(turn) else 0
+        is_enough = agreed > 0 and findings.criteria.is_complete(
+            fit_of_run(findings, turn)
+        )
+        if is_enough or agreed > 1 or in_vain == _MOST_IN_VAIN:
+            break
+    return best
+
+
+def _agrees(findings: Findings, turn: Turn) -> bool:
+    """Whether the run is what the stand-in had said, but for a part of what remains."""
+    n = sum(one.n_evaluated for one in turn.problem.signals)
+    remains = float(np.sqrt(turn.sse.sum() / n))
+    return turn.disagreement <= _AGREEMENT * max(remains, findings.criteria.noise.rms)
+
+
+def is_as_good(turn: Turn) -> bool:
+    """Whether the run leaves no more than the stand-in alone did."""
+    return float(turn.sse.sum()) <= _NO_WORSE * turn.said
+
+
+def _next_turn(findings: Findings, turn: Turn, runs: Runs) -> Turn | None:
+    """Run the simulation with the effect's force; correct the stand-in; fit again."""
+    problem = turn.problem
+    motions = simulate_at(problem, *rebuilt(problem, turn.fit, findings.scales))
+    drive = replace(problem.drive, effects={})
+    forces = [
+        force_of_motion(drive, one, motion)
+        for one, motion in zip(problem.signals, motions, strict=True)
+    ]
+    if not all(np.isfinite(one).all() for one in forces):
+        return None
+    push = partial(_pushed, runs, problem, forces, turn.at_force)
+    found = push(turn.values)
+    if found is None:
+        return None
+    late = [
+        run.output - motion.position - (0.0 if one.offset is None else one.offset)
+        for one, motion, run in zip(problem.signals, motions, found, strict=True)
+    ]
+    corrected = _corrected(problem, late, [run.output for run in found], forces)
+    following = Turn(
+        problem=corrected,
+        fit=turn.fit,
+        values=turn.values,
+        said=turn.said,
+        at_force=turn.at_force,
+        slopes=turn.slopes,
+        slopes_at=turn.slopes_at,
+        tried=(turn.fit, turn.values),
+        left=_left(problem, motions, found),
+        disagreement=_rms_of(problem, late),
+    )
+    if not problem.known:
+        return replace(following, fit=fitted_again(corrected, turn.fit, findings))
+    if not turn.slopes or have_moved(turn.slopes_at, turn.values, _SAME_SLOPES):
+        slopes = tuple(_slopes(runs, push, turn.values, found))
+        following = replace(following, slopes=slopes, slopes_at=turn.values)
+    return _with_values(following, (found, forces), runs, findings)
+
+
+def have_moved(
+    before: Mapping[str, float], now: Mapping[str, float], share: float
+) -> bool:
+    """Whether a parameter of a simulation is elsewhere.
+
+    Parameters
+    ----------
+    share : float, [-]
+        Of its value before, by which it may have changed.
+    """
+    return any(abs(now[one] - before[one]) > share * abs(before[one]) for one in before)
+
+
+def _left(
+    problem: DiagnosisProblem, motions: Sequence[Motion], found: Sequence[SimulatorRun]
+) -> tuple[np.ndarray, ...]:
+    """What runs leave of the recordings; a sensor's effect is on top of a run."""
+    return tuple(
+        (one.compared - run.output - (motion.output - motion.position))[one.evaluated]
+        for one, motion, run in zip(problem.signals, motions, found, strict=True)
+    )
+
+
+def _rms_of(problem: DiagnosisProblem, late: Sequence[np.ndarray]) -> float:
+    parts = [
+        error[one.evaluated] for one, error in zip(problem.signals, late, strict=True)
+    ]
+    return float(np.sqrt(np.mean(np.concatenate(parts) ** 2)))
+
+
+def _with_values(
+    turn: Turn,
+    run_with: tuple[Sequence[SimulatorRun], Sequence[np.ndarray]],
+    runs: Runs,
+    findings: Findings,
+) -> Turn:
+    """Fit effects and the simulation's parameters together; move both.
+
+    Parameters
+    ----------
+    run_with : tuple
+        The last runs, and the forces that they were made with.
+    """
+    (found, forces), slopes = run_with, turn.slopes
+    pushes = pushes_of(turn.problem, slopes, found)
+    fit, change = fitted_together(turn.problem, turn.fit, (slopes, pushes), findings)
+    values = dict(turn.values)
+    for column, (name, one) in enumerate(runs.simulator.free.items()):
+        low, high = one.bounds or (-np.inf, np.inf)
+        values[name] = float(np.clip(values[name] + change[column], low, high))
+    # What the change of the parameters should do, until the next run shows it.
+    more = [one @ change for one in slopes]
+    targets = [run.output + add for run, add in zip(found, more, strict=True)]
+    problem = _corrected(turn.problem, more, targets, forces)
+    return replace(turn, problem=problem, fit=fit, values=values)
+
+
+def _corrected(
+    problem: DiagnosisProblem,
+    late: Sequence[np.ndarray],
+    targets: Sequence[np.ndarray],
+    forces: Sequence[np.ndarray],
+) -> DiagnosisProblem:
+    """The stand-in with a further force that moves it by what it was late.
+
+    Parameters
+    ----------
+    late, targets : sequence of ndarray, shape (n_samples,), [output unit]
+        What is added to its motion, and where that has to lead.
+    forces : sequence of ndarray, [N]
+        Of the effect, with which it has to lead there.
+    """
+    drive = replace(problem.drive, effects={})
+    signals = []
+    for one, change, target, force in zip(
+        problem.signals, late, targets, forces, strict=True
+    ):
+        signals.append(corrected(one, drive, change, target, force))
+    return replace(problem, signals=tuple(signals))
+
+
+def _slopes(
+    runs: Runs,
+    push: Callable[[dict[str, float]], list[SimulatorRun] | None],
+    values: dict[str, float],
+    found: Sequence[SimulatorRun],
+) -> list[np.ndarray]:
+    """Derivatives of each recording's output by the simulation's free parameters.
+
+    Returns
+    -------
+    list of ndarray, shape (n_samples, n_free)
+    """
+    columns: list[list[np.ndarray]] = [[] for _ in found]
+    for name, one in runs.simulator.free.items():
+        step = DIFFERENCE * (abs(values[name]) or abs(one.value) or 1.0)
+        if one.bounds and values[name] + step > one.bounds[1]:
+            step = -step
+        # Where it cannot be run with more of a parameter, that one stays.
+        there = push({**values, name: values[name] + step}) or found
+        for row, (after, before) in enumerate(zip(there, found, strict=True)):
+            columns[row].append((after.output - before.output) / step)
+    return [np.column_stack(one) for one in columns]
+
+
+def _pushed(
+    runs: Runs,
+    problem: DiagnosisProblem,
+    forces: Sequence[np.ndarray],
+    at_force: bool,
+    values: Mapping[str, float],
+) -> list[SimulatorRun] | None:
+    """Run the simulation with forces, at its force input or through its input's gain.
+
+    None where a run gives no answer: the force may lead where the simulation ends.
+    """
+    if at_force:
+        return runs.tried(problem.signals, values, forces)
+    gain = problem.drive.force_constant_N_per_A
+    inputs = [
+        one.driven_by + force / gain
+        for one, force in zip(problem.signals, forces, strict=True)
+    ]
+    return runs.tried(problem.signals, values, (), inputs)
+
+
+def fit_of_run(findings: Findings, turn: Turn) -> CandidateFit:
+    """What the simulation was run with, and how that does.
+
+    The base is free again, so that intervals count what it could take over.
+    """
+    if turn.tried is None:
+        raise ValueError("nothing was run")
+    fit, drive = turn.tried[0], turn.problem.drive
+    if BASE not in {one.owner for one in fit.names}:
+        names = [name for name in BASE_PARAMETERS if getattr(drive, name) != 0]
+        fit = replace(
+            fit,
+            names=(*(ParameterRef(BASE, name) for name in names), *fit.names),
+            values=np.r_[[getattr(drive, name) for name in names], fit.values],
+        )
+    fit = replace(fit, sse=turn.sse)
+    # At corners a force between samples is late as an input is, by a little.
+    is_late = findings.criteria.ratio(fit) <= _LATE_AT_CORNERS
+    noise = findings.criteria.noise
+    if not is_late:
+        noise = replace(noise, input_rms=measured_input_rms(turn.problem))
+    problem = replace(turn.problem, known={})
+    white, cause = left_over(turn.left, problem, fitted_drive(drive, fit), noise)
+    return replace(fit, whiteness=white, cause=cause)
