@@ -25,6 +25,8 @@ _FEWEST_MEANS = 300
 _LINE_SHARE = 0.85
 # A step's levels hold for this share of all samples at least, [-].
 _HELD_SHARE = 0.8
+# Rows that are written twice are fewer than this share, [-].
+MOST_REPEATED = 0.01
 _FEWEST = 20
 # Recordings in one file, and the largest ratio of their steps.
 _MOST_RESTARTS, _SAME_STEP = 1000, 1.02
@@ -68,6 +70,10 @@ def clock_of(values: np.ndarray) -> Clock | None:
     if values.size < _FEWEST or not np.isfinite(values).all():
         return None
     steps = np.diff(values)
+    repeated = steps == 0.0
+    if np.mean(repeated) <= MOST_REPEATED:
+        # Rows that a logger wrote twice.
+        steps = np.diff(values[np.append(True, ~repeated)])
     median = float(np.median(steps))
     if median <= 0 or not (steps > 0).all():
         return None

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from hwid_cli.data.column_signs import MOST_REPEATED
 from hwid_cli.data.columns import (
     FileColumns,
     MeasuredColumn,
@@ -79,6 +80,7 @@ def sample_uniformly(
         return columns, options.sample_time_s
     columns = _without_second_clock(columns)
     _check_length(path, columns, time)
+    columns, time = _without_repeated_rows(path, columns, time)
     steps = np.diff(time.values)
     _check_order(path, time, steps)
     median = float(np.median(steps))
@@ -163,6 +165,36 @@ def _without_second_clock(columns: FileColumns) -> FileColumns:
     step = abs(float(time.values[n - 1] - time.values[0])) / (n - 1)
     far = np.max(np.abs(time.values[:n] - other.values[:n]))
     return replace(columns, output_time=None) if far <= _SAME_CLOCK * step else columns
+
+
+def _without_repeated_rows(
+    path: Path, columns: FileColumns, time: MeasuredColumn
+) -> tuple[FileColumns, MeasuredColumn]:
+    """Leave out rows that a logger wrote twice, to the last digit."""
+    given = (time, columns.input, columns.output, columns.reference)
+    known = [one for one in given if one is not None]
+    if columns.output_time is not None or len({one.values.size for one in known}) > 1:
+        return columns, time
+    again = np.logical_and.reduce(
+        [
+            (one.values[1:] == one.values[:-1])
+            | (np.isnan(one.values[1:]) & np.isnan(one.values[:-1]))
+            for one in known
+        ]
+    )
+    # More of them are no slip of a logger, but a clock that is too coarse.
+    if not 0.0 < np.mean(again) <= MOST_REPEATED:
+        return columns, time
+    keep = np.append(True, ~again)
+    _log.warning(
+        "%s: %d rows are the row before once more, and left out", path, again.sum()
+    )
+    kept = {
+        role: replace(one, values=one.values[keep], rows=one.rows[keep])
+        for role in ("time", *_SIGNALS)
+        if (one := getattr(columns, role)) is not None
+    }
+    return replace(columns, **kept), kept["time"]
 
 
 def _lacks_samples(columns: FileColumns) -> bool:

@@ -70,3 +70,10 @@ def test_an_integrator_runs_away_and_its_rate_does_not():
     speed = 1.0 - np.exp(-np.arange(2000) / 100)
     assert signs.runs_away(np.cumsum(speed))
     assert not signs.runs_away(speed)
+
+
+def test_a_clock_may_say_a_few_times_twice():
+    ticks = 0.5 * np.arange(400)
+    twice = np.insert(ticks, [100, 300], ticks[[100, 300]])
+    assert signs.clock_of(twice) == signs.clock_of(ticks)
+    assert signs.clock_of(np.repeat(ticks, 2)) is None

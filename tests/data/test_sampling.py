@@ -234,3 +234,21 @@ def test_resampling_does_not_fill_a_gap_longer_than_the_recording():
 def test_resampling_does_not_forgive_time_that_goes_back():
     with pytest.raises(MeasurementError, match="goes back"):
         sample_uniformly(PATH, columns([0, 1, 2, 1.5, 3]), options(resample=True))
+
+
+def test_rows_that_are_written_twice_are_left_out_and_said(caplog):
+    time = np.insert(0.001 * np.arange(400), [120, 300], [0.120, 0.300])
+    found, step = sample_uniformly(PATH, columns(time), options())
+    assert step == 0.001
+    np.testing.assert_array_equal(found.time.values, 0.001 * np.arange(400))
+    np.testing.assert_array_equal(found.input.values, 0.002 * np.arange(400))
+    assert 121 not in found.time.rows.tolist()
+    assert "2 rows are the row before once more" in caplog.text
+
+
+def test_a_time_that_comes_twice_with_other_numbers_is_refused():
+    time = np.insert(0.001 * np.arange(400), 120, 0.120)
+    given_columns = columns(time)
+    given_columns.input.values[120] += 1.0
+    with pytest.raises(MeasurementError, match="is repeated"):
+        sample_uniformly(PATH, given_columns, options())
