@@ -123,6 +123,7 @@ _REFERENCE = [
     "führungsgrösse",
     "führungsgröße",
 ]
+_ENDS_IN_REF = re.compile("[a-z]{1,3}ref")
 # Whole numbers under such a name say which recording a row belongs to.
 _RECORDINGS = [
     *("run", "trial", "recording", "experiment", "segment", "id", "series", "session"),
@@ -236,7 +237,10 @@ def meaning_of(title: str, stated: str = "") -> Meaning:
     bare, unit = split_unit(title)
     words = _words(bare)
     unit = stated or unit
-    is_reference = any(_rank(word, _REFERENCE) is not None for word in words)
+    is_reference = any(
+        _rank(word, _REFERENCE) is not None or _ENDS_IN_REF.fullmatch(word)
+        for word in words
+    )
     # The port of a block, of which the path says the name: Ref/Out1.
     is_reference |= any(word in _REFERENCE for word in _words_of_path(bare))
     role, rank, used = "", 99, ""

@@ -51,6 +51,13 @@ def test_settings_may_state_the_sample_time(title, value, step):
     assert sample_time_named(title, value) == step
 
 
+def test_a_letter_before_ref_is_what_is_wanted():
+    assert meaning_of("xref_um").role == "reference"
+    assert meaning_of("Vref").role == "reference"
+    assert meaning_of("iref_A").role == "input"
+    assert meaning_of("x_um").role == "output"
+
+
 def test_what_was_measured_is_said_by_another_word_or_it_is_the_output():
     assert meaning_of("Istwert").role == "output"
     assert meaning_of("measured").role == "output"
