@@ -34,6 +34,8 @@ from hwid_cli.drive.simulation import drive_effects
 from hwid_cli.records.candidates import CandidateFit
 
 _Starts = TypeVar("_Starts")
+# A set leads further than the preferred one where it leaves less than this share of that.
+_LEADS_FURTHER = 0.5
 
 
 def from_related(fits: SetFits, size: int) -> dict[Effects, list[SearchStart]]:
@@ -42,9 +44,9 @@ def from_related(fits: SetFits, size: int) -> dict[Effects, list[SearchStart]]:
     if best is None or not np.isfinite(fits.train_sse(best)):
         return {}
     sets = _from_best(fits, best)
-    lowest = fits.lowest_of_size(size)
-    if lowest is not best:
-        # A wider law that brings too little to be preferred may still lead further.
+    lowest, excess = fits.lowest_of_size(size), fits.rounds.criteria.excess
+    if excess(lowest) < _LEADS_FURTHER * excess(best):
+        # A wider law that brings too little of the whole to be preferred.
         sets = {**_from_best(fits, lowest), **sets}
     if not fits.rounds.criteria.is_complete(best):
         for ids, start in _from_parts(fits, size):
