@@ -20,10 +20,6 @@ _FEWEST = 3
 def odd_scales(raws: Sequence[RawRecording]) -> dict[str, str]:
     """Say which recordings seem to be in another unit than the others.
 
-    Parameters
-    ----------
-    raws : sequence of RawRecording
-
     Returns
     -------
     dict of str to str
