@@ -95,4 +95,5 @@ def test_what_pieces_lead_to_is_not_looked_for_on_whole_recordings(found):
         # Of the best of them alone.
         "the command held",
         "verdict",
+        "the other command",
     ]

@@ -200,8 +200,10 @@ def test_a_second_run_computes_no_candidate_again(with_friction, friction_found)
     run = settings(store, on_done=seen.append)
     first = diagnosed(with_friction, run=run)
     fitted = [one for one in seen if one.task.function.__name__ == "fit_candidate"]
-    assert fitted
-    assert not any(one.from_cache for one in fitted)
+    computed = {one.task.key for one in fitted if not one.from_cache}
+    assert computed
+    # A run may ask for one fit twice.
+    assert {one.task.key for one in fitted} == computed
 
     seen.clear()
     second = diagnosed(with_friction, run=run)
