@@ -210,7 +210,7 @@ def answers(first: np.ndarray, second: np.ndarray) -> float:
     -------
     float, [-]
         From 1, where only the second answers to the first, to -1, where only the first
-        first answers to the second; near 0 where the numbers do not tell.
+        answers to the second; near 0 where the numbers do not tell.
     """
     forward, backward, chance = _gains(first, second)
     return (forward - backward) / (forward + backward + chance)

@@ -332,26 +332,14 @@ _SUFFIXES = {
 # nobody can convert them.
 _COUNTS = (
     *("%", "cnt", "cnts", "count", "counts", "inc", "incs", "incr", "increments"),
-    *("ink", "inkr", "inkremente"),
+    *("ink", "inkr", "inkremente", "cts", "lsb", "digits", "pulses", "ticks", "steps"),
 )
 # What is measured beside a drive: units between round brackets too, as labels.
 _LABELS = (
-    *("°c", "degc", "deg c", "celsius", "°f", "degf", "k", "g", "mg", "kg"),
-    *("l/min", "l/h", "l/s", "ml/min", "m3/h", "m³/h", "slpm", "sccm", "gpm"),
+    *("°c", "degc", "deg c", "celsius", "°f", "degf", "k", "g", "mg", "kg", "mt"),
+    *("l/min", "l/h", "l/s", "ml/min", "m3/h", "m³/h", "slpm", "sccm", "gpm", "gauss"),
     *("%fs", "% fs", "%fso", "ppm", "db", "hz", "khz", "w", "kw", "va", "ohm", "ω"),
-    *(
-        "mv/v",
-        "µstrain",
-        "ustrain",
-        "µe",
-        "µm/m",
-        "strain",
-        "t/cm",
-        "mt",
-        "gauss",
-        "lx",
-    ),
-    *("mil", "mils", "grad", "cts", "lsb", "digits", "pulses", "ticks", "steps"),
+    *("mv/v", "µstrain", "ustrain", "µe", "µm/m", "strain", "t/cm", "lx"),
 )
 # What is followed by a member is the place in an array: run(2).current.
 _BRACKET = re.compile(r"([\[(])\s*([^\])]*?)\s*[\])](?!\.\w)")
@@ -446,7 +434,8 @@ def unit_in_name(title: str, role: str) -> str:
             return UNITLESS
         if unit in _ARGUMENTS or not re.search(r"[^\W\d]|[%°]", unit):
             return ""
-        is_known = quantity_of(unit) or unit.lower() in (*_COUNTS, *_LABELS)
+        is_label = unit.lower() in (*_COUNTS, *_LABELS) or bool(readings_of(unit))
+        is_known = bool(quantity_of(unit)) or is_label
         return unit if is_known or bracket[1] == "[" else ""
     if role == "time" and quantity_of(unit) != "time":
         return ""

@@ -50,11 +50,9 @@ def unclear_effects(
     def is_clear(ref: ParameterRef) -> bool:
         column = found.names.index(ref)
         unknown, q = fit_layout.shared[column], point.shared[column]
-        if not unknown.is_log:
-            return bool(abs(q) > spread.reaches()[column])
+        reach = spread.reach(_direction_of_size(ref, fit_layout, point, scales))
         # Of a logarithm linearised: a relative deviation of the value itself.
-        direction = _direction_of_size(ref, fit_layout, point, scales)
-        return spread.reach(direction) < 1.0
+        return reach < 1.0 if unknown.is_log else bool(abs(q) > reach)
 
     return tuple(
         effect
@@ -156,16 +154,23 @@ class _Spread:
     Parameters
     ----------
     covariance : ndarray, shape (n_shared, n_shared)
+        Of the coordinates times their scales.
+    scale : ndarray, shape (n_shared,)
+        Next to nothing where nothing determines a coordinate.
     away : ndarray, shape (n_valleys, n_shared)
         Of other valleys.
     """
 
     covariance: np.ndarray
+    scale: np.ndarray
     away: np.ndarray
 
     def reach(self, direction: np.ndarray) -> float:
         """Half of the 95 % interval of a sum of coordinates, with these weights."""
-        variance = max(float(direction @ self.covariance @ direction), 0.0)
+        # Divided here: what is not determined must not touch the others.
+        weights = direction / self.scale
+        with np.errstate(over="ignore"):
+            variance = max(float(weights @ self.covariance @ weights), 0.0)
         farthest = np.max(np.abs(self.away @ direction), initial=0.0)
         return float(np.hypot(_QUANTILE * np.sqrt(variance), 2 * farthest))
 
@@ -191,7 +196,8 @@ def _spread(
         for valley in found.valleys
     ]
     return _Spread(
-        covariance / np.outer(scale, scale),
+        covariance,
+        scale,
         np.reshape(np.array(away), (len(away), scale.size)),
     )
 

@@ -3,7 +3,11 @@
 import numpy as np
 import pytest
 
-from hwid_cli.diagnosis.intervals import intervals, unclear_effects
+from hwid_cli.diagnosis.intervals import (
+    intervals,
+    shared_covariance,
+    unclear_effects,
+)
 from hwid_cli.records.candidates import ParameterRef
 from tests.diagnosis.small_drive import fit, problem, recordings, sizes
 
@@ -60,3 +64,23 @@ def test_a_contact_that_nothing_reaches_is_open():
     scales = sizes(problem())
     found = fit(given, {CONTACT: far}, scales=scales)
     assert unclear_effects(given, found, scales) == (CONTACT,)
+
+
+def test_what_nothing_determines_leaves_the_other_intervals_as_they_are(monkeypatch):
+    """Its variance is beyond all numbers."""
+    given = problem(recordings({"coulomb_friction": {"force_N": 0.8}}))
+    scales = sizes(problem())
+    found = fit(given, {"coulomb_friction": {"force_N": 0.7}}, scales=scales)
+    low, high = intervals(given, found, scales)
+
+    def with_one_lost(*arguments):
+        covariance, scale = shared_covariance(*arguments)
+        covariance, scale = covariance.copy(), scale.copy()
+        covariance[0, 0], scale[0] = 1e20, 1e-150
+        return covariance, scale
+
+    monkeypatch.setattr("hwid_cli.diagnosis.intervals.shared_covariance", with_one_lost)
+    lost = intervals(given, found, scales)
+    np.testing.assert_array_equal(lost[0][1:], low[1:])
+    np.testing.assert_array_equal(lost[1][1:], high[1:])
+    assert not lost[1][0] <= high[0]

@@ -1,4 +1,5 @@
 import numpy as np
+import pytest
 
 from hwid_cli.records.recordings import RawRecording
 from hwid_cli.stages.proposal import propose
@@ -143,28 +144,23 @@ def around(level, name, values):
     return RawRecording(name, values, found.output + level, 1e-3)
 
 
-def test_a_level_at_which_all_rest_stays_in_all_of_them():
-    noise = after_a_rest(levels(4, 600))
+@pytest.mark.parametrize(
+    ("other_level", "recipe"),
+    [
+        (21.01, ("cut",)),
+        # A zero of its own in each recording.
+        (17.0, ("cut", "output_offset")),
+    ],
+)
+def test_a_level_at_which_all_rest_stays_in_all_of_them(other_level, recipe):
     step = after_a_rest(np.ones(600))
     found = propose(
         [
             around(21.0, "step_1", step),
-            around(21.01, "step_2", -step),
-            around(21.0, "noise_1", noise),
+            around(other_level, "step_2", -step),
+            around(21.0, "noise_1", after_a_rest(levels(4, 600))),
         ]
     )
-    assert found.recipes["step"] == ("cut",)
-    assert "the level at which the output rests, 21 m, stays" in found.recipe_reason
-
-
-def test_a_zero_that_differs_between_recordings_is_subtracted():
-    noise = after_a_rest(levels(4, 600))
-    step = after_a_rest(np.ones(600))
-    found = propose(
-        [
-            around(21.0, "step_1", step),
-            around(17.0, "step_2", -step),
-            around(21.0, "noise_1", noise),
-        ]
-    )
-    assert found.recipes["step"] == ("cut", "output_offset")
+    assert found.recipes["step"] == recipe
+    is_kept = "the level at which the output rests, 21 m, stays" in found.recipe_reason
+    assert is_kept == (recipe == ("cut",))
