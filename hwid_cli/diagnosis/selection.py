@@ -74,6 +74,9 @@ LEAST_OVER_STAND_IN = 10.0
 LEAST_ADDED = 0.03
 # Or it brings this share of what the included one leaves, where that is much.
 NEARLY_THE_REST = 0.9
+# Or what it leaves is nearly white (1 passes the test), where the included one is this far
+# from it.
+NEARLY_WHITE, FAR_FROM_WHITE = 2.0, 20.0
 
 
 @dataclass(frozen=True)
@@ -519,6 +522,7 @@ def _adds_enough(
     together = base.sse.sum() - larger.sse.sum()
     is_clear = criteria.is_complete(larger) and not criteria.is_complete(smaller)
     is_clear = is_clear or _takes_the_rest(criteria, larger, smaller)
+    is_clear = is_clear or _is_nearly_white_beside(larger, smaller)
     return bool(added >= LEAST_ADDED * together or is_clear)
 
 
@@ -533,6 +537,11 @@ def _takes_the_rest(
     )
 
 
+def _is_nearly_white_beside(larger: CandidateFit, smaller: CandidateFit) -> bool:
+    """Whether a set leaves nearly white noise, and a smaller one by no means."""
+    return larger.whiteness <= NEARLY_WHITE and smaller.whiteness >= FAR_FROM_WHITE
+
+
 def rivals(
     criteria: SelectionCriteria, found: Sequence[CandidateFit], best: CandidateFit
 ) -> list[CandidateFit]:
@@ -545,9 +554,10 @@ def rivals(
     Returns
     -------
     list of CandidateFit
-        Those that include the best one, or are included in it, are left out: they are
-        measured by what they add. So are those that need a further kind of effect where
-        the best one has one kind twice.
+        Those that include the best one are left out: they are measured by what they add.
+        So are those that need a further kind of effect where the best one has one kind
+        twice, and limit cases of the best one where nothing but noise is left: beside a
+        law that is not quite right, a wider one is no more likely than its limit case.
     """
     is_complete = criteria.is_complete(best)
     left = criteria.excess(best)
@@ -555,6 +565,8 @@ def rivals(
     judged = _excess_of_held_out(criteria, best)
 
     def leaves_as_little(one: CandidateFit) -> bool:
+        if is_complete:
+            return False
         there = _excess_of_held_out(criteria, one)
         return criteria.excess(one) <= most or 0 < there <= WITHIN_REACH * judged
 
@@ -564,12 +576,11 @@ def rivals(
         if one.is_usable
         and one is not best
         and not is_part_of(best, one)
-        and not is_part_of(one, best)
         and names_of(one) != names_of(best)
         and not _has_fewer_kinds(best, one)
         and (
-            criteria.gain(best, one) < TIE
-            or (not is_complete and leaves_as_little(one))
+            leaves_as_little(one)
+            or (criteria.gain(best, one) < TIE and not is_part_of(one, best))
         )
     ]
 

@@ -132,11 +132,12 @@ def _verdict_in_words(
             f"{before:.3g} to {after:.3g} times the noise ({share:.3g} % of what was left "
             f"is explained).{rest}"
         )
+    names = _names(effects)
     text = _named(problem, criteria, base, verdict, effects)
     text += _held_command(problem, effects)
     if verdict.word == "ambiguous":
-        others = ", ".join(title_of(one) for one in verdict.rivals)
-        text += f" These recordings cannot tell it from {others}."
+        others = " or from ".join(title_of(one) for one in verdict.rivals)
+        text += f" These recordings cannot tell {names} from {others}."
     if not problem.part(held_out=True).signals:
         text += " Named on training data only: no recording was held out to test it."
     return text
@@ -177,8 +178,10 @@ def _named(
             f"leaves of {on} recordings: the error falls from {before:.3g} to "
             f"{after:.3g} times the noise. What remains is not explained."
         )
+    others = "".join(f", or instead {title_of(one)}" for one in verdict.rivals)
+    which = "the first" if others else them
     text = (
-        f"The simulation lacks {names} ({meaning}): with {them} the error on {on} "
+        f"The simulation lacks {names} ({meaning}){others}: with {which} the error on {on} "
         f"recordings falls from {before:.3g} to {after:.3g} times the noise."
     )
     return f"{text}{_rest(criteria, verdict)}"

@@ -18,6 +18,7 @@ from hwid_cli.diagnosis.selection import (
     LEAST_GAIN,
     LEAST_IMPROVED,
     LEAST_LAST_CONTRIBUTION,
+    NEARLY_WHITE,
     SelectionCriteria,
     count,
     has_own_values,
@@ -30,8 +31,6 @@ from hwid_cli.drive.catalogue import CATALOGUE
 from hwid_cli.records.candidates import CandidateFit
 from hwid_cli.records.diagnosis import SMALL_REMAINDER, STILL_LARGE
 
-# Whiteness up to which a small remainder counts as noise that is not quite white.
-_NEARLY_WHITE = 2.0
 # Share that each of several rivals explains of what none of them explains for the most.
 LEAST_OF_RIVALS = 0.35
 # Sets that leave at most so many times what the best one leaves count as near it, so many
@@ -133,11 +132,21 @@ def decide(
         chosen = next((one for one in tried if may_be_named(one)), None)
         if chosen is None:
             continue
-        near = [one for one in rivals(criteria, same_size, chosen) if may_be_named(one)]
+        near = [
+            one
+            for one in rivals(criteria, same_size, chosen)
+            if may_be_named(one)
+            # What is named explains hardly more than this limit case of it.
+            or (
+                is_part_of(one, chosen)
+                and _explains_a_part(criteria, one, base)
+                and not unclear(one)
+            )
+        ]
         word = "ambiguous" if near else "named"
         return DiagnosisVerdict(word, criteria.is_complete(chosen), chosen, tuple(near))
     is_close = criteria.ratio(base) <= CLOSE_TO_NOISE
-    if is_close and base.whiteness <= _NEARLY_WHITE:
+    if is_close and base.whiteness <= NEARLY_WHITE:
         return DiagnosisVerdict(
             _without_effect(criteria, given_sse, base), True, base, ()
         )
@@ -318,15 +327,22 @@ def _rivals_by_halves(
             continue
         if has_own_values(one) and criteria.ratio(one) > STILL_LARGE:
             continue
-        against = criteria.evidence(one, base)
-        explains = against.explained >= LEAST_OF_RIVALS and against.improved == 1.0
-        is_clear = explains and against.gain >= LEAST_GAIN and not unclear(one)
-        if is_clear and criteria.is_beyond_stand_in(one, base):
+        if _explains_a_part(criteria, one, base) and not unclear(one):
             found.append(one)
     found.sort(key=lambda one: -criteria.gain(one, base))
     if not found:
         return []
     return [found[0], *rivals(criteria, found, found[0])]
+
+
+def _explains_a_part(
+    criteria: SelectionCriteria, one: CandidateFit, base: CandidateFit
+) -> bool:
+    """Whether a candidate explains a good part of the gap, in every recording."""
+    against = criteria.evidence(one, base)
+    explains = against.explained >= LEAST_OF_RIVALS and against.improved == 1.0
+    is_clear = explains and against.gain >= LEAST_GAIN
+    return is_clear and criteria.is_beyond_stand_in(one, base)
 
 
 def _without_effect(

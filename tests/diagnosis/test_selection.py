@@ -410,6 +410,17 @@ def test_it_wins_without_where_it_alone_leaves_white_noise():
     assert select_best(CRITERIA, fits, base()).effects == STRIBECK
 
 
+@pytest.mark.parametrize(("of_limit", "preferred"), [(21.0, STRIBECK), (19.0, COULOMB)])
+def test_it_wins_where_it_leaves_nearly_white_noise_and_its_limit_case_by_no_means(
+    of_limit, preferred
+):
+    """An arm: friction of another exponent, 1.05 against 1.01 times the noise."""
+    larger, smaller = larger_by(0.9 * LEAST_ADDED, whiteness=1.9)
+    smaller = replace(smaller, whiteness=of_limit)
+    assert not CRITERIA.is_complete(larger)
+    assert select_best(CRITERIA, [larger, smaller], base()).effects == preferred
+
+
 def test_white_noise_does_not_save_it_from_a_tie():
     fits = [
         after(TIE - 0.5, STRIBECK, parameters=3, whiteness=0.5),
@@ -461,8 +472,26 @@ def test_where_nothing_is_left_of_what_judges_the_criterion_decides():
 def test_what_includes_the_best_one_is_no_rival():
     best = made_up(COULOMB, 200.0)
     assert rivals(CRITERIA, [best, after(-1.0, STRIBECK)], best) == []
+
+
+def test_a_limit_case_is_a_rival_only_beside_a_law_that_is_not_quite_right():
+    limit, far = made_up(COULOMB, 220.0), made_up(COULOMB, 230.0)
     best = made_up(STRIBECK, 200.0)
-    assert rivals(CRITERIA, [best, after(-1.0, COULOMB)], best) == []
+    assert CRITERIA.gain(best, limit) > TIE
+    assert rivals(CRITERIA, [best, limit], best) == [limit]
+    assert rivals(CRITERIA, [best, far], best) == []
+    complete = made_up(STRIBECK, 200.0, whiteness=0.5)
+    assert rivals(CRITERIA, [complete, limit], complete) == []
+
+
+@pytest.mark.parametrize(("explained", "word"), [(0.4, "ambiguous"), (0.2, "named")])
+def test_a_limit_case_that_may_not_be_named_itself_is_a_rival(explained, word):
+    # The excess of the base is 1500; the wider law explains a half of it and some more.
+    wide = made_up(STRIBECK, 100.0 + 740.0 / 6, parameters=3)
+    limit = made_up(COULOMB, 100.0 + (1 - explained) * 1500.0 / 6)
+    verdict = decided(base(350.0), [wide, limit], [wide])
+    assert verdict.chosen is wide
+    assert verdict.word == word
 
 
 NAMED = made_up(("coulomb_friction",), 110.0, whiteness=0.6)
@@ -690,14 +719,20 @@ def test_what_leaves_too_little_for_another_name_is_nearly_all():
     assert CRITERIA.is_nearly_all(made_up(GOOD, 110.0, whiteness=0.9), base())
 
 
-def test_a_winner_that_explains_too_little_gives_way_to_what_it_is_a_case_of():
+@pytest.mark.parametrize(("left", "word"), [(8e3, "named"), (9.5e3, "ambiguous")])
+def test_a_winner_that_explains_too_little_gives_way_to_what_it_is_a_case_of(
+    left, word
+):
     # Far from the noise a set must explain 99 %: Coulomb friction beside it does not, the
     # asymmetric one that includes it does; the criterion alone takes the simpler set.
     start = base(1e6)
     change = np.tile([-0.1, 0.1], 3)
     winner, wider = (
         made_up((friction, "parameter_change:damping"), sse, own=change, whiteness=9.0)
-        for friction, sse in (("coulomb_friction", 1.1e4), ("asymmetric_friction", 9e3))
+        for friction, sse in (
+            ("coulomb_friction", 1.1e4),
+            ("asymmetric_friction", left),
+        )
     )
     parts = [
         made_up((one,), 2e5, own=own, whiteness=9.0)
@@ -708,7 +743,7 @@ def test_a_winner_that_explains_too_little_gives_way_to_what_it_is_a_case_of():
         )
     ]
     verdict = decided(start, [winner, wider, *parts], [parts[0], winner])
-    assert (verdict.word, verdict.chosen) == ("named", wider)
+    assert (verdict.word, verdict.chosen) == (word, wider)
 
     alone = decided(start, [winner, *parts], [parts[0], winner])
     assert alone.chosen is parts[0]
