@@ -20,7 +20,7 @@ from hwid_cli.diagnosis.parameters import (
 )
 from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals
 from hwid_cli.diagnosis.search import within_bounds
-from hwid_cli.diagnosis.whiteness import portmanteau, whiteness
+from hwid_cli.diagnosis.whiteness import WHITE_BY_TWO_ROUTES, portmanteau, whiteness
 from hwid_cli.records.diagnosis import NoiseFloor
 from hwid_cli.records.drive import Drive
 
@@ -35,8 +35,6 @@ _LEAST_CHANCE = 1e-3
 _STOPPED = 3.0
 # The input's noise may be so many times what its differences show.
 _LESS_NOISE, _MORE_NOISE = 0.7, 1.3
-# Innovations may be so far from white where the noise's size is right.
-_NEARLY_WHITE = 6.0
 # Times that the filter follows the drive that was fitted with it.
 _REWEIGHTINGS = 2
 # What is left calls for so many times the noise that the input shows: something else is
@@ -159,7 +157,7 @@ def whiteness_with_input_noise(
     )
     # The same size by two routes is evidence of its own: the innovations of a missing
     # effect are neither of that size nor nearly white.
-    return statistic / _NEARLY_WHITE if is_same else statistic
+    return statistic / WHITE_BY_TWO_ROUTES if is_same else statistic
 
 
 def _strength(

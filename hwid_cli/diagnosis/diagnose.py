@@ -373,7 +373,8 @@ def _with_residual_noise(whole: Findings) -> Findings:
         return whole
     criteria = replace(criteria, noise=noise)
     left = whiteness([one.residual for one in whole.before], noise)
-    base = replace(base, whiteness=left, cause="coloured_noise")
+    cause = "coloured_noise" if noise.is_coloured else base.cause
+    base = replace(base, whiteness=left, cause=cause)
     verdict = decide(criteria, whole.given_sse, base, {}, (), lambda _: ())
     return replace(whole, criteria=criteria, base=base, verdict=verdict)
 

@@ -66,7 +66,7 @@ def noise_floor(problem: DiagnosisProblem, *, rests: bool = True) -> NoiseFloor:
     ]
     grid = _grid(pieces)
     step = grid / np.sqrt(12)
-    differences = _from_differences(pieces, step)
+    differences = differences_rms(pieces, step)
     is_limited = grid > 0 and step >= _GRID_SHARE * max(differences, step)
     repeats = _from_repeats(problem.signals, differences)
     may_move = problem.start == "estimated"
@@ -113,10 +113,7 @@ def noise_levels(problem: DiagnosisProblem, noise: NoiseFloor) -> np.ndarray:
     if noise.resolution > 0 or noise.method == "residuals" or counts.sum() == 0:
         return alike
     found = np.array(
-        [
-            _from_differences([one.compared[one.evaluated]], 0.0)
-            for one in problem.signals
-        ]
+        [differences_rms([one.compared[one.evaluated]], 0.0) for one in problem.signals]
     )
     least = QUIETEST * float(found.max(initial=0.0))
     found = np.maximum(found, least)
@@ -142,7 +139,7 @@ def _input_rms(problem: DiagnosisProblem) -> float:
     """
     if isinstance(problem.drive, StandIn):
         pieces = [one.driven_by[one.skip :] for one in problem.signals]
-        return float(_from_differences(pieces, 0.0))
+        return float(differences_rms(pieces, 0.0))
     return measured_input_rms(problem)
 
 
@@ -160,7 +157,7 @@ def measured_input_rms(problem: DiagnosisProblem) -> float:
     noisy = [piece for piece in pieces if not _is_mostly_straight(piece)]
     counts = [piece.size for piece in pieces]
     share = sum(piece.size for piece in noisy) / max(sum(counts), 1)
-    return float(_from_differences(noisy, 0.0) * np.sqrt(share)) if noisy else 0.0
+    return float(differences_rms(noisy, 0.0) * np.sqrt(share)) if noisy else 0.0
 
 
 def _is_mostly_straight(piece: np.ndarray) -> bool:
@@ -170,8 +167,18 @@ def _is_mostly_straight(piece: np.ndarray) -> bool:
     return bends.size > 0 and float(np.median(bends)) <= rounding
 
 
-def _from_differences(pieces: Sequence[np.ndarray], step: float) -> float:
-    """RMS of white noise from the higher order where the lower one sees motion."""
+def differences_rms(pieces: Sequence[np.ndarray], step: float) -> float:
+    """RMS of white noise, from differences of one order or a higher one.
+
+    The higher order where the lower one sees motion.
+
+    Parameters
+    ----------
+    pieces : sequence of ndarray, shape (n_samples,)
+        Of signals with their motion.
+    step : float
+        Of the sensor's grid, as noise; smaller differences are its rounding.
+    """
     low = _difference_rms(pieces, _ORDER, step)
     high = _difference_rms(pieces, _HIGHER_ORDER, step)
     return high if 0 < high < _SEES_MOTION * low else low

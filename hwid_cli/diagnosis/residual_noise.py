@@ -1,8 +1,8 @@
 """Noise that is all that a simulation leaves, where no rest shows it.
 
-Under a controller that feeds the noise back there is no rest to read. What the re-fitted
-base leaves counts as noise there, if it has all marks of noise.
-docs/method_diagnosis.md, eq. (D28b).
+Under a controller that feeds the noise back there is no rest to read; noise may also grow
+after it. What the re-fitted base leaves counts as noise there, if it has all marks of noise.
+docs/method_diagnosis.md, eq. (D28b) and (D28c).
 """
 
 from collections.abc import Sequence
@@ -11,11 +11,17 @@ from dataclasses import replace
 import numpy as np
 import scipy
 
-from hwid_cli.diagnosis.noise import FEWEST_AT_REST, Stretch, noise_sentence
+from hwid_cli.diagnosis.noise import (
+    FEWEST_AT_REST,
+    Stretch,
+    differences_rms,
+    noise_sentence,
+)
 from hwid_cli.diagnosis.problem import Compared
 from hwid_cli.diagnosis.whiteness import (
     FALSE_ALARM,
     LAGS,
+    WHITE_BY_TWO_ROUTES,
     autocovariances,
     highest_order,
     pooled_rms,
@@ -32,6 +38,9 @@ _ORDER_OF_SENSOR = 3
 _PARTS = 4
 # Samples behind which a missing effect may show in the innovations of what is left.
 _LATER = (1, 2, 3)
+# White noise is as large at its fastest as in all: what is left may be larger than
+# differences see by this factor, of a few hundred samples.
+_AS_LARGE = 1.05
 # Correlations that make the size of coloured noise less sure, at most.
 _MOST_LAGS = 200
 # Directions of columns that make up less than this share of the largest are rounding.
@@ -41,6 +50,65 @@ _LEAST_COLUMN = 1e-10
 def residual_noise(
     compared: Sequence[Compared], noise: NoiseFloor, unit: str
 ) -> NoiseFloor | None:
+    """Noise that is all that a base leaves; None where more may be left.
+
+    Of one colour, or white where it is larger than before the input moved.
+
+    Parameters
+    ----------
+    compared : sequence of Compared
+        With the re-fitted base.
+    noise : NoiseFloor
+        As found without a model.
+    """
+    if noise.method == "rest" and not noise.is_coloured and noise.resolution == 0:
+        return _larger_than_at_rest(compared, noise, unit)
+    if noise.method == "differences" and noise.resolution == 0:
+        return _coloured(compared, noise, unit)
+    return None
+
+
+def _larger_than_at_rest(
+    compared: Sequence[Compared], noise: NoiseFloor, unit: str
+) -> NoiseFloor | None:
+    """White noise that is larger than in the rest before the input moves.
+
+    It may grow and fall along a recording. Differences of high order have to see all of
+    what is left: whatever is slower than noise they do not. What is as fast as they see,
+    a hum, is not white.
+
+    References
+    ----------
+    docs/method_diagnosis.md, eq. (D28c).
+    """
+    parts = [one.residual for one in compared]
+    size = pooled_rms(parts)
+    seen = differences_rms(
+        [one.signals.compared[one.signals.evaluated] for one in compared], 0.0
+    )
+    if not (np.isfinite(size) and 0 < size <= _AS_LARGE * seen):
+        return None
+    alike = [_of_one_size(one) for one in parts]
+    if portmanteau(alike, (1.0,), n_lags=LAGS) > WHITE_BY_TWO_ROUTES:
+        return None
+    sentence = noise_sentence(Stretch(seen, False, (1.0,)), "differences", 0.0, unit)
+    return replace(
+        noise, rms=seen, method="differences",
+        sentence=f"{sentence} (the rest before the input moves shows {noise.rms:.2g}"
+        f"{behind(unit)}; what the re-fitted simulation leaves is as large as this)",
+    )  # fmt: skip
+
+
+def _of_one_size(piece: np.ndarray) -> np.ndarray:
+    """A piece over its own RMS nearby."""
+    width = max(piece.size // _PARTS, 1)
+    nearby = scipy.ndimage.uniform_filter1d(piece**2, width, mode="nearest")
+    return np.asarray(piece / np.sqrt(np.maximum(nearby, 1e-300)))
+
+
+def _coloured(
+    compared: Sequence[Compared], noise: NoiseFloor, unit: str
+) -> NoiseFloor | None:
     """Noise of one colour that is all that a base leaves; None where more may be left.
 
     Noise is alike in all recordings and all along them, and does not know what the drive
@@ -48,21 +116,13 @@ def residual_noise(
     left of all; its innovations must then have the same power in every octave of every
     part of a recording, and must not go with input and motion.
 
-    Parameters
-    ----------
-    compared : sequence of Compared
-        With the re-fitted base.
-    noise : NoiseFloor
-        As found without a model: from differences, which see no colour.
-
     References
     ----------
     docs/method_diagnosis.md, eq. (D28b).
     """
     parts = [one.residual for one in compared]
     shortest = min(one.size for one in parts)
-    is_told = noise.method != "differences" or noise.resolution > 0
-    if is_told or shortest < _PARTS * FEWEST_AT_REST:
+    if shortest < _PARTS * FEWEST_AT_REST:
         return None
     size = pooled_rms(parts)
     if not (np.isfinite(size) and size > 0):

@@ -23,6 +23,9 @@ _SAMPLES_PER_COEFFICIENT = 20
 QUIETEST = 0.01
 # A piece in which this much more happens than in the quietest one is of another size.
 MORE_THAN_QUIETEST = 3.0
+# The statistic may be so many times its limit where the size of the noise is right by a
+# second route.
+WHITE_BY_TWO_ROUTES = 6.0
 
 
 def whiteness(

@@ -61,14 +61,17 @@ def coloured(rng, coefficient, rms=NOISE):
     return rms * lfilter([1.0], [1.0, -coefficient], waves, axis=1)[:, 200:]
 
 
-def recordings(hides="", size=0.0, *, spring=True, loop=False, coefficient=0.0, seed=1):
+def recordings(
+    hides="", size=0.0, *, spring=True, loop=False, coefficient=0.0, seed=1, grows=1.0
+):
     """What the sensor reads of a drive in which something of some size hides.
 
     ``asymmetry`` is friction that is twice as large backward as forward.
     Under a controller what the sensor reads goes back into the command, noise too.
+    ``grows`` is how much larger the noise is at the end than at the beginning.
     """
     rng = np.random.default_rng(seed)
-    noise = coloured(rng, coefficient)
+    noise = coloured(rng, coefficient) * np.linspace(1.0, grows, N)
     stiffness = 1184.0 if spring else 0.0
     wanted = references(5e-3 if loop else 3.0)
     x, v, inner, behind = (np.zeros(len(NAMES)) for _ in range(4))

@@ -118,6 +118,42 @@ def test_noise_that_is_known_is_not_found_again(noisy):
         assert residual_noise(compared, known, "m") is None
 
 
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_white_noise_that_grows_after_the_rest_is_told(seed):
+    _, compared, before = base_of(recordings(grows=4.0, seed=seed))
+    # The false alarm: the rest is quieter than what follows.
+    assert before.method == "rest"
+    assert rms(compared) > 2.0 * before.rms
+    noise = residual_noise(compared, before, "m")
+    # Mean square of 1 to 4 times: 7.
+    assert noise.rms == pytest.approx(NOISE * np.sqrt(7.0), rel=0.04)
+    assert (noise.method, noise.is_coloured) == ("differences", False)
+    assert f"shows {before.rms:.2g} m" in noise.sentence
+
+
+@pytest.mark.parametrize("times", [1.0, 3.0])
+@pytest.mark.parametrize("hides", SIZES[True, False])
+def test_what_a_hidden_effect_leaves_beside_growing_noise_is_no_noise(hides, times):
+    found = recordings(hides, times * SIZES[True, False][hides], grows=4.0)
+    _, compared, before = base_of(found)
+    assert before.method == "rest"
+    assert residual_noise(compared, before, "m") is None
+
+
+@pytest.mark.parametrize(
+    "more",
+    [
+        # A hum that differences see as well, and knocks, which they take for jumps.
+        lambda row, one, time: NOISE * np.sin(2 * np.pi * 390.0 * time) * (time > 0.04),
+        lambda row, one, time: 20 * NOISE * (np.arange(time.size) % 97 == 96),
+    ],
+)
+def test_what_is_fast_beside_growing_noise_is_no_noise(more):
+    _, compared, before = base_of(recordings(grows=4.0))
+    assert residual_noise(compared, before, "m") is not None
+    assert residual_noise(with_more(compared, more), before, "m") is None
+
+
 @pytest.mark.thorough
 @pytest.mark.parametrize("coefficient", [0.5, 0.9])
 def test_a_clean_machine_with_coloured_noise_in_its_loop_lacks_nothing(coefficient):
