@@ -24,7 +24,9 @@ from hwid_cli.diagnosis.rounds import RoundsResult
 from hwid_cli.diagnosis.selection import SelectionCriteria
 from hwid_cli.diagnosis.sentences import (
     doubtful_values,
+    held_in_words,
     hidden_from_view,
+    law_in_words,
     summarise,
     taken_up,
     unseen_beside,
@@ -181,16 +183,16 @@ def describe(findings: Findings) -> Diagnosis:
     verdict, noise, scales = findings.verdict, criteria.noise, findings.scales
     chosen, before = verdict.chosen, findings.before
     fits = list(findings.found.fits.values())
-    after = findings.after()
-    given_sse = findings.given_sse
+    after, given_sse = findings.after(), findings.given_sse
     from_sse = given_sse if verdict.word in ("parameters", "none") else base.sse
     parameters = _base(problem.drive, base, chosen)
     present, effects = findings.described_effects()
     trust, bands = findings.trust()
+    law = _law(findings.law, effects)
     return Diagnosis(
         verdict=verdict.word,
         complete=verdict.is_complete,
-        summary=summarise(problem, criteria, base, verdict, effects, fits),
+        summary=_summary(findings, effects, law),
         effects=effects,
         ambiguous_with=_ids_of(verdict.rivals),
         noise=_told(criteria, problem.unit),
@@ -218,20 +220,33 @@ def describe(findings: Findings) -> Diagnosis:
         input_unit=problem.drive.source_unit,
         output=problem.drive.output,
         hold=problem.drive.hold,
-        law=None if findings.law is None else _law(findings.law, effects),
+        law=law,
         trust=trust,
         bands=bands,
     )  # fmt: skip
+
+
+def _summary(
+    findings: Findings, effects: tuple[FittedEffect, ...], law: Law | None
+) -> str:
+    """Say the verdict in words."""
+    problem, base, verdict = findings.problem, findings.base, findings.verdict
+    if law is None:
+        fits = findings.found.fits.values()
+        text = summarise(problem, findings.criteria, base, verdict, effects, fits)
+    else:
+        text = law_in_words(findings.criteria, base, verdict, law, effects[0])
+    return text + held_in_words(problem)
 
 
 def _ids_of(rivals: Sequence[CandidateFit]) -> tuple[str, ...]:
     return tuple("+".join(public_id(name) for name in one.effects) for one in rivals)
 
 
-def _law(law: LawFound, effects: Sequence[FittedEffect]) -> Law | None:
+def _law(law: LawFound | None, effects: Sequence[FittedEffect]) -> Law | None:
     """The formula with the coefficients of its effect."""
-    held = [one for one in effects if one.own == law.identifier]
-    if not held:
+    held = [one for one in effects if law is not None and one.own == law.identifier]
+    if law is None or not held:
         return None
     of = {one.name: one for one in held[0].parameters}
     values = {name: float(f"{one.value:.6g}") for name, one in of.items()}

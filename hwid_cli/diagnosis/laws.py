@@ -48,7 +48,7 @@ from hwid_cli.drive.catalogue import CATALOGUE, public_id
 from hwid_cli.drive.simulation import drive_effects
 from hwid_cli.records.axis import unit_on
 from hwid_cli.records.candidates import CandidateFit
-from hwid_cli.records.diagnosis import SMALL_REMAINDER
+from hwid_cli.records.diagnosis import SMALL_REMAINDER, Law
 from hwid_cli.records.drive import BASE_PARAMETERS, BASE_UNDER_FORCE
 from hwid_cli.records.own_effects import OwnEffect, OwnParameter, own_id, own_of
 
@@ -593,6 +593,27 @@ _OF_READING: Mapping[frozenset[str], str] = {
     frozenset({"x**3"}): "sensor_cubic",
     frozenset({"t"}): "sensor_drift",
 }
+
+
+# Terms that are an effect beside others too: forces against the motion.
+_AGAINST_MOTION = ("sign(v)", "v*abs(v)")
+
+
+def known_terms(law: Law) -> dict[str, str]:
+    """Terms of a law that are effects of the catalogue by themselves.
+
+    Returns
+    -------
+    dict of str to str
+        Ids of the effects by the terms with their coefficients.
+    """
+    if law.acts_on != "force":
+        return {}
+    return {
+        f"{one.value:.4g}*{one.term}": _EFFECTS[frozenset({one.term})]
+        for one in law.terms
+        if one.term in _AGAINST_MOTION and one.high < 0
+    }
 
 
 def _effects_of(one: _Tried) -> tuple[str, ...]:

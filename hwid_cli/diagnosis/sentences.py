@@ -5,6 +5,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
+from hwid_cli.diagnosis.laws import known_terms
 from hwid_cli.diagnosis.problem import DiagnosisProblem
 from hwid_cli.diagnosis.selection import SelectionCriteria, title_of
 from hwid_cli.diagnosis.verdict import DiagnosisVerdict, lead
@@ -16,6 +17,7 @@ from hwid_cli.records.diagnosis import (
     STILL_LARGE,
     BaseParameter,
     FittedEffect,
+    Law,
 )
 from hwid_cli.records.drive import HELD, LINE, Drive, StandIn
 
@@ -74,12 +76,17 @@ def summarise(
     """
     best = lead(criteria, fits, verdict)
     text = _verdict_in_words(problem, criteria, base, verdict, effects)
-    if problem.may_be_held and problem.drive.hold == HELD:
-        text += (
-            " The command is held between samples, as controllers do it: so simulated "
-            "(simulation.hold: zero) it fits better than as a line."
-        )
     return text if best is None else f"{text} {_lead_in_words(criteria, best, verdict)}"
+
+
+def held_in_words(problem: DiagnosisProblem) -> str:
+    """Say that the command is held, where the recordings told it; else nothing."""
+    if not (problem.may_be_held and problem.drive.hold == HELD):
+        return ""
+    return (
+        " The command is held between samples, as controllers do it: so simulated "
+        "(simulation.hold: zero) it fits better than as a line."
+    )
 
 
 def _lead_in_words(
@@ -123,15 +130,6 @@ def _verdict_in_words(
             "noise, and no effect of the catalogue explains most of it."
             f"{_where_it_sits(problem, criteria, verdict.chosen)}"
         )
-    if verdict.word == "law":
-        share = 100 * criteria.evidence(verdict.chosen, base).explained
-        rest = _rest(criteria, verdict)
-        return (
-            "No effect of the catalogue is what the simulation lacks, but a formula holds: "
-            f"{effects[0].equation}. With it the error on held-out recordings falls from "
-            f"{before:.3g} to {after:.3g} times the noise ({share:.3g} % of what was left "
-            f"is explained).{rest}"
-        )
     names = _names(effects)
     text = _named(problem, criteria, base, verdict, effects)
     text += _held_command(problem, effects)
@@ -141,6 +139,38 @@ def _verdict_in_words(
     if not problem.part(held_out=True).signals:
         text += " Named on training data only: no recording was held out to test it."
     return text
+
+
+def law_in_words(
+    criteria: SelectionCriteria,
+    base: CandidateFit,
+    verdict: DiagnosisVerdict,
+    law: Law,
+    effect: FittedEffect,
+) -> str:
+    """Say which formula holds, and which of its terms have a name.
+
+    Parameters
+    ----------
+    base : CandidateFit
+        Re-fitted, without the law.
+    effect : FittedEffect
+        That holds the law.
+    """
+    share = 100 * criteria.evidence(verdict.chosen, base).explained
+    known = known_terms(law)
+    terms = " and ".join(f"{name} ({term})" for term, name in known.items())
+    text = (
+        f"The simulation lacks {terms} and something that is no effect of the catalogue; a "
+        "formula holds for both"
+        if known
+        else "No effect of the catalogue is what the simulation lacks, but a formula holds"
+    )
+    return (
+        f"{text}: {effect.equation}. With it the error on held-out recordings falls from "
+        f"{criteria.ratio(base):.3g} to {criteria.ratio(verdict.chosen):.3g} times the "
+        f"noise ({share:.3g} % of what was left is explained).{_rest(criteria, verdict)}"
+    )
 
 
 def _cause(criteria: SelectionCriteria, verdict: DiagnosisVerdict) -> str:

@@ -23,6 +23,7 @@ from hwid_cli.diagnosis.laws import _most_terms
 from hwid_cli.diagnosis.rounds import RoundsResult
 from hwid_cli.diagnosis.set_fits import fit_task
 from hwid_cli.diagnosis.verdict import DiagnosisVerdict
+from hwid_cli.records.diagnosis import Law, LawTerm
 from hwid_cli.records.own_effects import own_id
 from hwid_cli.stages.diagnose import extended_options
 from tests.diagnosis.made_up_fits import CRITERIA, base, made_up
@@ -88,7 +89,11 @@ def test_a_law_of_two_terms_is_found_with_units_intervals_and_inclusion(found):
         assert one.unit == unit
         assert one.inclusion > 0.8
     assert diagnosis.explained_share > 0.99
-    assert "No effect of the catalogue" in diagnosis.summary
+    assert "The simulation lacks coulomb_friction (-0.9" in diagnosis.summary
+    assert (
+        "*sign(v)) and something that is no effect of the catalogue"
+        in diagnosis.summary
+    )
 
 
 @pytest.mark.thorough
@@ -340,3 +345,23 @@ def test_what_sets_the_scale_stays_where_a_law_begins(is_force):
         for one in as_forces
     )
     assert nearest < 0.1 * 1184.0 / 0.3
+
+
+@pytest.mark.parametrize(
+    ("term", "high", "acts_on", "effect"),
+    [
+        ("sign(v)", -0.9, "force", "coulomb_friction"),
+        ("v*abs(v)", -0.9, "force", "quadratic_drag"),
+        # Pushing along, perhaps none, of the sensor, and without a name of its own.
+        ("sign(v)", 0.9, "force", None),
+        ("sign(v)", -0.9, "output", None),
+        ("x*v", -0.9, "force", None),
+    ],
+)
+def test_terms_of_a_law_that_have_a_name(term, high, acts_on, effect):
+    terms = (
+        LawTerm("abs(x)", -3.0, -4.0, -2.0, "N/m", 1.0),
+        LawTerm(term, -1.0, -1.1, high, "N", 1.0),
+    )
+    expected = {} if effect is None else {f"-1*{term}": effect}
+    assert laws.known_terms(Law("F", acts_on, terms)) == expected

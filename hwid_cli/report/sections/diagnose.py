@@ -59,7 +59,7 @@ _MOST_PLACES, _MOST_NAMED = 5, 3
 _MOST_FORCES, _LOWEST = 3, -20.0
 _VERDICTS = {
     "named": "The gap between simulation and measurement has a name.",
-    "law": "No effect of the catalogue is missing, but a formula describes what is.",
+    "law": "What is missing is not in the catalogue, but a formula describes it.",
     "ambiguous": "Several effects explain the gap equally well.",
     "parameters": "No effect is missing: the simulation's parameters were off.",
     "unknown": "There is a gap that no known effect explains.",
