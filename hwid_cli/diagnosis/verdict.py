@@ -125,6 +125,10 @@ def decide(
             and not unclear(one)
         )
 
+    def hardly_less(one: CandidateFit, chosen: CandidateFit) -> bool:
+        is_part = is_part_of(one, chosen) and not unclear(one)
+        return is_part and _explains_a_part(criteria, one, base)
+
     for winner in reversed(best):
         same_size = [one for one in fits.values()
                      if len(one.effects) == len(winner.effects)]  # fmt: skip
@@ -132,19 +136,22 @@ def decide(
         chosen = next((one for one in tried if may_be_named(one)), None)
         if chosen is None:
             continue
-        near = [
-            one
-            for one in rivals(criteria, same_size, chosen)
-            if may_be_named(one)
-            # What is named explains hardly more than this limit case of it.
-            or (
-                is_part_of(one, chosen)
-                and _explains_a_part(criteria, one, base)
-                and not unclear(one)
-            )
-        ]
+        others = rivals(criteria, same_size, chosen)
+        near = [one for one in others
+                if may_be_named(one) or hardly_less(one, chosen)]  # fmt: skip
         word = "ambiguous" if near else "named"
         return DiagnosisVerdict(word, criteria.is_complete(chosen), chosen, tuple(near))
+    return _nameless(criteria, given_sse, base, fits, unclear)
+
+
+def _nameless(
+    criteria: SelectionCriteria,
+    given_sse: np.ndarray,
+    base: CandidateFit,
+    fits: Mapping[tuple[str, ...], CandidateFit],
+    unclear: Callable[[CandidateFit], tuple[str, ...]],
+) -> DiagnosisVerdict:
+    """What is said where no set may be named: little is left, or several share it."""
     is_close = criteria.ratio(base) <= CLOSE_TO_NOISE
     if is_close and base.whiteness <= NEARLY_WHITE:
         return DiagnosisVerdict(
