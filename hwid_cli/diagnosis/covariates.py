@@ -7,7 +7,6 @@ import numpy as np
 
 from hwid_cli.diagnosis.latent_force import Smoothed
 from hwid_cli.diagnosis.problem import Compared
-from hwid_cli.records.axis import unit_on
 from hwid_cli.records.drive import SOURCES, Drive
 
 # Bins of equal count for the shares; finer ones for the curves.
@@ -59,17 +58,17 @@ def variables(
         one.signals.sample_time_s * np.arange(one.signals.input.size)
         for one in compared
     ]
-    source, unit = drive.source, drive.source_unit
+    source, units = drive.source, drive.units
     fast = float(np.quantile(np.abs(velocity), 0.99)) if velocity.size else 0.0
     direction = np.sign(velocity) * (np.abs(velocity) > _STANDING * fast)
     return (
-        Variable("displacement", unit_on(drive.axis, "m"), position),
+        Variable("displacement", units.length, position),
         Variable("size of the displacement", "", np.abs(position)),
-        Variable("velocity", unit_on(drive.axis, "m/s"), velocity),
+        Variable("velocity", f"{units.length}/s", velocity),
         Variable("direction", "", direction),
         Variable("speed", "", np.abs(velocity)),
-        Variable(source, unit, joined(compared, inputs)),
-        Variable(f"rate of the {source}", f"{unit}/s", joined(compared, rates)),
+        Variable(source, units.source, joined(compared, inputs)),
+        Variable(f"rate of the {source}", f"{units.source}/s", joined(compared, rates)),
         Variable("time", "s", joined(compared, times)),
     )
 

@@ -217,7 +217,7 @@ def describe(findings: Findings) -> Diagnosis:
         compared="command u" if problem.compares_command else "output y",
         warnings=findings.all_warnings(parameters),
         axis=problem.drive.axis,
-        input_unit=problem.drive.source_unit,
+        units=problem.drive.straight_units,
         output=problem.drive.output,
         hold=problem.drive.hold,
         law=law,

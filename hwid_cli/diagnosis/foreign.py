@@ -33,6 +33,7 @@ from hwid_cli.diagnosis.stand_in import (
 from hwid_cli.diagnosis.tasks import OnRound, RunTasks
 from hwid_cli.diagnosis.turns import have_moved
 from hwid_cli.diagnosis.verdict import DiagnosisVerdict
+from hwid_cli.records.axis import MotionUnits
 from hwid_cli.records.diagnosis import BaseParameter, Diagnosis
 from hwid_cli.records.drive import LINE, StandIn
 from hwid_cli.records.experiment import DiagnoseOptions, SimulationOptions
@@ -132,7 +133,14 @@ def _beside(
     simulator = runs.simulator
     drive = _standing(problem, given)
     drive = _in_newtons(runs, problem.signals, given, values, drive)
-    drive = replace(drive, effects={k: dict(v) for k, v in simulator.effects.items()})
+    has_force = simulator.capabilities.force
+    drive = replace(
+        drive,
+        effects={k: dict(v) for k, v in simulator.effects.items()},
+        own_units=MotionUnits(
+            "N" if has_force else problem.input_unit, problem.unit, problem.input_unit
+        ),
+    )
     standing = _with_stand_in(problem, drive, given)
     if simulator.run is not None:
         return standing
@@ -291,7 +299,7 @@ def _fit_parameters(
     # Large and small ones.
     chosen = train[:: max(1, len(train) // _MOST_FITTED)][:_MOST_FITTED]
     sizes = np.array([abs(one.value) or 1.0 for one in free.values()])
-    limits = [one.bounds or (-np.inf, np.inf) for one in free.values()]
+    limits = [one.limits for one in free.values()]
     low, high = (np.array(ends) / sizes for ends in zip(*limits, strict=True))
     n_errors = sum(one.n_evaluated for one in chosen)
 

@@ -46,7 +46,6 @@ from hwid_cli.diagnosis.tasks import DiagnosisTask
 from hwid_cli.diagnosis.verdict import DiagnosisVerdict, needs_each
 from hwid_cli.drive.catalogue import CATALOGUE, public_id
 from hwid_cli.drive.simulation import drive_effects
-from hwid_cli.records.axis import unit_on
 from hwid_cli.records.candidates import CandidateFit
 from hwid_cli.records.diagnosis import SMALL_REMAINDER, Law
 from hwid_cli.records.drive import BASE_PARAMETERS, BASE_UNDER_FORCE
@@ -290,8 +289,8 @@ def _near(value: float, change: float) -> float:
 
 def _units(rounds: Rounds) -> tuple[str, str, str]:
     """Units of force, reading and input."""
-    drive = rounds.problem.drive
-    return unit_on(drive.axis, "N"), unit_on(drive.axis, "m"), drive.source_unit
+    units = rounds.problem.drive.units
+    return units.force, units.length, units.source
 
 
 def _effect(

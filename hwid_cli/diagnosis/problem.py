@@ -173,6 +173,8 @@ class DiagnosisProblem:
         One of ``records.drive.STARTS``: how recordings start.
     unit : str
         Of what is compared.
+    input_unit : str
+        Of the recorded input.
     known : mapping of str to float, [-]
         Parameters of the base that may not move beyond this share of their value.
     stand_in_error : float, [output unit squared]
@@ -187,6 +189,7 @@ class DiagnosisProblem:
     drive: Drive
     start: str = "rest"
     unit: str = "m"
+    input_unit: str = "A"
     known: Mapping[str, float] = field(default_factory=dict)
     stand_in_error: float = 0.0
     may_be_held: bool = False
@@ -277,6 +280,7 @@ def prepare(
         recordings[0].input_unit
         if simulation.controller is not None
         else recordings[0].output_unit,
+        recordings[0].input_unit,
         {name_inside(name): share for name, share in simulation.known.items()},
         may_be_held=simulation.hold == UNSAID_HOLD and simulation.controller is None,
     )

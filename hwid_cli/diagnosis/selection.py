@@ -67,7 +67,11 @@ WITHIN_REACH = 1.25
 # The base of a stand-in that a candidate changes by more than this factor is no longer that
 # of the simulation. A damping may be near nothing, and so its factor anything.
 REPLACED = 3.0
-_OF_SIMULATION = ("stiffness_N_per_m", "force_constant_N_per_A")
+_SPRING = "stiffness_N_per_m"
+_OF_SIMULATION = (_SPRING, "force_constant_N_per_A")
+# A spring whose force is below this share of the input's may be any: a cylinder has none,
+# and a stand-in one of rounding errors.
+LEAST_OF_FORCES = 0.01
 # What is named explains this many times what a stand-in may be wrong by, at least.
 LEAST_OVER_STAND_IN = 10.0
 # An effect that includes another one must add this share of what both gain.
@@ -112,6 +116,8 @@ class SelectionCriteria:
         What stands for the simulation, if anything does.
     stand_in_error : float, [output unit squared]
         Of the problem.
+    least_stiffness : float, [N/m]
+        Of a spring of ``standing`` that counts as one.
     motion : float, [output unit]
         RMS of the held-out motion about its mean; infinite where a command is compared, in
         which all that the motion lacks shows.
@@ -125,6 +131,7 @@ class SelectionCriteria:
     inputs: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
     standing: StandIn | None = None
     stand_in_error: float = 0.0
+    least_stiffness: float = 0.0
     motion: float = inf
     levels: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
@@ -145,8 +152,10 @@ class SelectionCriteria:
         ]
         motion = float(np.sqrt(np.mean(np.concatenate(moved) ** 2)))
         motion = inf if problem.compares_command else motion
-        levels = noise_levels(problem, noise)
-        return cls(counts, held, noise, features, standing, error, motion, levels)
+        return cls(
+            counts, held, noise, features, standing, error, _least_stiffness(problem),
+            motion, noise_levels(problem, noise),
+        )  # fmt: skip
 
     @property
     def floors(self) -> np.ndarray:
@@ -359,6 +368,9 @@ class SelectionCriteria:
         values = {one.parameter: value
                   for one, value in zip(found.names, found.values, strict=True)
                   if one.owner == BASE}  # fmt: skip
+        stiffness = max(values.get(_SPRING, 0.0), self.standing.stiffness_N_per_m)
+        if stiffness < self.least_stiffness:
+            values.pop(_SPRING, None)
         pairs = [(values[one], getattr(self.standing, one))
                  for one in _OF_SIMULATION if one in values]  # fmt: skip
         return any(
@@ -395,6 +407,17 @@ class SelectionCriteria:
             column for column, one in enumerate(found.own_names) if is_factor(one)
         ]
         return any(_goes_with(found.own[:, one], self.inputs) for one in columns)
+
+
+def _least_stiffness(problem: DiagnosisProblem) -> float:
+    """Stiffness at which a spring makes a share of the input's force, [N/m]."""
+    pairs = ([one.output, one.driven_by] for one in problem.signals)
+    way, pushed = (
+        float(np.sqrt(np.mean(np.concatenate(parts) ** 2)))
+        for parts in zip(*pairs, strict=True)
+    )
+    force = problem.drive.force_constant_N_per_A * pushed
+    return LEAST_OF_FORCES * force / way if way > 0 else 0.0
 
 
 def _features(signals: Signals) -> tuple[float, float, float]:

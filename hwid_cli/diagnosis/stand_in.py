@@ -201,6 +201,7 @@ def _in_free_run(
     base: dict[str, Any] = base_of(drive_at(problem, fit_layout, found.point))
     # A damper that has grown is as fast as a mass that has shrunk.
     better = _no_faster_than_seen(replace(drive, **base), signals)
+    better = _without_idle_spring(better, compared)
     return in_newtons(better, better.force_constant_N_per_A)
 
 
@@ -215,6 +216,22 @@ def _no_faster_than_seen(drive: StandIn, signals: Sequence[Signals]) -> StandIn:
         drive.damping_N_s_per_m * shortest, drive.stiffness_N_per_m * shortest**2
     )
     return replace(drive, mass_kg=max(drive.mass_kg, least))
+
+
+def _without_idle_spring(drive: StandIn, moved: Sequence[Signals]) -> StandIn:
+    """The same without a straight spring whose force is rounding beside the input's.
+
+    A cylinder or a free axis has none; any candidate would seem to change it manyfold.
+    """
+    sizes = [
+        np.concatenate(parts)
+        for parts in zip(*((one.output, one.driven_by) for one in moved), strict=True)
+    ]
+    way, pushed = (float(np.sqrt(np.mean(one**2))) for one in sizes)
+    pushed *= drive.force_constant_N_per_A
+    is_idle = drive.stiffness_N_per_m * way < _LEAST_SHARE * pushed
+    has_bends = drive.bends != (0.0, 0.0)
+    return replace(drive, stiffness_N_per_m=0.0) if is_idle and not has_bends else drive
 
 
 def in_newtons(drive: StandIn, force_gain: float) -> StandIn:

@@ -270,8 +270,7 @@ def _with_values(
     fit, change = fitted_together(turn.problem, turn.fit, (slopes, pushes), findings)
     values = dict(turn.values)
     for column, (name, one) in enumerate(runs.simulator.free.items()):
-        low, high = one.bounds or (-np.inf, np.inf)
-        values[name] = float(np.clip(values[name] + change[column], low, high))
+        values[name] = float(np.clip(values[name] + change[column], *one.limits))
     # What the change of the parameters should do, until the next run shows it.
     more = [one @ change for one in slopes]
     targets = [run.output + add for run, add in zip(found, more, strict=True)]
@@ -318,7 +317,7 @@ def _slopes(
     columns: list[list[np.ndarray]] = [[] for _ in found]
     for name, one in runs.simulator.free.items():
         step = DIFFERENCE * (abs(values[name]) or abs(one.value) or 1.0)
-        if one.bounds and values[name] + step > one.bounds[1]:
+        if values[name] + step > one.limits[1]:
             step = -step
         # Where it cannot be run with more of a parameter, that one stays.
         there = push({**values, name: values[name] + step}) or found

@@ -28,7 +28,6 @@ from hwid_cli.diagnosis.segments import (
     step_parts,
 )
 from hwid_cli.diagnosis.whiteness import whiteness
-from hwid_cli.records.axis import unit_on
 from hwid_cli.records.diagnosis import LatentForce, NoiseFloor, Place
 from hwid_cli.records.drive import Drive
 
@@ -367,8 +366,8 @@ def _exponent(compared: Sequence[Compared], excess: np.ndarray) -> float | None:
 def _input_unit(drive: Drive) -> str:
     """Unit of what drives a recording."""
     if drive.controller is not None:
-        return unit_on(drive.axis, "m" if drive.output == "position" else "m/s")
-    return drive.source_unit
+        return drive.units.length + ("" if drive.output == "position" else "/s")
+    return drive.units.source
 
 
 def _plural(kind: str) -> str:

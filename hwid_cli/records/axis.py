@@ -5,6 +5,7 @@ kg m^2 where it rotates.
 """
 
 from collections.abc import Collection, Mapping
+from dataclasses import astuple, dataclass
 from typing import Any, Protocol
 
 from hwid_cli.records.rules import Refusal, Refused
@@ -23,6 +24,15 @@ INERTIA = ROTARY_NAMES["mass_kg"]
 _ROTARY_UNITS = {"m": "rad", "N": "N m", "kg": "kg m^2"}
 # Sensors' effects whose lengths are what is read; of all others they are ways.
 _OF_READING = ("sensor_saturation", "sensor_hum", "sensor_drift")
+
+
+@dataclass(frozen=True)
+class MotionUnits:
+    """Units of a force, of the displacement and of the input."""
+
+    force: str = "N"
+    length: str = "m"
+    source: str = "A"
 
 
 class HasAxis(Protocol):
@@ -115,8 +125,32 @@ def _rotary(product: str) -> str:
     return " ".join(found)
 
 
+def unit_in(units: MotionUnits, unit: str) -> str:
+    """Unit of a quantity in a simulation that has its own units.
+
+    Examples
+    --------
+    >>> unit_in(MotionUnits("V", "mm", "V"), "N s^2/m^2")
+    'V s^2/mm^2'
+    >>> unit_in(MotionUnits("N", "rev/min", "%"), "m/A")
+    '(rev/min)/%'
+    >>> unit_in(MotionUnits(), "N/m")
+    'N/m'
+    """
+    of = dict(zip(astuple(MotionUnits()), astuple(units), strict=True))
+
+    def own(factor: str) -> str:
+        base, _, power = factor.partition("^")
+        new = of.get(base, base)
+        # Of the unit itself a quotient is as it is; in a product it is one factor.
+        new = f"({new})" if "/" in new and factor != unit else new
+        return f"{new}^{power}" if power else new
+
+    return "/".join(" ".join(map(own, part.split(" "))) for part in unit.split("/"))
+
+
 def unit_of_effect(
-    identifier: str, unit: str, *, axis: str, output: str, source: str = "A"
+    identifier: str, unit: str, *, axis: str, output: str, units: MotionUnits
 ) -> str:
     """Unit of a parameter of an effect, from that at the end of its name.
 
@@ -126,23 +160,23 @@ def unit_of_effect(
         Id of the effect.
     output : str
         What is measured; one of ``drive.OUTPUTS``.
-    source : str
-        Unit of the input; one of ``drive.SOURCES``.
+    units : MotionUnits
+        Force and displacement of a straight axis; the unit of the input.
 
     Examples
     --------
     >>> unit_of_effect("input_dead_zone", "A", axis="rotary", output="position",
-    ...                source="N m")
+    ...                units=MotionUnits(source="N m"))
     'N m'
-    >>> unit_of_effect("sensor_drift", "m/s", axis="linear", output="velocity")
+    >>> si = MotionUnits()
+    >>> unit_of_effect("sensor_drift", "m/s", axis="linear", output="velocity", units=si)
     'm/s^2'
-    >>> unit_of_effect("end_stop", "N/m", axis="rotary", output="velocity")
+    >>> unit_of_effect("end_stop", "N/m", axis="rotary", output="velocity", units=si)
     'N m/rad'
     """
     if output == "velocity" and identifier in _OF_READING:
         unit = {"m": "m/s", "m/s": "m/s^2"}.get(unit, unit)
-    words = [source if one == "A" else one for one in unit_on(axis, unit).split("/")]
-    return "/".join(words)
+    return unit_in(units, unit_on(axis, unit))
 
 
 def units_note(*, axis: str, output: str) -> str:

@@ -5,6 +5,7 @@ from typing import Annotated
 
 import numpy as np
 
+from hwid_cli.records.axis import MotionUnits
 from hwid_cli.records.candidates import RankedCandidate
 from hwid_cli.records.drive import LINE
 from hwid_cli.records.programs import OF_DRIVE, Capabilities
@@ -330,6 +331,8 @@ class Diagnosis(Shown):
         Of the signal that is compared.
     warnings : tuple of str
         What a reader must check before believing the rest.
+    units : MotionUnits
+        Of force and displacement, as those of a straight axis, and of the input.
     axis, output : str
         One of ``axis.AXES`` and of ``drive.OUTPUTS``: in which units parameters are.
     confirmed : str
@@ -375,7 +378,7 @@ class Diagnosis(Shown):
     output_unit: str = "m"
     warnings: tuple[str, ...] = field(default=(), metadata=ADDED_LATER)
     axis: str = field(default="linear", metadata=ADDED_LATER)
-    input_unit: str = field(default="A", metadata=ADDED_LATER)
+    units: MotionUnits = field(default=MotionUnits(), metadata=ADDED_LATER)
     output: str = field(default="position", metadata=ADDED_LATER)
     confirmed: str = field(default="simulation", metadata=ADDED_LATER)
     capabilities: Capabilities = field(default=OF_DRIVE, metadata=ADDED_LATER)

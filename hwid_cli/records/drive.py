@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from hwid_cli.records.axis import AXES
+from hwid_cli.records.axis import AXES, MotionUnits, unit_on
 from hwid_cli.records.rules import (
     NOT_NEGATIVE,
     POSITIVE,
@@ -233,6 +233,17 @@ class Drive:
         return self.input_unit or ("A" if self.resistance_ohm is None else "V")
 
     @property
+    def units(self) -> MotionUnits:
+        """Of force, displacement and input on this axis."""
+        force, length = (unit_on(self.axis, one) for one in ("N", "m"))
+        return MotionUnits(force, length, self.source_unit)
+
+    @property
+    def straight_units(self) -> MotionUnits:
+        """The same on a straight axis, whatever this one is."""
+        return MotionUnits(source=self.source_unit)
+
+    @property
     def source(self) -> str:
         """What the input is, in words."""
         return SOURCES[self.source_unit]
@@ -261,11 +272,24 @@ class StandIn(Drive):
     one_curve_N_per_m : float, [N/m]
         Stiffness k that k2 and k3 belong to, where the spring is one curve that changes
         as a whole; 0 where k changes alone.
+    own_units : MotionUnits
+        Of the simulation.
     """
 
     quadratic_N_per_m2: float = 0.0
     cubic_N_per_m3: float = 0.0
     one_curve_N_per_m: float = 0.0
+    own_units: MotionUnits = field(default_factory=MotionUnits)
+
+    @property
+    def units(self) -> MotionUnits:
+        """Those of the simulation."""
+        return self.own_units
+
+    @property
+    def straight_units(self) -> MotionUnits:
+        """The same: it has no axis of another kind."""
+        return self.own_units
 
     @property
     def bends(self) -> tuple[float, float]:

@@ -6,6 +6,7 @@ given. What each of them can do decides what a diagnosis may claim.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from math import inf
 from typing import Annotated
 
 import numpy as np
@@ -25,6 +26,10 @@ from hwid_cli.records.rules import (
 _TIME_LIMIT = Number(above=0, words="a number of seconds > 0")
 
 
+# Without bounds a fit leaves this share of a parameter at least.
+_LEAST_OF_GIVEN = 1e-3
+
+
 @dataclass(frozen=True)
 class FreeParameter:
     """A parameter of a simulation that may be fitted again.
@@ -37,6 +42,19 @@ class FreeParameter:
 
     value: float
     bounds: tuple[float, ...] = ()
+
+    @property
+    def limits(self) -> tuple[float, float]:
+        """Lowest and highest value of a fit: without bounds its sign stays.
+
+        A damping that turns negative imitates what is missing. A value of 0 has no sign.
+        """
+        if self.bounds:
+            return self.bounds[0], self.bounds[1]
+        if self.value == 0:
+            return -inf, inf
+        least = _LEAST_OF_GIVEN * self.value
+        return (least, inf) if least > 0 else (-inf, least)
 
     def __post_init__(self) -> None:
         if not self.bounds:

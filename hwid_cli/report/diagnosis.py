@@ -124,7 +124,7 @@ def _told_as(
         unit,
         axis=diagnosis.axis,
         output=diagnosis.output,
-        source=diagnosis.input_unit,
+        units=diagnosis.units,
     )
 
 

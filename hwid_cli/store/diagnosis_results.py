@@ -218,6 +218,7 @@ def _content(diagnosis: Diagnosis) -> dict[str, Any]:
         ],
         **({} if diagnosis.law is None else {"law": _law(diagnosis.law)}),
         "axis": diagnosis.axis,
+        "units": asdict(diagnosis.units),
         "output": diagnosis.output,
         "hold": diagnosis.hold,
         "not_observable": list(diagnosis.not_observable),

@@ -13,6 +13,7 @@ from hwid_cli.diagnosis.foreign import diagnose_foreign, stand_in_for
 from hwid_cli.diagnosis.simulator import Runs, Simulator
 from hwid_cli.diagnosis.verdict import DiagnosisVerdict
 from hwid_cli.errors import SimulationError
+from hwid_cli.records.axis import MotionUnits
 from hwid_cli.records.experiment import DiagnoseOptions
 from hwid_cli.records.programs import Capabilities, FreeParameter, SimulatorRun
 from tests.black_boxes.plants import (
@@ -50,7 +51,7 @@ def recordings(hidden=None):
         Recording(
             name, u,
             integrate(LINEAR, TRUE, u, STEP_S, hidden, finer=4) + NOISE * rng.standard_normal(N),
-            STEP_S, kind=name.split("_", maxsplit=1)[0],
+            STEP_S, kind=name.split("_", maxsplit=1)[0], input_unit="V", output_unit="mm",
         )
         for name, u in inputs()
     ]  # fmt: skip
@@ -103,6 +104,7 @@ def test_friction_is_named_and_confirmed_in_the_simulation_with_its_parameters()
     (force,) = effect.parameters
     assert effect.id == "coulomb_friction"
     assert force.value == pytest.approx(2.0, rel=0.01)
+    assert found.units == MotionUnits("N", "mm", "V")
     # The noise allows a hundredth; the given ones are up to a quarter off.
     for one in found.base:
         assert one.after == pytest.approx(TRUE[one.name], rel=0.01)
@@ -127,7 +129,9 @@ def test_without_a_force_input_a_force_acts_through_the_input():
     able = Capabilities(run=True, parameters=True)
     found, _ = diagnosis(Simulator(able, simulate, {}, FREE, GIVEN), effects=FEW)
     assert (found.verdict, found.confirmed) == ("named", "simulation")
-    # In the unit of the input: 9 N an ampere.
+    # In the unit of the input: 9 N a volt.
+    assert found.units == MotionUnits("V", "mm", "V")
+    assert found.effects[0].parameters[0].name == "force_N"
     assert found.effects[0].parameters[0].value == pytest.approx(2.0 / 9.0, rel=0.02)
 
 
@@ -225,6 +229,56 @@ def test_what_the_simulation_does_not_bear_out_is_no_fact():
         "surrogate",
     )
     assert any(one.effects == ("coulomb_friction",) for one in found.candidates)
+
+
+def cylinder(values, command):
+    """A valve that lets little pass: no spring, and a lag that no sample shows."""
+    flow = values["gain"] * np.sign(command) * np.maximum(np.abs(command) - 0.35, 0.0)
+    return cylinder_run(values, flow / values["gain"])
+
+
+def cylinder_run(values, command):
+    """Exact for a command that is held, as a valve's is."""
+    speed, position, found = 0.0, 0.0, np.empty(command.size)
+    decay = np.exp(-STEP_S / values["lag"])
+    for row, one in enumerate(values["gain"] * command):
+        found[row] = position
+        position += one * STEP_S + (speed - one) * values["lag"] * (1.0 - decay)
+        speed = one + (speed - one) * decay
+    return found
+
+
+@pytest.mark.thorough
+def test_a_spring_of_rounding_does_not_keep_an_effect_from_the_simulation():
+    """It grew a thousandfold beside every effect, and none was tried in a cylinder."""
+    true = {"gain": 9.5, "lag": 5e-4}
+    rng = np.random.default_rng(5)
+    found = [
+        Recording(
+            name, u, cylinder(true, u) + 2e-3 * rng.standard_normal(N),
+            STEP_S, kind=name.split("_", maxsplit=1)[0], input_unit="V", output_unit="mm",
+        )
+        for name, u in inputs()
+    ]  # fmt: skip
+    simulator = Simulator(
+        Capabilities(run=True, parameters=True),
+        lambda request: SimulatorRun(
+            cylinder_run(request.parameters, request.input), np.zeros(0)
+        ),
+        {},
+        {name: FreeParameter(1.1 * value) for name, value in true.items()},
+        {name: 1.1 * value for name, value in true.items()},
+    )
+    told = diagnose_foreign(
+        found, simulator, DiagnoseOptions(), Count(), lambda what, total: None
+    )
+    assert told.confirmed == "simulation"
+    # Without inertia friction does the same.
+    assert told.verdict in ("named", "ambiguous")
+    (effect,) = told.effects
+    names = {effect.id, *told.ambiguous_with}
+    assert "input_dead_zone" in names <= {"input_dead_zone", "coulomb_friction"}
+    assert effect.parameters[0].value == pytest.approx(0.35, rel=0.02)
 
 
 SWING_S, SWUNG = 2e-3, 600

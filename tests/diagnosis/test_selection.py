@@ -712,6 +712,23 @@ def test_an_effect_beside_which_the_stand_in_becomes_another_drive_is_not_named(
         assert CRITERIA.may_be_named(far, base())
 
 
+@pytest.mark.parametrize(("stiffness", "is_named"), [(309.0, True), (311.0, False)])
+def test_a_spring_that_makes_next_to_no_force_may_become_any_other(stiffness, is_named):
+    standing = StandIn(stiffness_N_per_m=100.0, force_constant_N_per_A=2.0)
+    criteria = replace(CRITERIA, standing=standing, least_stiffness=310.0)
+    found = with_base(made_up(GOOD, 150.0), stiffness_N_per_m=stiffness)
+    assert criteria.may_be_named(found, base()) is is_named
+
+
+def test_a_spring_counts_from_a_hundredth_of_the_force_of_the_input():
+    (one,) = recordings()[:1]
+    criteria = SelectionCriteria.of(problem([one]), white())
+    sizes = (np.linalg.norm(one.input), np.linalg.norm(one.output))
+    force_constant = problem([one]).drive.force_constant_N_per_A
+    expected = 0.01 * force_constant * sizes[0] / sizes[1]
+    assert criteria.least_stiffness == pytest.approx(expected)
+
+
 def test_what_leaves_too_little_for_another_name_is_nearly_all():
     # 100 of noise in each recording, and 300 beyond it before.
     for left, is_so in ((100.14, True), (100.16, False)):

@@ -264,3 +264,14 @@ def test_a_small_further_force_moves_a_curved_stand_in_as_it_says(given):
     assert np.max(np.abs(found - push)[20:-20]) < 0.01 * np.max(push)
     straight = force_of_change(replace(CURVED, cubic_N_per_m3=0.0), change, before)
     assert np.max(np.abs(straight - push)[20:-20]) > 0.1 * np.max(push)
+
+
+def test_what_has_no_spring_is_given_none():
+    """A free run shrank it to a rounding error, which any effect then changed manyfold."""
+    commands = [one + 0.3 * (TIME > 0.05) for one in INPUTS]
+    runs = [
+        # A valve that passes a little more than in proportion.
+        SimulatorRun(np.cumsum(9.5 * STEP_S * (u + 0.01 * u * abs(u))), NOTHING)
+        for u in commands
+    ]
+    assert fit_stand_in([signals(u) for u in commands], runs).stiffness_N_per_m == 0.0

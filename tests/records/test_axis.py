@@ -4,6 +4,7 @@ import pytest
 
 from hwid_cli.records.axis import (
     ROTARY_NAMES,
+    MotionUnits,
     base_of,
     check_axis,
     name_inside,
@@ -49,7 +50,7 @@ def test_units_turn_with_the_axis(unit, expected):
 
 
 def test_what_a_sensor_reads_has_its_unit():
-    read = {"axis": "rotary", "output": "velocity"}
+    read = {"axis": "rotary", "output": "velocity", "units": MotionUnits()}
     assert unit_of_effect("sensor_saturation", "m", **read) == "rad/s"
     assert unit_of_effect("sensor_drift", "m/s", **read) == "rad/s^2"
     # Ways are ways whatever is read.

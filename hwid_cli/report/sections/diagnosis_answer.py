@@ -135,7 +135,7 @@ def _effect_in_words(effect: FittedEffect, diagnosis: Diagnosis) -> str:
             unit,
             axis=diagnosis.axis,
             output=diagnosis.output,
-            source=diagnosis.input_unit,
+            units=diagnosis.units,
         )
         name = f"{quantity} " if len(effect.parameters) > 1 else ""
         values.append(f"{name}{value_with_interval(one, unit)}")
