@@ -12,7 +12,7 @@ from hwid_cli.data.odd_scales import odd_scales
 from hwid_cli.data.signal_features import LEAST_QUIET, find_onset
 from hwid_cli.errors import HwidError
 from hwid_cli.records.experiment import CalibrateOptions
-from hwid_cli.records.recordings import KINDS, RawRecording
+from hwid_cli.records.recordings import KINDS, CalibrationLog, RawRecording
 from hwid_cli.records.starter import Proposal
 from hwid_cli.records.units import behind
 from hwid_cli.stages.calibrate import calibrate_all
@@ -301,7 +301,21 @@ def _works(recipe: tuple[str, ...], kind: str, raws: Sequence[RawRecording]) -> 
     onsets = [find_onset(raw.input, quiet_is_rest=not is_random) for raw in raws]
     is_seen = all((onset or 0) >= LEAST_QUIET for onset in onsets)
     rests = is_seen and all(_begins_at_rest(raw) for raw in raws)
+    if not all(_begins_where_it_rests(*one) for one in zip(raws, logs, strict=True)):
+        return False
     return is_long and (rests or (differ and "output_offset" not in recipe))
+
+
+def _begins_where_it_rests(raw: RawRecording, log: CalibrationLog) -> bool:
+    """Whether what is kept begins at the level of the first samples.
+
+    Under a controller the input starts to move in the noise, later than the output.
+    """
+    first = log.first_sample
+    start, kept = (raw.output[row : row + LEAST_QUIET] for row in (0, first))
+    swing = float(np.nanmax(raw.output) - np.nanmin(raw.output))
+    moved = float(np.nanmean(kept) - np.nanmean(start))
+    return abs(moved) <= _ALIKE_LEVELS * swing
 
 
 def _of_kind(raw: RawRecording, kind: str) -> RawRecording:

@@ -164,3 +164,28 @@ def test_a_level_at_which_all_rest_stays_in_all_of_them(other_level, recipe):
     assert found.recipes["step"] == recipe
     is_kept = "the level at which the output rests, 21 m, stays" in found.recipe_reason
     assert is_kept == (recipe == ("cut",))
+
+
+def motor_under_speed_control(slope, seed=4):
+    """A slow ramp of the speed after 60 ms, and a stop; noise hides where it begins."""
+    rng = np.random.default_rng(seed)
+    wanted = slope * np.clip(np.arange(2500) - 60, 0, 700)
+    wanted[2000:] = 0.0
+    current, speed, found = 0.0, 0.0, []
+    for one in wanted:
+        read = speed + 0.1 * rng.standard_normal()
+        current = 0.3 * (one - read)
+        speed += 0.15 * current - 0.002 * speed
+        found.append((current, read))
+    return np.array(found).T
+
+
+@pytest.mark.parametrize(
+    ("slope", "recipe"), [(0.03, ()), (0.1, ("cut", "output_offset"))]
+)
+def test_a_ramp_under_a_controller_is_not_cut_where_it_moves_already(slope, recipe):
+    ramps = []
+    for name, sign in (("ramp_a", 1.0), ("ramp_b", -1.0)):
+        current, speed = motor_under_speed_control(sign * slope)
+        ramps.append(RawRecording(name, current, speed, 1e-3))
+    assert propose(ramps).recipes["step"] == recipe
