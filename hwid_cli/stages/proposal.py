@@ -307,14 +307,14 @@ def _works(recipe: tuple[str, ...], kind: str, raws: Sequence[RawRecording]) -> 
 
 
 def _begins_where_it_rests(raw: RawRecording, log: CalibrationLog) -> bool:
-    """Whether what is kept begins at the level of the first samples.
+    """Whether the output is still at its first level where the recipe cuts.
 
     Under a controller the input starts to move in the noise, later than the output.
     """
-    first = log.first_sample
-    start, kept = (raw.output[row : row + LEAST_QUIET] for row in (0, first))
+    first = max(log.first_sample, LEAST_QUIET)
+    start, end = raw.output[:LEAST_QUIET], raw.output[first - LEAST_QUIET : first]
     swing = float(np.nanmax(raw.output) - np.nanmin(raw.output))
-    moved = float(np.nanmean(kept) - np.nanmean(start))
+    moved = float(np.nanmean(end) - np.nanmean(start))
     return abs(moved) <= _ALIKE_LEVELS * swing
 
 
