@@ -152,14 +152,22 @@ def guess_time(columns: Sequence[FoundColumn]) -> TimeGuess:
         return TimeGuess(role, None, is_rough, named + why, notes, column)
     for title, step_s in stated:
         return TimeGuess(None, step_s, False, f"the file's {title}")
+    for title, step_s in _coarse_clocks(columns).items():
+        why = f"{title!r} shows whole ticks, each held for many samples"
+        note = (
+            f"NOT SURE: a sample every {step_s:.6g} s, if the samples between two ticks of "
+            f"{title!r} are evenly apart"
+        )
+        return TimeGuess(None, step_s, False, why, (note,))
     return TimeGuess(None, None, False, "nothing in the file tells the time")
 
 
 def unused_times(columns: Sequence[FoundColumn]) -> tuple[str, ...]:
     """Say why columns that are named after time are no clocks."""
     notes = []
-    for one in long_columns(columns):
-        if meaning_of(one.title, one.unit).role != "time" and not _is_in_time(one):
+    coarse = _coarse_clocks(columns)
+    for one in _named_after_time(columns):
+        if one.title in coarse:
             continue
         with np.errstate(invalid="ignore"):
             bad = np.flatnonzero(~(np.diff(one.values) > 0))
@@ -169,6 +177,25 @@ def unused_times(columns: Sequence[FoundColumn]) -> tuple[str, ...]:
             "export the file again"
         )
     return tuple(notes)
+
+
+def _named_after_time(columns: Sequence[FoundColumn]) -> list[FoundColumn]:
+    return [
+        one
+        for one in long_columns(columns)
+        if meaning_of(one.title, one.unit).role == "time" or _is_in_time(one)
+    ]
+
+
+def _coarse_clocks(columns: Sequence[FoundColumn]) -> dict[str, float]:
+    """Sample times in s that columns named after time tell by their large ticks."""
+    found = {}
+    for one in _named_after_time(columns):
+        unit = unit_of_column(one, "time") or unit_of_dates(one.values) or "s"
+        step = signs.coarse_clock_of(one.values)
+        if step is not None:
+            found[one.title] = step * (factor_between(unit, "s") or 1.0)
+    return found
 
 
 def clocks_of(

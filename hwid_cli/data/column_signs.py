@@ -48,6 +48,10 @@ class Clock:
     jitter: float
 
 
+# Ticks of a clock that shows large ones only.
+_FEWEST_TICKS = 2
+
+
 def clock_of(values: np.ndarray) -> Clock | None:
     """Clock that a column may be.
 
@@ -81,6 +85,40 @@ def clock_of(values: np.ndarray) -> Clock | None:
     if np.mean(off > MOST_JITTER) > MOST_GAPS:
         return None
     return Clock(median, float(off.max()))
+
+
+def coarse_clock_of(values: np.ndarray) -> float | None:
+    """Step from sample to sample of a clock that shows its large ticks only.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+
+    Returns
+    -------
+    float or None
+        None where ticks are not evenly apart, or hold unequal numbers of samples.
+
+    Examples
+    --------
+    >>> coarse_clock_of(np.repeat([10.0, 11.0, 12.0, 13.0], 500))
+    0.002
+    >>> coarse_clock_of(np.arange(2000.0)) is None
+    True
+    """
+    if values.size < _FEWEST or not np.isfinite(values).all():
+        return None
+    begins = np.flatnonzero(np.diff(values)) + 1
+    if begins.size < _FEWEST_TICKS:
+        return None
+    ticks = np.diff(values[begins])
+    # The first and the last one may be cut.
+    held = np.diff(begins)
+    ends = max(begins[0], values.size - begins[-1])
+    is_even = np.ptp(ticks) <= MOST_JITTER * ticks[0] and ticks[0] > 0
+    is_even = is_even and values[begins[0]] - values[0] == ticks[0]
+    is_even = is_even and np.ptp(held) <= 1 and held.min() > 1 and ends <= held.max()
+    return float(ticks.sum() / held.sum()) if is_even else None
 
 
 def restarts_of(values: np.ndarray) -> tuple[int, ...]:

@@ -499,6 +499,9 @@ def _beside(column: FoundColumn, columns: Sequence[FoundColumn]) -> list[FoundCo
     """Columns among which the clock of a signal is: those of its group, or to its left."""
     number = next(n for n, one in enumerate(columns) if one is column)
     clocks = [one for one, _, _ in clocks_of(columns)]
+    if not clocks:
+        # One that shows large ticks only is none, and tells the sample time.
+        return [one for one in columns if one.values.size == column.values.size]
     alike = [one for one in clocks if one.values.size == column.values.size]
     for one in alike:
         # When its publisher sampled a message, and not when it was recorded.

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from hwid_cli.data.column_roles import guess_signals, guess_time
+from hwid_cli.data.column_roles import guess_signals, guess_time, unused_times
 from hwid_cli.records.starter import FoundColumn
 
 N = 800
@@ -175,6 +175,33 @@ def test_a_counter_of_samples_is_no_time_where_an_interval_is_stated():
     interval = FoundColumn("Increment", "x", np.array([0.37]), None, "s")
     found = guess_time([column("time", 1.0 * np.arange(N)), interval])
     assert (found.role, found.sample_time_s) == (None, 0.37)
+
+
+def stamped(samples, first=0):
+    """A clock that shows whole seconds, 500 samples to each."""
+    return np.floor((first + np.arange(samples)) / 500.0 + 1e-9)
+
+
+@pytest.mark.parametrize("first", [0, 120])
+def test_stamps_of_whole_seconds_tell_the_sample_time(first):
+    columns = [column("timestamp", stamped(1700, first), "s"), column("u", VOLTAGE)]
+    found = guess_time(columns)
+    assert (found.role, found.sample_time_s) == (None, pytest.approx(0.002))
+    assert found.notes == (
+        "NOT SURE: a sample every 0.002 s, if the samples between two ticks of "
+        "'timestamp' are evenly apart",
+    )
+    assert unused_times(columns) == ()
+
+
+def test_stamps_that_are_held_unevenly_tell_nothing():
+    uneven = np.repeat(np.arange(4.0), [400, 500, 450, 300])
+    back = stamped(1700)[::-1]
+    gap = stamped(1700) + 3.0 * (np.arange(1700) >= 1000)
+    for values in (uneven, back, gap):
+        columns = [column("timestamp", values, "s"), column("u", VOLTAGE)]
+        assert guess_time(columns).sample_time_s is None
+        assert "NOT USED: 'timestamp'" in unused_times(columns)[0]
 
 
 def test_a_unit_says_more_than_a_plug_of_an_instrument():
