@@ -74,6 +74,10 @@ class ModelAnswer:
     advised_rmsd : float, [unit]
         Mean over ``recordings`` of the model of the same recordings at the recommended
         orders; NaN where there is none.
+    advised_name : str
+        Of that model; empty where there is none.
+    noise_rms : float, [unit]
+        White noise of ``recordings``, from differences of high order; NaN without any.
     """
 
     name: str
@@ -97,6 +101,8 @@ class ModelAnswer:
     maps: ChosenMaps | None = None
     has_these_maps: bool = True
     advised_rmsd: float = float("nan")
+    advised_name: str = ""
+    noise_rms: float = float("nan")
 
     @property
     def median_place(self) -> int:

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from hwid_cli.diagnosis.noise import differences_rms
 from hwid_cli.model.input_range import SAME_LEVEL, outside_share
 from hwid_cli.model.scores import fit_percent, rmsd
 from hwid_cli.model.simulate import validation_output
@@ -64,6 +65,7 @@ def model_answer(
         beside.fit.model if beside else None, unseen
     )
     maps = _maps(stored, advice)
+    advised = _at(advice, found, named, stored.nk_role)
     visited = _visited(found, stored.recordings)
     return ModelAnswer(
         name=name,
@@ -86,7 +88,9 @@ def model_answer(
         advice=advice,
         maps=maps,
         has_these_maps=maps is None or _has_maps(found, maps),
-        advised_rmsd=_at(advice, found, named, unseen, stored.nk_role),
+        advised_rmsd=_mean_rmsd(named.get(advised), unseen),
+        advised_name=advised,
+        noise_rms=differences_rms([one.output for one in unseen], 0.0) or np.nan,
     )
 
 
@@ -131,17 +135,23 @@ def _at(
     advice: OrderChoice | None,
     found: Fit,
     named: Mapping[str, Fit],
-    unseen: Sequence[Recording],
     nk_role: str,
-) -> float:
-    """Mean RMSD of the model of the same recordings at the recommended orders, [unit]."""
-    if advice is None or not unseen:
-        return np.nan
-    for one in named.values():
+) -> str:
+    """Name of the model of the same recordings at the recommended orders, if there is one."""
+    if advice is None:
+        return ""
+    for name, one in named.items():
         is_same = one.identified_on == found.identified_on
         if is_same and grid_place(one, nk_role) == _place(advice):
-            return float(np.mean(_scores(one.model, unseen)[0]))
-    return np.nan
+            return name
+    return ""
+
+
+def _mean_rmsd(fit: Fit | None, unseen: Sequence[Recording]) -> float:
+    """Mean RMSD of a model on recordings, [unit]; NaN without one of them."""
+    if fit is None or not unseen:
+        return np.nan
+    return float(np.mean(_scores(fit.model, unseen)[0]))
 
 
 def _place(advice: OrderChoice) -> tuple[int, int]:

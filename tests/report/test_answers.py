@@ -351,6 +351,24 @@ def test_recommended_orders_and_maps_are_said(contents):
     assert "input_map: none, output_map: none" in given.next_steps[1][0]
 
 
+@pytest.mark.parametrize(("share", "is_said"), [(0.79, True), (0.81, False)])
+def test_a_far_nearer_model_of_the_recommended_orders_is_pointed_to(
+    contents, share, is_said
+):
+    own = contents.answer.mean_rmsd
+    found = answered(contents, advised_rmsd=share * own, advised_name="step_06/2/4")
+    told = plain(found.details[1])
+    assert "At these orders, step_06/2/4, the RMSD is" in told
+    assert ("Look at step_06/2/4 too" in told) is is_said
+
+
+@pytest.mark.parametrize(("share", "is_said"), [(0.3, True), (1e-4, False)])
+def test_noise_is_said_where_it_is_part_of_the_rmsd(contents, share, is_said):
+    found = answered(contents, noise_rms=share * contents.answer.mean_rmsd)
+    assert ("The noise of these recordings is about" in found.details[0]) is is_said
+    assert "The noise" not in answered(contents, noise_rms=np.nan).details[0]
+
+
 def test_a_model_above_the_threshold_is_not_settled(contents):
     fit = {"fit_percent": np.array([95.0]), "linear_rmsd": np.array([3e-2])}
     low = answered(contents, rmsd=np.array([1e-3]), threshold=0.01, **fit)

@@ -12,6 +12,7 @@ from hwid_cli.records.experiment import OrderOptions, OrdersOptions
 from hwid_cli.records.order import OrderAdvice
 from hwid_cli.records.report import StoredResults
 from hwid_cli.stages.answer import model_answer
+from hwid_cli.stages.model_views import named_fits
 from hwid_cli.stages.order import recommend_orders
 from hwid_cli.tasks.cache import MemoryStore
 from hwid_cli.tasks.runner import RunSettings, run_tasks
@@ -171,6 +172,23 @@ def test_the_recommended_orders_are_judged_where_the_model_is(stored):
     ]
 
     assert found.advised_rmsd == pytest.approx(np.mean(by_hand), rel=1e-12)
+    assert named_fits(few)[found.advised_name] is own[0]
+
+
+def test_the_noise_is_that_of_the_recordings_that_judge(stored):
+    found = answer_of(stored)
+    rng = np.random.default_rng(3)
+    size = 0.1 * float(np.std(stored.recordings[0].output))
+    noisy = tuple(
+        replace(one, output=one.output + size * rng.standard_normal(one.output.size))
+        for one in stored.recordings
+    )
+    calibrated = replace(stored.results["calibrate"], recordings=noisy)
+    results = {**stored.results, "calibrate": calibrated}
+    louder = answer_of(replace(stored, results=results))
+    assert louder.recordings == found.recordings
+    assert louder.noise_rms == pytest.approx(size, rel=0.1)
+    assert found.noise_rms < 0.1 * size
 
 
 def test_without_a_tensor_the_best_fit_is_taken_and_simulated_elsewhere(stored):

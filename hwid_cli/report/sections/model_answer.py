@@ -29,6 +29,10 @@ _MOST_ROWS, _MOST_POINTS = 6, 2000
 _HEIGHT = 170
 # Shares of samples beyond what the fit has visited that need no word, [-].
 _FEW = 0.005
+# Noise below this share of the RMSD needs no word either, [-].
+_NO_NOISE = 1e-3
+# The model of the recommended orders is worth a look below this share of the RMSD, [-].
+_FAR_NEARER = 0.8
 # Stages whose results choose the model.
 _STAGES = ("identify", "crossval", "group", "test")
 
@@ -151,7 +155,18 @@ def _model(found: ModelAnswer) -> str:
             f" {below} of {found.rmsd.size} below the threshold of "
             f"{with_unit(found.threshold, found.unit)}."
         )
-    return text + _spread(found)
+    return text + _noise(found) + _spread(found)
+
+
+def _noise(found: ModelAnswer) -> str:
+    """How much of the RMSD is noise, where that is worth a word."""
+    if not found.noise_rms >= _NO_NOISE * found.mean_rmsd:
+        return ""
+    size = with_unit(found.noise_rms, found.unit)
+    return (
+        f" The noise of these recordings is about {size} (sixth differences, as if white): "
+        "no model comes below that."
+    )
 
 
 def _orders(found: ModelAnswer, nk_role: str) -> str:
@@ -191,7 +206,16 @@ def _at_these(found: ModelAnswer) -> str:
         with_unit(one, found.unit) for one in (found.advised_rmsd, found.mean_rmsd)
     )
     mean = "mean RMSD" if len(found.recordings) > 1 else "RMSD"
-    return f" At these orders the {mean} is {advised}, that of this model {own}."
+    return f" At these orders, {found.advised_name}, the {mean} is {advised}, that of this model {own}.{_nearer(found)}"
+
+
+def _nearer(found: ModelAnswer) -> str:
+    """Point to the model of the recommended orders where it is far nearer."""
+    if not found.advised_rmsd < _FAR_NEARER * found.mean_rmsd:
+        return ""
+    return (
+        f" Look at {found.advised_name} too: it does not win where models are chosen."
+    )
 
 
 def _trust(found: ModelAnswer) -> str:
