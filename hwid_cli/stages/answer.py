@@ -4,6 +4,7 @@ The choice never looks at the recordings of the final test: those say how good i
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -61,16 +62,13 @@ def model_answer(
         found, fits.values(), stored.recordings, roles, run, nk_role=stored.nk_role
     )
     deviation, percent = _scores(found.model, unseen)
-    linear_deviation, linear_percent = _scores(
-        beside.fit.model if beside else None, unseen
-    )
-    maps = _maps(stored, advice)
-    advised = _at(advice, found, named, stored.nk_role)
-    visited = _visited(found, stored.recordings)
-    return ModelAnswer(
+    linear = beside.fit.model if beside else None
+    linear_deviation, linear_percent = _scores(linear, unseen)
+    maps, visited = _maps(stored, advice), _visited(found, stored.recordings)
+    answer = ModelAnswer(
         name=name,
         model=found.model,
-        linear=beside.fit.model if beside else None,
+        linear=linear,
         linear_name=beside.name if beside else "",
         linear_ratio=beside.ratio if beside else np.nan,
         own=own,
@@ -88,10 +86,10 @@ def model_answer(
         advice=advice,
         maps=maps,
         has_these_maps=maps is None or _has_maps(found, maps),
-        advised_rmsd=_mean_rmsd(named.get(advised), unseen),
-        advised_name=advised,
         noise_rms=differences_rms([one.output for one in unseen], 0.0) or np.nan,
     )
+    name = _at(advice, found, named, stored.nk_role)
+    return _with_advised(answer, name, named.get(name), unseen)
 
 
 def _threshold(judged: CrossValidation | FinalTest | None) -> float:
@@ -147,11 +145,14 @@ def _at(
     return ""
 
 
-def _mean_rmsd(fit: Fit | None, unseen: Sequence[Recording]) -> float:
-    """Mean RMSD of a model on recordings, [unit]; NaN without one of them."""
+def _with_advised(
+    answer: ModelAnswer, name: str, fit: Fit | None, unseen: Sequence[Recording]
+) -> ModelAnswer:
+    """The answer with what the model of the recommended orders leaves there."""
     if fit is None or not unseen:
-        return np.nan
-    return float(np.mean(_scores(fit.model, unseen)[0]))
+        return answer
+    mean = float(np.mean(_scores(fit.model, unseen)[0]))
+    return replace(answer, advised_name=name, advised_rmsd=mean)
 
 
 def _place(advice: OrderChoice) -> tuple[int, int]:
