@@ -17,6 +17,10 @@ class MeasurementError(HwidError):
     """A measurement file cannot be used as it is."""
 
 
+class MissingColumnError(MeasurementError):
+    """A measurement file lacks a column that is asked for."""
+
+
 class CacheError(HwidError):
     """The cache or a results file cannot be read or written."""
 

@@ -255,6 +255,16 @@ _STARTS = ("fitted", "steady", "empty")
     "measured, and say how much of the prediction rests on data.",
 )
 @click.option(
+    "--input",
+    "input_column",
+    metavar="NAME",
+    help="Column of the input, where the file names it otherwise than the model's own "
+    "files; a number counts as in a configuration.",
+)
+@click.option(
+    "--time", "time_column", metavar="NAME", help="The same for the column of the time."
+)
+@click.option(
     "--table",
     metavar="NAME",
     help="Sheet, group, struct or array of the file that holds the input, where there are "

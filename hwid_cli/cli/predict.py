@@ -7,7 +7,12 @@ import click
 from hwid_cli.export.json_reader import read_exported
 from hwid_cli.export.loading import check_trust
 from hwid_cli.export.predict import predict, predict_band
-from hwid_cli.export.prediction import check_target, read_input, write_prediction
+from hwid_cli.export.prediction import (
+    InputSource,
+    check_target,
+    read_input,
+    write_prediction,
+)
 from hwid_cli.files.messages import escaped
 from hwid_cli.model.input_range import SAME_LEVEL, outside_share
 from hwid_cli.records.exported import Exported, ExportedModel
@@ -34,13 +39,16 @@ def predict_file(  # noqa: PLR0913 - one for each option of the command
     run_own_functions: bool,
     band: bool,
     table: str | None,
+    input_column: str | None,
+    time_column: str | None,
 ) -> None:
     """Predict the output for an input, with an exported model."""
     exported = read_exported(model)
     check_trust(exported, model, is_trusted=run_own_functions)
     for function in _functions(exported):
         click.echo(f"{escaped(str(model))}: runs {described(function)}")
-    time, values = read_input(input_file, exported, table)
+    source = InputSource(table, input_column, time_column)
+    time, values = read_input(input_file, exported, source)
     check_target(out, (model, input_file), is_forced=force)
     card = exported.card
     signal = values * card.input_scale

@@ -36,7 +36,7 @@ from hwid_cli.data.table_columns import (
     with_unit,
 )
 from hwid_cli.data.table_heads import TableHead, is_quantity, read_head
-from hwid_cli.errors import MeasurementError
+from hwid_cli.errors import MeasurementError, MissingColumnError
 from hwid_cli.records.experiment import Columns
 from hwid_cli.records.starter import FoundColumn
 
@@ -365,7 +365,7 @@ def _find(sheet: _Sheet, key: str | int, role: str) -> int:
             len(sheet.rows[min(sheet.head.body, len(sheet.rows) - 1)]), sheet.width
         )
         if key >= width:
-            raise MeasurementError(
+            raise MissingColumnError(
                 f"{sheet.path}: has no column {key} for the {role}; expected a number "
                 f"from 0 to {width - 1}; correct recordings.columns.{role}"
             )

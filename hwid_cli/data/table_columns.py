@@ -17,7 +17,7 @@ from hwid_cli.data.cells import (
 from hwid_cli.data.columns import MeasuredColumn
 from hwid_cli.data.table_heads import TableHead
 from hwid_cli.data.units import unit_in_name
-from hwid_cli.errors import MeasurementError
+from hwid_cli.errors import MeasurementError, MissingColumnError
 from hwid_cli.files.messages import is_plain, shown
 from hwid_cli.files.suggestions import did_you_mean
 from hwid_cli.records.starter import FoundColumn
@@ -217,7 +217,7 @@ def column_named(key: str, header: Sequence[str], role: str, place: str) -> int:
         said = did_you_mean(key, [name for name in header if name])
         # A name that was nearly right says what to do by itself.
         step = "" if said.endswith("?") else "; name one of them, or rename the column"
-        raise MeasurementError(
+        raise MissingColumnError(
             f"{place}: has no column {key!r} for the {role}; {said}{step}"
         )
     return header.index(key)

@@ -2,7 +2,7 @@
 
 import csv
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +10,7 @@ import numpy as np
 from hwid_cli.data.columns import MeasuredColumn, keep_rows, place_of
 from hwid_cli.data.formats import read_columns, tables_of
 from hwid_cli.data.units import factor_between, in_unit, is_unitless
-from hwid_cli.errors import ConfigError, MeasurementError
+from hwid_cli.errors import ConfigError, MeasurementError, MissingColumnError
 from hwid_cli.files.csv_tables import write_table_csv
 from hwid_cli.records.experiment import Columns
 from hwid_cli.records.exported import Exported, ModelCard
@@ -24,18 +24,35 @@ _LISTED = 3
 _LONGEST_HEADER = 10_000
 
 
+@dataclass(frozen=True)
+class InputSource:
+    """Where a file holds the input, other than the model's own files do.
+
+    Parameters
+    ----------
+    table : str or None
+        Sheet, group, struct or array; None takes that of the model's own files, or the
+        only one.
+    input, time : str or None
+        Columns by name, or by number as in a configuration.
+    """
+
+    table: str | None = None
+    input: str | None = None
+    time: str | None = None
+
+
 def read_input(
-    path: Path, exported: Exported, table: str | None = None
+    path: Path, exported: Exported, source: InputSource | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Read time and input as a model's file names them.
+    """Read time and input as a model's file names them, or as they are named here.
 
     Parameters
     ----------
     path : Path
         CSV, MAT, NPZ or H5.
-    table : str or None
-        Sheet, group, struct or array of it; None takes that of the model's own files, or
-        the only one.
+    source : InputSource or None
+        Where they are in it; None as in the model's own files.
 
     Returns
     -------
@@ -56,7 +73,9 @@ def read_input(
         raise MeasurementError(
             f"{path}: no such file; expected measurements of the input; correct the path"
         )
-    columns, step = exported.card.columns, exported.sample_time_s
+    source = source or InputSource()
+    columns = _named_in(exported.card.columns, source)
+    step = exported.sample_time_s
     # Nobody knows the output yet: the input's column stands in for it.
     wanted = Columns(
         input=columns.input,
@@ -64,7 +83,10 @@ def read_input(
         time=columns.time,
         variable=columns.variable,
     )
-    found = read_columns(path, _in_table(path, wanted, table))
+    try:
+        found = read_columns(path, _in_table(path, wanted, source.table))
+    except MissingColumnError as error:
+        raise MeasurementError(f"{error}{_other_names(columns, source)}") from None
     _check_numbers(path, found.input)
     values = _as_in_its_files(path, found.input, exported.card)
     if found.time is None:
@@ -80,6 +102,27 @@ def read_input(
     _check_numbers(path, time)
     _check_steps(path, time, step)
     return time.values, values
+
+
+def _named_in(columns: Columns, source: InputSource) -> Columns:
+    def key(name: str) -> str | int:
+        return int(name) if name.isdigit() else name
+
+    if source.input is not None:
+        columns = replace(columns, input=key(source.input))
+    if source.time is not None:
+        columns = replace(columns, time=key(source.time))
+    return columns
+
+
+def _other_names(columns: Columns, source: InputSource) -> str:
+    """What to do where a column of the model's own files is missing."""
+    if source.input is not None:
+        return ""
+    return (
+        f"; the model's own files call the input {columns.input!r}: --input NAME says "
+        "another name, --time NAME that of the time"
+    )
 
 
 def _in_table(path: Path, wanted: Columns, table: str | None) -> Columns:

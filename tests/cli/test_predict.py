@@ -66,6 +66,33 @@ def test_a_prediction_is_what_simulate_gives(start, model, tmp_path):
     assert np.array_equal(predicted(out), expected)
 
 
+@pytest.mark.parametrize("names", [("U_cmd", "t"), ("1", "0")])
+def test_columns_may_have_other_names_than_in_the_models_files(names, model, tmp_path):
+    given = write_input(tmp_path / "u.csv", example_input(1))
+    expected = tmp_path / "expected.csv"
+    assert predict(model, given, "--out", expected).exit_code == 0
+    other = tmp_path / "other.csv"
+    other.write_text(given.read_text().replace("time_s,current_A", "t,U_cmd"))
+
+    refused = predict(model, other, "--out", tmp_path / "p.csv")
+    assert refused.exit_code != 0
+    assert (
+        "call the input 'current_A': --input NAME says another name" in refused.stderr
+    )
+    found = predict(
+        model,
+        other,
+        "--out",
+        tmp_path / "p.csv",
+        "--input",
+        names[0],
+        "--time",
+        names[1],
+    )
+    assert found.exit_code == 0, found.stderr
+    assert np.array_equal(predicted(tmp_path / "p.csv"), predicted(expected))
+
+
 def test_prediction_csv_lies_here_unless_told(model, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     write_input(tmp_path / "u.csv", np.ones(3))

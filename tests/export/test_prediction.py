@@ -5,7 +5,7 @@ import pytest
 from hwid_cli import HammersteinWiener
 from hwid_cli.errors import MeasurementError, ModelFileError
 from hwid_cli.export.predict import predict
-from hwid_cli.export.prediction import read_input, write_prediction
+from hwid_cli.export.prediction import InputSource, read_input, write_prediction
 from hwid_cli.records.experiment import Columns
 from hwid_cli.records.exported import ModelCard
 from hwid_cli.records.maps import StaticMap
@@ -126,10 +126,10 @@ def test_of_several_tables_one_is_chosen(of_tables, tmp_path):
     ):
         read_input(path, of_tables)
 
-    _, values = read_input(path, of_tables, "runs/b")
+    _, values = read_input(path, of_tables, InputSource("runs/b"))
     assert np.array_equal(values, [3.0, 4.0])
     with pytest.raises(MeasurementError, match="no variable 'c'"):
-        read_input(path, of_tables, "c")
+        read_input(path, of_tables, InputSource("c"))
 
 
 def with_poles(*poles):
