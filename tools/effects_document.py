@@ -60,7 +60,7 @@ Y largest reading of the sensor (X, or V where a velocity is measured).
 """
 CHANGE = "parameter_change"
 CHANGE_SENTENCE = (
-    "The stiffness, the force constant or the damping differs from recording to recording by more than chance. "
+    "The stiffness, the force constant, the damping or the mass (a load) differs from recording to recording by more than chance. "
     "Each recording gets its own value; the report gives which parameter and the relative standard deviation (`spread`)."
 )
 

@@ -359,6 +359,7 @@ def _recording_gaps(
     def rms(sse: np.ndarray, row: int) -> float:
         return float(np.sqrt(sse[row] / problem.signals[row].n_evaluated))
 
+    factors = _own_factors(chosen)
     return tuple(
         RecordingGap(
             one.name,
@@ -367,9 +368,25 @@ def _recording_gaps(
             rms(given_sse, row),
             rms(base.sse, row),
             rms(chosen.sse, row),
+            float(factors[row]),
         )
         for row, one in enumerate(problem.signals)
     )
+
+
+def _own_factors(found: CandidateFit) -> np.ndarray:
+    """Of each recording, the factor of the parameter that differs, over their mean.
+
+    Returns
+    -------
+    ndarray, shape (n_recordings,), [-]
+        NaN where none does; of several parameters the first one's.
+    """
+    columns = [row for row, one in enumerate(found.own_names) if is_factor(one)]
+    if not columns:
+        return np.full(found.sse.size, np.nan)
+    factors = np.exp(found.own[:, columns[0]])
+    return np.asarray(factors / np.mean(factors))
 
 
 def _overlays(

@@ -190,6 +190,8 @@ class RecordingGap:
     ----------
     rms_given, rms_before, rms_after : float, [output unit]
         Simulation as given, base re-fitted, with the effects.
+    factor : float, [-]
+        Over its mean, the parameter that differs between recordings; NaN where none does.
     """
 
     name: str
@@ -198,6 +200,7 @@ class RecordingGap:
     rms_given: float
     rms_before: float
     rms_after: float
+    factor: float = field(default=float("nan"), metadata=ADDED_LATER)
 
 
 @dataclass(frozen=True)

@@ -23,6 +23,8 @@ from hwid_cli.report.table import Column, Heading, Table, Text, numbers, texts
 # What a unit in a name is made of.
 _UNITS = {"N", "m", "kg", "A", "V", "H", "ohm", "s", "Hz", "rad", "deg"}
 _PER = "per"
+# Recordings whose factors are listed.
+_MOST_FACTORS = 12
 
 
 def quantity_and_unit(name: str) -> tuple[str, str]:
@@ -303,21 +305,48 @@ def ranking_table(diagnosis: Diagnosis, *, count: int | None = None) -> Table:
 def recordings_table(diagnosis: Diagnosis) -> Table:
     """Show the gap in every recording."""
     heads = ["given", "re-fitted", "with the effects"]
+    heads = heads if diagnosis.effects else heads[:-1]
+    changing = _changing(diagnosis)
+    heads += [f"{changing} over its mean"] if changing else []
     rows = []
     for one in diagnosis.gaps:
         values = [one.rms_given, one.rms_before, one.rms_after]
         if not diagnosis.effects:
             values.pop()
         use = "validation" if one.is_held_out else "training"
-        rows.append((one.name, one.kind, use, *map(number, values)))
+        factor = [f"{one.factor:.3f}"] if changing else []
+        rows.append((one.name, one.kind, use, *map(number, values), *factor))
     return Table(
         f"RMS gap of every recording [{diagnosis.output_unit}]",
         (
             *texts("recording", "kind", "used for"),
-            *numbers(*(heads if diagnosis.effects else heads[:-1])),
+            *numbers(*heads),
         ),
         tuple(rows),
     )
+
+
+def _change_sentences(diagnosis: Diagnosis) -> list[str]:
+    """Say what the parameter that differs is in every recording, the largest first."""
+    changing = _changing(diagnosis)
+    gaps = sorted(diagnosis.gaps, key=lambda one: -one.factor)
+    if not changing or not gaps or not np.isfinite(gaps[0].factor):
+        return []
+    told = [f"{one.name} {one.factor:.3f}" for one in gaps[:_MOST_FACTORS]]
+    rest = "; all in gaps.csv" if len(gaps) > _MOST_FACTORS else ""
+    return [f"The {changing} over its mean: {', '.join(told)}{rest}."]
+
+
+def _changing(diagnosis: Diagnosis) -> str:
+    """Which parameter differs between recordings; empty where none does."""
+    which = (
+        one.text
+        for effect in diagnosis.effects
+        if effect.id == "parameter_change"
+        for one in effect.parameters
+        if one.text
+    )
+    return next(which, "")
 
 
 def closing_sentences(diagnosis: Diagnosis) -> list[str]:
@@ -528,6 +557,7 @@ def diagnosis_blocks(
         blocks += [Text(f"Formula: {diagnosis.law.formula}"), law_table(diagnosis.law)]
     elif diagnosis.effects:
         blocks.append(effects_table(diagnosis))
+        blocks += [Text(one) for one in _change_sentences(diagnosis)]
     blocks.append(gap_table(diagnosis))
     if not is_short and diagnosis.places:
         places = [Text(f"- {one.sentence}") for one in diagnosis.places[:_MOST_SHOWN]]

@@ -325,6 +325,7 @@ GAPS_COLUMNS = (
     "rms_given",
     "rms_before",
     "rms_after",
+    "factor",
 )
 SIMULATED_COLUMNS = ("time_s", "input", "measured", "simulated")
 _STAGE = "diagnose"
@@ -391,6 +392,7 @@ def write_diagnosis_tables(folder: Path, diagnosis: Diagnosis) -> None:
             gap.rms_given,
             gap.rms_before,
             gap.rms_after,
+            gap.factor,
         )
         for gap in diagnosis.gaps
     )

@@ -215,6 +215,18 @@ def test_every_recording_has_its_row():
     assert rows[1][2] == "training"
 
 
+def test_what_differs_between_recordings_has_a_column():
+    which = FittedParameter("which", NAN, text="mass")
+    change = FittedEffect("parameter_change", "", "", (which,))
+    gaps = tuple(replace(one, factor=1.25) for one in named().gaps)
+    changed = replace(named(), effects=(change,), gaps=gaps)
+    table = recordings_table(changed)
+    assert table.columns[-1].head == "mass over its mean"
+    assert table.rows[0][-1] == "1.250"
+    assert "The mass over its mean: step_00 1.250" in diagnosis_text(changed, 200)
+    assert len(recordings_table(named()).columns) == len(table.columns) - 1
+
+
 def test_the_closing_sentences_end_once():
     assert closing_sentences(named()) == [
         "These data cannot tell it from: stribeck_friction, hysteresis + cogging.",

@@ -25,24 +25,29 @@ VOLTAGE = {"resistance_ohm": 2.0, "inductance_H": 2e-3, "back_emf_V_s_per_m": 5.
 
 
 @pytest.mark.thorough
-def test_a_change_between_recordings_is_extended_by_its_word():
+@pytest.mark.parametrize(
+    ("word", "name"), [("stiffness", "stiffness_N_per_m"), ("mass", "mass_kg")]
+)
+def test_a_change_between_recordings_is_extended_by_its_word(word, name):
     factors = 1 + 0.05 * np.sin(2.1 * np.arange(9))
-    given = recordings(
-        own=lambda number, drive: replace(
-            drive, stiffness_N_per_m=1184.0 * factors[number]
-        )
-    )
+
+    def changed(number, drive):
+        return replace(drive, **{name: getattr(drive, name) * factors[number]})
+
+    given = recordings(own=changed)
     found = diagnosed(given, effects=("parameter_change", "coulomb_friction"))
     assert [one.id for one in found.effects] == ["parameter_change"]
     which, spread = found.effects[0].parameters
-    assert which.text == "stiffness"
+    assert which.text == word
     true = factors.std(ddof=1) / factors.mean()
     # Every factor is known to some 0.1 %.
     assert spread.value == pytest.approx(true, rel=0.05)
     assert spread.low < true < spread.high
+    told = [one.factor for one in found.gaps]
+    np.testing.assert_allclose(told, factors / factors.mean(), atol=5e-3)
 
     extended = extended_options(found, simulation())
-    assert extended.effects["parameter_change"]["which"] == "stiffness"
+    assert extended.effects["parameter_change"]["which"] == word
     assert diagnosed(given, extended, effects=("coulomb_friction",)).verdict == "none"
 
 
