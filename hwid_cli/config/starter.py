@@ -58,9 +58,29 @@ def draft_experiment(layout: FolderLayout, folder: Path) -> Experiment:
     return experiment_of(content, str(source))
 
 
+# Folders of any experiment: the one around them has its name.
+_OF_ANY = (
+    "data",
+    "daten",
+    "raw",
+    "csv",
+    "logs",
+    "recordings",
+    "measurements",
+    "messungen",
+)
+
+
 def starter_name(folder: Path) -> str:
-    """Name of an experiment after the folder of its measurements."""
-    name = folder.resolve().name
+    """Name of an experiment after the folder of its measurements.
+
+    Examples
+    --------
+    >>> starter_name(Path("/lab/gripper/data")), starter_name(Path("/lab/axis 2"))
+    ('gripper', 'axis_2')
+    """
+    path = folder.resolve()
+    name = path.parent.name if path.name.lower() in _OF_ANY else path.name
     kept = "".join(c if c.isalnum() or c in "-_" else "_" for c in name).strip("_")
     return kept or "measurements"
 
