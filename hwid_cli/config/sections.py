@@ -49,6 +49,8 @@ from hwid_cli.records.rules import OtherForm, Refusal, Refused, Rule, StandsFor
 
 # A path of Linux has no more; a text of a configuration needs no more.
 _LONGEST_TEXT = 4096
+# As many languages write it.
+_DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+")
 # As a number with its unit, or in quotes, does.
 _BEGINS_WITH_NUMBER = re.compile(r"\s*[-+]?\.?\d")
 # What 64 bits hold.
@@ -337,6 +339,8 @@ def _step(kind: str, value: Any) -> str:
     if kind == "string_type" and value is not None:
         return "" if isinstance(value, list | dict) else "put it in quotes"
     is_number = _EXPECTED[kind] in (_WORDS[int], _WORDS[float])
+    if is_number and isinstance(value, str) and _DECIMAL_COMMA.fullmatch(value):
+        return f"write {value.replace(',', '.')}, with a decimal point"
     if is_number and isinstance(value, str) and _BEGINS_WITH_NUMBER.match(value):
         return "write the number alone, without quotes or a unit"
     return ""

@@ -144,6 +144,10 @@ def test_source_is_the_path_as_given_and_no_key(load, write_config):
             "without quotes or a unit",
         ),
         (
+            "crossval: {threshold: '0,2'}",
+            r"found '0,2'; expected a finite number; write 0.2, with a decimal point",
+        ),
+        (
             "fit: {units: '3'}",
             r"found '3'; expected an integer; write the number alone",
         ),
