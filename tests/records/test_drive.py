@@ -74,4 +74,5 @@ def test_what_is_fitted_are_fields_of_the_drive():
     assert set(BASE_PARAMETERS) <= set(vars(Drive()))
     assert "mass_kg" not in BASE_PARAMETERS
     for which in CHANGING:
-        assert any(name.startswith(which) for name in BASE_PARAMETERS)
+        # The mass is held in a fit; between recordings it may differ.
+        assert any(name.startswith(which) for name in (*BASE_PARAMETERS, "mass_kg"))
