@@ -353,6 +353,24 @@ def test_the_diagnosis_begins_as_the_recordings_do(folder, tmp_path, rest, rule)
     assert load_experiment(out).diagnose.initial_state == rule
 
 
+def test_stamps_of_whole_seconds_are_no_rows_to_sort(folder, tmp_path):
+    time = np.arange(1700) * 0.002
+    for number, size in enumerate((1.0, -2.0, 1.5)):
+        u = size * (time > 0.2)
+        y = size * np.clip((time - 0.2) / 0.5, 0.0, 1.0)
+        rows = [
+            f"2026-05-04 10:00:{int(t + 1e-9):02d},{a:.3f},{b:.5f}"
+            for t, a, b in zip(time, u, y, strict=True)
+        ]
+        text = "\n".join(["timestamp,current_A,pos_mm", *rows])
+        (folder / f"step_{number}.csv").write_text(text + "\n")
+    out = tmp_path / "mine.yaml"
+    result = invoke("init", folder, "--out", out)
+    assert "sample time 0.002 s: 'timestamp' shows whole ticks" in result.stdout
+    assert "sort the rows" not in result.stdout
+    assert load_experiment(out).recordings.sample_time_s == 0.002
+
+
 def test_steps_that_keep_their_rest_start_in_equilibrium(folder, tmp_path):
     write_german_csv(folder)
     (folder / "Rauschen_1.csv").unlink()

@@ -198,7 +198,8 @@ def test_stamps_that_are_held_unevenly_tell_nothing():
     uneven = np.repeat(np.arange(4.0), [400, 500, 450, 300])
     back = stamped(1700)[::-1]
     gap = stamped(1700) + 3.0 * (np.arange(1700) >= 1000)
-    for values in (uneven, back, gap):
+    late = np.repeat(np.arange(4.0), [900, 500, 500, 300])
+    for values in (uneven, back, gap, late):
         columns = [column("timestamp", values, "s"), column("u", VOLTAGE)]
         assert guess_time(columns).sample_time_s is None
         assert "NOT USED: 'timestamp'" in unused_times(columns)[0]

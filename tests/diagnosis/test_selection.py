@@ -482,6 +482,10 @@ def test_a_limit_case_is_a_rival_only_beside_a_law_that_is_not_quite_right():
     assert rivals(CRITERIA, [best, far], best) == []
     complete = made_up(STRIBECK, 200.0, whiteness=0.5)
     assert rivals(CRITERIA, [complete, limit], complete) == []
+    # Nor one that is as good: it was chosen among what may be named.
+    tied = after(-1.0, COULOMB)
+    assert CRITERIA.gain(complete, tied) < TIE
+    assert rivals(CRITERIA, [complete, tied], complete) == []
 
 
 @pytest.mark.parametrize(("explained", "word"), [(0.4, "ambiguous"), (0.2, "named")])
@@ -492,6 +496,9 @@ def test_a_limit_case_that_may_not_be_named_itself_is_a_rival(explained, word):
     verdict = decided(base(350.0), [wide, limit], [wide])
     assert verdict.chosen is wide
     assert verdict.word == word
+    # What may as well not be there is no rival.
+    none = decided(base(350.0), [wide, limit], [wide], unclear=COULOMB)
+    assert none.word == "named"
 
 
 NAMED = made_up(("coulomb_friction",), 110.0, whiteness=0.6)

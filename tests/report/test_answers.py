@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from hwid_cli.records.answer import ChosenMaps
+from hwid_cli.records.axis import MotionUnits
 from hwid_cli.records.diagnosis import BaseParameter, FittedParameter, Gap
 from hwid_cli.records.report import ReportContents, StageRun, StoredResults
 from hwid_cli.report.html import report_page
@@ -58,6 +59,9 @@ def test_a_named_effect_is_said_with_its_size_and_interval():
     # force_N of the example is 0.81 with 0.79 to 0.83.
     assert plain(found.verdict).startswith("The simulation lacks Coulomb friction: ")
     assert " N [" in plain(found.verdict)
+    # Of a simulation that takes a voltage and gives millimetres.
+    volts = answer_to(replace(named(), units=MotionUnits("V", "mm", "V")))
+    assert " V [" in plain(volts.verdict)
     assert found.is_settled
     assert "were never trained on" in found.details[0]
     assert "times the noise" in found.details[0]

@@ -4,6 +4,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from hwid_cli.records.axis import MotionUnits
 from hwid_cli.records.diagnosis import (
     FittedEffect,
     FittedParameter,
@@ -75,6 +76,8 @@ def test_the_effects_have_values_intervals_and_units():
         ("parameter_change", "which", "stiffness", "-", "-"),
         ("clock_skew", "ratio", "1.000120", "1.000100 to 1.000140", "-"),
     )
+    volts = replace(named(), effects=(DRAG,), units=MotionUnits("V", "mm", "V"))
+    assert effects_table(volts).rows[0][-1] == "V s^2/mm^2"
 
 
 def test_the_gap_closes_row_by_row():

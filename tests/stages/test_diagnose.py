@@ -134,6 +134,7 @@ def test_slow_ramps_with_noise_cannot_tell_a_delay_from_a_lag():
     found = diagnosed(slow_ramps(4e-4), effects=two)
     assert found.verdict == "ambiguous"
     assert {found.effects[0].id, *found.ambiguous_with} == set(two)
+    assert f", or instead {found.ambiguous_with[0]}: with the first" in found.summary
     assert "cannot tell" in found.summary
     assert found.next_experiment.input
 
