@@ -40,7 +40,8 @@ EFFECTS = tuple(
         ),
         words={"which": which},
         confused_with={"force_constant_saturation": "repeats of the same recording"},
-        needs_spring=which == "stiffness",
+        # A free axis hardly tells a load from another force constant.
+        needs_spring=which in ("stiffness", "mass"),
     )
     for which in CHANGING
 )
