@@ -30,6 +30,8 @@ MOST_REPEATED = 0.01
 _FEWEST = 20
 # Recordings in one file, and the largest ratio of their steps.
 _MOST_RESTARTS, _SAME_STEP = 1000, 1.02
+# Ticks of a clock that shows large ones only.
+_FEWEST_TICKS = 2
 
 
 @dataclass(frozen=True)
@@ -46,10 +48,6 @@ class Clock:
 
     step: float
     jitter: float
-
-
-# Ticks of a clock that shows large ones only.
-_FEWEST_TICKS = 2
 
 
 def clock_of(values: np.ndarray) -> Clock | None:
