@@ -36,8 +36,9 @@ _DRIVE = "hwid_cli.drive"
 MODULES = (
     f"{_DRIVE}.interpreter",
     f"{_DRIVE}.command",
-    f"{_DRIVE}.controller",
     f"{_DRIVE}.motion.push",
+    f"{_DRIVE}.output",
+    f"{_DRIVE}.controller",
     f"{_DRIVE}.motion.forces",
     f"{_DRIVE}.motion.corners",
     f"{_DRIVE}.motion.curved",
@@ -45,7 +46,6 @@ MODULES = (
     f"{_DRIVE}.motion.events",
     f"{_DRIVE}.motion.quiet",
     f"{_DRIVE}.motion.move",
-    f"{_DRIVE}.output",
 )
 # Whole recordings, tables of matrices for speed, and what only these need: the source
 # around the loops goes sample by sample.
@@ -54,6 +54,7 @@ LEFT_OUT = {
     "read",
     "on_other_clock",
     "_play",
+    "_let_lag",
     "glide_plain",
     "glide_inner",
     "which_matrix",

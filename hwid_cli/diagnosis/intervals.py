@@ -16,7 +16,7 @@ from hwid_cli.diagnosis.parameters import (
     sum_of_squares,
 )
 from hwid_cli.diagnosis.problem import DiagnosisProblem
-from hwid_cli.diagnosis.search import local_matrix
+from hwid_cli.diagnosis.search import local_matrix, matrix_beside_pushes
 from hwid_cli.drive.catalogue import CATALOGUE
 from hwid_cli.drive.effect import Scales
 from hwid_cli.records.candidates import CandidateFit, ParameterRef
@@ -185,7 +185,9 @@ def _spread(
     fit_layout: ParameterLayout,
     point: ParameterPoint,
 ) -> _Spread:
-    covariance, scale = shared_covariance(problem, found, fit_layout, point)
+    covariance, scale = shared_covariance(
+        problem, found, fit_layout, point, beside_pushes=True
+    )
     away = [
         [
             one.coordinate(value) - q
@@ -207,6 +209,8 @@ def shared_covariance(
     found: CandidateFit,
     fit_layout: ParameterLayout,
     point: ParameterPoint,
+    *,
+    beside_pushes: bool = False,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Covariance of the shared coordinates, scaled; the training recordings decide.
 
@@ -214,6 +218,9 @@ def shared_covariance(
     ----------
     point : ParameterPoint
         Of the fit, with own values of all recordings.
+    beside_pushes : bool
+        Whether the parameters of the simulation that the drive stands for are open, where
+        there are any, and not the drive's own.
 
     Returns
     -------
@@ -225,7 +232,11 @@ def shared_covariance(
     rows = [row for row, one in enumerate(problem.signals) if not one.is_held_out]
     train = problem.part(held_out=False)
     at = ParameterPoint(point.shared, point.own[rows])
-    matrix = local_matrix(train, fit_layout, at)
+    matrix = (
+        matrix_beside_pushes(train, fit_layout, at)
+        if beside_pushes and all(one.pushes.size for one in train.signals)
+        else local_matrix(train, fit_layout, at)
+    )
     if not matrix.size:
         return matrix, np.zeros(0)
     sse = sum_of_squares(residuals_at(train, fit_layout, at))

@@ -46,7 +46,7 @@ def fitted_together(
     rows = [row for row, one in enumerate(problem.signals) if not one.is_held_out]
     fit_layout, point = rebuilt(problem, before, findings.scales)
     slopes, pushes = moved_by
-    sizes = _sizes(problem, slopes, findings.criteria.noise.rms)
+    sizes = noise_sizes(problem, slopes, findings.criteria.noise.rms)
     n_free, n_shared = sizes.size, len(fit_layout.shared)
 
     def changed(coordinates: np.ndarray) -> DiagnosisProblem:
@@ -78,10 +78,20 @@ def fitted_together(
     return fit, found.x[:n_free] * sizes
 
 
-def _sizes(
+def noise_sizes(
     problem: DiagnosisProblem, slopes: Sequence[np.ndarray], noise_rms: float
 ) -> np.ndarray:
-    """Changes of the simulation's parameters that move it by about the noise."""
+    """Changes of the simulation's parameters that move it by about the noise.
+
+    Parameters
+    ----------
+    slopes : sequence of ndarray, shape (n_samples, n_free)
+    noise_rms : float, [output unit]
+
+    Returns
+    -------
+    ndarray, shape (n_free,)
+    """
     lengths = np.sqrt(sum(np.sum(one**2, axis=0) for one in slopes))
     n = sum(one.n_evaluated for one in problem.signals)
     return np.asarray(noise_rms * np.sqrt(n) / np.where(lengths > 0, lengths, 1.0))

@@ -23,6 +23,8 @@ _EVERY = 3
 _SAME = 0.05
 # Extremes that training recordings come near to, by this share of the largest.
 _NEARLY = 0.95
+# All move in one direction if the way back is no longer than this share of the way, [-].
+_WAY_BACK = 0.05
 _EXTREMES: tuple[Callable[[Recording], float], ...] = (
     lambda one: float(np.max(one.output) - one.output[0]),
     lambda one: float(one.output[0] - np.min(one.output)),
@@ -60,6 +62,9 @@ class Signals:
         simulation.
     offset : ndarray, shape (n_samples,), or None
         What is added to the simulated output.
+    pushes : ndarray, shape (n_samples, n_free) or (0, 0), [N]
+        Forces that move such a drive as parameters of that simulation do, each by about
+        the noise; what is fitted beside them is as uncertain as they leave it.
     """
 
     name: str
@@ -76,6 +81,7 @@ class Signals:
     is_velocity: bool = False
     force: np.ndarray = field(default_factory=lambda: NO_FORCE)
     offset: np.ndarray | None = None
+    pushes: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
 
     @cached_property
     def position(self) -> np.ndarray:
@@ -221,6 +227,22 @@ class DiagnosisProblem:
         """
         parts = [one.compared[one.evaluated] for one in self.signals]
         return np.array([np.sum(np.square(one - one.mean())) for one in parts])
+
+    @property
+    def moves_one_way(self) -> bool:
+        """Whether no recording goes back on more than a small share of the longest way."""
+        up = down = 0.0
+        for one in self.signals:
+            way = one.position
+            up = max(up, float(np.max(way - np.minimum.accumulate(way))))
+            down = max(down, float(np.max(np.maximum.accumulate(way) - way)))
+        return min(up, down) <= _WAY_BACK * max(up, down)
+
+    @property
+    def passes_once(self) -> bool:
+        """Whether each place is passed once: what changes there may change in time."""
+        train = self.part(held_out=False)
+        return len(train.signals) == 1 and train.moves_one_way
 
     def part(self, *, held_out: bool) -> "DiagnosisProblem":
         """Only the recordings that are held out, or only the others."""

@@ -88,6 +88,7 @@ def scales_of_recordings(
         resistance_ohm=drive.resistance_ohm or 1.0,
         reading=max(reading, 1e-12),
         missing=missing,
+        passes_once=problem.passes_once,
     )
 
 

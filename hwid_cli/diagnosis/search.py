@@ -20,6 +20,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hwid_cli.diagnosis.parameters import (
+    BASE,
     START,
     ParameterLayout,
     ParameterPoint,
@@ -44,6 +45,9 @@ LEAST_PROMISE = 2e-6
 _FIRST_DAMPING = 1e-3
 _LARGEST_DAMPING = 1e8
 _LARGEST_STEP = 1.5
+# Share of the largest below which a push is like others, and what holds a coordinate.
+_SAME_PUSH = 1e-10
+_HELD = 1e12
 _LEAST_DIAGONAL = 1e-14
 OWN_ITERATIONS = 12
 # A further secant step is tried while the last step gained this share of what it promised,
@@ -331,6 +335,68 @@ def local_matrix(
     jacobians = derivatives(problem, fit_layout, point, parts)
     size = fit_layout.size(len(problem.signals))
     return _normal_equations(fit_layout, size, jacobians, parts)[0]
+
+
+def matrix_beside_pushes(
+    problem: DiagnosisProblem, fit_layout: ParameterLayout, point: ParameterPoint
+) -> np.ndarray:
+    """The same where a simulation's own parameters take what they can.
+
+    The base of the drive that stands for it stays as it is: these parameters move it.
+
+    Parameters
+    ----------
+    problem : DiagnosisProblem
+        With the pushes of these parameters.
+
+    Returns
+    -------
+    ndarray, shape (n_unknowns, n_unknowns)
+
+    References
+    ----------
+    docs/method_diagnosis.md, eq. (D33a).
+    """
+    parts = residuals_at(problem, fit_layout, point)
+    jacobians = derivatives(problem, fit_layout, point, parts)
+    pushed = _derivatives_by_pushes(problem, fit_layout, point, parts)
+    n_free = pushed[0].shape[1]
+    size = fit_layout.size(len(parts))
+    matrix, by_push = np.zeros((size, size)), np.zeros((size, n_free))
+    of_pushes = np.zeros((n_free, n_free))
+    columns = _columns(fit_layout, len(parts))
+    for jacobian, push, at in zip(jacobians, pushed, columns, strict=True):
+        matrix[np.ix_(at, at)] += jacobian.T @ jacobian
+        by_push[at] += jacobian.T @ push
+        of_pushes += push.T @ push
+    matrix -= by_push @ np.linalg.pinv(of_pushes, _SAME_PUSH, True) @ by_push.T
+    held = [j for j, one in enumerate(fit_layout.shared) if one.owner == BASE]
+    largest = max(float(np.diag(matrix).max(initial=0.0)), 1e-300)
+    matrix[held], matrix[:, held] = 0.0, 0.0
+    matrix[held, held] = _HELD * largest
+    return matrix
+
+
+def _derivatives_by_pushes(
+    problem: DiagnosisProblem,
+    fit_layout: ParameterLayout,
+    point: ParameterPoint,
+    parts: list[np.ndarray],
+) -> list[np.ndarray]:
+    """Derivatives of each recording's simulation by the pushes' sizes."""
+    found = [
+        np.zeros((part.size, one.pushes.shape[1]))
+        for part, one in zip(parts, problem.signals, strict=True)
+    ]
+    for column in range(found[0].shape[1]):
+        signals = tuple(
+            replace(one, force=one.force + _DIFFERENCE * one.pushes[:, column])
+            for one in problem.signals
+        )
+        shifted = residuals_at(replace(problem, signals=signals), fit_layout, point)
+        for jacobian, before, after in zip(found, parts, shifted, strict=True):
+            jacobian[:, column] = np.nan_to_num((before - after) / _DIFFERENCE)
+    return found
 
 
 def _normal_equations(

@@ -51,8 +51,6 @@ _NO_MORE_THAN_NOISE = 1.02
 # What is late by this near to half a sample may be a command that is held, [samples].
 _NEAR_HALF = 0.1
 _LATE = {"input_delay": ("delay_s",), "actuator_lag": ("time_constant_s",)}
-# All move in one direction if the way back is no longer than this share of the way, [-].
-_WAY_BACK = 0.05
 
 
 def summarise(
@@ -397,7 +395,7 @@ def hidden_from_view(problem: DiagnosisProblem) -> tuple[str, ...]:
         texts.append("where the drive is, because its velocity is measured")
     else:
         texts += _unseen_sides(problem)
-    if _moves_one_way(problem):
+    if problem.moves_one_way:
         texts.append(
             "dry friction apart from a constant load: all recordings move in one "
             "direction only, where the two are the same force"
@@ -446,16 +444,6 @@ def taken_up(effects: Sequence[str], named: Sequence[str]) -> tuple[str, ...]:
         "keep one known zero, where the spring is relaxed, show it with "
         "diagnose.initial_state: estimated",
     )
-
-
-def _moves_one_way(problem: DiagnosisProblem) -> bool:
-    """Whether no recording goes back on more than a small share of the longest way."""
-    up = down = 0.0
-    for one in problem.signals:
-        output = one.position
-        up = max(up, float(np.max(output - np.minimum.accumulate(output))))
-        down = max(down, float(np.max(np.maximum.accumulate(output) - output)))
-    return min(up, down) <= _WAY_BACK * max(up, down)
 
 
 def _unseen_sides(problem: DiagnosisProblem) -> list[str]:

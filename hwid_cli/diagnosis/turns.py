@@ -14,7 +14,12 @@ import numpy as np
 from hwid_cli.diagnosis.candidate import fitted_drive, rebuilt
 from hwid_cli.diagnosis.causes import left_over
 from hwid_cli.diagnosis.findings import Findings
-from hwid_cli.diagnosis.joint_fit import fitted_again, fitted_together, pushes_of
+from hwid_cli.diagnosis.joint_fit import (
+    fitted_again,
+    fitted_together,
+    noise_sizes,
+    pushes_of,
+)
 from hwid_cli.diagnosis.noise import measured_input_rms
 from hwid_cli.diagnosis.parameters import BASE, each_sum_of_squares, simulate_at
 from hwid_cli.diagnosis.problem import DiagnosisProblem
@@ -30,6 +35,8 @@ from hwid_cli.records.programs import SimulatorRun
 # simulation may differ.
 _MOST_TURNS = 8
 _AGREEMENT = 0.1
+# Squares of the noise that are hardly worth another turn.
+_WORTH_A_FIT = 2.0
 # Turns in a row that leave more than the stand-in said, and more than this share of the best
 # run before: there it does not settle.
 _MOST_IN_VAIN = 3
@@ -162,8 +169,10 @@ def _best_turn(findings: Findings, turn: Turn, runs: Runs) -> Turn:
         if turn.sse.sum() < best.sse.sum():
             best = turn
         agreed = agreed + 1 if _agrees(findings, turn) and is_as_good(turn) else 0
-        is_enough = agreed > 0 and findings.criteria.is_complete(
-            fit_of_run(findings, turn)
+        is_enough = (
+            agreed > 0
+            and findings.criteria.is_complete(fit_of_run(findings, turn))
+            and not _promises_more(findings, turn)
         )
         if is_enough or agreed > 1 or in_vain == _MOST_IN_VAIN:
             break
@@ -175,6 +184,12 @@ def _agrees(findings: Findings, turn: Turn) -> bool:
     n = sum(one.n_evaluated for one in turn.problem.signals)
     remains = float(np.sqrt(turn.sse.sum() / n))
     return turn.disagreement <= _AGREEMENT * max(remains, findings.criteria.noise.rms)
+
+
+def _promises_more(findings: Findings, turn: Turn) -> bool:
+    """Whether the next fit takes clearly more of what the run leaves."""
+    gain = float(turn.sse.sum() - turn.fit.sse.sum())
+    return gain > _WORTH_A_FIT * findings.criteria.noise.rms**2
 
 
 def is_as_good(turn: Turn) -> bool:
@@ -275,7 +290,14 @@ def _with_values(
     more = [one @ change for one in slopes]
     targets = [run.output + add for run, add in zip(found, more, strict=True)]
     problem = _corrected(turn.problem, more, targets, forces)
-    return replace(turn, problem=problem, fit=fit, values=values)
+    sizes = noise_sizes(turn.problem, slopes, findings.criteria.noise.rms)
+    signals = tuple(
+        replace(one, pushes=push * sizes)
+        for one, push in zip(problem.signals, pushes, strict=True)
+    )
+    return replace(
+        turn, problem=replace(problem, signals=signals), fit=fit, values=values
+    )
 
 
 def _corrected(

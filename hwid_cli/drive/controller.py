@@ -7,10 +7,13 @@ import numpy as np
 
 from hwid_cli.compiled import INNER, compiled
 from hwid_cli.drive import slots
+from hwid_cli.drive.output import lagged
 
-# Places in what a controller keeps: sum of the error over time, error at the last
-# sample, and whether there was one.
-ERROR_SUM, LAST_ERROR, HAS_ERROR, N_CONTROL = range(4)
+# Places in what a controller keeps: sum of the error over time, error at the last sample,
+# whether there was one, and motion and readings of a sensor that lags.
+(
+    ERROR_SUM, LAST_ERROR, HAS_ERROR, LAST_X, LAST_V, LATE_X, LATE_V, N_CONTROL,
+) = range(8)  # fmt: skip
 
 
 @compiled(**INNER)
@@ -45,6 +48,8 @@ def controlled(
         Changed in place.
     p : ndarray, shape (N_SLOTS,)
     """
+    if p[slots.SENSOR_LAG] > 0.0:
+        x, v = _late(x, v, sample_time, control, p)
     error, gain = reference - x, p[slots.PROPORTIONAL_GAIN]
     reset = p[slots.INTEGRAL_GAIN]
     if p[slots.VELOCITY_GAIN] > 0.0:
@@ -64,3 +69,19 @@ def controlled(
     if (wanted - given) * error <= 0.0:
         control[ERROR_SUM] = total
     return given
+
+
+@compiled(**INNER)
+def _late(
+    x: float, v: float, sample_time: float, control: np.ndarray, p: np.ndarray
+) -> tuple[float, float]:
+    """Return position and velocity as a sensor that lags reads them."""
+    time_constant = p[slots.SENSOR_LAG]
+    if control[HAS_ERROR] > 0.0:
+        late_x = lagged(control[LATE_X], control[LAST_X], x, sample_time, time_constant)
+        late_v = lagged(control[LATE_V], control[LAST_V], v, sample_time, time_constant)
+    else:
+        late_x, late_v = x - time_constant * v, v
+    control[LAST_X], control[LAST_V] = x, v
+    control[LATE_X], control[LATE_V] = late_x, late_v
+    return late_x, late_v

@@ -125,6 +125,8 @@ class Scales:
         Largest magnitude of what the sensor reads; 0 stands for the displacement.
     missing : Missing or None
         What the simulation lacks, where it is known.
+    passes_once : bool
+        Whether each place of the way is passed once.
     """
 
     displacement_m: float
@@ -143,6 +145,7 @@ class Scales:
     resistance_ohm: float = 1.0
     reading: float = 0.0
     missing: Missing | None = field(default=None, compare=False, repr=False)
+    passes_once: bool = False
 
     def __post_init__(self) -> None:
         if self.reading == 0:
@@ -193,6 +196,16 @@ def line_bounds(scales: Scales) -> tuple[float, float]:
     The longest recording shows it come back at least once: a slower swing is any wander.
     """
     return 1.5 / scales.duration_s, 0.5 / scales.sample_time_s
+
+
+def time_shares(scales: Scales) -> tuple[float, ...]:
+    """Shares of the natural period at which a delay or a lag is tried."""
+    return tuple(share / scales.natural_Hz for share in (0.01, 0.03, 0.1))
+
+
+def time_bounds(scales: Scales) -> tuple[float, float]:
+    """Bounds of a delay or a time constant: half a natural period is another drive."""
+    return 0.01 * scales.sample_time_s, 0.5 / scales.natural_Hz
 
 
 @dataclass(frozen=True)

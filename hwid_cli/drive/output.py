@@ -38,7 +38,43 @@ def read(
         lag = positions[i] - output[i]
         time = sample_time * i
         output[i] = sensed(output[i], lag, velocities[i], command[i], time, p)
+    if p[slots.SENSOR_LAG] > 0.0:
+        speed = 0.0 if p[slots.OUTPUT_IS_VELOCITY] > 0.0 else velocities[0]
+        _let_lag(output, speed, sample_time, p[slots.SENSOR_LAG])
     return output
+
+
+@compiled(**INNER)
+def lagged(
+    late: float, before: float, now: float, sample_time: float, time_constant: float
+) -> float:
+    """Return the output of a first-order lag, one sample on.
+
+    Parameters
+    ----------
+    late : float, [m] or [m/s]
+        Its output at the sample before.
+    before, now : float, [same]
+        Its input at both samples; a straight line between them.
+    sample_time, time_constant : float, [s]
+    """
+    # A line is followed at a distance; what is off it dies away.
+    behind = (now - before) * time_constant / sample_time
+    left = late - before + behind
+    return now - behind + left * np.exp(-sample_time / time_constant)
+
+
+@compiled(**MAKING)
+def _let_lag(
+    output: np.ndarray, speed: float, sample_time: float, time_constant: float
+) -> None:
+    """Let readings lag in place; before them the motion has gone on at one speed."""
+    before = output[0]
+    output[0] -= time_constant * speed
+    for i in range(1, output.size):
+        now = output[i]
+        output[i] = lagged(output[i - 1], before, now, sample_time, time_constant)
+        before = now
 
 
 @compiled(nogil=True, error_model="numpy")

@@ -132,5 +132,6 @@ that is switched off is 0, except where the comment says infinite.
     OWN_BENDS,  # set: the force has corners
     SAMPLE_TIME,  # set by the simulation
     LAG_DAMPING_RATIO,
+    SENSOR_LAG,
     N_SLOTS,
-) = range(125)
+) = range(126)

@@ -102,6 +102,7 @@ LAWS = {
     "sensor_hum": _Law(
         "{y} + {amplitude_m}*sin(2*pi*{frequency_Hz}*time + {phase_rad})"
     ),
+    "sensor_lag": _Law("#y", (("y", "({y} - #y)/{time_constant_s}"),)),
     "sensor_saturation": _Law("max(min({y}, {limit_m}), -{limit_m})"),
 }
 # What changes the input, and what changes the reading, in the order of the signal.
@@ -112,7 +113,7 @@ _INPUT_ORDER = (
 )  # fmt: skip
 _OUTPUT_ORDER = (
     "sensor_eccentricity", "own", "sensor_quadratic", "sensor_cubic", "sensor_drift",
-    "sensor_hum", "sensor_saturation",
+    "sensor_hum", "sensor_saturation", "sensor_lag",
 )  # fmt: skip
 _HOLE = re.compile(r"\{(\w+)\}|#(\w+)")
 _OWN_NAMES = {"Max": "max", "Min": "min", "atan": "atan"}
@@ -158,6 +159,7 @@ def modelica_text(extended: ExtendedSimulation, card: ModelCard) -> str:
     equations += [line for lines in inner for line in lines]
     lines = [
         *_declared(extended, card, written),
+        *_rested(readings),
         "equation",
         "  s = tanh(v/v_rest);",
         f"  force = {total};",
@@ -174,7 +176,8 @@ def _declared(
 ) -> list[str]:
     """Lines above the equations."""
     drive = extended.stand_in
-    inner = [one.names[f"#{name}"] for one in written for name, _ in one.law.inner]
+    inner = _inner([one for one in written if one.kind != "output"])
+    of_reading = _inner([one for one in written if one.kind == "output"])
     return [
         f"model {identifier(card.name)}_effects",
         f'  "What hwid {__version__} found that a simulation lacks"',
@@ -196,7 +199,18 @@ def _declared(
         '  output Real y "what the sensor reads";',
         "  Real s;",
         *(f"  Real {one}(start = 0, fixed = true);" for one in inner),
+        *(f"  Real {one};" for one in of_reading),
     ]
+
+
+def _inner(effects: Sequence[_Written]) -> list[str]:
+    return [one.names[f"#{name}"] for one in effects for name, _ in one.law.inner]
+
+
+def _rested(readings: Sequence[_Written]) -> list[str]:
+    """Lines that let a sensor begin at rest, wherever the simulation begins."""
+    starts = [f"  der({one}) = 0;" for one in _inner(readings)]
+    return ["initial equation", *starts] if starts else []
 
 
 def _written(name: str, values: Mapping[str, float]) -> _Written:

@@ -73,8 +73,8 @@ def test_what_nothing_determines_leaves_the_other_intervals_as_they_are(monkeypa
     found = fit(given, {"coulomb_friction": {"force_N": 0.7}}, scales=scales)
     low, high = intervals(given, found, scales)
 
-    def with_one_lost(*arguments):
-        covariance, scale = shared_covariance(*arguments)
+    def with_one_lost(*arguments, **options):
+        covariance, scale = shared_covariance(*arguments, **options)
         covariance, scale = covariance.copy(), scale.copy()
         covariance[0, 0], scale[0] = 1e20, 1e-150
         return covariance, scale

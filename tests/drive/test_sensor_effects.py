@@ -2,8 +2,11 @@
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicHermiteSpline, CubicSpline
 
+from hwid_cli.drive.simulation import simulate_drive
+from hwid_cli.records.drive import Controller, Drive
 from tests.drive.drive_cases import (
     CORNER_TIMES_S,
     CORNERS,
@@ -145,3 +148,98 @@ def test_a_smooth_input_is_read_by_another_clock():
     spline = CubicHermiteSpline(TIMES_S, plain.position, plain.velocity)
     # Between samples the tool has finer ones.
     assert rms(found - spline(0.99 * TIMES_S)) < 3e-8
+
+
+SENSOR_LAG = {"sensor_lag": {"time_constant_s": 0.012}}
+
+
+def first_order(times, followed, time_constant):
+    """A first-order lag behind a curve, by a general integrator."""
+    curve = CubicSpline(times, followed)
+    found = solve_ivp(
+        lambda t, y: (curve(t) - y) / time_constant, (0.0, times[-1]), [followed[0]],
+        t_eval=times, rtol=1e-10, atol=1e-14, max_step=1e-3,
+    )  # fmt: skip
+    return found.y[0]
+
+
+@pytest.mark.parametrize("output", ["position", "velocity"])
+def test_a_sensor_that_lags_reads_what_a_first_order_lag_gives(output):
+    found = tool(SENSOR_LAG, output=output)
+    expected = first_order(TIMES_S, getattr(found, output), 0.012)
+    # A straight line between samples cuts dt^2 / 12 of the second derivative, which a lag
+    # of 12 samples lets through by a twelfth: 20 m/s^2, or 2e3 m/s^3.
+    bound = {"position": 2e-6, "velocity": 2e-4}[output]
+    assert rms(found.output - expected) < bound
+    assert rms(found.output - getattr(found, output)) > 100 * bound
+    np.testing.assert_array_equal(found.position, tool({}).position)
+
+
+def test_a_sensor_that_lags_comes_behind_its_other_laws():
+    laws = {
+        "sensor_cubic": {"coefficient": 0.2},
+        "sensor_saturation": {"limit_m": 0.01},
+    }
+    sensed = tool(laws).output
+    expected = first_order(TIMES_S, sensed, 0.012)
+    assert rms(tool(laws | SENSOR_LAG).output - expected) < 1e-5
+
+
+def test_a_recording_that_begins_in_motion_has_lagged_before():
+    drive = Drive(
+        mass_kg=1.0, damping_N_s_per_m=0.0, stiffness_N_per_m=0.0,
+        force_constant_N_per_A=1.0, effects=SENSOR_LAG,
+    )  # fmt: skip
+    found = simulate_drive(
+        np.zeros(50), drive, sample_time_s=1e-3, start=(0.003, 0.4)
+    ).output
+    # At a constant speed a lag is behind by its time constant, from the first sample on.
+    expected = 0.003 + 0.4 * (1e-3 * np.arange(50) - 0.012)
+    np.testing.assert_allclose(found, expected, atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    "controller",
+    [
+        Controller(position_gain_per_s=20.0, velocity_gain=30.0),
+        Controller(proportional_gain=120.0, integral_gain=900.0, derivative_gain=2.0),
+    ],
+    ids=["cascade", "PID"],
+)
+def test_a_controller_reads_the_sensor_that_lags(controller):
+    mass, damping, constant, lag, step = 0.3, 15.0, 5.0, 0.012, 1e-3
+    reference = 0.01 * np.sin(2 * np.pi * 4.0 * np.arange(400) * step) ** 2
+    drive = Drive(
+        mass_kg=mass, damping_N_s_per_m=damping, stiffness_N_per_m=0.0,
+        force_constant_N_per_A=constant, controller=controller,
+        effects={"sensor_lag": {"time_constant_s": lag}},
+    )  # fmt: skip
+    found = simulate_drive(reference, drive, sample_time_s=step)
+
+    def rates(t, state, current):
+        x, v, late_x, late_v = state
+        push = constant * current - damping * v
+        return [v, push / mass, (x - late_x) / lag, (v - late_v) / lag]
+
+    state, total, last, given = np.zeros(4), 0.0, None, []
+    for wanted in reference:
+        _, _, x, v = state
+        error = wanted - x
+        gain, reset = controller.proportional_gain, controller.integral_gain
+        if controller.velocity_gain is not None:
+            error = controller.position_gain_per_s * error - v
+            gain, reset = controller.velocity_gain, 0.0
+        total += step * error
+        current = gain * error + reset * total
+        if last is not None:
+            current += controller.derivative_gain * (error - last) / step
+        last = error
+        given.append(current)
+        state = solve_ivp(
+            rates, (0.0, step), state, args=(current,), rtol=1e-9, atol=1e-12
+        ).y[:, -1]
+    assert rms(found.command - given) < 2e-3 * rms(np.array(given))
+    undelayed = simulate_drive(
+        reference, drive.__class__(**{**vars(drive), "effects": {}}), sample_time_s=step
+    )
+    assert rms(undelayed.command - given) > 0.05 * rms(np.array(given))

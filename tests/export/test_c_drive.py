@@ -32,6 +32,7 @@ SENSORS = {
     "sensor_eccentricity": {"amplitude_m": 3e-4, "period_m": 4e-3},
     "sensor_hum": {"amplitude_m": 2e-4, "frequency_Hz": 50.0},
     "sensor_saturation": {"limit_m": 0.01},
+    "sensor_lag": {"time_constant_s": 0.004},
 }
 COUPLED_MOTOR = {
     "elastic_coupling": {

@@ -67,6 +67,7 @@ VALUES = {
     "sensor_drift": {"drift_m_per_s": 5e-3},
     "sensor_hum": {"amplitude_m": 3e-4, "frequency_Hz": 50.0, "phase_rad": 0.5},
     "sensor_saturation": {"limit_m": 0.007},
+    "sensor_lag": {"time_constant_s": 5e-3},
     own_id("chain", OWN): {"a": 0.3, "b": 60.0},
 }  # fmt: skip
 
@@ -86,8 +87,13 @@ class Block:
                 r"(?:parameter|constant) Real (\w+) = ([-\w.+]+)", text
             )
         }
-        self.inner = re.findall(r"Real (\w+)\(start = 0, fixed = true\)", text)
-        body = text.split("equation\n")[1].rsplit("end ", 1)[0]
+        declared, body = text.split("\nequation\n")
+        # What begins at rest does so with its input, which is 0 in these cases.
+        resting = re.findall(r"  der\((\w+)\) = 0;", declared)
+        self.inner = (
+            re.findall(r"Real (\w+)\(start = 0, fixed = true\)", text) + resting
+        )
+        body = body.rsplit("end ", 1)[0]
         pairs = [one.strip().split(" = ", 1) for one in body.split(";") if one.strip()]
         self.equations = {
             left: compile(in_python(right), "mo", "eval") for left, right in pairs

@@ -14,19 +14,12 @@ from hwid_cli.drive.effect import (
     Scales,
     shares_of,
     span_of,
+    time_bounds,
+    time_shares,
 )
 
 # The force would change its sign along the way.
 _BELOW_WHOLE = Limit("a share below 1", lambda value: value < 1)
-
-
-def _times(scales: Scales) -> tuple[float, ...]:
-    period = 1.0 / scales.natural_Hz
-    return tuple(share * period for share in (0.01, 0.03, 0.1))
-
-
-def _time_bounds(scales: Scales) -> tuple[float, float]:
-    return 0.01 * scales.sample_time_s, 0.5 / scales.natural_Hz
 
 
 DEAD_ZONE = Effect(
@@ -102,7 +95,7 @@ DELAY = Effect(
     enters="command",
     parameters=(
         Parameter(
-            "delay_s", _times, _time_bounds, places=("DELAY",), limits=(POSITIVE,)
+            "delay_s", time_shares, time_bounds, places=("DELAY",), limits=(POSITIVE,)
         ),
     ),
     confused_with={"actuator_lag": "a sine far above the natural frequency"},
@@ -110,7 +103,7 @@ DELAY = Effect(
 )
 
 _TIME_CONSTANT = Parameter(
-    "time_constant_s", _times, _time_bounds, places=("LAG",), limits=(POSITIVE,)
+    "time_constant_s", time_shares, time_bounds, places=("LAG",), limits=(POSITIVE,)
 )
 
 LAG = Effect(

@@ -10,6 +10,7 @@ from hwid_cli.drive.effect import (
     Effect,
     Limit,
     Parameter,
+    Scales,
     Stated,
     Values,
     bend,
@@ -172,6 +173,20 @@ LOAD = tuple(
     for load, place in LOADS.items()
 )
 
+# Periods of a stroke: what is passed once has to repeat, or it is any change in time.
+_FEWEST_PERIODS, _FEWEST_IN_ONE_PASS = 0.5, 3.0
+
+
+def _wave_bounds(scales: Scales) -> tuple[float, float]:
+    fewest = _FEWEST_IN_ONE_PASS if scales.passes_once else _FEWEST_PERIODS
+    return scales.stroke_m / 200, scales.stroke_m / fewest
+
+
+def _wave_periods(scales: Scales) -> tuple[float, ...]:
+    periods = (scales.stroke_m / count for count in (0.8, 1.5, 2.5, 4, 6, 9, 14, 20))
+    return tuple(one for one in periods if one <= _wave_bounds(scales)[1])
+
+
 POSITION = Effect(
     id="position_friction",
     sentence="dry friction that varies along the way",
@@ -192,10 +207,8 @@ POSITION = Effect(
         ),
         Parameter(
             "period_m",
-            lambda scales: tuple(
-                scales.stroke_m / count for count in (0.8, 1.5, 2.5, 4, 6, 9, 14, 20)
-            ),
-            lambda scales: (scales.stroke_m / 200, 2.0 * scales.stroke_m),
+            _wave_periods,
+            _wave_bounds,
             places=("WAVY_PERIOD",),
             limits=(POSITIVE,),
         ),

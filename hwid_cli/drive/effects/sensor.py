@@ -15,6 +15,8 @@ from hwid_cli.drive.effect import (
     line_bounds,
     shares_of,
     span_of,
+    time_bounds,
+    time_shares,
 )
 
 BACKLASH = Effect(
@@ -224,6 +226,38 @@ CLOCK = Effect(
     },
 )
 
+# Share of a recording that a filter's time constant may be.
+_LONGEST_LAG = 0.05
+
+
+def _lag_bounds(scales: Scales) -> tuple[float, float]:
+    """Bounds of a filter: a probe may be as slow as what it measures."""
+    low, high = time_bounds(scales)
+    return low, max(high, _LONGEST_LAG * scales.duration_s)
+
+
+LAG = Effect(
+    id="sensor_lag",
+    sentence="the reading follows the motion with a first-order lag",
+    equation="tau dy/dt + y = x",
+    enters="output",
+    parameters=(
+        Parameter(
+            "time_constant_s",
+            time_shares,
+            _lag_bounds,
+            places=("SENSOR_LAG",),
+            limits=(POSITIVE,),
+        ),
+    ),
+    # A drive that is linear otherwise gives the same with either.
+    contains=("actuator_lag",),
+    confused_with={
+        "actuator_lag": "large and small motions, where the drive is not linear",
+        "input_delay": "a sine far above the natural frequency",
+    },
+)
+
 EFFECTS = (
     BACKLASH,
     QUADRATIC,
@@ -233,4 +267,5 @@ EFFECTS = (
     HUM,
     ECCENTRICITY,
     CLOCK,
+    LAG,
 )

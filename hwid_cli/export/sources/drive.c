@@ -27,13 +27,15 @@ typedef struct {
     double motion[@n_state@];
     double memory[@n_memory@];
     double room[@n_room@];
-    double control[3];
+    double control[@n_control@];
     double starts[@n_history@];
     double ends[@n_history@];
     double before;
     double followed;
     double previous;
     double played;
+    double sensed;
+    double late;
     double position;
     double velocity;
     double beside; /* A force on the mass beside the drive's own, held [N]. */
@@ -279,6 +281,24 @@ static double played(HWID_NAME(state) *s, double x0, double v0)
     return least(most(y, x1 - gap), x1 + gap);
 }
 
+/* What the sensor reads. */
+static double reading(HWID_NAME(state) *s)
+{
+    double *p = s->p;
+    const double now = drive_sensed(s->played, s->position - s->played, s->velocity,
+                                    s->previous, sample_time * (double)s->sample, p);
+    if (!(p[SENSOR_LAG] > 0.0)) {
+        return now;
+    }
+    if (s->sample == 0) {
+        s->late = now - (p[OUTPUT_IS_VELOCITY] > 0.0 ? 0.0 : p[SENSOR_LAG] * s->velocity);
+    } else {
+        s->late = drive_lagged(s->late, s->sensed, now, sample_time, p[SENSOR_LAG]);
+    }
+    s->sensed = now;
+    return s->late;
+}
+
 void HWID_NAME(init)(HWID_NAME(state) *state)
 {
     int n;
@@ -346,8 +366,7 @@ double HWID_NAME(step)(HWID_NAME(state) *state, double u)
     if (!(p[OUTPUT_GAP] > 0.0)) {
         state->played = state->position;
     }
-    u = drive_sensed(state->played, state->position - state->played, state->velocity,
-                     state->previous, sample_time * (double)state->sample, p);
+    u = reading(state);
     state->sample += 1;
     return u;
 }

@@ -125,7 +125,8 @@ enum {
     OWN_BENDS = 121,
     SAMPLE_TIME = 122,
     LAG_DAMPING_RATIO = 123,
-    N_SLOTS = 124,
+    SENSOR_LAG = 124,
+    N_SLOTS = 125,
     CONSTANT = 0,
     VARIABLE = 1,
     ADD = 2,
@@ -153,10 +154,6 @@ enum {
     TANH = 24,
     MOST_PIECES = 80,
     OWN_PIECES = 4,
-    ERROR_SUM = 0,
-    LAST_ERROR = 1,
-    HAS_ERROR = 2,
-    N_CONTROL = 3,
     DRIVE = 0,
     OTHER = 4,
     WARMTH = 8,
@@ -165,6 +162,14 @@ enum {
     BEGUN = 11,
     N_PUSH = 12,
     N_ROOM = 23,
+    ERROR_SUM = 0,
+    LAST_ERROR = 1,
+    HAS_ERROR = 2,
+    LAST_X = 3,
+    LAST_V = 4,
+    LATE_X = 5,
+    LATE_V = 6,
+    N_CONTROL = 7,
     X = 0,
     V = 1,
     MOTOR_X = 2,
@@ -615,49 +620,6 @@ static double drive_static_command(double value, double *p)
     return least(most(value, -limit), limit);
 }
 
-static int drive_is_closed(double *p)
-{
-    return (p[VELOCITY_GAIN] > 0.0) || (p[PROPORTIONAL_GAIN] > 0.0);
-}
-
-static double drive_controlled(double reference, double x, double v, double sample_time, double *control, double *p)
-{
-    double error = 0.0;
-    double gain = 0.0;
-    double reset = 0.0;
-    double total = 0.0;
-    double wanted = 0.0;
-    double rate = 0.0;
-    double limit = 0.0;
-    double given = 0.0;
-    error = reference - x;
-    gain = p[PROPORTIONAL_GAIN];
-    reset = p[INTEGRAL_GAIN];
-    if (p[VELOCITY_GAIN] > 0.0) {
-        error = (p[POSITION_GAIN] * error) - v;
-        gain = p[VELOCITY_GAIN];
-        reset = gain * p[RESET_RATE];
-    } else {
-        if (p[OUTPUT_IS_VELOCITY] > 0.0) {
-            error = reference - v;
-        }
-    }
-    total = control[ERROR_SUM] + (sample_time * error);
-    wanted = (gain * error) + (reset * total);
-    if ((p[DERIVATIVE_GAIN] != 0.0) && (control[HAS_ERROR] > 0.0)) {
-        rate = (error - control[LAST_ERROR]) / sample_time;
-        wanted += p[DERIVATIVE_GAIN] * rate;
-    }
-    control[LAST_ERROR] = error;
-    control[HAS_ERROR] = 1.0;
-    limit = p[COMMAND_LIMIT];
-    given = least(most(wanted, -limit), limit);
-    if (((wanted - given) * error) <= 0.0) {
-        control[ERROR_SUM] = total;
-    }
-    return given;
-}
-
 static int drive_depends_on_motion(double *p)
 {
     return (p[RESISTANCE] > 0.0) || (p[CLIP_LIMIT] < HUGE_VAL);
@@ -916,6 +878,155 @@ static tuple_dddd drive_shift(double *push, int which, double done)
         return (tuple_dddd){a, b, c, d};
     }
     return (tuple_dddd){a + (done * (b + (done * (c + (done * d))))), b + (done * ((2.0 * c) + ((3.0 * done) * d))), c + ((3.0 * done) * d), d};
+}
+
+static double drive_lagged(double late, double before, double now, double sample_time, double time_constant)
+{
+    double behind = 0.0;
+    double left = 0.0;
+    behind = ((now - before) * time_constant) / sample_time;
+    left = (late - before) + behind;
+    return (now - behind) + (left * exp((-sample_time) / time_constant));
+}
+
+static double drive_sensed(double y, double lag, double speed, double command, double time, double *p)
+{
+    int is_velocity = 0;
+    int is_pushed = 0;
+    double phase = 0.0;
+    double size = 0.0;
+    double turn = 0.0;
+    double own = 0.0;
+    double share = 0.0;
+    double angle = 0.0;
+    double limit = 0.0;
+    if (p[OUTPUT_ZERO] != 0.0) {
+        y -= p[OUTPUT_ZERO];
+    }
+    is_velocity = p[OUTPUT_IS_VELOCITY] > 0.0;
+    if (is_velocity && (p[OUTPUT_GAP] > 0.0)) {
+        is_pushed = fabs(lag) >= ((1.0 - 1e-09) * p[OUTPUT_GAP]);
+        speed = (is_pushed && ((lag * speed) > 0.0)) ? speed : 0.0;
+    }
+    if (p[ECCENTRICITY] != 0.0) {
+        phase = p[ECCENTRIC_PHASE];
+        size = p[ECCENTRICITY];
+        turn = 6.283185307179586 / p[ECCENTRIC_PERIOD];
+        speed *= 1.0 + ((size * turn) * cos((turn * y) + phase));
+        y += size * (sin((turn * y) + phase) - sin(phase));
+    }
+    if (p[OWN_OUTPUT] != 0.0) {
+        own = drive_formula_value(p[OWN_OUTPUT], y, speed, command, time, sign_of(speed), p);
+        y = own;
+        speed = own;
+    }
+    if (is_velocity) {
+        y = speed;
+    }
+    if ((p[SENSOR_QUADRATIC] != 0.0) || (p[SENSOR_CUBIC] != 0.0)) {
+        share = y / p[REFERENCE_DISPLACEMENT];
+        y *= 1.0 + ((p[SENSOR_QUADRATIC] + (p[SENSOR_CUBIC] * share)) * share);
+    }
+    if (p[SENSOR_DRIFT] != 0.0) {
+        y += p[SENSOR_DRIFT] * time;
+    }
+    if (p[HUM_AMPLITUDE] != 0.0) {
+        angle = ((6.283185307179586 * p[HUM_FREQUENCY]) * time) + p[HUM_PHASE];
+        y += p[HUM_AMPLITUDE] * sin(angle);
+    }
+    limit = p[OUTPUT_LIMIT];
+    if (limit < HUGE_VAL) {
+        y = least(most(y, -limit), limit);
+    }
+    return y;
+}
+
+static double drive_extreme(double x0, double v0, double x1, double v1)
+{
+    double a = 0.0;
+    double b = 0.0;
+    double root = 0.0;
+    double half = 0.0;
+    double t = 0.0;
+    a = 3.0 * (((2.0 * (x0 - x1)) + v0) + v1);
+    b = 2.0 * (((3.0 * (x1 - x0)) - (2.0 * v0)) - v1);
+    root = sqrt(most((b * b) - ((4.0 * a) * v0), 0.0));
+    half = (-0.5) * (b + ((b >= 0.0) ? root : (-root)));
+    t = (half != 0.0) ? (v0 / half) : 0.5;
+    if (!((0.0 <= t) && (t <= 1.0))) {
+        t = (a != 0.0) ? (half / a) : 0.5;
+    }
+    t = least(most(t, 0.0), 1.0);
+    return x0 + (t * (v0 + (t * ((0.5 * b) + ((t * a) / 3.0)))));
+}
+
+static int drive_is_closed(double *p)
+{
+    return (p[VELOCITY_GAIN] > 0.0) || (p[PROPORTIONAL_GAIN] > 0.0);
+}
+
+static tuple_dd drive_late(double x, double v, double sample_time, double *control, double *p)
+{
+    double time_constant = 0.0;
+    double late_x = 0.0;
+    double late_v = 0.0;
+    time_constant = p[SENSOR_LAG];
+    if (control[HAS_ERROR] > 0.0) {
+        late_x = drive_lagged(control[LATE_X], control[LAST_X], x, sample_time, time_constant);
+        late_v = drive_lagged(control[LATE_V], control[LAST_V], v, sample_time, time_constant);
+    } else {
+        late_x = x - (time_constant * v);
+        late_v = v;
+    }
+    control[LAST_X] = x;
+    control[LAST_V] = v;
+    control[LATE_X] = late_x;
+    control[LATE_V] = late_v;
+    return (tuple_dd){late_x, late_v};
+}
+
+static double drive_controlled(double reference, double x, double v, double sample_time, double *control, double *p)
+{
+    tuple_dd t1 = {0};
+    double error = 0.0;
+    double gain = 0.0;
+    double reset = 0.0;
+    double total = 0.0;
+    double wanted = 0.0;
+    double rate = 0.0;
+    double limit = 0.0;
+    double given = 0.0;
+    if (p[SENSOR_LAG] > 0.0) {
+        t1 = drive_late(x, v, sample_time, control, p);
+        x = t1.m0;
+        v = t1.m1;
+    }
+    error = reference - x;
+    gain = p[PROPORTIONAL_GAIN];
+    reset = p[INTEGRAL_GAIN];
+    if (p[VELOCITY_GAIN] > 0.0) {
+        error = (p[POSITION_GAIN] * error) - v;
+        gain = p[VELOCITY_GAIN];
+        reset = gain * p[RESET_RATE];
+    } else {
+        if (p[OUTPUT_IS_VELOCITY] > 0.0) {
+            error = reference - v;
+        }
+    }
+    total = control[ERROR_SUM] + (sample_time * error);
+    wanted = (gain * error) + (reset * total);
+    if ((p[DERIVATIVE_GAIN] != 0.0) && (control[HAS_ERROR] > 0.0)) {
+        rate = (error - control[LAST_ERROR]) / sample_time;
+        wanted += p[DERIVATIVE_GAIN] * rate;
+    }
+    control[LAST_ERROR] = error;
+    control[HAS_ERROR] = 1.0;
+    limit = p[COMMAND_LIMIT];
+    given = least(most(wanted, -limit), limit);
+    if (((wanted - given) * error) <= 0.0) {
+        control[ERROR_SUM] = total;
+    }
+    return given;
 }
 
 static double drive_ripple(double angle, double *p)
@@ -3221,75 +3332,4 @@ static void drive_move_piece(double *state, double *trial, double *memory, doubl
             corner = drive_corner_of(state, drive_value_of(push, DRIVE, done), p);
         }
     }
-}
-
-static double drive_sensed(double y, double lag, double speed, double command, double time, double *p)
-{
-    int is_velocity = 0;
-    int is_pushed = 0;
-    double phase = 0.0;
-    double size = 0.0;
-    double turn = 0.0;
-    double own = 0.0;
-    double share = 0.0;
-    double angle = 0.0;
-    double limit = 0.0;
-    if (p[OUTPUT_ZERO] != 0.0) {
-        y -= p[OUTPUT_ZERO];
-    }
-    is_velocity = p[OUTPUT_IS_VELOCITY] > 0.0;
-    if (is_velocity && (p[OUTPUT_GAP] > 0.0)) {
-        is_pushed = fabs(lag) >= ((1.0 - 1e-09) * p[OUTPUT_GAP]);
-        speed = (is_pushed && ((lag * speed) > 0.0)) ? speed : 0.0;
-    }
-    if (p[ECCENTRICITY] != 0.0) {
-        phase = p[ECCENTRIC_PHASE];
-        size = p[ECCENTRICITY];
-        turn = 6.283185307179586 / p[ECCENTRIC_PERIOD];
-        speed *= 1.0 + ((size * turn) * cos((turn * y) + phase));
-        y += size * (sin((turn * y) + phase) - sin(phase));
-    }
-    if (p[OWN_OUTPUT] != 0.0) {
-        own = drive_formula_value(p[OWN_OUTPUT], y, speed, command, time, sign_of(speed), p);
-        y = own;
-        speed = own;
-    }
-    if (is_velocity) {
-        y = speed;
-    }
-    if ((p[SENSOR_QUADRATIC] != 0.0) || (p[SENSOR_CUBIC] != 0.0)) {
-        share = y / p[REFERENCE_DISPLACEMENT];
-        y *= 1.0 + ((p[SENSOR_QUADRATIC] + (p[SENSOR_CUBIC] * share)) * share);
-    }
-    if (p[SENSOR_DRIFT] != 0.0) {
-        y += p[SENSOR_DRIFT] * time;
-    }
-    if (p[HUM_AMPLITUDE] != 0.0) {
-        angle = ((6.283185307179586 * p[HUM_FREQUENCY]) * time) + p[HUM_PHASE];
-        y += p[HUM_AMPLITUDE] * sin(angle);
-    }
-    limit = p[OUTPUT_LIMIT];
-    if (limit < HUGE_VAL) {
-        y = least(most(y, -limit), limit);
-    }
-    return y;
-}
-
-static double drive_extreme(double x0, double v0, double x1, double v1)
-{
-    double a = 0.0;
-    double b = 0.0;
-    double root = 0.0;
-    double half = 0.0;
-    double t = 0.0;
-    a = 3.0 * (((2.0 * (x0 - x1)) + v0) + v1);
-    b = 2.0 * (((3.0 * (x1 - x0)) - (2.0 * v0)) - v1);
-    root = sqrt(most((b * b) - ((4.0 * a) * v0), 0.0));
-    half = (-0.5) * (b + ((b >= 0.0) ? root : (-root)));
-    t = (half != 0.0) ? (v0 / half) : 0.5;
-    if (!((0.0 <= t) && (t <= 1.0))) {
-        t = (a != 0.0) ? (half / a) : 0.5;
-    }
-    t = least(most(t, 0.0), 1.0);
-    return x0 + (t * (v0 + (t * ((0.5 * b) + ((t * a) / 3.0)))));
 }

@@ -63,10 +63,7 @@ static void effect_read(HWID_NAME(effect) *effect, double x0, double v0)
     } else if (!(p[OUTPUT_GAP] > 0.0)) {
         drive->played = drive->position;
     }
-    effect->reading = drive_sensed(drive->played, drive->position - drive->played,
-                                   drive->velocity, drive->previous,
-                                   sample_time * (double)drive->sample, drive->p)
-        - drive->position;
+    effect->reading = reading(drive) - drive->position;
 }
 
 void HWID_NAME(effect_start)(HWID_NAME(effect) *effect, double u, double x)
