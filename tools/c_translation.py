@@ -11,6 +11,7 @@ Place = tuple[str, str]
 _CALLS = {
     "sqrt": "sqrt",
     "exp": "exp",
+    "expm1": "expm1",
     "sin": "sin",
     "cos": "cos",
     "floor": "floor",

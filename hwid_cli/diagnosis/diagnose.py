@@ -22,8 +22,8 @@ from hwid_cli.diagnosis.findings import Findings, describe
 from hwid_cli.diagnosis.held_command import (
     best_of,
     does_as_well,
-    is_complete_if_held,
     is_held,
+    is_settled_if_held,
     other_command,
     with_held_command,
 )
@@ -311,8 +311,8 @@ def _on_whole_recordings(searched: _Searched, max_effects: int) -> _Searched:
             known = found
     may_be_enough = rounds.problem.may_be_held and rounds.problem.drive.hold == LINE
 
-    def is_enough(winner: CandidateFit) -> bool:
-        return may_be_enough and is_complete_if_held(rounds, winner)
+    def is_enough(so_far: RoundsResult) -> bool:
+        return may_be_enough and is_settled_if_held(rounds, so_far)
 
     found = run_rounds(rounds, max_effects, is_enough, known)
     return replace(searched, found=found)

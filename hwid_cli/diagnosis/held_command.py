@@ -19,7 +19,7 @@ from hwid_cli.diagnosis.candidate import (
 from hwid_cli.diagnosis.effect_sets import Effects
 from hwid_cli.diagnosis.problem import DiagnosisProblem
 from hwid_cli.diagnosis.rounds import RoundsResult
-from hwid_cli.diagnosis.selection import LEAST_GAIN, TIE, count
+from hwid_cli.diagnosis.selection import LEAST_GAIN, NEARLY_THE_REST, TIE, count
 from hwid_cli.diagnosis.set_fits import Rounds, fit_task
 from hwid_cli.records.candidates import CandidateFit
 from hwid_cli.records.drive import HELD, LINE
@@ -114,13 +114,23 @@ def does_as_well(rounds: Rounds, held: CandidateFit, line: CandidateFit) -> bool
     return lead <= (TIE if count(held) < count(line) else 0.0)
 
 
-def is_complete_if_held(rounds: Rounds, best: CandidateFit) -> bool:
-    """Whether nothing remains beside a held command, of a set that leaves something.
+def is_settled_if_held(rounds: Rounds, found: RoundsResult) -> bool:
+    """Whether next to nothing remains beside a held command, where a line leaves something.
 
     Larger sets are not worth their time then: they would imitate half a sample.
+
+    Parameters
+    ----------
+    found : RoundsResult
+        Beside a command that goes on in a line.
     """
-    better = _better_if_held(rounds, best, _without_each(rounds, best))
-    return any(rounds.criteria.is_complete(one) for one in better)
+    best = best_of(rounds, found)
+    better = _better_if_held(rounds, best, _worth_trying(rounds, found, best))
+    criteria = rounds.criteria
+    least = (1 - NEARLY_THE_REST) * criteria.excess(best)
+    return any(
+        criteria.is_complete(one) or criteria.excess(one) <= least for one in better
+    )
 
 
 def _better_if_held(

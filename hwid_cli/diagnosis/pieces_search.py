@@ -80,9 +80,10 @@ def seeds_of_pieces(
     free = in_pieces(rounds.problem, force, are_free=True)
     criteria = SelectionCriteria.of(free, rounds.baseline.noise)
 
-    def is_enough(winner: CandidateFit) -> bool:
+    def is_enough(so_far: RoundsResult) -> bool:
         # What starts that are not exact leave looks as if more were missing.
-        return criteria.ratio(_from_there(rounds, free, winner)) <= SMALL_REMAINDER
+        best = so_far.best[-1]
+        return criteria.ratio(_from_there(rounds, free, best)) <= SMALL_REMAINDER
 
     found = run_rounds(of_pieces, max_effects, is_enough)
     excess = of_pieces.criteria.excess

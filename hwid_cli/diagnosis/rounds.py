@@ -77,7 +77,7 @@ class RoundsResult:
 def run_rounds(
     rounds: Rounds,
     max_effects: int,
-    is_enough: Callable[[CandidateFit], bool] = lambda winner: False,
+    is_enough: Callable[[RoundsResult], bool] = lambda found: False,
     known: RoundsResult | None = None,
 ) -> RoundsResult:
     """Fit single effects, and larger sets while something remains.
@@ -85,7 +85,7 @@ def run_rounds(
     Parameters
     ----------
     is_enough : callable
-        Whether larger sets than the best one of a size are not worth their time.
+        Whether larger sets than those so far are not worth their time.
     known : RoundsResult or None
         Sets that another search has led to: larger ones only, on top of these.
     """
@@ -108,11 +108,11 @@ def run_rounds(
         best.append(winner)
         if rounds.criteria.is_nearly_all(winner, rounds.base):
             break
-        if is_enough(winner):
+        if is_enough(search.result(best)):
             break
         parents = search.parents(size)
     search.fit_parts(best)
-    return RoundsResult(search.fits.found, tuple(best), search.proposals.shares)
+    return search.result(best)
 
 
 def continue_rounds(
@@ -140,7 +140,7 @@ def continue_rounds(
         if rounds.criteria.is_complete(winner):
             break
     search.fit_parts(best)
-    return RoundsResult(search.fits.found, tuple(best), search.proposals.shares)
+    return search.result(best)
 
 
 class _Search:
@@ -150,6 +150,10 @@ class _Search:
         self.rounds = rounds
         self.fits = SetFits(rounds)
         self.proposals = Proposals(rounds)
+
+    def result(self, best: Sequence[CandidateFit]) -> RoundsResult:
+        """All that was fitted so far, with the best set of each size."""
+        return RoundsResult(self.fits.found, tuple(best), self.proposals.shares)
 
     def round_of(
         self, size: int, parents: Sequence[CandidateFit]

@@ -133,5 +133,9 @@ that is switched off is 0, except where the comment says infinite.
     SAMPLE_TIME,  # set by the simulation
     LAG_DAMPING_RATIO,
     SENSOR_LAG,
+    HAS_BRISTLES,  # set by the simulation: a hysteresis whose level falls with the speed
+    BRISTLE_VELOCITY,
+    BRISTLE_DAMPING,
+    BRISTLE_EXCESS,
     N_SLOTS,
-) = range(126)
+) = range(130)

@@ -44,6 +44,9 @@ _MODE = (
     "({mass_kg}*(2*pi*{frequency_Hz})^2*(x - #r)"
     " + 2*{damping_ratio}*{mass_kg}*2*pi*{frequency_Hz}*(v - #w))"
 )
+_BENDING = (
+    "(v - #z*abs(v)/(1 + {static_excess_N}/{force_N}*exp(-(v/{velocity_m_per_s})^2)))"
+)
 LAWS = {
     "coulomb_friction": _Law("-{force_N}*s"),
     "asymmetric_friction": _Law(
@@ -56,6 +59,10 @@ LAWS = {
         "-{force_N}*(1 + {variation_share}*sin(2*pi*x/{period_m} + {phase_rad}))*s"
     ),
     "hysteresis": _Law("-{force_N}*#z", (("z", "(v - #z*abs(v))/{yield_m}"),)),
+    "lugre_friction": _Law(
+        f"-{{force_N}}*#z - {{damping_N_s_per_m}}*{_BENDING}",
+        (("z", f"{_BENDING}/{{yield_m}}"),),
+    ),
     "quadratic_drag": _Law("-{drag_N_s2_per_m2}*v*abs(v)"),
     "cubic_stiffness": _Law("-{stiffness_N_per_m3}*x^3"),
     "quadratic_stiffness": _Law("-{stiffness_N_per_m2}*x^2"),

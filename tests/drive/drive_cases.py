@@ -22,6 +22,15 @@ STRIBECK = {
     }
 }
 HYSTERESIS = {"hysteresis": {"force_N": 0.8, "yield_m": 2e-4}}
+BRISTLES = {
+    "lugre_friction": {
+        "force_N": 0.8,
+        "yield_m": 2e-4,
+        "static_excess_N": 0.5,
+        "velocity_m_per_s": 0.01,
+        "damping_N_s_per_m": 8.0,
+    }
+}
 CUBIC = {"cubic_stiffness": {"stiffness_N_per_m3": 5e5}}
 END_STOP = {"end_stop": {"position_m": 0.012, "stiffness_N_per_m": 2e4}}
 GAP = {"spring_gap": {"half_gap_m": 1e-3}}

@@ -43,6 +43,10 @@ VALUES = {
         "force_N": 0.8, "variation_share": 0.5, "period_m": 0.008, "phase_rad": 0.4,
     },
     "hysteresis": {"force_N": 1.0, "yield_m": 4e-4},
+    "lugre_friction": {
+        "force_N": 0.9, "yield_m": 4e-4, "static_excess_N": 0.5,
+        "velocity_m_per_s": 0.05, "damping_N_s_per_m": 4.0,
+    },
     "quadratic_drag": {"drag_N_s2_per_m2": 40.0},
     "cubic_stiffness": {"stiffness_N_per_m3": 3e6},
     "quadratic_stiffness": {"stiffness_N_per_m2": 2e4},

@@ -258,6 +258,52 @@ BOUC_WEN = replace(
     contains=("hysteresis", *HYSTERESIS.contains),
 )
 
+LUGRE = Effect(
+    id="lugre_friction",
+    sentence="dry friction of bristles that bend before they slide, less at speed (LuGre)",
+    equation="F = -s0 z - s1 z', z' = v - s0 |v| z / (Fc + dFs exp(-(v/vs)^2)), s0 = Fc / zy",
+    enters="motion",
+    parameters=(
+        Parameter(
+            "force_N",
+            shares_of("force_N", 0.03, 0.1),
+            places=("HYSTERESIS_FORCE",),
+            limits=(POSITIVE,),
+        ),
+        Parameter(
+            "yield_m",
+            shares_of("displacement_m", 0.003, 0.012),
+            span_of("displacement_m", 1e-4, 0.3),
+            places=("HYSTERESIS_YIELD",),
+            limits=(POSITIVE,),
+        ),
+        Parameter(
+            "static_excess_N", shares_of("force_N", 0.03), limits=(NOT_NEGATIVE,)
+        ),
+        Parameter(
+            "velocity_m_per_s",
+            shares_of("velocity_m_per_s", 0.01, 0.05),
+            span_of("velocity_m_per_s", 1e-4, 0.3),
+            places=("BRISTLE_VELOCITY",),
+            limits=(POSITIVE,),
+        ),
+        Parameter(
+            "damping_N_s_per_m",
+            lambda scales: (0.1 * scales.force_N / scales.velocity_m_per_s,),
+            places=("BRISTLE_DAMPING",),
+            default=0.0,
+            limits=(NOT_NEGATIVE,),
+        ),
+    ),
+    derived={"BRISTLE_EXCESS": lambda one: one["static_excess_N"] / one["force_N"]},
+    confused_with={
+        "stribeck_friction": "very slow small triangles, which show the way before sliding",
+        "hysteresis": "slow motion at several speeds",
+    },
+    told_by="static_excess_N",
+    contains=("stribeck_friction", "hysteresis", "coulomb_friction"),
+)
+
 DRAG = Effect(
     id="quadratic_drag",
     sentence="resistance that grows with the square of the velocity",
@@ -278,4 +324,14 @@ DRAG = Effect(
     },
 )
 
-EFFECTS = (COULOMB, ASYMMETRIC, STRIBECK, *LOAD, POSITION, HYSTERESIS, BOUC_WEN, DRAG)
+EFFECTS = (
+    COULOMB,
+    ASYMMETRIC,
+    STRIBECK,
+    *LOAD,
+    POSITION,
+    HYSTERESIS,
+    BOUC_WEN,
+    LUGRE,
+    DRAG,
+)

@@ -21,6 +21,7 @@ from hwid_cli.drive.motion.forces import (
     acceleration,
     beyond,
     beyond_side,
+    bristle_level,
     drive_now,
     is_force_curved,
     net_forces,
@@ -292,6 +293,8 @@ def _rate_of_yielding(
     state: np.ndarray, memory: np.ndarray, mass: float, p: np.ndarray
 ) -> float:
     """Return how fast the hysteresis changes, as long as it has not yielded."""
+    if p[slots.HAS_BRISTLES] != 0.0:
+        return _rate_of_bending(state, memory, mass, p)
     if p[slots.HAS_SHAPE] != 0.0:
         return _rate_in_shape(state, memory, mass, p)
     gone = abs(state[X] - memory[TURNED_AT]) / p[slots.HYSTERESIS_YIELD]
@@ -302,6 +305,24 @@ def _rate_of_yielding(
     # How much of it is left decides how exactly it has to be followed.
     speed = abs(state[V]) / p[slots.HYSTERESIS_YIELD]
     return np.sqrt(stiffness * fading / mass) + 0.6 * speed * np.sqrt(np.sqrt(fading))
+
+
+@compiled(**INNER)
+def _rate_of_bending(
+    state: np.ndarray, memory: np.ndarray, mass: float, p: np.ndarray
+) -> float:
+    """Return it for bristles, whose level falls with the speed."""
+    v, force = state[V], abs(p[slots.HYSTERESIS_FORCE])
+    level = bristle_level(v, p)
+    slope = abs(1.0 - memory[WAY] * memory[DEFLECTION] / level)
+    stiffness = force * slope / p[slots.HYSTERESIS_YIELD]
+    speed = abs(v) / p[slots.HYSTERESIS_YIELD]
+    rate = np.sqrt(stiffness / mass) + p[slots.BRISTLE_DAMPING] * slope / mass
+    rate += 0.6 * speed * np.sqrt(np.sqrt(min(0.5 * slope, 1.0)))
+    if level > 1.0:
+        # How steeply the level falls, at most.
+        rate += force * p[slots.BRISTLE_EXCESS] / (mass * p[slots.BRISTLE_VELOCITY])
+    return rate
 
 
 @compiled(**INNER)

@@ -11,12 +11,14 @@ from hwid_cli.drive.motion.corners import corner_of, margin
 from hwid_cli.drive.motion.curved import is_curved_here, step_all, step_plain
 from hwid_cli.drive.motion.forces import (
     DEFLECTION,
+    LEVEL,
     SIDE,
     TURNED_AT,
     WAY,
     V,
     X,
     acceleration,
+    bristle_level,
     held_further,
     moved_mass,
     surplus,
@@ -244,8 +246,9 @@ def stop(
     """
     state[V] = 0.0
     if p[slots.HYSTERESIS_FORCE] != 0.0:
-        memory[DEFLECTION] = yielded(state[X], memory, p)
+        memory[DEFLECTION] = yielded(state[X], 0.0, memory, p)
         memory[TURNED_AT] = state[X]
+        memory[LEVEL] = bristle_level(0.0, p)
     memory[WAY] = 0.0
     net, more = excess(state, memory, push, done, p)
     if more > 0.0:

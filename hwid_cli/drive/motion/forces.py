@@ -25,8 +25,10 @@ from hwid_cli.drive.motion.push import (
 X, V, MOTOR_X, MOTOR_V, PART_X, PART_V, CIRCUIT, N_STATE = range(8)
 # Places in the memory: direction of sliding (0 at rest), position and deflection at the
 # last reversal, current after the lag, temperature, side of a preload (0 held at 0), rate
-# of a second-order lag.
-WAY, TURNED_AT, DEFLECTION, LAGGED, HEAT, SIDE, LAG_RATE, N_MEMORY = range(8)
+# of a second-order lag, and how far bristles yield at the speed of the last step.
+(
+    WAY, TURNED_AT, DEFLECTION, LAGGED, HEAT, SIDE, LAG_RATE, LEVEL, N_MEMORY,
+) = range(9)  # fmt: skip
 # Tries that bracket the position at rest, each this much further, and that narrow it.
 MOST_TRIES, FURTHER, NARROWING = 120, 1.3, 90
 # Length of a step along the deflection of a hysteresis, in yield lengths, and what is
@@ -234,7 +236,10 @@ def resisting(x: float, v: float, memory: np.ndarray, p: np.ndarray) -> float:
     if p[slots.DRAG] != 0.0:
         force += p[slots.DRAG] * v * abs(v)
     if p[slots.HYSTERESIS_FORCE] != 0.0:
-        force += p[slots.HYSTERESIS_FORCE] * yielded(x, memory, p)
+        deflection = yielded(x, v, memory, p)
+        force += p[slots.HYSTERESIS_FORCE] * deflection
+        if p[slots.BRISTLE_DAMPING] != 0.0:
+            force += p[slots.BRISTLE_DAMPING] * bending(v, deflection, memory, p)
     way = memory[WAY]
     if way != 0.0:
         force += way * sliding_friction(way, v, p)
@@ -351,6 +356,7 @@ def is_force_curved(p: np.ndarray) -> bool:
         or p[slots.SPRING_SHARE] != 0.0
         or p[slots.DRIVE_VARIES] != 0.0
         or p[slots.OWN_FORCE] != 0.0
+        or p[slots.HAS_BRISTLES] != 0.0
     )
 
 
@@ -486,12 +492,12 @@ def bite(twist: float, speed: float, p: np.ndarray) -> float:
 
 
 @compiled(**INNER)
-def yielded(x: float, memory: np.ndarray, p: np.ndarray) -> float:
-    """Return the deflection of the hysteresis, -1 to 1.
+def yielded(x: float, v: float, memory: np.ndarray, p: np.ndarray) -> float:
+    """Return the deflection of the hysteresis: 1 where it has yielded, at speed.
 
     Parameters
     ----------
-    x : float, [m]
+    x, v : float, [m], [m/s]
     memory : ndarray, shape (N_MEMORY,)
     p : ndarray, shape (N_SLOTS,)
     """
@@ -499,9 +505,58 @@ def yielded(x: float, memory: np.ndarray, p: np.ndarray) -> float:
     if way == 0.0:
         return memory[DEFLECTION]
     gone = abs(x - memory[TURNED_AT]) / p[slots.HYSTERESIS_YIELD]
+    if p[slots.HAS_BRISTLES] != 0.0:
+        return way * _bent(way * memory[DEFLECTION], gone, v, memory, p)
     if p[slots.HAS_SHAPE] != 0.0:
         return way * _yielded_in_shape(way * memory[DEFLECTION], gone, p)
     return way - (way - memory[DEFLECTION]) * np.exp(-gone)
+
+
+@compiled(**INNER)
+def bristle_level(v: float, p: np.ndarray) -> float:
+    """Return the deflection at which bristles slide at a speed, [-].
+
+    Parameters
+    ----------
+    v : float, [m/s]
+    p : ndarray, shape (N_SLOTS,)
+    """
+    if p[slots.BRISTLE_EXCESS] == 0.0:
+        return 1.0
+    share = v / p[slots.BRISTLE_VELOCITY]
+    return 1.0 + p[slots.BRISTLE_EXCESS] * np.exp(-share * share)
+
+
+@compiled(**INNER)
+def bending(v: float, deflection: float, memory: np.ndarray, p: np.ndarray) -> float:
+    """Return how fast bristles bend, [m/s].
+
+    Parameters
+    ----------
+    v : float, [m/s]
+    deflection : float, [-]
+    memory : ndarray, shape (N_MEMORY,)
+    p : ndarray, shape (N_SLOTS,)
+    """
+    return v * (1.0 - memory[WAY] * deflection / bristle_level(v, p))
+
+
+@compiled(**INNER)
+def _bent(
+    ahead: float, gone: float, v: float, memory: np.ndarray, p: np.ndarray
+) -> float:
+    """Return the deflection of bristles in the direction of motion.
+
+    Their level g changes evenly along the way s: of z' = 1 - z / g follows that z - g dies
+    away while -g' drives it.
+    """
+    before, now = memory[LEVEL], bristle_level(v, p)
+    if gone <= 0.0:
+        return ahead
+    level = 0.5 * (before + now)
+    lost = -np.expm1(-gone / level)
+    off = (ahead - before) * (1.0 - lost)
+    return now + off - (now - before) * level / gone * lost
 
 
 @compiled(**INNER)
@@ -563,12 +618,12 @@ def _shape_step(ahead: float, h: float, p: np.ndarray) -> float:
 
 
 @compiled(**INNER)
-def remember(x: float, memory: np.ndarray, p: np.ndarray) -> None:
+def remember(x: float, v: float, memory: np.ndarray, p: np.ndarray) -> None:
     """Keep how far a hysteresis of any shape has yielded, at the end of a step.
 
     Parameters
     ----------
-    x : float, [m]
+    x, v : float, [m], [m/s]
     memory : ndarray, shape (N_MEMORY,)
         Changed in place.
     p : ndarray, shape (N_SLOTS,)
@@ -576,7 +631,11 @@ def remember(x: float, memory: np.ndarray, p: np.ndarray) -> None:
     way = memory[WAY]
     if way == 0.0:
         return
-    deflection = yielded(x, memory, p)
+    deflection = yielded(x, v, memory, p)
+    if p[slots.HAS_BRISTLES] != 0.0:
+        memory[DEFLECTION], memory[LEVEL] = deflection, bristle_level(v, p)
+        memory[TURNED_AT] = x
+        return
     memory[DEFLECTION] = way if 1.0 - way * deflection <= YIELDED else deflection
     memory[TURNED_AT] = x
 

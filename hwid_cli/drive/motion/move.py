@@ -30,6 +30,7 @@ from hwid_cli.drive.motion.events import (
 from hwid_cli.drive.motion.forces import (
     CIRCUIT,
     LAGGED,
+    LEVEL,
     MOTOR_V,
     MOTOR_X,
     N_MEMORY,
@@ -41,6 +42,7 @@ from hwid_cli.drive.motion.forces import (
     WAY,
     V,
     X,
+    bristle_level,
     drawn_current,
     has_dry_friction,
     is_anywhere,
@@ -256,6 +258,7 @@ def _start(
     state[PART_X], state[PART_V] = state[X], state[V]
     memory[SIDE] = np.sign(state[X])
     memory[TURNED_AT] = state[X]
+    memory[LEVEL] = bristle_level(state[V], p)
     memory[WAY] = np.sign(state[V])
     if memory[WAY] != 0.0:
         set_off(state, memory, memory[WAY], p)
@@ -299,7 +302,9 @@ def _take_stock(sample_time: float, p: np.ndarray) -> None:
     has_more = has_more or p[slots.OWN_FRICTION] != 0.0
     p[slots.HAS_MORE] = 1.0 if has_more else 0.0
     has_shape = p[slots.HYSTERESIS_BEND] != 0.0 or p[slots.HYSTERESIS_RATIO] != 0.0
-    p[slots.HAS_SHAPE] = 1.0 if has_shape else 0.0
+    has_bristles = p[slots.BRISTLE_EXCESS] != 0.0 or p[slots.BRISTLE_DAMPING] != 0.0
+    p[slots.HAS_BRISTLES] = 1.0 if has_bristles else 0.0
+    p[slots.HAS_SHAPE] = 1.0 if has_shape or has_bristles else 0.0
     varies = p[slots.RIPPLE_SHARE] != 0.0 or p[slots.DRIVE_SHARE] > 0.0
     p[slots.DRIVE_VARIES] = 1.0 if varies else 0.0
 
@@ -390,7 +395,7 @@ def _move_piece(
             state[n] = trial[n]
         done = length if h >= left * (1.0 - 1e-12) else done + h
         if p[slots.HAS_SHAPE] != 0.0:
-            remember(state[X], memory, p)
+            remember(state[X], state[V], memory, p)
         if is_leaving:
             # Whether the force here is a last bit above or below, it is growing.
             way = np.sign(excess(state, memory, push, done, p)[0])

@@ -206,7 +206,7 @@ def glide_plain(
                 break
             x, v = x1, v1
             if p[slots.HAS_SHAPE] != 0.0:
-                remember(x, memory, p)
+                remember(x, v, memory, p)
             done = length if h >= left * (1.0 - 1e-12) else done + h
         if done < length:
             break

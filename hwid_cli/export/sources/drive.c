@@ -133,7 +133,7 @@ static double glide_plain(HWID_NAME(state) *s, double *push, double length, doub
         x = next.m0;
         v = next.m1;
         if (p[HAS_SHAPE] != 0.0) {
-            drive_remember(x, memory, p);
+            drive_remember(x, v, memory, p);
         }
         done = h >= left * (1.0 - 1e-12) ? length : done + h;
     }

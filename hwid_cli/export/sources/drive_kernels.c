@@ -126,7 +126,11 @@ enum {
     SAMPLE_TIME = 122,
     LAG_DAMPING_RATIO = 123,
     SENSOR_LAG = 124,
-    N_SLOTS = 125,
+    HAS_BRISTLES = 125,
+    BRISTLE_VELOCITY = 126,
+    BRISTLE_DAMPING = 127,
+    BRISTLE_EXCESS = 128,
+    N_SLOTS = 129,
     CONSTANT = 0,
     VARIABLE = 1,
     ADD = 2,
@@ -185,7 +189,8 @@ enum {
     HEAT = 4,
     SIDE = 5,
     LAG_RATE = 6,
-    N_MEMORY = 7,
+    LEVEL = 7,
+    N_MEMORY = 8,
     MOST_TRIES = 120,
     NARROWING = 90,
     MOST_TURNS = 60,
@@ -1138,6 +1143,34 @@ static double drive_spring_force(double x, double *p)
     return force;
 }
 
+static double drive_bristle_level(double v, double *p)
+{
+    double share = 0.0;
+    if (p[BRISTLE_EXCESS] == 0.0) {
+        return 1.0;
+    }
+    share = v / p[BRISTLE_VELOCITY];
+    return 1.0 + (p[BRISTLE_EXCESS] * exp((-share) * share));
+}
+
+static double drive_bent_motion(double ahead, double gone, double v, double *memory, double *p)
+{
+    double before = 0.0;
+    double now = 0.0;
+    double level = 0.0;
+    double lost = 0.0;
+    double off = 0.0;
+    before = memory[LEVEL];
+    now = drive_bristle_level(v, p);
+    if (gone <= 0.0) {
+        return ahead;
+    }
+    level = 0.5 * (before + now);
+    lost = -expm1((-gone) / level);
+    off = (ahead - before) * (1.0 - lost);
+    return (now + off) - ((((now - before) * level) / gone) * lost);
+}
+
 static double drive_yielding(double ahead, double *p)
 {
     double share = 0.0;
@@ -1198,7 +1231,7 @@ static double drive_yielded_in_shape(double ahead, double gone, double *p)
     return least(ahead, 1.0);
 }
 
-static double drive_yielded(double x, double *memory, double *p)
+static double drive_yielded(double x, double v, double *memory, double *p)
 {
     double way = 0.0;
     double gone = 0.0;
@@ -1207,6 +1240,9 @@ static double drive_yielded(double x, double *memory, double *p)
         return memory[DEFLECTION];
     }
     gone = fabs(x - memory[TURNED_AT]) / p[HYSTERESIS_YIELD];
+    if (p[HAS_BRISTLES] != 0.0) {
+        return way * drive_bent_motion(way * memory[DEFLECTION], gone, v, memory, p);
+    }
     if (p[HAS_SHAPE] != 0.0) {
         return way * drive_yielded_in_shape(way * memory[DEFLECTION], gone, p);
     }
@@ -1269,16 +1305,26 @@ static double drive_friction_here(double x, double *p)
     return level;
 }
 
+static double drive_bending(double v, double deflection, double *memory, double *p)
+{
+    return v * (1.0 - ((memory[WAY] * deflection) / drive_bristle_level(v, p)));
+}
+
 static double drive_resisting(double x, double v, double *memory, double *p)
 {
     double force = 0.0;
+    double deflection = 0.0;
     double way = 0.0;
     force = (p[DAMPING] * v) + drive_spring_force(x, p);
     if (p[DRAG] != 0.0) {
         force += (p[DRAG] * v) * fabs(v);
     }
     if (p[HYSTERESIS_FORCE] != 0.0) {
-        force += p[HYSTERESIS_FORCE] * drive_yielded(x, memory, p);
+        deflection = drive_yielded(x, v, memory, p);
+        force += p[HYSTERESIS_FORCE] * deflection;
+        if (p[BRISTLE_DAMPING] != 0.0) {
+            force += p[BRISTLE_DAMPING] * drive_bending(v, deflection, memory, p);
+        }
     }
     way = memory[WAY];
     if (way != 0.0) {
@@ -1487,10 +1533,10 @@ static double drive_spring_rate(double x, double low, double high, double *p)
 
 static int drive_is_force_curved(double *p)
 {
-    return (p[CUBIC] != 0.0) || (p[QUADRATIC] != 0.0) || (p[COGGING_FORCE] != 0.0) || (p[DRAG] != 0.0) || (p[GRAVITY_TORQUE] != 0.0) || (p[SECOND_COGGING_FORCE] != 0.0) || (p[WAVY_FRICTION] != 0.0) || (p[SPRING_SHARE] != 0.0) || (p[DRIVE_VARIES] != 0.0) || (p[OWN_FORCE] != 0.0);
+    return (p[CUBIC] != 0.0) || (p[QUADRATIC] != 0.0) || (p[COGGING_FORCE] != 0.0) || (p[DRAG] != 0.0) || (p[GRAVITY_TORQUE] != 0.0) || (p[SECOND_COGGING_FORCE] != 0.0) || (p[WAVY_FRICTION] != 0.0) || (p[SPRING_SHARE] != 0.0) || (p[DRIVE_VARIES] != 0.0) || (p[OWN_FORCE] != 0.0) || (p[HAS_BRISTLES] != 0.0);
 }
 
-static void drive_remember(double x, double *memory, double *p)
+static void drive_remember(double x, double v, double *memory, double *p)
 {
     double way = 0.0;
     double deflection = 0.0;
@@ -1498,7 +1544,13 @@ static void drive_remember(double x, double *memory, double *p)
     if (way == 0.0) {
         return;
     }
-    deflection = drive_yielded(x, memory, p);
+    deflection = drive_yielded(x, v, memory, p);
+    if (p[HAS_BRISTLES] != 0.0) {
+        memory[DEFLECTION] = deflection;
+        memory[LEVEL] = drive_bristle_level(v, p);
+        memory[TURNED_AT] = x;
+        return;
+    }
     memory[DEFLECTION] = ((1.0 - (way * deflection)) <= 1e-14) ? way : deflection;
     memory[TURNED_AT] = x;
 }
@@ -1994,6 +2046,29 @@ static tuple_dd drive_further_stiffness(double *state, double *push, double done
     return (tuple_dd){stiffness, waves};
 }
 
+static double drive_rate_of_bending(double *state, double *memory, double mass, double *p)
+{
+    double v = 0.0;
+    double force = 0.0;
+    double level = 0.0;
+    double slope = 0.0;
+    double stiffness = 0.0;
+    double speed = 0.0;
+    double rate = 0.0;
+    v = state[V];
+    force = fabs(p[HYSTERESIS_FORCE]);
+    level = drive_bristle_level(v, p);
+    slope = fabs(1.0 - ((memory[WAY] * memory[DEFLECTION]) / level));
+    stiffness = (force * slope) / p[HYSTERESIS_YIELD];
+    speed = fabs(v) / p[HYSTERESIS_YIELD];
+    rate = sqrt(stiffness / mass) + ((p[BRISTLE_DAMPING] * slope) / mass);
+    rate += (0.6 * speed) * sqrt(sqrt(least(0.5 * slope, 1.0)));
+    if (level > 1.0) {
+        rate += (force * p[BRISTLE_EXCESS]) / (mass * p[BRISTLE_VELOCITY]);
+    }
+    return rate;
+}
+
 static double drive_rate_in_shape(double *state, double *memory, double mass, double *p)
 {
     double ahead = 0.0;
@@ -2020,6 +2095,9 @@ static double drive_rate_of_yielding(double *state, double *memory, double mass,
     double fading = 0.0;
     double stiffness = 0.0;
     double speed = 0.0;
+    if (p[HAS_BRISTLES] != 0.0) {
+        return drive_rate_of_bending(state, memory, mass, p);
+    }
     if (p[HAS_SHAPE] != 0.0) {
         return drive_rate_in_shape(state, memory, mass, p);
     }
@@ -2888,8 +2966,9 @@ static void drive_stop(double *state, double *memory, double *push, double done,
     double more = 0.0;
     state[V] = 0.0;
     if (p[HYSTERESIS_FORCE] != 0.0) {
-        memory[DEFLECTION] = drive_yielded(state[X], memory, p);
+        memory[DEFLECTION] = drive_yielded(state[X], 0.0, memory, p);
         memory[TURNED_AT] = state[X];
+        memory[LEVEL] = drive_bristle_level(0.0, p);
     }
     memory[WAY] = 0.0;
     t1 = drive_excess(state, memory, push, done, p);
@@ -3110,6 +3189,7 @@ static void drive_take_stock(double sample_time, double *p)
     int has_second = 0;
     int has_more = 0;
     int has_shape = 0;
+    int has_bristles = 0;
     int varies = 0;
     p[CAPTURE_TIME] = 0.02 * sample_time;
     p[SAMPLE_TIME] = sample_time;
@@ -3129,7 +3209,9 @@ static void drive_take_stock(double sample_time, double *p)
     has_more = has_more || (p[OWN_FRICTION] != 0.0);
     p[HAS_MORE] = has_more ? 1.0 : 0.0;
     has_shape = (p[HYSTERESIS_BEND] != 0.0) || (p[HYSTERESIS_RATIO] != 0.0);
-    p[HAS_SHAPE] = has_shape ? 1.0 : 0.0;
+    has_bristles = (p[BRISTLE_EXCESS] != 0.0) || (p[BRISTLE_DAMPING] != 0.0);
+    p[HAS_BRISTLES] = has_bristles ? 1.0 : 0.0;
+    p[HAS_SHAPE] = (has_shape || has_bristles) ? 1.0 : 0.0;
     varies = (p[RIPPLE_SHARE] != 0.0) || (p[DRIVE_SHARE] > 0.0);
     p[DRIVE_VARIES] = varies ? 1.0 : 0.0;
 }
@@ -3188,6 +3270,7 @@ static double drive_start(double *state, double *memory, double command, double 
     state[PART_V] = state[V];
     memory[SIDE] = sign_of(state[X]);
     memory[TURNED_AT] = state[X];
+    memory[LEVEL] = drive_bristle_level(state[V], p);
     memory[WAY] = sign_of(state[V]);
     if (memory[WAY] != 0.0) {
         drive_set_off(state, memory, memory[WAY], p);
@@ -3312,7 +3395,7 @@ static void drive_move_piece(double *state, double *trial, double *memory, doubl
         }
         done = (h >= (left * (1.0 - 1e-12))) ? length : (done + h);
         if (p[HAS_SHAPE] != 0.0) {
-            drive_remember(state[X], memory, p);
+            drive_remember(state[X], state[V], memory, p);
         }
         if (is_leaving) {
             way = sign_of(drive_excess(state, memory, push, done, p).m0);
