@@ -3,7 +3,7 @@
 import math
 
 from hwid_cli.drive import controller, slots
-from hwid_cli.drive.motion import forces, push
+from hwid_cli.drive.motion import push, state
 from hwid_cli.errors import ConfigError
 from hwid_cli.export.c_source import card_text, comment_lines, filled, numbers
 from hwid_cli.records.exported import ExportedSimulation
@@ -57,9 +57,9 @@ def drive_source(exported: ExportedSimulation) -> str:
             "effects": comment_lines(effects),
             "hold": _HOLDS[drive.hold],
             "n_slots": exported.slots.size,
-            "n_state": forces.N_STATE,
+            "n_state": state.N_STATE,
             "n_control": controller.N_CONTROL,
-            "n_memory": forces.N_MEMORY,
+            "n_memory": state.N_MEMORY,
             "n_room": push.N_ROOM,
             "n_history": n_history,
             "kernels": filled("drive_kernels.c", {}),

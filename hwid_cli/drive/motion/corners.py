@@ -7,16 +7,9 @@ import numpy as np
 
 from hwid_cli.compiled import INNER, compiled
 from hwid_cli.drive import slots
-from hwid_cli.drive.motion.forces import (
-    MOTOR_V,
-    MOTOR_X,
-    V,
-    X,
-    bite,
-    drawn_current,
-    wanted_current,
-)
+from hwid_cli.drive.motion.forces import bite, drawn_current, wanted_current
 from hwid_cli.drive.motion.push import depends_on_motion
+from hwid_cli.drive.motion.state import MOTOR_V, MOTOR_X, V, X
 
 
 @compiled(**INNER)

@@ -8,30 +8,15 @@ import numpy as np
 from hwid_cli.compiled import INNER, MAKING, compiled
 from hwid_cli.drive import slots
 from hwid_cli.drive.motion.forces import (
-    DEFLECTION,
-    MOTOR_V,
-    MOTOR_X,
-    N_STATE,
-    PART_V,
-    TURNED_AT,
-    WAY,
-    YIELDED,
-    V,
-    X,
     acceleration,
-    beyond,
-    beyond_side,
-    bristle_level,
     drive_now,
     is_force_curved,
     net_forces,
     own_force,
-    reaches_side,
     resisting,
     ripple,
-    spring_rate,
-    yielding,
 )
+from hwid_cli.drive.motion.hysteresis import YIELDED, bristle_level, yielding
 from hwid_cli.drive.motion.push import (
     DRIVE,
     OTHER,
@@ -40,6 +25,18 @@ from hwid_cli.drive.motion.push import (
     has_losses,
     shift,
     value_of,
+)
+from hwid_cli.drive.motion.springs import beyond, beyond_side, reaches_side, spring_rate
+from hwid_cli.drive.motion.state import (
+    DEFLECTION,
+    MOTOR_V,
+    MOTOR_X,
+    N_STATE,
+    PART_V,
+    TURNED_AT,
+    WAY,
+    V,
+    X,
 )
 
 # Beyond this many Stribeck velocities the excess is below rounding, exp(-6.1^2); and

@@ -9,21 +9,8 @@ from hwid_cli.compiled import INNER, compiled
 from hwid_cli.drive import slots
 from hwid_cli.drive.motion.corners import corner_of, margin
 from hwid_cli.drive.motion.curved import is_curved_here, step_all, step_plain
-from hwid_cli.drive.motion.forces import (
-    DEFLECTION,
-    LEVEL,
-    SIDE,
-    TURNED_AT,
-    WAY,
-    V,
-    X,
-    acceleration,
-    bristle_level,
-    held_further,
-    moved_mass,
-    surplus,
-    yielded,
-)
+from hwid_cli.drive.motion.forces import acceleration, held_further, moved_mass, surplus
+from hwid_cli.drive.motion.hysteresis import bristle_level, yielded
 from hwid_cli.drive.motion.linear import (
     DRIVEN,
     OFFSET,
@@ -33,6 +20,7 @@ from hwid_cli.drive.motion.linear import (
     sum_series,
 )
 from hwid_cli.drive.motion.push import DRIVE, OTHER, shift, value_of
+from hwid_cli.drive.motion.state import DEFLECTION, LEVEL, SIDE, TURNED_AT, WAY, V, X
 
 # Iterations that locate an event; each one at least halves what is left.
 LOCATING = 40

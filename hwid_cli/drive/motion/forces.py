@@ -8,6 +8,7 @@ import numpy as np
 from hwid_cli.compiled import INNER, compiled
 from hwid_cli.drive import slots
 from hwid_cli.drive.interpreter import formula_value
+from hwid_cli.drive.motion.hysteresis import bending, yielded
 from hwid_cli.drive.motion.push import (
     BEGUN,
     COMMAND,
@@ -20,24 +21,18 @@ from hwid_cli.drive.motion.push import (
     force_of,
     value_of,
 )
-
-# Places in the state: mass, motor, appendage, current of the circuit.
-X, V, MOTOR_X, MOTOR_V, PART_X, PART_V, CIRCUIT, N_STATE = range(8)
-# Places in the memory: direction of sliding (0 at rest), position and deflection at the
-# last reversal, current after the lag, temperature, side of a preload (0 held at 0), rate
-# of a second-order lag, and how far bristles yield at the speed of the last step.
-(
-    WAY, TURNED_AT, DEFLECTION, LAGGED, HEAT, SIDE, LAG_RATE, LEVEL, N_MEMORY,
-) = range(9)  # fmt: skip
-# Tries that bracket the position at rest, each this much further, and that narrow it.
-MOST_TRIES, FURTHER, NARROWING = 120, 1.3, 90
-# Length of a step along the deflection of a hysteresis, in yield lengths, and what is
-# left of it when it has yielded, [-].
-SHAPE_STEP, YIELDED = 0.1, 1e-14
-# Where the law of what is left has a solution of its own, to a part in 1e8 of the force.
-NEARLY_YIELDED = 1e-3
-# Tries that find how far a motor on its tooth has turned, each far below the last one.
-MOST_TURNS = 60
+from hwid_cli.drive.motion.springs import beyond, contact_damping, spring_force
+from hwid_cli.drive.motion.state import (
+    CIRCUIT,
+    MOTOR_V,
+    MOTOR_X,
+    PART_V,
+    PART_X,
+    SIDE,
+    WAY,
+    V,
+    X,
+)
 
 
 @compiled(**INNER)
@@ -250,94 +245,6 @@ def resisting(x: float, v: float, memory: np.ndarray, p: np.ndarray) -> float:
 
 
 @compiled(**INNER)
-def spring_force(x: float, p: np.ndarray) -> float:
-    """Return the force of everything that depends on position alone but a preload.
-
-    Parameters
-    ----------
-    x : float, [m]
-    p : ndarray, shape (N_SLOTS,)
-    """
-    free = beyond(x, p[slots.SPRING_GAP]) if p[slots.SPRING_GAP] > 0.0 else x
-    force = p[slots.STIFFNESS] * free
-    force += (p[slots.CUBIC] * x + p[slots.QUADRATIC]) * x * x
-    if p[slots.STOP_STIFFNESS] > 0.0:
-        into = beyond(x, p[slots.STOP_POSITION])
-        force += p[slots.STOP_STIFFNESS] * bent(into, p[slots.STOP_BEND])
-    if p[slots.SIDE_STIFFNESS] > 0.0:
-        into = beyond_side(x, p[slots.SIDE_POSITION])
-        force += p[slots.SIDE_STIFFNESS] * bent(into, p[slots.SIDE_BEND])
-    if p[slots.COGGING_FORCE] != 0.0:
-        force -= cogging(x, p)
-    if p[slots.HAS_MORE] != 0.0:
-        force += further_spring(x, p)
-    return force
-
-
-@compiled(**INNER)
-def further_spring(x: float, p: np.ndarray) -> float:
-    """Return the force of what few drives have: weight, a second of a kind.
-
-    Parameters
-    ----------
-    x : float, [m]
-    p : ndarray, shape (N_SLOTS,)
-    """
-    force = 0.0
-    if p[slots.GRAVITY_TORQUE] != 0.0:
-        force += p[slots.GRAVITY_TORQUE] * np.sin(x + p[slots.GRAVITY_ANGLE])
-    if p[slots.SECOND_STIFFNESS] > 0.0:
-        into = beyond_side(x, p[slots.SECOND_POSITION])
-        force += p[slots.SECOND_STIFFNESS] * bent(into, p[slots.SECOND_BEND])
-    if p[slots.SECOND_COGGING_FORCE] != 0.0:
-        force -= second_cogging(x, p)
-    return force
-
-
-@compiled(**INNER)
-def spring_rate(x: float, low: float, high: float, p: np.ndarray) -> float:
-    """Return how stiff the springs are at most but for curved contacts, [N/m].
-
-    Parameters
-    ----------
-    x : float, [m]
-    low, high : float, [m]
-        Between which places the next step stays: a stop in between counts.
-    p : ndarray, shape (N_SLOTS,)
-    """
-    stiffness = p[slots.STIFFNESS]
-    if p[slots.CUBIC] != 0.0 or p[slots.QUADRATIC] != 0.0:
-        bend = 3.0 * p[slots.CUBIC] * x + 2.0 * p[slots.QUADRATIC]
-        stiffness += abs(bend * x)
-    is_plain = p[slots.STOP_BEND] + p[slots.STOP_LOSS] == 0.0
-    if is_plain and max(high, -low) > p[slots.STOP_POSITION]:
-        stiffness += p[slots.STOP_STIFFNESS]
-    is_plain = p[slots.SIDE_BEND] + p[slots.SIDE_LOSS] == 0.0
-    if is_plain and reaches_side(low, high, p[slots.SIDE_POSITION]):
-        stiffness += p[slots.SIDE_STIFFNESS]
-    if p[slots.HAS_MORE] != 0.0:
-        stiffness += abs(p[slots.GRAVITY_TORQUE])
-        stiffness += p[slots.SPRING_SHARE] * p[slots.STIFFNESS]
-        if p[slots.SECOND_STIFFNESS] > 0.0:
-            is_plain = p[slots.SECOND_BEND] + p[slots.SECOND_LOSS] == 0.0
-            if is_plain and reaches_side(low, high, p[slots.SECOND_POSITION]):
-                stiffness += p[slots.SECOND_STIFFNESS]
-    return stiffness
-
-
-@compiled(**INNER)
-def reaches_side(low: float, high: float, position: float) -> bool:
-    """Return whether a stop on one side begins between two places.
-
-    Parameters
-    ----------
-    low, high : float, [m]
-    position : float, [m]
-    """
-    return beyond_side(low, position) != 0.0 or beyond_side(high, position) != 0.0
-
-
-@compiled(**INNER)
 def is_force_curved(p: np.ndarray) -> bool:
     """Return whether a force on the mass is curved everywhere.
 
@@ -361,34 +268,6 @@ def is_force_curved(p: np.ndarray) -> bool:
 
 
 @compiled(**INNER)
-def cogging(x: float, p: np.ndarray) -> float:
-    """Return the force that repeats along the way.
-
-    Parameters
-    ----------
-    x : float, [m]
-    p : ndarray, shape (N_SLOTS,)
-    """
-    angle = TURN * (x - p[slots.COGGING_ORIGIN]) / p[slots.COGGING_PERIOD]
-    swing = np.sin(angle + p[slots.COGGING_PHASE]) - p[slots.COGGING_REST]
-    return p[slots.COGGING_FORCE] * swing
-
-
-@compiled(**INNER)
-def second_cogging(x: float, p: np.ndarray) -> float:
-    """Return the force that repeats along the way with another period.
-
-    Parameters
-    ----------
-    x : float, [m]
-    p : ndarray, shape (N_SLOTS,)
-    """
-    angle = TURN * (x - p[slots.COGGING_ORIGIN]) / p[slots.SECOND_COGGING_PERIOD]
-    phase = p[slots.SECOND_COGGING_PHASE]
-    return p[slots.SECOND_COGGING_FORCE] * (np.sin(angle + phase) - np.sin(phase))
-
-
-@compiled(**INNER)
 def ripple(angle: float, p: np.ndarray) -> float:
     """Return by what the motor's force is multiplied at an angle.
 
@@ -399,76 +278,6 @@ def ripple(angle: float, p: np.ndarray) -> float:
     """
     turned = p[slots.RIPPLE_PER_TURN] * angle + p[slots.RIPPLE_PHASE]
     return 1.0 + p[slots.RIPPLE_SHARE] * np.sin(turned)
-
-
-@compiled(**INNER)
-def bent(into: float, bend: float) -> float:
-    """Return how a contact's force grows: ``into |into|^bend``.
-
-    Parameters
-    ----------
-    into : float, [m]
-        How far into the contact, with its sign.
-    bend : float, [-]
-        Exponent of the law less 1.
-    """
-    if bend == 0.0 or into == 0.0:
-        return into
-    return into * np.power(abs(into), bend)
-
-
-@compiled(**INNER)
-def contact_damping(x: float, v: float, p: np.ndarray) -> float:
-    """Return what the damping of stops adds to their force; they never pull.
-
-    Parameters
-    ----------
-    x : float, [m]
-    v : float, [m/s]
-    p : ndarray, shape (N_SLOTS,)
-    """
-    force = 0.0
-    if p[slots.STOP_LOSS] > 0.0:
-        into = beyond(x, p[slots.STOP_POSITION])
-        elastic = p[slots.STOP_STIFFNESS] * bent(into, p[slots.STOP_BEND])
-        force += elastic * max(p[slots.STOP_LOSS] * np.sign(into) * v, -1.0)
-    if p[slots.SIDE_LOSS] > 0.0:
-        into = beyond_side(x, p[slots.SIDE_POSITION])
-        elastic = p[slots.SIDE_STIFFNESS] * bent(into, p[slots.SIDE_BEND])
-        force += elastic * max(p[slots.SIDE_LOSS] * np.sign(into) * v, -1.0)
-    if p[slots.SECOND_LOSS] > 0.0:
-        into = beyond_side(x, p[slots.SECOND_POSITION])
-        elastic = p[slots.SECOND_STIFFNESS] * bent(into, p[slots.SECOND_BEND])
-        force += elastic * max(p[slots.SECOND_LOSS] * np.sign(into) * v, -1.0)
-    return force
-
-
-@compiled(**INNER)
-def beyond_side(x: float, edge: float) -> float:
-    """Return how far a position is beyond a stop on the side of its sign.
-
-    Parameters
-    ----------
-    x, edge : float, [m]
-    """
-    into = x - edge
-    return into if into * edge > 0.0 else 0.0
-
-
-@compiled(**INNER)
-def beyond(x: float, half_gap: float) -> float:
-    """Return how far a position is beyond a gap, with its sign.
-
-    Parameters
-    ----------
-    x : float, [m]
-    half_gap : float, [m]
-    """
-    if x > half_gap:
-        return x - half_gap
-    if x < -half_gap:
-        return x + half_gap
-    return 0.0
 
 
 @compiled(**INNER)
@@ -489,155 +298,6 @@ def bite(twist: float, speed: float, p: np.ndarray) -> float:
     if into > 0.0:
         return max(force, 0.0)
     return min(force, 0.0) if into < 0.0 else 0.0
-
-
-@compiled(**INNER)
-def yielded(x: float, v: float, memory: np.ndarray, p: np.ndarray) -> float:
-    """Return the deflection of the hysteresis: 1 where it has yielded, at speed.
-
-    Parameters
-    ----------
-    x, v : float, [m], [m/s]
-    memory : ndarray, shape (N_MEMORY,)
-    p : ndarray, shape (N_SLOTS,)
-    """
-    way = memory[WAY]
-    if way == 0.0:
-        return memory[DEFLECTION]
-    gone = abs(x - memory[TURNED_AT]) / p[slots.HYSTERESIS_YIELD]
-    if p[slots.HAS_BRISTLES] != 0.0:
-        return way * _bent(way * memory[DEFLECTION], gone, v, memory, p)
-    if p[slots.HAS_SHAPE] != 0.0:
-        return way * _yielded_in_shape(way * memory[DEFLECTION], gone, p)
-    return way - (way - memory[DEFLECTION]) * np.exp(-gone)
-
-
-@compiled(**INNER)
-def bristle_level(v: float, p: np.ndarray) -> float:
-    """Return the deflection at which bristles slide at a speed, [-].
-
-    Parameters
-    ----------
-    v : float, [m/s]
-    p : ndarray, shape (N_SLOTS,)
-    """
-    if p[slots.BRISTLE_EXCESS] == 0.0:
-        return 1.0
-    share = v / p[slots.BRISTLE_VELOCITY]
-    return 1.0 + p[slots.BRISTLE_EXCESS] * np.exp(-share * share)
-
-
-@compiled(**INNER)
-def bending(v: float, deflection: float, memory: np.ndarray, p: np.ndarray) -> float:
-    """Return how fast bristles bend, [m/s].
-
-    Parameters
-    ----------
-    v : float, [m/s]
-    deflection : float, [-]
-    memory : ndarray, shape (N_MEMORY,)
-    p : ndarray, shape (N_SLOTS,)
-    """
-    return v * (1.0 - memory[WAY] * deflection / bristle_level(v, p))
-
-
-@compiled(**INNER)
-def _bent(
-    ahead: float, gone: float, v: float, memory: np.ndarray, p: np.ndarray
-) -> float:
-    """Return the deflection of bristles in the direction of motion.
-
-    Their level g changes evenly along the way s: of z' = 1 - z / g follows that z - g dies
-    away while -g' drives it.
-    """
-    before, now = memory[LEVEL], bristle_level(v, p)
-    if gone <= 0.0:
-        return ahead
-    level = 0.5 * (before + now)
-    lost = -np.expm1(-gone / level)
-    off = (ahead - before) * (1.0 - lost)
-    return now + off - (now - before) * level / gone * lost
-
-
-@compiled(**INNER)
-def yielding(ahead: float, p: np.ndarray) -> float:
-    """Return how the deflection of a hysteresis of any shape grows, [1/yield length].
-
-    Parameters
-    ----------
-    ahead : float, [-]
-        Deflection in the direction of motion.
-    p : ndarray, shape (N_SLOTS,)
-    """
-    share = np.power(abs(ahead), 1.0 + p[slots.HYSTERESIS_BEND])
-    if ahead < 0.0:
-        share *= (p[slots.HYSTERESIS_RATIO] - 1.0) / (p[slots.HYSTERESIS_RATIO] + 1.0)
-    return 1.0 - share
-
-
-@compiled(**INNER)
-def _yielded_in_shape(ahead: float, gone: float, p: np.ndarray) -> float:
-    """Return the deflection in the direction of motion after a way in yield lengths."""
-    count = np.ceil(gone * (1.0 + p[slots.HYSTERESIS_BEND]) / SHAPE_STEP)
-    h = gone / max(count, 1.0)
-    left = gone
-    while left > 0.5 * h:
-        if 1.0 - ahead < NEARLY_YIELDED:
-            return 1.0 - _left_to_yield(1.0 - ahead, left, p)
-        step = h
-        after = _shape_step(ahead, step, p)
-        if ahead < 0.0 and after > 0.0:
-            # The law has an edge at 0: there first, by Simpson's rule.
-            rest = 1.0 / yielding(ahead, p) + 4.0 / yielding(0.5 * ahead, p)
-            step = min(-ahead * (rest + 1.0) / 6.0, h)
-            after = _shape_step(0.0, h - step, p)
-        ahead = after
-        left -= h
-    return min(ahead, 1.0)
-
-
-@compiled(**INNER)
-def _left_to_yield(left: float, gone: float, p: np.ndarray) -> float:
-    """Return what is left of a deflection near 1, where the law is nearly linear.
-
-    With d = 1 - z the law is d' = -n d + n (n - 1) / 2 d^2, up to d^3.
-    """
-    fading = np.exp(-(1.0 + p[slots.HYSTERESIS_BEND]) * gone)
-    bent = 0.5 * p[slots.HYSTERESIS_BEND] * left * (1.0 - fading)
-    return left * fading / (1.0 - bent)
-
-
-@compiled(**INNER)
-def _shape_step(ahead: float, h: float, p: np.ndarray) -> float:
-    """Return the deflection one Runge-Kutta step on."""
-    k1 = yielding(ahead, p)
-    k2 = yielding(ahead + 0.5 * h * k1, p)
-    k3 = yielding(ahead + 0.5 * h * k2, p)
-    k4 = yielding(ahead + h * k3, p)
-    return ahead + h / 6.0 * (k1 + 2.0 * (k2 + k3) + k4)
-
-
-@compiled(**INNER)
-def remember(x: float, v: float, memory: np.ndarray, p: np.ndarray) -> None:
-    """Keep how far a hysteresis of any shape has yielded, at the end of a step.
-
-    Parameters
-    ----------
-    x, v : float, [m], [m/s]
-    memory : ndarray, shape (N_MEMORY,)
-        Changed in place.
-    p : ndarray, shape (N_SLOTS,)
-    """
-    way = memory[WAY]
-    if way == 0.0:
-        return
-    deflection = yielded(x, v, memory, p)
-    if p[slots.HAS_BRISTLES] != 0.0:
-        memory[DEFLECTION], memory[LEVEL] = deflection, bristle_level(v, p)
-        memory[TURNED_AT] = x
-        return
-    memory[DEFLECTION] = way if 1.0 - way * deflection <= YIELDED else deflection
-    memory[TURNED_AT] = x
 
 
 @compiled(**INNER)
@@ -763,102 +423,3 @@ def sliding_friction(way: float, v: float, p: np.ndarray) -> float:
         share = v / p[slots.STRIBECK_VELOCITY]
         level += p[slots.STATIC_EXCESS] * np.exp(-share * share)
     return level
-
-
-@compiled(**INNER)
-def is_anywhere(p: np.ndarray) -> bool:
-    """Return whether nothing holds a position.
-
-    Parameters
-    ----------
-    p : ndarray, shape (N_SLOTS,)
-    """
-    return p[slots.STIFFNESS] <= 0.0 and p[slots.CUBIC] <= 0.0
-
-
-@compiled(**INNER)
-def resting_point(current: float, has_cogging: bool, p: np.ndarray) -> float:
-    """Return where the drive rests without friction, nearest to zero.
-
-    Parameters
-    ----------
-    current : float, [A]
-    p : ndarray, shape (N_SLOTS,)
-
-    Returns
-    -------
-    float, [m]
-        The given start where nothing holds a position.
-    """
-    if is_anywhere(p):
-        return p[slots.START_POSITION]
-    force = resting_force(0.0, current, p) + p[slots.LOAD]
-    force -= p[slots.GRAVITY_TORQUE] * np.sin(p[slots.GRAVITY_ANGLE])
-    if p[slots.OWN_FORCE] != 0.0:
-        force += own_force_at_rest(0.0, _command_at(current, p), p)
-    if abs(force) <= p[slots.PRELOAD]:
-        return 0.0
-    side = np.sign(force)
-    force -= side * p[slots.PRELOAD]
-    stiffness = p[slots.STIFFNESS]
-    stiffness += np.cbrt(max(p[slots.CUBIC], 0.0) * force * force)
-    far = 1e-3 * force / stiffness
-    near = 0.0
-    for _ in range(MOST_TRIES):
-        if _away(far, side, current, has_cogging, p) * force <= 0.0:
-            break
-        near = far
-        far *= FURTHER
-    for _ in range(NARROWING):
-        middle = 0.5 * (near + far)
-        if _away(middle, side, current, has_cogging, p) * force > 0.0:
-            near = middle
-        else:
-            far = middle
-    return far
-
-
-@compiled(**INNER)
-def _away(
-    x: float, side: float, current: float, has_cogging: bool, p: np.ndarray
-) -> float:
-    """Return the force that is not balanced."""
-    force = resting_force(x, current, p) + p[slots.LOAD]
-    left = force - side * p[slots.PRELOAD] - spring_force(x, p)
-    if not has_cogging and p[slots.COGGING_FORCE] != 0.0:
-        left -= cogging(x, p)
-    if not has_cogging and p[slots.SECOND_COGGING_FORCE] != 0.0:
-        left -= second_cogging(x, p)
-    if p[slots.OWN_FORCE] != 0.0:
-        left += own_force_at_rest(x, _command_at(current, p), p)
-    return left
-
-
-@compiled(**INNER)
-def _command_at(current: float, p: np.ndarray) -> float:
-    """Return the command that lets a current flow at rest."""
-    return current * p[slots.RESISTANCE] if p[slots.RESISTANCE] > 0.0 else current
-
-
-@compiled(**INNER)
-def resting_force(x: float, current: float, p: np.ndarray) -> float:
-    """Return the motor's force at rest.
-
-    Parameters
-    ----------
-    x : float, [m]
-    current : float, [A]
-    p : ndarray, shape (N_SLOTS,)
-    """
-    limit = p[slots.CLIP_LIMIT]
-    constant = force_of(min(max(current, -limit), limit), 0.0, p)
-    force = constant
-    if p[slots.RIPPLE_SHARE] != 0.0 and p[slots.GEAR_STIFFNESS] > 0.0:
-        # The motor turns with its force, and the force with its angle.
-        for _ in range(MOST_TURNS):
-            turned = np.sign(force) * p[slots.GEAR_GAP]
-            turned += force / p[slots.GEAR_STIFFNESS]
-            force = constant * ripple(x + turned, p)
-    elif p[slots.RIPPLE_SHARE] != 0.0:
-        force *= ripple(x, p)
-    return force

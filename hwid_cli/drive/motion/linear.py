@@ -9,7 +9,7 @@ import numpy as np
 
 from hwid_cli.compiled import INNER, MAKING, compiled
 from hwid_cli.drive import slots
-from hwid_cli.drive.motion.forces import N_STATE
+from hwid_cli.drive.motion.state import N_STATE
 
 # Inputs of a step: offsets of gaps and stops, force on the mass, cubic of the drive,
 # and the rest of the cubic of the other forces.

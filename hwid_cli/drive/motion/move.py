@@ -27,7 +27,20 @@ from hwid_cli.drive.motion.events import (
     stop,
     time_of,
 )
-from hwid_cli.drive.motion.forces import (
+from hwid_cli.drive.motion.forces import drawn_current, has_dry_friction
+from hwid_cli.drive.motion.hysteresis import bristle_level, remember
+from hwid_cli.drive.motion.linear import N_COLUMNS, N_INPUT, active_states, fastest
+from hwid_cli.drive.motion.pieces import LENGTH, N_PIECE, SAMPLE, list_pieces
+from hwid_cli.drive.motion.push import (
+    DRIVE,
+    N_PUSH,
+    N_ROOM,
+    depends_on_motion,
+    value_of,
+)
+from hwid_cli.drive.motion.quiet import MOST_STEPS, glide_inner, glide_plain
+from hwid_cli.drive.motion.resting import is_anywhere, resting_force, resting_point
+from hwid_cli.drive.motion.state import (
     CIRCUIT,
     LAGGED,
     LEVEL,
@@ -42,24 +55,7 @@ from hwid_cli.drive.motion.forces import (
     WAY,
     V,
     X,
-    bristle_level,
-    drawn_current,
-    has_dry_friction,
-    is_anywhere,
-    remember,
-    resting_force,
-    resting_point,
 )
-from hwid_cli.drive.motion.linear import N_COLUMNS, N_INPUT, active_states, fastest
-from hwid_cli.drive.motion.pieces import LENGTH, N_PIECE, SAMPLE, list_pieces
-from hwid_cli.drive.motion.push import (
-    DRIVE,
-    N_PUSH,
-    N_ROOM,
-    depends_on_motion,
-    value_of,
-)
-from hwid_cli.drive.motion.quiet import MOST_STEPS, glide_inner, glide_plain
 
 # Where events are watched, a step turns nothing by more than this, [rad]: a longer one
 # could go there and back.

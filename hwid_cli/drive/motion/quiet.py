@@ -17,7 +17,7 @@ from hwid_cli.drive.motion.events import (
     set_inputs,
     steady_force,
 )
-from hwid_cli.drive.motion.forces import WAY, V, X, remember
+from hwid_cli.drive.motion.hysteresis import remember
 from hwid_cli.drive.motion.linear import (
     DRIVEN,
     N_STATE,
@@ -28,6 +28,7 @@ from hwid_cli.drive.motion.linear import (
 )
 from hwid_cli.drive.motion.pieces import LENGTH, SAMPLE
 from hwid_cli.drive.motion.push import DRIVE, OTHER, shift, turns_sign, value_of
+from hwid_cli.drive.motion.state import WAY, V, X
 
 # The limit of curved steps is not looked at again for so many pieces if it was twice
 # the piece: forces that depend on position change little within them, but for stops.

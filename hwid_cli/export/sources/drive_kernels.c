@@ -1034,115 +1034,6 @@ static double drive_controlled(double reference, double x, double v, double samp
     return given;
 }
 
-static double drive_ripple(double angle, double *p)
-{
-    double turned = 0.0;
-    turned = (p[RIPPLE_PER_TURN] * angle) + p[RIPPLE_PHASE];
-    return 1.0 + (p[RIPPLE_SHARE] * sin(turned));
-}
-
-static double drive_beyond(double x, double half_gap)
-{
-    if (x > half_gap) {
-        return x - half_gap;
-    }
-    if (x < (-half_gap)) {
-        return x + half_gap;
-    }
-    return 0.0;
-}
-
-static double drive_bite(double twist, double speed, double *p)
-{
-    double into = 0.0;
-    double force = 0.0;
-    if (p[IS_COUPLED] > 0.0) {
-        return (p[GEAR_STIFFNESS] * twist) + (p[GEAR_DAMPING] * speed);
-    }
-    into = drive_beyond(twist, p[GEAR_GAP]);
-    force = (p[GEAR_STIFFNESS] * into) + (p[GEAR_DAMPING] * speed);
-    if (into > 0.0) {
-        return most(force, 0.0);
-    }
-    return (into < 0.0) ? least(force, 0.0) : 0.0;
-}
-
-static double drive_beyond_side(double x, double edge)
-{
-    double into = 0.0;
-    into = x - edge;
-    return ((into * edge) > 0.0) ? into : 0.0;
-}
-
-static double drive_cogging(double x, double *p)
-{
-    double angle = 0.0;
-    double swing = 0.0;
-    angle = (6.283185307179586 * (x - p[COGGING_ORIGIN])) / p[COGGING_PERIOD];
-    swing = sin(angle + p[COGGING_PHASE]) - p[COGGING_REST];
-    return p[COGGING_FORCE] * swing;
-}
-
-static double drive_second_cogging(double x, double *p)
-{
-    double angle = 0.0;
-    double phase = 0.0;
-    angle = (6.283185307179586 * (x - p[COGGING_ORIGIN])) / p[SECOND_COGGING_PERIOD];
-    phase = p[SECOND_COGGING_PHASE];
-    return p[SECOND_COGGING_FORCE] * (sin(angle + phase) - sin(phase));
-}
-
-static double drive_bent(double into, double bend)
-{
-    if ((bend == 0.0) || (into == 0.0)) {
-        return into;
-    }
-    return into * pow(fabs(into), bend);
-}
-
-static double drive_further_spring(double x, double *p)
-{
-    double force = 0.0;
-    double into = 0.0;
-    force = 0.0;
-    if (p[GRAVITY_TORQUE] != 0.0) {
-        force += p[GRAVITY_TORQUE] * sin(x + p[GRAVITY_ANGLE]);
-    }
-    if (p[SECOND_STIFFNESS] > 0.0) {
-        into = drive_beyond_side(x, p[SECOND_POSITION]);
-        force += p[SECOND_STIFFNESS] * drive_bent(into, p[SECOND_BEND]);
-    }
-    if (p[SECOND_COGGING_FORCE] != 0.0) {
-        force -= drive_second_cogging(x, p);
-    }
-    return force;
-}
-
-static double drive_spring_force(double x, double *p)
-{
-    double free = 0.0;
-    double force = 0.0;
-    double into = 0.0;
-    free = (p[SPRING_GAP] > 0.0) ? drive_beyond(x, p[SPRING_GAP]) : x;
-    force = p[STIFFNESS] * free;
-    force += (((p[CUBIC] * x) + p[QUADRATIC]) * x) * x;
-    if (p[STOP_STIFFNESS] > 0.0) {
-        into = drive_beyond(x, p[STOP_POSITION]);
-        force += p[STOP_STIFFNESS] * drive_bent(into, p[STOP_BEND]);
-    }
-    if (p[SIDE_STIFFNESS] > 0.0) {
-        into = drive_beyond_side(x, p[SIDE_POSITION]);
-        force += p[SIDE_STIFFNESS] * drive_bent(into, p[SIDE_BEND]);
-    }
-    if (p[COGGING_FORCE] != 0.0) {
-        force -= drive_cogging(x, p);
-    }
-    if (p[HAS_MORE] != 0.0) {
-        force += drive_further_spring(x, p);
-    }
-    return force;
-}
-
 static double drive_bristle_level(double v, double *p)
 {
     double share = 0.0;
@@ -1153,7 +1044,7 @@ static double drive_bristle_level(double v, double *p)
     return 1.0 + (p[BRISTLE_EXCESS] * exp((-share) * share));
 }
 
-static double drive_bent_motion(double ahead, double gone, double v, double *memory, double *p)
+static double drive_bent(double ahead, double gone, double v, double *memory, double *p)
 {
     double before = 0.0;
     double now = 0.0;
@@ -1241,12 +1132,205 @@ static double drive_yielded(double x, double v, double *memory, double *p)
     }
     gone = fabs(x - memory[TURNED_AT]) / p[HYSTERESIS_YIELD];
     if (p[HAS_BRISTLES] != 0.0) {
-        return way * drive_bent_motion(way * memory[DEFLECTION], gone, v, memory, p);
+        return way * drive_bent(way * memory[DEFLECTION], gone, v, memory, p);
     }
     if (p[HAS_SHAPE] != 0.0) {
         return way * drive_yielded_in_shape(way * memory[DEFLECTION], gone, p);
     }
     return way - ((way - memory[DEFLECTION]) * exp(-gone));
+}
+
+static double drive_bending(double v, double deflection, double *memory, double *p)
+{
+    return v * (1.0 - ((memory[WAY] * deflection) / drive_bristle_level(v, p)));
+}
+
+static void drive_remember(double x, double v, double *memory, double *p)
+{
+    double way = 0.0;
+    double deflection = 0.0;
+    way = memory[WAY];
+    if (way == 0.0) {
+        return;
+    }
+    deflection = drive_yielded(x, v, memory, p);
+    if (p[HAS_BRISTLES] != 0.0) {
+        memory[DEFLECTION] = deflection;
+        memory[LEVEL] = drive_bristle_level(v, p);
+        memory[TURNED_AT] = x;
+        return;
+    }
+    memory[DEFLECTION] = ((1.0 - (way * deflection)) <= 1e-14) ? way : deflection;
+    memory[TURNED_AT] = x;
+}
+
+static double drive_beyond(double x, double half_gap)
+{
+    if (x > half_gap) {
+        return x - half_gap;
+    }
+    if (x < (-half_gap)) {
+        return x + half_gap;
+    }
+    return 0.0;
+}
+
+static double drive_beyond_side(double x, double edge)
+{
+    double into = 0.0;
+    into = x - edge;
+    return ((into * edge) > 0.0) ? into : 0.0;
+}
+
+static double drive_cogging(double x, double *p)
+{
+    double angle = 0.0;
+    double swing = 0.0;
+    angle = (6.283185307179586 * (x - p[COGGING_ORIGIN])) / p[COGGING_PERIOD];
+    swing = sin(angle + p[COGGING_PHASE]) - p[COGGING_REST];
+    return p[COGGING_FORCE] * swing;
+}
+
+static double drive_second_cogging(double x, double *p)
+{
+    double angle = 0.0;
+    double phase = 0.0;
+    angle = (6.283185307179586 * (x - p[COGGING_ORIGIN])) / p[SECOND_COGGING_PERIOD];
+    phase = p[SECOND_COGGING_PHASE];
+    return p[SECOND_COGGING_FORCE] * (sin(angle + phase) - sin(phase));
+}
+
+static double drive_bent_motion(double into, double bend)
+{
+    if ((bend == 0.0) || (into == 0.0)) {
+        return into;
+    }
+    return into * pow(fabs(into), bend);
+}
+
+static double drive_further_spring(double x, double *p)
+{
+    double force = 0.0;
+    double into = 0.0;
+    force = 0.0;
+    if (p[GRAVITY_TORQUE] != 0.0) {
+        force += p[GRAVITY_TORQUE] * sin(x + p[GRAVITY_ANGLE]);
+    }
+    if (p[SECOND_STIFFNESS] > 0.0) {
+        into = drive_beyond_side(x, p[SECOND_POSITION]);
+        force += p[SECOND_STIFFNESS] * drive_bent_motion(into, p[SECOND_BEND]);
+    }
+    if (p[SECOND_COGGING_FORCE] != 0.0) {
+        force -= drive_second_cogging(x, p);
+    }
+    return force;
+}
+
+static double drive_spring_force(double x, double *p)
+{
+    double free = 0.0;
+    double force = 0.0;
+    double into = 0.0;
+    free = (p[SPRING_GAP] > 0.0) ? drive_beyond(x, p[SPRING_GAP]) : x;
+    force = p[STIFFNESS] * free;
+    force += (((p[CUBIC] * x) + p[QUADRATIC]) * x) * x;
+    if (p[STOP_STIFFNESS] > 0.0) {
+        into = drive_beyond(x, p[STOP_POSITION]);
+        force += p[STOP_STIFFNESS] * drive_bent_motion(into, p[STOP_BEND]);
+    }
+    if (p[SIDE_STIFFNESS] > 0.0) {
+        into = drive_beyond_side(x, p[SIDE_POSITION]);
+        force += p[SIDE_STIFFNESS] * drive_bent_motion(into, p[SIDE_BEND]);
+    }
+    if (p[COGGING_FORCE] != 0.0) {
+        force -= drive_cogging(x, p);
+    }
+    if (p[HAS_MORE] != 0.0) {
+        force += drive_further_spring(x, p);
+    }
+    return force;
+}
+
+static int drive_reaches_side(double low, double high, double position)
+{
+    return (drive_beyond_side(low, position) != 0.0) || (drive_beyond_side(high, position) != 0.0);
+}
+
+static double drive_spring_rate(double x, double low, double high, double *p)
+{
+    double stiffness = 0.0;
+    double bend = 0.0;
+    int is_plain = 0;
+    stiffness = p[STIFFNESS];
+    if ((p[CUBIC] != 0.0) || (p[QUADRATIC] != 0.0)) {
+        bend = ((3.0 * p[CUBIC]) * x) + (2.0 * p[QUADRATIC]);
+        stiffness += fabs(bend * x);
+    }
+    is_plain = (p[STOP_BEND] + p[STOP_LOSS]) == 0.0;
+    if (is_plain && (most(high, -low) > p[STOP_POSITION])) {
+        stiffness += p[STOP_STIFFNESS];
+    }
+    is_plain = (p[SIDE_BEND] + p[SIDE_LOSS]) == 0.0;
+    if (is_plain && drive_reaches_side(low, high, p[SIDE_POSITION])) {
+        stiffness += p[SIDE_STIFFNESS];
+    }
+    if (p[HAS_MORE] != 0.0) {
+        stiffness += fabs(p[GRAVITY_TORQUE]);
+        stiffness += p[SPRING_SHARE] * p[STIFFNESS];
+        if (p[SECOND_STIFFNESS] > 0.0) {
+            is_plain = (p[SECOND_BEND] + p[SECOND_LOSS]) == 0.0;
+            if (is_plain && drive_reaches_side(low, high, p[SECOND_POSITION])) {
+                stiffness += p[SECOND_STIFFNESS];
+            }
+        }
+    }
+    return stiffness;
+}
+
+static double drive_contact_damping(double x, double v, double *p)
+{
+    double force = 0.0;
+    double into = 0.0;
+    double elastic = 0.0;
+    force = 0.0;
+    if (p[STOP_LOSS] > 0.0) {
+        into = drive_beyond(x, p[STOP_POSITION]);
+        elastic = p[STOP_STIFFNESS] * drive_bent_motion(into, p[STOP_BEND]);
+        force += elastic * most((p[STOP_LOSS] * sign_of(into)) * v, -1.0);
+    }
+    if (p[SIDE_LOSS] > 0.0) {
+        into = drive_beyond_side(x, p[SIDE_POSITION]);
+        elastic = p[SIDE_STIFFNESS] * drive_bent_motion(into, p[SIDE_BEND]);
+        force += elastic * most((p[SIDE_LOSS] * sign_of(into)) * v, -1.0);
+    }
+    if (p[SECOND_LOSS] > 0.0) {
+        into = drive_beyond_side(x, p[SECOND_POSITION]);
+        elastic = p[SECOND_STIFFNESS] * drive_bent_motion(into, p[SECOND_BEND]);
+        force += elastic * most((p[SECOND_LOSS] * sign_of(into)) * v, -1.0);
+    }
+    return force;
+}
+
+static double drive_ripple(double angle, double *p)
+{
+    double turned = 0.0;
+    turned = (p[RIPPLE_PER_TURN] * angle) + p[RIPPLE_PHASE];
+    return 1.0 + (p[RIPPLE_SHARE] * sin(turned));
+}
+
+static double drive_bite(double twist, double speed, double *p)
+{
+    double into = 0.0;
+    double force = 0.0;
+    if (p[IS_COUPLED] > 0.0) {
+        return (p[GEAR_STIFFNESS] * twist) + (p[GEAR_DAMPING] * speed);
+    }
+    into = drive_beyond(twist, p[GEAR_GAP]);
+    force = (p[GEAR_STIFFNESS] * into) + (p[GEAR_DAMPING] * speed);
+    if (into > 0.0) {
+        return most(force, 0.0);
+    }
+    return (into < 0.0) ? least(force, 0.0) : 0.0;
 }
 
 static double drive_sliding_friction(double way, double v, double *p)
@@ -1259,30 +1343,6 @@ static double drive_sliding_friction(double way, double v, double *p)
         level += p[STATIC_EXCESS] * exp((-share) * share);
     }
     return level;
-}
-
-static double drive_contact_damping(double x, double v, double *p)
-{
-    double force = 0.0;
-    double into = 0.0;
-    double elastic = 0.0;
-    force = 0.0;
-    if (p[STOP_LOSS] > 0.0) {
-        into = drive_beyond(x, p[STOP_POSITION]);
-        elastic = p[STOP_STIFFNESS] * drive_bent(into, p[STOP_BEND]);
-        force += elastic * most((p[STOP_LOSS] * sign_of(into)) * v, -1.0);
-    }
-    if (p[SIDE_LOSS] > 0.0) {
-        into = drive_beyond_side(x, p[SIDE_POSITION]);
-        elastic = p[SIDE_STIFFNESS] * drive_bent(into, p[SIDE_BEND]);
-        force += elastic * most((p[SIDE_LOSS] * sign_of(into)) * v, -1.0);
-    }
-    if (p[SECOND_LOSS] > 0.0) {
-        into = drive_beyond_side(x, p[SECOND_POSITION]);
-        elastic = p[SECOND_STIFFNESS] * drive_bent(into, p[SECOND_BEND]);
-        force += elastic * most((p[SECOND_LOSS] * sign_of(into)) * v, -1.0);
-    }
-    return force;
 }
 
 static double drive_friction_here(double x, double *p)
@@ -1303,11 +1363,6 @@ static double drive_friction_here(double x, double *p)
         level += p[SPRING_SHARE] * fabs(load);
     }
     return level;
-}
-
-static double drive_bending(double v, double deflection, double *memory, double *p)
-{
-    return v * (1.0 - ((memory[WAY] * deflection) / drive_bristle_level(v, p)));
 }
 
 static double drive_resisting(double x, double v, double *memory, double *p)
@@ -1495,64 +1550,9 @@ static double drive_moved_mass(double *p)
     return p[MASS];
 }
 
-static int drive_reaches_side(double low, double high, double position)
-{
-    return (drive_beyond_side(low, position) != 0.0) || (drive_beyond_side(high, position) != 0.0);
-}
-
-static double drive_spring_rate(double x, double low, double high, double *p)
-{
-    double stiffness = 0.0;
-    double bend = 0.0;
-    int is_plain = 0;
-    stiffness = p[STIFFNESS];
-    if ((p[CUBIC] != 0.0) || (p[QUADRATIC] != 0.0)) {
-        bend = ((3.0 * p[CUBIC]) * x) + (2.0 * p[QUADRATIC]);
-        stiffness += fabs(bend * x);
-    }
-    is_plain = (p[STOP_BEND] + p[STOP_LOSS]) == 0.0;
-    if (is_plain && (most(high, -low) > p[STOP_POSITION])) {
-        stiffness += p[STOP_STIFFNESS];
-    }
-    is_plain = (p[SIDE_BEND] + p[SIDE_LOSS]) == 0.0;
-    if (is_plain && drive_reaches_side(low, high, p[SIDE_POSITION])) {
-        stiffness += p[SIDE_STIFFNESS];
-    }
-    if (p[HAS_MORE] != 0.0) {
-        stiffness += fabs(p[GRAVITY_TORQUE]);
-        stiffness += p[SPRING_SHARE] * p[STIFFNESS];
-        if (p[SECOND_STIFFNESS] > 0.0) {
-            is_plain = (p[SECOND_BEND] + p[SECOND_LOSS]) == 0.0;
-            if (is_plain && drive_reaches_side(low, high, p[SECOND_POSITION])) {
-                stiffness += p[SECOND_STIFFNESS];
-            }
-        }
-    }
-    return stiffness;
-}
-
 static int drive_is_force_curved(double *p)
 {
     return (p[CUBIC] != 0.0) || (p[QUADRATIC] != 0.0) || (p[COGGING_FORCE] != 0.0) || (p[DRAG] != 0.0) || (p[GRAVITY_TORQUE] != 0.0) || (p[SECOND_COGGING_FORCE] != 0.0) || (p[WAVY_FRICTION] != 0.0) || (p[SPRING_SHARE] != 0.0) || (p[DRIVE_VARIES] != 0.0) || (p[OWN_FORCE] != 0.0) || (p[HAS_BRISTLES] != 0.0);
-}
-
-static void drive_remember(double x, double v, double *memory, double *p)
-{
-    double way = 0.0;
-    double deflection = 0.0;
-    way = memory[WAY];
-    if (way == 0.0) {
-        return;
-    }
-    deflection = drive_yielded(x, v, memory, p);
-    if (p[HAS_BRISTLES] != 0.0) {
-        memory[DEFLECTION] = deflection;
-        memory[LEVEL] = drive_bristle_level(v, p);
-        memory[TURNED_AT] = x;
-        return;
-    }
-    memory[DEFLECTION] = ((1.0 - (way * deflection)) <= 1e-14) ? way : deflection;
-    memory[TURNED_AT] = x;
 }
 
 static int drive_has_dry_friction(double *p)
