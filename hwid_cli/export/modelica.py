@@ -59,7 +59,7 @@ LAWS = {
         "-{force_N}*(1 + {variation_share}*sin(2*pi*x/{period_m} + {phase_rad}))*s"
     ),
     "hysteresis": _Law("-{force_N}*#z", (("z", "(v - #z*abs(v))/{yield_m}"),)),
-    "lugre_friction": _Law(
+    "hysteresis:lugre": _Law(
         f"-{{force_N}}*#z - {{damping_N_s_per_m}}*{_BENDING}",
         (("z", f"{_BENDING}/{{yield_m}}"),),
     ),

@@ -23,7 +23,7 @@ STRIBECK = {
 }
 HYSTERESIS = {"hysteresis": {"force_N": 0.8, "yield_m": 2e-4}}
 BRISTLES = {
-    "lugre_friction": {
+    "hysteresis": {
         "force_N": 0.8,
         "yield_m": 2e-4,
         "static_excess_N": 0.5,

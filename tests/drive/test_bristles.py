@@ -49,7 +49,7 @@ def published(values, times, command, stiffness=STIFFNESS):
 )
 def test_bristles_move_as_their_equations_say(changed):
     values = BRISTLES | changed
-    found = tool({"lugre_friction": values})
+    found = tool({"hysteresis": values})
     times = 1e-3 * np.arange(found.position.size)
     expected = published(values, times, (CORNER_TIMES_S, CORNERS))
     plain = tool({}).position
@@ -64,7 +64,7 @@ def test_slow_motion_sticks_and_slips_on_bristles():
     }  # fmt: skip
     times = 1e-3 * np.arange(4001)
     command = 0.8 * times / times[-1]
-    found = tool({"lugre_friction": values}, command)
+    found = tool({"hysteresis": values}, command)
     expected = published(values, times, (times, command))
     assert rms(found.position - expected) < 1e-3 * np.ptp(expected)
     speed = np.gradient(expected, 1e-3)
@@ -75,7 +75,7 @@ def test_slow_motion_sticks_and_slips_on_bristles():
 def test_without_excess_and_damping_bristles_are_dahls_hysteresis():
     values = BRISTLES | {"static_excess_N": 0.0}
     plain = {key: values[key] for key in ("force_N", "yield_m")}
-    found = tool({"lugre_friction": values}).position
+    found = tool({"hysteresis": values}).position
     expected = tool({"hysteresis": plain}).position
     assert rms(found - expected) < 1e-9
 
@@ -83,7 +83,7 @@ def test_without_excess_and_damping_bristles_are_dahls_hysteresis():
 def test_bristles_without_a_spring_and_held_at_the_end():
     values = BRISTLES | {"damping_N_s_per_m": 15.0}
     command = np.interp(1e-3 * np.arange(1201), [0, 0.2, 0.4, 0.5], [0, 1.5, -1.0, 0.1])
-    found = tool({"lugre_friction": values}, command, stiffness_N_per_m=0.0)
+    found = tool({"hysteresis": values}, command, stiffness_N_per_m=0.0)
     times = 1e-3 * np.arange(1201)
     expected = published(values, times, (times, command), stiffness=0.0)
     assert rms(found.position - expected) < 1e-4 * np.ptp(expected)

@@ -50,6 +50,7 @@ MACHINES = (
     (cases.COULOMB, {"hold": "zero"}),
     (cases.COULOMB, {"resistance_ohm": 2.0}),
     (cases.COULOMB | cases.HEAT, {"resistance_ohm": 2.0, "inductance_H": 1e-3}),
+    (cases.BRISTLES, {}),
     (cases.STRIBECK, {"controller": Controller(20.0, 30.0, 4.0)}),
     (COUPLED_MOTOR, {"controller": Controller(20.0, 30.0, 4.0, 25.0)}),
     (

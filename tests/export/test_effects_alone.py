@@ -43,7 +43,7 @@ VALUES = {
         "force_N": 0.8, "variation_share": 0.5, "period_m": 0.008, "phase_rad": 0.4,
     },
     "hysteresis": {"force_N": 1.0, "yield_m": 4e-4},
-    "lugre_friction": {
+    "hysteresis:lugre": {
         "force_N": 0.9, "yield_m": 4e-4, "static_excess_N": 0.5,
         "velocity_m_per_s": 0.05, "damping_N_s_per_m": 4.0,
     },

@@ -108,8 +108,10 @@ def stage_lugre(draw):
     force = draw.near(0.06 * b.force)
     lugre = h.lugre(force, 1.5 * force, 0.02 * b.speed, 0.004 * b.travel, b.base.mass)
     friction = ["hysteresis", "stribeck_friction", "coulomb_friction"]
+    # Bristles are an entry of the hysteresis: with them it may be all.
     answers = Answers(
-        near=[[one] for one in friction] + [["hysteresis", "stribeck_friction"]]
+        full=[["hysteresis"]],
+        near=[[one] for one in friction] + [["hysteresis", "stribeck_friction"]],
     )
     return b.machine("stage on roller guides", [lugre], answers=answers, cells=40)
 

@@ -259,8 +259,8 @@ BOUC_WEN = replace(
 )
 
 LUGRE = Effect(
-    id="lugre_friction",
-    sentence="dry friction of bristles that bend before they slide, less at speed (LuGre)",
+    id="hysteresis:lugre",
+    sentence="friction of bristles that bend before they slide, less at speed (LuGre)",
     equation="F = -s0 z - s1 z', z' = v - s0 |v| z / (Fc + dFs exp(-(v/vs)^2)), s0 = Fc / zy",
     enters="motion",
     parameters=(
