@@ -278,18 +278,23 @@ LUGRE = Effect(
             limits=(POSITIVE,),
         ),
         Parameter(
-            "static_excess_N", shares_of("force_N", 0.03), limits=(NOT_NEGATIVE,)
+            "static_excess_N",
+            shares_of("force_N", 0.03),
+            # More than the drive's force would never let go.
+            span_of("force_N", 1e-7, 1.0),
+            limits=(NOT_NEGATIVE,),
         ),
         Parameter(
             "velocity_m_per_s",
             shares_of("velocity_m_per_s", 0.01, 0.05),
-            span_of("velocity_m_per_s", 1e-4, 0.3),
+            span_of("velocity_m_per_s", 1e-3, 0.3),
             places=("BRISTLE_VELOCITY",),
             limits=(POSITIVE,),
         ),
         Parameter(
             "damping_N_s_per_m",
             lambda scales: (0.1 * scales.force_N / scales.velocity_m_per_s,),
+            lambda scales: (0.0, 10 * scales.force_N / scales.velocity_m_per_s),
             places=("BRISTLE_DAMPING",),
             default=0.0,
             limits=(NOT_NEGATIVE,),

@@ -222,6 +222,10 @@ def step_limit(
         rate += _rate_of_yielding(state, memory, mass, p)
     if p[slots.OWN_FORCE] != 0.0:
         rate += _rate_of_own(state, memory, push, done, mass, p)
+    slow = p[slots.BRISTLE_VELOCITY]
+    if p[slots.BRISTLE_EXCESS] != 0.0 and speed < FAST * slow:
+        pull = abs(acceleration(state, memory, push, done, p)[0])
+        rate += 0.5 * pull / slow
     slow = p[slots.STRIBECK_VELOCITY]
     if p[slots.STATIC_EXCESS] != 0.0 and memory[WAY] != 0.0 and speed < FAST * slow:
         pull = abs(acceleration(state, memory, push, done, p)[0])
@@ -311,14 +315,17 @@ def _rate_of_bending(
     """Return it for bristles, whose level falls with the speed."""
     v, force = state[V], abs(p[slots.HYSTERESIS_FORCE])
     level = bristle_level(v, p)
+    if abs(v) > FAST * p[slots.BRISTLE_VELOCITY]:
+        level = 1.0
     slope = abs(1.0 - memory[WAY] * memory[DEFLECTION] / level)
     stiffness = force * slope / p[slots.HYSTERESIS_YIELD]
     speed = abs(v) / p[slots.HYSTERESIS_YIELD]
     rate = np.sqrt(stiffness / mass) + p[slots.BRISTLE_DAMPING] * slope / mass
     rate += 0.6 * speed * np.sqrt(np.sqrt(min(0.5 * slope, 1.0)))
     if level > 1.0:
-        # How steeply the level falls, at most.
-        rate += force * p[slots.BRISTLE_EXCESS] / (mass * p[slots.BRISTLE_VELOCITY])
+        # How steeply the level falls, at most; the force follows no faster than it bends.
+        falls = force * p[slots.BRISTLE_EXCESS] / (mass * p[slots.BRISTLE_VELOCITY])
+        rate += min(falls, np.sqrt(falls * speed))
     return rate
 
 

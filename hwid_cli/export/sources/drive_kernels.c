@@ -2055,16 +2055,21 @@ static double drive_rate_of_bending(double *state, double *memory, double mass, 
     double stiffness = 0.0;
     double speed = 0.0;
     double rate = 0.0;
+    double falls = 0.0;
     v = state[V];
     force = fabs(p[HYSTERESIS_FORCE]);
     level = drive_bristle_level(v, p);
+    if (fabs(v) > (6.1 * p[BRISTLE_VELOCITY])) {
+        level = 1.0;
+    }
     slope = fabs(1.0 - ((memory[WAY] * memory[DEFLECTION]) / level));
     stiffness = (force * slope) / p[HYSTERESIS_YIELD];
     speed = fabs(v) / p[HYSTERESIS_YIELD];
     rate = sqrt(stiffness / mass) + ((p[BRISTLE_DAMPING] * slope) / mass);
     rate += (0.6 * speed) * sqrt(sqrt(least(0.5 * slope, 1.0)));
     if (level > 1.0) {
-        rate += (force * p[BRISTLE_EXCESS]) / (mass * p[BRISTLE_VELOCITY]);
+        falls = (force * p[BRISTLE_EXCESS]) / (mass * p[BRISTLE_VELOCITY]);
+        rate += least(falls, sqrt(falls * speed));
     }
     return rate;
 }
@@ -2234,6 +2239,11 @@ static double drive_step_limit(double *state, double *memory, double *push, doub
     }
     if (p[OWN_FORCE] != 0.0) {
         rate += drive_rate_of_own(state, memory, push, done, mass, p);
+    }
+    slow = p[BRISTLE_VELOCITY];
+    if ((p[BRISTLE_EXCESS] != 0.0) && (speed < (6.1 * slow))) {
+        pull = fabs(drive_acceleration(state, memory, push, done, p).m0);
+        rate += (0.5 * pull) / slow;
     }
     slow = p[STRIBECK_VELOCITY];
     if ((p[STATIC_EXCESS] != 0.0) && (memory[WAY] != 0.0) && (speed < (6.1 * slow))) {
