@@ -24,6 +24,7 @@ from hwid_cli.diagnosis.candidate import (
 )
 from hwid_cli.diagnosis.intervals import intervals, unclear_effects
 from hwid_cli.diagnosis.latent_force import Smoothed
+from hwid_cli.diagnosis.law_names import effects_of
 from hwid_cli.diagnosis.law_search import (
     MOST_TERMS,
     Regression,
@@ -47,7 +48,7 @@ from hwid_cli.diagnosis.verdict import DiagnosisVerdict, needs_each
 from hwid_cli.drive.catalogue import CATALOGUE, public_id
 from hwid_cli.drive.simulation import drive_effects
 from hwid_cli.records.candidates import CandidateFit
-from hwid_cli.records.diagnosis import SMALL_REMAINDER, Law
+from hwid_cli.records.diagnosis import SMALL_REMAINDER
 from hwid_cli.records.drive import BASE_PARAMETERS, BASE_UNDER_FORCE
 from hwid_cli.records.own_effects import OwnEffect, OwnParameter, own_id, own_of
 
@@ -568,68 +569,9 @@ def _value_of(one: _Tried, start: str) -> float:
     return next(v for name, v in values.items() if name.startswith(start))
 
 
-# What terms are in the catalogue, by their kinds; a wave has two parts.
-_EFFECTS: Mapping[frozenset[str], str] = {
-    frozenset({"sign(v)"}): "coulomb_friction",
-    frozenset({"v*abs(v)"}): "quadratic_drag",
-    frozenset({"x**3"}): "cubic_stiffness",
-    frozenset({"x**2"}): "quadratic_stiffness",
-    frozenset({"sign(x)"}): "spring_preload",
-    frozenset({"Max(x - a, 0)"}): "one_sided_stop",
-    frozenset({"Max(-x - a, 0)"}): "one_sided_stop",
-    frozenset({"Max(abs(x) - a, 0)*sign(x)"}): "end_stop",
-    frozenset({"u*abs(u)"}): "supply_sag",
-    frozenset({"u**3"}): "force_constant_saturation",
-    frozenset({"sin(2*pi*x/l)", "cos(2*pi*x/l)"}): "cogging",
-    frozenset({"sin(2*pi*x/l)"}): "cogging",
-    frozenset({"sin(2*pi*f*t)", "cos(2*pi*f*t)"}): "periodic_force",
-    frozenset({"sin(2*pi*f*t)"}): "periodic_force",
-    frozenset({"sign(v)", "abs(x)*sign(v)"}): "load_friction:spring",
-    frozenset({"sign(v)", "abs(u)*sign(v)"}): "load_friction:drive",
-}  # fmt: skip
-_OF_READING: Mapping[frozenset[str], str] = {
-    frozenset({"x**2"}): "sensor_quadratic",
-    frozenset({"x**3"}): "sensor_cubic",
-    frozenset({"t"}): "sensor_drift",
-}
-
-
-# Terms that are an effect beside others too: forces against the motion.
-_AGAINST_MOTION = ("sign(v)", "v*abs(v)")
-
-
-def known_terms(law: Law) -> dict[str, str]:
-    """Terms of a law that are effects of the catalogue by themselves.
-
-    Returns
-    -------
-    dict of str to str
-        Ids of the effects by the terms with their coefficients.
-    """
-    if law.acts_on != "force":
-        return {}
-    return {
-        f"{one.value:.4g}*{one.term}": _EFFECTS[frozenset({one.term})]
-        for one in law.terms
-        if one.term in _AGAINST_MOTION and one.high < 0
-    }
-
-
-def _effects_of(one: _Tried) -> tuple[str, ...]:
-    """Effects of the catalogue that the terms are; empty where some are none."""
-    left = {term.formula for term in one.terms}
-    known = _OF_READING if one.acts_on == "output" else _EFFECTS
-    found = []
-    for terms, effect in sorted(known.items(), key=lambda item: -len(item[0])):
-        if terms <= left:
-            found.append(effect)
-            left -= terms
-    return () if left else tuple(sorted(found))
-
-
 def _named(rounds: Rounds, one: _Tried, found: RoundsResult) -> CandidateFit | None:
     """Fit of the catalogue's own effects, where the law is nothing else."""
-    effects = _effects_of(one)
+    effects = effects_of({term.formula for term in one.terms}, one.acts_on)
     allowed = set(rounds.allowed) or set(CATALOGUE)
     if not effects or not set(effects) <= allowed:
         return None

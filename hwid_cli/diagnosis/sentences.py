@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
-from hwid_cli.diagnosis.laws import known_terms
+from hwid_cli.diagnosis.law_names import known_terms
 from hwid_cli.diagnosis.problem import DiagnosisProblem
 from hwid_cli.diagnosis.selection import SelectionCriteria, title_of
 from hwid_cli.diagnosis.verdict import DiagnosisVerdict, lead

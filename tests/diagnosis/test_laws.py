@@ -10,7 +10,7 @@ import sympy
 from hwid_cli import DiagnoseOptions, Recording, SimulationOptions, diagnose
 from hwid_cli.config.extended_simulation import write_extended_simulation
 from hwid_cli.config.load import experiment_of, load_experiment
-from hwid_cli.diagnosis import laws, set_fits
+from hwid_cli.diagnosis import law_names, laws, set_fits
 from hwid_cli.diagnosis.candidate import (
     compared_with_fit,
     fit_candidate,
@@ -364,4 +364,4 @@ def test_terms_of_a_law_that_have_a_name(term, high, acts_on, effect):
         LawTerm(term, -1.0, -1.1, high, "N", 1.0),
     )
     expected = {} if effect is None else {f"-1*{term}": effect}
-    assert laws.known_terms(Law("F", acts_on, terms)) == expected
+    assert law_names.known_terms(Law("F", acts_on, terms)) == expected
