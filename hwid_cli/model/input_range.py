@@ -6,7 +6,8 @@ import numpy as np
 _ROUNDING = 1e-9
 # Share of its width by which an input may leave the range where people are told: the
 # noise of a level that both hold, and the offset of a sensor. No map turns within that.
-SAME_LEVEL = 0.01
+# What `trust.visited` calls visited is told in cells of this width, too.
+SAME_LEVEL = 1 / 32
 
 
 def outside_share(

@@ -15,9 +15,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from hwid_cli.model.input_range import SAME_LEVEL
 from hwid_cli.records.trust import Inside, Visited, VisitedPlane
 
-N_CELLS = 32
+# A value in the next cell counts as visited: a sentence on the range says the same.
+N_CELLS = round(1 / SAME_LEVEL)
 # Octaves below Nyquist's frequency; the last takes all that is slower.
 N_BANDS = 11
 # A rate or an amplitude may be larger by this share: noise and rounding.

@@ -11,7 +11,7 @@ def test_what_lies_outside_the_data_is_counted():
 
 
 def test_the_noise_of_a_level_that_both_hold_takes_nothing_outside():
-    signal = np.array([0.0, 8.025, 8.041, 8.2])
+    signal = np.array([0.0, 8.025, 8.041, 8.5])
 
     assert outside_share(signal, (-3.75, 8.013))[0] == 0.75
     assert outside_share(signal, (-3.75, 8.013), same=SAME_LEVEL)[0] == 0.25

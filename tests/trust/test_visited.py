@@ -3,6 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from hwid_cli.model.input_range import SAME_LEVEL, outside_share
 from hwid_cli.trust.visited import (
     N_BANDS,
     band_amplitudes,
@@ -34,6 +35,15 @@ def test_larger_values_are_outside_by_value():
     # Beyond one cell (a sixteenth) above the largest value: two thirds of the time.
     expected = np.abs(sine(2.0, 100)) > 1.0 + 2.0 / 32
     assert np.array_equal(~where.amplitude, expected)
+
+
+@pytest.mark.parametrize("beyond", [0.0, 0.05, 0.07])
+def test_a_sentence_on_the_range_and_the_trust_agree(beyond):
+    # Both judge a level that a fit has not quite seen, of a range that is 2 wide.
+    signal = np.full(N, 1.0 + beyond)
+    where = inside(seen(sine(1.0, 100)), signal, sine(0.5, 100))
+    share, *_ = outside_share(signal, (-1.0, 1.0), same=SAME_LEVEL)
+    assert share == 1.0 - where.amplitude.mean() == float(beyond > 2.0 / 32)
 
 
 def test_the_same_values_faster_are_outside_by_rate_and_frequency():
