@@ -8,7 +8,9 @@ import pytest
 import scipy
 
 from hwid_cli import Recording, diagnose
-from hwid_cli.diagnosis.held_command import does_as_well
+from hwid_cli.diagnosis import held_command
+from hwid_cli.diagnosis.held_command import does_as_well, is_settled_if_held
+from hwid_cli.diagnosis.rounds import RoundsResult
 from hwid_cli.records.experiment import DiagnoseOptions, SimulationOptions
 from hwid_cli.stages.diagnose import extended_options
 from tests.diagnosis.made_up_fits import CRITERIA, made_up
@@ -153,3 +155,31 @@ def test_ties_go_to_the_set_that_needs_no_delay(held_sse, effects, stands):
     held = made_up(effects, held_sse, parameters=len(effects))
     rounds = SimpleNamespace(criteria=CRITERIA)
     assert does_as_well(rounds, held, line) == stands
+
+
+@pytest.mark.parametrize(
+    ("left", "whiteness", "is_settled"),
+    [
+        # Of an excess of 20 beyond the noise of 100 each.
+        (101.5, 3.0, True),
+        (104.0, 3.0, False),
+        (104.0, 0.9, True),
+    ],
+)
+def test_larger_sets_are_left_out_where_the_next_best_is_all_beside_a_held_command(
+    monkeypatch, left, whiteness, is_settled
+):
+    best = made_up(("coulomb_friction",), 120.0)
+    held = made_up(("hysteresis",), left, whiteness=whiteness)
+    asked = []
+
+    def better(_, given, sets):
+        asked.append((given, set(sets)))
+        return [held]
+
+    monkeypatch.setattr(held_command, "_better_if_held", better)
+    monkeypatch.setattr(held_command, "start_from", lambda drive, one: one)
+    rounds = SimpleNamespace(criteria=CRITERIA, problem=SimpleNamespace(drive=None))
+    found = RoundsResult({one.effects: one for one in (best, held)}, (best,), {})
+    assert is_settled_if_held(rounds, found) == is_settled
+    assert asked == [(best, {("coulomb_friction",), (), ("hysteresis",)})]

@@ -49,6 +49,32 @@ def test_an_input_that_moves_at_once_rests_at_its_first_sample():
     assert one.rest_position_m == 4.0
 
 
+UP, THERE_AND_BACK = [0.0, 1.0, 2.0, 2.96], [0.0, 2.0, 2.0, 1.8]
+
+
+@pytest.mark.parametrize(
+    ("outputs", "passes_once"),
+    [
+        ([UP], True),
+        ([[0.0, -1.0, -2.0, -1.92]], True),
+        ([THERE_AND_BACK], False),
+        # Two recordings pass the same places at their own times and speeds.
+        ([UP, UP], False),
+        # One that only judges teaches nothing.
+        ([UP, None], True),
+    ],
+)
+def test_each_place_is_passed_once_by_one_recording_that_does_not_come_back(
+    outputs, passes_once
+):
+    given = [
+        signals([0, 1, 1, 1], UP if one is None else one, held_out=one is None)
+        for one in outputs
+    ]
+    found = DiagnosisProblem(tuple(given), Drive(1.0, 1.0, 0.0, 1.0))
+    assert found.passes_once == passes_once
+
+
 def test_skipped_samples_are_not_evaluated():
     one = signals([0, 1, 1, 1], [9.0, 9.0, 1.0, 3.0], skip=2)
     beside = Compared(one, np.zeros(4), np.zeros(4), np.zeros(4))

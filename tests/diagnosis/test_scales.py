@@ -159,3 +159,14 @@ def test_scales_of_recordings_without_motion_are_not_zero():
     still = DiagnosisProblem((signals([0, 1, 1], [0, 0, 0]),), Drive())
     found = scales_of_recordings(still, [np.zeros(3)])
     assert min(found.displacement_m, found.velocity_m_per_s, found.stroke_m) > 0
+
+
+@pytest.mark.parametrize(("passes_once", "fewest"), [(False, 0.5), (True, 3.0)])
+def test_friction_along_a_way_that_is_passed_once_has_to_repeat(passes_once, fewest):
+    scales = replace(sizes(problem()), passes_once=passes_once)
+    friction = CATALOGUE["position_friction"]
+    (period,) = [one for one in friction.parameters if one.name == "period_m"]
+    assert period.bounds(scales)[1] == pytest.approx(scales.stroke_m / fewest)
+    starts = period.starts(scales)
+    assert starts
+    assert max(starts) <= scales.stroke_m / fewest
