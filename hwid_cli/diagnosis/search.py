@@ -45,9 +45,8 @@ LEAST_PROMISE = 2e-6
 _FIRST_DAMPING = 1e-3
 _LARGEST_DAMPING = 1e8
 _LARGEST_STEP = 1.5
-# Share of the largest below which a push is like others, and what holds a coordinate.
+# Share of the largest below which a push is like others.
 _SAME_PUSH = 1e-10
-_HELD = 1e12
 _LEAST_DIAGONAL = 1e-14
 OWN_ITERATIONS = 12
 # A further secant step is tried while the last step gained this share of what it promised,
@@ -365,15 +364,13 @@ def matrix_beside_pushes(
     matrix, by_push = np.zeros((size, size)), np.zeros((size, n_free))
     of_pushes = np.zeros((n_free, n_free))
     columns = _columns(fit_layout, len(parts))
+    held = [j for j, one in enumerate(fit_layout.shared) if one.owner == BASE]
     for jacobian, push, at in zip(jacobians, pushed, columns, strict=True):
+        jacobian[:, held] = 0.0
         matrix[np.ix_(at, at)] += jacobian.T @ jacobian
         by_push[at] += jacobian.T @ push
         of_pushes += push.T @ push
     matrix -= by_push @ np.linalg.pinv(of_pushes, _SAME_PUSH, True) @ by_push.T
-    held = [j for j, one in enumerate(fit_layout.shared) if one.owner == BASE]
-    largest = max(float(np.diag(matrix).max(initial=0.0)), 1e-300)
-    matrix[held], matrix[:, held] = 0.0, 0.0
-    matrix[held, held] = _HELD * largest
     return matrix
 
 

@@ -170,3 +170,12 @@ def test_friction_along_a_way_that_is_passed_once_has_to_repeat(passes_once, few
     starts = period.starts(scales)
     assert starts
     assert max(starts) <= scales.stroke_m / fewest
+
+
+@pytest.mark.parametrize("n", [1, 2])
+def test_scales_know_that_a_way_is_passed_once(n):
+    one = problem().signals[0]
+    up = replace(one, output=np.linspace(0.0, 0.01, one.output.size))
+    of = DiagnosisProblem((up,) * n, DRIVE)
+    found = scales_of_recordings(of, [np.zeros(3)] * n)
+    assert found.passes_once == (n == 1)

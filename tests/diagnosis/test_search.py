@@ -20,6 +20,7 @@ from hwid_cli.diagnosis.search import (
     fit_own,
     fit_point,
     local_matrix,
+    matrix_beside_pushes,
     with_own_trials,
 )
 from hwid_cli.records.experiment import DiagnoseOptions
@@ -166,6 +167,30 @@ def test_with_noise_everything_is_within_four_standard_errors():
     # Logarithms, so relative. Four: one of 16 000 draws is beyond.
     assert (np.abs(apart) < 4 * errors).all()
     assert (errors < 0.02).all()
+
+
+def test_pushes_that_do_what_the_base_does_leave_an_effect_as_uncertain_as_the_base():
+    start = {"cubic_stiffness": {"stiffness_N_per_m3": 8e5}}
+    of = problem(recordings(start, noise=0.0))
+    layout, point = begun(of, start)
+    free = np.linalg.inv(local_matrix(of, layout, point))
+    # More of a parameter of the base is a force: of the input, the way or the speed.
+    signals = []
+    for one in of.signals:
+        speed = np.gradient(one.output, one.sample_time_s)
+        pushes = np.column_stack([one.input, -one.output, -speed])
+        # As much as the noise each, as they are handed on.
+        pushes *= np.array([1e-3, 1.0, 1e-2])
+        signals.append(replace(one, force=np.zeros(one.output.size), pushes=pushes))
+    pushed = replace(of, signals=tuple(signals))
+    matrix = matrix_beside_pushes(pushed, layout, point)
+    (effect,) = [j for j, one in enumerate(layout.shared) if one.owner in start]
+    assert 1 / matrix[effect, effect] == pytest.approx(free[effect, effect], rel=0.01)
+    # The base is held: its own derivatives count for nothing.
+    held = np.delete(matrix, effect, axis=0)
+    np.testing.assert_array_equal(held, 0.0)
+    alone = local_matrix(of, layout, point)[effect, effect]
+    assert matrix[effect, effect] < 0.5 * alone
 
 
 def test_a_start_that_is_not_at_rest_is_estimated():

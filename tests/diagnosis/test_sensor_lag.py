@@ -12,9 +12,13 @@ from hwid_cli.records.programs import Capabilities, FreeParameter, SimulatorRun
 from tests.diagnosis.test_foreign import Count
 
 STEP_S, N = 4.0, 400
-TRUE = {"block": 63.0, "plate": 141.0, "conduction": 1.25, "loss": 1.4}
-GIVEN = {"block": 60.0, "plate": 150.0, "conduction": 1.2, "loss": 1.5}
-RADIATION, RESISTANCE = 1.2e-9, 10.0
+TRUE = {
+    "block": 63.0, "plate": 141.0, "conduction": 1.25, "loss": 1.4, "radiation": 1.2e-9,
+}  # fmt: skip
+GIVEN = {
+    "block": 60.0, "plate": 150.0, "conduction": 1.2, "loss": 1.5, "radiation": 1e-9,
+}  # fmt: skip
+RESISTANCE = 10.0
 PROBE_S = 25.0
 NOISE = 0.2
 
@@ -25,7 +29,8 @@ def plate(values, voltages):
     for power in voltages[:-1] ** 2 / RESISTANCE:
         for _ in range(2):
             flow = values["conduction"] * (block - rise)
-            lost = values["loss"] * rise + RADIATION * ((rise + 295) ** 4 - 295**4)
+            hot = (rise + 295) ** 4 - 295**4
+            lost = values["loss"] * rise + values["radiation"] * hot
             block += STEP_S / 2 * (power - flow) / values["block"]
             rise += STEP_S / 2 * (flow - lost) / values["plate"]
         found.append(rise)
@@ -61,7 +66,7 @@ def recordings():
 
 
 def by_least_squares(train):
-    """All parameters at once: the probe's time constant and its standard deviation."""
+    """All parameters at once: the probe's time constant, its deviation, and the RMS."""
 
     def errors(shares):
         values = dict(zip(GIVEN, shares[:-1] * list(GIVEN.values()), strict=True))
@@ -75,7 +80,8 @@ def by_least_squares(train):
     found = scipy.optimize.least_squares(errors, np.ones(len(GIVEN) + 1))
     variance = np.mean(found.fun**2)
     covariance = np.linalg.inv(found.jac.T @ found.jac) * variance
-    return 20.0 * found.x[-1], 20.0 * np.sqrt(covariance[-1, -1])
+    deviation = np.sqrt(covariance[-1, -1])
+    return 20.0 * found.x[-1], 20.0 * deviation, np.sqrt(variance)
 
 
 @pytest.mark.thorough
@@ -99,9 +105,12 @@ def test_a_slow_probe_is_named_and_is_as_uncertain_as_all_parameters_leave_it():
     assert effect.id == "sensor_lag"
     (lag,) = effect.parameters
     train = [one for one in given if one.name != "run_1"]
-    value, deviation = by_least_squares(train)
+    value, deviation, rms = by_least_squares(train)
     # The same squares, so the same place; turns of stand-in and simulation end before.
     assert lag.value == pytest.approx(value, abs=0.5 * deviation)
+    # What its last run leaves beyond that fit, in squares of the noise.
+    more = len(train) * N * (found.after.train_rms**2 - rms**2) / NOISE**2
+    assert -1.0 < more < 5.0
     low, high = lag.low, lag.high
     assert high - low == pytest.approx(2 * 1.96 * deviation, rel=0.2)
     assert low < PROBE_S < high

@@ -89,3 +89,16 @@ def test_bristles_without_a_spring_and_held_at_the_end():
     assert rms(found.position - expected) < 1e-4 * np.ptp(expected)
     # A load below the level bends the bristles and moves nothing further.
     assert np.ptp(found.position[-200:]) < 1e-6
+
+
+def test_slow_sampling_takes_steps_as_short_as_the_level_is_steep():
+    # Between two slow samples the level falls by far more than its slope says at either.
+    values = BRISTLES | {
+        "damping_N_s_per_m": 10.0, "velocity_m_per_s": 2e-3, "yield_m": 1e-5,
+    }  # fmt: skip
+    step = 0.01
+    times = step * np.arange(201)
+    command = 0.6 * times / times[-1]
+    found = tool({"hysteresis": values}, command, sample_time=step)
+    expected = published(values, times, (times, command))
+    assert rms(found.position - expected) < 5e-5 * np.ptp(expected)

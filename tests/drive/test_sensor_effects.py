@@ -1,10 +1,13 @@
 """What the sensor makes of the motion."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicHermiteSpline, CubicSpline
 
+from hwid_cli.drive.catalogue import CATALOGUE
 from hwid_cli.drive.simulation import simulate_drive
 from hwid_cli.records.drive import Controller, Drive
 from tests.drive.drive_cases import (
@@ -12,6 +15,7 @@ from tests.drive.drive_cases import (
     CORNERS,
     COULOMB,
     SAMPLE_TIME_S,
+    SCALES,
     TIMES_S,
     rms,
     tool,
@@ -185,16 +189,18 @@ def test_a_sensor_that_lags_comes_behind_its_other_laws():
     assert rms(tool(laws | SENSOR_LAG).output - expected) < 1e-5
 
 
-def test_a_recording_that_begins_in_motion_has_lagged_before():
+@pytest.mark.parametrize("output", ["position", "velocity"])
+def test_a_recording_that_begins_in_motion_has_lagged_before(output):
     drive = Drive(
         mass_kg=1.0, damping_N_s_per_m=0.0, stiffness_N_per_m=0.0,
-        force_constant_N_per_A=1.0, effects=SENSOR_LAG,
+        force_constant_N_per_A=1.0, effects=SENSOR_LAG, output=output,
     )  # fmt: skip
     found = simulate_drive(
         np.zeros(50), drive, sample_time_s=1e-3, start=(0.003, 0.4)
     ).output
     # At a constant speed a lag is behind by its time constant, from the first sample on.
     expected = 0.003 + 0.4 * (1e-3 * np.arange(50) - 0.012)
+    expected = expected if output == "position" else np.full(50, 0.4)
     np.testing.assert_allclose(found, expected, atol=1e-15)
 
 
@@ -243,3 +249,22 @@ def test_a_controller_reads_the_sensor_that_lags(controller):
         reference, drive.__class__(**{**vars(drive), "effects": {}}), sample_time_s=step
     )
     assert rms(undelayed.command - given) > 0.05 * rms(np.array(given))
+
+
+def test_a_controller_begins_with_what_lags_as_well():
+    drive = Drive(
+        mass_kg=1.0, damping_N_s_per_m=0.0, stiffness_N_per_m=0.0,
+        force_constant_N_per_A=1.0, effects=SENSOR_LAG,
+        controller=Controller(proportional_gain=5.0),
+    )  # fmt: skip
+    found = simulate_drive(
+        np.full(10, 0.02), drive, sample_time_s=1e-3, start=(0.003, 0.4)
+    )
+    assert found.command[0] == pytest.approx(5.0 * (0.02 - (0.003 - 0.012 * 0.4)))
+
+
+def test_a_probe_may_be_as_slow_as_a_twentieth_of_a_recording():
+    (lag,) = CATALOGUE["sensor_lag"].parameters
+    long = replace(SCALES, duration_s=100.0)
+    assert lag.bounds(long)[1] == pytest.approx(5.0)
+    assert lag.bounds(SCALES)[1] == pytest.approx(0.5 / SCALES.natural_Hz)

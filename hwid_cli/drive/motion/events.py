@@ -10,7 +10,7 @@ from hwid_cli.drive import slots
 from hwid_cli.drive.motion.corners import corner_of, margin
 from hwid_cli.drive.motion.curved import is_curved_here, step_all, step_plain
 from hwid_cli.drive.motion.forces import acceleration, held_further, moved_mass, surplus
-from hwid_cli.drive.motion.hysteresis import bristle_level, yielded
+from hwid_cli.drive.motion.hysteresis import yielded
 from hwid_cli.drive.motion.linear import (
     DRIVEN,
     OFFSET,
@@ -20,7 +20,7 @@ from hwid_cli.drive.motion.linear import (
     sum_series,
 )
 from hwid_cli.drive.motion.push import DRIVE, OTHER, shift, value_of
-from hwid_cli.drive.motion.state import DEFLECTION, LEVEL, SIDE, TURNED_AT, WAY, V, X
+from hwid_cli.drive.motion.state import DEFLECTION, SIDE, TURNED_AT, WAY, V, X
 
 # Iterations that locate an event; each one at least halves what is left.
 LOCATING = 40
@@ -236,7 +236,6 @@ def stop(
     if p[slots.HYSTERESIS_FORCE] != 0.0:
         memory[DEFLECTION] = yielded(state[X], 0.0, memory, p)
         memory[TURNED_AT] = state[X]
-        memory[LEVEL] = bristle_level(0.0, p)
     memory[WAY] = 0.0
     net, more = excess(state, memory, push, done, p)
     if more > 0.0:

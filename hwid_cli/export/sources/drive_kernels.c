@@ -2978,7 +2978,6 @@ static void drive_stop(double *state, double *memory, double *push, double done,
     if (p[HYSTERESIS_FORCE] != 0.0) {
         memory[DEFLECTION] = drive_yielded(state[X], 0.0, memory, p);
         memory[TURNED_AT] = state[X];
-        memory[LEVEL] = drive_bristle_level(0.0, p);
     }
     memory[WAY] = 0.0;
     t1 = drive_excess(state, memory, push, done, p);
