@@ -7,13 +7,14 @@ import numpy as np
 
 from hwid_cli.compiled import INNER, compiled
 from hwid_cli.drive import slots
-from hwid_cli.drive.output import lagged
+from hwid_cli.drive.output import first_late, lagged
 
 # Places in what a controller keeps: sum of the error over time, error at the last sample,
-# whether there was one, and motion and readings of a sensor that lags.
+# whether there was one, and motion, readings and their rates of a sensor that lags.
 (
-    ERROR_SUM, LAST_ERROR, HAS_ERROR, LAST_X, LAST_V, LATE_X, LATE_V, N_CONTROL,
-) = range(8)  # fmt: skip
+    ERROR_SUM, LAST_ERROR, HAS_ERROR, LAST_X, LAST_V, LATE_X, LATE_V, PACE_X, PACE_V,
+    N_CONTROL,
+) = range(10)  # fmt: skip
 
 
 @compiled(**INNER)
@@ -76,12 +77,16 @@ def _late(
     x: float, v: float, sample_time: float, control: np.ndarray, p: np.ndarray
 ) -> tuple[float, float]:
     """Return position and velocity as a sensor that lags reads them."""
-    time_constant = p[slots.SENSOR_LAG]
+    late_x, pace_x = first_late(x, v, p)
+    late_v, pace_v = first_late(v, 0.0, p)
     if control[HAS_ERROR] > 0.0:
-        late_x = lagged(control[LATE_X], control[LAST_X], x, sample_time, time_constant)
-        late_v = lagged(control[LATE_V], control[LAST_V], v, sample_time, time_constant)
-    else:
-        late_x, late_v = x - time_constant * v, v
+        late_x, pace_x = lagged(
+            control[LATE_X], control[PACE_X], control[LAST_X], x, sample_time, p
+        )
+        late_v, pace_v = lagged(
+            control[LATE_V], control[PACE_V], control[LAST_V], v, sample_time, p
+        )
     control[LAST_X], control[LAST_V] = x, v
     control[LATE_X], control[LATE_V] = late_x, late_v
+    control[PACE_X], control[PACE_V] = pace_x, pace_v
     return late_x, late_v

@@ -8,7 +8,7 @@ import numpy as np
 from hwid_cli.compiled import INNER, MAKING, compiled
 from hwid_cli.drive import slots
 from hwid_cli.drive.interpreter import formula_value
-from hwid_cli.drive.motion.push import TURN
+from hwid_cli.drive.motion.push import TURN, faded
 
 # Play is at its end within this share of it, for rounding.
 TOUCHING = 1e-9
@@ -40,40 +40,71 @@ def read(
         output[i] = sensed(output[i], lag, velocities[i], command[i], time, p)
     if p[slots.SENSOR_LAG] > 0.0:
         speed = 0.0 if p[slots.OUTPUT_IS_VELOCITY] > 0.0 else velocities[0]
-        _let_lag(output, speed, sample_time, p[slots.SENSOR_LAG])
+        _let_lag(output, speed, sample_time, p)
     return output
 
 
 @compiled(**INNER)
 def lagged(
-    late: float, before: float, now: float, sample_time: float, time_constant: float
-) -> float:
-    """Return the output of a first-order lag, one sample on.
+    late: float,
+    pace: float,
+    before: float,
+    now: float,
+    sample_time: float,
+    p: np.ndarray,
+) -> tuple[float, float]:
+    """Return what a sensor that lags reads one sample on, and how fast that changes.
 
     Parameters
     ----------
-    late : float, [m] or [m/s]
-        Its output at the sample before.
+    late, pace : float, [m] or [m/s]
+        Reading at the sample before, and its rate times the time constant.
     before, now : float, [same]
-        Its input at both samples; a straight line between them.
-    sample_time, time_constant : float, [s]
+        What it follows at both samples; a straight line between them.
+    sample_time : float, [s]
+    p : ndarray, shape (N_SLOTS,)
     """
+    ratio = p[slots.SENSOR_LAG_DAMPING_RATIO]
+    held, added = faded(sample_time / p[slots.SENSOR_LAG], ratio)
     # A line is followed at a distance; what is off it dies away.
-    behind = (now - before) * time_constant / sample_time
-    left = late - before + behind
-    return now - behind + left * np.exp(-sample_time / time_constant)
+    even = (now - before) * p[slots.SENSOR_LAG] / sample_time
+    off = late - before + _behind(even, p)
+    turning = pace - even if ratio > 0.0 else 0.0
+    after = now - _behind(even, p) + off * held + turning * added
+    return after, even - off * added + turning * (held - 2.0 * ratio * added)
 
 
-@compiled(**MAKING)
+@compiled(**INNER)
+def first_late(now: float, speed: float, p: np.ndarray) -> tuple[float, float]:
+    """Return the same at the first sample, before which the motion went on at one speed.
+
+    Parameters
+    ----------
+    now, speed : float, [m], [m/s]; or [m/s] and 0
+        What is followed, and how fast it changes.
+    p : ndarray, shape (N_SLOTS,)
+    """
+    even = speed * p[slots.SENSOR_LAG]
+    return now - _behind(even, p), even
+
+
+@compiled(**INNER)
+def _behind(even: float, p: np.ndarray) -> float:
+    """Return how far a lag is behind a line that rises by this in a time constant."""
+    ratio = p[slots.SENSOR_LAG_DAMPING_RATIO]
+    return 2.0 * ratio * even if ratio > 0.0 else even
+
+
+@compiled(**INNER)
 def _let_lag(
-    output: np.ndarray, speed: float, sample_time: float, time_constant: float
+    output: np.ndarray, speed: float, sample_time: float, p: np.ndarray
 ) -> None:
-    """Let readings lag in place; before them the motion has gone on at one speed."""
+    """Let readings lag in place."""
     before = output[0]
-    output[0] -= time_constant * speed
+    output[0], pace = first_late(before, speed, p)
     for i in range(1, output.size):
         now = output[i]
-        output[i] = lagged(output[i - 1], before, now, sample_time, time_constant)
+        output[i], pace = lagged(output[i - 1], pace, before, now, sample_time, p)
         before = now
 
 

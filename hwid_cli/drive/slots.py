@@ -137,5 +137,6 @@ that is switched off is 0, except where the comment says infinite.
     BRISTLE_VELOCITY,
     BRISTLE_DAMPING,
     BRISTLE_EXCESS,
+    SENSOR_LAG_DAMPING_RATIO,
     N_SLOTS,
-) = range(130)
+) = range(131)

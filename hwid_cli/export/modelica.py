@@ -110,6 +110,16 @@ LAWS = {
         "{y} + {amplitude_m}*sin(2*pi*{frequency_Hz}*time + {phase_rad})"
     ),
     "sensor_lag": _Law("#y", (("y", "({y} - #y)/{time_constant_s}"),)),
+    "sensor_lag:second_order": _Law(
+        "#y",
+        (
+            ("y", "#r"),
+            (
+                "r",
+                "({y} - #y)/{time_constant_s}^2 - 2*{damping_ratio}/{time_constant_s}*#r",
+            ),
+        ),
+    ),
     "sensor_saturation": _Law("max(min({y}, {limit_m}), -{limit_m})"),
 }
 # What changes the input, and what changes the reading, in the order of the signal.
@@ -120,7 +130,7 @@ _INPUT_ORDER = (
 )  # fmt: skip
 _OUTPUT_ORDER = (
     "sensor_eccentricity", "own", "sensor_quadratic", "sensor_cubic", "sensor_drift",
-    "sensor_hum", "sensor_saturation", "sensor_lag",
+    "sensor_hum", "sensor_saturation", "sensor_lag", "sensor_lag:second_order",
 )  # fmt: skip
 _HOLE = re.compile(r"\{(\w+)\}|#(\w+)")
 _OWN_NAMES = {"Max": "max", "Min": "min", "atan": "atan"}

@@ -157,23 +157,40 @@ def test_a_smooth_input_is_read_by_another_clock():
 SENSOR_LAG = {"sensor_lag": {"time_constant_s": 0.012}}
 
 
-def first_order(times, followed, time_constant):
-    """A first-order lag behind a curve, by a general integrator."""
+RATIOS = [0.0, 0.6, 1.0, 1.8]
+
+
+def behind(times, followed, time_constant, ratio=0.0):
+    """A lag of first or second order behind a curve, by a general integrator."""
     curve = CubicSpline(times, followed)
+
+    def rates(t, state):
+        y, rate = state
+        if ratio == 0.0:
+            return [(curve(t) - y) / time_constant, 0.0]
+        pull = (curve(t) - y) / time_constant - 2.0 * ratio * rate
+        return [rate, pull / time_constant]
+
     found = solve_ivp(
-        lambda t, y: (curve(t) - y) / time_constant, (0.0, times[-1]), [followed[0]],
-        t_eval=times, rtol=1e-10, atol=1e-14, max_step=1e-3,
+        rates, (0.0, times[-1]), [followed[0], 0.0], t_eval=times, rtol=1e-10,
+        atol=1e-14, max_step=1e-3,
     )  # fmt: skip
     return found.y[0]
 
 
+def lag(ratio):
+    values = {"time_constant_s": 0.012}
+    return {"sensor_lag": values | ({"damping_ratio": ratio} if ratio else {})}
+
+
+@pytest.mark.parametrize("ratio", RATIOS)
 @pytest.mark.parametrize("output", ["position", "velocity"])
-def test_a_sensor_that_lags_reads_what_a_first_order_lag_gives(output):
-    found = tool(SENSOR_LAG, output=output)
-    expected = first_order(TIMES_S, getattr(found, output), 0.012)
-    # A straight line between samples cuts dt^2 / 12 of the second derivative, which a lag
-    # of 12 samples lets through by a twelfth: 20 m/s^2, or 2e3 m/s^3.
-    bound = {"position": 2e-6, "velocity": 2e-4}[output]
+def test_a_sensor_that_lags_reads_what_a_lag_of_its_order_gives(output, ratio):
+    found = tool(lag(ratio), output=output)
+    expected = behind(TIMES_S, getattr(found, output), 0.012, ratio)
+    # A straight line between samples is off by dt^2 / 12 of the second derivative on
+    # average, of which a lag lets most through: 20 m/s^2, or 2e3 m/s^3 of a velocity.
+    bound = {"position": 3e-6, "velocity": 3e-4}[output]
     assert rms(found.output - expected) < bound
     assert rms(found.output - getattr(found, output)) > 100 * bound
     np.testing.assert_array_equal(found.position, tool({}).position)
@@ -185,21 +202,23 @@ def test_a_sensor_that_lags_comes_behind_its_other_laws():
         "sensor_saturation": {"limit_m": 0.01},
     }
     sensed = tool(laws).output
-    expected = first_order(TIMES_S, sensed, 0.012)
+    expected = behind(TIMES_S, sensed, 0.012)
     assert rms(tool(laws | SENSOR_LAG).output - expected) < 1e-5
 
 
+@pytest.mark.parametrize("ratio", RATIOS)
 @pytest.mark.parametrize("output", ["position", "velocity"])
-def test_a_recording_that_begins_in_motion_has_lagged_before(output):
+def test_a_recording_that_begins_in_motion_has_lagged_before(output, ratio):
     drive = Drive(
         mass_kg=1.0, damping_N_s_per_m=0.0, stiffness_N_per_m=0.0,
-        force_constant_N_per_A=1.0, effects=SENSOR_LAG, output=output,
+        force_constant_N_per_A=1.0, effects=lag(ratio), output=output,
     )  # fmt: skip
     found = simulate_drive(
         np.zeros(50), drive, sample_time_s=1e-3, start=(0.003, 0.4)
     ).output
-    # At a constant speed a lag is behind by its time constant, from the first sample on.
-    expected = 0.003 + 0.4 * (1e-3 * np.arange(50) - 0.012)
+    # At a constant speed a lag is behind by its slope at 0, from the first sample on.
+    late = 0.012 * (2 * ratio if ratio else 1.0)
+    expected = 0.003 + 0.4 * (1e-3 * np.arange(50) - late)
     expected = expected if output == "position" else np.full(50, 0.4)
     np.testing.assert_allclose(found, expected, atol=1e-15)
 
@@ -207,29 +226,35 @@ def test_a_recording_that_begins_in_motion_has_lagged_before(output):
 @pytest.mark.parametrize(
     "controller",
     [
-        Controller(position_gain_per_s=20.0, velocity_gain=30.0),
+        Controller(position_gain_per_s=10.0, velocity_gain=3.0),
         Controller(proportional_gain=120.0, integral_gain=900.0, derivative_gain=2.0),
     ],
     ids=["cascade", "PID"],
 )
-def test_a_controller_reads_the_sensor_that_lags(controller):
-    mass, damping, constant, lag, step = 0.3, 15.0, 5.0, 0.012, 1e-3
+@pytest.mark.parametrize("ratio", [0.0, 0.7])
+def test_a_controller_reads_the_sensor_that_lags(controller, ratio):
+    mass, damping, constant, late, step = 0.3, 15.0, 5.0, 0.012, 1e-3
     reference = 0.01 * np.sin(2 * np.pi * 4.0 * np.arange(400) * step) ** 2
     drive = Drive(
         mass_kg=mass, damping_N_s_per_m=damping, stiffness_N_per_m=0.0,
         force_constant_N_per_A=constant, controller=controller,
-        effects={"sensor_lag": {"time_constant_s": lag}},
+        effects=lag(ratio),
     )  # fmt: skip
     found = simulate_drive(reference, drive, sample_time_s=step)
 
     def rates(t, state, current):
-        x, v, late_x, late_v = state
+        x, v, late_x, late_v, rate_x, rate_v = state
         push = constant * current - damping * v
-        return [v, push / mass, (x - late_x) / lag, (v - late_v) / lag]
+        moved = [v, push / mass]
+        off_x, off_v = (x - late_x) / late, (v - late_v) / late
+        if ratio == 0.0:
+            return [*moved, off_x, off_v, 0.0, 0.0]
+        pull_x, pull_v = off_x - 2 * ratio * rate_x, off_v - 2 * ratio * rate_v
+        return [*moved, rate_x, rate_v, pull_x / late, pull_v / late]
 
-    state, total, last, given = np.zeros(4), 0.0, None, []
+    state, total, last, given = np.zeros(6), 0.0, None, []
     for wanted in reference:
-        _, _, x, v = state
+        _, _, x, v, *_ = state
         error = wanted - x
         gain, reset = controller.proportional_gain, controller.integral_gain
         if controller.velocity_gain is not None:

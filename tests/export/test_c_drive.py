@@ -42,7 +42,9 @@ COUPLED_MOTOR = {
         "sensor": "motor",
     }
 }
+SLOW_SENSOR = {"sensor_lag": {"time_constant_s": 0.004, "damping_ratio": 0.7}}
 MACHINES = (
+    (SLOW_SENSOR, {"controller": Controller(20.0, 30.0, 4.0)}),
     ({}, {}),
     (BACKLASH, {}),
     (SENSORS, {}),

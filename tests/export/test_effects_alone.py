@@ -72,6 +72,7 @@ VALUES = {
     "sensor_hum": {"amplitude_m": 3e-4, "frequency_Hz": 50.0, "phase_rad": 0.5},
     "sensor_saturation": {"limit_m": 0.007},
     "sensor_lag": {"time_constant_s": 5e-3},
+    "sensor_lag:second_order": {"time_constant_s": 5e-3, "damping_ratio": 0.6},
     own_id("chain", OWN): {"a": 0.3, "b": 60.0},
 }  # fmt: skip
 

@@ -6,6 +6,7 @@ docs/method_diagnosis.md, eq. (D14).
 from math import inf, pi
 
 from hwid_cli.drive.effect import (
+    NOT_NEGATIVE,
     POSITIVE,
     QUARTERS,
     Effect,
@@ -236,26 +237,48 @@ def _lag_bounds(scales: Scales) -> tuple[float, float]:
     return low, max(high, _LONGEST_LAG * scales.duration_s)
 
 
+_TIME_CONSTANT = Parameter(
+    "time_constant_s",
+    time_shares,
+    _lag_bounds,
+    places=("SENSOR_LAG",),
+    limits=(POSITIVE,),
+)
+
 LAG = Effect(
     id="sensor_lag",
     sentence="the reading follows the motion with a first-order lag",
     equation="tau dy/dt + y = x",
     enters="output",
-    parameters=(
-        Parameter(
-            "time_constant_s",
-            time_shares,
-            _lag_bounds,
-            places=("SENSOR_LAG",),
-            limits=(POSITIVE,),
-        ),
-    ),
+    parameters=(_TIME_CONSTANT,),
     # A drive that is linear otherwise gives the same with either.
     contains=("actuator_lag",),
     confused_with={
         "actuator_lag": "large and small motions, where the drive is not linear",
         "input_delay": "a sine far above the natural frequency",
     },
+)
+
+SECOND_ORDER_LAG = Effect(
+    id="sensor_lag:second_order",
+    sentence="the reading follows the motion with a second-order lag",
+    equation="tau^2 y'' + 2 z tau y' + y = x",
+    enters="output",
+    parameters=(
+        _TIME_CONSTANT,
+        Parameter(
+            "damping_ratio",
+            lambda scales: (0.7, 1.5),
+            # What rings more than a filter that somebody has chosen is a spring.
+            lambda scales: (0.3, 10.0),
+            places=("SENSOR_LAG_DAMPING_RATIO",),
+            # Without it, the lag is of first order.
+            default=0.0,
+            limits=(NOT_NEGATIVE,),
+        ),
+    ),
+    contains=("sensor_lag", "actuator_lag:second_order", "actuator_lag"),
+    confused_with=dict(LAG.confused_with),
 )
 
 EFFECTS = (
@@ -268,4 +291,5 @@ EFFECTS = (
     ECCENTRICITY,
     CLOCK,
     LAG,
+    SECOND_ORDER_LAG,
 )

@@ -113,8 +113,8 @@ def prepare_push(room: np.ndarray, length: float, p: np.ndarray) -> None:
     if p[slots.LAG] > 0.0:
         turns, ratio = length / p[slots.LAG], p[slots.LAG_DAMPING_RATIO]
         for j in range(5):
-            room[1 + j], room[17 + j] = _faded(_SHARES[j] * turns, ratio)
-        room[6], room[22] = _faded(turns, ratio)
+            room[1 + j], room[17 + j] = faded(_SHARES[j] * turns, ratio)
+        room[6], room[22] = faded(turns, ratio)
     if p[slots.THERMAL_LOSS] != 0.0:
         room[7] = np.exp(-length / p[slots.THERMAL_TIME])
         room[8] = np.sqrt(room[7])
@@ -129,7 +129,7 @@ def prepare_push(room: np.ndarray, length: float, p: np.ndarray) -> None:
 
 
 @compiled(**INNER)
-def _faded(turns: float, ratio: float) -> tuple[float, float]:
+def faded(turns: float, ratio: float) -> tuple[float, float]:
     """Return what is left of a lag's value, and what its rate has added, without input.
 
     Parameters
@@ -138,6 +138,10 @@ def _faded(turns: float, ratio: float) -> tuple[float, float]:
         Time over the time constant, which the rate is in as well.
     ratio : float, [-]
         Damping ratio; 0 for a first-order lag.
+
+    Returns
+    -------
+    tuple of float, [-]
     """
     if ratio <= 0.0:
         return np.exp(-turns), 0.0

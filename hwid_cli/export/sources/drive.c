@@ -36,6 +36,7 @@ typedef struct {
     double played;
     double sensed;
     double late;
+    double pace;
     double position;
     double velocity;
     double beside; /* A force on the mass beside the drive's own, held [N]. */
@@ -287,14 +288,15 @@ static double reading(HWID_NAME(state) *s)
     double *p = s->p;
     const double now = drive_sensed(s->played, s->position - s->played, s->velocity,
                                     s->previous, sample_time * (double)s->sample, p);
+    tuple_dd next;
     if (!(p[SENSOR_LAG] > 0.0)) {
         return now;
     }
-    if (s->sample == 0) {
-        s->late = now - (p[OUTPUT_IS_VELOCITY] > 0.0 ? 0.0 : p[SENSOR_LAG] * s->velocity);
-    } else {
-        s->late = drive_lagged(s->late, s->sensed, now, sample_time, p[SENSOR_LAG]);
-    }
+    next = s->sample == 0
+        ? drive_first_late(now, p[OUTPUT_IS_VELOCITY] > 0.0 ? 0.0 : s->velocity, p)
+        : drive_lagged(s->late, s->pace, s->sensed, now, sample_time, p);
+    s->late = next.m0;
+    s->pace = next.m1;
     s->sensed = now;
     return s->late;
 }

@@ -130,7 +130,8 @@ enum {
     BRISTLE_VELOCITY = 126,
     BRISTLE_DAMPING = 127,
     BRISTLE_EXCESS = 128,
-    N_SLOTS = 129,
+    SENSOR_LAG_DAMPING_RATIO = 129,
+    N_SLOTS = 130,
     CONSTANT = 0,
     VARIABLE = 1,
     ADD = 2,
@@ -173,7 +174,9 @@ enum {
     LAST_V = 4,
     LATE_X = 5,
     LATE_V = 6,
-    N_CONTROL = 7,
+    PACE_X = 7,
+    PACE_V = 8,
+    N_CONTROL = 9,
     X = 0,
     V = 1,
     MOTOR_X = 2,
@@ -885,13 +888,39 @@ static tuple_dddd drive_shift(double *push, int which, double done)
     return (tuple_dddd){a + (done * (b + (done * (c + (done * d))))), b + (done * ((2.0 * c) + ((3.0 * done) * d))), c + ((3.0 * done) * d), d};
 }
 
-static double drive_lagged(double late, double before, double now, double sample_time, double time_constant)
+static double drive_behind(double even, double *p)
 {
-    double behind = 0.0;
-    double left = 0.0;
-    behind = ((now - before) * time_constant) / sample_time;
-    left = (late - before) + behind;
-    return (now - behind) + (left * exp((-sample_time) / time_constant));
+    double ratio = 0.0;
+    ratio = p[SENSOR_LAG_DAMPING_RATIO];
+    return (ratio > 0.0) ? ((2.0 * ratio) * even) : even;
+}
+
+static tuple_dd drive_lagged(double late, double pace, double before, double now, double sample_time, double *p)
+{
+    double ratio = 0.0;
+    tuple_dd t1 = {0};
+    double held = 0.0;
+    double added = 0.0;
+    double even = 0.0;
+    double off = 0.0;
+    double turning = 0.0;
+    double after = 0.0;
+    ratio = p[SENSOR_LAG_DAMPING_RATIO];
+    t1 = drive_faded(sample_time / p[SENSOR_LAG], ratio);
+    held = t1.m0;
+    added = t1.m1;
+    even = ((now - before) * p[SENSOR_LAG]) / sample_time;
+    off = (late - before) + drive_behind(even, p);
+    turning = (ratio > 0.0) ? (pace - even) : 0.0;
+    after = ((now - drive_behind(even, p)) + (off * held)) + (turning * added);
+    return (tuple_dd){after, (even - (off * added)) + (turning * (held - ((2.0 * ratio) * added)))};
+}
+
+static tuple_dd drive_first_late(double now, double speed, double *p)
+{
+    double even = 0.0;
+    even = speed * p[SENSOR_LAG];
+    return (tuple_dd){now - drive_behind(even, p), even};
 }
 
 static double drive_sensed(double y, double lag, double speed, double command, double time, double *p)
@@ -972,21 +1001,34 @@ static int drive_is_closed(double *p)
 
 static tuple_dd drive_late(double x, double v, double sample_time, double *control, double *p)
 {
-    double time_constant = 0.0;
+    tuple_dd t1 = {0};
     double late_x = 0.0;
+    double pace_x = 0.0;
+    tuple_dd t2 = {0};
     double late_v = 0.0;
-    time_constant = p[SENSOR_LAG];
+    double pace_v = 0.0;
+    tuple_dd t3 = {0};
+    tuple_dd t4 = {0};
+    t1 = drive_first_late(x, v, p);
+    late_x = t1.m0;
+    pace_x = t1.m1;
+    t2 = drive_first_late(v, 0.0, p);
+    late_v = t2.m0;
+    pace_v = t2.m1;
     if (control[HAS_ERROR] > 0.0) {
-        late_x = drive_lagged(control[LATE_X], control[LAST_X], x, sample_time, time_constant);
-        late_v = drive_lagged(control[LATE_V], control[LAST_V], v, sample_time, time_constant);
-    } else {
-        late_x = x - (time_constant * v);
-        late_v = v;
+        t3 = drive_lagged(control[LATE_X], control[PACE_X], control[LAST_X], x, sample_time, p);
+        late_x = t3.m0;
+        pace_x = t3.m1;
+        t4 = drive_lagged(control[LATE_V], control[PACE_V], control[LAST_V], v, sample_time, p);
+        late_v = t4.m0;
+        pace_v = t4.m1;
     }
     control[LAST_X] = x;
     control[LAST_V] = v;
     control[LATE_X] = late_x;
     control[LATE_V] = late_v;
+    control[PACE_X] = pace_x;
+    control[PACE_V] = pace_v;
     return (tuple_dd){late_x, late_v};
 }
 
