@@ -323,6 +323,21 @@ class Formula:
     node: "Node"
 
 
+def ratio_of_lag(place: str) -> Parameter:
+    """Damping ratio of a lag of second order; without it the lag is of first order.
+
+    What rings more than a loop or a filter that somebody has tuned is a spring.
+    """
+    return Parameter(
+        "damping_ratio",
+        lambda scales: (0.7, 1.5),
+        lambda scales: (0.3, 10.0),
+        places=(place,),
+        default=0.0,
+        limits=(NOT_NEGATIVE,),
+    )
+
+
 @dataclass(frozen=True)
 class Effect:
     """The declaration of one effect.

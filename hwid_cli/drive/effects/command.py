@@ -12,6 +12,7 @@ from hwid_cli.drive.effect import (
     Limit,
     Parameter,
     Scales,
+    ratio_of_lag,
     shares_of,
     span_of,
     time_bounds,
@@ -126,16 +127,7 @@ SECOND_ORDER_LAG = Effect(
     enters="command",
     parameters=(
         _TIME_CONSTANT,
-        Parameter(
-            "damping_ratio",
-            lambda scales: (0.7, 1.5),
-            # What rings more than a current loop that somebody has tuned is a spring.
-            lambda scales: (0.3, 10.0),
-            places=("LAG_DAMPING_RATIO",),
-            # Without it, the lag is of first order.
-            default=0.0,
-            limits=(NOT_NEGATIVE,),
-        ),
+        ratio_of_lag("LAG_DAMPING_RATIO"),
     ),
     # Strongly damped, with a small time constant.
     contains=("actuator_lag",),

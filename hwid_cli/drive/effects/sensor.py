@@ -6,7 +6,6 @@ docs/method_diagnosis.md, eq. (D14).
 from math import inf, pi
 
 from hwid_cli.drive.effect import (
-    NOT_NEGATIVE,
     POSITIVE,
     QUARTERS,
     Effect,
@@ -14,6 +13,7 @@ from hwid_cli.drive.effect import (
     Parameter,
     Scales,
     line_bounds,
+    ratio_of_lag,
     shares_of,
     span_of,
     time_bounds,
@@ -266,16 +266,7 @@ SECOND_ORDER_LAG = Effect(
     enters="output",
     parameters=(
         _TIME_CONSTANT,
-        Parameter(
-            "damping_ratio",
-            lambda scales: (0.7, 1.5),
-            # What rings more than a filter that somebody has chosen is a spring.
-            lambda scales: (0.3, 10.0),
-            places=("SENSOR_LAG_DAMPING_RATIO",),
-            # Without it, the lag is of first order.
-            default=0.0,
-            limits=(NOT_NEGATIVE,),
-        ),
+        ratio_of_lag("SENSOR_LAG_DAMPING_RATIO"),
     ),
     contains=("sensor_lag", "actuator_lag:second_order", "actuator_lag"),
     confused_with=dict(LAG.confused_with),
