@@ -109,6 +109,7 @@ def loaded(folder, content):
     return None
 
 
+@pytest.mark.thorough
 @given(st.dictionaries(KEYS, VALUES, max_size=5) | nearly_good())
 @hypothesis_settings(max_examples=30)
 def test_any_mapping_is_an_experiment_or_an_error_to_mend(content):

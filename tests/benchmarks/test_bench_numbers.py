@@ -37,6 +37,7 @@ def test_exponent_of_a_power():
     assert exponent(sizes, 2.0 * sizes**1.7) == pytest.approx(1.7)
 
 
+@pytest.mark.thorough
 def test_the_baseline_is_a_fair_one():
     orders, u, y, u_test, y_test = random_plant(0, 500)
     for free in (False, True):

@@ -180,6 +180,7 @@ def test_further_states_give_the_motion_of_another_integrator():
         assert distance(BASE, expected) > 1000 * KINKED_M, rates.__name__
 
 
+@pytest.mark.thorough
 def test_gear_and_bristles_give_the_motion_of_another_integrator():
     def gear(t, s):
         x, v, xm, vm = s
@@ -257,6 +258,7 @@ def friction_reference(level, break_away):
     return expected
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("excess", "speed"), [(0.0, 1.0), (1.0, 0.05)], ids=["coulomb", "stribeck"]
 )

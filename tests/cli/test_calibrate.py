@@ -29,6 +29,7 @@ def test_an_unchanged_calibration_is_not_repeated(after_run, hwid, out):
     assert figure.stat().st_mtime_ns == before
 
 
+@pytest.mark.thorough
 def test_a_missing_figure_is_drawn_again(after_run, hwid, out):
     figure = out / "figures" / "calibrate" / "step_02.png"
     figure.unlink()
@@ -37,6 +38,7 @@ def test_a_missing_figure_is_drawn_again(after_run, hwid, out):
     assert figure.is_file()
 
 
+@pytest.mark.thorough
 def test_another_recipe_calibrates_again(after_run, hwid, edit, out):
     edit("samples: 400\norders", "samples: 300\norders")
     result = hwid("calibrate")

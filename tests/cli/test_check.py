@@ -40,6 +40,7 @@ def test_a_finished_experiment_is_all_in_the_cache(simulated):
     assert re.search(r"sine_12 +sine +\d+/\d+ +400 ", text)
 
 
+@pytest.mark.thorough
 def test_nothing_is_written(simulated, tmp_path):
     config, out = simulated
     before = snapshot(tmp_path)

@@ -53,6 +53,7 @@ def test_the_bands_of_the_widest_models_are_a_table(after_run, out):
     assert [f"{one.width!r}" for one in stored] == [row["width"] for row in rows]
 
 
+@pytest.mark.thorough
 def test_what_the_thesis_calls_things_is_shown_on_request(after_run, hwid, config):
     plain = hwid("crossval").stdout
     config.write_text(config.read_text() + "thesis_names: true\n")
@@ -96,6 +97,7 @@ def test_two_jobs_give_the_numbers_of_one(after_run, hwid, out, tmp_path):
     assert one == two
 
 
+@pytest.mark.thorough
 def test_another_threshold_counts_anew_without_simulating(after_run, hwid, edit, out):
     edit("threshold: 0.01", "threshold: 1000.0")
     result = hwid("crossval")
@@ -104,6 +106,7 @@ def test_another_threshold_counts_anew_without_simulating(after_run, hwid, edit,
     assert {row["coverage"] for row in rows_of(out / "coverage.csv")} == {"3"}
 
 
+@pytest.mark.thorough
 def test_chosen_recordings_judge(after_run, hwid, edit, out):
     edit("{threshold: 0.01}", "{threshold: 0.01, recordings: [step_12]}")
     hwid("crossval")

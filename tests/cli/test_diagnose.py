@@ -241,6 +241,7 @@ def test_holding_everything_out_is_one_line(again, edit, config):
     )
 
 
+@pytest.mark.thorough
 def test_run_diagnoses_where_the_section_is_given_and_the_report_shows_it(
     config, hwid, out
 ):
@@ -253,6 +254,7 @@ def test_run_diagnoses_where_the_section_is_given_and_the_report_shows_it(
     assert found_in(out)["summary"] in html
 
 
+@pytest.mark.thorough
 def test_a_diagnosis_of_an_older_configuration_is_called_so(config, hwid, edit, out):
     edit("stiffness_N_per_m: 1150.0", "stiffness_N_per_m: 1160.0")
     hwid("report")

@@ -39,6 +39,7 @@ def test_the_model_is_that_of_the_results(after_run, hwid, out):
     assert content["columns"]["input"] == "current_A"
 
 
+@pytest.mark.thorough
 def test_stages_before_run(hwid, out):
     result = hwid("export", "--model", "step_02/1/1")
 

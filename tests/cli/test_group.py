@@ -54,6 +54,7 @@ def test_the_search_is_written_and_shown(grouped, out):
     assert "group level 1: 6 fits from the cache, 0 computed" in grouped
 
 
+@pytest.mark.thorough
 def test_a_second_run_answers_from_the_cache_with_the_same_table(grouped, hwid, out):
     before = (out / "groups.csv").read_bytes()
     result = hwid("group")

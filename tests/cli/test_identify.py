@@ -56,6 +56,7 @@ def test_an_unknown_recording_is_refused(after_run, hwid, edit):
     assert "identify.recordings: no recording 'step_2'; did you mean" in result.stderr
 
 
+@pytest.mark.thorough
 def test_recordings_of_the_final_test_are_left_out(after_run, hwid, edit, out):
     edit("identify: {}", "test: {recordings: [step_12]}")
     hwid("identify")

@@ -90,6 +90,7 @@ def test_recordings_in_which_a_signal_stands_still_are_named_and_left_out(
     assert "# skipped:" in (tmp_path / "mine.yaml").read_text()
 
 
+@pytest.mark.thorough
 def test_the_configuration_is_sound_and_says_why(folder, tmp_path):
     write_german_csv(folder)
     out = tmp_path / "mine.yaml"

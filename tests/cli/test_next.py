@@ -76,6 +76,7 @@ def test_proposed_inputs_are_ready_to_play_and_say_why(bench):
     assert not content["is_enough"]
 
 
+@pytest.mark.thorough
 def test_the_loop_takes_up_what_was_recorded_and_ends(bench):
     said = run(bench, LIMITS.replace("next: {", "next: {enough: 0.1, "))
     known = [json.loads((bench / "out" / "next.json").read_text())["known"]]
@@ -266,6 +267,7 @@ def answered(name, current, effects=None):
     )
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("effects", "said"),
     [
@@ -273,7 +275,6 @@ def answered(name, current, effects=None):
         pytest.param(
             {"one_sided_stop": {"position_m": -0.008, "stiffness_N_per_m": 5000.0}},
             "nough is known: the diagnosis says 'named', and no input on offer would",
-            marks=pytest.mark.thorough,
         ),
     ],
 )  # fmt: skip

@@ -24,6 +24,7 @@ def config(tmp_path):
     return tmp_path / "mine.yaml"
 
 
+@pytest.mark.thorough
 def test_it_is_named_by_every_command_that_looks_at_the_files(config):
     out = config.parent / "results"
     said = "run_2: for its input the output is"

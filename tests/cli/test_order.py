@@ -9,6 +9,7 @@ def rows_of(path):
         return list(csv.DictReader(file))
 
 
+@pytest.mark.thorough
 def test_stages_before_run_and_orders_are_recommended(hwid, out):
     result = hwid("order", "-v")
 
@@ -25,6 +26,7 @@ def test_stages_before_run_and_orders_are_recommended(hwid, out):
     assert (rows[0]["judges"], rows[0]["beyond"]) == ("3", "0")
 
 
+@pytest.mark.thorough
 def test_a_second_run_says_the_same(after_run, hwid, out):
     hwid("order", "-v")
     first = (out / "order.csv").read_bytes()
@@ -112,6 +114,7 @@ def test_maps_are_recommended_and_come_from_the_cache_the_second_time(
     assert (out / "maps.csv").read_bytes() == first
 
 
+@pytest.mark.thorough
 def test_check_counts_the_fits_of_maps(after_run, hwid, edit):
     edit("identify: {}", MAPS)
     result = hwid("check")

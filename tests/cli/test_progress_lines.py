@@ -49,6 +49,7 @@ def test_quiet_and_a_terminal_with_its_bar_have_none(monkeypatch, is_quiet):
     assert told.lines == []
 
 
+@pytest.mark.thorough
 def test_a_stage_that_takes_long_says_so_in_its_log(hwid, monkeypatch):
     # A moment is long here, and nothing is held back.
     monkeypatch.setattr(ProgressLines.__init__, "__kwdefaults__", {"every_s": 0.02})

@@ -48,7 +48,11 @@ def test_the_better_model_is_exported_next(after_run, hwid, monkeypatch):
     ("section", "maps"),
     [
         ("order: {tolerance: 1000.0}", ""),
-        ("order: {tolerance: 1000.0, maps: [none]}", ", no maps"),
+        pytest.param(
+            "order: {tolerance: 1000.0, maps: [none]}",
+            ", no maps",
+            marks=pytest.mark.thorough,
+        ),
     ],
 )
 def test_recommended_orders_stand_in_the_last_block(

@@ -133,6 +133,7 @@ def test_every_table_says_how_its_models_start(first_run):
         assert note in block.splitlines()
 
 
+@pytest.mark.thorough
 def test_without_groups_the_single_models_are_judged(again, edit, out):
     edit(GROUP, "")
     result = again()
@@ -194,6 +195,7 @@ def test_a_lost_results_file_is_made_from_the_cache(again, out, first_run):
     assert tables_of(out) == tables_of(first_run[0])
 
 
+@pytest.mark.thorough
 def test_force_judges_again(again):
     said = again("--force").stderr
 
@@ -201,6 +203,7 @@ def test_force_judges_again(again):
     assert "crossval: 9 pairs from the cache, 0 computed" in said
 
 
+@pytest.mark.thorough
 def test_another_threshold_is_another_result(again, edit, out):
     edit("threshold: 0.01", "threshold: 1000.0")
     again()

@@ -207,6 +207,7 @@ def test_what_nobody_says_is_said_to_be_assumed(tmp_path, section):
     )
 
 
+@pytest.mark.thorough
 def test_an_unknown_unit_that_the_sizes_contradict_is_refused_in_one_line(tmp_path):
     path = write_experiment(tmp_path, "time_s,current_A,y", (1.0, 1.0, 1e3))
     said = set()
@@ -230,6 +231,7 @@ def test_an_unknown_unit_that_the_sizes_contradict_is_refused_in_one_line(tmp_pa
     assert "is the output in mm, not m?" in result.stderr
 
 
+@pytest.mark.thorough
 def test_init_writes_the_units_that_it_reads(tmp_path):
     write_experiment(tmp_path, "t,i,y\nms,mA,mm", MILLI)
     out = tmp_path / "mine.yaml"
@@ -242,6 +244,7 @@ def test_init_writes_the_units_that_it_reads(tmp_path):
     assert run("check", out).exit_code == 0
 
 
+@pytest.mark.thorough
 def test_a_prediction_takes_any_unit_that_goes_into_the_models(tmp_path):
     small = (("diagnose: {", "identify: {recordings: [step_04]}\ndiagnose: {"),)
     fit = (("orders: {nb: 1, nk: 1}", "orders: {nb: 1, nk: 1}\nfit: {units: 3, starts: 1, max_iterations: 3}"),)  # fmt: skip

@@ -253,6 +253,7 @@ def test_the_form_of_a_long_file_is_told_from_few_rows(tmp_path, monkeypatch):
     assert found["input"].unit == "mA"
 
 
+@pytest.mark.thorough
 @given(
     st.lists(
         st.tuples(

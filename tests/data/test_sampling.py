@@ -177,6 +177,7 @@ def test_resampling_over_missing_samples_and_jitter_keeps_the_step_of_the_clock(
     assert step == pytest.approx(1e-3, rel=2e-4)
 
 
+@pytest.mark.thorough
 @given(st.integers(0, 2**32 - 1))
 def test_resampling_keeps_the_integral_of_the_input(seed):
     rng = np.random.default_rng(seed)

@@ -20,6 +20,7 @@ def test_any_runner_gives_what_the_stage_gives():
     assert_same(found, diagnosed(given))
 
 
+@pytest.mark.thorough
 def test_fits_are_to_be_kept_and_forecasts_are_not():
     seen = []
 

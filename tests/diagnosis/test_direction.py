@@ -35,6 +35,7 @@ def test_the_scale_of_the_input_keeps_its_size():
         assert f"write input_scale: {other}, or" in text
 
 
+@pytest.mark.thorough
 def test_a_force_constant_of_the_other_sign_mends_it():
     turned = [replace(one, output=-one.output) for one in recordings(FRICTION)]
     negative = -simulation().force_constant_N_per_A

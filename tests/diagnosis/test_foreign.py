@@ -408,6 +408,7 @@ def test_the_simulation_decides_between_an_effect_and_what_makes_up_for_it(
     assert runs_of(tmp_path) <= 800
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("confirmed", "searched", "told"),
     [
@@ -457,6 +458,7 @@ def test_the_given_parameters_come_last_where_nothing_was_confirmed(
     assert seen.confirmed == ("simulation" if is_confirmed else "surrogate")
 
 
+@pytest.mark.thorough
 def test_a_trial_without_an_answer_ends_no_search_for_the_parameters():
     refused = []
 

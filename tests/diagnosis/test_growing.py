@@ -24,6 +24,8 @@ from tests.diagnosis.small_drive import (
     white,
 )
 
+pytestmark = pytest.mark.thorough
+
 PLAY = {
     "half_gap_m": 3e-4,
     "stiffness_N_per_m": 2e5,

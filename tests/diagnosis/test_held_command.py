@@ -92,6 +92,7 @@ def test_a_lag_beside_a_held_command_is_the_lag(hold):
     assert found.hold == hold
 
 
+@pytest.mark.thorough
 def test_beside_a_long_delay_the_line_stays_and_the_interval_holds_both():
     found = found_in(measured("linear", delay=3))
     assert [one.id for one in found.effects] == ["input_delay"]
@@ -102,6 +103,7 @@ def test_beside_a_long_delay_the_line_stays_and_the_interval_holds_both():
     assert 3e-3 < delay.high < 3.05e-3
 
 
+@pytest.mark.thorough
 def test_where_both_commands_do_as_well_the_truth_is_in_the_interval():
     found = found_in(measured("zero", delay=3))
     (delay,) = found.effects[0].parameters
@@ -111,6 +113,7 @@ def test_where_both_commands_do_as_well_the_truth_is_in_the_interval():
     assert any("that it is held does as well" in one for one in found.warnings)
 
 
+@pytest.mark.thorough
 def test_a_command_that_is_said_leaves_narrow_intervals():
     found = found_in(measured("zero", delay=3), hold="zero")
     (delay,) = found.effects[0].parameters
@@ -118,6 +121,7 @@ def test_a_command_that_is_said_leaves_narrow_intervals():
     assert found.warnings == ()
 
 
+@pytest.mark.thorough
 def test_what_is_said_is_not_tried():
     found = found_in(measured("zero"), hold="linear")
     assert [one.id for one in found.effects] == ["input_delay"]
@@ -125,6 +129,7 @@ def test_what_is_said_is_not_tried():
     assert "set simulation.hold: zero" in found.summary
 
 
+@pytest.mark.thorough
 def test_what_the_noise_hides_is_not_tried(monkeypatch):
     def refuse(*_):
         raise AssertionError("tried a held command")

@@ -107,6 +107,7 @@ def test_what_a_sensor_adds_is_found_without_going_through_the_drive():
     )
 
 
+@pytest.mark.thorough
 def test_inclusion_is_sure_of_what_is_there_and_not_of_noise():
     rng = np.random.default_rng(3)
     strong = motions(lambda x, v, u, t: -900 * x * v, noise=1e-6)
@@ -143,6 +144,7 @@ def test_a_term_has_the_values_of_its_formula():
     assert term.variables == {"x", "v"}
 
 
+@pytest.mark.thorough
 def test_a_law_is_found_in_the_speed_of_a_free_axis():
     # Where it started does not show in its speed.
     free = replace(DRIVE, stiffness_N_per_m=0.0, output="velocity")

@@ -81,6 +81,7 @@ def test_a_model_stays_stable_within_its_limits():
             assert np.max(np.abs(found)) < 20 * np.max(np.abs(stage(COMMAND)))
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "name",
     ["nothing", "gain, no map", "gain", "amplifier's gain", "spring and damper"],
@@ -91,6 +92,7 @@ def test_what_has_only_changed_its_size_is_a_parameter(name):
     assert found.after.ratio_to_noise < 1.1
 
 
+@pytest.mark.thorough
 def test_the_gain_that_has_changed_is_told():
     found = diagnosed(CASES["gain"])
     after = {one.name: one.after for one in found.base}

@@ -92,6 +92,7 @@ def test_constant_recordings_have_no_noise():
     assert noise.sentence.startswith("no noise")
 
 
+@pytest.mark.thorough
 def test_slow_noise_is_read_from_the_rest(motions, driven_by):
     found = []
     for seed in range(5):
@@ -279,6 +280,7 @@ def test_a_swing_while_the_input_stands_is_no_noise(motions, driven_by):
     assert noise_floor(given).rms > 1e-4
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "count", [100, pytest.param(300, marks=pytest.mark.slow)], ids=["few", "many"]
 )
@@ -294,6 +296,7 @@ def test_white_residuals_raise_a_false_alarm_in_less_than_one_percent(driven_by,
     assert np.median(found) == pytest.approx(0.491, abs=0.03)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("seeds", "most"),
     # Over 120 seeds 0 and 1 were above 1; two of 60 are more than chance at 1 %.

@@ -37,6 +37,7 @@ def absorbed(of, found):
     return absorbed_effects(of, found, sizes(of), NOISE)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("hides", ["friction", "asymmetry"])
 def test_free_zeros_hide_whether_friction_has_one_size(hides):
     of, found = fitted(hides, 0.4, "held", COULOMB)
@@ -57,6 +58,7 @@ def test_one_known_zero_shows_it():
     assert one_size.whiteness > 10.0
 
 
+@pytest.mark.thorough
 def test_without_friction_only_a_load_hides():
     assert absorbed(*fitted("", 0.0, "held")) == ("constant_load",)
     assert absorbed(*fitted("", 0.0, "estimated")) == ()

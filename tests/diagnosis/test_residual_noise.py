@@ -26,7 +26,10 @@ def rms(compared):
 
 
 @pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.thorough)])
-@pytest.mark.parametrize("coefficient", [0.3, 0.5, 0.7, 0.9])
+@pytest.mark.parametrize(
+    "coefficient",
+    [0.3, 0.9, *(pytest.param(one, marks=pytest.mark.thorough) for one in (0.5, 0.7))],
+)
 @pytest.mark.parametrize(("spring", "loop"), LOOPS)
 def test_coloured_noise_under_a_controller_is_told(spring, loop, coefficient, seed):
     found = recordings(spring=spring, loop=loop, coefficient=coefficient, seed=seed)
@@ -131,7 +134,7 @@ def test_white_noise_that_grows_after_the_rest_is_told(seed):
     assert f"shows {before.rms:.2g} m" in noise.sentence
 
 
-@pytest.mark.parametrize("times", [1.0, 3.0])
+@pytest.mark.parametrize("times", [1.0, pytest.param(3.0, marks=pytest.mark.thorough)])
 @pytest.mark.parametrize("hides", SIZES[True, False])
 def test_what_a_hidden_effect_leaves_beside_growing_noise_is_no_noise(hides, times):
     found = recordings(hides, times * SIZES[True, False][hides], grows=4.0)

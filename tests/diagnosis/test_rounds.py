@@ -224,6 +224,7 @@ def test_nested_effects_are_never_put_together(pair):
         assert len(nested & set(ids)) <= 1
 
 
+@pytest.mark.thorough
 def test_a_second_effect_that_adds_nothing_is_not_taken():
     # Something remains, and drag looks like friction, but does not explain most of it.
     watched = Watched(

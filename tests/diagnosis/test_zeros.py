@@ -52,6 +52,7 @@ def test_one_zero_of_all_recordings_is_a_constant_load():
     assert [one.id for one in diagnosis.effects] == ["constant_load"]
 
 
+@pytest.mark.thorough
 def test_zeros_hide_no_friction():
     diagnosis = found(recordings(FRICTION))
 

@@ -58,6 +58,7 @@ def test_bristles_move_as_their_equations_say(changed):
     assert rms(found.position - expected) < share * rms(plain - expected)
 
 
+@pytest.mark.thorough
 def test_slow_motion_sticks_and_slips_on_bristles():
     values = BRISTLES | {
         "damping_N_s_per_m": 10.0, "velocity_m_per_s": 2e-3, "yield_m": 1e-5,

@@ -126,7 +126,7 @@ def test_effects_of_many_events_together_follow_the_oracle(effects):
     [
         pytest.param(0.02, {}, marks=pytest.mark.slow),
         pytest.param(0.3, {}, marks=pytest.mark.slow),
-        (0.02, COULOMB),
+        pytest.param(0.02, COULOMB, marks=pytest.mark.thorough),
     ],
 )
 def test_teeth_that_are_damped_push_and_never_pull(ratio, other):
@@ -152,7 +152,11 @@ def test_limits_and_losses_act_on_the_current_of_the_circuit(effects):
     assert difference(effects, **circuit) < 1e-9
 
 
-@pytest.mark.parametrize("effects", [{}, COULOMB, GEAR], ids="+".join)
+@pytest.mark.parametrize(
+    "effects",
+    [{}, COULOMB, pytest.param(GEAR, marks=pytest.mark.thorough)],
+    ids="+".join,
+)
 def test_a_free_axis_follows_the_oracle(effects):
     assert difference(effects, stiffness=0.0) < RATTLING_M
 

@@ -26,6 +26,7 @@ def simulated(drag, stiffness, current=CURRENT):
     return simulate_drive(current, drive, sample_time_s=STEP_S).position
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("stiffness", [0.0, 1000.0])
 @pytest.mark.parametrize("drag", [1e5, 1e6])
 def test_motion_in_heavy_drag_is_that_of_an_implicit_solver(drag, stiffness):

@@ -115,6 +115,7 @@ FRICTIONS = {
 }
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", FRICTIONS)
 def test_friction_of_a_formula_sticks_and_breaks_away_as_in_another_integration(name):
     formula, values, force = FRICTIONS[name]

@@ -172,6 +172,7 @@ def test_an_fmu_of_fmi_3_is_refused_with_the_other_way(tmp_path):
         )
 
 
+@pytest.mark.thorough
 def test_the_effect_alone_compiles_without_a_warning(plant, tmp_path):
     text = effect_source(extended_of(plant, EFFECTS["both"]), CARD, 1e-4)
     (tmp_path / "effect.c").write_text(text)

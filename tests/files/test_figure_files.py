@@ -31,6 +31,7 @@ def test_figure_of_something_else_is_not_taken(tmp_path, png, about):
     assert read_figure(tmp_path / "a.png", about) is None
 
 
+@pytest.mark.thorough
 def test_any_byte_that_changed_or_is_missing_is_noticed(tmp_path, png):
     path = tmp_path / "a.png"
     write_figure(path, png, "key a")

@@ -87,6 +87,7 @@ def test_a_machine_without_effects_moves_as_the_matrix_exponential_says():
     )
 
 
+@pytest.mark.thorough
 def test_two_masses_swing_with_their_frequency():
     base = Base(3.0, 0.0, 0.0, 1.0)
     shaft = h.shaft(base, 900.0, 1.0 / 3.0, 0.0, "motor")

@@ -61,6 +61,7 @@ def test_one_delay_is_that_delay():
     assert listed.rmsd == plain.rmsd
 
 
+@pytest.mark.thorough
 def test_more_parameters_never_fit_worse_whatever_delays_are_found():
     recording = measured(delayed(3), noise=0.01)
     small = fit([recording], Orders(1, 2, 1), ANY)
@@ -90,6 +91,7 @@ def test_a_start_of_a_delay_that_is_not_tried_is_refused():
         fit([recording], Orders(2, 2, 1), replace(ANY, delays=(1, 2)), starts=[model])
 
 
+@pytest.mark.thorough
 def test_a_given_block_starts_with_every_delay_that_contains_it():
     true = delayed(2)
     recording = measured(true, noise=0.01)

@@ -122,6 +122,7 @@ def test_standard_errors_around_a_frozen_block_are_those_of_the_estimates():
     assert 0.5 < np.sqrt(np.mean(np.square(deviations))) < 1.6
 
 
+@pytest.mark.thorough
 def test_a_given_block_is_one_more_start():
     true = plant("dead_zone", "polynomial")
     recording = measured(true, noise=0.01)
@@ -155,6 +156,7 @@ def test_the_start_of_a_given_block_has_the_gain_and_offset_of_the_data(frozen):
         np.testing.assert_array_equal(start.denominator, np.r_[true.denominator, 0])
 
 
+@pytest.mark.thorough
 def test_member_models_of_a_group_take_over_the_frozen_block():
     true = plant("dead_zone", "polynomial")
     pair = [measured(true, seed=seed, noise=0.01) for seed in (1, 2)]

@@ -12,6 +12,7 @@ from tests.benchmarks.bench_first_outliers import LINEAR, damaged, deviations
 from tests.model.plants import level_input, plant
 
 
+@pytest.mark.thorough
 def test_early_outliers_do_not_hide_in_the_initial_state():
     # With all these the first samples were off by 3 to 16 times the noise.
     for seed in (6, 7, 9, 18, 23, 28, 32, 39):

@@ -26,6 +26,7 @@ def two_recordings_that_start_in_motion():
     ]
 
 
+@pytest.mark.thorough
 def test_experiments_have_initial_states_of_their_own():
     parts = two_recordings_that_start_in_motion()
     separate = fit(
@@ -41,6 +42,7 @@ def test_experiments_have_initial_states_of_their_own():
     assert separate.name == "a+b"
 
 
+@pytest.mark.thorough
 def test_order_of_experiments_does_not_matter():
     parts = two_recordings_that_start_in_motion()
     kind = options("saturation", "none", "estimated", join="experiments")
@@ -50,6 +52,7 @@ def test_order_of_experiments_does_not_matter():
     )
 
 
+@pytest.mark.thorough
 def test_concatenation_is_the_fit_of_the_joined_record():
     parts = two_recordings_that_start_in_motion()
     joined = Recording(

@@ -57,6 +57,7 @@ def test_a_linear_fit_is_never_worse_than_the_models_it_contains():
     assert large.rmsd <= alone.rmsd * (1.0 + 1e-9)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("starts", ["none", "members"])
 def test_a_fit_that_only_goes_on_keeps_the_best_of_the_models_it_contains(starts):
     recording = measured(plant("piecewise_linear", "saturation"), noise=0.02)

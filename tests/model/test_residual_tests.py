@@ -133,6 +133,7 @@ def test_the_pull_begins_with_the_number_of_parameters():
     assert pulled[0] == pytest.approx(result.information.n_parameters, abs=1.001)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("seeds", "most_off"),
     # Three standard deviations of a share of 5 %, and what chi2 as a limit is off.

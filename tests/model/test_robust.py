@@ -91,6 +91,7 @@ def test_outliers_spoil_a_squared_fit_and_leave_a_huber_fit_alone():
     assert errors["squared"] > 0.05
 
 
+@pytest.mark.thorough
 def test_a_nonlinear_plant_is_found_behind_outliers():
     true = plant("dead_zone", "polynomial")
     clean, other = measured(true, noise=0.01), measured(true, seed=2)
@@ -126,6 +127,7 @@ def test_rmsd_and_fit_percent_stay_plain():
     assert result.linear_rmsd == pytest.approx(result.rmsd, rel=1e-2)
 
 
+@pytest.mark.thorough
 def test_standard_errors_with_outliers_are_those_of_the_estimates():
     deviations = []
     for seed in range(12):

@@ -24,6 +24,7 @@ def stairs(u):
     return np.round(2.0 * u) / 2.0
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("output_map", ["none", "piecewise_linear", "saturation"])
 def test_a_linear_plant_has_straight_maps_whatever_is_asked(output_map):
     one = recording(lambda u: u)
@@ -53,6 +54,7 @@ def test_levels_of_the_output_are_straight_too():
     )
 
 
+@pytest.mark.thorough
 def test_parameters_that_say_nothing_have_no_standard_errors():
     one = recording(lambda u: u)
     options = FitOptions(input_map="piecewise_constant", output_map="none", units=4)
@@ -65,6 +67,7 @@ def test_parameters_that_say_nothing_have_no_standard_errors():
         parameter_covariance(found, [one])
 
 
+@pytest.mark.thorough
 def test_levels_that_the_plant_has_stay():
     one = recording(stairs, samples=3000)
     options = FitOptions(input_map="piecewise_constant", output_map="none", units=6)
@@ -74,6 +77,7 @@ def test_levels_that_the_plant_has_stay():
     assert np.unique(evaluate(found.model.input_map, one.input)).size <= 6
 
 
+@pytest.mark.thorough
 def test_larger_orders_stay_as_good_where_the_smaller_ones_became_linear():
     one = recording(lambda u: u)
     options = FitOptions(input_map="piecewise_constant", output_map="none", units=4)

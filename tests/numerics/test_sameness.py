@@ -70,6 +70,7 @@ def test_two_workers_give_the_same_bits(experiment):
     assert run(experiment, "two", "--jobs", "2") == first
 
 
+@pytest.mark.thorough
 def test_the_memory_and_the_disk_as_cache_give_the_same_bits(tmp_path):
     data = [measured("a", 1), measured("b", 2)]
     in_memory = validated(identified(data), data)

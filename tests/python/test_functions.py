@@ -83,6 +83,7 @@ def test_a_cross_validation_is_a_simulation_of_every_model(grid):
     assert found.rmsd[1, 0, 1, 2] == pytest.approx(np.sqrt(np.mean(left**2)))
 
 
+@pytest.mark.thorough
 def test_groups_are_searched_over_the_recordings_asked_for(grid):
     options = GroupOptions(candidates=("a", "b"), max_level=2, keep={"best": True})
     told = []

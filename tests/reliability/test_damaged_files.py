@@ -10,6 +10,8 @@ import pytest
 
 from tests.reliability import harness
 
+pytestmark = pytest.mark.thorough
+
 
 def cut_off(content):
     return content[: len(content) // 2]

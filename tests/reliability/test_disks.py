@@ -90,6 +90,7 @@ def test_a_quota_for_each_file_is_one_line(config, out, undisturbed, most_bytes)
     assert harness.results(out) == harness.results(undisturbed)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", ["--out", "--cache"])
 def test_a_file_in_the_place_of_a_folder_is_one_line(config, out, tmp_path, name):
     (tmp_path / "file").write_text("")

@@ -45,6 +45,7 @@ def test_the_second_order_is_called_what_it_counts():
     assert explanation(Table("", numbers("RMSD"), ()), "poles") == ""
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("role", "said"), [("poles", "poles"), ("delay", "samples of delay")]
 )

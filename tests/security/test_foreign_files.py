@@ -88,6 +88,7 @@ RAN = (
 )
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("version", ["4.10", "3.30"])
 @pytest.mark.parametrize("text", RAN)
 def test_a_conversion_of_an_mdf_file_does_not_run(folder, canary, version, text):
@@ -170,6 +171,7 @@ def changed_xlsx(path, members):
     path.write_bytes(made.getvalue())
 
 
+@pytest.mark.thorough
 def test_formulas_of_a_spreadsheet_are_no_numbers_and_do_not_run(folder, canary):
     book = openpyxl.Workbook()
     book.active.append(["t", "u", "y"])
@@ -199,6 +201,7 @@ def test_bombs_beside_the_sheet_of_a_spreadsheet_are_refused(folder):
         config(folder, "run.xlsx", "run.csv")
 
 
+@pytest.mark.thorough
 def test_members_with_paths_are_not_unpacked(folder, tmp_path):
     names = ("../../escaped", "/tmp/../escaped", "xl/worksheets/../../../escaped")
     changed_xlsx(folder / "run.xlsx", dict.fromkeys(names, b"x"))

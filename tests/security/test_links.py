@@ -76,6 +76,7 @@ def test_result_that_is_no_plain_file_is_refused(out, victim, name, kind):
     assert place.is_symlink() or place.is_fifo()
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("is_readable", [True, False])
 def test_results_of_a_stage_that_are_a_link_stay_a_link(out, victim, is_readable):
     place = out / "results.h5"

@@ -114,6 +114,7 @@ def test_function_of_another_text_does_not_run(after_own):
     assert "with another text" in done.stderr
 
 
+@pytest.mark.thorough
 def test_planted_results_with_the_right_key_are_computed_again(folder):
     own = hwid(folder, "crossval", folder / "own.yaml", out="own")
     plain = hwid(folder, "crossval", folder / "plain.yaml", out="plain")

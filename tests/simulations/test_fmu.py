@@ -81,6 +81,7 @@ def moved(force, times=TIMES, *, damping=15.0, start=(0.0, 0.0), is_line=True):
     return lsim(system, force, times, X0=start, interp=is_line)[1].T
 
 
+@pytest.mark.thorough
 def test_inputs_are_straight_lines_between_samples(plant):
     found = run(replace(plant, step_s=5e-5), FORCE)
 
@@ -89,6 +90,7 @@ def test_inputs_are_straight_lines_between_samples(plant):
     assert found.velocity == pytest.approx(velocity, abs=1e-6 * np.ptp(velocity))
 
 
+@pytest.mark.thorough
 def test_a_step_of_the_sample_time_holds_the_mean(plant):
     found = run(plant, FORCE)
 
@@ -101,6 +103,7 @@ def test_a_step_of_the_sample_time_holds_the_mean(plant):
     assert found.output == pytest.approx(exact, abs=1e-3 * np.ptp(exact))
 
 
+@pytest.mark.thorough
 def test_a_unit_of_fixed_step_samples_its_inputs(tmp_path):
     path = make_fmu(
         tmp_path,
@@ -210,6 +213,7 @@ def test_what_it_can_do(free, force):
     assert (found.parameters, found.force) == (free, force)
 
 
+@pytest.mark.thorough
 def test_content_follows_the_file(tmp_path, plant_2):
     first = fmu.KIND.content(plant_2)
     other = make_fmu(tmp_path, internal_step_s=2e-4)
@@ -293,6 +297,7 @@ def test_a_name_that_does_not_fit(plant, changes, expected, call):
     assert re.search(expected, told(replace(plant, **changes), call))
 
 
+@pytest.mark.thorough
 def test_an_array(tmp_path):
     path = make_fmu(tmp_path, 3)
 
@@ -326,6 +331,7 @@ def test_no_description(tmp_path):
     assert "it holds no modelDescription.xml" in told(section(tmp_path / "a.fmu"))
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("old", "new", "expected"),
     [
@@ -339,6 +345,7 @@ def test_a_description_of_something_else(tmp_path, old, new, expected):
     assert expected in told(section(path))
 
 
+@pytest.mark.thorough
 def test_the_first_version_of_the_standard(tmp_path):
     text = (
         '<fmiModelDescription fmiVersion="1.0" modelName="a" modelIdentifier="a" '
@@ -350,6 +357,7 @@ def test_the_first_version_of_the_standard(tmp_path):
     assert "is of FMI version 1.0; expected 2.0 or 3.0" in told(section(path))
 
 
+@pytest.mark.thorough
 def test_another_platform(tmp_path):
     other = "win64" if fmpy.platform != "win64" else "linux64"
     path = make_fmu(tmp_path, platform=other)

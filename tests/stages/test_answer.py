@@ -112,6 +112,7 @@ def test_the_advised_orders_are_those_of_the_command(stored):
     assert answer_of(stored).advice == advice.overall
 
 
+@pytest.mark.thorough
 def test_a_level_with_its_noise_is_no_input_beyond_the_fit(stored):
     found = answer_of(stored)
     low, high = found.input_range

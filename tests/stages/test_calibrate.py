@@ -159,6 +159,7 @@ def test_repair_can_be_switched_off():
 
 
 # The whole record is as quiet elsewhere; only within what is kept the lead-in stands out.
+@pytest.mark.thorough
 @example(kind="random", lead_in=20, offsets=(0.0, 0.0), noise=0.0, samples=800, seed=1)
 @settings(max_examples=30, deadline=None)
 @given(
@@ -194,6 +195,7 @@ def test_calibrating_twice_is_calibrating_once(
     np.testing.assert_allclose(twice.output, once.output, rtol=0, atol=1e-11)
 
 
+@pytest.mark.thorough
 @settings(max_examples=30, deadline=None)
 @given(
     kind=st.sampled_from(["step", "sine"]),

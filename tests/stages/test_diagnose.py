@@ -237,6 +237,7 @@ def test_everything_that_matters_is_in_the_key(with_friction):
     assert key() == keys[0]
 
 
+@pytest.mark.thorough
 def test_chosen_recordings_are_held_out(with_friction):
     found = diagnosed(with_friction, hold_out=("step_0", "sine_2"))
     assert found.held_out == ("step_0", "sine_2")
@@ -257,6 +258,7 @@ def test_without_any_effect_allowed_a_gap_is_unknown(with_friction):
     assert diagnosed(with_friction, max_effects=0).verdict == "unknown"
 
 
+@pytest.mark.thorough
 def test_the_stages_are_announced(with_friction):
     seen = []
     few = with_friction[::2]
@@ -332,6 +334,7 @@ def test_a_known_parameter_stays_where_data_would_move_it():
     assert after["stiffness_N_per_m"] > 1184.0 * 1.01
 
 
+@pytest.mark.thorough
 def test_a_parameter_without_tolerance_is_exactly_what_was_given():
     held = dict.fromkeys(("force_constant_N_per_A", "damping_N_s_per_m"), 0.0)
     wrong = simulation(force_constant_N_per_A=5.3, known=held)
@@ -342,6 +345,7 @@ def test_a_parameter_without_tolerance_is_exactly_what_was_given():
     assert after["stiffness_N_per_m"] != 1184.0
 
 
+@pytest.mark.thorough
 def test_all_of_the_base_may_be_known():
     held = dict.fromkeys(BASE_PARAMETERS, 0.0)
     assert diagnosed(recordings(), simulation(known=held)).verdict == "none"
@@ -349,6 +353,7 @@ def test_all_of_the_base_may_be_known():
     assert parameters(found.effects[0])["force_N"] == pytest.approx(0.8, rel=0.01)
 
 
+@pytest.mark.thorough
 def test_under_a_measured_force_the_mass_is_found_and_friction_is_not_scaled():
     """Force constant 5 N/A times the current is the force; the mass is given 17 % low."""
     force = [

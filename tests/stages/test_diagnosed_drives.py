@@ -167,6 +167,7 @@ def closed_loop(effects):
     return found, simulation(stiffness_N_per_m=0.0, controller=controller)
 
 
+@pytest.mark.thorough
 def test_under_a_controller_the_command_tells():
     given, model = closed_loop(FRICTION)
     found = diagnosed(given, model)
@@ -238,6 +239,7 @@ def test_what_the_sensor_does_is_named(hidden, others):
         assert told[name] == pytest.approx(value, rel=0.01)
 
 
+@pytest.mark.thorough
 def test_a_ratio_of_clocks_is_found_to_a_tenth_of_a_thousandth():
     found = diagnosed(
         recordings({"clock_skew": {"ratio": 1.004}}, seed=2), effects=("clock_skew",)

@@ -170,6 +170,7 @@ def blind_cases():
         yield make_case("nuisance", (), 0, plan="short", nuisance=nuisance)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "case",
     [

@@ -170,6 +170,7 @@ def test_single_recordings_are_the_tasks_of_identify():
     assert not [name for name in bench.computed if " on " not in name]
 
 
+@pytest.mark.thorough
 def test_a_search_is_resumed_in_the_middle_of_a_level(search, bench):
     total = len(bench.computed)
     stopped = Bench(stop_after=total - 4)

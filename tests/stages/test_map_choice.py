@@ -87,6 +87,7 @@ def test_too_many_units_for_few_data_are_not():
     assert advice.given.factor > 1.05
 
 
+@pytest.mark.thorough
 def test_a_lone_recording_leaves_the_choice_to_bic():
     options = OrderOptions(maps=("none", "dead_zone"))
     advice = advice_on(recordings(1), options)

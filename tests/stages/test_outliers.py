@@ -95,6 +95,7 @@ def test_an_outlier_among_the_first_samples_does_not_hide_in_the_initial_state()
     assert judging.rmsd == pytest.approx(truth.rmsd, rel=0.02)
 
 
+@pytest.mark.thorough
 def test_maps_are_judged_without_outliers_too():
     chosen = recordings(outliers=N_OUTLIERS, gain=lambda u: u - np.clip(u, -0.1, 0.1))
     options = replace(ROBUST, input_map="piecewise_linear", units=6)

@@ -33,6 +33,7 @@ def alarms(loss):
     return count
 
 
+@pytest.mark.thorough
 def test_outliers_of_a_true_model_are_no_missing_dynamics():
     # Three tests of 5 % each, of which some fail together.
     assert alarms("huber") <= 0.2 * SEEDS

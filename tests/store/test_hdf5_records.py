@@ -38,6 +38,7 @@ def round_trip(record):
         return read_record(file["record"], type(record))
 
 
+@pytest.mark.thorough
 @given(WITH_MORE)
 def test_every_record_comes_back_bit_by_bit(record):
     assert_same(round_trip(record), record)

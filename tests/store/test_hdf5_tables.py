@@ -26,6 +26,7 @@ def in_memory():
     return h5py.File(uuid4().hex, "w", driver="core", backing_store=False)
 
 
+@pytest.mark.thorough
 @given(st.lists(st.none() | EVERYTHING, max_size=5))
 def test_every_list_of_records_comes_back_bit_by_bit(records):
     with in_memory() as file:
@@ -36,6 +37,7 @@ def test_every_list_of_records_comes_back_bit_by_bit(records):
         assert_same(one, other)
 
 
+@pytest.mark.thorough
 @given(st.lists(st.none() | WITH_GAPS, max_size=4))
 def test_every_list_of_records_with_gaps_comes_back_bit_by_bit(records):
     with in_memory() as file:

@@ -105,6 +105,7 @@ def test_a_worker_of_another_version_is_refused():
         cluster.run_chunk("0.0.0", [])
 
 
+@pytest.mark.thorough
 def test_a_scheduler_that_is_not_there_is_named(monkeypatch):
     monkeypatch.setattr(cluster, "CONNECT_TIMEOUT_S", 0.5)
     with pytest.raises(ConfigError, match=r"--scheduler tcp://127\.0\.0\.1:9: "):

@@ -160,6 +160,7 @@ def test_recordings_of_a_joint_fit_judge_in_turn():
     assert model_trust(joint, pair, []).judged_on == ("a", "b")
 
 
+@pytest.mark.thorough
 def test_a_piecewise_constant_output_map_has_no_steps_and_says_why():
     own = recording("own", 13, curve=np.tanh)
     options = FitOptions(input_map="none", output_map="piecewise_constant", units=4)

@@ -82,6 +82,7 @@ def test_own_function_gets_its_parameters_in_the_units_of_the_data():
     assert found.function.unit == pytest.approx(1.0, rel=1e-15)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("kind", UNITS)
 def test_a_fit_can_begin_with_a_model_of_its_kind(kind):
     first, _ = fitted(kind, "input", max_iterations=3)
@@ -101,6 +102,7 @@ def test_maps_have_as_many_units_as_their_sides_ask_for():
     assert model.output_map.parameters.size == 2 * (5 + 2)
 
 
+@pytest.mark.thorough
 def test_no_standard_errors_behind_a_map_without_slope():
     result, _ = fitted("piecewise_constant", "output", max_iterations=2)
     assert result.uncertainty.standard_errors.size == 0

@@ -209,6 +209,7 @@ def test_names_with_dollars_are_no_formulas(contents):
     assert as_png(figure)
 
 
+@pytest.mark.thorough
 def test_figures_do_not_depend_on_the_settings_of_the_user(contents):
     expected = as_png(bode_figure(contents.models[0]))
     with mpl.rc_context({"font.size": 30.0, "axes.grid": False, "savefig.dpi": 20}):
