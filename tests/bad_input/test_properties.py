@@ -180,6 +180,7 @@ ANY = arrays.arrays(
 )
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("ending", [".npz", ".mat"])
 @given(time=ANY | st.just(np.arange(80.0)), current=ANY, output=ANY)
 @hypothesis_settings(max_examples=25)

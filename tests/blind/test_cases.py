@@ -178,6 +178,7 @@ def test_coloured_noise_has_unit_power():
     assert np.std(noise) == pytest.approx(1.0, abs=0.03)
 
 
+@pytest.mark.thorough
 def test_the_files_hold_recordings_and_configuration_but_nothing_of_the_truth(tmp_path):
     case = short_case("input_dead_zone")
     config, truth = write_case(case, tmp_path / "case", tmp_path / "truth" / "a.json")

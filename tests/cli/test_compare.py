@@ -40,6 +40,7 @@ def test_own_models_have_the_numbers_of_the_cross_validation(compare, out):
     assert (out / "figures" / "compare.png").read_bytes()[:4] == b"\x89PNG"
 
 
+@pytest.mark.thorough
 def test_the_end_says_that_an_older_comparison_is_replaced(compare):
     words = "(those of the last comparison are replaced)"
 

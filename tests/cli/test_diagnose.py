@@ -123,6 +123,7 @@ def test_an_unchanged_run_answers_from_the_results_with_the_same_files(
     assert shown == then != ""
 
 
+@pytest.mark.thorough
 def test_a_lost_figure_is_drawn_again(again, out):
     (path, *_) = sorted((out / "figures").glob("diagnosis_*.png"))
     path.unlink()

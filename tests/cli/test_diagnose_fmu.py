@@ -129,6 +129,7 @@ def _check_module(folder, said):
     assert np.std(truth - output) < 2 * NOISE
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("old", "new", "expected"),
     [

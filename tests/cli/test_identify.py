@@ -95,6 +95,7 @@ def test_a_map_of_ones_own_is_fitted_and_kept(own_map, hwid, edit, out):
     assert "0 fits from the cache, 3 computed" in hwid("identify").stderr
 
 
+@pytest.mark.thorough
 def test_a_map_of_ones_own_that_contradicts_itself_is_one_line(own_map, hwid):
     own_map.write_text(OWN_MAP.replace("1.0 - p[0]", "1.0 + p[0]"), encoding="utf-8")
     result = hwid("identify")

@@ -381,6 +381,7 @@ def test_steps_that_keep_their_rest_start_in_equilibrium(folder, tmp_path):
     assert "# diagnose: {max_effects: 2}\n" in out.read_text()
 
 
+@pytest.mark.thorough
 def test_no_name_of_a_file_folder_or_column_begins_a_key(tmp_path):
     """Line ends in names would put keys of their choice into the configuration."""
     evil = "x\nexport: {}\nidentify: {recordings: [evil]}\n# "
@@ -451,6 +452,7 @@ def test_files_in_other_units_are_not_read_in_the_first_ones(folder, tmp_path):
     assert len(load_experiment(out).recordings.files) == 2
 
 
+@pytest.mark.thorough
 def test_a_missing_library_is_one_line_with_the_command(folder, tmp_path, monkeypatch):
     """As in a process without the extra: the module cannot be imported there."""
     hidden = tmp_path / "hidden"

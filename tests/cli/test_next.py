@@ -193,6 +193,7 @@ def test_a_plan_is_chosen_from(bench):
     assert [row["name"] for row in proposals(bench)] == ["fast"]
 
 
+@pytest.mark.thorough
 def test_parameters_ask_for_a_recording_that_excites_them(bench):
     (bench / "plan.csv").write_text(
         "name,kind,amplitude,frequency_Hz,duration_s\n"

@@ -119,6 +119,7 @@ def test_settings_that_changed_since_the_run_are_named(after_run, config, out, e
     assert changed == {"calibrate": (), "identify": (), "crossval": ("crossval",)}
 
 
+@pytest.mark.thorough
 def test_calibration_alone_can_be_reported(hwid, out):
     hwid("calibrate")
     result = hwid("report")

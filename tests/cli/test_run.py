@@ -113,6 +113,7 @@ def test_tables_are_shown_where_more_is_asked_for(after_run, hwid, out):
     assert said.count("Best models of each recording") == 1
 
 
+@pytest.mark.thorough
 def test_progress_is_apart_from_the_results(after_run, hwid):
     done = hwid("run")
 
@@ -136,6 +137,7 @@ def test_a_stage_draws_a_page_anew_that_is_there(after_run, hwid, out, edit):
     assert "0.03" in (out / "report.html").read_text()
 
 
+@pytest.mark.thorough
 def test_a_page_that_cannot_be_drawn_stays_and_fails_nothing(after_run, hwid, out):
     (out / "report.html").write_text("an older page")
     (out / "diagnosis.json").write_text("{")
@@ -165,6 +167,7 @@ def test_a_second_run_computes_nothing_and_force_computes_all(after_run, hwid, e
     assert "0 pairs from the cache, 9 computed" in text
 
 
+@pytest.mark.thorough
 @pytest.mark.usefixtures("blank_figures")
 def test_only_the_stages_that_are_named_run(hwid, edit, out):
     edit("identify: {}\ncrossval: {threshold: 0.01}", "")

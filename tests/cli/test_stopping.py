@@ -3,6 +3,8 @@
 import subprocess
 import sys
 
+import pytest
+
 PROGRAM = """
 import signal, sys, time
 import click
@@ -24,6 +26,7 @@ except Stopped as stopped:
 """
 
 
+@pytest.mark.thorough
 def test_a_signal_while_an_object_is_freed_stops_the_program_without_a_traceback():
     for _ in range(3):
         done = subprocess.run(

@@ -168,6 +168,7 @@ def test_joining_is_proposed_where_no_single_model_is_good_enough(
     assert hwid("test").exit_code == 0
 
 
+@pytest.mark.thorough
 def test_a_second_run_answers_from_the_results_with_the_same_tables(
     again, out, first_run
 ):

@@ -126,6 +126,7 @@ def test_results_say_what_was_converted(tmp_path):
     assert calibrated.recordings[0].input_unit == "A"
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("header", "more", "changed", "said"),
     [

@@ -203,6 +203,7 @@ def test_a_pattern_of_tables_chooses_among_them(folder, tmp_path):
     assert [raw.name for raw in raws] == ["run_a", "run_b"]
 
 
+@pytest.mark.thorough
 def test_a_pattern_without_a_table_is_refused_with_its_columns(folder, tmp_path):
     LAYOUTS["recordings in sheets"](folder)
     read(folder, tmp_path / "mine.yaml")

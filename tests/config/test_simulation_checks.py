@@ -43,6 +43,7 @@ def test_every_effect_is_accepted_with_all_of_its_parameters(load_effect):
         assert found == {identifier: values}
 
 
+@pytest.mark.thorough
 def test_what_an_effect_needs_is_required_and_the_rest_is_not(load_effect):
     for identifier, parameters in EFFECTS.items():
         needed = {one.name: some_value(one) for one in parameters if one.is_needed}

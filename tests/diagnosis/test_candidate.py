@@ -115,6 +115,7 @@ def test_effects_that_the_simulation_has_are_fitted_again():
     assert value(found, "coulomb_friction/force_N") == pytest.approx(0.8, rel=0.01)
 
 
+@pytest.mark.thorough
 def test_the_best_of_several_starts_is_kept():
     given = recordings({"cogging": {"amplitude_N": 0.5, "period_m": 0.005}})
     starts = [

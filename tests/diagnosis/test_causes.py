@@ -239,6 +239,7 @@ def base_of(found):
     }
 
 
+@pytest.mark.thorough
 def test_a_fit_that_knows_of_the_noise_of_the_input_is_the_weighted_one():
     rng = np.random.default_rng(3)
     # It rests under its first sample, which is read without noise.

@@ -149,6 +149,7 @@ def with_interval(of, start=None):
     return found, *intervals(of, found, sizes(of))
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("count", "fewest", "most"),
     # 95 % on average; fewer once in a hundred times even if the four parameters of a

@@ -247,6 +247,7 @@ def test_only_an_interval_on_one_side_of_zero_is_clear_however_large(monkeypatch
     assert laws._unclear_terms(rounds_of, tried) == ["c2", "c3", "c4"]
 
 
+@pytest.mark.thorough
 def test_a_period_in_time_cannot_leave_what_the_recordings_show():
     # Hardly anything swings: the best frequency is any that does not matter.
     of = rounds_of(FRICTION, ())
@@ -316,6 +317,7 @@ def test_a_law_leaves_of_other_recordings_what_it_leaves_of_its_own(
     assert laws._is_as_good_elsewhere(rounds, "law") == agrees
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("is_force", [False, True])
 def test_what_sets_the_scale_stays_where_a_law_begins(is_force):
     """Under a current the mass, and under a force its constant: the mass is found."""

@@ -103,6 +103,7 @@ def test_the_gain_that_has_changed_is_told():
     )
 
 
+@pytest.mark.thorough
 def test_a_gain_is_a_parameter_where_no_linear_drive_is_the_model():
     # Eight samples of delay, which the model knows and the stand-in has as a force only.
     machine = Machine(lambda u: late(u, 8 * STEP_S), gain=1.2)

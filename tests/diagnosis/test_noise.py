@@ -200,6 +200,7 @@ def test_noise_above_the_grid_is_noise(motions, driven_by):
     assert noise.rms == pytest.approx(step * np.sqrt(4 + 1 / 12), rel=0.02)
 
 
+@pytest.mark.thorough
 def test_repeats_that_drift_show_their_noise_alone(motions, driven_by):
     rng = np.random.default_rng(4)
     ramp = np.linspace(-1, 1, motions[0].size)
@@ -232,6 +233,7 @@ def test_repeats_show_slow_noise(motions, driven_by):
     assert noise.rms == pytest.approx(1e-4, rel=0.06)
 
 
+@pytest.mark.thorough
 def test_repeats_that_move_differently_are_no_noise(motions, driven_by):
     rng = np.random.default_rng(6)
     measured, repeated = [], []
@@ -352,6 +354,7 @@ def test_whiteness_of_nothing_is_zero():
     assert whiteness([], white(1.0)) == 0
 
 
+@pytest.mark.thorough
 def test_noise_that_differs_between_recordings_is_white_as_often_as_alike_noise():
     # One recording in eight is thirty times as noisy: pooled by size, its samples alone
     # would speak, and their chance correlations would count eight times too much.

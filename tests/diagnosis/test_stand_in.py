@@ -170,6 +170,7 @@ SWINGS = [
 ]
 
 
+@pytest.mark.thorough
 def test_a_spring_that_would_let_go_beyond_what_was_seen_stays_straight():
     def found(share):
         commands = [share / 2 * one for one in SWINGS]
@@ -187,6 +188,7 @@ def test_a_spring_that_would_let_go_beyond_what_was_seen_stays_straight():
     assert 2.7 / 1.2 < widest < 2.7
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("share", [0.9, 1.2])
 def test_the_error_of_a_stand_in_is_about_what_it_makes_wrong(share):
     # Recordings of a pendulum whose weight is off, by a fit that knows by how much.

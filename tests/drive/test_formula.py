@@ -51,6 +51,7 @@ def test_sympy_arrays_and_loops_agree(given_text, monkeypatch):
     assert compiled_value(node, VALUES, -1.0) == pytest.approx(found, rel=1e-12)
 
 
+@pytest.mark.thorough
 @given(st.recursive(st.sampled_from(["x", "v", "2", "0.5"]), lambda inner: st.one_of(
     st.tuples(inner, st.sampled_from("+-*/"), inner).map(lambda p: f"({p[0]}){p[1]}({p[2]})"),
     inner.map(lambda p: f"-({p})"), inner.map(lambda p: f"abs({p})**2"),

@@ -42,6 +42,7 @@ def test_fmpy_finds_no_fault_and_simulates_the_same(unit, exported):
         assert deviation(simulated(unit, u, STEP, start), expected) <= PROMISED
 
 
+@pytest.mark.thorough
 def test_without_a_delay_the_output_answers_to_the_input_of_its_instant(tmp_path):
     exported = exported_of(example_model(2, nb=2, nf=3, nk=0))
     unit = write_exported(tmp_path, exported, "fmu")[0]
@@ -56,6 +57,7 @@ def test_a_step_of_another_length_is_refused(unit):
         answered(unit, np.ones(3), 0.4 * STEP)
 
 
+@pytest.mark.thorough
 def test_the_sources_are_inside_and_equal_models_give_equal_files(
     unit, exported, tmp_path
 ):
@@ -67,6 +69,7 @@ def test_the_sources_are_inside_and_equal_models_give_equal_files(
     assert unit.read_bytes() == again.read_bytes()
 
 
+@pytest.mark.thorough
 def test_a_name_with_any_characters_gives_a_valid_unit(tmp_path):
     exported = exported_of(example_model(1), name='7b<&"+x/1/2', output_unit="<m>")
     unit = write_exported(tmp_path, exported, "fmu")[0]
@@ -87,6 +90,7 @@ def test_without_a_compiler_there_is_one_line(
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("sign", ["\uffff", "\ufffe", "\U0001f600", "\x0b", "é"])
 def test_a_name_that_xml_has_no_place_for_leaves_a_document(tmp_path, sign):
     exported = exported_of(example_model(5), name=f"a{sign}b/1/2", output_unit=sign)

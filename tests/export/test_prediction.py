@@ -109,6 +109,7 @@ def groups(tmp_path, **values):
     return path
 
 
+@pytest.mark.thorough
 def test_the_only_table_of_a_file_holds_the_input(of_tables, tmp_path):
     _, values = read_input(groups(tmp_path, a=[1.0, 2.0]), of_tables)
     assert np.array_equal(values, [1.0, 2.0])

@@ -95,6 +95,7 @@ def test_a_crash_of_the_reader_is_a_message_and_the_next_file_is_read(good, cras
     assert read_columns(good, COLUMNS).input.values.size == 5
 
 
+@pytest.mark.thorough
 def test_a_process_that_an_earlier_file_has_spoilt_is_replaced(good):
     read_columns(good, COLUMNS)
     os.kill(process_of(formats._ISOLATED), signal.SIGKILL)
@@ -170,6 +171,7 @@ def test_nothing_stays_behind_of_a_reader_that_was_stopped(
     assert list(temporary.iterdir()) == []
 
 
+@pytest.mark.thorough
 def test_files_are_read_where_there_is_no_room_for_temporary_ones(
     good, tmp_path, monkeypatch
 ):

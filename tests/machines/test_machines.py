@@ -109,6 +109,7 @@ def test_a_lag_follows_a_ramp_at_its_time_constant():
     assert np.allclose(lagged, 3.0 * (t - 0.02 * (1.0 - np.exp(-t / 0.02))), atol=1e-12)
 
 
+@pytest.mark.thorough
 def test_arms_and_loads_rest_where_forces_balance():
     base = Base(1.0, 0.5, 10.0, 1.0)
     x = response(bare(base, np.zeros(300), [h.weight(-2.0)]))

@@ -110,6 +110,7 @@ def test_delays_are_sorted_and_counted_once():
     assert FitOptions(delays=(3, 1, 3)).delays == (1, 3)
 
 
+@pytest.mark.thorough
 def test_a_smaller_model_keeps_its_own_delay_where_that_is_needed():
     recording = measured(plant("dead_zone", "polynomial"), noise=0.01)
     options = FitOptions(units=4, delays=(1, 2, 3))

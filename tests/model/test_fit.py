@@ -214,6 +214,7 @@ def test_delays_that_leave_nothing_give_a_failed_fit():
     assert "a delay of 350 samples leaves nothing of a record of 300" in joined.message
 
 
+@pytest.mark.thorough
 def test_fit_of_pure_noise_is_a_value_and_stable():
     rng = np.random.default_rng(0)
     recording = Recording("r", *rng.standard_normal((2, 300)), 1.0)

@@ -73,6 +73,7 @@ def test_maps_around_a_frozen_block_are_found_in_any_units(scale):
     assert np.ptp(values) / (high - low) == pytest.approx(1.0, rel=1e-9)
 
 
+@pytest.mark.thorough
 def test_without_a_gain_in_the_maps_the_given_gain_counts():
     true = plant("saturation", "none")
     recording = measured(true)
@@ -105,6 +106,7 @@ def test_frozen_coefficients_are_no_parameters():
     assert fewer == 3
 
 
+@pytest.mark.thorough
 def test_standard_errors_around_a_frozen_block_are_those_of_the_estimates():
     true = plant("dead_zone", "piecewise_linear")
     given = replace(

@@ -21,6 +21,7 @@ def test_early_outliers_do_not_hide_in_the_initial_state():
         assert later < 0.5, seed
 
 
+@pytest.mark.thorough
 def test_early_outliers_behind_an_input_map_are_found_too():
     for seed in (7, 17, 23):
         assert deviations(seed, bent=True)[0] < 1.0, seed

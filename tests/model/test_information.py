@@ -22,6 +22,7 @@ def test_aic_and_bic_are_those_of_the_gaussian_likelihood_at_its_maximum():
     assert found.aicc - found.aic == pytest.approx(2 * 7 * 8 / (250 - 8), rel=1e-9)
 
 
+@pytest.mark.thorough
 def test_fpe_of_a_linear_regression_is_its_error_on_new_data():
     rng = np.random.default_rng(1)
     regressors = rng.normal(size=(60, 12))

@@ -89,6 +89,7 @@ def test_an_offset_that_no_map_takes_is_said():
     )
 
 
+@pytest.mark.thorough
 def test_a_start_in_equilibrium_far_from_zero_is_no_exception():
     orders, u, y, *_ = random_plant(0, 600)
     far = Recording("r", u + 1e7, y + 1e7, 1.0)

@@ -105,6 +105,7 @@ def test_a_nonlinear_plant_is_found_behind_outliers():
     assert percent["squared"] < 90.0
 
 
+@pytest.mark.thorough
 def test_several_experiments_share_one_threshold():
     true = plant("dead_zone", "none")
     pair = [with_outliers(measured(true, seed=s, noise=0.01), seed=s) for s in (1, 2)]

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from hwid_cli.model import fit as module
 from hwid_cli.model.fit import fit
@@ -10,6 +11,7 @@ from hwid_cli.records.model import FitOptions, Orders
 from hwid_cli.records.recordings import Recording
 
 
+@pytest.mark.thorough
 def test_a_map_that_was_visited_without_end_makes_the_fit_a_failed_one(monkeypatch):
     rng = np.random.default_rng(1)
     u = np.repeat(rng.uniform(-1, 1, 20), 20)

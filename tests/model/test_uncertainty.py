@@ -32,6 +32,7 @@ def test_covariance_of_a_moving_average_is_that_of_least_squares():
     np.testing.assert_allclose(found.matrix, expected, rtol=1e-9)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("join", ["concatenate", "experiments"])
 def test_the_diagonal_holds_the_squares_of_the_standard_errors(join):
     true = plant("dead_zone", "polynomial", "estimated")
@@ -79,6 +80,7 @@ def test_standard_errors_can_be_worked_out_afterwards(join, loss):
         with_standard_errors(bare, pair[:1])
 
 
+@pytest.mark.thorough
 def test_estimates_spread_as_their_covariance_says():
     u = np.random.default_rng(5).standard_normal(300)
     clean = signal.lfilter([0.0, 0.3], [1.0, -0.7], u)

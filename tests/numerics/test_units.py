@@ -60,6 +60,7 @@ def cross_validated(metre):
     return validated(identified(data), data)
 
 
+@pytest.mark.thorough
 def test_cross_validation_is_the_same_in_nanometres():
     first, second = cross_validated(1.0), cross_validated(1e-9)
 
@@ -71,6 +72,7 @@ def test_cross_validation_is_the_same_in_nanometres():
     np.testing.assert_allclose(found[:, :, 1], first.rmsd[:, :, 1], rtol=1e-4)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("metre", [2.0**-30, 2.0**20])
 def test_a_fit_that_begins_with_models_is_the_same_bits_in_every_unit(metre):
     """Of several recordings that begins with their models, as in groups."""
@@ -83,6 +85,7 @@ def test_a_fit_that_begins_with_models_is_the_same_bits_in_every_unit(metre):
     assert joined(metre).rmsd * metre == joined(1.0).rmsd
 
 
+@pytest.mark.thorough
 def test_cross_validation_in_powers_of_two_gives_the_same_bits():
     first, second = cross_validated(1.0), cross_validated(2.0**-30)
 

@@ -55,6 +55,7 @@ def test_a_grid_holds_every_pair_of_every_recording(grid):
     assert grid[0].rmsd == alone.rmsd
 
 
+@pytest.mark.thorough
 def test_identify_is_the_same_and_tells_of_its_progress(grid, capsys):
     told = []
     again = identify(

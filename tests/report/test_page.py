@@ -23,6 +23,7 @@ def keys():
     return keys_of(everything(6, levels=2))
 
 
+@pytest.mark.thorough
 def test_a_change_of_what_draws_gives_each_figure_another_key(keys, monkeypatch):
     monkeypatch.setattr("hwid_cli.report.page.checksum_of_folder", lambda _: "other")
 
@@ -30,11 +31,13 @@ def test_a_change_of_what_draws_gives_each_figure_another_key(keys, monkeypatch)
     assert not set(changed.values()) & set(keys.values())
 
 
+@pytest.mark.thorough
 def test_equal_results_give_each_figure_the_same_key(keys):
     assert keys_of(everything(6, levels=2)) == keys
     assert len(set(keys.values())) == len(keys) > 30
 
 
+@pytest.mark.thorough
 def test_a_diagnosis_leaves_the_figures_of_other_stages(keys):
     stored = everything(6, levels=2)
     other = replace(named(), summary="another one")

@@ -104,6 +104,7 @@ def test_a_conversion_of_an_mdf_file_does_not_run(folder, canary, version, text)
     assert not canary.exists()
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("conversion", "law"),
     [

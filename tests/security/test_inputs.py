@@ -190,6 +190,7 @@ def test_a_manifest_cannot_remove_a_file_elsewhere(tmp_path):
     assert kept.read_text() == "precious"
 
 
+@pytest.mark.thorough
 def test_only_the_function_that_a_configuration_names_runs(tmp_path):
     folder = tmp_path / "tiny"
     trial.make_good(folder)

@@ -30,6 +30,7 @@ def is_allowed(name, part, licence):
     return bool(ALLOWED.search(licence)) and not REFUSED.search(licence)
 
 
+@pytest.mark.thorough
 def test_every_package_has_a_licence_that_is_allowed(licences):
     needed = licences.needed()
     assert {"numpy", "scipy", "numba", "h5py", "click"} <= needed.keys()

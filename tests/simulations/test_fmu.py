@@ -118,6 +118,7 @@ def test_a_unit_of_fixed_step_samples_its_inputs(tmp_path):
     assert found.output == pytest.approx(position, abs=1e-8 * np.ptp(position))
 
 
+@pytest.mark.thorough
 def test_parameters_and_starts_are_set_by_name(plant):
     values = {"damping": FreeParameter(3.0, (1.0, 9.0)), "start_m": 1e-3}
     found = run(replace(plant, parameters=values, step_s=1e-4))
@@ -126,6 +127,7 @@ def test_parameters_and_starts_are_set_by_name(plant):
     assert found.output == pytest.approx(position, abs=1e-5 * np.ptp(position))
 
 
+@pytest.mark.thorough
 def test_a_run_leaves_nothing_for_the_next_one(plant):
     first = run(plant)
     run(plant, FORCE)
@@ -306,6 +308,7 @@ def test_an_array(tmp_path):
     )
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("step_s", [3e-4, 2e-3])
 def test_a_step_that_does_not_divide_the_sample_time(plant_2, step_s):
     said = told(replace(plant_2, step_s=step_s))
@@ -324,6 +327,7 @@ def test_no_archive(tmp_path):
     assert "simulation.file: a.fmu is no FMU" in told(section(tmp_path / "a.fmu"))
 
 
+@pytest.mark.thorough
 def test_no_description(tmp_path):
     with zipfile.ZipFile(tmp_path / "a.fmu", "w") as archive:
         archive.writestr("readme.txt", "")

@@ -53,6 +53,7 @@ def run(options, **values):
     return kind_named(options.kind).run(options, request(options, **values))
 
 
+@pytest.mark.thorough
 def test_a_function_gives_what_the_transfer_function_gives(python):
     found = run(python)
     # Four steps of Runge-Kutta a sample.
@@ -164,6 +165,7 @@ def test_a_program_gives_what_the_function_gives(python, program):
     np.testing.assert_allclose(found.velocity, same.velocity, rtol=1e-12)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("text", "said"),
     [
@@ -222,6 +224,7 @@ def test_a_program_gets_its_parameters_as_json_and_leaves_no_files(program, tmp_
     assert not (tmp_path / (tmp_path / "where").read_text()).exists()
 
 
+@pytest.mark.thorough
 def test_a_fitted_model_gives_what_simulate_gives():
     output = lsim(([9.0], [0.8, 11.0, 2100.0]), INPUT, TIME)[1]
     recording = Recording("r1", INPUT, output, STEP_S)

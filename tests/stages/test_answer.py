@@ -134,6 +134,7 @@ def test_a_level_with_its_noise_is_no_input_beyond_the_fit(stored):
     assert (beyond(high + 0.1 * (high - low)) == 1.0).all()
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(("nb", "is_told"), [(0, True), (1, False)])
 def test_maps_are_told_where_they_belong_to_the_advised_orders(stored, nb, is_told):
     advice = answer_of(stored).advice
@@ -176,6 +177,7 @@ def test_the_recommended_orders_are_judged_where_the_model_is(stored):
     assert named_fits(few)[found.advised_name] is own[0]
 
 
+@pytest.mark.thorough
 def test_the_noise_is_that_of_the_recordings_that_judge(stored):
     found = answer_of(stored)
     rng = np.random.default_rng(3)

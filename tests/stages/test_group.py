@@ -122,6 +122,7 @@ def test_a_group_is_scored_by_simulating_its_best_model(search):
         assert fit.name == group.name
 
 
+@pytest.mark.thorough
 def test_what_no_group_may_hold_is_scored_apart(search):
     validated = replace(plan(), candidates=("a", "b", "c"))
     place = validated.validate.index("d")

@@ -89,6 +89,7 @@ def test_the_number_of_workers_changes_no_number(options):
         np.testing.assert_array_equal(numbers_of(fit), numbers_of(again))
 
 
+@pytest.mark.thorough
 def test_a_fit_from_the_cache_is_the_fit_that_was_computed(tmp_path):
     items = []
     settings = RunSettings(Hdf5Store(tmp_path), Workers(1), on_done=items.append)
@@ -180,6 +181,7 @@ def test_the_key_of_the_stage_holds_all_that_its_fits_see():
     assert whole != whole_key(renamed)
 
 
+@pytest.mark.thorough
 def test_more_parameters_never_fit_worse():
     grid = OrdersOptions(nb=(1, 2, 3), nk=(1, 2, 3))
     fits = identify_all(

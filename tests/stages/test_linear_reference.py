@@ -33,6 +33,7 @@ def recordings():
     return [two_lags(name, seed) for seed, name in enumerate("abc")]
 
 
+@pytest.mark.thorough
 def test_the_best_orders_of_the_grid_are_taken_not_those_of_the_model(recordings):
     one_pole, two_poles = (
         fit(recordings[:1], orders, OPTIONS)
@@ -137,6 +138,7 @@ def test_a_grid_whose_linear_fits_all_fail_gives_none(recordings):
     assert linear_reference(bent, [], recordings, Roles(), run, nk_role="poles") is None
 
 
+@pytest.mark.thorough
 def test_all_recordings_that_do_not_judge_are_fitted_together(recordings):
     """One recording of little motion and much noise tells less than two."""
     loud = two_lags("a", 0, noise=0.2)
@@ -153,6 +155,7 @@ def test_all_recordings_that_do_not_judge_are_fitted_together(recordings):
     assert chosen(("b", "c")) == "linear:a/1/2"
 
 
+@pytest.mark.thorough
 def test_the_ratio_is_over_all_recordings_but_those_of_the_fit(recordings):
     # Large inputs count less: a map is worth having, on each recording in its own measure.
     bent = [replace(one, input=np.arctanh(0.95 * one.input)) for one in recordings]

@@ -99,6 +99,7 @@ def test_a_lone_recording_leaves_the_choice_to_bic():
     assert advice.candidates[0].n_parameters > advice.chosen.n_parameters
 
 
+@pytest.mark.thorough
 def test_all_comes_from_the_store_the_second_time():
     done = []
     settings = RunSettings(MemoryStore(), Workers(1), on_done=done.append)

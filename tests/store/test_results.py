@@ -131,6 +131,7 @@ def test_rewriting_one_stage_keeps_the_others_whole(path):
     assert read_stage_key(path, "identify") == "k3"
 
 
+@pytest.mark.thorough
 def test_rewriting_a_stage_again_and_again_gives_back_its_room(path):
     fits = [example_fit(f"step_{number}", seed=number) for number in range(300)]
     sizes = []

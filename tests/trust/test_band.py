@@ -45,6 +45,7 @@ def test_steps_multiply_to_the_covariance_of_the_parameters(linear):
     assert np.allclose(steps.T @ steps, expected, rtol=1e-5)
 
 
+@pytest.mark.thorough
 def test_the_parameters_part_is_the_scatter_of_refitted_models(linear):
     own, found = linear
     new = recording("new", 77, noise=0.0)

@@ -134,6 +134,7 @@ def test_the_threshold_is_marked_in_the_colour_bar(contents):
     assert bar.get_title() == ""
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("factor", [1.0, 1e-5, 1e6])
 def test_nothing_beside_the_matrix_touches_whatever_the_numbers(contents, factor):
     matrix = contents.full_matrix
