@@ -19,7 +19,7 @@ from hwid_cli.config.simulation_checks import (
 )
 from hwid_cli.data.units import factor_between, is_unitless, quantity_of
 from hwid_cli.files.messages import name_fault
-from hwid_cli.records.experiment import Experiment, RecordingsOptions
+from hwid_cli.records.experiment import Experiment, NextOptions, RecordingsOptions
 from hwid_cli.records.model import LinearBlock, Orders
 
 # Lists of recordings that may not hold a test recording, and what they do with it.
@@ -334,6 +334,21 @@ def _next(experiment: Experiment) -> Iterator[Fault]:
     if section is not None and getattr(experiment, section) is None:
         expected = f"coverage, or a section {section}: for this goal"
         yield wrong(("next", "goal"), options.goal, expected, f"add {section}:")
+    if options.output_range is not None:
+        yield from _foreseen(experiment, options)
+
+
+def _foreseen(experiment: Experiment, options: NextOptions) -> Iterator[Fault]:
+    """What tells the output of an input that nobody has played."""
+    place, found = ("next", "output_range"), list(options.output_range or ())
+    if options.goal == "coverage" and experiment.identify is None:
+        expected = "a model that foresees the output of an input"
+        yield wrong(place, found, expected, "add identify:")
+    if options.goal == "diagnosis" and getattr(
+        experiment.simulation, "controller", None
+    ):
+        expected = "a drive without a controller, whose output an input alone decides"
+        yield wrong(place, found, expected, "take it out")
 
 
 def _listed(experiment: Experiment, section: str, name: str) -> tuple[str, ...] | None:

@@ -32,7 +32,9 @@ from hwid_cli.diagnosis.judgement import decided, is_lost
 from hwid_cli.diagnosis.latent_force import Smoothed, latent_force
 from hwid_cli.diagnosis.laws import find_law
 from hwid_cli.diagnosis.next_experiment import (
+    UNDECIDED,
     FittedCandidate,
+    played,
     separation,
     undecided_candidates,
     with_best_lead,
@@ -139,21 +141,61 @@ def separations(
     """
     problem = _problem(recordings, simulation, options)
     found = find(problem, options, run_tasks, on_round)
-    criteria, fits = found.criteria, list(found.found.fits.values())
-    candidates = undecided_candidates(criteria, found.verdict, fits)
-    candidates = with_best_lead(criteria, candidates, fits)
+    candidates = _undecided(found)
     titles = tuple(title_of(one) for one in candidates)
     if len(candidates) < 2:
         return Separations(titles, np.full(len(inputs), np.nan))
     best, *rivals = (
         FittedCandidate(*rebuilt(problem, one, found.scales)) for one in candidates
     )
-    noise = max(criteria.noise.rms, np.finfo(float).tiny)
+    noise = max(found.criteria.noise.rms, np.finfo(float).tiny)
     ratios = [
         min(separation(problem, best, rival, one) for rival in rivals) / noise
         for one in inputs
     ]
     return Separations(titles, np.array(ratios))
+
+
+def answers(
+    recordings: Sequence[Recording],
+    simulation: SimulationOptions,
+    options: DiagnoseOptions,
+    inputs: Sequence[np.ndarray],
+    run_tasks: RunTasks,
+    on_round: OnRound,
+) -> list[tuple[np.ndarray, ...]]:
+    """Simulate what a diagnosis leaves, on inputs.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+        Of the diagnosis, whose tasks are asked for again.
+    inputs : sequence of ndarray, shape (n_samples,), [input unit]
+        That could be played, at the sample time of the recordings.
+
+    Returns
+    -------
+    list of tuple of ndarray, shape (n_samples,), [output unit]
+        For each input the output of each candidate that may be the machine.
+    """
+    problem = _problem(recordings, simulation, options)
+    found = find(problem, options, run_tasks, on_round)
+    candidates = [found.verdict.chosen]
+    if found.verdict.word in UNDECIDED:
+        candidates = _undecided(found)
+    fitted = [
+        FittedCandidate(*rebuilt(problem, one, found.scales)) for one in candidates
+    ]
+    return [
+        tuple(played(problem, each, one)[1].output for each in fitted) for one in inputs
+    ]
+
+
+def _undecided(found: Findings) -> list[CandidateFit]:
+    """Candidates of an undecided diagnosis, the best one first."""
+    criteria, fits = found.criteria, list(found.found.fits.values())
+    candidates = undecided_candidates(criteria, found.verdict, fits)
+    return with_best_lead(criteria, candidates, fits)
 
 
 def hidden(

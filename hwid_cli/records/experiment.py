@@ -26,6 +26,7 @@ from hwid_cli.records.rules import (
     NO_KEY,
     NOT_NEGATIVE,
     POSITIVE,
+    Ascending,
     Distinct,
     Each,
     FileLimit,
@@ -230,11 +231,14 @@ class NextOptions:
         Gain below which a recording is not worth taking: a share of the table of
         amplitudes and frequencies, by which standard errors shrink, or of what the output
         varies, by which a repeat lets the band of a further recording shrink.
+    output_range : tuple of float, shape (2,), or None, [output unit]
+        Lowest and highest output that a recording may reach, such as a travel.
     """
 
     goal: Annotated[str, OneOf(GOALS)] = "coverage"
     plan: str | None = None
     limits: NextLimits | None = None
+    output_range: Annotated[tuple[float, float] | None, Ascending()] = None
     number: Annotated[int, Integer(least=1), FileLimit(100)] = 3
     enough: Annotated[float, Number(above=0, most=1)] = 0.01
 

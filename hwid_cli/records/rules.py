@@ -256,6 +256,15 @@ class Distinct(Rule):
 
 
 @dataclass(frozen=True)
+class Ascending(Rule):
+    """Finite numbers, each above the one before it."""
+
+    def _check(self, value: Any) -> None:
+        if not np.isfinite(value).all() or (np.diff(value) <= 0.0).any():
+            raise Refused(Refusal(list(value), "finite numbers, the lower one first"))
+
+
+@dataclass(frozen=True)
 class FileLimit(Reading):
     """The largest number that a file may ask for, far beyond any use.
 

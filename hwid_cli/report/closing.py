@@ -92,7 +92,7 @@ def best_model_sentences(best: BestModel) -> list[str]:
     said = [f"{best.name}: {mean} {with_unit(best.rmsd, best.unit)} on {on}"]
     if np.isfinite(best.linear_rmsd):
         linear = with_unit(best.linear_rmsd, best.unit)
-        said.append(f"best linear model, {best.linear_name}: {linear}")
+        said.append(f"{_linear_model(best)}: {linear}")
         if best.linear_rmsd < best.rmsd:
             # Few recordings, and the others speak for the maps.
             said[-1] += (
@@ -105,6 +105,13 @@ def best_model_sentences(best: BestModel) -> list[str]:
         single = with_unit(best.single_rmsd, best.unit)
         said.append(f"joining recordings {helps} here: {best.single} alone {single}")
     return said
+
+
+def _linear_model(best: BestModel) -> str:
+    """Which linear model stands beside a model; one without a name has its orders."""
+    if not best.linear_name:
+        return "linear model of the same orders"
+    return f"best linear model, {best.linear_name}"
 
 
 def _nothing_to_take(best: BestModel, on: str) -> list[str]:

@@ -471,6 +471,24 @@ def undecided(
     return _on_inputs(given, runner, inputs, pipeline.separations)
 
 
+def answers(
+    given: ToDiagnose, runner: Runner, inputs: Sequence[np.ndarray]
+) -> list[tuple[np.ndarray, ...]]:
+    """What the candidates that a diagnosis leaves answer to inputs.
+
+    Parameters
+    ----------
+    inputs : sequence of ndarray, shape (n_samples,), [input unit]
+        At the sample time of the recordings.
+
+    Raises
+    ------
+    ConfigError
+        If the simulation is not the program's own drive.
+    """
+    return _on_inputs(given, runner, inputs, pipeline.answers)
+
+
 def hidden(
     given: ToDiagnose, runner: Runner, inputs: Sequence[np.ndarray]
 ) -> list[HiddenEffect]:

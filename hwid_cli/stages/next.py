@@ -11,7 +11,7 @@ docs/trust.md.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import nan
 from pathlib import Path
 
@@ -42,9 +42,17 @@ from hwid_cli.records.recordings import Recording
 from hwid_cli.records.units import as_percent, behind
 from hwid_cli.report.next import next_blocks
 from hwid_cli.report.table import Block
-from hwid_cli.stages.diagnose import ToDiagnose, hidden, undecided
+from hwid_cli.stages.diagnose import ToDiagnose, answers, hidden, undecided
 from hwid_cli.stages.diagnose import choose as choose_diagnosis
 from hwid_cli.stages.fit_seconds import counted
+from hwid_cli.stages.output_range import (
+    Foresee,
+    Reach,
+    foreseen_by,
+    in_words,
+    reaches,
+    within,
+)
 from hwid_cli.stages.ranking import best_fits
 from hwid_cli.stages.repeats import Repeats, proposed_repeats
 from hwid_cli.stages.stage import Context, Planning, Runner, Stage, in_results
@@ -81,6 +89,7 @@ class ToChoose:
     diagnosed: ToDiagnose | None = None
     verdict: str = ""
     previous: NextRecordings | None = None
+    source: str = ""
 
     @property
     def offered(self) -> tuple[PlannedInput, ...]:
@@ -113,16 +122,20 @@ def propose_next(given: ToChoose, runner: Runner) -> NextRecordings:
         "diagnosis": _for_diagnosis,
     }
     with one_thread():
+        reached = _reached(given, runner)
+        given, left_out = _within_range(given, reached)
         choice = ways[given.options.goal](given, runner)
-    table = _input_map(given, [one.values for one in choice.proposals])
+    unit = given.recordings[0].output_unit
+    proposals = tuple(_with_reach(one, reached, unit) for one in choice.proposals)
+    table = _input_map(given, [one.values for one in proposals])
     return NextRecordings(
         goal=given.options.goal,
         recordings=tuple(one.name for one in given.recordings),
         known=choice.known,
         known_words=choice.known_words,
-        is_enough=not choice.proposals,
-        sentence=choice.sentence,
-        proposals=choice.proposals,
+        is_enough=not proposals,
+        sentence=choice.sentence + left_out,
+        proposals=proposals,
         map=table,
         n_offered=len(given.offered),
         sample_time_s=given.recordings[0].sample_time_s,
@@ -130,6 +143,48 @@ def propose_next(given: ToChoose, runner: Runner) -> NextRecordings:
         changed=_changed(given, choice),
         repeats=choice.repeats,
     )
+
+
+def _reached(given: ToChoose, runner: Runner) -> dict[str, Reach]:
+    """Outputs that the offered inputs are foreseen to reach, where a range is given."""
+    if given.options.output_range is None:
+        return {}
+    return reaches(given.offered, _foresee(given, runner))
+
+
+def _foresee(given: ToChoose, runner: Runner) -> Foresee:
+    """What tells the output of an input that nobody has played."""
+    diagnosed = given.diagnosed
+    if diagnosed is not None:
+        return lambda inputs: answers(diagnosed, runner, inputs)
+    if given.fit is None or given.fit.model is None:
+        raise ValueError("a range of the output has a model")
+    return foreseen_by(given.fit.model)
+
+
+def _within_range(given: ToChoose, reached: dict[str, Reach]) -> tuple[ToChoose, str]:
+    """The same without inputs that leave the range, and how many these are in words."""
+    limits = given.options.output_range
+    if limits is None:
+        return given, ""
+    unit = given.recordings[0].output_unit
+    left = within(given.plan, reached, limits, unit, given.source)
+    count = len(given.plan) - len(left)
+    said = (
+        f"; {counted(count, 'input')} of {len(reached)} left out: the output is foreseen "
+        f"to leave {in_words(limits, unit)}"
+    )
+    return replace(given, plan=left), said * (count > 0)
+
+
+def _with_reach(
+    one: ProposedRecording, reached: dict[str, Reach], unit: str
+) -> ProposedRecording:
+    """The same with what it is foreseen to reach; repeats were played already."""
+    if one.name not in reached:
+        return one
+    said = f"the output is foreseen to go from {in_words(reached[one.name], unit)}"
+    return replace(one, reason=f"{one.reason}; {said}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -425,11 +480,12 @@ def _choose(context: Context) -> ToChoose:
         _offered(experiment, recordings),
         kept_for_test(experiment),
         _model(experiment, results["identify"], recordings)
-        if options.goal == "parameters"
+        if _asks_model(options)
         else None,
         choose_diagnosis(context) if is_diagnosis else None,
         results["diagnose"].verdict if is_diagnosis else "",
         read_previous(context.out),
+        experiment.source,
     )
 
 
@@ -440,8 +496,8 @@ def _model(
     best = [group[0] for group in best_fits(fits, 1) if group]
     if not best:
         raise ConfigError(
-            f"{experiment.source}: next.goal: no recording has a usable model; expected "
-            "one for the goal 'parameters'; widen the orders or change fit"
+            f"{experiment.source}: next: no recording has a usable model; expected one, "
+            "which tells what inputs do; widen the orders or change fit"
         )
     tested = kept_for_test(experiment)
     judges = [one for one in recordings if one.name not in tested]
@@ -507,8 +563,18 @@ def _options(experiment: Experiment) -> NextOptions:
 
 
 def _needs(experiment: Experiment) -> tuple[str, ...]:
-    goal = "" if experiment.next is None else _goal(experiment)
-    return {"parameters": ("identify",), "diagnosis": ("diagnose",)}.get(goal, ())
+    options = experiment.next
+    if options is None:
+        return ()
+    if options.goal == "diagnosis":
+        return ("diagnose",)
+    return ("identify",) if _asks_model(options) else ()
+
+
+def _asks_model(options: NextOptions) -> bool:
+    """Whether a fitted model tells what inputs do."""
+    is_foreseen = options.output_range is not None and options.goal == "coverage"
+    return options.goal == "parameters" or is_foreseen
 
 
 def _write_files(

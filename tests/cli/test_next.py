@@ -15,6 +15,7 @@ from tests.stages.test_diagnose import slow_ramps
 
 N, STEP_S = 400, 0.01
 LIMITS = "next: {limits: {amplitude: 2.0, rate: 100, duration_s: 4.0}}\n"
+RANGE = LIMITS.replace("next: {", "next: {output_range: [-0.3, 0.9], number: 20, ")
 HEAD = (
     "name: bench\n"
     "recordings:\n"
@@ -269,6 +270,39 @@ def answered(name, current, effects=None):
 
 
 @pytest.mark.thorough
+@pytest.mark.parametrize("is_settled", [False, True])
+def test_the_candidates_of_a_diagnosis_foresee_the_travel(tmp_path, is_settled):
+    time = 1e-3 * np.arange(400)
+    bump = np.interp(time, [0.04, 0.05, 0.24, 0.25], [0, 1, 1, 0])
+    steps = [answered(f"step_{k}", 0.5 * k * bump) for k in (1, 2, 3)]
+    for one in steps if is_settled else slow_ramps(4e-4):
+        write_recording(tmp_path / "raw", one)
+    config = tmp_path / "bench.yaml"
+    # 4 A move it by 17 mm, beyond which it swings by a quarter.
+    text = DIAGNOSIS.replace("number: 1", "number: 20, output_range: [-0.012, 0.013]")
+    if is_settled:
+        text = text.replace("actuator_lag, input_delay", "one_sided_stop")
+    config.write_text(text)
+    asked = ["next", str(config), "--out", str(tmp_path / "out"), "--jobs", "1"]
+
+    said = CliRunner().invoke(main, asked)
+
+    assert said.exit_code == 0, said.output
+    words = flat(said.output)
+    assert "left out: the output is foreseen to leave -0.012 to 0.013 m" in words
+    rows, reached = proposals(tmp_path), []
+    for row in rows:
+        u = played(tmp_path, row)[:, 1]
+        reached.append(simulate_drive(u, DRIVE, sample_time_s=1e-3).output)
+        told = row["reason"].rsplit("foreseen to go from ", 1)[1].split()
+        assert float(told[0]) == pytest.approx(reached[-1].min(), abs=1e-3)
+        assert float(told[2]) == pytest.approx(reached[-1].max(), abs=1e-3)
+    assert min(one.min() for one in reached) > -0.0125
+    # What the smaller inputs reach is used.
+    assert 0.004 < max(one.max() for one in reached) < 0.0135
+
+
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("effects", "said"),
     [
@@ -318,6 +352,9 @@ def test_an_effect_that_hides_is_looked_for_where_no_recording_was(
         ("next: {plan: p.csv, goal: diagnosis}\n",
          "next.goal: found 'diagnosis'; expected coverage, or a section simulation:"),
         ("next: {plan: p.csv, goal: speed}\n", "next.goal: found 'speed'"),
+        (RANGE, "expected a model that foresees the output of an input; add identify:"),
+        ("identify: {}\n" + RANGE.replace("-0.3, 0.9", "0.9, -0.3"),
+         "next.output_range: found [0.9, -0.3]; expected finite numbers, the lower one"),
         ("next: {limits: {amplitude: 6, rate: 1, duration_s: 0.1}}\n",
          "next.limits: found amplitude 6 A, rate 1 A/s and 0.1 s"),
         ("next: {limits: {amplitude: -6, rate: 1, duration_s: 1}}\n",
@@ -330,3 +367,48 @@ def test_what_cannot_be_proposed_is_one_line(bench, text, said):
     assert result.exit_code == 1
     assert said in result.stderr
     assert result.stderr.count("\n") == 1
+
+
+def answer(values, gain=1.0):
+    """What the drive of `measure` does without noise."""
+    return lfilter([0.0, 0.2 * gain], [1.0, -0.8], values)
+
+
+def test_inputs_whose_output_leaves_its_range_are_left_out(bench):
+    said = run(bench, "identify: {}\n" + LIMITS.replace("{", "{number: 20, ", 1))
+    assert said.exit_code == 0, said.output
+    free = {row["name"]: answer(played(bench, row)[:, 1]) for row in proposals(bench)}
+
+    said = run(bench, "identify: {}\n" + RANGE)
+
+    assert said.exit_code == 0, said.output
+    kept = {row["name"]: answer(played(bench, row)[:, 1]) for row in proposals(bench)}
+    assert kept
+    # The model is as good as noise of 0.01 lets it be.
+    assert all(one.min() > -0.32 and one.max() < 0.92 for one in kept.values())
+    assert any(one.min() < -0.5 or one.max() > 1.1 for one in free.values())
+    assert "left out: the output is foreseen to leave -0.3 to 0.9" in flat(said.output)
+    for row in proposals(bench):
+        low, high = kept[row["name"]].min(), kept[row["name"]].max()
+        told = row["reason"].rsplit("foreseen to go from ", 1)[1].split()
+        assert float(told[0]) == pytest.approx(low, abs=0.03)
+        assert float(told[2].rstrip(".")) == pytest.approx(high, abs=0.03)
+
+
+def test_a_range_that_every_input_leaves_is_one_line(bench):
+    said = run(bench, "identify: {}\n" + RANGE.replace("-0.3, 0.9", "-0.001, 0.001"))
+    assert said.exit_code == 1
+    assert "next.output_range: found -0.001 to 0.001" in flat(said.output)
+    assert "every one of" in flat(said.output)
+
+
+def test_under_a_controller_no_input_decides_the_output(bench):
+    text = DIAGNOSIS.replace("number: 1", "output_range: [-1, 1]")
+    text = text.replace("5.0}", "5.0, controller: {proportional_gain: 100}}")
+    text = text.replace("output: y}", "output: y, reference: r}")
+    (bench / "bench.yaml").write_text(text)
+    said = CliRunner().invoke(main, ["next", str(bench / "bench.yaml")])
+    assert said.exit_code == 1
+    assert (
+        "next.output_range: found [-1.0, 1.0]; expected a drive without" in said.output
+    )

@@ -37,6 +37,15 @@ def test_a_failure_to_help_is_said():
     assert "joining recordings helps here" in "; ".join(best_model_sentences(better))
 
 
+def test_a_linear_model_without_a_name_is_the_one_of_the_same_orders():
+    own = replace(BEST, judge="own", judged_on=("a",), chosen_on=())
+    said = "; ".join(best_model_sentences(own)).replace("\xa0", " ")
+    assert "; linear model of the same orders: 0.03 m;" in said
+    named = replace(own, linear_name="linear:a/1/2")
+    said = "; ".join(best_model_sentences(named)).replace("\xa0", " ")
+    assert "; best linear model, linear:a/1/2: 0.03 m;" in said
+
+
 def test_a_judge_that_nobody_knows_is_refused():
     with pytest.raises(ValueError, match="judge 'me' is none of"):
         replace(BEST, judge="me")
