@@ -26,12 +26,12 @@ from hwid_cli.records.rules import (
     NO_KEY,
     NOT_NEGATIVE,
     POSITIVE,
-    Ascending,
     Distinct,
     Each,
     FileLimit,
     Filled,
     Integer,
+    Interval,
     NamesFor,
     Number,
     OneOf,
@@ -238,7 +238,7 @@ class NextOptions:
     goal: Annotated[str, OneOf(GOALS)] = "coverage"
     plan: str | None = None
     limits: NextLimits | None = None
-    output_range: Annotated[tuple[float, float] | None, Ascending()] = None
+    output_range: Annotated[tuple[float, float] | None, Interval()] = None
     number: Annotated[int, Integer(least=1), FileLimit(100)] = 3
     enough: Annotated[float, Number(above=0, most=1)] = 0.01
 

@@ -256,12 +256,12 @@ class Distinct(Rule):
 
 
 @dataclass(frozen=True)
-class Ascending(Rule):
-    """Finite numbers, each above the one before it."""
+class Interval(Rule):
+    """Two finite numbers, the lower one first."""
 
     def _check(self, value: Any) -> None:
-        if not np.isfinite(value).all() or (np.diff(value) <= 0.0).any():
-            raise Refused(Refusal(list(value), "finite numbers, the lower one first"))
+        if len(value) != 2 or not -math.inf < value[0] < value[1] < math.inf:
+            raise Refused(Refusal(list(value), "two numbers, the lower one first"))
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,6 @@
 import csv
 import json
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -354,7 +355,7 @@ def test_an_effect_that_hides_is_looked_for_where_no_recording_was(
         ("next: {plan: p.csv, goal: speed}\n", "next.goal: found 'speed'"),
         (RANGE, "expected a model that foresees the output of an input; add identify:"),
         ("identify: {}\n" + RANGE.replace("-0.3, 0.9", "0.9, -0.3"),
-         "next.output_range: found [0.9, -0.3]; expected finite numbers, the lower one"),
+         "next.output_range: found [0.9, -0.3]; expected two numbers, the lower one first"),
         ("next: {limits: {amplitude: 6, rate: 1, duration_s: 0.1}}\n",
          "next.limits: found amplitude 6 A, rate 1 A/s and 0.1 s"),
         ("next: {limits: {amplitude: -6, rate: 1, duration_s: 1}}\n",
@@ -412,3 +413,20 @@ def test_under_a_controller_no_input_decides_the_output(bench):
     assert (
         "next.output_range: found [-1.0, 1.0]; expected a drive without" in said.output
     )
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "identify: {}\n" + RANGE,
+        "identify: {}\n" + LIMITS.replace("{", "{goal: parameters, ", 1),
+        DIAGNOSIS.replace("duration_s: 0.4", "duration_s: 4"),
+    ],
+)
+def test_check_foresees_every_goal(bench, text):
+    config = bench / "bench.yaml"
+    config.write_text(text if text.startswith("name") else HEAD + text)
+    asked = ["check", str(config), "--out", str(bench / "out"), "--no-timing"]
+    said = CliRunner().invoke(main, asked)
+    assert said.exit_code == 0, said.output
+    assert re.search(r"next +\d+ inputs on offer", said.output)
