@@ -32,6 +32,11 @@ from hwid_cli.diagnosis.stand_in import (
 )
 from hwid_cli.diagnosis.tasks import OnRound, RunTasks
 from hwid_cli.diagnosis.turns import have_moved
+from hwid_cli.diagnosis.untold import (
+    law_without_forces_told,
+    untold_parameters,
+    without_forces_told,
+)
 from hwid_cli.diagnosis.verdict import DiagnosisVerdict
 from hwid_cli.records.axis import MotionUnits
 from hwid_cli.records.diagnosis import BaseParameter, Diagnosis
@@ -113,8 +118,9 @@ def diagnose_foreign(
         law = _law_instead(runs, problem, found.verdict, refitted, options, on_round)
         found, values = law or (found, values)
     told = _told(found, simulator, (refitted, values))
-    confirmed = "simulation" if is_confirmed else "surrogate"
-    return replace(told, confirmed=confirmed)
+    if not is_confirmed:
+        return replace(told, confirmed="surrogate")
+    return _confirmed(told, found, (runs, values), on_round)
 
 
 def _beside(
@@ -426,3 +432,22 @@ def _told(
         for name, one in simulator.free.items()
     )
     return replace(told, base=base or told.base, capabilities=simulator.capabilities)
+
+
+def _confirmed(
+    told: Diagnosis,
+    findings: Findings,
+    simulation: tuple[Runs, Mapping[str, float]],
+    on_round: OnRound,
+) -> Diagnosis:
+    """The diagnosis that the simulation bears out, with what the recordings leave open."""
+    on_round("what the recordings leave open", 0)
+    untold = untold_parameters(simulation[0], findings, simulation[1])
+    effects, law = told.effects, told.law
+    if untold.with_forces:
+        effects = tuple(without_forces_told(one) for one in effects)
+        law = None if law is None else law_without_forces_told(law)
+    warnings = (*untold.sentences, *told.warnings)
+    return replace(
+        told, confirmed="simulation", effects=effects, law=law, warnings=warnings
+    )

@@ -449,6 +449,9 @@ def test_the_given_parameters_come_last_where_nothing_was_confirmed(
     monkeypatch.setattr(
         foreign, "_told", lambda found, simulator, values: Told(found, values[1]["c"])
     )
+    monkeypatch.setattr(
+        foreign, "_confirmed", lambda told, *_: replace(told, confirmed="simulation")
+    )
     able = Capabilities(run=True, parameters=True, force=True)
     seen, _ = diagnosis(Simulator(able, simulate, {}, FREE, GIVEN))
 

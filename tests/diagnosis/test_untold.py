@@ -1,0 +1,82 @@
+"""What recordings of input and output cannot tell of a simulation: only its ratios."""
+
+import numpy as np
+import pytest
+
+from hwid_cli.diagnosis.simulator import Simulator
+from hwid_cli.diagnosis.untold import Untold, without_forces_told
+from hwid_cli.records.diagnosis import FittedEffect, FittedParameter
+from hwid_cli.records.programs import Capabilities, FreeParameter
+from tests.diagnosis.test_foreign import GIVEN, diagnosis, simulate
+
+# The box itself has a mass of 0.8.
+ALL = {**GIVEN, "unused": 3.0}
+ABLE = Capabilities(run=True, parameters=True, force=True)
+
+
+def simulator(*names):
+    free = {one: FreeParameter(ALL[one], (0.01 * ALL[one], 100 * ALL[one]))
+            for one in names}  # fmt: skip
+    return Simulator(ABLE, simulate, {}, free, ALL)
+
+
+def of_them(found, word="these recordings do not tell "):
+    (said,) = [one for one in found.warnings if one.startswith(word)]
+    return said.removeprefix(word).partition(":")
+
+
+@pytest.mark.thorough
+def test_a_common_factor_of_all_forces_and_the_mass_is_not_told():
+    found, _ = diagnosis(simulator("m", "c", "k", "kt"), effects=("coulomb_friction",))
+    assert (found.verdict, found.complete) == ("named", True)
+    names, _, said = of_them(found)
+    assert names == "m, c, k and kt"
+    assert "the forces of the effects follow" in said
+    assert "hold what you know, as in 'parameters: {m: 0.8}'" in said
+    ((force,),) = (one.parameters for one in found.effects)
+    assert np.isnan(force.low)
+    assert np.isnan(force.high)
+    # What is told is the friction over the mass: 2 N of 0.8 kg.
+    mass = next(one.after for one in found.base if one.name == "m")
+    assert force.value / mass == pytest.approx(2.0 / 0.8, rel=0.02)
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize(
+    ("free", "untold"),
+    [(("c", "k", "kt"), []), (("c", "k", "kt", "unused"), ["unused"])],
+)
+def test_what_is_told_is_not_questioned(free, untold):
+    found, _ = diagnosis(simulator(*free), effects=("coulomb_friction",))
+    assert (found.verdict, found.complete) == ("named", True)
+    said = [one for one in found.warnings if "do not tell" in one]
+    assert [one.split(":")[0].rpartition(" ")[2] for one in said] == untold
+    assert not any("forces of the effects" in one for one in said)
+    ((force,),) = (one.parameters for one in found.effects)
+    assert force.low < 2.0 < force.high
+
+
+@pytest.mark.thorough
+def test_a_simulation_that_lacks_nothing_is_asked_too():
+    found, _ = diagnosis(simulator("m", "c", "k", "kt"), None, ("coulomb_friction",))
+    assert found.verdict in ("parameters", "none")
+    names, _, said = of_them(found)
+    assert names == "m, c, k and kt"
+    assert "the forces" not in said
+
+
+def test_nothing_is_said_where_all_is_told():
+    assert Untold().sentences == ()
+
+
+def test_only_forces_lose_their_intervals():
+    parameters = (
+        FittedParameter("break_away_N", 2.0, 1.9, 2.1),
+        FittedParameter("stribeck_velocity_m_per_s", 0.1, 0.05, 0.2),
+        FittedParameter("stiffness_N_per_m", 5.0, 4.0, 6.0),
+    )
+    effect = FittedEffect("stribeck_friction", "", "", parameters)
+    first, speed, last = without_forces_told(effect).parameters
+    assert np.isnan([first.low, first.high, last.low, last.high]).all()
+    assert (speed.low, speed.high) == (0.05, 0.2)
+    assert (first.value, last.value) == (2.0, 5.0)
