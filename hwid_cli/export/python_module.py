@@ -4,7 +4,7 @@ The simulation's own files are copied beside it; the module names them by that p
 """
 
 from collections.abc import Mapping
-from dataclasses import fields, replace
+from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
 
 from hwid_cli import __version__
@@ -34,7 +34,7 @@ Needs hwid ({version} wrote it): pip install hwid
 
 from pathlib import Path
 
-from hwid_cli.records.drive import Drive
+{imports}
 from hwid_cli.records.programs import {kind}
 from hwid_cli.simulations.extended import ExtendedSimulation, simulate_extended
 
@@ -43,10 +43,10 @@ EXTENDED = ExtendedSimulation(
     base={kind}(
 {base}
     ),
-    plain=Drive(
+    plain={plain_type}(
 {plain}
     ),
-    stand_in=Drive(
+    stand_in={stand_in_type}(
 {stand_in}
     ),
 )
@@ -99,6 +99,9 @@ def write_module(
         exactness=_in_docstring(exactness),
         most=100.0 * _most(),
         version=__version__,
+        imports=_imports(extended.plain, extended.stand_in),
+        plain_type=type(extended.plain).__name__,
+        stand_in_type=type(extended.stand_in).__name__,
         kind=type(base).__name__,
         base=f"        file=str(_FOLDER / {file.name!r}),\n{arguments}",
         plain=_arguments(extended.plain),
@@ -113,6 +116,16 @@ def _most() -> float:
     from hwid_cli.simulations.extended import MOST_DISAGREEMENT
 
     return MOST_DISAGREEMENT
+
+
+def _imports(*drives: Drive) -> str:
+    """Lines that import the types of drives, and those of their arguments."""
+    types: set[type] = {type(one) for one in drives}
+    for drive in drives:
+        values = [getattr(drive, one.name) for one in fields(drive)]
+        types |= {type(one) for one in values if is_dataclass(one)}
+    rows = sorted((one.__module__, one.__name__) for one in types)
+    return "\n".join(f"from {module} import {name}" for module, name in rows)
 
 
 def _arguments(record: Drive | Program, leave_out: tuple[str, ...] = ()) -> str:
