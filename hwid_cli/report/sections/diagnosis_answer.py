@@ -1,7 +1,7 @@
 """The answer of a diagnosis: what the simulation lacks, how much, and how much it helps."""
 
 from collections.abc import Mapping
-from math import floor, isfinite, log10
+from math import floor, isfinite, isnan, log10
 from typing import Any
 
 import numpy as np
@@ -152,13 +152,17 @@ def value_with_interval(one: FittedParameter, unit: str) -> str:
     '0.799 [0.797, 0.801]'
     >>> value_with_interval(FittedParameter("which", float("nan"), text="stiffness"), "-")
     'stiffness'
+    >>> value_with_interval(FittedParameter("force_N", 0.7989), "N")
+    '0.7989\xa0N (not told)'
     """
     if one.text:
         return one.text
     behind = "" if unit in ("-", "") else f"\N{NO-BREAK SPACE}{unit}"
     if not (isfinite(one.low) and isfinite(one.high) and one.high > one.low):
         value = shown_value(one.value, one.name) if isfinite(one.value) else "unknown"
-        return f"{value}{behind}"
+        # The recordings leave it open; a warning says beside what.
+        untold = " (not told)" if isfinite(one.value) and isnan(one.low) else ""
+        return f"{value}{behind}{untold}"
     # The first digit of half the interval is the last one of all three that says something.
     half = 0.5 * (one.high - one.low)
     digits = -floor(log10(half))
