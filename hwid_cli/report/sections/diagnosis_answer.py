@@ -152,8 +152,8 @@ def value_with_interval(one: FittedParameter, unit: str) -> str:
     '0.799 [0.797, 0.801]'
     >>> value_with_interval(FittedParameter("which", float("nan"), text="stiffness"), "-")
     'stiffness'
-    >>> value_with_interval(FittedParameter("force_N", 0.7989), "N")
-    '0.7989\xa0N (not told)'
+    >>> value_with_interval(FittedParameter("force_N", 0.7989), "-")
+    '0.7989 (not told)'
     """
     if one.text:
         return one.text
