@@ -1,22 +1,28 @@
 """What recordings of input and output cannot tell of a simulation: only its ratios."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from hwid_cli.diagnosis.foreign import diagnose_foreign
 from hwid_cli.diagnosis.simulator import Simulator
 from hwid_cli.diagnosis.untold import Untold, without_forces_told
 from hwid_cli.records.diagnosis import FittedEffect, FittedParameter
+from hwid_cli.records.experiment import DiagnoseOptions
 from hwid_cli.records.programs import Capabilities, FreeParameter
-from tests.diagnosis.test_foreign import GIVEN, diagnosis, simulate
+from tests.diagnosis.test_foreign import GIVEN, Count, diagnosis, recordings, simulate
 
 # The box itself has a mass of 0.8.
 ALL = {**GIVEN, "unused": 3.0}
 ABLE = Capabilities(run=True, parameters=True, force=True)
 
 
-def simulator(*names):
+def simulator(*names, mass=(0.008, 80.0)):
     free = {one: FreeParameter(ALL[one], (0.01 * ALL[one], 100 * ALL[one]))
             for one in names}  # fmt: skip
+    if "m" in free:
+        free["m"] = FreeParameter(ALL["m"], mass)
     return Simulator(ABLE, simulate, {}, free, ALL)
 
 
@@ -63,6 +69,37 @@ def test_a_simulation_that_lacks_nothing_is_asked_too():
     names, _, said = of_them(found)
     assert names == "m, c, k and kt"
     assert "the forces" not in said
+
+
+@pytest.mark.thorough
+def test_bounds_tell_what_the_recordings_do_not():
+    given = simulator("m", "c", "k", "kt", mass=(0.76, 0.84))
+    found, _ = diagnosis(given, None, ("coulomb_friction",))
+    assert found.verdict in ("parameters", "none")
+    assert not any("do not tell" in one for one in found.warnings)
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize(("leak", "is_told"), [(6e-6, True), (6e-7, False)])
+def test_a_weak_parameter_is_told_where_a_fifth_of_it_shows(leak, is_told):
+    # Beside the other parameters the noise leaves 5e-7 of the input open.
+    given = [
+        replace(one, output=one.output + 3.0 * leak * one.input) for one in recordings()
+    ]
+
+    def leaking(request):
+        found = simulate(request)
+        more = leak * request.parameters["unused"] * request.input
+        return replace(found, output=found.output + more)
+
+    names = ("c", "k", "kt", "unused")
+    found = diagnose_foreign(
+        given, replace(simulator(*names), run=leaking),
+        DiagnoseOptions(effects=("coulomb_friction",)), Count(), lambda what, n: None,
+    )  # fmt: skip
+    assert found.verdict in ("parameters", "none")
+    said = [one for one in found.warnings if "do not tell unused:" in one]
+    assert len(said) == (not is_told)
 
 
 def test_nothing_is_said_where_all_is_told():
