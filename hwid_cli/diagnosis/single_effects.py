@@ -20,9 +20,10 @@ from hwid_cli.diagnosis.selection import (
 from hwid_cli.diagnosis.simulator import Runs
 from hwid_cli.diagnosis.turns import Turn, fit_of_run, settled
 from hwid_cli.diagnosis.verdict import decide
+from hwid_cli.drive.catalogue import public_id
 from hwid_cli.records.candidates import CandidateFit
 
-# Single effects that the simulation is run with: at most so many, of those that leave at
+# Single effects that the simulation is run with: at most so many different ones, of those that leave at
 # most so many times what the best one leaves beside the stand-in, which counts as at least
 # this share of what the base leaves.
 _MOST_SINGLES = 4
@@ -119,11 +120,19 @@ def _likely(findings: Findings) -> list[CandidateFit]:
         criteria.excess(usable[0]), _LEAST_LEFT * criteria.excess(findings.base)
     )
     near = [one for one in usable if criteria.excess(one) <= _LIKELY * least]
-    first = near[:_MOST_SINGLES]
+    first = _one_of_each(near)[:_MOST_SINGLES]
     # What leaves little more with fewer parameters may be all of it.
     limits = [one for one in near if one not in first
               and any(is_part_of(one, wide) for wide in first)]  # fmt: skip
     return sorted([*first, *limits], key=lambda one: -_n_including(one, near))
+
+
+def _one_of_each(near: Sequence[CandidateFit]) -> list[CandidateFit]:
+    """The first variant of each effect: others of its kind take no place of another."""
+    found: dict[tuple[str, ...], CandidateFit] = {}
+    for one in near:
+        found.setdefault(tuple(public_id(each) for each in one.effects), one)
+    return list(found.values())
 
 
 def _n_including(one: CandidateFit, others: Sequence[CandidateFit]) -> int:
