@@ -110,8 +110,7 @@ def settled(
 ) -> Turn | None:
     """Best run of the simulation with a set of effects; None if it is no better."""
     has_force = runs.simulator.capabilities.force
-    enters = {CATALOGUE[one].enters for one in fit.effects}
-    at_force = has_force and bool(enters - {"command", "output"})
+    at_force = acts_at_force(fit, runs)
     said = float(fit.sse.sum())
     turn = Turn(findings.problem, fit, values, said, at_force)
     best = _best_of(findings, turn, runs)
@@ -201,14 +200,10 @@ def _next_turn(findings: Findings, turn: Turn, runs: Runs) -> Turn | None:
     """Run the simulation with the effect's force; correct the stand-in; fit again."""
     problem = turn.problem
     motions = simulate_at(problem, *rebuilt(problem, turn.fit, findings.scales))
-    drive = replace(problem.drive, effects={})
-    forces = [
-        force_of_motion(drive, one, motion)
-        for one, motion in zip(problem.signals, motions, strict=True)
-    ]
+    forces = forces_along(problem, motions)
     if not all(np.isfinite(one).all() for one in forces):
         return None
-    push = partial(_pushed, runs, problem, forces, turn.at_force)
+    push = partial(pushed, runs, problem, forces, turn.at_force)
     found = push(turn.values)
     if found is None:
         return None
@@ -235,6 +230,24 @@ def _next_turn(findings: Findings, turn: Turn, runs: Runs) -> Turn | None:
         slopes = tuple(_slopes(runs, push, turn.values, found))
         following = replace(following, slopes=slopes, slopes_at=turn.values)
     return _with_values(following, (found, forces), runs, findings)
+
+
+def acts_at_force(fit: CandidateFit, runs: Runs) -> bool:
+    """Whether effects act at a simulation's force input rather than through its input."""
+    enters = {CATALOGUE[one].enters for one in fit.effects}
+    has_force = runs.simulator.capabilities.force
+    return has_force and bool(enters - {"command", "output"})
+
+
+def forces_along(
+    problem: DiagnosisProblem, motions: Sequence[Motion]
+) -> list[np.ndarray]:
+    """Forces that effects make along the motions of the stand-in, in each recording."""
+    drive = replace(problem.drive, effects={})
+    return [
+        force_of_motion(drive, one, motion)
+        for one, motion in zip(problem.signals, motions, strict=True)
+    ]
 
 
 def have_moved(
@@ -348,7 +361,7 @@ def _slopes(
     return [np.column_stack(one) for one in columns]
 
 
-def _pushed(
+def pushed(
     runs: Runs,
     problem: DiagnosisProblem,
     forces: Sequence[np.ndarray],

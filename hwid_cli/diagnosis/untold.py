@@ -17,7 +17,7 @@ from hwid_cli.diagnosis.findings import Findings
 from hwid_cli.diagnosis.parameters import simulate_at
 from hwid_cli.diagnosis.problem import DiagnosisProblem
 from hwid_cli.diagnosis.simulator import DIFFERENCE, Runs
-from hwid_cli.diagnosis.stand_in import force_of_motion
+from hwid_cli.diagnosis.turns import acts_at_force, forces_along, pushed
 from hwid_cli.drive.catalogue import CATALOGUE
 from hwid_cli.records.diagnosis import FittedEffect, Law
 from hwid_cli.records.programs import FreeParameter
@@ -200,15 +200,13 @@ class _Moving:
         if enters - {"output"}:
             layout, point = rebuilt(findings.problem, chosen, findings.scales)
             motions = simulate_at(findings.problem, layout, point)
-            drive = replace(problem.drive, effects={})
+            of_all = forces_along(findings.problem, motions)
             forces = tuple(
-                force_of_motion(drive, one, motion)
-                for one, motion in zip(findings.problem.signals, motions, strict=True)
+                force
+                for force, one in zip(of_all, findings.problem.signals, strict=True)
                 if not one.is_held_out
             )
-        at_force = runs.simulator.capabilities.force and bool(
-            enters - {"command", "output"}
-        )
+        at_force = acts_at_force(chosen, runs)
         noise = findings.criteria.noise.rms
         return cls(runs, problem, values, free, forces, at_force, noise)
 
@@ -235,29 +233,18 @@ class _Moving:
 
     def errors(self, logs: np.ndarray) -> np.ndarray | None:
         """Outputs over the noise; None where the simulation gives no answer."""
-        share = float(np.exp(logs[-1])) if self.forces else 1.0
-        forces = [share * one for one in self.forces]
-        gain = self.problem.drive.force_constant_N_per_A
-        inputs = (
-            []
-            if self.at_force
-            else [
-                one.driven_by + force / gain
-                for one, force in zip(self.problem.signals, forces, strict=False)
-            ]
-        )
-        found = self.runs.tried(
-            self.problem.signals,
-            self._values(logs),
-            forces if self.at_force else (),
-            inputs,
-        )
+        signals, values = self.problem.signals, self._values(logs)
+        if self.forces:
+            forces = [float(np.exp(logs[-1])) * one for one in self.forces]
+            found = pushed(self.runs, self.problem, forces, self.at_force, values)
+        else:
+            found = self.runs.tried(signals, values)
         if found is None:
             return None
         return np.concatenate(
             [
                 run.output[one.evaluated] / self.noise_rms
-                for one, run in zip(self.problem.signals, found, strict=True)
+                for one, run in zip(signals, found, strict=True)
             ]
         )
 
