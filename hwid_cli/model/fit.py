@@ -20,6 +20,7 @@ from hwid_cli.model.circle_starts import lasting_poles
 from hwid_cli.model.description import described
 from hwid_cli.model.fit_conditions import check_arguments, reason_not_to_fit
 from hwid_cli.model.initial_candidates import (
+    LinearCandidates,
     block_starts,
     linear_initial_candidates,
     member_models,
@@ -37,7 +38,6 @@ from hwid_cli.model.search import (
     search_beside_nested,
 )
 from hwid_cli.model.simulate import validation_output
-from hwid_cli.model.starts import Start
 from hwid_cli.model.straight_levels import SAID, asks_for_levels, with_straight_maps
 from hwid_cli.model.warm_search import warm_search
 from hwid_cli.records.model import (
@@ -266,20 +266,20 @@ def _searched(
     anew = given.search_anew or not known
     search = _warm_search(problem, options, given.starts, known, anew)
     if search is None:
-        starts_found, linear = linear_initial_candidates(
-            problem, orders, options, sees_input_map=anew
-        )
-        linear_rmsd = rmsd(_yardstick(linear, problem, orders, options), problem)
-        problem = _with_threshold(problem, linear)
-        orders = replace(orders, nk=starts_found[0].delay)
+        begun = linear_initial_candidates(problem, orders, options, sees_input_map=anew)
+        if _is_linear(options):
+            begun = begun.with_circle
+        problem = _with_threshold(problem, begun.linear)
+        orders = replace(orders, nk=begun.starts[0].delay)
         known = nested_candidates(problem, orders, options, given.contained)
-        found = (starts_found, linear, known)
         if anew or _is_linear(options):
-            search = _search(problem, options, found)
+            search = _search(problem, options, begun, known)
             search, problem, hidden = _settled(search, problem, options)
-            search = _again(search, problem, orders, options, found)
+            search = _again(search, problem, orders, options, begun, known)
         else:
-            search = continue_nested(known, problem.experiments, options, linear)
+            search = continue_nested(known, problem.experiments, options, begun)
+        linear = begun.beside(search).linear
+        linear_rmsd = rmsd(_yardstick(linear, problem, orders, options), problem)
     search, problem, others = _settled(search, problem, options)
     return _Searched(search, problem, linear_rmsd, hidden + others)
 
@@ -300,7 +300,8 @@ def _yardstick(
     if not options.keeps_block:
         return linear
     free = replace(options, linear_block=None)
-    return linear_initial_candidates(problem, orders, free, sees_input_map=False)[1]
+    begun = linear_initial_candidates(problem, orders, free, sees_input_map=False)
+    return begun.with_circle.linear
 
 
 def _warm_search(
@@ -344,15 +345,15 @@ def _is_usable(search: Search) -> bool:
 def _search(
     problem: FitProblem,
     options: FitOptions,
-    found: tuple[tuple[Start, ...], Search, list[Candidate]],
+    begun: LinearCandidates,
+    known: Sequence[Candidate],
 ) -> Search:
     """Search from nothing but linear models and models of smaller orders."""
-    starts, linear, known = found
     if _is_linear(options):
-        return linear_from_nested(known, problem.experiments, options, linear)
+        return linear_from_nested(known, problem.experiments, options, begun.linear)
     if known:
-        return search_beside_nested(known, problem.experiments, options, starts, linear)
-    return nonlinear_search(problem.experiments, options, starts, linear)
+        return search_beside_nested(known, problem.experiments, options, begun)
+    return nonlinear_search(problem.experiments, options, begun)
 
 
 def _again(
@@ -360,14 +361,15 @@ def _again(
     problem: FitProblem,
     orders: Orders,
     options: FitOptions,
-    found: tuple[tuple[Start, ...], Search, list[Candidate]],
+    begun: LinearCandidates,
+    known: Sequence[Candidate],
 ) -> Search:
     """The better of a search and a second one that knows which samples are outliers."""
     if options.loss == "squared" or _is_linear(options):
         return first
     first, experiments = settled(first, problem.experiments, options)
     starts = block_starts(winsorised(first, experiments), orders, options)
-    second = _search(problem, options, (starts, *found[1:]))
+    second = _search(problem, options, replace(begun, starts=starts), known)
     second, experiments = settled(second, problem.experiments, options)
     first = rescored(first, experiments)
     return min(first, rescored(second, experiments), key=lambda one: one.cost)

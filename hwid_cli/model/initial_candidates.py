@@ -12,7 +12,8 @@ A fit that goes on from them is never worse, and a grid of orders grows from its
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -69,13 +70,68 @@ def enlarged(model: HammersteinWiener, orders: Orders) -> HammersteinWiener:
 _FALL = 0.25
 
 
+@dataclass(frozen=True, eq=False)
+class LinearCandidates:
+    """Linear blocks that a search begins with, and the linear model that comes of them.
+
+    Parameters
+    ----------
+    starts : tuple of Start
+        At least one.
+    linear : Search
+    experiments : sequence of FitData
+        Scaled to about one.
+    options : FitOptions
+        In the units of the experiments; of the kinds that the starts see.
+    has_circle : bool
+        Whether blocks with poles on the unit circle were looked for already.
+    """
+
+    starts: tuple[Start, ...]
+    linear: Search
+    experiments: Sequence[FitData]
+    options: FitOptions
+    has_circle: bool = False
+
+    @cached_property
+    def with_circle(self) -> "LinearCandidates":
+        """The same with blocks whose poles stand on the unit circle.
+
+        They are added where poles of the linear model hardly settle within the
+        recordings. That costs as much as all other starts, so a search asks for them
+        where it may need them.
+        """
+        options, linear = self.options, self.linear
+        knows_poles = options.keeps_block or options.largest_pole_radius < 1.0
+        if self.has_circle or knows_poles:
+            return self
+        lasting = lasting_poles([linear.candidate.model.denominator], self.experiments)
+        if lasting.size == 0:
+            return self
+        model = linear.candidate.model
+        cut = winsorised(linear, self.experiments)
+        on_circle = circle_starts(cut, model.orders, options, lasting)
+        for one in on_circle:
+            if not one.is_expanded:
+                tried = linear_search(self.experiments, options, [one])
+                linear = min(linear, tried, key=lambda search: search.cost)
+        starts = (*self.starts, *on_circle)
+        return replace(self, starts=starts, linear=linear, has_circle=True)
+
+    def beside(self, best: Search) -> "LinearCandidates":
+        """Those with poles on the circle where a model has poles that hardly settle."""
+        denominator = best.candidate.model.denominator
+        lasts = lasting_poles([denominator], self.experiments).size > 0
+        return self.with_circle if lasts else self
+
+
 def linear_initial_candidates(
     problem: FitProblem,
     orders: Orders,
     options: FitOptions,
     *,
     sees_input_map: bool = True,
-) -> tuple[tuple[Start, ...], Search]:
+) -> LinearCandidates:
     """Linear starts and linear model; found again where outliers were in the way.
 
     Parameters
@@ -85,54 +141,20 @@ def linear_initial_candidates(
     sees_input_map : bool
         Whether there shall be starts that see through an input map too; the linear
         model needs none of them.
-
-    Returns
-    -------
-    starts : tuple of Start
-        At least one.
     """
     experiments: Sequence[FitData] = problem.experiments
     kinds = options if sees_input_map else replace(options, input_map="none")
-    starts, linear = _found_linear(experiments, experiments, orders, options, kinds)
-    if options.loss == "squared":
-        return starts, linear
+    starts = block_starts(experiments, orders, kinds)
+    linear = linear_search(experiments, options, starts)
     asked = 0.0
-    while asked < experiments[0].threshold:
+    while options.loss != "squared" and asked < experiments[0].threshold:
         asked = renewed(experiments, [linear.candidate])[0].threshold
         slowly = max(asked, _FALL * experiments[0].threshold)
         experiments = [replace(one, threshold=slowly) for one in experiments]
-        cut = winsorised(linear, experiments)
-        starts, again = _found_linear(experiments, cut, orders, options, kinds)
+        starts = block_starts(winsorised(linear, experiments), orders, kinds)
+        again = linear_search(experiments, options, starts)
         linear = min(rescored(linear, experiments), again, key=lambda one: one.cost)
-    return starts, linear
-
-
-def _found_linear(
-    experiments: Sequence[FitData],
-    cut: Sequence[FitData],
-    orders: Orders,
-    options: FitOptions,
-    kinds: FitOptions,
-) -> tuple[tuple[Start, ...], Search]:
-    """Linear starts from experiments without outliers, and the linear model of all.
-
-    Where poles hardly settle within the recordings, blocks with poles on the unit circle
-    are starts too.
-    """
-    starts = block_starts(cut, orders, kinds)
-    linear = linear_search(experiments, options, starts)
-    if options.keeps_block or options.largest_pole_radius < 1.0:
-        return starts, linear
-    lasting = lasting_poles([linear.candidate.model.denominator], experiments)
-    if lasting.size == 0:
-        return starts, linear
-    at = replace(orders, nk=linear.candidate.model.delay)
-    on_circle = circle_starts(cut, at, kinds, lasting)
-    for one in on_circle:
-        if not one.is_expanded:
-            tried = linear_search(experiments, options, [one])
-            linear = min(linear, tried, key=lambda search: search.cost)
-    return (*starts, *on_circle), linear
+    return LinearCandidates(starts, linear, experiments, kinds)
 
 
 def block_starts(

@@ -18,7 +18,7 @@ import numpy as np
 
 from hwid_cli.model import static_map
 from hwid_cli.model.candidates import Candidate, FitData
-from hwid_cli.model.initial_candidates import block_starts
+from hwid_cli.model.initial_candidates import LinearCandidates, block_starts
 from hwid_cli.model.levenberg_marquardt import Search
 from hwid_cli.model.phases import converge, finish, place, refine, standing
 from hwid_cli.model.placing import reaching
@@ -55,8 +55,7 @@ _AS_GOOD = 1.01**2
 def nonlinear_search(
     experiments: Sequence[FitData],
     options: FitOptions,
-    starts: Sequence[Start],
-    linear: Search,
+    begun: LinearCandidates,
 ) -> Search:
     """Hammerstein-Wiener model of given orders and kinds of maps.
 
@@ -64,27 +63,50 @@ def nonlinear_search(
     ----------
     experiments : sequence of FitData
         Scaled to about one.
-    linear : Search
-        What `linear_search` found: with maps that pass everything on it is a model of
-        every kind, and the result is never worse.
+    begun : LinearCandidates
+        Its linear model is, with maps that pass everything on, a model of every kind,
+        and the result is never worse.
 
     Returns
     -------
     Search
         Its iterations are those of the winning chain.
     """
-    finalists = screen(experiments, starts, options)
+    finalists = screen(experiments, begun.starts, options)
     experiments = renewed(experiments, [one.candidate for one in finalists])
     best = finish(_best(place(finalists, experiments, options)), experiments, options)
     if not options.keeps_block:
         best = _with_reestimated_block(best, experiments, options)
-    best = _restarted(best, experiments, options, starts)
+    if leaves_structure(best.candidate, experiments):
+        begun, before = begun.with_circle, begun
+    else:
+        begun, before = begun.beside(best), begun
+    best = _from_added_starts(best, experiments, options, (before, begun))
+    best = _restarted(best, experiments, options, begun.starts)
     if not options.keeps_block:
         lasting = reestimate_lasting_block(best, experiments, options)
         best = _finished_where_better(lasting, best, experiments, options)
-    best = _from_break_points(best, experiments, options, starts, linear)
-    best = _not_worse_than(linear, best, experiments, options)
-    return _without_needless_limits(linear, best, experiments, options)
+    best = _from_break_points(best, experiments, options, begun)
+    best = _not_worse_than(begun.linear, best, experiments, options)
+    return _without_needless_limits(begun.linear, best, experiments, options)
+
+
+def _from_added_starts(
+    best: Search,
+    experiments: Sequence[FitData],
+    options: FitOptions,
+    begun: tuple[LinearCandidates, LinearCandidates],
+) -> Search:
+    """The best so far, or what comes of starts that were added since."""
+    before, now = begun
+    added = now.starts[len(before.starts) :]
+    if not added:
+        return best
+    finalists = screen(experiments, added, options)
+    again = finish(_best(place(finalists, experiments, options)), experiments, options)
+    if not options.keeps_block:
+        again = _with_reestimated_block(again, experiments, options)
+    return _best([best, again])
 
 
 def _with_reestimated_block(
@@ -137,8 +159,7 @@ def _from_break_points(
     best: Search,
     experiments: Sequence[FitData],
     options: FitOptions,
-    starts: Sequence[Start],
-    linear: Search,
+    begun: LinearCandidates,
 ) -> Search:
     """The best so far, or what comes of piecewise linear maps where it is not noise.
 
@@ -147,7 +168,7 @@ def _from_break_points(
     bent = with_break_points(options)
     if bent == options or not leaves_structure(best.candidate, experiments):
         return best
-    found = nonlinear_search(experiments, bent, starts, linear)
+    found = nonlinear_search(experiments, bent, begun)
     if found.cost > _WORTH_RESTARTING * best.cost:
         return best
     entered = starts_with_new_maps(found.candidate, experiments, FINE_MAP_POINTS)
@@ -170,7 +191,7 @@ def continue_nested(
     nested: Sequence[Candidate],
     experiments: Sequence[FitData],
     options: FitOptions,
-    linear: Search,
+    begun: LinearCandidates,
 ) -> Search:
     """Continue from the best of the nested models of smaller orders.
 
@@ -187,6 +208,7 @@ def continue_nested(
     experiments = renewed(experiments, nested)
     known = _best([standing(one, experiments) for one in nested])
     near = converge(known, experiments, options, least_gain=_SMALL_GAIN)
+    linear = begun.beside(near).linear
     best = _not_worse_than(linear, _best([known, near]), experiments, options)
     return _without_needless_limits(linear, best, experiments, options, known.cost)
 
@@ -195,8 +217,7 @@ def search_beside_nested(
     nested: Sequence[Candidate],
     experiments: Sequence[FitData],
     options: FitOptions,
-    starts: Sequence[Start],
-    linear: Search,
+    begun: LinearCandidates,
 ) -> Search:
     """The better of a model that goes on from smaller orders and one found anew.
 
@@ -211,9 +232,10 @@ def search_beside_nested(
         Never worse than any of the nested models, nor than the linear one. The search
         anew is a shorter one than `nonlinear_search`.
     """
-    near = continue_nested(nested, experiments, options, linear)
+    near = continue_nested(nested, experiments, options, begun)
+    begun = begun.beside(near)
     experiments = renewed(experiments, nested)
-    leaders = screen(experiments, starts, options, rounds=SHORT)
+    leaders = screen(experiments, begun.starts, options, rounds=SHORT)
     (placed,) = place(leaders, experiments, options)
     anew = finish(placed, experiments, options, least_gain=_SMALL_GAIN)
     best = _best([near, anew])
@@ -221,7 +243,7 @@ def search_beside_nested(
     if len(options.delays) > 1:
         best = _with_reestimated_block(best, experiments, options)
     least = min(standing(one, experiments).cost for one in nested)
-    return _without_needless_limits(linear, best, experiments, options, least)
+    return _without_needless_limits(begun.linear, best, experiments, options, least)
 
 
 def _not_worse_than(

@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from hwid_cli.model import initial_candidates
+from hwid_cli.model.circle_starts import circle_starts
 from hwid_cli.model.fit import fit
 from hwid_cli.model.normalise import integrates, normalise
 from hwid_cli.model.simulate import simulate
@@ -38,6 +40,45 @@ def test_an_integrator_behind_a_dead_zone_is_fitted_to_the_noise():
         found = fit([plant.recording], plant.orders, WITH_MAP)
         # The fit follows some of the noise with its two dozen parameters.
         assert found.rmsd < 1.05 * plant.noise, (seed, plant.kind, found.poles)
+
+
+@pytest.fixture
+def looked_for(monkeypatch):
+    """Poles with which a search asked for starts on the unit circle."""
+    asked = []
+
+    def spied(experiments, orders, options, lasting):
+        asked.append(lasting)
+        return circle_starts(experiments, orders, options, lasting)
+
+    monkeypatch.setattr(initial_candidates, "circle_starts", spied)
+    return asked
+
+
+def limited_plant(denominator, seed=4):
+    """A saturation before a block, which its linear model follows with a slow pole."""
+    rng = np.random.default_rng(seed)
+    u = np.repeat(rng.uniform(-1.0, 2.0, 40), 15)
+    y = lfilter([0.0, 0.1], denominator, np.clip(u, -0.2, 0.4))
+    noise = 0.01 * np.std(y) * rng.standard_normal(y.size)
+    return Recording("r", u, y + noise, 1.0), np.std(noise)
+
+
+def test_a_plant_that_settles_costs_no_starts_on_the_circle(looked_for):
+    recording, noise = limited_plant([1.0, -0.8])
+    orders = Orders(2, 3, 1)
+    fit([recording], orders, LINEAR)
+    assert len(looked_for) == 1, "its linear model has a pole that lasts"
+    found = fit([recording], orders, WITH_MAP)
+    assert len(looked_for) == 1
+    assert found.rmsd < 1.02 * noise
+
+
+def test_an_integrator_behind_a_map_asks_for_starts_on_the_circle_once(looked_for):
+    recording, noise = limited_plant([1.0, -1.0])
+    found = fit([recording], Orders(1, 1, 1), WITH_MAP)
+    assert len(looked_for) == 1
+    assert found.rmsd < 1.02 * noise
 
 
 @pytest.mark.parametrize("poles", [[1.0], [1.0, 1.0], [1.0, 0.5, 0.2]])
