@@ -357,11 +357,13 @@ def _calibrate_lines(proposal: Proposal) -> list[str]:
 
 
 def _fit_lines(proposal: Proposal) -> list[str]:
+    rule, why = proposal.fit_start
     return [
         "# nb numerator coefficients and nk poles, [first, last]; "
         f"{proposal.order_reason}.",
         f"orders: {{nb: {list(proposal.nb)}, nk: {list(proposal.nk)}}}",
-        "fit: {units: 10, initial_state: estimated, join: experiments}",
+        f"# initial_state: {why}.",
+        f"fit: {{units: 10, initial_state: {rule}, join: experiments}}",
     ]
 
 

@@ -21,7 +21,7 @@ from hwid_cli.diagnosis.parameters import (
 from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals
 from hwid_cli.diagnosis.search import within_bounds
 from hwid_cli.diagnosis.whiteness import WHITE_BY_TWO_ROUTES, portmanteau, whiteness
-from hwid_cli.records.diagnosis import NoiseFloor
+from hwid_cli.records.diagnosis import LEAST_SURE, SMALL_REMAINDER, NoiseFloor
 from hwid_cli.records.drive import Drive
 
 # Single repeats are damage where they are between these shares of the samples: more are
@@ -151,6 +151,8 @@ def whiteness_with_input_noise(
         if found is None:
             return float("inf")
         white.append(found)
+    if not _are_alike(white):
+        return float("inf")
     statistic = portmanteau(white, (1.0,), n_lags=30)
     is_same = excess > 0 and _strength(parts, problem, drive, excess) >= (
         (_LESS_NOISE * input_rms) ** 2
@@ -158,6 +160,16 @@ def whiteness_with_input_noise(
     # The same size by two routes is evidence of its own: the innovations of a missing
     # effect are neither of that size nor nearly white.
     return statistic / WHITE_BY_TWO_ROUTES if is_same else statistic
+
+
+def _are_alike(white: Sequence[np.ndarray]) -> bool:
+    """Whether no recording leaves clearly more than all of them together."""
+    usual = np.sqrt(_mean_square(white))
+    return all(
+        np.sqrt(_mean_square([one]))
+        <= (SMALL_REMAINDER + LEAST_SURE * np.sqrt(0.5 / one.size)) * usual
+        for one in white
+    )
 
 
 def _strength(

@@ -19,7 +19,12 @@ from hwid_cli.diagnosis.parameters import BASE, START, is_factor
 from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals
 from hwid_cli.drive.catalogue import CATALOGUE, public_id
 from hwid_cli.records.candidates import CandidateFit
-from hwid_cli.records.diagnosis import SMALL_REMAINDER, STILL_LARGE, NoiseFloor
+from hwid_cli.records.diagnosis import (
+    LEAST_SURE,
+    SMALL_REMAINDER,
+    STILL_LARGE,
+    NoiseFloor,
+)
 from hwid_cli.records.drive import StandIn
 
 # A set of effects must lower the criterion by this much against the smaller one.
@@ -57,8 +62,6 @@ LEAST_SPREAD = 0.01
 LEAST_PIECES = 10
 # Ratio to the noise up to which what remains is of no account.
 CLOSE_TO_NOISE = 1.03
-# Standard deviations of a ratio of few samples that count as chance.
-LEAST_SURE = 3.0
 # Candidates closer than this are not told apart.
 TIE = 6.0
 # Nor are those that leave at most so many times as much beyond the noise, where both
@@ -253,10 +256,12 @@ class SelectionCriteria:
         ----------
         docs/method_diagnosis.md, eq. (D23a).
         """
-        # With effects, noise of the input is no excuse for that much.
+        # With effects, noise of the input is no excuse for that much. What it leaves
+        # wanders by chance, so recordings are compared behind its filter (D27).
         is_fact = not found.effects or self.ratio(found) <= STILL_LARGE
         is_white = found.is_usable and found.whiteness <= 1.0
-        return is_white and is_fact and self.holds(found)
+        is_alike = not found.effects and found.cause == "input_noise"
+        return is_white and is_fact and (is_alike or self.holds(found))
 
     def holds(self, found: CandidateFit) -> bool:
         """Whether a candidate leaves hardly more of held-out recordings than of others."""

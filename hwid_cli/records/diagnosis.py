@@ -19,6 +19,8 @@ STILL_LARGE = 3.0
 # Ratio to the noise up to which a remainder that no effect explains is no missing effect:
 # the logger, a timer, a cable.
 SMALL_REMAINDER = 1.2
+# Standard deviations of a ratio of few samples that count as chance.
+LEAST_SURE = 3.0
 VERDICTS = ("named", "ambiguous", "law", "parameters", "unknown", "none")
 
 

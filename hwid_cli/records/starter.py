@@ -136,6 +136,8 @@ class Proposal:
         Why these.
     average : int, [samples]
         1 for no advice.
+    fit_start : tuple of (str, str)
+        How models take the recordings to start, and why.
     initial_state : str
         How a diagnosis takes the recordings to start.
     sample_time_s : float, [s]
@@ -161,6 +163,7 @@ class Proposal:
     held_out: tuple[str, ...] = ()
     held_out_reason: str = ""
     average: int = 1
+    fit_start: tuple[str, str] = ("estimated", "")
     initial_state: str = "rest"
     notes: tuple[str, ...] = ()
     names: tuple[str, ...] = ()

@@ -16,6 +16,14 @@ from hwid_cli.records.recordings import KINDS, CalibrationLog, RawRecording
 from hwid_cli.records.starter import Proposal
 from hwid_cli.records.units import behind
 from hwid_cli.stages.calibrate import calibrate_all
+from hwid_cli.stages.proposed_starts import (
+    ALIKE_LEVELS,
+    begins_at_rest,
+    rest_level,
+    start_of_diagnosis,
+    start_of_fits,
+    swing_of,
+)
 
 # Words in file names, German and English; the first kind that has one of them is it.
 _KIND_WORDS = {
@@ -52,8 +60,6 @@ _ALIKE_LENGTH = 0.8
 # Least power in the same third octaves, [-]: a multisine of other phases has nearly all,
 # sines of other frequencies have none.
 _ALIKE_SPECTRA = 0.5
-# Levels of rest that differ by less than this share of the output's swing are one, [-].
-_ALIKE_LEVELS = 0.05
 # A recipe that keeps less than this share of a recording has misjudged it, [-].
 _LEAST_KEPT = 0.5
 # Fits that a first run may take without asking, [-].
@@ -122,7 +128,8 @@ def propose(
         notes=tuple(f"{one}: {note}" for one, note in odd_scales(raws).items()),
         problems=tuple(problems),
         average=max(1, memory // _ENOUGH_SAMPLES),
-        initial_state=_initial_state(raws, recipes, is_cut=bool(parts)),
+        fit_start=start_of_fits(raws, recipes, kinds, is_cut=bool(parts)),
+        initial_state=start_of_diagnosis(raws, recipes, is_cut=bool(parts)),
     )
 
 
@@ -234,14 +241,14 @@ def _recipes(
         kind
         for kind, recipe in recipes.items()
         if recipe
-        and all(_begins_at_rest(raw) for raw in raws if kinds[raw.name] == kind)
+        and all(begins_at_rest(raw) for raw in raws if kinds[raw.name] == kind)
     ]
     if some:
         reason = f"tried: {' and '.join(some)} recordings begin with a rest"
         if recipes.get("random") == ():
             reason += "; random ones are left whole: a cut may begin in mid-motion"
         return recipes, reason + level
-    if all(_begins_at_rest(raw) for raw in raws):
+    if all(begins_at_rest(raw) for raw in raws):
         return recipes, "nothing is cut: the rest before may be a level of the input"
     return recipes, "no rest is cut: not all recordings begin with one"
 
@@ -265,10 +272,10 @@ def _with_common_level(
     own = [raw for raw in raws if "output_offset" in recipes[kinds[raw.name]]]
     if not own or len(own) == len(raws):
         return recipes, ""
-    swing = float(np.median([np.nanmax(r.output) - np.nanmin(r.output) for r in raws]))
-    levels = np.array([_rest_level(raw) for raw in own])
-    is_common = np.ptp(levels) <= _ALIKE_LEVELS * swing
-    if not is_common or abs(np.mean(levels)) <= _ALIKE_LEVELS * swing:
+    swing = swing_of([raw.output for raw in raws])
+    levels = np.array([rest_level(raw) for raw in own])
+    is_common = np.ptp(levels) <= ALIKE_LEVELS * swing
+    if not is_common or abs(np.mean(levels)) <= ALIKE_LEVELS * swing:
         return recipes, ""
     kept = {
         kind: tuple(step for step in recipe if step != "output_offset")
@@ -276,12 +283,6 @@ def _with_common_level(
     }
     level = f"{np.mean(levels):.3g}{behind(raws[0].output_unit)}"
     return kept, f"; the level at which the output rests, {level}, stays in all of them"
-
-
-def _rest_level(raw: RawRecording) -> float:
-    """Mean of the output before the input moves."""
-    onset = find_onset(raw.input[np.isfinite(raw.input)], quiet_is_rest=True)
-    return float(np.nanmean(raw.output[:onset]))
 
 
 def _works(recipe: tuple[str, ...], kind: str, raws: Sequence[RawRecording]) -> bool:
@@ -300,7 +301,7 @@ def _works(recipe: tuple[str, ...], kind: str, raws: Sequence[RawRecording]) -> 
     is_random = kind == "random"
     onsets = [find_onset(raw.input, quiet_is_rest=not is_random) for raw in raws]
     is_seen = all((onset or 0) >= LEAST_QUIET for onset in onsets)
-    rests = is_seen and all(_begins_at_rest(raw) for raw in raws)
+    rests = is_seen and all(begins_at_rest(raw) for raw in raws)
     if not all(_begins_where_it_rests(*one) for one in zip(raws, logs, strict=True)):
         return False
     return is_long and (rests or (differ and "output_offset" not in recipe))
@@ -315,39 +316,12 @@ def _begins_where_it_rests(raw: RawRecording, log: CalibrationLog) -> bool:
     start, end = raw.output[:LEAST_QUIET], raw.output[first - LEAST_QUIET : first]
     swing = float(np.nanmax(raw.output) - np.nanmin(raw.output))
     moved = float(np.nanmean(end) - np.nanmean(start))
-    return abs(moved) <= _ALIKE_LEVELS * swing
+    return abs(moved) <= ALIKE_LEVELS * swing
 
 
 def _of_kind(raw: RawRecording, kind: str) -> RawRecording:
     about = {name: getattr(raw, name) for name in RawRecording.__dataclass_fields__}
     return RawRecording(**{**about, "kind": kind})
-
-
-def _initial_state(
-    raws: Sequence[RawRecording],
-    recipes: dict[str, tuple[str, ...]],
-    *,
-    is_cut: bool,
-) -> str:
-    """How a diagnosis must take the recordings to start, rests cut as proposed."""
-    if is_cut or not all(_begins_at_rest(raw) for raw in raws):
-        return "estimated"
-    # This leaves a random signal no rest, and may begin it in mid-motion.
-    if recipes.get("random") == ("cut",):
-        return "estimated"
-    # 'cut' keeps no rest before a sine: the drive is still where it was before.
-    if "cut" in recipes.get("sine", ()):
-        return "held"
-    return "rest"
-
-
-def _begins_at_rest(raw: RawRecording) -> bool:
-    """Whether input and output stand still at first: a drive may move before its input."""
-    onsets = [
-        find_onset(signal[np.isfinite(signal)], quiet_is_rest=True)
-        for signal in (raw.input, raw.output)
-    ]
-    return all(onset is None or onset >= LEAST_QUIET for onset in onsets)
 
 
 def _held_out(

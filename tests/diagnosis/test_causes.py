@@ -195,6 +195,13 @@ def test_an_input_that_shows_more_noise_has_to_leave_white_noise_by_itself(of):
     assert louder == pytest.approx(6 * alike)
 
 
+def test_one_recording_with_more_than_its_input_can_shake_is_something(of):
+    parts = moved_by_input_noise(1)
+    louder = [*parts[:-1], 1.5 * parts[-1]]
+    assert whiteness_with_input_noise(parts, of, of.drive, floor()) < 1.0
+    assert whiteness_with_input_noise(louder, of, of.drive, floor()) == np.inf
+
+
 def test_under_a_controller_the_input_is_not_the_cause(of):
     held = replace(of, drive=replace(of.drive, controller=Controller(20.0, 30.0)))
     parts = moved_by_input_noise(1)

@@ -283,6 +283,16 @@ def test_complete_holds_on_recordings_that_were_held_out(sse, holds):
     assert CRITERIA.is_complete(found) == holds
 
 
+def test_noise_of_the_input_wanders_more_in_one_recording_than_in_others():
+    sse = [100, 100, 100, 100, 100, 900]
+    left = replace(base(sse), whiteness=0.5)
+    assert not CRITERIA.is_complete(left)
+    assert CRITERIA.is_complete(replace(left, cause="input_noise"))
+    # Beside an effect it is no excuse.
+    beside = replace(made_up(GOOD, sse, whiteness=0.5), cause="input_noise")
+    assert not CRITERIA.is_complete(beside)
+
+
 def test_few_samples_that_go_together_say_less_about_completeness():
     sse = [100, 100, 100, 180, 180, 180]
     found = made_up(GOOD, sse, whiteness=0.5, neighbour=0.9)

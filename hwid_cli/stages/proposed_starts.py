@@ -1,0 +1,116 @@
+"""``init``: how recordings start, for fits of models and for a diagnosis."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from hwid_cli.data.signal_features import LEAST_QUIET, find_onset
+from hwid_cli.records.recordings import RawRecording
+
+# Levels of rest that differ by less than this share of a signal's swing are one, [-].
+ALIKE_LEVELS = 0.05
+_RESTS = (
+    "all recordings begin with a rest, so 'steady': nothing is fitted to their starts"
+)
+_MOVES = "not all recordings begin with a rest, so their starts are fitted"
+_ANYWHERE = "the drive rests anywhere under one input, so starts are fitted"
+
+
+def begins_at_rest(raw: RawRecording) -> bool:
+    """Whether input and output stand still at first: a drive may move before its input."""
+    onsets = [
+        find_onset(signal[np.isfinite(signal)], quiet_is_rest=True)
+        for signal in (raw.input, raw.output)
+    ]
+    return all(onset is None or onset >= LEAST_QUIET for onset in onsets)
+
+
+def rest_level(raw: RawRecording) -> float:
+    """Mean of the output before the input moves, [output unit]."""
+    return _rest_levels(raw)[1]
+
+
+def swing_of(signals: Sequence[np.ndarray]) -> float:
+    """Median range of signals."""
+    return float(np.median([np.nanmax(one) - np.nanmin(one) for one in signals]))
+
+
+def start_of_fits(
+    raws: Sequence[RawRecording],
+    recipes: Mapping[str, tuple[str, ...]],
+    kinds: Mapping[str, str],
+    *,
+    is_cut: bool,
+) -> tuple[str, str]:
+    """How models take the recordings to start, and why.
+
+    A start that is fitted to each recording lets a block with slow poles follow what it
+    does not explain; a prediction has no such start. So it is left to recordings that
+    need it.
+
+    Parameters
+    ----------
+    recipes : mapping of str to tuple of str
+        Steps of calibration of each kind.
+    kinds : mapping of str to str
+        By names of recordings.
+    is_cut : bool
+        Whether parts of one recording are used.
+
+    Returns
+    -------
+    rule, reason : str
+        ``steady`` or ``estimated``.
+    """
+    if is_cut or not _keep_their_rests(raws, recipes):
+        return "estimated", _MOVES
+    if not _rest_where_the_input_says(raws, recipes, kinds):
+        return "estimated", _ANYWHERE
+    return "steady", _RESTS
+
+
+def start_of_diagnosis(
+    raws: Sequence[RawRecording],
+    recipes: Mapping[str, tuple[str, ...]],
+    *,
+    is_cut: bool,
+) -> str:
+    """How a diagnosis must take the recordings to start, rests cut as proposed."""
+    if is_cut or not _keep_their_rests(raws, recipes):
+        return "estimated"
+    # 'cut' keeps no rest before a sine: the drive is still where it was before.
+    if "cut" in recipes.get("sine", ()):
+        return "held"
+    return "rest"
+
+
+def _keep_their_rests(
+    raws: Sequence[RawRecording], recipes: Mapping[str, tuple[str, ...]]
+) -> bool:
+    """Whether no recording may begin in mid-motion after its recipe."""
+    # This leaves a random signal no rest.
+    return recipes.get("random") != ("cut",) and all(map(begins_at_rest, raws))
+
+
+def _rest_where_the_input_says(
+    raws: Sequence[RawRecording],
+    recipes: Mapping[str, tuple[str, ...]],
+    kinds: Mapping[str, str],
+) -> bool:
+    """Whether equal levels of the input go with equal levels of the output."""
+    levels = np.array([_rest_levels(raw) for raw in raws])
+    for row, raw in zip(levels, raws, strict=True):
+        if "output_offset" in recipes.get(kinds[raw.name], ()):
+            row[1] = 0.0
+    inputs, outputs = levels.T
+    alike = ALIKE_LEVELS * swing_of([raw.input for raw in raws])
+    same = np.abs(inputs[:, None] - inputs) <= alike
+    apart = np.abs(outputs[:, None] - outputs)
+    limit = ALIKE_LEVELS * swing_of([raw.output for raw in raws])
+    return not bool((same & (apart > limit)).any())
+
+
+def _rest_levels(raw: RawRecording) -> tuple[float, float]:
+    """Means of input and output before the input moves."""
+    onset = find_onset(raw.input[np.isfinite(raw.input)], quiet_is_rest=True)
+    return float(np.nanmean(raw.input[:onset])), float(np.nanmean(raw.output[:onset]))

@@ -1,0 +1,66 @@
+"""How models take recordings to start, as ``init`` proposes it."""
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from hwid_cli.records.recordings import RawRecording
+from hwid_cli.stages.proposal import propose
+
+REST, N = 100, 900
+
+
+def settled(name, height, *, before=0.0, offset=0.0, seed=0):
+    """A step of a plant that has settled under the level before it."""
+    rng = np.random.default_rng(seed)
+    u = np.where(np.arange(N) < REST, before, height)
+    x = 2.0 * before + lfilter([0.0, 0.1], [1.0, -0.95], u - before)
+    y = x + offset + 0.002 * rng.standard_normal(N)
+    return RawRecording(name, u + 0.002 * rng.standard_normal(N), y, 1e-3)
+
+
+def start(*raws):
+    return propose(raws).fit_start
+
+
+@pytest.mark.parametrize("offset", [0.0, 20.0])
+def test_where_all_begin_with_a_rest_nothing_is_fitted_to_starts(offset):
+    rule, why = start(
+        settled("step_1", 1.0, offset=offset), settled("step_2", -2.0, offset=offset)
+    )
+    assert rule == "steady"
+    assert why.startswith("all recordings begin with a rest")
+
+
+def random_ones(*raws):
+    """Recordings of a kind that keeps its level."""
+    return [
+        RawRecording(f"prbs_{one.name}", one.input, one.output, 1e-3) for one in raws
+    ]
+
+
+def test_rests_under_other_inputs_are_equilibria_too():
+    raws = random_ones(settled("a", 1.0), settled("b", 2.0, before=1.0))
+    assert start(*raws)[0] == "steady"
+
+
+def test_a_drive_that_rests_anywhere_has_fitted_starts():
+    rule, why = start(*random_ones(settled("a", 1.0), settled("b", 2.0, offset=0.8)))
+    assert rule == "estimated"
+    assert why.startswith("the drive rests anywhere")
+
+
+def test_a_recording_that_begins_in_motion_has_a_fitted_start():
+    moving = settled("b", 2.0)
+    moving = RawRecording("b", moving.input[REST:], moving.output[REST:], 1e-3)
+    rule, why = start(settled("a", 1.0), moving)
+    assert rule == "estimated"
+    assert why.startswith("not all recordings begin with a rest")
+
+
+def test_parts_of_one_recording_begin_in_mid_motion():
+    u = np.r_[
+        np.zeros(REST), np.repeat(np.random.default_rng(1).uniform(-1, 1, 60), 50)
+    ]
+    only = RawRecording("a", u, lfilter([0.0, 0.1], [1.0, -0.95], u), 1e-3)
+    assert start(only)[0] == "estimated"
