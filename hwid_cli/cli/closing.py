@@ -11,6 +11,7 @@ from hwid_cli.records.experiment import CrossvalOptions
 from hwid_cli.records.report import StoredResults
 from hwid_cli.report.closing import (
     LINEAR_KEYS,
+    UNDECIDED_MAPS,
     best_model_sentences,
     closing_text,
     diagnosis_sentence,
@@ -126,8 +127,10 @@ def _better_maps(session: Session, name: str) -> list[tuple[str, str]]:
     """What to set where a linear model is better than the maps of the configuration."""
     source = str(session.experiment.source)
     maps = getattr(session.results.get("order"), "maps", None)
-    if maps is None or maps.chosen == maps.given:
+    if maps is None:
         return [("hint", keys_hint(LINEAR_KEYS, source))]
+    if maps.chosen == maps.given:
+        return [("hint", UNDECIDED_MAPS)]
     # The orders' row of a run says it already.
     return [] if name == _RUN else [("hint", keys_hint(fit_keys(maps.chosen), source))]
 

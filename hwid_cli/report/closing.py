@@ -17,6 +17,8 @@ from hwid_cli.report.orders import axes_to_widen, delay_keys, delays_to_try
 # Room for the words on the left, [characters].
 _LABELS = 12
 _FEW = 3
+# Share of the RMSD of the maps below which a linear model is better, not as good.
+_CLEARLY = 0.9
 # Keys of the configuration that ask for linear models.
 LINEAR_KEYS = "input_map: none, output_map: none"
 # Rows that people copy: a line break would spoil them.
@@ -140,11 +142,17 @@ def _percent(value: float) -> str:
     return f"{value:.1f}\N{NO-BREAK SPACE}%"
 
 
+def linear_is(linear_rmsd: float, own_rmsd: float) -> str:
+    """How a linear model that wins stands to the maps: a few percent say little."""
+    return "better" if linear_rmsd < _CLEARLY * own_rmsd else "as good"
+
+
 def _linear_sentences(best: BestModel, mean: str, on: str) -> list[str]:
     """Say that maps make a model worse where its fit has not seen the recordings."""
     linear, own = (with_unit(rmsd, best.unit) for rmsd in (best.linear_rmsd, best.rmsd))
+    how = linear_is(best.linear_rmsd, best.rmsd)
     return [
-        f"a linear model is better, {best.linear_name}: {mean} {linear} on {on}",
+        f"a linear model is {how}, {best.linear_name}: {mean} {linear} on {on}",
         *_beside_threshold(best.linear_rmsd, best),
         f"{best.name}: {own}; these maps are not worth it here",
     ]
@@ -193,6 +201,14 @@ def recordings_sentence(found: NextRecordings, folder: Path) -> str:
     first, *others = found.proposals
     more = f" and {len(others)} more" if others else ""
     return f"{first.name}{more}; files to play: {folder} (hwid next says why)"
+
+
+# Where two kinds of evidence disagree on maps: parts of the recordings of the fits, and
+# recordings that they have not seen.
+UNDECIDED_MAPS = (
+    "'hwid order' prefers these maps, the recordings that judge a linear model: let more "
+    "recordings judge (test.recordings)"
+)
 
 
 def keys_hint(keys: str, source: str) -> str:

@@ -10,6 +10,7 @@ from hwid_cli.records.answer import ChosenMaps
 from hwid_cli.records.axis import MotionUnits
 from hwid_cli.records.diagnosis import BaseParameter, FittedParameter, Gap
 from hwid_cli.records.report import ReportContents, StageRun, StoredResults
+from hwid_cli.report.closing import UNDECIDED_MAPS
 from hwid_cli.report.html import report_page
 from hwid_cli.report.sections.diagnosis_answer import (
     diagnosis_answer,
@@ -245,6 +246,21 @@ def test_a_better_linear_model_is_the_answer(contents):
     (only,) = exports
     assert only == found.next_steps[0][1]
     assert "--model linear:step_02/1/1 " in only
+
+
+def test_a_linear_model_that_wins_by_little_is_as_good(contents):
+    wins = {"rmsd": np.array([1.02e-3]), "linear_rmsd": np.array([9.49e-4])}
+    said = plain(answered(contents, threshold=0.01, **wins).verdict)
+    assert said.startswith("A linear model is as good: RMSD 0.000949 m")
+
+
+def test_where_the_evidence_on_maps_disagrees_more_recordings_are_asked(contents):
+    maps = ChosenMaps(1, 1, "piecewise_linear", "none", 5)
+    wins = {"rmsd": np.array([1.36e-3]), "linear_rmsd": np.array([9.49e-4])}
+    found = answered(contents, maps=maps, has_these_maps=True, **wins)
+    assert found.next_steps[1] == (f"{UNDECIDED_MAPS}, then", "hwid run CONFIG")
+    other = answered(contents, maps=maps, has_these_maps=False, **wins)
+    assert other.next_steps[1][0].startswith("To try other maps put input_map: piece")
 
 
 def test_a_name_with_blanks_is_one_word_of_a_command(contents):

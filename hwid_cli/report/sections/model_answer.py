@@ -15,7 +15,7 @@ from hwid_cli.report.charts import (
     thinned_places,
     thinning,
 )
-from hwid_cli.report.closing import LINEAR_KEYS
+from hwid_cli.report.closing import LINEAR_KEYS, UNDECIDED_MAPS, linear_is
 from hwid_cli.report.dots import Dot, DotGroup, DotRow, Dots
 from hwid_cli.report.formats import counted, listed, with_unit
 from hwid_cli.report.map_words import fit_keys, map_words
@@ -80,8 +80,9 @@ def _verdict(found: ModelAnswer) -> str:
         mean = "mean RMSD" if len(found.recordings) > 1 else "RMSD"
         linear = with_unit(found.linear_mean_rmsd, found.unit)
         own = with_unit(found.mean_rmsd, found.unit)
+        how = linear_is(found.linear_mean_rmsd, found.mean_rmsd)
         return (
-            f"A linear model is better: {mean} {linear}, with the maps of "
+            f"A linear model is {how}: {mean} {linear}, with the maps of "
             f"the configuration {own}, on {where} {unused}. Those are not worth it here."
         )
     sentence = (
@@ -97,11 +98,13 @@ def _verdict(found: ModelAnswer) -> str:
     return f"{sentence}."
 
 
-def _better_keys(found: ModelAnswer) -> str:
-    """Keys of the configuration where a linear model is better than the maps that it has."""
-    if found.maps is not None and found.maps.has_maps and not found.has_these_maps:
-        return fit_keys(found.maps)
-    return LINEAR_KEYS
+def _other_maps(found: ModelAnswer) -> str:
+    """What to try where a linear model is better than the maps of the configuration."""
+    if found.maps is None or not found.maps.has_maps:
+        return f"For linear models put {LINEAR_KEYS} into fit, then"
+    if found.has_these_maps:
+        return f"{UNDECIDED_MAPS}, then"
+    return f"To try other maps put {fit_keys(found.maps)} into fit, then"
 
 
 def _nothing_to_take(found: ModelAnswer, on: str) -> str:
@@ -250,11 +253,9 @@ def _next(found: ModelAnswer, contents: ReportContents) -> tuple[tuple[str, str]
         )
     elif found.is_linear_better:
         linear = f"hwid export CONFIG --model {quote(found.linear_name)} --format json"
-        keys = _better_keys(found)
-        why = "For linear models" if keys == LINEAR_KEYS else "To try other maps"
         steps[:0] = [
             ("Take the linear model elsewhere:", linear),
-            (f"{why} put {keys} into fit, then", "hwid run CONFIG"),
+            (_other_maps(found), "hwid run CONFIG"),
         ]
     else:
         steps.append(
