@@ -33,6 +33,8 @@ UNDECIDED = ("ambiguous", "unknown")
 # Samples of a proposed recording.
 _MOST_SAMPLES = 6000
 _PERIODS = 12
+# So much farther from its start than in the recordings may a proposed motion go, [-].
+_BEYOND_TRAVEL = 1.25
 # Share of the sample rate up to which the recordings show a frequency well, [-].
 HIGHEST_SHARE = 0.1
 
@@ -68,6 +70,13 @@ def propose(
         )
     models = [FittedCandidate(*rebuilt(problem, one, scales)) for one in pair]
     best = best_separation(problem, models[0], models[1], scales)
+    if not best.input:
+        return NextExperiment(
+            "",
+            "every input of the menu goes farther than these recordings; one that "
+            "moves the drive forth and back may tell "
+            f"{title_of(pair[0])} and {title_of(pair[1])} apart",
+        )
     # The dash of a dimensionless output would be a minus behind a number.
     by = f"{best.rms:.2g}{behind(problem.unit)}"
     names = f"{title_of(pair[0])} and {title_of(pair[1])}"
@@ -222,13 +231,30 @@ def best_separation(
     Parameters
     ----------
     problem : DiagnosisProblem
-        For the drive.
+        Its recordings say how far the drive may move.
+
+    Returns
+    -------
+    Separation
+        With an empty input where all of them leave that travel.
     """
-    found = [
-        Separation(name, separation(problem, favourite, rival, command), command.size)
-        for name, command in menu(scales, problem.drive.source_unit).items()
-    ]
-    return max(found, key=lambda item: item.rms)
+    found = [Separation("", 0.0, 1)]
+    for name, command in menu(scales, problem.drive.source_unit).items():
+        asked, motion = played(problem, favourite, command)
+        if _stays(motion.position, problem):
+            found.append(Separation(name, _left_over(asked, rival), command.size))
+    return max(found, key=lambda item: (item.rms, bool(item.input)))
+
+
+def _stays(position: np.ndarray, problem: DiagnosisProblem) -> bool:
+    """Whether a motion goes hardly farther from its start than those recorded.
+
+    On a free axis a step that is held, or a sine around a level, runs away.
+    """
+    ways = [one.position - one.position[0] for one in problem.signals]
+    farthest = max(float(np.nanmax(np.abs(one))) for one in ways)
+    # A motion without numbers is told by what it leaves.
+    return not bool(np.any(np.abs(position - position[0]) > _BEYOND_TRAVEL * farthest))
 
 
 def separation(

@@ -5,6 +5,7 @@ import re
 import numpy as np
 import pytest
 
+from hwid_cli.diagnosis import next_experiment
 from hwid_cli.diagnosis.candidate import rebuilt
 from hwid_cli.diagnosis.next_experiment import (
     FittedCandidate,
@@ -12,6 +13,7 @@ from hwid_cli.diagnosis.next_experiment import (
     best_separation,
     least_separation,
     menu,
+    played,
     propose,
     with_best_lead,
 )
@@ -87,6 +89,39 @@ def test_what_the_rival_can_absorb_does_not_count(rivals):
     found = best_separation(of, coulomb, other, scales)
     unabsorbed = 1e-3 * 0.8 / DRIVE.stiffness_N_per_m
     assert found.rms < 0.05 * unabsorbed
+
+
+def candidate(of, effect, start):
+    """An effect beside the given base, not fitted."""
+    layout = parameter_layout(of, (effect,), {effect: start}, sizes(of))
+    return FittedCandidate(layout, first_point(of, layout, of.drive, {effect: start}))
+
+
+def test_on_a_free_axis_no_motion_is_proposed_that_runs_away(rivals):
+    with_spring, _, scales, _ = rivals
+    of = replace(with_spring, drive=replace(with_spring.drive, stiffness_N_per_m=0.0))
+    coulomb = candidate(of, "coulomb_friction", {"force_N": 0.8})
+    backlash = candidate(of, "output_backlash", {"half_gap_m": 2e-4})
+    farthest = max(np.abs(one.position).max() for one in of.signals)
+    inputs = menu(scales, "A")
+    going = {
+        name: np.abs(played(of, coulomb, one)[1].position).max() / farthest
+        for name, one in inputs.items()
+    }
+    assert max(going.values()) > 3.0
+    assert min(going.values()) < 1.0
+    found = best_separation(of, coulomb, backlash, scales)
+    assert going[found.input] < 1.3
+
+
+def test_where_every_input_goes_too_far_that_is_said(rivals, monkeypatch):
+    of, _, scales, fits = rivals
+    monkeypatch.setattr(next_experiment, "_BEYOND_TRAVEL", 1e-6)
+    criteria = SelectionCriteria.of(of, white())
+    verdict = DiagnosisVerdict("ambiguous", True, fits[0], (fits[1],))
+    found = propose(of, criteria, scales, verdict, fits)
+    assert found.input == ""
+    assert found.reason.startswith("every input of the menu goes farther")
 
 
 def test_a_rival_that_runs_away_separates_nothing(rivals):
