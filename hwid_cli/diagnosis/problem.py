@@ -295,10 +295,11 @@ def prepare(
     """
     signals = tuple(_signals(one, simulation, options, held_out) for one in recordings)
     train = [one for one in signals if not one.is_held_out] or list(signals)
+    drive = drive_of(simulation, train, recordings[0].input_unit)
     return DiagnosisProblem(
         signals,
-        drive_of(simulation, train, recordings[0].input_unit),
-        options.initial_state,
+        drive,
+        _start_of(drive, options.initial_state),
         recordings[0].input_unit
         if simulation.controller is not None
         else recordings[0].output_unit,
@@ -306,6 +307,16 @@ def prepare(
         {name_inside(name): share for name, share in simulation.known.items()},
         may_be_held=simulation.hold == UNSAID_HOLD and simulation.controller is None,
     )
+
+
+def _start_of(drive: Drive, initial_state: str) -> str:
+    """How recordings start; without a spring nothing pulls a drive that is held.
+
+    Its zero would say nothing but where along the way forces repeat, which recordings of
+    one sensor have in common.
+    """
+    is_free = drive.stiffness_N_per_m == 0 and drive.controller is None
+    return "rest" if is_free and initial_state == "held" else initial_state
 
 
 def drive_of(

@@ -310,3 +310,22 @@ def test_both_sides_always_have_a_recording(n):
         for k, (size, frequency) in enumerate(rng.uniform(1, 20, (n, 2)))
     ]
     assert 1 <= len(held_out_names(given)) < n
+
+
+@pytest.mark.parametrize(
+    ("simulation", "start"),
+    [
+        (SimulationOptions(), "held"),
+        (SimulationOptions(stiffness_N_per_m=0.0), "rest"),
+        (
+            SimulationOptions(stiffness_N_per_m=0.0, controller=Controller(20.0, 30.0)),
+            "held",
+        ),
+    ],
+)
+def test_without_a_spring_nothing_pulls_a_drive_that_is_held(simulation, start):
+    referred = [
+        replace(one, reference=np.zeros(one.n_samples)) for one in (TRAIN, HELD)
+    ]
+    options = DiagnoseOptions(initial_state="held")
+    assert prepare(referred, simulation, options, ["b"]).start == start
