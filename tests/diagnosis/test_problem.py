@@ -315,7 +315,7 @@ def test_both_sides_always_have_a_recording(n):
 @pytest.mark.parametrize(
     ("simulation", "start"),
     [
-        (SimulationOptions(), "held"),
+        (SimulationOptions(stiffness_N_per_m=100.0), "held"),
         (SimulationOptions(stiffness_N_per_m=0.0), "rest"),
         (
             SimulationOptions(stiffness_N_per_m=0.0, controller=Controller(20.0, 30.0)),
