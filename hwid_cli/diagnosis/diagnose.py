@@ -438,6 +438,7 @@ def allowed_effects(
         # A second one waits for the first.
         and may_be_added(name, {*present, effect.beside})
         and (has_spring or not effect.needs_spring)
+        and not (has_spring and effect.needs_free_axis)
         and (has_circuit or not effect.needs_circuit)
         and (several or not any(one.is_own for one in effect.parameters))
         and not (problem.compares_command and effect.enters == "output")

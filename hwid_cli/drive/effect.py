@@ -358,6 +358,8 @@ class Effect:
         Effects that it includes as limit cases.
     needs_spring : bool
         Whether it means nothing on a free axis.
+    needs_free_axis : bool
+        Whether a spring has an entry of its own for it.
     needs_circuit : bool
         Whether it means nothing where the input is the current.
     seen : callable or None
@@ -401,6 +403,7 @@ class Effect:
     confused_with: Mapping[str, str] = field(default_factory=dict)
     contains: tuple[str, ...] = ()
     needs_spring: bool = False
+    needs_free_axis: bool = False
     needs_circuit: bool = False
     seen: Callable[[Scales], tuple[dict[str, float], ...]] | None = None
     stated: tuple[Stated, ...] = ()

@@ -36,6 +36,7 @@ that is switched off is 0, except where the comment says infinite.
     COGGING_FORCE,
     COGGING_PERIOD,
     COGGING_PHASE,
+    COGGING_ABOUT_MEAN,  # 1 where its mean along the way is zero
     COGGING_ORIGIN,  # set by the simulation: where the drive rests without current
     COGGING_REST,  # set by the simulation: sine of the phase
     LOAD,
@@ -139,4 +140,4 @@ that is switched off is 0, except where the comment says infinite.
     BRISTLE_EXCESS,
     SENSOR_LAG_DAMPING_RATIO,
     N_SLOTS,
-) = range(131)
+) = range(132)

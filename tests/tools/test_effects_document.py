@@ -53,7 +53,9 @@ def test_the_table_of_the_configuration_names_every_key():
     text = readme(README.read_text())
     rows = [line for line in text.splitlines() if line.startswith("| `cogging` |")]
     assert len(rows) == 1
-    assert rows[0].endswith("| `amplitude_N`, `period_m` (`phase_rad`) |")
+    assert rows[0].endswith(
+        "| `amplitude_N`, `period_m` (`phase_rad`, `zero_at` (`mean`)) |"
+    )
     assert r"F = -d v \|v\| |" in text
 
 

@@ -11,6 +11,7 @@ from hwid_cli.drive.effect import (
     Effect,
     Parameter,
     Scales,
+    Stated,
     Values,
     bend,
     shares_of,
@@ -279,6 +280,23 @@ COGGING = Effect(
     seen=_waves,
 )
 
+# Where a spring holds the drive, the mean only moves the place at which it rests; a free
+# axis that friction or a controller holds may rest anywhere between two teeth.
+COGGING_ABOUT_MEAN = replace(
+    COGGING,
+    id="cogging:about_mean",
+    equation="F = A sin(2 pi x / l + q)",
+    derived={"COGGING_ABOUT_MEAN": lambda values: 1.0},
+    stated=(
+        Stated("amplitude_N"),
+        Stated("period_m", (POSITIVE,)),
+        Stated("phase_rad", is_needed=False),
+        Stated("zero_at", words=("mean",), is_needed=False),
+    ),
+    words={"zero_at": "mean"},
+    needs_free_axis=True,
+)
+
 COGGING_SECOND = replace(
     COGGING,
     id="cogging:second",
@@ -376,6 +394,7 @@ EFFECTS = (
     ONE_SIDED_SECOND_CONTACT,
     SPRING_GAP,
     COGGING,
+    COGGING_ABOUT_MEAN,
     COGGING_SECOND,
     GRAVITY,
     LOAD,

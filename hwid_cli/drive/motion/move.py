@@ -228,7 +228,8 @@ def _start(
         current /= p[slots.RESISTANCE]
         current += p[slots.START_CURRENT] if has_winding else 0.0
         state[CIRCUIT] = current
-    p[slots.COGGING_REST] = np.sin(p[slots.COGGING_PHASE])
+    if p[slots.COGGING_ABOUT_MEAN] == 0.0:
+        p[slots.COGGING_REST] = np.sin(p[slots.COGGING_PHASE])
     if p[slots.STIFFNESS] > 0.0:
         p[slots.COGGING_ORIGIN] = resting_point(0.0, False, p)
     if p[slots.IS_START_GIVEN] > 0.0:
