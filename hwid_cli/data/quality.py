@@ -46,7 +46,8 @@ def quality_notes(values: np.ndarray, *, may_hold: bool = False) -> tuple[str, .
     holds = held_share(values) >= _HOLDS
     if not holds or _comes_back_from_limits(values, inside):
         for word, limit in (("largest", values.max()), ("smallest", values.min())):
-            at_limit = values == limit
+            # A rest before the motion is no limit of the sensor.
+            at_limit = (values == limit) & (np.cumsum(values != values[0]) > 0)
             if longest_run(at_limit) >= _LIMIT_RUN:
                 share = 100.0 * float(np.mean(at_limit))
                 notes.append(

@@ -125,7 +125,7 @@ def _verdict_in_words(
     if verdict.word == "unknown":
         return (
             f"The simulation differs from the recordings by {before:.3g} times their "
-            "noise, and no effect of the catalogue explains most of it."
+            "noise, and no effect of the catalogue explains it well enough to be named."
             f"{_where_it_sits(problem, criteria, verdict.chosen)}"
         )
     names = _names(effects)
@@ -253,7 +253,7 @@ def untold_command(problem: DiagnosisProblem, is_untold: bool) -> tuple[str, ...
     return (
         f"Between samples the command {taken} here; that it {other} does as well, with "
         "other values. The intervals hold both: set simulation.hold to zero (held, as "
-        "controllers and D/A converters do it) or linear, and run again.",
+        "controllers and D/A converters do it) or linear, and run again",
     )
 
 

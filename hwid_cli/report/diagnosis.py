@@ -501,7 +501,8 @@ def verdict_sentence(diagnosis: Diagnosis) -> str:
                 if leaves_little(diagnosis)
                 else "a part stays unexplained"
             )
-        line += f", {names} ({rest})"
+        named = "" if names == diagnosis.verdict else f", {names}"
+        line += f"{named} ({rest})"
     return line
 
 
@@ -511,7 +512,8 @@ def effect_sentences(diagnosis: Diagnosis) -> list[str]:
     for effect in diagnosis.effects:
         if effect.sentence not in diagnosis.summary:
             found.append(f"{effect.id}: {effect.sentence}")
-        found.append(f"Law of {effect.id}: {effect.equation}")
+        whose = "" if effect.id == diagnosis.verdict else f" of {effect.id}"
+        found.append(f"Law{whose}: {effect.equation}")
     return found
 
 

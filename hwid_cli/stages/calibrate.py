@@ -276,14 +276,15 @@ def _changed(given: Measured, result: Calibrated) -> str:
         return "left as they are (no calibrate: section)"
     kinds = {recording.kind for recording in result.recordings}
     bare = sorted(kind for kind in kinds if not getattr(options, kind))
-    left = f"calibrate: has no recipe for {' and '.join(bare)}"
+    none = f"calibrate: has no recipe for {' and '.join(bare)}"
     if len(bare) == len(kinds):
-        return f"left as they are, not repaired either ({left})"
+        return f"left as they are, not repaired either ({none})"
     n_repaired = sum(
         len(log.repaired_input) + len(log.repaired_output) for log in result.logs
     )
     changed = f"{n_repaired} damaged samples replaced"
-    return f"{changed}, some left as they are ({left})" if bare else changed
+    whole = f"{changed}, kinds used whole: {', '.join(bare)} (no recipe)"
+    return whole if bare else changed
 
 
 def _warnings(context: Context, given: Measured) -> list[str]:

@@ -22,6 +22,16 @@ def test_limits_on_both_sides_are_named():
     assert notes[1].startswith("at its smallest value -0.7 for")
 
 
+@pytest.mark.parametrize(("first", "notes"), [(0, 0), (400, 1)])
+def test_a_rest_before_the_motion_is_no_limit(first, notes):
+    """An encoder reads one value until the drive moves."""
+    swing = np.maximum(np.sin(2 * np.pi * 3 * T), 0.0) + 1e-6 * np.arange(1000)
+    swing = np.concatenate([swing[:first], np.zeros(150), 0.01 + swing[first:]])
+    swing[first : first + 150] = swing.min() - 0.1
+    found = [one for one in quality_notes(swing) if "smallest" in one]
+    assert len(found) == notes
+
+
 def test_a_sensor_that_stands_still_is_named():
     stuck = WAVE.copy()
     stuck[400:500] = stuck[400]
