@@ -210,11 +210,18 @@ class FinalTestOptions:
 
 @dataclass(frozen=True)
 class NextLimits:
-    """What a recording that is designed may do, in the unit of the input."""
+    """What a recording that is designed may do, in the unit of the input.
+
+    Parameters
+    ----------
+    one_sided : bool
+        Whether the input has the sign of the recorded ones only, as a heater's power.
+    """
 
     amplitude: Annotated[float, POSITIVE]
     rate: Annotated[float, POSITIVE]
     duration_s: Annotated[float, POSITIVE]
+    one_sided: bool = False
 
 
 @dataclass(frozen=True)

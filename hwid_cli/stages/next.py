@@ -72,7 +72,9 @@ from hwid_cli.trust.designs import LEAST_SAMPLES, designs
 from hwid_cli.trust.visited import N_BANDS
 
 NAME = "next"
-STAGE_VERSION = 4
+STAGE_VERSION = 5
+# Share of the largest input up to which inputs of the other sign are noise.
+_OTHER_SIDE = 0.02
 # Hidden effects that a reason names.
 _NAMED_EFFECTS = 3
 
@@ -530,6 +532,7 @@ def _offered(
         limits.duration_s,
         first.sample_time_s,
         first.input_unit,
+        side=_usual_sign(recordings) if limits.one_sided else 0,
     )
     if not found:
         least = LEAST_SAMPLES * first.sample_time_s
@@ -541,6 +544,30 @@ def _offered(
             f"within the duration, and at least {least:g} s; raise rate or duration_s"
         )
     return found
+
+
+def _usual_sign(recordings: Sequence[Recording]) -> int:
+    """Sign of the largest input."""
+    lowest = min(float(one.input.min()) for one in recordings)
+    highest = max(float(one.input.max()) for one in recordings)
+    return 1 if highest >= -lowest else -1
+
+
+def _warnings(context: Context, given: ToChoose) -> list[str]:
+    """Designed inputs that have a sign which no recording has had."""
+    limits, recordings = given.options.limits, given.recordings
+    if limits is None or limits.one_sided:
+        return []
+    sign = _usual_sign(recordings)
+    largest = max(float((sign * one.input).max()) for one in recordings)
+    lowest = min(float((sign * one.input).min()) for one in recordings)
+    if lowest < -_OTHER_SIDE * largest:
+        return []
+    word = "negative" if sign > 0 else "positive"
+    return [
+        f"no recording has a {word} input, but designed ones may: where there is none, "
+        f"as of a heater, put one_sided: true into next.limits of {context.experiment.source}"
+    ]
 
 
 def _files(experiment: Experiment) -> RecordingsOptions:
@@ -624,6 +651,7 @@ STAGE = Stage(
     ),
     write_files=_write_files,
     tables=_tables,
+    warnings=_warnings,
     plan=_plan,
     files=("next.csv", "next.json", "next"),
 )

@@ -26,7 +26,13 @@ _LEVELS = (8, 25, 70)
 
 
 def designs(
-    amplitude: float, rate: float, duration_s: float, sample_time_s: float, unit: str
+    amplitude: float,
+    rate: float,
+    duration_s: float,
+    sample_time_s: float,
+    unit: str,
+    *,
+    side: int = 0,
 ) -> tuple[PlannedInput, ...]:
     """Inputs within limits.
 
@@ -36,6 +42,8 @@ def designs(
     rate : float, [unit/s]
     unit : str
         Of the input, for words.
+    side : int
+        1 or -1 where the input has one sign only, as a heater's power; 0 for both.
 
     Returns
     -------
@@ -45,7 +53,7 @@ def designs(
     n = round(duration_s / sample_time_s)
     if n < LEAST_SAMPLES:
         return ()
-    limits = _Limits(n, sample_time_s, amplitude, rate, behind(unit))
+    limits = _Limits(n, sample_time_s, amplitude, rate, behind(unit), side)
     makers = (_steps, _levels, _multisines, _sweeps)
     found = [one for make in makers for one in make(limits)]
     least = LEAST_SHARE * amplitude
@@ -64,6 +72,8 @@ class _Limits:
     rate : float, [input unit/s]
     unit : str
         As it stands behind a number.
+    side : int
+        0 for inputs of both signs.
     """
 
     n: int
@@ -71,6 +81,7 @@ class _Limits:
     amplitude: float
     rate: float
     unit: str
+    side: int
 
     @property
     def rest(self) -> int:
@@ -92,6 +103,8 @@ def _steps(limits: _Limits) -> list[PlannedInput]:
     found = []
     for size in _SIZES:
         for sign, word in ((1.0, "positive"), (-1.0, "negative")):
+            if sign == -limits.side:
+                continue
             level = sign * size * limits.amplitude
             target = np.zeros(limits.n)
             target[limits.rest : round(0.6 * limits.n)] = level
@@ -111,11 +124,11 @@ def _levels(limits: _Limits) -> list[PlannedInput]:
             hold = max(1, inner // count)
             # Strata, so that few levels spread over the whole range.
             strata = (np.arange(count) + rng.uniform(0, 1, count)) / count
-            heights = most * (2.0 * rng.permutation(strata) - 1.0)
+            heights = rng.permutation(strata)
+            heights = limits.side * heights if limits.side else 2.0 * heights - 1.0
             target = np.zeros(limits.n)
-            target[limits.rest : limits.rest + inner] = np.repeat(heights, hold + 1)[
-                :inner
-            ]
+            held = np.repeat(most * heights, hold + 1)[:inner]
+            target[limits.rest : limits.rest + inner] = held
             seconds = hold * limits.step_s
             words = (
                 f"{count} levels within {most:.3g}{limits.unit}, each held for "
@@ -140,7 +153,7 @@ def _multisines(limits: _Limits) -> list[PlannedInput]:
         sines = np.sin(2 * np.pi * lines[:, None] * time + phases[:, None])
         shape = np.sum(sines / np.sqrt(lines / low)[:, None], axis=0) * _window(limits)
         for size in _SIZES[:2]:
-            values = _within(limits, shape, size * limits.amplitude)
+            values = _within(limits, _sided(limits, shape), size * limits.amplitude)
             words = (
                 f"a multisine from {low:.3g} to {high:.3g} Hz, up to "
                 f"{np.abs(values).max():.3g}{limits.unit}"
@@ -161,7 +174,7 @@ def _sweeps(limits: _Limits) -> list[PlannedInput]:
         growth = np.log(high / limits.lowest) / time[-1]
         phase = 2 * np.pi * limits.lowest * (np.exp(growth * time) - 1.0) / growth
         shape = np.sin(phase) * _window(limits)
-        values = _within(limits, shape, most)
+        values = _within(limits, _sided(limits, shape), most)
         words = (
             f"a sweep from {limits.lowest:.3g} to {high:.3g} Hz at "
             f"{np.abs(values).max():.3g}{limits.unit}"
@@ -176,6 +189,15 @@ def _window(limits: _Limits) -> np.ndarray:
     at = np.arange(limits.n)
     up = np.clip((at - limits.rest) / rise, 0.0, 1.0)
     return up * up[::-1]
+
+
+def _sided(limits: _Limits, shape: np.ndarray) -> np.ndarray:
+    """A shape that swings about a level, where the input has one sign."""
+    if limits.side == 0:
+        return shape
+    raised = np.abs(shape).max() * _window(limits) + shape
+    # A crest may stand where the window still rises.
+    return limits.side * np.maximum(raised, 0.0)
 
 
 def _within(limits: _Limits, shape: np.ndarray, most: float) -> np.ndarray:

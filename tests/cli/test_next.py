@@ -78,6 +78,17 @@ def test_proposed_inputs_are_ready_to_play_and_say_why(bench):
     assert not content["is_enough"]
 
 
+def test_a_sign_that_no_recording_has_had_is_asked_about(bench):
+    both = run(bench, LIMITS)
+    assert "no recording has a negative input" in flat(both.stderr)
+    assert min(played(bench, row)[:, 1].min() for row in proposals(bench)) < -0.5
+
+    one = run(bench, LIMITS.replace("amplitude", "one_sided: true, amplitude"))
+    assert "no recording has" not in one.stderr
+    assert min(played(bench, row)[:, 1].min() for row in proposals(bench)) >= 0.0
+    assert max(played(bench, row)[:, 1].max() for row in proposals(bench)) > 1.5
+
+
 @pytest.mark.thorough
 def test_the_loop_takes_up_what_was_recorded_and_ends(bench):
     said = run(bench, LIMITS.replace("next: {", "next: {enough: 0.1, "))

@@ -12,10 +12,14 @@ from hwid_cli.trust.designs import designs
     st.floats(1.0, 1e4),
     st.floats(0.1, 20.0),
     st.sampled_from([1e-3, 5e-3, 0.02]),
+    st.sampled_from([-1, 0, 1]),
 )
-def test_no_design_leaves_its_limits(amplitude, relative_rate, duration_s, step_s):
+def test_no_design_leaves_its_limits(
+    amplitude, relative_rate, duration_s, step_s, side
+):
     rate = amplitude * relative_rate
-    for one in designs(amplitude, rate, duration_s, step_s, "A"):
+    for one in designs(amplitude, rate, duration_s, step_s, "A", side=side):
+        assert side == 0 or (side * one.values >= -1e-12 * amplitude).all()
         # Sums of a few thousand rounded steps.
         assert np.abs(one.values).max() <= amplitude * (1 + 1e-9)
         assert np.abs(np.diff(one.values)).max() <= rate * step_s * (1 + 1e-9)
@@ -41,8 +45,25 @@ def test_designs_stay_below_a_tenth_of_the_sample_rate():
             assert power[fast].sum() < 1e-3 * power.sum(), one.name
 
 
-def test_designs_begin_and_end_at_rest():
-    for one in designs(6.0, 50.0, 7.5, 1e-3, "A"):
+@pytest.mark.parametrize("side", [-1, 1])
+def test_inputs_of_one_sign_visit_their_range(side):
+    """A heater cannot cool."""
+    found = designs(6.0, 50.0, 7.5, 1e-3, "A", side=side)
+    kinds = {one.name.split("_")[0] for one in found}
+    assert kinds == {"step", "levels", "multisine", "sweep"}
+    for one in found:
+        assert (side * one.values >= 0.0).all(), one.name
+        # Nothing of the other half is designed twice as large.
+        assert np.abs(one.values).max() <= 6.0 * (1 + 1e-9)
+    (sweep,) = [one for one in found if one.name == "sweep_100"]
+    inner = side * sweep.values[2000:5500]
+    assert inner.min() < 0.3
+    assert inner.max() > 5.5
+
+
+@pytest.mark.parametrize("side", [0, 1])
+def test_designs_begin_and_end_at_rest(side):
+    for one in designs(6.0, 50.0, 7.5, 1e-3, "A", side=side):
         assert np.abs(one.values[[0, -1]]).max() < 1e-9
 
 
