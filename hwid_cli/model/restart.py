@@ -73,7 +73,10 @@ def leaves_structure(candidate: Candidate, experiments: Sequence[FitData]) -> bo
     spread = sum(
         float(np.sum((one.output - np.mean(one.output)) ** 2)) for one in experiments
     )
-    coloured = max(_COLOURED, _BY_CHANCE / np.sqrt(joined.size))
+    by_chance = _BY_CHANCE / np.sqrt(joined.size)
+    # A drift that is slightly wrong is slow and small.
+    drifts = lasting_poles([candidate.model.denominator], experiments).size > 0
+    coloured = by_chance if drifts else max(_COLOURED, by_chance)
     if following > coloured * power or power > _FAR**2 * spread:
         return True
     squares = joined * joined

@@ -43,6 +43,8 @@ _WORTH_GOING_ON = 0.995
 # Restarts that follow a search whose residuals are not noise, and the share of the cost that
 # one must reach for another to follow it.
 _MOST_RESTARTS, _WORTH_RESTARTING = 3, 0.9
+# Times that a block which hardly settles is found anew, each better than the one before.
+_MOST_LASTING = 4
 # Linear starts of such a search: more than least squares pass on the way.
 _MORE_STARTS = 30
 # Share of the cost that a step must gain where larger models go on from the result.
@@ -84,8 +86,7 @@ def nonlinear_search(
     best = _from_added_starts(best, experiments, options, (before, begun))
     best = _restarted(best, experiments, options, begun.starts)
     if not options.keeps_block:
-        lasting = reestimate_lasting_block(best, experiments, options)
-        best = _finished_where_better(lasting, best, experiments, options)
+        best = _with_lasting_block(best, experiments, options)
     best = _from_break_points(best, experiments, options, begun)
     best = _not_worse_than(begun.linear, best, experiments, options)
     return _without_needless_limits(begun.linear, best, experiments, options)
@@ -104,8 +105,11 @@ def _from_added_starts(
         return best
     finalists = screen(experiments, added, options)
     again = finish(_best(place(finalists, experiments, options)), experiments, options)
-    if not options.keeps_block:
-        again = _with_reestimated_block(again, experiments, options)
+    again = _with_reestimated_block(again, experiments, options)
+    again = _with_lasting_block(again, experiments, options)
+    if leaves_structure(again.candidate, experiments):
+        again = _restarted(again, experiments, options, now.starts)
+        again = _with_lasting_block(again, experiments, options)
     return _best([best, again])
 
 
@@ -115,6 +119,22 @@ def _with_reestimated_block(
     """The best so far, or what comes of another block between its maps."""
     reestimated = reestimate_block(best, experiments, options)
     return _finished_where_better(reestimated, best, experiments, options)
+
+
+def _with_lasting_block(
+    best: Search, experiments: Sequence[FitData], options: FitOptions
+) -> Search:
+    """The best so far, or what comes of blocks that hardly settle between its maps.
+
+    Maps that follow a wrong drift give way step by step.
+    """
+    for _ in range(_MOST_LASTING):
+        lasting = reestimate_lasting_block(best, experiments, options)
+        further = _finished_where_better(lasting, best, experiments, options)
+        if further is best:
+            break
+        best = further
+    return best
 
 
 def _finished_where_better(
