@@ -27,6 +27,8 @@ from hwid_cli.records.candidates import ParameterRef
 from hwid_cli.records.drive import Drive, StandIn
 
 # Owners beside the effects: the base, and how a recording starts.
+# Largest logarithm of a value over its scale.
+_FARTHEST = 500.0
 BASE, START = "base", "start"
 # A damping of zero is searched from this share of what halves an oscillation.
 _SMALL_DAMPING = 0.02
@@ -78,7 +80,8 @@ class Unknown:
         float, [unit of the parameter]
         """
         if self.is_log:
-            return float(self.scale * np.exp(coordinate))
+            # A step that is tried may go far beyond the bounds.
+            return float(self.scale * np.exp(min(coordinate, _FARTHEST)))
         return self.center + self.scale * coordinate
 
     def coordinate(self, value: float) -> float:

@@ -338,3 +338,10 @@ def test_damping_makes_a_drive_no_faster_than_the_recordings_show(given, largest
     layout = parameter_layout(of, (), {}, sizes(of))
     (damping,) = [one for one in layout.shared if one.name == "damping_N_s_per_m"]
     assert damping.high == pytest.approx(largest)
+
+
+def test_a_step_far_beyond_the_bounds_has_a_value():
+    unknown = Unknown("base", "damping_N_s_per_m", True, 2.0, 0.1, 10.0)
+    with np.errstate(over="raise"):
+        assert unknown.value(1e4) > 1e200
+    assert unknown.value(1.0) == 2.0 * np.exp(1.0)
