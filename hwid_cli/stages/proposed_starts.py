@@ -9,6 +9,9 @@ from hwid_cli.records.recordings import RawRecording
 
 # Levels of rest that differ by less than this share of a signal's swing are one, [-].
 ALIKE_LEVELS = 0.05
+# A level that moves by less than this share of the swing from the first half of a rest to
+# the second stays, [-].
+_STILL = 0.01
 _RESTS = (
     "all recordings begin with a rest, so 'steady': nothing is fitted to their starts"
 )
@@ -64,7 +67,9 @@ def start_of_fits(
     """
     if is_cut or not _keep_their_rests(raws, recipes):
         return "estimated", _MOVES
-    if not _rest_where_the_input_says(raws, recipes, kinds):
+    if not _rest_where_the_input_says(raws, recipes, kinds) or any(
+        map(_stays_away, raws)
+    ):
         return "estimated", _ANYWHERE
     return "steady", _RESTS
 
@@ -108,6 +113,23 @@ def _rest_where_the_input_says(
     apart = np.abs(outputs[:, None] - outputs)
     limit = ALIKE_LEVELS * swing_of([raw.output for raw in raws])
     return not bool((same & (apart > limit)).any())
+
+
+def _stays_away(raw: RawRecording) -> bool:
+    """Whether the output rests elsewhere once the input is back: an axis without a spring.
+
+    An equilibrium with the first sample of its input, noise and all, would be a drift.
+    """
+    input_rest, output_rest = _rest_levels(raw)
+    swing_u, swing_y = swing_of([raw.input]), swing_of([raw.output])
+    away = np.flatnonzero(np.abs(raw.input - input_rest) > ALIKE_LEVELS * swing_u)
+    tail = raw.output[away[-1] + 1 :] if away.size else raw.output[:0]
+    if tail.size < 2 * LEAST_QUIET:
+        return False
+    first, last = (float(np.nanmean(one)) for one in np.array_split(tail, 2))
+    # What still comes back is no axis that stays.
+    is_still = abs(last - first) <= _STILL * swing_y
+    return is_still and abs(last - output_rest) > ALIKE_LEVELS * swing_y
 
 
 def _rest_levels(raw: RawRecording) -> tuple[float, float]:

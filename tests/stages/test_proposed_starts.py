@@ -50,6 +50,21 @@ def test_a_drive_that_rests_anywhere_has_fitted_starts():
     assert why.startswith("the drive rests anywhere")
 
 
+@pytest.mark.parametrize(
+    ("pole", "rule"), [(1.0, "estimated"), (0.95, "steady"), (0.998, "steady")]
+)
+def test_what_stays_where_it_was_moved_to_has_a_fitted_start(pole, rule):
+    u = np.zeros(N)
+    u[REST : 2 * REST] = 1.0
+    rng = np.random.default_rng(3)
+    moved = []
+    for name, height in (("prbs_1", 1.0), ("prbs_2", -0.5)):
+        y = lfilter([0.0, 0.1], [1.0, -pole], height * u)
+        y = y + 0.002 * rng.standard_normal(N)
+        moved.append(RawRecording(name, height * u, y, 1e-3))
+    assert start(*moved)[0] == rule
+
+
 def test_a_recording_that_begins_in_motion_has_a_fitted_start():
     moving = settled("b", 2.0)
     moving = RawRecording("b", moving.input[REST:], moving.output[REST:], 1e-3)
