@@ -43,8 +43,6 @@ _WORTH_GOING_ON = 0.995
 # Restarts that follow a search whose residuals are not noise, and the share of the cost that
 # one must reach for another to follow it.
 _MOST_RESTARTS, _WORTH_RESTARTING = 3, 0.9
-# Times that a block which hardly settles is found anew, each better than the one before.
-_MOST_LASTING = 4
 # Linear starts of such a search: more than least squares pass on the way.
 _MORE_STARTS = 30
 # Share of the cost that a step must gain where larger models go on from the result.
@@ -79,11 +77,10 @@ def nonlinear_search(
     best = finish(_best(place(finalists, experiments, options)), experiments, options)
     if not options.keeps_block:
         best = _with_reestimated_block(best, experiments, options)
-    if leaves_structure(best.candidate, experiments):
-        begun, before = begun.with_circle, begun
-    else:
-        begun, before = begun.beside(best), begun
-    best = _from_added_starts(best, experiments, options, (before, begun))
+    is_poor = leaves_structure(best.candidate, experiments)
+    added = begun.with_circle if is_poor else begun.beside(best)
+    best = _from_added_starts(best, experiments, options, (begun, added))
+    begun = added
     best = _restarted(best, experiments, options, begun.starts)
     if not options.keeps_block:
         best = _with_lasting_block(best, experiments, options)
@@ -124,17 +121,9 @@ def _with_reestimated_block(
 def _with_lasting_block(
     best: Search, experiments: Sequence[FitData], options: FitOptions
 ) -> Search:
-    """The best so far, or what comes of blocks that hardly settle between its maps.
-
-    Maps that follow a wrong drift give way step by step.
-    """
-    for _ in range(_MOST_LASTING):
-        lasting = reestimate_lasting_block(best, experiments, options)
-        further = _finished_where_better(lasting, best, experiments, options)
-        if further is best:
-            break
-        best = further
-    return best
+    """The best so far, or what comes of blocks that hardly settle between its maps."""
+    lasting = reestimate_lasting_block(best, experiments, options)
+    return _finished_where_better(lasting, best, experiments, options)
 
 
 def _finished_where_better(

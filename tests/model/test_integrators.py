@@ -146,8 +146,9 @@ def test_where_an_integrator_starts_is_said_to_look_like_a_constant():
 
 @pytest.mark.thorough
 # Of sixty plants with a dead zone before poles on, or next to, the circle: those whose
-# search stood still at 1.06 to 1.9 times the noise, in the block and not in the map.
-@pytest.mark.parametrize("seed", [2009, 2024, 2036, 2039])
+# search stood still at 1.06 to 1.9 times the noise, in the block and not in the map. The
+# last one left a correlation of residuals too small to be structure of other blocks.
+@pytest.mark.parametrize("seed", [2009, 2024, 2036, 2039, 190])
 def test_a_block_behind_a_dead_zone_drifts_as_the_plant_does(seed):
     plant = integrating_plant(seed, bent=True)
 
