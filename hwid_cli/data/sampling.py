@@ -37,6 +37,8 @@ _ROUNDING = 1e-9
 _STEP_DIGITS = 6
 # Resampling fills gaps by straight lines; beyond this growth it would invent data.
 _MOST_GROWTH = 2
+# A sample within this share of a step is next to a point of the grid.
+_NEXT_TO_IT = 0.05
 # Clocks that differ by less than this share of their step are one, [-].
 _SAME_CLOCK = 0.01
 # Longest stretch without a sample that a straight line may cross, [steps].
@@ -387,7 +389,8 @@ def _resample(columns: FileColumns, stamps: np.ndarray, step: float) -> FileColu
     """Put every column on a grid over its own stretch of time.
 
     An output is interpolated. An input is averaged over each step of the grid, because
-    what it moves follows its integral: corners keep their time.
+    what it moves follows its integral: corners keep their time. Where every point of the
+    grid has a sample next to it, means would only smooth the input and its noise.
     """
 
     def resampled(column: MeasuredColumn) -> MeasuredColumn:
@@ -396,7 +399,8 @@ def _resample(columns: FileColumns, stamps: np.ndarray, step: float) -> FileColu
         count = int((known[-1] - known[0]) / step * (1 + _ROUNDING)) + 1
         grid = known[0] + step * np.arange(count)
         is_input = column is columns.input
-        values = _averaged if is_input else np.interp
+        is_averaged = is_input and not _have_neighbours(grid, known, step)
+        values = _averaged if is_averaged else np.interp
         return array_column(
             column.title,
             values(grid, known, column.values),
@@ -405,6 +409,13 @@ def _resample(columns: FileColumns, stamps: np.ndarray, step: float) -> FileColu
         )
 
     return replace(with_each(columns, resampled), time=None)
+
+
+def _have_neighbours(grid: np.ndarray, known: np.ndarray, step: float) -> bool:
+    """Whether next to every point of a grid there is a sample."""
+    after = np.clip(np.searchsorted(known, grid), 1, known.size - 1)
+    away = np.minimum(np.abs(known[after] - grid), np.abs(grid - known[after - 1]))
+    return bool(np.max(away) <= _NEXT_TO_IT * step)
 
 
 def _averaged(grid: np.ndarray, known: np.ndarray, values: np.ndarray) -> np.ndarray:

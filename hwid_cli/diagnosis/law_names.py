@@ -3,6 +3,7 @@
 docs/method_diagnosis.md, eq. (D37).
 """
 
+import re
 from collections.abc import Collection, Mapping
 
 from hwid_cli.records.diagnosis import Law
@@ -35,6 +36,10 @@ _OF_READING: Mapping[frozenset[str], str] = {
 
 # Terms that are an effect beside others too: forces against the motion.
 _AGAINST_MOTION = ("sign(v)", "v*abs(v)")
+# Where they come back in this share of resampled recordings, and beside no other term of
+# the velocity alone: friction and a drag of another exponent make up for each other.
+_LEAST_INCLUSION = 0.9
+_VARIABLE = re.compile(r"\b[xvut]\b")
 
 
 def known_terms(law: Law) -> dict[str, str]:
@@ -45,12 +50,18 @@ def known_terms(law: Law) -> dict[str, str]:
     dict of str to str
         Ids of the effects by the terms with their coefficients.
     """
-    if law.acts_on != "force":
+    of_velocity = {
+        one.term for one in law.terms if set(_VARIABLE.findall(one.term)) == {"v"}
+    }
+    is_alone = of_velocity <= set(_AGAINST_MOTION)
+    if law.acts_on != "force" or not is_alone:
         return {}
     return {
         f"{one.value:.4g}*{one.term}": _EFFECTS[frozenset({one.term})]
         for one in law.terms
-        if one.term in _AGAINST_MOTION and one.high < 0
+        if one.term in _AGAINST_MOTION
+        and one.high < 0
+        and one.inclusion >= _LEAST_INCLUSION
     }
 
 

@@ -46,6 +46,8 @@ _FEWEST_MULTIPLES = 5
 # Repeats that differ this much more in motion than at rest differ by more than noise.
 # Slow noise reads a little less in a short rest.
 _MORE_IN_MOTION = 2.0
+# A command that is quiet somewhere is that for so many samples.
+_QUIET_LENGTH = 64
 
 
 def noise_floor(problem: DiagnosisProblem, *, rests: bool = True) -> NoiseFloor:
@@ -158,6 +160,27 @@ def measured_input_rms(problem: DiagnosisProblem) -> float:
     counts = [piece.size for piece in pieces]
     share = sum(piece.size for piece in noisy) / max(sum(counts), 1)
     return float(differences_rms(noisy, 0.0) * np.sqrt(share)) if noisy else 0.0
+
+
+def quiet_input_rms(problem: DiagnosisProblem) -> float:
+    """Noise of the measured input where the command is quietest: at rest, say.
+
+    A controller's command is fast wherever it works, and its differences are no noise
+    there.
+
+    Returns
+    -------
+    float, [input unit]
+        Median over the recordings; 0 where none is long enough.
+    """
+    found = []
+    for one in problem.signals:
+        piece = one.driven_by[one.skip :]
+        starts = range(0, piece.size - _QUIET_LENGTH + 1, _QUIET_LENGTH // 2)
+        stretches = [piece[at : at + _QUIET_LENGTH] for at in starts]
+        if stretches:
+            found.append(min(differences_rms([each], 0.0) for each in stretches))
+    return float(np.median(found)) if found else 0.0
 
 
 def _is_mostly_straight(piece: np.ndarray) -> bool:

@@ -48,6 +48,8 @@ _PROPORTIONAL = 3
 _SAME_FACTOR = 1.5
 # A ratio to the noise that is taken for 1, [-].
 _NO_MORE_THAN_NOISE = 1.02
+# A term that comes back in fewer of the resampled recordings is one of several, [-].
+_SURE_INCLUSION = 0.5
 # What is late by this near to half a sample may be a command that is held, [samples].
 _NEAR_HALF = 0.1
 _LATE = {"input_delay": ("delay_s",), "actuator_lag": ("time_constant_s",)}
@@ -167,7 +169,19 @@ def law_in_words(
     return (
         f"{text}: {effect.equation}. With it the error on held-out recordings falls from "
         f"{criteria.ratio(base):.3g} to {criteria.ratio(verdict.chosen):.3g} times the "
-        f"noise ({share:.3g} % of what was left is explained).{_rest(criteria, verdict)}"
+        f"noise ({share:.3g} % of what was left is explained)."
+        f"{_how_sure(law)}{_rest(criteria, verdict)}"
+    )
+
+
+def _how_sure(law: Law) -> str:
+    """Say that terms are a curve and no mechanism, where others would do as well."""
+    least = min(one.inclusion for one in law.terms)
+    if least >= _SURE_INCLUSION:
+        return ""
+    return (
+        f" Take it as a curve, not as a mechanism: other terms do nearly as well (chosen "
+        f"again in {100 * least:.0f} % of resampled recordings)."
     )
 
 

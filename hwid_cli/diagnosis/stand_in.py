@@ -29,6 +29,9 @@ _LEAST_MASS = 1e-12
 # Nothing in a stand-in runs faster than this many times in a sample: samples do not show
 # it, and each of its curved forces is followed in steps of that size, [-].
 _FASTEST = 10.0
+# Nor faster than this share of how long a damper takes to let its spring go, where that
+# is less than a sample: a slow process without inertia needs no short steps, [-].
+_FASTEST_SHARE = 0.005
 # A straight spring that leaves less than this share of the balance of forces is enough; a
 # curved one has to leave at most this share of that, and to push back over so many times
 # the way that was seen.
@@ -211,10 +214,12 @@ def _no_faster_than_seen(drive: StandIn, signals: Sequence[Signals]) -> StandIn:
     A simulation of the first order leaves a mass of rounding errors, which would settle
     within a thousandth of a sample.
     """
-    shortest = min(one.sample_time_s for one in signals) / _FASTEST
-    least = max(
-        drive.damping_N_s_per_m * shortest, drive.stiffness_N_per_m * shortest**2
-    )
+    sample_time_s = min(one.sample_time_s for one in signals)
+    shortest = sample_time_s / _FASTEST
+    damping, stiffness = drive.damping_N_s_per_m, drive.stiffness_N_per_m
+    slowest_s = damping / stiffness if stiffness > 0 else np.inf
+    of_damper = min(max(_FASTEST_SHARE * slowest_s, shortest), sample_time_s)
+    least = max(damping * of_damper, stiffness * shortest**2)
     return replace(drive, mass_kg=max(drive.mass_kg, least))
 
 

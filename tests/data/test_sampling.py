@@ -253,3 +253,16 @@ def test_a_time_that_comes_twice_with_other_numbers_is_refused():
     given_columns.input.values[120] += 1.0
     with pytest.raises(MeasurementError, match="is repeated"):
         sample_uniformly(PATH, given_columns, options())
+
+
+@pytest.mark.parametrize(("jitter", "share"), [(0.01, 1.0), (0.2, 0.8)])
+def test_resampling_a_clock_that_hardly_jitters_leaves_noise_as_it_is(jitter, share):
+    rng = np.random.default_rng(6)
+    time = np.arange(2000) + np.r_[0.0, rng.uniform(-jitter, jitter, 1999)]
+    data, noise = columns(time), rng.standard_normal(2000)
+    data = FileColumns(array_column("u", noise), data.output, data.time)
+    stated = options(resample=True, sample_time_s=1.0, sampling_tolerance=1e-3)
+    values = sample_uniformly(PATH, data, stated)[0].input.values
+    # Means of lines between samples: weights of 1/8, 3/4, 1/8, whose squares add up to
+    # 0.77 of one sample's.
+    assert np.std(values) / np.std(noise) == pytest.approx(share, abs=0.05)

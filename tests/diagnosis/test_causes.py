@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from scipy.linalg import solve_triangular, toeplitz
-from scipy.optimize import least_squares
+from scipy.optimize import least_squares, minimize_scalar
 from scipy.signal import cont2discrete, dlsim, lfilter
 
 from hwid_cli.diagnosis import causes
@@ -123,10 +123,10 @@ def answer_to_a_pulse(drive=DRIVE):
     model = (
         np.array([[0.0, 1.0], [-k / m, -c / m]]),
         np.array([[0.0], [drive.force_constant_N_per_A / m]]),
-        np.array([[1.0, 0.0]]),
+        np.array([[0.0, 1.0] if drive.output == "velocity" else [1.0, 0.0]]),
         np.array([[0.0]]),
     )
-    found = cont2discrete(model, STEP_S, "foh")
+    found = cont2discrete(model, STEP_S, "zoh" if drive.hold == "zero" else "foh")
     pulse = np.zeros(N)
     pulse[0] = 1.0
     return dlsim((*found[:4], STEP_S), pulse)[1][:, 0]
@@ -143,14 +143,33 @@ def factor_of_the_noise(pulse, input_noise):
     )
 
 
-def moved_by_input_noise(seed, count=9):
+def moved_by_input_noise(seed, count=9, pulse=PULSE):
     """What noise of the input leaves, by convolution, with that of the sensor."""
     rng = np.random.default_rng(seed)
     return [
-        np.convolve(PULSE, INPUT_NOISE * rng.standard_normal(N))[:N]
+        np.convolve(pulse, INPUT_NOISE * rng.standard_normal(N))[:N]
         + NOISE * rng.standard_normal(N)
         for _ in range(count)
     ]
+
+
+def innovations_by_factors(parts, pulse):
+    """By another route: the covariance of the residual, inverted by its factors.
+
+    The size of the input's noise is the most probable one, that of the output's free.
+    """
+
+    def free(power):
+        factor = factor_of_the_noise(pulse, np.exp(power) * INPUT_NOISE)
+        return factor, solve_triangular(factor, np.column_stack(parts), lower=True)
+
+    def unlikely(power):
+        factor, found = free(power)
+        logs = 2 * len(parts) * np.sum(np.log(np.diag(factor)))
+        return found.size * np.log(np.mean(found**2)) + logs
+
+    best = minimize_scalar(unlikely, bounds=(-3.0, 0.26), method="bounded")
+    return list(free(best.x)[1].T)
 
 
 def floor(input_rms=INPUT_NOISE):
@@ -166,18 +185,42 @@ def of():
 def test_what_noise_of_the_input_leaves_is_white_behind_the_filter(of, seed):
     parts = moved_by_input_noise(seed)
     found = whiteness_with_input_noise(parts, of, of.drive, floor())
-    # By another route: the covariance of the residual, inverted by its factors.
-    moved = np.mean(np.sum(np.square(toeplitz(PULSE, np.zeros(N))), axis=1))
-    size = np.sqrt((np.mean(np.square(parts)) - NOISE**2) / moved)
-    factor = factor_of_the_noise(PULSE, size)
-    free = [solve_triangular(factor, one, lower=True) for one in parts]
+    free = innovations_by_factors(parts, PULSE)
     expected = portmanteau(free, (1.0,), n_lags=30)
 
     assert whiteness(parts, floor()) > 100
     assert expected < 1
-    # The same size by two routes makes the limit six times as wide. The filter is that of
-    # a noise that has lasted for ever, the covariance that of one from the first sample.
-    assert 6 * found == pytest.approx(expected, abs=0.02)
+    # The filter is that of a noise that has lasted for ever, the covariance that of one
+    # from the first sample.
+    assert found == pytest.approx(expected, abs=0.02)
+
+
+FREE = {"stiffness_N_per_m": 0.0}
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"hold": "zero"},
+        {"output": "velocity"},
+        {"output": "velocity", **FREE},
+        {"output": "velocity", "hold": "zero", **FREE},
+        FREE,
+    ],
+)
+def test_the_filter_is_that_of_any_reading_and_command(of, changes):
+    drive = replace(of.drive, **changes)
+    pulse = answer_to_a_pulse(drive)
+    # Noise of the input that moves the reading about as much as the sensor's does.
+    pulse *= NOISE / INPUT_NOISE / np.sqrt(np.mean(np.cumsum(pulse**2)))
+    gain = pulse[5] / answer_to_a_pulse(drive)[5]
+    push = gain * drive.force_constant_N_per_A
+    drive = replace(drive, force_constant_N_per_A=push)
+    parts = moved_by_input_noise(3, pulse=pulse)
+    found = whiteness_with_input_noise(parts, of, drive, floor())
+    expected = portmanteau(innovations_by_factors(parts, pulse), (1.0,), n_lags=30)
+    assert expected < 1
+    assert found == pytest.approx(expected, abs=0.04)
 
 
 @pytest.mark.parametrize("share", [0.5, 0.0])
@@ -187,12 +230,38 @@ def test_an_input_that_shows_less_noise_is_not_the_cause(of, share):
     assert whiteness_with_input_noise(parts, of, of.drive, noise) == np.inf
 
 
-def test_an_input_that_shows_more_noise_has_to_leave_white_noise_by_itself(of):
-    parts = moved_by_input_noise(1)
+def colored(parts):
+    """The same with neighbours that go together a little: behind the filter as well."""
+    return [lfilter([1.0, 0.16], [1.0], one) for one in parts]
+
+
+def test_noise_of_the_size_that_the_input_shows_may_be_a_little_coloured(of):
+    parts = colored(moved_by_input_noise(1))
     alike = whiteness_with_input_noise(parts, of, of.drive, floor())
     # A fast command looks like noise as well: the size is no evidence then.
     louder = whiteness_with_input_noise(parts, of, of.drive, floor(2 * INPUT_NOISE))
-    assert louder == pytest.approx(6 * alike)
+    assert alike < 1 < louder
+    assert louder == pytest.approx(6 * alike, rel=0.05)
+
+
+def test_a_fast_command_shows_its_noise_where_it_rests(of):
+    rng = np.random.default_rng(4)
+    noise = INPUT_NOISE * rng.standard_normal(N)
+    fast = np.r_[np.zeros(N // 4), rng.standard_normal(N - N // 4)]
+    signals = [replace(one, driven_by=noise + fast) for one in of.signals]
+    parts = colored(moved_by_input_noise(1))
+    resting = replace(of, signals=tuple(signals))
+    found = whiteness_with_input_noise(parts, resting, of.drive, floor(1.0))
+    assert found < 1 < whiteness_with_input_noise(parts, of, of.drive, floor(1.0))
+
+
+@pytest.mark.parametrize("share", [0.5, 2.0])
+def test_residuals_as_large_as_the_noise_behind_the_filter_makes_them(of, share):
+    parts = moved_by_input_noise(1)
+    filters = causes._Filters(of, of.drive, NOISE)
+    likeliest = filters.likeliest(parts, 2 * INPUT_NOISE / NOISE)
+    assert filters.is_as_large(parts, likeliest)
+    assert not filters.is_as_large(parts, share * likeliest)
 
 
 def test_one_recording_with_more_than_its_input_can_shake_is_something(of):
@@ -362,7 +431,7 @@ def test_more_than_the_input_can_have_shaken_is_not_filtered(
         return SimpleNamespace(x=start)
 
     monkeypatch.setattr("scipy.optimize.least_squares", noted)
-    of = problem(recordings(noise=10 * NOISE))
+    of = problem(recordings({"coulomb_friction": {"force_N": 0.8}}))
     fit_layout = parameter_layout(of, (), {}, sizes(of))
     point = first_point(of, fit_layout, of.drive, {})
     noise = replace(white(NOISE), input_rms=input_rms)

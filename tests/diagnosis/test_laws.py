@@ -367,3 +367,25 @@ def test_terms_of_a_law_that_have_a_name(term, high, acts_on, effect):
     )
     expected = {} if effect is None else {f"-1*{term}": effect}
     assert law_names.known_terms(Law("F", acts_on, terms)) == expected
+
+
+@pytest.mark.parametrize(
+    ("beside", "inclusion", "is_named"),
+    [
+        ("x*abs(x)", 1.0, True),
+        ("sign(v)", 1.0, True),
+        ("x*v", 1.0, True),
+        # A drag of another exponent makes up for it.
+        ("abs(v)**1.5*sign(v)", 1.0, False),
+        ("x*abs(x)", 0.5, False),
+    ],
+)
+def test_a_drag_is_named_where_nothing_else_goes_with_the_velocity(
+    beside, inclusion, is_named
+):
+    terms = (
+        LawTerm(beside, 3.0, 2.0, 4.0, "N", 1.0),
+        LawTerm("v*abs(v)", -1.0, -1.1, -0.9, "N", inclusion),
+    )
+    found = law_names.known_terms(Law("F", "force", terms))
+    assert ("-1*v*abs(v)" in found) is is_named
