@@ -10,13 +10,11 @@ import numpy as np
 
 from hwid_cli.diagnosis.candidate import (
     SearchStart,
-    at_point,
     base_of,
     compared_with_fit,
     fit_candidate,
-    rebuilt,
+    with_input_noise,
 )
-from hwid_cli.diagnosis.causes import fit_with_input_noise
 from hwid_cli.diagnosis.direction import ReversedInputError, find_reversal
 from hwid_cli.diagnosis.growing import fit_grown, grown_starts, is_rugged
 from hwid_cli.diagnosis.noise import noise_floor
@@ -80,7 +78,7 @@ def fitted_base(problem: DiagnosisProblem) -> FittedBase:
     reversal = find_reversal(problem, base, scales, noise)
     if reversal is not None:
         raise ReversedInputError(reversal)
-    base = _with_input_noise(problem, base, scales, noise)
+    base = with_input_noise(problem, base, scales, noise)
     problem, base = with_zeros(problem, base, scales, noise)
     if base.cause == "zeros":
         given = compared_as_given(problem)
@@ -115,19 +113,6 @@ def _refit_base(
     starts = grown_starts(start, tuple(present), scales)
     grown = fit_grown(problem, found, starts, scales, noise)
     return grown if grown.sse.sum() < found.sse.sum() else found
-
-
-def _with_input_noise(
-    problem: DiagnosisProblem, base: CandidateFit, scales: Scales, noise: NoiseFloor
-) -> CandidateFit:
-    """Base as fitted with the input's noise in mind, if nothing else remains then."""
-    may_help = 1.0 < base.whiteness < np.inf and noise.input_rms > 0
-    if not may_help or problem.compares_command:
-        return base
-    fit_layout, point = rebuilt(problem, base, scales)
-    point = fit_with_input_noise(problem, fit_layout, point, noise)
-    found = at_point(problem, base, fit_layout, point, noise)
-    return found if found.cause == "input_noise" else base
 
 
 def _is_too_much(base: CandidateFit, noise: NoiseFloor, n_samples: int) -> bool:

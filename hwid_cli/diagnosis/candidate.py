@@ -15,6 +15,7 @@ import numpy as np
 
 from hwid_cli.diagnosis.causes import left_over
 from hwid_cli.diagnosis.few_samples import fewer_recordings
+from hwid_cli.diagnosis.input_noise import fit_with_input_noise
 from hwid_cli.diagnosis.parameters import (
     BASE,
     START,
@@ -22,6 +23,7 @@ from hwid_cli.diagnosis.parameters import (
     ParameterPoint,
     compare_at,
     drive_at,
+    drives_at,
     each_sum_of_squares,
     effects_at,
     first_point,
@@ -312,8 +314,8 @@ def evaluated(
     sse = each_sum_of_squares(parts)
     is_usable = bool(np.isfinite(sse).all())
     neighbour = _neighbour(parts) if is_usable else 0.0
-    drive = drive_at(problem, best.layout, best.point)
-    white, cause = left_over(parts, problem, drive, noise)
+    drives = drives_at(problem, best.layout, ParameterPoint(best.point.shared, own))
+    white, cause = left_over(parts, problem, drives, noise)
     shared = zip(best.layout.shared, best.point.shared, strict=True)
     own_values = np.array(
         [
@@ -424,7 +426,7 @@ def at_point(
     if not np.isfinite(sse).all():
         return found
     white, cause = left_over(
-        parts, problem, drive_at(problem, fit_layout, point), noise
+        parts, problem, drives_at(problem, fit_layout, point), noise
     )
     shared = zip(fit_layout.shared, point.shared, strict=True)
     own = [
@@ -442,6 +444,19 @@ def at_point(
         cause=cause,
         valleys=np.zeros((0, 0)),
     )
+
+
+def with_input_noise(
+    problem: DiagnosisProblem, fit: CandidateFit, scales: Scales, noise: NoiseFloor
+) -> CandidateFit:
+    """A fit with the input's noise in mind, if nothing else remains then."""
+    may_help = 1.0 < fit.whiteness < np.inf and noise.input_rms > 0
+    if not may_help or problem.compares_command:
+        return fit
+    fit_layout, point = rebuilt(problem, fit, scales)
+    point = fit_with_input_noise(problem, fit_layout, point, noise)
+    found = at_point(problem, fit, fit_layout, point, noise)
+    return found if found.cause == "input_noise" else fit
 
 
 def fitted_start(

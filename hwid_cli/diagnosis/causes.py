@@ -1,29 +1,21 @@
 """Causes of a gap that are no effect of the drive: what the measuring chain does.
 
-Noise on the measured input makes the simulation move where the drive did not; its share
-of the output has the colour of the drive itself. A logger that repeats samples leaves
-single steps. Interpolation between uneven samples links neighbours. Each is tested
-before an effect is named. docs/method_diagnosis.md, eq. (D27), (D28).
+A logger that repeats samples leaves single steps, interpolation between uneven samples
+links neighbours, and noise of the input moves the simulation (``input_noise``). Each is
+tested before an effect is named. docs/method_diagnosis.md, eq. (D27), (D28).
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import scipy
 
-from hwid_cli.diagnosis.noise import quiet_input_rms
-from hwid_cli.diagnosis.parameters import (
-    ParameterLayout,
-    ParameterPoint,
-    drive_at,
-    residuals_at,
-)
+from hwid_cli.diagnosis.input_noise import whiteness_with_input_noise
 from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals
-from hwid_cli.diagnosis.search import within_bounds
-from hwid_cli.diagnosis.whiteness import WHITE_BY_TWO_ROUTES, portmanteau, whiteness
-from hwid_cli.records.diagnosis import LEAST_SURE, SMALL_REMAINDER, NoiseFloor
-from hwid_cli.records.drive import HELD, Drive
+from hwid_cli.diagnosis.whiteness import portmanteau, whiteness
+from hwid_cli.records.diagnosis import NoiseFloor
+from hwid_cli.records.drive import Drive
 
 # Single repeats are damage where they are between these shares of the samples: more are
 # a hold, fewer may be chance.
@@ -34,22 +26,6 @@ _LEAST_REPEATED, _MOST_REPEATED = 2e-3, 0.25
 _BY_CHANCE = 2.0
 _LEAST_CHANCE = 1e-3
 _STOPPED = 3.0
-# The input's noise may be so many times what its differences show.
-_LESS_NOISE, _MORE_NOISE = 0.7, 1.3
-# Times that the filter follows the drive that was fitted with it.
-_REWEIGHTINGS = 2
-# What is left calls for so many times the noise that the input shows: something else is
-# missing, and no filter makes it white.
-_FAR_MORE_NOISE = 5.0
-# A size found above this share of the largest one asked for is at that limit.
-_AT_THE_LIMIT = 0.99
-# Of a size without a filter: the search subtracts, so that it is finite.
-_IMPOSSIBLE = 1e100
-# Sizes are looked for over so many powers of e, to this fineness.
-_WIDEST, _FINE_ENOUGH = 7.0, 0.02
-# Coordinates of that search go no farther, as powers of e, and it takes no more steps.
-_FARTHEST = 30.0
-_MOST_STEPS = 30
 # Correlations of neighbours, and of the next but one, that interpolation makes at most.
 _MOST_LINKED = (0.35, 0.1)
 
@@ -122,356 +98,6 @@ def _one_step(values: np.ndarray) -> float:
     return 0.5 * np.count_nonzero(moves < 1.5 * moves.min()) if moves.size else 0.0
 
 
-def whiteness_with_input_noise(
-    parts: Sequence[np.ndarray],
-    problem: DiagnosisProblem,
-    drive: Drive,
-    noise: NoiseFloor,
-) -> float:
-    """Whether residuals hold more than noise of the input and of the output.
-
-    The noise of the input drives the linear part of the drive; its size follows from
-    the residuals, and is at most a little more than the input shows. The innovations of
-    the stationary Kalman filter are white if nothing else is there.
-
-    Parameters
-    ----------
-    parts : sequence of ndarray, shape (n_evaluated,)
-        Residuals of all recordings.
-
-    Returns
-    -------
-    float, [-]
-        As ``noise.whiteness`` gives it; infinite where the input cannot be the cause.
-
-    References
-    ----------
-    docs/method_diagnosis.md, eq. (D27).
-    """
-    input_rms = noise.input_rms
-    if input_rms <= 0 or noise.rms <= 0 or problem.compares_command:
-        return float("inf")
-    filters = _Filters(problem, drive, noise.rms)
-    most = _MORE_NOISE * input_rms / noise.rms
-    share = filters.likeliest(parts, most)
-    white = filters.innovations(parts, share)
-    if white is None or share >= _AT_THE_LIMIT * most or not _are_alike(white):
-        return float("inf")
-    output_rms = filters.output_rms(parts, share)
-    if output_rms > SMALL_REMAINDER * noise.rms:
-        return float("inf")
-    statistic = portmanteau(white, (1.0,), n_lags=30)
-    # The same size by further routes is evidence of its own: the innovations of a missing
-    # effect are neither of that size nor nearly white.
-    if 1.0 < statistic <= WHITE_BY_TWO_ROUTES:
-        found = share * output_rms
-        is_same = found >= _LESS_NOISE * input_rms or _is_that_of_rests(found, problem)
-        if is_same and filters.is_as_large(parts, share):
-            return statistic / WHITE_BY_TWO_ROUTES
-    return statistic
-
-
-def _is_that_of_rests(input_rms: float, problem: DiagnosisProblem) -> bool:
-    """Whether noise of the input is of the size that its quietest stretches show."""
-    quiet = quiet_input_rms(problem)
-    return _LESS_NOISE * quiet <= input_rms <= _MORE_NOISE * quiet
-
-
-def _are_alike(white: Sequence[np.ndarray]) -> bool:
-    """Whether no recording leaves clearly more than all of them together."""
-    usual = np.sqrt(_mean_square(white))
-    return all(
-        np.sqrt(_mean_square([one]))
-        <= (SMALL_REMAINDER + LEAST_SURE * np.sqrt(0.5 / one.size)) * usual
-        for one in white
-    )
-
-
-def fit_with_input_noise(
-    problem: DiagnosisProblem,
-    fit_layout: ParameterLayout,
-    point: ParameterPoint,
-    noise: NoiseFloor,
-) -> ParameterPoint:
-    """Fit again with the noise of the input taken into account.
-
-    A fit to the output alone makes the drive too sluggish, because a smaller answer to
-    the input's noise leaves less. Innovations in units of their own deviation, with the
-    size of both noises held, have no such bias.
-
-    Parameters
-    ----------
-    point : ParameterPoint
-        Where the fit to the output ended.
-
-    References
-    ----------
-    docs/method_diagnosis.md, eq. (D27).
-    """
-    n_shared = len(fit_layout.shared)
-
-    def at(coordinates: np.ndarray) -> ParameterPoint:
-        # The search knows no bounds, and far beyond them a simulation has no end.
-        near = np.clip(coordinates, -_FARTHEST, _FARTHEST)
-        return within_bounds(
-            fit_layout,
-            ParameterPoint(near[:n_shared], near[n_shared:].reshape(point.own.shape)),
-        )
-
-    most = _FAR_MORE_NOISE * noise.input_rms / noise.rms
-    for _ in range(_REWEIGHTINGS):
-        drive = drive_at(problem, fit_layout, point)
-        parts = residuals_at(problem, fit_layout, point)
-        share = _Filters(problem, drive, noise.rms).likeliest(parts, most)
-        if share >= _AT_THE_LIMIT * most:
-            return point
-
-        def scaled(coordinates: np.ndarray, share: float = share) -> np.ndarray:
-            there = at(coordinates)
-            parts = residuals_at(problem, fit_layout, there)
-            drive = drive_at(problem, fit_layout, there)
-            filters = _Filters(problem, drive, noise.rms)
-            return np.concatenate(filters.in_deviations(parts, share))
-
-        start = np.concatenate([point.shared, point.own.ravel()])
-        if scaled(start).size < start.size:
-            return point
-        # "lm" counts the simulations for derivatives among its calls in some versions of
-        # SciPy only, "trf" in none.
-        found = scipy.optimize.least_squares(
-            scaled, start, method="trf", x_scale=1.0, max_nfev=_MOST_STEPS
-        )
-        point = at(found.x)
-    return point
-
-
-def _mean_square(parts: Sequence[np.ndarray]) -> float:
-    count = sum(one.size for one in parts)
-    return sum(float(one @ one) for one in parts) / max(count, 1)
-
-
-class _Filters:
-    """Whitening filters of the noise of the input and of the output.
-
-    Parameters
-    ----------
-    problem : DiagnosisProblem
-        Whose recordings the residuals belong to.
-    drive : Drive
-        With the fitted base.
-    output_rms : float, [output unit]
-        Noise of the output, in whose unit deviations are given.
-    """
-
-    def __init__(
-        self, problem: DiagnosisProblem, drive: Drive, output_rms: float
-    ) -> None:
-        self._times = [one.sample_time_s for one in problem.signals]
-        self._sampled = {one: _sampled(drive, one) for one in set(self._times)}
-        self._output_rms = output_rms
-
-    def likeliest(self, parts: Sequence[np.ndarray], most: float) -> float:
-        """Noise of the input over that of the output that makes residuals most probable.
-
-        A free axis adds up its noise: a recording is about one draw of the size of that,
-        but its innovations are as many as its samples.
-
-        Parameters
-        ----------
-        parts : sequence of ndarray, shape (n_evaluated,)
-            Residuals of all recordings.
-        most : float, [input unit/output unit]
-        """
-
-        def unlikely(power: float) -> float:
-            found = self._filtered(parts, most * np.exp(power))
-            if found is None:
-                return _IMPOSSIBLE
-            count = sum(one.size for one, _ in found)
-            logs = sum(one.size * np.log(variance) for one, variance in found)
-            size = float(count * np.log(_per_variance(found)) + logs)
-            return size if np.isfinite(size) else _IMPOSSIBLE
-
-        found = scipy.optimize.minimize_scalar(
-            unlikely,
-            bounds=(-_WIDEST, 0.0),
-            method="bounded",
-            options={"xatol": _FINE_ENOUGH},
-        )
-        return float(most * np.exp(found.x))
-
-    def output_rms(self, parts: Sequence[np.ndarray], share: float) -> float:
-        """Noise of the output that goes with this share of the input's."""
-        found = self._filtered(parts, share)
-        return np.inf if found is None else float(np.sqrt(_per_variance(found)))
-
-    def innovations(
-        self, parts: Sequence[np.ndarray], share: float
-    ) -> list[np.ndarray] | None:
-        """What the samples before do not tell of each residual; None without a filter."""
-        found = self._filtered(parts, share)
-        return None if found is None else [one for one, _ in found]
-
-    def is_as_large(self, parts: Sequence[np.ndarray], share: float) -> bool:
-        """Whether residuals are as large as noise of this size would make them.
-
-        Innovations tell the size from what is fast; a missing effect is slower, and
-        leaves more or less than they say.
-        """
-        output = self.output_rms(parts, share) ** 2
-        n_samples = sum(one.size for one in parts)
-        expected, spread = 0.0, 2.0 * output**2 * n_samples
-        for part, time in zip(parts, self._times, strict=True):
-            moved, n_free = _moved(self._sampled[time], part.size)
-            moved *= share**2 * output * part.size
-            expected += moved
-            spread += 2.0 * moved**2 / n_free
-        excess = _mean_square(parts) * n_samples - output * n_samples
-        chance = LEAST_SURE * np.sqrt(spread)
-        most = max((_MORE_NOISE**2 - 1.0) * expected, chance)
-        least = max((1.0 - _LESS_NOISE**2) * expected, chance)
-        return bool(-least <= excess - expected <= most)
-
-    def in_deviations(
-        self, parts: Sequence[np.ndarray], share: float
-    ) -> list[np.ndarray]:
-        """Innovations in units of their deviation; residuals where there is no filter."""
-        found = self._filtered(parts, share)
-        if found is None:
-            return list(parts)
-        return [one / (self._output_rms * np.sqrt(size)) for one, size in found]
-
-    def _filtered(
-        self, parts: Sequence[np.ndarray], share: float
-    ) -> list[tuple[np.ndarray, float]] | None:
-        """Innovations, each with its variance in units of the output's noise."""
-        filters = {
-            time: _whitening(one, share**2) for time, one in self._sampled.items()
-        }
-        found = []
-        for part, time in zip(parts, self._times, strict=True):
-            one = filters[time]
-            if one is None:
-                return None
-            filtered = scipy.signal.lfilter(one.top, one.bottom, part)
-            found.append((np.asarray(filtered), one.variance))
-        return found
-
-
-def _per_variance(found: Sequence[tuple[np.ndarray, float]]) -> float:
-    """Mean square of innovations over their variance in units of the output's noise."""
-    count = sum(one.size for one, _ in found)
-    squares = sum(float(one @ one) / size for one, size in found)
-    return max(squares / max(count, 1), np.finfo(float).tiny)
-
-
-@dataclass(frozen=True, eq=False)
-class _Whitening:
-    """Filter from a residual to its innovations.
-
-    Parameters
-    ----------
-    top, bottom : ndarray, shape (n_states + 1,)
-        Its coefficients, the newest sample first.
-    variance : float, [-]
-        Of the innovations, in units of the output's noise.
-    """
-
-    top: np.ndarray
-    bottom: np.ndarray
-    variance: float
-
-
-@dataclass(frozen=True, eq=False)
-class _Sampled:
-    """Linear drive from sample to sample.
-
-    Parameters
-    ----------
-    a : ndarray, shape (n_states, n_states)
-    b : ndarray, shape (n_states,)
-        By which a sample of the input moves the following state.
-    c : ndarray, shape (1, n_states)
-        The reading of a state.
-    through : float
-        By which a sample of the input moves the reading at once.
-    """
-
-    a: np.ndarray
-    b: np.ndarray
-    c: np.ndarray
-    through: float
-
-
-def _moved(sampled: _Sampled, size: int) -> tuple[float, float]:
-    """Mean square of the reading that the input's noise of variance 1 makes from rest.
-
-    Returns
-    -------
-    float
-    float
-        How many draws of its size a recording is worth.
-    """
-    top, bottom = scipy.signal.ss2tf(
-        sampled.a, sampled.b[:, None], sampled.c, np.array([[sampled.through]])
-    )
-    pulse = np.zeros(size)
-    pulse[0] = 1.0
-    impulse = scipy.signal.lfilter(top[0], bottom, pulse)
-    mean_square = float(np.square(impulse) @ (1.0 - np.arange(size) / size))
-    both_ways = scipy.signal.fftconvolve(impulse, impulse[::-1])[size - 1 :]
-    together = np.square(both_ways / both_ways[0]) @ (1.0 - np.arange(size) / size)
-    return mean_square, size / max(2.0 * float(together) - 1.0, 1.0)
-
-
-def _whitening(sampled: _Sampled, strength: float) -> _Whitening | None:
-    """Whitening filter of input and output noise; None where there is none.
-
-    ``strength`` is the variance of the input's noise in units of the output's.
-    """
-    a, b, c, through = sampled.a, sampled.b, sampled.c, sampled.through
-    moved = strength * np.outer(b, b)
-    # The input's noise moves the reading at once, too.
-    both = strength * through * b[:, None]
-    read = np.array([[1.0 + strength * through**2]])
-    try:
-        covariance = scipy.linalg.solve_discrete_are(a.T, c.T, moved, read, s=both)
-    except (np.linalg.LinAlgError, ValueError):
-        return None
-    variance = float((c @ covariance @ c.T)[0, 0]) + float(read[0, 0])
-    correct = ((a @ covariance @ c.T + both) / variance).ravel()
-    bottom = np.poly(a - np.outer(correct, c))
-    return _Whitening(np.poly(a), bottom, variance)
-
-
-def _sampled(drive: Drive, sample_time_s: float) -> _Sampled:
-    """Linear drive from sample to sample, its input held or a straight line between them."""
-    push, damping = drive.force_constant_N_per_A, drive.damping_N_s_per_m
-    if drive.resistance_ohm is not None:
-        push /= drive.resistance_ohm
-        back_emf = drive.back_emf_V_s_per_m
-        damping += push * (
-            drive.force_constant_N_per_A if back_emf is None else back_emf
-        )
-    # State, input, and its slope.
-    block = np.zeros((4, 4))
-    block[0, 1] = 1.0
-    block[1, :3] = np.array([-drive.stiffness_N_per_m, -damping, push]) / drive.mass_kg
-    block[2, 3] = 1.0 / sample_time_s
-    step = scipy.linalg.expm(block * sample_time_s)
-    a, rising = step[:2, :2], step[:2, 3]
-    if drive.hold == HELD:
-        rising = np.zeros(2)
-    falling = step[:2, 2] - rising
-    is_velocity = drive.output == "velocity"
-    c = np.array([[0.0, 1.0]]) if is_velocity else np.array([[1.0, 0.0]])
-    b, through = a @ rising + falling, float((c @ rising)[0])
-    if is_velocity and drive.stiffness_N_per_m == 0:
-        # Nothing tells where it is.
-        return _Sampled(a[1:, 1:], b[1:], c[:, 1:], through)
-    return _Sampled(a, b, c, through)
-
-
 def whiteness_but_for_neighbours(
     parts: Sequence[np.ndarray], noise: NoiseFloor
 ) -> float:
@@ -503,7 +129,7 @@ def whiteness_but_for_neighbours(
 def left_over(
     parts: Sequence[np.ndarray],
     problem: DiagnosisProblem,
-    drive: Drive,
+    drives: Sequence[Drive],
     noise: NoiseFloor,
 ) -> tuple[float, str]:
     """Whether residuals hold more than noise, whatever made the noise.
@@ -512,8 +138,8 @@ def left_over(
     ----------
     parts : sequence of ndarray, shape (n_evaluated,)
         Residuals of all recordings.
-    drive : Drive
-        With the fitted base.
+    drives : sequence of Drive
+        Of each recording, with the fitted base.
 
     Returns
     -------
@@ -526,7 +152,7 @@ def left_over(
     plain = whiteness(parts, noise)
     if plain <= 1.0 or not np.isfinite(plain):
         return plain, ""
-    through = whiteness_with_input_noise(parts, problem, drive, noise)
+    through = whiteness_with_input_noise(parts, problem, drives, noise)
     if through <= 1.0:
         return through, "input_noise"
     linked = whiteness_but_for_neighbours(parts, noise)

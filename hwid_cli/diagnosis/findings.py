@@ -181,9 +181,8 @@ def describe(findings: Findings) -> Diagnosis:
     """Put together what shows the verdict."""
     problem, criteria, base = findings.problem, findings.criteria, findings.base
     verdict, noise, scales = findings.verdict, criteria.noise, findings.scales
-    chosen, before = verdict.chosen, findings.before
-    fits = list(findings.found.fits.values())
-    after, given_sse = findings.after(), findings.given_sse
+    chosen, before, after = verdict.chosen, findings.before, findings.after()
+    fits, given_sse = list(findings.found.fits.values()), findings.given_sse
     from_sse = given_sse if verdict.word in ("parameters", "none") else base.sse
     parameters = _base(problem.drive, base, chosen)
     present, effects = findings.described_effects()
@@ -220,6 +219,7 @@ def describe(findings: Findings) -> Diagnosis:
         units=problem.drive.straight_units,
         output=problem.drive.output,
         hold=problem.drive.hold,
+        remains=chosen.cause,
         law=law,
         trust=trust,
         bands=bands,
@@ -340,13 +340,21 @@ def _base(
 
 
 def _mean_factor(chosen: CandidateFit, name: str) -> float:
-    """Mean of the factors by which recordings change a parameter; 1 without any."""
+    """What the mean over the recordings is of a parameter that they change, over the fit.
+
+    The mass is known from the configuration: beside another mean mass all others, which
+    are known in proportion to it, are others. 1 without any change.
+    """
     mean = 1.0
     for column, one in enumerate(chosen.own_names):
-        if is_factor(one) and name.startswith(
-            f"{CATALOGUE[one.owner].words['which']}_"
-        ):
-            mean = float(np.mean(np.exp(chosen.own[:, column])))
+        if not is_factor(one):
+            continue
+        which = CATALOGUE[one.owner].words["which"]
+        of_recordings = float(np.mean(np.exp(chosen.own[:, column])))
+        if which == "mass":
+            mean /= of_recordings
+        elif name.startswith(f"{which}_"):
+            mean *= of_recordings
     return mean
 
 

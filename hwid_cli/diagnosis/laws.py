@@ -41,6 +41,7 @@ from hwid_cli.diagnosis.selection import (
     LEAST_GAIN,
     LEAST_IMPROVED,
     TIE,
+    has_own_values,
 )
 from hwid_cli.diagnosis.set_fits import Rounds, has_many_samples
 from hwid_cli.diagnosis.tasks import DiagnosisTask
@@ -159,7 +160,7 @@ def find_law(
     best = _best(
         rounds, _tried(rounds, [one for one in likely if len(one.terms) <= most])
     )
-    if best is None or not _holds(rounds, best, verdict):
+    if best is None or not _holds(rounds, best, found, verdict):
         return verdict, found, None
     best = _refined(rounds, best)
     named = _named(rounds, best, found)
@@ -187,7 +188,8 @@ def _most_terms(rounds: Rounds, verdict: DiagnosisVerdict) -> int:
     a law as short as that leaves nothing.
     """
     is_open = rounds.base.is_usable and not rounds.problem.compares_command
-    if verdict.is_complete or not is_open:
+    is_settled = verdict.is_complete or rounds.criteria.leaves_noise(verdict.chosen)
+    if is_settled or not is_open:
         return 0
     return _as_short(rounds, verdict) or MOST_TERMS
 
@@ -437,7 +439,9 @@ def _unclear_terms(rounds: Rounds, one: _Tried) -> list[str]:
     ]
 
 
-def _holds(rounds: Rounds, one: _Tried, verdict: DiagnosisVerdict) -> bool:
+def _holds(
+    rounds: Rounds, one: _Tried, found: RoundsResult, verdict: DiagnosisVerdict
+) -> bool:
     """Whether held-out recordings agree, and effects of the catalogue do not do as well."""
     criteria, fit = rounds.criteria, _fit(one)
     against = criteria.evidence(fit, rounds.base)
@@ -447,6 +451,7 @@ def _holds(rounds: Rounds, one: _Tried, verdict: DiagnosisVerdict) -> bool:
         and against.improved >= LEAST_IMPROVED
         and criteria.is_beyond_stand_in(fit, rounds.base)
         and _is_as_good_elsewhere(rounds, fit)
+        and not _is_behind(rounds, one, found)
         and not _unclear_terms(rounds, one)
     )
     if not verdict.chosen.effects or not holds:
@@ -457,6 +462,18 @@ def _holds(rounds: Rounds, one: _Tried, verdict: DiagnosisVerdict) -> bool:
     if _as_short(rounds, verdict):
         return is_better and criteria.is_complete(fit)
     return is_better and (rest <= MOST_OF_NAMED or criteria.is_complete(fit))
+
+
+def _is_behind(rounds: Rounds, one: _Tried, found: RoundsResult) -> bool:
+    """Whether effects of the catalogue, named or not, leave clearly less than a law."""
+    criteria, law = rounds.criteria, _fit(one)
+    return any(
+        fit.is_usable
+        and not has_own_values(fit)
+        and criteria.gain(fit, law) >= LEAST_GAIN
+        and criteria.rms(fit, held_out=True) < criteria.rms(law, held_out=True)
+        for fit in found.fits.values()
+    )
 
 
 def _is_as_good_elsewhere(rounds: Rounds, fit: CandidateFit) -> bool:

@@ -24,7 +24,7 @@ from hwid_cli.drive.simulation import (
     set_start,
 )
 from hwid_cli.records.candidates import ParameterRef
-from hwid_cli.records.drive import Drive, StandIn
+from hwid_cli.records.drive import BASE_PARAMETERS, Drive, StandIn
 
 # Owners beside the effects: the base, and how a recording starts.
 # Largest logarithm of a value over its scale.
@@ -330,6 +330,34 @@ def drive_at(
         if one.owner == BASE
     }
     return replace(problem.drive, **base)
+
+
+def drives_at(
+    problem: DiagnosisProblem, fit_layout: ParameterLayout, point: ParameterPoint
+) -> list[Drive]:
+    """Drive of each recording, with the base of a point and what it changes of that."""
+    drive = drive_at(problem, fit_layout, point)
+    changes = [
+        (column, one, _changed_by(one))
+        for column, one in enumerate(fit_layout.own)
+        if is_factor(one.ref)
+    ]
+    if not changes:
+        return [drive] * len(problem.signals)
+    found = []
+    for row in point.own:
+        changed: dict[str, Any] = {
+            name: getattr(drive, name) * np.exp(one.value(row[column]))
+            for column, one, name in changes
+        }
+        found.append(replace(drive, **changed))
+    return found
+
+
+def _changed_by(unknown: Unknown) -> str:
+    """Parameter of the base that the factors of recordings multiply."""
+    which = CATALOGUE[unknown.owner].words["which"]
+    return next(one for one in ("mass_kg", *BASE_PARAMETERS) if one.startswith(which))
 
 
 def effects_at(

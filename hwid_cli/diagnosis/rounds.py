@@ -184,6 +184,7 @@ class _Search:
         self.fits.go_on(size)
         if self.fits.grow_bouncing(size):
             self._use_again(size)
+        self.fits.fit_with_input_noise(size)
         return self.fits.best_of_size(size)
 
     def goes_on(

@@ -263,6 +263,14 @@ class SelectionCriteria:
         is_alike = not found.effects and found.cause == "input_noise"
         return is_white and is_fact and (is_alike or self.holds(found))
 
+    def leaves_noise(self, found: CandidateFit) -> bool:
+        """Whether nothing but noise remains, be it that of the input.
+
+        Of far more than the sensor's noise that is said, and not taken for complete.
+        """
+        is_of_input = found.is_usable and found.cause == "input_noise"
+        return self.is_complete(found) or (is_of_input and found.whiteness <= 1.0)
+
     def holds(self, found: CandidateFit) -> bool:
         """Whether a candidate leaves hardly more of held-out recordings than of others."""
         held, train = (self._over_noise(found, rows) for rows in self._sides)
@@ -304,7 +312,7 @@ class SelectionCriteria:
         base : CandidateFit
             Re-fitted, without further effects.
         """
-        if self.is_complete(found):
+        if self.leaves_noise(found):
             return True
         return self.excess(found) < LEAST_LAST_CONTRIBUTION * self.excess(base)
 
@@ -334,13 +342,13 @@ class SelectionCriteria:
         explains = against.explained >= self._least_explained(found)
         return (
             against.gain >= LEAST_GAIN
-            and (explains or self.is_complete(found))
+            and (explains or self.leaves_noise(found))
             and against.improved >= LEAST_IMPROVED
             and has_size(found)
             and not self.replaces(found)
             and self.is_beyond_stand_in(found, base)
             and not self.is_systematic(found)
-            and (self.is_complete(found) or not holds_look_alikes(found))
+            and (self.leaves_noise(found) or not holds_look_alikes(found))
         )
 
     def _least_explained(self, found: CandidateFit) -> float:
@@ -356,7 +364,8 @@ class SelectionCriteria:
 
     def is_far(self, found: CandidateFit) -> bool:
         """Whether a set of several effects leaves more than such sets may."""
-        return len(found.effects) > 1 and self.ratio(found) > MOST_LEFT_BY_SET
+        is_far = len(found.effects) > 1 and self.ratio(found) > MOST_LEFT_BY_SET
+        return is_far and not self.leaves_noise(found)
 
     def replaces(self, found: CandidateFit) -> bool:
         """Whether a candidate puts another base in the place of the simulation's.

@@ -218,7 +218,7 @@ def _named(
         return (
             f"{names} ({meaning}) explains {100 * share:.3g} % of what the simulation "
             f"leaves of {on} recordings: the error falls from {before:.3g} to "
-            f"{after:.3g} times the noise. What remains is not explained."
+            f"{after:.3g} times the noise.{_rest(criteria, verdict)}"
         )
     others = "".join(f", or instead {title_of(one)}" for one in verdict.rivals)
     which = "the first" if others else them
@@ -275,6 +275,8 @@ def _rest(criteria: SelectionCriteria, verdict: DiagnosisVerdict) -> str:
     """Say what remains beside what was found; nothing where it is complete."""
     if verdict.is_complete:
         return ""
+    if verdict.chosen.cause:
+        return f" What remains is {CAUSES[verdict.chosen.cause]}."
     if criteria.ratio(verdict.chosen) > STILL_LARGE:
         return " What remains is not explained."
     if criteria.ratio(verdict.chosen) > SMALL_REMAINDER:

@@ -18,6 +18,7 @@ from hwid_cli.diagnosis.candidate import (
     residuals_of_few,
     screen,
     start_from,
+    with_input_noise,
 )
 from hwid_cli.diagnosis.effect_sets import Effects
 from hwid_cli.diagnosis.few_samples import fewer_recordings
@@ -58,6 +59,8 @@ LEAST_FURTHER = 0.25
 LEAST_OF_REST = 0.5
 # Sets that leave more than so many times what the best one leaves are far behind it.
 FAR_BEHIND = 10.0
+# Sets of a size that are fitted with the noise of the input in mind.
+WITH_INPUT_NOISE = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,6 +109,24 @@ class SetFits:
     def best_of_size(self, size: int) -> CandidateFit | None:
         """The best set of a size."""
         return select_best(self.rounds.criteria, self.of_size(size), self.rounds.base)
+
+    def fit_with_input_noise(self, size: int) -> None:
+        """Fit the best sets of a size with the input's noise in mind, where that is all.
+
+        On a free axis it moves the simulation by far more than the sensor's noise, and the
+        values of a fit to the output with it.
+        """
+        rounds, usable = (
+            self.rounds,
+            [one for one in self.of_size(size) if one.is_usable],
+        )
+        if rounds.criteria.standing is not None:
+            return
+        usable.sort(key=lambda one: -rounds.criteria.gain(one, rounds.base))
+        scales, noise = rounds.baseline.scales, rounds.baseline.noise
+        for one in usable[:WITH_INPUT_NOISE]:
+            found = with_input_noise(rounds.problem, one, scales, noise)
+            self.found[one.effects] = found
 
     def lowest_of_size(self, size: int) -> CandidateFit:
         """The set of a size with the lowest criterion, however much it brings."""

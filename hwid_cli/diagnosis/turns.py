@@ -404,5 +404,6 @@ def fit_of_run(findings: Findings, turn: Turn) -> CandidateFit:
     if not is_late:
         noise = replace(noise, input_rms=measured_input_rms(turn.problem))
     problem = replace(turn.problem, known={})
-    white, cause = left_over(turn.left, problem, fitted_drive(drive, fit), noise)
+    drives = [fitted_drive(drive, fit)] * len(problem.signals)
+    white, cause = left_over(turn.left, problem, drives, noise)
     return replace(fit, whiteness=white, cause=cause)

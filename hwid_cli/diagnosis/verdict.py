@@ -54,7 +54,8 @@ def lead(
         part of it in most of the held-out recordings.
     """
     chosen = verdict.chosen
-    if verdict.is_complete or verdict.word not in ("named", "unknown"):
+    is_open = verdict.word in ("named", "unknown")
+    if not is_open or criteria.leaves_noise(chosen):
         return None
     best, most = None, LEAST_LEAD
     for one in found:
@@ -275,7 +276,8 @@ def needs_each(
                 return False
             continue
         against = criteria.evidence(whole, fits[left])
-        completes = criteria.is_complete(whole) and not criteria.is_complete(fits[left])
+        completes = criteria.leaves_noise(whole)
+        completes = completes and not criteria.leaves_noise(fits[left])
         explains = against.explained >= LEAST_EXPLAINED or completes
         completes = completes or _nearly_completes(criteria, whole, fits[left])
         is_clear = against.gain >= LEAST_GAIN and against.improved >= LEAST_IMPROVED
@@ -308,7 +310,7 @@ def _is_beaten_by_fewer(
 
     Such a set makes up for a law that the fewer ones come closer to, named or not.
     """
-    if criteria.is_complete(whole):
+    if criteria.leaves_noise(whole):
         return False
     gain = criteria.gain(whole, base)
     return any(

@@ -353,6 +353,9 @@ class Diagnosis(Shown):
         How its bands of 90 % did on held-out recordings, each told by the others.
     hold : str
         How the command goes on between samples, as given or as found.
+    remains : str
+        What beside the noise of the output makes up what is left, one of ``CAUSES``;
+        empty where that is not known.
     compared : str
         The signal that is compared: ``output y``, or ``command u`` beside a controller.
     """
@@ -391,6 +394,7 @@ class Diagnosis(Shown):
     trust: ModelTrust | None = field(default=None, metadata=ADDED_LATER)
     bands: TrustOnTests = field(default=TrustOnTests(), metadata=ADDED_LATER)
     hold: str = field(default=LINE, metadata=ADDED_LATER)
+    remains: str = field(default="", metadata=ADDED_LATER)
     compared: str = field(default="output y", metadata=ADDED_LATER)
 
     @property

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hwid_cli.records.axis import unit_of_effect
+from hwid_cli.records.candidates import CAUSES
 from hwid_cli.records.diagnosis import (
     SMALL_REMAINDER,
     Diagnosis,
@@ -501,6 +502,8 @@ def verdict_sentence(diagnosis: Diagnosis) -> str:
                 if leaves_little(diagnosis)
                 else "a part stays unexplained"
             )
+            if diagnosis.remains:
+                rest = f"what remains is {CAUSES[diagnosis.remains].split(',')[0]}"
         named = "" if names == diagnosis.verdict else f", {names}"
         line += f"{named} ({rest})"
     return line

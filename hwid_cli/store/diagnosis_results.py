@@ -206,21 +206,13 @@ def _content(diagnosis: Diagnosis) -> dict[str, Any]:
             moment: {one.name: getattr(one, moment) for one in diagnosis.base}
             for moment in ("before", "refitted", "after")
         },
-        "where": [
-            {
-                "variable": place.variable,
-                "share": place.share,
-                "sentence": place.sentence,
-                "about": place.about,
-                "rms": place.rms,
-            }
-            for place in diagnosis.places
-        ],
+        "where": [asdict(place) for place in diagnosis.places],
         **({} if diagnosis.law is None else {"law": _law(diagnosis.law)}),
         "axis": diagnosis.axis,
         "units": asdict(diagnosis.units),
         "output": diagnosis.output,
         "hold": diagnosis.hold,
+        "remains": diagnosis.remains,
         "not_observable": list(diagnosis.not_observable),
         "warnings": list(diagnosis.warnings),
         "next_experiment": asdict(diagnosis.next_experiment),

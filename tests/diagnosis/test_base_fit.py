@@ -1,10 +1,23 @@
 """The base, fitted again: what measuring alone explains."""
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
 from hwid_cli.diagnosis import base_fit
+from hwid_cli.diagnosis.candidate import with_input_noise
 from hwid_cli.records.diagnosis import NoiseFloor
-from tests.diagnosis.small_drive import NOISE, problem, recordings, white
+from tests.diagnosis.small_drive import (
+    DRIVE,
+    NOISE,
+    N,
+    fit,
+    problem,
+    recordings,
+    sizes,
+    white,
+)
 
 
 @pytest.mark.parametrize(("times", "kept"), [(1.5, 1.5), (5.0, 1.0)])
@@ -19,3 +32,42 @@ def test_noise_that_a_fit_leaves_a_fifth_of_is_read_from_the_motion(
     )
     found = base_fit.fitted_base(problem(recordings()))
     assert found.noise.rms == pytest.approx(kept * NOISE)
+
+
+def loaded(number, drive):
+    """Every second recording with a quarter more mass."""
+    return replace(drive, mass_kg=(1.25 if number % 2 else 1.0) * drive.mass_kg)
+
+
+@pytest.mark.thorough
+def test_loads_of_a_free_axis_are_told_behind_noise_of_the_input():
+    free = replace(DRIVE, stiffness_N_per_m=0.0)
+    rng = np.random.default_rng(3)
+    noisy = [
+        replace(one, input=one.input + 0.1 * np.r_[0, rng.standard_normal(N - 1)])
+        for one in recordings(drive=free, own=loaded)
+    ]
+    of = problem(noisy, stiffness_N_per_m=0.0)
+    plain = fit(of, {"parameter_change:mass": {"log_mass": 0.0}})
+    noise = replace(white(), input_rms=0.1)
+    found = with_input_noise(of, plain, sizes(of), noise)
+
+    def off(one):
+        factor = np.exp(one.own[:, 0])
+        ratios = factor[1::2, None] / factor[0::2]
+        return float(np.max(np.abs(ratios / 1.25 - 1)))
+
+    assert plain.whiteness > 1
+    assert found.cause == "input_noise"
+    assert off(found) < 0.5 * off(plain)
+    # Masses and all others together change nothing.
+    base = drive_of(found)["force_constant_N_per_A"] / np.exp(found.own[:, 0])
+    true = np.where(np.arange(9) % 2, 5.0 / 1.25, 5.0)
+    assert np.median(base / true) == pytest.approx(1.0, abs=0.01)
+
+
+def drive_of(found):
+    return {
+        one.parameter: value
+        for one, value in zip(found.names, found.values, strict=True)
+    }

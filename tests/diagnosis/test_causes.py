@@ -1,39 +1,23 @@
-"""Causes of a gap in the measuring chain: repeats, noise of the input, interpolation."""
+"""Causes of a gap in the measuring chain: repeats, and interpolation."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scipy.linalg import solve_triangular, toeplitz
-from scipy.optimize import least_squares, minimize_scalar
-from scipy.signal import cont2discrete, dlsim, lfilter
+from scipy.signal import lfilter
 
-from hwid_cli.diagnosis import causes
 from hwid_cli.diagnosis.causes import (
-    fit_with_input_noise,
     left_over,
     whiteness_but_for_neighbours,
-    whiteness_with_input_noise,
     without_repeats,
 )
-from hwid_cli.diagnosis.parameters import (
-    drive_at,
-    first_point,
-    parameter_layout,
-    residuals_at,
-)
-from hwid_cli.diagnosis.whiteness import portmanteau, whiteness
-from hwid_cli.records.drive import Controller
+from hwid_cli.diagnosis.whiteness import whiteness
 from tests.diagnosis.small_drive import (
-    DRIVE,
     NOISE,
     STEP_S,
     N,
-    fit,
     problem,
     recordings,
-    sizes,
     white,
 )
 
@@ -113,239 +97,9 @@ def test_repeats_of_a_noisy_signal_on_a_grid_may_be_chance(seed):
     assert without_repeats(of).signals == of.signals
 
 
-# Noise of the input that moves the drive by about twice the noise of its sensor.
-INPUT_NOISE = 0.05
-
-
-def answer_to_a_pulse(drive=DRIVE):
-    """Of the drive to one sample of the input, by another route: a textbook's model."""
-    k, c, m = drive.stiffness_N_per_m, drive.damping_N_s_per_m, drive.mass_kg
-    model = (
-        np.array([[0.0, 1.0], [-k / m, -c / m]]),
-        np.array([[0.0], [drive.force_constant_N_per_A / m]]),
-        np.array([[0.0, 1.0] if drive.output == "velocity" else [1.0, 0.0]]),
-        np.array([[0.0]]),
-    )
-    found = cont2discrete(model, STEP_S, "zoh" if drive.hold == "zero" else "foh")
-    pulse = np.zeros(N)
-    pulse[0] = 1.0
-    return dlsim((*found[:4], STEP_S), pulse)[1][:, 0]
-
-
-PULSE = answer_to_a_pulse()
-
-
-def factor_of_the_noise(pulse, input_noise):
-    """Lower factor of the covariance of a residual of N samples."""
-    transfer = toeplitz(pulse, np.zeros(N))
-    return np.linalg.cholesky(
-        NOISE**2 * np.eye(N) + input_noise**2 * transfer @ transfer.T
-    )
-
-
-def moved_by_input_noise(seed, count=9, pulse=PULSE):
-    """What noise of the input leaves, by convolution, with that of the sensor."""
-    rng = np.random.default_rng(seed)
-    return [
-        np.convolve(pulse, INPUT_NOISE * rng.standard_normal(N))[:N]
-        + NOISE * rng.standard_normal(N)
-        for _ in range(count)
-    ]
-
-
-def innovations_by_factors(parts, pulse):
-    """By another route: the covariance of the residual, inverted by its factors.
-
-    The size of the input's noise is the most probable one, that of the output's free.
-    """
-
-    def free(power):
-        factor = factor_of_the_noise(pulse, np.exp(power) * INPUT_NOISE)
-        return factor, solve_triangular(factor, np.column_stack(parts), lower=True)
-
-    def unlikely(power):
-        factor, found = free(power)
-        logs = 2 * len(parts) * np.sum(np.log(np.diag(factor)))
-        return found.size * np.log(np.mean(found**2)) + logs
-
-    best = minimize_scalar(unlikely, bounds=(-3.0, 0.26), method="bounded")
-    return list(free(best.x)[1].T)
-
-
-def floor(input_rms=INPUT_NOISE):
-    return replace(white(), input_rms=input_rms)
-
-
 @pytest.fixture(scope="module")
 def of():
     return problem()
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_what_noise_of_the_input_leaves_is_white_behind_the_filter(of, seed):
-    parts = moved_by_input_noise(seed)
-    found = whiteness_with_input_noise(parts, of, of.drive, floor())
-    free = innovations_by_factors(parts, PULSE)
-    expected = portmanteau(free, (1.0,), n_lags=30)
-
-    assert whiteness(parts, floor()) > 100
-    assert expected < 1
-    # The filter is that of a noise that has lasted for ever, the covariance that of one
-    # from the first sample.
-    assert found == pytest.approx(expected, abs=0.02)
-
-
-FREE = {"stiffness_N_per_m": 0.0}
-
-
-@pytest.mark.parametrize(
-    "changes",
-    [
-        {"hold": "zero"},
-        {"output": "velocity"},
-        {"output": "velocity", **FREE},
-        {"output": "velocity", "hold": "zero", **FREE},
-        FREE,
-    ],
-)
-def test_the_filter_is_that_of_any_reading_and_command(of, changes):
-    drive = replace(of.drive, **changes)
-    pulse = answer_to_a_pulse(drive)
-    # Noise of the input that moves the reading about as much as the sensor's does.
-    pulse *= NOISE / INPUT_NOISE / np.sqrt(np.mean(np.cumsum(pulse**2)))
-    gain = pulse[5] / answer_to_a_pulse(drive)[5]
-    push = gain * drive.force_constant_N_per_A
-    drive = replace(drive, force_constant_N_per_A=push)
-    parts = moved_by_input_noise(3, pulse=pulse)
-    found = whiteness_with_input_noise(parts, of, drive, floor())
-    expected = portmanteau(innovations_by_factors(parts, pulse), (1.0,), n_lags=30)
-    assert expected < 1
-    assert found == pytest.approx(expected, abs=0.04)
-
-
-@pytest.mark.parametrize("share", [0.5, 0.0])
-def test_an_input_that_shows_less_noise_is_not_the_cause(of, share):
-    parts = moved_by_input_noise(1)
-    noise = floor(share * INPUT_NOISE)
-    assert whiteness_with_input_noise(parts, of, of.drive, noise) == np.inf
-
-
-def colored(parts):
-    """The same with neighbours that go together a little: behind the filter as well."""
-    return [lfilter([1.0, 0.16], [1.0], one) for one in parts]
-
-
-def test_noise_of_the_size_that_the_input_shows_may_be_a_little_coloured(of):
-    parts = colored(moved_by_input_noise(1))
-    alike = whiteness_with_input_noise(parts, of, of.drive, floor())
-    # A fast command looks like noise as well: the size is no evidence then.
-    louder = whiteness_with_input_noise(parts, of, of.drive, floor(2 * INPUT_NOISE))
-    assert alike < 1 < louder
-    assert louder == pytest.approx(6 * alike, rel=0.05)
-
-
-def test_a_fast_command_shows_its_noise_where_it_rests(of):
-    rng = np.random.default_rng(4)
-    noise = INPUT_NOISE * rng.standard_normal(N)
-    fast = np.r_[np.zeros(N // 4), rng.standard_normal(N - N // 4)]
-    signals = [replace(one, driven_by=noise + fast) for one in of.signals]
-    parts = colored(moved_by_input_noise(1))
-    resting = replace(of, signals=tuple(signals))
-    found = whiteness_with_input_noise(parts, resting, of.drive, floor(1.0))
-    assert found < 1 < whiteness_with_input_noise(parts, of, of.drive, floor(1.0))
-
-
-@pytest.mark.parametrize("share", [0.5, 2.0])
-def test_residuals_as_large_as_the_noise_behind_the_filter_makes_them(of, share):
-    parts = moved_by_input_noise(1)
-    filters = causes._Filters(of, of.drive, NOISE)
-    likeliest = filters.likeliest(parts, 2 * INPUT_NOISE / NOISE)
-    assert filters.is_as_large(parts, likeliest)
-    assert not filters.is_as_large(parts, share * likeliest)
-
-
-def test_one_recording_with_more_than_its_input_can_shake_is_something(of):
-    parts = moved_by_input_noise(1)
-    louder = [*parts[:-1], 1.5 * parts[-1]]
-    assert whiteness_with_input_noise(parts, of, of.drive, floor()) < 1.0
-    assert whiteness_with_input_noise(louder, of, of.drive, floor()) == np.inf
-
-
-def test_under_a_controller_the_input_is_not_the_cause(of):
-    held = replace(of, drive=replace(of.drive, controller=Controller(20.0, 30.0)))
-    parts = moved_by_input_noise(1)
-    assert whiteness_with_input_noise(parts, held, held.drive, floor()) == np.inf
-
-
-def test_the_cause_is_told_with_what_is_left(of):
-    assert left_over(moved_by_input_noise(2), of, of.drive, floor())[1] == "input_noise"
-    rng = np.random.default_rng(2)
-    alone = [NOISE * rng.standard_normal(N) for _ in range(9)]
-    assert left_over(alone, of, of.drive, floor())[1] == ""
-
-
-@pytest.mark.parametrize("force", [0.3, 0.8])
-def test_missing_friction_is_no_noise_of_the_input(force):
-    given = recordings({"coulomb_friction": {"force_N": force}})
-    rng = np.random.default_rng(5)
-    noisy = [
-        replace(one, input=one.input + 0.01 * np.r_[0, rng.standard_normal(N - 1)])
-        for one in given
-    ]
-    of = problem(noisy)
-    layout, point, parts = at(of, fit(of))
-    for input_rms in (0.01, 0.1):
-        left, cause = left_over(
-            parts, of, drive_at(of, layout, point), floor(input_rms)
-        )
-        assert (cause, left > 1) == ("", True)
-
-
-def at(of, found):
-    """Layout, point and residuals of a fit of the base."""
-    layout = parameter_layout(of, (), {}, sizes(of))
-    point = first_point(of, layout, replace(of.drive, **base_of(found)), {})
-    return layout, point, residuals_at(of, layout, point)
-
-
-def base_of(found):
-    return {
-        one.parameter: value
-        for one, value in zip(found.names, found.values, strict=True)
-    }
-
-
-@pytest.mark.thorough
-def test_a_fit_that_knows_of_the_noise_of_the_input_is_the_weighted_one():
-    rng = np.random.default_rng(3)
-    # It rests under its first sample, which is read without noise.
-    given = [
-        replace(one, input=one.input + 0.3 * np.r_[0, rng.standard_normal(N - 1)])
-        for one in recordings(noise=NOISE)
-    ]
-    of = problem(given)
-    layout, plain, _ = at(of, fit(of))
-    found = fit_with_input_noise(of, layout, plain, floor(0.3))
-    weighted = fit_by_factors(of, layout, plain, 0.3)
-    expected, started, ended = (
-        np.array([drive.damping_N_s_per_m, drive.stiffness_N_per_m])
-        for drive in (drive_at(of, layout, one) for one in (weighted, plain, found))
-    )
-    # It takes the size of the noise from the residuals, 2 % off.
-    assert np.all(np.abs(ended - expected) < 0.1 * np.abs(started - expected))
-
-
-def fit_by_factors(of, layout, point, input_noise):
-    """Weighted with the covariance of the noise at each trial of the parameters."""
-
-    def errors(shared):
-        trial = replace(point, shared=shared)
-        pulse = answer_to_a_pulse(drive_at(of, layout, trial))
-        parts = np.column_stack(residuals_at(of, layout, trial))
-        factor = factor_of_the_noise(pulse, input_noise)
-        return solve_triangular(factor, parts, lower=True).ravel()
-
-    return replace(point, shared=least_squares(errors, point.shared).x)
 
 
 def linked(seed, share=1.0):
@@ -365,7 +119,7 @@ def test_noise_that_interpolation_has_linked_is_noise(of, seed):
     parts = linked(seed)
     noise = white()
     assert whiteness(parts, noise) > 1
-    left, cause = left_over(parts, of, of.drive, noise)
+    left, cause = left_over(parts, of, [of.drive] * len(of.signals), noise)
     assert (left < 1, cause) == (True, "interpolation")
 
 
@@ -385,74 +139,10 @@ def test_noise_that_interpolation_has_linked_is_noise(of, seed):
 def test_noise_that_is_linked_otherwise_is_something(of, taps):
     rng = np.random.default_rng(7)
     parts = [lfilter(taps, [1.0], NOISE * rng.standard_normal(N)) for _ in range(9)]
-    left, cause = left_over(parts, of, of.drive, white())
+    left, cause = left_over(parts, of, [of.drive] * len(of.signals), white())
     assert (left > 1, cause) == (True, "")
 
 
 def test_where_the_noise_is_coloured_already_nothing_is_linked():
     coloured = replace(white(), is_coloured=True, whitening=(1.0, -0.3))
     assert whiteness_but_for_neighbours(linked(1), coloured) == np.inf
-
-
-def test_a_search_under_input_noise_stays_within_the_bounds(monkeypatch):
-    # Far beyond them a stiffness has so short a period that a simulation has no end.
-    asked = []
-
-    def far_away(scaled, start, **options):
-        assert options["max_nfev"] <= 100
-        for way in (1e3, -1e3):
-            scaled(start + way)
-        return SimpleNamespace(x=start)
-
-    def noted(of, fit_layout, point):
-        asked.append(drive_at(of, fit_layout, point).stiffness_N_per_m)
-        return residuals_at(of, fit_layout, point)
-
-    monkeypatch.setattr("scipy.optimize.least_squares", far_away)
-    monkeypatch.setattr(causes, "residuals_at", noted)
-    of = problem(recordings(noise=10 * NOISE))
-    fit_layout = parameter_layout(of, (), {}, sizes(of))
-    point = first_point(of, fit_layout, of.drive, {})
-    fit_with_input_noise(of, fit_layout, point, replace(white(NOISE), input_rms=1e3))
-
-    known = DRIVE.stiffness_N_per_m
-    assert max(asked) == pytest.approx(1e4 * known)
-    assert min(asked) == pytest.approx(1e-4 * known)
-
-
-@pytest.mark.parametrize(("input_rms", "is_tried"), [(1e-6, False), (1e3, True)])
-def test_more_than_the_input_can_have_shaken_is_not_filtered(
-    monkeypatch, input_rms, is_tried
-):
-    tried = []
-
-    def noted(scaled, start, **options):
-        tried.append(options)
-        return SimpleNamespace(x=start)
-
-    monkeypatch.setattr("scipy.optimize.least_squares", noted)
-    of = problem(recordings({"coulomb_friction": {"force_N": 0.8}}))
-    fit_layout = parameter_layout(of, (), {}, sizes(of))
-    point = first_point(of, fit_layout, of.drive, {})
-    noise = replace(white(NOISE), input_rms=input_rms)
-    fit_with_input_noise(of, fit_layout, point, noise)
-    assert bool(tried) is is_tried
-
-
-def test_a_search_under_input_noise_has_few_steps(monkeypatch):
-    # SciPy's "lm" does not count the simulations for derivatives in every version.
-    calls = []
-
-    def noted(of, fit_layout, point):
-        calls.append(point)
-        return residuals_at(of, fit_layout, point)
-
-    monkeypatch.setattr(causes, "residuals_at", noted)
-    monkeypatch.setattr(causes, "_MOST_STEPS", 2)
-    of = problem(recordings(noise=10 * NOISE))
-    fit_layout = parameter_layout(of, (), {}, sizes(of))
-    point = first_point(of, fit_layout, of.drive, {})
-    fit_with_input_noise(of, fit_layout, point, replace(white(NOISE), input_rms=1e3))
-    # Two searches; in each one at the start, two steps with derivatives.
-    size = point.shared.size + point.own.size
-    assert 0 < len(calls) <= 2 * (2 + 3 * (size + 1))

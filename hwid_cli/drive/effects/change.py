@@ -41,7 +41,7 @@ EFFECTS = tuple(
         words={"which": which},
         confused_with={"force_constant_saturation": "repeats of the same recording"},
         # A free axis hardly tells a load from another force constant.
-        needs_spring=which in ("stiffness", "mass"),
+        needs_spring=which == "stiffness",
     )
     for which in CHANGING
 )

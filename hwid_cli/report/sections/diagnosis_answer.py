@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from hwid_cli.records.axis import unit_of_effect
+from hwid_cli.records.candidates import CAUSES
 from hwid_cli.records.diagnosis import (
     STILL_LARGE,
     Diagnosis,
@@ -95,9 +96,8 @@ def verdict_in_words(diagnosis: Diagnosis) -> str:
     if diagnosis.verdict == "named" and diagnosis.after.ratio_to_noise > STILL_LARGE:
         verb = "explains" if len(found) == 1 else "explain"
         share = f"{100 * diagnosis.explained_share:.3g} %"
-        text = (
-            f"{listed(found)} {verb} {share} of the gap; what remains is not explained."
-        )
+        remains = CAUSES.get(diagnosis.remains, "not explained")
+        text = f"{listed(found)} {verb} {share} of the gap; what remains is {remains}."
         return text[:1].upper() + text[1:]
     if diagnosis.verdict == "named" and found:
         return f"The simulation lacks {listed(found)}.{_rest(diagnosis)}"
@@ -120,6 +120,8 @@ def _rest(diagnosis: Diagnosis) -> str:
     """What stays unexplained beside the effects; empty for nothing."""
     if diagnosis.complete:
         return ""
+    if diagnosis.remains:
+        return f" What remains is {CAUSES[diagnosis.remains]}."
     if leaves_little(diagnosis):
         return " Little more than the noise remains."
     return " A part of the gap stays unexplained."
