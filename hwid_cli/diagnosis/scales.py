@@ -17,7 +17,7 @@ from hwid_cli.diagnosis.covariates import (
     variables,
 )
 from hwid_cli.diagnosis.latent_force import Smoothed, finite, latent_force
-from hwid_cli.diagnosis.problem import Compared, DiagnosisProblem
+from hwid_cli.diagnosis.problem import Compared, DiagnosisProblem, Signals
 from hwid_cli.diagnosis.segments import parabolic_peak
 from hwid_cli.drive.effect import Missing, Scales, Wave
 from hwid_cli.records.candidates import CandidateFit
@@ -25,6 +25,8 @@ from hwid_cli.records.diagnosis import NoiseFloor
 from hwid_cli.records.drive import Drive
 
 _MOST_LINES = 3
+# A speed is seen over this many samples at least, and over one of so many stretches.
+_FEWEST_OF_SPEED, _STRETCHES_OF_SPEED = 10, 50
 _FINER = 8
 # Samples that start values of formulas are fitted to, at most.
 _MOST_OF_STARTS = 2000
@@ -66,6 +68,8 @@ def scales_of_recordings(
         for one in all_signals
     )
     speed = max(float(np.nanmax(np.abs(one))) for one in velocities)
+    # A base that imitates what is missing may hardly move.
+    speed = max(speed, *(_measured_speed(one) for one in all_signals))
     duration = max(one.compared.size * one.sample_time_s for one in all_signals)
     natural = np.sqrt(drive.stiffness_N_per_m / drive.mass_kg) / (2 * np.pi)
     force = abs(drive.force_constant_N_per_A) * current
@@ -90,6 +94,17 @@ def scales_of_recordings(
         missing=missing,
         passes_once=problem.passes_once,
     )
+
+
+def _measured_speed(signals: Signals) -> float:
+    """Speed that a recording reaches at least, over a stretch that noise does not move."""
+    if signals.is_velocity:
+        return float(np.max(np.abs(signals.output)))
+    length = max(_FEWEST_OF_SPEED, signals.output.size // _STRETCHES_OF_SPEED)
+    if length >= signals.output.size:
+        return 0.0
+    ways = signals.output[length:] - signals.output[:-length]
+    return float(np.max(np.abs(ways))) / (length * signals.sample_time_s)
 
 
 def scales_of_fit(

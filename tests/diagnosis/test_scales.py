@@ -16,7 +16,15 @@ from hwid_cli.diagnosis.scales import (
 )
 from hwid_cli.drive.catalogue import CATALOGUE
 from hwid_cli.records.drive import Drive
-from tests.diagnosis.small_drive import DRIVE, STEP_S, problem, sizes, white
+from tests.diagnosis.small_drive import (
+    DRIVE,
+    STEP_S,
+    N,
+    problem,
+    recordings,
+    sizes,
+    white,
+)
 
 TIME = STEP_S * np.arange(400)
 
@@ -179,3 +187,18 @@ def test_scales_know_that_a_way_is_passed_once(n):
     of = DiagnosisProblem((up,) * n, DRIVE)
     found = scales_of_recordings(of, [np.zeros(3)] * n)
     assert found.passes_once == (n == 1)
+
+
+@pytest.mark.parametrize("is_velocity", [False, True])
+def test_a_base_that_hardly_moves_makes_no_speed_small(is_velocity):
+    # Friction, drag and limits at speed start from it, and a thousandth of it is stiff.
+    of = problem([replace(one, output=0.1 * np.sin(0.02 * np.arange(N)))
+                  for one in recordings()])  # fmt: skip
+    signals = [replace(one, is_velocity=is_velocity) for one in of.signals]
+    of = replace(of, signals=tuple(signals))
+    still = [np.zeros(3) for _ in signals]
+    found = scales_of_recordings(of, still).velocity_m_per_s
+    # Of a position 0.1 m at 20 rad/s: 2 m/s.
+    assert found == pytest.approx(0.1 if is_velocity else 2.0, rel=0.01)
+    fast = scales_of_recordings(of, [np.full(3, 50.0) for _ in signals])
+    assert fast.velocity_m_per_s == 50.0
