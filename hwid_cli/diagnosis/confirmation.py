@@ -42,7 +42,8 @@ def confirm(
     found, criteria = _with_run(findings, best), findings.criteria
     run = found.verdict.chosen
     is_enough = is_as_good(best) or criteria.is_nearly_all(run, findings.base)
-    if is_enough and not criteria.replaces(run):
+    may_be_named = not (criteria.replaces(run) or criteria.imitates_one_law(run))
+    if is_enough and may_be_named:
         return found, best.values_of_run, True
     return _unconfirmed(findings), best.values_of_run, False
 

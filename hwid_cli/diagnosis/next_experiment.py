@@ -26,6 +26,7 @@ from hwid_cli.drive.effect import Scales
 from hwid_cli.drive.simulation import Motion
 from hwid_cli.records.candidates import CandidateFit
 from hwid_cli.records.diagnosis import NextExperiment
+from hwid_cli.records.drive import SOURCES
 from hwid_cli.records.units import behind
 
 # Verdicts after which another recording is of use.
@@ -35,6 +36,8 @@ _MOST_SAMPLES = 6000
 _PERIODS = 12
 # So much farther from its start than in the recordings may a proposed motion go, [-].
 _BEYOND_TRAVEL = 1.25
+# An input that stays within this share of its largest value has no sign there, [-].
+_ONE_SIGN = 0.05
 # Share of the sample rate up to which the recordings show a frequency well, [-].
 HIGHEST_SHARE = 0.1
 
@@ -75,11 +78,11 @@ def propose(
             "",
             "every input of the menu goes farther than these recordings; one that "
             "moves the drive forth and back may tell "
-            f"{title_of(pair[0])} and {title_of(pair[1])} apart",
+            f"{_titles(pair)} apart",
         )
     # The dash of a dimensionless output would be a minus behind a number.
     by = f"{best.rms:.2g}{behind(problem.unit)}"
-    names = f"{title_of(pair[0])} and {title_of(pair[1])}"
+    names = _titles(pair)
     ratio = best.rms / max(criteria.noise.rms, 1e-300)
     least = least_separation(best.n_samples)
     if ratio < least:
@@ -94,6 +97,14 @@ def propose(
         f"{names} then differ by {by} ({times_the_noise(ratio, least, best.n_samples)}) "
         "after the parameters have been fitted again",
     )
+
+
+def _titles(pair: Sequence[CandidateFit]) -> str:
+    """Two candidates in words that tell them apart."""
+    titles = [title_of(one) for one in pair]
+    if titles[0] == titles[1]:
+        titles = [" with ".join(one.effects) for one in pair]
+    return " and ".join(titles)
 
 
 def least_separation(n_samples: int) -> float:
@@ -129,13 +140,13 @@ def times_the_noise(ratio: float, least: float, n_samples: int) -> str:
     >>> times_the_noise(5.0, 0.11, 500)
     '5 times the noise'
     >>> times_the_noise(0.4, 0.11, 500)
-    '0.4 times the noise of a sample; over 500 samples 0.11 times is seen'
+    '0.4 times the noise of one sample; 500 samples show 0.11 times and more'
     """
     if ratio >= 1.0:
         return f"{ratio:.2g} times the noise"
     return (
-        f"{ratio:.2g} times the noise of a sample; over {n_samples} samples {least:.2g} "
-        "times is seen"
+        f"{ratio:.2g} times the noise of one sample; {n_samples} samples show {least:.2g} "
+        "times and more"
     )
 
 
@@ -239,11 +250,30 @@ def best_separation(
         With an empty input where all of them leave that travel.
     """
     found = [Separation("", 0.0, 1)]
-    for name, command in menu(scales, problem.drive.source_unit).items():
+    unit = problem.input_unit or problem.drive.source_unit
+    for name, command in menu(scales, unit).items():
+        if not _has_known_sign(command, problem):
+            continue
         asked, motion = played(problem, favourite, command)
         if _stays(motion.position, problem):
             found.append(Separation(name, _left_over(asked, rival), command.size))
     return max(found, key=lambda item: (item.rms, bool(item.input)))
+
+
+def _has_known_sign(command: np.ndarray, problem: DiagnosisProblem) -> bool:
+    """Whether an input keeps to the signs that were recorded, where it may have only one.
+
+    A motor turns both ways; a heater does not cool.
+    """
+    if problem.input_unit in SOURCES:
+        return True
+    recorded = np.concatenate([one.input for one in problem.signals])
+    least = _ONE_SIGN * float(np.max(np.abs(recorded)))
+    is_upward, is_downward = np.min(recorded) > -least, np.max(recorded) < least
+    return not (
+        (is_upward and np.min(command) < -least)
+        or (is_downward and np.max(command) > least)
+    )
 
 
 def _stays(position: np.ndarray, problem: DiagnosisProblem) -> bool:

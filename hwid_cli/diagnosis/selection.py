@@ -348,8 +348,12 @@ class SelectionCriteria:
             and not self.replaces(found)
             and self.is_beyond_stand_in(found, base)
             and not self.is_systematic(found)
-            and (self.leaves_noise(found) or not holds_look_alikes(found))
+            and not self.imitates_one_law(found)
         )
+
+    def imitates_one_law(self, found: CandidateFit) -> bool:
+        """Whether effects that look like each other leave something beside both."""
+        return holds_look_alikes(found) and not self.leaves_noise(found)
 
     def _least_explained(self, found: CandidateFit) -> float:
         """Share that a set has to explain, from how much it leaves."""

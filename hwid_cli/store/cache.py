@@ -8,6 +8,7 @@ may share a folder: an entry appears as a whole, and two of one key hold the sam
 import errno
 import hashlib
 import logging
+import stat
 from pathlib import Path
 from typing import TypeVar
 
@@ -78,8 +79,8 @@ class Hdf5Store:
         """
         path = self._path(key)
         try:
-            if not path.is_file():
-                path.stat()
+            # Asked once: another run may write the entry meanwhile.
+            if not stat.S_ISREG(path.stat().st_mode):
                 raise OSError(errno.EINVAL, "is no plain file")
             content = path.read_bytes()
         except FileNotFoundError:

@@ -114,6 +114,34 @@ def test_on_a_free_axis_no_motion_is_proposed_that_runs_away(rivals):
     assert going[found.input] < 1.3
 
 
+@pytest.mark.parametrize(("sign", "word"), [(1.0, "negative"), (-1.0, "positive")])
+def test_an_input_of_one_sign_keeps_it(rivals, sign, word):
+    of, _, scales, _ = rivals
+    signals = [replace(one, input=sign * np.abs(one.input)) for one in of.signals]
+    one_sided = replace(of, signals=tuple(signals), input_unit="W")
+    inputs = menu(scales, "W")
+    kept = [
+        name for name, one in inputs.items()
+        if next_experiment._has_known_sign(one, one_sided)
+    ]  # fmt: skip
+    assert kept
+    assert not any(word in name or "triangle" in name for name in kept)
+    motor = replace(one_sided, input_unit="A")
+    assert all(next_experiment._has_known_sign(one, motor) for one in inputs.values())
+
+
+def test_two_changes_of_parameters_are_told_apart_by_what_changes(rivals):
+    *_, fits = rivals
+    pair = [
+        replace(fits[0], effects=(f"parameter_change:{which}",))
+        for which in ("mass", "damping")
+    ]
+    assert next_experiment._titles(pair) == (
+        "parameter_change:mass and parameter_change:damping"
+    )
+    assert next_experiment._titles([fits[0], pair[0]]).endswith(" and parameter_change")
+
+
 def test_where_every_input_goes_too_far_that_is_said(rivals, monkeypatch):
     of, _, scales, fits = rivals
     monkeypatch.setattr(next_experiment, "_BEYOND_TRAVEL", 1e-6)
@@ -193,7 +221,7 @@ def test_a_difference_below_the_noise_of_a_sample_says_why_it_is_seen(rivals):
     assert proposed(rivals, best.rms / (1.01 * least)).input == best.input
     assert proposed(rivals, best.rms / (0.99 * least)).input == ""
     said = proposed(rivals, 2 * best.rms).reason
-    assert f"0.5 times the noise of a sample; over {best.n_samples} samples" in said
+    assert f"0.5 times the noise of one sample; {best.n_samples} samples" in said
 
 
 def effects(found):

@@ -58,6 +58,7 @@ CUBIC = Effect(
     confused_with={
         "quadratic_stiffness": "a step of the other sign",
         "end_stop": "small and full amplitude",
+        "one_sided_stop": "small and full amplitude to both sides",
         "sensor_cubic": "a sine near resonance",
     },
 )
@@ -80,6 +81,7 @@ QUADRATIC = Effect(
     ),
     confused_with={
         "cubic_stiffness": "a step of the other sign",
+        "one_sided_stop": "small and full amplitude to both sides",
         "sensor_quadratic": "a sine near resonance",
     },
 )
@@ -142,6 +144,7 @@ ONE_SIDED = Effect(
     confused_with={
         "end_stop": "a step of the other sign",
         "quadratic_stiffness": "small and full amplitude",
+        "cubic_stiffness": "small and full amplitude",
     },
     bounces=True,
 )
