@@ -2101,3 +2101,111 @@ def clean_known_winding(draw):
         simulation={"inductance_H": inductance},
         input_unit=("voltage_V", 1.0),
     )
+
+
+# Noise of the logged input on a free axis, which adds it up, beside a fine encoder
+
+
+@machine("clean")
+def clean_free_noisy_log(draw):
+    b = draw.bench(
+        "doublets levels steps",
+        mass=12.0,
+        pace=2.0,
+        damping=0.2,
+        force_constant=40.0,
+        top=6.0,
+        sample_s=1e-3,
+        samples=1500,
+        count=6,
+        free=True,
+    )
+    return b.machine("linear motor, noisy log", noise=2e-5, input_noise=0.002)
+
+
+@machine("clean")
+def clean_servo_noisy_log(draw):
+    b = draw.servo(
+        "moves sine triangles",
+        mass=2e-4,
+        damping_time_s=0.3,
+        force_constant=0.11,
+        travel=3.0,
+        bandwidth=8.0,
+        sample_s=1e-3,
+    )
+    return b.machine(
+        "servo under position control, noisy log",
+        noise=2e-5,
+        input_noise=0.01,
+        output_unit=("angle_rad", 1.0),
+    )
+
+
+@machine("noisy log")
+def gantry_coulomb_noisy_log(draw):
+    b = draw.bench(
+        "doublets levels steps",
+        mass=1800.0,
+        pace=0.4,
+        damping=0.12,
+        force_constant=140.0,
+        top=12.0,
+        sample_s=5e-3,
+        samples=1600,
+        count=8,
+        free=True,
+    )
+    return b.machine(
+        "gantry on rails, noisy log",
+        [h.coulomb(0.08 * b.force)],
+        noise=2e-5,
+        input_noise=0.002,
+    )
+
+
+@machine("noisy log")
+def ripple_noisy_log(draw):
+    b = draw.bench(
+        "doublets levels steps",
+        mass=1.5e-3,
+        pace=2.0,
+        damping=0.2,
+        force_constant=0.3,
+        top=2.0,
+        sample_s=1e-3,
+        samples=1500,
+        count=6,
+        free=True,
+    )
+    turns = max(1.0, np.round(12.0 / b.travel * 2.0 * np.pi))
+    return b.machine(
+        "motor with torque ripple and friction, noisy log",
+        [
+            h.ripple(draw.near(0.08), float(turns), draw.angle()),
+            h.coulomb(0.06 * b.force),
+        ],
+        noise=2e-5,
+        input_noise=0.002,
+        output_unit=("angle_rad", 1.0),
+    )
+
+
+@machine("noisy log")
+def wheel_coulomb_noisy_log(draw):
+    b = draw.servo(
+        "moves sine triangles",
+        mass=2e-3,
+        damping_time_s=0.8,
+        force_constant=0.06,
+        travel=3.0,
+        bandwidth=6.0,
+        sample_s=1e-3,
+    )
+    return b.machine(
+        "wheel under position control, noisy log",
+        [h.coulomb(0.08 * b.force)],
+        noise=2e-5,
+        input_noise=0.01,
+        output_unit=("angle_rad", 1.0),
+    )
