@@ -399,6 +399,13 @@ def _group_lines(proposal: Proposal) -> list[str]:
     ]
 
 
+# Under a drive with a voltage at its input; a second mark, because a piezo has none.
+_CIRCUIT = (
+    "#   # resistance_ohm: 1.0    # of a motor's winding, which the voltage drives with its",
+    "#                            # back-EMF; without this line the constant counts per V",
+)
+
+
 def _diagnose_lines(layout: FolderLayout, proposal: Proposal) -> list[str]:
     lines = [
         "# What does a physics simulation of the drive lack? Put the values that you "
@@ -418,6 +425,7 @@ def _diagnose_lines(layout: FolderLayout, proposal: Proposal) -> list[str]:
         *lines,
         "# simulation:",
         *_drive_lines(_units(layout).get("output", ""), pushes=bool(push)),
+        *(_CIRCUIT if unit == "V" else ()),
         "#   hold: auto               # linear or zero (held, as by a controller, PLC or",
         "#                            # D/A converter): say so where you know it",
         *_STARTS[proposal.initial_state],

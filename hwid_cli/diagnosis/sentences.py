@@ -466,6 +466,10 @@ def _unseen_sides(problem: DiagnosisProblem) -> list[str]:
     lowest = min(float(np.min(one.output)) for one in problem.signals)
     highest = max(float(np.max(one.output)) for one in problem.signals)
     reach = max(abs(lowest), abs(highest))
+    # A sensor's zero may lie elsewhere than where the drive starts.
+    ways = [one.output - one.output[0] for one in problem.signals]
+    lowest = min(lowest, *(float(np.min(one)) for one in ways))
+    highest = max(highest, *(float(np.max(one)) for one in ways))
     texts = []
     if lowest > -_ONE_SIDE * reach:
         texts.append("anything on the negative side, where the drive never is")

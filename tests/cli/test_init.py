@@ -498,6 +498,7 @@ def test_kinds_of_a_plan_do_not_ask_for_columns_of_one_length(tmp_path):
     ("source", "column", "said"),
     [
         ("current_A", "speed_rpm", ("inertia_kg_m2: 0.01", "output: velocity")),
+        ("voltage_V", "speed_rpm", ("inertia_kg_m2: 0.01", "output: velocity")),
         ("current_A", "angle_deg", ("torque_constant_N_m_per_A: 0.1",)),
         ("current_A", "speed [mm/s]", ("mass_kg: 1.0", "output: velocity")),
         ("current_A", "position_mm", ("force_constant_N_per_A: 10.0",)),
@@ -527,6 +528,8 @@ def test_the_starting_simulation_is_of_the_axis_that_is_measured(
     text = out.read_text()
     assert all(f"#   {one}\n" in text for one in said)
     assert ("output: velocity" in text) == column.startswith("speed")
+    # Of a winding, where a voltage may drive one; a second mark, because a piezo has none.
+    assert ("#   # resistance_ohm: 1.0" in text) == source.startswith("voltage")
     pushes = {"torque [Nm]": "N m", "force_kN": "N"}
     assert ("# (The input is a " in text) == (source in pushes)
     if source not in pushes:

@@ -124,3 +124,13 @@ def test_what_a_simulation_of_ones_own_holds_is_not_said_to_be_unseen():
     assert any("brush" in text for text in hidden_from_view(of))
     texts = hidden_from_view(own)
     assert not any("brush" in text or "mass" in text for text in texts)
+
+
+def test_where_a_drive_never_is_counts_from_its_start_as_well():
+    one_way = [replace(one, output=abs(one.output)) for one in recordings()]
+    side = "anything on the negative side, where the drive never is"
+    assert side in hidden_from_view(problem(one_way))
+    # A laser whose zero lies elsewhere: the drive moves to both sides of its rest.
+    offset = [replace(one, output=one.output + 0.1) for one in recordings()]
+    assert side not in hidden_from_view(problem(offset))
+    assert side not in hidden_from_view(problem())
