@@ -389,3 +389,22 @@ def test_a_drag_is_named_where_nothing_else_goes_with_the_velocity(
     )
     found = law_names.known_terms(Law("F", "force", terms))
     assert ("-1*v*abs(v)" in found) is is_named
+
+
+@pytest.mark.parametrize(
+    ("left", "own", "is_behind"),
+    [
+        (150.0, None, True),
+        (2_990.0, None, False),
+        (3_500.0, None, False),
+        # Values of each recording make up for anything.
+        (150.0, [0.1, -0.1] * 3, False),
+    ],
+)
+def test_a_law_is_none_where_effects_of_the_catalogue_leave_clearly_less(
+    left, own, is_behind
+):
+    law = SimpleNamespace(fit=made_up(("law",), 3_000.0))
+    pair = made_up(("coulomb_friction", "torque_ripple"), left, own=own)
+    rounds = SimpleNamespace(criteria=CRITERIA)
+    assert laws._is_behind(rounds, law, RoundsResult({pair.effects: pair})) is is_behind

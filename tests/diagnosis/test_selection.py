@@ -946,3 +946,25 @@ def test_what_is_no_clear_effect_imitates_a_simpler_one(of_plain, chosen):
 @pytest.mark.parametrize("sensor", ["motor", "load"])
 def test_a_coupling_is_told_by_the_inertia_of_the_motor(sensor):
     assert CATALOGUE[f"elastic_coupling:{sensor}"].told_by == "motor_share"
+
+
+def test_noise_of_the_input_is_all_that_remains_and_not_complete():
+    # 20 times the noise, white behind the input's filter.
+    far = replace(made_up(("gravity", "torque_ripple"), 40_000.0, whiteness=0.5))
+    of_input = replace(far, cause="input_noise")
+    assert CRITERIA.leaves_noise(of_input)
+    assert not CRITERIA.leaves_noise(far)
+    assert not CRITERIA.is_complete(of_input)
+    assert CRITERIA.is_far(far)
+    assert not CRITERIA.is_far(of_input)
+    assert CRITERIA.is_nearly_all(of_input, base(90_000.0))
+    assert not CRITERIA.is_nearly_all(far, base(90_000.0))
+    coloured = replace(of_input, whiteness=1.5)
+    assert not CRITERIA.leaves_noise(coloured)
+
+
+def test_two_that_look_alike_are_one_law_in_a_simulation_of_ones_own_as_well():
+    alike = ("cubic_stiffness", "one_sided_stop:contact")
+    assert CRITERIA.imitates_one_law(made_up(alike, 110.0))
+    assert not CRITERIA.imitates_one_law(made_up(alike, 100.0, whiteness=0.9))
+    assert not CRITERIA.imitates_one_law(made_up((*GOOD, alike[0]), 110.0))
