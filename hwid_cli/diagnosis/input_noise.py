@@ -144,22 +144,15 @@ def fit_with_input_noise(
         parts = residuals_at(problem, fit_layout, point)
         share = _Filters(problem, drives, noise.rms).likeliest(parts, most)
 
-        start = np.concatenate([point.shared, point.own.ravel()])
-
-        def scaled(
-            coordinates: np.ndarray,
-            share: float = share,
-            start: np.ndarray = start,
-        ) -> np.ndarray:
+        def scaled(coordinates: np.ndarray, share: float = share) -> np.ndarray:
             there = at(coordinates)
             parts = residuals_at(problem, fit_layout, there)
             drives = drives_at(problem, fit_layout, there)
             filters = _Filters(problem, drives, noise.rms)
-            # What nothing tells stays: masses, say, with the force constant.
-            stays = coordinates - start
-            return np.concatenate([*filters.in_deviations(parts, share), stays])
+            return np.concatenate(filters.in_deviations(parts, share))
 
-        if scaled(start).size < 2 * start.size:
+        start = np.concatenate([point.shared, point.own.ravel()])
+        if scaled(start).size < start.size:
             return point
         # "lm" counts the simulations for derivatives among its calls in some versions of
         # SciPy only, "trf" in none.

@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hwid_cli.diagnosis.findings import MOST_OVERLAYS
+from hwid_cli.diagnosis.findings import MOST_OVERLAYS, _mean_factor
 from hwid_cli.diagnosis.intervals import intervals
 from hwid_cli.records.candidates import ParameterRef
+from tests.diagnosis.made_up_fits import made_up
 from tests.diagnosis.small_drive import (
     NOISE,
     N,
@@ -229,3 +230,19 @@ def test_what_nothing_determines_has_a_wide_one():
     flat = replace(held, input=current, output=2.0 * 5.0 / 1184.0 + noise)
     found, low, high = with_interval(problem([flat]), {})
     assert ((high - low) > found.values).all()
+
+
+@pytest.mark.parametrize(
+    ("which", "name", "factor"),
+    [
+        ("damping", "damping_N_s_per_m", 3.0),
+        ("damping", "stiffness_N_per_m", 1.0),
+        # All others are known in proportion to the mass.
+        ("mass", "damping_N_s_per_m", 1 / 3.0),
+        ("mass", "force_constant_N_per_A", 1 / 3.0),
+    ],
+)
+def test_values_are_told_beside_the_mean_of_what_differs(which, name, factor):
+    fit = made_up(("coulomb_friction",), 100.0, own=np.log([2.0, 4.0] * 3))
+    ref = ParameterRef(f"parameter_change:{which}", f"log_{which}")
+    assert _mean_factor(replace(fit, own_names=(ref,)), name) == pytest.approx(factor)

@@ -149,6 +149,9 @@ def test_the_filter_is_that_of_any_reading_and_command(of, changes):
     expected = portmanteau(innovations_by_factors(parts, pulse), (1.0,), n_lags=30)
     assert expected < 1
     assert found == pytest.approx(expected, abs=0.04)
+    moved, _ = noise_of_input._moved(noise_of_input._sampled(drive, STEP_S), N)
+    by_pulse = np.sum(pulse**2 * (1 - np.arange(N) / N))
+    assert moved == pytest.approx(by_pulse, rel=1e-3)
 
 
 @pytest.mark.parametrize("share", [0.5, 0.0])
@@ -197,6 +200,14 @@ def test_one_recording_with_more_than_its_input_can_shake_is_something(of):
     louder = [*parts[:-1], 1.5 * parts[-1]]
     assert whiteness_with_input_noise(parts, of, each(of), floor()) < 1.0
     assert whiteness_with_input_noise(louder, of, each(of), floor()) == np.inf
+
+
+def test_an_output_with_more_than_its_noise_holds_something(of):
+    rng = np.random.default_rng(5)
+    parts = [
+        one + 1.5 * NOISE * rng.standard_normal(N) for one in moved_by_input_noise(1)
+    ]
+    assert whiteness_with_input_noise(parts, of, each(of), floor()) == np.inf
 
 
 def test_under_a_controller_the_input_is_not_the_cause(of):

@@ -21,6 +21,7 @@ from hwid_cli.diagnosis.law_search import MOST_TERMS
 from hwid_cli.diagnosis.law_terms import Term
 from hwid_cli.diagnosis.laws import _most_terms
 from hwid_cli.diagnosis.rounds import RoundsResult
+from hwid_cli.diagnosis.sentences import law_in_words
 from hwid_cli.diagnosis.set_fits import fit_task
 from hwid_cli.diagnosis.verdict import DiagnosisVerdict
 from hwid_cli.records.diagnosis import Law, LawTerm
@@ -408,3 +409,31 @@ def test_a_law_is_none_where_effects_of_the_catalogue_leave_clearly_less(
     pair = made_up(("coulomb_friction", "torque_ripple"), left, own=own)
     rounds = SimpleNamespace(criteria=CRITERIA)
     assert laws._is_behind(rounds, law, RoundsResult({pair.effects: pair})) is is_behind
+
+
+def test_a_law_does_not_hold_where_it_is_behind_the_catalogue(monkeypatch):
+    for name in ("_is_as_good_elsewhere", "_unclear_terms"):
+        answer = name != "_unclear_terms"
+        monkeypatch.setattr(laws, name, lambda *_, answer=answer: answer)
+    law = SimpleNamespace(fit=made_up(("law",), 3_000.0))
+    pair = made_up(("coulomb_friction", "torque_ripple"), 150.0)
+    rounds = SimpleNamespace(criteria=CRITERIA, base=base(90_000.0))
+    unknown = DiagnosisVerdict("unknown", False, rounds.base, ())
+    assert laws._holds(rounds, law, RoundsResult(), unknown)
+    found = RoundsResult({pair.effects: pair})
+    assert not laws._holds(rounds, law, found, unknown)
+
+
+@pytest.mark.parametrize(("inclusion", "is_curve"), [(0.9, False), (0.3, True)])
+def test_a_law_whose_terms_others_replace_is_a_curve(inclusion, is_curve):
+    terms = (
+        LawTerm("x*abs(x)", 3.0, 2.0, 4.0, "N", 1.0),
+        LawTerm("x**3", -1.0, -1.1, -0.9, "N", inclusion),
+    )
+    fit = made_up(("law",), 110.0)
+    said = law_in_words(
+        CRITERIA, base(90_000.0), DiagnosisVerdict("law", False, fit, ()),
+        Law("F", "force", terms), SimpleNamespace(equation="F = ..."),
+    )  # fmt: skip
+    assert ("Take it as a curve" in said) is is_curve
+    assert ("chosen again in 30 %" in said) is is_curve

@@ -963,8 +963,10 @@ def test_noise_of_the_input_is_all_that_remains_and_not_complete():
     assert not CRITERIA.leaves_noise(coloured)
 
 
-def test_two_that_look_alike_are_one_law_in_a_simulation_of_ones_own_as_well():
-    alike = ("cubic_stiffness", "one_sided_stop:contact")
+@pytest.mark.parametrize("stop", ["one_sided_stop", "one_sided_stop:contact"])
+@pytest.mark.parametrize("spring", ["cubic_stiffness", "quadratic_stiffness"])
+def test_a_curved_spring_and_a_stop_are_one_law_while_something_remains(spring, stop):
+    alike = (spring, stop)
     assert CRITERIA.imitates_one_law(made_up(alike, 110.0))
     assert not CRITERIA.imitates_one_law(made_up(alike, 100.0, whiteness=0.9))
     assert not CRITERIA.imitates_one_law(made_up((*GOOD, alike[0]), 110.0))

@@ -1,6 +1,7 @@
 """The drive that stands for another simulation, and the force that makes it move so."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ from scipy.signal import lfilter, lsim
 
 from hwid_cli.diagnosis.problem import Signals
 from hwid_cli.diagnosis.stand_in import (
+    _no_faster_than_seen,
     derived,
     error_of,
     fit_stand_in,
@@ -277,3 +279,24 @@ def test_what_has_no_spring_is_given_none():
         for u in commands
     ]
     assert fit_stand_in([signals(u) for u in commands], runs).stiffness_N_per_m == 0.0
+
+
+@pytest.mark.parametrize(
+    ("stiffness", "lag_s"),
+    [
+        # A plate of 200 s, sampled each second: a whole sample is the 200th part.
+        (0.6, 1.0),
+        # One of 20 s: 0.1 s, and one of 4 s no less than a tenth of a sample.
+        (6.0, 0.1),
+        (30.0, 0.1),
+        # Without a spring nothing lets go: a sample.
+        (0.0, 1.0),
+    ],
+)
+def test_what_stands_for_a_slow_process_has_no_short_steps(stiffness, lag_s):
+    massless = StandIn(
+        mass_kg=1e-9, damping_N_s_per_m=120.0, stiffness_N_per_m=stiffness,
+        force_constant_N_per_A=1.0,
+    )  # fmt: skip
+    found = _no_faster_than_seen(massless, [SimpleNamespace(sample_time_s=1.0)])
+    assert found.mass_kg == pytest.approx(120.0 * lag_s, rel=1e-9)
