@@ -22,6 +22,7 @@ from hwid_cli.diagnosis.parameters import (
 from hwid_cli.diagnosis.problem import DiagnosisProblem
 from hwid_cli.diagnosis.search import within_bounds
 from hwid_cli.diagnosis.whiteness import WHITE_BY_TWO_ROUTES, portmanteau
+from hwid_cli.drive.simulation import push_and_damping
 from hwid_cli.records.diagnosis import LEAST_SURE, SMALL_REMAINDER, NoiseFloor
 from hwid_cli.records.drive import HELD, Drive
 
@@ -366,13 +367,7 @@ def _whitening(sampled: _Sampled, strength: float) -> _Whitening | None:
 
 def _sampled(drive: Drive, sample_time_s: float) -> _Sampled:
     """Linear drive from sample to sample, its input held or a straight line between them."""
-    push, damping = drive.force_constant_N_per_A, drive.damping_N_s_per_m
-    if drive.resistance_ohm is not None:
-        push /= drive.resistance_ohm
-        back_emf = drive.back_emf_V_s_per_m
-        damping += push * (
-            drive.force_constant_N_per_A if back_emf is None else back_emf
-        )
+    push, damping = push_and_damping(drive)
     # State, input, and its slope.
     block = np.zeros((4, 4))
     block[0, 1] = 1.0

@@ -23,6 +23,7 @@ import scipy
 
 from hwid_cli.compiled import compiled
 from hwid_cli.diagnosis.problem import Compared
+from hwid_cli.drive.simulation import push_and_damping
 from hwid_cli.records.diagnosis import NoiseFloor
 from hwid_cli.records.drive import Controller, Drive
 
@@ -381,16 +382,8 @@ def _without_force(one: Compared) -> Smoothed:
 
 def _copy(drive: Drive, sample_time_s: float, sigma: float) -> _Copy:
     """Discrete copy of the drive, scaled so that all numbers are near 1."""
-    mass, damping = drive.mass_kg, drive.damping_N_s_per_m
-    stiffness, push = drive.stiffness_N_per_m, drive.force_constant_N_per_A
-    if drive.resistance_ohm is not None:
-        # The coil's own time is short beside what is sought: it turns voltage into
-        # current at once, and speed into damping.
-        push /= drive.resistance_ohm
-        back_emf = drive.back_emf_V_s_per_m
-        damping += push * (
-            drive.force_constant_N_per_A if back_emf is None else back_emf
-        )
+    mass, stiffness = drive.mass_kg, drive.stiffness_N_per_m
+    push, damping = push_and_damping(drive)
     reading, unit = np.array([1.0, 0.0, 0.0]), 1.0
     if drive.output == "velocity":
         reading, unit = np.array([0.0, 1.0, 0.0]), 1 / sample_time_s

@@ -116,12 +116,10 @@ class SetFits:
         On a free axis it moves the simulation by far more than the sensor's noise, and the
         values of a fit to the output with it.
         """
-        rounds, usable = (
-            self.rounds,
-            [one for one in self.of_size(size) if one.is_usable],
-        )
+        rounds = self.rounds
         if rounds.criteria.standing is not None:
             return
+        usable = [one for one in self.of_size(size) if one.is_usable]
         usable.sort(key=lambda one: -rounds.criteria.gain(one, rounds.base))
         scales, noise = rounds.baseline.scales, rounds.baseline.noise
         for one in usable[:WITH_INPUT_NOISE]:

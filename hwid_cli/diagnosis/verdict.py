@@ -54,8 +54,8 @@ def lead(
         part of it in most of the held-out recordings.
     """
     chosen = verdict.chosen
-    is_open = verdict.word in ("named", "unknown")
-    if not is_open or criteria.leaves_noise(chosen):
+    is_settled = verdict.is_complete or criteria.leaves_noise(chosen)
+    if is_settled or verdict.word not in ("named", "unknown"):
         return None
     best, most = None, LEAST_LEAD
     for one in found:

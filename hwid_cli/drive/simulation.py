@@ -224,12 +224,9 @@ def parameter_vector(drive: Drive, effects: Mapping[str, Values]) -> np.ndarray:
     vector[slots.ZERO_ORDER_HOLD] = float(drive.hold == "zero")
     vector[slots.OUTPUT_IS_VELOCITY] = float(drive.output == "velocity")
     if drive.resistance_ohm is not None:
-        back_emf = drive.back_emf_V_s_per_m
         vector[slots.RESISTANCE] = drive.resistance_ohm
         vector[slots.INDUCTANCE] = drive.inductance_H
-        vector[slots.BACK_EMF] = (
-            drive.force_constant_N_per_A if back_emf is None else back_emf
-        )
+        vector[slots.BACK_EMF] = _back_emf(drive)
     if drive.controller is not None:
         one = drive.controller
         vector[slots.POSITION_GAIN] = one.position_gain_per_s or 0.0
@@ -250,6 +247,30 @@ def parameter_vector(drive: Drive, effects: Mapping[str, Values]) -> np.ndarray:
         if CATALOGUE[one].formula is not None
     ]
     return with_formulas(vector, formulas)
+
+
+def push_and_damping(drive: Drive) -> tuple[float, float]:
+    """Force for one unit of the input, and damping, of the linear drive.
+
+    A coil's own time is left out: it turns voltage into current at once, and speed into
+    damping.
+
+    Returns
+    -------
+    push : float, [N/unit of the input]
+    damping : float, [N s/m]
+    """
+    push, damping = drive.force_constant_N_per_A, drive.damping_N_s_per_m
+    if drive.resistance_ohm is None:
+        return push, damping
+    push /= drive.resistance_ohm
+    return push, damping + push * _back_emf(drive)
+
+
+def _back_emf(drive: Drive) -> float:
+    """Voltage that the motion induces, [V s/m]: in SI units the force constant is one."""
+    back_emf = drive.back_emf_V_s_per_m
+    return drive.force_constant_N_per_A if back_emf is None else back_emf
 
 
 def _fill(vector: np.ndarray, effect: Effect, given: Values) -> None:

@@ -56,9 +56,8 @@ def voice_coil_coulomb(draw):
     )
 
 
-@machine("friction")
-def gantry_coulomb(draw):
-    b = draw.bench(
+def _gantry(draw):
+    return draw.bench(
         "doublets levels steps",
         mass=1800.0,
         pace=0.4,
@@ -70,12 +69,16 @@ def gantry_coulomb(draw):
         count=8,
         free=True,
     )
-    return b.machine("gantry on rails", [h.coulomb(0.08 * b.force)], noise=0.001)
 
 
 @machine("friction")
-def wheel_coulomb_servo(draw):
-    b = draw.servo(
+def gantry_coulomb(draw):
+    b = _gantry(draw)
+    return b.machine("gantry on rails", [h.coulomb(0.08 * b.force)], noise=0.001)
+
+
+def _wheel(draw):
+    return draw.servo(
         "moves sine triangles",
         mass=2e-3,
         damping_time_s=0.8,
@@ -84,6 +87,11 @@ def wheel_coulomb_servo(draw):
         bandwidth=6.0,
         sample_s=1e-3,
     )
+
+
+@machine("friction")
+def wheel_coulomb_servo(draw):
+    b = _wheel(draw)
     return b.machine(
         "wheel under position control",
         [h.coulomb(0.08 * b.force)],
@@ -2144,18 +2152,7 @@ def clean_servo_noisy_log(draw):
 
 @machine("noisy log")
 def gantry_coulomb_noisy_log(draw):
-    b = draw.bench(
-        "doublets levels steps",
-        mass=1800.0,
-        pace=0.4,
-        damping=0.12,
-        force_constant=140.0,
-        top=12.0,
-        sample_s=5e-3,
-        samples=1600,
-        count=8,
-        free=True,
-    )
+    b = _gantry(draw)
     return b.machine(
         "gantry on rails, noisy log",
         [h.coulomb(0.08 * b.force)],
@@ -2193,15 +2190,7 @@ def ripple_noisy_log(draw):
 
 @machine("noisy log")
 def wheel_coulomb_noisy_log(draw):
-    b = draw.servo(
-        "moves sine triangles",
-        mass=2e-3,
-        damping_time_s=0.8,
-        force_constant=0.06,
-        travel=3.0,
-        bandwidth=6.0,
-        sample_s=1e-3,
-    )
+    b = _wheel(draw)
     return b.machine(
         "wheel under position control, noisy log",
         [h.coulomb(0.08 * b.force)],
