@@ -15,7 +15,7 @@ import numpy as np
 
 from hwid_cli.diagnosis.causes import left_over
 from hwid_cli.diagnosis.few_samples import fewer_recordings
-from hwid_cli.diagnosis.input_noise import fit_with_input_noise
+from hwid_cli.diagnosis.input_noise import fit_with_input_noise, may_be_input_noise
 from hwid_cli.diagnosis.parameters import (
     BASE,
     START,
@@ -454,6 +454,8 @@ def with_input_noise(
     if not may_help or problem.compares_command:
         return fit
     fit_layout, point = rebuilt(problem, fit, scales)
+    if not may_be_input_noise(problem, fit_layout, point, noise):
+        return fit
     point = fit_with_input_noise(problem, fit_layout, point, noise)
     found = at_point(problem, fit, fit_layout, point, noise)
     return found if found.cause == "input_noise" else fit

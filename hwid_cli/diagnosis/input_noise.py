@@ -41,6 +41,11 @@ _WIDEST, _FINE_ENOUGH = 7.0, 0.02
 # Coordinates of that search go no farther, as powers of e, and it takes no more steps.
 _FARTHEST = 30.0
 _MOST_STEPS = 30
+# Of a coordinate, for a derivative by differences.
+_STEP = 1.5e-8
+# Noise may move the fitted drive so many times less than the true one: with the noise
+# left out of mind it is fitted too sluggish.
+_TOO_SLUGGISH = 4.0
 
 
 def whiteness_with_input_noise(
@@ -129,44 +134,116 @@ def fit_with_input_noise(
     ----------
     docs/method_diagnosis.md, eq. (D27).
     """
-    n_shared = len(fit_layout.shared)
-
-    def at(coordinates: np.ndarray) -> ParameterPoint:
-        # The search knows no bounds, and far beyond them a simulation has no end.
-        near = np.clip(coordinates, -_FARTHEST, _FARTHEST)
-        return within_bounds(
-            fit_layout,
-            ParameterPoint(near[:n_shared], near[n_shared:].reshape(point.own.shape)),
-        )
-
     most = _MORE_NOISE * noise.input_rms / noise.rms
     for _ in range(_REWEIGHTINGS):
         drives = drives_at(problem, fit_layout, point)
         parts = residuals_at(problem, fit_layout, point)
-        share = _Filters(problem, drives, noise.rms).likeliest(parts, most)
-
-        def scaled(coordinates: np.ndarray, share: float = share) -> np.ndarray:
-            there = at(coordinates)
-            parts = residuals_at(problem, fit_layout, there)
-            drives = drives_at(problem, fit_layout, there)
-            filters = _Filters(problem, drives, noise.rms)
-            return np.concatenate(filters.in_deviations(parts, share))
-
+        filters = _Filters(problem, drives, noise.rms)
+        share = filters.likeliest(parts, most)
+        search = _Search(problem, fit_layout, point, noise.rms, share)
         start = np.concatenate([point.shared, point.own.ravel()])
-        if scaled(start).size < start.size:
+        if search.deviations(start).size < start.size:
             return point
         # "lm" counts the simulations for derivatives among its calls in some versions of
         # SciPy only, "trf" in none.
         found = scipy.optimize.least_squares(
-            scaled, start, method="trf", x_scale=1.0, max_nfev=_MOST_STEPS
-        )
-        point = at(found.x)
+            search.deviations, start, jac=search.jacobian, method="trf", x_scale=1.0,
+            max_nfev=_MOST_STEPS,
+        )  # fmt: skip
+        point = search.point(found.x)
     return point
 
 
+def may_be_input_noise(
+    problem: DiagnosisProblem,
+    fit_layout: ParameterLayout,
+    point: ParameterPoint,
+    noise: NoiseFloor,
+) -> bool:
+    """Whether what a fit leaves is no larger than noise of the input can make it.
+
+    Below this a fit with that noise in mind is worth its time: such a fit never leaves
+    less of the output than the one before.
+    """
+    parts = residuals_at(problem, fit_layout, point)
+    filters = _Filters(problem, drives_at(problem, fit_layout, point), noise.rms)
+    return filters.may_be_as_large(parts, _MORE_NOISE * noise.input_rms / noise.rms)
+
+
+@dataclass(frozen=True, eq=False)
+class _Search:
+    """Deviations behind the filter as a function of all coordinates.
+
+    Parameters
+    ----------
+    problem : DiagnosisProblem
+    fit_layout : ParameterLayout
+    first : ParameterPoint
+        Where the search begins.
+    output_rms : float, [output unit]
+    share : float, [input unit/output unit]
+        Noise of the input over that of the output.
+    """
+
+    problem: DiagnosisProblem
+    fit_layout: ParameterLayout
+    first: ParameterPoint
+    output_rms: float
+    share: float
+
+    def point(self, coordinates: np.ndarray) -> ParameterPoint:
+        """Parameters at coordinates: those of all recordings, then those of each."""
+        # The search knows no bounds, and far beyond them a simulation has no end.
+        near = np.clip(coordinates, -_FARTHEST, _FARTHEST)
+        n_shared = self.first.shared.size
+        own = near[n_shared:].reshape(self.first.own.shape)
+        return within_bounds(self.fit_layout, ParameterPoint(near[:n_shared], own))
+
+    def deviations(self, coordinates: np.ndarray) -> np.ndarray:
+        """Deviations of all recordings in a row."""
+        return np.concatenate(self._parts(coordinates))
+
+    def jacobian(self, coordinates: np.ndarray) -> np.ndarray:
+        """Derivatives of the deviations by differences, shape (n_samples, n_coordinates).
+
+        What belongs to one recording moves no other one: all recordings take such a
+        step in one simulation.
+        """
+        n_recordings, n_own = self.first.own.shape
+        n_shared = self.first.shared.size
+        here = self._parts(coordinates)
+        ends = np.cumsum([0, *(one.size for one in here)])
+        slopes = np.zeros((ends[-1], coordinates.size))
+        for index in range(n_shared + n_own):
+            is_own = index >= n_shared
+            columns = (
+                index + n_own * np.arange(n_recordings) if is_own else np.array([index])
+            )
+            moved = coordinates.copy()
+            moved[columns] += _STEP * np.maximum(np.abs(coordinates[columns]), 1.0)
+            by = (moved - coordinates)[columns]
+            there = self._parts(moved)
+            for row, (before, after) in enumerate(zip(here, there, strict=True)):
+                which = row if is_own else 0
+                slopes[ends[row] : ends[row + 1], columns[which]] = (
+                    after - before
+                ) / by[which]
+        return slopes
+
+    def _parts(self, coordinates: np.ndarray) -> list[np.ndarray]:
+        there = self.point(coordinates)
+        drives = drives_at(self.problem, self.fit_layout, there)
+        filters = _Filters(self.problem, drives, self.output_rms)
+        parts = residuals_at(self.problem, self.fit_layout, there)
+        return filters.in_deviations(parts, self.share)
+
+
 def _mean_square(parts: Sequence[np.ndarray]) -> float:
-    count = sum(one.size for one in parts)
-    return sum(float(one @ one) for one in parts) / max(count, 1)
+    return sum(float(one @ one) for one in parts) / max(_count(parts), 1)
+
+
+def _count(parts: Sequence[np.ndarray]) -> int:
+    return sum(one.size for one in parts)
 
 
 class _Filters:
@@ -240,18 +317,33 @@ class _Filters:
         leaves more or less than they say.
         """
         output = self.output_rms(parts, share) ** 2
-        n_samples = sum(one.size for one in parts)
-        expected, spread = 0.0, 2.0 * output**2 * n_samples
+        expected, chance = self._expected(parts, share, output)
+        excess = _mean_square(parts) * _count(parts) - output * _count(parts)
+        most = max((_MORE_NOISE**2 - 1.0) * expected, chance)
+        least = max((1.0 - _LESS_NOISE**2) * expected, chance)
+        return bool(-least <= excess - expected <= most)
+
+    def may_be_as_large(self, parts: Sequence[np.ndarray], share: float) -> bool:
+        """Whether noise of this size, or of less, may make residuals this large."""
+        output = self._output_rms**2
+        expected, chance = self._expected(parts, share, output)
+        excess = _mean_square(parts) * _count(parts) - output * _count(parts)
+        return bool(excess <= _TOO_SLUGGISH * (expected + chance))
+
+    def _expected(
+        self, parts: Sequence[np.ndarray], share: float, output: float
+    ) -> tuple[float, float]:
+        """Sum of squares that the input's noise adds, and how far chance moves it.
+
+        ``output`` is the variance of the output's noise.
+        """
+        expected, spread = 0.0, 2.0 * output**2 * _count(parts)
         for part, kind in zip(parts, self._kinds, strict=True):
             moved, n_free = _moved(self._sampled[kind], part.size)
             moved *= share**2 * output * part.size
             expected += moved
             spread += 2.0 * moved**2 / n_free
-        excess = _mean_square(parts) * n_samples - output * n_samples
-        chance = LEAST_SURE * np.sqrt(spread)
-        most = max((_MORE_NOISE**2 - 1.0) * expected, chance)
-        least = max((1.0 - _LESS_NOISE**2) * expected, chance)
-        return bool(-least <= excess - expected <= most)
+        return expected, LEAST_SURE * np.sqrt(spread)
 
     def in_deviations(
         self, parts: Sequence[np.ndarray], share: float

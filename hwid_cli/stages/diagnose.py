@@ -387,7 +387,7 @@ def _warnings(context: Context, given: ToDiagnose) -> list[str]:
         assumed_units(given.experiment, recordings, given.logs),
         doubtful_sizes(given.experiment, recordings, simulation, options, given.logs),
     ]
-    moving = moving_starts(recordings, given.logs, options)
+    moving = moving_starts(recordings, given.logs, simulation, options)
     names = [
         name
         for name in unsettled_starts(recordings, simulation, options)

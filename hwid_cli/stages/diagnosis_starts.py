@@ -127,6 +127,7 @@ def unsettled_starts(
 def moving_starts(
     recordings: Sequence[Recording],
     logs: Sequence[CalibrationLog],
+    simulation: SimulationOptions,
     options: DiagnoseOptions,
 ) -> tuple[str, ...]:
     """Find recordings that a cut begins in mid-motion, where they are taken to rest.
@@ -142,16 +143,36 @@ def moving_starts(
     -------
     tuple of str
         Names of those whose output leaves its rest before the first sample that was
-        kept. None where a diagnosis fits how recordings start.
+        kept, and moves too fast there for a spring to be about in equilibrium. None
+        where a diagnosis fits how recordings start.
     """
     if options.initial_state == "estimated":
         return ()
     by_name = {log.name: log for log in logs}
-    return tuple(
-        one.name
+    moving = [
+        one
         for one in recordings
         if one.name in by_name and _moves_before(one, by_name[one.name])
+    ]
+    base = base_of(simulation)
+    stiffness = base.get("stiffness_N_per_m", 0.0)
+    if not moving or not stiffness > 0 or simulation.output == "velocity":
+        return tuple(one.name for one in moving)
+    noise = noise_floor(prepare(recordings, simulation, options, ())).rms
+    # By so much motion at an even speed is away from equilibrium and swings afterwards.
+    time_s = base["damping_N_s_per_m"] / stiffness + np.sqrt(
+        base["mass_kg"] / stiffness
     )
+    return tuple(
+        one.name for one in moving if _first_speed(one) * time_s > _AWAY * noise
+    )
+
+
+def _first_speed(recording: Recording) -> float:
+    """Speed of the output over the first samples, [output unit/s]."""
+    first = recording.output[:_KEPT_REST]
+    slope = np.polyfit(np.arange(first.size), first, 1)[0]
+    return float(abs(slope)) / recording.sample_time_s
 
 
 def _moves_before(recording: Recording, log: CalibrationLog) -> bool:

@@ -13,6 +13,7 @@ from hwid_cli.diagnosis import input_noise as noise_of_input
 from hwid_cli.diagnosis.causes import left_over
 from hwid_cli.diagnosis.input_noise import (
     fit_with_input_noise,
+    may_be_input_noise,
     whiteness_with_input_noise,
 )
 from hwid_cli.diagnosis.parameters import (
@@ -24,6 +25,7 @@ from hwid_cli.diagnosis.parameters import (
 )
 from hwid_cli.diagnosis.whiteness import portmanteau, whiteness
 from hwid_cli.records.drive import Controller
+from hwid_cli.records.experiment import DiagnoseOptions
 from tests.diagnosis.small_drive import (
     DRIVE,
     NOISE,
@@ -329,4 +331,58 @@ def test_a_search_under_input_noise_has_few_steps(monkeypatch):
     fit_with_input_noise(of, fit_layout, point, replace(white(NOISE), input_rms=1e3))
     # Two searches; in each one at the start, two steps with derivatives.
     size = point.shared.size + point.own.size
-    assert 0 < len(calls) <= 2 * (2 + 3 * (size + 1))
+    assert 0 < len(calls) <= 2 * (2 + 3 * (size + 2))
+
+
+def with_own_starts(count):
+    """A problem whose recordings each have a position and a velocity at the start."""
+    options = DiagnoseOptions(initial_state="estimated")
+    of = problem(recordings(noise=10 * NOISE)[:count], options=options)
+    fit_layout = parameter_layout(of, (), {}, sizes(of))
+    return of, fit_layout, first_point(of, fit_layout, of.drive, {})
+
+
+def test_derivatives_behind_the_filter_are_those_of_one_coordinate_after_another():
+    of, fit_layout, point = with_own_starts(4)
+    search = noise_of_input._Search(of, fit_layout, point, NOISE, 0.5)
+    at = np.concatenate([point.shared, point.own.ravel()])
+    assert point.own.size > 4
+    expected = least_squares(search.deviations, at, max_nfev=1).jac
+
+    assert search.jacobian(at) == pytest.approx(
+        expected, abs=1e-5 * np.abs(expected).max()
+    )
+
+
+def test_derivatives_behind_the_filter_cost_no_more_with_more_recordings(monkeypatch):
+    costs = []
+    for count in (3, 9):
+        of, fit_layout, point = with_own_starts(count)
+        calls = []
+
+        def noted(*args, calls=calls):
+            calls.append(args)
+            return residuals_at(*args)
+
+        monkeypatch.setattr(noise_of_input, "residuals_at", noted)
+        search = noise_of_input._Search(of, fit_layout, point, NOISE, 0.5)
+        search.jacobian(np.concatenate([point.shared, point.own.ravel()]))
+        costs.append(len(calls))
+    assert costs[0] == costs[1] > 2
+
+
+@pytest.mark.parametrize(("times", "may_be"), [(0.5, True), (1.0, True), (12.0, False)])
+def test_what_noise_of_the_input_cannot_make_is_not_fitted_with_it(times, may_be):
+    # Noise of that size moves the drive by about twice the noise of its sensor.
+    rng = np.random.default_rng(5)
+    slow = 2 * times * NOISE * np.cos(np.linspace(0, 6, N))
+    found = [
+        replace(one, output=one.output + slow + NOISE * rng.standard_normal(N))
+        for one in recordings(noise=0.0)
+    ]
+    of = problem(found)
+    fit_layout = parameter_layout(of, (), {}, sizes(of))
+    point = first_point(of, fit_layout, of.drive, {})
+    noise = replace(white(NOISE), input_rms=INPUT_NOISE)
+
+    assert may_be_input_noise(of, fit_layout, point, noise) is may_be

@@ -112,19 +112,38 @@ def test_a_random_signal_that_is_cut_in_mid_motion_is_named(rule):
     )[:2]
     assert logs[0].first_sample > LEAD_IN + 20
 
-    assert moving_starts(cut, logs, options) == ("random_1",)
+    assert moving_starts(cut, logs, simulation(), options) == ("random_1",)
     text = moving_sentence(("random_1",), cut)
     for words in ("random_1", "in mid-motion", "calibrate.random", "estimated"):
         assert words in text
     assert moving_sentence((), cut) == ""
 
     fitted = DiagnoseOptions(initial_state="estimated")
-    assert moving_starts(cut, logs, fitted) == ()
+    assert moving_starts(cut, logs, simulation(), fitted) == ()
 
 
 def test_a_random_signal_that_keeps_its_rest_is_not_in_motion():
     whole, logs = calibrate_all([random_after_a_rest()], CalibrateOptions())[:2]
-    assert moving_starts(whole, logs, REST) == ()
+    assert moving_starts(whole, logs, simulation(), REST) == ()
+
+
+def test_a_slow_drive_that_is_cut_in_motion_is_about_in_equilibrium():
+    # A sine of 60 s: its spring is never farther from its equilibrium than noise. The
+    # noise of the logged current hides its onset.
+    time = np.r_[np.zeros(LEAD_IN), STEP_S * np.arange(15000)]
+    current = 4.0 * np.sin(2 * np.pi * time / 60.0)
+    rng = np.random.default_rng(1)
+    output = displacement(current) + NOISE * rng.standard_normal(time.size)
+    current = current + 0.04 * rng.standard_normal(time.size)
+    raw = RawRecording("slow_1", current, output, STEP_S, kind="step")
+    cut, logs = calibrate_all([raw], CalibrateOptions(step=("cut",)))[:2]
+    assert logs[0].first_sample > LEAD_IN
+
+    held = DiagnoseOptions(initial_state="held")
+    assert moving_starts(cut, logs, simulation(), held) == ()
+    # The same motion of a drive that takes a second to settle is none.
+    sluggish = simulation(damping_N_s_per_m=1200.0)
+    assert moving_starts(cut, logs, sluggish, held) == ("slow_1",)
 
 
 def sines_after_a_rest():
@@ -149,7 +168,7 @@ def test_the_rest_that_was_cut_is_given_back_to_a_simulation():
         assert one.input == pytest.approx(raw.input[first:] - log.input_offset)
         assert one.output == pytest.approx(raw.output[first:])
         assert one.input[:38] == pytest.approx(np.full(38, 2.0 - log.input_offset))
-    assert moving_starts(given, logs, REST) == ()
+    assert moving_starts(given, logs, simulation(), REST) == ()
 
 
 def test_what_was_cut_in_mid_motion_or_not_at_all_stays_as_it_is():
