@@ -5,6 +5,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 from hwid_cli.cli.session import Session, Timer, say_damaged
+from hwid_cli.report.formats import counted
 from hwid_cli.report.progress import StageProgress
 from hwid_cli.store.cache import Hdf5Store
 from hwid_cli.tasks.runner import RunSettings, TaskDone, run_tasks
@@ -127,7 +128,8 @@ class _Part:
     computed: int
 
     def __str__(self) -> str:
-        return f"{self.from_cache} {self.unit} from the cache, {self.computed} computed"
+        stored = counted(self.from_cache, self.unit.removesuffix("s"))
+        return f"{stored} from the cache, {self.computed} computed"
 
 
 class LinearRunner:

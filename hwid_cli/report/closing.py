@@ -164,7 +164,11 @@ def _beside_threshold(rmsd: float, best: BestModel) -> list[str]:
         return []
     side = "below" if rmsd < best.threshold else "NOT below"
     limit = with_unit(best.threshold, best.unit)
-    return [f"{side} the {limit} of crossval.threshold"]
+    by = ""
+    if limit == with_unit(rmsd, best.unit) and rmsd != best.threshold:
+        # Both look alike as they are rounded.
+        by = f", by {_percent(100.0 * abs(rmsd / best.threshold - 1.0))}"
+    return [f"{side} the {limit} of crossval.threshold{by}"]
 
 
 def orders_sentence(orders: OrderAdvice, maps: MapAdvice | None) -> str:

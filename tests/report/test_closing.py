@@ -27,6 +27,14 @@ def test_a_command_to_copy_stays_on_one_line():
     assert max(map(len, text.splitlines()[:-1])) <= 80
 
 
+def test_a_threshold_that_looks_like_the_error_says_by_how_much():
+    near = replace(BEST, rmsd=0.01002, threshold=0.01)
+    said = "; ".join(best_model_sentences(near)).replace("\xa0", " ")
+    assert "NOT below the 0.01 m of crossval.threshold, by 0.2 %" in said
+    clear = "; ".join(best_model_sentences(replace(near, rmsd=0.012)))
+    assert "crossval.threshold, by" not in clear
+
+
 def test_a_failure_to_help_is_said():
     said = "; ".join(best_model_sentences(BEST)).replace("\xa0", " ")
 
