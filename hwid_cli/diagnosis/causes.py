@@ -12,10 +12,11 @@ import numpy as np
 import scipy
 
 from hwid_cli.diagnosis.input_noise import whiteness_with_input_noise
+from hwid_cli.diagnosis.noise import measured_input_rms
 from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals
 from hwid_cli.diagnosis.whiteness import portmanteau, whiteness
 from hwid_cli.records.diagnosis import NoiseFloor
-from hwid_cli.records.drive import Drive
+from hwid_cli.records.drive import Drive, StandIn
 
 # Single repeats are damage where they are between these shares of the samples: more are
 # a hold, fewer may be chance.
@@ -154,6 +155,23 @@ def left_over(
         return plain, ""
     through = whiteness_with_input_noise(parts, problem, drives, noise)
     if through <= 1.0:
-        return through, "input_noise"
+        return through, _cause_of_input(parts, problem, drives, noise)
     linked = whiteness_but_for_neighbours(parts, noise)
     return (linked, "interpolation") if linked <= 1.0 else (plain, "")
+
+
+def _cause_of_input(
+    parts: Sequence[np.ndarray],
+    problem: DiagnosisProblem,
+    drives: Sequence[Drive],
+    noise: NoiseFloor,
+) -> str:
+    """Whether the input's noise makes up what is left, or a stand-in's error at steps.
+
+    Beside a stand-in steps and corners of the input count as its noise.
+    """
+    if not isinstance(problem.drive, StandIn):
+        return "input_noise"
+    measured = replace(noise, input_rms=measured_input_rms(problem))
+    left = whiteness_with_input_noise(parts, problem, drives, measured)
+    return "input_noise" if left <= 1.0 else "stand_in"

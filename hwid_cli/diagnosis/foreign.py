@@ -52,6 +52,9 @@ _MOST_FITTED = 6
 _PUSH = 0.05
 _PUSH_LIMITS = (0.005, 0.3)
 _MOST_PUSHES = 4
+# Of the force along its motion, for the first guess; and of a push that it did not bear.
+_SMALL_PUSH = 1e-3
+_WEAKER = 0.1
 # Searches, each from where the last one has moved the parameters by more than this.
 _MOST_SEARCHES = 3
 _MOVED = 0.01
@@ -364,19 +367,26 @@ def _in_newtons(
     row = int(np.argmax([np.ptp(one.output) for one in given]))
     one, before = signals[row], given[row]
     size = float(np.std(before.output))
-    push = _test_push(one)
     moved = derived(before, one.sample_time_s)
     force = force_along(drive, moved, one.driven_by)
     plain = moved_plainly(drive, one, force, moved).position
+    # A spring that softens gives way to a large push for good.
+    push = _test_push(one) * _SMALL_PUSH * max(float(np.std(force)), 1e-300)
     pushed = moved_plainly(drive, one, force + push, moved).position - plain
     push = push * (_PUSH * size / max(float(np.std(pushed)), 1e-300))
+    answer = np.zeros(0)
     for _ in range(_MOST_PUSHES):
-        (after,) = runs.of([one], values, [push])
-        answer = after.output - before.output
+        found = runs.tried([one], values, [push])
+        if found is None:
+            push = push * _WEAKER
+            continue
+        answer = found[0].output - before.output
         share = float(np.std(answer)) / size
         if _PUSH_LIMITS[0] <= share <= _PUSH_LIMITS[1]:
             break
         push = push * min(max(_PUSH / max(share, 1e-6), 1e-4), 1e4)
+    if not answer.size:
+        return drive
     expected = moved_plainly(drive, one, force + push, moved).position - plain
     gain = float(expected @ answer) / max(float(expected @ expected), 1e-300)
     return in_newtons(drive, gain) if gain > 0 else drive

@@ -22,6 +22,8 @@ from hwid_cli.records.programs import SimulatorRun
 _TURN_ITERATIONS = 10
 # Derivatives by parameters of effects, in their coordinates: across corners of thresholds.
 _EFFECT_DIFFERENCE = 3e-4
+# What a stand-in leaves that runs away, over the largest output: no search goes there.
+_FAR = 1e3
 
 
 def fitted_together(
@@ -48,6 +50,7 @@ def fitted_together(
     slopes, pushes = moved_by
     sizes = noise_sizes(problem, slopes, findings.criteria.noise.rms)
     n_free, n_shared = sizes.size, len(fit_layout.shared)
+    far = _FAR * max(float(np.abs(one.compared).max()) for one in problem.signals)
 
     def changed(coordinates: np.ndarray) -> DiagnosisProblem:
         change = coordinates[:n_free] * sizes
@@ -68,9 +71,14 @@ def fitted_together(
 
     def errors(coordinates: np.ndarray) -> np.ndarray:
         train = changed(coordinates).part(held_out=False)
-        return np.concatenate(residuals_at(train, fit_layout, at(coordinates)))
+        left = np.concatenate(residuals_at(train, fit_layout, at(coordinates)))
+        # No search goes where the stand-in runs away.
+        return left if np.isfinite(left).all() else np.full(left.size, far)
 
     start = np.r_[np.zeros(n_free), point.shared, point.own[rows].ravel()]
+    if (errors(start) == far).all():
+        # A stand-in whose spring softens has run away: it tells no change.
+        return before, np.zeros(n_free)
     found = scipy.optimize.least_squares(
         errors, start, partial(_derivatives, errors), method="lm"
     )

@@ -18,7 +18,7 @@ from hwid_cli.diagnosis.noise import noise_levels
 from hwid_cli.diagnosis.parameters import BASE, START, is_factor
 from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals
 from hwid_cli.drive.catalogue import CATALOGUE, public_id
-from hwid_cli.records.candidates import CandidateFit
+from hwid_cli.records.candidates import LIKE_INPUT_NOISE, CandidateFit
 from hwid_cli.records.diagnosis import (
     LEAST_SURE,
     SMALL_REMAINDER,
@@ -260,7 +260,7 @@ class SelectionCriteria:
         # wanders by chance, so recordings are compared behind its filter (D27).
         is_fact = not found.effects or self.ratio(found) <= STILL_LARGE
         is_white = found.is_usable and found.whiteness <= 1.0
-        is_alike = not found.effects and found.cause == "input_noise"
+        is_alike = not found.effects and found.cause in LIKE_INPUT_NOISE
         return is_white and is_fact and (is_alike or self.holds(found))
 
     def leaves_noise(self, found: CandidateFit) -> bool:
@@ -268,7 +268,7 @@ class SelectionCriteria:
 
         Of far more than the sensor's noise that is said, and not taken for complete.
         """
-        is_of_input = found.is_usable and found.cause == "input_noise"
+        is_of_input = found.is_usable and found.cause in LIKE_INPUT_NOISE
         return self.is_complete(found) or (is_of_input and found.whiteness <= 1.0)
 
     def holds(self, found: CandidateFit) -> bool:

@@ -70,6 +70,11 @@ class Runs:
             At its force input; empty for none.
         inputs : sequence of ndarray
             In place of the recordings' own; empty for these.
+
+        Raises
+        ------
+        SimulationError
+            If a run gives no answer, or a force is not finite: none is run with that.
         """
         run = self.simulator.run
         if run is None:
@@ -80,6 +85,10 @@ class Runs:
         tasks = []
         for row, one in enumerate(signals):
             force = forces[row] if forces else NO_FORCE
+            if not np.isfinite(force).all():
+                raise SimulationError(
+                    f"simulation: the force for recording {one.name!r} is not finite"
+                )
             driven_by = inputs[row] if inputs else one.driven_by
             request = RunRequest(
                 one.name, one.sample_time_s, driven_by, force, dict(values)

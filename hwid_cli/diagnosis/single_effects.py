@@ -120,7 +120,7 @@ def _likely(findings: Findings) -> list[CandidateFit]:
         criteria.excess(usable[0]), _LEAST_LEFT * criteria.excess(findings.base)
     )
     near = [one for one in usable if criteria.excess(one) <= _LIKELY * least]
-    first = _one_of_each(near)[:_MOST_SINGLES]
+    first = _of_different_families(_one_of_each(near), near)[:_MOST_SINGLES]
     # What leaves little more with fewer parameters may be all of it.
     limits = [one for one in near if one not in first
               and any(is_part_of(one, wide) for wide in first)]  # fmt: skip
@@ -133,6 +133,22 @@ def _one_of_each(near: Sequence[CandidateFit]) -> list[CandidateFit]:
     for one in near:
         found.setdefault(tuple(public_id(each) for each in one.effects), one)
     return list(found.values())
+
+
+def _of_different_families(
+    each: Sequence[CandidateFit], near: Sequence[CandidateFit]
+) -> list[CandidateFit]:
+    """The best of each family first: all kinds of friction would take every place.
+
+    A family has a limit case in common.
+    """
+    first: dict[tuple[str, ...], CandidateFit] = {}
+    for one in each:
+        limits = [other for other in near if is_part_of(other, one)]
+        root = min([one, *limits], key=count)
+        first.setdefault(root.effects, one)
+    leading = list(first.values())
+    return [*leading, *(one for one in each if one not in leading)]
 
 
 def _n_including(one: CandidateFit, others: Sequence[CandidateFit]) -> int:

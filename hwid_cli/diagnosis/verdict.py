@@ -18,6 +18,8 @@ from hwid_cli.diagnosis.selection import (
     LEAST_GAIN,
     LEAST_IMPROVED,
     LEAST_LAST_CONTRIBUTION,
+    MOST_LEFT_BY_SET,
+    NEARLY_THE_REST,
     NEARLY_WHITE,
     SelectionCriteria,
     count,
@@ -36,6 +38,8 @@ LEAST_OF_RIVALS = 0.35
 # Sets that leave at most so many times what the best one leaves count as near it, so many
 # at least; what all near sets share is there, whatever the rest is.
 NEAR_BEST, LEAST_SHARING = 2.0, 10
+# An effect is the only one for a rest if so many others were tried in its place.
+LEAST_TRIED = 4
 # Share of what a verdict leaves that makes a set worth following.
 LEAST_LEAD = 0.25
 
@@ -279,7 +283,7 @@ def needs_each(
         completes = criteria.leaves_noise(whole)
         completes = completes and not criteria.leaves_noise(fits[left])
         explains = against.explained >= LEAST_EXPLAINED or completes
-        completes = completes or _nearly_completes(criteria, whole, fits[left])
+        completes = completes or _nearly_completes(criteria, whole, fits[left], fits)
         is_clear = against.gain >= LEAST_GAIN and against.improved >= LEAST_IMPROVED
         brings = criteria.excess(fits[left]) - criteria.excess(whole)
         is_last = completes and not _changes_freely(whole, effect)
@@ -293,11 +297,33 @@ def needs_each(
 
 
 def _nearly_completes(
-    criteria: SelectionCriteria, whole: CandidateFit, part: CandidateFit
+    criteria: SelectionCriteria,
+    whole: CandidateFit,
+    part: CandidateFit,
+    fits: Mapping[tuple[str, ...], CandidateFit],
 ) -> bool:
-    """Whether an effect takes a large error down to what a logger may leave."""
-    is_small = criteria.ratio(whole) <= SMALL_REMAINDER
-    return is_small and criteria.ratio(part) > STILL_LARGE
+    """Whether an effect takes a large error down to what a logger may leave.
+
+    Or nearly there, where none of the others that were tried in its place takes much:
+    then no other law does as well.
+    """
+    if criteria.ratio(part) <= STILL_LARGE:
+        return False
+    if criteria.ratio(whole) <= SMALL_REMAINDER:
+        return True
+    others = [
+        one
+        for one in fits.values()
+        if one.is_usable
+        and len(one.effects) == len(whole.effects)
+        and set(part.effects) < set(one.effects)
+        and not (is_part_of(one, whole) or is_part_of(whole, one))
+    ]
+    most = max((criteria.evidence(one, part).explained for one in others), default=1.0)
+    is_alone = len(others) >= LEAST_TRIED and most < LEAST_EXPLAINED
+    takes = criteria.evidence(whole, part).explained
+    is_little = criteria.ratio(whole) <= MOST_LEFT_BY_SET
+    return is_alone and is_little and takes >= NEARLY_THE_REST
 
 
 def _is_beaten_by_fewer(

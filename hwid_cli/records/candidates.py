@@ -14,10 +14,15 @@ CANDIDATE_ROLES = ("", "diagnosis", "rival")
 # What the measuring chain may add to the noise of the output, in words.
 CAUSES = {
     "input_noise": "noise of the measured input, seen through the drive",
+    "stand_in": "small, and of the kind that the drive in place of the simulation is "
+    "wrong by at steps of the input",
     "zeros": "the sensor's zero, which differs between recordings",
     "interpolation": "noise that interpolation between uneven samples has linked",
     "coloured_noise": "coloured noise, of one size and colour in all recordings",
 }
+
+# Of these the filter of the input's noise leaves nothing.
+LIKE_INPUT_NOISE = ("input_noise", "stand_in")
 
 
 @dataclass(frozen=True)

@@ -624,6 +624,33 @@ def test_a_small_effect_is_needed_that_takes_much_down_to_nearly_noise(
     assert verdict.chosen is (both if is_both else one)
 
 
+OTHERS = ("cogging", "gravity", "sensor_lag", "quadratic_drag", "spring_gap")
+
+
+@pytest.mark.parametrize(
+    ("with_both", "others", "is_both"),
+    [
+        # The second effect brings 0.2 %, from 4.1 to 1.3 times the noise, and five that
+        # were tried in its place bring hardly anything ...
+        (169.0, [1_700.0] * 5, True),
+        # ... to 2.1 times; three others are too few; one of them does half of it, too.
+        (441.0, [1_700.0] * 5, False),
+        (169.0, [1_700.0] * 3, False),
+        (169.0, [800.0, *[1_700.0] * 4], False),
+    ],
+)
+def test_a_small_effect_is_named_that_nothing_else_can_be(with_both, others, is_both):
+    one = made_up(("input_saturation",), 1_740.0, whiteness=9.0)
+    both = made_up(("input_saturation", "coulomb_friction"), with_both, whiteness=2.0)
+    instead = [
+        made_up(("input_saturation", name), sse, whiteness=8.0)
+        for name, sse in zip(OTHERS, others, strict=False)
+    ]
+    start = base(780_000.0)
+    verdict = decided(start, [one, both, *instead], [one, both], given=780_000.0)
+    assert verdict.chosen is (both if is_both else one)
+
+
 @pytest.mark.parametrize(
     ("without", "is_both"),
     [
