@@ -12,10 +12,16 @@ from hwid_cli.diagnosis import foreign
 from hwid_cli.diagnosis.foreign import diagnose_foreign, stand_in_for
 from hwid_cli.diagnosis.simulator import Runs, Simulator
 from hwid_cli.diagnosis.verdict import DiagnosisVerdict
+from hwid_cli.drive.simulation import NO_FORCE
 from hwid_cli.errors import SimulationError
 from hwid_cli.records.axis import MotionUnits
 from hwid_cli.records.experiment import DiagnoseOptions
-from hwid_cli.records.programs import Capabilities, FreeParameter, SimulatorRun
+from hwid_cli.records.programs import (
+    Capabilities,
+    FreeParameter,
+    RunRequest,
+    SimulatorRun,
+)
 from tests.black_boxes.plants import (
     LINEAR,
     MOTOR,
@@ -122,6 +128,58 @@ def test_references_of_a_stand_in_are_those_of_the_training_recordings():
     )  # fmt: skip
     assert len(signals) == len(found) > len(held) > 0
     assert drive.reference_current_A == 2.5
+
+
+def swings(request):
+    """A pendulum of 0.05 kg m^2 that goes far beyond a quarter turn."""
+    assert np.isfinite(request.force).all()
+    force = request.force if request.force.size else np.zeros(N)
+    found = np.zeros(N)
+    angle = speed = 0.0
+    for row in range(N - 1):
+        for _ in range(4):
+            push = (
+                3.0 * request.input[row]
+                + force[row]
+                - 1.1 * np.sin(angle)
+                - 0.07 * speed
+            )
+            speed += 2.5 * STEP_S * push / 0.05
+            angle += 2.5 * STEP_S * speed
+        found[row + 1] = angle
+    return SimulatorRun(found, np.zeros(0))
+
+
+def test_a_spring_that_softens_is_pushed_no_farther_than_it_bears():
+    able = Capabilities(run=True, parameters=True, force=True)
+    inputs_N = [np.where(TIME > 0.05, size, 0.0) for size in (0.16, -0.26, 0.31)]
+    found = [
+        Recording(f"r{row}", one, swings(RunRequest("r", STEP_S, one, NO_FORCE, {})).output,
+                  10 * STEP_S)
+        for row, one in enumerate(inputs_N)
+    ]  # fmt: skip
+    assert max(np.max(one.output) for one in found) > 1.6
+    drive, _ = stand_in_for(
+        found, Simulator(able, swings, {}, {}, {}), DiagnoseOptions(), Count()
+    )
+    # In N m; without an answer to a push it would be 1.
+    assert drive.force_constant_N_per_A == pytest.approx(3.0, rel=0.3)
+
+
+def test_a_simulation_is_not_run_with_a_force_that_is_not_finite():
+    able = Capabilities(run=True, force=True)
+    found = recordings()
+    _, signals = stand_in_for(
+        found, Simulator(able, simulate, {}, FREE, GIVEN), DiagnoseOptions(), Count()
+    )
+    runs = Runs(Simulator(able, simulate, {}, FREE, GIVEN), Count())
+    force = [np.full(N, np.nan)] * len(signals)
+    assert runs.tried(signals, GIVEN, force) is None
+    with pytest.raises(
+        SimulationError, match=r"force for recording 'step_1\.5' is not"
+    ):
+        runs.of(signals, GIVEN, force)
+    assert runs.run_tasks.runs == 0
 
 
 @pytest.mark.thorough

@@ -24,7 +24,8 @@ from hwid_cli.diagnosis.parameters import (
     residuals_at,
 )
 from hwid_cli.diagnosis.whiteness import portmanteau, whiteness
-from hwid_cli.records.drive import Controller
+from hwid_cli.records.axis import MotionUnits
+from hwid_cli.records.drive import Controller, StandIn
 from hwid_cli.records.experiment import DiagnoseOptions
 from tests.diagnosis.small_drive import (
     DRIVE,
@@ -287,6 +288,21 @@ def fit_by_factors(of, layout, point, input_noise):
         return solve_triangular(factor, parts, lower=True).ravel()
 
     return replace(point, shared=least_squares(errors, point.shared).x)
+
+
+def test_what_a_stand_in_leaves_at_steps_is_no_noise_of_a_clean_input():
+    of = problem(recordings())
+    of = replace(of, drive=StandIn(**vars(DRIVE), own_units=MotionUnits()))
+    left = moved_by_input_noise(2)
+    assert left_over(left, of, each(of), floor())[1] == "stand_in"
+
+    rng = np.random.default_rng(3)
+    noisy = [
+        replace(one, driven_by=one.driven_by + INPUT_NOISE * rng.standard_normal(N))
+        for one in of.signals
+    ]
+    of = replace(of, signals=tuple(noisy))
+    assert left_over(left, of, each(of), floor())[1] == "input_noise"
 
 
 def test_a_search_under_input_noise_stays_within_the_bounds(monkeypatch):

@@ -25,3 +25,26 @@ def test_variants_of_one_effect_take_no_place_of_another():
     )
     found = [one.effects[0] for one in _likely(findings)]
     assert sorted(found) == sorted(LIKELY)
+
+
+def test_kinds_of_friction_do_not_keep_a_dead_zone_from_the_simulation():
+    frictions = [
+        "stribeck_friction",
+        "position_friction",
+        "hysteresis",
+        "asymmetric_friction",
+        "load_friction:drive",
+        "coulomb_friction",
+    ]
+    names = [*frictions, "input_dead_zone"]
+    fits = {
+        (one,): made_up((one,), 101.0 + row, parameters=2 - (one == "coulomb_friction"))
+        for row, one in enumerate(names)
+    }
+    findings = SimpleNamespace(
+        criteria=CRITERIA, base=base(), found=SimpleNamespace(fits=fits)
+    )
+    found = {one.effects[0] for one in _likely(findings)}
+    # Four different ones and the limit case of most.
+    assert {"stribeck_friction", "input_dead_zone", "coulomb_friction"} <= found
+    assert len(found) == 5
