@@ -30,7 +30,7 @@ from hwid_cli.records.recordings import CalibrationLog, Recording
 from hwid_cli.report.diagnosis import diagnosis_blocks
 from hwid_cli.simulations.drive import simulate_recordings
 from hwid_cli.simulations.kinds import kind_named
-from hwid_cli.stages.diagnosis_seconds import time_diagnosis
+from hwid_cli.stages.diagnosis_seconds import LEAST_RUNS, MOST_RUNS, time_diagnosis
 from hwid_cli.stages.diagnosis_starts import (
     moving_sentence,
     moving_starts,
@@ -600,7 +600,9 @@ def _plan(planning: Planning) -> tuple[StagePlan, ...]:
         planning.workers,
     )
     what = f"{counted(n, 'recording')} x {counted(found.n_tasks, 'effect')}"
-    if not found.n_tasks:
+    if found.by_runs:
+        what = f"{counted(n, 'recording')}; {LEAST_RUNS} to {MOST_RUNS} runs of the simulation"
+    elif not found.n_tasks:
         what = f"{counted(n, 'recording')}; no effect is looked for"
     why = "one effect is not enough"
     if given.options.laws != "never":

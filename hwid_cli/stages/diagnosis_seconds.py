@@ -30,6 +30,8 @@ _SET_OF_EFFECTS = 1.5
 _CONFIRMING_RUNS = 9
 # A simulation of the user's own is not run for longer to say how long it takes, [s].
 _MOST_RUN_S = 30.0
+# Runs of it that a diagnosis takes, as measured (docs/any_simulation.md), [-].
+LEAST_RUNS, MOST_RUNS = 250, 800
 
 # Drawing what was found, [s].
 _FIGURES_S = 0.7
@@ -98,17 +100,20 @@ class DiagnosisTime:
     Parameters
     ----------
     seconds : float, [s]
-        Where a single effect is enough and shows at once; NaN where a simulation of the
-        user's own takes so long that even its beginning does.
+        Where a single effect is enough and shows at once.
     most_seconds : float, [s]
         With all rounds of the search.
     n_tasks : int, [-]
         Candidates that are screened; 0 where nothing is searched for.
+    by_runs : bool
+        Whether a simulation of the user's own takes so long that its runs are the
+        forecast; then nothing is known of the search.
     """
 
     seconds: float
     most_seconds: float
     n_tasks: int
+    by_runs: bool = False
 
 
 def time_diagnosis(
@@ -132,12 +137,15 @@ def time_diagnosis(
         diagnose(sampler.run, sampler.on_round)
     except _Enough:
         if not sampler.n_tasks:
-            return DiagnosisTime(math.nan, math.nan, 0)
+            side_by_side = min(workers, n_recordings)
+            each = sampler.run_seconds / sampler.runs / side_by_side
+            return DiagnosisTime(LEAST_RUNS * each, MOST_RUNS * each, 0, by_runs=True)
     spent = time.process_time() - start - sampler.sampling
-    confirming = 0.0
+    confirming = most_confirming = 0.0
     if sampler.runs and sampler.n_tasks:
         each = sampler.run_seconds / sampler.runs
         confirming = _CONFIRMING_RUNS * n_recordings * each
+        most_confirming = max(confirming, (MOST_RUNS - sampler.runs) * each)
     # The user's own simulations run side by side, all at once; what comes before the
     # screening waits for each of its steps.
     running = (sampler.run_seconds + confirming) / workers
@@ -145,6 +153,7 @@ def time_diagnosis(
     single = _SINGLE_EFFECTS * sampler.screening / _gain(sampler.n_tasks, workers)
     rounds = 1 + MOST_SCREENINGS
     most = rounds * single * (1.0 + _sets_for_one(sampler.n_tasks, max_effects))
+    most += (most_confirming - confirming) / workers
     return DiagnosisTime(fixed + single, fixed + most, sampler.n_tasks)
 
 

@@ -1,4 +1,3 @@
-import math
 from types import SimpleNamespace
 
 import pytest
@@ -87,6 +86,9 @@ def test_runs_of_the_users_simulation_come_again_at_the_end(clock):
     found = time_diagnosis(diagnose, 3, 2, 1)
     # The fake clock counts a run on both clocks.
     assert found.seconds == pytest.approx(3.0 + 3.0 + 9 * 3 * 1.0 + 0.6 + 0.7)
+    # At most 800 of them.
+    assert found.most_seconds == pytest.approx(3.0 + 800.0 + 0.6 + 0.7)
+    assert not found.by_runs
 
 
 def test_a_slow_simulation_is_not_run_to_the_end_for_a_forecast(clock):
@@ -95,9 +97,13 @@ def test_a_slow_simulation_is_not_run_to_the_end_for_a_forecast(clock):
         run([task(clock, 20.0, SimulatorRun) for _ in range(9)], keep=True)
 
     found = time_diagnosis(diagnose, 9, 2, 1)
-    assert math.isnan(found.seconds)
+    assert found.by_runs
     assert found.n_tasks == 0
     assert clock.now == 100.0 + 2 * 20.0
+    # Those that were made say how long the 250 to 800 of a diagnosis take.
+    assert (found.seconds, found.most_seconds) == (250 * 20.0, 800 * 20.0)
+    shared = time_diagnosis(diagnose, 9, 2, 2)
+    assert shared.seconds == 0.5 * found.seconds
 
 
 def test_a_round_of_few_tasks_gains_little_from_several_processes(clock):
