@@ -231,12 +231,28 @@ class DiagnosisProblem:
     @property
     def moves_one_way(self) -> bool:
         """Whether no recording goes back on more than a small share of the longest way."""
-        up = down = 0.0
-        for one in self.signals:
-            way = one.position
-            up = max(up, float(np.max(way - np.minimum.accumulate(way))))
-            down = max(down, float(np.max(np.maximum.accumulate(way) - way)))
-        return min(up, down) <= _WAY_BACK * max(up, down)
+        ways = [_ways(one) for one in self.signals]
+        return _is_one_way(max(up for up, _ in ways), max(down for _, down in ways))
+
+    @property
+    def way_without_return(self) -> float:
+        """Longest way of a training recording, where none comes back on its own.
+
+        In each of them place and time go together. 0 where one does, and of pieces of
+        recordings.
+
+        Returns
+        -------
+        float, [output unit]
+        """
+        train = [one for one in self.signals if not one.is_held_out]
+        ways = [_ways(one) for one in train]
+        are_whole = all(one.start is None for one in train)
+        return (
+            max(max(one) for one in ways)
+            if ways and are_whole and all(_is_one_way(*one) for one in ways)
+            else 0.0
+        )
 
     @property
     def passes_once(self) -> bool:
@@ -248,6 +264,17 @@ class DiagnosisProblem:
         """Only the recordings that are held out, or only the others."""
         chosen = tuple(one for one in self.signals if one.is_held_out == held_out)
         return replace(self, signals=chosen)
+
+
+def _ways(signals: Signals) -> tuple[float, float]:
+    """Longest ways up and down of a recording, [output unit]."""
+    way = signals.position
+    up = float(np.max(way - np.minimum.accumulate(way)))
+    return up, float(np.max(np.maximum.accumulate(way) - way))
+
+
+def _is_one_way(up: float, down: float) -> bool:
+    return min(up, down) <= _WAY_BACK * max(up, down)
 
 
 @dataclass(frozen=True, eq=False)

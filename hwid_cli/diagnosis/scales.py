@@ -93,6 +93,7 @@ def scales_of_recordings(
         reading=max(reading, 1e-12),
         missing=missing,
         passes_once=problem.passes_once,
+        way_m=problem.way_without_return,
     )
 
 

@@ -127,6 +127,8 @@ class Scales:
         What the simulation lacks, where it is known.
     passes_once : bool
         Whether each place of the way is passed once.
+    way_m : float, [m]
+        Of the longest recording, where none passes a place again; else 0.
     """
 
     displacement_m: float
@@ -146,6 +148,7 @@ class Scales:
     reading: float = 0.0
     missing: Missing | None = field(default=None, compare=False, repr=False)
     passes_once: bool = False
+    way_m: float = 0.0
 
     def __post_init__(self) -> None:
         if self.reading == 0:

@@ -75,6 +75,29 @@ def test_each_place_is_passed_once_by_one_recording_that_does_not_come_back(
     assert found.passes_once == passes_once
 
 
+@pytest.mark.parametrize(
+    ("outputs", "way"),
+    [
+        ([UP], 2.96),
+        # To both sides of where they start: in each of them place and time go together.
+        ([UP, [0.0, -1.0, -2.0, -1.92]], 2.96),
+        ([UP, THERE_AND_BACK], 0.0),
+        # What only judges teaches nothing, of whatever length.
+        ([UP, None], 2.96),
+    ],
+)
+def test_the_way_of_recordings_that_do_not_come_back(outputs, way):
+    longer = [5.0 * one for one in UP]
+    given = [
+        signals([0, 1, 1, 1], longer if one is None else one, held_out=one is None)
+        for one in outputs
+    ]
+    found = DiagnosisProblem(tuple(given), Drive(1.0, 1.0, 0.0, 1.0))
+    assert found.way_without_return == pytest.approx(way)
+    pieces = tuple(replace(one, start=(0.0, 0.0)) for one in found.signals)
+    assert replace(found, signals=pieces).way_without_return == 0.0
+
+
 def test_skipped_samples_are_not_evaluated():
     one = signals([0, 1, 1, 1], [9.0, 9.0, 1.0, 3.0], skip=2)
     beside = Compared(one, np.zeros(4), np.zeros(4), np.zeros(4))

@@ -15,6 +15,7 @@ from hwid_cli.diagnosis.scales import (
     waves_along,
 )
 from hwid_cli.drive.catalogue import CATALOGUE
+from hwid_cli.drive.effect import Wave
 from hwid_cli.records.drive import Drive
 from tests.diagnosis.small_drive import (
     DRIVE,
@@ -178,6 +179,32 @@ def test_friction_along_a_way_that_is_passed_once_has_to_repeat(passes_once, few
     starts = period.starts(scales)
     assert starts
     assert max(starts) <= scales.stroke_m / fewest
+
+
+@pytest.mark.parametrize(
+    ("share_of_stroke", "fewest"),
+    # The stroke of recordings to both sides is twice the way of each.
+    [(0.0, 0.4), (1.0, 3.0), (0.5, 6.0)],
+)
+def test_a_ripple_has_to_repeat_where_no_recording_comes_back(share_of_stroke, fewest):
+    scales = sizes(problem())
+    waves = [Wave(scales.stroke_m / n, 0.1, 0.5) for n in (8, 2)]
+    scales = replace(
+        scales, way_m=share_of_stroke * scales.stroke_m, ripples=tuple(waves)
+    )
+    ripple = CATALOGUE["torque_ripple"]
+    (per_turn,) = [one for one in ripple.parameters if one.name == "per_turn"]
+    least = 2 * np.pi * fewest / scales.stroke_m
+    assert per_turn.bounds(scales)[0] == pytest.approx(least)
+    starts = per_turn.starts(scales)
+    assert starts
+    assert min(starts) >= least
+    together = [one["per_turn"] for one in ripple.seen(scales)]
+    assert min(together) >= least
+    # Two of each wave that repeats often enough.
+    assert len(together) >= (4 if fewest < 2 else 2)
+    bare = replace(scales, ripples=tuple(waves[1:]))
+    assert bool(ripple.seen(bare)) is (fewest < 2)
 
 
 @pytest.mark.parametrize("n", [1, 2])

@@ -185,9 +185,22 @@ _FEW_RIPPLES = tuple(count for count in _RIPPLES_PER_STROKE if count <= 3)
 _PHASES = (-0.75 * pi, -0.25 * pi, 0.25 * pi, 0.75 * pi)
 
 
+def _fewest_ripples(scales: Scales) -> float:
+    """Waves in a stroke: where no recording comes back, fewer are any change in time."""
+    return 3.0 * scales.stroke_m / scales.way_m if scales.way_m > 0 else 0.4
+
+
+def _ripple_starts(scales: Scales) -> tuple[float, ...]:
+    fewest = _fewest_ripples(scales)
+    counts = [count for count in _RIPPLES_PER_STROKE if count >= fewest]
+    return tuple(2 * pi * count / scales.stroke_m for count in counts)
+
+
 def _ripples(scales: Scales) -> tuple[dict[str, float], ...]:
     """Waves that the missing force shows, and the slow ones that it cannot."""
-    if not scales.ripples:
+    longest = scales.stroke_m / _fewest_ripples(scales)
+    ripples = [one for one in scales.ripples if one.period_m <= longest]
+    if not ripples:
         return ()
     found = [
         {
@@ -195,13 +208,14 @@ def _ripples(scales: Scales) -> tuple[dict[str, float], ...]:
             "per_turn": 2 * pi / one.period_m,
             "phase_rad": one.phase_rad,
         }
-        for one in scales.ripples
+        for one in ripples
         # The smoothed force that they were read from is too small where motion is fast.
         for multiple in (1.0, 1.6)
     ]
     slow = [
         {"share": 0.1, "per_turn": 2 * pi * count / scales.stroke_m, "phase_rad": phase}
         for count in _FEW_RIPPLES
+        if count >= _fewest_ripples(scales)
         for phase in _PHASES
     ]
     return (*found, *slow)
@@ -222,11 +236,9 @@ RIPPLE = Effect(
         ),
         Parameter(
             "per_turn",
-            lambda scales: tuple(
-                2 * pi * count / scales.stroke_m for count in _RIPPLES_PER_STROKE
-            ),
+            _ripple_starts,
             lambda scales: (
-                2 * pi * 0.4 / scales.stroke_m,
+                2 * pi * _fewest_ripples(scales) / scales.stroke_m,
                 2 * pi * 200 / scales.stroke_m,
             ),
             places=("RIPPLE_PER_TURN",),
