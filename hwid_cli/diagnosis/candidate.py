@@ -298,13 +298,14 @@ def evaluated(
     rest = [row for row, _ in numbered if row not in rows and row not in held]
     own = np.zeros((len(problem.signals), len(best.layout.own)))
     own[rows] = best.point.own
+    usual = np.median(best.point.own, axis=0)
     if rest and best.layout.own:
         part = replace(problem, signals=tuple(problem.signals[row] for row in rest))
-        own[rest] = fit_own(part, best.layout, best.point.shared).own
+        own[rest] = fit_own(part, best.layout, best.point.shared, usual).own
     held_parts: list[np.ndarray] = []
     if held:
         part = problem.part(held_out=True)
-        own[held] = fit_own(part, best.layout, best.point.shared).own
+        own[held] = fit_own(part, best.layout, best.point.shared, usual).own
         held_parts = cross_fitted(
             part, best.layout, ParameterPoint(best.point.shared, own[held])
         )

@@ -171,6 +171,7 @@ def _evaluated(
     own[~held] = of_train.own
     if held.any():
         part = problem.part(held_out=True)
-        own[held] = fit_own(part, fit_layout, of_train.shared).own
+        usual = np.median(of_train.own, axis=0)
+        own[held] = fit_own(part, fit_layout, of_train.shared, usual).own
     point = ParameterPoint(of_train.shared, own)
     return at_point(problem, before, fit_layout, point, findings.criteria.noise)

@@ -475,6 +475,7 @@ def with_own_trials(
     fit_layout: ParameterLayout,
     point: ParameterPoint,
     known: Collection[ParameterRef] = (),
+    usual: np.ndarray | None = None,
 ) -> ParameterPoint:
     """Set each recording's own parameters to the best of a few values.
 
@@ -482,15 +483,24 @@ def with_own_trials(
     ----------
     known : collection of ParameterRef
         What stays as it is.
+    usual : ndarray, shape (n_own,), or None
+        Coordinates of other recordings, around which the values are tried as well.
     """
     for column, unknown in enumerate(fit_layout.own):
         if unknown.owner == START or unknown.ref in known:
             continue
         best = np.full(len(problem.signals), np.inf)
         chosen = point.own[:, column].copy()
-        for value in CATALOGUE[unknown.owner].parameter(unknown.name).trials:
+        values = CATALOGUE[unknown.owner].parameter(unknown.name).trials
+        tried = [unknown.coordinate(value) for value in values]
+        if usual is not None:
+            # One that all of them share may be far from none: a drive that sticks there
+            # says nothing of the way.
+            around = usual[column] - unknown.coordinate(0.0)
+            tried += [around + one for one in tried]
+        for coordinate in tried:
             own = point.own.copy()
-            own[:, column] = unknown.coordinate(value)
+            own[:, column] = coordinate
             parts = residuals_at(problem, fit_layout, ParameterPoint(point.shared, own))
             sse = np.array([float(part @ part) for part in parts])
             better = sse < best
@@ -503,7 +513,10 @@ def with_own_trials(
 
 
 def fit_own(
-    problem: DiagnosisProblem, fit_layout: ParameterLayout, shared: np.ndarray
+    problem: DiagnosisProblem,
+    fit_layout: ParameterLayout,
+    shared: np.ndarray,
+    usual: np.ndarray | None = None,
 ) -> ParameterPoint:
     """Find each recording's own parameters for given shared ones.
 
@@ -511,6 +524,8 @@ def fit_own(
     ----------
     shared : ndarray, shape (n_shared,)
         Coordinates.
+    usual : ndarray, shape (n_own,), or None
+        Of the recordings that the shared ones were fitted with.
     """
     point = ParameterPoint(
         shared, np.zeros((len(problem.signals), len(fit_layout.own)))
@@ -519,7 +534,8 @@ def fit_own(
         return point
     start = {one: dict[str, float]() for one in fit_layout.effects}
     first = first_point(problem, _only_own(fit_layout), problem.drive, start)
-    point = with_own_trials(problem, fit_layout, ParameterPoint(shared, first.own))
+    point = ParameterPoint(shared, first.own)
+    point = with_own_trials(problem, fit_layout, point, usual=usual)
     return _fit_each(problem, fit_layout, point, range(len(fit_layout.own)))
 
 
