@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from hwid_cli.diagnosis.noise import quiet_input_rms
+from hwid_cli.diagnosis.noise import input_levels, noise_levels, quiet_input_rms
 from hwid_cli.diagnosis.parameters import (
     ParameterLayout,
     ParameterPoint,
@@ -77,7 +77,7 @@ def whiteness_with_input_noise(
     input_rms = noise.input_rms
     if input_rms <= 0 or noise.rms <= 0 or problem.compares_command:
         return float("inf")
-    filters = _Filters(problem, drives, noise.rms)
+    filters = _Filters(problem, drives, noise.rms, _Levels.of(problem, noise))
     most = _MORE_NOISE * input_rms / noise.rms
     share = filters.likeliest(parts, most)
     white = filters.innovations(parts, share)
@@ -134,13 +134,13 @@ def fit_with_input_noise(
     ----------
     docs/method_diagnosis.md, eq. (D27).
     """
-    most = _MORE_NOISE * noise.input_rms / noise.rms
+    most, levels = _MORE_NOISE * noise.input_rms / noise.rms, _Levels.of(problem, noise)
     for _ in range(_REWEIGHTINGS):
         drives = drives_at(problem, fit_layout, point)
         parts = residuals_at(problem, fit_layout, point)
-        filters = _Filters(problem, drives, noise.rms)
+        filters = _Filters(problem, drives, noise.rms, levels)
         share = filters.likeliest(parts, most)
-        search = _Search(problem, fit_layout, point, noise.rms, share)
+        search = _Search(problem, fit_layout, point, noise.rms, share, levels)
         start = np.concatenate([point.shared, point.own.ravel()])
         if search.deviations(start).size < start.size:
             return point
@@ -166,7 +166,8 @@ def may_be_input_noise(
     less of the output than the one before.
     """
     parts = residuals_at(problem, fit_layout, point)
-    filters = _Filters(problem, drives_at(problem, fit_layout, point), noise.rms)
+    drives = drives_at(problem, fit_layout, point)
+    filters = _Filters(problem, drives, noise.rms, _Levels.of(problem, noise))
     return filters.may_be_as_large(parts, _MORE_NOISE * noise.input_rms / noise.rms)
 
 
@@ -183,6 +184,8 @@ class _Search:
     output_rms : float, [output unit]
     share : float, [input unit/output unit]
         Noise of the input over that of the output.
+    levels : _Levels
+        How much of both noises each recording holds.
     """
 
     problem: DiagnosisProblem
@@ -190,6 +193,7 @@ class _Search:
     first: ParameterPoint
     output_rms: float
     share: float
+    levels: "_Levels"
 
     def point(self, coordinates: np.ndarray) -> ParameterPoint:
         """Parameters at coordinates: those of all recordings, then those of each."""
@@ -233,7 +237,7 @@ class _Search:
     def _parts(self, coordinates: np.ndarray) -> list[np.ndarray]:
         there = self.point(coordinates)
         drives = drives_at(self.problem, self.fit_layout, there)
-        filters = _Filters(self.problem, drives, self.output_rms)
+        filters = _Filters(self.problem, drives, self.output_rms, self.levels)
         parts = residuals_at(self.problem, self.fit_layout, there)
         return filters.in_deviations(parts, self.share)
 
@@ -244,6 +248,30 @@ def _mean_square(parts: Sequence[np.ndarray]) -> float:
 
 def _count(parts: Sequence[np.ndarray]) -> int:
     return sum(one.size for one in parts)
+
+
+@dataclass(frozen=True, eq=False)
+class _Levels:
+    """How much noise each recording holds, beside all of them together.
+
+    Sensors have ranges: what moves farther is read with more noise.
+
+    Parameters
+    ----------
+    output : ndarray, shape (n_recordings,), [-]
+        Of the output.
+    ratio : ndarray, shape (n_recordings,), [-]
+        Of the input over that of the output.
+    """
+
+    output: np.ndarray
+    ratio: np.ndarray
+
+    @classmethod
+    def of(cls, problem: DiagnosisProblem, noise: NoiseFloor) -> "_Levels":
+        """From differences of both signals."""
+        output = noise_levels(problem, noise)
+        return cls(output, input_levels(problem) / output)
 
 
 class _Filters:
@@ -257,15 +285,22 @@ class _Filters:
         Of each recording, with the fitted base.
     output_rms : float, [output unit]
         Noise of the output, in whose unit deviations are given.
+    levels : _Levels
+        How much of both noises each recording holds.
     """
 
     def __init__(
-        self, problem: DiagnosisProblem, drives: Sequence[Drive], output_rms: float
+        self,
+        problem: DiagnosisProblem,
+        drives: Sequence[Drive],
+        output_rms: float,
+        levels: "_Levels",
     ) -> None:
         pairs = list(zip(drives, problem.signals, strict=True))
         kinds = {(id(one), signals.sample_time_s): one for one, signals in pairs}
         self._sampled = {key: _sampled(one, key[1]) for key, one in kinds.items()}
         self._kinds = [(id(one), signals.sample_time_s) for one, signals in pairs]
+        self._levels = levels
         self._output_rms = output_rms
 
     def likeliest(self, parts: Sequence[np.ndarray], most: float) -> float:
@@ -306,9 +341,12 @@ class _Filters:
     def innovations(
         self, parts: Sequence[np.ndarray], share: float
     ) -> list[np.ndarray] | None:
-        """What the samples before do not tell of each residual; None without a filter."""
+        """What the samples before do not tell of each residual, all of one deviation.
+
+        None without a filter.
+        """
         found = self._filtered(parts, share)
-        return None if found is None else [one for one, _ in found]
+        return None if found is None else [one / np.sqrt(size) for one, size in found]
 
     def is_as_large(self, parts: Sequence[np.ndarray], share: float) -> bool:
         """Whether residuals are as large as noise of this size would make them.
@@ -318,7 +356,7 @@ class _Filters:
         """
         output = self.output_rms(parts, share) ** 2
         expected, chance = self._expected(parts, share, output)
-        excess = _mean_square(parts) * _count(parts) - output * _count(parts)
+        excess = self._sum_of_squares(parts) - output * _count(parts)
         most = max((_MORE_NOISE**2 - 1.0) * expected, chance)
         least = max((1.0 - _LESS_NOISE**2) * expected, chance)
         return bool(-least <= excess - expected <= most)
@@ -327,8 +365,13 @@ class _Filters:
         """Whether noise of this size, or of less, may make residuals this large."""
         output = self._output_rms**2
         expected, chance = self._expected(parts, share, output)
-        excess = _mean_square(parts) * _count(parts) - output * _count(parts)
+        excess = self._sum_of_squares(parts) - output * _count(parts)
         return bool(excess <= _TOO_SLUGGISH * (expected + chance))
+
+    def _sum_of_squares(self, parts: Sequence[np.ndarray]) -> float:
+        """Of residuals over the level of noise of their recordings."""
+        pairs = zip(parts, self._levels.output, strict=True)
+        return sum(float(one @ one) / level**2 for one, level in pairs)
 
     def _expected(
         self, parts: Sequence[np.ndarray], share: float, output: float
@@ -338,9 +381,11 @@ class _Filters:
         ``output`` is the variance of the output's noise.
         """
         expected, spread = 0.0, 2.0 * output**2 * _count(parts)
-        for part, kind in zip(parts, self._kinds, strict=True):
+        for part, kind, ratio in zip(
+            parts, self._kinds, self._levels.ratio, strict=True
+        ):
             moved, n_free = _moved(self._sampled[kind], part.size)
-            moved *= share**2 * output * part.size
+            moved *= (ratio * share) ** 2 * output * part.size
             expected += moved
             spread += 2.0 * moved**2 / n_free
         return expected, LEAST_SURE * np.sqrt(spread)
@@ -357,16 +402,21 @@ class _Filters:
     def _filtered(
         self, parts: Sequence[np.ndarray], share: float
     ) -> list[tuple[np.ndarray, float]] | None:
-        """Innovations, each with its variance in units of the output's noise."""
-        filters = {
-            kind: _whitening(one, share**2) for kind, one in self._sampled.items()
-        }
+        """Innovations over the recording's level of noise, each with its variance.
+
+        Variances are in units of the output's noise.
+        """
+        filters: dict[tuple[object, float], _Whitening | None] = {}
         found = []
-        for part, kind in zip(parts, self._kinds, strict=True):
-            one = filters[kind]
+        levels = zip(self._levels.output, self._levels.ratio, strict=True)
+        for part, kind, (level, ratio) in zip(parts, self._kinds, levels, strict=True):
+            if (kind, ratio) not in filters:
+                strength = float(ratio * share) ** 2
+                filters[kind, ratio] = _whitening(self._sampled[kind], strength)
+            one = filters[kind, ratio]
             if one is None:
                 return None
-            filtered = scipy.signal.lfilter(one.top, one.bottom, part)
+            filtered = scipy.signal.lfilter(one.top, one.bottom, part / level)
             found.append((np.asarray(filtered), one.variance))
         return found
 

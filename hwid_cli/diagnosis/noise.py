@@ -110,17 +110,34 @@ def noise_levels(problem: DiagnosisProblem, noise: NoiseFloor) -> np.ndarray:
         Mean square over all samples 1; all of them 1 where noise is alike in all.
     """
     counts = np.array([one.n_evaluated for one in problem.signals])
-    alike = np.ones(counts.size)
     # A grid is the same in all, and what a base leaves was tested to be.
     if noise.resolution > 0 or noise.method == "residuals" or counts.sum() == 0:
-        return alike
-    found = np.array(
-        [differences_rms([one.compared[one.evaluated]], 0.0) for one in problem.signals]
-    )
+        return np.ones(counts.size)
+    return _levels([one.compared[one.evaluated] for one in problem.signals])
+
+
+def input_levels(problem: DiagnosisProblem) -> np.ndarray:
+    """How much noise the input of each recording holds, beside all of them together.
+
+    Returns
+    -------
+    ndarray, shape (n_recordings,), [-]
+        As of ``noise_levels``; all of them 1 where steps and lines hide noise in one.
+    """
+    pieces = [one.driven_by[one.skip :] for one in problem.signals]
+    if any(_is_mostly_straight(piece) for piece in pieces):
+        return np.ones(len(pieces))
+    return _levels(pieces)
+
+
+def _levels(pieces: Sequence[np.ndarray]) -> np.ndarray:
+    """Noise of each piece over that of all, from differences of high order, [-]."""
+    counts = np.array([piece.size for piece in pieces])
+    found = np.array([differences_rms([piece], 0.0) for piece in pieces])
     least = QUIETEST * float(found.max(initial=0.0))
     found = np.maximum(found, least)
     if least <= 0 or found.max() <= _ALIKE * found.min():
-        return alike
+        return np.ones(counts.size)
     return np.asarray(found / np.sqrt(np.sum(counts * found**2) / counts.sum()))
 
 

@@ -16,6 +16,7 @@ from hwid_cli.diagnosis.input_noise import (
     may_be_input_noise,
     whiteness_with_input_noise,
 )
+from hwid_cli.diagnosis.noise import noise_floor
 from hwid_cli.diagnosis.parameters import (
     drive_at,
     drives_at,
@@ -77,6 +78,11 @@ def moved_by_input_noise(seed, count=9, pulse=PULSE):
         + NOISE * rng.standard_normal(N)
         for _ in range(count)
     ]
+
+
+def alike(of):
+    """As much noise in every recording."""
+    return noise_of_input._Levels(np.ones(len(of.signals)), np.ones(len(of.signals)))
 
 
 def innovations_by_factors(parts, pulse):
@@ -192,7 +198,7 @@ def test_a_fast_command_shows_its_noise_where_it_rests(of):
 @pytest.mark.parametrize("share", [0.5, 2.0])
 def test_residuals_as_large_as_the_noise_behind_the_filter_makes_them(of, share):
     parts = moved_by_input_noise(1)
-    filters = noise_of_input._Filters(of, each(of), NOISE)
+    filters = noise_of_input._Filters(of, each(of), NOISE, alike(of))
     likeliest = filters.likeliest(parts, 2 * INPUT_NOISE / NOISE)
     assert filters.is_as_large(parts, likeliest)
     assert not filters.is_as_large(parts, share * likeliest)
@@ -290,6 +296,29 @@ def fit_by_factors(of, layout, point, input_noise):
     return replace(point, shared=least_squares(errors, point.shared).x)
 
 
+def test_both_noises_may_go_with_the_range_of_a_recording(monkeypatch):
+    rng = np.random.default_rng(7)
+    given = [
+        replace(
+            one,
+            # It starts in equilibrium with the first sample.
+            input=one.input
+            + level * INPUT_NOISE * np.r_[0, rng.standard_normal(N - 1)],
+            output=one.output + level * NOISE * rng.standard_normal(N),
+        )
+        for one, level in zip(recordings(noise=0.0), [2.0, 0.25, 1.0] * 3, strict=True)
+    ]
+    of = problem(given)
+    fit_layout = parameter_layout(of, (), {}, sizes(of))
+    point = first_point(of, fit_layout, of.drive, {})
+    parts = residuals_at(of, fit_layout, point)
+    noise = noise_floor(of)
+    assert left_over(parts, of, each(of), noise)[1] == "input_noise"
+    # As if each held as much: one leaves far more than all together.
+    monkeypatch.setattr(noise_of_input._Levels, "of", lambda of, noise: alike(of))
+    assert left_over(parts, of, each(of), noise)[1] == ""
+
+
 def test_what_a_stand_in_leaves_at_steps_is_no_noise_of_a_clean_input():
     of = problem(recordings())
     of = replace(of, drive=StandIn(**vars(DRIVE), own_units=MotionUnits()))
@@ -360,7 +389,7 @@ def with_own_starts(count):
 
 def test_derivatives_behind_the_filter_are_those_of_one_coordinate_after_another():
     of, fit_layout, point = with_own_starts(4)
-    search = noise_of_input._Search(of, fit_layout, point, NOISE, 0.5)
+    search = noise_of_input._Search(of, fit_layout, point, NOISE, 0.5, alike(of))
     at = np.concatenate([point.shared, point.own.ravel()])
     assert point.own.size > 4
     expected = least_squares(search.deviations, at, max_nfev=1).jac
@@ -381,7 +410,7 @@ def test_derivatives_behind_the_filter_cost_no_more_with_more_recordings(monkeyp
             return residuals_at(*args)
 
         monkeypatch.setattr(noise_of_input, "residuals_at", noted)
-        search = noise_of_input._Search(of, fit_layout, point, NOISE, 0.5)
+        search = noise_of_input._Search(of, fit_layout, point, NOISE, 0.5, alike(of))
         search.jacobian(np.concatenate([point.shared, point.own.ravel()]))
         costs.append(len(calls))
     assert costs[0] == costs[1] > 2
