@@ -440,3 +440,33 @@ def test_a_recording_that_runs_away_does_not_keep_others_from_their_own_values()
     own = fit_own(of, found, point.shared).own[1:, 0] * found.own[0].scale
     apart = np.angle(np.exp(1j * (own - 0.4 - 0.9 * np.arange(1, 9))))
     np.testing.assert_allclose(apart, 0.0, atol=1e-5)
+
+
+def test_own_values_are_looked_for_around_those_of_other_recordings():
+    # Shared and own factor of the force are one: where all the recordings of a fit share
+    # 1.8, the drive sticks at 1, and nothing tells the way from there.
+    def weaker(number, true):
+        return replace(true, force_constant_N_per_A=4.0 + 0.05 * number)
+
+    given = recordings(
+        {"coulomb_friction": {"force_N": 12.0}},
+        drive=replace(DRIVE, stiffness_N_per_m=0.0),
+        noise=0.0,
+        own=weaker,
+    )
+    free = {"stiffness_N_per_m": 0.0, "force_constant_N_per_A": 2.2}
+    of = problem([one for one in given if np.ptp(one.output) > 1e-4], **free)
+    which = "parameter_change:force_constant"
+    effects = {
+        which: {"log_force_constant": 0.0},
+        "coulomb_friction": {"force_N": 12.0},
+    }
+    found, point = begun(of, effects)
+    near = np.log(4.0 / 2.2) / found.own[0].scale
+
+    def left(own):
+        return sum_of_squares(residuals_at(of, found, own))
+
+    without = left(fit_own(of, found, point.shared))
+    usual = np.array([near])
+    assert left(fit_own(of, found, point.shared, usual)) < 1e-3 * without
