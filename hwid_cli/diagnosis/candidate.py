@@ -318,18 +318,12 @@ def evaluated(
     drives = drives_at(problem, best.layout, ParameterPoint(best.point.shared, own))
     white, cause = left_over(parts, problem, drives, noise)
     shared = zip(best.layout.shared, best.point.shared, strict=True)
-    own_values = np.array(
-        [
-            [one.value(q) for one, q in zip(best.layout.own, row, strict=True)]
-            for row in own
-        ]
-    ).reshape(own.shape)
     return CandidateFit(
         effects=effects,
         names=tuple(one.ref for one in best.layout.shared),
         values=np.array([one.value(q) for one, q in shared]),
         own_names=tuple(one.ref for one in best.layout.own),
-        own=own_values,
+        own=_own_values(best.layout, own),
         sse=sse,
         whiteness=white,
         neighbour=neighbour,
@@ -337,6 +331,15 @@ def evaluated(
         has_converged=best.has_converged,
         cause=cause,
     )
+
+
+def _own_values(fit_layout: ParameterLayout, own: np.ndarray) -> np.ndarray:
+    """Values of what belongs to each recording, from its coordinates."""
+    values = [
+        [one.value(q) for one, q in zip(fit_layout.own, row, strict=True)]
+        for row in own
+    ]
+    return np.array(values).reshape(own.shape)
 
 
 def _neighbour(parts: list[np.ndarray]) -> float:

@@ -280,8 +280,8 @@ def needs_each(
                 return False
             continue
         against = criteria.evidence(whole, fits[left])
-        completes = criteria.leaves_noise(whole)
-        completes = completes and not criteria.leaves_noise(fits[left])
+        leaves = criteria.leaves_noise
+        completes = leaves(whole) and not leaves(fits[left])
         explains = against.explained >= LEAST_EXPLAINED or completes
         completes = completes or _nearly_completes(criteria, whole, fits[left], fits)
         is_clear = against.gain >= LEAST_GAIN and against.improved >= LEAST_IMPROVED

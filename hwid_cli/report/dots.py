@@ -9,6 +9,8 @@ from typing import ClassVar
 _WIDTH, _NARROW, _ROW, _TITLE, _AXIS = 720, 340, 20, 26, 40
 # Room of a character of a name and of a number, of which a narrow drawing has less.
 _CHARACTER, _MOST_NAME = 6.4, 240
+# A bold letter over a plain one.
+_BOLD = 1.12
 # Numbers beyond this, or below its reciprocal on a logarithmic axis, have no place on one.
 _LARGEST = 1e100
 # A logarithmic axis reaches at least so far, [-].
@@ -144,7 +146,8 @@ def dot_drawing(dots: Dots) -> DotDrawing:
     rows = [row for group in dots.groups for row in group.rows]
     width = _NARROW if dots.is_narrow else _WIDTH
     most = int((0.44 * width if dots.is_narrow else _MOST_NAME) / _CHARACTER)
-    left = _CHARACTER * min(most, max(len(row.name) for row in rows)) + 14
+    longest = max(len(row.name) * (_BOLD if row.is_bold else 1.0) for row in rows)
+    left = round(_CHARACTER * min(most, longest)) + 14
     beside = _CHARACTER * max(len(row.text) for row in rows)
     right = width - 14 - beside
     low, high, ticks = _axis(
@@ -181,9 +184,7 @@ def dot_drawing(dots: Dots) -> DotDrawing:
         rows=tuple(placed),
         titles=tuple(titles),
         ticks=tuple(drawn),
-        reference=None
-        if dots.reference is None
-        else (place(dots.reference[0]), dots.reference[1]),
+        reference=dots.reference and (place(dots.reference[0]), dots.reference[1]),
         label=dots.label,
     )
 

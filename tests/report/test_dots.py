@@ -84,3 +84,13 @@ def test_what_has_no_logarithm_stands_at_the_lower_end(value):
 
     assert lowest == drawing.left
     assert lowest < middle < highest
+
+
+def test_a_bold_name_has_more_room():
+    def left(*, is_bold):
+        row = DotRow(
+            "with parameter change", (Dot(2.0, "given", "2"),), is_bold=is_bold
+        )
+        return dot_drawing(Dots("RMS [m]", (DotGroup("", (row,)),), "", "")).left
+
+    assert left(is_bold=True) > left(is_bold=False) + 10
