@@ -20,7 +20,7 @@ from hwid_cli.diagnosis.selection import (
 from hwid_cli.diagnosis.simulator import Runs
 from hwid_cli.diagnosis.turns import Turn, fit_of_run, settled
 from hwid_cli.diagnosis.verdict import decide
-from hwid_cli.drive.catalogue import public_id
+from hwid_cli.drive.catalogue import CATALOGUE, public_id
 from hwid_cli.records.candidates import CandidateFit
 
 # Single effects that the simulation is run with: at most so many different ones, of those that leave at
@@ -66,10 +66,66 @@ def single_in_simulation(
         turn = settled(findings, one, runs, values)
         if turn is not None:
             tried[one.effects], fits[one.effects] = turn, fit_of_run(findings, turn)
+    for turn in _twins_in_simulation(findings, runs, tried, fits):
+        fit = fit_of_run(findings, turn)
+        tried[fit.effects], fits[fit.effects] = turn, fit
     decided = _decided(findings, tried, fits)
     if decided is not None:
         return decided
     return None, _moved_by_best(findings, tried, fits, values)
+
+
+def _twins_in_simulation(
+    findings: Findings,
+    runs: Runs,
+    tried: Mapping[tuple[str, ...], Turn],
+    fits: Mapping[tuple[str, ...], CandidateFit],
+) -> list[Turn]:
+    """Limit cases with the same parameters, beside effects that leave nothing.
+
+    A lag of the sensor and one of the actuator are the same for a simulation that is
+    linear. Beside a stand-in whose parameters are off only one of them may fit.
+    """
+    done = [
+        effects
+        for effects, fit in fits.items()
+        if findings.criteria.is_nearly_all(fit, findings.base)
+    ]
+    found = []
+    for effects in done:
+        turn = tried[effects]
+        for twin in _twins(findings, turn):
+            if twin.effects not in done:
+                found.append(settled(findings, twin, runs, turn.values_of_run))
+    return [turn for turn in found if turn is not None]
+
+
+def _twins(findings: Findings, turn: Turn) -> list[CandidateFit]:
+    """Effects that another one includes, with its values as they are."""
+    if turn.tried is None:
+        return []
+    fit = turn.tried[0]
+    (effect,) = fit.effects
+
+    def names(one: str) -> list[str]:
+        return [each.name for each in CATALOGUE[one].parameters]
+
+    alike = [
+        one
+        for one in CATALOGUE[effect].contains
+        if (one,) in findings.found.shares and names(one) == names(effect)
+    ]
+    return [
+        replace(
+            fit,
+            effects=(one,),
+            names=tuple(
+                replace(name, owner=one) if name.owner == effect else name
+                for name in fit.names
+            ),
+        )
+        for one in alike
+    ]
 
 
 def _moved_by_best(

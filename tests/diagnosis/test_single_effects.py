@@ -1,8 +1,14 @@
 """Which single effects a simulation of one's own is run with."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
-from hwid_cli.diagnosis.single_effects import _likely
+import numpy as np
+import pytest
+
+from hwid_cli.diagnosis import single_effects
+from hwid_cli.diagnosis.single_effects import _likely, _twins_in_simulation
+from hwid_cli.records.candidates import ParameterRef
 from tests.diagnosis.made_up_fits import CRITERIA, base, made_up
 
 # In the order in which they leave least beside the stand-in.
@@ -48,3 +54,44 @@ def test_kinds_of_friction_do_not_keep_a_dead_zone_from_the_simulation():
     # Four different ones and the limit case of most.
     assert {"stribeck_friction", "input_dead_zone", "coulomb_friction"} <= found
     assert len(found) == 5
+
+
+@pytest.mark.parametrize(
+    ("sse", "is_allowed", "tried"),
+    [
+        # A lag of the sensor leaves nothing: that of the actuator is the same ...
+        (100.0, True, ["actuator_lag"]),
+        # ... unless something remains, or nobody has asked for it.
+        (400.0, True, []),
+        (100.0, False, []),
+    ],
+)
+def test_what_leaves_nothing_is_tried_as_the_limit_case_with_its_values(
+    monkeypatch, sse, is_allowed, tried
+):
+    lag = replace(
+        made_up(("sensor_lag",), sse, whiteness=0.5 if sse == 100.0 else 9.0),
+        names=(ParameterRef("base", "damping_N_s_per_m"),
+               ParameterRef("sensor_lag", "time_constant_s")),
+        values=np.array([4.7, 0.065]),
+    )  # fmt: skip
+    asked = []
+
+    def settled(_findings, fit, _runs, values):
+        asked.append((fit, values))
+
+    monkeypatch.setattr(single_effects, "settled", settled)
+    shares = {("sensor_lag",): 0.8} | ({("actuator_lag",): 0.2} if is_allowed else {})
+    findings = SimpleNamespace(
+        criteria=CRITERIA, base=base(), found=SimpleNamespace(shares=shares)
+    )
+    turn = SimpleNamespace(tried=(lag,), values_of_run={"c": 0.45})
+    fits = {lag.effects: lag}
+    found = _twins_in_simulation(findings, None, {lag.effects: turn}, fits)
+    # None of them could be run here.
+    assert found == []
+    assert [fit.effects[0] for fit, _ in asked] == tried
+    for fit, values in asked:
+        assert fit.names[1] == ParameterRef("actuator_lag", "time_constant_s")
+        assert fit.values.tolist() == [4.7, 0.065]
+        assert values == {"c": 0.45}
