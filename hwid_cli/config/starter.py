@@ -235,8 +235,20 @@ def _units(layout: FolderLayout) -> dict[str, str]:
     return {
         name: role.unit
         for name, role in roles.items()
-        if role is not None and quantity_of(role.unit) in _CONVERTED[name]
+        if role is not None
+        and (
+            quantity_of(role.unit) in _CONVERTED[name]
+            or (name == "input" and _is_reference(layout))
+        )
     }
+
+
+def _is_reference(layout: FolderLayout) -> bool:
+    """Whether the input is of the output's quantity: one in mm beside the other in m."""
+    quantity = quantity_of(layout.input.unit)
+    return quantity in _CONVERTED["output"] and quantity == quantity_of(
+        layout.output.unit
+    )
 
 
 def _si_unit(role: Role) -> str:

@@ -257,7 +257,9 @@ def meaning_of(title: str, stated: str = "") -> Meaning:
                 role, rank, used = name, found, word
     if not unit and any(word in _STATES for word in words):
         role, rank, used = "counter", 99, ""
-    if unit and (not role or _is_contradicted(role, used, unit)):
+    if role == "time" and used == "t" and _is_temperature(words, unit):
+        role, rank = "output", _rank("temp", _OUTPUT) or 98
+    elif unit and (not role or _is_contradicted(role, used, unit)):
         role, rank, used = _role_of_unit(unit), 99, ""
     is_wanted = any(word in _WANTED and word != used for word in words)
     if is_reference or is_wanted:
@@ -294,6 +296,17 @@ def _is_contradicted(role: str, word: str, unit: str) -> bool:
     says = "output" if unit.lower() in _OUTPUT_UNITS else says
     # A letter stands for many things; what is measured in A is none of them but a current.
     return (word in _PLUGS or len(word) == 1) and says not in ("", role)
+
+
+def _is_temperature(words: list[str], unit: str) -> bool:
+    """Whether a letter T stands for a temperature, by its unit or in its name."""
+    named = {"temp", "temperature", "temperatur", "celsius", "kelvin", "degc"}
+    is_degree = "deg" in words and "c" in words
+    return (
+        unit.lower() in ("°c", "k", "degc", "deg c")
+        or is_degree
+        or bool(named & set(words))
+    )
 
 
 def _words(title: str) -> list[str]:

@@ -544,3 +544,22 @@ def test_the_starting_simulation_is_of_the_axis_that_is_measured(
     out.write_text(text + simulation)
     done = CliRunner().invoke(main, ["check", str(out), "--no-timing"])
     assert done.exit_code == 0, done.output + out.read_text()
+
+
+def test_a_reference_in_millimetres_is_converted_as_its_position_is(folder, tmp_path):
+    # A simulation of the loop counts both in m.
+    time = 0.002 * np.arange(600)
+    for number, size in enumerate((20.0, 5.0, -12.0)):
+        reference = size * np.clip((time - 0.1) / 0.3, 0.0, 1.0)
+        position = np.r_[np.zeros(9), reference[:-9]]
+        table = np.column_stack([time, reference, position])
+        head = "time_s,pos_ref_mm,pos_act_mm"
+        path = folder / f"move_{number}.csv"
+        np.savetxt(path, table, delimiter=",", header=head, comments="")
+    out = tmp_path / "mine.yaml"
+    result = invoke("init", folder, "--out", out)
+    assert result.exit_code == 0, result.output
+    options = load_experiment(out).recordings
+    assert (options.units.input, options.units.output) == ("mm", "mm")
+    raws = read_recordings(load_experiment(out), out)
+    assert max(np.max(one.input) for one in raws) == pytest.approx(0.02)

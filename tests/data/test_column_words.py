@@ -64,3 +64,18 @@ def test_what_was_measured_is_said_by_another_word_or_it_is_the_output():
     assert meaning_of("measured_current").role == "input"
     assert meaning_of("Drehmomentistwert").role == "input"
     assert meaning_of("Drehzahlistwert").role == "output"
+
+
+@pytest.mark.parametrize(
+    ("title", "role"),
+    [
+        ("T_air_degC", "output"),
+        ("T_K [K]", "output"),
+        ("T Luft [°C]", "output"),
+        ("t [s]", "time"),
+        ("t", "time"),
+        ("T_ms", "time"),
+    ],
+)
+def test_a_capital_t_may_be_a_temperature(title, role):
+    assert meaning_of(title).role == role
