@@ -374,22 +374,51 @@ def _in_newtons(
     push = _test_push(one) * _SMALL_PUSH * max(float(np.std(force)), 1e-300)
     pushed = moved_plainly(drive, one, force + push, moved).position - plain
     push = push * (_PUSH * size / max(float(np.std(pushed)), 1e-300))
-    answer = np.zeros(0)
-    for _ in range(_MOST_PUSHES):
-        found = runs.tried([one], values, [push])
-        if found is None:
-            push = push * _WEAKER
-            continue
-        answer = found[0].output - before.output
-        share = float(np.std(answer)) / size
-        if _PUSH_LIMITS[0] <= share <= _PUSH_LIMITS[1]:
-            break
-        push = push * min(max(_PUSH / max(share, 1e-6), 1e-4), 1e4)
-    if not answer.size:
+    answered = _answered(runs, one, values, before, push)
+    if answered is None:
         return drive
+    push, answer = answered
     expected = moved_plainly(drive, one, force + push, moved).position - plain
     gain = float(expected @ answer) / max(float(expected @ expected), 1e-300)
     return in_newtons(drive, gain) if gain > 0 else drive
+
+
+def _answered(
+    runs: Runs,
+    signals: Signals,
+    values: Mapping[str, float],
+    before: SimulatorRun,
+    push: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray] | None:
+    """A push that moves the simulation enough, and by how much; None where none does.
+
+    Parameters
+    ----------
+    before : SimulatorRun
+        Without it.
+    push : ndarray, shape (n_samples,), [N]
+        The first guess.
+    """
+    size = float(np.std(before.output))
+    found, factor, too_much = None, 1.0, np.inf
+    for _ in range(_MOST_PUSHES):
+        there = runs.tried([signals], values, [push * factor])
+        if there is None:
+            too_much = factor
+            # The last one that it bore, or a weaker one.
+            if found is not None:
+                break
+            factor *= _WEAKER
+            continue
+        answer = there[0].output - before.output
+        found = push * factor, answer
+        share = float(np.std(answer)) / size
+        if _PUSH_LIMITS[0] <= share <= _PUSH_LIMITS[1]:
+            break
+        factor *= min(max(_PUSH / max(share, 1e-6), 1e-4), 1e4)
+        if factor >= too_much:
+            break
+    return found
 
 
 def stand_in_for(

@@ -166,6 +166,24 @@ def test_a_spring_that_softens_is_pushed_no_farther_than_it_bears():
     assert drive.force_constant_N_per_A == pytest.approx(3.0, rel=0.3)
 
 
+def test_a_push_that_a_simulation_does_not_bear_is_made_weaker():
+    able = Capabilities(run=True, parameters=True, force=True)
+
+    def frail(request):
+        if request.force.size and np.max(np.abs(request.force)) > 0.2:
+            raise SimulationError("the joint has left its range")
+        return simulate(request)
+
+    drive, _ = stand_in_for(
+        recordings(),
+        Simulator(able, frail, {}, FREE, GIVEN),
+        DiagnoseOptions(),
+        Count(),
+    )
+    # 8 N for each V.
+    assert drive.force_constant_N_per_A == pytest.approx(8.0, rel=0.1)
+
+
 def test_a_simulation_is_not_run_with_a_force_that_is_not_finite():
     able = Capabilities(run=True, force=True)
     found = recordings()

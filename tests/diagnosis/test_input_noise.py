@@ -319,6 +319,30 @@ def test_both_noises_may_go_with_the_range_of_a_recording(monkeypatch):
     assert left_over(parts, of, each(of), noise)[1] == ""
 
 
+def test_every_recording_is_seen_through_a_filter_of_its_own_noise(of):
+    # The noise of the input of every second one is eight times as large.
+    ratio = np.array([2.0, 0.25] * 5)[:9]
+    rng = np.random.default_rng(7)
+    parts = [
+        np.convolve(PULSE, 30 * level * INPUT_NOISE * rng.standard_normal(N))[:N]
+        + NOISE * rng.standard_normal(N)
+        for level in ratio
+    ]
+    share = 30 * INPUT_NOISE / NOISE
+    levels = noise_of_input._Levels(np.ones(9), ratio)
+    filters = noise_of_input._Filters(of, each(of), NOISE, levels)
+    sizes_found = [np.std(one) for one in filters.in_deviations(parts, share)]
+    assert sizes_found == pytest.approx([1.0] * 9, abs=0.15)
+    assert filters.is_as_large(parts, share)
+
+    # As much more as the squares of the levels say.
+    usual = noise_of_input._Filters(of, each(of), NOISE, alike(of))
+    twice = noise_of_input._Levels(np.ones(9), 2 * np.ones(9))
+    more = noise_of_input._Filters(of, each(of), NOISE, twice)
+    expected = usual._expected(parts, share, NOISE**2)[0]
+    assert more._expected(parts, share, NOISE**2)[0] == pytest.approx(4 * expected)
+
+
 def test_what_a_stand_in_leaves_at_steps_is_no_noise_of_a_clean_input():
     of = problem(recordings())
     of = replace(of, drive=StandIn(**vars(DRIVE), own_units=MotionUnits()))
