@@ -94,17 +94,14 @@ def _twins_in_simulation(
     found = []
     for effects in done:
         turn = tried[effects]
-        for twin in _twins(findings, turn):
+        for twin in _twins(findings, fits[effects]):
             if twin.effects not in done:
                 found.append(settled(findings, twin, runs, turn.values_of_run))
     return [turn for turn in found if turn is not None]
 
 
-def _twins(findings: Findings, turn: Turn) -> list[CandidateFit]:
+def _twins(findings: Findings, fit: CandidateFit) -> list[CandidateFit]:
     """Effects that another one includes, with its values as they are."""
-    if turn.tried is None:
-        return []
-    fit = turn.tried[0]
     (effect,) = fit.effects
 
     def names(one: str) -> list[str]:

@@ -85,7 +85,7 @@ def test_what_leaves_nothing_is_tried_as_the_limit_case_with_its_values(
     findings = SimpleNamespace(
         criteria=CRITERIA, base=base(), found=SimpleNamespace(shares=shares)
     )
-    turn = SimpleNamespace(tried=(lag,), values_of_run={"c": 0.45})
+    turn = SimpleNamespace(values_of_run={"c": 0.45})
     fits = {lag.effects: lag}
     found = _twins_in_simulation(findings, None, {lag.effects: turn}, fits)
     # None of them could be run here.
