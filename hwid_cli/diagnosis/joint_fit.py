@@ -31,8 +31,10 @@ def fitted_together(
     before: CandidateFit,
     moved_by: tuple[Sequence[np.ndarray], Sequence[np.ndarray]],
     findings: Findings,
-) -> tuple[CandidateFit, np.ndarray]:
+) -> tuple[CandidateFit, np.ndarray] | None:
     """Fit of effects and of the simulation's parameters.
+
+    None where the stand-in has run away, as one whose spring softens may.
 
     Parameters
     ----------
@@ -77,8 +79,7 @@ def fitted_together(
 
     start = np.r_[np.zeros(n_free), point.shared, point.own[rows].ravel()]
     if (errors(start) == far).all():
-        # A stand-in whose spring softens has run away: it tells no change.
-        return before, np.zeros(n_free)
+        return None
     found = scipy.optimize.least_squares(
         errors, start, partial(_derivatives, errors), method="lm"
     )

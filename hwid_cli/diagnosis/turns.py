@@ -81,6 +81,8 @@ class Turn:
         What that run left of each recording.
     disagreement : float, [output unit]
         RMS between that run and what the stand-in had said.
+    ran_away : bool
+        Whether the stand-in no longer says what the parameters should be.
     """
 
     problem: DiagnosisProblem
@@ -93,6 +95,7 @@ class Turn:
     slopes_at: dict[str, float] = field(default_factory=dict)
     left: tuple[np.ndarray, ...] = ()
     disagreement: float = np.inf
+    ran_away: bool = False
 
     @property
     def sse(self) -> np.ndarray:
@@ -139,7 +142,9 @@ def _best_of(findings: Findings, turn: Turn, runs: Runs) -> Turn:
     if runs.simulator.free:
         held = replace(turn, problem=_held(findings.problem))
         best = _best_turn(findings, held, runs)
-    if best is None or not is_as_good(best):
+    # Forces in the place of parameters that nobody could find would pass for the effect's.
+    is_lost = best is not None and best.ran_away
+    if best is None or not (is_lost or is_as_good(best)):
         other = _best_turn(findings, turn, runs)
         if best is None or other.sse.sum() * _PREFERRED < best.sse.sum():
             best = other
@@ -167,6 +172,8 @@ def _best_turn(findings: Findings, turn: Turn, runs: Runs) -> Turn:
         in_vain = 0 if is_worth_it or is_as_good(turn) else in_vain + 1
         if turn.sse.sum() < best.sse.sum():
             best = turn
+        if turn.ran_away:
+            return replace(best, ran_away=True)
         agreed = agreed + 1 if _agrees(findings, turn) and is_as_good(turn) else 0
         is_enough = (
             agreed > 0
@@ -295,7 +302,10 @@ def _with_values(
     """
     (found, forces), slopes = run_with, turn.slopes
     pushes = pushes_of(turn.problem, slopes, found)
-    fit, change = fitted_together(turn.problem, turn.fit, (slopes, pushes), findings)
+    together = fitted_together(turn.problem, turn.fit, (slopes, pushes), findings)
+    if together is None:
+        return replace(turn, ran_away=True)
+    fit, change = together
     values = dict(turn.values)
     for column, (name, one) in enumerate(runs.simulator.free.items()):
         values[name] = float(np.clip(values[name] + change[column], *one.limits))
