@@ -514,6 +514,20 @@ def start_from(drive: Drive, found: CandidateFit) -> SearchStart:
     return SearchStart(base_of(fitted_drive(drive, found)), values)
 
 
+def without_base(found: CandidateFit) -> CandidateFit:
+    """The fit of the effects alone; the base stays as the drive has it."""
+    is_kept = np.array([one.owner != BASE for one in found.names], dtype=bool)
+    names = tuple(one for one in found.names if one.owner != BASE)
+    return replace(found, names=names, values=found.values[is_kept])
+
+
+def without_starts(found: CandidateFit) -> CandidateFit:
+    """The fit without where its recordings start, beside starts that are known."""
+    kept = [row for row, one in enumerate(found.own_names) if one.owner != START]
+    names = tuple(found.own_names[row] for row in kept)
+    return replace(found, own_names=names, own=found.own[:, kept])
+
+
 def fitted_drive(drive: Drive, found: CandidateFit) -> Drive:
     """Drive with the base of a fit."""
     base: dict[str, Any] = _values_by_owner(found).get(BASE, {})

@@ -30,6 +30,7 @@ def fitted_together(
     problem: DiagnosisProblem,
     before: CandidateFit,
     moved_by: tuple[Sequence[np.ndarray], Sequence[np.ndarray]],
+    holds: np.ndarray,
     findings: Findings,
 ) -> tuple[CandidateFit, np.ndarray] | None:
     """Fit of effects and of the simulation's parameters.
@@ -40,6 +41,9 @@ def fitted_together(
     ----------
     moved_by : tuple of two sequences of ndarray, shape (n_samples, n_free)
         What these parameters change: the output, and the force of the stand-in.
+    holds : ndarray, shape (n_free,), [output unit/parameter]
+        What a change of a parameter counts for beside what is left of the samples, so
+        that one which these do not tell apart from others stays where it is.
 
     Returns
     -------
@@ -73,7 +77,8 @@ def fitted_together(
 
     def errors(coordinates: np.ndarray) -> np.ndarray:
         train = changed(coordinates).part(held_out=False)
-        left = np.concatenate(residuals_at(train, fit_layout, at(coordinates)))
+        off = residuals_at(train, fit_layout, at(coordinates))
+        left = np.concatenate([*off, holds * sizes * coordinates[:n_free]])
         # No search goes where the stand-in runs away.
         return left if np.isfinite(left).all() else np.full(left.size, far)
 

@@ -14,7 +14,11 @@ from itertools import pairwise
 
 import numpy as np
 
-from hwid_cli.diagnosis.candidate import compared_with_fit, rebuilt
+from hwid_cli.diagnosis.candidate import (
+    compared_with_fit,
+    rebuilt,
+    without_starts,
+)
 from hwid_cli.diagnosis.latent_force import Smoothed
 from hwid_cli.diagnosis.parameters import START, compare_at, parameter_layout
 from hwid_cli.diagnosis.problem import Compared, DiagnosisProblem, Signals
@@ -66,13 +70,9 @@ class JudgedPieces:
 
     def joined_fit(self, found: CandidateFit) -> CandidateFit:
         """A fit of the pieces as one of the recordings: what is left adds up."""
-        kept = [n for n, one in enumerate(found.own_names) if one.owner != START]
-        return replace(
-            found,
-            own_names=tuple(found.own_names[n] for n in kept),
-            own=found.own[self._firsts][:, kept],
-            sse=self.joined_sse(found.sse),
-        )
+        found = without_starts(found)
+        own, sse = found.own[self._firsts], self.joined_sse(found.sse)
+        return replace(found, own=own, sse=sse)
 
     def compared(self, found: CandidateFit, scales: Scales) -> list[Compared]:
         """Recordings beside the simulation of all their pieces."""

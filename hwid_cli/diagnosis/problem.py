@@ -62,6 +62,9 @@ class Signals:
         simulation.
     offset : ndarray, shape (n_samples,), or None
         What is added to the simulated output.
+    own_start : tuple of float, or None, [m], [m/s]
+        Where that simulation starts whatever acts on it, be it out of balance there; None
+        if it starts in balance, or nothing is known of it.
     pushes : ndarray, shape (n_samples, n_free) or (0, 0), [N]
         Forces that move such a drive as parameters of that simulation do, each by about
         the noise; what is fitted beside them is as uncertain as they leave it.
@@ -81,6 +84,7 @@ class Signals:
     is_velocity: bool = False
     force: np.ndarray = field(default_factory=lambda: NO_FORCE)
     offset: np.ndarray | None = None
+    own_start: tuple[float, float] | None = None
     pushes: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
 
     @cached_property

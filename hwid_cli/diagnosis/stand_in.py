@@ -23,6 +23,10 @@ from hwid_cli.records.drive import BASE_PARAMETERS, Drive, StandIn
 from hwid_cli.records.programs import SimulatorRun
 
 _DEGREE = 5
+# Samples before the start of a run from rest; and the share of the second step that the
+# first one may be there, [-].
+_MIRRORED = 20
+_STEP_FROM_REST = 0.5
 # A spring or a damper that gives less of the force than this share is none.
 _LEAST_SHARE = 1e-4
 _LEAST_MASS = 1e-12
@@ -41,6 +45,8 @@ _PUSHES_BACK = 1.2
 _ITERATIONS = 20
 # A first velocity below this share of the largest is rest.
 _STILL = 1e-3
+# Starts that differ by less than this share of the motion are the same.
+_SAME_START = 1e-6
 # The forces that correct the stand-in are filtered to this share of the largest frequency:
 # lower ones leave edges of contacts to the offset, which the effect does not see, [-].
 _SLOW_SHARE = 0.5
@@ -66,17 +72,35 @@ class Moved:
 
 
 def derived(found: SimulatorRun, sample_time_s: float) -> Moved:
-    """Motion of a run, with derivatives from a spline through its samples."""
-    size = found.output.size
-    time = sample_time_s * np.arange(size)
-    degree = min(_DEGREE, size - 1)
-    spline = scipy.interpolate.make_interp_spline(time, found.output, k=degree)
+    """Motion of a run, with derivatives from a spline through its samples.
+
+    A run from rest is continued to before its start by its mirror image: a spline alone
+    takes the bend there for a velocity and a force.
+    """
+    n_before = _MIRRORED if _rests_at_first(found.output) else 0
+    n_before = min(n_before, found.output.size - 1)
+    size = found.output.size + n_before
+    time = sample_time_s * (np.arange(size) - n_before)
+    inside = time[n_before:]
+
+    def spline(values: np.ndarray, sign: float) -> Any:
+        before = sign * values[n_before:0:-1]
+        degree = min(_DEGREE, size - 1)
+        return scipy.interpolate.make_interp_spline(time, np.r_[before, values], degree)
+
     if found.velocity.size:
-        slope = scipy.interpolate.make_interp_spline(
-            time, found.velocity, k=degree
-        ).derivative()
-        return Moved(found.output, found.velocity, slope(time))
-    return Moved(found.output, spline.derivative()(time), spline.derivative(2)(time))
+        slope = spline(found.velocity, -1.0).derivative()
+        return Moved(found.output, found.velocity, slope(inside))
+    way = spline(found.output, 1.0)
+    return Moved(found.output, way.derivative()(inside), way.derivative(2)(inside))
+
+
+def _rests_at_first(output: np.ndarray) -> bool:
+    """Whether a motion begins at rest: from there its second step is three times the first."""
+    if output.size < 3:
+        return False
+    first, second = np.abs(np.diff(output[:3]))
+    return bool(first <= _STEP_FROM_REST * second)
 
 
 def fit_stand_in(
@@ -313,6 +337,7 @@ def standing_for(
         signals,
         force=force,
         offset=found.output - plain.position,
+        own_start=seen_start(moved),
         start=start if drive.stiffness_N_per_m > 0 else signals.start,
     )
 
@@ -390,6 +415,11 @@ def start_of(moved: Moved) -> tuple[float, float] | None:
     return float(moved.position[0]), float(moved.velocity[0])
 
 
+def seen_start(moved: Moved) -> tuple[float, float]:
+    """Where a run starts, be it at rest: there it need not be in balance."""
+    return start_of(moved) or (float(moved.position[0]), 0.0)
+
+
 def moved_plainly(
     drive: Drive, signals: Signals, force: np.ndarray, moved: Moved
 ) -> Motion:
@@ -401,10 +431,23 @@ def moved_plainly(
     moved : Moved
         Of the simulation, which starts there.
     """
+    is_free = drive.stiffness_N_per_m == 0
+    start = seen_start(moved) if is_free else start_of(moved)
+    return moved_from(start, drive, signals, force)
+
+
+def moved_from(
+    start: tuple[float, float] | None, drive: Drive, signals: Signals, force: np.ndarray
+) -> Motion:
+    """Motion of the stand-in without effects, from a position and a velocity.
+
+    Parameters
+    ----------
+    start : tuple of float or None, [m], [m/s]
+        None to begin in balance.
+    force : ndarray, shape (n_samples,), [N]
+    """
     vector = parameter_vector(drive, {})
-    start = start_of(moved)
-    if start is None and drive.stiffness_N_per_m == 0:
-        start = float(moved.position[0]), 0.0
     if start is not None:
         set_start(vector, *start)
     return run(signals.driven_by, vector, signals.sample_time_s, force=force)
@@ -419,20 +462,33 @@ def corrected(
 ) -> Signals:
     """The stand-in with a further force that moves it by what it was late.
 
+    It starts where the simulation does (``Signals.own_start``). What the force
+    cannot follow is left to the offset, which effects do not see; the next correction
+    takes it up again, so that it does not grow.
+
     Parameters
     ----------
     late, target : ndarray, shape (n_samples,), [output unit]
-        What is added to its motion, and where that has to lead.
+        What is added to its output, and where that has to lead.
     force : ndarray, shape (n_samples,), [N]
         Of the effect, with which it has to lead there.
     """
     step, nothing = signals.sample_time_s, np.zeros(0)
-    change = derived(SimulatorRun(late, nothing), step)
+    added = late if signals.offset is None else late + signals.offset
+    change = derived(SimulatorRun(added, nothing), step)
     # Half way between where it was and where it has to be.
-    more = signals.force + _slow(force_of_change(drive, change, target - 0.5 * late))
+    more = signals.force + _slow(force_of_change(drive, change, target - 0.5 * added))
     there = derived(SimulatorRun(target, nothing), step)
-    plain = moved_plainly(drive, signals, more + force, there)
-    return replace(signals, force=more, offset=target - plain.position)
+    start = start_of(there) or signals.own_start
+    plain = moved_from(start, drive, signals, more + force)
+    return replace(signals, force=more, offset=target - plain.position, start=start)
+
+
+def starts_in_balance(signals: Signals, found: SimulatorRun) -> bool:
+    """Whether a force at the first sample moves where a simulation starts."""
+    own = signals.own_start
+    reach = _SAME_START * float(np.ptp(found.output))
+    return own is None or abs(float(found.output[0]) - own[0]) > reach
 
 
 def _slow(force: np.ndarray) -> np.ndarray:

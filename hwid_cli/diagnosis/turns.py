@@ -11,7 +11,12 @@ from functools import partial
 
 import numpy as np
 
-from hwid_cli.diagnosis.candidate import fitted_drive, rebuilt
+from hwid_cli.diagnosis.candidate import (
+    fitted_drive,
+    rebuilt,
+    without_base,
+    without_starts,
+)
 from hwid_cli.diagnosis.causes import left_over
 from hwid_cli.diagnosis.findings import Findings
 from hwid_cli.diagnosis.joint_fit import (
@@ -21,10 +26,16 @@ from hwid_cli.diagnosis.joint_fit import (
     pushes_of,
 )
 from hwid_cli.diagnosis.noise import measured_input_rms
+from hwid_cli.diagnosis.own_parameters import fit_parameters
 from hwid_cli.diagnosis.parameters import BASE, each_sum_of_squares, simulate_at
-from hwid_cli.diagnosis.problem import DiagnosisProblem
+from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals
 from hwid_cli.diagnosis.simulator import DIFFERENCE, Runs
-from hwid_cli.diagnosis.stand_in import corrected, force_of_motion
+from hwid_cli.diagnosis.stand_in import (
+    corrected,
+    force_of_motion,
+    starts_in_balance,
+)
+from hwid_cli.diagnosis.standing import standing_beside
 from hwid_cli.drive.catalogue import CATALOGUE
 from hwid_cli.drive.simulation import Motion
 from hwid_cli.records.candidates import CandidateFit, ParameterRef
@@ -43,6 +54,9 @@ _MOST_IN_VAIN = 3
 _WORTH_A_TURN = 0.95
 # Over the noise, what a run may leave because its effect is a little late at corners.
 _LATE_AT_CORNERS = 1.1
+# To double a parameter of the simulation costs this share of what the last run left: the
+# stand-in knows little of it so far from there, [-].
+_HOLD = 0.1
 # Derivatives by the simulation's parameters are found again where one of these has moved by
 # more than this share.
 _SAME_SLOPES = 0.02
@@ -146,9 +160,68 @@ def _best_of(findings: Findings, turn: Turn, runs: Runs) -> Turn:
     is_lost = best is not None and best.ran_away
     if best is None or not (is_lost or is_as_good(best)):
         other = _best_turn(findings, turn, runs)
-        if best is None or other.sse.sum() * _PREFERRED < best.sse.sum():
+        if best is not None and _is_clearly_better(other, best):
+            again = _best_turn(findings, _beside_effect(findings, other, runs), runs)
+            best = min(best, again, key=lambda one: float(one.sse.sum()))
+        if best is None or _is_clearly_better(other, best):
             best = other
     return best
+
+
+def _is_clearly_better(one: Turn, other: Turn) -> bool:
+    return bool(one.sse.sum() * _PREFERRED < other.sse.sum())
+
+
+def _beside_effect(findings: Findings, turn: Turn, runs: Runs) -> Turn:
+    """A first turn with the simulation's parameters as they fit beside known effects.
+
+    Parameters that have imitated an effect are far from where they belong; beside forces
+    that go with displacement, velocity and input the effect is known well enough to lead
+    them there.
+    """
+    fit, problem = turn.fit, turn.problem
+    motions = simulate_at(problem, *rebuilt(problem, fit, findings.scales))
+    changed = replace(fitted_drive(problem.drive, fit), effects={})
+    forces = {
+        one.name: force_of_motion(changed, one, motion)
+        for one, motion in zip(problem.signals, motions, strict=True)
+    }
+
+    def ask(
+        signals: Sequence[Signals], values: Mapping[str, float]
+    ) -> list[SimulatorRun] | None:
+        some = replace(problem, signals=tuple(signals))
+        return pushed(
+            runs, some, [forces[one.name] for one in signals], turn.at_force, values
+        )
+
+    values = fit_parameters(ask, problem.signals, runs.simulator.free, turn.values)
+    given = runs.tried(problem.signals, values)
+    if given is None:
+        return replace(turn, problem=_held(problem))
+    standing = standing_beside(runs, problem, given, values)
+    return Turn(_held(standing), without_base(fit), values, turn.said, turn.at_force)
+
+
+def _with_starts(
+    problem: DiagnosisProblem, found: Sequence[SimulatorRun]
+) -> DiagnosisProblem:
+    """The stand-in that starts in balance once runs with an effect show it."""
+    pairs = zip(problem.signals, found, strict=True)
+    if not any(starts_in_balance(one, run) for one, run in pairs):
+        return problem
+    signals = tuple(replace(one, own_start=None) for one in problem.signals)
+    return replace(problem, signals=signals)
+
+
+def _late(
+    problem: DiagnosisProblem, motions: Sequence[Motion], found: Sequence[SimulatorRun]
+) -> list[np.ndarray]:
+    """How far runs are from what the stand-in had said."""
+    return [
+        run.output - motion.position - (0.0 if one.offset is None else one.offset)
+        for one, motion, run in zip(problem.signals, motions, found, strict=True)
+    ]
 
 
 def _held(problem: DiagnosisProblem) -> DiagnosisProblem:
@@ -214,25 +287,25 @@ def _next_turn(findings: Findings, turn: Turn, runs: Runs) -> Turn | None:
     found = push(turn.values)
     if found is None:
         return None
-    late = [
-        run.output - motion.position - (0.0 if one.offset is None else one.offset)
-        for one, motion, run in zip(problem.signals, motions, found, strict=True)
-    ]
+    late = _late(problem, motions, found)
+    problem = _with_starts(problem, found)
     corrected = _corrected(problem, late, [run.output for run in found], forces)
+    # The simulation starts where it does.
+    fit = without_starts(turn.fit) if corrected.has_starts else turn.fit
     following = Turn(
         problem=corrected,
-        fit=turn.fit,
+        fit=fit,
         values=turn.values,
         said=turn.said,
         at_force=turn.at_force,
         slopes=turn.slopes,
         slopes_at=turn.slopes_at,
-        tried=(turn.fit, turn.values),
+        tried=(fit, turn.values),
         left=_left(problem, motions, found),
         disagreement=_rms_of(problem, late),
     )
     if not problem.known:
-        return replace(following, fit=fitted_again(corrected, turn.fit, findings))
+        return replace(following, fit=fitted_again(corrected, fit, findings))
     if not turn.slopes or have_moved(turn.slopes_at, turn.values, _SAME_SLOPES):
         slopes = tuple(_slopes(runs, push, turn.values, found))
         following = replace(following, slopes=slopes, slopes_at=turn.values)
@@ -302,7 +375,10 @@ def _with_values(
     """
     (found, forces), slopes = run_with, turn.slopes
     pushes = pushes_of(turn.problem, slopes, found)
-    together = fitted_together(turn.problem, turn.fit, (slopes, pushes), findings)
+    now = np.array([abs(turn.values[name]) or 1.0 for name in runs.simulator.free])
+    holds = _HOLD * float(np.sqrt(turn.sse.sum())) / now
+    moved_by = slopes, pushes
+    together = fitted_together(turn.problem, turn.fit, moved_by, holds, findings)
     if together is None:
         return replace(turn, ran_away=True)
     fit, change = together

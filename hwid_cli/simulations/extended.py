@@ -18,8 +18,9 @@ from hwid_cli.diagnosis.stand_in import (
     derived,
     force_along,
     force_of_motion,
-    moved_plainly,
-    start_of,
+    moved_from,
+    seen_start,
+    starts_in_balance,
 )
 from hwid_cli.drive.catalogue import CATALOGUE
 from hwid_cli.drive.simulation import (
@@ -37,9 +38,9 @@ from hwid_cli.simulations.kinds import kind_named
 
 # Runs with the effect; drive and simulation agree to this share of what the effect does.
 _MOST_TURNS = 12
-_AGREEMENT = 2e-3
+_AGREEMENT = 2e-4
 # Of the whole motion: an effect that changes less has nothing to agree on.
-_NEGLIGIBLE = 1e-5
+_NEGLIGIBLE = 1e-2
 # What does not come nearer is no answer.
 MOST_DISAGREEMENT = 0.05
 # Times of samples may be rounded in a file.
@@ -149,6 +150,8 @@ def _settled(
             best = ExtendedRun(found.output + read, found.velocity, disagreement)
         if disagreement <= _AGREEMENT:
             break
+        if starts_in_balance(signals, found):
+            signals = replace(signals, own_start=None)
         signals = corrected(signals, plain, late, found.output, force)
     return best
 
@@ -158,10 +161,10 @@ def _standing(plain: Drive, given: SimulatorRun, request: RunRequest) -> Signals
     moved = derived(given, request.sample_time_s)
     signals = Signals(
         request.name, "", request.input, given.output, request.input, given.output,
-        request.sample_time_s, start=start_of(moved),
+        request.sample_time_s, start=seen_start(moved), own_start=seen_start(moved),
         force=force_along(plain, moved, request.input),
     )  # fmt: skip
-    there = moved_plainly(plain, signals, signals.force, moved)
+    there = moved_from(signals.start, plain, signals, signals.force)
     return replace(signals, offset=given.output - there.position)
 
 

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from hwid_cli.diagnosis.foreign import stand_in_for
 from hwid_cli.diagnosis.problem import Signals
+from hwid_cli.diagnosis.standing import stand_in_for
 from hwid_cli.errors import SimulationError
 from hwid_cli.records.diagnosis import Diagnosis
 from hwid_cli.records.drive import Drive

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from hwid_cli.diagnosis.foreign import stand_in_for
 from hwid_cli.diagnosis.simulator import Simulator
+from hwid_cli.diagnosis.standing import stand_in_for
 from hwid_cli.diagnosis.tasks import DiagnosisTask
 from hwid_cli.errors import ConfigError, ModelFileError, SimulationError
 from hwid_cli.export.json_reader import read_exported

@@ -9,8 +9,9 @@ from scipy.signal import lsim
 
 from hwid_cli import Recording
 from hwid_cli.diagnosis import foreign
-from hwid_cli.diagnosis.foreign import diagnose_foreign, stand_in_for
+from hwid_cli.diagnosis.foreign import diagnose_foreign
 from hwid_cli.diagnosis.simulator import Runs, Simulator
+from hwid_cli.diagnosis.standing import stand_in_for
 from hwid_cli.diagnosis.verdict import DiagnosisVerdict
 from hwid_cli.drive.simulation import NO_FORCE
 from hwid_cli.errors import SimulationError
@@ -520,7 +521,7 @@ def test_the_given_parameters_come_last_where_nothing_was_confirmed(
 
     monkeypatch.setattr(foreign, "_found", found)
     monkeypatch.setattr(
-        foreign, "_fit_parameters", lambda runs, problem, values: {**values, "c": 20.0}
+        foreign, "fit_parameters", lambda ask, signals, free, values: {**values, "c": 20.0}
     )
     monkeypatch.setattr(
         foreign, "_told", lambda found, simulator, values: Told(found, values[1]["c"])
@@ -548,10 +549,10 @@ def test_a_trial_without_an_answer_ends_no_search_for_the_parameters():
             raise SimulationError("gave nan")
         return simulate(request)
 
-    of = foreign.prepare(recordings(), foreign._ITS_OWN, DiagnoseOptions(), ())
+    of = foreign.prepare(recordings(), foreign.ITS_OWN, DiagnoseOptions(), ())
     able = Capabilities(run=True, parameters=True)
     runs = Runs(Simulator(able, fragile, {}, FREE, GIVEN), Count())
-    found = foreign._fit_parameters(runs, of, GIVEN)
+    found = foreign.fit_parameters(runs.tried, of.signals, FREE, GIVEN)
     assert refused
     assert 8.0 <= found["kt"] <= 8.3
     before, after = (
@@ -600,7 +601,7 @@ def test_a_law_takes_the_place_of_a_name_that_leaves_far_more(
         verdict=DiagnosisVerdict("law", False, law, ()),
         criteria=CRITERIA,
     )
-    monkeypatch.setattr(foreign, "_beside", lambda *_: None)
+    monkeypatch.setattr(foreign, "standing_beside", lambda *_: None)
     monkeypatch.setattr(foreign, "find", lambda *_: found)
     monkeypatch.setattr(
         foreign, "confirm", lambda one, *_: (one, {"kt": 2.0}, case["is_confirmed"])

@@ -19,14 +19,25 @@ def with_friction():
     return replace(of, signals=signals)
 
 
-def together(of, before):
-    """With one parameter of the simulation, which shifts its output."""
+def together(of, before, n=1, hold=1e-6):
+    """With parameters of the simulation, each of which shifts its output."""
     findings = SimpleNamespace(
         scales=sizes(of), criteria=SimpleNamespace(noise=white())
     )
-    slopes = [np.ones((one.driven_by.size, 1)) for one in of.signals]
-    pushes = [1184.0 * one for one in slopes]
-    return joint_fit.fitted_together(of, before, (slopes, pushes), findings)
+    slopes = [np.ones((one.driven_by.size, n)) for one in of.signals]
+    moved_by = slopes, [1184.0 * one for one in slopes]
+    holds = hold * np.arange(1.0, n + 1)
+    return joint_fit.fitted_together(of, before, moved_by, holds, findings)
+
+
+def test_parameters_that_samples_do_not_tell_apart_stay_where_they_are():
+    # Each recording is off by 1 mm, which each of two parameters explains as well.
+    of = with_friction()
+    signals = tuple(replace(one, compared=one.compared + 1e-3) for one in of.signals)
+    _, (first, second) = together(replace(of, signals=signals), fit(of), 2, hold=1e-3)
+    assert first + second == pytest.approx(1e-3, rel=0.05)
+    # Least a^2 + (2 b)^2 with a + b given: the one that is held twice as hard moves least.
+    assert first == pytest.approx(4 * second, rel=0.02)
 
 
 def test_a_stand_in_that_has_run_away_tells_nothing(monkeypatch):

@@ -141,8 +141,8 @@ def test_a_function_with_drag(extended):
 
 @pytest.mark.thorough
 def test_one_that_does_not_settle_is_no_answer(extended):
-    # A stop that the stand-in meets and that the function, far too stiff, does not.
-    wrong = replace(extended.plain, mass_kg=3000.0, force_constant_N_per_A=-5.0)
+    # A stand-in far too heavy: what it takes for its friction is none of the function's.
+    wrong = replace(extended.plain, mass_kg=3000.0)
     strange = {"coulomb_friction": {"force_N": 3.0}}
     extended = replace(extended, plain=wrong, stand_in=replace(wrong, effects=strange))
 

@@ -1,0 +1,198 @@
+"""The drive that stands for a simulation with given parameters, and moves as it does.
+
+Where a force can be put into the simulation, a test push says what one N of the stand-in
+is. docs/method_diagnosis.md, eq. (D30), (D31).
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from hwid_cli.diagnosis.diagnose import held_out_of
+from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals, prepare
+from hwid_cli.diagnosis.simulator import Runs, Simulator
+from hwid_cli.diagnosis.stand_in import (
+    derived,
+    error_of,
+    fit_stand_in,
+    force_along,
+    in_newtons,
+    moved_plainly,
+    standing_for,
+)
+from hwid_cli.diagnosis.tasks import RunTasks
+from hwid_cli.records.axis import MotionUnits
+from hwid_cli.records.drive import LINE, StandIn
+from hwid_cli.records.experiment import DiagnoseOptions, SimulationOptions
+from hwid_cli.records.programs import SimulatorRun
+from hwid_cli.records.recordings import Recording
+
+# The force of the test push moves the simulation by this share of its motion.
+_PUSH = 0.05
+_PUSH_LIMITS = (0.005, 0.3)
+_MOST_PUSHES = 4
+# Of the force along its motion, for the first guess; and of a push that it did not bear.
+_SMALL_PUSH = 1e-3
+_WEAKER = 0.1
+# How a command goes on between samples is the matter of the simulation itself.
+ITS_OWN = SimulationOptions(hold=LINE)
+
+
+def stand_in_for(
+    recordings: Sequence[Recording],
+    simulator: Simulator,
+    options: DiagnoseOptions,
+    run_tasks: RunTasks,
+    *,
+    may_curve: bool = True,
+) -> tuple[StandIn, tuple[Signals, ...]]:
+    """Plain drive that stands for a simulation that can be run, and what it was fitted to.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+        At least one.
+    options : DiagnoseOptions
+        Which of them are held out: laws that need a reference count from the others.
+    may_curve : bool
+        Whether its spring may be curved.
+    """
+    held_out = held_out_of(recordings, options)
+    problem = prepare(recordings, ITS_OWN, options, held_out)
+    runs = Runs(simulator, run_tasks)
+    given = runs.of(problem.signals, simulator.values)
+    drive = _standing(problem, given, may_curve=may_curve)
+    return (
+        _in_newtons(runs, problem.signals, given, simulator.values, drive),
+        problem.signals,
+    )
+
+
+def standing_beside(
+    runs: Runs,
+    problem: DiagnosisProblem,
+    given: Sequence[SimulatorRun],
+    values: Mapping[str, float],
+) -> DiagnosisProblem:
+    """The problem of the drive that stands for the simulation with these parameters.
+
+    Parameters
+    ----------
+    given : sequence of SimulatorRun
+        What the simulation gives with them.
+    """
+    simulator = runs.simulator
+    drive = _standing(problem, given)
+    drive = _in_newtons(runs, problem.signals, given, values, drive)
+    has_force = simulator.capabilities.force
+    drive = replace(
+        drive,
+        effects={k: dict(v) for k, v in simulator.effects.items()},
+        own_units=MotionUnits(
+            "N" if has_force else problem.input_unit, problem.unit, problem.input_unit
+        ),
+    )
+    standing = _with_stand_in(problem, drive, given)
+    if simulator.run is not None:
+        return standing
+    error = error_of(drive, problem.signals, given)
+    return replace(standing, stand_in_error=error)
+
+
+def _standing(
+    problem: DiagnosisProblem, given: Sequence[SimulatorRun], *, may_curve: bool = True
+) -> StandIn:
+    """The stand-in, with where laws count from."""
+    return replace(
+        fit_stand_in(problem.signals, given, may_curve=may_curve),
+        reference_current_A=problem.drive.reference_current_A,
+        reference_displacement_m=problem.drive.reference_displacement_m,
+    )
+
+
+def _with_stand_in(
+    problem: DiagnosisProblem, drive: StandIn, given: Sequence[SimulatorRun]
+) -> DiagnosisProblem:
+    """The problem of a drive that moves as the simulation did."""
+    signals = []
+    for one, found in zip(problem.signals, given, strict=True):
+        moved = derived(found, one.sample_time_s)
+        force = force_along(drive, moved, one.driven_by)
+        signals.append(standing_for(one, found, replace(drive, effects={}), force))
+    return replace(problem, signals=tuple(signals), drive=drive)
+
+
+def _in_newtons(
+    runs: Runs,
+    signals: Sequence[Signals],
+    given: Sequence[SimulatorRun],
+    values: Mapping[str, float],
+    drive: StandIn,
+) -> StandIn:
+    """The stand-in with forces in N, where a force can be put into the simulation."""
+    if not runs.simulator.capabilities.force:
+        return drive
+    row = int(np.argmax([np.ptp(one.output) for one in given]))
+    one, before = signals[row], given[row]
+    size = float(np.std(before.output))
+    moved = derived(before, one.sample_time_s)
+    force = force_along(drive, moved, one.driven_by)
+    plain = moved_plainly(drive, one, force, moved).position
+    # A spring that softens gives way to a large push for good.
+    push = _test_push(one) * _SMALL_PUSH * max(float(np.std(force)), 1e-300)
+    pushed = moved_plainly(drive, one, force + push, moved).position - plain
+    push = push * (_PUSH * size / max(float(np.std(pushed)), 1e-300))
+    answered = _answered(runs, one, values, before, push)
+    if answered is None:
+        return drive
+    push, answer = answered
+    expected = moved_plainly(drive, one, force + push, moved).position - plain
+    gain = float(expected @ answer) / max(float(expected @ expected), 1e-300)
+    return in_newtons(drive, gain) if gain > 0 else drive
+
+
+def _answered(
+    runs: Runs,
+    signals: Signals,
+    values: Mapping[str, float],
+    before: SimulatorRun,
+    push: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray] | None:
+    """A push that moves the simulation enough, and by how much; None where none does.
+
+    Parameters
+    ----------
+    before : SimulatorRun
+        Without it.
+    push : ndarray, shape (n_samples,), [N]
+        The first guess.
+    """
+    size = float(np.std(before.output))
+    found, factor, too_much = None, 1.0, np.inf
+    for _ in range(_MOST_PUSHES):
+        there = runs.tried([signals], values, [push * factor])
+        if there is None:
+            too_much = factor
+            # The last one that it bore, or a weaker one.
+            if found is not None:
+                break
+            factor *= _WEAKER
+            continue
+        answer = there[0].output - before.output
+        found = push * factor, answer
+        share = float(np.std(answer)) / size
+        if _PUSH_LIMITS[0] <= share <= _PUSH_LIMITS[1]:
+            break
+        factor *= min(max(_PUSH / max(share, 1e-6), 1e-4), 1e4)
+        if factor >= too_much:
+            break
+    return found
+
+
+def _test_push(signals: Signals) -> np.ndarray:
+    """A force that goes to and fro, slowly and fast, from rest to rest."""
+    n = signals.driven_by.size
+    share = np.arange(n) / max(n - 1, 1)
+    waves = sum(np.sin(2 * np.pi * count * share) / count for count in (2, 5, 13))
+    return np.asarray(waves * np.sin(np.pi * share))
