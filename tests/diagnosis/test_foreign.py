@@ -521,7 +521,9 @@ def test_the_given_parameters_come_last_where_nothing_was_confirmed(
 
     monkeypatch.setattr(foreign, "_found", found)
     monkeypatch.setattr(
-        foreign, "fit_parameters", lambda ask, signals, free, values: {**values, "c": 20.0}
+        foreign,
+        "fit_parameters",
+        lambda ask, signals, free, values: {**values, "c": 20.0},
     )
     monkeypatch.setattr(
         foreign, "_told", lambda found, simulator, values: Told(found, values[1]["c"])

@@ -48,6 +48,33 @@ def given():
     return [signals(one) for one in INPUTS]
 
 
+@pytest.mark.parametrize("has_velocity", [False, True])
+def test_derivatives_are_exact_where_a_run_leaves_its_rest(has_velocity):
+    # A cart that is pushed from the first sample on, against its damper: m = d = F = 1.
+    time = 0.05 * np.arange(60)
+    way, speed = time + np.exp(-time) - 1, 1 - np.exp(-time)
+    run_from_rest = SimulatorRun(way, speed if has_velocity else NOTHING)
+    moved = derived(run_from_rest, 0.05)
+    np.testing.assert_allclose(moved.velocity[:5], speed[:5], atol=2e-3)
+    np.testing.assert_allclose(moved.acceleration[:5], np.exp(-time[:5]), atol=0.04)
+
+
+def test_a_corner_at_the_first_sample_is_no_velocity():
+    # A drive that rests in balance, until a held and noisy input moves it.
+    rng = np.random.default_rng(1)
+    force = np.r_[0.0, 0.0, rng.standard_normal(N - 2)]
+    way = lsim(([1.0], [MASS, DAMPING, STIFFNESS]), force, TIME)[1]
+    moved = derived(SimulatorRun(way, NOTHING), STEP_S)
+    assert abs(moved.velocity[0]) < 1e-3 * np.abs(moved.velocity).max()
+    assert abs(MASS * moved.acceleration[0]) < 0.1
+
+
+def test_a_run_that_starts_in_motion_keeps_its_first_velocity():
+    way = np.sin(20 * TIME + 0.4)
+    moved = derived(SimulatorRun(way, NOTHING), STEP_S)
+    assert moved.velocity[0] == pytest.approx(20 * np.cos(0.4), rel=1e-6)
+
+
 def test_the_stand_in_of_a_linear_drive_is_this_drive(given):
     runs = [SimulatorRun(linear(GAIN * one), NOTHING) for one in INPUTS]
     found = fit_stand_in(given, runs)

@@ -1,12 +1,14 @@
 from dataclasses import replace
 from functools import partial
+from itertools import pairwise
 
 import numpy as np
 import pytest
+from scipy.signal import lsim
 
 from hwid_cli.errors import SimulationError
 from hwid_cli.records.drive import Drive
-from hwid_cli.records.programs import PythonSimulation, RunRequest
+from hwid_cli.records.programs import PythonSimulation, RunRequest, SimulatorRun
 from hwid_cli.simulations import fmu
 from hwid_cli.simulations.extended import (
     ExtendedSimulation,
@@ -78,6 +80,77 @@ def test_a_force_of_the_users_own_acts_beside_the_effects(plants):
     )
 
     assert np.std(found.output - truth) < 0.01 * np.std(before - truth)
+
+
+def noisy_current():
+    """Off from the first sample on, to and fro, with pauses in which friction holds."""
+    rng = np.random.default_rng(4)
+    pushes = np.interp(TIMES, [0.1, 0.13, 0.4, 0.45, 0.7, 0.72], [1, 3, 3, -1, -1, 2])
+    return pushes + 0.02 * rng.standard_normal(TIMES.size)
+
+
+def frictionless(request, is_in_balance):
+    """The plant as a user may write it: it starts at 0, or where its first input rests."""
+    pushed = 5.0 * request.input + (request.force if request.force.size else 0.0)
+    system = ([[0, 1], [-1184 / 0.3, -50]], [[0], [1 / 0.3]], np.eye(2), [[0], [0]])
+    first = [pushed[0] / 1184 if is_in_balance else 0.0, 0.0]
+    moved = lsim(system, pushed, request.sample_time_s * np.arange(pushed.size), first)
+    return SimulatorRun(moved[1][:, 0], moved[1][:, 1])
+
+
+def with_friction(current, start_m, n_steps=100):
+    """Position of the plant with dry friction, in small steps that know no stand-in."""
+    x, v, step = start_m, 0.0, STEP_S / n_steps
+    found = [x]
+    for before, after in pairwise(5.0 * current):
+        for share in (np.arange(n_steps) + 0.5) / n_steps:
+            push = before + (after - before) * share - 15 * v - 1184 * x
+            if v == 0 and abs(push) <= FRICTION_N:
+                continue
+            way = np.sign(v) or np.sign(push)
+            faster = v + step / 0.3 * (push - FRICTION_N * way)
+            # It comes to rest before it turns.
+            faster = 0.0 if v * faster < 0 else faster
+            x, v = x + step * (v + faster) / 2, faster
+        found.append(x)
+    return np.array(found)
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("is_in_balance", [False, True])
+@pytest.mark.parametrize("plain", [EXACT, ROUGH])
+def test_friction_holds_where_the_simulation_starts(plain, is_in_balance):
+    request = request_of(noisy_current())
+    simulate = partial(frictionless, is_in_balance=is_in_balance)
+    before = simulate(request).output
+    truth = with_friction(request.input, before[0])
+
+    drives = plain, replace(plain, effects=FRICTION)
+    found = run_extended(simulate, request, drives, has_force=True)
+
+    size = np.ptp(before - truth)
+    assert found.output[0] == pytest.approx(before[0], abs=0.02 * size)
+    assert rms(found.output - truth) < 0.01 * rms(before - truth)
+
+
+def rms(values):
+    return np.sqrt(np.mean(np.square(values)))
+
+
+def test_an_effect_that_does_nothing_in_a_recording_is_no_fault():
+    """The simulation's own integrator is no more exact than what is left then."""
+    rng, request = np.random.default_rng(3), request_of(CURRENTS["slow"])
+
+    def inexact(asked):
+        run = frictionless(asked, is_in_balance=False)
+        size = 3e-5 * np.std(run.output)
+        return replace(run, output=run.output + size * rng.standard_normal(TIMES.size))
+
+    limit = {"input_saturation": {"limit_A": 3.0}}
+    drives = EXACT, replace(EXACT, effects=limit)
+    found = run_extended(inexact, request, drives, has_force=False)
+    given = inexact(request).output
+    assert rms(found.output - given) < 1e-3 * np.std(given)
 
 
 FUNCTION = """\
