@@ -519,14 +519,26 @@ def force_of_motion(drive: Drive, signals: Signals, motion: Motion) -> np.ndarra
     given = drive.force_constant_N_per_A * signals.driven_by
     if signals.force.size:
         given = given + signals.force
-    return _with_means(impulse / dt - 0.5 * (given[1:] + given[:-1]))
+    # What begins in balance tells the first corner.
+    first = None if signals.start is not None else float(ends[0] - given[0])
+    return _with_means(impulse / dt - 0.5 * (given[1:] + given[:-1]), first)
 
 
-def _with_means(means: np.ndarray) -> np.ndarray:
+def _with_means(means: np.ndarray, first: float | None = None) -> np.ndarray:
     """Corners of straight lines that have given means, without going up and down.
 
     Corners that go up and down from sample to sample change no mean: the smoothest ones
     are taken.
+
+    Parameters
+    ----------
+    means : ndarray, shape (n,)
+    first : float or None
+        The first corner, where it is known.
+
+    Returns
+    -------
+    ndarray, shape (n + 1,)
     """
     size = means.size + 1
     if size < 4 or not np.isfinite(means).all():
@@ -534,4 +546,9 @@ def _with_means(means: np.ndarray) -> np.ndarray:
     pairs = scipy.sparse.diags([0.5, 0.5], [0, 1], shape=(size - 1, size))
     bends = scipy.sparse.diags([1.0, -2.0, 1.0], [0, 1, 2], shape=(size - 2, size))
     matrix = pairs.T @ pairs + _SMOOTHNESS * (bends.T @ bends)
-    return np.asarray(scipy.sparse.linalg.spsolve(matrix.tocsc(), pairs.T @ means))
+    right = pairs.T @ means
+    if first is None:
+        return np.asarray(scipy.sparse.linalg.spsolve(matrix.tocsc(), right))
+    rows = matrix.tocsc()[1:]
+    known = rows[:, [0]].toarray()[:, 0] * first
+    return np.r_[first, scipy.sparse.linalg.spsolve(rows[:, 1:], right[1:] - known)]

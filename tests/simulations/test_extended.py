@@ -129,7 +129,7 @@ def test_friction_holds_where_the_simulation_starts(plain, is_in_balance):
     found = run_extended(simulate, request, drives, has_force=True)
 
     size = np.ptp(before - truth)
-    assert found.output[0] == pytest.approx(before[0], abs=0.02 * size)
+    assert found.output[0] == pytest.approx(before[0], abs=0.01 * size)
     assert rms(found.output - truth) < 0.01 * rms(before - truth)
 
 
