@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from hwid_cli.diagnosis.candidate import fitted_drive
 from hwid_cli.diagnosis.causes import without_repeats
 from hwid_cli.diagnosis.confirmation import confirm
 from hwid_cli.diagnosis.diagnose import find, held_out_of
@@ -21,6 +22,7 @@ from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals, prepare
 from hwid_cli.diagnosis.selection import LEAST_GAIN
 from hwid_cli.diagnosis.simulator import Runs, Simulator
 from hwid_cli.diagnosis.single_effects import single_in_simulation
+from hwid_cli.diagnosis.stand_in import change_between
 from hwid_cli.diagnosis.standing import ITS_OWN, standing_beside
 from hwid_cli.diagnosis.tasks import OnRound, RunTasks
 from hwid_cli.diagnosis.turns import have_moved
@@ -33,12 +35,17 @@ from hwid_cli.diagnosis.verdict import DiagnosisVerdict
 from hwid_cli.records.diagnosis import BaseParameter, Diagnosis
 from hwid_cli.records.drive import StandIn
 from hwid_cli.records.experiment import DiagnoseOptions
-from hwid_cli.records.programs import SimulatorRun
+from hwid_cli.records.programs import SimulatorRun, StandInChange
 from hwid_cli.records.recordings import Recording
 
 # Searches, each from where the last one has moved the parameters by more than this.
 _MOST_SEARCHES = 3
 _MOVED = 0.01
+_BESIDE_PARAMETERS = (
+    "the parameters of the simulation alone do not give what is said here: forces that go "
+    "with displacement, velocity and input act beside them, as factors under "
+    "simulation.stand_in in extended_simulation.yaml"
+)
 
 
 def diagnose_foreign(
@@ -66,9 +73,9 @@ def diagnose_foreign(
     given = runs.of(problem.signals, simulator.values)
     # With effects of its own the stand-in says what the whole simulation leaves, and the
     # parameters are fitted with them.
-    given_sse = None if simulator.effects else _sse(problem.signals, given)
+    given_sse = None if simulator.is_extended else _sse(problem.signals, given)
     values = dict(simulator.values)
-    if simulator.free and not simulator.effects:
+    if simulator.free and not simulator.is_extended:
         on_round("its parameters", 0)
         values = fit_parameters(runs.tried, problem.signals, simulator.free, values)
         given = runs.of(problem.signals, values)
@@ -234,7 +241,26 @@ def _told(
         BaseParameter(name, one.value, *(of[name] for of in values))
         for name, one in simulator.free.items()
     )
-    return replace(told, base=base or told.base, capabilities=simulator.capabilities)
+    change = _change_of(findings, simulator)
+    warnings = told.warnings
+    if base and not change.is_none:
+        warnings = (*warnings, _BESIDE_PARAMETERS)
+    return replace(
+        told,
+        base=base or told.base,
+        capabilities=simulator.capabilities,
+        stand_in=change,
+        warnings=warnings,
+    )
+
+
+def _change_of(findings: Findings, simulator: Simulator) -> StandInChange:
+    """What the drive that stands for a simulation changes at last."""
+    before = findings.problem.drive
+    after = fitted_drive(before, findings.verdict.chosen)
+    if not (isinstance(before, StandIn) and isinstance(after, StandIn)):
+        raise ValueError("no drive that stands for a simulation")
+    return simulator.change.beside(change_between(before, after))
 
 
 def _confirmed(

@@ -14,6 +14,7 @@ from hwid_cli.records.programs import (
     FreeParameter,
     RunRequest,
     SimulatorRun,
+    StandInChange,
 )
 
 # Derivatives by its parameters, as a share of their size: its integrator may be no more
@@ -38,6 +39,8 @@ class Simulator:
         All parameters.
     effects : mapping
         Effects that were added to it before.
+    change : StandInChange
+        Of the drive that stands for it, added before.
     """
 
     capabilities: Capabilities
@@ -46,6 +49,12 @@ class Simulator:
     free: Mapping[str, FreeParameter] = field(default_factory=dict)
     values: Mapping[str, float] = field(default_factory=dict)
     effects: Mapping[str, Mapping[str, float | str]] = field(default_factory=dict)
+    change: StandInChange = field(default_factory=StandInChange)
+
+    @property
+    def is_extended(self) -> bool:
+        """Whether something was added to it before."""
+        return bool(self.effects) or not self.change.is_none
 
 
 @dataclass(frozen=True, eq=False)

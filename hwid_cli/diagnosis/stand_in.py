@@ -18,9 +18,10 @@ from hwid_cli.diagnosis.parameters import drive_at, first_point, parameter_layou
 from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals
 from hwid_cli.diagnosis.scales import scales_of_recordings
 from hwid_cli.diagnosis.search import fit_point
+from hwid_cli.drive.catalogue import CATALOGUE
 from hwid_cli.drive.simulation import Motion, parameter_vector, run, set_start
 from hwid_cli.records.drive import BASE_PARAMETERS, Drive, StandIn
-from hwid_cli.records.programs import SimulatorRun
+from hwid_cli.records.programs import SimulatorRun, StandInChange
 
 _DEGREE = 5
 # Samples before the start of a run from rest; and the share of the second step that the
@@ -263,6 +264,36 @@ def _without_idle_spring(drive: StandIn, moved: Sequence[Signals]) -> StandIn:
     return replace(drive, stiffness_N_per_m=0.0) if is_idle and not has_bends else drive
 
 
+def with_change(drive: StandIn, change: StandInChange) -> StandIn:
+    """The drive with factors of its base."""
+    return replace(
+        drive,
+        damping_N_s_per_m=drive.damping_N_s_per_m * change.damping,
+        stiffness_N_per_m=drive.stiffness_N_per_m * change.stiffness,
+        force_constant_N_per_A=drive.force_constant_N_per_A * change.force_constant,
+        quadratic_N_per_m2=drive.quadratic_N_per_m2 * change.curve,
+        cubic_N_per_m3=drive.cubic_N_per_m3 * change.curve,
+        one_curve_N_per_m=drive.one_curve_N_per_m * change.stiffness,
+    )
+
+
+def change_between(before: StandIn, after: StandIn) -> StandInChange:
+    """The factors that lead from one drive to another."""
+
+    def factor(one: float, other: float) -> float:
+        return other / one if one else 1.0
+
+    bend = int(np.argmax(np.abs(before.bends)))
+    return StandInChange(
+        damping=factor(before.damping_N_s_per_m, after.damping_N_s_per_m),
+        stiffness=factor(before.stiffness_N_per_m, after.stiffness_N_per_m),
+        force_constant=factor(
+            before.force_constant_N_per_A, after.force_constant_N_per_A
+        ),
+        curve=factor(before.bends[bend], after.bends[bend]),
+    )
+
+
 def in_newtons(drive: StandIn, force_gain: float) -> StandIn:
     """The same drive with forces in another unit.
 
@@ -497,6 +528,12 @@ def _slow(force: np.ndarray) -> np.ndarray:
         return force
     slow_ones = scipy.signal.butter(2, _SLOW_SHARE, output="sos")
     return np.asarray(scipy.signal.sosfiltfilt(slow_ones, force))
+
+
+def act_as_forces(effects: Sequence[str]) -> bool:
+    """Whether something acts on the mass; what changes the drive itself does."""
+    enters = {CATALOGUE[one].enters for one in effects}
+    return not enters or bool(enters - {"command", "output"})
 
 
 def force_of_motion(drive: Drive, signals: Signals, motion: Motion) -> np.ndarray:

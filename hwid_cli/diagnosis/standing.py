@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from hwid_cli.diagnosis.base_fit import compared_as_given
 from hwid_cli.diagnosis.diagnose import held_out_of
 from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals, prepare
 from hwid_cli.diagnosis.simulator import Runs, Simulator
@@ -20,6 +21,7 @@ from hwid_cli.diagnosis.stand_in import (
     in_newtons,
     moved_plainly,
     standing_for,
+    with_change,
 )
 from hwid_cli.diagnosis.tasks import RunTasks
 from hwid_cli.records.axis import MotionUnits
@@ -69,6 +71,28 @@ def stand_in_for(
     )
 
 
+def outputs_of_stand_in(
+    recordings: Sequence[Recording],
+    simulator: Simulator,
+    options: DiagnoseOptions,
+    run_tasks: RunTasks,
+) -> dict[str, np.ndarray]:
+    """What the drive that stands for a simulation says with what was added to it.
+
+    All that can be said of one that cannot be run.
+
+    Returns
+    -------
+    dict of str to ndarray, shape (n_samples,)
+        By the names of the recordings.
+    """
+    problem = prepare(recordings, ITS_OWN, options, held_out_of(recordings, options))
+    runs = Runs(simulator, run_tasks)
+    given = runs.of(problem.signals, simulator.values)
+    standing = standing_beside(runs, problem, given, simulator.values)
+    return {one.signals.name: one.simulated for one in compared_as_given(standing)}
+
+
 def standing_beside(
     runs: Runs,
     problem: DiagnosisProblem,
@@ -94,6 +118,7 @@ def standing_beside(
         ),
     )
     standing = _with_stand_in(problem, drive, given)
+    standing = replace(standing, drive=with_change(drive, simulator.change))
     if simulator.run is not None:
         return standing
     error = error_of(drive, problem.signals, given)

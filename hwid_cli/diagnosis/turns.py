@@ -31,12 +31,12 @@ from hwid_cli.diagnosis.parameters import BASE, each_sum_of_squares, simulate_at
 from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals
 from hwid_cli.diagnosis.simulator import DIFFERENCE, Runs
 from hwid_cli.diagnosis.stand_in import (
+    act_as_forces,
     corrected,
     force_of_motion,
     starts_in_balance,
 )
 from hwid_cli.diagnosis.standing import standing_beside
-from hwid_cli.drive.catalogue import CATALOGUE
 from hwid_cli.drive.simulation import Motion
 from hwid_cli.records.candidates import CandidateFit, ParameterRef
 from hwid_cli.records.drive import BASE_PARAMETERS
@@ -314,9 +314,7 @@ def _next_turn(findings: Findings, turn: Turn, runs: Runs) -> Turn | None:
 
 def acts_at_force(fit: CandidateFit, runs: Runs) -> bool:
     """Whether effects act at a simulation's force input rather than through its input."""
-    enters = {CATALOGUE[one].enters for one in fit.effects}
-    has_force = runs.simulator.capabilities.force
-    return has_force and bool(enters - {"command", "output"})
+    return runs.simulator.capabilities.force and act_as_forces(fit.effects)
 
 
 def forces_along(

@@ -8,7 +8,7 @@ import numpy as np
 from hwid_cli.records.axis import MotionUnits
 from hwid_cli.records.candidates import RankedCandidate
 from hwid_cli.records.drive import LINE
-from hwid_cli.records.programs import OF_DRIVE, Capabilities
+from hwid_cli.records.programs import OF_DRIVE, Capabilities, StandInChange
 from hwid_cli.records.rules import STORED_CURVE, STORED_NUMBERS, STORED_OR_MISSING
 from hwid_cli.records.shown import Shown
 from hwid_cli.records.stored import ADDED_LATER, check_lengths
@@ -356,6 +356,8 @@ class Diagnosis(Shown):
     remains : str
         What beside the noise of the output makes up what is left, one of ``CAUSES``;
         empty where that is not known.
+    stand_in : StandInChange
+        Of the drive that stands for a simulation, for parameters that it does not offer.
     compared : str
         The signal that is compared: ``output y``, or ``command u`` beside a controller.
     """
@@ -396,6 +398,7 @@ class Diagnosis(Shown):
     hold: str = field(default=LINE, metadata=ADDED_LATER)
     remains: str = field(default="", metadata=ADDED_LATER)
     compared: str = field(default="output y", metadata=ADDED_LATER)
+    stand_in: StandInChange = field(default=StandInChange(), metadata=ADDED_LATER)
 
     @property
     def refitted(self) -> Gap:

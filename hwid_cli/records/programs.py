@@ -68,6 +68,40 @@ class FreeParameter:
             raise Refused(Refusal(self.value, expected, ("value",)))
 
 
+@dataclass(frozen=True)
+class StandInChange:
+    """What stands in for parameters that a simulation does not offer.
+
+    Factors of the drive that stands for the simulation: what that drive gives more, or
+    less, acts on the simulation as a force.
+
+    Parameters
+    ----------
+    damping, stiffness, force_constant : float, [-]
+    curve : float, [-]
+        Of what bends its spring, if anything does.
+    """
+
+    damping: Annotated[float, POSITIVE] = 1.0
+    stiffness: Annotated[float, POSITIVE] = 1.0
+    force_constant: Annotated[float, POSITIVE] = 1.0
+    curve: Annotated[float, POSITIVE] = 1.0
+
+    @property
+    def is_none(self) -> bool:
+        """Whether it changes nothing."""
+        return self == StandInChange()
+
+    def beside(self, other: "StandInChange") -> "StandInChange":
+        """Both changes, one after the other."""
+        return StandInChange(
+            self.damping * other.damping,
+            self.stiffness * other.stiffness,
+            self.force_constant * other.force_constant,
+            self.curve * other.curve,
+        )
+
+
 class _Parametrised:
     """Parameters of a simulation, by name: numbers that stay, and those that are free."""
 
@@ -110,6 +144,8 @@ class _Program(_Parametrised):
         Of one run.
     effects : dict of str to dict of str to float or str
         Put into the simulation beside what it has.
+    stand_in : StandInChange
+        Put into it beside its own parameters.
     """
 
     input: Annotated[str, Filled("the name of an input")]
@@ -121,6 +157,7 @@ class _Program(_Parametrised):
     effects: Annotated[dict[str, dict[str, float | str]], Repeatable()] = field(
         default_factory=dict
     )
+    stand_in: StandInChange = field(default_factory=StandInChange)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -191,6 +228,7 @@ class ModelSimulation(_Parametrised):
     effects: Annotated[dict[str, dict[str, float | str]], Repeatable()] = field(
         default_factory=dict
     )
+    stand_in: StandInChange = field(default_factory=StandInChange)
 
     def __post_init__(self) -> None:
         if bool(self.file) == bool(self.results) and self.model is None:
@@ -214,6 +252,7 @@ class OutputsSimulation:
     effects: Annotated[dict[str, dict[str, float | str]], Repeatable()] = field(
         default_factory=dict
     )
+    stand_in: StandInChange = field(default_factory=StandInChange)
 
 
 Program = PythonSimulation | FmuSimulation | CommandSimulation

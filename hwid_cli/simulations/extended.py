@@ -14,6 +14,7 @@ import numpy as np
 
 from hwid_cli.diagnosis.problem import Signals
 from hwid_cli.diagnosis.stand_in import (
+    act_as_forces,
     corrected,
     derived,
     force_along,
@@ -22,7 +23,6 @@ from hwid_cli.diagnosis.stand_in import (
     seen_start,
     starts_in_balance,
 )
-from hwid_cli.drive.catalogue import CATALOGUE
 from hwid_cli.drive.simulation import (
     Motion,
     drive_effects,
@@ -106,8 +106,7 @@ def run_extended(
     SimulationError
         If simulation and drive do not agree.
     """
-    enters = {CATALOGUE[one].enters for one in drive_effects(drives[1])}
-    at_force = has_force and (not enters or bool(enters - {"command", "output"}))
+    at_force = has_force and act_as_forces(tuple(drive_effects(drives[1])))
     best = _settled(simulate, request, drives, at_force=at_force)
     if best.disagreement > MOST_DISAGREEMENT and has_force and not at_force:
         # A map of the simulation may cut off what should come through its input.

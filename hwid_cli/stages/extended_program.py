@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from hwid_cli.diagnosis.problem import Signals
+from hwid_cli.diagnosis.stand_in import with_change
 from hwid_cli.diagnosis.standing import stand_in_for
 from hwid_cli.errors import SimulationError
 from hwid_cli.records.diagnosis import Diagnosis
-from hwid_cli.records.drive import Drive
 from hwid_cli.records.programs import Program, RunRequest
 from hwid_cli.records.units import as_percent
 from hwid_cli.simulations.extended import ExtendedRun, ExtendedSimulation, run_extended
@@ -54,24 +54,13 @@ def extended_program(
     plain, signals = stand_in_for(
         given.recordings, simulator, given.options, in_turn, may_curve=False
     )
-    base: dict[str, Any] = {} if program.free else _changed(plain, diagnosis)
     stand_in = replace(
-        plain,
-        **base,
+        with_change(plain, section.stand_in),
         effects=section.effects,
         reference_current_A=diagnosis.reference_current_A,
         reference_displacement_m=diagnosis.reference_displacement_m,
     )
     return ExtendedProgram(ExtendedSimulation(section, plain, stand_in), signals)
-
-
-def _changed(plain: Drive, diagnosis: Diagnosis) -> dict[str, float]:
-    """What stands in for parameters that nobody can reach, as shares of the stand-in."""
-    return {
-        one.name: getattr(plain, one.name) * one.after / one.before
-        for one in diagnosis.base
-        if one.before
-    }
 
 
 def _run_of(extended: ExtendedSimulation) -> Callable[[RunRequest], ExtendedRun]:

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from hwid_cli.diagnosis.simulator import Simulator
-from hwid_cli.diagnosis.standing import stand_in_for
+from hwid_cli.diagnosis.stand_in import with_change
+from hwid_cli.diagnosis.standing import outputs_of_stand_in, stand_in_for
 from hwid_cli.diagnosis.tasks import DiagnosisTask
 from hwid_cli.errors import ConfigError, ModelFileError, SimulationError
 from hwid_cli.export.json_reader import read_exported
@@ -175,6 +176,7 @@ def simulator_of(
         free=getattr(options, "free", {}),
         values=getattr(options, "values", {}),
         effects=options.effects,
+        change=options.stand_in,
     )
 
 
@@ -198,7 +200,7 @@ def simulated(
 ) -> tuple[DriveResponse, ...]:
     """What a simulation makes of the recordings' inputs, beside what was measured.
 
-    Effects of its section are put into it.
+    What was added to it before is put into it.
 
     Parameters
     ----------
@@ -223,6 +225,9 @@ def _answers(
 ) -> Callable[[Recording], np.ndarray]:
     """From a recording to what the simulation makes of its input."""
     run = simulator.run
+    if run is None and simulator.is_extended:
+        of_stand_in = outputs_of_stand_in(recordings, simulator, diagnosed, in_turn)
+        return lambda one: of_stand_in[one.name]
     if run is None:
         return lambda one: simulator.given[one.name]
 
@@ -232,11 +237,12 @@ def _answers(
             one.name, one.sample_time_s, np.array(one.input), nothing, values
         )
 
-    if not simulator.effects:
+    if not simulator.is_extended:
         return lambda one: run(request(one)).output
     plain, _ = stand_in_for(recordings, simulator, diagnosed, in_turn)
     effects = {name: dict(values) for name, values in simulator.effects.items()}
-    drives = (plain, replace(plain, effects=effects))
+    changed = with_change(plain, simulator.change)
+    drives = (plain, replace(changed, effects=effects))
     has_force = simulator.capabilities.force
     return lambda one: (
         run_extended(run, request(one), drives, has_force=has_force).output
@@ -261,5 +267,7 @@ def extended_foreign(
     ]
     fitted = {one.name: one.after for one in diagnosis.base}
     with_them = kind_named(options.kind).with_fitted(options, fitted)
-    extended: ForeignSimulation = replace(with_them, effects=told_apart(effects))
+    extended: ForeignSimulation = replace(
+        with_them, effects=told_apart(effects), stand_in=diagnosis.stand_in
+    )
     return extended

@@ -89,9 +89,7 @@ def move(
     before = 0.0 if has_controller else command[0]
     state, memory = np.zeros(N_STATE), np.zeros(N_MEMORY)
     at_start = force[0] if force.size > 0 else 0.0
-    p[slots.LOAD] += at_start
-    followed = _start(state, memory, before, sample_time, p)
-    p[slots.LOAD] -= at_start
+    followed = _start(state, memory, before, at_start, sample_time, p)
     trial, inputs, active = state.copy(), np.zeros(N_INPUT), active_states(p)
     kind = _kind_of(p)
     step = _longest_step(sample_time, kind)
@@ -212,10 +210,17 @@ def _start(
     state: np.ndarray,
     memory: np.ndarray,
     command: float,
+    force: float,
     sample_time: float,
     p: np.ndarray,
 ) -> float:
-    """Set the drive to rest in equilibrium, or to the given start."""
+    """Set the drive to rest in equilibrium, or to the given start.
+
+    Parameters
+    ----------
+    force : float, [N]
+        That acts at first beside the drive's own; it moves no magnets.
+    """
     _couple(p)
     _take_stock(sample_time, p)
     command = static_command(command, p)
@@ -236,17 +241,19 @@ def _start(
         state[X] = p[slots.START_POSITION]
         state[V] = p[slots.START_VELOCITY]
     else:
+        p[slots.LOAD] += force
         state[X] = resting_point(current, True, p)
+        p[slots.LOAD] -= force
     if p[slots.GEAR_STIFFNESS] > 0.0:
         # Of both masses that swing against each other on the teeth.
         swinging = p[slots.MASS] * p[slots.MOTOR_SHARE] * (1.0 - p[slots.MOTOR_SHARE])
         p[slots.GEAR_DAMPING] = 2.0 * p[slots.GEAR_DAMPING_RATIO]
         p[slots.GEAR_DAMPING] *= np.sqrt(p[slots.GEAR_STIFFNESS] * swinging)
-    force = resting_force(state[X], current, p)
+    driving = resting_force(state[X], current, p)
     state[MOTOR_X] = state[X]
-    if p[slots.GEAR_STIFFNESS] > 0.0 and force != 0.0:
-        state[MOTOR_X] += np.sign(force) * p[slots.GEAR_GAP]
-        state[MOTOR_X] += force / p[slots.GEAR_STIFFNESS]
+    if p[slots.GEAR_STIFFNESS] > 0.0 and driving != 0.0:
+        state[MOTOR_X] += np.sign(driving) * p[slots.GEAR_GAP]
+        state[MOTOR_X] += driving / p[slots.GEAR_STIFFNESS]
     is_placed = p[slots.IS_START_GIVEN] > 0.0 or is_anywhere(p)
     if p[slots.SENSOR_AT_MOTOR] > 0.0 and is_placed:
         # The start is that of the place that is measured.

@@ -330,7 +330,7 @@ static void begin(HWID_NAME(state) *state, double command)
 {
     int n;
     state->before = command;
-    state->followed = drive_start(state->motion, state->memory, command, sample_time,
+    state->followed = drive_start(state->motion, state->memory, command, 0.0, sample_time,
                                   state->p);
     for (n = 0; n < N_HISTORY; ++n) {
         state->starts[n] = command;

@@ -3268,12 +3268,12 @@ static void drive_take_stock(double sample_time, double *p)
     p[DRIVE_VARIES] = varies ? 1.0 : 0.0;
 }
 
-static double drive_start(double *state, double *memory, double command, double sample_time, double *p)
+static double drive_start(double *state, double *memory, double command, double force, double sample_time, double *p)
 {
     int has_winding = 0;
     double current = 0.0;
     double swinging = 0.0;
-    double force = 0.0;
+    double driving = 0.0;
     int is_placed = 0;
     double t1 = 0.0;
     double t2 = 0.0;
@@ -3299,18 +3299,20 @@ static double drive_start(double *state, double *memory, double command, double 
         state[X] = p[START_POSITION];
         state[V] = p[START_VELOCITY];
     } else {
+        p[LOAD] += force;
         state[X] = drive_resting_point(current, 1, p);
+        p[LOAD] -= force;
     }
     if (p[GEAR_STIFFNESS] > 0.0) {
         swinging = (p[MASS] * p[MOTOR_SHARE]) * (1.0 - p[MOTOR_SHARE]);
         p[GEAR_DAMPING] = 2.0 * p[GEAR_DAMPING_RATIO];
         p[GEAR_DAMPING] *= sqrt(p[GEAR_STIFFNESS] * swinging);
     }
-    force = drive_resting_force(state[X], current, p);
+    driving = drive_resting_force(state[X], current, p);
     state[MOTOR_X] = state[X];
-    if ((p[GEAR_STIFFNESS] > 0.0) && (force != 0.0)) {
-        state[MOTOR_X] += sign_of(force) * p[GEAR_GAP];
-        state[MOTOR_X] += force / p[GEAR_STIFFNESS];
+    if ((p[GEAR_STIFFNESS] > 0.0) && (driving != 0.0)) {
+        state[MOTOR_X] += sign_of(driving) * p[GEAR_GAP];
+        state[MOTOR_X] += driving / p[GEAR_STIFFNESS];
     }
     is_placed = (p[IS_START_GIVEN] > 0.0) || drive_is_anywhere(p);
     if ((p[SENSOR_AT_MOTOR] > 0.0) && is_placed) {
