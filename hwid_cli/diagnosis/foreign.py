@@ -124,7 +124,8 @@ def _found(
     """What the stand-in lacks, single effects first, put into the simulation.
 
     Where one that explains most has moved the parameters, these had imitated it: no set is
-    looked for beside a stand-in of the old ones.
+    looked for beside a stand-in of the old ones. One that the simulation's own run bears
+    out stays where no set, which a stand-in has chosen, leaves less.
 
     Parameters
     ----------
@@ -132,15 +133,15 @@ def _found(
         That it stands for, with these parameters.
     """
     runs, values = simulation
-    singles = replace(options, max_effects=1, laws="never")
+    singles, alone = replace(options, max_effects=1, laws="never"), None
     if options.laws != "only" and runs.simulator.run is not None:
         found = find(standing, singles, runs.run_tasks, on_round, given_sse)
         on_round("single effects in the simulation", 0)
-        alone, moved = single_in_simulation(found, runs, values)
-        if alone is not None:
-            return alone, moved, True
-        if is_first and have_moved(values, moved, _MOVED):
-            return found, moved, False
+        alone = single_in_simulation(found, runs, values)
+        if alone.findings is not None and alone.is_all:
+            return alone.findings, alone.values, True
+        if is_first and have_moved(values, alone.values, _MOVED):
+            return found, alone.values, False
         # Nothing more to look for: no gap, or parameters.
         if found.verdict.word in ("none", "parameters"):
             return confirm(found, runs, values)
@@ -148,7 +149,20 @@ def _found(
         standing = _with_nearer_spring(standing, singles, runs.run_tasks, on_round)
     found = find(standing, options, runs.run_tasks, on_round, given_sse)
     on_round("the effect in the simulation", 0)
-    return confirm(found, runs, values)
+    several = confirm(found, runs, values)
+    one = None if alone is None else alone.findings
+    if alone is None or one is None or _leaves_less(several, one):
+        return several
+    return one, alone.values, True
+
+
+def _leaves_less(
+    several: tuple[Findings, dict[str, float], bool], one: Findings
+) -> bool:
+    """Whether the simulation's run with a set leaves less than that with one effect."""
+    told, _, is_confirmed = several
+    chosen, alone = told.verdict.chosen, one.verdict.chosen
+    return is_confirmed and bool(chosen.effects) and chosen.sse.sum() < alone.sse.sum()
 
 
 def _law_instead(

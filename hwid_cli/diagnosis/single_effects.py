@@ -6,7 +6,7 @@ docs/method_diagnosis.md, eq. (D33).
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from hwid_cli.diagnosis.findings import Findings
 from hwid_cli.diagnosis.intervals import unclear_effects
@@ -31,9 +31,29 @@ _LIKELY = 4.0
 _LEAST_LEFT = 0.01
 
 
+@dataclass(frozen=True, eq=False)
+class BySingleEffects:
+    """What runs with single effects tell.
+
+    Parameters
+    ----------
+    findings : Findings or None
+        Of the run that decides; None where none may be named.
+    values : dict of str to float
+        Parameters of the simulation at that run; without one, at the best run of an effect
+        that explains most, which the parameters may have imitated.
+    is_all : bool
+        Whether that run leaves so little that a further effect could not be named.
+    """
+
+    findings: Findings | None
+    values: dict[str, float]
+    is_all: bool
+
+
 def single_in_simulation(
     findings: Findings, runs: Runs, values: dict[str, float]
-) -> tuple[Findings | None, dict[str, float]]:
+) -> BySingleEffects:
     """Put the likely single effects into the simulation, and let its runs decide.
 
     Where the simulation is not linear, what the stand-in leaves of a large effect is its
@@ -43,21 +63,12 @@ def single_in_simulation(
     ----------
     findings : Findings
         Of single effects.
-
-    Returns
-    -------
-    Findings or None
-        None where no single effect leaves so little in the simulation that a further
-        one could not be named.
-    dict of str to float
-        Parameters of the simulation at the run that decides; without one, at the best run
-        of an effect that explains most, which the parameters may have imitated.
     """
     if not findings.base.is_usable:
-        return None, values
+        return BySingleEffects(None, values, is_all=False)
     alone = _base_in_simulation(findings, runs, values)
     if alone is not None:
-        return alone
+        return BySingleEffects(*alone, is_all=True)
     tried: dict[tuple[str, ...], Turn] = {}
     fits: dict[tuple[str, ...], CandidateFit] = {}
     for one in _likely(findings):
@@ -71,8 +82,11 @@ def single_in_simulation(
         tried[fit.effects], fits[fit.effects] = turn, fit
     decided = _decided(findings, tried, fits)
     if decided is not None:
-        return decided
-    return None, _moved_by_best(findings, tried, fits, values)
+        told, moved = decided
+        is_all = findings.criteria.is_nearly_all(told.verdict.chosen, findings.base)
+        return BySingleEffects(told, moved, is_all)
+    moved = _moved_by_best(findings, tried, fits, values)
+    return BySingleEffects(None, moved, is_all=False)
 
 
 def _twins_in_simulation(
@@ -239,7 +253,7 @@ def _decided(
     tried: Mapping[tuple[str, ...], Turn],
     fits: Mapping[tuple[str, ...], CandidateFit],
 ) -> tuple[Findings, dict[str, float]] | None:
-    """The verdict by runs of the simulation, if one of its effects is all."""
+    """The verdict by runs of the simulation, if one of its effects may be named."""
     criteria, base = findings.criteria, findings.base
     best = select_best(criteria, list(fits.values()), base)
     if best is None:
@@ -250,7 +264,7 @@ def _decided(
         return unclear_effects(problem, one, findings.scales)
 
     verdict = decide(criteria, findings.given_sse, base, fits, (best,), unclear)
-    if not verdict.chosen.effects or not criteria.is_nearly_all(verdict.chosen, base):
+    if not verdict.chosen.effects:
         return None
     turn = tried[verdict.chosen.effects]
     found = replace(findings.found, fits={**findings.found.fits, **fits})

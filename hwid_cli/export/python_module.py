@@ -90,7 +90,9 @@ def write_module(
     there.mkdir(parents=True, exist_ok=True)
     contents = {there / one.name: one.read_bytes() for one in copied}
     plain_base = replace(base, parameters=dict(base.values), effects={})
-    arguments = _arguments(plain_base, leave_out=("kind", "file", "effects", "stand_in"))
+    arguments = _arguments(
+        plain_base, leave_out=("kind", "file", "effects", "stand_in")
+    )
     contents[folder / MODULE] = _TEXT.format(
         title=_in_docstring(title),
         name=_in_docstring(file.name),
