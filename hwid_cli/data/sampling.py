@@ -412,10 +412,14 @@ def _resample(columns: FileColumns, stamps: np.ndarray, step: float) -> FileColu
 
 
 def _have_neighbours(grid: np.ndarray, known: np.ndarray, step: float) -> bool:
-    """Whether next to every point of a grid there is a sample."""
+    """Whether samples scatter little around the points of a grid.
+
+    The grid begins at the first sample, which is as far off its clock as any other.
+    """
     after = np.clip(np.searchsorted(known, grid), 1, known.size - 1)
-    away = np.minimum(np.abs(known[after] - grid), np.abs(grid - known[after - 1]))
-    return bool(np.max(away) <= _NEXT_TO_IT * step)
+    late, early = known[after] - grid, grid - known[after - 1]
+    away = np.where(late < early, late, -early)
+    return bool(np.max(np.abs(away - np.median(away))) <= _NEXT_TO_IT * step)
 
 
 def _averaged(grid: np.ndarray, known: np.ndarray, values: np.ndarray) -> np.ndarray:

@@ -24,6 +24,7 @@ from hwid_cli.diagnosis.rounds import RoundsResult
 from hwid_cli.diagnosis.selection import SelectionCriteria
 from hwid_cli.diagnosis.sentences import (
     doubtful_values,
+    hardly_late,
     held_in_words,
     hidden_from_view,
     law_in_words,
@@ -162,12 +163,16 @@ class Findings:
         found = absorbed_effects(self.problem, chosen, self.scales, noise.rms)
         return taken_up(found, [public_id(one) for one in chosen.effects])
 
-    def all_warnings(self, parameters: Sequence[BaseParameter]) -> tuple[str, ...]:
+    def all_warnings(
+        self, parameters: Sequence[BaseParameter], effects: Sequence[FittedEffect]
+    ) -> tuple[str, ...]:
         """What a reader has to know, of how it was judged and of the values."""
+        sample_time_s = min(one.sample_time_s for one in self.problem.signals)
         return (
             *self.warnings,
             *untold_command(self.problem, self.is_untold),
             *doubtful_values(parameters, self.problem.drive),
+            *hardly_late(effects, sample_time_s),
         )
 
     def trust(self) -> tuple[ModelTrust | None, TrustOnTests]:
@@ -214,7 +219,7 @@ def describe(findings: Findings) -> Diagnosis:
         reference_displacement_m=problem.drive.reference_displacement_m,
         output_unit=problem.unit,
         compared="command u" if problem.compares_command else "output y",
-        warnings=findings.all_warnings(parameters),
+        warnings=findings.all_warnings(parameters, effects),
         axis=problem.drive.axis,
         units=problem.drive.straight_units,
         output=problem.drive.output,

@@ -42,6 +42,10 @@ _FEW = 1 / 3
 _MOST_NAMED = 6
 # A value off by more than this factor is a wrong one, not an inaccurate one, [-].
 _DOUBTFUL = 3.0
+# Effects that make a signal late; below this share of a sample they may be no part of a
+# machine, [-].
+_MAKE_LATE = ("input_delay", "actuator_lag", "sensor_lag")
+_HARDLY_LATE = 0.2
 # Values that a wrong mass moves, in a drive with a spring; and how far apart they may
 # have moved, [-].
 _PROPORTIONAL = 3
@@ -344,6 +348,30 @@ def doubtful_values(base: Sequence[BaseParameter], drive: Drive) -> tuple[str, .
         "check its value, or the units of the recordings; simulation.known: "
         f"[{one.name}] holds it{rests}"
         for one in doubtful
+    )
+
+
+def hardly_late(
+    effects: Sequence[FittedEffect], sample_time_s: float
+) -> tuple[str, ...]:
+    """Question effects that only shift a signal by a small part of a sample.
+
+    Parameters
+    ----------
+    sample_time_s : float, [s]
+        The shortest one.
+    """
+    shares = {
+        effect.id: one.value / sample_time_s
+        for effect in effects
+        if effect.id in _MAKE_LATE
+        for one in effect.parameters
+        if not one.text and one.value < _HARDLY_LATE * sample_time_s
+    }
+    return tuple(
+        f"{name} is {share:.2g} of a sample: how the simulation goes on between samples, "
+        "or when the logger reads, may be all of it"
+        for name, share in shares.items()
     )
 
 

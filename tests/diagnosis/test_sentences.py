@@ -10,6 +10,7 @@ from hwid_cli.diagnosis.sentences import (
     _named,
     _rest,
     doubtful_values,
+    hardly_late,
     hidden_from_view,
     unseen_beside,
 )
@@ -134,3 +135,20 @@ def test_where_a_drive_never_is_counts_from_its_start_as_well():
     offset = [replace(one, output=one.output + 0.1) for one in recordings()]
     assert side not in hidden_from_view(problem(offset))
     assert side not in hidden_from_view(problem())
+
+
+@pytest.mark.parametrize(
+    ("effect", "value", "said"),
+    [
+        ("input_delay", 2e-5, "input_delay is 0.02 of a sample"),
+        ("sensor_lag", 1.9e-4, "sensor_lag is 0.19 of a sample"),
+        ("actuator_lag", 2.1e-4, None),
+        ("coulomb_friction", 2e-5, None),
+    ],
+)
+def test_what_shifts_a_signal_by_a_small_part_of_a_sample_is_questioned(
+    effect, value, said
+):
+    found = FittedEffect(effect, "", "", (FittedParameter("a", value, 0.0, 1.0),))
+    texts = hardly_late([found], 1e-3)
+    assert [one.split(":")[0] for one in texts] == ([] if said is None else [said])
