@@ -136,8 +136,7 @@ def _found(
     singles, alone = replace(options, max_effects=1, laws="never"), None
     if options.laws != "only" and runs.simulator.run is not None:
         found = find(standing, singles, runs.run_tasks, on_round, given_sse)
-        on_round("single effects in the simulation", 0)
-        alone = single_in_simulation(found, runs, values)
+        alone = single_in_simulation(found, runs, values, on_round)
         if alone.findings is not None and alone.is_all:
             return alone.findings, alone.values, True
         if is_first and have_moved(values, alone.values, _MOVED):

@@ -18,6 +18,8 @@ from hwid_cli.diagnosis.selection import (
     select_best,
 )
 from hwid_cli.diagnosis.simulator import Runs
+from hwid_cli.diagnosis.stand_in import changes_input
+from hwid_cli.diagnosis.tasks import OnRound
 from hwid_cli.diagnosis.turns import Turn, fit_of_run, settled
 from hwid_cli.diagnosis.verdict import decide
 from hwid_cli.drive.catalogue import CATALOGUE, public_id
@@ -29,6 +31,10 @@ from hwid_cli.records.candidates import CandidateFit
 _MOST_SINGLES = 4
 _LIKELY = 4.0
 _LEAST_LEFT = 0.01
+# Effects on the input alone beside these, and the share of what the base leaves that each
+# of them leaves at most.
+_MOST_ON_INPUT = 3
+_CLEARLY_LESS = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +58,7 @@ class BySingleEffects:
 
 
 def single_in_simulation(
-    findings: Findings, runs: Runs, values: dict[str, float]
+    findings: Findings, runs: Runs, values: dict[str, float], on_round: OnRound
 ) -> BySingleEffects:
     """Put the likely single effects into the simulation, and let its runs decide.
 
@@ -71,9 +77,13 @@ def single_in_simulation(
         return BySingleEffects(*alone, is_all=True)
     tried: dict[tuple[str, ...], Turn] = {}
     fits: dict[tuple[str, ...], CandidateFit] = {}
-    for one in _likely(findings):
+    likely = _likely(findings)
+    for place, one in enumerate(likely, 1):
         if _is_settled_by(findings, one, list(fits.values())):
             continue
+        (effect,) = one.effects
+        what = f"single effects in the simulation, {place} of {len(likely)}"
+        on_round(f"{what}, {public_id(effect)}", 0)
         turn = settled(findings, one, runs, values)
         if turn is not None:
             tried[one.effects], fits[one.effects] = turn, fit_of_run(findings, turn)
@@ -177,9 +187,11 @@ def _base_in_simulation(
 def _likely(findings: Findings) -> list[CandidateFit]:
     """Single effects that leave least beside the stand-in, limit cases first."""
     criteria = findings.criteria
+    # What changes the input alone is put into the simulation, not into its stand-in: it
+    # may have taken the stand-in's base anywhere.
     usable = [one for one in findings.found.fits.values()
               if one.is_usable and len(one.effects) == 1
-              and not criteria.replaces(one)]  # fmt: skip
+              and (changes_input(one.effects) or not criteria.replaces(one))]  # fmt: skip
     usable.sort(key=criteria.excess)
     if not usable:
         return []
@@ -188,10 +200,25 @@ def _likely(findings: Findings) -> list[CandidateFit]:
     )
     near = [one for one in usable if criteria.excess(one) <= _LIKELY * least]
     first = _of_different_families(_one_of_each(near), near)[:_MOST_SINGLES]
+    first += _on_the_input(findings, usable, first)
     # What leaves little more with fewer parameters may be all of it.
     limits = [one for one in near if one not in first
               and any(is_part_of(one, wide) for wide in first)]  # fmt: skip
     return sorted([*first, *limits], key=lambda one: -_n_including(one, near))
+
+
+def _on_the_input(
+    findings: Findings, usable: Sequence[CandidateFit], first: Sequence[CandidateFit]
+) -> list[CandidateFit]:
+    """Effects on the input alone that leave clearly less than the base.
+
+    The simulation itself says how much: the rest is what its stand-in errs by.
+    """
+    criteria = findings.criteria
+    most = _CLEARLY_LESS * criteria.excess(findings.base)
+    further = [one for one in usable if changes_input(one.effects) and one not in first]
+    clear = [one for one in further if criteria.excess(one) <= most]
+    return clear[:_MOST_ON_INPUT]
 
 
 def _one_of_each(near: Sequence[CandidateFit]) -> list[CandidateFit]:
@@ -235,8 +262,14 @@ def _is_settled_by(
     if any(criteria.is_complete(fit) and is_part_of(fit, one) for fit in fits):
         return True
     done = [fit for fit in fits if criteria.is_nearly_all(fit, findings.base)]
+    if not done:
+        return False
     is_simpler = any(is_part_of(one, fit) or count(one) < count(fit) for fit in done)
-    return bool(done) and not is_simpler and not _is_near(findings, one, done)
+    # A stand-in tells a delay from a lag by its own error.
+    is_alike = changes_input(one.effects) and any(
+        changes_input(f.effects) for f in done
+    )
+    return not (is_simpler or is_alike or _is_near(findings, one, done))
 
 
 def _is_near(

@@ -536,6 +536,11 @@ def act_as_forces(effects: Sequence[str]) -> bool:
     return not enters or bool(enters - {"command", "output"})
 
 
+def changes_input(effects: Sequence[str]) -> bool:
+    """Whether effects change the input alone, which no stand-in needs to tell."""
+    return bool(effects) and all(CATALOGUE[one].enters == "command" for one in effects)
+
+
 def force_of_motion(drive: Drive, signals: Signals, motion: Motion) -> np.ndarray:
     """Force beside input and stand-in force that a motion needs: what an effect makes.
 

@@ -27,7 +27,11 @@ from hwid_cli.diagnosis.joint_fit import (
 )
 from hwid_cli.diagnosis.noise import measured_input_rms
 from hwid_cli.diagnosis.own_parameters import fit_parameters
-from hwid_cli.diagnosis.parameters import BASE, each_sum_of_squares, simulate_at
+from hwid_cli.diagnosis.parameters import (
+    BASE,
+    each_sum_of_squares,
+    simulate_at,
+)
 from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals
 from hwid_cli.diagnosis.simulator import DIFFERENCE, Runs
 from hwid_cli.diagnosis.stand_in import (
@@ -157,15 +161,17 @@ def _best_of(findings: Findings, turn: Turn, runs: Runs) -> Turn:
         held = replace(turn, problem=_held(findings.problem))
         best = _best_turn(findings, held, runs)
     # Forces in the place of parameters that nobody could find would pass for the effect's.
-    is_lost = best is not None and best.ran_away
-    if best is None or not (is_lost or is_as_good(best)):
-        other = _best_turn(findings, turn, runs)
-        if best is not None and _is_clearly_better(other, best):
-            again = _best_turn(findings, _beside_effect(findings, other, runs), runs)
-            best = min(best, again, key=lambda one: float(one.sse.sum()))
-        if best is None or _is_clearly_better(other, best):
-            best = other
-    return best
+    if best is not None and (best.ran_away or is_as_good(best)):
+        return best
+    other = _best_turn(findings, turn, runs)
+    if best is not None and _is_clearly_better(other, best):
+        again = _best_turn(findings, _beside_effect(findings, other, runs), runs)
+        best = min(best, again, key=_left_by)
+    return other if best is None or _is_clearly_better(other, best) else best
+
+
+def _left_by(turn: Turn) -> float:
+    return float(turn.sse.sum())
 
 
 def _is_clearly_better(one: Turn, other: Turn) -> bool:

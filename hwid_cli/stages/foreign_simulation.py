@@ -21,7 +21,11 @@ from hwid_cli.records.drive import DriveResponse, told_apart
 from hwid_cli.records.experiment import DiagnoseOptions, SimulationOptions
 from hwid_cli.records.exported import ExportedModel
 from hwid_cli.records.model import HammersteinWiener
-from hwid_cli.records.programs import ForeignSimulation, RunRequest
+from hwid_cli.records.programs import (
+    ForeignSimulation,
+    RunRequest,
+    StandInChange,
+)
 from hwid_cli.records.recordings import CalibrationLog, Recording
 from hwid_cli.simulations.extended import run_extended
 from hwid_cli.simulations.kinds import kind_named
@@ -176,7 +180,7 @@ def simulator_of(
         free=getattr(options, "free", {}),
         values=getattr(options, "values", {}),
         effects=options.effects,
-        change=options.stand_in,
+        change=getattr(options, "stand_in", StandInChange()),
     )
 
 
@@ -267,7 +271,8 @@ def extended_foreign(
     ]
     fitted = {one.name: one.after for one in diagnosis.base}
     with_them = kind_named(options.kind).with_fitted(options, fitted)
-    extended: ForeignSimulation = replace(
-        with_them, effects=told_apart(effects), stand_in=diagnosis.stand_in
-    )
+    found: dict[str, Any] = {"effects": told_apart(effects)}
+    if hasattr(options, "stand_in"):
+        found["stand_in"] = diagnosis.stand_in
+    extended: ForeignSimulation = replace(with_them, **found)
     return extended

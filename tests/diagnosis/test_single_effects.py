@@ -7,7 +7,11 @@ import numpy as np
 import pytest
 
 from hwid_cli.diagnosis import single_effects
-from hwid_cli.diagnosis.single_effects import _likely, _twins_in_simulation
+from hwid_cli.diagnosis.single_effects import (
+    _is_settled_by,
+    _likely,
+    _twins_in_simulation,
+)
 from hwid_cli.records.candidates import ParameterRef
 from tests.diagnosis.made_up_fits import CRITERIA, base, made_up
 
@@ -95,3 +99,57 @@ def test_what_leaves_nothing_is_tried_as_the_limit_case_with_its_values(
         assert fit.names[1] == ParameterRef("actuator_lag", "time_constant_s")
         assert fit.values.tolist() == [4.7, 0.065]
         assert values == {"c": 0.45}
+
+
+def findings_of(sses, criteria=CRITERIA):
+    fits = {(one,): made_up((one,), sse) for one, sse in sses.items()}
+    return SimpleNamespace(
+        criteria=criteria, base=base(), found=SimpleNamespace(fits=fits)
+    )
+
+
+def test_a_delay_is_run_although_the_stand_in_takes_others_for_far_better():
+    # Excesses of 2, 30, 140 and 290 beside the 300 of the base.
+    given = {
+        "coulomb_friction": 102.0,
+        "input_delay": 130.0,
+        "input_saturation": 240.0,
+        "input_dead_zone": 390.0,
+    }
+    found = {one.effects[0] for one in _likely(findings_of(given))}
+    # Saturation leaves less than half of what the base leaves, the dead zone does not.
+    assert found == {"coulomb_friction", "input_delay", "input_saturation"}
+
+
+class Replacing:
+    """Criteria of a stand-in that has become another drive beside every effect."""
+
+    def __getattr__(self, name):
+        return getattr(CRITERIA, name)
+
+    def replaces(self, _found):
+        return True
+
+
+def test_what_changes_the_input_is_run_whatever_it_has_made_of_the_stand_in():
+    given = {"coulomb_friction": 101.0, "input_dead_zone": 102.0}
+    found = [one.effects for one in _likely(findings_of(given, Replacing()))]
+    assert found == [("input_dead_zone",)]
+
+
+@pytest.mark.parametrize(
+    ("run", "other", "is_tried"),
+    [
+        # The lag has left nothing in the simulation: a delay may, too ...
+        ("actuator_lag", "input_delay", True),
+        # ... as the stand-in is no judge between the two; of friction it is.
+        ("actuator_lag", "coulomb_friction", False),
+        ("coulomb_friction", "input_delay", False),
+    ],
+)
+def test_changes_of_the_input_are_rivals_until_they_were_run(run, other, is_tried):
+    findings = findings_of({run: 100.5, other: 120.0})
+    (one,) = (fit for fit in findings.found.fits.values() if fit.effects == (other,))
+    done = [made_up((run,), 100.0, whiteness=0.5)]
+    assert _is_settled_by(findings, one, done) is not is_tried
+    assert not _is_settled_by(findings, one, [])
