@@ -153,6 +153,8 @@ def gap_table(diagnosis: Diagnosis) -> Table:
     ]
     unit = diagnosis.output_unit
     notes = [explained_sentence(diagnosis)] if diagnosis.effects else []
+    if diagnosis.confirmed == "surrogate":
+        notes.append(_OF_STAND_IN)
     if diagnosis.noise.sentence:
         notes.append(f"What counts as noise: {diagnosis.noise.sentence}.")
     return Table(
@@ -239,6 +241,10 @@ def is_chosen(candidate: RankedCandidate) -> bool:
     return bool(candidate.effects) and candidate.role == "diagnosis"
 
 
+_OF_STAND_IN = (
+    "Below 'as given' stands what a drive in the place of the simulation leaves "
+    "(confirmed: surrogate); the simulation itself was not run so."
+)
 _NOT_FITTED = (
     f"{MISSING}: left after its first iterations, where others were better; or not needed, "
     "because what it includes leaves only noise."
