@@ -30,7 +30,7 @@ def fit_parameters(
     ask : callable
         Runs, with what is known beside the parameters.
     values : dict of str to float
-        All of them, to begin with.
+        All of them, to begin with; they stay where no run is possible with them.
     """
     train = [one for one in signals if not one.is_held_out]
     train = sorted(train, key=lambda one: -float(np.ptp(one.compared)))
@@ -67,6 +67,8 @@ def fit_parameters(
         return np.column_stack(columns)
 
     start = np.array([values[name] for name in free]) / sizes
+    if not np.isfinite(errors(np.clip(start, low, high))).all():
+        return values
     found = scipy.optimize.least_squares(
         errors, np.clip(start, low, high), slopes, (low, high), x_scale=1.0,
         max_nfev=_MOST_EVALUATIONS, ftol=1e-6, xtol=1e-5,

@@ -37,13 +37,16 @@ from hwid_cli.diagnosis.simulator import DIFFERENCE, Runs
 from hwid_cli.diagnosis.stand_in import (
     act_as_forces,
     corrected,
+    derived,
+    force_along,
     force_of_motion,
+    standing_for,
     starts_in_balance,
 )
 from hwid_cli.diagnosis.standing import standing_beside
 from hwid_cli.drive.simulation import Motion
 from hwid_cli.records.candidates import CandidateFit, ParameterRef
-from hwid_cli.records.drive import BASE_PARAMETERS
+from hwid_cli.records.drive import BASE_PARAMETERS, Drive
 from hwid_cli.records.programs import SimulatorRun
 
 # Runs with the effect, and the share of what remains (or of the noise) by which loop and
@@ -60,7 +63,7 @@ _WORTH_A_TURN = 0.95
 _LATE_AT_CORNERS = 1.1
 # To double a parameter of the simulation costs this share of what the last run left: the
 # stand-in knows little of it so far from there, [-].
-_HOLD = 0.1
+_HOLD = 0.03
 # Derivatives by the simulation's parameters are found again where one of these has moved by
 # more than this share.
 _SAME_SLOPES = 0.02
@@ -156,18 +159,27 @@ def _best_of(findings: Findings, turn: Turn, runs: Runs) -> Turn:
     They do what the stand-in's base did; where they cannot, forces that go with
     displacement, velocity and input do it.
     """
-    best = None
-    if runs.simulator.free:
-        held = replace(turn, problem=_held(findings.problem))
-        best = _best_turn(findings, held, runs)
+    if not runs.simulator.free:
+        return _best_turn(findings, turn, runs)
+    held = replace(turn, problem=_held(findings.problem))
+    best = _best_turn(findings, held, runs)
+    if not is_as_good(best):
+        best = min(best, _again(findings, turn, runs), key=_left_by)
     # Forces in the place of parameters that nobody could find would pass for the effect's.
-    if best is not None and (best.ran_away or is_as_good(best)):
+    if best.ran_away or is_as_good(best):
         return best
     other = _best_turn(findings, turn, runs)
-    if best is not None and _is_clearly_better(other, best):
-        again = _best_turn(findings, _beside_effect(findings, other, runs), runs)
-        best = min(best, again, key=_left_by)
-    return other if best is None or _is_clearly_better(other, best) else best
+    if _is_clearly_better(other, best):
+        # Its runs know the effect better than the first stand-in did.
+        best = min(best, _again(findings, other, runs), key=_left_by)
+    return other if _is_clearly_better(other, best) else best
+
+
+def _again(findings: Findings, turn: Turn, runs: Runs) -> Turn:
+    """Best turn from where the simulation's parameters belong beside known effects."""
+    if not turn.fit.effects:
+        return turn
+    return _best_turn(findings, _beside_effect(findings, turn, runs), runs)
 
 
 def _left_by(turn: Turn) -> float:
@@ -181,9 +193,8 @@ def _is_clearly_better(one: Turn, other: Turn) -> bool:
 def _beside_effect(findings: Findings, turn: Turn, runs: Runs) -> Turn:
     """A first turn with the simulation's parameters as they fit beside known effects.
 
-    Parameters that have imitated an effect are far from where they belong; beside forces
-    that go with displacement, velocity and input the effect is known well enough to lead
-    them there.
+    Parameters that have imitated an effect are far from where they belong; where the
+    stand-in has moved its base for them, it knows the effect well enough to lead them there.
     """
     fit, problem = turn.fit, turn.problem
     motions = simulate_at(problem, *rebuilt(problem, fit, findings.scales))
@@ -202,11 +213,40 @@ def _beside_effect(findings: Findings, turn: Turn, runs: Runs) -> Turn:
         )
 
     values = fit_parameters(ask, problem.signals, runs.simulator.free, turn.values)
-    given = runs.tried(problem.signals, values)
-    if given is None:
+    given, found = runs.tried(problem.signals, values), ask(problem.signals, values)
+    if given is None or found is None:
         return replace(turn, problem=_held(problem))
     standing = standing_beside(runs, problem, given, values)
-    return Turn(_held(standing), without_base(fit), values, turn.said, turn.at_force)
+    signals = tuple(
+        _standing_with(standing.drive, one, run, forces[one.name])
+        for one, run in zip(standing.signals, found, strict=True)
+    )
+    there = _held(replace(standing, signals=signals))
+    fit = _where_it_starts(there, without_base(fit))
+    return Turn(there, fit, values, turn.said, turn.at_force)
+
+
+def _standing_with(
+    drive: Drive, signals: Signals, found: SimulatorRun, force: np.ndarray
+) -> Signals:
+    """Signals with what makes the stand-in move as a run does, with an effect's force.
+
+    Without it both may be far from there.
+
+    Parameters
+    ----------
+    found : SimulatorRun
+        With the force.
+    """
+    plain = replace(drive, effects={})
+    along = force_along(plain, derived(found, signals.sample_time_s), signals.driven_by)
+    there = standing_for(signals, found, plain, along)
+    return replace(there, force=along - force, start=there.own_start)
+
+
+def _where_it_starts(problem: DiagnosisProblem, fit: CandidateFit) -> CandidateFit:
+    """The fit without starts of its own where these are known: the simulation's."""
+    return without_starts(fit) if problem.has_starts else fit
 
 
 def _with_starts(
@@ -296,8 +336,7 @@ def _next_turn(findings: Findings, turn: Turn, runs: Runs) -> Turn | None:
     late = _late(problem, motions, found)
     problem = _with_starts(problem, found)
     corrected = _corrected(problem, late, [run.output for run in found], forces)
-    # The simulation starts where it does.
-    fit = without_starts(turn.fit) if corrected.has_starts else turn.fit
+    fit = _where_it_starts(corrected, turn.fit)
     following = Turn(
         problem=corrected,
         fit=fit,
