@@ -161,7 +161,11 @@ def _leaves_less(
     """Whether the simulation's run with a set leaves less than that with one effect."""
     told, _, is_confirmed = several
     chosen, alone = told.verdict.chosen, one.verdict.chosen
-    return is_confirmed and bool(chosen.effects) and chosen.sse.sum() < alone.sse.sum()
+    return (
+        is_confirmed
+        and bool(chosen.effects)
+        and bool(chosen.sse.sum() < alone.sse.sum())
+    )
 
 
 def _law_instead(

@@ -10,6 +10,8 @@ from scipy.signal import lfilter, lsim
 from hwid_cli.diagnosis.problem import Signals
 from hwid_cli.diagnosis.stand_in import (
     _no_faster_than_seen,
+    change_between,
+    corrected,
     derived,
     error_of,
     fit_stand_in,
@@ -17,8 +19,11 @@ from hwid_cli.diagnosis.stand_in import (
     force_of_change,
     force_of_motion,
     in_newtons,
+    moved_from,
     moved_plainly,
     standing_for,
+    starts_in_balance,
+    with_change,
 )
 from hwid_cli.drive.simulation import parameter_vector, run
 from hwid_cli.records.drive import Drive, StandIn
@@ -67,6 +72,48 @@ def test_a_corner_at_the_first_sample_is_no_velocity():
     moved = derived(SimulatorRun(way, NOTHING), STEP_S)
     assert abs(moved.velocity[0]) < 1e-3 * np.abs(moved.velocity).max()
     assert abs(MASS * moved.acceleration[0]) < 0.1
+
+
+def test_a_correction_takes_up_what_the_last_one_has_left():
+    """Effects do not see an offset: it must not grow from turn to turn."""
+    drive = StandIn(MASS, DAMPING, STIFFNESS, GAIN)
+    one = signals(INPUTS[0])
+    left = 1e-4 * np.sin(2 * np.pi * 5 * TIME) * np.minimum(TIME / 0.05, 1.0)
+    one = replace(one, force=np.zeros(N), offset=left, own_start=(0.0, 0.0))
+    target = linear(GAIN * INPUTS[0]) + left
+    found = corrected(one, drive, np.zeros(N), target, np.zeros(N))
+    assert np.std(found.offset) < 0.02 * np.std(left)
+    there = moved_from((0.0, 0.0), drive, found, found.force)
+    assert np.std(there.position - target) < 0.02 * np.std(left)
+
+
+@pytest.mark.parametrize(
+    ("own", "first", "is_in_balance"),
+    [((0.0, 0.0), 0.0, False), ((0.0, 0.0), 1e-3, True), (None, 0.0, True)],
+)
+def test_a_start_that_a_force_moves_is_one_in_balance(own, first, is_in_balance):
+    run_with_force = SimulatorRun(np.linspace(first, 1.0, 50), NOTHING)
+    one = replace(signals(INPUTS[0]), own_start=own)
+    assert starts_in_balance(one, run_with_force) is is_in_balance
+
+
+@pytest.mark.parametrize("of_curve", [0.0, STIFFNESS])
+def test_the_change_between_two_stand_ins_leads_from_one_to_the_other(of_curve):
+    before = StandIn(
+        MASS, DAMPING, STIFFNESS, GAIN, quadratic_N_per_m2=-30.0,
+        cubic_N_per_m3=4e5, one_curve_N_per_m=of_curve,
+    )  # fmt: skip
+    after = replace(
+        before, damping_N_s_per_m=6.0, stiffness_N_per_m=2500.0,
+        force_constant_N_per_A=8.0,
+    )  # fmt: skip
+    change = change_between(before, after)
+    assert change.curve == pytest.approx(2500.0 / STIFFNESS if of_curve else 1.0)
+    found = with_change(before, change)
+    for name in ("damping_N_s_per_m", "stiffness_N_per_m", "force_constant_N_per_A"):
+        assert getattr(found, name) == pytest.approx(getattr(after, name))
+    assert found.bends == pytest.approx(after.bends)
+    assert change_between(before, before).is_none
 
 
 def test_a_run_that_starts_in_motion_keeps_its_first_velocity():

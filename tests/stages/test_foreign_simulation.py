@@ -12,7 +12,12 @@ from scipy.signal import lfilter
 from hwid_cli import Recording
 from hwid_cli.records.diagnosis import BaseParameter
 from hwid_cli.records.experiment import DiagnoseOptions
-from hwid_cli.records.programs import Capabilities, SimulatorRun
+from hwid_cli.records.programs import (
+    Capabilities,
+    OutputsSimulation,
+    SimulatorRun,
+    StandInChange,
+)
 from hwid_cli.records.rules import OneOf
 from hwid_cli.simulations.simulation import SimulationKind
 from hwid_cli.stages.foreign_simulation import (
@@ -20,6 +25,7 @@ from hwid_cli.stages.foreign_simulation import (
     extended_foreign,
     placed,
     simulated,
+    simulator_of,
     uncovered_by,
 )
 from tests.report.diagnosis_examples import named
@@ -72,6 +78,14 @@ def test_a_kind_without_a_file_and_parameters_is_placed_and_simulated():
 def test_what_was_found_is_put_into_a_kind_that_has_no_parameters():
     found = extended_foreign(named(), Scaled(gain=2.0))
     assert (found.gain, list(found.effects)) == (2.0, ["coulomb_friction"])
+
+
+def test_what_stands_in_for_parameters_goes_with_it():
+    change = StandInChange(damping=0.8, curve=1.1)
+    found = extended_foreign(replace(named(), stand_in=change), OutputsSimulation())
+    assert found.stand_in == change
+    simulator = simulator_of(found, (), ())
+    assert (simulator.change, simulator.is_extended) == (change, True)
 
 
 def test_a_kind_says_itself_where_its_fitted_values_belong(kind):

@@ -1,0 +1,98 @@
+"""Which run of a simulation with an effect counts."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from hwid_cli.diagnosis import turns
+from hwid_cli.diagnosis.foreign import _leaves_less
+from hwid_cli.diagnosis.turns import Turn, settled
+from tests.diagnosis.made_up_fits import base, made_up
+from tests.diagnosis.small_drive import problem, recordings
+
+FRICTION = "coulomb_friction"
+
+
+def left(sse):
+    """What a run leaves, as one sample."""
+    return (np.array([np.sqrt(sse)]),)
+
+
+@pytest.fixture
+def settle(monkeypatch):
+    """Best run where each way leaves a given sum of squares; the stand-in said 100."""
+
+    def of(*, held, beside, free, beside_free, ran_away=False):
+        asked = []
+
+        def best_turn(_findings, turn, _runs):
+            as_given = "held" if turn.problem.known else "free"
+            way = turn.values.get("way", as_given)
+            asked.append(way)
+            sse = {"held": held, "beside held": beside, "free": free,
+                   "beside free": beside_free}[way]  # fmt: skip
+            run = (turn.fit, {"way": way})
+            is_lost = ran_away and way == "held"
+            return Turn(turn.problem, turn.fit, {"way": way}, 100.0, at_force=True,
+                        tried=run, left=left(sse), ran_away=is_lost)  # fmt: skip
+
+        def beside_effect(_findings, turn, _runs):
+            way = "beside free" if turn.values.get("way") == "free" else "beside held"
+            return Turn(turn.problem, turn.fit, {"way": way}, 100.0, at_force=True)
+
+        monkeypatch.setattr(turns, "_best_turn", best_turn)
+        monkeypatch.setattr(turns, "_beside_effect", beside_effect)
+        able = SimpleNamespace(force=True)
+        simulator = SimpleNamespace(free={"c": None}, capabilities=able)
+        findings = SimpleNamespace(problem=problem(recordings()), base=base(1e5))
+        fit = made_up((FRICTION,), 100.0 / 6)
+        best = settled(findings, fit, SimpleNamespace(simulator=simulator), {})
+        return best.values_of_run["way"], asked
+
+    return of
+
+
+def test_a_run_as_good_as_the_stand_in_is_enough(settle):
+    best, asked = settle(held=110.0, beside=1.0, free=1.0, beside_free=1.0)
+    assert (best, asked) == ("held", ["held"])
+
+
+def test_parameters_are_fitted_beside_the_effect_before_forces_take_their_place(settle):
+    best, asked = settle(held=900.0, beside=110.0, free=1.0, beside_free=1.0)
+    assert (best, asked) == ("beside held", ["held", "beside held"])
+
+
+def test_and_again_where_forces_know_the_effect_better(settle):
+    best, asked = settle(held=900.0, beside=800.0, free=100.0, beside_free=105.0)
+    assert best == "beside free"
+    assert asked == ["held", "beside held", "free", "beside free"]
+
+
+def test_forces_take_the_place_of_parameters_that_nobody_can_find(settle):
+    best, _ = settle(held=900.0, beside=800.0, free=100.0, beside_free=700.0)
+    assert best == "free"
+
+
+def test_no_forces_pass_for_an_effect_where_the_stand_in_has_run_away(settle):
+    args = {"free": 1.0, "beside_free": 1.0, "ran_away": True}
+    assert settle(held=900.0, beside=950.0, **args)[0] == "held"
+    assert settle(held=900.0, beside=120.0, **args)[0] == "beside held"
+
+
+@pytest.mark.parametrize(
+    ("effects", "sse", "is_confirmed", "is_less"),
+    [
+        (("cogging", FRICTION), 90.0, True, True),
+        (("cogging", FRICTION), 110.0, True, False),
+        (("cogging", FRICTION), 90.0, False, False),
+        ((), 90.0, True, False),
+    ],
+)
+def test_a_set_has_to_leave_less_than_one_effect(effects, sse, is_confirmed, is_less):
+    def told(fit):
+        return SimpleNamespace(verdict=SimpleNamespace(chosen=fit))
+
+    one = told(made_up((FRICTION,), 100.0))
+    several = told(made_up(effects, sse)), {}, is_confirmed
+    assert bool(_leaves_less(several, one)) is is_less
