@@ -147,7 +147,7 @@ def settled(
     ):
         # A map of the simulation may cut off what should come through its input.
         other = _best_of(findings, replace(turn, at_force=True), runs)
-        best = min(best, other, key=lambda one: float(one.sse.sum()))
+        best = min(best, other, key=_left_by)
     # A run that is worse than without the effect says nothing of it.
     is_worse = bool(fit.effects) and float(best.sse.sum()) >= without
     return None if best.tried is None or is_worse else best
@@ -198,11 +198,10 @@ def _beside_effect(findings: Findings, turn: Turn, runs: Runs) -> Turn:
     """
     fit, problem = turn.fit, turn.problem
     motions = simulate_at(problem, *rebuilt(problem, fit, findings.scales))
-    changed = replace(fitted_drive(problem.drive, fit), effects={})
-    forces = {
-        one.name: force_of_motion(changed, one, motion)
-        for one, motion in zip(problem.signals, motions, strict=True)
-    }
+    # Of the effect alone: what the changed base does is no force of it.
+    changed = replace(problem, drive=fitted_drive(problem.drive, fit))
+    names = [one.name for one in problem.signals]
+    forces = dict(zip(names, forces_along(changed, motions), strict=True))
 
     def ask(
         signals: Sequence[Signals], values: Mapping[str, float]
