@@ -260,7 +260,8 @@ def _told(
     )
     change = _change_of(findings, simulator)
     warnings = told.warnings
-    if base and not change.is_none:
+    # Without an effect the table says whose gap this is.
+    if base and told.effects and not change.is_none:
         warnings = (*warnings, _BESIDE_PARAMETERS)
     return replace(
         told,

@@ -22,6 +22,7 @@ from hwid_cli.records.programs import (
     FreeParameter,
     RunRequest,
     SimulatorRun,
+    StandInChange,
 )
 from tests.black_boxes.plants import (
     LINEAR,
@@ -33,6 +34,7 @@ from tests.black_boxes.plants import (
 )
 from tests.black_boxes.run_boxes import diagnose, runs_of, write_case
 from tests.diagnosis.made_up_fits import CRITERIA, made_up
+from tests.report.diagnosis_examples import named
 
 STEP_S, N = 1e-3, 500
 TIME = STEP_S * np.arange(N)
@@ -619,3 +621,28 @@ def test_a_law_takes_the_place_of_a_name_that_leaves_far_more(
         lambda *_: None,
     )
     assert told == ((found, {"kt": 2.0}) if is_taken else None)
+
+
+@pytest.mark.parametrize(
+    ("is_free", "is_named", "change", "n_said"),
+    [
+        (True, True, StandInChange(damping=0.7), 1),
+        # All that is said comes from the simulation's own parameters; or there are none,
+        # and the factors are in the table of parameters; or nothing is said of an effect.
+        (True, True, StandInChange(), 0),
+        (False, True, StandInChange(damping=0.7), 0),
+        (True, False, StandInChange(damping=0.7), 0),
+    ],
+)
+def test_forces_in_the_place_of_parameters_are_told(
+    monkeypatch, is_free, is_named, change, n_said
+):
+    said = named() if is_named else replace(named(), effects=())
+    monkeypatch.setattr(foreign, "describe", lambda _: said)
+    monkeypatch.setattr(foreign, "_change_of", lambda *_: change)
+    able = Capabilities(run=True, parameters=True)
+    simulator = Simulator(able, simulate, {}, FREE if is_free else {}, GIVEN)
+    told = foreign._told(None, simulator, (GIVEN, GIVEN))
+    texts = [one for one in told.warnings if "simulation.stand_in" in one]
+    assert len(texts) == n_said
+    assert told.stand_in == change
