@@ -20,6 +20,9 @@ from hwid_cli.records.candidates import CandidateFit
 from hwid_cli.records.programs import SimulatorRun
 
 _TURN_ITERATIONS = 10
+# Of a search in one turn: beside corners it would go on hundreds of times, and the next
+# turn begins there anyway.
+_MOST_EVALUATIONS = 30
 # Derivatives by parameters of effects, in their coordinates: across corners of thresholds.
 _EFFECT_DIFFERENCE = 3e-4
 # What a stand-in leaves that runs away, over the largest output: no search goes there.
@@ -86,8 +89,9 @@ def fitted_together(
     if (errors(start) == far).all():
         return None
     found = scipy.optimize.least_squares(
-        errors, start, partial(_derivatives, errors), method="lm"
-    )
+        errors, start, partial(_derivatives, errors), method="lm",
+        max_nfev=_MOST_EVALUATIONS,
+    )  # fmt: skip
     fit = _evaluated(changed(found.x), before, fit_layout, at(found.x), findings)
     return fit, found.x[:n_free] * sizes
 
