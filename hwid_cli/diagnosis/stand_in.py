@@ -208,7 +208,11 @@ def _bends(drive: Drive) -> tuple[float, float]:
 def _in_free_run(
     drive: StandIn, signals: Sequence[Signals], runs: Sequence[SimulatorRun]
 ) -> StandIn:
-    """The same, nearer in a free run, where that can be found."""
+    """The same, nearer in a free run, where that can be found.
+
+    It starts where the simulation does: a spring of rounding errors would be in balance
+    far from there.
+    """
     compared = tuple(
         replace(
             one,
@@ -216,6 +220,7 @@ def _in_free_run(
             compared=found.output,
             is_held_out=False,
             used=None,
+            start=seen_start(derived(found, one.sample_time_s)),
         )
         for one, found in zip(signals, runs, strict=True)
     )

@@ -148,6 +148,20 @@ def test_a_free_axis_has_a_stand_in_without_a_spring(given):
     assert found.damping_N_s_per_m == pytest.approx(DAMPING / GAIN, rel=1e-3)
 
 
+def test_a_free_axis_that_starts_out_of_balance_has_none_either():
+    # A rough input leaves a little for a spring, which would be in balance far away.
+    rng = np.random.default_rng(2)
+    inputs = [one + 0.05 * rng.standard_normal(TIME.size) for one in INPUTS]
+    runs = [
+        SimulatorRun(lsim(([GAIN], [MASS, DAMPING, 0.0]), one, TIME)[1], NOTHING)
+        for one in inputs
+    ]
+    found = fit_stand_in([signals(one) for one in inputs], runs)
+    assert found.stiffness_N_per_m == 0.0
+    assert found.mass_kg == pytest.approx(MASS / GAIN, rel=1e-2)
+    assert found.damping_N_s_per_m == pytest.approx(DAMPING / GAIN, rel=1e-2)
+
+
 @pytest.mark.thorough
 @pytest.mark.parametrize("lag_s", [0.003, 0.05])
 def test_a_simulation_without_inertia_gets_a_mass_that_samples_show(given, lag_s):
