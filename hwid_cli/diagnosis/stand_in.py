@@ -37,6 +37,10 @@ _FASTEST = 10.0
 # Nor faster than this share of how long a damper takes to let its spring go, where that
 # is less than a sample: a slow process without inertia needs no short steps, [-].
 _FASTEST_SHARE = 0.005
+# Without a spring that is none, a free run leaves at most so many times the squares; less
+# than this share of the motion is rounding, [-].
+_IDLE = 2.0
+_HARDLY_ANY = 1e-4
 # A straight spring that leaves less than this share of the balance of forces is enough; a
 # curved one has to leave at most this share of that, and to push back over so many times
 # the way that was seen.
@@ -254,19 +258,29 @@ def _no_faster_than_seen(drive: StandIn, signals: Sequence[Signals]) -> StandIn:
 
 
 def _without_idle_spring(drive: StandIn, moved: Sequence[Signals]) -> StandIn:
-    """The same without a straight spring whose force is rounding beside the input's.
+    """The same without a straight spring that a free run hardly shows.
 
-    A cylinder or a free axis has none; any candidate would seem to change it manyfold.
+    A cylinder, a free axis or a motor has none, but what a mass and a damper do not
+    reproduce of it leaves a little for one: any candidate would seem to change it manyfold,
+    and what is known of free axes would be left out.
     """
-    sizes = [
-        np.concatenate(parts)
-        for parts in zip(*((one.output, one.driven_by) for one in moved), strict=True)
-    ]
-    way, pushed = (float(np.sqrt(np.mean(one**2))) for one in sizes)
-    pushed *= drive.force_constant_N_per_A
-    is_idle = drive.stiffness_N_per_m * way < _LEAST_SHARE * pushed
-    has_bends = drive.bends != (0.0, 0.0)
-    return replace(drive, stiffness_N_per_m=0.0) if is_idle and not has_bends else drive
+    if drive.stiffness_N_per_m == 0 or drive.bends != (0.0, 0.0):
+        return drive
+    free = replace(drive, stiffness_N_per_m=0.0)
+    least = _HARDLY_ANY**2 * len(moved)
+    with_it = max(_left_in_free_run(drive, moved), least)
+    return free if _left_in_free_run(free, moved) <= _IDLE * with_it else drive
+
+
+def _left_in_free_run(drive: StandIn, moved: Sequence[Signals]) -> float:
+    """Squares that a drive leaves of runs, each over that run's own, [-]."""
+    total = 0.0
+    for one in moved:
+        plain = moved_from(one.start, drive, one, np.zeros(one.driven_by.size))
+        left = one.compared - plain.position
+        size = float(np.var(one.compared)) or 1.0
+        total += float(np.mean(left**2)) / size
+    return total
 
 
 def with_change(drive: StandIn, change: StandInChange) -> StandIn:

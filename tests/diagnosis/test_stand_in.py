@@ -369,6 +369,18 @@ def test_what_has_no_spring_is_given_none():
     assert fit_stand_in([signals(u) for u in commands], runs).stiffness_N_per_m == 0.0
 
 
+@pytest.mark.parametrize("stiffness", [0.0, 2.0])
+def test_a_coil_beside_a_free_axis_is_no_spring_and_a_weak_spring_is_one(stiffness):
+    """A mass and a damper leave a little of the coil, which a spring took up."""
+    coil = np.polymul([MASS, DAMPING, stiffness], [0.004, 1.0])
+    # From noise on, as a logged input begins.
+    rng = np.random.default_rng(1)
+    commands = [one + 0.01 * rng.standard_normal(TIME.size) for one in INPUTS]
+    runs = [SimulatorRun(lsim(([GAIN], coil), u, TIME)[1], NOTHING) for u in commands]
+    found = fit_stand_in([signals(u) for u in commands], runs)
+    assert (found.stiffness_N_per_m > 0) == (stiffness > 0)
+
+
 @pytest.mark.parametrize(
     ("stiffness", "lag_s"),
     [
