@@ -19,6 +19,7 @@ from hwid_cli.diagnosis.findings import Findings, describe
 from hwid_cli.diagnosis.laws import MOST_OF_NAMED
 from hwid_cli.diagnosis.own_parameters import fit_parameters
 from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals, prepare
+from hwid_cli.diagnosis.run_starts import Begun, begin, starts_sentence
 from hwid_cli.diagnosis.selection import LEAST_GAIN
 from hwid_cli.diagnosis.simulator import Runs, Simulator
 from hwid_cli.diagnosis.single_effects import single_in_simulation
@@ -68,9 +69,9 @@ def diagnose_foreign(
     held_out = held_out_of(recordings, options)
     problem = prepare(recordings, ITS_OWN, options, held_out)
     problem = without_repeats(problem)
-    runs = Runs(simulator, run_tasks)
     on_round("the simulation as given", len(problem.signals))
-    given = runs.of(problem.signals, simulator.values)
+    begun = begin(problem, simulator, options, run_tasks)
+    problem, runs, given = begun.problem, begun.runs, list(begun.given)
     # With effects of its own the stand-in says what the whole simulation leaves, and the
     # parameters are fitted with them.
     given_sse = None if simulator.is_extended else _sse(problem.signals, given)
@@ -106,7 +107,7 @@ def diagnose_foreign(
     if is_confirmed:
         law = _law_instead(runs, problem, found.verdict, refitted, options, on_round)
         found, values = law or (found, values)
-    told = _told(found, simulator, (refitted, values))
+    told = _told(found, begun, (refitted, values))
     if not is_confirmed:
         return replace(told, confirmed="surrogate")
     return _confirmed(told, found, (runs, values), on_round)
@@ -249,11 +250,11 @@ def _sse(signals: Sequence[Signals], runs: Sequence[SimulatorRun]) -> np.ndarray
 
 def _told(
     findings: Findings,
-    simulator: Simulator,
+    begun: Begun,
     values: tuple[Mapping[str, float], Mapping[str, float]],
 ) -> Diagnosis:
     """The diagnosis with the simulation's own parameters, re-fitted and at last."""
-    told = describe(findings)
+    told, simulator = describe(findings), begun.runs.simulator
     base = tuple(
         BaseParameter(name, one.value, *(of[name] for of in values))
         for name, one in simulator.free.items()
@@ -263,6 +264,8 @@ def _told(
     # Without an effect the table says whose gap this is.
     if base and told.effects and not change.is_none:
         warnings = (*warnings, _BESIDE_PARAMETERS)
+    said = starts_sentence(begun.starts.above, begun.problem.unit)
+    warnings = (*warnings, said) if said else warnings
     return replace(
         told,
         base=base or told.base,

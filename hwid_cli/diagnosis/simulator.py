@@ -1,7 +1,7 @@
 """A simulation of any kind as the diagnosis sees it, and its runs on recordings."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -59,10 +59,18 @@ class Simulator:
 
 @dataclass(frozen=True, eq=False)
 class Runs:
-    """Runs of a simulation on recordings, by whoever runs tasks."""
+    """Runs of a simulation on recordings, by whoever runs tasks.
+
+    Parameters
+    ----------
+    starts : mapping of str to float, [output unit]
+        What is added to the outputs of recordings, by their names: a machine that goes
+        on from where it is, beside a simulation that always starts at one place.
+    """
 
     simulator: Simulator
     run_tasks: RunTasks
+    starts: Mapping[str, float] = field(default_factory=dict)
 
     def of(
         self,
@@ -87,10 +95,9 @@ class Runs:
         """
         run = self.simulator.run
         if run is None:
-            return [
-                SimulatorRun(self.simulator.given[one.name], np.zeros(0))
-                for one in signals
-            ]
+            given = self.simulator.given
+            found = [SimulatorRun(given[one.name], np.zeros(0)) for one in signals]
+            return self.from_starts(signals, found)
         tasks = []
         for row, one in enumerate(signals):
             force = forces[row] if forces else NO_FORCE
@@ -109,7 +116,18 @@ class Runs:
                     (driven_by, force),
                 )
             )  # fmt: skip
-        return list(self.run_tasks(tasks, keep=True))
+        return self.from_starts(signals, self.run_tasks(tasks, keep=True))
+
+    def from_starts(
+        self, signals: Sequence[Signals], found: Sequence[SimulatorRun]
+    ) -> list[SimulatorRun]:
+        """Runs from where their recordings start."""
+        return [
+            replace(run, output=run.output + self.starts[one.name])
+            if one.name in self.starts
+            else run
+            for one, run in zip(signals, found, strict=True)
+        ]
 
     def tried(
         self,

@@ -12,6 +12,7 @@ import numpy as np
 from hwid_cli.diagnosis.base_fit import compared_as_given
 from hwid_cli.diagnosis.diagnose import held_out_of
 from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals, prepare
+from hwid_cli.diagnosis.run_starts import Begun, begin
 from hwid_cli.diagnosis.simulator import Runs, Simulator
 from hwid_cli.diagnosis.stand_in import (
     derived,
@@ -48,7 +49,7 @@ def stand_in_for(
     run_tasks: RunTasks,
     *,
     may_curve: bool = True,
-) -> tuple[StandIn, tuple[Signals, ...]]:
+) -> tuple[StandIn, Begun]:
     """Plain drive that stands for a simulation that can be run, and what it was fitted to.
 
     Parameters
@@ -62,13 +63,27 @@ def stand_in_for(
     """
     held_out = held_out_of(recordings, options)
     problem = prepare(recordings, ITS_OWN, options, held_out)
-    runs = Runs(simulator, run_tasks)
-    given = runs.of(problem.signals, simulator.values)
-    drive = _standing(problem, given, may_curve=may_curve)
-    return (
-        _in_newtons(runs, problem.signals, given, simulator.values, drive),
-        problem.signals,
-    )
+    begun = begin(problem, simulator, options, run_tasks)
+    given, signals = begun.given, begun.problem.signals
+    drive = _standing(begun.problem, given, may_curve=may_curve)
+    return _in_newtons(begun.runs, signals, given, simulator.values, drive), begun
+
+
+def outputs_as_given(
+    recordings: Sequence[Recording],
+    simulator: Simulator,
+    options: DiagnoseOptions,
+    run_tasks: RunTasks,
+) -> dict[str, np.ndarray]:
+    """What a simulation gives by itself, from where the recordings start.
+
+    Returns
+    -------
+    dict of str to ndarray, shape (n_samples,)
+        By the names of the recordings.
+    """
+    problem = prepare(recordings, ITS_OWN, options, held_out_of(recordings, options))
+    return begin(problem, simulator, options, run_tasks).outputs
 
 
 def outputs_of_stand_in(
@@ -87,10 +102,12 @@ def outputs_of_stand_in(
         By the names of the recordings.
     """
     problem = prepare(recordings, ITS_OWN, options, held_out_of(recordings, options))
-    runs = Runs(simulator, run_tasks)
-    given = runs.of(problem.signals, simulator.values)
-    standing = standing_beside(runs, problem, given, simulator.values)
-    return {one.signals.name: one.simulated for one in compared_as_given(standing)}
+    begun = begin(problem, simulator, options, run_tasks)
+    standing = standing_beside(begun.runs, begun.problem, begun.given, simulator.values)
+    return {
+        one.signals.name: one.simulated + begun.starts.of_sensor(one.signals.name)
+        for one in compared_as_given(standing)
+    }
 
 
 def standing_beside(

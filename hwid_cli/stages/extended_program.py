@@ -51,7 +51,7 @@ def extended_program(
     section: Any = extended_foreign(diagnosis, program)
     simulator = simulator_of(section, given.recordings, given.logs)
     # What is exported holds a drive with a straight spring.
-    plain, signals = stand_in_for(
+    plain, begun = stand_in_for(
         given.recordings, simulator, given.options, in_turn, may_curve=False
     )
     stand_in = replace(
@@ -60,7 +60,8 @@ def extended_program(
         reference_current_A=diagnosis.reference_current_A,
         reference_displacement_m=diagnosis.reference_displacement_m,
     )
-    return ExtendedProgram(ExtendedSimulation(section, plain, stand_in), signals)
+    extended = ExtendedSimulation(section, plain, stand_in)
+    return ExtendedProgram(extended, begun.lowered)
 
 
 def _run_of(extended: ExtendedSimulation) -> Callable[[RunRequest], ExtendedRun]:

@@ -1,6 +1,6 @@
 """A simulation of the user's own, from its section to what the diagnosis works with."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
@@ -10,7 +10,11 @@ import numpy as np
 
 from hwid_cli.diagnosis.simulator import Simulator
 from hwid_cli.diagnosis.stand_in import with_change
-from hwid_cli.diagnosis.standing import outputs_of_stand_in, stand_in_for
+from hwid_cli.diagnosis.standing import (
+    outputs_as_given,
+    outputs_of_stand_in,
+    stand_in_for,
+)
 from hwid_cli.diagnosis.tasks import DiagnosisTask
 from hwid_cli.errors import ConfigError, ModelFileError, SimulationError
 from hwid_cli.export.json_reader import read_exported
@@ -24,6 +28,7 @@ from hwid_cli.records.model import HammersteinWiener
 from hwid_cli.records.programs import (
     ForeignSimulation,
     RunRequest,
+    SimulatorRun,
     StandInChange,
 )
 from hwid_cli.records.recordings import CalibrationLog, Recording
@@ -227,13 +232,18 @@ def simulated(
 def _answers(
     simulator: Simulator, recordings: Sequence[Recording], diagnosed: DiagnoseOptions
 ) -> Callable[[Recording], np.ndarray]:
-    """From a recording to what the simulation makes of its input."""
+    """From a recording to what the simulation makes of its input, from where that starts."""
     run = simulator.run
-    if run is None and simulator.is_extended:
-        of_stand_in = outputs_of_stand_in(recordings, simulator, diagnosed, in_turn)
-        return lambda one: of_stand_in[one.name]
+    if not simulator.is_extended:
+        return _by_name(outputs_as_given(recordings, simulator, diagnosed, in_turn))
     if run is None:
-        return lambda one: simulator.given[one.name]
+        return _by_name(outputs_of_stand_in(recordings, simulator, diagnosed, in_turn))
+    plain, begun = stand_in_for(recordings, simulator, diagnosed, in_turn)
+    effects = {name: dict(values) for name, values in simulator.effects.items()}
+    changed = with_change(plain, simulator.change)
+    drives = (plain, replace(changed, effects=effects))
+    has_force = simulator.capabilities.force
+    starts = begun.starts
 
     def request(one: Recording) -> RunRequest:
         nothing, values = np.zeros(0), simulator.values
@@ -241,16 +251,20 @@ def _answers(
             one.name, one.sample_time_s, np.array(one.input), nothing, values
         )
 
-    if not simulator.is_extended:
-        return lambda one: run(request(one)).output
-    plain, _ = stand_in_for(recordings, simulator, diagnosed, in_turn)
-    effects = {name: dict(values) for name, values in simulator.effects.items()}
-    changed = with_change(plain, simulator.change)
-    drives = (plain, replace(changed, effects=effects))
-    has_force = simulator.capabilities.force
+    def moved(asked: RunRequest) -> SimulatorRun:
+        found = run(asked)
+        return replace(
+            found, output=found.output + starts.of_places.get(asked.name, 0.0)
+        )
+
     return lambda one: (
-        run_extended(run, request(one), drives, has_force=has_force).output
+        run_extended(moved, request(one), drives, has_force=has_force).output
+        + starts.of_sensor(one.name)
     )
+
+
+def _by_name(found: Mapping[str, np.ndarray]) -> Callable[[Recording], np.ndarray]:
+    return lambda one: found[one.name]
 
 
 def in_turn(tasks: Sequence[DiagnosisTask], *, keep: bool) -> list[Any]:  # noqa: ARG001

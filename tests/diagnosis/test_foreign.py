@@ -10,6 +10,7 @@ from scipy.signal import lsim
 from hwid_cli import Recording
 from hwid_cli.diagnosis import foreign
 from hwid_cli.diagnosis.foreign import diagnose_foreign
+from hwid_cli.diagnosis.run_starts import Begun, RunStarts
 from hwid_cli.diagnosis.simulator import Runs, Simulator
 from hwid_cli.diagnosis.standing import stand_in_for
 from hwid_cli.diagnosis.verdict import DiagnosisVerdict
@@ -125,11 +126,11 @@ def test_references_of_a_stand_in_are_those_of_the_training_recordings():
     able = Capabilities(run=True, parameters=True, force=True)
     found = recordings()
     held = [one.name for one in found if np.max(np.abs(one.input)) > 2.6]
-    drive, signals = stand_in_for(
+    drive, begun = stand_in_for(
         found, Simulator(able, simulate, {}, FREE, GIVEN),
         DiagnoseOptions(hold_out=tuple(held)), Count(),
     )  # fmt: skip
-    assert len(signals) == len(found) > len(held) > 0
+    assert len(begun.problem.signals) == len(found) > len(held) > 0
     assert drive.reference_current_A == 2.5
 
 
@@ -190,10 +191,10 @@ def test_a_push_that_a_simulation_does_not_bear_is_made_weaker():
 def test_a_simulation_is_not_run_with_a_force_that_is_not_finite():
     able = Capabilities(run=True, force=True)
     found = recordings()
-    _, signals = stand_in_for(
+    _, begun = stand_in_for(
         found, Simulator(able, simulate, {}, FREE, GIVEN), DiagnoseOptions(), Count()
     )
-    runs = Runs(Simulator(able, simulate, {}, FREE, GIVEN), Count())
+    runs, signals = Runs(begun.runs.simulator, Count()), begun.problem.signals
     force = [np.full(N, np.nan)] * len(signals)
     assert runs.tried(signals, GIVEN, force) is None
     with pytest.raises(
@@ -642,7 +643,14 @@ def test_forces_in_the_place_of_parameters_are_told(
     monkeypatch.setattr(foreign, "_change_of", lambda *_: change)
     able = Capabilities(run=True, parameters=True)
     simulator = Simulator(able, simulate, {}, FREE if is_free else {}, GIVEN)
-    told = foreign._told(None, simulator, (GIVEN, GIVEN))
+    begun = Begun(
+        SimpleNamespace(unit="mm"),
+        Runs(simulator, Count()),
+        (),
+        RunStarts({"step": 1.5}),
+    )
+    told = foreign._told(None, begun, (GIVEN, GIVEN))
+    assert "start 1.5 to 1.5 mm from where the simulation does" in told.warnings[-1]
     texts = [one for one in told.warnings if "simulation.stand_in" in one]
     assert len(texts) == n_said
     assert told.stand_in == change
