@@ -6,6 +6,7 @@ from hwid_cli.cli.closing import say_end
 from hwid_cli.cli.driver import result_of, show_blocks
 from hwid_cli.cli.options import Choices
 from hwid_cli.cli.session import Session, Timer, context_of, open_session
+from hwid_cli.diagnosis.run_starts import starts_sentence
 from hwid_cli.report.diagnosis import simulated_table
 from hwid_cli.report.formats import counted
 from hwid_cli.stages.diagnose import choose, simulated_recordings
@@ -55,4 +56,6 @@ def _simulate_drive(session: Session) -> None:
     has_controller = getattr(given.simulation, "controller", None) is not None
     side = "input" if has_controller else "output"
     unit = getattr(given.recordings[0], f"{side}_unit")
+    if said := starts_sentence({one.name: one.start for one in curves}, unit):
+        _log.warning("%s", said)
     show_blocks(session, [simulated_table(curves, side, unit)])

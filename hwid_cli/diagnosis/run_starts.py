@@ -83,13 +83,11 @@ class Begun:
             _lowered(one, above.get(one.name, 0.0)) for one in self.problem.signals
         )
 
-    @property
-    def outputs(self) -> dict[str, np.ndarray]:
-        """What the simulation gives beside the recordings as they were measured."""
-        pairs = zip(self.problem.signals, self.given, strict=True)
-        return {
-            one.name: run.output + self.starts.of_sensor(one.name) for one, run in pairs
-        }
+    def beside_recordings(self, outputs: Sequence[np.ndarray]) -> dict[str, np.ndarray]:
+        """Outputs by the names of the recordings, beside these as they were measured."""
+        names = [one.name for one in self.problem.signals]
+        pairs = zip(names, outputs, strict=True)
+        return {name: one + self.starts.of_sensor(name) for name, one in pairs}
 
 
 def begin(

@@ -42,15 +42,13 @@ _WEAKER = 0.1
 ITS_OWN = SimulationOptions(hold=LINE)
 
 
-def stand_in_for(
+def as_given(
     recordings: Sequence[Recording],
     simulator: Simulator,
     options: DiagnoseOptions,
     run_tasks: RunTasks,
-    *,
-    may_curve: bool = True,
-) -> tuple[StandIn, Begun]:
-    """Plain drive that stands for a simulation that can be run, and what it was fitted to.
+) -> Begun:
+    """Recordings and what a simulation gives by itself, from where they start.
 
     Parameters
     ----------
@@ -58,40 +56,25 @@ def stand_in_for(
         At least one.
     options : DiagnoseOptions
         Which of them are held out: laws that need a reference count from the others.
+    """
+    problem = prepare(recordings, ITS_OWN, options, held_out_of(recordings, options))
+    return begin(problem, simulator, options, run_tasks)
+
+
+def stand_in_for(begun: Begun, *, may_curve: bool = True) -> StandIn:
+    """Plain drive that stands for a simulation that can be run.
+
+    Parameters
+    ----------
     may_curve : bool
         Whether its spring may be curved.
     """
-    held_out = held_out_of(recordings, options)
-    problem = prepare(recordings, ITS_OWN, options, held_out)
-    begun = begin(problem, simulator, options, run_tasks)
-    given, signals = begun.given, begun.problem.signals
-    drive = _standing(begun.problem, given, may_curve=may_curve)
-    return _in_newtons(begun.runs, signals, given, simulator.values, drive), begun
+    problem, runs, given = begun.problem, begun.runs, begun.given
+    drive = _standing(problem, given, may_curve=may_curve)
+    return _in_newtons(runs, problem.signals, given, runs.simulator.values, drive)
 
 
-def outputs_as_given(
-    recordings: Sequence[Recording],
-    simulator: Simulator,
-    options: DiagnoseOptions,
-    run_tasks: RunTasks,
-) -> dict[str, np.ndarray]:
-    """What a simulation gives by itself, from where the recordings start.
-
-    Returns
-    -------
-    dict of str to ndarray, shape (n_samples,)
-        By the names of the recordings.
-    """
-    problem = prepare(recordings, ITS_OWN, options, held_out_of(recordings, options))
-    return begin(problem, simulator, options, run_tasks).outputs
-
-
-def outputs_of_stand_in(
-    recordings: Sequence[Recording],
-    simulator: Simulator,
-    options: DiagnoseOptions,
-    run_tasks: RunTasks,
-) -> dict[str, np.ndarray]:
+def outputs_of_stand_in(begun: Begun) -> dict[str, np.ndarray]:
     """What the drive that stands for a simulation says with what was added to it.
 
     All that can be said of one that cannot be run.
@@ -101,13 +84,11 @@ def outputs_of_stand_in(
     dict of str to ndarray, shape (n_samples,)
         By the names of the recordings.
     """
-    problem = prepare(recordings, ITS_OWN, options, held_out_of(recordings, options))
-    begun = begin(problem, simulator, options, run_tasks)
-    standing = standing_beside(begun.runs, begun.problem, begun.given, simulator.values)
-    return {
-        one.signals.name: one.simulated + begun.starts.of_sensor(one.signals.name)
-        for one in compared_as_given(standing)
-    }
+    values = begun.runs.simulator.values
+    standing = standing_beside(begun.runs, begun.problem, begun.given, values)
+    return begun.beside_recordings(
+        [one.simulated for one in compared_as_given(standing)]
+    )
 
 
 def standing_beside(

@@ -310,6 +310,8 @@ class DriveResponse:
         command and the simulated one.
     rms : float
         Of measured minus simulated, in the unit of what is compared.
+    start : float
+        By how much the recording starts above the simulation, which was added to it.
     """
 
     name: str
@@ -318,3 +320,4 @@ class DriveResponse:
     measured: np.ndarray
     simulated: np.ndarray
     rms: float
+    start: float = 0.0

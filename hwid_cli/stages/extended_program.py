@@ -10,7 +10,7 @@ import numpy as np
 
 from hwid_cli.diagnosis.problem import Signals
 from hwid_cli.diagnosis.stand_in import with_change
-from hwid_cli.diagnosis.standing import stand_in_for
+from hwid_cli.diagnosis.standing import as_given, stand_in_for
 from hwid_cli.errors import SimulationError
 from hwid_cli.records.diagnosis import Diagnosis
 from hwid_cli.records.programs import Program, RunRequest
@@ -51,9 +51,8 @@ def extended_program(
     section: Any = extended_foreign(diagnosis, program)
     simulator = simulator_of(section, given.recordings, given.logs)
     # What is exported holds a drive with a straight spring.
-    plain, begun = stand_in_for(
-        given.recordings, simulator, given.options, in_turn, may_curve=False
-    )
+    begun = as_given(given.recordings, simulator, given.options, in_turn)
+    plain = stand_in_for(begun, may_curve=False)
     stand_in = replace(
         with_change(plain, section.stand_in),
         effects=section.effects,

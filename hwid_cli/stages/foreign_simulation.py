@@ -1,6 +1,6 @@
 """A simulation of the user's own, from its section to what the diagnosis works with."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
@@ -8,13 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from hwid_cli.diagnosis.run_starts import Begun
 from hwid_cli.diagnosis.simulator import Simulator
 from hwid_cli.diagnosis.stand_in import with_change
-from hwid_cli.diagnosis.standing import (
-    outputs_as_given,
-    outputs_of_stand_in,
-    stand_in_for,
-)
+from hwid_cli.diagnosis.standing import as_given, outputs_of_stand_in, stand_in_for
 from hwid_cli.diagnosis.tasks import DiagnosisTask
 from hwid_cli.errors import ConfigError, ModelFileError, SimulationError
 from hwid_cli.export.json_reader import read_exported
@@ -217,54 +214,45 @@ def simulated(
         How a diagnosis divides the recordings.
     """
     simulator = simulator_of(options, recordings, logs)
-    answer = _answers(simulator, recordings, diagnosed)
+    begun = as_given(recordings, simulator, diagnosed, in_turn)
+    outputs = _outputs(begun)
     found = []
     for one in recordings:
-        output = answer(one)
+        output, start = outputs[one.name], begun.starts.above.get(one.name, 0.0)
         rms = float(np.sqrt(np.mean(np.square(one.output - output))))
         time_s = one.sample_time_s * np.arange(one.n_samples)
         found.append(
-            DriveResponse(one.name, time_s, one.input, one.output, output, rms)
+            DriveResponse(one.name, time_s, one.input, one.output, output, rms, start)
         )
     return tuple(found)
 
 
-def _answers(
-    simulator: Simulator, recordings: Sequence[Recording], diagnosed: DiagnoseOptions
-) -> Callable[[Recording], np.ndarray]:
-    """From a recording to what the simulation makes of its input, from where that starts."""
+def _outputs(begun: Begun) -> dict[str, np.ndarray]:
+    """What the simulation makes of the recordings' inputs, with what was added to it."""
+    simulator = begun.runs.simulator
     run = simulator.run
     if not simulator.is_extended:
-        return _by_name(outputs_as_given(recordings, simulator, diagnosed, in_turn))
+        return begun.beside_recordings([one.output for one in begun.given])
     if run is None:
-        return _by_name(outputs_of_stand_in(recordings, simulator, diagnosed, in_turn))
-    plain, begun = stand_in_for(recordings, simulator, diagnosed, in_turn)
+        return outputs_of_stand_in(begun)
+    plain = stand_in_for(begun)
     effects = {name: dict(values) for name, values in simulator.effects.items()}
     changed = with_change(plain, simulator.change)
     drives = (plain, replace(changed, effects=effects))
-    has_force = simulator.capabilities.force
-    starts = begun.starts
-
-    def request(one: Recording) -> RunRequest:
-        nothing, values = np.zeros(0), simulator.values
-        return RunRequest(
-            one.name, one.sample_time_s, np.array(one.input), nothing, values
-        )
+    places, has_force = begun.starts.of_places, simulator.capabilities.force
 
     def moved(asked: RunRequest) -> SimulatorRun:
         found = run(asked)
-        return replace(
-            found, output=found.output + starts.of_places.get(asked.name, 0.0)
+        return replace(found, output=found.output + places.get(asked.name, 0.0))
+
+    outputs = []
+    for one in begun.problem.signals:
+        request = RunRequest(
+            one.name, one.sample_time_s, one.driven_by, np.zeros(0), simulator.values
         )
-
-    return lambda one: (
-        run_extended(moved, request(one), drives, has_force=has_force).output
-        + starts.of_sensor(one.name)
-    )
-
-
-def _by_name(found: Mapping[str, np.ndarray]) -> Callable[[Recording], np.ndarray]:
-    return lambda one: found[one.name]
+        found = run_extended(moved, request, drives, has_force=has_force)
+        outputs.append(found.output)
+    return begun.beside_recordings(outputs)
 
 
 def in_turn(tasks: Sequence[DiagnosisTask], *, keep: bool) -> list[Any]:  # noqa: ARG001

@@ -12,7 +12,7 @@ from hwid_cli.diagnosis import foreign
 from hwid_cli.diagnosis.foreign import diagnose_foreign
 from hwid_cli.diagnosis.run_starts import Begun, RunStarts
 from hwid_cli.diagnosis.simulator import Runs, Simulator
-from hwid_cli.diagnosis.standing import stand_in_for
+from hwid_cli.diagnosis.standing import as_given, stand_in_for
 from hwid_cli.diagnosis.verdict import DiagnosisVerdict
 from hwid_cli.drive.simulation import NO_FORCE
 from hwid_cli.errors import SimulationError
@@ -126,10 +126,11 @@ def test_references_of_a_stand_in_are_those_of_the_training_recordings():
     able = Capabilities(run=True, parameters=True, force=True)
     found = recordings()
     held = [one.name for one in found if np.max(np.abs(one.input)) > 2.6]
-    drive, begun = stand_in_for(
+    begun = as_given(
         found, Simulator(able, simulate, {}, FREE, GIVEN),
         DiagnoseOptions(hold_out=tuple(held)), Count(),
     )  # fmt: skip
+    drive = stand_in_for(begun)
     assert len(begun.problem.signals) == len(found) > len(held) > 0
     assert drive.reference_current_A == 2.5
 
@@ -163,9 +164,8 @@ def test_a_spring_that_softens_is_pushed_no_farther_than_it_bears():
         for row, one in enumerate(inputs_N)
     ]  # fmt: skip
     assert max(np.max(one.output) for one in found) > 1.6
-    drive, _ = stand_in_for(
-        found, Simulator(able, swings, {}, {}, {}), DiagnoseOptions(), Count()
-    )
+    simulator = Simulator(able, swings, {}, {}, {})
+    drive = stand_in_for(as_given(found, simulator, DiagnoseOptions(), Count()))
     # In N m; without an answer to a push it would be 1.
     assert drive.force_constant_N_per_A == pytest.approx(3.0, rel=0.3)
 
@@ -178,12 +178,8 @@ def test_a_push_that_a_simulation_does_not_bear_is_made_weaker():
             raise SimulationError("the joint has left its range")
         return simulate(request)
 
-    drive, _ = stand_in_for(
-        recordings(),
-        Simulator(able, frail, {}, FREE, GIVEN),
-        DiagnoseOptions(),
-        Count(),
-    )
+    simulator = Simulator(able, frail, {}, FREE, GIVEN)
+    drive = stand_in_for(as_given(recordings(), simulator, DiagnoseOptions(), Count()))
     # 8 N for each V.
     assert drive.force_constant_N_per_A == pytest.approx(8.0, rel=0.1)
 
@@ -191,7 +187,7 @@ def test_a_push_that_a_simulation_does_not_bear_is_made_weaker():
 def test_a_simulation_is_not_run_with_a_force_that_is_not_finite():
     able = Capabilities(run=True, force=True)
     found = recordings()
-    _, begun = stand_in_for(
+    begun = as_given(
         found, Simulator(able, simulate, {}, FREE, GIVEN), DiagnoseOptions(), Count()
     )
     runs, signals = Runs(begun.runs.simulator, Count()), begun.problem.signals

@@ -9,7 +9,7 @@ from scipy.signal import lsim
 from hwid_cli.diagnosis.problem import Signals
 from hwid_cli.diagnosis.run_starts import begin, starts_above, starts_sentence
 from hwid_cli.diagnosis.simulator import Simulator
-from hwid_cli.diagnosis.standing import ITS_OWN, outputs_as_given, prepare
+from hwid_cli.diagnosis.standing import ITS_OWN, prepare
 from hwid_cli.records.experiment import DiagnoseOptions
 from hwid_cli.records.programs import Capabilities, SimulatorRun
 from hwid_cli.records.recordings import Recording
@@ -123,7 +123,7 @@ def test_a_free_axis_runs_from_its_start_and_a_spring_has_a_sensor_with_a_zero(
     # Later runs as well, and what is shown beside the recordings as they were measured.
     again = begun.runs.of(begun.problem.signals, {})
     assert [one.output[0] for one in again] == pytest.approx(firsts)
-    shown = outputs_as_given(found, simulator, options, Count())
+    shown = begun.beside_recordings([one.output for one in begun.given])
     for one in found:
         assert abs(np.mean(one.output - shown[one.name])) < 1e-3
 
