@@ -61,7 +61,10 @@ def _unconfirmed(findings: Findings) -> Findings:
 
 def _with_run(findings: Findings, turn: Turn) -> Findings:
     """Findings with what the simulation itself has left with the effect in it."""
-    fit = fit_of_run(findings, turn)
+    fit, before = fit_of_run(findings, turn), findings.verdict.chosen
+    if not before.effects and before.cause and is_as_good(turn):
+        # No more is left than was told to be noise.
+        fit = replace(fit, whiteness=before.whiteness, cause=before.cause)
     is_complete = findings.criteria.is_complete(fit)
     verdict = replace(findings.verdict, chosen=fit, is_complete=is_complete)
     problem = replace(turn.problem, known={})

@@ -199,7 +199,9 @@ def _cause(criteria: SelectionCriteria, verdict: DiagnosisVerdict) -> str:
             "be wrong by: outputs alone do not tell it from a small effect."
         )
     if not verdict.is_complete:
-        return " The little that is left beyond the noise goes with no effect."
+        is_little = criteria.ratio(verdict.chosen) <= SMALL_REMAINDER
+        what = "The little that" if is_little else "What"
+        return f" {what} is left beyond the noise goes with no effect."
     return ""
 
 

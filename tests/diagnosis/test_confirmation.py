@@ -1,12 +1,15 @@
 """What is found beside a stand-in, put into the simulation itself."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
 
 from hwid_cli.diagnosis import confirmation
 from hwid_cli.diagnosis.findings import Findings
+from hwid_cli.diagnosis.problem import DiagnosisProblem
 from hwid_cli.diagnosis.verdict import DiagnosisVerdict
+from hwid_cli.records.drive import StandIn
 from tests.diagnosis.made_up_fits import CRITERIA, base, made_up
 
 
@@ -37,3 +40,31 @@ def test_two_that_look_alike_are_no_fact_where_its_run_leaves_something(
     assert is_confirmed is is_named
     if not is_named:
         assert found.verdict.word == "unknown"
+
+
+@pytest.mark.parametrize(
+    ("effects", "is_as_good", "cause"),
+    [
+        ((), True, "input_noise"),
+        # More than was told, or told of an effect: the run itself has to show it.
+        ((), False, ""),
+        (("coulomb_friction",), True, ""),
+    ],
+)
+def test_what_was_told_to_be_noise_is_noise_where_the_run_leaves_no_more(
+    monkeypatch, effects, is_as_good, cause
+):
+    whole = base(600_000.0)
+    chosen = replace(made_up(effects, 100.0, whiteness=0.8), cause="input_noise")
+    findings = Findings(
+        problem=None, criteria=CRITERIA, scales=None, given_sse=whole.sse, base=whole,
+        before=[], force=[], where=(), found=None,
+        verdict=DiagnosisVerdict("parameters", True, chosen, ()),
+    )  # fmt: skip
+    run = made_up(effects, 100.0, whiteness=7.0)
+    monkeypatch.setattr(confirmation, "fit_of_run", lambda *_: run)
+    monkeypatch.setattr(confirmation, "is_as_good", lambda _: is_as_good)
+    turn = SimpleNamespace(problem=DiagnosisProblem((), StandIn(1.0, 1.0, 1.0, 1.0)))
+    verdict = confirmation._with_run(findings, turn).verdict
+    assert verdict.chosen.cause == cause
+    assert verdict.is_complete is bool(cause)
