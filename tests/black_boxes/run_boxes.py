@@ -1,7 +1,7 @@
 """Diagnoses every black box and scores the verdicts.
 
 ``python -m tests.black_boxes.run_boxes --work DIR [--only PLANT/EFFECT ...] [--access python|outputs]
-[--noise 0.005] [--write FILE.md]``. Rows are appended to the file as they come; boxes that it
+[--noise 0.005] [--log-noise 0.01] [--write FILE.md]``. Rows are appended to the file as they come; boxes that it
 holds are not run again.
 """
 
@@ -41,8 +41,11 @@ def inputs(plant, rng):
         yield f"multi_{count}", 0.35 * plant.size * waves * on
 
 
-def write_case(folder, plant, effect, *, access, noise, seed, most=""):
-    """Write recordings, the simulation and the configuration of a case."""
+def write_case(folder, plant, effect, *, access, noise, seed, most="", log_noise=0.0):
+    """Write recordings, the simulation and the configuration of a case.
+
+    ``log_noise`` is on the recorded input alone, as a share of its RMS.
+    """
     rng = np.random.default_rng([seed, zlib.crc32(f"{plant.name}/{effect}".encode())])
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "raw").mkdir(exist_ok=True)
@@ -63,9 +66,12 @@ def write_case(folder, plant, effect, *, access, noise, seed, most=""):
     for name, u in signals:
         y = integrate(plant, plant.values, u, DT, hidden)
         y = y + noise * x_max * rng.standard_normal(N)
-        columns, head = [t, u, y], f"time_s,{plant.input},{plant.output}"
+        logged = u
+        if log_noise:
+            logged = u + log_noise * np.sqrt(np.mean(u**2)) * rng.standard_normal(N)
+        columns, head = [t, logged, y], f"time_s,{plant.input},{plant.output}"
         if access == "outputs":
-            found = scope["simulate"](t, {plant.input: u}, given)
+            found = scope["simulate"](t, {plant.input: logged}, given)
             columns.append(found[plant.output])
             head += ",simulated"
         np.savetxt(
@@ -198,6 +204,7 @@ def main():
     parser.add_argument("--only", nargs="+", default=[])
     parser.add_argument("--access", default="python", choices=["python", "outputs"])
     parser.add_argument("--noise", type=float, default=0.005)
+    parser.add_argument("--log-noise", type=float, default=0.0)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--singles", action="store_true", help="no sets, no laws")
     parser.add_argument("--far", action="store_true", help="plants far from a drive")
@@ -235,6 +242,7 @@ def run_box(label, plant, effect, options):
     write_case(
         folder, plant, effect,
         access=options.access, noise=options.noise, seed=options.seed,
+        log_noise=options.log_noise,
         most="max_effects: 1, laws: never" if options.singles else "",
     )  # fmt: skip
     began = time.time()
