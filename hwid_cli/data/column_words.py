@@ -150,6 +150,8 @@ _STATES = [
     *("state", "status", "mode", "flag", "flags", "enable", "enabled", "ready", "bit"),
     *("zustand", "modus", "freigabe", "fault"),
 ]
+# Currents and voltages of an axis, where the axis may stand apart: i_q.
+_OF_AXES = {"iq", "uq", "ia", "ua"}
 # What a unit in brackets says of the role, by its first word.
 _INPUT_UNITS = {"a", "ma", "ka", "v", "mv", "kv", "n", "kn", "nm", "n m", "mnm", "%"}
 _OUTPUT_UNITS = {
@@ -233,9 +235,11 @@ def meaning_of(title: str, stated: str = "") -> Meaning:
     ('reference', '2')
     >>> meaning_of("DriveState").role, meaning_of("drive_current").role
     ('counter', 'input')
+    >>> meaning_of("i_q").role, meaning_of("q_motor").role
+    ('input', 'output')
     """
     bare, unit = split_unit(title)
-    words = _words(bare)
+    words = _with_axes(_words(bare))
     unit = stated or unit
     is_reference = any(
         _rank(word, _REFERENCE) is not None or _ENDS_IN_REF.fullmatch(word)
@@ -314,6 +318,17 @@ def _words(title: str) -> list[str]:
     member = title.replace("/", ".").rstrip(". ").split(".")[-1]
     spaced = re.sub(r"([a-zäöü])([A-ZÄÖÜ])", r"\1 \2", member)
     return [word.lower() for word in re.findall(r"[^\W\d_]+|\d+", spaced)]
+
+
+def _with_axes(words: list[str]) -> list[str]:
+    """Words with the axis of a current or a voltage joined to it: i_q is no position."""
+    joined: list[str] = []
+    for word in words:
+        if joined and joined[-1] + word in _OF_AXES:
+            joined[-1] += word
+        else:
+            joined.append(word)
+    return joined
 
 
 def _words_of_path(title: str) -> list[str]:
