@@ -6,8 +6,9 @@ docs/method_diagnosis.md, eq. (D32), (D33).
 from dataclasses import replace
 
 from hwid_cli.diagnosis.findings import Findings
+from hwid_cli.diagnosis.settling import settled
 from hwid_cli.diagnosis.simulator import Runs
-from hwid_cli.diagnosis.turns import Turn, fit_of_run, is_as_good, settled
+from hwid_cli.diagnosis.turns import Turn, fit_of_run, is_as_good
 from hwid_cli.diagnosis.verdict import DiagnosisVerdict
 
 

@@ -17,10 +17,11 @@ from hwid_cli.diagnosis.selection import (
     is_part_of,
     select_best,
 )
+from hwid_cli.diagnosis.settling import settled
 from hwid_cli.diagnosis.simulator import Runs
 from hwid_cli.diagnosis.stand_in import changes_input
 from hwid_cli.diagnosis.tasks import OnRound
-from hwid_cli.diagnosis.turns import Turn, fit_of_run, settled
+from hwid_cli.diagnosis.turns import Turn, fit_of_run
 from hwid_cli.diagnosis.verdict import decide
 from hwid_cli.drive.catalogue import CATALOGUE, public_id
 from hwid_cli.records.candidates import CandidateFit

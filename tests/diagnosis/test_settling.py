@@ -5,9 +5,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from hwid_cli.diagnosis import turns
+from hwid_cli.diagnosis import settling
 from hwid_cli.diagnosis.foreign import _leaves_less
-from hwid_cli.diagnosis.turns import Turn, settled
+from hwid_cli.diagnosis.settling import settled
+from hwid_cli.diagnosis.turns import Turn
 from tests.diagnosis.made_up_fits import base, made_up
 from tests.diagnosis.small_drive import problem, recordings
 
@@ -41,8 +42,8 @@ def settle(monkeypatch):
             way = "beside free" if turn.values.get("way") == "free" else "beside held"
             return Turn(turn.problem, turn.fit, {"way": way}, 100.0, at_force=True)
 
-        monkeypatch.setattr(turns, "_best_turn", best_turn)
-        monkeypatch.setattr(turns, "_beside_effect", beside_effect)
+        monkeypatch.setattr(settling, "best_turn", best_turn)
+        monkeypatch.setattr(settling, "_beside_effect", beside_effect)
         able = SimpleNamespace(force=True)
         simulator = SimpleNamespace(free={"c": None}, capabilities=able)
         findings = SimpleNamespace(problem=problem(recordings()), base=base(1e5))

@@ -1,0 +1,153 @@
+"""Which way stand-in and simulation settle with an effect.
+
+The simulation's own parameters do what the stand-in's base did; where they had imitated
+the effect they are fitted beside it; only what no parameter can do is left to forces.
+docs/method_diagnosis.md, eq. (D32).
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from hwid_cli.diagnosis.candidate import fitted_drive, rebuilt, without_base
+from hwid_cli.diagnosis.findings import Findings
+from hwid_cli.diagnosis.own_parameters import fit_parameters
+from hwid_cli.diagnosis.parameters import simulate_at
+from hwid_cli.diagnosis.problem import Signals
+from hwid_cli.diagnosis.simulator import Runs
+from hwid_cli.diagnosis.stand_in import derived, force_along, standing_for
+from hwid_cli.diagnosis.standing import standing_beside
+from hwid_cli.diagnosis.turns import (
+    Turn,
+    acts_at_force,
+    best_turn,
+    forces_along,
+    held,
+    is_as_good,
+    pushed,
+    where_it_starts,
+)
+from hwid_cli.records.candidates import CandidateFit
+from hwid_cli.records.drive import Drive
+from hwid_cli.records.programs import SimulatorRun
+
+# The simulation's own parameters rather than further forces, if no more squares are left.
+_PREFERRED = 2.0
+# An effect through the input that leaves more than this share of what the base leaves is
+# tried at the force input as well.
+_CUT_OFF = 0.9
+
+
+def settled(
+    findings: Findings, fit: CandidateFit, runs: Runs, values: dict[str, float]
+) -> Turn | None:
+    """Best run of the simulation with a set of effects; None if it is no better."""
+    has_force = runs.simulator.capabilities.force
+    at_force = acts_at_force(fit, runs)
+    said = float(fit.sse.sum())
+    turn = Turn(findings.problem, fit, values, said, at_force)
+    best = _best_of(findings, turn, runs)
+    without = float(findings.base.sse.sum())
+    if (
+        fit.effects
+        and has_force
+        and not at_force
+        and best.sse.sum() > _CUT_OFF * without
+    ):
+        # A map of the simulation may cut off what should come through its input.
+        other = _best_of(findings, replace(turn, at_force=True), runs)
+        best = min(best, other, key=_left_by)
+    # A run that is worse than without the effect says nothing of it.
+    is_worse = bool(fit.effects) and float(best.sse.sum()) >= without
+    return None if best.tried is None or is_worse else best
+
+
+def _best_of(findings: Findings, turn: Turn, runs: Runs) -> Turn:
+    """Best turn, of those in which the simulation's own parameters may do enough.
+
+    They do what the stand-in's base did; where they cannot, forces that go with
+    displacement, velocity and input do it.
+    """
+    if not runs.simulator.free:
+        return best_turn(findings, turn, runs)
+    first = replace(turn, problem=held(findings.problem))
+    best = best_turn(findings, first, runs)
+    if not is_as_good(best):
+        best = min(best, _again(findings, turn, runs), key=_left_by)
+    # Forces in the place of parameters that nobody could find would pass for the effect's.
+    if best.ran_away or is_as_good(best):
+        return best
+    other = best_turn(findings, turn, runs)
+    if _is_clearly_better(other, best):
+        # Its runs know the effect better than the first stand-in did.
+        best = min(best, _again(findings, other, runs), key=_left_by)
+    return other if _is_clearly_better(other, best) else best
+
+
+def _again(findings: Findings, turn: Turn, runs: Runs) -> Turn:
+    """Best turn from where the simulation's parameters belong beside known effects."""
+    if not turn.fit.effects:
+        return turn
+    return best_turn(findings, _beside_effect(findings, turn, runs), runs)
+
+
+def _left_by(turn: Turn) -> float:
+    return float(turn.sse.sum())
+
+
+def _is_clearly_better(one: Turn, other: Turn) -> bool:
+    return bool(one.sse.sum() * _PREFERRED < other.sse.sum())
+
+
+def _beside_effect(findings: Findings, turn: Turn, runs: Runs) -> Turn:
+    """A first turn with the simulation's parameters as they fit beside known effects.
+
+    Parameters that have imitated an effect are far from where they belong; where the
+    stand-in has moved its base for them, it knows the effect well enough to lead them there.
+    """
+    fit, problem = turn.fit, turn.problem
+    motions = simulate_at(problem, *rebuilt(problem, fit, findings.scales))
+    # Of the effect alone: what the changed base does is no force of it.
+    changed = replace(problem, drive=fitted_drive(problem.drive, fit))
+    names = [one.name for one in problem.signals]
+    forces = dict(zip(names, forces_along(changed, motions), strict=True))
+
+    def ask(
+        signals: Sequence[Signals], values: Mapping[str, float]
+    ) -> list[SimulatorRun] | None:
+        some = replace(problem, signals=tuple(signals))
+        return pushed(
+            runs, some, [forces[one.name] for one in signals], turn.at_force, values
+        )
+
+    values = fit_parameters(ask, problem.signals, runs.simulator.free, turn.values)
+    given, found = runs.tried(problem.signals, values), ask(problem.signals, values)
+    if given is None or found is None:
+        return replace(turn, problem=held(problem))
+    standing = standing_beside(runs, problem, given, values)
+    signals = tuple(
+        _standing_with(standing.drive, one, run, forces[one.name])
+        for one, run in zip(standing.signals, found, strict=True)
+    )
+    there = held(replace(standing, signals=signals))
+    fit = where_it_starts(there, without_base(fit))
+    return Turn(there, fit, values, turn.said, turn.at_force)
+
+
+def _standing_with(
+    drive: Drive, signals: Signals, found: SimulatorRun, force: np.ndarray
+) -> Signals:
+    """Signals with what makes the stand-in move as a run does, with an effect's force.
+
+    Without it both may be far from there.
+
+    Parameters
+    ----------
+    found : SimulatorRun
+        With the force.
+    """
+    plain = replace(drive, effects={})
+    along = force_along(plain, derived(found, signals.sample_time_s), signals.driven_by)
+    there = standing_for(signals, found, plain, along)
+    return replace(there, force=along - force, start=there.own_start)
