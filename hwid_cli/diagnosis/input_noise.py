@@ -22,9 +22,9 @@ from hwid_cli.diagnosis.parameters import (
 from hwid_cli.diagnosis.problem import DiagnosisProblem
 from hwid_cli.diagnosis.search import within_bounds
 from hwid_cli.diagnosis.whiteness import WHITE_BY_TWO_ROUTES, portmanteau
-from hwid_cli.drive.simulation import push_and_damping
+from hwid_cli.diagnosis.whitening_filters import Innovations, Whitening, noisy_drives
 from hwid_cli.records.diagnosis import LEAST_SURE, SMALL_REMAINDER, NoiseFloor
-from hwid_cli.records.drive import HELD, Drive
+from hwid_cli.records.drive import Drive
 
 # The input's noise may be so many times what its differences show.
 _LESS_NOISE, _MORE_NOISE = 0.7, 1.3
@@ -296,10 +296,7 @@ class _Filters:
         output_rms: float,
         levels: "_Levels",
     ) -> None:
-        pairs = list(zip(drives, problem.signals, strict=True))
-        kinds = {(id(one), signals.sample_time_s): one for one, signals in pairs}
-        self._sampled = {key: _sampled(one, key[1]) for key, one in kinds.items()}
-        self._kinds = [(id(one), signals.sample_time_s) for one, signals in pairs]
+        self._drives = noisy_drives(drives, problem.signals)
         self._levels = levels
         self._output_rms = output_rms
 
@@ -320,9 +317,10 @@ class _Filters:
             found = self._filtered(parts, most * np.exp(power))
             if found is None:
                 return _IMPOSSIBLE
-            count = sum(one.size for one, _ in found)
-            logs = sum(one.size * np.log(variance) for one, variance in found)
-            size = float(count * np.log(_per_variance(found)) + logs)
+            values = [one.values for one in found]
+            logs = sum(one.log_variances for one in found)
+            mean = max(_mean_square(values), np.finfo(float).tiny)
+            size = float(_count(values) * np.log(mean) + logs)
             return size if np.isfinite(size) else _IMPOSSIBLE
 
         found = scipy.optimize.minimize_scalar(
@@ -335,8 +333,8 @@ class _Filters:
 
     def output_rms(self, parts: Sequence[np.ndarray], share: float) -> float:
         """Noise of the output that goes with this share of the input's."""
-        found = self._filtered(parts, share)
-        return np.inf if found is None else float(np.sqrt(_per_variance(found)))
+        found = self.innovations(parts, share)
+        return np.inf if found is None else float(np.sqrt(_mean_square(found)))
 
     def innovations(
         self, parts: Sequence[np.ndarray], share: float
@@ -346,7 +344,7 @@ class _Filters:
         None without a filter.
         """
         found = self._filtered(parts, share)
-        return None if found is None else [one / np.sqrt(size) for one, size in found]
+        return None if found is None else [one.values for one in found]
 
     def is_as_large(self, parts: Sequence[np.ndarray], share: float) -> bool:
         """Whether residuals are as large as noise of this size would make them.
@@ -381,10 +379,10 @@ class _Filters:
         ``output`` is the variance of the output's noise.
         """
         expected, spread = 0.0, 2.0 * output**2 * _count(parts)
-        for part, kind, ratio in zip(
-            parts, self._kinds, self._levels.ratio, strict=True
+        for part, drive, ratio in zip(
+            parts, self._drives, self._levels.ratio, strict=True
         ):
-            moved, n_free = _moved(self._sampled[kind], part.size)
+            moved, n_free = drive.moved(part.size)
             moved *= (ratio * share) ** 2 * output * part.size
             expected += moved
             spread += 2.0 * moved**2 / n_free
@@ -394,136 +392,26 @@ class _Filters:
         self, parts: Sequence[np.ndarray], share: float
     ) -> list[np.ndarray]:
         """Innovations in units of their deviation; residuals where there is no filter."""
-        found = self._filtered(parts, share)
+        found = self.innovations(parts, share)
         if found is None:
             return list(parts)
-        return [one / (self._output_rms * np.sqrt(size)) for one, size in found]
+        return [one / self._output_rms for one in found]
 
     def _filtered(
         self, parts: Sequence[np.ndarray], share: float
-    ) -> list[tuple[np.ndarray, float]] | None:
-        """Innovations over the recording's level of noise, each with its variance.
-
-        Variances are in units of the output's noise.
-        """
-        filters: dict[tuple[object, float], _Whitening | None] = {}
+    ) -> list[Innovations] | None:
+        """Innovations over the recording's level of noise; None without a filter."""
+        filters: dict[tuple[int, float], Whitening | None] = {}
         found = []
         levels = zip(self._levels.output, self._levels.ratio, strict=True)
-        for part, kind, (level, ratio) in zip(parts, self._kinds, levels, strict=True):
-            if (kind, ratio) not in filters:
+        for part, drive, (level, ratio) in zip(
+            parts, self._drives, levels, strict=True
+        ):
+            if (id(drive), ratio) not in filters:
                 strength = float(ratio * share) ** 2
-                filters[kind, ratio] = _whitening(self._sampled[kind], strength)
-            one = filters[kind, ratio]
+                filters[id(drive), ratio] = drive.whitening(strength)
+            one = filters[id(drive), ratio]
             if one is None:
                 return None
-            filtered = scipy.signal.lfilter(one.top, one.bottom, part / level)
-            found.append((np.asarray(filtered), one.variance))
+            found.append(one(part / level))
         return found
-
-
-def _per_variance(found: Sequence[tuple[np.ndarray, float]]) -> float:
-    """Mean square of innovations over their variance in units of the output's noise."""
-    count = sum(one.size for one, _ in found)
-    squares = sum(float(one @ one) / size for one, size in found)
-    return max(squares / max(count, 1), np.finfo(float).tiny)
-
-
-@dataclass(frozen=True, eq=False)
-class _Whitening:
-    """Filter from a residual to its innovations.
-
-    Parameters
-    ----------
-    top, bottom : ndarray, shape (n_states + 1,)
-        Its coefficients, the newest sample first.
-    variance : float, [-]
-        Of the innovations, in units of the output's noise.
-    """
-
-    top: np.ndarray
-    bottom: np.ndarray
-    variance: float
-
-
-@dataclass(frozen=True, eq=False)
-class _Sampled:
-    """Linear drive from sample to sample.
-
-    Parameters
-    ----------
-    a : ndarray, shape (n_states, n_states)
-    b : ndarray, shape (n_states,)
-        By which a sample of the input moves the following state.
-    c : ndarray, shape (1, n_states)
-        The reading of a state.
-    through : float
-        By which a sample of the input moves the reading at once.
-    """
-
-    a: np.ndarray
-    b: np.ndarray
-    c: np.ndarray
-    through: float
-
-
-def _moved(sampled: _Sampled, size: int) -> tuple[float, float]:
-    """Mean square of the reading that the input's noise of variance 1 makes from rest.
-
-    Returns
-    -------
-    float
-    float
-        How many draws of its size a recording is worth.
-    """
-    top, bottom = scipy.signal.ss2tf(
-        sampled.a, sampled.b[:, None], sampled.c, np.array([[sampled.through]])
-    )
-    pulse = np.zeros(size)
-    pulse[0] = 1.0
-    impulse = scipy.signal.lfilter(top[0], bottom, pulse)
-    mean_square = float(np.square(impulse) @ (1.0 - np.arange(size) / size))
-    both_ways = scipy.signal.fftconvolve(impulse, impulse[::-1])[size - 1 :]
-    together = np.square(both_ways / both_ways[0]) @ (1.0 - np.arange(size) / size)
-    return mean_square, size / max(2.0 * float(together) - 1.0, 1.0)
-
-
-def _whitening(sampled: _Sampled, strength: float) -> _Whitening | None:
-    """Whitening filter of input and output noise; None where there is none.
-
-    ``strength`` is the variance of the input's noise in units of the output's.
-    """
-    a, b, c, through = sampled.a, sampled.b, sampled.c, sampled.through
-    moved = strength * np.outer(b, b)
-    # The input's noise moves the reading at once, too.
-    both = strength * through * b[:, None]
-    read = np.array([[1.0 + strength * through**2]])
-    try:
-        covariance = scipy.linalg.solve_discrete_are(a.T, c.T, moved, read, s=both)
-    except (np.linalg.LinAlgError, ValueError):
-        return None
-    variance = float((c @ covariance @ c.T)[0, 0]) + float(read[0, 0])
-    correct = ((a @ covariance @ c.T + both) / variance).ravel()
-    bottom = np.poly(a - np.outer(correct, c))
-    return _Whitening(np.poly(a), bottom, variance)
-
-
-def _sampled(drive: Drive, sample_time_s: float) -> _Sampled:
-    """Linear drive from sample to sample, its input held or a straight line between them."""
-    push, damping = push_and_damping(drive)
-    # State, input, and its slope.
-    block = np.zeros((4, 4))
-    block[0, 1] = 1.0
-    block[1, :3] = np.array([-drive.stiffness_N_per_m, -damping, push]) / drive.mass_kg
-    block[2, 3] = 1.0 / sample_time_s
-    step = scipy.linalg.expm(block * sample_time_s)
-    a, rising = step[:2, :2], step[:2, 3]
-    if drive.hold == HELD:
-        rising = np.zeros(2)
-    falling = step[:2, 2] - rising
-    is_velocity = drive.output == "velocity"
-    c = np.array([[0.0, 1.0]]) if is_velocity else np.array([[1.0, 0.0]])
-    b, through = a @ rising + falling, float((c @ rising)[0])
-    if is_velocity and drive.stiffness_N_per_m == 0:
-        # Nothing tells where it is.
-        return _Sampled(a[1:, 1:], b[1:], c[:, 1:], through)
-    return _Sampled(a, b, c, through)

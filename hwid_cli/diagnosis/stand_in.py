@@ -20,6 +20,7 @@ from hwid_cli.diagnosis.scales import scales_of_recordings
 from hwid_cli.diagnosis.search import fit_point
 from hwid_cli.drive.catalogue import CATALOGUE
 from hwid_cli.drive.simulation import Motion, parameter_vector, run, set_start
+from hwid_cli.drive.springs import spring_force, stiffness_at
 from hwid_cli.records.drive import BASE_PARAMETERS, Drive, StandIn
 from hwid_cli.records.programs import SimulatorRun, StandInChange
 
@@ -190,23 +191,7 @@ def _pushes_back(drive: StandIn, widest: float) -> bool:
     """Whether a spring pushes back wherever it is, be it softer there."""
     position = np.linspace(-widest, widest, 101)
     position = position[position != 0]
-    return bool(np.all(_spring_force(drive, position) / position > 0))
-
-
-def _stiffness_at(drive: Drive, position: np.ndarray) -> np.ndarray:
-    quadratic, cubic = _bends(drive)
-    bend = 2 * quadratic + 3 * cubic * position
-    return np.asarray(drive.stiffness_N_per_m + bend * position)
-
-
-def _spring_force(drive: Drive, position: np.ndarray) -> np.ndarray:
-    quadratic, cubic = _bends(drive)
-    bend = quadratic + cubic * position
-    return np.asarray((drive.stiffness_N_per_m + bend * position) * position)
-
-
-def _bends(drive: Drive) -> tuple[float, float]:
-    return drive.bends if isinstance(drive, StandIn) else (0.0, 0.0)
+    return bool(np.all(spring_force(drive, position) / position > 0))
 
 
 def _in_free_run(
@@ -345,7 +330,7 @@ def force_along(drive: Drive, moved: Moved, driven_by: np.ndarray) -> np.ndarray
     return np.asarray(
         drive.mass_kg * moved.acceleration
         + drive.damping_N_s_per_m * moved.velocity
-        + _spring_force(drive, moved.position)
+        + spring_force(drive, moved.position)
         - drive.force_constant_N_per_A * driven_by
     )
 
@@ -365,7 +350,7 @@ def force_of_change(drive: Drive, change: Moved, position: np.ndarray) -> np.nda
     return np.asarray(
         drive.mass_kg * change.acceleration
         + drive.damping_N_s_per_m * change.velocity
-        + _stiffness_at(drive, position) * change.position
+        + stiffness_at(drive, position) * change.position
     )
 
 
@@ -574,8 +559,8 @@ def force_of_motion(drive: Drive, signals: Signals, motion: Motion) -> np.ndarra
     way = np.diff(x)
     # Simpson's rule on the cubics through positions and velocities.
     middle = 0.5 * (x[1:] + x[:-1]) - dt / 8 * np.diff(v)
-    ends = _spring_force(drive, x)
-    area = dt / 6 * (ends[1:] + ends[:-1] + 4 * _spring_force(drive, middle))
+    ends = spring_force(drive, x)
+    area = dt / 6 * (ends[1:] + ends[:-1] + 4 * spring_force(drive, middle))
     impulse = drive.mass_kg * np.diff(v) + drive.damping_N_s_per_m * way + area
     given = drive.force_constant_N_per_A * signals.driven_by
     if signals.force.size:

@@ -25,6 +25,7 @@ from hwid_cli.diagnosis.parameters import (
     residuals_at,
 )
 from hwid_cli.diagnosis.whiteness import portmanteau, whiteness
+from hwid_cli.diagnosis.whitening_filters import straight_drive
 from hwid_cli.records.axis import MotionUnits
 from hwid_cli.records.drive import Controller, StandIn
 from hwid_cli.records.experiment import DiagnoseOptions
@@ -158,7 +159,7 @@ def test_the_filter_is_that_of_any_reading_and_command(of, changes):
     expected = portmanteau(innovations_by_factors(parts, pulse), (1.0,), n_lags=30)
     assert expected < 1
     assert found == pytest.approx(expected, abs=0.04)
-    moved, _ = noise_of_input._moved(noise_of_input._sampled(drive, STEP_S), N)
+    moved, _ = straight_drive(drive, STEP_S).moved(N)
     by_pulse = np.sum(pulse**2 * (1 - np.arange(N) / N))
     assert moved == pytest.approx(by_pulse, rel=1e-3)
 

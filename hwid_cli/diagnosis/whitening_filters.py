@@ -1,0 +1,319 @@
+"""Filters from a residual to its innovations, where noise of the input moves a drive.
+
+A straight spring has one stationary filter; a curved one is another spring at each place,
+and its filter follows the motion. docs/method_diagnosis.md, eq. (D27), (D27a).
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+import scipy
+
+from hwid_cli.compiled import INNER, compiled
+from hwid_cli.diagnosis.problem import Signals
+from hwid_cli.drive.simulation import push_and_damping
+from hwid_cli.drive.springs import stiffness_at
+from hwid_cli.records.drive import HELD, Drive
+
+# Springs that differ along a motion by less than this share of their mean are one.
+_ONE_SPRING = 0.01
+# A curved one is found between so many.
+_N_SPRINGS = 32
+
+
+@dataclass(frozen=True, eq=False)
+class Innovations:
+    """What the samples before do not tell of a residual.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n_samples,)
+        Over their own deviation, in units of the output's noise.
+    log_variances : float
+        Sum of the logarithms of their variances, in the same units.
+    """
+
+    values: np.ndarray
+    log_variances: float
+
+
+# a, b and through of several springs.
+_Tables = tuple[np.ndarray, np.ndarray, np.ndarray]
+Whitening = Callable[[np.ndarray], Innovations]
+
+
+class NoisyDrive(Protocol):
+    """A drive that noise of its input moves, from sample to sample."""
+
+    def whitening(self, strength: float) -> Whitening | None:
+        """From a residual to its innovations; None without a filter.
+
+        Parameters
+        ----------
+        strength : float
+            Variance of the input's noise in units of the output's.
+        """
+
+    def moved(self, size: int) -> tuple[float, float]:
+        """Mean square of the reading that noise of variance 1 makes from rest.
+
+        Returns
+        -------
+        float
+        float
+            How many draws of its size a recording is worth.
+        """
+
+
+@dataclass(frozen=True, eq=False)
+class StraightDrive:
+    """Linear drive from sample to sample.
+
+    Parameters
+    ----------
+    a : ndarray, shape (n_states, n_states)
+    b : ndarray, shape (n_states,)
+        By which a sample of the input moves the following state.
+    c : ndarray, shape (1, n_states)
+        The reading of a state.
+    through : float
+        By which a sample of the input moves the reading at once.
+    """
+
+    a: np.ndarray
+    b: np.ndarray
+    c: np.ndarray
+    through: float
+
+    def covariance(self, strength: float) -> np.ndarray | None:
+        """Of the state before a sample is read, where that has settled; None without one."""
+        b, through = self.b, self.through
+        # The input's noise moves the reading at once, too.
+        both = strength * through * b[:, None]
+        read = np.array([[1.0 + strength * through**2]])
+        moved = strength * np.outer(b, b)
+        try:
+            return np.asarray(
+                scipy.linalg.solve_discrete_are(self.a.T, self.c.T, moved, read, s=both)
+            )
+        except (np.linalg.LinAlgError, ValueError):
+            return None
+
+    def whitening(self, strength: float) -> Whitening | None:
+        """From a residual to its innovations; None without a filter."""
+        covariance = self.covariance(strength)
+        if covariance is None:
+            return None
+        a, c, through = self.a, self.c, self.through
+        both = strength * through * self.b[:, None]
+        variance = float((c @ covariance @ c.T)[0, 0]) + 1.0 + strength * through**2
+        correct = ((a @ covariance @ c.T + both) / variance).ravel()
+        top, bottom = np.poly(a), np.poly(a - np.outer(correct, c))
+
+        def innovations(residual: np.ndarray) -> Innovations:
+            found = np.asarray(scipy.signal.lfilter(top, bottom, residual))
+            logs = residual.size * float(np.log(variance))
+            return Innovations(found / np.sqrt(variance), logs)
+
+        return innovations
+
+    def moved(self, size: int) -> tuple[float, float]:
+        """Mean square of the reading that noise of variance 1 makes from rest."""
+        top, bottom = scipy.signal.ss2tf(
+            self.a, self.b[:, None], self.c, np.array([[self.through]])
+        )
+        pulse = np.zeros(size)
+        pulse[0] = 1.0
+        impulse = scipy.signal.lfilter(top[0], bottom, pulse)
+        mean_square = float(np.square(impulse) @ (1.0 - np.arange(size) / size))
+        both_ways = scipy.signal.fftconvolve(impulse, impulse[::-1])[size - 1 :]
+        together = np.square(both_ways / both_ways[0]) @ (1.0 - np.arange(size) / size)
+        return mean_square, size / max(2.0 * float(together) - 1.0, 1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class CurvedDrive:
+    """A drive with another spring at each place of a motion.
+
+    Parameters
+    ----------
+    mean : StraightDrive
+        With the mean of its springs.
+    springs : tuple of StraightDrive
+        From soft to stiff.
+    at : ndarray, shape (n_samples,)
+        Where between them the spring is after each sample that is evaluated.
+    """
+
+    mean: StraightDrive
+    springs: tuple[StraightDrive, ...]
+    at: np.ndarray
+
+    @cached_property
+    def _tables(self) -> _Tables:
+        """a, b and through of all springs."""
+        a = np.array([one.a for one in self.springs])
+        b = np.array([one.b for one in self.springs])
+        return a, b, np.array([one.through for one in self.springs])
+
+    def whitening(self, strength: float) -> Whitening | None:
+        """From a residual to its innovations; None without a filter."""
+        first = self.mean.covariance(strength)
+        if first is None:
+            return None
+        reading, tables = int(np.argmax(self.mean.c[0])), self._tables
+
+        def innovations(residual: np.ndarray) -> Innovations:
+            values, logs = _along(residual, self.at, tables, reading, strength, first)
+            return Innovations(values, float(logs))
+
+        return innovations
+
+    def moved(self, size: int) -> tuple[float, float]:
+        """Mean square of the reading that noise of variance 1 makes from rest."""
+        reading = int(np.argmax(self.mean.c[0]))
+        _, draws = self.mean.moved(size)
+        return float(_spread(self.at[:size], self._tables, reading)), draws
+
+
+@compiled()
+def _along(
+    residual: np.ndarray,
+    at: np.ndarray,
+    tables: _Tables,
+    reading: int,
+    strength: float,
+    covariance: np.ndarray,
+) -> tuple[np.ndarray, float]:
+    """Kalman filter with the spring of each sample; innovations over their deviations."""
+    values = np.empty(residual.size)
+    x0 = x1 = logs = 0.0
+    p00, p01, p11 = covariance[0, 0], covariance[0, 1], covariance[1, 1]
+    for n in range(residual.size):
+        a00, a01, a10, a11, b0, b1, through = _step_at(tables, at[n])
+        read = x0 if reading == 0 else x1
+        c0, c1 = (p00, p01) if reading == 0 else (p01, p11)
+        variance = (c0 if reading == 0 else c1) + 1.0 + strength * through * through
+        error = residual[n] - read
+        values[n] = error / np.sqrt(variance)
+        logs += np.log(variance)
+        # The input's noise moves the reading at once, too.
+        gain0 = (a00 * c0 + a01 * c1 + strength * through * b0) / variance
+        gain1 = (a10 * c0 + a11 * c1 + strength * through * b1) / variance
+        x0, x1 = (
+            a00 * x0 + a01 * x1 + gain0 * error,
+            a10 * x0 + a11 * x1 + gain1 * error,
+        )
+        p00, p01, p11 = _carried(tables, at[n], (p00, p01, p11), strength)
+        p00 -= variance * gain0 * gain0
+        p01 -= variance * gain0 * gain1
+        p11 -= variance * gain1 * gain1
+    return values, logs
+
+
+@compiled()
+def _spread(at: np.ndarray, tables: _Tables, reading: int) -> float:
+    """Mean variance of the reading that input noise of variance 1 makes from rest."""
+    p = (0.0, 0.0, 0.0)
+    total = 0.0
+    for n in range(at.size):
+        through = _step_at(tables, at[n])[6]
+        total += (p[0] if reading == 0 else p[2]) + through * through
+        p = _carried(tables, at[n], p, 1.0)
+    return total / at.size
+
+
+@compiled(**INNER)
+def _step_at(tables: _Tables, place: float) -> tuple[float, ...]:
+    """The step of a spring between two: a by rows, b, through."""
+    a, b, through = tables
+    j = min(int(place), through.size - 2)
+    w = place - j
+    return (
+        a[j, 0, 0] + w * (a[j + 1, 0, 0] - a[j, 0, 0]),
+        a[j, 0, 1] + w * (a[j + 1, 0, 1] - a[j, 0, 1]),
+        a[j, 1, 0] + w * (a[j + 1, 1, 0] - a[j, 1, 0]),
+        a[j, 1, 1] + w * (a[j + 1, 1, 1] - a[j, 1, 1]),
+        b[j, 0] + w * (b[j + 1, 0] - b[j, 0]),
+        b[j, 1] + w * (b[j + 1, 1] - b[j, 1]),
+        through[j] + w * (through[j + 1] - through[j]),
+    )
+
+
+@compiled(**INNER)
+def _carried(
+    tables: _Tables, place: float, p: tuple[float, float, float], strength: float
+) -> tuple[float, float, float]:
+    """Covariance of the state a sample later: upper row, and the last element."""
+    a00, a01, a10, a11, b0, b1, _ = _step_at(tables, place)
+    p00, p01, p11 = p
+    q00, q01 = a00 * p00 + a01 * p01, a00 * p01 + a01 * p11
+    q10, q11 = a10 * p00 + a11 * p01, a10 * p01 + a11 * p11
+    return (
+        q00 * a00 + q01 * a01 + strength * b0 * b0,
+        q00 * a10 + q01 * a11 + strength * b0 * b1,
+        q10 * a10 + q11 * a11 + strength * b1 * b1,
+    )
+
+
+def noisy_drives(
+    drives: Sequence[Drive], signals: Sequence[Signals]
+) -> list[NoisyDrive]:
+    """What noise of the input moves, for each recording.
+
+    Parameters
+    ----------
+    drives : sequence of Drive
+        Of each recording, with the fitted base.
+    """
+    straight: dict[tuple[int, float], StraightDrive] = {}
+    found: list[NoisyDrive] = []
+    for drive, one in zip(drives, signals, strict=True):
+        stiffness = stiffness_at(drive, one.position[one.evaluated])
+        if np.ptp(stiffness) > _ONE_SPRING * abs(float(np.mean(stiffness))):
+            found.append(_curved(drive, one.sample_time_s, stiffness))
+            continue
+        kind = id(drive), one.sample_time_s
+        if kind not in straight:
+            straight[kind] = straight_drive(drive, one.sample_time_s)
+        found.append(straight[kind])
+    return found
+
+
+def _curved(drive: Drive, sample_time_s: float, stiffness: np.ndarray) -> CurvedDrive:
+    """A drive with the stiffness of each sample."""
+    low, high = float(stiffness.min()), float(stiffness.max())
+    springs = np.linspace(low, high, _N_SPRINGS)
+    at = (stiffness - low) / (high - low) * (_N_SPRINGS - 1)
+
+    def of(spring: float) -> StraightDrive:
+        one = replace(drive, stiffness_N_per_m=float(spring))
+        return straight_drive(one, sample_time_s)
+
+    mean = of(float(np.mean(stiffness)))
+    return CurvedDrive(mean, tuple(of(one) for one in springs), at)
+
+
+def straight_drive(drive: Drive, sample_time_s: float) -> StraightDrive:
+    """Linear drive from sample to sample, its input held or a straight line between them."""
+    push, damping = push_and_damping(drive)
+    # State, input, and its slope.
+    block = np.zeros((4, 4))
+    block[0, 1] = 1.0
+    block[1, :3] = np.array([-drive.stiffness_N_per_m, -damping, push]) / drive.mass_kg
+    block[2, 3] = 1.0 / sample_time_s
+    step = scipy.linalg.expm(block * sample_time_s)
+    a, rising = step[:2, :2], step[:2, 3]
+    if drive.hold == HELD:
+        rising = np.zeros(2)
+    falling = step[:2, 2] - rising
+    is_velocity = drive.output == "velocity"
+    c = np.array([[0.0, 1.0]]) if is_velocity else np.array([[1.0, 0.0]])
+    b, through = a @ rising + falling, float((c @ rising)[0])
+    if is_velocity and drive.stiffness_N_per_m == 0:
+        # Nothing tells where it is.
+        return StraightDrive(a[1:, 1:], b[1:], c[:, 1:], through)
+    return StraightDrive(a, b, c, through)

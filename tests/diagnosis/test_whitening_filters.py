@@ -1,0 +1,119 @@
+"""Innovations of what noise of the input and of the output makes, by a second way."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hwid_cli.diagnosis.input_noise import whiteness_with_input_noise
+from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals
+from hwid_cli.diagnosis.whitening_filters import noisy_drives, straight_drive
+from hwid_cli.records.diagnosis import NoiseFloor
+from hwid_cli.records.drive import StandIn
+
+STEP_S, N = 0.005, 240
+HARD = StandIn(
+    0.5, 1.5, 60.0, 4.0, quadratic_N_per_m2=-20.0, cubic_N_per_m3=900.0
+)  # fmt: skip
+SOFT = replace(HARD, quadratic_N_per_m2=0.0, cubic_N_per_m3=0.0)
+WAY = 0.35 * np.sin(2 * np.pi * 0.9 * STEP_S * np.arange(N))
+
+
+def drive_of(one, way=WAY):
+    signals = Signals("r", "", 0 * way, way, 0 * way, way, STEP_S)
+    return noisy_drives([one], [signals])[0]
+
+
+def answers(one, way=WAY):
+    """Reading of every sample to each sample's unit of input noise: a lower triangle.
+
+    In 40 Euler steps a sample along the motion, its input a straight line between samples.
+    """
+    steps = 40
+    stiffness = one.stiffness_N_per_m
+    if one.cubic_N_per_m3:
+        stiffness = stiffness - 40.0 * way + 2700.0 * way**2
+    stiffness = stiffness + 0 * way
+    found = np.zeros((N, N))
+    noise = np.eye(N)
+    x = v = np.zeros(N)
+    h = STEP_S / steps
+    for n in range(N):
+        found[n] = x
+        if n + 1 == N:
+            break
+        for j in range(steps):
+            share = (j + 0.5) / steps
+            u = (1 - share) * noise[n] + share * noise[n + 1]
+            v = v + h * (4.0 * u - 1.5 * v - stiffness[n] * x) / 0.5
+            x = x + h * v
+    return found
+
+
+@pytest.mark.parametrize("one", [SOFT, HARD])
+def test_innovations_are_those_of_the_whole_covariance(one):
+    """Cholesky's factor of the covariance of all samples does the same at once."""
+    strength = 2e4
+    through = answers(one)
+    whole = np.eye(N) + strength * through @ through.T
+    factor = np.linalg.cholesky(whole)
+    rng = np.random.default_rng(5)
+    values = factor @ rng.standard_normal(N)
+    expected = np.linalg.solve(factor, values)
+    whitening = drive_of(one).whitening(strength)
+    found = whitening(values)
+    # The start apart: the filter begins as if the noise had always been there.
+    n = N // 3
+    np.testing.assert_allclose(found.values[n:], expected[n:], atol=0.15)
+    assert found.log_variances == pytest.approx(
+        2 * np.log(np.diag(factor)).sum(), rel=0.05
+    )
+
+
+LONG = 4000
+NOISE, INPUT_NOISE = 1e-5, 0.02
+
+
+def recording_of(seed):
+    """A motion along the curved spring, and what noise of its input has moved it by."""
+    rng = np.random.default_rng(seed)
+    way = 0.4 * np.sin(2 * np.pi * (0.4 + 0.2 * seed) * STEP_S * np.arange(LONG))
+    noise = INPUT_NOISE * rng.standard_normal(LONG)
+    stiffness = HARD.stiffness_N_per_m - 40.0 * way + 2700.0 * way**2
+    moved, x, v, steps = np.zeros(LONG), 0.0, 0.0, 20
+    h = STEP_S / steps
+    for n in range(LONG - 1):
+        for j in range(steps):
+            u = noise[n] + (j + 0.5) / steps * (noise[n + 1] - noise[n])
+            v += h * (4.0 * u - 1.5 * v - stiffness[n] * x) / 0.5
+            x += h * v
+        moved[n + 1] = x
+    sensor = NOISE * rng.standard_normal(LONG)
+    signals = Signals(f"r{seed}", "", noise, way + sensor, noise, way + sensor, STEP_S)
+    return signals, moved + sensor
+
+
+@pytest.mark.parametrize(("one", "is_noise"), [(HARD, True), (SOFT, False)])
+def test_noise_of_the_input_is_told_along_a_curved_spring(one, is_noise):
+    signals, parts = zip(*(recording_of(seed) for seed in range(4)), strict=True)
+    noise = NoiseFloor(
+        NOISE, "differences", 0.0, False, (1.0,), "", input_rms=INPUT_NOISE
+    )
+    problem = DiagnosisProblem(signals, one)
+    found = whiteness_with_input_noise(parts, problem, [one] * 4, noise)
+    assert (found < 1) is is_noise
+
+
+@pytest.mark.parametrize("one", [SOFT, HARD])
+def test_how_far_noise_moves_the_reading(one):
+    expected = np.mean(np.sum(answers(one) ** 2, axis=1))
+    assert drive_of(one).moved(N)[0] == pytest.approx(expected, rel=0.05)
+
+
+def test_a_spring_that_hardly_bends_is_one():
+    little = replace(HARD, quadratic_N_per_m2=0.0, cubic_N_per_m3=1e-3)
+    found = drive_of(little)
+    straight = straight_drive(little, STEP_S)
+    np.testing.assert_array_equal(found.a, straight.a)
+    assert not hasattr(found, "springs")
+    assert hasattr(drive_of(HARD), "springs")
