@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hwid_cli.diagnosis.base_fit import compared_as_given, fitted_base
+from hwid_cli.diagnosis.base_fit import FittedBase, compared_as_given, fitted_base
 from hwid_cli.diagnosis.candidate import (
     Baseline,
     compared_with_fit,
@@ -39,6 +39,7 @@ from hwid_cli.diagnosis.next_experiment import (
     undecided_candidates,
     with_best_lead,
 )
+from hwid_cli.diagnosis.odd_recordings import with_odd_ones_trained
 from hwid_cli.diagnosis.parameters import each_sum_of_squares
 from hwid_cli.diagnosis.pieces_search import (
     imitates,
@@ -313,6 +314,8 @@ def _searched(
     """Fit the base again, and search for sets of effects."""
     on_round("base", 0)
     fitted = fitted_base(problem)
+    if isinstance(options.hold_out, str):
+        fitted = _with_odd_ones_trained(fitted)
     problem, noise, base = fitted.problem, fitted.noise, fitted.base
     drive = fitted_drive(problem.drive, base)
     before = compared_with_fit(problem, base, fitted.scales)
@@ -330,6 +333,16 @@ def _searched(
     )
     searched = _Searched(rounds, given_sse, before, force, RoundsResult(), (), force)
     return _on_whole_recordings(searched, options.max_effects)
+
+
+def _with_odd_ones_trained(fitted: FittedBase) -> FittedBase:
+    """The base fitted again where the few recordings that hold the gap were held out."""
+    criteria = SelectionCriteria.of(fitted.problem, fitted.noise)
+    if not fitted.base.is_usable or criteria.needs_nothing(fitted.base):
+        return fitted
+    excess = np.maximum(fitted.base.sse - criteria.floors, 0.0)
+    problem = with_odd_ones_trained(fitted.problem, excess)
+    return fitted if problem is fitted.problem else fitted_base(problem)
 
 
 def _on_whole_recordings(searched: _Searched, max_effects: int) -> _Searched:

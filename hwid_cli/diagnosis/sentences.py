@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 
 from hwid_cli.diagnosis.law_names import known_terms
+from hwid_cli.diagnosis.odd_recordings import NEARLY_ALL, rows_of_few
 from hwid_cli.diagnosis.problem import DiagnosisProblem
 from hwid_cli.diagnosis.selection import SelectionCriteria, title_of
 from hwid_cli.diagnosis.verdict import DiagnosisVerdict, lead
@@ -35,10 +36,6 @@ _BEFORE = {
 }
 # Share of the largest displacement that counts as motion to one side.
 _ONE_SIDE = 0.05
-# The gap sits in recordings that hold this share of it ...
-_NEARLY_ALL = 0.95
-# ... and are of one kind, or no more than this share of all.
-_FEW = 1 / 3
 _MOST_NAMED = 6
 # A value off by more than this factor is a wrong one, not an inaccurate one, [-].
 _DOUBTFUL = 3.0
@@ -314,7 +311,7 @@ def _where_it_sits(
 
 def _rows_of_gap(excess: np.ndarray, kinds: list[str]) -> list[int]:
     """Rows of the kind, or of the few recordings, that hold nearly all; else none."""
-    least = _NEARLY_ALL * excess.sum()
+    least = NEARLY_ALL * excess.sum()
     largest = np.argsort(-excess)
     n_most = int(np.searchsorted(np.cumsum(excess[largest]), least)) + 1
     kind = kinds[largest[0]]
@@ -323,7 +320,7 @@ def _rows_of_gap(excess: np.ndarray, kinds: list[str]) -> list[int]:
     is_kind = excess[of_kind].sum() >= least and n_most > len(of_kind) / 2
     if is_kind and len(of_kind) < len(kinds):
         return of_kind
-    return sorted(largest[:n_most]) if n_most <= _FEW * len(kinds) else []
+    return rows_of_few(excess)
 
 
 def doubtful_values(base: Sequence[BaseParameter], drive: Drive) -> tuple[str, ...]:

@@ -6,14 +6,24 @@ from hwid_cli.records.drive import Drive, StandIn
 
 
 def stiffness_at(drive: Drive, position: np.ndarray) -> np.ndarray:
-    """Slope of the spring's force at each place, [N/m]."""
+    """Slope of the spring's force at each place, [N/m].
+
+    Parameters
+    ----------
+    position : ndarray, shape (n,), [m]
+    """
     quadratic, cubic = _bends(drive)
     bend = 2 * quadratic + 3 * cubic * position
     return np.asarray(drive.stiffness_N_per_m + bend * position)
 
 
 def spring_force(drive: Drive, position: np.ndarray) -> np.ndarray:
-    """Force that pulls back at each place, [N]."""
+    """Force that pulls back at each place, [N].
+
+    Parameters
+    ----------
+    position : ndarray, shape (n,), [m]
+    """
     quadratic, cubic = _bends(drive)
     bend = quadratic + cubic * position
     return np.asarray((drive.stiffness_N_per_m + bend * position) * position)

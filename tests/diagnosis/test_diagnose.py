@@ -1,8 +1,11 @@
 """The whole way of a diagnosis, with a runner that keeps nothing."""
 
+from dataclasses import replace
+
 import pytest
 
 from hwid_cli.diagnosis.diagnose import allowed_effects, diagnose
+from hwid_cli.diagnosis.problem import held_out_names
 from hwid_cli.drive.catalogue import CATALOGUE
 from hwid_cli.records.drive import Controller
 from hwid_cli.records.experiment import DiagnoseOptions
@@ -105,3 +108,30 @@ def test_a_second_one_is_tried_until_the_simulation_has_two():
 def test_two_recordings_show_no_change_between_recordings():
     few = allowed_effects(problem(recordings()[:2]), DiagnoseOptions())
     assert not any(CATALOGUE[one].parameters[0].is_own for one in few)
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("is_asked_for", [False, True])
+def test_a_payload_in_one_recording_is_found_wherever_the_plan_has_put_it(is_asked_for):
+    names = [one.name for one in recordings()]
+    held_out = held_out_names(recordings())
+    loaded = names.index(held_out[-1])
+
+    def own(number, drive):
+        return replace(drive, mass_kg=0.4) if number == loaded else drive
+
+    options = DiagnoseOptions(
+        effects=("parameter_change", "coulomb_friction"),
+        hold_out=held_out if is_asked_for else "auto",
+    )
+    given = recordings(own=own)
+    found = diagnose(given, simulation(), options, in_turn, lambda what, count: None)
+    if is_asked_for:
+        # Who says what is held out has it so.
+        assert found.held_out == held_out
+        return
+    assert [one.id for one in found.effects] == ["parameter_change"]
+    assert names[loaded] in found.train
+    assert found.held_out
+    which, _ = found.effects[0].parameters
+    assert which.text == "mass"

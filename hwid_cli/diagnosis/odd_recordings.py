@@ -1,0 +1,76 @@
+"""The few recordings that hold the gap, which a search has to see.
+
+What one recording has and no other, as a payload, is found where it is trained on; held
+out, it can only be told to be off. docs/method_diagnosis.md, eq. (D22a).
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals
+
+# The few hold this share of the gap, and are at most this share of all.
+NEARLY_ALL = 0.95
+FEW = 1 / 3
+
+
+def rows_of_few(excess: np.ndarray) -> list[int]:
+    """Rows of the few recordings that hold nearly all of a gap; none where many do.
+
+    Parameters
+    ----------
+    excess : ndarray, shape (n_recordings,), [output unit squared]
+        Squares over the noise.
+    """
+    if not 0 < excess.sum() < np.inf:
+        return []
+    largest = np.argsort(-excess)
+    n_most = int(np.searchsorted(np.cumsum(excess[largest]), NEARLY_ALL * excess.sum()))
+    few = sorted(int(row) for row in largest[: n_most + 1])
+    return few if len(few) <= FEW * excess.size else []
+
+
+def with_odd_ones_trained(
+    problem: DiagnosisProblem, excess: np.ndarray
+) -> DiagnosisProblem:
+    """The same recordings, those that hold the gap trained on if all of them are held out.
+
+    As many others are held out instead, as large as these, where too few are left. The
+    base alone decides, no candidate.
+
+    Parameters
+    ----------
+    excess : ndarray, shape (n_recordings,), [output unit squared]
+        Squares over the noise that the re-fitted base leaves of each recording.
+    """
+    odd = set(rows_of_few(excess))
+    signals = problem.signals
+    if not odd or not all(signals[row].is_held_out for row in odd):
+        return problem
+    held_out = {row for row, one in enumerate(signals) if one.is_held_out} - odd
+    n_wanted = max(1, len(signals) // 4)
+    while len(held_out) < n_wanted:
+        others = [row for row in range(len(signals)) if row not in held_out | odd]
+        if not others:
+            break
+        held_out.add(min(others, key=lambda row: _unlike(signals, row, odd)))
+    return replace(
+        problem,
+        signals=tuple(
+            replace(one, is_held_out=row in held_out) for row, one in enumerate(signals)
+        ),
+    )
+
+
+def _unlike(signals: Sequence[Signals], row: int, odd: set[int]) -> tuple[bool, float]:
+    """How far a recording is in kind and range from those that it takes the place of."""
+    kinds = {signals[one].kind for one in odd}
+    sizes = [_range(signals[one]) for one in odd]
+    apart = float(np.min(np.abs(np.log(np.array(sizes) / _range(signals[row])))))
+    return signals[row].kind not in kinds, apart
+
+
+def _range(signals: Signals) -> float:
+    return max(float(np.ptp(signals.compared)), np.finfo(float).tiny)
