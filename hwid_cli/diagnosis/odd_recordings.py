@@ -14,6 +14,9 @@ from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals
 # The few hold this share of the gap, and are at most this share of all.
 NEARLY_ALL = 0.95
 FEW = 1 / 3
+# What is off by more than this share of its motion went another way altogether, as a
+# pendulum over the top: a fit to it leads nowhere.
+_MOST_OFF = 0.3
 
 
 def rows_of_few(excess: np.ndarray) -> list[int]:
@@ -47,7 +50,11 @@ def with_odd_ones_trained(
     """
     odd = set(rows_of_few(excess))
     signals = problem.signals
-    if not odd or not all(signals[row].is_held_out for row in odd):
+    may_be_seen = all(
+        signals[row].is_held_out and _share_off(signals[row], excess[row]) <= _MOST_OFF
+        for row in odd
+    )
+    if not odd or not may_be_seen:
         return problem
     held_out = {row for row, one in enumerate(signals) if one.is_held_out} - odd
     n_wanted = max(1, len(signals) // 4)
@@ -62,6 +69,12 @@ def with_odd_ones_trained(
             replace(one, is_held_out=row in held_out) for row, one in enumerate(signals)
         ),
     )
+
+
+def _share_off(signals: Signals, excess: float) -> float:
+    """What the base leaves of a recording, over its motion, [-]."""
+    motion = float(np.std(signals.compared[signals.evaluated]))
+    return float(np.sqrt(excess / signals.n_evaluated)) / max(motion, 1e-300)
 
 
 def _unlike(signals: Sequence[Signals], row: int, odd: set[int]) -> tuple[bool, float]:

@@ -64,9 +64,18 @@ def test_as_many_as_needed_are_held_out_in_its_place_the_most_alike():
 
 
 @pytest.mark.parametrize(
-    "excess", [gap_in(0), gap_in(0, 4), gap_in(0, 1, 4, 6), np.zeros(8)]
+    "excess",
+    [
+        # Trained on already, or too many, or nothing at all.
+        gap_in(0),
+        gap_in(0, 4),
+        gap_in(0, 1, 4, 6),
+        np.zeros(8),
+        # It went another way altogether.
+        100 * gap_in(4),
+    ],
 )
-def test_what_training_sees_already_changes_nothing(excess):
+def test_what_training_sees_or_cannot_use_changes_nothing(excess):
     given = problem()
     assert with_odd_ones_trained(given, excess) is given
 
