@@ -16,7 +16,7 @@ NEARLY_ALL = 0.95
 FEW = 1 / 3
 # What is off by more than this share of its motion went another way altogether, as a
 # pendulum over the top: a fit to it leads nowhere.
-_MOST_OFF = 0.3
+_MOST_OFF = 0.7
 
 
 def rows_of_few(excess: np.ndarray) -> list[int]:
