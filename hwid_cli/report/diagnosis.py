@@ -241,6 +241,10 @@ def is_chosen(candidate: RankedCandidate) -> bool:
     return bool(candidate.effects) and candidate.role == "diagnosis"
 
 
+_OF_SIMULATION = (
+    "The last row is of your simulation itself, run with the effects in it "
+    "(confirmed: simulation)."
+)
 _OF_STAND_IN = (
     "Below 'as given' stands what a drive in the place of the simulation leaves "
     "(confirmed: surrogate); the simulation itself was not run so."

@@ -11,6 +11,7 @@ from hwid_cli.records.axis import MotionUnits
 from hwid_cli.records.diagnosis import BaseParameter, FittedParameter, Gap
 from hwid_cli.records.report import ReportContents, StageRun, StoredResults
 from hwid_cli.report.closing import UNDECIDED_MAPS
+from hwid_cli.report.diagnosis import gap_table
 from hwid_cli.report.html import report_page
 from hwid_cli.report.sections.diagnosis_answer import (
     diagnosis_answer,
@@ -154,10 +155,22 @@ def test_verdicts_without_an_effect():
     )
 
 
-def test_a_stand_in_is_called_one():
-    assert "A linear stand-in was run" in " ".join(
-        answer_to(replace(named(), confirmed="surrogate")).details
-    )
+@pytest.mark.parametrize(
+    ("confirmed", "detail", "note"),
+    [
+        ("surrogate", "A linear stand-in was run", "(confirmed: surrogate)"),
+        ("simulation", "The simulation itself was run", "(confirmed: simulation)"),
+        ("", "", ""),
+    ],
+)
+def test_what_was_run_with_the_effect_is_said(confirmed, detail, note):
+    record = replace(named(), confirmed=confirmed)
+    details, notes = answer_to(record).details, gap_table(record).notes
+    assert detail in " ".join(details)
+    assert note in " ".join(notes)
+    if not confirmed:
+        assert "was run" not in " ".join(details)
+        assert "confirmed" not in " ".join(notes)
 
 
 def test_without_held_out_recordings_the_gap_is_that_of_the_fit():

@@ -241,6 +241,8 @@ def _gap_in_words(diagnosis: Diagnosis) -> str:
     text += "."
     if diagnosis.effects and diagnosis.confirmed == "surrogate":
         text += " A linear stand-in was run with the effect, not the simulation itself."
+    if diagnosis.effects and diagnosis.confirmed == "simulation":
+        text += " The simulation itself was run with the effect."
     return text
 
 
