@@ -5,7 +5,7 @@ and its filter follows the motion. docs/method_diagnosis.md, eq. (D27), (D27a).
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol
 
@@ -289,21 +289,28 @@ def _curved(drive: Drive, sample_time_s: float, stiffness: np.ndarray) -> Curved
     springs = np.linspace(low, high, _N_SPRINGS)
     at = (stiffness - low) / (high - low) * (_N_SPRINGS - 1)
 
-    def of(spring: float) -> StraightDrive:
-        one = replace(drive, stiffness_N_per_m=float(spring))
-        return straight_drive(one, sample_time_s)
-
-    mean = of(float(np.mean(stiffness)))
-    return CurvedDrive(mean, tuple(of(one) for one in springs), at)
+    mean = straight_drive(drive, sample_time_s, float(np.mean(stiffness)))
+    each = tuple(straight_drive(drive, sample_time_s, float(one)) for one in springs)
+    return CurvedDrive(mean, each, at)
 
 
-def straight_drive(drive: Drive, sample_time_s: float) -> StraightDrive:
-    """Linear drive from sample to sample, its input held or a straight line between them."""
+def straight_drive(
+    drive: Drive, sample_time_s: float, stiffness: float | None = None
+) -> StraightDrive:
+    """Linear drive from sample to sample, its input held or a straight line between them.
+
+    Parameters
+    ----------
+    stiffness : float or None, [N/m]
+        In place of the drive's own; below 0 where a spring gives way, as a pendulum's
+        beyond a quarter turn.
+    """
     push, damping = push_and_damping(drive)
+    spring = drive.stiffness_N_per_m if stiffness is None else stiffness
     # State, input, and its slope.
     block = np.zeros((4, 4))
     block[0, 1] = 1.0
-    block[1, :3] = np.array([-drive.stiffness_N_per_m, -damping, push]) / drive.mass_kg
+    block[1, :3] = np.array([-spring, -damping, push]) / drive.mass_kg
     block[2, 3] = 1.0 / sample_time_s
     step = scipy.linalg.expm(block * sample_time_s)
     a, rising = step[:2, :2], step[:2, 3]
@@ -313,7 +320,7 @@ def straight_drive(drive: Drive, sample_time_s: float) -> StraightDrive:
     is_velocity = drive.output == "velocity"
     c = np.array([[0.0, 1.0]]) if is_velocity else np.array([[1.0, 0.0]])
     b, through = a @ rising + falling, float((c @ rising)[0])
-    if is_velocity and drive.stiffness_N_per_m == 0:
+    if is_velocity and spring == 0:
         # Nothing tells where it is.
         return StraightDrive(a[1:, 1:], b[1:], c[:, 1:], through)
     return StraightDrive(a, b, c, through)

@@ -155,6 +155,8 @@ def gap_table(diagnosis: Diagnosis) -> Table:
     notes = [explained_sentence(diagnosis)] if diagnosis.effects else []
     if diagnosis.confirmed == "surrogate":
         notes.append(_OF_STAND_IN)
+    if diagnosis.effects and diagnosis.confirmed == "simulation":
+        notes.append(_OF_SIMULATION)
     if diagnosis.noise.sentence:
         notes.append(f"What counts as noise: {diagnosis.noise.sentence}.")
     return Table(

@@ -30,9 +30,8 @@ def answers(one, way=WAY):
     In 40 Euler steps a sample along the motion, its input a straight line between samples.
     """
     steps = 40
-    stiffness = one.stiffness_N_per_m
-    if one.cubic_N_per_m3:
-        stiffness = stiffness - 40.0 * way + 2700.0 * way**2
+    stiffness = one.stiffness_N_per_m + 2 * one.quadratic_N_per_m2 * way
+    stiffness = stiffness + 3 * one.cubic_N_per_m3 * way**2
     stiffness = stiffness + 0 * way
     found = np.zeros((N, N))
     noise = np.eye(N)
@@ -50,7 +49,11 @@ def answers(one, way=WAY):
     return found
 
 
-@pytest.mark.parametrize("one", [SOFT, HARD])
+# It pushes away at both ends of its way.
+GIVES_WAY = replace(HARD, quadratic_N_per_m2=0.0, cubic_N_per_m3=-300.0)
+
+
+@pytest.mark.parametrize("one", [SOFT, HARD, GIVES_WAY])
 def test_innovations_are_those_of_the_whole_covariance(one):
     """Cholesky's factor of the covariance of all samples does the same at once."""
     strength = 2e4
