@@ -51,7 +51,7 @@ def with_odd_ones_trained(
     odd = set(rows_of_few(excess))
     signals = problem.signals
     may_be_seen = all(
-        signals[row].is_held_out and _share_off(signals[row], excess[row]) <= _MOST_OFF
+        signals[row].is_held_out and not went_another_way(signals[row], excess[row])
         for row in odd
     )
     if not odd or not may_be_seen:
@@ -71,10 +71,16 @@ def with_odd_ones_trained(
     )
 
 
-def _share_off(signals: Signals, excess: float) -> float:
-    """What the base leaves of a recording, over its motion, [-]."""
+def went_another_way(signals: Signals, excess: float) -> bool:
+    """Whether a recording went another way altogether than what a fit makes of it.
+
+    Parameters
+    ----------
+    excess : float, [output unit squared]
+        Squares over the noise.
+    """
     motion = float(np.std(signals.compared[signals.evaluated]))
-    return float(np.sqrt(excess / signals.n_evaluated)) / max(motion, 1e-300)
+    return float(np.sqrt(excess / signals.n_evaluated)) > _MOST_OFF * motion
 
 
 def _unlike(signals: Sequence[Signals], row: int, odd: set[int]) -> tuple[bool, float]:

@@ -6,7 +6,11 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 
 from hwid_cli.diagnosis.law_names import known_terms
-from hwid_cli.diagnosis.odd_recordings import NEARLY_ALL, rows_of_few
+from hwid_cli.diagnosis.odd_recordings import (
+    NEARLY_ALL,
+    rows_of_few,
+    went_another_way,
+)
 from hwid_cli.diagnosis.problem import DiagnosisProblem
 from hwid_cli.diagnosis.selection import SelectionCriteria, title_of
 from hwid_cli.diagnosis.verdict import DiagnosisVerdict, lead
@@ -304,6 +308,12 @@ def _where_it_sits(
     more = len(rows) - _MOST_NAMED
     shown += f" and {more} more" if more > 0 else ""
     text = f" Nearly all of the gap sits in {shown}"
+    if all(went_another_way(signals[row], excess[row]) for row in rows):
+        # A pendulum over the top: one run more or less tells nothing of the machine.
+        return (
+            f"{text}, where the machine went another way altogether: leave that out "
+            "(diagnose.recordings), and diagnose again."
+        )
     if problem.compares_command or problem.start == "estimated":
         return f"{text}."
     return f"{text}: check how they start (diagnose.initial_state)."

@@ -2,9 +2,12 @@
 
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
+from hwid_cli.diagnosis import sentences
 from hwid_cli.diagnosis.sentences import (
     _held_command,
     _named,
@@ -19,6 +22,7 @@ from hwid_cli.records.diagnosis import BaseParameter, FittedEffect, FittedParame
 from hwid_cli.records.drive import StandIn
 from tests.diagnosis.made_up_fits import CRITERIA, base, made_up
 from tests.diagnosis.small_drive import DRIVE, STEP_S, problem, recordings
+from tests.diagnosis.test_odd_recordings import problem as eight_recordings
 
 
 @pytest.mark.parametrize(
@@ -152,3 +156,25 @@ def test_what_shifts_a_signal_by_a_small_part_of_a_sample_is_questioned(
     found = FittedEffect(effect, "", "", (FittedParameter("a", value, 0.0, 1.0),))
     texts = hardly_late([found], 1e-3)
     assert [one.split(":")[0] for one in texts] == ([] if said is None else [said])
+
+
+@pytest.mark.parametrize(
+    ("gap", "said"),
+    [
+        ([0.1] * 8, ""),
+        ([0.0] * 4 + [5.0] + [0.0] * 3, "sits in r4: check how they start"),
+        # Off by as much as it has moved.
+        (
+            [0.0] * 4 + [5000.0] + [0.0] * 3,
+            "sits in r4, where the machine went another",
+        ),
+        ([0.0, 5.0, *[0.0] * 5, 5e4], "sits in r7, where the machine went another way"),
+    ],
+)
+def test_where_the_gap_sits_and_what_to_do_about_it(gap, said):
+    criteria = SimpleNamespace(floors=np.zeros(8))
+    chosen = SimpleNamespace(sse=np.array(gap))
+    text = sentences._where_it_sits(eight_recordings(), criteria, chosen)
+    assert said in text
+    assert bool(said) == bool(text)
+    assert ("diagnose.recordings" in text) == ("another" in said)
