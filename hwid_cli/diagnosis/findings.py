@@ -4,7 +4,7 @@ Gaps, parameters with their intervals, and the curves that show them.
 docs/method_diagnosis.md, eq. (D20).
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -107,18 +107,31 @@ class Findings:
 
         Where another command does as well, the intervals hold what is found beside it.
         """
-        pieces = self.pieces
-        if pieces is None:
-            problem, chosen = self.problem, self.verdict.chosen
-        else:
-            problem, chosen = pieces.problem, pieces.chosen
         if not ids:
             return ()
+        problem, chosen = self._judging
         ends = intervals(problem, chosen, self.scales)
         if self.other is not None:
             beside = intervals(self.other.problem, self.other.fit, self.scales)
             ends = np.fmin(ends[0], beside[0]), np.fmax(ends[1], beside[1])
         return _fitted_effects_of(chosen, ends, ids)
+
+    @property
+    def _judging(self) -> tuple[DiagnosisProblem, CandidateFit]:
+        """The fit that judges, and what it was fitted to."""
+        if self.pieces is None:
+            return self.problem, self.verdict.chosen
+        return self.pieces.problem, self.pieces.chosen
+
+    def intervals_of_base(self) -> dict[str, tuple[float, float]]:
+        """95 % intervals of the base's parameters in the fit that judges."""
+        problem, chosen = self._judging
+        ends = zip(*intervals(problem, chosen, self.scales), strict=True)
+        return {
+            one.parameter: (float(low), float(high))
+            for one, (low, high) in zip(chosen.names, ends, strict=True)
+            if one.owner == BASE
+        }
 
     @property
     def is_untold(self) -> bool:
@@ -189,7 +202,7 @@ def describe(findings: Findings) -> Diagnosis:
     chosen, before, after = verdict.chosen, findings.before, findings.after()
     fits, given_sse = list(findings.found.fits.values()), findings.given_sse
     from_sse = given_sse if verdict.word in ("parameters", "none") else base.sse
-    parameters = _base(problem.drive, base, chosen)
+    parameters = _base(problem.drive, base, chosen, findings.intervals_of_base())
     present, effects = findings.described_effects()
     trust, bands = findings.trust()
     law = _law(findings.law, effects)
@@ -330,18 +343,27 @@ def _explained(
 
 
 def _base(
-    drive: Drive, base: CandidateFit, chosen: CandidateFit
+    drive: Drive,
+    base: CandidateFit,
+    chosen: CandidateFit,
+    ends: Mapping[str, tuple[float, float]],
 ) -> tuple[BaseParameter, ...]:
     refitted, after = fitted_drive(drive, base), fitted_drive(drive, chosen)
-    return tuple(
-        BaseParameter(
-            name_on(drive.axis, name),
-            getattr(drive, name),
-            getattr(refitted, name),
-            getattr(after, name) * _mean_factor(chosen, name),
+    found = []
+    for name in drive.fitted_base:
+        factor = _mean_factor(chosen, name)
+        low, high = ends.get(name, (np.nan, np.nan))
+        found.append(
+            BaseParameter(
+                name_on(drive.axis, name),
+                getattr(drive, name),
+                getattr(refitted, name),
+                getattr(after, name) * factor,
+                low * factor,
+                high * factor,
+            )
         )
-        for name in drive.fitted_base
-    )
+    return tuple(found)
 
 
 def _mean_factor(chosen: CandidateFit, name: str) -> float:

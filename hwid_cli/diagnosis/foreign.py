@@ -30,6 +30,7 @@ from hwid_cli.diagnosis.turns import have_moved
 from hwid_cli.diagnosis.untold import (
     law_without_forces_told,
     untold_parameters,
+    with_interval,
     without_forces_told,
 )
 from hwid_cli.diagnosis.verdict import DiagnosisVerdict
@@ -42,6 +43,8 @@ from hwid_cli.records.recordings import Recording
 # Searches, each from where the last one has moved the parameters by more than this.
 _MOST_SEARCHES = 3
 _MOVED = 0.01
+# Factors of the stand-in that are none, where parameters are not told better, [-].
+_SLIGHT = 1e-4
 _BESIDE_PARAMETERS = (
     "the parameters of the simulation alone do not give what is said here: forces that go "
     "with displacement, velocity and input act beside them, as factors under "
@@ -297,7 +300,17 @@ def _confirmed(
     if untold.with_forces:
         effects = tuple(without_forces_told(one) for one in effects)
         law = None if law is None else law_without_forces_told(law)
-    warnings = (*untold.sentences, *told.warnings)
+    base = told.base
+    least = max([_SLIGHT, *untold.deviations.values()])
+    if not told.effects and told.law is None and told.stand_in.is_within(least):
+        # Beside an effect, a force between samples is off by more than the noise tells; and
+        # beside forces in their place parameters would be those of nothing.
+        base = tuple(with_interval(one, untold) for one in base)
     return replace(
-        told, confirmed="simulation", effects=effects, law=law, warnings=warnings
+        told,
+        confirmed="simulation",
+        effects=effects,
+        law=law,
+        base=base,
+        warnings=(*untold.sentences, *told.warnings),
     )

@@ -22,7 +22,7 @@ from hwid_cli.drive.effect import Scales
 from hwid_cli.records.candidates import CandidateFit, ParameterRef
 
 # Normal quantile of a 95 % interval.
-_QUANTILE = 1.96
+QUANTILE = 1.96
 # Share of the best determined direction below which one counts as undetermined.
 _DETERMINED = 1e-12
 # Difference for derivatives of an effect's size, in coordinates.
@@ -172,7 +172,7 @@ class _Spread:
         with np.errstate(over="ignore"):
             variance = max(float(weights @ self.covariance @ weights), 0.0)
         farthest = np.max(np.abs(self.away @ direction), initial=0.0)
-        return float(np.hypot(_QUANTILE * np.sqrt(variance), 2 * farthest))
+        return float(np.hypot(QUANTILE * np.sqrt(variance), 2 * farthest))
 
     def reaches(self) -> np.ndarray:
         """Of each coordinate alone."""
@@ -254,5 +254,7 @@ def shared_covariance(
 def _inverse(matrix: np.ndarray) -> np.ndarray:
     """Inverse in which what nothing determines is large, not infinite."""
     sizes, turned = np.linalg.eigh(matrix)
+    if not sizes[-1] > 0:
+        return np.full(matrix.shape, np.nan)
     sizes = np.maximum(sizes, _DETERMINED * sizes[-1])
     return np.asarray((turned / sizes) @ turned.T)

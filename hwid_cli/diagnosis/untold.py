@@ -14,18 +14,21 @@ import numpy as np
 
 from hwid_cli.diagnosis.candidate import rebuilt
 from hwid_cli.diagnosis.findings import Findings
+from hwid_cli.diagnosis.intervals import QUANTILE
 from hwid_cli.diagnosis.parameters import simulate_at
 from hwid_cli.diagnosis.problem import DiagnosisProblem
 from hwid_cli.diagnosis.simulator import DIFFERENCE, Runs
 from hwid_cli.diagnosis.turns import acts_at_force, forces_along, pushed
 from hwid_cli.drive.catalogue import CATALOGUE
-from hwid_cli.records.diagnosis import FittedEffect, Law
+from hwid_cli.records.diagnosis import BaseParameter, FittedEffect, Law
 from hwid_cli.records.programs import FreeParameter
 
 # Factor by which a parameter is moved on purpose.
 FACTOR = 1.2
 # Relative standard deviation above which a parameter is moved.
 _LEAST_DEVIATION = 0.02
+# Above this one a parameter is hardly told, and has no interval.
+_HARDLY_TOLD = 1.0
 # Squares of the noise by which a run has to differ for the recordings to show it: the
 # 95 % quantile of chi squared with one degree of freedom.
 _SHOWN = 3.84
@@ -49,10 +52,14 @@ class Untold:
         large or small, where the others follow.
     with_forces : bool
         Whether the forces of the effects follow too.
+    deviations : dict of str to float, [-]
+        Relative standard deviations of the other parameters, as if what is left were
+        white.
     """
 
     parameters: Mapping[str, float] = field(default_factory=dict)
     with_forces: bool = False
+    deviations: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def sentences(self) -> tuple[str, ...]:
@@ -72,6 +79,16 @@ class Untold:
             f"{follow} follow, and the output changes by less than its noise; hold what "
             f"you know, as in 'parameters: {{{name}: {value:g}}}'",
         )
+
+
+def with_interval(parameter: BaseParameter, untold: Untold) -> BaseParameter:
+    """A parameter of the simulation with its 95 % interval, where the recordings tell it."""
+    deviation = untold.deviations.get(parameter.name)
+    if deviation is None or deviation > _HARDLY_TOLD:
+        return parameter
+    factor = float(np.exp(QUANTILE * deviation))
+    low, high = sorted((parameter.after / factor, parameter.after * factor))
+    return replace(parameter, low=low, high=high)
 
 
 def without_forces_told(effect: FittedEffect) -> FittedEffect:
@@ -113,15 +130,25 @@ def untold_parameters(
     if before is None:
         return Untold()
     slopes = moving.slopes(before)
-    open_ones = np.flatnonzero(_deviations(slopes) > _LEAST_DEVIATION)
+    deviations = _deviations(slopes)
+    open_ones = np.flatnonzero(deviations > _LEAST_DEVIATION)
     found = [
         column
         for column in open_ones
         if column < len(free) and _is_untold(moving, int(column), before, slopes)
     ]
     forces = len(free) in open_ones and bool(found)
-    names = list(free)
-    return Untold({names[row]: free[names[row]].value for row in found}, forces)
+    # What is left counts as noise of its own size.
+    size = max(1.0, findings.criteria.ratio(findings.verdict.chosen))
+    told = {
+        name: size * float(deviations[row])
+        for row, name in enumerate(free)
+        if row not in found
+    }
+    untold = {
+        name: one.value for row, (name, one) in enumerate(free.items()) if row in found
+    }
+    return Untold(untold, forces, told)
 
 
 def _deviations(slopes: np.ndarray) -> np.ndarray:

@@ -1,5 +1,6 @@
 """What a diagnosis found: the verdict, how it was reached, and what shows it."""
 
+import math
 from dataclasses import dataclass, field
 from typing import Annotated
 
@@ -176,12 +177,16 @@ class BaseParameter:
     ----------
     before, refitted, after : float
         As given; fitted without an effect; fitted together with the effects.
+    low, high : float
+        95 % interval of the last; NaN where there is none.
     """
 
     name: str
     before: float
     refitted: float
     after: float
+    low: float = math.nan
+    high: float = math.nan
 
 
 @dataclass(frozen=True)

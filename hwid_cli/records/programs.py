@@ -92,6 +92,11 @@ class StandInChange:
         """Whether it changes nothing."""
         return self == StandInChange()
 
+    def is_within(self, share: float) -> bool:
+        """Whether each factor is 1 but for a share."""
+        factors = self.damping, self.stiffness, self.force_constant, self.curve
+        return all(abs(one - 1.0) <= share for one in factors)
+
     def beside(self, other: "StandInChange") -> "StandInChange":
         """Both changes, one after the other."""
         return StandInChange(

@@ -9,6 +9,7 @@ from hwid_cli.records.axis import unit_of_effect
 from hwid_cli.records.candidates import CAUSES
 from hwid_cli.records.diagnosis import (
     SMALL_REMAINDER,
+    BaseParameter,
     Diagnosis,
     FittedEffect,
     FittedParameter,
@@ -131,7 +132,7 @@ def _told_as(
     )
 
 
-def _interval(parameter: FittedParameter) -> str:
+def _interval(parameter: FittedParameter | BaseParameter) -> str:
     bounds = (parameter.low, parameter.high)
     if not np.isfinite(bounds).all():
         return MISSING
@@ -186,6 +187,8 @@ class Moved:
     ----------
     before, refitted, after : float, [unit]
         As given; fitted without further effects; fitted with them.
+    interval : str
+        95 % interval of the last.
     """
 
     quantity: str
@@ -193,12 +196,19 @@ class Moved:
     before: float
     refitted: float
     after: float
+    interval: str = MISSING
 
 
 def moved_parameters(diagnosis: Diagnosis) -> list[Moved]:
     """List the parameters of the simulation, the base first."""
     moved = [
-        Moved(*quantity_and_unit(one.name), one.before, one.refitted, one.after)
+        Moved(
+            *quantity_and_unit(one.name),
+            one.before,
+            one.refitted,
+            one.after,
+            _interval(one),
+        )
         for one in diagnosis.base
     ]
     for effect in diagnosis.present:
@@ -206,7 +216,8 @@ def moved_parameters(diagnosis: Diagnosis) -> list[Moved]:
             quantity, unit = _told_as(diagnosis, effect, parameter)
             steps = (parameter.before, parameter.refitted, parameter.value)
             if np.isfinite(steps).all():
-                moved.append(Moved(f"{effect.id}: {quantity}", unit, *steps))
+                name = f"{effect.id}: {quantity}"
+                moved.append(Moved(name, unit, *steps, _interval(parameter)))
     return moved
 
 
@@ -219,16 +230,19 @@ def base_table(diagnosis: Diagnosis) -> Table:
         Base first, then the effects that it has; the last column but the unit is how far
         the last fit moved each of them.
     """
-    heads = ["parameter", "given", "re-fitted", "with the effects", "shift", "unit"]
-    if not diagnosis.effects:
-        heads.remove("with the effects")
+    steps = ["given", "re-fitted", "with the effects"][: 3 if diagnosis.effects else 2]
     rows = []
     for one in moved_parameters(diagnosis):
-        values = [one.before, one.refitted, one.after][: len(heads) - 3]
+        values = [one.before, one.refitted, one.after][: len(steps)]
         shift = _shift(one.before, values[-1])
-        rows.append((one.quantity, *map(_value, values), shift, one.unit))
-    columns = (*texts(heads[0]), *numbers(*heads[1:-1]), *texts(heads[-1]))
-    caption = "Parameters of the simulation; shift: from given to the last"
+        row = (one.quantity, *map(_value, values), shift, one.interval, one.unit)
+        rows.append(row)
+    columns = (
+        *texts("parameter"),
+        *numbers(*steps, "shift", "95 % interval"),
+        *texts("unit"),
+    )
+    caption = "Parameters of the simulation; shift and interval: of the last"
     return Table(caption, columns, tuple(rows))
 
 

@@ -18,6 +18,7 @@ from hwid_cli.files.atomic import replace_file
 from hwid_cli.files.csv_tables import write_table_csv
 from hwid_cli.files.messages import shown
 from hwid_cli.records.diagnosis import (
+    BaseParameter,
     Diagnosis,
     FittedEffect,
     FittedParameter,
@@ -203,8 +204,11 @@ def _content(diagnosis: Diagnosis) -> dict[str, Any]:
             "displacement_m": diagnosis.reference_displacement_m,
         },
         "base": {
-            moment: {one.name: getattr(one, moment) for one in diagnosis.base}
-            for moment in ("before", "refitted", "after")
+            **{
+                moment: {one.name: getattr(one, moment) for one in diagnosis.base}
+                for moment in ("before", "refitted", "after")
+            },
+            "ci95": {one.name: _interval(one) for one in diagnosis.base},
         },
         "where": [asdict(place) for place in diagnosis.places],
         **({} if diagnosis.law is None else {"law": _law(diagnosis.law)}),
@@ -262,7 +266,7 @@ def _law(law: Law) -> dict[str, Any]:
     }
 
 
-def _interval(parameter: FittedParameter) -> list[float] | None:
+def _interval(parameter: FittedParameter | BaseParameter) -> list[float] | None:
     bounds = [parameter.low, parameter.high]
     return bounds if any(math.isfinite(bound) for bound in bounds) else None
 

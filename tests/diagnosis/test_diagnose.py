@@ -9,7 +9,7 @@ from hwid_cli.diagnosis.problem import held_out_names
 from hwid_cli.drive.catalogue import CATALOGUE
 from hwid_cli.records.drive import Controller
 from hwid_cli.records.experiment import DiagnoseOptions
-from tests.diagnosis.small_drive import in_turn, problem, recordings, simulation
+from tests.diagnosis.small_drive import DRIVE, in_turn, problem, recordings, simulation
 from tests.stages.diagnosed_drive import FEW, FRICTION, diagnosed
 from tests.store.record_examples import assert_same
 
@@ -135,3 +135,14 @@ def test_a_payload_in_one_recording_is_found_wherever_the_plan_has_put_it(is_ask
     assert found.held_out
     which, _ = found.effects[0].parameters
     assert which.text == "mass"
+
+
+@pytest.mark.thorough
+def test_intervals_of_the_base_hold_on_fresh_noise():
+    options, inside = DiagnoseOptions(effects=("coulomb_friction",)), []
+    for seed in range(8):
+        given = recordings(seed=seed)
+        found = diagnose(given, simulation(), options, in_turn, lambda what, n: None)
+        assert found.verdict == "none"
+        inside += [one.low < getattr(DRIVE, one.name) < one.high for one in found.base]
+    assert 20 <= sum(inside) <= len(inside) == 24

@@ -10,8 +10,15 @@ from hwid_cli.diagnosis.simulator import Simulator
 from hwid_cli.diagnosis.untold import Untold, without_forces_told
 from hwid_cli.records.diagnosis import FittedEffect, FittedParameter
 from hwid_cli.records.experiment import DiagnoseOptions
-from hwid_cli.records.programs import Capabilities, FreeParameter
-from tests.diagnosis.test_foreign import GIVEN, Count, diagnosis, recordings, simulate
+from hwid_cli.records.programs import Capabilities, FreeParameter, RunRequest
+from tests.diagnosis.test_foreign import (
+    GIVEN,
+    TRUE,
+    Count,
+    diagnosis,
+    recordings,
+    simulate,
+)
 
 # The box itself has a mass of 0.8.
 ALL = {**GIVEN, "unused": 3.0}
@@ -60,6 +67,32 @@ def test_what_is_told_is_not_questioned(free, untold):
     assert not any("forces of the effects" in one for one in said)
     ((force,),) = (one.parameters for one in found.effects)
     assert force.low < 2.0 < force.high
+    # A force between samples is off by more than the noise tells.
+    assert all(np.isnan(one.low) for one in found.base)
+
+
+@pytest.mark.thorough
+def test_intervals_of_parameters_hold_on_fresh_noise():
+    rng = np.random.default_rng(8)
+    inside = []
+    for _ in range(6):
+        given = [replace(one, output=plain(one) + 2e-3 * rng.standard_normal(one.n_samples))
+                 for one in recordings()]  # fmt: skip
+        found = diagnose_foreign(
+            given, simulator("c", "k", "kt"), DiagnoseOptions(effects=("coulomb_friction",)),
+            Count(), lambda what, n: None,
+        )  # fmt: skip
+        assert found.verdict == "parameters"
+        inside += [one.low < TRUE[one.name] < one.high for one in found.base]
+    assert 14 <= sum(inside) <= len(inside) == 18
+
+
+def plain(recording):
+    """What the true parameters give."""
+    nothing = np.zeros(0)
+    values = {**ALL, **TRUE}
+    request = RunRequest("r", recording.sample_time_s, recording.input, nothing, values)
+    return simulate(request).output
 
 
 @pytest.mark.thorough
@@ -100,6 +133,8 @@ def test_a_weak_parameter_is_told_where_a_fifth_of_it_shows(leak, is_told):
     assert found.verdict in ("parameters", "none")
     said = [one for one in found.warnings if "do not tell unused:" in one]
     assert len(said) == (not is_told)
+    has_interval = {one.name: np.isfinite(one.low) for one in found.base}
+    assert has_interval == {**dict.fromkeys(names, True), "unused": is_told}
 
 
 def test_nothing_is_said_where_all_is_told():

@@ -117,14 +117,29 @@ def test_without_effects_nothing_is_shown_with_them():
     assert [row[0] for row in gap_table(found).rows] == ["as given", "base re-fitted"]
     assert "with the effects" not in base_table(found).heads
     assert "with the effects" not in recordings_table(found).heads
-    assert base_table(found).rows[0] == ("damping", "15", "17.2", "+14.7 %", "N s/m")
+    assert base_table(found).rows[0] == (
+        "damping",
+        "15",
+        "17.2",
+        "+14.7 %",
+        "-",
+        "N s/m",
+    )
 
 
 def test_the_shift_is_that_of_the_last_fit_and_needs_something_to_shift():
     rows = base_table(named()).rows
 
-    assert rows[0] == ("damping", "15", "17.2", "15.1", "+0.7 %", "N s/m")
+    assert rows[0] == ("damping", "15", "17.2", "15.1", "+0.7 %", "-", "N s/m")
     assert rows[2][4] == "-"
+
+
+def test_the_interval_of_the_last_fit_is_shown():
+    first, *others = named().base
+    known = replace(first, low=14.9, high=15.3)
+    rows = base_table(replace(named(), base=(known, *others))).rows
+    assert rows[0][-2:] == ("14.9 to 15.3", "N s/m")
+    assert rows[1][-2] == "-"
 
 
 def test_effects_that_the_simulation_has_are_shown_with_what_they_were_given_as():
@@ -136,11 +151,10 @@ def test_effects_that_the_simulation_has_are_shown_with_what_they_were_given_as(
     found = base_table(replace(unknown(), present=(present,))).rows
     rows = base_table(replace(named(), present=(present,), axis="rotary")).rows
 
-    shown = ("0.0001", "0.0002", "+100.0 %")
-    assert found[-1] == ("gear_backlash: half gap", "0.0001", "0.0003", "+200.0 %", "m")
-    assert rows[-1] == (
-        "gear_backlash: half gap", "0.0001", "0.0003", *shown[1:], "rad"
-    )  # fmt: skip
+    name, ends = "gear_backlash: half gap", "0.00019 to 0.00021"
+    assert found[-1] == (name, "0.0001", "0.0003", "+200.0 %", ends, "m")
+    shown = ("0.0001", "0.0003", "0.0002", "+100.0 %")
+    assert rows[-1] == (name, *shown, ends, "rad")
 
 
 def test_the_ranking_marks_the_chosen_candidate_only():
@@ -268,7 +282,7 @@ def test_the_screen_shows_everything_that_was_found(width):
         "noise 2.10e-05 m",
         "- The missing force follows the velocity: 55 %.",
         "Trained on 6 recordings, validated on 3 recordings held out.",
-        "stiffness        1184       1210              1185  +0.1 %  N/m",
+        "stiffness        1184       1210              1185  +0.1 %              -  N/m",
         "Next experiment: a slow triangle",
     ):
         assert part in text
