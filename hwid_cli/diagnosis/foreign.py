@@ -43,8 +43,9 @@ from hwid_cli.records.recordings import Recording
 # Searches, each from where the last one has moved the parameters by more than this.
 _MOST_SEARCHES = 3
 _MOVED = 0.01
-# Factors of the stand-in that are none, where parameters are not told better, [-].
-_SLIGHT = 1e-4
+# Factors of the stand-in that are none: as far as parameters are told, at most and at
+# least by these shares, [-].
+_SLIGHT, _LARGEST_SLIGHT = 1e-4, 0.01
 _BESIDE_PARAMETERS = (
     "the parameters of the simulation alone do not give what is said here: forces that go "
     "with displacement, velocity and input act beside them, as factors under "
@@ -301,7 +302,7 @@ def _confirmed(
         effects = tuple(without_forces_told(one) for one in effects)
         law = None if law is None else law_without_forces_told(law)
     base = told.base
-    least = max([_SLIGHT, *untold.deviations.values()])
+    least = min(max([_SLIGHT, *untold.deviations.values()]), _LARGEST_SLIGHT)
     if not told.effects and told.law is None and told.stand_in.is_within(least):
         # Beside an effect, a force between samples is off by more than the noise tells; and
         # beside forces in their place parameters would be those of nothing.

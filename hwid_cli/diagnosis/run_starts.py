@@ -165,7 +165,8 @@ def starts_sentence(above: Mapping[str, float], unit: str) -> str:
     if not any(above.values()):
         return ""
     low, high = min(above.values()), max(above.values())
+    ends = f"{low:.4g} to {high:.4g} {unit}".rstrip()
     return (
-        f"recordings start {low:.4g} to {high:.4g} {unit} from where the simulation does; "
+        f"recordings start {ends} from where the simulation does; "
         "each is compared from its own start (diagnose.initial_state: held)"
     )

@@ -124,3 +124,23 @@ def test_two_effects_of_one_name(folder, section):
     twice = "  effects:\n" + 2 * "    coulomb_friction: {force_N: 1.0}\n"
     text = NO_COLUMN + PYTHON + (own if section == "own_effects" else twice)
     assert "is given twice, first in line" in told(folder, text)
+
+
+@pytest.mark.parametrize("is_apart", [True, False])
+def test_recordings_that_start_elsewhere_are_compared_from_there_and_it_is_said(
+    folder, is_apart
+):
+    for row, path in enumerate(sorted((folder / "raw").glob("*.csv"))):
+        table = np.loadtxt(path, delimiter=",", skiprows=1)
+        table[:, 2] += 0.002 * (row - 1) * is_apart
+        np.savetxt(path, table, delimiter=",", header="t,i,x,s", comments="")
+    (folder / "bad.yaml").write_text(HEAD + OUTPUTS)
+    arguments = [str(folder / "bad.yaml"), "--out", str(folder / "out"), "--jobs", "1"]
+    result = CliRunner().invoke(main, ["simulate", *arguments])
+    assert result.exit_code == 0, result.output
+    said = "recordings start -0.002 to 0.002 from where the simulation does"
+    assert (said in result.stderr) == is_apart
+    for path in (folder / "out").glob("**/simulated/*.csv"):
+        found = np.loadtxt(path, delimiter=",", skiprows=1)
+        # A tenth of the motion is missing, at most 0.2 mm.
+        assert np.max(np.abs(found[:, 2] - found[:, 3])) < 2.1e-4

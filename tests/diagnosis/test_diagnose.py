@@ -146,3 +146,13 @@ def test_intervals_of_the_base_hold_on_fresh_noise():
         assert found.verdict == "none"
         inside += [one.low < getattr(DRIVE, one.name) < one.high for one in found.base]
     assert 20 <= sum(inside) <= len(inside) == 24
+
+
+def test_where_nothing_is_missing_no_recording_is_odd(monkeypatch):
+    def odd(*_):
+        raise AssertionError("noise is no gap")
+
+    monkeypatch.setattr("hwid_cli.diagnosis.diagnose.with_odd_ones_trained", odd)
+    options = DiagnoseOptions(effects=("coulomb_friction",))
+    found = diagnose(recordings(), simulation(), options, in_turn, lambda what, n: None)
+    assert found.verdict == "none"

@@ -1,15 +1,18 @@
 """What a diagnosis reports: gaps, parameters with intervals, curves, the candidates."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from hwid_cli.diagnosis import findings
 from hwid_cli.diagnosis.findings import MOST_OVERLAYS, _mean_factor
 from hwid_cli.diagnosis.intervals import intervals
 from hwid_cli.records.candidates import ParameterRef
 from tests.diagnosis.made_up_fits import made_up
 from tests.diagnosis.small_drive import (
+    DRIVE,
     NOISE,
     N,
     fit,
@@ -246,3 +249,25 @@ def test_values_are_told_beside_the_mean_of_what_differs(which, name, factor):
     fit = made_up(("coulomb_friction",), 100.0, own=np.log([2.0, 4.0] * 3))
     ref = ParameterRef(f"parameter_change:{which}", f"log_{which}")
     assert _mean_factor(replace(fit, own_names=(ref,)), name) == pytest.approx(factor)
+
+
+def test_intervals_of_the_base_are_told_beside_that_mean_too():
+    fit = made_up(("coulomb_friction",), 100.0, own=np.log([2.0, 4.0] * 3))
+    ref = ParameterRef("parameter_change:mass", "log_mass")
+    fit = replace(fit, own_names=(ref,), names=(), values=np.zeros(0))
+    ends = {"damping_N_s_per_m": (6.0, 9.0)}
+    damping, *others = findings._base(DRIVE, fit, fit, ends)
+    assert (damping.low, damping.high) == pytest.approx((2.0, 3.0))
+    assert all(np.isnan(one.low) for one in others)
+
+
+def test_intervals_of_the_base_are_not_those_of_an_effect_of_the_same_name(monkeypatch):
+    name = "stiffness_N_per_m"
+    refs = ParameterRef("base", name), ParameterRef("one_sided_stop", name)
+    fit = replace(made_up(("one_sided_stop",), 1.0), names=refs, values=np.ones(2))
+    low, high = np.array([1.0, 100.0]), np.array([2.0, 200.0])
+    monkeypatch.setattr(findings, "intervals", lambda *_: (low, high))
+    told = findings.Findings.intervals_of_base(
+        SimpleNamespace(_judging=(None, fit), scales=None)
+    )
+    assert told == {name: (1.0, 2.0)}

@@ -13,10 +13,12 @@ from hwid_cli.diagnosis.foreign import diagnose_foreign
 from hwid_cli.diagnosis.run_starts import Begun, RunStarts
 from hwid_cli.diagnosis.simulator import Runs, Simulator
 from hwid_cli.diagnosis.standing import as_given, stand_in_for
+from hwid_cli.diagnosis.untold import Untold
 from hwid_cli.diagnosis.verdict import DiagnosisVerdict
 from hwid_cli.drive.simulation import NO_FORCE
 from hwid_cli.errors import SimulationError
 from hwid_cli.records.axis import MotionUnits
+from hwid_cli.records.diagnosis import BaseParameter
 from hwid_cli.records.experiment import DiagnoseOptions
 from hwid_cli.records.programs import (
     Capabilities,
@@ -650,3 +652,27 @@ def test_forces_in_the_place_of_parameters_are_told(
     texts = [one for one in told.warnings if "simulation.stand_in" in one]
     assert len(texts) == n_said
     assert told.stand_in == change
+
+
+@pytest.mark.parametrize(
+    ("change", "effects", "is_told"),
+    [
+        (StandInChange(), (), True),
+        # As little as the recordings leave open.
+        (StandInChange(damping=1.005), (), True),
+        (StandInChange(damping=0.7), (), False),
+        (StandInChange(), named().effects, False),
+    ],
+)
+def test_parameters_have_intervals_where_nothing_acts_beside_them(
+    monkeypatch, change, effects, is_told
+):
+    untold = Untold(deviations={"c": 0.01, "kt": 2.0})
+    monkeypatch.setattr(foreign, "untold_parameters", lambda *_: untold)
+    base = tuple(BaseParameter(one, 9.0, 10.0, 10.0) for one in ("c", "kt", "gone"))
+    told = replace(named(), base=base, stand_in=change, effects=effects)
+    found = foreign._confirmed(told, None, (None, {}), lambda what, n: None)
+    assert [np.isfinite(one.low) for one in found.base] == [is_told, False, False]
+    if is_told:
+        ends = found.base[0].low, found.base[0].high
+        assert ends == pytest.approx((10 * np.exp(-0.0196), 10 * np.exp(0.0196)))

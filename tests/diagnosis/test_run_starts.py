@@ -132,3 +132,17 @@ def test_what_was_done_about_starts_is_said_with_its_unit():
     said = starts_sentence({"a": -1.25, "b": 2.0}, "rad")
     assert "start -1.25 to 2 rad from where the simulation does" in said
     assert starts_sentence({}, "rad") == starts_sentence({"a": 0.0}, "rad") == ""
+
+
+@pytest.mark.parametrize("size", [0.2, 0.6, 1.0, 1.6, 3.0])
+def test_starts_count_where_half_of_the_squares_go_with_them(size):
+    apart = measured([0.25 * size * one for one in STARTS], gain=1.5)
+    given = runs()
+    pairs = list(zip(apart, given, strict=True))
+    before = sum(np.sum((one.output - run.output) ** 2) for one, run in pairs)
+    after = sum(
+        np.sum((one.output - run.output - 0.25 * size * start) ** 2)
+        for (one, run), start in zip(pairs, STARTS, strict=True)
+    )
+    found = starts_above(apart, given, is_said=False)
+    assert bool(found) == (after <= 0.5 * before)

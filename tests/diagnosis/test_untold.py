@@ -1,10 +1,12 @@
 """What recordings of input and output cannot tell of a simulation: only its ratios."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from hwid_cli.diagnosis import untold
 from hwid_cli.diagnosis.foreign import diagnose_foreign
 from hwid_cli.diagnosis.simulator import Simulator
 from hwid_cli.diagnosis.untold import Untold, without_forces_told
@@ -56,14 +58,14 @@ def test_a_common_factor_of_all_forces_and_the_mass_is_not_told():
 
 @pytest.mark.thorough
 @pytest.mark.parametrize(
-    ("free", "untold"),
+    ("free", "open_ones"),
     [(("c", "k", "kt"), []), (("c", "k", "kt", "unused"), ["unused"])],
 )
-def test_what_is_told_is_not_questioned(free, untold):
+def test_what_is_told_is_not_questioned(free, open_ones):
     found, _ = diagnosis(simulator(*free), effects=("coulomb_friction",))
     assert (found.verdict, found.complete) == ("named", True)
     said = [one for one in found.warnings if "do not tell" in one]
-    assert [one.split(":")[0].rpartition(" ")[2] for one in said] == untold
+    assert [one.split(":")[0].rpartition(" ")[2] for one in said] == open_ones
     assert not any("forces of the effects" in one for one in said)
     ((force,),) = (one.parameters for one in found.effects)
     assert force.low < 2.0 < force.high
@@ -152,3 +154,19 @@ def test_only_forces_lose_their_intervals():
     assert np.isnan([first.low, first.high, last.low, last.high]).all()
     assert (speed.low, speed.high) == (0.05, 0.2)
     assert (first.value, last.value) == (2.0, 5.0)
+
+
+@pytest.mark.parametrize(("ratio", "size"), [(0.9, 1.0), (5.0, 5.0)])
+def test_what_is_left_counts_as_noise_of_its_own_size(monkeypatch, ratio, size):
+    moving = SimpleNamespace(
+        size=1, errors=np.zeros_like, slopes=lambda _: np.full((100, 1), 10.0)
+    )
+    monkeypatch.setattr(untold._Moving, "of", lambda *_: moving)
+    findings = SimpleNamespace(
+        pieces=None,
+        criteria=SimpleNamespace(ratio=lambda _: ratio),
+        verdict=SimpleNamespace(chosen=None),
+    )
+    runs = SimpleNamespace(simulator=simulator("c"))
+    found = untold.untold_parameters(runs, findings, ALL)
+    assert found.deviations == pytest.approx({"c": size * 0.01})

@@ -67,7 +67,7 @@ def test_innovations_are_those_of_the_whole_covariance(one):
     found = whitening(values)
     # The start apart: the filter begins as if the noise had always been there.
     n = N // 3
-    np.testing.assert_allclose(found.values[n:], expected[n:], atol=0.15)
+    np.testing.assert_allclose(found.values[n:], expected[n:], atol=0.02)
     assert found.log_variances == pytest.approx(
         2 * np.log(np.diag(factor)).sum(), rel=0.05
     )
@@ -120,3 +120,11 @@ def test_a_spring_that_hardly_bends_is_one():
     np.testing.assert_array_equal(found.a, straight.a)
     assert not hasattr(found, "springs")
     assert hasattr(drive_of(HARD), "springs")
+
+
+def test_the_spring_is_that_of_the_samples_that_are_evaluated():
+    signals = Signals("r", "", 0 * WAY, WAY, 0 * WAY, WAY, STEP_S, skip=90)
+    (found,) = noisy_drives([HARD], [signals])
+    (whole,) = noisy_drives([HARD], [replace(signals, skip=0)])
+    assert found.at.size == N - 90
+    np.testing.assert_allclose(found.at, whole.at[90:])

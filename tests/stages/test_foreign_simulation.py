@@ -96,3 +96,21 @@ def test_a_kind_says_itself_where_its_fitted_values_belong(kind):
     base = (BaseParameter("gain", 2.0, 2.5, 3.0),)
     found = extended_foreign(replace(named(), base=base), Scaled(gain=2.0))
     assert found.gain == 3.0
+
+
+def test_a_stand_in_with_an_effect_is_shown_from_where_recordings_start():
+    def moved(size):
+        u = size * (TIME > 0.02)
+        return u, lagged(1.0, 0.03, u)
+
+    sizes, zeros = (1.0, -2.0, 1.5), (0.8, 0.0, -0.7)
+    given = []
+    for size, zero in zip(sizes, zeros, strict=True):
+        u, x = moved(size)
+        given.append(Recording(f"r{size}", u, 0.9 * x + zero, STEP_S, reference=x))
+    options = OutputsSimulation(stand_in=StandInChange(force_constant=0.9))
+    for one, zero in zip(
+        simulated(options, given, [], DiagnoseOptions()), zeros, strict=True
+    ):
+        assert one.start == pytest.approx(zero)
+        assert one.rms < 0.01

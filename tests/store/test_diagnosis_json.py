@@ -218,3 +218,12 @@ def test_a_changed_number_is_not_believed(tmp_path, written):
 
     with pytest.raises(CacheError, match="content and checksum do not match"):
         read_diagnosis(path)
+
+
+def test_parameters_of_the_base_have_an_interval_or_null(written):
+    first, *others = named().base
+    found = written(replace(named(), base=(replace(first, low=1.0, high=2.0), *others)))
+    intervals = found["base"]["ci95"]
+    assert intervals.pop(first.name) == [1.0, 2.0]
+    assert set(intervals.values()) == {None}
+    assert set(found["base"]["after"]) == {first.name, *intervals}
