@@ -19,24 +19,24 @@ SOFT = replace(HARD, quadratic_N_per_m2=0.0, cubic_N_per_m3=0.0)
 WAY = 0.35 * np.sin(2 * np.pi * 0.9 * STEP_S * np.arange(N))
 
 
-def drive_of(one, way=WAY):
-    signals = Signals("r", "", 0 * way, way, 0 * way, way, STEP_S)
+def drive_of(one, step_s=STEP_S):
+    signals = Signals("r", "", 0 * WAY, WAY, 0 * WAY, WAY, step_s)
     return noisy_drives([one], [signals])[0]
 
 
-def answers(one, way=WAY):
+def answers(one, step_s=STEP_S):
     """Reading of every sample to each sample's unit of input noise: a lower triangle.
 
     In 40 Euler steps a sample along the motion, its input a straight line between samples.
     """
-    steps = 40
+    steps, way = 40, WAY
     stiffness = one.stiffness_N_per_m + 2 * one.quadratic_N_per_m2 * way
     stiffness = stiffness + 3 * one.cubic_N_per_m3 * way**2
     stiffness = stiffness + 0 * way
     found = np.zeros((N, N))
     noise = np.eye(N)
     x = v = np.zeros(N)
-    h = STEP_S / steps
+    h = step_s / steps
     for n in range(N):
         found[n] = x
         if n + 1 == N:
@@ -53,17 +53,27 @@ def answers(one, way=WAY):
 GIVES_WAY = replace(HARD, quadratic_N_per_m2=0.0, cubic_N_per_m3=-300.0)
 
 
-@pytest.mark.parametrize("one", [SOFT, HARD, GIVES_WAY])
-def test_innovations_are_those_of_the_whole_covariance(one):
+# In the longer step a sample of the input moves its own reading, too.
+@pytest.mark.parametrize(
+    ("one", "step_s"),
+    [
+        (SOFT, STEP_S),
+        (HARD, STEP_S),
+        (GIVES_WAY, STEP_S),
+        (SOFT, 10 * STEP_S),
+        (HARD, 10 * STEP_S),
+    ],
+)
+def test_innovations_are_those_of_the_whole_covariance(one, step_s):
     """Cholesky's factor of the covariance of all samples does the same at once."""
     strength = 2e4
-    through = answers(one)
+    through = answers(one, step_s)
     whole = np.eye(N) + strength * through @ through.T
     factor = np.linalg.cholesky(whole)
     rng = np.random.default_rng(5)
     values = factor @ rng.standard_normal(N)
     expected = np.linalg.solve(factor, values)
-    whitening = drive_of(one).whitening(strength)
+    whitening = drive_of(one, step_s).whitening(strength)
     found = whitening(values)
     # The start apart: the filter begins as if the noise had always been there.
     n = N // 3
