@@ -273,6 +273,7 @@ def _told(
     return replace(
         told,
         base=base or told.base,
+        is_foreign=True,
         capabilities=simulator.capabilities,
         stand_in=change,
         warnings=warnings,

@@ -185,8 +185,8 @@ class BaseParameter:
     before: float
     refitted: float
     after: float
-    low: float = math.nan
-    high: float = math.nan
+    low: float = field(default=math.nan, metadata=ADDED_LATER)
+    high: float = field(default=math.nan, metadata=ADDED_LATER)
 
 
 @dataclass(frozen=True)
@@ -348,6 +348,8 @@ class Diagnosis(Shown):
     confirmed : str
         ``simulation`` where the simulation itself was run with the effect, ``surrogate``
         where only a stand-in was.
+    is_foreign : bool
+        Whether the simulation is the user's own program, outputs or model, not a drive.
     capabilities : Capabilities
         What the simulation can do.
     law : Law or None
@@ -396,6 +398,7 @@ class Diagnosis(Shown):
     units: MotionUnits = field(default=MotionUnits(), metadata=ADDED_LATER)
     output: str = field(default="position", metadata=ADDED_LATER)
     confirmed: str = field(default="simulation", metadata=ADDED_LATER)
+    is_foreign: bool = field(default=False, metadata=ADDED_LATER)
     capabilities: Capabilities = field(default=OF_DRIVE, metadata=ADDED_LATER)
     law: Law | None = field(default=None, metadata=ADDED_LATER)
     trust: ModelTrust | None = field(default=None, metadata=ADDED_LATER)

@@ -156,7 +156,7 @@ def gap_table(diagnosis: Diagnosis) -> Table:
     notes = [explained_sentence(diagnosis)] if diagnosis.effects else []
     if diagnosis.confirmed == "surrogate":
         notes.append(_OF_STAND_IN)
-    if diagnosis.effects and diagnosis.confirmed == "simulation":
+    if says_what_was_run(diagnosis):
         notes.append(_OF_SIMULATION)
     if diagnosis.noise.sentence:
         notes.append(f"What counts as noise: {diagnosis.noise.sentence}.")
@@ -172,6 +172,12 @@ def gap_table(diagnosis: Diagnosis) -> Table:
         tuple(_gap_row(*step) for step in steps[: 3 if diagnosis.effects else 2]),
         tuple(notes),
     )
+
+
+def says_what_was_run(diagnosis: Diagnosis) -> bool:
+    """Whether a simulation of the user's own was run with effects in it."""
+    is_run = diagnosis.is_foreign and diagnosis.confirmed == "simulation"
+    return is_run and bool(diagnosis.effects)
 
 
 def _gap_row(label: str, gap: Gap) -> tuple[str, ...]:

@@ -156,19 +156,20 @@ def test_verdicts_without_an_effect():
 
 
 @pytest.mark.parametrize(
-    ("confirmed", "detail", "note"),
+    ("is_foreign", "confirmed", "detail", "note"),
     [
-        ("surrogate", "A linear stand-in was run", "(confirmed: surrogate)"),
-        ("simulation", "The simulation itself was run", "(confirmed: simulation)"),
-        ("", "", ""),
+        (True, "surrogate", "A linear stand-in was run", "(confirmed: surrogate)"),
+        (True, "simulation", "The simulation itself was", "(confirmed: simulation)"),
+        # Of a drive it goes without saying.
+        (False, "simulation", "", ""),
     ],
 )
-def test_what_was_run_with_the_effect_is_said(confirmed, detail, note):
-    record = replace(named(), confirmed=confirmed)
+def test_what_was_run_with_the_effect_is_said(is_foreign, confirmed, detail, note):
+    record = replace(named(), is_foreign=is_foreign, confirmed=confirmed)
     details, notes = answer_to(record).details, gap_table(record).notes
     assert detail in " ".join(details)
     assert note in " ".join(notes)
-    if not confirmed:
+    if not is_foreign:
         assert "was run" not in " ".join(details)
         assert "confirmed" not in " ".join(notes)
 

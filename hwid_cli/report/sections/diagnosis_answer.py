@@ -31,6 +31,7 @@ from hwid_cli.report.diagnosis import (
     leaves_little,
     moved_parameters,
     quantity_and_unit,
+    says_what_was_run,
     shown_value,
     warning_sentences,
 )
@@ -241,7 +242,7 @@ def _gap_in_words(diagnosis: Diagnosis) -> str:
     text += "."
     if diagnosis.effects and diagnosis.confirmed == "surrogate":
         text += " A linear stand-in was run with the effect, not the simulation itself."
-    if diagnosis.effects and diagnosis.confirmed == "simulation":
+    if says_what_was_run(diagnosis):
         text += " The simulation itself was run with the effect."
     return text
 
