@@ -433,7 +433,8 @@ def held_out_names(recordings: Sequence[Recording]) -> tuple[str, ...]:
 
     Within each kind of recording, amplitudes and speeds of change are numbered; a
     recording is held out where the sum of its two numbers is a multiple of three, so
-    that every amplitude and every speed is on both sides where the plan is a table.
+    that every amplitude and every speed is on both sides where the plan is a table. Of few
+    recordings chance may choose most; at most half are held out.
 
     Returns
     -------
@@ -455,7 +456,7 @@ def held_out_names(recordings: Sequence[Recording]) -> tuple[str, ...]:
             chosen |= _of_kind(members)
     if not chosen and len(recordings) > 1:
         chosen = {recordings[-1].name}
-    chosen = _without_extremes(recordings, chosen)
+    chosen = _at_most_half(recordings, _without_extremes(recordings, chosen))
     return tuple(one.name for one in recordings if one.name in chosen)
 
 
@@ -472,6 +473,17 @@ def _without_extremes(recordings: Sequence[Recording], chosen: set[str]) -> set[
         if largest > 0 and all(name in held_out for name in reached):
             held_out.discard(max(sizes, key=lambda name: sizes[name]))
     return held_out or chosen
+
+
+def _at_most_half(recordings: Sequence[Recording], chosen: set[str]) -> set[str]:
+    """Give back what is too many, small and large ones alike: a fit needs the others."""
+    most = max(1, len(recordings) // 2)
+    if len(chosen) <= most:
+        return chosen
+    ones = [one for one in recordings if one.name in chosen]
+    by_size = sorted(ones, key=lambda one: float(np.max(np.abs(one.input))))
+    kept = np.rint(np.linspace(0, len(by_size) - 1, most)).astype(int)
+    return {by_size[row].name for row in kept}
 
 
 def _of_kind(members: Sequence[Recording]) -> set[str]:

@@ -314,6 +314,20 @@ def test_of_two_recordings_one_is_held_out():
     assert len(held_out_names([step("a", 1.0), sine("b", 2.0, 5)])) == 1
 
 
+def test_of_few_recordings_at_most_half_are_held_out_small_and_large_ones():
+    rng = np.random.default_rng(0)
+    for _ in range(40):
+        sizes, speeds = rng.uniform(0.5, 3, 9), rng.uniform(0.5, 6, 9)
+        n = int(rng.integers(3, 10))
+        pairs = list(zip(sizes, speeds, strict=True))[:n]
+        given = [sine(f"r{row}", *one) for row, one in enumerate(pairs)]
+        held = [int(name[1:]) for name in held_out_names(given)]
+        assert 1 <= len(held) <= n / 2
+        # Where many are, they are of several sizes.
+        if len(held) > 2:
+            assert np.ptp(sizes[held]) > 0.3 * np.ptp(sizes[:n])
+
+
 def test_a_single_recording_is_not_held_out():
     assert held_out_names([step("a", 1.0)]) == ()
 
