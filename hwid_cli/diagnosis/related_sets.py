@@ -28,7 +28,13 @@ from hwid_cli.diagnosis.effect_sets import (
     without_effect,
 )
 from hwid_cli.diagnosis.selection import LEAST_ADDED
-from hwid_cli.diagnosis.set_fits import LEAST_LEFT, LEAST_TURN, WORTH_MORE, SetFits
+from hwid_cli.diagnosis.set_fits import (
+    FAR_BEHIND,
+    LEAST_LEFT,
+    LEAST_TURN,
+    WORTH_MORE,
+    SetFits,
+)
 from hwid_cli.drive.catalogue import CATALOGUE
 from hwid_cli.drive.simulation import drive_effects
 from hwid_cli.records.candidates import CandidateFit
@@ -132,18 +138,21 @@ def near_the_best(
 ) -> dict[Effects, Sequence[SearchStart]]:
     """Sets that come close to the best one, from where it ended, in the screening.
 
-    Not those that there bring hardly more than the best set in them.
+    Not those that there bring hardly more than the best set in them. A simpler law may be
+    further away: few steps do not lead it where the wider one has been led by many.
     """
     if best is None:
         return {}
     found = {one.effects: one for one in screened}
     floor, reached = fits.floor(), fits.few_sse(best)
-    most = floor + WORTH_MORE * max(reached - floor, LEAST_LEFT * reached)
+    excess = max(reached - floor, LEAST_LEFT * reached)
     near: dict[Effects, Sequence[SearchStart]] = {}
     for ids in sets:
         part = fits.largest_part(ids)
         left = np.inf if part is None else found[part.effects].sse - floor
-        if found[ids].sse <= most and found[ids].sse - floor <= LEAST_TURN * left:
+        is_simpler = includes_one_of(best.effects, [ids])
+        most = (FAR_BEHIND if is_simpler else WORTH_MORE) * excess
+        if found[ids].sse - floor <= min(most, LEAST_TURN * left):
             near[ids] = found[ids].starts
     return near
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from hwid_cli.diagnosis import related_sets, set_fits
-from hwid_cli.diagnosis.candidate import start_from
+from hwid_cli.diagnosis.candidate import Screened, start_from
 from hwid_cli.diagnosis.related_sets import near_the_best, parts_of, that_add
 from hwid_cli.diagnosis.set_fits import SetFits
 from tests.diagnosis.small_drive import fit, search_start
@@ -84,3 +84,20 @@ def test_sets_that_bring_nothing_from_where_a_smaller_one_ended_are_not_finished
     assert set(near_the_best(fits, sets, screened, best)) == {pair}
     # It is what they bring that counts: beside what leaves as much both would be near.
     assert set(near_the_best(fits, sets, screened, friction)) == {pair}
+
+
+def test_a_simpler_law_may_be_further_from_the_best_set_than_another_one(monkeypatch):
+    # Few steps do not lead it where the wider one has been led by many.
+    fits = SetFits(rounds_of(FRICTION, FEW))
+    best = fit(
+        fits.rounds.problem,
+        {"stribeck_friction": BREAKING},
+        scales=fits.rounds.baseline.scales,
+    )
+    left = {best.effects: 1.0, ("coulomb_friction",): 5.0, ("cubic_stiffness",): 5.0}
+    monkeypatch.setattr(fits, "floor", lambda: 0.0)
+    monkeypatch.setattr(fits, "few_sse", lambda found: left.get(found.effects, 100.0))
+    monkeypatch.setattr(fits, "largest_part", lambda whole: None)
+    sets = {ids: ["a"] for ids in left if ids != best.effects}
+    screened = [Screened(ids, left[ids], ("a",)) for ids in sets]
+    assert set(near_the_best(fits, sets, screened, best)) == {("coulomb_friction",)}
