@@ -42,6 +42,8 @@ _FASTEST_SHARE = 0.005
 # than this share of the motion is rounding, [-].
 _IDLE = 2.0
 _HARDLY_ANY = 1e-4
+# Of the largest input: a constant part of it that moves nothing may hold a weight, [-].
+_LEAST_CONSTANT = 0.01
 # A straight spring that leaves less than this share of the balance of forces is enough; a
 # curved one has to leave at most this share of that, and to push back over so many times
 # the way that was seen.
@@ -132,25 +134,90 @@ def fit_stand_in(
     ----------
     docs/method_diagnosis.md, eq. (D30).
     """
-    straight, left = _by_regression(signals, runs, is_curved=False)
-    curved, left_then = _by_regression(signals, runs, is_curved=True)
+    straight, left, constant = _by_regression(signals, runs, is_curved=False)
+    curved, left_then, _ = _by_regression(signals, runs, is_curved=True)
     widest = _PUSHES_BACK * max(float(np.max(np.abs(one.output))) for one in runs)
     is_nearer = left > _STRAIGHT and left_then <= _CURVED * left
     is_curved = may_curve and is_nearer and _pushes_back(curved, widest)
     drive = _no_faster_than_seen(curved if is_curved else straight, signals)
-    return _in_free_run(drive, signals, runs)
+    moved = [_as_moved(one, found) for one, found in zip(signals, runs, strict=True)]
+    found = _in_free_run(drive, moved)
+    if abs(constant) <= _LEAST_CONSTANT * _largest(signals):
+        return found
+    # A weight that the input holds: without it the drive would fall.
+    held = [replace(one, driven_by=one.driven_by - constant) for one in moved]
+    beside = _in_free_run(drive, held)
+    is_held = _IDLE * _left_in_free_run(beside, held) < _left_in_free_run(found, moved)
+    return beside if is_held else found
+
+
+def _largest(signals: Sequence[Signals]) -> float:
+    return max(float(np.max(np.abs(one.driven_by))) for one in signals)
+
+
+def fit_to_push(
+    signals: Signals, push: np.ndarray, runs: tuple[SimulatorRun, SimulatorRun]
+) -> StandIn:
+    """Plain drive that a force moves most nearly as it moves a simulation.
+
+    Where a loop is closed inside the simulation, its input is no force: what a reference
+    moves says nothing of what a force does. In N; its force constant is 1.
+
+    Parameters
+    ----------
+    push : ndarray, shape (n_samples,), [N]
+    runs : tuple of SimulatorRun
+        Without and with the push.
+
+    References
+    ----------
+    docs/method_diagnosis.md, eq. (D30).
+    """
+    before, there = runs
+    change = SimulatorRun(
+        there.output - before.output,
+        there.velocity - before.velocity if there.velocity.size else there.velocity,
+    )
+    return fit_stand_in([replace(signals, driven_by=push)], [change], may_curve=False)
+
+
+def with_input_of(
+    drive: StandIn, signals: Sequence[Signals], runs: Sequence[SimulatorRun]
+) -> StandIn | None:
+    """The drive with the force constant that balances a usual run; None where none does.
+
+    Parameters
+    ----------
+    drive : StandIn
+        In N.
+    runs : sequence of SimulatorRun
+        What the simulation makes of the inputs.
+    """
+    without = replace(drive, force_constant_N_per_A=0.0)
+    constants = []
+    for one, found in zip(signals, runs, strict=True):
+        moved = derived(found, one.sample_time_s)
+        force = force_along(without, moved, one.driven_by)
+        driven_by = one.driven_by - np.mean(one.driven_by)
+        size = float(driven_by @ driven_by)
+        if size > 0:
+            constants.append(float(driven_by @ (force - np.mean(force))) / size)
+    usual = float(np.median(constants)) if constants else 0.0
+    return replace(drive, force_constant_N_per_A=usual) if usual > 0 else None
 
 
 def _by_regression(
     signals: Sequence[Signals], runs: Sequence[SimulatorRun], *, is_curved: bool
-) -> tuple[StandIn, float]:
+) -> tuple[StandIn, float, float]:
     """Mass, damping and spring that balance the input along the motion.
 
     Returns
     -------
     StandIn
-    float
+    float, [-]
         Share of the input that it leaves.
+    float, [input unit]
+        What of the input they do not need, all along.
     """
     rows, right = [], []
     for one, found in zip(signals, runs, strict=True):
@@ -184,7 +251,7 @@ def _by_regression(
         quadratic_N_per_m2=float(bends[0]) if is_curved else 0.0,
         cubic_N_per_m3=float(bends[1]) if is_curved else 0.0,
     )
-    return drive, float(left) / whole
+    return drive, float(left) / whole, float(values[3] - values[4])
 
 
 def _pushes_back(drive: StandIn, widest: float) -> bool:
@@ -194,26 +261,25 @@ def _pushes_back(drive: StandIn, widest: float) -> bool:
     return bool(np.all(spring_force(drive, position) / position > 0))
 
 
-def _in_free_run(
-    drive: StandIn, signals: Sequence[Signals], runs: Sequence[SimulatorRun]
-) -> StandIn:
+def _as_moved(signals: Signals, found: SimulatorRun) -> Signals:
+    """Signals of what a simulation made of them, from where it started."""
+    return replace(
+        signals,
+        output=found.output,
+        compared=found.output,
+        is_held_out=False,
+        used=None,
+        start=seen_start(derived(found, signals.sample_time_s)),
+    )
+
+
+def _in_free_run(drive: StandIn, compared: Sequence[Signals]) -> StandIn:
     """The same, nearer in a free run, where that can be found.
 
     It starts where the simulation does: a spring of rounding errors would be in balance
     far from there.
     """
-    compared = tuple(
-        replace(
-            one,
-            output=found.output,
-            compared=found.output,
-            is_held_out=False,
-            used=None,
-            start=seen_start(derived(found, one.sample_time_s)),
-        )
-        for one, found in zip(signals, runs, strict=True)
-    )
-    problem = DiagnosisProblem(compared, drive)
+    problem = DiagnosisProblem(tuple(compared), drive)
     scales = scales_of_recordings(problem, [one.velocity for one in compared])
     fit_layout = parameter_layout(problem, (), {}, scales)
     point = first_point(problem, fit_layout, drive, {})
@@ -222,7 +288,7 @@ def _in_free_run(
         return drive
     base: dict[str, Any] = base_of(drive_at(problem, fit_layout, found.point))
     # A damper that has grown is as fast as a mass that has shrunk.
-    better = _no_faster_than_seen(replace(drive, **base), signals)
+    better = _no_faster_than_seen(replace(drive, **base), compared)
     better = _without_idle_spring(better, compared)
     return in_newtons(better, better.force_constant_N_per_A)
 

@@ -15,14 +15,17 @@ from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals, prepare
 from hwid_cli.diagnosis.run_starts import Begun, begin
 from hwid_cli.diagnosis.simulator import Runs, Simulator
 from hwid_cli.diagnosis.stand_in import (
+    Moved,
     derived,
     error_of,
     fit_stand_in,
+    fit_to_push,
     force_along,
     in_newtons,
     moved_plainly,
     standing_for,
     with_change,
+    with_input_of,
 )
 from hwid_cli.diagnosis.tasks import RunTasks
 from hwid_cli.records.axis import MotionUnits
@@ -38,6 +41,9 @@ _MOST_PUSHES = 4
 # Of the force along its motion, for the first guess; and of a push that it did not bear.
 _SMALL_PUSH = 1e-3
 _WEAKER = 0.1
+# A drive that misses a larger share of the answer to a push is no model of what a force
+# does, [-].
+_MOST_MISSED = 0.05
 # How a command goes on between samples is the matter of the simulation itself.
 ITS_OWN = SimulationOptions(hold=LINE)
 
@@ -153,26 +159,73 @@ def _in_newtons(
     values: Mapping[str, float],
     drive: StandIn,
 ) -> StandIn:
-    """The stand-in with forces in N, where a force can be put into the simulation."""
+    """The stand-in with forces in N, where a force can be put into the simulation.
+
+    One that is fitted to inputs may say nothing of forces: behind a loop that the
+    simulation closes, an input is none. Then one that is fitted to the push takes its
+    place, if that answers rightly.
+    """
     if not runs.simulator.capabilities.force:
         return drive
-    row = int(np.argmax([np.ptp(one.output) for one in given]))
-    one, before = signals[row], given[row]
-    size = float(np.std(before.output))
-    moved = derived(before, one.sample_time_s)
-    force = force_along(drive, moved, one.driven_by)
-    plain = moved_plainly(drive, one, force, moved).position
+    first = drive
+    for count, row in enumerate(_pushed_rows(given)):
+        moved = derived(given[row], signals[row].sample_time_s)
+        along = signals[row], moved
+        guess = _first_push(drive, *along)
+        answered = _answered(runs, signals[row], values, given[row], guess)
+        if answered is None:
+            continue
+        push, there = answered
+        answer = there.output - given[row].output
+        if not answer.any():
+            continue
+        gain, missed = _told_by(drive, *along, push, answer)
+        in_force = in_newtons(drive, gain) if gain > 0 else drive
+        if gain > 0 and missed <= _MOST_MISSED:
+            return in_force
+        by_push = fit_to_push(signals[row], push, (given[row], there))
+        other = with_input_of(by_push, signals, given)
+        if other and _told_by(other, *along, push, answer)[1] <= _MOST_MISSED:
+            return other
+        first = first if count else in_force
+    return first
+
+
+def _pushed_rows(given: Sequence[SimulatorRun]) -> list[int]:
+    """A usual run, and the one that moves most: that may leave a valley for good."""
+    order = np.argsort([-float(np.ptp(one.output)) for one in given])
+    return list(dict.fromkeys([int(order[order.size // 2]), int(order[0])]))
+
+
+def _first_push(drive: StandIn, signals: Signals, moved: Moved) -> np.ndarray:
+    """A push that moves a drive by a small share of its motion."""
+    force = force_along(drive, moved, signals.driven_by)
+    plain = moved_plainly(drive, signals, force, moved).position
     # A spring that softens gives way to a large push for good.
-    push = _test_push(one) * _SMALL_PUSH * max(float(np.std(force)), 1e-300)
-    pushed = moved_plainly(drive, one, force + push, moved).position - plain
-    push = push * (_PUSH * size / max(float(np.std(pushed)), 1e-300))
-    answered = _answered(runs, one, values, before, push)
-    if answered is None:
-        return drive
-    push, answer = answered
-    expected = moved_plainly(drive, one, force + push, moved).position - plain
+    push = _test_push(signals) * _SMALL_PUSH * max(float(np.std(force)), 1e-300)
+    pushed = moved_plainly(drive, signals, force + push, moved).position - plain
+    size = float(np.std(moved.position))
+    return np.asarray(push * (_PUSH * size / max(float(np.std(pushed)), 1e-300)))
+
+
+def _told_by(
+    drive: StandIn, signals: Signals, moved: Moved, push: np.ndarray, answer: np.ndarray
+) -> tuple[float, float]:
+    """How a simulation's answer to a push goes with that of a drive along its motion.
+
+    Returns
+    -------
+    float
+        Factor between them.
+    float, [-]
+        Share of the answer's squares that differs.
+    """
+    force = force_along(drive, moved, signals.driven_by)
+    plain = moved_plainly(drive, signals, force, moved).position
+    expected = moved_plainly(drive, signals, force + push, moved).position - plain
     gain = float(expected @ answer) / max(float(expected @ expected), 1e-300)
-    return in_newtons(drive, gain) if gain > 0 else drive
+    left = answer - gain * expected
+    return gain, float(left @ left) / max(float(answer @ answer), 1e-300)
 
 
 def _answered(
@@ -181,8 +234,8 @@ def _answered(
     values: Mapping[str, float],
     before: SimulatorRun,
     push: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray] | None:
-    """A push that moves the simulation enough, and by how much; None where none does.
+) -> tuple[np.ndarray, SimulatorRun] | None:
+    """A push that moves the simulation enough, and that run; None where none does.
 
     Parameters
     ----------
@@ -202,9 +255,8 @@ def _answered(
                 break
             factor *= _WEAKER
             continue
-        answer = there[0].output - before.output
-        found = push * factor, answer
-        share = float(np.std(answer)) / size
+        found = push * factor, there[0]
+        share = float(np.std(there[0].output - before.output)) / size
         if _PUSH_LIMITS[0] <= share <= _PUSH_LIMITS[1]:
             break
         factor *= min(max(_PUSH / max(share, 1e-6), 1e-4), 1e4)

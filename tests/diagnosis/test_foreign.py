@@ -172,6 +172,47 @@ def test_a_spring_that_softens_is_pushed_no_farther_than_it_bears():
     assert drive.force_constant_N_per_A == pytest.approx(3.0, rel=0.3)
 
 
+def test_of_a_loop_inside_a_simulation_a_push_tells_what_a_force_does():
+    """A reference moves an axis as if it had no mass, whatever a force does to it."""
+    # 2 kg behind a stiff loop that knows the reference's slope.
+    mass, gain, damping = 2.0, 2000.0, 80.0
+
+    def follows(request):
+        force = request.force if request.force.size else np.zeros(N)
+        pushed = lsim(([1.0], [mass, damping, gain]), force, TIME)[1]
+        led = lsim(([damping, gain], [mass, damping, gain]), request.input, TIME)[1]
+        return SimulatorRun(led + pushed, np.zeros(0))
+
+    able = Capabilities(run=True, force=True)
+    found = [
+        Recording(name, u, follows(RunRequest(name, STEP_S, u, NO_FORCE, {})).output, STEP_S)
+        for name, u in inputs()
+    ]  # fmt: skip
+    simulator = Simulator(able, follows, {}, {}, {})
+    drive = stand_in_for(as_given(found, simulator, DiagnoseOptions(), Count()))
+    assert drive.mass_kg == pytest.approx(mass, rel=0.01)
+    assert drive.damping_N_s_per_m == pytest.approx(damping, rel=0.01)
+    assert drive.stiffness_N_per_m == pytest.approx(gain, rel=0.01)
+    # A reference of 1 asks for what the spring of the loop holds there.
+    assert drive.force_constant_N_per_A == pytest.approx(gain, rel=0.1)
+
+
+def test_a_usual_run_is_pushed_and_not_one_that_has_left_its_valley():
+    able = Capabilities(run=True, force=True)
+    inputs_N = [np.where(TIME > 0.05, size, 0.0) for size in (0.05, -0.09, 0.07, 0.45)]
+    found = [
+        Recording(f"r{row}", one, swings(RunRequest("r", STEP_S, one, NO_FORCE, {})).output,
+                  10 * STEP_S)
+        for row, one in enumerate(inputs_N)
+    ]  # fmt: skip
+    assert max(np.max(one.output) for one in found) > 6.3
+    simulator = Simulator(able, swings, {}, {}, {})
+    drive = stand_in_for(as_given(found, simulator, DiagnoseOptions(), Count()))
+    assert drive.mass_kg == pytest.approx(0.05, rel=0.1)
+    assert drive.stiffness_N_per_m == pytest.approx(1.1, rel=0.2)
+    assert drive.force_constant_N_per_A == pytest.approx(3.0, rel=0.2)
+
+
 def test_a_push_that_a_simulation_does_not_bear_is_made_weaker():
     able = Capabilities(run=True, parameters=True, force=True)
 

@@ -162,6 +162,20 @@ def test_a_free_axis_that_starts_out_of_balance_has_none_either():
     assert found.damping_N_s_per_m == pytest.approx(DAMPING / GAIN, rel=1e-2)
 
 
+def test_a_weight_that_the_input_holds_is_no_damper():
+    """A hovering mass, whose input is never near zero: its stand-in fell, and was slowed."""
+    weight = 9.81 * MASS / GAIN
+    inputs = [weight + one for one in INPUTS]
+    runs = [
+        SimulatorRun(lsim(([GAIN], [MASS, DAMPING, 0.0]), one, TIME)[1], NOTHING)
+        for one in INPUTS
+    ]
+    found = fit_stand_in([signals(one) for one in inputs], runs)
+    assert found.stiffness_N_per_m == 0.0
+    assert found.mass_kg == pytest.approx(MASS / GAIN, rel=1e-3)
+    assert found.damping_N_s_per_m == pytest.approx(DAMPING / GAIN, rel=1e-3)
+
+
 @pytest.mark.thorough
 @pytest.mark.parametrize("lag_s", [0.003, 0.05])
 def test_a_simulation_without_inertia_gets_a_mass_that_samples_show(given, lag_s):
