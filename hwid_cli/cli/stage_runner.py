@@ -4,7 +4,10 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
+import click
+
 from hwid_cli.cli.session import Session, Timer, say_damaged
+from hwid_cli.cli.stopping import WORKS_ON
 from hwid_cli.report.formats import counted
 from hwid_cli.report.progress import StageProgress
 from hwid_cli.store.cache import Hdf5Store
@@ -87,13 +90,16 @@ class StageRunner:
         callable
             Takes what the next round does and how many tasks it has.
         """
+        context = click.get_current_context(silent=True)
+        told = {} if context is None else context.find_root().meta
         with self._progress(0, unit, "") as (settings, progress):
-            yield (
-                settings,
-                lambda text, total: progress.begin_round(
-                    f"{self.place}: {text}", total
-                ),
-            )
+
+            def begin(text: str, total: int) -> None:
+                told[WORKS_ON] = text
+                progress.begin_round(f"{self.place}: {text}", total)
+
+            yield settings, begin
+        told.pop(WORKS_ON, None)
 
     @contextmanager
     def _progress(

@@ -24,6 +24,8 @@ Handler = Callable[[int, FrameType | None], None]
 
 # Where a command tells in which folder its finished results are kept.
 KEPT_IN = "hwid_cli.kept_in"
+# Where a command tells what it works on, with what it has found until then.
+WORKS_ON = "hwid_cli.works_on"
 # Time to unwind, [s]; the promise is that the process has ended after two seconds.
 GRACE_S = 0.8
 # After a stop that was lost it is tried again, [s].
@@ -153,10 +155,12 @@ def _listen(stop: Handler) -> dict[int, Any]:
 
 def _sentence(context: click.Context, number: int) -> str:
     """What is kept, and how to go on."""
-    folder = context.find_root().meta.get(KEPT_IN)
+    told = context.find_root().meta
+    folder, doing = told.get(KEPT_IN), told.get(WORKS_ON)
     how = "" if number == signal.SIGINT else f" by {signal.Signals(number).name}"
     kept = "nothing was begun" if folder is None else _kept(folder)
-    return f"interrupted{how}; {kept}; run the same command again to go on"
+    came_to = f"; it had come to: {doing}" if doing else ""
+    return f"interrupted{how}; {kept}; run the same command again to go on{came_to}"
 
 
 def _kept(folder: Path) -> str:

@@ -240,6 +240,8 @@ def find(
     run_tasks: RunTasks,
     on_round: OnRound,
     given_sse: np.ndarray | None = None,
+    *,
+    may_cut: bool = True,
 ) -> Findings:
     """Find what the drive of a problem lacks.
 
@@ -248,6 +250,8 @@ def find(
     given_sse : ndarray, shape (n_recordings,), or None, [output unit squared]
         What the simulation leaves with the parameters that the configuration gives; None
         where that is the problem's own drive.
+    may_cut : bool
+        Look in pieces of the recordings, too, where whole ones settle nothing.
 
     Raises
     ------
@@ -262,7 +266,8 @@ def find(
         best = best_of(again.rounds, again.found)
         if does_as_well(rounds, best, best_of(rounds, found)):
             searched = again
-    searched = _with_pieces(searched, options.max_effects)
+    if may_cut:
+        searched = _with_pieces(searched, options.max_effects)
     whole = _judged(searched, options)
     if whole.pieces is not None or whole.law is not None:
         return whole

@@ -93,6 +93,13 @@ def diagnose_foreign(
         )
         chosen, criteria = found.verdict.chosen, found.criteria
         is_done = is_confirmed and criteria.is_nearly_all(chosen, found.base)
+        if (
+            kept
+            and kept[1]
+            and not (is_confirmed and _leaves_less_than(found, kept[0]))
+        ):
+            # A search that is borne out stays, where a further one does no better.
+            break
         if is_confirmed or search < _MOST_SEARCHES - 1:
             kept = found, is_confirmed, moved if is_confirmed else values
         if is_done:
@@ -140,7 +147,9 @@ def _found(
     runs, values = simulation
     singles, alone = replace(options, max_effects=1, laws="never"), None
     if options.laws != "only" and runs.simulator.run is not None:
-        found = find(standing, singles, runs.run_tasks, on_round, given_sse)
+        found = find(
+            standing, singles, runs.run_tasks, on_round, given_sse, may_cut=False
+        )
         alone = single_in_simulation(found, runs, values, on_round)
         if alone.findings is not None and alone.is_all:
             return alone.findings, alone.values, True
@@ -151,10 +160,14 @@ def _found(
             return confirm(found, runs, values)
     if runs.simulator.run is None:
         standing = _with_nearer_spring(standing, singles, runs.run_tasks, on_round)
-    found = find(standing, options, runs.run_tasks, on_round, given_sse)
+    one = None if alone is None else alone.findings
+    # What a stand-in leaves of an effect that runs bear out is its own error: pieces,
+    # which are asked where nothing is settled, would only repeat it.
+    found = find(
+        standing, options, runs.run_tasks, on_round, given_sse, may_cut=one is None
+    )
     on_round("the effect in the simulation", 0)
     several = confirm(found, runs, values)
-    one = None if alone is None else alone.findings
     if alone is None or one is None or _leaves_less(several, one):
         return several
     return one, alone.values, True
@@ -165,12 +178,13 @@ def _leaves_less(
 ) -> bool:
     """Whether the simulation's run with a set leaves less than that with one effect."""
     told, _, is_confirmed = several
-    chosen, alone = told.verdict.chosen, one.verdict.chosen
-    return (
-        is_confirmed
-        and bool(chosen.effects)
-        and bool(chosen.sse.sum() < alone.sse.sum())
-    )
+    has_effects = bool(told.verdict.chosen.effects)
+    return is_confirmed and has_effects and _leaves_less_than(told, one)
+
+
+def _leaves_less_than(one: Findings, other: Findings) -> bool:
+    """Whether what is chosen leaves less of all recordings than in other findings."""
+    return bool(one.verdict.chosen.sse.sum() < other.verdict.chosen.sse.sum())
 
 
 def _law_instead(

@@ -6,7 +6,7 @@ most of their error beyond the noise must be explained, in most of them.
 docs/method_diagnosis.md, eq. (D21) to (D24).
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations
 from math import inf
@@ -634,6 +634,21 @@ def _excess_of_held_out(criteria: SelectionCriteria, found: CandidateFit) -> flo
 def title_of(found: CandidateFit) -> str:
     """Public ids of a set of effects, in words."""
     return " with ".join(public_id(one) for one in found.effects)
+
+
+def with_best_so_far(
+    what: str,
+    criteria: SelectionCriteria,
+    fits: Iterable[CandidateFit],
+    base: CandidateFit,
+) -> str:
+    """What begins, with what leads until now: a search that is stopped has said so much."""
+    usable = [one for one in fits if one.is_usable]
+    if not usable:
+        return what
+    best = max(usable, key=lambda one: criteria.gain(one, base))
+    left = f"{criteria.ratio(best):.3g} times the noise"
+    return f"{what} (so far {title_of(best)}, {left})"
 
 
 def names_of(found: CandidateFit) -> tuple[str, ...]:

@@ -35,6 +35,7 @@ from hwid_cli.diagnosis.selection import (
     SelectionCriteria,
     is_part_of,
     select_best,
+    with_best_so_far,
 )
 from hwid_cli.diagnosis.tasks import DiagnosisTask, OnRound, RunTasks
 from hwid_cli.drive.catalogue import CATALOGUE
@@ -208,7 +209,7 @@ class SetFits:
         """Fit all proposed sets cheaply."""
         if not proposed:
             return []
-        self.rounds.on_round(f"{name}, screening", len(proposed))
+        self._begin(f"{name}, screening", len(proposed))
         scales = self.rounds.baseline.scales
         tasks = [
             DiagnosisTask(
@@ -265,7 +266,7 @@ class SetFits:
         rounds = self.rounds
         if not sets:
             return []
-        rounds.on_round(what, len(sets))
+        self._begin(what, len(sets))
         tasks = [
             fit_task(rounds, ids, starts, most_samples) for ids, starts in sets.items()
         ]
@@ -347,12 +348,20 @@ class SetFits:
 
     def _grow(self, chosen: CandidateFit, *, to_the_end: bool = False) -> None:
         """Fit a set to growing parts of the recordings."""
-        self.rounds.on_round(f"{name_of(len(chosen.effects))}, growing parts", 1)
+        self._begin(f"{name_of(len(chosen.effects))}, growing parts", 1)
         self.keep(
             self.rounds.run_tasks(
                 [_growing_task(self.rounds, chosen, to_the_end)], keep=True
             )
         )
+
+    def _begin(self, what: str, n_tasks: int) -> None:
+        """Tell what begins; of whole recordings, with what leads until now."""
+        rounds = self.rounds
+        if not self.are_pieces:
+            fits = self.found.values()
+            what = with_best_so_far(what, rounds.criteria, fits, rounds.base)
+        rounds.on_round(what, n_tasks)
 
     def unless_tried(
         self, ids: Effects, starts: Sequence[SearchStart]

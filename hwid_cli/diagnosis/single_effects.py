@@ -16,6 +16,7 @@ from hwid_cli.diagnosis.selection import (
     count,
     is_part_of,
     select_best,
+    with_best_so_far,
 )
 from hwid_cli.diagnosis.settling import settled
 from hwid_cli.diagnosis.simulator import Runs
@@ -84,7 +85,9 @@ def single_in_simulation(
             continue
         (effect,) = one.effects
         what = f"single effects in the simulation, {place} of {len(likely)}"
-        on_round(f"{what}, {public_id(effect)}", 0)
+        what = f"{what}, {public_id(effect)}"
+        so_far = fits.values()
+        on_round(with_best_so_far(what, findings.criteria, so_far, findings.base), 0)
         turn = settled(findings, one, runs, values)
         if turn is not None:
             tried[one.effects], fits[one.effects] = turn, fit_of_run(findings, turn)

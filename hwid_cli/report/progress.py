@@ -12,11 +12,23 @@ from rich.progress import (
     Task,
     TextColumn,
 )
+from rich.table import Column
 from rich.text import Text
 
 # Short, so that all of it stands in one line of 80 characters.
 _BAR = 12
+# Columns beside the text, and those of the text that are shown in any case.
+_BESIDE, _FEWEST_SHOWN = 40, 24
 _MINUTE, _HOUR = 60, 3600
+
+
+def _as_wide_as_fits(console: Console) -> Column:
+    """A column that leaves room for the bar and its counts."""
+    return Column(
+        no_wrap=True,
+        overflow="ellipsis",
+        max_width=max(console.width - _BESIDE, _FEWEST_SHOWN),
+    )
 
 
 class StageProgress:
@@ -45,7 +57,7 @@ class StageProgress:
         console = Console(file=sys.stderr)
         self._is_shown = console.is_terminal and not is_silent
         self._bar = Progress(
-            TextColumn("{task.description}"),
+            TextColumn("{task.description}", table_column=_as_wide_as_fits(console)),
             BarColumn(bar_width=_BAR),
             MofNCompleteColumn(),
             _Rate(unit),

@@ -529,19 +529,24 @@ def test_the_simulation_decides_between_an_effect_and_what_makes_up_for_it(
 
 @pytest.mark.thorough
 @pytest.mark.parametrize(
-    ("confirmed", "searched", "told"),
+    ("confirmed", "left", "searched", "told"),
     [
         # Parameters that are fitted, where the search has moved them, and the given ones.
-        ((False, False, False), [20.0, 21.0, 14.0], (False, 21.0)),
-        ((False, False, True), [20.0, 21.0, 14.0], (True, 15.0)),
-        ((False, True, False), [20.0, 21.0, 22.0], (True, 22.0)),
+        ((False, False, False), (3, 2, 1), [20.0, 21.0, 14.0], (False, 21.0)),
+        ((False, False, True), (3, 2, 1), [20.0, 21.0, 14.0], (True, 15.0)),
+        ((False, True, False), (3, 2, 1), [20.0, 21.0, 22.0], (True, 22.0)),
+        # What is borne out stays, unless a further search is as well and leaves less.
+        ((True, False, False), (3, 2, 1), [20.0, 21.0], (True, 21.0)),
+        ((True, True, True), (2, 3, 1), [20.0, 21.0], (True, 21.0)),
+        ((True, True, True), (3, 2, 1), [20.0, 21.0, 22.0], (True, 23.0)),
     ],
 )
 def test_the_given_parameters_come_last_where_nothing_was_confirmed(
-    monkeypatch, confirmed, searched, told
+    monkeypatch, confirmed, left, searched, told
 ):
     def stub(is_confirmed):
-        verdict = SimpleNamespace(chosen=None, word="unknown")
+        chosen = SimpleNamespace(sse=np.array([float(left[len(begun) - 1])]))
+        verdict = SimpleNamespace(chosen=chosen, word="unknown")
         criteria = SimpleNamespace(is_nearly_all=lambda *_: False)
         return SimpleNamespace(
             verdict=verdict, criteria=criteria, base=None, is_confirmed=is_confirmed

@@ -210,9 +210,22 @@ def test_a_pair_is_found_although_neither_effect_explains_much_alone(pair):
 
 @pytest.mark.thorough
 def test_the_larger_sets_that_are_finished_are_few(pair):
-    counts = dict(pair.announced)
+    counts = {what.partition(" (so far")[0]: n for what, n in pair.announced}
     assert 0 < counts["sets of 2 effects, screening"] <= 2 * SCREENED_ON_TOP
     assert 0 < counts["sets of 2 effects"] <= MOST_FINISHED
+
+
+@pytest.mark.thorough
+def test_what_begins_is_told_with_what_leads_until_then(pair):
+    """A search that is stopped has said so much."""
+    begun = [what for what, _ in pair.announced]
+    assert begun[1] == "single effects, screening"
+    (larger,) = [one for one in begun if one.startswith("sets of 2 effects, screening")]
+    title, _, left = larger.partition(" (so far ")[2].rpartition(", ")
+    assert title in {ids[0] for ids in pair.found.fits if len(ids) == 1}
+    number, words = left.split(" ", maxsplit=1)
+    assert words == "times the noise)"
+    assert float(number) > 1.5
 
 
 @pytest.mark.thorough

@@ -1,3 +1,9 @@
+import io
+
+import pytest
+from rich.console import Console
+
+from hwid_cli.report import progress as progress_module
 from hwid_cli.report.progress import StageProgress
 
 
@@ -62,3 +68,23 @@ def test_what_is_under_way_is_told_in_words():
     progress.begin_round("stage 2 of 2 diagnose: pairs", 9)
     progress.advance(from_cache=False)
     assert progress.text == "stage 2 of 2 diagnose: pairs: 1 of 9 tasks"
+
+
+@pytest.mark.parametrize("width", [80, 140])
+def test_a_long_text_leaves_room_for_the_counts(monkeypatch, width):
+    screen = io.StringIO()
+    monkeypatch.setattr(
+        progress_module,
+        "Console",
+        lambda **_: Console(file=screen, width=width, force_terminal=True),
+    )
+    text = "stage 2 of 2 diagnose: sets of 2 effects (so far coulomb_friction, 8.4 times the noise)"
+    with StageProgress("", 9, "tasks", is_silent=False) as progress:
+        progress.begin_round(text, 9)
+        progress.advance(from_cache=False)
+        progress._bar.refresh()
+    shown = screen.getvalue()
+    assert "1/9" in shown
+    assert ("8.4 times the noise" in shown) == (width == 140)
+    # What is cut there is whole where lines are written.
+    assert progress.text.startswith(text)
