@@ -173,12 +173,53 @@ def fit_to_push(
     ----------
     docs/method_diagnosis.md, eq. (D30).
     """
-    before, there = runs
-    change = SimulatorRun(
-        there.output - before.output,
-        there.velocity - before.velocity if there.velocity.size else there.velocity,
+    answer = _answer_to_push(runs)
+    return fit_stand_in([replace(signals, driven_by=push)], [answer], may_curve=False)
+
+
+def fit_beside_integral(
+    signals: Signals, push: np.ndarray, runs: tuple[SimulatorRun, SimulatorRun]
+) -> tuple[StandIn, float]:
+    """Mass, damper and spring of a loop that also adds up where it is, from a push.
+
+    An integral part lets go of what lasts, and makes a damper look negative. No drive has
+    one, but what it does is slow: the turns that correct a stand-in find it.
+
+    Parameters
+    ----------
+    push : ndarray, shape (n_samples,), [N]
+    runs : tuple of SimulatorRun
+        Without and with the push.
+
+    Returns
+    -------
+    StandIn
+        In N; its force constant is 1.
+    float, [-]
+        Share of the push's squares that all of them leave.
+    """
+    moved = derived(_answer_to_push(runs), signals.sample_time_s)
+    sum_s = signals.sample_time_s * np.cumsum(moved.position)
+    matrix = np.column_stack([
+        moved.acceleration, moved.velocity, moved.position, sum_s
+    ])  # fmt: skip
+    lengths = np.sqrt(np.sum(matrix**2, axis=0))
+    lengths[lengths == 0] = 1.0
+    values, left = scipy.optimize.nnls(matrix / lengths, push)
+    mass, damping, stiffness, _ = values / lengths
+    drive = StandIn(
+        max(float(mass), _LEAST_MASS), float(damping), float(stiffness), 1.0
     )
-    return fit_stand_in([replace(signals, driven_by=push)], [change], may_curve=False)
+    drive = _no_faster_than_seen(drive, [signals])
+    return drive, float(left**2 / max(float(push @ push), 1e-300))
+
+
+def _answer_to_push(runs: tuple[SimulatorRun, SimulatorRun]) -> SimulatorRun:
+    """What a push changes."""
+    before, there = runs
+    has_velocity = bool(there.velocity.size)
+    velocity = there.velocity - before.velocity if has_velocity else there.velocity
+    return SimulatorRun(there.output - before.output, velocity)
 
 
 def with_input_of(

@@ -18,6 +18,7 @@ from hwid_cli.diagnosis.stand_in import (
     Moved,
     derived,
     error_of,
+    fit_beside_integral,
     fit_stand_in,
     fit_to_push,
     force_along,
@@ -183,12 +184,38 @@ def _in_newtons(
         in_force = in_newtons(drive, gain) if gain > 0 else drive
         if gain > 0 and missed <= _MOST_MISSED:
             return in_force
-        by_push = fit_to_push(signals[row], push, (given[row], there))
-        other = with_input_of(by_push, signals, given)
-        if other and _told_by(other, *along, push, answer)[1] <= _MOST_MISSED:
+        other = _fitted_to_push(signals, given, row, push, there)
+        if other is not None:
             return other
         first = first if count else in_force
     return first
+
+
+def _fitted_to_push(
+    signals: Sequence[Signals],
+    given: Sequence[SimulatorRun],
+    row: int,
+    push: np.ndarray,
+    there: SimulatorRun,
+) -> StandIn | None:
+    """A drive that answers a push as a simulation does; None where none does.
+
+    Parameters
+    ----------
+    row : int
+        Of the recording whose run was pushed.
+    push : ndarray, shape (n_samples,), [N]
+    there : SimulatorRun
+        With the push.
+    """
+    one, runs = signals[row], (given[row], there)
+    moved = derived(given[row], one.sample_time_s)
+    answer = there.output - given[row].output
+    plain = with_input_of(fit_to_push(one, push, runs), signals, given)
+    if plain and _told_by(plain, one, moved, push, answer)[1] <= _MOST_MISSED:
+        return plain
+    beside, missed = fit_beside_integral(one, push, runs)
+    return with_input_of(beside, signals, given) if missed <= _MOST_MISSED else None
 
 
 def _pushed_rows(given: Sequence[SimulatorRun]) -> list[int]:
