@@ -50,6 +50,8 @@ _LEAST_CONSTANT = 0.01
 _STRAIGHT = 1e-3
 _CURVED = 0.5
 _PUSHES_BACK = 1.2
+# Friction is in a simulation where it leaves at most this share of what other drives do.
+_DRY = 0.2
 _ITERATIONS = 20
 # A first velocity below this share of the largest is rest.
 _STILL = 1e-3
@@ -134,12 +136,19 @@ def fit_stand_in(
     ----------
     docs/method_diagnosis.md, eq. (D30).
     """
-    straight, left, constant = _by_regression(signals, runs, is_curved=False)
-    curved, left_then, _ = _by_regression(signals, runs, is_curved=True)
+    straight = _by_regression(signals, runs)
+    curved = _by_regression(signals, runs, is_curved=True)
     widest = _PUSHES_BACK * max(float(np.max(np.abs(one.output))) for one in runs)
-    is_nearer = left > _STRAIGHT and left_then <= _CURVED * left
-    is_curved = may_curve and is_nearer and _pushes_back(curved, widest)
-    drive = _no_faster_than_seen(curved if is_curved else straight, signals)
+    is_nearer = straight.left > _STRAIGHT and curved.left <= _CURVED * straight.left
+    is_curved = may_curve and is_nearer and _pushes_back(curved.drive, widest)
+    best = curved if is_curved else straight
+    dry = _by_regression(signals, runs, is_dry=True)
+    if dry.left <= _DRY * best.left and best.left > _STRAIGHT:
+        # Friction in the simulation goes with the forces along its motion; in a free run
+        # without it a damper would stand for it.
+        return _no_faster_than_seen(dry.drive, signals)
+    drive = _no_faster_than_seen(best.drive, signals)
+    constant = straight.constant
     moved = [_as_moved(one, found) for one, found in zip(signals, runs, strict=True)]
     found = _in_free_run(drive, moved)
     if abs(constant) <= _LEAST_CONSTANT * _largest(signals):
@@ -214,6 +223,44 @@ def fit_beside_integral(
     return drive, float(left**2 / max(float(push @ push), 1e-300))
 
 
+def gain_beside_friction(
+    signals: Signals, push: np.ndarray, there: SimulatorRun
+) -> tuple[float, float]:
+    """What of the input a push of 1 N replaces where friction eats a part of its answer.
+
+    From the balance of forces along the pushed run, where something moves.
+
+    Parameters
+    ----------
+    push : ndarray, shape (n_samples,), [N]
+    there : SimulatorRun
+        With the push.
+
+    Returns
+    -------
+    float, [input unit/N]
+    float, [-]
+        Its standard error as a share of it.
+    """
+    moved = derived(there, signals.sample_time_s)
+    speed = np.abs(moved.velocity)
+    used = speed > _STILL * np.max(speed)
+    columns = np.column_stack([
+        -push, moved.acceleration, moved.velocity, moved.position,
+        np.ones(push.size), np.sign(moved.velocity),
+    ])[used]  # fmt: skip
+    lengths = np.sqrt(np.sum(columns**2, axis=0))
+    lengths[lengths == 0] = 1.0
+    inverse = np.linalg.pinv(columns / lengths)
+    driven_by = signals.driven_by[used]
+    values = inverse @ driven_by
+    left = driven_by - (columns / lengths) @ values
+    deviation = float(np.sqrt(left @ left / max(left.size - values.size, 1)))
+    error = deviation * float(np.sqrt(inverse[0] @ inverse[0]))
+    gain = float(values[0])
+    return gain / lengths[0], error / abs(gain) if gain else np.inf
+
+
 def _answer_to_push(runs: tuple[SimulatorRun, SimulatorRun]) -> SimulatorRun:
     """What a push changes."""
     before, there = runs
@@ -247,18 +294,37 @@ def with_input_of(
     return replace(drive, force_constant_N_per_A=usual) if usual > 0 else None
 
 
+@dataclass(frozen=True, eq=False)
+class _Balance:
+    """A drive that balances the input along the motion of a simulation.
+
+    Parameters
+    ----------
+    left : float, [-]
+        Share of the input that is not balanced.
+    constant : float, [input unit]
+        What of the input is not needed, all along.
+    """
+
+    drive: StandIn
+    left: float
+    constant: float
+
+
 def _by_regression(
-    signals: Sequence[Signals], runs: Sequence[SimulatorRun], *, is_curved: bool
-) -> tuple[StandIn, float, float]:
+    signals: Sequence[Signals],
+    runs: Sequence[SimulatorRun],
+    *,
+    is_curved: bool = False,
+    is_dry: bool = False,
+) -> _Balance:
     """Mass, damping and spring that balance the input along the motion.
 
-    Returns
-    -------
-    StandIn
-    float, [-]
-        Share of the input that it leaves.
-    float, [input unit]
-        What of the input they do not need, all along.
+    Parameters
+    ----------
+    is_dry : bool
+        Beside a friction that goes with the direction alone, where something moves; it
+        is no part of the drive.
     """
     rows, right = [], []
     for one, found in zip(signals, runs, strict=True):
@@ -270,9 +336,26 @@ def _by_regression(
             signed += [moved.position**2, moved.position**3]
         columns = [moved.acceleration, moved.velocity, moved.position]
         columns += [sign * column for column in signed for sign in (1.0, -1.0)]
-        rows.append(np.column_stack(columns) / size)
-        right.append(one.driven_by / size)
-    matrix, vector = np.concatenate(rows), np.concatenate(right)
+        used = np.ones(one.driven_by.size, dtype=bool)
+        if is_dry:
+            columns.append(np.sign(moved.velocity))
+            speed = np.abs(moved.velocity)
+            used = speed > _STILL * np.max(speed)
+        rows.append(np.column_stack(columns)[used] / size)
+        right.append(one.driven_by[used] / size)
+    return _balanced(np.concatenate(rows), np.concatenate(right), is_curved=is_curved)
+
+
+def _balanced(matrix: np.ndarray, vector: np.ndarray, *, is_curved: bool) -> _Balance:
+    """Least squares of forces, none of which is negative.
+
+    Parameters
+    ----------
+    matrix : ndarray, shape (n_samples, n_columns)
+        Acceleration, velocity, position, pairs of what may have either sign, and more.
+    vector : ndarray, shape (n_samples,)
+        The input.
+    """
     lengths = np.sqrt(np.sum(matrix**2, axis=0))
     lengths[lengths == 0] = 1.0
     found_values, left = scipy.optimize.nnls(matrix / lengths, vector)
@@ -283,16 +366,15 @@ def _by_regression(
     if shares[0] < _LEAST_SHARE:
         # Hardly any inertia: as much as a sampled motion can show.
         mass = max(_LEAST_SHARE * whole / lengths[0], _LEAST_MASS)
-    bends = values[5::2] - values[6::2]
     drive = StandIn(
         mass_kg=float(mass),
         damping_N_s_per_m=float(damping if shares[1] > _LEAST_SHARE else 0.0),
         stiffness_N_per_m=float(stiffness if shares[2] > _LEAST_SHARE else 0.0),
         force_constant_N_per_A=1.0,
-        quadratic_N_per_m2=float(bends[0]) if is_curved else 0.0,
-        cubic_N_per_m3=float(bends[1]) if is_curved else 0.0,
+        quadratic_N_per_m2=float(values[5] - values[6]) if is_curved else 0.0,
+        cubic_N_per_m3=float(values[7] - values[8]) if is_curved else 0.0,
     )
-    return drive, float(left) / whole, float(values[3] - values[4])
+    return _Balance(drive, float(left) / whole, float(values[3] - values[4]))
 
 
 def _pushes_back(drive: StandIn, widest: float) -> bool:

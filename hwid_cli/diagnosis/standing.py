@@ -22,6 +22,7 @@ from hwid_cli.diagnosis.stand_in import (
     fit_stand_in,
     fit_to_push,
     force_along,
+    gain_beside_friction,
     in_newtons,
     moved_plainly,
     standing_for,
@@ -45,6 +46,8 @@ _WEAKER = 0.1
 # A drive that misses a larger share of the answer to a push is no model of what a force
 # does, [-].
 _MOST_MISSED = 0.05
+# Of the push itself a drive beside an integral part leaves a smaller share.
+_MOST_UNBALANCED = 0.01
 # How a command goes on between samples is the matter of the simulation itself.
 ITS_OWN = SimulationOptions(hold=LINE)
 
@@ -187,6 +190,9 @@ def _in_newtons(
         other = _fitted_to_push(signals, given, row, push, there)
         if other is not None:
             return other
+        gain, error = gain_beside_friction(signals[row], push, there)
+        if gain > 0 and error <= _MOST_MISSED:
+            return in_newtons(drive, gain)
         first = first if count else in_force
     return first
 
@@ -211,11 +217,12 @@ def _fitted_to_push(
     one, runs = signals[row], (given[row], there)
     moved = derived(given[row], one.sample_time_s)
     answer = there.output - given[row].output
-    plain = with_input_of(fit_to_push(one, push, runs), signals, given)
-    if plain and _told_by(plain, one, moved, push, answer)[1] <= _MOST_MISSED:
-        return plain
     beside, missed = fit_beside_integral(one, push, runs)
-    return with_input_of(beside, signals, given) if missed <= _MOST_MISSED else None
+    if missed <= _MOST_UNBALANCED:
+        return with_input_of(beside, signals, given)
+    plain = with_input_of(fit_to_push(one, push, runs), signals, given)
+    is_near = plain and _told_by(plain, one, moved, push, answer)[1] <= _MOST_MISSED
+    return plain if is_near else None
 
 
 def _pushed_rows(given: Sequence[SimulatorRun]) -> list[int]:

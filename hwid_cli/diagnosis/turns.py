@@ -46,6 +46,8 @@ from hwid_cli.records.programs import SimulatorRun
 # Runs with the effect, and the share of what remains (or of the noise) by which loop and
 # simulation may differ.
 _MOST_TURNS = 8
+# And at most so many while each leaves clearly less, and no more than the stand-in said.
+_MOST_THAT_GAIN = 16
 _AGREEMENT = 0.1
 # Squares of the noise that are hardly worth another turn.
 _WORTH_A_FIT = 2.0
@@ -53,6 +55,8 @@ _WORTH_A_FIT = 2.0
 # run before: there it does not settle.
 _MOST_IN_VAIN = 3
 _WORTH_A_TURN = 0.95
+# Turns that agree go on while each leaves less than this share of the last one.
+_SETTLED = 0.995
 # Over the noise, what a run may leave because its effect is a little late at corners.
 _LATE_AT_CORNERS = 1.1
 # To double a parameter of the simulation costs this share of what the last run left: the
@@ -156,10 +160,11 @@ def best_turn(findings: Findings, turn: Turn, runs: Runs) -> Turn:
     remains, one more turn follows.
     """
     best, agreed, in_vain = turn, 0, 0
-    for _ in range(_MOST_TURNS):
+    for count in range(_MOST_THAT_GAIN):
         following = _next_turn(findings, turn, runs)
         if following is None:
             break
+        has_settled = following.sse.sum() > _SETTLED * turn.sse.sum()
         turn = following
         is_worth_it = turn.sse.sum() < _WORTH_A_TURN * best.sse.sum()
         in_vain = 0 if is_worth_it or is_as_good(turn) else in_vain + 1
@@ -167,13 +172,16 @@ def best_turn(findings: Findings, turn: Turn, runs: Runs) -> Turn:
             best = turn
         if turn.ran_away:
             return replace(best, ran_away=True)
+        if count >= _MOST_TURNS - 1 and not (is_worth_it and is_as_good(turn)):
+            break
         agreed = agreed + 1 if _agrees(findings, turn) and is_as_good(turn) else 0
         is_enough = (
             agreed > 0
             and findings.criteria.is_complete(fit_of_run(findings, turn))
             and not _promises_more(findings, turn)
         )
-        if is_enough or agreed > 1 or in_vain == _MOST_IN_VAIN:
+        is_over = agreed > 1 and has_settled
+        if is_enough or is_over or in_vain == _MOST_IN_VAIN:
             break
     return best
 

@@ -14,10 +14,13 @@ from hwid_cli.diagnosis.stand_in import (
     corrected,
     derived,
     error_of,
+    fit_beside_integral,
     fit_stand_in,
+    fit_to_push,
     force_along,
     force_of_change,
     force_of_motion,
+    gain_beside_friction,
     in_newtons,
     moved_from,
     moved_plainly,
@@ -174,6 +177,68 @@ def test_a_weight_that_the_input_holds_is_no_damper():
     assert found.stiffness_N_per_m == 0.0
     assert found.mass_kg == pytest.approx(MASS / GAIN, rel=1e-3)
     assert found.damping_N_s_per_m == pytest.approx(DAMPING / GAIN, rel=1e-3)
+
+
+def rubs(force, dry, stiffness=STIFFNESS, finer=20):
+    """A drive with dry friction, in small steps of its own."""
+    way = speed = 0.0
+    found = np.zeros(force.size)
+    step = STEP_S / finer
+    held = np.repeat(force, finer)
+    for row, push in enumerate(held):
+        if row % finer == 0:
+            found[row // finer] = way
+        free = speed + step * (push - DAMPING * speed - stiffness * way) / MASS
+        most = step * dry / MASS
+        speed = free - min(max(free, -most), most)
+        way += step * speed
+    return SimulatorRun(found, NOTHING)
+
+
+@pytest.mark.parametrize("stiffness", [STIFFNESS, 0.0])
+def test_friction_in_a_simulation_is_no_damper_of_its_stand_in(stiffness):
+    inputs = [3.0 * one for one in INPUTS]
+    runs = [rubs(GAIN * one, 6.0, stiffness) for one in inputs]
+    found = fit_stand_in([signals(one) for one in inputs], runs)
+    assert found.mass_kg == pytest.approx(MASS / GAIN, rel=0.05)
+    assert found.damping_N_s_per_m == pytest.approx(DAMPING / GAIN, rel=0.1)
+    assert found.stiffness_N_per_m == pytest.approx(stiffness / GAIN, rel=0.02, abs=0.5)
+
+
+def test_what_a_push_replaces_beside_friction_is_told_by_forces_and_not_by_the_way():
+    slow = np.sin(2 * np.pi * 4.0 * TIME)
+    command = signals(1.2 * INPUTS[0])
+    before = rubs(GAIN * command.driven_by, 6.0, stiffness=0.0)
+    there = rubs(GAIN * command.driven_by + slow, 6.0, stiffness=0.0)
+    gain, error = gain_beside_friction(command, slow, there)
+    assert gain == pytest.approx(1 / GAIN, rel=0.05)
+    assert error < 0.05
+    # What friction has eaten of the answer:
+    free = lsim(([1.0], [MASS, DAMPING, 0.0]), slow, TIME)[1]
+    answer = there.output - before.output
+    assert not 0.8 < float(answer @ free) / float(free @ free) < 1.2
+    # A push that nothing answers tells nothing.
+    _, error = gain_beside_friction(command, 1e-4 * slow, before)
+    assert error > 1.0
+
+
+def test_a_loop_that_adds_up_is_told_from_a_negative_damper():
+    kp, ki = STIFFNESS, 9.0 * STIFFNESS
+    push = np.sin(np.pi * TIME / TIME[-1]) * np.sin(2 * np.pi * 2 * TIME / TIME[-1])
+    loop = ([1.0, 0.0], [MASS, DAMPING, kp, ki])
+    rest = SimulatorRun(np.zeros(N), NOTHING)
+    pushed = SimulatorRun(lsim(loop, push, TIME)[1], NOTHING)
+    one = signals(push)
+    drive, missed = fit_beside_integral(one, push, (rest, pushed))
+    assert missed < 1e-3
+    assert drive.mass_kg == pytest.approx(MASS, rel=0.05)
+    assert drive.damping_N_s_per_m == pytest.approx(DAMPING, rel=0.05)
+    assert drive.stiffness_N_per_m == pytest.approx(kp, rel=0.01)
+    assert fit_to_push(one, push, (rest, pushed)).damping_N_s_per_m < 0.5 * DAMPING
+    # Noise is no drive.
+    rng = np.random.default_rng(1)
+    rough = SimulatorRun(rng.standard_normal(N), NOTHING)
+    assert fit_beside_integral(one, push, (rest, rough))[1] > 0.5
 
 
 @pytest.mark.thorough

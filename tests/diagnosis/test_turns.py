@@ -1,0 +1,68 @@
+"""How long stand-in and simulation take turns."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from hwid_cli.diagnosis import turns
+from hwid_cli.diagnosis.turns import Turn, best_turn
+from tests.diagnosis.made_up_fits import made_up
+
+FIT = made_up(("coulomb_friction",), 100.0)
+
+
+@pytest.fixture
+def taken(monkeypatch):
+    """Turns that are taken, of those that would leave given sums of squares."""
+
+    def of(sums, *, agrees):
+        left = iter(sums)
+        seen = []
+
+        def following(_findings, turn, _runs):
+            sse = next(left)
+            seen.append(sse)
+            return Turn(turn.problem, FIT, {}, 100.0, at_force=True, tried=(FIT, {}),
+                        left=(np.array([np.sqrt(sse)]),))  # fmt: skip
+
+        monkeypatch.setattr(turns, "_next_turn", following)
+        monkeypatch.setattr(turns, "_agrees", lambda *_: agrees)
+        monkeypatch.setattr(turns, "fit_of_run", lambda *_: FIT)
+        criteria = SimpleNamespace(is_complete=lambda _: False)
+        first = Turn(None, FIT, {}, 100.0, at_force=True)
+        best = best_turn(SimpleNamespace(criteria=criteria), first, None)
+        return len(seen), float(best.sse.sum())
+
+    return of
+
+
+def falling(first, factor, n=40):
+    return [first * factor**k for k in range(n)]
+
+
+def test_turns_go_on_while_each_leaves_clearly_less(taken):
+    # A rough simulation settles by a tenth in a turn.
+    count, left = taken(falling(80.0, 0.9), agrees=False)
+    assert count == 16
+    assert left == pytest.approx(80.0 * 0.9**15)
+
+
+@pytest.mark.parametrize(
+    ("first", "factor"),
+    [
+        # Hardly anything is gained.
+        (80.0, 0.97),
+        # The stand-in had said 100.
+        (1e4, 0.8),
+    ],
+)
+def test_other_turns_are_eight_at_most(taken, first, factor):
+    count, _ = taken(falling(first, factor), agrees=False)
+    assert count <= 8
+
+
+def test_two_turns_that_agree_are_enough_once_nothing_is_gained(taken):
+    assert taken([50.0, 49.9, 1.0], agrees=True) == (2, 49.9)
+    count, left = taken([50.0, 49.0, 48.0, 47.9, 1.0], agrees=True)
+    assert (count, left) == (4, 47.9)
