@@ -12,6 +12,7 @@ from hwid_cli.diagnosis.findings import Findings
 from hwid_cli.diagnosis.intervals import unclear_effects
 from hwid_cli.diagnosis.selection import (
     LEAST_EXPLAINED,
+    LEAST_GAIN,
     WITHIN_REACH,
     count,
     is_part_of,
@@ -189,7 +190,7 @@ def _base_in_simulation(
 
 
 def _likely(findings: Findings) -> list[CandidateFit]:
-    """Single effects that leave least beside the stand-in, limit cases first."""
+    """Single effects that leave least beside the stand-in, limit cases and simple ones first."""
     criteria = findings.criteria
     # What changes the input alone is put into the simulation, not into its stand-in: it
     # may have taken the stand-in's base anywhere.
@@ -208,7 +209,9 @@ def _likely(findings: Findings) -> list[CandidateFit]:
     # What leaves little more with fewer parameters may be all of it.
     limits = [one for one in near if one not in first
               and any(is_part_of(one, wide) for wide in first)]  # fmt: skip
-    return sorted([*first, *limits], key=lambda one: -_n_including(one, near))
+    return sorted(
+        [*first, *limits], key=lambda one: (-_n_including(one, near), count(one))
+    )
 
 
 def _on_the_input(
@@ -268,6 +271,14 @@ def _is_settled_by(
     done = [fit for fit in fits if criteria.is_nearly_all(fit, findings.base)]
     if not done:
         return False
+    if any(
+        count(one) > count(fit)
+        and criteria.is_complete(fit)
+        and criteria.gain(one, fit) < LEAST_GAIN
+        for fit in done
+    ):
+        # Even beside the stand-in, which it may suit, it leaves no less.
+        return True
     is_simpler = any(is_part_of(one, fit) or count(one) < count(fit) for fit in done)
     # A stand-in tells a delay from a lag by its own error.
     is_alike = changes_input(one.effects) and any(

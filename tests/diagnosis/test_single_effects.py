@@ -12,6 +12,7 @@ from hwid_cli.diagnosis.single_effects import (
     _likely,
     _twins_in_simulation,
 )
+from hwid_cli.drive.catalogue import CATALOGUE
 from hwid_cli.records.candidates import ParameterRef
 from tests.diagnosis.made_up_fits import CRITERIA, base, made_up
 
@@ -102,7 +103,10 @@ def test_what_leaves_nothing_is_tried_as_the_limit_case_with_its_values(
 
 
 def findings_of(sses, criteria=CRITERIA):
-    fits = {(one,): made_up((one,), sse) for one, sse in sses.items()}
+    fits = {
+        (one,): made_up((one,), sse, parameters=len(CATALOGUE[one].parameters))
+        for one, sse in sses.items()
+    }
     return SimpleNamespace(
         criteria=criteria, base=base(), found=SimpleNamespace(fits=fits)
     )
@@ -153,3 +157,20 @@ def test_changes_of_the_input_are_rivals_until_they_were_run(run, other, is_trie
     done = [made_up((run,), 100.0, whiteness=0.5)]
     assert _is_settled_by(findings, one, done) is not is_tried
     assert not _is_settled_by(findings, one, [])
+
+
+@pytest.mark.parametrize(("said", "is_tried"), [(100.2, False), (60.0, True)])
+def test_a_wider_effect_that_says_no_more_than_a_run_with_a_simpler_one_is_not_run(
+    said, is_tried
+):
+    """A coupling beside a delay took 1259 runs, and had nothing left to explain."""
+    findings = findings_of({"input_delay": 104.0, "elastic_coupling:load": said})
+    wide = findings.found.fits["elastic_coupling:load",]
+    done = [made_up(("input_delay",), 100.0, whiteness=0.5)]
+    assert _is_settled_by(findings, wide, done) is not is_tried
+
+
+def test_of_likely_effects_the_simple_ones_are_run_first():
+    findings = findings_of({"elastic_coupling:load": 101.0, "input_delay": 102.0})
+    found = [one.effects[0] for one in _likely(findings)]
+    assert found == ["input_delay", "elastic_coupling:load"]
