@@ -12,7 +12,7 @@ import numpy as np
 
 from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals
 from hwid_cli.diagnosis.simulator import Runs, Simulator
-from hwid_cli.diagnosis.stand_in import fit_stand_in
+from hwid_cli.diagnosis.stand_in_fit import fit_stand_in
 from hwid_cli.diagnosis.tasks import RunTasks
 from hwid_cli.records.experiment import DiagnoseOptions
 from hwid_cli.records.programs import SimulatorRun
