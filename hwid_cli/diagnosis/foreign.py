@@ -21,7 +21,7 @@ from hwid_cli.diagnosis.own_parameters import fit_parameters
 from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals, prepare
 from hwid_cli.diagnosis.run_starts import Begun, begin, starts_sentence
 from hwid_cli.diagnosis.selection import LEAST_GAIN
-from hwid_cli.diagnosis.simulator import Runs, Simulator
+from hwid_cli.diagnosis.simulator import CountedRuns, Runs, Simulator
 from hwid_cli.diagnosis.single_effects import single_in_simulation
 from hwid_cli.diagnosis.stand_in import change_between
 from hwid_cli.diagnosis.standing import ITS_OWN, standing_beside
@@ -70,6 +70,8 @@ def diagnose_foreign(
         Computes tasks, runs of the simulation among them, or takes their results from
         where it kept them.
     """
+    run_tasks = counted = CountedRuns(run_tasks)
+    on_round = counted.told(on_round)
     held_out = held_out_of(recordings, options)
     problem = prepare(recordings, ITS_OWN, options, held_out)
     problem = without_repeats(problem)

@@ -2,11 +2,12 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
 from hwid_cli.diagnosis.problem import Signals
-from hwid_cli.diagnosis.tasks import DiagnosisTask, RunTasks
+from hwid_cli.diagnosis.tasks import DiagnosisTask, OnRound, RunTasks
 from hwid_cli.drive.simulation import NO_FORCE
 from hwid_cli.errors import SimulationError
 from hwid_cli.records.programs import (
@@ -55,6 +56,29 @@ class Simulator:
     def is_extended(self) -> bool:
         """Whether something was added to it before."""
         return bool(self.effects) or not self.change.is_none
+
+
+class CountedRuns:
+    """Runs tasks as another one does, and counts runs of a simulation among them."""
+
+    def __init__(self, run_tasks: RunTasks) -> None:
+        self.count = 0
+        self._run_tasks = run_tasks
+
+    def __call__(self, tasks: Sequence[DiagnosisTask], *, keep: bool) -> list[Any]:
+        """Results in the order of the tasks."""
+        self.count += sum(one.result_type is SimulatorRun for one in tasks)
+        return self._run_tasks(tasks, keep=keep)
+
+    def told(self, on_round: OnRound) -> OnRound:
+        """What begins, with the runs until then."""
+
+        def begin(what: str, total: int) -> None:
+            plural = "" if self.count == 1 else "s"
+            after = f", after {self.count} run{plural}" if self.count else ""
+            on_round(f"{what}{after}", total)
+
+        return begin
 
 
 @dataclass(frozen=True, eq=False)
