@@ -7,7 +7,7 @@ until both agree: only then is it confirmed. docs/method_diagnosis.md, eq. (D30)
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -77,38 +77,88 @@ def diagnose_foreign(
     problem = without_repeats(problem)
     on_round("the simulation as given", len(problem.signals))
     begun = begin(problem, simulator, options, run_tasks)
-    problem, runs, given = begun.problem, begun.runs, list(begun.given)
-    # With effects of its own the stand-in says what the whole simulation leaves, and the
-    # parameters are fitted with them.
-    given_sse = None if simulator.is_extended else _sse(problem.signals, given)
-    values = dict(simulator.values)
+    runs, given, refitted = begun.runs, list(begun.given), dict(simulator.values)
     if simulator.free and not simulator.is_extended:
         on_round("its parameters", 0)
-        values = fit_parameters(runs.tried, problem.signals, simulator.free, values)
-        given = runs.of(problem.signals, values)
-    refitted = values
-    kept: tuple[Findings, bool, dict[str, float]] | None = None
-    for search in range(_MOST_SEARCHES):
+        signals = begun.problem.signals
+        refitted = fit_parameters(runs.tried, signals, simulator.free, refitted)
+        given = runs.of(signals, refitted)
+    search = _searched(begun, given, refitted, options, on_round)
+    found, values = search.findings, search.values
+    if search.is_confirmed:
+        law = _law_instead(
+            runs, begun.problem, found.verdict, refitted, options, on_round
+        )
+        found, values = law or (found, values)
+    told = _told(found, begun, (refitted, values))
+    if not search.is_confirmed:
+        return replace(told, confirmed="surrogate")
+    return _confirmed(told, found, (runs, values), on_round)
+
+
+@dataclass(frozen=True, eq=False)
+class _Search:
+    """What one search beside a stand-in has led to.
+
+    Parameters
+    ----------
+    values : dict of str to float
+        Parameters of the simulation, with what was found where that is confirmed.
+    is_confirmed : bool
+        Whether the simulation's own run bears it out.
+    """
+
+    findings: Findings
+    values: dict[str, float]
+    is_confirmed: bool
+
+    def stays_beside(self, further: "_Search") -> bool:
+        """Whether a further search is no reason to give this one up."""
+        if not self.is_confirmed:
+            return False
+        return not (
+            further.is_confirmed and _leaves_less_than(further.findings, self.findings)
+        )
+
+
+def _searched(
+    begun: Begun,
+    given: Sequence[SimulatorRun],
+    values: dict[str, float],
+    options: DiagnoseOptions,
+    on_round: OnRound,
+) -> _Search:
+    """Search, again and again while that moves the simulation's parameters.
+
+    Parameters
+    ----------
+    given : sequence of SimulatorRun
+        What the simulation gives with these values of its parameters.
+    """
+    problem, runs = begun.problem, begun.runs
+    simulator = runs.simulator
+    # With effects of its own the stand-in says what the whole simulation leaves, and the
+    # parameters are fitted with them.
+    given_sse = None if simulator.is_extended else _sse(problem.signals, begun.given)
+    kept: _Search | None = None
+    for count in range(_MOST_SEARCHES):
+        is_last = count == _MOST_SEARCHES - 1
         standing = standing_beside(runs, problem, given, values)
         found, moved, is_confirmed = _found(
-            standing, options, (runs, values), on_round, given_sse, is_first=search == 0
+            standing, options, (runs, values), on_round, given_sse, is_first=count == 0
         )
-        chosen, criteria = found.verdict.chosen, found.criteria
-        is_done = is_confirmed and criteria.is_nearly_all(chosen, found.base)
-        if (
-            kept
-            and kept[1]
-            and not (is_confirmed and _leaves_less_than(found, kept[0]))
-        ):
-            # A search that is borne out stays, where a further one does no better.
+        this = _Search(found, moved if is_confirmed else values, is_confirmed)
+        if kept is not None and kept.stays_beside(this):
             break
-        if is_confirmed or search < _MOST_SEARCHES - 1:
-            kept = found, is_confirmed, moved if is_confirmed else values
-        if is_done:
+        if kept is None or is_confirmed or not is_last:
+            kept = this
+        if is_confirmed and found.criteria.is_nearly_all(
+            found.verdict.chosen, found.base
+        ):
             break
         # Parameters that imitated what is missing have led elsewhere; or to where nothing
         # holds in the simulation: the given ones have imitated nothing yet.
-        is_in_vain = search == _MOST_SEARCHES - 2 and not is_confirmed
+        is_in_vain = count == _MOST_SEARCHES - 2 and not is_confirmed
         following = dict(simulator.values) if is_in_vain else moved
         if not have_moved(values, following, _MOVED):
             break
@@ -116,14 +166,7 @@ def diagnose_foreign(
         given = runs.of(problem.signals, values)
     if kept is None:
         raise ValueError("no search was made")
-    found, is_confirmed, values = kept
-    if is_confirmed:
-        law = _law_instead(runs, problem, found.verdict, refitted, options, on_round)
-        found, values = law or (found, values)
-    told = _told(found, begun, (refitted, values))
-    if not is_confirmed:
-        return replace(told, confirmed="surrogate")
-    return _confirmed(told, found, (runs, values), on_round)
+    return kept
 
 
 def _found(
