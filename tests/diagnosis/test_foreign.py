@@ -589,6 +589,35 @@ def test_the_given_parameters_come_last_where_nothing_was_confirmed(
     assert seen.confirmed == ("simulation" if is_confirmed else "surrogate")
 
 
+@pytest.mark.parametrize("is_borne_out", [True, False])
+def test_pieces_are_asked_where_no_run_bears_a_single_effect_out(
+    monkeypatch, is_borne_out
+):
+    """What a stand-in leaves of an effect that runs bear out is its own error."""
+    asked = []
+
+    def find(_standing, options, *_, may_cut=True):
+        asked.append((options.max_effects, may_cut))
+        chosen = made_up((), 100.0, parameters=0)
+        return SimpleNamespace(verdict=SimpleNamespace(word="unknown", chosen=chosen))
+
+    one = find(None, DiagnoseOptions()) if is_borne_out else None
+    asked.clear()
+    alone = SimpleNamespace(findings=one, values={"c": 1.0}, is_all=False)
+    monkeypatch.setattr(foreign, "find", find)
+    monkeypatch.setattr(foreign, "single_in_simulation", lambda *_: alone)
+    monkeypatch.setattr(
+        foreign, "confirm", lambda found, *_: (found, {"c": 1.0}, False)
+    )
+    simulator = SimpleNamespace(run=simulate)
+    runs = SimpleNamespace(simulator=simulator, run_tasks=None)
+    foreign._found(
+        None, DiagnoseOptions(max_effects=3), (runs, {"c": 1.0}),
+        lambda *_: None, None, is_first=False,
+    )  # fmt: skip
+    assert asked == [(1, False), (3, not is_borne_out)]
+
+
 @pytest.mark.thorough
 def test_a_trial_without_an_answer_ends_no_search_for_the_parameters():
     refused = []

@@ -9,10 +9,11 @@ from hwid_cli.diagnosis.candidate import Screened
 from hwid_cli.diagnosis.few_samples import first_parts
 from hwid_cli.diagnosis.proposals import SCREENED_ON_TOP
 from hwid_cli.diagnosis.rounds import FEWEST_FINISHED, MOST_FINISHED, run_rounds
+from hwid_cli.diagnosis.set_fits import SetFits
 from hwid_cli.drive.catalogue import CATALOGUE
 from tests.diagnosis.made_up_fits import base as made_up_base
 from tests.diagnosis.made_up_fits import made_up
-from tests.diagnosis.small_drive import in_turn
+from tests.diagnosis.small_drive import fit, in_turn
 from tests.diagnosis.small_rounds import (
     FEW,
     STIFFNESS,
@@ -280,3 +281,19 @@ def test_a_search_of_few_samples_looks_no_closer():
     search = rounds._Search(of)
     assert search.look_closer(1, [of.base]) is None
     assert not search.fits.found
+
+
+@pytest.mark.parametrize("are_pieces", [False, True])
+def test_what_leads_in_pieces_is_not_told(monkeypatch, are_pieces):
+    """They have starts of their own: what is left there is no share of the recordings."""
+    said = []
+    fits = SetFits(rounds_of(FRICTION, FEW))
+    rounds = replace(fits.rounds, on_round=lambda what, _: said.append(what))
+    fits = SetFits(rounds)
+    found = fit(rounds.problem, FRICTION, scales=rounds.baseline.scales)
+    fits.found[found.effects] = found
+    monkeypatch.setattr(SetFits, "are_pieces", are_pieces)
+    fits._begin("sets of 2 effects", 3)
+    (what,) = said
+    assert what.startswith("sets of 2 effects")
+    assert ("so far" in what) is not are_pieces

@@ -231,6 +231,10 @@ def test_a_loop_that_adds_up_is_told_from_a_negative_damper():
     assert drive.damping_N_s_per_m == pytest.approx(DAMPING, rel=0.05)
     assert drive.stiffness_N_per_m == pytest.approx(kp, rel=0.01)
     assert fit_to_push(one, push, (rest, pushed)).damping_N_s_per_m < 0.5 * DAMPING
+    # Without inertia it gets a mass that samples show.
+    slow = SimulatorRun(lsim(([1.0], [DAMPING, kp]), push, TIME)[1], NOTHING)
+    light, _ = fit_beside_integral(one, push, (rest, slow))
+    assert light.mass_kg >= 0.99 * kp * (STEP_S / 10) ** 2
     # Noise is no drive.
     rng = np.random.default_rng(1)
     rough = SimulatorRun(rng.standard_normal(N), NOTHING)
