@@ -91,7 +91,7 @@ def follows(driven, force):
     return SimulatorRun(led + pushed, np.zeros(0))
 
 
-@pytest.mark.parametrize(("mass", "is_taken"), [(MASS, True), (3.0, False)])
+@pytest.mark.parametrize(("mass", "is_taken"), [(MASS, True), (1.0, False)])
 def test_a_drive_in_free_run_takes_the_place_if_it_misses_little(
     monkeypatch, mass, is_taken
 ):
