@@ -99,6 +99,7 @@ class StageRunner:
                 progress.begin_round(f"{self.place}: {text}", total)
 
             yield settings, begin
+        # Where it is stopped on the way, that is told.
         told.pop(WORKS_ON, None)
 
     @contextmanager

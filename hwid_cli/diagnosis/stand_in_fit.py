@@ -19,6 +19,7 @@ from hwid_cli.diagnosis.scales import scales_of_recordings
 from hwid_cli.diagnosis.search import fit_point
 from hwid_cli.diagnosis.stand_in import (
     STILL,
+    Moved,
     derived,
     force_along,
     in_newtons,
@@ -90,20 +91,30 @@ def fit_stand_in(
         # without it a damper would stand for it.
         return _no_faster_than_seen(dry.drive, signals)
     drive = _no_faster_than_seen(best.drive, signals)
-    constant = straight.constant
     moved = [_as_moved(one, found) for one, found in zip(signals, runs, strict=True)]
+    return _beside_weight(drive, moved, straight.constant)
+
+
+def _beside_weight(
+    drive: StandIn, moved: Sequence[Signals], constant: float
+) -> StandIn:
+    """The nearest drive in free run, beside a weight that the input holds if there is one.
+
+    Without the weight the drive would fall.
+
+    Parameters
+    ----------
+    constant : float, [input unit]
+        What of the input may hold it.
+    """
     found = _in_free_run(drive, moved)
-    if abs(constant) <= _LEAST_CONSTANT * _largest(signals):
+    largest = max(float(np.max(np.abs(one.driven_by))) for one in moved)
+    if abs(constant) <= _LEAST_CONSTANT * largest:
         return found
-    # A weight that the input holds: without it the drive would fall.
     held = [replace(one, driven_by=one.driven_by - constant) for one in moved]
     beside = _in_free_run(drive, held)
     is_held = _IDLE * _left_in_free_run(beside, held) < _left_in_free_run(found, moved)
     return beside if is_held else found
-
-
-def _largest(signals: Sequence[Signals]) -> float:
-    return max(float(np.max(np.abs(one.driven_by))) for one in signals)
 
 
 def fit_to_push(
@@ -122,7 +133,7 @@ def fit_to_push(
 
     References
     ----------
-    docs/method_diagnosis.md, eq. (D30).
+    docs/method_diagnosis.md, eq. (D30c).
     """
     answer = _answer_to_push(runs)
     return fit_stand_in([replace(signals, driven_by=push)], [answer], may_curve=False)
@@ -154,8 +165,7 @@ def fit_beside_integral(
     matrix = np.column_stack([
         moved.acceleration, moved.velocity, moved.position, sum_s
     ])  # fmt: skip
-    lengths = np.sqrt(np.sum(matrix**2, axis=0))
-    lengths[lengths == 0] = 1.0
+    lengths = _lengths(matrix)
     values, left = scipy.optimize.nnls(matrix / lengths, push)
     mass, damping, stiffness, _ = values / lengths
     drive = StandIn(
@@ -185,14 +195,12 @@ def gain_beside_friction(
         Its standard error as a share of it.
     """
     moved = derived(there, signals.sample_time_s)
-    speed = np.abs(moved.velocity)
-    used = speed > STILL * np.max(speed)
+    used = _moves(moved)
     columns = np.column_stack([
         -push, moved.acceleration, moved.velocity, moved.position,
         np.ones(push.size), np.sign(moved.velocity),
     ])[used]  # fmt: skip
-    lengths = np.sqrt(np.sum(columns**2, axis=0))
-    lengths[lengths == 0] = 1.0
+    lengths = _lengths(columns)
     inverse = np.linalg.pinv(columns / lengths)
     driven_by = signals.driven_by[used]
     values = inverse @ driven_by
@@ -200,7 +208,20 @@ def gain_beside_friction(
     deviation = float(np.sqrt(left @ left / max(left.size - values.size, 1)))
     error = deviation * float(np.sqrt(inverse[0] @ inverse[0]))
     gain = float(values[0])
-    return gain / lengths[0], error / abs(gain) if gain else np.inf
+    return gain / float(lengths[0]), error / abs(gain) if gain else np.inf
+
+
+def _moves(moved: Moved) -> np.ndarray:
+    """Samples in which friction has the direction of the motion; at rest it has any."""
+    speed = np.abs(moved.velocity)
+    return np.asarray(speed > STILL * np.max(speed))
+
+
+def _lengths(columns: np.ndarray) -> np.ndarray:
+    """Length of each column, 1 for one of zeros."""
+    lengths = np.sqrt(np.sum(columns**2, axis=0))
+    lengths[lengths == 0] = 1.0
+    return np.asarray(lengths)
 
 
 def _answer_to_push(runs: tuple[SimulatorRun, SimulatorRun]) -> SimulatorRun:
@@ -281,8 +302,7 @@ def _by_regression(
         used = np.ones(one.driven_by.size, dtype=bool)
         if is_dry:
             columns.append(np.sign(moved.velocity))
-            speed = np.abs(moved.velocity)
-            used = speed > STILL * np.max(speed)
+            used = _moves(moved)
         rows.append(np.column_stack(columns)[used] / size)
         right.append(one.driven_by[used] / size)
     return _balanced(np.concatenate(rows), np.concatenate(right), is_curved=is_curved)
@@ -298,8 +318,7 @@ def _balanced(matrix: np.ndarray, vector: np.ndarray, *, is_curved: bool) -> _Ba
     vector : ndarray, shape (n_samples,)
         The input.
     """
-    lengths = np.sqrt(np.sum(matrix**2, axis=0))
-    lengths[lengths == 0] = 1.0
+    lengths = _lengths(matrix)
     found_values, left = scipy.optimize.nnls(matrix / lengths, vector)
     values = found_values / lengths
     whole = float(np.sqrt(np.sum(vector**2))) or 1.0
