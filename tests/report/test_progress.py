@@ -73,6 +73,8 @@ def test_what_is_under_way_is_told_in_words():
 @pytest.mark.parametrize("width", [80, 140])
 def test_a_long_text_leaves_room_for_the_counts(monkeypatch, width):
     screen = io.StringIO()
+    # A bar is drawn on a terminal that can move its cursor; a server's often cannot.
+    monkeypatch.setenv("TERM", "xterm")
     monkeypatch.setattr(
         progress_module,
         "Console",
