@@ -14,7 +14,7 @@ from hwid_cli.diagnosis.candidate import at_point, rebuilt
 from hwid_cli.diagnosis.findings import Findings
 from hwid_cli.diagnosis.parameters import ParameterLayout, ParameterPoint, residuals_at
 from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals
-from hwid_cli.diagnosis.search import fit_own, fit_point
+from hwid_cli.diagnosis.search import fit_own, fit_point, within_bounds
 from hwid_cli.diagnosis.stand_in import Moved, derived, force_of_change
 from hwid_cli.records.candidates import CandidateFit
 from hwid_cli.records.programs import SimulatorRun
@@ -72,11 +72,7 @@ def fitted_together(
     def at(coordinates: np.ndarray) -> ParameterPoint:
         shared = coordinates[n_free : n_free + n_shared]
         own = coordinates[n_free + n_shared :].reshape(len(rows), -1)
-        inside = [
-            one.coordinate(one.value(q))
-            for one, q in zip(fit_layout.shared, shared, strict=True)
-        ]
-        return ParameterPoint(np.array(inside), own)
+        return within_bounds(fit_layout, ParameterPoint(shared, own))
 
     def errors(coordinates: np.ndarray) -> np.ndarray:
         train = changed(coordinates).part(held_out=False)

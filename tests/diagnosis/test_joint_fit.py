@@ -69,3 +69,18 @@ def test_a_search_goes_on_where_the_stand_in_runs_away_beside_it(monkeypatch):
     found, _ = together(of, before)
     assert len(calls) > 4
     assert found.sse.sum() == pytest.approx(usual.sse.sum(), rel=0.02)
+
+
+def test_what_belongs_to_a_recording_stays_within_its_bounds(monkeypatch):
+    # A mass of almost nothing: its drive would be simulated for hours.
+    of = with_friction()
+    change = "parameter_change:mass"
+    before = fit(of, {change: {"log_mass": 0.0}})
+
+    def far_away(errors, start, *_, **__):
+        at = np.concatenate([start[:-3], [-10.0, -10.0, -10.0]])
+        return SimpleNamespace(x=at, left=errors(at))
+
+    monkeypatch.setattr(joint_fit.scipy.optimize, "least_squares", far_away)
+    found, _ = together(of, before)
+    assert found.own.min() == pytest.approx(-1.5)
